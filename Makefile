@@ -1,0 +1,60 @@
+# make demo   plan, drive, certify and film one world
+# make test   the whole test suite (make test-slow: the long ones too)
+# Everything else that these need they set up themselves, in .venv.
+.DELETE_ON_ERROR:
+.PHONY: demo test test-slow lint format bench warm clean help
+
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+DEMO := out/demo
+
+help:
+	@sed -n 's/^# //p' Makefile
+
+# The core, then the compiled kernels' cache, so that the first plan is quick.
+$(VENV)/.core: pyproject.toml tools/find-python
+	@python=$$(tools/find-python) && echo "Setting up $(VENV) with $$python" && "$$python" -m venv $(VENV)
+	@echo "Installing antdrive and what it needs"
+	@$(PIP) install --editable .
+	@touch $@
+
+$(VENV)/.warm: $(VENV)/.core $(wildcard */_kernels*.py)
+	@echo "Compiling the kernels, once"
+	@$(BIN)/python -m sim.warm
+	@touch $@
+
+$(VENV)/.dev: $(VENV)/.core
+	@echo "Installing what the tests need"
+	@$(PIP) install --editable '.[dev]'
+	@touch $@
+
+warm: $(VENV)/.warm
+
+demo: $(VENV)/.warm
+	@$(BIN)/antdrive run forest --planner aco-han --robot turtlebot --out $(DEMO) --video $(DEMO)/film.mp4
+
+test: $(VENV)/.dev $(VENV)/.warm
+	@$(BIN)/ruff check --quiet .
+	@$(BIN)/ruff format --quiet --check .
+	@$(BIN)/mypy --no-error-summary
+	@$(BIN)/python -m pytest --numprocesses 2 --dist loadgroup
+
+test-slow: $(VENV)/.dev $(VENV)/.warm
+	@$(BIN)/python -m pytest --numprocesses 2 --dist loadgroup -m ''
+
+lint: $(VENV)/.dev
+	@$(BIN)/ruff check .
+	@$(BIN)/ruff format --check .
+	@$(BIN)/mypy
+
+format: $(VENV)/.dev
+	@$(BIN)/ruff format .
+	@$(BIN)/ruff check --fix .
+
+bench: $(VENV)/.dev $(VENV)/.warm
+	@$(BIN)/python -m benchmarks.loop
+
+clean:
+	rm -rf $(VENV) out .pytest_cache .mypy_cache .ruff_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
