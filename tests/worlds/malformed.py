@@ -1,0 +1,260 @@
+"""World files that are wrong in one way each: what is written, and what the one-line error must say.
+
+The file is called bad.yaml.
+"""
+
+from __future__ import annotations
+
+_START = """\
+schema: 1
+name: bad
+bounds: [0.0, 0.0, 10.0, 10.0]
+start: [1.0, 1.0, 0.0]
+goal: [9.0, 9.0]
+goal_tolerance: 0.25
+cell: 0.5
+"""
+_END = """\
+obstacles:
+  - {x: 5.0, y: 5.0, radius: 0.5}
+"""
+#: What all of them would be without their fault.
+GOOD = _START + _END
+
+
+def _replace(old: str, new: str) -> str:
+    assert GOOD.count(old) == 1
+    return GOOD.replace(old, new)
+
+
+def _disc(disc: str) -> str:
+    return f"{GOOD}  - {disc}\n"
+
+
+def _bomb() -> str:
+    """Nine levels of ten aliases each: a billion values in half a kilobyte."""
+    lines = ["a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]"]
+    lines += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]" for i in range(1, 9)]
+    return GOOD + "\n".join(lines) + "\n"
+
+
+#: name -> (what the file holds, what the error says after the file's name)
+MALFORMED: dict[str, tuple[str | bytes, str]] = {
+    # not even YAML
+    "empty": ("", "bad.yaml: is empty"),
+    "only a comment": ("# nothing here\n", "bad.yaml: is empty"),
+    "binary": (b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR", "bad.yaml:1: is not a text file in UTF-8"),
+    "latin-1": (GOOD.replace("name: bad", "name: größe").encode("latin-1"), "bad.yaml:2: is not a text file"),
+    "utf-16": (GOOD.encode("utf-16"), "bad.yaml:1: is not a text file"),
+    "null character": (GOOD + "# \x00\n", "bad.yaml:10: not YAML: a special character '\\x00'"),
+    "tab": (GOOD + "\tsource: me\n", "bad.yaml:10: not YAML: a tab; indent with spaces"),
+    "unclosed list": (_replace("[9.0, 9.0]", "[9.0, 9.0"), "bad.yaml:6: not YAML: "),
+    "unclosed quote": (_replace("name: bad", 'name: "bad'), "bad.yaml:10: not YAML: "),
+    "colon in text": (_replace("name: bad", "name: bad: worse"), "bad.yaml:2: not YAML: mapping values"),
+    "two documents": (GOOD + "---\nschema: 1\n", "bad.yaml:10: not YAML: but found another document"),
+    "unknown alias": (GOOD + "source: *other\n", "bad.yaml:10: not YAML: found undefined alias"),
+    "deep nesting": (
+        GOOD + "source: " + "[" * 3000 + "]" * 3000,
+        "bad.yaml:10: not YAML: nested deeper than",
+    ),
+    "merge conflict": (GOOD + "<<<<<<< HEAD\n", "bad.yaml:11: not YAML: "),
+    # YAML, but no plain data
+    "python object": (GOOD + "source: !!python/name:os.system\n", "bad.yaml:10: source: must be plain data"),
+    "own tag": (GOOD + "source: !mine [1]\n", "bad.yaml:10: source: must be plain data, got the tag !mine"),
+    "set": (GOOD + "source: !!set {a, b}\n", "bad.yaml:10: source: must be plain data, got the tag !!set"),
+    "alias bomb": (_bomb(), "unfolds to too much; write the values out"),
+    "alias to itself": (GOOD + "movers: &m [*m]\n", "bad.yaml:10: movers: unfolds to too much"),
+    "list as a key": (GOOD + "? [a, b]\n: 1\n", "bad.yaml:10: a key must be a word"),
+    "duplicate key": (GOOD + "cell: 0.25\n", "bad.yaml:10: cell: is given twice, first on line 7"),
+    "duplicate key inside": (
+        _disc("{x: 1.0, y: 5.0, x: 2.0, radius: 0.5}"),
+        "bad.yaml:10: obstacles[1].x: is given twice",
+    ),
+    # plain data, but no mapping
+    "list": ("- 1\n- 2\n", "bad.yaml: must be a mapping with the keys schema, name, bounds, start, goal"),
+    "text": (
+        "hello\n",
+        'bad.yaml: must be a mapping with the keys schema, name, bounds, start, goal, got "hello"',
+    ),
+    "null": ("null\n", "bad.yaml: must be a mapping"),
+    # keys
+    "unknown key": (GOOD + "colour: red\n", "bad.yaml:10: colour: unknown key; choose from schema, name"),
+    "misspelt key": (
+        _replace("obstacles", "obstacels"),
+        "bad.yaml:8: obstacels: unknown key; did you mean obstacles?",
+    ),
+    "key in capitals": (_replace("goal: ", "Goal: "), "bad.yaml:5: Goal: unknown key; did you mean goal?"),
+    "number as a key": (GOOD + "1: 2\n", "bad.yaml:10: 1: unknown key"),
+    "merge key": (GOOD + "<<: {cell: 1.0}\n", "bad.yaml:10: <<: unknown key"),
+    "misspelt key inside": (
+        _disc("{x: 1.0, y: 5.0, raduis: 0.5}"),
+        "bad.yaml:10: obstacles[1].raduis: unknown key; did you mean radius?",
+    ),
+    "no schema": (_replace("schema: 1\n", ""), "bad.yaml: schema: missing; write schema: 1"),
+    "no start": (_replace("start: [1.0, 1.0, 0.0]\n", ""), "bad.yaml: start: missing; write [x, y, yaw]"),
+    "no bounds": (
+        _replace("bounds: [0.0, 0.0, 10.0, 10.0]\n", ""),
+        "bad.yaml: bounds: missing; write [xmin, ymin",
+    ),
+    "no radius": (
+        _disc("{x: 1.0, y: 5.0}"),
+        "bad.yaml:10: obstacles[1].radius: missing; the radius as built [m]",
+    ),
+    "movers": (
+        GOOD + "movers:\n  - {radius: 0.3, keyframes: [[0.0, 5.0, 1.0], [8.0, 5.0, 9.0]]}\n",
+        "bad.yaml:10: movers: moving obstacles are not supported in this version",
+    ),
+    "movers without a value": (GOOD + "movers:\n", "bad.yaml:10: movers: moving obstacles are not supported"),
+    # kinds
+    "newer schema": (_replace("schema: 1", "schema: 2"), "bad.yaml:1: schema: must be 1, got 2"),
+    "schema as text": (_replace("schema: 1", 'schema: "1"'), 'bad.yaml:1: schema: must be 1, got "1"'),
+    "schema as a float": (_replace("schema: 1", "schema: 1.0"), "bad.yaml:1: schema: must be 1, got 1.0"),
+    "schema true": (_replace("schema: 1", "schema: true"), "bad.yaml:1: schema: must be 1, got true"),
+    "name is a number": (_replace("name: bad", "name: 7"), "bad.yaml:2: name: must be text, got 7"),
+    "name is no": (_replace("name: bad", "name: no"), "bad.yaml:2: name: must be text, got false"),
+    "name is empty": (_replace("name: bad", 'name: ""'), "bad.yaml:2: name: "),
+    "name of two lines": (_replace("name: bad", 'name: "a\\nb"'), "bad.yaml:2: name: must be one line"),
+    "source is a list": (GOOD + "source: [me]\n", 'bad.yaml:10: source: must be text, got ["me"]'),
+    "start is text": (_replace("[1.0, 1.0, 0.0]", "here"), 'bad.yaml:4: start: must be a list, got "here"'),
+    "start is a mapping": (
+        _replace("[1.0, 1.0, 0.0]", "{x: 1.0}"),
+        "bad.yaml:4: start: must be a list, got a mapping",
+    ),
+    "start without yaw": (
+        _replace("[1.0, 1.0, 0.0]", "[1.0, 1.0]"),
+        "bad.yaml:4: start: must have 3 entries, got 2; write [x, y, yaw]",
+    ),
+    "goal with yaw": (
+        _replace("[9.0, 9.0]", "[9.0, 9.0, 0.0]"),
+        "bad.yaml:5: goal: must have 2 entries, got 3",
+    ),
+    "three bounds": (
+        _replace("[0.0, 0.0, 10.0, 10.0]", "[0.0, 0.0, 10.0]"),
+        "bad.yaml:3: bounds: must have 4 entries",
+    ),
+    "obstacles is a number": (
+        _replace(_END, "obstacles: 3\n"),
+        "bad.yaml:8: obstacles: must be a list, got 3",
+    ),
+    "obstacles without a value": (
+        _replace(_END, "obstacles:\n"),
+        "bad.yaml:8: obstacles: must be a list, got null",
+    ),
+    "obstacle is a list": (
+        _disc("[5.0, 5.0, 0.5]"),
+        "bad.yaml:10: obstacles[1]: must be a mapping with the keys x, y, radius, got [5.0, 5.0, 0.5]",
+    ),
+    # numbers
+    "bool for a number": (
+        _replace("cell: 0.5", "cell: true"),
+        "bad.yaml:7: cell: must be a number, got true",
+    ),
+    "null for a number": (_replace("cell: 0.5", "cell:"), "bad.yaml:7: cell: must be a number, got null"),
+    "number in quotes": (
+        _replace("cell: 0.5", 'cell: "0.5"'),
+        'bad.yaml:7: cell: must be a number, got "0.5" (text)',
+    ),
+    "unit": (_replace("cell: 0.5", "cell: 50cm"), 'bad.yaml:7: cell: must be a number, got "50cm"'),
+    "comma for a point": (_replace("cell: 0.5", "cell: 0,5"), "bad.yaml:7: cell: must be a"),
+    "exponent without a point": (
+        _disc("{x: 1.0, y: 5.0, radius: 1e-3}"),
+        'bad.yaml:10: obstacles[1].radius: must be a number, got "1e-3" (text); write 1.0e-3',
+    ),
+    "exponent without a sign": (
+        _replace("cell: 0.5", "cell: 5.0e1"),
+        "bad.yaml:7: cell: must be a number, got ",
+    ),
+    "octal": (
+        _replace("[9.0, 9.0]", "[010, 9.0]"),
+        "bad.yaml:5: goal[0]: must be a plain decimal number, got 010",
+    ),
+    "hexadecimal": (
+        _replace("[9.0, 9.0]", "[0x8, 9.0]"),
+        "bad.yaml:5: goal[0]: must be a plain decimal number",
+    ),
+    "sixties": (
+        _replace("[9.0, 9.0]", "[9.0, 1:30]"),
+        "bad.yaml:5: goal[1]: must be a plain decimal number, got 1:30",
+    ),
+    "nan": (
+        _disc("{x: .nan, y: 5.0, radius: 0.5}"),
+        "bad.yaml:10: obstacles[1].x: must be a finite number, got .nan",
+    ),
+    "infinite": (
+        _replace("10.0, 10.0]", "10.0, .inf]"),
+        "bad.yaml:3: bounds[3]: must be a finite number, got .inf",
+    ),
+    "minus infinite": (
+        _replace("[1.0, 1.0, 0.0]", "[1.0, -.inf, 0.0]"),
+        "bad.yaml:4: start[1]: must be a finite number",
+    ),
+    "too large for a float": (
+        _replace("cell: 0.5", "cell: 1.0e+999"),
+        "bad.yaml:7: cell: must be a finite number",
+    ),
+    "a thousand digits": (
+        _replace("cell: 0.5", "cell: " + "9" * 1000),
+        "bad.yaml:7: cell: must be a finite number",
+    ),
+    "five thousand digits": (
+        _replace("cell: 0.5", "cell: " + "9" * 5000),
+        "bad.yaml:7: cell: must be a finite",
+    ),
+    "far away": (
+        _disc("{x: 1.0e+300, y: 5.0, radius: 0.5}"),
+        "bad.yaml:10: obstacles[1].x: must be at most 1e+06",
+    ),
+    "huge": (
+        _disc("{x: 1.0, y: 5.0, radius: 1.0e+9}"),
+        "bad.yaml:10: obstacles[1].radius: must be at most 1e+06",
+    ),
+    "negative radius": (
+        _disc("{x: 1.0, y: 5.0, radius: -1}"),
+        "bad.yaml:10: obstacles[1].radius: must be greater than 0, got -1",
+    ),
+    "no height": (
+        _disc("{x: 1.0, y: 5.0, radius: 0.5, height: 0}"),
+        "bad.yaml:10: obstacles[1].height: must be greater",
+    ),
+    "no tolerance": (
+        _replace("tolerance: 0.25", "tolerance: 0.0"),
+        "bad.yaml:6: goal_tolerance: must be greater than 0",
+    ),
+    "negative cell": (
+        _replace("cell: 0.5", "cell: -0.5"),
+        "bad.yaml:7: cell: must be greater than 0, got -0.5",
+    ),
+    "tiny cell": (
+        _replace("cell: 0.5", "cell: 0.00001"),
+        "bad.yaml:7: cell: 1e-05 m cuts these bounds into more than",
+    ),
+    # a world that cannot be
+    "bounds reversed": (
+        _replace("[0.0, 0.0, 10.0, 10.0]", "[10.0, 0.0, 0.0, 10.0]"),
+        "bad.yaml:3: bounds: must be [xmin, ymin, xmax, ymax] with min < max",
+    ),
+    "bounds without a size": (
+        _replace("[0.0, 0.0, 10.0, 10.0]", "[0.0, 5.0, 10.0, 5.0]"),
+        "bad.yaml:3: bounds: must be",
+    ),
+    "start in an obstacle": (
+        _disc("{x: 1.2, y: 1.0, radius: 0.5}"),
+        "bad.yaml:4: start: (1, 1) is inside obstacles[1] at (1.2, 1) with radius 0.5",
+    ),
+    "goal in an obstacle": (
+        _disc("{x: 9, y: 9, radius: 1}"),
+        "bad.yaml:5: goal: (9, 9) is inside obstacles[1]",
+    ),
+    "start out of bounds": (
+        _replace("[1.0, 1.0, 0.0]", "[-1.0, 1.0, 0.0]"),
+        "bad.yaml:4: start: (-1, 1) is out of bounds",
+    ),
+    "goal out of bounds": (
+        _replace("[9.0, 9.0]", "[9.0, 19.0]"),
+        "bad.yaml:5: goal: (9, 19) is out of bounds",
+    ),
+    "goal is the start": (
+        _replace("[9.0, 9.0]", "[1.0, 1.0]"),
+        "bad.yaml:5: goal: is where the robot starts",
+    ),
+}

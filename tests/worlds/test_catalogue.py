@@ -1,0 +1,122 @@
+"""The worlds that come along: sound, and passable for whom they are meant."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from tests.worlds.oracles import passable
+from worlds import Disc, Task, catalogue, forest, load_task, point_clearance, rasterise
+
+TURTLEBOT, JACKAL = 0.18, 0.333  # radii [m]
+MARGIN = 0.05  # [m]
+
+#: Every world of the catalogue, and whether each robot gets through with the margin.
+PASSABLE = {
+    "empty": (True, True),
+    "forest": (True, True),
+    "gate": (True, True),
+    "han2007-aco": (True, True),
+    "han2007-ga": (True, True),
+    "han2007-single": (True, True),
+    "no-path": (False, False),
+    "slalom": (True, True),
+    "u-trap": (True, True),
+}
+#: Grid points of the thesis' listings, 0.5 m each.
+ACO = [(4, 6), (14, 12), (13, 11), (8, 10), (10, 10), (14, 10), (14, 4)]
+ACO += [(8, 14), (13, 14), (4, 10), (16, 14), (10, 16), (17, 10), (19, 18)]
+GA = [(3, 3), (10, 10), (14, 10), (14, 4), (8, 14), (6, 18)]
+
+
+@pytest.fixture(params=PASSABLE)
+def task(request: pytest.FixtureRequest) -> Task:
+    return load_task(request.param)
+
+
+def test_the_table_names_the_whole_catalogue():
+    assert list(catalogue()) == list(PASSABLE)
+
+
+@pytest.mark.parametrize(("radius", "who"), [(TURTLEBOT, 0), (JACKAL, 1)])
+def test_robots_get_through_where_the_table_says(task, radius, who):
+    grid = rasterise(task.world, task.cell, radius + MARGIN)
+    assert passable(task, grid) == PASSABLE[task.world.name][who]
+
+
+def test_both_ends_have_room_for_every_robot(task):
+    assert (point_clearance(task.world, [task.start[:2], task.goal]) > JACKAL + 0.2).all()
+
+
+def test_a_world_is_called_as_its_file_and_says_where_it_comes_from(task):
+    assert task.world.name in PASSABLE
+    assert task.world.source
+    assert task.goal_tolerance == 0.25
+
+
+def test_a_world_has_the_size_of_a_room_and_a_grid_that_ants_can_walk(task):
+    assert all(6 <= side <= 15 for side in task.world.size)
+    rows, cols = rasterise(task.world, task.cell).shape
+    assert 20 <= rows <= 60
+    assert 20 <= cols <= 60
+
+
+def test_no_obstacle_is_listed_twice(task):
+    assert len(set(task.world.obstacles)) == len(task.world.obstacles)
+
+
+@pytest.mark.parametrize(
+    ("name", "points", "radius", "first", "last"),
+    [
+        ("han2007-aco", ACO, 1, 1, 20),
+        ("han2007-ga", GA, 1, 0, 20),
+        ("han2007-single", [(10, 10)], 5, 0, 20),
+    ],
+)
+def test_the_thesis_worlds_stand_on_its_grid_points(name, points, radius, first, last):
+    task = load_task(name)
+    assert task.world.obstacles == tuple(Disc(x / 2, y / 2, radius / 2) for x, y in points)
+    assert task.start[:2] == (first / 2, first / 2)
+    assert task.goal == (last / 2, last / 2)
+    grid = rasterise(task.world, task.cell)
+    for point in (first, 7, last):
+        cell = grid.cell_at(point / 2, point / 2)
+        assert grid.xy([cell])[0].tolist() == pytest.approx([point / 2, point / 2])
+    # One more cell outside the map on every side.
+    assert grid.shape == (last - first + 3,) * 2
+
+
+def test_the_gate_is_just_wide_enough():
+    task = load_task("gate")
+    assert passable(task, rasterise(task.world, task.cell, 0.39))
+    assert not passable(task, rasterise(task.world, task.cell, 0.41))
+    assert not passable(task, rasterise(task.world, 0.02, 0.401))
+
+
+def test_not_even_a_point_leaves_the_ring_of_no_path():
+    task = load_task("no-path")
+    assert not passable(task, rasterise(task.world, 0.02))
+
+
+def test_the_straight_way_of_the_trap_ends_in_the_u():
+    task = load_task("u-trap")
+    way = np.linspace(task.start[:2], task.goal, 200)
+    hits = np.flatnonzero(point_clearance(task.world, way) < 0)
+    assert len(hits)
+    assert way[hits[0], 0] > 7.5
+
+
+def test_the_forest_is_the_generators():
+    made = forest(
+        np.random.default_rng(3),
+        size=12.0,
+        count=64,
+        radius=(0.15, 0.45),
+        clearance=0.8,
+        spacing=0.25,
+        robot_radius=0.383,
+    )
+    kept = load_task("forest")
+    assert "default_rng(3), size=12.0, count=64" in (kept.world.source or "")
+    assert made.world.obstacles == kept.world.obstacles
+    assert dataclasses.replace(made, world=kept.world, start=kept.start) == kept

@@ -1,0 +1,155 @@
+"""Cells and moves against their definitions."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.worlds.oracles import clearance_of_point, moves_by_force, worlds
+from worlds import DIRECTIONS, Disc, Grid, World, rasterise
+
+
+def bits(grid: Grid) -> np.ndarray:
+    """The moves as truth values, (R, C, 8)."""
+    return (grid.moves[..., None] >> np.arange(8) & 1).astype(bool)
+
+
+def crowd(seed: int, count: int = 30) -> World:
+    rng = np.random.default_rng(seed)
+    discs = tuple(Disc(*rng.uniform(0, 10, 2).tolist(), float(rng.uniform(0.1, 1.0))) for _ in range(count))
+    return World("crowd", (0.0, 0.0, 10.0, 10.0), discs)
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(("cell", "inflate"), [(0.31, 0.17), (0.5, 0.0), (0.77, 0.4)])
+def test_moves_are_as_defined_in_a_crowd(seed, cell, inflate):
+    world = crowd(seed)
+    grid = rasterise(world, cell, inflate)
+    expected = moves_by_force(grid, world)
+    sure = ~np.isnan(expected)
+    assert (bits(grid)[sure] == expected[sure].astype(bool)).all()
+
+
+@settings(max_examples=40)
+@given(worlds(), st.floats(0.4, 1.5), st.floats(0.0, 0.6))
+def test_moves_are_as_defined(world, cell, inflate):
+    grid = rasterise(world, cell, inflate)
+    expected = moves_by_force(grid, world)
+    sure = ~np.isnan(expected)
+    assert (bits(grid)[sure] == expected[sure].astype(bool)).all()
+
+
+@settings(max_examples=40)
+@given(worlds(), st.floats(0.4, 1.5), st.floats(0.0, 0.6))
+def test_a_cell_is_free_when_the_robot_fits_at_its_centre(world, cell, inflate):
+    grid = rasterise(world, cell, inflate)
+    for r, c in np.argwhere(np.ones(grid.shape)):
+        clearance = clearance_of_point(world, *grid.xy([(r, c)])[0])
+        assert abs(clearance - inflate) < 1e-9 or grid.free[r, c] == (clearance > inflate)
+
+
+def test_a_thin_post_between_two_free_cells_closes_the_move():
+    world = World("post", (0.0, 0.0, 4.0, 2.0), (Disc(2.0, 0.5, 0.05),))
+    grid = rasterise(world, 1.0)
+    assert grid.free.all()
+    assert not bits(grid)[0, 1, DIRECTIONS.index((0, 1))]
+    assert bits(grid)[1, 1, DIRECTIONS.index((0, 1))]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_every_move_can_be_taken_back(seed):
+    moves = bits(rasterise(crowd(seed), 0.25, 0.2))
+    for r, c, k in np.argwhere(moves):
+        dr, dc = DIRECTIONS[k]
+        assert moves[r + dr, c + dc, (k + 4) % 8]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_larger_robot_has_no_move_that_a_smaller_one_lacks(seed):
+    small, large = (rasterise(crowd(seed), 0.25, r) for r in (0.1, 0.3))
+    assert not (large.moves & ~small.moves).any()
+    assert not (large.free & ~small.free).any()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_removing_an_obstacle_closes_nothing(seed):
+    world = crowd(seed)
+    less = World(world.name, world.bounds, world.obstacles[1:])
+    before, after = (rasterise(w, 0.25, 0.2) for w in (world, less))
+    assert not (before.moves & ~after.moves).any()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_mirrored_world_has_the_mirrored_moves(seed):
+    world = crowd(seed)
+    mirror = World("m", world.bounds, tuple(Disc(10 - d.x, d.y, d.radius) for d in world.obstacles))
+    here, there = (rasterise(w, 0.25, 0.2) for w in (world, mirror))
+    order = [DIRECTIONS.index((dr, -dc)) for dr, dc in DIRECTIONS]
+    assert (here.free == there.free[:, ::-1]).all()
+    assert (bits(here) == bits(there)[:, ::-1][..., order]).all()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_moved_world_has_the_same_moves(seed):
+    world = crowd(seed)
+    there = World("m", (8.0, -4.0, 18.0, 6.0), tuple(Disc(d.x + 8, d.y - 4, d.radius) for d in world.obstacles))
+    assert (rasterise(world, 0.25, 0.2).moves == rasterise(there, 0.25, 0.2).moves).all()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_world_with_x_and_y_swapped_has_the_grid_transposed(seed):
+    world = crowd(seed)
+    swapped = World("m", world.bounds, tuple(Disc(d.y, d.x, d.radius) for d in world.obstacles))
+    here, there = (rasterise(w, 0.25, 0.2) for w in (world, swapped))
+    order = [DIRECTIONS.index((dc, dr)) for dr, dc in DIRECTIONS]
+    assert (bits(here) == bits(there).transpose(1, 0, 2)[..., order]).all()
+
+
+@given(st.integers(0, 19), st.integers(0, 29))
+def test_a_cell_holds_its_own_centre(row, col):
+    grid = rasterise(World("w", (-3.0, 2.0, 12.0, 12.0)), 0.5)
+    assert grid.shape == (20, 30)
+    x, y = grid.xy([(row, col)])[0]
+    assert grid.cell_at(x, y) == (row, col)
+    assert (x, y) == pytest.approx((-3.0 + 0.5 * (col + 0.5), 2.0 + 0.5 * (row + 0.5)))
+
+
+def test_a_point_outside_belongs_to_the_nearest_cell():
+    grid = rasterise(World("w", (0.0, 0.0, 3.0, 2.0)), 0.5)
+    assert grid.cell_at(-9, 9) == (3, 0)
+    assert grid.cell_at(9, -9) == (0, 5)
+
+
+def test_cells_that_the_walls_cut_are_kept():
+    assert rasterise(World("w", (0.0, 0.0, 3.1, 1.9)), 0.5).shape == (4, 7)
+    assert rasterise(World("w", (0.0, 0.0, 0.3, 0.3)), 0.1).shape == (3, 3)
+
+
+def test_a_picture_alone_gives_moves_without_cut_corners():
+    grid = Grid.from_free([[True, True, False], [True, False, True], [True, True, True]])
+    here = bits(grid)
+    assert not here[0, 1].tolist()[DIRECTIONS.index((1, 1))]
+    assert not here[1, 0].tolist()[DIRECTIONS.index((-1, 1))]
+    assert here[2, 1].tolist() == [k in (0, 4) for k in range(8)]
+
+
+def test_a_grid_cannot_be_written_to():
+    grid = rasterise(crowd(0), 0.5)
+    for array in (grid.free, grid.moves):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0, 0] = 1
+
+
+@pytest.mark.parametrize(
+    ("cell", "inflate", "key"),
+    [
+        (0.0, 0.0, "cell"),
+        (-1.0, 0.0, "cell"),
+        (0.5, -0.1, "inflate"),
+        (1e-4, 0.0, "cell"),
+        (float("nan"), 0, "cell"),
+    ],
+)
+def test_sizes_that_make_no_sense_are_named(cell, inflate, key):
+    with pytest.raises(ValueError, match=f"^{key}: "):
+        rasterise(crowd(0), cell, inflate)
