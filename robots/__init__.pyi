@@ -1,0 +1,12 @@
+from .files import load_robot as load_robot
+from .files import robot_schema as robot_schema
+from .files import robot_to_dict as robot_to_dict
+from .files import robots as robots
+from .footprint import footprint_clearance as footprint_clearance
+from .pursuit import LIMITERS as LIMITERS
+from .pursuit import Guide as Guide
+from .pursuit import Progress as Progress
+from .pursuit import PurePursuit as PurePursuit
+from .pursuit import Twist as Twist
+from .spec import Footprint as Footprint
+from .spec import RobotSpec as RobotSpec

@@ -1,0 +1,75 @@
+from pathlib import Path
+
+import pytest
+
+from robots import load_robot, robot_schema, robots
+from worlds import InputError
+
+GOOD = """\
+schema: 1
+footprint: {radius: 0.2}
+height: 0.3
+mass: 5.0
+wheel_radius: 0.04
+track: 0.25
+max_speed: 1
+max_yaw_rate: 3.0
+max_acceleration: 1.0
+max_yaw_acceleration: 8.0
+max_lateral_acceleration: 1.0
+max_wheel_speed: 40.0
+wheel_torque: 2.0
+"""
+
+
+def test_catalogue_robots_load() -> None:
+    assert set(robots()) >= {"turtlebot", "jackal"}
+    jackal = load_robot("jackal")
+    assert jackal.radius == pytest.approx(0.333, abs=1e-3)
+    assert jackal.max_speed == 2.0
+    assert load_robot("turtlebot").footprint.is_disc
+
+
+def test_a_robot_is_one_file(tmp_path: Path) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text(GOOD)
+    mine = load_robot(path)
+    assert (mine.name, mine.radius, mine.max_speed) == ("mine", 0.2, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("mass: 5.0", "mass: -5.0", "mass: must be greater than 0, got -5.0"),
+        ("mass: 5.0", "mass: heavy", "mass: must be a number"),
+        ("mass: 5.0\n", "", "mass: missing"),
+        ("mass: 5.0", "mas: 5.0", "mas: unknown key; did you mean mass?"),
+        ("{radius: 0.2}", "{radius: 0.2, length: 1.0}", "footprint: write {radius: 0.18}"),
+        ("{radius: 0.2}", "{length: 1.0}", "footprint: write {radius: 0.18}"),
+        ("track: 0.25", "track: 0.55", "track: wheels 0.55 m apart stand outside the footprint"),
+        ("wheel_radius: 0.04", "wheel_radius: 0.4", "wheel_radius: 0.4 m is larger than the robot"),
+        ("max_speed: 1", "max_speed: .inf", "max_speed: must be"),
+        ("schema: 1", "schema: 9", "schema: must be 1, got 9"),
+    ],
+)
+def test_faults_are_one_line_that_names_file_and_key(tmp_path: Path, old: str, new: str, says: str) -> None:
+    path = tmp_path / "mine.yaml"
+    assert old in GOOD
+    path.write_text(GOOD.replace(old, new))
+    with pytest.raises(InputError) as caught:
+        load_robot(path)
+    message = str(caught.value)
+    assert str(path) in message
+    assert says in message
+    assert "\n" not in message
+
+
+def test_unknown_robot_suggests_a_known_one() -> None:
+    with pytest.raises(InputError, match="did you mean jackal"):
+        load_robot("jackel")
+
+
+def test_schema_asks_for_what_the_file_needs() -> None:
+    schema = robot_schema()
+    assert set(schema["required"]) >= {"schema", "footprint", "mass", "track"}
+    assert "name" not in schema["required"]

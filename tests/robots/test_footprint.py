@@ -1,0 +1,69 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robots import Footprint, footprint_clearance
+from worlds import Disc, World
+
+coordinate = st.floats(-3, 3)
+FOOTPRINTS = [Footprint.disc(0.3), Footprint.rectangle(0.5, 0.4), Footprint(0.2, 0.1, 0.05)]
+
+
+def outline(foot: Footprint, pose: tuple[float, float, float]) -> np.ndarray:
+    """Points along the edge of a footprint, made from its definition: a rectangle's edge moved outwards."""
+    sides = np.linspace(-1, 1, 801)
+    hx, hy = foot.half_length, foot.half_width
+    edge = np.concatenate(
+        [
+            np.stack([hx * sides, np.full_like(sides, s * hy)], 1) + [0, s * foot.rounding] for s in (-1, 1)
+        ] + [np.stack([np.full_like(sides, s * hx), hy * sides], 1) + [s * foot.rounding, 0] for s in (-1, 1)]
+    )  # fmt: skip
+    angles = np.linspace(0, 2 * math.pi, 4001)
+    round_corner = foot.rounding * np.stack([np.cos(angles), np.sin(angles)], 1)
+    corners = np.concatenate([round_corner + [a * hx, b * hy] for a in (-1, 1) for b in (-1, 1)])
+    points = np.concatenate([edge, corners])
+    x, y, yaw = pose
+    rotation = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
+    return points @ rotation.T + [x, y]
+
+
+@pytest.mark.parametrize("foot", FOOTPRINTS, ids=["disc", "rectangle", "rounded"])
+@given(x=coordinate, y=coordinate, yaw=st.floats(-4, 4), dx=coordinate, dy=coordinate, radius=st.floats(0.05, 1))
+def test_distance_to_a_disc_is_that_of_the_outline(
+    foot: Footprint, x: float, y: float, yaw: float, dx: float, dy: float, radius: float
+) -> None:
+    world = World("w", (-50, -50, 50, 50), (Disc(dx, dy, radius),))
+    brute = np.hypot(*(outline(foot, (x, y, yaw)) - [dx, dy]).T).min() - radius
+    exact = footprint_clearance(world, foot, [(x, y, yaw)])[0]
+    if exact > -radius:  # the disc's centre is outside the footprint
+        assert exact == pytest.approx(brute, abs=2e-3)
+    else:
+        assert brute < 0.5
+
+
+@pytest.mark.parametrize("foot", FOOTPRINTS, ids=["disc", "rectangle", "rounded"])
+@given(x=coordinate, y=coordinate, yaw=st.floats(-4, 4))
+def test_distance_to_the_walls_is_that_of_the_outline(foot: Footprint, x: float, y: float, yaw: float) -> None:
+    world = World("w", (-4, -5, 6, 7))
+    points = outline(foot, (x, y, yaw))
+    brute = min(points[:, 0].min() + 4, 6 - points[:, 0].max(), points[:, 1].min() + 5, 7 - points[:, 1].max())
+    assert footprint_clearance(world, foot, [(x, y, yaw)])[0] == pytest.approx(brute, abs=1e-4)
+
+
+def test_a_long_way_among_many_discs_is_measured_exactly() -> None:
+    """The list of near discs that the kernel carries along never misses the nearest one."""
+    rng = np.random.default_rng(1)
+    world = World("w", (-10, -10, 10, 10), tuple(Disc(*rng.uniform(-9, 9, 2), 0.1) for _ in range(200)))
+    foot = Footprint.rectangle(0.5, 0.4)
+    walk = np.cumsum(rng.normal(0, 0.05, (2000, 3)), axis=0)
+    together = footprint_clearance(world, foot, walk)
+    alone = [footprint_clearance(world, foot, pose[None])[0] for pose in walk]
+    np.testing.assert_array_equal(together, alone)
+
+
+def test_radius_is_the_circumscribed_one() -> None:
+    assert Footprint.rectangle(0.508, 0.430).radius == pytest.approx(0.3328, abs=1e-4)
+    assert Footprint.disc(0.18).radius == 0.18
