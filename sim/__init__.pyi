@@ -1,0 +1,11 @@
+from .certificate import Certificate as Certificate
+from .certificate import certify as certify
+from .engine import Engine as Engine
+from .metrics import METRICS as METRICS
+from .metrics import measure as measure
+from .rollout import Outcome as Outcome
+from .rollout import Rollout as Rollout
+from .scenario import Run as Run
+from .scenario import Scenario as Scenario
+from .scenario import plan as plan
+from .scenario import run as run

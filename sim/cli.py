@@ -1,0 +1,542 @@
+"""The command line: reads words, calls the library, prints. Heavy modules are imported when a command needs them."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from sim.console import as_json, bar, complain, planning, say, say_json, table
+from worlds.errors import InputError
+
+if TYPE_CHECKING:
+    from sim.scenario import Run, Scenario
+    from worlds import Disc, Task
+
+SUCCEEDED, FAILED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+app = typer.Typer(
+    name="antdrive",
+    help="Drive planned paths in physics: plan, drive, certify, film.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+worlds_app = typer.Typer(help="List, show, generate and import worlds.", no_args_is_help=True, rich_markup_mode=None)
+app.add_typer(worlds_app, name="worlds")
+
+World = Annotated[str, typer.Argument(metavar="WORLD", help="A name of the catalogue or a world file.")]
+Planner = Annotated[str, typer.Option("--planner", "-p", help="See `antdrive planners`.")]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option("--set", "-s", metavar="GROUP.KEY=VALUE", help="planner.ants=50, controller.lookahead_time=0.5"),
+]
+Robot = Annotated[str, typer.Option("--robot", "-r", help="A name of the catalogue or a robot file.")]
+Seed = Annotated[int, typer.Option(min=0, help="All chance comes from it.")]
+Margin = Annotated[float, typer.Option(min=0.0, help="Kept free around the robot by planners [m].")]
+CellSize = Annotated[float | None, typer.Option(min=1e-6, help="Grid resolution [m]; the world's own by default.")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else.")]
+Out = Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the results.")]
+
+
+@app.command()
+def run(
+    world: World,
+    planner: Planner = "astar",
+    settings: Settings = None,
+    robot: Robot = "turtlebot",
+    seed: Seed = 0,
+    margin: Margin = 0.03,
+    cell: CellSize = None,
+    unseen: Annotated[
+        list[str] | None,
+        typer.Option(metavar="X,Y,RADIUS", help="A cylinder that neither planner nor controller know of."),
+    ] = None,
+    time_limit: Annotated[float | None, typer.Option(min=1e-3, help="Simulated time allowed [s].")] = None,
+    out: Out = None,
+    video: Annotated[Path | None, typer.Option(help="Also film it: .mp4, .gif or .webp.")] = None,
+    json: Json = False,
+) -> int:
+    """Plan, drive in physics, certify; exit 0 when the robot stopped at the goal and touched nothing."""
+    from sim.scenario import plan as make_plan
+    from sim.scenario import run as drive_it
+
+    scenario = _scenario(
+        world, planner, settings, robot, seed=seed, margin=margin, cell=cell, time_limit=time_limit,
+        unseen=tuple(_disc(text) for text in unseen or ()),
+    )  # fmt: skip
+    folder = out or Path("out") / _slug(scenario)
+    if video is not None:
+        _check_film(video)
+    with planning(f"planning with {planner}"):
+        grid, answer = make_plan(scenario)
+    with bar("driving") as progress:
+        result = drive_it(scenario, planned=(grid, answer), progress=progress)
+    files = _write(result, folder, video)
+    report = {**result.as_dict(), "files": files, "command": _command()}
+    _write_json(folder / "result.json", report)
+    if json:
+        say_json(report)
+    else:
+        _tell(result, files)
+    return SUCCEEDED if result.succeeded else FAILED
+
+
+@app.command()
+def plan(
+    world: World,
+    planner: Planner = "astar",
+    settings: Settings = None,
+    robot: Robot = "turtlebot",
+    seed: Seed = 0,
+    margin: Margin = 0.03,
+    cell: CellSize = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Also draw the plan into this folder.")] = None,
+    json: Json = False,
+) -> int:
+    """Plan without driving; exit 0 when there is a path."""
+    from sim.scenario import plan as make_plan
+
+    scenario = _scenario(world, planner, settings, robot, seed=seed, margin=margin, cell=cell)
+    with planning(f"planning with {planner}"):
+        grid, answer = make_plan(scenario)
+    files = {}
+    if out is not None:
+        from sim.plots import plan_figure
+
+        files["plan"] = str(plan_figure(scenario.task, grid, answer, scenario.robot, out / "plan.png"))
+    facts = {
+        "world": scenario.task.world.name, "planner": planner, "robot": scenario.robot.name, "seed": seed,
+        "status": answer.status.name.lower(), "sentence": answer.status.value, "reason": answer.reason,
+        "cost_m": answer.cost, "work": answer.work, "work_unit": answer.work_unit, "plan_s": answer.wall_s,
+        "grid": {"rows": grid.shape[0], "cols": grid.shape[1], "cell": grid.cell, "inflate": grid.inflate},
+        "options": {key: value if isinstance(value, bool | int | float | str | None) else str(value)
+                    for key, value in answer.options.items()},
+        "cells": answer.cells.tolist(), "files": files,
+    }  # fmt: skip
+    if json:
+        say_json(facts)
+    else:
+        say(f"{scenario.task.world.name}: {planner} {answer.status.value}" + _because(answer.reason))
+        if answer.solved:
+            say(f"  length {answer.cost:.3f} m over {len(answer.cells)} cells, {answer.work} {answer.work_unit}")
+        say(f"  planned in {answer.wall_s * 1000:.1f} ms on {grid.shape[0]} x {grid.shape[1]} cells of {grid.cell:g} m")
+        _tell_files(files)
+    return SUCCEEDED if answer.solved else FAILED
+
+
+@app.command()
+def render(
+    rollout: Annotated[Path, typer.Argument(metavar="ROLLOUT.npz")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="The film: .mp4, .gif or .webp; .png gives one frame.")],
+    camera: Annotated[str, typer.Option(help="oblique, top or follow.")] = "oblique",
+    size: Annotated[str, typer.Option(help="Width x height in pixels.")] = "1280x720",
+    fps: Annotated[int, typer.Option(min=1, max=240)] = 30,
+    speed: Annotated[float, typer.Option(min=0.01, max=100, help="2 is twice as fast as life.")] = 1.0,
+    json: Json = False,
+) -> int:
+    """Film a rollout, from any camera, without simulating again."""
+    from sim.rollout import Rollout
+
+    log = Rollout.load(rollout)
+    shape = _size(size)
+    if out.suffix == ".png":
+        from sim.video import still
+
+        still(log, out, camera=camera, size=shape, note=_note(log))
+        facts: dict[str, Any] = {"file": str(out), "frames": 1}
+    else:
+        facts = _film(log, out, camera=camera, size=shape, fps=fps, speed=speed)
+    if json:
+        say_json(facts)
+    else:
+        _tell_files({"film": facts["file"]})
+    return SUCCEEDED
+
+
+@app.command()
+def verify(
+    rollouts: Annotated[list[Path], typer.Argument(metavar="ROLLOUT.npz...")],
+    json: Json = False,
+) -> int:
+    """Check drives again from their logs alone; exit 0 when each is certified to have touched nothing."""
+    from sim.certificate import certify
+    from sim.rollout import Rollout
+
+    checked = {str(path): certify(Rollout.load(path)) for path in rollouts}
+    if json:
+        say_json({"certified": all(c.certified for c in checked.values()),
+                  "rollouts": {path: c.as_dict() for path, c in checked.items()}})  # fmt: skip
+    else:
+        for path, c in checked.items():
+            verdict = "certified collision-free" if c.certified else "NOT certified"
+            say(f"{path}: {verdict}: least clearance {c.min_clearance:.4f} m, between steps at least {c.bound:.4f} m")
+            for problem in c.problems:
+                say(f"  {problem}")
+    return SUCCEEDED if all(c.certified for c in checked.values()) else FAILED
+
+
+@app.command()
+def planners(json: Json = False) -> int:
+    """List the planners with their options."""
+    from planners import all_planners, describe
+
+    known = all_planners()
+    if json:
+        say_json({
+            name: {"about": describe(p), "options": {f.name: _plain(getattr(p, f.name)) for f in _fields(p)}}
+            for name, p in known.items()
+        })  # fmt: skip
+        return SUCCEEDED
+    for name, p in known.items():
+        say(f"{name:14} {describe(p)}")
+        options = [f"{f.name}={getattr(p, f.name)}" for f in _fields(p)]
+        if options:
+            say(f"{'':14}   {', '.join(options)}")
+    return SUCCEEDED
+
+
+@app.command()
+def robots(json: Json = False) -> int:
+    """List the robots of the catalogue."""
+    from robots import load_robot, robot_to_dict
+    from robots import robots as catalogue
+
+    specs = [load_robot(name) for name in catalogue()]
+    if json:
+        say_json({spec.name: robot_to_dict(spec) for spec in specs})
+    else:
+        table(
+            ("robot", "radius m", "m/s", "m/s2", "about"),
+            ((s.name, f"{s.radius:.3f}", f"{s.max_speed:g}", f"{s.max_acceleration:g}", s.source or "") for s in specs),
+        )
+    return SUCCEEDED
+
+
+@app.command()
+def schema(kind: Annotated[str, typer.Argument(help="world or robot.")] = "world") -> int:
+    """Print the JSON Schema of a file, for editors."""
+    from robots import robot_schema
+    from worlds import task_schema
+
+    schemas = {"world": task_schema, "robot": robot_schema}
+    if kind not in schemas:
+        raise InputError(f"schema: there is none for {kind!r}; choose from {', '.join(schemas)}")
+    say_json(schemas[kind]())
+    return SUCCEEDED
+
+
+@worlds_app.command("list")
+def list_worlds(json: Json = False) -> int:
+    """List the catalogue."""
+    from worlds import catalogue, load_task
+
+    tasks = {name: load_task(name) for name in catalogue()}
+    if json:
+        say_json({name: _task_facts(task) for name, task in tasks.items()})
+    else:
+        table(
+            ("world", "size m", "obstacles", "cell m", "about"),
+            (
+                (name, "{:g} x {:g}".format(*task.world.size), str(len(task.world.obstacles)), f"{task.cell:g}",
+                 task.world.source or "")
+                for name, task in tasks.items()
+            ),
+        )  # fmt: skip
+    return SUCCEEDED
+
+
+@worlds_app.command("show")
+def show_world(
+    world: World,
+    robot: Robot = "turtlebot",
+    margin: Margin = 0.03,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Draw it into this file (.png, .svg, .pdf).")] = None,
+    json: Json = False,
+) -> int:
+    """Tell what a world holds and whether a robot can pass it, and draw it."""
+    from planners import Query, find_planner, reachable
+    from robots import load_robot
+    from worlds import load_task, rasterise, task_to_dict
+
+    task, spec = load_task(world), load_robot(robot)
+    grid = rasterise(task.world, task.cell, spec.radius + margin)
+    query = Query.between(grid, task)
+    passable = query.blocked_end is None and reachable(query)
+    if out is not None:
+        import numpy as np
+
+        from sim.plots import plan_figure
+
+        plan_figure(task, grid, find_planner("astar").plan(query, np.random.default_rng(0)), spec, out)
+    if json:
+        say_json({**task_to_dict(task), "passable": passable, "robot": spec.name, "margin": margin})
+        return SUCCEEDED
+    for key, value in _task_facts(task).items():
+        say(f"{key:14} {value}")
+    say(f"{'passable':14} {'yes' if passable else 'no'}, for {spec.name} with a margin of {margin:g} m")
+    _tell_files({"figure": str(out)} if out else {})
+    return SUCCEEDED
+
+
+@worlds_app.command("generate")
+def generate_world(
+    kind: Annotated[str, typer.Argument(help="forest (han2007's rule) or barn (the BARN cellular automaton).")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="The world file to write.")],
+    seed: Seed = 0,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", "-s", metavar="KEY=VALUE", help="forest: count=20; barn: fill=0.25"),
+    ] = None,
+) -> int:
+    """Write a random world."""
+    import numpy as np
+
+    from worlds import GENERATORS, generate, save_task
+
+    options = dict(_pair(text) for text in settings or ())
+    if kind not in GENERATORS:
+        raise InputError(f"generate: unknown kind {kind!r}; choose from {', '.join(GENERATORS)}")
+    task = generate(kind, np.random.default_rng(seed), options, name=out.stem, note=f"seed {seed}")
+    save_task(task, out)
+    _tell_files({"world": str(out)})
+    return SUCCEEDED
+
+
+@worlds_app.command("import")
+def import_world(
+    path: Annotated[Path, typer.Argument(metavar="FILE.world", help="Gazebo SDF with cylinders.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="The world file to write.")],
+    barn: Annotated[bool, typer.Option("--barn", help="With the start and goal of the BARN challenge.")] = False,
+    start: Annotated[str | None, typer.Option(metavar="X,Y,YAW")] = None,
+    goal: Annotated[str | None, typer.Option(metavar="X,Y")] = None,
+    bounds: Annotated[str | None, typer.Option(metavar="XMIN,YMIN,XMAX,YMAX")] = None,
+    cell: CellSize = None,
+    skip_unsupported: Annotated[bool, typer.Option(help="Leave out what is no cylinder.")] = False,
+) -> int:
+    """Turn a world of another simulator into a world file."""
+    from worlds import import_barn, import_sdf, save_task
+
+    if barn:
+        task = import_barn(path)
+    else:
+        given: dict[str, Any] = {
+            "start": _numbers("start", start, 3), "goal": _numbers("goal", goal, 2),
+            "bounds": _numbers("bounds", bounds, 4), "cell": cell,
+        }  # fmt: skip
+        task = import_sdf(path, skip_unsupported=skip_unsupported, **{k: v for k, v in given.items() if v is not None})
+    save_task(task, out)
+    _tell_files({"world": str(out)})
+    return SUCCEEDED
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        say(f"antdrive {version('antdrive')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Say so.")] = False,
+) -> None:
+    pass
+
+
+def _scenario(world: str, planner: str, settings: list[str] | None, robot: str, **rest: Any) -> Scenario:
+    import dataclasses
+
+    from robots import PurePursuit
+    from sim.scenario import Scenario
+
+    groups: dict[str, dict[str, str]] = {"planner": {}, "controller": {}}
+    for text in settings or ():
+        key, value = _pair(text)
+        group, _, name = key.partition(".")
+        if group not in groups or not name:
+            raise InputError(f"--set {text}: write GROUP.KEY=VALUE with a group of {', '.join(groups)}")
+        groups[group][name] = value
+    controller = PurePursuit()
+    known = [f.name for f in dataclasses.fields(controller)]
+    for name, value in groups["controller"].items():
+        if name not in known:
+            raise InputError(f"controller.{name}: unknown; choose from {', '.join(known)}")
+        try:
+            controller = dataclasses.replace(controller, **{name: float(value)})
+        except ValueError as error:
+            raise InputError(f"controller.{name}: {str(error).partition(': ')[2]}") from None
+    return Scenario.of(world, planner, robot, options=groups["planner"], controller=controller, **rest)
+
+
+def _pair(text: str) -> tuple[str, str]:
+    key, mark, value = text.partition("=")
+    if not mark or not key:
+        raise InputError(f"--set {text}: write KEY=VALUE")
+    return key.strip(), value.strip()
+
+
+def _numbers(key: str, text: str | None, count: int) -> tuple[float, ...] | None:
+    if text is None:
+        return None
+    try:
+        values = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        values = ()
+    if len(values) != count:
+        raise InputError(f"--{key} {text}: write {count} numbers separated by commas")
+    return values
+
+
+def _disc(text: str) -> Disc:
+    from worlds import Disc
+
+    values = _numbers("unseen", text, 3)
+    assert values is not None
+    try:
+        return Disc(*values)
+    except ValueError as error:
+        raise InputError(f"--unseen {text}: {error}") from None
+
+
+def _size(text: str) -> tuple[int, int]:
+    width, _, height = text.partition("x")
+    if not (width.isdigit() and height.isdigit() and 64 <= int(width) <= 7680 and 64 <= int(height) <= 4320):
+        raise InputError(f"--size {text}: write WIDTHxHEIGHT in pixels, such as 1280x720")
+    return int(width), int(height)
+
+
+def _slug(scenario: Scenario) -> str:
+    parts = (scenario.task.world.name, scenario.planner_name, scenario.robot.name, str(scenario.seed))
+    return "-".join("".join(c if c.isalnum() or c in "-_." else "_" for c in part) for part in parts)
+
+
+def _write(result: Run, folder: Path, video: Path | None) -> dict[str, str]:
+    files = {"result": str(folder / "result.json")}
+    if result.rollout is None:
+        from sim.plots import plan_figure
+
+        s = result.scenario
+        files["figure"] = str(plan_figure(s.task, result.grid, result.plan, s.robot, folder / "overview.png"))
+        return files
+    from sim.plots import overview
+
+    files["rollout"] = str(result.rollout.save(folder / "rollout.npz"))
+    files["figure"] = str(overview(result.rollout, folder / "overview.png"))
+    if video is not None:
+        files["film"] = _film(result.rollout, video)["file"]
+    return files
+
+
+def _film(log: Any, path: Path, **options: Any) -> dict[str, Any]:
+    from sim.video import film
+
+    with bar("filming") as progress:
+        info = film(log, path, note=_note(log), progress=progress, **options)
+    return {
+        "file": str(path),
+        "frames": info.frames,
+        "size": list(info.size),
+        "fps": info.fps,
+        "renderer": info.renderer,
+    }
+
+
+def _check_film(path: Path) -> None:
+    from sim.video import ENCODERS
+
+    if path.suffix not in ENCODERS:
+        raise InputError(f"--video {path}: films are written as {', '.join(ENCODERS)}")
+
+
+def _note(log: Any) -> str:
+    from sim.certificate import certify
+
+    c = certify(log)
+    return f"certified: never closer than {c.bound:.3f} m" if c.certified else "not certified collision-free"
+
+
+def _write_json(path: Path, value: Any) -> None:
+    from worlds.atomic import written_whole
+
+    with written_whole(path) as temporary:
+        temporary.write_text(as_json(value) + "\n", encoding="utf-8")
+
+
+def _tell(result: Run, files: dict[str, str]) -> None:
+    s = result.scenario
+    say(
+        f"{s.task.world.name}: {s.robot.name} with {s.planner_name}: {result.outcome.value}"
+        + _because(result.plan.reason)
+    )
+    if result.rollout is not None and result.certificate is not None:
+        facts = result.as_dict()["metrics"]
+        say(
+            f"  drove {facts['driven_length_m']:.2f} m in {facts['duration_s']:.1f} s "
+            f"(planned {facts['path_length_m']:.2f} m); tracking error at most {facts['tracking_error_max_m']:.3f} m"
+        )
+        c = result.certificate
+        verdict = "certified collision-free" if c.certified else "NOT certified"
+        say(f"  {verdict}: least clearance {c.min_clearance:.4f} m, between steps at least {c.bound:.4f} m")
+        for problem in c.problems:
+            say(f"    {problem}")
+    _tell_files(files)
+
+
+def _tell_files(files: dict[str, str]) -> None:
+    for name, path in files.items():
+        say(f"  {name:8} {path}")
+
+
+def _because(reason: str) -> str:
+    return f" ({reason})" if reason else ""
+
+
+def _task_facts(task: Task) -> dict[str, Any]:
+    return {
+        "name": task.world.name, "source": task.world.source, "bounds": list(task.world.bounds),
+        "start": list(task.start), "goal": list(task.goal), "goal_tolerance": task.goal_tolerance,
+        "cell": task.cell, "obstacles": len(task.world.obstacles),
+    }  # fmt: skip
+
+
+def _fields(planner: Any) -> tuple[Any, ...]:
+    import dataclasses
+
+    return dataclasses.fields(planner) if dataclasses.is_dataclass(planner) else ()
+
+
+def _plain(value: Any) -> Any:
+    return value if isinstance(value, bool | int | float | str | None) else str(value)
+
+
+def _command() -> str:
+    import shlex
+
+    return shlex.join(["antdrive", *sys.argv[1:]])
+
+
+# What the command line raises for every wrong word; typer exports only this descendant of it.
+_USAGE_ERROR: Any = typer.BadParameter.__mro__[2]
+
+
+def main() -> None:
+    """Run the command line; the exit code says how it went."""
+    try:
+        code = app(standalone_mode=False)
+    except InputError as error:
+        complain(str(error))
+        code = WRONG_INPUT
+    except (KeyboardInterrupt, typer.Abort):
+        code = INTERRUPTED
+    except _USAGE_ERROR as error:
+        complain(f"{error.format_message()} (see antdrive --help)")
+        code = WRONG_INPUT
+    if code == INTERRUPTED:
+        complain("interrupted")
+    sys.exit(code if isinstance(code, int) else SUCCEEDED)

@@ -1,0 +1,106 @@
+"""Following a route in physics, with everything logged."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from robots import Guide, Progress, PurePursuit, Twist, footprint_clearance
+from sim.engine import Engine
+from sim.rollout import Outcome
+from worlds import Floats, Task
+
+STOPPED_SPEED = 0.01  # slower than this counts as standing [m/s]
+STUCK_AFTER = 8.0  # without progress for this long the robot is stuck [s]
+STUCK_PROGRESS = 0.02  # what counts as progress [m]
+AFTER_CONTACT = 0.5  # a collision stays in the log for this long, braking [s]
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """What a drive logged, a row per physics step; row 0 is the start."""
+
+    outcome: Outcome
+    t: Floats  # (T,) [s]
+    pose: Floats  # (T, 3)
+    twist: Floats  # (T, 2) measured
+    command: Floats  # (T, 2) in force when the row was reached
+    clearance: Floats  # (T,) [m]
+    limiter: np.ndarray[tuple[int], np.dtype[np.uint8]]  # (T,)
+    contacts: Floats  # (K, 4)
+
+
+def drive(
+    engine: Engine,
+    controller: PurePursuit,
+    guide: Guide,
+    task: Task,
+    *,
+    control_hz: int = 60,
+    time_limit: float,
+    progress: Callable[[float], None] | None = None,
+) -> Drive:
+    """Drive along a guide until the robot stands at its end, touches something, is stuck or late.
+
+    `progress` is told the fraction of the route that is done, about ten times per simulated second.
+
+    Raises:
+        ValueError: the control rate does not divide the physics rate.
+    """
+    substeps, rest = divmod(engine.physics_hz, control_hz)
+    if rest or substeps < 1:
+        raise ValueError(f"control_hz: must divide the physics rate {engine.physics_hz}, got {control_hz}")
+    engine.place(task.start)
+    rows = [(*engine.state(), 0.0, 0.0, 0)]
+    contacts = [(0, *contact) for contact in engine.contacts()]
+    outcome = Outcome.COLLIDED if contacts else None
+    command, state = Twist(0.0, 0.0), Progress()
+    best, best_at = 0.0, 0
+    ticks = round(time_limit * control_hz)
+    patience = round(STUCK_AFTER * control_hz)
+    for tick in range(ticks):
+        if outcome is not None:
+            break
+        x, y, yaw, speed, yaw_rate = rows[-1][:5]
+        command, state = controller.step(guide, (x, y, yaw), command, state)
+        if guide.length - state.arc <= controller.goal_distance and _standing(speed, yaw_rate) and not any(command):
+            reached = np.hypot(x - task.goal[0], y - task.goal[1]) <= task.goal_tolerance
+            outcome = Outcome.SUCCEEDED if reached else Outcome.STUCK
+            break
+        engine.command(*command)
+        for _ in range(substeps):
+            touched = engine.step()
+            rows.append((*engine.state(), *command, state.limiter))
+            if touched:
+                contacts += [(len(rows) - 1, *contact) for contact in touched]
+                outcome = Outcome.COLLIDED
+        if state.arc > best + STUCK_PROGRESS:
+            best, best_at = state.arc, tick
+        elif tick - best_at >= patience:
+            outcome = Outcome.STUCK
+        if progress is not None and tick % (control_hz // 10 or 1) == 0:
+            progress(state.arc / guide.length)
+    if outcome is Outcome.COLLIDED:
+        engine.command(0.0, 0.0)
+        for _ in range(round(AFTER_CONTACT * engine.physics_hz)):
+            touched = engine.step()
+            rows.append((*engine.state(), 0.0, 0.0, state.limiter))
+            contacts += [(len(rows) - 1, *contact) for contact in touched]
+    log = np.array(rows)
+    pose = np.ascontiguousarray(log[:, :3])
+    return Drive(
+        outcome=outcome or Outcome.TIMED_OUT,
+        t=np.arange(len(log)) / engine.physics_hz,
+        pose=pose,
+        twist=np.ascontiguousarray(log[:, 3:5]),
+        command=np.ascontiguousarray(log[:, 5:7]),
+        clearance=footprint_clearance(engine.world, engine.robot.footprint, pose),
+        limiter=log[:, 7].astype(np.uint8),
+        contacts=np.array(contacts, dtype=np.float64).reshape(-1, 4),
+    )
+
+
+def _standing(speed: float, yaw_rate: float) -> bool:
+    return abs(speed) < STOPPED_SPEED and abs(yaw_rate) < STOPPED_SPEED

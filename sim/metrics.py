@@ -1,0 +1,128 @@
+"""What a drive is worth, from its log alone: one name, one definition, the unit in the name."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+
+from sim.rollout import Outcome, Rollout
+
+Floats = npt.NDArray[np.float64]
+
+JERK_WINDOW = 0.1  # measured speed is averaged over this long before it is differentiated [s]
+
+
+def path_length_m(rollout: Rollout) -> float:
+    """Length of the planned cells."""
+    return float(rollout.meta["plan"]["cost_m"])
+
+
+def route_length_m(rollout: Rollout) -> float:
+    """Length of the line that was to be followed."""
+    return _length(rollout.route)
+
+
+def driven_length_m(rollout: Rollout) -> float:
+    """Length of the way driven by the axle's centre."""
+    return _length(rollout.pose[:, :2])
+
+
+def gap_to_grid_optimum(rollout: Rollout) -> float:
+    """Planned length over Dijkstra's on the same moves, minus 1."""
+    optimum = float(rollout.meta["plan"]["grid_optimum_m"])
+    return path_length_m(rollout) / optimum - 1 if optimum > 0 else 0.0
+
+
+def min_clearance_m(rollout: Rollout) -> float:
+    """Smallest distance between the robot's surface and an obstacle's or wall's."""
+    return float(rollout.clearance.min())
+
+
+def mean_clearance_m(rollout: Rollout) -> float:
+    """Mean of that distance over time."""
+    return float(rollout.clearance.mean())
+
+
+def tracking_error_max_m(rollout: Rollout) -> float:
+    """Largest distance of the axle's centre from the route."""
+    return float(tracking_error(rollout).max())
+
+
+def tracking_error_p95_m(rollout: Rollout) -> float:
+    """95th percentile of that distance over time."""
+    return float(np.percentile(tracking_error(rollout), 95))
+
+
+def duration_s(rollout: Rollout) -> float:
+    """Simulated time."""
+    return float(rollout.t[-1])
+
+
+def turning_rad_per_m(rollout: Rollout) -> float:
+    """Total change of heading over the length driven."""
+    turned = np.abs((np.diff(rollout.pose[:, 2]) + math.pi) % (2 * math.pi) - math.pi).sum()
+    length = driven_length_m(rollout)
+    return float(turned / length) if length > 0 else 0.0
+
+
+def jerk_rms(rollout: Rollout) -> float:
+    """Root mean square of the second derivative of the measured speed [m/s^3], smoothed over 0.1 s."""
+    hz = int(rollout.meta["physics_hz"])
+    window = max(1, round(JERK_WINDOW * hz))
+    if len(rollout.t) < 3 * window:
+        return 0.0
+    speed = np.convolve(rollout.twist[:, 0], np.ones(window) / window, mode="valid")[::window]
+    if len(speed) < 3:
+        return 0.0
+    jerk = np.diff(speed, 2) * (hz / window) ** 2
+    return float(np.sqrt(np.mean(jerk**2)))
+
+
+METRICS: Mapping[str, Callable[[Rollout], float]] = MappingProxyType(
+    {
+        "path_length_m": path_length_m,
+        "route_length_m": route_length_m,
+        "driven_length_m": driven_length_m,
+        "gap_to_grid_optimum": gap_to_grid_optimum,
+        "min_clearance_m": min_clearance_m,
+        "mean_clearance_m": mean_clearance_m,
+        "tracking_error_max_m": tracking_error_max_m,
+        "tracking_error_p95_m": tracking_error_p95_m,
+        "duration_s": duration_s,
+        "plan_s": lambda rollout: float(rollout.meta["times"]["plan_s"]),
+        "drive_wall_s": lambda rollout: float(rollout.meta["times"]["drive_wall_s"]),
+        "turning_rad_per_m": turning_rad_per_m,
+        "jerk_rms": jerk_rms,
+    }
+)
+
+
+def measure(rollout: Rollout) -> dict[str, float]:
+    """Every metric of a drive by name."""
+    return {name: metric(rollout) for name, metric in METRICS.items()}
+
+
+def succeeded(rollout: Rollout) -> bool:
+    """Whether the robot stopped at the goal in time without contact."""
+    return rollout.outcome is Outcome.SUCCEEDED
+
+
+def tracking_error(rollout: Rollout) -> Floats:
+    """Distance of the axle's centre from the route at each row, shape (T,) [m]."""
+    a, b = rollout.route[:-1], rollout.route[1:]
+    along = b - a
+    length2 = (along**2).sum(axis=1)
+    error = np.empty(len(rollout.pose))
+    for rows in np.array_split(np.arange(len(error)), 1 + len(error) * len(a) // 1_000_000):
+        offset = rollout.pose[rows, None, :2] - a
+        f = np.clip((offset * along).sum(axis=2) / length2, 0, 1)
+        error[rows] = np.linalg.norm(offset - f[:, :, None] * along, axis=2).min(axis=1)
+    return error
+
+
+def _length(xy: Floats) -> float:
+    return float(np.hypot(*np.diff(xy, axis=0).T).sum())

@@ -1,0 +1,200 @@
+"""Plan and drive one scenario: the whole of antdrive on one page."""
+
+from __future__ import annotations
+
+import dataclasses
+import platform
+import time
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from importlib import metadata
+from typing import Any
+
+import numpy as np
+
+from planners import AStar, Planner, PlanResult, PlanStatus, Query, find_planner, route_along
+from robots import LIMITERS, PurePursuit, RobotSpec, load_robot
+from sim.certificate import Certificate, certify
+from sim.drive import Drive, drive
+from sim.engine import Engine
+from sim.metrics import measure
+from sim.rollout import SCHEMA, Outcome, Rollout
+from worlds import Disc, Grid, Route, Task, load_task, rasterise, task_to_dict
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scenario:
+    """Everything a run depends on. The same scenario gives the same rollout, bit for bit, on one machine."""
+
+    task: Task
+    planner: Planner
+    robot: RobotSpec
+    planner_name: str = ""  # what records call the planner; its class by default
+    margin: float = 0.03  # kept free around the robot, on top of its radius [m]
+    cell: float | None = None  # grid resolution [m]; None: the task's own
+    seed: int = 0
+    controller: PurePursuit = field(default_factory=PurePursuit)
+    unseen: tuple[Disc, ...] = ()  # obstacles that neither planner nor controller know of
+    time_limit: float | None = None  # simulated time allowed [s]; None: ample for the route
+    physics_hz: int = 240
+    control_hz: int = 60
+
+    def __post_init__(self) -> None:
+        if not self.margin >= 0:
+            raise ValueError(f"margin: must be at least 0, got {self.margin:g}")
+        if self.time_limit is not None and not self.time_limit > 0:
+            raise ValueError(f"time_limit: must be greater than 0, got {self.time_limit:g}")
+
+    @property
+    def inflate(self) -> float:
+        """What planners keep between the robot's centre and every surface [m]."""
+        return self.robot.radius + self.margin
+
+    def rng(self, purpose: str) -> np.random.Generator:
+        """A stream of random numbers of its own for each purpose, from the one seed."""
+        return np.random.default_rng([self.seed, zlib.crc32(purpose.encode())])
+
+    @classmethod
+    def of(
+        cls, world: str, planner: str = "astar", robot: str = "turtlebot", *, options: dict[str, Any] | None = None,
+        **settings: Any,
+    ) -> Scenario:  # fmt: skip
+        """A scenario by names: of a world and a robot (or their files) and of a planner with its options."""
+        return cls(
+            task=load_task(world),
+            planner=find_planner(planner, **(options or {})),
+            planner_name=planner,
+            robot=load_robot(robot),
+            **settings,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """What came of a scenario: a plan and, if that found a path, a rollout with its certificate."""
+
+    scenario: Scenario
+    grid: Grid
+    plan: PlanResult
+    rollout: Rollout | None = None
+    certificate: Certificate | None = None
+
+    @property
+    def outcome(self) -> Outcome:
+        """How it ended."""
+        if self.rollout is not None:
+            return self.rollout.outcome
+        return Outcome.NO_PATH if self.plan.status is PlanStatus.NO_PATH else Outcome.STOPPED
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether the robot stopped at the goal in time, and its log proves that it touched nothing."""
+        return self.outcome is Outcome.SUCCEEDED and self.certificate is not None and self.certificate.certified
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, for JSON."""
+        s = self.scenario
+        return {
+            "world": s.task.world.name,
+            "planner": _name(s),
+            "robot": s.robot.name,
+            "seed": s.seed,
+            "outcome": self.outcome.name.lower(),
+            "sentence": self.outcome.value,
+            "reason": self.plan.reason,
+            "succeeded": self.succeeded,
+            "certificate": self.certificate.as_dict() if self.certificate else None,
+            "metrics": measure(self.rollout) if self.rollout else {"plan_s": self.plan.wall_s},
+            "digest": self.rollout.digest if self.rollout else None,
+        }
+
+
+def plan(s: Scenario) -> tuple[Grid, PlanResult]:
+    """Rasterise the world and plan on it."""
+    grid = rasterise(s.task.world, s.cell or s.task.cell, s.inflate)
+    return grid, s.planner.plan(Query.between(grid, s.task), s.rng("planner"))
+
+
+def run(
+    s: Scenario,
+    *,
+    planned: tuple[Grid, PlanResult] | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Run:
+    """Plan and drive one scenario, or drive what `plan` planned for it; `progress` is told the fraction driven."""
+    grid, answer = planned or plan(s)
+    if not answer.solved:
+        return Run(s, grid, answer)
+    route = route_along(answer, grid, s.task)
+    guide = s.controller.guide(route, s.task.world, s.robot, s.margin, 1 / s.control_hz)
+    built = dataclasses.replace(s.task.world, obstacles=s.task.world.obstacles + s.unseen)
+    limit = s.time_limit or 30.0 + 10.0 * route.length / s.robot.max_speed
+    started = time.perf_counter()
+    with Engine(built, s.robot, physics_hz=s.physics_hz) as engine:
+        log = drive(engine, s.controller, guide, s.task, control_hz=s.control_hz, time_limit=limit, progress=progress)
+    rollout = _record(s, grid, answer, route, log, limit, time.perf_counter() - started)
+    return Run(s, grid, answer, rollout, certify(rollout))
+
+
+def _record(
+    s: Scenario, grid: Grid, answer: PlanResult, route: Route, log: Drive, limit: float, wall: float
+) -> Rollout:
+    task = task_to_dict(s.task)
+    known = len(s.task.world.obstacles)
+    task["obstacles"] += [dataclasses.asdict(disc) for disc in s.unseen]
+    optimum = AStar().plan(Query.between(grid, s.task), np.random.default_rng(0)).cost
+    return Rollout(
+        t=log.t,
+        pose=log.pose,
+        twist=log.twist,
+        command=log.command,
+        clearance=log.clearance,
+        limiter=log.limiter,
+        movers=np.empty((len(log.t), 0, 2)),
+        contacts=log.contacts,
+        route=route.xy,
+        cells=answer.cells,
+        meta={
+            "schema": SCHEMA,
+            "task": task,
+            "unseen": list(range(known, known + len(s.unseen))),
+            "planner": {"name": _name(s), "options": _plain(answer.options)},
+            "plan": {
+                "status": answer.status.name.lower(),
+                "cost_m": answer.cost,
+                "grid_optimum_m": optimum,
+                "work": answer.work,
+                "work_unit": answer.work_unit,
+            },
+            "robot": dataclasses.asdict(s.robot),
+            "controller": {"name": type(s.controller).__name__, **dataclasses.asdict(s.controller)},
+            "limiters": list(LIMITERS),
+            "margin": s.margin,
+            "inflate": s.inflate,
+            "cell": grid.cell,
+            "seed": s.seed,
+            "rows": "physics",
+            "physics_hz": s.physics_hz,
+            "control_hz": s.control_hz,
+            "time_limit": limit,
+            "outcome": log.outcome.name.lower(),
+            "versions": versions(),
+            "times": {"plan_s": answer.wall_s, "drive_wall_s": wall},
+        },
+    )
+
+
+def versions() -> dict[str, str]:
+    """What a run was made with."""
+    packages = ("antdrive", "numpy", "pybullet", "numba")
+    return {"python": platform.python_version(), **{name: metadata.version(name) for name in packages}}
+
+
+def _name(s: Scenario) -> str:
+    return s.planner_name or type(s.planner).__name__
+
+
+def _plain(options: Any) -> dict[str, Any]:
+    """Planner options as JSON can hold them."""
+    return {k: v if isinstance(v, bool | int | float | str | None) else str(v) for k, v in dict(options).items()}

@@ -1,0 +1,54 @@
+"""Worlds and runs that many tests share."""
+
+from pathlib import Path
+
+import hypothesis
+import pytest
+
+from planners import find_planner
+from robots import RobotSpec, load_robot
+from sim import Run, Scenario, run
+from worlds import Disc, Task, World
+
+hypothesis.settings.register_profile("repeatable", derandomize=True, deadline=None)
+hypothesis.settings.load_profile("repeatable")
+
+SHARED = Path(__file__).parent.parent.parent / "shared" / "data"
+
+
+@pytest.fixture(scope="session")
+def turtlebot() -> RobotSpec:
+    return load_robot("turtlebot")
+
+
+@pytest.fixture(scope="session")
+def jackal() -> RobotSpec:
+    return load_robot("jackal")
+
+
+@pytest.fixture(scope="session")
+def small_task() -> Task:
+    """A start and a goal with one cylinder between them."""
+    world = World("small", (0.0, 0.0, 4.0, 3.0), (Disc(2.0, 1.5, 0.3),))
+    return Task(world, (0.6, 1.4, 0.0), (3.4, 1.6), cell=0.2)
+
+
+@pytest.fixture(scope="session")
+def small_scenario(small_task: Task, turtlebot: RobotSpec) -> Scenario:
+    return Scenario(task=small_task, planner=find_planner("astar"), planner_name="astar", robot=turtlebot)
+
+
+@pytest.fixture(scope="session")
+def small_run(small_scenario: Scenario) -> Run:
+    return run(small_scenario)
+
+
+@pytest.fixture(scope="session")
+def collided_run(small_scenario: Scenario) -> Run:
+    """The same, with a cylinder on the way that nobody told the planner of."""
+    from dataclasses import replace
+
+    clean = run(small_scenario)
+    assert clean.rollout is not None
+    x, y = clean.rollout.pose[len(clean.rollout.pose) // 2, :2]
+    return run(replace(small_scenario, unseen=(Disc(float(x), float(y), 0.1),)))

@@ -1,0 +1,232 @@
+"""The command line, in its own processes where exit codes and streams matter."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from sim import Run
+from sim.cli import main
+from tests.worlds.malformed import MALFORMED
+from worlds import load_task, save_task
+
+
+@pytest.fixture
+def antdrive(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path):  # type: ignore[no-untyped-def]
+    """Call the command line in this process: its exit code, stdout and stderr."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(*words: str | Path) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["antdrive", *map(str, words)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        out, err = capsys.readouterr()
+        return int(ended.value.code or 0), out, err
+
+    return call
+
+
+@pytest.fixture
+def small(small_run: Run, tmp_path: Path) -> Path:
+    path = tmp_path / "small.yaml"
+    save_task(small_run.scenario.task, path)
+    return path
+
+
+def test_run_writes_what_it_says_and_verify_agrees(antdrive, small: Path, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    code, out, err = antdrive("run", small, "--out", tmp_path / "r", "--json")
+    facts = json.loads(out)
+    assert (code, err) == (0, "")
+    assert facts["outcome"] == "succeeded"
+    assert facts["certificate"]["certified"]
+    for path in facts["files"].values():
+        assert Path(path).stat().st_size > 0
+    assert json.loads((tmp_path / "r" / "result.json").read_text()) == facts
+    code, out, _ = antdrive("verify", facts["files"]["rollout"])
+    assert code == 0
+    assert "certified collision-free" in out
+
+
+def test_run_tells_people_what_happened(antdrive, small: Path) -> None:  # type: ignore[no-untyped-def]
+    code, out, _ = antdrive("run", small, "--planner", "aco-han", "--set", "planner.ants=50", "--seed", "3")
+    assert code == 0
+    assert "stopped at the goal without contact" in out
+    assert "certified collision-free" in out
+    assert Path("out/small-aco-han-turtlebot-3/rollout.npz").exists()
+
+
+def test_a_collision_is_exit_code_1_and_the_log_fails_verify(antdrive, small: Path, collided_run: Run) -> None:  # type: ignore[no-untyped-def]
+    disc = collided_run.scenario.unseen[0]
+    code, out, _ = antdrive("run", small, "--unseen", f"{disc.x},{disc.y},{disc.radius}", "--json", "--out", "r")
+    facts = json.loads(out)
+    assert code == 1
+    assert facts["outcome"] == "collided"
+    assert facts["digest"] == collided_run.rollout.digest  # type: ignore[union-attr]
+    code, out, _ = antdrive("verify", "r/rollout.npz")
+    assert code == 1
+    assert "NOT certified" in out
+
+
+def test_no_path_is_exit_code_1(antdrive) -> None:  # type: ignore[no-untyped-def]
+    code, out, _ = antdrive("run", "no-path", "--json")
+    facts = json.loads(out)
+    assert (code, facts["outcome"]) == (1, "no_path")
+    assert facts["reason"]
+    assert antdrive("plan", "no-path")[0] == 1
+
+
+def test_plan_needs_no_physics(antdrive, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    code, out, _ = antdrive("plan", "han2007-aco", "--planner", "aco-han", "--json", "--out", tmp_path / "p")
+    facts = json.loads(out)
+    assert code == 0
+    assert facts["status"] == "solved"
+    assert len(facts["cells"]) > 10
+    assert Path(facts["files"]["plan"]).read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("name", MALFORMED)
+def test_malformed_worlds_are_exit_code_2_and_one_line(antdrive, name: str, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    content, says = MALFORMED[name]
+    path = tmp_path / "bad.yaml"
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    code, out, err = antdrive("plan", path)
+    assert code == 2
+    assert out == ""
+    assert err.count("\n") == 1
+    assert str(path) in err
+    assert says in err
+
+
+def test_there_are_at_least_30_malformed_worlds() -> None:
+    assert len(MALFORMED) >= 30
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["run"], "Missing argument 'WORLD'"),
+        (["rum", "empty"], "Did you mean 'run'"),
+        (["run", "emty"], "did you mean empty"),
+        (["run", "empty", "--planner", "asta"], "astar"),
+        (["run", "empty", "--robot", "jackel"], "did you mean jackal"),
+        (["run", "empty", "--set", "ants=50"], "GROUP.KEY=VALUE"),
+        (["run", "empty", "--set", "planner.ants"], "KEY=VALUE"),
+        (["run", "empty", "-p", "aco-han", "--set", "planner.ant=50"], "ants"),
+        (["run", "empty", "-p", "aco-han", "--set", "planner.ants=many"], "whole number"),
+        (["run", "empty", "-p", "aco-han", "--set", "planner.ants=0"], "at least 1"),
+        (["run", "empty", "--set", "controller.lookahead=1"], "lookahead_time"),
+        (["run", "empty", "--set", "controller.guard=7"], "between 0 and 1"),
+        (["run", "empty", "--margin", "-1"], "--margin"),
+        (["run", "empty", "--cell", "nan"], "cell"),
+        (["run", "empty", "--cell", "1e-5"], "cell"),
+        (["run", "empty", "--unseen", "1,2"], "3 numbers"),
+        (["run", "empty", "--unseen", "1,2,-3"], "radius: must be greater than 0"),
+        (["run", "empty", "--video", "film.avi"], ".mp4"),
+        (["run", "empty", "--out", "/proc/nowhere"], "cannot be written"),
+        (["verify", "nothing.npz"], "no such file"),
+        (["render", "nothing.npz", "-o", "f.mp4"], "no such file"),
+        (["worlds", "generate", "desert", "-o", "w.yaml"], "forest"),
+        (["worlds", "generate", "forest", "-o", "w.yaml", "--set", "cuont=3"], "count"),
+        (["worlds", "generate", "forest", "-o", "w.yaml", "--set", "count=3000"], "no world with 3000"),
+        (["worlds", "import", "nothing.world", "-o", "w.yaml"], "nothing.world: cannot be read"),
+        (["schema", "moon"], "world, robot"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_wrong_words_are_one_line_and_exit_code_2(antdrive, words: list[str], says: str) -> None:  # type: ignore[no-untyped-def]
+    code, out, err = antdrive(*words)
+    assert code == 2, (out, err)
+    assert out == ""
+    assert err.count("\n") == 1
+    assert says in err
+
+
+def test_lists(antdrive) -> None:  # type: ignore[no-untyped-def]
+    assert "han2007-aco" in antdrive("worlds", "list")[1]
+    assert "aco-han" in antdrive("planners")[1]
+    assert "jackal" in antdrive("robots")[1]
+    for words in (
+        ["worlds", "list", "--json"],
+        ["planners", "--json"],
+        ["robots", "--json"],
+        ["schema"],
+        ["schema", "robot"],
+    ):
+        code, out, err = antdrive(*words)
+        assert (code, err) == (0, "")
+        assert json.loads(out)
+
+
+def test_show_tells_whether_a_robot_fits(antdrive, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    code, out, _ = antdrive("worlds", "show", "gate", "--out", tmp_path / "gate.png")
+    assert code == 0
+    assert "passable       yes" in out
+    assert (tmp_path / "gate.png").exists()
+    assert not json.loads(antdrive("worlds", "show", "no-path", "--json")[1])["passable"]
+
+
+@pytest.mark.parametrize("words", [["forest", "--set", "count=8"], ["barn", "--set", "fill=0.2"]])
+def test_generated_worlds_load_and_repeat(antdrive, words: list[str]) -> None:  # type: ignore[no-untyped-def]
+    for name in ("a.yaml", "b.yaml"):
+        assert antdrive("worlds", "generate", *words, "--seed", "5", "-o", name)[0] == 0
+    a, b = load_task("a.yaml"), load_task("b.yaml")
+    assert a.world.obstacles == b.world.obstacles
+    assert antdrive("worlds", "generate", *words, "--seed", "6", "-o", "c.yaml")[0] == 0
+    assert load_task("c.yaml").world.obstacles != a.world.obstacles
+
+
+def test_import_brings_a_gazebo_world(antdrive, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    (tmp_path / "one.world").write_text(
+        "<sdf version='1.6'><world name='one'><model name='c'><static>1</static><pose>2 1 0 0 0 0</pose><link name='l'>"
+        "<collision name='c'><geometry><cylinder><radius>0.2</radius><length>1</length></cylinder></geometry></collision>"
+        "</link></model></world></sdf>"
+    )
+    code, _, err = antdrive(
+        "worlds",
+        "import",
+        "one.world",
+        "-o",
+        "one.yaml",
+        "--start",
+        "0,0,0",
+        "--goal",
+        "4,2",
+        "--bounds=-1,-1,5,3",
+    )
+    assert code == 0, err
+    task = load_task("one.yaml")
+    assert [(d.x, d.y, d.radius) for d in task.world.obstacles] == [(2, 1, 0.2)]
+    assert antdrive("run", "one.yaml", "--cell", "0.2")[0] == 0
+
+
+def test_render_films_again_from_another_camera(antdrive, small_run: Run, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    assert small_run.rollout is not None
+    log = small_run.rollout.save(tmp_path / "run.npz")
+    code, out, _ = antdrive(
+        "render", log, "-o", "top.mp4", "--camera", "top", "--size", "320x240", "--speed", "4", "--json"
+    )
+    assert code == 0
+    assert json.loads(out)["size"] == [320, 240]
+    assert Path("top.mp4").stat().st_size > 1000
+    assert antdrive("render", log, "-o", "x.mp4", "--camera", "moon")[0] == 2
+    assert antdrive("render", log, "-o", "x.mp4", "--size", "big")[0] == 2
+
+
+def test_python_m_sim_is_the_same_and_nothing_leaks_to_the_streams(small: Path, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "sim", "run", str(small), "--json", "--out", str(tmp_path / "r")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0
+    assert done.stderr == ""
+    assert json.loads(done.stdout)["succeeded"]
+
+
+def test_ctrl_c_is_one_line(antdrive, monkeypatch: pytest.MonkeyPatch) -> None:  # type: ignore[no-untyped-def]
+    def interrupt(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("sim.scenario.run", interrupt)
+    code, _, err = antdrive("run", "empty")
+    assert code == 130
+    assert err == "antdrive: interrupted\n"

@@ -1,0 +1,190 @@
+"""The whole job: plan, drive, certify."""
+
+import json
+import math
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from planners import find_planner
+from robots import PurePursuit, RobotSpec
+from sim import Engine, Outcome, Run, Scenario, measure, run
+from sim.drive import drive
+from worlds import Disc, InputError, Route, Task, World, catalogue, load_task
+
+
+def test_a_run_ends_at_the_goal_certified(small_run: Run) -> None:
+    assert small_run.outcome is Outcome.SUCCEEDED
+    assert small_run.succeeded
+    log = small_run.rollout
+    assert log is not None
+    assert math.dist(log.pose[-1, :2], small_run.scenario.task.goal) < 0.05
+    assert len(log.contacts) == 0
+    assert log.clearance.min() > 0.3 * small_run.scenario.margin
+    assert log.t[1] == pytest.approx(1 / 240)
+    assert log.meta["outcome"] == "succeeded"
+    assert json.dumps(small_run.as_dict())
+
+
+def test_metrics_have_sensible_values(small_run: Run) -> None:
+    assert small_run.rollout is not None
+    m = measure(small_run.rollout)
+    direct = math.dist((0.6, 1.4), (3.4, 1.6))
+    assert direct < m["driven_length_m"] < 1.3 * direct
+    assert m["driven_length_m"] == pytest.approx(m["route_length_m"], rel=0.05)
+    assert 0 <= m["tracking_error_p95_m"] <= m["tracking_error_max_m"] < 0.05
+    assert 0 < m["min_clearance_m"] < m["mean_clearance_m"]
+    assert m["gap_to_grid_optimum"] == pytest.approx(0)
+    assert m["duration_s"] > direct / 0.7
+
+
+@pytest.mark.parametrize("planner", ["astar", "aco-han"])
+@pytest.mark.parametrize("robot", ["turtlebot", "jackal"])
+@pytest.mark.parametrize("name", sorted(catalogue()))
+def test_every_catalogue_world_is_driven(name: str, robot: str, planner: str) -> None:
+    result = run(Scenario.of(name, planner, robot))
+    fits = name != "no-path" and (robot == "turtlebot" or name not in TOO_NARROW_FOR_JACKAL)
+    assert result.outcome is (Outcome.SUCCEEDED if fits else Outcome.NO_PATH)
+    assert result.succeeded == fits
+    assert (result.certificate is not None) == fits
+
+
+TOO_NARROW_FOR_JACKAL: set[str] = set()
+
+
+def test_an_obstacle_put_on_the_route_after_planning_is_hit(collided_run: Run) -> None:
+    assert collided_run.outcome is Outcome.COLLIDED
+    assert not collided_run.succeeded
+    log, certificate = collided_run.rollout, collided_run.certificate
+    assert log is not None
+    assert certificate is not None
+    assert len(log.contacts) > 0
+    step, obstacle, distance, force = log.contacts[0]
+    assert log.meta["unseen"] == [int(obstacle)]
+    assert abs(log.clearance[int(step)]) < 0.01
+    assert distance <= 1e-4 or force > 0
+    assert not certificate.certified
+    assert not any("disagree" in problem for problem in certificate.problems)
+
+
+def test_no_path_is_an_outcome_with_a_reason(turtlebot: RobotSpec) -> None:
+    wall = tuple(Disc(2, 0.1 + 0.2 * i, 0.11) for i in range(15))
+    task = Task(World("cut", (0, 0, 4, 3), wall), (0.6, 1.5, 0), (3.4, 1.5), cell=0.2)
+    for planner in ("astar", "aco-han"):
+        result = run(Scenario(task=task, planner=find_planner(planner), robot=turtlebot))
+        assert result.outcome is Outcome.NO_PATH
+        assert result.rollout is None
+        assert result.plan.reason
+
+
+def test_a_goal_without_room_is_no_path(turtlebot: RobotSpec) -> None:
+    """The goal lies 2 cm from a disc: nothing within the tolerance lets the robot stand."""
+    task = Task(World("w", (0, 0, 4, 3), (Disc(3, 1.5, 0.3),)), (0.6, 1.5, 0), (2.68, 1.5), 0.05, 0.2)
+    result = run(Scenario(task=task, planner=find_planner("astar"), robot=turtlebot))
+    assert result.outcome is Outcome.NO_PATH
+    assert "goal" in result.plan.reason
+    near = replace(task, goal_tolerance=0.35)
+    assert run(Scenario(task=near, planner=find_planner("astar"), robot=turtlebot)).succeeded
+
+
+def test_a_budget_that_ends_first_is_told(small_scenario: Scenario) -> None:
+    blind = find_planner("aco-han", ants=1, iterations=1, max_steps=2)
+    result = run(replace(small_scenario, planner=blind))
+    assert result.outcome is Outcome.STOPPED
+    assert result.plan.reason
+
+
+def test_time_runs_out(small_scenario: Scenario) -> None:
+    result = run(replace(small_scenario, time_limit=1.0))
+    assert result.outcome is Outcome.TIMED_OUT
+    assert result.rollout is not None
+    assert result.rollout.t[-1] == pytest.approx(1.0)
+    assert result.certificate is not None
+    assert result.certificate.certified  # it touched nothing, as far as it came
+    assert not result.succeeded
+
+
+def test_a_robot_that_cannot_move_is_stuck(small_scenario: Scenario) -> None:
+    powerless = replace(small_scenario.robot, wheel_torque=1e-4)
+    result = run(replace(small_scenario, robot=powerless))
+    assert result.outcome is Outcome.STUCK
+    assert result.rollout is not None
+    assert result.rollout.t[-1] < 12
+
+
+def test_a_start_that_touches_is_a_collision_at_once(turtlebot: RobotSpec) -> None:
+    task = Task(World("w", (0, 0, 4, 3), (Disc(0.6, 1.5, 0.1),)), (0.85, 1.5, 0), (3.4, 1.5), cell=0.2)
+    result = run(Scenario(task=task, planner=find_planner("astar"), robot=turtlebot))
+    assert result.outcome is Outcome.COLLIDED
+    assert result.rollout is not None
+    assert result.rollout.contacts[0, 0] == 0
+
+
+def test_a_route_through_an_obstacle_ends_in_contact_not_in_a_loop(turtlebot: RobotSpec) -> None:
+    """The controller trusts no planner: it creeps up to the obstacle and the outcome is told."""
+    task = Task(World("w", (0, 0, 4, 3), (Disc(2, 1.5, 0.3),)), (0.6, 1.5, 0), (3.4, 1.5))
+    controller = PurePursuit()
+    guide = controller.guide(Route(np.array([(0.6, 1.5), (3.4, 1.5)])), task.world, turtlebot, 0.05, 1 / 60)
+    with Engine(task.world, turtlebot) as engine:
+        log = drive(engine, controller, guide, task, time_limit=120)
+    assert log.outcome in (Outcome.COLLIDED, Outcome.STUCK)
+
+
+def test_the_control_rate_must_divide_the_physics_rate(small_scenario: Scenario) -> None:
+    with pytest.raises(ValueError, match="control_hz: must divide"):
+        run(replace(small_scenario, control_hz=70))
+
+
+def test_other_rates_arrive_too(small_scenario: Scenario) -> None:
+    for physics, control in ((120, 60), (240, 30), (240, 240)):
+        assert run(replace(small_scenario, physics_hz=physics, control_hz=control)).succeeded
+
+
+def test_the_same_scenario_gives_the_same_bits_in_any_order(small_scenario: Scenario, small_run: Run) -> None:
+    assert small_run.rollout is not None
+    digest = small_run.rollout.digest
+    ants = replace(small_scenario, planner=find_planner("aco-han", ants=50, iterations=5))
+    first = run(ants).rollout
+    run(replace(small_scenario, unseen=(Disc(1.5, 2.5, 0.2),)))
+    again, second = run(small_scenario).rollout, run(ants).rollout
+    assert again is not None
+    assert first is not None
+    assert second is not None
+    assert again.digest == digest
+    assert first.digest == second.digest
+    other = run(replace(ants, seed=1)).rollout
+    assert other is not None
+    assert other.digest != first.digest
+
+
+def test_the_same_scenario_gives_the_same_bits_in_another_process(small_run: Run, tmp_path: Path) -> None:
+    from worlds import save_task
+
+    assert small_run.rollout is not None
+    save_task(small_run.scenario.task, tmp_path / "small.yaml")
+    code = (
+        "import sys; from sim import Scenario, run\n"
+        "print(run(Scenario.of(sys.argv[1], 'astar', 'turtlebot')).rollout.digest)"
+    )
+    command = [sys.executable, "-c", code, str(tmp_path / "small.yaml")]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.split()[-1] == small_run.rollout.digest
+
+
+def test_settings_out_of_range_are_refused(small_scenario: Scenario) -> None:
+    with pytest.raises(ValueError, match="margin: must be at least 0"):
+        replace(small_scenario, margin=-0.1)
+    with pytest.raises(InputError, match="did you mean"):
+        Scenario.of("empti")
+
+
+def test_the_planner_does_not_see_what_is_unseen(small_run: Run, collided_run: Run) -> None:
+    np.testing.assert_array_equal(small_run.plan.cells, collided_run.plan.cells)
+
+
+def test_load_task_of_a_catalogue_name_is_used_by_of() -> None:
+    assert Scenario.of("empty").task == load_task("empty")
