@@ -1,8 +1,13 @@
 from .certificate import Certificate as Certificate
 from .certificate import certify as certify
 from .engine import Engine as Engine
+from .filming.video import FilmInfo as FilmInfo
+from .filming.video import film as film
+from .filming.video import still as still
 from .metrics import METRICS as METRICS
 from .metrics import measure as measure
+from .plots import overview as overview
+from .plots import plan_figure as plan_figure
 from .rollout import Outcome as Outcome
 from .rollout import Rollout as Rollout
 from .scenario import Run as Run

@@ -144,8 +144,8 @@ def render(
 
     log = Rollout.load(rollout)
     shape = _size(size)
-    if out.suffix == ".png":
-        from sim.video import still
+    if out.suffix.lower() == ".png":
+        from sim.filming.video import still
 
         still(log, out, camera=camera, size=shape, note=_note(log))
         facts: dict[str, Any] = {"file": str(out), "frames": 1}
@@ -434,7 +434,7 @@ def _write(result: Run, folder: Path, video: Path | None) -> dict[str, str]:
 
 
 def _film(log: Any, path: Path, **options: Any) -> dict[str, Any]:
-    from sim.video import film
+    from sim.filming.video import film
 
     with bar("filming") as progress:
         info = film(log, path, note=_note(log), progress=progress, **options)
@@ -448,9 +448,9 @@ def _film(log: Any, path: Path, **options: Any) -> dict[str, Any]:
 
 
 def _check_film(path: Path) -> None:
-    from sim.video import ENCODERS
+    from sim.filming.video import ENCODERS
 
-    if path.suffix not in ENCODERS:
+    if path.suffix.lower() not in ENCODERS:
         raise InputError(f"--video {path}: films are written as {', '.join(ENCODERS)}")
 
 

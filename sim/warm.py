@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+import tempfile
 from dataclasses import replace
+from pathlib import Path
 
 from planners import PLANNERS
 from robots import load_robot
+from sim.filming.video import film
 from sim.scenario import Scenario, plan, run
 from worlds import Disc, Task, World
 
 
 def warm() -> None:
-    """Plan with every planner and drive once, in a world so small that compiling is all it costs."""
+    """Plan with every planner drive once and film it, in a world so small that compiling is all it costs."""
     world = World("warm", (0.0, 0.0, 3.0, 3.0), (Disc(1.5, 1.5, 0.2),))
     task = Task(world, (0.75, 0.75, 0.0), (2.25, 2.25), cell=0.25)
     scenario = Scenario(task=task, planner=PLANNERS["astar"], robot=load_robot("turtlebot"))
     for planner in PLANNERS.values():
         plan(replace(scenario, planner=planner))
-    run(scenario)
+    log = run(scenario).rollout
+    assert log is not None
+    with tempfile.TemporaryDirectory() as folder:
+        film(log, Path(folder) / "warm.mp4", size=(160, 160), fps=2)
 
 
 if __name__ == "__main__":

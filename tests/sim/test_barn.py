@@ -25,9 +25,7 @@ def barn(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize(
-    "number", [pytest.param(n, marks=[] if n % 30 == 0 else [pytest.mark.slow]) for n in WORLDS]
-)
+@pytest.mark.parametrize("number", [pytest.param(n, marks=[] if n % 30 == 0 else [pytest.mark.slow]) for n in WORLDS])
 def test_the_jackal_drives_a_barn_world(number: int, barn: Path, jackal: RobotSpec) -> None:
     task = import_barn(barn / f"world_{number}.world")
     result = run(Scenario(task=task, planner=find_planner("astar"), robot=jackal))

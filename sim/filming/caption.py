@@ -1,0 +1,201 @@
+"""What a film says: a band below the picture with names and numbers, a legend in its corner, the outcome at its end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image, ImageDraw
+
+from sim.colours import BAD, BAND, CALM, DOUBT, GOOD, INK, MOVER, MUTED, ROUTE, UNSEEN, ZONE, Colour, speed_colours
+from sim.filming import _kernels_paint as kernels
+from sim.filming.lettering import Sprite, fitted, font, pill, plate, text_width
+from sim.filming.scene import Scene
+from sim.rollout import Outcome
+
+Picture = npt.NDArray[np.uint8]  # (H, W, 3)
+
+VERDICTS: dict[Outcome, tuple[str, Colour]] = {
+    Outcome.SUCCEEDED: ("✓ SUCCEEDED", GOOD),
+    Outcome.COLLIDED: ("✕ COLLIDED", BAD),
+    Outcome.TIMED_OUT: ("TIMED OUT", DOUBT),
+    Outcome.STUCK: ("STUCK", DOUBT),
+    Outcome.NO_PATH: ("NO PATH", DOUBT),
+    Outcome.STOPPED: ("STOPPED", DOUBT),
+}
+DRIVING = ("DRIVING", CALM)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """The numbers of one frame."""
+
+    time: float  # [s]
+    speed: float  # [m/s]
+    clearance: float  # [m]
+    least: float  # the smallest clearance so far [m]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Sizes of lettering and band for a frame [px]."""
+
+    width: int
+    unit: int  # height of small text
+    wide: bool  # whether names, numbers and outcome fit beside each other
+    card: bool  # whether the legend is a card in the picture's corner; else it is a row of the band
+    height: int  # of the band
+
+    @classmethod
+    def of(cls, size: tuple[int, int], card: bool) -> Layout:
+        """The layout for a frame of a size."""
+        width, height = size
+        wide = width >= 1.5 * height and width >= 900
+        unit = max(8, round(min(height / 46, width / (82 if wide else 56))))
+        rows = (4.7 if wide else 7.8) + (0.0 if card else 1.9)
+        return cls(width, unit, wide, card, 2 * round(rows * unit / 2))
+
+
+class Band:
+    """The band below the picture. What never changes is drawn once."""
+
+    def __init__(self, layout: Layout, title: str, subtitle: str, note: str | None, entries: list[Entry]) -> None:
+        self.layout = layout
+        unit, width, wide = layout.unit, layout.width, layout.wide
+        self._blank = Image.new("RGB", (width, layout.height), BAND)
+        draw = ImageDraw.Draw(self._blank)
+        draw.line([(0, 0), (width, 0)], fill=(210, 216, 225), width=max(1, unit // 8))
+        pad, big, small = unit, round(1.35 * unit), round(0.86 * unit)
+        numbers, column = (round(0.36 * width), 8 * unit) if wide else (pad, (width - pad) // 4)
+        self._fields = [(numbers + k * column, round((0.75 if wide else 4.25) * unit)) for k in range(4)]
+        note_room = width - self._fields[3][0] - column - pad if wide else width // 2
+        shown = fitted(note or "", note_room, small, True)
+        room = numbers - 2 * pad if wide else width - _widest_verdict(unit) - 3 * pad
+        subroom = room if wide else width - text_width(shown, small, True) - 3 * pad
+        draw.text((pad, 0.6 * unit), fitted(title, room, big, True), font=font(big, True), fill=INK)
+        draw.text((pad, 2.45 * unit), fitted(subtitle, subroom, unit), font=font(unit), fill=MUTED)
+        draw.text((width - pad, (3.75 if wide else 3.3) * unit), shown, font=font(small, True), fill=CALM, anchor="rm")
+        for (x, y), name in zip(self._fields, ("TIME", "SPEED", "CLEARANCE", "MINIMUM"), strict=True):
+            draw.text((x, y), name, font=font(round(0.82 * unit), True), fill=MUTED)
+        if not layout.card:
+            _legend_row(draw, entries, layout)
+
+    def draw(self, reading: Reading, verdict: tuple[str, Colour]) -> Picture:
+        """The band (h, W, 3) with the numbers of one frame."""
+        unit = self.layout.unit
+        image = self._blank.copy()
+        draw = ImageDraw.Draw(image)
+        values = (
+            f"{reading.time:.1f} s",
+            f"{reading.speed:.2f} m/s",
+            _metres(reading.clearance),
+            _metres(reading.least),
+        )
+        alarm = (False, False, reading.clearance <= 0, reading.least <= 0)
+        for (x, y), text, bad in zip(self._fields, values, alarm, strict=True):
+            draw.text((x, y + 1.15 * unit), text, font=font(round(1.4 * unit), True), fill=BAD if bad else INK)
+        band = np.array(image)
+        plate_ = pill(verdict[0], round(1.08 * unit), verdict[1])
+        kernels.put_sprite(band, plate_, self.layout.width - unit - plate_.shape[1], round(0.5 * unit), 1.0)
+        return band
+
+
+def _widest_verdict(unit: int) -> int:
+    size = round(1.08 * unit)
+    widest = max(text_width(text, size, True) for text, _ in (*VERDICTS.values(), DRIVING))
+    return widest + 2 * round(0.75 * size)
+
+
+def _metres(value: float) -> str:
+    if not abs(value) < 99:
+        return "—"
+    return f"{value + 0.0 if abs(value) >= 5e-4 else 0.0:.3f} m"
+
+
+class Entry(NamedTuple):
+    """A line of the legend."""
+
+    kind: str  # how its sample is drawn
+    colour: Colour
+    text: str
+
+
+def entries_for(scene: Scene, step: float) -> list[Entry]:
+    """What the legend of a scene with grid lines every `step` metres tells."""
+    found = [
+        Entry("ramp", INK, f"speed, 0 to {scene.robot.max_speed:.3g} m/s"),
+        Entry("dash", ROUTE, "planned route"),
+    ]
+    if scene.inflate > 0:
+        found.append(Entry("zone", ZONE, f"inflated by {scene.inflate:.2f} m"))
+    if scene.unseen.any():
+        found.append(Entry("dot", UNSEEN, "placed after planning"))
+    if scene.mover_radii:
+        found.append(Entry("dot", MOVER, "moving obstacle"))
+    return [*found, Entry("grid", MUTED, f"grid {step:g} m")]
+
+
+def legend_card(entries: list[Entry], layout: Layout) -> Sprite:
+    """The legend as a card."""
+    size = max(8, round(0.9 * layout.unit))
+    line, pad, key = round(1.55 * size), round(0.8 * size), round(2.6 * size)
+    wide = 2 * pad + key + size // 2 + max(text_width(entry.text, size) for entry in entries)
+    image = plate(wide, 2 * pad + line * len(entries), (255, 255, 255), 222, radius=size // 2)
+    draw = ImageDraw.Draw(image)
+    for k, entry in enumerate(entries):
+        middle = pad + line * k + line / 2
+        _key(draw, entry, pad, middle, key, size)
+        draw.text((pad + key + size // 2, middle), entry.text, font=font(size), fill=INK, anchor="lm")
+    return np.array(image)
+
+
+def _legend_row(draw: ImageDraw.ImageDraw, entries: list[Entry], layout: Layout) -> None:
+    """The legend as the last row of a band."""
+    unit = layout.unit
+    middle = layout.height - 1.15 * unit
+    draw.line([(unit, middle - 1.05 * unit), (layout.width - unit, middle - 1.05 * unit)], fill=(226, 230, 237))
+    size = max(7, round(0.9 * unit))
+    while True:
+        keys = [round((2.2 if entry.kind in ("ramp", "dash", "zone") else 1.0) * size) for entry in entries]
+        widths = [key + 0.5 * size + text_width(entry.text, size) for key, entry in zip(keys, entries, strict=True)]
+        gap = (layout.width - 2 * unit - sum(widths)) / max(1, len(entries) - 1)
+        if gap >= size or size <= 7:
+            break
+        size -= 1
+    x, gap = float(unit), min(gap, 2.5 * size)
+    for entry, key, width in zip(entries, keys, widths, strict=True):
+        _key(draw, entry, round(x), middle, key, size)
+        draw.text((x + key + 0.5 * size, middle), entry.text, font=font(size), fill=INK, anchor="lm")
+        x += width + gap
+
+
+def _key(draw: ImageDraw.ImageDraw, entry: Entry, x: int, y: float, wide: int, size: int) -> None:
+    """The sample beside a line of the legend."""
+    kind, colour, _ = entry
+    r = 0.42 * size
+    if kind == "ramp":
+        for i, tint in enumerate(speed_colours(np.linspace(0, 1, wide))):
+            draw.line([(x + i, y - 0.22 * size), (x + i, y + 0.22 * size)], fill=tuple(int(c) for c in tint))
+    elif kind == "dash":
+        for start in np.arange(x, x + wide - 1, wide / 3):
+            draw.line([(start, y), (start + wide / 5, y)], fill=colour, width=max(2, size // 6))
+    elif kind == "zone":
+        pale = tuple(round(238 + (c - 238) * 0.3) for c in colour)
+        draw.rounded_rectangle((x, y - 0.4 * size, x + wide, y + 0.4 * size), size // 4, fill=pale, outline=colour)
+    elif kind == "dot":
+        draw.ellipse((x + wide / 2 - r, y - r, x + wide / 2 + r, y + r), fill=colour)
+    else:
+        draw.rectangle((x + wide / 2 - r, y - r, x + wide / 2 + r, y + r), outline=(150, 160, 175))
+
+
+def banner(outcome: Outcome, layout: Layout) -> Sprite:
+    """The outcome as a sentence, for the end of a film."""
+    name, colour = VERDICTS[outcome]
+    sentence = outcome.value[0].upper() + outcome.value[1:]
+    size = round(1.5 * layout.unit)
+    text = f"{name[0]}  {sentence}" if name[0] in "✓✕" else sentence
+    while size > 8 and text_width(text, size, True) > 0.86 * layout.width:
+        size -= 1
+    return pill(text, size, colour)

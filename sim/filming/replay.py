@@ -1,0 +1,118 @@
+"""A log read at any moment: poses between its rows, wheel angles, the trail, contacts."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from sim.filming.scene import Scene
+from sim.rollout import Rollout
+
+Floats = npt.NDArray[np.float64]
+
+SMOOTHING = 0.6  # a following camera looks at the mean place of this long before and after [s]
+
+
+class Replay:
+    """A run as functions of time [s]."""
+
+    def __init__(self, rollout: Rollout) -> None:
+        scene = Scene.of(rollout)
+        robot = scene.robot
+        rows = max(1, len(rollout.t))
+        self.t = rollout.t if len(rollout.t) else np.zeros(1)
+        pose = rollout.pose if len(rollout.pose) else np.array([scene.start])
+        self._pose = np.column_stack([pose[:, :2], np.unwrap(pose[:, 2])])
+        self._twist = rollout.twist if len(rollout.twist) else np.zeros((rows, 2))
+        self._clearance = rollout.clearance if len(rollout.clearance) else np.full(rows, np.nan)
+        self._least = np.minimum.accumulate(self._clearance)
+        self._movers = rollout.movers
+        rim = self._twist[:, 1] * robot.track / 2
+        steps = np.diff(self.t)
+        self._angles = []
+        for speeds in (self._twist[:, 0] - rim, self._twist[:, 0] + rim):
+            turned = (speeds[1:] + speeds[:-1]) / 2 * steps / robot.wheel_radius
+            self._angles.append(np.concatenate([[0.0], np.cumsum(turned)]))
+        self._contact_times = self.t[np.clip(rollout.contacts[:, 0].astype(np.int64), 0, rows - 1)]
+        self._contact_points = [
+            contact_point(scene, self._pose[min(int(step), rows - 1)], int(index))
+            for step, index in rollout.contacts[:1, :2]
+        ]
+
+    @property
+    def duration(self) -> float:
+        """How long the run took [s]."""
+        return float(self.t[-1] - self.t[0])
+
+    def pose(self, at: float) -> tuple[float, float, float]:
+        """Where the robot is."""
+        x, y, yaw = (float(np.interp(at, self.t, column)) for column in self._pose.T)
+        return x, y, yaw
+
+    def smooth(self, at: float) -> tuple[float, float]:
+        """Where the robot is around a moment, on average."""
+        moments = at + SMOOTHING * np.linspace(-1, 1, 25)
+        x, y = (float(np.interp(moments, self.t, self._pose[:, axis]).mean()) for axis in (0, 1))
+        return x, y
+
+    def wheels(self, at: float) -> tuple[float, float]:
+        """How far the left and the right wheel have turned [rad]."""
+        left, right = (float(np.interp(at, self.t, angle)) for angle in self._angles)
+        return left, right
+
+    def movers(self, at: float) -> Floats:
+        """Where the moving obstacles are (M, 2)."""
+        count = self._movers.shape[1] if self._movers.ndim == 3 else 0
+        places = [[np.interp(at, self.t, self._movers[:, m, axis]) for axis in (0, 1)] for m in range(count)]
+        return np.array(places, dtype=np.float64).reshape(-1, 2)
+
+    def speed(self, at: float) -> float:
+        """The measured forward speed [m/s]; standing reads 0, not -0."""
+        return float(np.interp(at, self.t, self._twist[:, 0])) + 0.0
+
+    def clearance(self, at: float) -> float:
+        """The distance to what is nearest [m]."""
+        return float(np.interp(at, self.t, self._clearance))
+
+    def least_clearance(self, at: float) -> float:
+        """The smallest distance in any row so far [m]."""
+        return float(self._least[self._row(at)])
+
+    def trail(self, since: float, until: float) -> tuple[Floats, Floats]:
+        """Points (N, 2) driven through between two moments, and the speeds (N,) there."""
+        count = max(2, math.ceil((until - since) * 60) + 1)
+        moments = np.linspace(since, until, count)
+        points = np.column_stack([np.interp(moments, self.t, self._pose[:, axis]) for axis in (0, 1)])
+        return points, np.interp(moments, self.t, self._twist[:, 0])
+
+    def touched(self, at: float) -> tuple[float, float, float] | None:
+        """Where the first contact was, and how long ago the latest began or went on [s]; None before any."""
+        past = self._contact_times[self._contact_times <= at + 1e-9]
+        if not len(past):
+            return None
+        x, y = self._contact_points[0]
+        return x, y, float(at - past.max())
+
+    def _row(self, at: float) -> int:
+        return int(np.clip(np.searchsorted(self.t, at + 1e-9, side="right") - 1, 0, len(self.t) - 1))
+
+
+def contact_point(scene: Scene, pose: npt.ArrayLike, index: int) -> tuple[float, float]:
+    """The point of an obstacle or wall (left, right, bottom, top) that is nearest to the robot's footprint."""
+    x, y, yaw = (float(value) for value in np.asarray(pose))
+    foot = scene.robot.footprint
+    if index >= len(scene.obstacles):
+        x0, y0, x1, y1 = scene.bounds
+        wall = index - len(scene.obstacles)
+        return ((x0, y), (x1, y), (x, y0), (x, y1))[wall % 4]
+    ox, oy, radius, _ = (float(value) for value in scene.obstacles[index])
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    ahead = min(max((ox - x) * cosine + (oy - y) * sine, -foot.half_length), foot.half_length)
+    aside = min(max((oy - y) * cosine - (ox - x) * sine, -foot.half_width), foot.half_width)
+    nx, ny = x + ahead * cosine - aside * sine, y + ahead * sine + aside * cosine
+    gap = math.hypot(nx - ox, ny - oy)
+    if gap < 1e-9:
+        return ox, oy
+    return ox + radius * (nx - ox) / gap, oy + radius * (ny - oy) / gap

@@ -1,0 +1,242 @@
+"""Films of a run: a replay of its log, so that physics never waits for pixels and an old run can be filmed again.
+
+Frames go straight to the encoder, one at a time; a film's length costs no memory. A file appears when it is complete.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image
+
+from sim.colours import CONTACT, GOAL, START
+from sim.filming import _kernels_paint as kernels
+from sim.filming.camera import CAMERAS, Camera, camera_for
+from sim.filming.caption import DRIVING, VERDICTS, Band, Layout, Reading, banner, entries_for, legend_card
+from sim.filming.encode import ENCODERS as ENCODERS
+from sim.filming.encode import encoding, known_suffix
+from sim.filming.lettering import Sprite, burst, label
+from sim.filming.model import robot_height
+from sim.filming.paint import grid_step
+from sim.filming.replay import Replay
+from sim.filming.scene import Scene
+from sim.filming.stage import Stage, drawn_height
+from sim.rollout import Rollout
+from worlds.atomic import written_whole
+from worlds.errors import InputError
+
+Picture = npt.NDArray[np.uint8]  # (H, W, 3)
+
+HOLD = 1.0  # the last picture stays this long [s]
+FLASH = 0.45  # a contact flashes this long [s]
+
+
+@dataclass(frozen=True)
+class FilmInfo:
+    """What was filmed."""
+
+    path: Path
+    frames: int
+    size: tuple[int, int]  # [px]
+    fps: float
+    camera: str
+    wall_s: float  # how long rendering and encoding took [s]
+    renderer: str = "TinyRenderer"
+
+    @property
+    def duration_s(self) -> float:
+        """The film's length [s]."""
+        return self.frames / self.fps
+
+
+def film(
+    rollout: Rollout,
+    path: str | Path,
+    *,
+    camera: str = "oblique",
+    size: tuple[int, int] = (1280, 720),
+    fps: float = 30.0,
+    speed: float = 1.0,
+    note: str | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> FilmInfo:
+    """Film a run as MP4 (H.264), GIF or WebP by the file's suffix, `speed` times as fast as it happened.
+
+    `note` is a line of the caption, for example what a certificate says. `progress` is told the fraction that is done.
+
+    Raises:
+        InputError: an unknown camera or suffix, an odd or tiny size, a rate or speed that is not positive.
+        OSError: the encoder could not write the film.
+    """
+    target = Path(path)
+    known_suffix(target)
+    _check(camera, size, fps, speed)
+    started = time.perf_counter()
+    with Shot(rollout, camera=camera, size=size, note=note) as shot, written_whole(target) as temporary:
+        times = frame_times(shot.replay.duration, fps, speed)
+        hold = round(HOLD * fps)
+        total = len(times) + hold
+        with encoding(temporary, size, fps) as send:
+            for k, at in enumerate(times):
+                send(shot.picture(at, flash=FLASH * speed))
+                if progress is not None:
+                    progress((k + 1) / total)
+            last = shot.ending(flash=FLASH * speed)
+            for k in range(hold):
+                send(last)
+                if progress is not None:
+                    progress((len(times) + k + 1) / total)
+    return FilmInfo(target, total, size, float(fps), camera, time.perf_counter() - started)
+
+
+def still(
+    rollout: Rollout,
+    path: str | Path,
+    t: float | None = None,
+    *,
+    camera: str = "oblique",
+    size: tuple[int, int] = (1280, 720),
+    note: str | None = None,
+) -> Path:
+    """One picture of a run at a time [s], as PNG; without a time, how it ended.
+
+    Raises:
+        InputError: an unknown camera, a suffix other than .png, an odd or tiny size.
+    """
+    target = Path(path)
+    if target.suffix.lower() != ".png":
+        raise InputError(f"{target}: unknown suffix {target.suffix!r}; choose .png")
+    _check(camera, size, 1.0, 1.0)
+    with Shot(rollout, camera=camera, size=size, note=note) as shot:
+        picture = shot.ending() if t is None else shot.picture(min(max(float(t), 0.0), shot.replay.duration))
+    with written_whole(target) as temporary:
+        Image.fromarray(picture).save(temporary, format="PNG")
+    return target
+
+
+def frame_times(duration: float, fps: float, speed: float) -> npt.NDArray[np.float64]:
+    """The moments of a run [s] that a film's frames show: the first is 0, the last the end or less than a frame before."""
+    return np.arange(int(duration * fps / speed + 1e-9) + 1, dtype=np.float64) * (speed / fps)
+
+
+class Shot:
+    """A run before a camera, shown at moments that never go back. Use it in a `with` block."""
+
+    def __init__(self, rollout: Rollout, *, camera: str, size: tuple[int, int], note: str | None = None) -> None:
+        self.replay = Replay(rollout)
+        self.scene = scene = Scene.of(rollout)
+        self.outcome = rollout.outcome
+        self._follows = camera == "follow"
+        for card in (True, False):
+            self._layout = layout = Layout.of(size, card)
+            self._camera = self._aim(camera, rollout, (size[0], size[1] - layout.height))
+            entries = entries_for(scene, grid_step(self._camera))
+            self._legend = legend_card(entries, layout) if card else None
+            if self._legend is not None and self._free(self._legend):
+                break
+        planner = str(rollout.meta.get("planner", {}).get("name", "?"))
+        subtitle = f"planner {planner}  ·  robot {scene.robot.name}"
+        self._band = Band(layout, scene.name, subtitle, note, entries)
+        fine = 3 if size[0] * size[1] <= 400_000 and not self._follows else 2
+        self._stage = Stage(scene, self._camera, route=rollout.route, fine=fine)
+        self._end = banner(self.outcome, layout)
+        self._shown = 0.0
+
+    def __enter__(self) -> Shot:
+        self._stage.__enter__()
+        self._lay_labels()
+        return self
+
+    def __exit__(self, *problem: object) -> None:
+        self._stage.__exit__(*problem)
+
+    def picture(self, at: float, *, flash: float = FLASH) -> Picture:
+        """The frame (H, W, 3) at a moment of the run [s]; contacts flash for `flash` seconds of it."""
+        return self._compose(at, flash, DRIVING, None)
+
+    def ending(self, *, flash: float = FLASH) -> Picture:
+        """The frame that tells how it ended."""
+        return self._compose(self.replay.duration, flash, VERDICTS[self.outcome], self._end)
+
+    def _compose(
+        self, at: float, flash: float, verdict: tuple[str, tuple[int, int, int]], end: Sprite | None
+    ) -> Picture:
+        replay, stage = self.replay, self._stage
+        if self._follows:
+            stage.look(self._camera.moved(*replay.smooth(at)))
+        if at > self._shown:
+            stage.drive(*replay.trail(self._shown, at))
+            self._shown = at
+        view = stage.frame(replay.pose(at), replay.wheels(at), replay.movers(at))
+        self._mark_contacts(view, at, flash, last=end is not None)
+        unit = self._layout.unit
+        if self._legend is not None:
+            kernels.put_sprite(view, self._legend, unit, unit, 1.0)
+        if end is not None:
+            high = stage.pixel(*replay.pose(at)[:2])[1] < 0.4 * view.shape[0]  # the robot is: say it below
+            top = view.shape[0] - end.shape[0] - round(1.2 * unit) if high else round(1.2 * unit)
+            kernels.put_sprite(view, end, (view.shape[1] - end.shape[1]) // 2, top, 1.0)
+        reading = Reading(at, replay.speed(at), replay.clearance(at), replay.least_clearance(at))
+        return np.vstack([view, self._band.draw(reading, verdict)])
+
+    def _aim(self, camera: str, rollout: Rollout, size: tuple[int, int]) -> Camera:
+        """A camera that sees the whole task or, where it follows, the robot's surroundings."""
+        scene = self.scene
+        tall = drawn_height(scene)
+        if camera == "follow":
+            reach = max(1.2, 7 * scene.robot.footprint.radius)
+            return camera_for(camera, (-reach, -0.6 * reach), (reach, 0.6 * reach), tall, size)
+        low, high = scene.region(np.vstack([rollout.pose[:, :2], rollout.route]))
+        return camera_for(camera, low, high, tall, size)
+
+    def _free(self, card: Sprite) -> bool:
+        """Whether a card in the upper left corner leaves the world uncovered."""
+        if self._follows:
+            return True
+        x0, y0, x1, y1 = self.scene.bounds
+        along = np.linspace(0, 1, 33)
+        edge = np.concatenate(
+            [np.column_stack([x0 + (x1 - x0) * along, np.full(33, y)]) for y in (y0, y1)]
+            + [np.column_stack([np.full(33, x), y0 + (y1 - y0) * along]) for x in (x0, x1)]
+        )
+        at = self._camera.pixels(np.column_stack([edge, np.zeros(len(edge))]))
+        reach = np.array([card.shape[1], card.shape[0]]) + 1.3 * self._layout.unit
+        return not bool((at < reach).all(axis=1).any())
+
+    def _lay_labels(self) -> None:
+        size = self._layout.unit
+        scene = self.scene
+        radius = scene.robot.footprint.radius
+        start = (*scene.start[:2], 1.3 * radius)
+        for (x, y, reach), text, colour in (
+            (start, "START", START), ((*scene.goal, scene.goal_tolerance), "GOAL", GOAL)
+        ):  # fmt: skip
+            self._stage.write(label(text, round(0.95 * size), colour), x, y, reach)
+
+    def _mark_contacts(self, view: Picture, at: float, flash: float, last: bool) -> None:
+        touched = self.replay.touched(at)
+        if touched is None:
+            return
+        x, y, age = touched
+        size = 2 * round(2.2 * self._layout.unit)
+        px, py = self._stage.pixel(x, y, robot_height(self.scene.robot) / 2)
+        kernels.put_sprite(view, burst(size, CONTACT), round(px - size / 2), round(py - size / 2), 1.0)
+        fresh = max(0.0, 1.0 - age / flash)
+        edge, tint = (0.75, 0.0) if last else (fresh, 0.25 * fresh)
+        if edge > 0:
+            kernels.flash(view, np.array(CONTACT, dtype=np.float64), 0.9 * self._layout.unit, edge, tint)
+
+
+def _check(camera: str, size: tuple[int, int], fps: float, speed: float) -> None:
+    if camera not in CAMERAS:
+        raise InputError(f"camera: unknown camera {camera!r}; choose one of {', '.join(CAMERAS)}")
+    if len(size) != 2 or any(side % 2 or not 160 <= side <= 4096 for side in size):
+        raise InputError(f"size: width and height must be even numbers from 160 to 4096, got {size}")
+    for key, value in (("fps", fps), ("speed", speed)):
+        if not 0 < value <= 240:
+            raise InputError(f"{key}: must be greater than 0 and at most 240, got {value:g}")

@@ -1,0 +1,111 @@
+"""What the tests of films and figures share: a made-up drive along a smooth curve among cylinders, without physics."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sim.rollout import Rollout
+
+
+@pytest.fixture(scope="session")
+def made_up_drive() -> Callable[..., Rollout]:
+    return _made_up_drive
+
+
+def _made_up_drive(
+    *,
+    obstacles: int = 20,
+    seconds: float = 1.0,
+    collide: bool = False,
+    square: bool = False,
+    movers: int = 0,
+    size: tuple[float, float] = (4.0, 3.0),
+    outcome: str = "succeeded",
+) -> Rollout:
+    """A rollout with metadata of the usual form; `collide` puts a cylinder in the way and ends there."""
+    rng = np.random.default_rng(7)
+    hz, radius = 240, 0.18
+    t = np.arange(round(seconds * hz) + 1) / hz
+    share = 0.5 - 0.5 * np.cos(np.pi * t / seconds)
+    x = size[0] * (0.12 + 0.76 * share)
+    y = size[1] * (0.5 + 0.25 * np.sin(2 * np.pi * share))
+    dx, dy = np.gradient(x, t), np.gradient(y, t)
+    yaw = np.unwrap(np.arctan2(np.gradient(y, x + 1e-9 * t), 1.0))
+    pose = np.column_stack([x, y, yaw])
+    twist = np.column_stack([np.hypot(dx, dy), np.gradient(yaw, t)])
+    found: list[dict[str, float]] = []
+    for _ in range(20000):
+        if len(found) == obstacles:
+            break
+        r = rng.uniform(0.08, 0.2)
+        ox, oy = rng.uniform((r, r), (size[0] - r, size[1] - r))
+        free = all(math.hypot(ox - o["x"], oy - o["y"]) > r + o["radius"] for o in found)
+        if free and np.hypot(x - ox, y - oy).min() > r + 0.35:
+            found.append({"x": ox, "y": oy, "radius": r, "height": 0.5})
+    contacts = np.empty((0, 4))
+    if collide:
+        end = round(0.6 * len(t))
+        ahead = radius + 0.15
+        hit = {"x": x[end] + ahead * math.cos(yaw[end]), "y": y[end] + ahead * math.sin(yaw[end])}
+        found.append({**hit, "radius": 0.15, "height": 0.5})
+        t, pose, twist = t[: end + 1], pose[: end + 1], twist[: end + 1]
+        contacts = np.array([[end, len(found) - 1, -0.001, 25.0]])
+        outcome = "collided"
+    discs = np.array([(o["x"], o["y"], o["radius"]) for o in found]).reshape(-1, 3)
+    away = np.hypot(pose[:, None, 0] - discs[:, 0], pose[:, None, 1] - discs[:, 1]) - discs[:, 2] - radius
+    walls = np.minimum.reduce([pose[:, 0], size[0] - pose[:, 0], pose[:, 1], size[1] - pose[:, 1]]) - radius
+    foot = {"half_length": 0.2, "half_width": 0.15, "rounding": 0.0}
+    task: dict[str, Any] = {
+        "schema": 1,
+        "name": "made-up",
+        "bounds": [0.0, 0.0, *size],
+        "start": [float(value) for value in pose[0]],
+        "goal": [float(x[-1]), float(y[-1])],
+        "goal_tolerance": 0.2,
+        "cell": 0.25,
+        "obstacles": [{key: float(value) for key, value in o.items()} for o in found],
+        "movers": [{"radius": 0.12}] * movers,
+    }
+    meta = {
+        "schema": 1,
+        "task": task,
+        "unseen": [],
+        "robot": {
+            "name": "turtlebot",
+            "footprint": foot if square else {"half_length": 0.0, "half_width": 0.0, "rounding": radius},
+            "height": 0.2,
+            "mass": 3.0,
+            "wheel_radius": 0.04,
+            "track": 0.25,
+            "max_speed": float(twist[:, 0].max()) + 0.1,
+        },
+        "inflate": 0.23,
+        "margin": 0.05,
+        "planner": {"name": "mmas", "options": {}},
+        "outcome": outcome,
+        "physics_hz": hz,
+        "control_hz": 60,
+        "limiters": ["cruise", "curvature"],
+        "seed": 0,
+    }
+    places = np.empty((len(t), movers, 2))
+    for m in range(movers):
+        places[:, m] = np.column_stack([x[0] + 0.6 + m + 0 * t, y[0] + 0.5 * t])
+    return Rollout(
+        t=t,
+        pose=pose,
+        twist=twist,
+        command=twist * 1.01,
+        clearance=np.minimum(away.min(axis=1, initial=9.0), walls),
+        limiter=(np.abs(twist[:, 1]) > 1).astype(np.uint8),
+        movers=places,
+        contacts=contacts,
+        route=np.column_stack([x, y])[::24],
+        cells=np.empty((0, 2), dtype=np.int32),
+        meta=meta,
+    )
