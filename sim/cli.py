@@ -112,7 +112,8 @@ def plan(
     facts = {
         "world": scenario.task.world.name, "planner": planner, "robot": scenario.robot.name, "seed": seed,
         "status": answer.status.name.lower(), "sentence": answer.status.value, "reason": answer.reason,
-        "cost_m": answer.cost, "work": answer.work, "work_unit": answer.work_unit, "plan_s": answer.wall_s,
+        "cost_m": answer.cost, "length_m": answer.line_length,
+        "work": answer.work, "work_unit": answer.work_unit, "plan_s": answer.wall_s,
         "grid": {"rows": grid.shape[0], "cols": grid.shape[1], "cell": grid.cell, "inflate": grid.inflate},
         "options": {key: value if isinstance(value, bool | int | float | str | None) else str(value)
                     for key, value in answer.options.items()},
@@ -123,7 +124,7 @@ def plan(
     else:
         say(f"{scenario.task.world.name}: {planner} {answer.status.value}" + _because(answer.reason))
         if answer.solved:
-            say(f"  length {answer.cost:.3f} m over {len(answer.cells)} cells, {answer.work} {answer.work_unit}")
+            say(f"  length {answer.line_length:.3f} m over {len(answer.cells)} cells, {answer.work} {answer.work_unit}")
         say(f"  planned in {answer.wall_s * 1000:.1f} ms on {grid.shape[0]} x {grid.shape[1]} cells of {grid.cell:g} m")
         _tell_files(files)
     return SUCCEEDED if answer.solved else FAILED
@@ -478,7 +479,7 @@ def _tell(result: Run, files: dict[str, str]) -> None:
         facts = result.as_dict()["metrics"]
         say(
             f"  drove {facts['driven_length_m']:.2f} m in {facts['duration_s']:.1f} s "
-            f"(planned {facts['path_length_m']:.2f} m); tracking error at most {facts['tracking_error_max_m']:.3f} m"
+            f"(route {facts['route_length_m']:.2f} m); tracking error at most {facts['tracking_error_max_m']:.3f} m"
         )
         c = result.certificate
         verdict = "certified collision-free" if c.certified else "NOT certified"

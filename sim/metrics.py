@@ -13,12 +13,13 @@ from sim.rollout import Outcome, Rollout
 
 Floats = npt.NDArray[np.float64]
 
+BARN_SPEED = 2.0  # the challenge's reference [m/s]
 JERK_WINDOW = 0.1  # measured speed is averaged over this long before it is differentiated [s]
 
 
 def path_length_m(rollout: Rollout) -> float:
-    """Length of the planned cells."""
-    return float(rollout.meta["plan"]["cost_m"])
+    """Length of the planned path: of its cells, or of a planner's own any-angle line."""
+    return float(rollout.meta["plan"]["length_m"])
 
 
 def route_length_m(rollout: Rollout) -> float:
@@ -32,9 +33,29 @@ def driven_length_m(rollout: Rollout) -> float:
 
 
 def gap_to_grid_optimum(rollout: Rollout) -> float:
-    """Planned length over Dijkstra's on the same moves, minus 1."""
-    optimum = float(rollout.meta["plan"]["grid_optimum_m"])
-    return path_length_m(rollout) / optimum - 1 if optimum > 0 else 0.0
+    """Planned length over Dijkstra's on the same moves, minus 1; any-angle lines fall below 0."""
+    return _over(path_length_m(rollout), rollout.meta["plan"]["grid_optimum_m"])
+
+
+def gap_to_euclidean_optimum(rollout: Rollout) -> float:
+    """Route over the exact shortest path among the inflated discs, minus 1."""
+    return _over(route_length_m(rollout), rollout.meta["plan"]["euclidean_optimum_m"])
+
+
+def spl(rollout: Rollout) -> float:
+    """Success weighted by path length (Anderson et al. 2018): optimum / max(driven, optimum), 0 without success."""
+    optimum = float(rollout.meta["plan"]["euclidean_optimum_m"])
+    if not succeeded(rollout) or not math.isfinite(optimum):
+        return 0.0
+    return optimum / max(driven_length_m(rollout), optimum)
+
+
+def barn(rollout: Rollout) -> float:
+    """The BARN challenge's score: OT / clip(duration, 2 OT, 8 OT), OT = optimum / 2 m/s; at most 0.5, 0 without success."""
+    fastest = float(rollout.meta["plan"]["euclidean_optimum_m"]) / BARN_SPEED
+    if not succeeded(rollout) or not math.isfinite(fastest):
+        return 0.0
+    return fastest / min(max(duration_s(rollout), 2 * fastest), 8 * fastest)
 
 
 def min_clearance_m(rollout: Rollout) -> float:
@@ -88,6 +109,9 @@ METRICS: Mapping[str, Callable[[Rollout], float]] = MappingProxyType(
         "route_length_m": route_length_m,
         "driven_length_m": driven_length_m,
         "gap_to_grid_optimum": gap_to_grid_optimum,
+        "gap_to_euclidean_optimum": gap_to_euclidean_optimum,
+        "spl": spl,
+        "barn": barn,
         "min_clearance_m": min_clearance_m,
         "mean_clearance_m": mean_clearance_m,
         "tracking_error_max_m": tracking_error_max_m,
@@ -122,6 +146,10 @@ def tracking_error(rollout: Rollout) -> Floats:
         f = np.clip((offset * along).sum(axis=2) / length2, 0, 1)
         error[rows] = np.linalg.norm(offset - f[:, :, None] * along, axis=2).min(axis=1)
     return error
+
+
+def _over(length: float, optimum: float) -> float:
+    return length / optimum - 1 if 0 < optimum < math.inf else math.nan
 
 
 def _length(xy: Floats) -> float:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from planners import AStar, Planner, PlanResult, PlanStatus, Query, find_planner, route_along
+from planners import PLANNERS, Planner, PlanResult, PlanStatus, Query, find_planner, route_along
 from robots import LIMITERS, PurePursuit, RobotSpec, load_robot
 from sim.certificate import Certificate, certify
 from sim.drive import Drive, drive
@@ -143,7 +143,7 @@ def _record(
     task = task_to_dict(s.task)
     known = len(s.task.world.obstacles)
     task["obstacles"] += [dataclasses.asdict(disc) for disc in s.unseen]
-    optimum = AStar().plan(Query.between(grid, s.task), np.random.default_rng(0)).cost
+    query = Query.between(grid, s.task)
     return Rollout(
         t=log.t,
         pose=log.pose,
@@ -163,7 +163,9 @@ def _record(
             "plan": {
                 "status": answer.status.name.lower(),
                 "cost_m": answer.cost,
-                "grid_optimum_m": optimum,
+                "length_m": answer.line_length,
+                "grid_optimum_m": PLANNERS["astar"].plan(query, s.rng("optimum")).cost,
+                "euclidean_optimum_m": PLANNERS["tangent"].plan(query, s.rng("optimum")).line_length,
                 "work": answer.work,
                 "work_unit": answer.work_unit,
             },

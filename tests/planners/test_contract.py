@@ -1,0 +1,142 @@
+"""What every planner in the registry promises; a new line in `PLANNERS` is tested by being there."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from worlds_to_solve import catalogue, optimum, random_query, sealed
+
+from planners import PLANNERS, Planner, PlanResult, PlanStatus, Query, find_planner, path_cost
+from worlds import DIRECTIONS, Grid, InputError, polyline_clearance
+
+CATALOGUE = catalogue()
+# What planners may declare: that they plan in the world itself, or that they may miss a path that exists.
+NEEDS_WORLD = [name for name, planner in PLANNERS.items() if getattr(planner, "needs_world", False)]
+ON_GRIDS = [name for name in PLANNERS if name not in NEEDS_WORLD]
+INCOMPLETE = [name for name, planner in PLANNERS.items() if not getattr(planner, "complete", True)]
+
+
+def quick(name: str) -> Planner:
+    """A planner with a budget that suits a test."""
+    planner: Any = PLANNERS[name]
+    small = {"ants": 60, "iterations": 12}
+    known = {f.name for f in dataclasses.fields(planner)}
+    return find_planner(name, **{key: value for key, value in small.items() if key in known})
+
+
+def solve(name: str, query: Query, seed: int = 0) -> PlanResult:
+    return quick(name).plan(query, np.random.default_rng(seed))
+
+
+def assert_valid(result: PlanResult, query: Query) -> None:
+    cells = result.cells
+    assert tuple(cells[0]) == query.start
+    assert tuple(cells[-1]) == query.goal
+    assert query.grid.free[tuple(cells.T)].all()
+    for here, step in zip(cells, np.diff(cells, axis=0), strict=False):
+        assert int(query.grid.moves[tuple(here)]) >> DIRECTIONS.index(tuple(step)) & 1
+    assert result.cost == pytest.approx(path_cost(cells, query.grid.cell), abs=1e-9)
+
+
+def assert_drivable(result: PlanResult, query: Query) -> None:
+    """A line of its own, where a planner has one, keeps the clearance and joins the exact ends."""
+    if result.waypoints is None:
+        assert result.length is None
+        return
+    assert query.task is not None
+    xy = query.grid.xy(result.line)
+    np.testing.assert_allclose(xy[[0, -1]], [query.task.start[:2], query.task.goal], atol=1e-9)
+    assert polyline_clearance(query.task.world, xy) >= query.grid.inflate - 1e-9
+    # The polyline stands for what is no longer than itself: it goes round arcs on the outside.
+    drawn = float(np.hypot(*np.diff(xy, axis=0).T).sum())
+    assert drawn - 0.05 <= result.length <= drawn + 1e-9  # type: ignore[operator]
+
+
+@pytest.mark.parametrize("world", CATALOGUE)
+@pytest.mark.parametrize("name", PLANNERS)
+def test_solves_the_catalogue_along_allowed_moves(name: str, world: str) -> None:
+    query = CATALOGUE[world]
+    result = solve(name, query)
+    if name in INCOMPLETE and not result.solved:
+        assert result.status is PlanStatus.STOPPED
+        assert result.reason
+        return
+    assert result.status is PlanStatus.SOLVED, result.reason
+    assert_valid(result, query)
+    assert result.cost >= optimum(query) - 1e-9
+    assert result.work > 0
+    assert_drivable(result, query)
+
+
+@pytest.mark.parametrize("name", ON_GRIDS)
+def test_any_answer_on_a_random_grid_is_sound(name: str) -> None:
+    rng = np.random.default_rng(11)
+    for seed in range(40):
+        query = random_query(rng, largest=12)
+        result, floor = solve(name, query, seed), optimum(query)
+        assert (result.status is PlanStatus.NO_PATH) == math.isinf(floor)
+        if result.solved:
+            assert_valid(result, query)
+            assert result.cost >= floor - 1e-9
+
+
+@pytest.mark.parametrize("name", PLANNERS)
+def test_the_same_seed_gives_the_same_plan(name: str) -> None:
+    one, two = (solve(name, CATALOGUE["forest"], seed=5) for _ in range(2))
+    np.testing.assert_array_equal(one.cells, two.cells)
+    np.testing.assert_array_equal(one.history.iteration_mean, two.history.iteration_mean)
+    assert one.work == two.work
+
+
+@pytest.mark.parametrize("name", ON_GRIDS)
+def test_a_sealed_goal_has_no_path(name: str) -> None:
+    result = solve(name, sealed())
+    assert result.status is PlanStatus.NO_PATH
+    assert len(result.cells) == 0
+    assert "allowed moves" in result.reason
+
+
+@pytest.mark.parametrize("end", ["start", "goal"])
+@pytest.mark.parametrize("name", ON_GRIDS)
+def test_a_blocked_end_has_no_path(name: str, end: str) -> None:
+    free = np.ones((5, 5), dtype=np.bool_)
+    free[0, 0] = False
+    ends = {"start": (4, 4), "goal": (4, 4), end: (0, 0)}
+    result = solve(name, Query(Grid.from_free(free), **ends))
+    assert result.status is PlanStatus.NO_PATH
+    assert end in result.reason
+
+
+@pytest.mark.parametrize("name", ON_GRIDS)
+def test_being_there_already_is_a_path_of_one_cell(name: str) -> None:
+    result = solve(name, Query(Grid.from_free(np.ones((3, 3))), (1, 1), (1, 1)))
+    assert result.solved
+    assert result.cells.tolist() == [[1, 1]]
+    assert result.cost == 0.0
+
+
+@pytest.mark.parametrize("name", NEEDS_WORLD)
+def test_a_planner_that_needs_a_world_refuses_a_bare_grid(name: str) -> None:
+    with pytest.raises(InputError, match="has no task"):
+        solve(name, sealed())
+
+
+@pytest.mark.parametrize("name", PLANNERS)
+def test_the_query_is_left_as_it_was(name: str) -> None:
+    query = CATALOGUE["gate"]
+    free, moves = query.grid.free.copy(), query.grid.moves.copy()
+    solve(name, query)
+    np.testing.assert_array_equal(query.grid.free, free)
+    np.testing.assert_array_equal(query.grid.moves, moves)
+
+
+@pytest.mark.parametrize("name", PLANNERS)
+def test_the_result_records_its_options(name: str) -> None:
+    planner: Any = quick(name)
+    result = planner.plan(CATALOGUE["empty"], np.random.default_rng(0))
+    assert set(result.options) == {f.name for f in dataclasses.fields(planner)}
+    assert result.wall_s > 0

@@ -1,0 +1,156 @@
+from __future__ import annotations
+
+import importlib
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from worlds_to_solve import catalogue, optimum
+
+from planners import PLANNERS, AcoHan, all_planners, describe, find_planner
+from worlds import InputError
+
+ROOT = Path(__file__).parents[2]
+EXAMPLE = ROOT / "examples" / "plugin_planner"
+
+
+class Site:
+    """A directory of installed distributions, on the path while a test runs."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def install(self, name: str, modules: dict[str, str], entries: dict[str, str]) -> None:
+        for module, source in modules.items():
+            (self.path / f"{module}.py").write_text(source)
+        info = self.path / f"{name.replace('-', '_')}-1.0.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+        lines = [f"{key} = {value}" for key, value in entries.items()]
+        (info / "entry_points.txt").write_text("\n".join(["[antdrive.planners]", *lines, ""]))
+        importlib.invalidate_caches()
+
+
+@pytest.fixture
+def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Site]:
+    monkeypatch.syspath_prepend(str(tmp_path))
+    before = set(sys.modules)
+    yield Site(tmp_path)
+    for name in set(sys.modules) - before:
+        if str(tmp_path) in str(getattr(sys.modules[name], "__file__", "")):
+            del sys.modules[name]
+
+
+def test_the_example_plugin_joins_through_its_entry_point(site: Site) -> None:
+    project = (EXAMPLE / "pyproject.toml").read_text()
+    (name,) = re.findall(r'^name = "(.*)"$', project, re.MULTILINE)
+    entries = dict(re.findall(r'"antdrive.planners"\]\n(\w+) = "(.*)"$', project, re.MULTILINE))
+    source = (EXAMPLE / "wavefront.py").read_text()
+    site.install(name, {"wavefront": source}, entries)
+
+    assert "wavefront" in all_planners()
+    query = catalogue()["slalom"]
+    result = find_planner("wavefront").plan(query, np.random.default_rng(0))
+    assert result.solved
+    assert result.cost >= optimum(query) - 1e-9
+    straight = find_planner("wavefront", straight="true").plan(query, np.random.default_rng(0))
+    assert (np.abs(np.diff(straight.cells, axis=0)).sum(axis=1) == 1).all()
+    with pytest.raises(InputError, match="option of wavefront"):
+        find_planner("wavefront", strait="true")
+
+
+def test_a_broken_plugin_is_named_and_left_out(site: Site) -> None:
+    site.install(
+        "antdrive-broken",
+        {"broken_ants": "raise RuntimeError('no licence')"},
+        {"broken": "broken_ants:Planner"},
+    )
+    with pytest.warns(UserWarning, match="'broken' of antdrive-broken cannot be loaded .*no licence"):
+        known = all_planners()
+    assert set(known) == set(PLANNERS)
+    with pytest.raises(InputError, match="antdrive-broken cannot be loaded"):
+        find_planner("broken")
+
+
+def test_a_plugin_that_is_no_planner_is_refused(site: Site) -> None:
+    site.install("antdrive-odd", {"odd_ants": "thing = 3"}, {"odd": "odd_ants:thing"})
+    with pytest.raises(InputError, match=r"antdrive-odd is not a planner .*plan\(query, rng\)"):
+        find_planner("odd")
+
+
+def test_a_plugin_cannot_take_a_name_of_ours(site: Site) -> None:
+    site.install("antdrive-thief", {"thief": "raise AssertionError('must not load')"}, {"astar": "thief:AStar"})
+    with pytest.warns(UserWarning, match="'astar' of antdrive-thief is left out: antdrive has one of that name"):
+        assert all_planners()["astar"] is PLANNERS["astar"]
+    assert find_planner("astar") is PLANNERS["astar"]
+
+
+def test_an_unknown_planner_is_answered_with_close_names() -> None:
+    with pytest.raises(InputError, match=r"'aco_han'; did you mean aco-han .*choose from .*astar, dijkstra"):
+        find_planner("aco_han")
+
+
+def test_an_unknown_option_is_answered_with_the_options() -> None:
+    with pytest.raises(InputError, match=r"planner\.antz: .*did you mean ants\? choose from ants, attraction"):
+        find_planner("aco-han", antz=5)
+    with pytest.raises(InputError, match=r"planner\.ants: no option of astar .* there are none"):
+        find_planner("astar", ants=5)
+
+
+@pytest.mark.parametrize(
+    ("options", "field", "value"),
+    [
+        ({"ants": "50"}, "ants", 50),
+        ({"evaporation": "0.3"}, "evaporation", 0.3),
+        ({"evaporation": 1}, "evaporation", 1.0),
+        ({"max_steps": "none"}, "max_steps", None),
+        ({"max_steps": "75"}, "max_steps", 75),
+        ({"time_budget": "2.5"}, "time_budget", 2.5),
+        ({"form": "listing"}, "form", "listing"),
+    ],
+)
+def test_options_are_read_by_their_type(options: dict[str, object], field: str, value: object) -> None:
+    read = getattr(find_planner("aco-han", **options), field)
+    assert read == value
+    assert type(read) is type(value)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"ants": "many"}, "planner.ants: must be a whole number, got 'many'"),
+        ({"ants": 2.5}, "planner.ants: must be a whole number, got 2.5"),
+        ({"ants": True}, "planner.ants: must be a whole number, got True"),
+        ({"ants": "0"}, "planner.ants: must be at least 1 and at most 1000000, got 0"),
+        ({"evaporation": "nan"}, "planner.evaporation: must be a finite number, got 'nan'"),
+        ({"evaporation": "1.5"}, "planner.evaporation: must be at least 0 and at most 1, got 1.5"),
+        ({"form": "song"}, "planner.form: must be one of equation, listing; got 'song'"),
+        ({"time_budget": "-1"}, "planner.time_budget: must be above 0, got -1"),
+        ({"ants": None}, "planner.ants: must be a whole number, got None"),
+    ],
+)
+def test_wrong_option_values_are_refused_by_name(options: dict[str, object], message: str) -> None:
+    with pytest.raises(InputError) as refused:
+        find_planner("aco-han", **options)
+    assert str(refused.value) == message
+
+
+def test_every_planner_says_what_it_does_in_one_line() -> None:
+    for name, planner in PLANNERS.items():
+        line = describe(planner)
+        assert line.endswith("."), name
+        assert "\n" not in line
+    assert "elitism 100" in describe(PLANNERS["aco-han-elite"])
+    assert describe(PLANNERS["aco-han"]) == describe(AcoHan())
+
+
+def test_naming_planners_does_not_load_the_compiler() -> None:
+    code = (
+        "import sys; from planners import all_planners, find_planner, describe; all_planners();"
+        "find_planner('aco-han', ants=3); assert 'numba' not in sys.modules, 'numba was imported'"
+    )
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)

@@ -1,0 +1,125 @@
+"""Grids and queries that the tests of planners share, and an oracle that shares no code with them."""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections.abc import Iterable
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
+
+from planners import Query
+from worlds import DIRECTIONS, Disc, Grid, Task, World, rasterise
+
+
+def optimum(query: Query) -> float:
+    """The length of the shortest path [m], inf if there is none: a plain Dijkstra."""
+    moves = query.grid.moves
+    best, queue = {query.start: 0.0}, [(0.0, query.start)]
+    while queue:
+        g, cell = heapq.heappop(queue)
+        if cell == query.goal:
+            return g * query.grid.cell
+        if g > best[cell]:
+            continue
+        for k, (dr, dc) in enumerate(DIRECTIONS):
+            if int(moves[cell]) >> k & 1:
+                near = cell[0] + dr, cell[1] + dc
+                reached = g + math.hypot(dr, dc)
+                if reached < best.get(near, math.inf):
+                    best[near] = reached
+                    heapq.heappush(queue, (reached, near))
+    return math.inf
+
+
+def optimum_by_scipy(query: Query) -> float:
+    """The same, by scipy: for grids too large for the plain one."""
+    rows, cols = query.grid.shape
+    moves = query.grid.moves
+    links = []
+    for k, (dr, dc) in enumerate(DIRECTIONS):
+        r, c = np.nonzero(moves >> k & 1)
+        links.append((r * cols + c, (r + dr) * cols + c + dc, np.full(len(r), math.hypot(dr, dc))))
+    origin, target, length = (np.concatenate(part) for part in zip(*links, strict=True))
+    graph = csr_matrix((length, (origin, target)), shape=(rows * cols, rows * cols))
+    reached = dijkstra(graph, indices=query.start[0] * cols + query.start[1])
+    return float(reached[query.goal[0] * cols + query.goal[1]]) * query.grid.cell
+
+
+def thinned(rng: np.random.Generator, side: int, cut: float) -> Query:
+    """Moves that no picture or discs would give: each two-way move is left out with probability `cut`."""
+    picture = Grid.from_free(rng.random((side, side)) >= 0.05)
+    moves = picture.moves.copy()
+    for k, (dr, dc) in enumerate(DIRECTIONS[:4]):
+        r, c = np.nonzero((moves >> k & 1 == 1) & (rng.random(moves.shape) < cut))
+        moves[r, c] &= np.uint8(255 - (1 << k))
+        moves[r + dr, c + dc] &= np.uint8(255 - (1 << (k + 4)))
+    ends = rng.choice(np.argwhere(picture.free), size=2)
+    return Query(Grid(picture.free, moves), *(tuple(map(int, end)) for end in ends))
+
+
+def random_query(rng: np.random.Generator, largest: int = 24) -> Query:
+    """A random picture between two random free cells; some cannot be solved."""
+    shape = rng.integers(1, largest, size=2)
+    free = rng.random(shape) >= rng.uniform(0.0, 0.5)
+    free[tuple(shape // 2)] = True
+    ends = rng.choice(np.argwhere(free), size=2)
+    return Query(Grid.from_free(free, cell=0.5), *(tuple(map(int, end)) for end in ends))
+
+
+def random_discs(rng: np.random.Generator, count: int = 14) -> Query:
+    """Random discs, so that moves between free cells may be closed too."""
+    discs = tuple(Disc(*rng.uniform(0, 10, 2), rng.uniform(0.05, 0.9)) for _ in range(count))
+    grid = rasterise(World("random", (0, 0, 10, 10), discs), 0.5, rng.uniform(0, 0.4))
+    free = np.argwhere(grid.free)
+    if not len(free):
+        return Query(Grid.from_free(np.ones((2, 2))), (0, 0), (1, 1))
+    ends = rng.choice(free, size=2)
+    return Query(grid, *(tuple(map(int, end)) for end in ends))
+
+
+def _wall(x0: float, y0: float, x1: float, y1: float) -> list[Disc]:
+    count = max(2, int(math.hypot(x1 - x0, y1 - y0) / 0.3) + 1)
+    return [
+        Disc(float(x), float(y), 0.2)
+        for x, y in zip(np.linspace(x0, x1, count), np.linspace(y0, y1, count), strict=True)
+    ]
+
+
+def _query(size: float, discs: Iterable[Disc], start: tuple[float, float], goal: tuple[float, float]) -> Query:
+    task = Task(World("test", (0, 0, size, size), tuple(discs)), (*start, 0.0), goal)
+    return Query.between(rasterise(task.world, 0.5, 0.25), task)
+
+
+def _forest() -> list[Disc]:
+    rng, discs = np.random.default_rng(3), []
+    while len(discs) < 40:
+        x, y = rng.uniform(0, 10, 2)
+        if min(math.hypot(x - 1, y - 1), math.hypot(x - 9, y - 9)) > 1.3:
+            discs.append(Disc(float(x), float(y), float(rng.uniform(0.15, 0.4))))
+    return discs
+
+
+def catalogue() -> dict[str, Query]:
+    """Small worlds, each hard in one way; all can be solved."""
+    corner, far = (1.0, 1.0), (9.0, 9.0)
+    slalom = _wall(2.5, 0, 2.5, 7) + _wall(5, 3, 5, 10) + _wall(7.5, 0, 7.5, 7)
+    gate = _wall(5, 0, 5, 1) + _wall(5, 2.5, 5, 10)
+    trap = _wall(3, 2, 7, 2) + _wall(7, 2, 7, 8) + _wall(3, 8, 7, 8)
+    return {
+        "empty": _query(10, [], corner, far),
+        "slalom": _query(10, slalom, corner, far),
+        "gate": _query(10, gate, (1.0, 8.0), (9.0, 8.0)),
+        "trap": _query(10, trap, (4.0, 5.0), (9.0, 5.0)),
+        "forest": _query(10, _forest(), corner, far),
+    }
+
+
+def sealed() -> Query:
+    """A goal behind a wall without a gap."""
+    free: npt.NDArray[np.bool_] = np.ones((8, 8), dtype=np.bool_)
+    free[:, 4] = False
+    return Query(Grid.from_free(free), (1, 1), (6, 6))

@@ -1,0 +1,71 @@
+"""What the README shows is run."""
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from worlds import load_task
+
+ROOT = Path(__file__).parent.parent
+TEXT = (ROOT / "README.md").read_text()
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", TEXT, flags=re.DOTALL)
+
+
+def test_the_python_block_is_ten_lines_that_run(tmp_path: Path) -> None:
+    (code,) = blocks("python")
+    assert len([line for line in code.splitlines() if line.strip()]) <= 10
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[0] == "stopped at the goal without contact"
+    assert (tmp_path / "forest.npz").exists()
+
+
+def test_the_world_file_is_driven(tmp_path: Path) -> None:
+    (text,) = blocks("yaml")
+    (tmp_path / "two-posts.yaml").write_text(text)
+    assert len(load_task(tmp_path / "two-posts.yaml").world.obstacles) == 2
+    done = subprocess.run(
+        [sys.executable, "-m", "sim", "run", "two-posts.yaml"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_commands_work(tmp_path: Path) -> None:
+    lines = [line.split("#")[0].split("||")[0].strip() for block in blocks("sh") for line in block.splitlines()]
+    commands = [shlex.split(line) for line in lines if line.startswith("antdrive")]
+    assert len(commands) >= 5
+    for command in commands:
+        done = subprocess.run(
+            [sys.executable, "-m", "sim", *command[1:]],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        expected = 1 if "--unseen" in command else 0
+        assert done.returncode == expected, (command, done.stdout, done.stderr)
+
+
+@pytest.mark.parametrize("target", ["demo", "test"])
+def test_make_knows_the_two_commands(target: str) -> None:
+    assert f"make {target}" in TEXT
+    done = subprocess.run(["make", "-n", target], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_links_and_pictures_exist() -> None:
+    targets = [t for t in re.findall(r"\]\(([^)#]+)\)", TEXT) if not t.startswith("http")]
+    assert targets
+    for target in targets:
+        assert (ROOT / target).exists(), target
