@@ -18,6 +18,9 @@ from .grid import Grid as Grid
 from .grid import rasterise as rasterise
 from .importers import import_barn as import_barn
 from .importers import import_sdf as import_sdf
+from .movingai import MapProblem as MapProblem
+from .movingai import import_movingai_map as import_movingai_map
+from .movingai import import_movingai_problems as import_movingai_problems
 from .route import Route as Route
 from .world import Bounds as Bounds
 from .world import Disc as Disc

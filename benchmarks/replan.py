@@ -1,0 +1,103 @@
+"""What repairing a plan costs beside planning anew: `python -m benchmarks.replan`.
+
+A robot crosses 200 x 200 cells. Again and again it takes a few steps along its path, and a patch of up to 3 x 3 cells a few
+steps ahead of it is blocked, or one blocked before is cleared. Telling the replanner and getting the repaired path is timed
+against planning the same query anew, with the same planner and with `astar`; lengths must agree. Prints Markdown.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from planners import DStar, DStarLite, Query, find_planner
+from planners.replan import ReplanningPlanner
+from worlds import Disc, Grid, World, rasterise
+
+SIDE, CHANGES, WORLDS = 200, 12, 40
+
+
+def discs(rng: np.random.Generator) -> Grid:
+    """Among 150 cylinders."""
+    made = tuple(Disc(*map(float, rng.uniform(0, 40, 2)), float(rng.uniform(0.3, 1.2))) for _ in range(150))
+    return rasterise(World("discs", (0, 0, 40, 40), made), 0.2, 0.2)
+
+
+def scattered(rng: np.random.Generator) -> Grid:
+    """A fifth of the cells blocked at random."""
+    return Grid.from_free(rng.random((SIDE, SIDE)) >= 0.2)
+
+
+def corner_to_corner(grid: Grid) -> Query:
+    free = np.argwhere(grid.free)
+    ends = (free[np.abs(free - corner).sum(axis=1).argmin()] for corner in (5, SIDE - 6))
+    return Query(grid, *(tuple(map(int, end)) for end in ends))
+
+
+def timed(call: Callable[[], Any]) -> tuple[float, Any]:
+    began = time.perf_counter()
+    answer = call()
+    return time.perf_counter() - began, answer
+
+
+def drive(planner: ReplanningPlanner, query: Query, rng: np.random.Generator) -> list[tuple[float, float, float]]:
+    """Seconds of repair, of planning anew, and of `astar`, by change."""
+    replanner, astar = planner.replanner(query), find_planner("astar")
+    replanner.block([])  # what a replanner looks up once for a grid
+    blocked: list[Any] = []
+    rows = []
+    for turn in range(CHANGES):
+        path = replanner.result().cells
+        if len(path) < 40:
+            break
+        replanner.move(tuple(map(int, path[int(rng.integers(1, 8))])))
+        if turn % 3 == 2:
+            patch, tell = blocked.pop(0), replanner.clear
+        else:
+            ahead = path[int(rng.integers(12, 20))]
+            patch = np.clip(ahead + rng.integers(-1, 2, (5, 2)), 0, SIDE - 1)
+            patch = patch[replanner.query.grid.free[tuple(patch.T)]]
+            blocked.append(patch)
+            tell = replanner.block
+
+        def repair(tell: Callable[[Any], int] = tell, patch: Any = patch) -> Any:
+            tell(patch)
+            return replanner.result()
+
+        took, repaired = timed(repair)
+        now = replanner.query
+        again = Query(Grid(now.grid.free.copy(), now.grid.moves.copy(), now.grid.cell), now.start, now.goal)
+        anew, planned = timed(lambda again=again: planner.plan(again, rng))
+        other, optimal = timed(lambda again=again: astar.plan(again, rng))
+        if not optimal.solved:
+            break
+        assert abs(repaired.cost - planned.cost) < 1e-9
+        assert abs(repaired.cost - optimal.cost) < 1e-9
+        rows.append((took, anew, other))
+    return rows
+
+
+def main() -> None:
+    print(
+        "| 200×200 | planner | repair, µs: median | 90 % | 99 % | anew, µs | anew / repair | `astar`, µs | `astar` / repair |"
+    )
+    print("|---|---|---|---|---|---|---|---|---|")
+    for kind in (discs, scattered):
+        for planner in (DStarLite(), DStar()):
+            rng = np.random.default_rng(0)
+            drive(planner, corner_to_corner(kind(rng)), rng)  # warms up
+            rows = [row for _ in range(WORLDS) for row in drive(planner, corner_to_corner(kind(rng)), rng)]
+            repair, anew, astar = np.array(rows).T
+            name = "dstar-lite" if isinstance(planner, DStarLite) else "dstar"
+            spread = " | ".join(f"{q:.0f}" for q in np.percentile(repair * 1e6, [50, 90, 99]))
+            print(
+                f"| {kind.__name__} | `{name}` | {spread} | {np.median(anew) * 1e6:.0f} | {np.median(anew / repair):.1f} |"
+                f" {np.median(astar) * 1e6:.0f} | {np.median(astar / repair):.1f} |"
+            )
+
+
+if __name__ == "__main__":
+    main()
