@@ -8,8 +8,8 @@ import pytest
 from worlds_to_solve import catalogue
 
 from planners import AcoHan, Iteration, PlanStatus, Progress, Query, watch
-from planners.ants import Ground, Season, Walks, without_loops
-from worlds import Grid
+from planners.ants import Ground, Season, Walks, _Walk, without_loops
+from worlds import Floats, Grid
 
 OPEN = Query(Grid.from_free(np.ones((3, 4))), (0, 0), (2, 3))
 
@@ -24,6 +24,12 @@ def walks(ground: Ground, *paths: list[tuple[int, int]]) -> Walks:
     return Walks(cells, np.array([len(p) for p in paths]), np.array(lengths))
 
 
+def season(ground: Ground, walked: Walks, best: Walks) -> Season:
+    """The first iteration, with these walks."""
+    tours = without_loops(walked, ground)
+    return Season(0, ground, walked, tours, None, best, 0, np.random.default_rng(0))
+
+
 DIRECT = [(0, 0), (1, 1), (2, 2), (2, 3)]
 ROUND = [(0, 0), (0, 1), (0, 2), (0, 1), (1, 2), (2, 3)]  # with a loop
 
@@ -34,7 +40,7 @@ def test_trails_follow_equations_4_2_2_to_4_2_4(elitism: int) -> None:
     both = walks(ground, DIRECT, ROUND)
     before = np.linspace(0.1, 1.2, 12)
     trail = before.copy()
-    planner.update(trail, Season(0, both, without_loops(both, ground), both.only(0), np.random.default_rng(0)))
+    planner.update(trail, season(ground, both, both.only(0)))
 
     expected = 0.75 * before.reshape(3, 4)
     direct, wander = 2 * math.sqrt(2) + 1, 3 + 2 * math.sqrt(2)
@@ -49,7 +55,7 @@ def test_the_listing_evaporates_only_where_ants_deposit() -> None:
     ground, planner = Ground.of(OPEN), AcoHan(evaporation=0.25, deposit=5.0, form="listing")
     one = walks(ground, DIRECT)
     trail = np.ones(12)
-    planner.update(trail, Season(0, one, one, one, np.random.default_rng(0)))
+    planner.update(trail, season(ground, one, one))
     expected = np.ones((3, 4))
     for cell in DIRECT:
         expected[cell] = 0.75 + 5.0 / (2 * math.sqrt(2) + 1)
@@ -143,12 +149,15 @@ def test_ants_give_up_after_max_steps() -> None:
 
 def test_an_ant_draws_the_same_numbers_whoever_walks_with_it() -> None:
     query = catalogue()["forest"]
-    ground, few, many = Ground.of(query), AcoHan(ants=5), AcoHan(ants=9)
-    weights = np.zeros((len(ground.mask), 8))
-    few.weigh(ground, np.zeros(len(ground.mask)), few.desire(ground), weights)
-    one, _ = few._walk(ground, weights, 500, np.random.default_rng(4))
-    two, _ = many._walk(ground, weights, 500, np.random.default_rng(4))
-    np.testing.assert_array_equal(one.lengths, two.lengths[:5])
+    ground = Ground.of(query)
+
+    def lengths(ants: int) -> Floats:
+        planner = AcoHan(ants=ants)
+        walk = _Walk.of(planner, ground)
+        planner.weigh(ground, np.zeros(len(ground.mask)), planner.desire(ground), walk.weights[0])
+        return walk.go(np.random.default_rng(4))[0].lengths
+
+    np.testing.assert_array_equal(lengths(5), lengths(9)[:5])
 
 
 def test_a_time_budget_ends_early_and_says_so() -> None:

@@ -1,0 +1,228 @@
+"""Every planner by name, with its options checked; planners of other packages join through entry points."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import importlib.metadata
+import math
+import numbers
+import types
+import typing
+import warnings
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
+from typing import Any, Literal, Union
+
+from planners.aco_han import AcoHan
+from planners.ant_system import AgeingAnts, AntSystem, ExploringAnts
+from planners.apf import PotentialField
+from planners.dstar import DStar
+from planners.dstar_lite import DStarLite
+from planners.ga_han import GaHan
+from planners.hybrid import Hybrid
+from planners.merging_ants import MergingAnts
+from planners.mmas import MaxMinAnts
+from planners.mmas_dstar import MaxMinDStar
+from planners.pfaco import PotentialFieldAnts
+from planners.plan import Planner
+from planners.search import AStar, Dijkstra
+from planners.tangent import Tangent
+from worlds import InputError
+
+#: The planners of this package.
+PLANNERS: Mapping[str, Planner] = MappingProxyType(
+    {
+        "dijkstra": Dijkstra(),
+        "astar": AStar(),
+        "dstar": DStar(),
+        "dstar-lite": DStarLite(),
+        "apf": PotentialField(),
+        "aco-han": AcoHan(),
+        "aco-han-elite": AcoHan(elitism=100),
+        "as": AntSystem(),
+        "maco": AgeingAnts(),
+        "iaco": ExploringAnts(),
+        "pfaco": PotentialFieldAnts(),
+        "mmas": MaxMinAnts(),
+        "mmas-dstar": MaxMinDStar(),
+        "ants": MergingAnts(),
+        "ga-han": GaHan(),
+        "hybrid": Hybrid(),
+        "tangent": Tangent(),
+    }
+)
+
+#: The entry-point group through which other packages add a planner: an object with `plan` or a class of it.
+GROUP = "antdrive.planners"
+
+
+def find_planner(name: str, /, **options: Any) -> Planner:
+    """The planner of that name, with options set. Option values may be text, as from a command line.
+
+    Raises:
+        InputError: no such planner or option, or a value that it does not take; says what would be right.
+    """
+    planner = PLANNERS.get(name)
+    if planner is None:
+        entry = _plugins().get(name)
+        if entry is None:
+            raise InputError(f"planner: {_unknown(name, [*PLANNERS, *_plugins()])}")
+        planner = _load(entry)
+    return _with_options(name, planner, options)
+
+
+def all_planners() -> Mapping[str, Planner]:
+    """Every planner by name, other packages' last. One that cannot be loaded is left out with a warning."""
+    found = dict(PLANNERS)
+    for name, entry in _plugins().items():
+        try:
+            found[name] = _load(entry)
+        except InputError as broken:
+            warnings.warn(str(broken), stacklevel=2)
+    return MappingProxyType(found)
+
+
+def describe(planner: Planner) -> str:
+    """One line on what a planner does, with the options in which it departs from its class's defaults."""
+    summary = (type(planner).__doc__ or "No description.").strip().splitlines()[0]
+    changed = [
+        f"{f.name} {getattr(planner, f.name)}"
+        for f in _fields(planner)
+        if f.default is not dataclasses.MISSING and getattr(planner, f.name) != f.default
+    ]
+    return f"{summary} With {', '.join(changed)}." if changed else summary
+
+
+def parse(key: str, kind: Any, value: Any) -> Any:
+    """A value for an option of type `kind`: int, float, bool, str, a Literal, or one of these or None.
+
+    Raises:
+        InputError: the value, or the text given for it, is not of that type.
+    """
+    origin, members = typing.get_origin(kind), typing.get_args(kind)
+    if origin in (Union, types.UnionType) and type(None) in members:
+        if value is None or (isinstance(value, str) and value.strip().lower() in ("none", "null", "")):
+            return None
+        inner = tuple(m for m in members if m is not type(None))
+        return parse(key, Union[inner], value)  # noqa: UP007 - a union made at run time
+    if origin is Literal:
+        for member in members:
+            if value == member or (isinstance(value, str) and value == str(member)):
+                return member
+        raise InputError(f"{key}: must be one of {', '.join(map(str, members))}; got {value!r}")
+    if kind in _READERS:
+        wanted, read = _READERS[kind]
+        try:
+            return read(value)
+        except (ValueError, KeyError, OverflowError):
+            raise InputError(f"{key}: must be {wanted}, got {value!r}") from None
+    if isinstance(value, str):
+        raise InputError(f"{key}: cannot be given as text; set it from Python")
+    return value
+
+
+def _whole(value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, str | numbers.Integral):
+        raise ValueError
+    return int(value)
+
+
+def _real(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, str | numbers.Real):
+        raise ValueError
+    number = float(value)
+    if not math.isfinite(number):
+        raise ValueError
+    return number
+
+
+def _truth(value: Any) -> bool:
+    if isinstance(value, bool):
+        return value
+    if not isinstance(value, str):
+        raise ValueError
+    return {
+        "true": True,
+        "yes": True,
+        "on": True,
+        "1": True,
+        "false": False,
+        "no": False,
+        "off": False,
+        "0": False,
+    }[value.strip().lower()]
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise ValueError
+    return value
+
+
+_READERS: Mapping[Any, tuple[str, typing.Callable[[Any], Any]]] = {
+    int: ("a whole number", _whole),
+    float: ("a finite number", _real),
+    bool: ("true or false", _truth),
+    str: ("text", _text),
+}
+
+
+def _with_options(name: str, planner: Planner, options: Mapping[str, Any]) -> Planner:
+    if not options:
+        return planner
+    known = {f.name for f in _fields(planner)}
+    hints = typing.get_type_hints(type(planner)) if known else {}
+    values: dict[str, Any] = {}
+    for key, value in options.items():
+        if key not in known:
+            raise InputError(f"planner.{key}: {_unknown(key, known, f'option of {name}')}")
+        values[key] = parse(f"planner.{key}", hints[key], value)
+    try:
+        return typing.cast(Planner, dataclasses.replace(typing.cast(Any, planner), **values))
+    except ValueError as wrong:
+        raise InputError(f"planner.{wrong}") from None
+
+
+def _fields(planner: Planner) -> tuple[dataclasses.Field[Any], ...]:
+    kind = type(planner)
+    return tuple(f for f in dataclasses.fields(kind) if f.init) if dataclasses.is_dataclass(kind) else ()
+
+
+def _unknown(name: str, choices: Iterable[str], what: str = "planner") -> str:
+    choices = sorted(choices)
+    if not choices:
+        return f"no {what} is called {name!r}; there are none"
+    close = difflib.get_close_matches(name, choices, n=3)
+    hint = f"did you mean {' or '.join(close)}? " if close else ""
+    return f"no {what} is called {name!r}; {hint}choose from {', '.join(choices)}"
+
+
+def _plugins() -> dict[str, importlib.metadata.EntryPoint]:
+    found: dict[str, importlib.metadata.EntryPoint] = {}
+    for entry in importlib.metadata.entry_points(group=GROUP):
+        if entry.name in PLANNERS or (entry.name in found and found[entry.name].value != entry.value):
+            taken = "antdrive" if entry.name in PLANNERS else _maker(found[entry.name])
+            warnings.warn(
+                f"planner {entry.name!r} of {_maker(entry)} is left out: {taken} has one of that name",
+                stacklevel=3,
+            )
+            continue
+        found.setdefault(entry.name, entry)
+    return found
+
+
+def _load(entry: importlib.metadata.EntryPoint) -> Planner:
+    who = f"planner {entry.name!r} of {_maker(entry)}"
+    try:
+        made = entry.load()
+        planner = made() if isinstance(made, type) else made
+    except Exception as error:  # whatever another package's import or constructor raises
+        raise InputError(f"{who} cannot be loaded ({entry.value}): {type(error).__name__}: {error}") from error
+    if not isinstance(planner, Planner):
+        raise InputError(f"{who} is not a planner ({entry.value}): it has no method `plan(query, rng)`")
+    return planner
+
+
+def _maker(entry: importlib.metadata.EntryPoint) -> str:
+    return entry.dist.name if entry.dist is not None else "an unnamed distribution"
