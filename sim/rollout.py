@@ -32,7 +32,7 @@ class Outcome(enum.Enum):
     TIMED_OUT = "the time limit passed before the goal was reached"
     STUCK = "stopped making progress"
     NO_PATH = "no path exists"
-    STOPPED = "the budget ended before a path was found"
+    STOPPED = "stopped before a path was found"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
