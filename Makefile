@@ -10,7 +10,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 DEMO := out/demo
 
 help:
-	@sed -n 's/^# //p' Makefile
+	@sed -n '1,3s/^# //p' Makefile
 
 # The core, then the compiled kernels' cache, so that the first plan is quick.
 $(VENV)/.core: pyproject.toml tools/find-python

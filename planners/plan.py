@@ -27,7 +27,7 @@ class PlanStatus(enum.Enum):
     """How planning ended. The value is the sentence shown to people."""
 
     SOLVED = "found a path"
-    NO_PATH = "no path exists"
+    NO_PATH = "no path on this grid"
     STOPPED = "stopped before a path was found"
 
 
@@ -62,7 +62,8 @@ class Query:
         room = float(point_clearance(task.world, [task.goal])[0])
         start, out = _enter(grid, task, task.start[:2], math.inf)
         # A goal with too little room around it is reached where there is room, if that is within the tolerance.
-        goal, into = _enter(grid, task, task.goal, math.inf if room >= grid.inflate else task.goal_tolerance)
+        within = task.goal_tolerance - min(0.02, task.goal_tolerance / 2)  # the robot stops a little short, or aside
+        goal, into = _enter(grid, task, task.goal, math.inf if room >= grid.inflate else within)
         reasons = {"the start": out, "the goal": into}
         unreachable = "; ".join(
             f"no free cell near {end} can be reached from it" for end, ok in reasons.items() if not ok
@@ -86,7 +87,8 @@ def _enter(grid: Grid, task: Task, point: Point, within: float) -> tuple[Cell, b
 
     row, col = grid.cell_at(*point)
     rows, cols = grid.shape
-    reach = 3  # cells: beyond them the way in would be a plan of its own
+    # Cells farther off than this are no entrance: the way to them would be a plan of its own.
+    reach = max(3, math.ceil(grid.inflate / grid.cell) + 1)
     near = [
         (r, c)
         for r in range(max(0, row - reach), min(rows, row + reach + 1))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from planners.plan import PlanResult
@@ -23,7 +25,12 @@ def route_along(plan: PlanResult, grid: Grid, task: Task) -> Route:
     xy = _join(grid.xy(plan.line), np.array(task.start[:2]), grid, task)
     if point_clearance(task.world, [task.goal])[0] >= grid.inflate - 1e-9:
         xy = _join(xy[::-1], np.array(task.goal), grid, task)[::-1]
-    return Route(_straightened(xy))
+    xy = _straightened(xy)
+    if np.ptp(xy, axis=0).max() < 1e-6:
+        # The robot already stands where it should: a route of a tenth of a millimetre is over before it begins.
+        yaw = task.start[2]
+        xy = np.vstack([xy[0], xy[0] + 1e-4 * np.array([math.cos(yaw), math.sin(yaw)])])
+    return Route(xy)
 
 
 def _join(xy: Floats, end: Floats, grid: Grid, task: Task) -> Floats:

@@ -330,7 +330,7 @@ def pursue(
 
     # Shrink the lookahead until the arc to the carrot keeps its distance: corners are cut only where there is room.
     guard = min(guard, segment_clearance(x, y, x, y, discs, bounds) - 5e-4)
-    look = clip(look_time * v, look_min, reach)
+    look = clip(look_time * v, look_min, min(reach, max(remaining, look_min)))  # to the end itself, not past it
     blocked = True
     cx, cy, left, ahead, distance, bearing = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     while True:

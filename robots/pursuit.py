@@ -59,6 +59,7 @@ class Guide:
     discs: Floats  # (M, 3) the obstacles known to the controller, repeated for each square that they are near to
     starts: npt.NDArray[np.int64]  # where each square's rows of `discs` start
     bounds: Floats  # (4,)
+    goal_distance: float  # the robot stops when this little of the route remains [m]
     limits: Floats  # the robot's limits, as `_kernels.pursue` unpacks them
     tuning: Floats  # the controller's settings, as `_kernels.pursue` unpacks them
 
@@ -89,8 +90,8 @@ class PurePursuit:
 
     def __post_init__(self) -> None:
         for key in ("lookahead_time", "lookahead_min", "lookahead_max", "turn_to", "creep", "goal_distance"):
-            if not getattr(self, key) > 0:
-                raise ValueError(f"{key}: must be greater than 0, got {getattr(self, key):g}")
+            if not 1e-3 <= getattr(self, key) <= 100:
+                raise ValueError(f"{key}: must be between 0.001 and 100, got {getattr(self, key):g}")
         if self.lookahead_max < self.lookahead_min:
             raise ValueError(f"lookahead_max: must be at least lookahead_min ({self.lookahead_min:g})")
         for key in ("guard", "floor"):
@@ -101,13 +102,20 @@ class PurePursuit:
         if not self.turn_to < self.turn_from < math.pi / 2:
             raise ValueError(f"turn_from: must lie between turn_to and pi/2, got {self.turn_from:g}")
 
-    def guide(self, route: Route, world: World, robot: RobotSpec, margin: float, period: float) -> Guide:
-        """Prepare a route for a robot that keeps `margin` [m] and is controlled every `period` [s]."""
+    def guide(
+        self, route: Route, world: World, robot: RobotSpec, margin: float, period: float, tolerance: float = math.inf
+    ) -> Guide:
+        """Prepare a route for a robot that keeps `margin` [m] and is controlled every `period` [s].
+
+        Where the goal's `tolerance` [m] is small, the robot drives closer to the route's end than it would otherwise.
+        """
+        goal_distance = min(self.goal_distance, tolerance / 2)
         ds = 0.02
         guard = robot.radius + self.guard * margin
         arc = route.arc
         bounds = np.asarray(world.bounds, dtype=np.float64)
-        side = 0.5  # of the squares that the known obstacles are sorted into [m]
+        # The known obstacles are sorted into squares: of half a metre, or more where the world is huge.
+        side = max(0.5, math.sqrt(math.prod(world.size) / 250_000))
         discs, starts = _kernels.bucket(world.discs, bounds, side, self.lookahead_max + guard + side)
         lookahead = np.empty(int(arc[-1] / ds) + 2)
         _kernels.clear_lookaheads(
@@ -152,11 +160,11 @@ class PurePursuit:
                 self.turn_to,
                 self.braking,
                 self.creep,
-                self.goal_distance,
+                goal_distance,
                 robot.radius + self.floor * margin,
             ]
         )
-        return Guide(route, lookahead, speed, arc, discs, starts, bounds, limits, tuning)
+        return Guide(route, lookahead, speed, arc, discs, starts, bounds, goal_distance, limits, tuning)
 
     def step(self, guide: Guide, pose: Pose, command: Twist, state: Progress) -> tuple[Twist, Progress]:
         """The next command, from the pose now and the command given last."""

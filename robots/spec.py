@@ -70,10 +70,16 @@ class RobotSpec:
                 raise ValueError(f"{field.name}: must be greater than 0, got {value:g}")
         if not self.footprint.radius > 0:
             raise ValueError("footprint: must have an extent")
-        if self.wheel_radius >= self.footprint.radius:
-            raise ValueError(f"wheel_radius: {self.wheel_radius:g} m is larger than the robot")
-        if self.track / 2 > self.footprint.radius:
+        # Contacts are felt by the chassis alone, so no part of the wheels may stand outside it.
+        foot, half_track = self.footprint, self.track / 2
+        if foot.is_disc and math.hypot(half_track, self.wheel_radius) > foot.rounding:
+            raise ValueError(
+                f"track: wheels of {self.wheel_radius:g} m, {self.track:g} m apart, stand outside the footprint"
+            )
+        if not foot.is_disc and half_track > foot.half_width + foot.rounding:
             raise ValueError(f"track: wheels {self.track:g} m apart stand outside the footprint")
+        if not foot.is_disc and self.wheel_radius > foot.half_length + foot.rounding:
+            raise ValueError(f"wheel_radius: wheels of {self.wheel_radius:g} m stand outside the footprint")
 
     @property
     def radius(self) -> float:

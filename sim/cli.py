@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from sim.scenario import Run, Scenario
     from worlds import Disc, Task
 
-SUCCEEDED, FAILED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
+SUCCEEDED, FAILED, WRONG_INPUT, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
 
 app = typer.Typer(
     name="antdrive",
@@ -36,9 +37,11 @@ Settings = Annotated[
     typer.Option("--set", "-s", metavar="GROUP.KEY=VALUE", help="planner.ants=50, controller.lookahead_time=0.5"),
 ]
 Robot = Annotated[str, typer.Option("--robot", "-r", help="A name of the catalogue or a robot file.")]
-Seed = Annotated[int, typer.Option(min=0, help="All chance comes from it.")]
-Margin = Annotated[float, typer.Option(min=0.0, help="Kept free around the robot by planners [m].")]
-CellSize = Annotated[float | None, typer.Option(min=1e-6, help="Grid resolution [m]; the world's own by default.")]
+Seed = Annotated[int, typer.Option(min=0, max=2**63 - 1, help="All chance comes from it.")]
+Margin = Annotated[float, typer.Option(min=0.0, max=100.0, help="Kept free around the robot by planners [m].")]
+CellSize = Annotated[
+    float | None, typer.Option(min=1e-6, max=1e6, help="Grid resolution [m]; the world's own by default.")
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else.")]
 Out = Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the results.")]
 
@@ -56,7 +59,7 @@ def run(
         list[str] | None,
         typer.Option(metavar="X,Y,RADIUS", help="A cylinder that neither planner nor controller know of."),
     ] = None,
-    time_limit: Annotated[float | None, typer.Option(min=1e-3, help="Simulated time allowed [s].")] = None,
+    time_limit: Annotated[float | None, typer.Option(min=1e-3, max=1e6, help="Simulated time allowed [s].")] = None,
     out: Out = None,
     video: Annotated[Path | None, typer.Option(help="Also film it: .mp4, .gif or .webp.")] = None,
     json: Json = False,
@@ -72,6 +75,8 @@ def run(
     folder = out or Path("out") / _slug(scenario)
     if video is not None:
         _check_film(video)
+        _make_folder(video.parent)
+    _make_folder(folder)
     with planning(f"planning with {planner}"):
         grid, answer = make_plan(scenario)
     with bar("driving") as progress:
@@ -322,13 +327,16 @@ def import_world(
     """Turn a world of another simulator into a world file."""
     from worlds import import_barn, import_sdf, save_task
 
+    given: dict[str, Any] = {
+        "start": _numbers("start", start, 3), "goal": _numbers("goal", goal, 2), "bounds": _numbers("bounds", bounds, 4),
+    }  # fmt: skip
     if barn:
-        task = import_barn(path)
+        for key in given:
+            if given[key] is not None:
+                raise InputError(f"--{key}: --barn brings its own")
+        task = import_barn(path, **({} if cell is None else {"cell": cell}))
     else:
-        given: dict[str, Any] = {
-            "start": _numbers("start", start, 3), "goal": _numbers("goal", goal, 2),
-            "bounds": _numbers("bounds", bounds, 4), "cell": cell,
-        }  # fmt: skip
+        given["cell"] = cell
         task = import_sdf(path, skip_unsupported=skip_unsupported, **{k: v for k, v in given.items() if v is not None})
     save_task(task, out)
     _tell_files({"world": str(out)})
@@ -353,6 +361,7 @@ def _root(
 def _scenario(world: str, planner: str, settings: list[str] | None, robot: str, **rest: Any) -> Scenario:
     import dataclasses
 
+    from planners.registry import parse
     from robots import PurePursuit
     from sim.scenario import Scenario
 
@@ -363,15 +372,15 @@ def _scenario(world: str, planner: str, settings: list[str] | None, robot: str, 
         if group not in groups or not name:
             raise InputError(f"--set {text}: write GROUP.KEY=VALUE with a group of {', '.join(groups)}")
         groups[group][name] = value
-    controller = PurePursuit()
-    known = [f.name for f in dataclasses.fields(controller)]
-    for name, value in groups["controller"].items():
+    known = [f.name for f in dataclasses.fields(PurePursuit)]
+    for name in groups["controller"]:
         if name not in known:
             raise InputError(f"controller.{name}: unknown; choose from {', '.join(known)}")
-        try:
-            controller = dataclasses.replace(controller, **{name: float(value)})
-        except ValueError as error:
-            raise InputError(f"controller.{name}: {str(error).partition(': ')[2]}") from None
+    values = {name: parse(f"controller.{name}", float, value) for name, value in groups["controller"].items()}
+    try:
+        controller = PurePursuit(**values)
+    except ValueError as error:
+        raise InputError(f"controller.{error}") from None
     return Scenario.of(world, planner, robot, options=groups["planner"], controller=controller, **rest)
 
 
@@ -389,8 +398,8 @@ def _numbers(key: str, text: str | None, count: int) -> tuple[float, ...] | None
         values = tuple(float(part) for part in text.split(","))
     except ValueError:
         values = ()
-    if len(values) != count:
-        raise InputError(f"--{key} {text}: write {count} numbers separated by commas")
+    if len(values) != count or not all(abs(value) <= 1e6 for value in values):
+        raise InputError(f"--{key} {text}: write {count} numbers separated by commas, none beyond a million")
     return values
 
 
@@ -407,7 +416,13 @@ def _disc(text: str) -> Disc:
 
 def _size(text: str) -> tuple[int, int]:
     width, _, height = text.partition("x")
-    if not (width.isdigit() and height.isdigit() and 64 <= int(width) <= 7680 and 64 <= int(height) <= 4320):
+    if not (
+        text.isascii()
+        and width.isdigit()
+        and height.isdigit()
+        and 64 <= int(width) <= 7680
+        and 64 <= int(height) <= 4320
+    ):
         raise InputError(f"--size {text}: write WIDTHxHEIGHT in pixels, such as 1280x720")
     return int(width), int(height)
 
@@ -420,6 +435,7 @@ def _slug(scenario: Scenario) -> str:
 def _write(result: Run, folder: Path, video: Path | None) -> dict[str, str]:
     files = {"result": str(folder / "result.json")}
     if result.rollout is None:
+        (folder / "rollout.npz").unlink(missing_ok=True)  # of an earlier run; it would belie this one's result
         from sim.plots import plan_figure
 
         s = result.scenario
@@ -432,6 +448,15 @@ def _write(result: Run, folder: Path, video: Path | None) -> dict[str, str]:
     if video is not None:
         files["film"] = _film(result.rollout, video)["file"]
     return files
+
+
+def _make_folder(folder: Path) -> None:
+    """Make sure, before the work, that its results can be written."""
+    from worlds.atomic import written_whole
+
+    with written_whole(folder / ".antdrive") as probe:
+        probe.touch()
+    (folder / ".antdrive").unlink(missing_ok=True)
 
 
 def _film(log: Any, path: Path, **options: Any) -> dict[str, Any]:
@@ -471,10 +496,7 @@ def _write_json(path: Path, value: Any) -> None:
 
 def _tell(result: Run, files: dict[str, str]) -> None:
     s = result.scenario
-    say(
-        f"{s.task.world.name}: {s.robot.name} with {s.planner_name}: {result.outcome.value}"
-        + _because(result.plan.reason)
-    )
+    say(f"{s.task.world.name}: {s.robot.name} with {s.planner_name}: {result.outcome.value}" + _because(result.reason))
     if result.rollout is not None and result.certificate is not None:
         facts = result.as_dict()["metrics"]
         say(
@@ -528,6 +550,7 @@ _USAGE_ERROR: Any = typer.BadParameter.__mro__[2]
 
 def main() -> None:
     """Run the command line; the exit code says how it went."""
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(TERMINATED))  # so that half-written files are cleared away
     try:
         code = app(standalone_mode=False)
     except InputError as error:
@@ -535,7 +558,13 @@ def main() -> None:
         code = WRONG_INPUT
     except (KeyboardInterrupt, typer.Abort):
         code = INTERRUPTED
+    except OSError as error:  # such as a full disk
+        complain(f"{error.filename or 'output'}: {error.strerror}")
+        code = WRONG_INPUT
     except _USAGE_ERROR as error:
+        if type(error).__name__ == "NoArgsIsHelpError":
+            say(error.format_message())
+            sys.exit(WRONG_INPUT)
         complain(f"{error.format_message()} (see antdrive --help)")
         code = WRONG_INPUT
     if code == INTERRUPTED:

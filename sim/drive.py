@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -14,7 +15,8 @@ from worlds import Floats, Task
 
 STOPPED_SPEED = 0.01  # slower than this counts as standing [m/s]
 STUCK_AFTER = 8.0  # without progress for this long the robot is stuck [s]
-STUCK_PROGRESS = 0.02  # what counts as progress [m]
+STUCK_PROGRESS = 0.02  # what counts as progress along the route [m]
+STUCK_TURN = 0.1  # and, while turning on the spot, as progress in heading [rad]
 AFTER_CONTACT = 0.5  # a collision stays in the log for this long, braking [s]
 
 
@@ -23,6 +25,7 @@ class Drive:
     """What a drive logged, a row per physics step; row 0 is the start."""
 
     outcome: Outcome
+    reason: str  # where the outcome's sentence does not say it all
     t: Floats  # (T,) [s]
     pose: Floats  # (T, 3)
     twist: Floats  # (T, 2) measured
@@ -57,7 +60,8 @@ def drive(
     contacts = [(0, *contact) for contact in engine.contacts()]
     outcome = Outcome.COLLIDED if contacts else None
     command, state = Twist(0.0, 0.0), Progress()
-    best, best_at = 0.0, 0
+    best, facing, best_at = 0.0, task.start[2], 0
+    reason = ""
     ticks = round(time_limit * control_hz)
     patience = round(STUCK_AFTER * control_hz)
     for tick in range(ticks):
@@ -65,9 +69,11 @@ def drive(
             break
         x, y, yaw, speed, yaw_rate = rows[-1][:5]
         command, state = controller.step(guide, (x, y, yaw), command, state)
-        if guide.length - state.arc <= controller.goal_distance and _standing(speed, yaw_rate) and not any(command):
-            reached = np.hypot(x - task.goal[0], y - task.goal[1]) <= task.goal_tolerance
-            outcome = Outcome.SUCCEEDED if reached else Outcome.STUCK
+        if guide.length - state.arc <= guide.goal_distance and _standing(speed, yaw_rate) and not any(command):
+            left = math.dist((x, y), task.goal)
+            outcome = Outcome.SUCCEEDED if left <= task.goal_tolerance else Outcome.STUCK
+            if outcome is Outcome.STUCK:
+                reason = f"the route ends here, {left:.3f} m from the goal; the tolerance is {task.goal_tolerance:g} m"
             break
         engine.command(*command)
         for _ in range(substeps):
@@ -78,6 +84,8 @@ def drive(
                 outcome = Outcome.COLLIDED
         if state.arc > best + STUCK_PROGRESS:
             best, best_at = state.arc, tick
+        elif state.turning and abs(math.remainder(rows[-1][2] - facing, 2 * math.pi)) > STUCK_TURN:
+            facing, best_at = rows[-1][2], tick
         elif tick - best_at >= patience:
             outcome = Outcome.STUCK
         if progress is not None and tick % (control_hz // 10 or 1) == 0:
@@ -92,6 +100,7 @@ def drive(
     pose = np.ascontiguousarray(log[:, :3])
     return Drive(
         outcome=outcome or Outcome.TIMED_OUT,
+        reason=reason,
         t=np.arange(len(log)) / engine.physics_hz,
         pose=pose,
         twist=np.ascontiguousarray(log[:, 3:5]),

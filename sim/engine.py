@@ -99,10 +99,11 @@ class Engine:
         self._build_robot()
         self._obstacles: dict[int, int] = {}
         for disc in self.world.obstacles:
+            height = max(disc.height, 0.05)  # the chassis hangs 5 mm above the floor and must not pass over anything
             shape = p.createCollisionShape(
-                p.GEOM_CYLINDER, radius=disc.radius, height=disc.height, physicsClientId=self._client
+                p.GEOM_CYLINDER, radius=disc.radius, height=height, physicsClientId=self._client
             )
-            self._build_obstacle(shape, (disc.x, disc.y, disc.height / 2))
+            self._build_obstacle(shape, (disc.x, disc.y, height / 2))
         for half, centre in _walls(self.world, max(2 * self.robot.height, 0.2)):
             shape = p.createCollisionShape(p.GEOM_BOX, halfExtents=half, physicsClientId=self._client)
             self._build_obstacle(shape, centre)

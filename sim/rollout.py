@@ -8,9 +8,10 @@ from __future__ import annotations
 import enum
 import hashlib
 import json
+import math
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -31,7 +32,7 @@ class Outcome(enum.Enum):
     COLLIDED = "touched an obstacle"
     TIMED_OUT = "the time limit passed before the goal was reached"
     STUCK = "stopped making progress"
-    NO_PATH = "no path exists"
+    NO_PATH = "no path on this grid"
     STOPPED = "stopped before a path was found"
 
 
@@ -84,6 +85,8 @@ class Rollout:
             InputError: no such file, not a rollout, or written by a newer version.
         """
         try:
+            with Path(path).open("rb") as raw, zipfile.ZipFile(raw):  # a plain array is no archive
+                pass
             with Path(path).open("rb") as raw, np.load(raw, allow_pickle=False) as file:
                 arrays = {name: file[name] for name in (*_ARRAYS, "meta")}
                 meta = json.loads(str(arrays.pop("meta")[()]))
@@ -91,14 +94,94 @@ class Rollout:
             raise InputError(f"{path}: no such file") from None
         except KeyError as error:
             raise InputError(f"{path}: not a rollout: {error.args[0]}") from None
-        except AttributeError:
-            raise InputError(f"{path}: not a rollout (a single array)") from None
+        except RecursionError:
+            raise InputError(f"{path}: meta: nested too deeply") from None
         except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
             raise InputError(f"{path}: not a rollout ({str(error).splitlines()[0]})") from None
         if not isinstance(meta, dict) or meta.get("schema") != SCHEMA:
             found = meta.get("schema") if isinstance(meta, dict) else meta
-            raise InputError(f"{path}: meta.schema: this version reads rollouts of schema {SCHEMA}, found {found!r}")
-        return cls(**arrays, meta=meta)
+            raise InputError(
+                f"{path}: meta.schema: this version reads rollouts of schema {SCHEMA}, found {found!r:.40}"
+            )
+        if "digest" not in meta:
+            raise InputError(f"{path}: meta.digest: missing; a log that antdrive wrote has one")
+        loaded = cls(**arrays, meta=meta)
+        problems = loaded.problems()
+        if problems:
+            raise InputError(f"{path}: {problems[0]}")
+        return loaded
+
+    def problems(self) -> list[str]:
+        """What no log of a drive can look like: a sentence for each array or entry of wrong shape or kind."""
+        return [*self._array_problems(), *_meta_problems(self.meta)]
+
+    def _array_problems(self) -> Iterator[str]:
+        rows = self.t.shape[0] if self.t.ndim else 0
+        shapes = {
+            "t": (rows,), "pose": (rows, 3), "twist": (rows, 2), "command": (rows, 2), "clearance": (rows,),
+            "limiter": (rows,), "contacts": (None, 4), "movers": (rows, None, 2), "route": (None, 2), "cells": (None, 2),
+        }  # fmt: skip
+        if rows == 0:
+            yield "t: the log is empty"
+        for name, shape in shapes.items():
+            array = getattr(self, name)
+            fits = len(array.shape) == len(shape) and all(
+                m in (None, n) for n, m in zip(array.shape, shape, strict=True)
+            )
+            if not fits:
+                yield f"{name}: shape {array.shape} where {_told(shape)} is due"
+            elif array.dtype.kind not in "fiu":
+                yield f"{name}: holds {array.dtype} where numbers are due"
+            elif not np.isfinite(array).all():
+                yield f"{name}: holds numbers that are not finite"
+        steps = self.contacts[:, 0] if self.contacts.ndim == 2 and self.contacts.shape[1:] == (4,) else np.empty(0)
+        if steps.size and steps.dtype.kind in "fiu" and not (steps.min() >= 0 and steps.max() < rows):
+            yield "contacts: a step outside the log"
 
 
 _ARRAYS = tuple(field.name for field in fields(Rollout) if field.name != "meta")
+
+
+def _told(shape: tuple[int | None, ...]) -> str:
+    return "(" + ", ".join("any" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "") + ")"
+
+
+def _meta_problems(meta: Mapping[str, Any]) -> Iterator[str]:
+    """What is missing or impossible in the metadata that certificates, metrics and films read."""
+    task, robot, plan = (_mapping(meta.get(key)) for key in ("task", "robot", "plan"))
+    foot = _mapping(robot.get("footprint"))
+    checks: list[tuple[str, bool]] = [
+        ("outcome", str(meta.get("outcome")).upper() in Outcome.__members__),
+        ("physics_hz", _numbers([meta.get("physics_hz")], 1) and meta["physics_hz"] > 0),
+        ("task.bounds", _numbers(task.get("bounds"), 4)),
+        ("task.start", _numbers(task.get("start"), 3)),
+        ("task.goal", _numbers(task.get("goal"), 2)),
+        ("task.goal_tolerance", _numbers([task.get("goal_tolerance")], 1) and task["goal_tolerance"] > 0),
+        ("robot.footprint", _numbers([foot.get(k) for k in ("half_length", "half_width", "rounding")], 3)
+            and min(foot.values()) >= 0 < max(foot.values())),
+        ("plan", all(_numbers([plan.get(k)], 1, finite=False) for k in ("length_m", "grid_optimum_m", "euclidean_optimum_m"))),
+        ("inflate", _numbers([meta.get("inflate")], 1)),
+    ]  # fmt: skip
+    for key, fine in checks:
+        if not fine:
+            yield f"meta.{key}: missing or impossible"
+    obstacles = task.get("obstacles")
+    if not isinstance(obstacles, list):
+        yield "meta.task.obstacles: missing"
+        return
+    for i, disc in enumerate(obstacles):
+        if not (_numbers([_mapping(disc).get(k) for k in ("x", "y", "radius", "height")], 4) and disc["radius"] > 0):
+            yield f"meta.task.obstacles[{i}]: missing or impossible"
+
+
+def _mapping(value: Any) -> Mapping[str, Any]:
+    return value if isinstance(value, dict) else {}
+
+
+def _numbers(values: Any, count: int, *, finite: bool = True) -> bool:
+    return (
+        isinstance(values, list | tuple)
+        and len(values) == count
+        and all(isinstance(v, int | float) and not isinstance(v, bool) for v in values)
+        and (not finite or all(math.isfinite(v) for v in values))
+    )

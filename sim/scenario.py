@@ -88,6 +88,11 @@ class Run:
         return Outcome.NO_PATH if self.plan.status is PlanStatus.NO_PATH else Outcome.STOPPED
 
     @property
+    def reason(self) -> str:
+        """What the outcome's sentence leaves open, if anything."""
+        return str(self.rollout.meta["reason"]) if self.rollout is not None else self.plan.reason
+
+    @property
     def succeeded(self) -> bool:
         """Whether the robot stopped at the goal in time, and its log proves that it touched nothing."""
         return self.outcome is Outcome.SUCCEEDED and self.certificate is not None and self.certificate.certified
@@ -102,7 +107,7 @@ class Run:
             "seed": s.seed,
             "outcome": self.outcome.name.lower(),
             "sentence": self.outcome.value,
-            "reason": self.plan.reason,
+            "reason": self.reason,
             "succeeded": self.succeeded,
             "certificate": self.certificate.as_dict() if self.certificate else None,
             "metrics": measure(self.rollout) if self.rollout else {"plan_s": self.plan.wall_s},
@@ -127,7 +132,7 @@ def run(
     if not answer.solved:
         return Run(s, grid, answer)
     route = route_along(answer, grid, s.task)
-    guide = s.controller.guide(route, s.task.world, s.robot, s.margin, 1 / s.control_hz)
+    guide = s.controller.guide(route, s.task.world, s.robot, s.margin, 1 / s.control_hz, s.task.goal_tolerance)
     built = dataclasses.replace(s.task.world, obstacles=s.task.world.obstacles + s.unseen)
     limit = s.time_limit or 30.0 + 10.0 * route.length / s.robot.max_speed
     started = time.perf_counter()
@@ -181,6 +186,7 @@ def _record(
             "control_hz": s.control_hz,
             "time_limit": limit,
             "outcome": log.outcome.name.lower(),
+            "reason": log.reason,
             "versions": versions(),
             "times": {"plan_s": answer.wall_s, "drive_wall_s": wall},
         },

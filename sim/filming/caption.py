@@ -89,7 +89,7 @@ class Band:
         draw = ImageDraw.Draw(image)
         values = (
             f"{reading.time:.1f} s",
-            f"{reading.speed:.2f} m/s",
+            f"{max(reading.speed, 0.0):.2f} m/s",
             _metres(reading.clearance),
             _metres(reading.least),
         )

@@ -109,7 +109,7 @@ def test_any_grid_like_route_is_driven_to_its_end(turns: list[int], step: float)
 @pytest.mark.parametrize(
     ("key", "value", "says"),
     [
-        ("lookahead_time", 0.0, "must be greater than 0"),
+        ("lookahead_time", 0.0, "between 0.001 and 100"),
         ("guard", 1.5, "between 0 and 1"),
         ("braking", 0.0, "between 0 and 1"),
         ("lookahead_max", 0.01, "at least lookahead_min"),

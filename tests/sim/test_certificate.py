@@ -1,5 +1,7 @@
 """The certificate must be able to fail: every reading, and every hand on the log."""
 
+import json
+import math
 import subprocess
 import sys
 from collections.abc import Callable
@@ -56,36 +58,57 @@ def _shifted(pose: np.ndarray) -> None:
     pose[:, 1] += 0.3
 
 
+ROWS = ("t", "pose", "twist", "command", "clearance", "limiter", "movers")
 TAMPERINGS: dict[str, tuple[Callable[[Rollout], Rollout], str]] = {
-    "a pose": (lambda log: changed(log, "pose", _jump), "does not follow from the measured speed"),
+    "a pose": (lambda log: changed(log, "pose", _jump), "do not follow from the measured speed"),
     "poses inside an obstacle": (lambda log: changed(log, "pose", _into_the_obstacle), "overlaps an obstacle"),
     "the whole path": (lambda log: changed(log, "pose", _shifted), "not the task's start"),
     "clearance": (lambda log: changed(log, "clearance", lambda c: c + 0.01), "closed form says"),
     "a contact added": (lambda log: changed(log, "contacts", lambda c: np.array([[5, 0, -0.001, 9.0]])), "disagree"),
     "the end cut off": (
-        lambda log: replace(log, **{k: getattr(log, k)[:400] for k in ("t", "pose", "twist", "command", "clearance", "limiter")}),
+        lambda log: replace(log, **{k: getattr(log, k)[:400] for k in ROWS}),
         "from the goal",
     ),
     "time stretched": (lambda log: changed(log, "t", lambda t: t * 1.01), "rows are not 240 a second"),
     "rows missing": (lambda log: changed(log, "twist", lambda t: t[:-1]), "shape"),
     "not finite": (lambda log: changed(log, "pose", lambda p: np.full_like(p, np.nan)), "not finite"),
-    "speeds": (lambda log: changed(log, "twist", lambda t: t * 3), "does not follow from the measured speed"),
+    "speeds": (lambda log: changed(log, "twist", lambda t: t * 3), "do not follow from the measured speed"),
     "a smaller robot": (lambda log: _meta(log, "robot", "footprint", "rounding", 0.1), "closed form says"),
     "an obstacle removed": (lambda log: _obstacle(log, []), "closed form says"),
     "an obstacle moved": (
         lambda log: _obstacle(log, [{"x": 2.0, "y": 1.4, "radius": 0.3, "height": 1.0}]), "closed form says"),
     "the outcome": (lambda log: replace(log, meta={**log.meta, "outcome": "collided"}), "with 0 contacts"),
     "the goal": (lambda log: _meta(log, "task", "goal", 0, 1.0), "from the goal"),
+    "a NaN obstacle": (lambda log: _obstacle(log, [{"x": 2.0, "y": 1.5, "radius": math.nan, "height": 1.0}]), "impossible"),
+    "a negative radius": (lambda log: _obstacle(log, [{"x": 2.0, "y": 1.5, "radius": -0.3, "height": 1.0}]), "impossible"),
+    "a NaN robot": (lambda log: _meta(log, "robot", "footprint", "rounding", math.nan), "impossible"),
+    "NaN bounds": (lambda log: _meta(log, "task", "bounds", 0, math.nan), "impossible"),
+    "a NaN goal": (lambda log: _meta(log, "task", "goal", 0, math.nan), "impossible"),
+    "a NaN start": (lambda log: _meta(log, "task", "start", 0, math.nan), "impossible"),
+    "no footprint": (lambda log: _meta(log, "robot", "footprint", 3), "impossible"),
+    "no task": (lambda log: _meta(log, "task", 3), "impossible"),
+    "an unknown outcome": (lambda log: _meta(log, "outcome", "flew"), "impossible"),
+    "no rate": (lambda log: _meta(log, "physics_hz", "fast"), "impossible"),
+    "text for poses": (lambda log: changed(log, "pose", lambda p: p.astype(str)), "numbers are due"),
+    "complex poses": (lambda log: changed(log, "pose", lambda p: p.astype(complex)), "numbers are due"),
+    "time as one number": (lambda log: changed(log, "t", lambda t: np.array(3.0)), "shape"),
+    "a detour": (lambda log: _detour(log), "do not follow from the measured speed"),
     "nothing left": (
-        lambda log: replace(log, **{k: getattr(log, k)[:0] for k in ("t", "pose", "twist", "command", "clearance", "limiter")}),
+        lambda log: replace(log, **{k: getattr(log, k)[:0] for k in ROWS}),
         "empty",
     ),
 }  # fmt: skip
 
 
-def _meta(log: Rollout, *path_and_value: Any) -> Rollout:
-    import json
+def _detour(log: Rollout) -> Rollout:
+    """The path bent 0.4 m aside, by less than a millimetre from row to row, with clearances to match."""
+    pose = log.pose.copy()
+    pose[:, 1] += 0.4 * np.sin(np.linspace(0, math.pi, len(pose))) ** 2
+    bent = replace(log, pose=pose)
+    return replace(bent, clearance=closed_form_clearance(bent))
 
+
+def _meta(log: Rollout, *path_and_value: Any) -> Rollout:
     *path, last, value = path_and_value
     meta = json.loads(json.dumps(dict(log.meta)))
     place = meta
@@ -166,6 +189,15 @@ def test_an_archive_of_other_arrays_is_refused(log: Rollout, tmp_path: Path) -> 
     np.savez(tmp_path / "other.npz", a=np.zeros(3))
     with pytest.raises(InputError, match="not a rollout"):
         Rollout.load(tmp_path / "other.npz")
+    np.save(tmp_path / "plain.npy", np.zeros(3))
+    with pytest.raises(InputError, match="not a rollout"):
+        Rollout.load(tmp_path / "plain.npy")
+    with np.load(log.save(tmp_path / "run.npz")) as saved:
+        arrays = dict(saved)
+    unsigned = {k: v for k, v in json.loads(str(arrays.pop("meta"))).items() if k != "digest"}
+    np.savez(tmp_path / "unsigned.npz", meta=np.array(json.dumps(unsigned)), **arrays)
+    with pytest.raises(InputError, match="digest: missing"):
+        Rollout.load(tmp_path / "unsigned.npz")
     newer = replace(log, meta={**log.meta, "schema": 99})
     with pytest.raises(InputError, match="schema 1, found 99"):
         Rollout.load(newer.save(tmp_path / "newer.npz"))

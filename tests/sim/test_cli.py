@@ -70,6 +70,9 @@ def test_a_collision_is_exit_code_1_and_the_log_fails_verify(antdrive, small: Pa
 
 
 def test_no_path_is_exit_code_1(antdrive) -> None:  # type: ignore[no-untyped-def]
+    antdrive("run", "empty", "--out", "r")
+    assert antdrive("run", "no-path", "--out", "r")[0] == 1
+    assert not Path("r/rollout.npz").exists()  # the earlier run's would belie the result beside it
     code, out, _ = antdrive("run", "no-path", "--json")
     facts = json.loads(out)
     assert (code, facts["outcome"]) == (1, "no_path")
@@ -121,6 +124,14 @@ def test_there_are_at_least_30_malformed_worlds() -> None:
         (["run", "empty", "--margin", "-1"], "--margin"),
         (["run", "empty", "--cell", "nan"], "cell"),
         (["run", "empty", "--cell", "1e-5"], "cell"),
+        (["run", "empty", "--cell", "inf"], "--cell"),
+        (["run", "empty", "--margin", "inf"], "--margin"),
+        (["run", "empty", "--time-limit", "inf"], "--time-limit"),
+        (["run", "empty", "--set", "controller.lookahead_max=inf"], "finite"),
+        (["run", "empty", "--set", "controller.lookahead_max=1e9"], "between 0.001 and 100"),
+        (["run", "empty", "--set", "controller.guard=abc"], "must be a finite number"),
+        (["run", "empty", "--unseen", "1e300,1,1"], "none beyond a million"),
+        (["worlds", "import", "x.world", "-o", "w.yaml", "--barn", "--goal", "1,2"], "--barn brings its own"),
         (["run", "empty", "--unseen", "1,2"], "3 numbers"),
         (["run", "empty", "--unseen", "1,2,-3"], "radius: must be greater than 0"),
         (["run", "empty", "--video", "film.avi"], ".mp4"),

@@ -116,6 +116,33 @@ def test_a_robot_that_cannot_move_is_stuck(small_scenario: Scenario) -> None:
     assert result.rollout.t[-1] < 12
 
 
+def test_a_robot_that_only_turns_slowly_is_not_stuck(turtlebot: RobotSpec) -> None:
+    slow = replace(turtlebot, max_yaw_rate=0.25)  # half a turn takes 12 s
+    task = Task(World("w", (0, 0, 4, 3)), (3.0, 1.5, 0.0), (1.0, 1.5), cell=0.2)
+    assert run(Scenario(task=task, planner=find_planner("astar"), robot=slow)).succeeded
+
+
+@pytest.mark.parametrize("robot", ["turtlebot", "jackal"])
+def test_a_small_tolerance_is_met(robot: str, request: pytest.FixtureRequest) -> None:
+    task = Task(World("w", (0, 0, 4, 3), (Disc(2, 1.5, 0.3),)), (0.6, 1.4, 0), (3.4, 1.7), 0.02, 0.2)
+    result = run(Scenario(task=task, planner=find_planner("astar"), robot=request.getfixturevalue(robot)))
+    assert result.succeeded, result.reason
+
+
+def test_a_robot_that_stands_where_it_should_need_not_drive(turtlebot: RobotSpec) -> None:
+    """The goal has no room, and the only cell near it is the one that the robot starts in."""
+    task = Task(World("w", (0, 0, 1, 1)), (0.5, 0.5, 0.0), (0.5, 0.3), 0.25, 1.0)
+    result = run(Scenario(task=task, planner=find_planner("astar"), robot=turtlebot, margin=0.15))
+    assert result.succeeded
+    assert result.rollout is not None
+    assert len(result.rollout.t) == 1
+
+
+def test_no_obstacle_is_too_low_to_be_felt(small_scenario: Scenario, collided_run: Run) -> None:
+    low = replace(collided_run.scenario.unseen[0], height=0.003)
+    assert run(replace(small_scenario, unseen=(low,))).outcome is Outcome.COLLIDED
+
+
 def test_a_start_that_touches_is_a_collision_at_once(turtlebot: RobotSpec) -> None:
     task = Task(World("w", (0, 0, 4, 3), (Disc(0.6, 1.5, 0.1),)), (0.85, 1.5, 0), (3.4, 1.5), cell=0.2)
     result = run(Scenario(task=task, planner=find_planner("astar"), robot=turtlebot))
