@@ -65,7 +65,10 @@ def speed_profile(
     from robots import _kernels_profile
 
     places, headings, stops, turns = _headings(route, stop_from)
-    arcs, speeds, times, curvatures = [], [], [], []
+    arcs: list[Floats] = []
+    speeds: list[Floats] = []
+    times: list[Floats] = []
+    curvatures: list[Floats] = []
     now = 0.0
     for first, last, turn in zip([0.0, *stops], [*stops, route.length], [0.0, *turns], strict=True):
         now += turning_time(turn, robot)
