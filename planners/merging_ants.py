@@ -26,7 +26,7 @@ class MergingAnts(MaxMinAnts):
     - After an iteration the shortest way is sought over the arcs that its tours used, and the best tour's: ants
       find the pieces, and what deposits is the best that can be put together of them. Nothing beyond those arcs,
       about a tenth of a grid's, is searched.
-    - It ends when `settled` iterations brought nothing better, or the tour cannot be shorter on any grid.
+    - It ends when so many iterations brought nothing better (`settled`), or the tour cannot be shorter on any grid.
     """
 
     ants: int = 25
@@ -37,7 +37,7 @@ class MergingAnts(MaxMinAnts):
     evaporation: float = 0.1
     patience: int = 10
     iterations: int = 300
-    settled: int = 60
+    settled: int = 60  # at most; where tours are short 0.6 times their length in cells, but 20
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -112,4 +112,5 @@ class MergingAnts(MaxMinAnts):
         (r0, c0), (r1, c1) = divmod(season.ground.start, cols), divmod(season.ground.goal, cols)
         low, high = sorted((abs(r1 - r0), abs(c1 - c0)))
         shortest = high - low + math.sqrt(2.0) * low
-        return season.since >= self.settled or bool(season.best.lengths[0] <= shortest + 1e-9)
+        enough = min(self.settled, max(20, round(0.6 * float(season.best.lengths[0]))))
+        return season.since >= enough or bool(season.best.lengths[0] <= shortest + 1e-9)

@@ -14,8 +14,9 @@ from worlds import Grid
 free = np.ones((6, 7))
 free[1:5, 3] = 0
 query = Query(Grid.from_free(free), (2, 1), (3, 5))
-for name in ("astar", "dijkstra", "dstar", "dstar-lite", "apf", "aco-han-elite"):
-    options = {"ants": 4, "iterations": 2} if name.startswith("aco") else {}
+colonies = ("aco-han-elite", "as", "maco", "iaco", "mmas", "ants", "pfaco")
+for name in ("astar", "dijkstra", "dstar", "dstar-lite", "apf", "mmas-dstar", *colonies):
+    options = {"ants": 4, "iterations": 3, "retreat": True, "shortcut": True} if name in colonies else {}
     result = find_planner(name, **options).plan(query, np.random.default_rng(0))
     print(name, result.status.name, round(result.cost, 9), result.cells.tolist(), result.work)
 """
@@ -36,5 +37,5 @@ def run(**environment: str) -> str:
 
 def test_uncompiled_kernels_give_the_same_plans_without_a_warning() -> None:
     plain = run(NUMBA_DISABLE_JIT="1")
-    assert plain.count("SOLVED") == 5
+    assert plain.count("SOLVED") == 12
     assert plain == run(NUMBA_DISABLE_JIT="0")

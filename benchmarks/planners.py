@@ -1,0 +1,441 @@
+"""How good and how fast the planners are: `python -m benchmarks.planners [--quick] [--peer PYTHON] [TABLE ...]`.
+
+Tables: quality, papers, hasan, han2007, speed, peer; all but the last by default. Everything runs in one go on one
+core, on the same grids; figures are medians over seeds. A gap is how much longer a path is than the shortest over
+the same moves.
+
+The papers' own maps are known as pictures only. Maps here that stand for them are called recreated: random ones of the same size
+and kind, judged by their own optimum. The papers' figures stand beside them, and are not of the same map.
+
+The peer is python_motion_planning 1.1.1 (GPL, hence never imported here): PYTHON is an interpreter that has it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import json
+import math
+import statistics
+import subprocess
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from planners import PLANNERS, Planner, PlanResult, Query, find_planner
+from planners.ants import Ground, _Walk
+from worlds import DIRECTIONS, Disc, Grid, World, forest, rasterise
+
+Picture = npt.NDArray[np.bool_]
+SEEDS = range(10)
+
+
+# Grids
+
+
+def crossable(draw: Callable[[np.random.Generator], Picture], seed: int) -> Query:
+    """Corner to corner over the first picture drawn that can be crossed."""
+    rng = np.random.default_rng(seed)
+    while True:
+        free = draw(rng)
+        free[0, 0] = free[-1, -1] = True
+        query = Query(Grid.from_free(free), (0, 0), (free.shape[0] - 1, free.shape[1] - 1))
+        if math.isfinite(optimum(query)):
+            return query
+
+
+def random_grid(size: int, seed: int, blocked: float = 0.25) -> Query:
+    """Each cell blocked with one probability."""
+    return crossable(lambda rng: rng.random((size, size)) >= blocked, seed)
+
+
+def cylinder_grid(size: int, seed: int) -> Query:
+    """A forest of cylinders, cut into cells of 0.25 m for a robot of radius 0.2 m."""
+    side = 0.25 * size
+    count = max(3, round(0.12 * side**2))
+    rng = np.random.default_rng(seed)
+    task = forest(rng, size=side, count=count, radius=(0.2, 0.8), clearance=0.6, robot_radius=0.2, cell=0.25)
+    return Query.between(rasterise(task.world, 0.25, 0.2), task)
+
+
+def block_grid(rows: int, cols: int, count: int, largest: int, seed: int) -> Query:
+    """`count` upright rectangles of 1 to `largest` cells a side, two cells clear of both corners."""
+
+    def draw(rng: np.random.Generator) -> Picture:
+        free = np.ones((rows, cols), dtype=np.bool_)
+        for _ in range(count):
+            height, width = rng.integers(1, largest + 1, 2)
+            r, c = rng.integers(0, rows - height + 1), rng.integers(0, cols - width + 1)
+            free[r : r + height, c : c + width] = False
+        free[:3, :3] = free[-3:, -3:] = True
+        return free
+
+    return crossable(draw, seed)
+
+
+def optimum(query: Query) -> float:
+    return find_planner("astar").plan(query, np.random.default_rng(0)).cost
+
+
+def solve(planner: Planner, query: Query, seed: int) -> PlanResult:
+    return planner.plan(query, np.random.default_rng(seed))
+
+
+# Tables
+
+
+def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
+    """Markdown, a line at a time."""
+    yield f"| {' | '.join(heads)} |"
+    yield "|" + "---|" * len(heads)
+    for row in rows:
+        yield f"| {' | '.join(row)} |"
+    yield ""
+
+
+def seconds(value: float) -> str:
+    return f"{1e3 * value:.2g} ms" if value < 0.1 else f"{1e3 * value:.0f} ms" if value < 1 else f"{value:.2f} s"
+
+
+def percent(share: float) -> str:
+    return f"{100 * max(share, 0.0):.1f} %"
+
+
+def summary(planner: Planner, queries: Sequence[Query]) -> tuple[int, list[float], float]:
+    """How many arrived, the gaps of these, and the median time."""
+    results = [solve(planner, query, seed) for seed, query in enumerate(queries)]
+    gaps = [r.cost / optimum(q) - 1 for r, q in zip(results, queries, strict=True) if r.solved]
+    return len(gaps), gaps, statistics.median(r.wall_s for r in results)
+
+
+def quality(quick: bool) -> Iterator[str]:
+    """Every planner of the registry with its own defaults."""
+    sizes = (20, 50) if quick else (20, 50, 100)
+    seeds = SEEDS[:3] if quick else SEEDS
+    heads = ["planner", *(f"{size}×{size}" for size in sizes)]
+    for kind, make in (("25 % of cells blocked at random", random_grid), ("cylinders", cylinder_grid)):
+        queries = {size: [make(size, seed) for seed in seeds] for size in sizes}
+        rows = []
+        for name, planner in PLANNERS.items():
+            if getattr(planner, "needs_world", False) and make is random_grid:
+                continue
+            solve(planner, queries[20][0], 0)  # compiled before it is timed
+            row = [f"`{name}`"]
+            for size in sizes:
+                arrived, gaps, wall = summary(planner, queries[size])
+                gap = f"{percent(statistics.median(gaps))} / {percent(max(gaps))}" if gaps else "–"
+                row.append(f"{arrived}/{len(seeds)}, {gap}, {seconds(wall)}")
+            rows.append(row)
+        yield f"{kind.capitalize()}; arrived, gap median / most, time"
+        yield ""
+        yield from table(heads, rows)
+
+
+def paper_maps(quick: bool) -> Iterator[tuple[str, str, str, dict[str, Any], list[Query], str]]:
+    """Paper, map, planner, its options there, recreated maps, and what the paper printed."""
+    seeds = SEEDS[:3] if quick else SEEDS
+    # suganthi2019, Table 2: sizes; how much is blocked is not told.
+    common = {"alpha": 1.0, "beta": 1.0, "evaporation": 0.3, "deposit": 1.0, "heuristic": "step", "iterations": 100}
+    printed = {
+        10: (13.899, 13.899, 13.899), 20: (28.627, 38.627, 28.627), 30: (46.527, 59.355, 42.184), 50: (96.125, 109.761, 94.326),
+    }  # fmt: skip
+    for size, figures in printed.items():
+        queries = [random_grid(size, seed, 0.15) for seed in seeds]
+        for name, options, figure in (
+            ("as", {"ants": 50, **common}, figures[0]),
+            ("pfaco", {"ants": 50, "iterations": 100, "listed": 15}, figures[1]),
+            ("iaco", {"ants": 25, "explorers": 75, **common}, figures[2]),
+        ):
+            yield "suganthi2019", f"{size}×{size}, 15 % blocked", name, options, queries, f"{figure:g}"
+    # ibraheem2016, Table 2: 5 and 10 obstacles; those of the larger maps are not told.
+    for size, count, figures in (
+        (10, 5, (15.07, 1.217, 15.07, 1.155)), (20, 10, (28.6274, 9.073, 28.6274, 7.839)),
+        (30, 15, (45.9411, 52.854, 45.1127, 52.017)), (40, 20, (62.6690, 134.771, 61.8406, 132.678)),
+    ):  # fmt: skip
+        queries = [block_grid(size, size, count, size // 4, seed) for seed in seeds]
+        options = {"ants": 50, "iterations": 100, "evaporation": 0.3}
+        for name, length, wall in (("as", *figures[:2]), ("maco", *figures[2:])):
+            yield "ibraheem2016", f"{size}×{size}, {count} obstacles", name, options, queries, f"{length:g}, {wall:g} s"
+    # lee2008, Tables I and II.
+    for number, (rows, cols), figures in (
+        (1, (25, 25), (72.0833, 13326, 59.2548, 602)), (2, (50, 44), (83.3970, 3926, 64.0833, 274)),
+        (3, (100, 100), (154.2376, 16552, 123.6102, 1063)), (4, (100, 100), (175.2376, 17953, 135.8234, 1201)),
+        (5, (100, 100), (168.6518, 22641, 131.6812, 1593)),
+    ):  # fmt: skip
+        queries = [block_grid(rows, cols, 25, max(rows, cols) // 6, 100 * number + seed) for seed in seeds]
+        place = f"{number}: {rows}×{cols}, 25 obstacles"
+        old = {"ants": 500, "beta": 2.0, "evaporation": 0.01, "iterations": 100}
+        for name, options, length, wall in (("as", old, *figures[:2]), ("pfaco", {}, *figures[2:])):
+            yield "lee2008", place, name, options, queries, f"{length:g}, {wall:g} s"
+
+
+def papers(quick: bool) -> Iterator[str]:
+    """Each paper's planners at its own parameters, then with our two options; `ants` on the same maps."""
+    rows = []
+    for paper, place, name, options, queries, printed in paper_maps(quick):
+        row = [paper, place, f"`{name}`", printed]
+        helped = find_planner(name, **options, retreat=True, shortcut=True)
+        for planner in (find_planner(name, **options), helped, find_planner("ants")):
+            solve(planner, queries[0], 0)
+            arrived, gaps, wall = summary(planner, queries)
+            gap = f"{percent(statistics.median(gaps))} / {percent(max(gaps))}" if gaps else "–"
+            row.append(f"{arrived}/{len(queries)}, {gap}, {seconds(wall)}")
+        row.insert(4, f"{statistics.median(map(optimum, queries)):.1f}")
+        rows.append(row)
+    yield "Recreated maps; arrived, gap median / most, time"
+    yield ""
+    yield from table(
+        ["paper", "map", "planner", "printed", "shortest here", "by the paper", "retreat, shortcut", "`ants`"], rows
+    )
+
+
+# hasan's environments, 50×50
+
+
+def environments() -> Iterator[tuple[str, Query, str]]:
+    """Name, recreated environment with the paper's start and goal, and what it printed."""
+    row, col = np.mgrid[:50, :50]
+
+    def ring(r: float, c: float, radius: float, opening: float, wide: float) -> Picture:
+        angle = np.degrees(np.arctan2(row - r, col - c)) - opening
+        shut = np.abs((angle + 180) % 360 - 180) > wide / 2
+        return (np.abs(np.hypot(row - r, col - c) - radius) < 0.8) & shut
+
+    def query(blocked: Picture, start: tuple[int, int], goal: tuple[int, int]) -> Query:
+        free = ~blocked
+        free[start] = free[goal] = True
+        return Query(Grid.from_free(free), start, goal)
+
+    curved = ring(5, 8, 18.6, 185, 170) | ring(38, 30, 7, 90, 90) | ring(36, 8, 6, 270, 90) | ring(14, 40, 6, 0, 90)
+    overlapping = ring(2, 26, 11, 270, 220) | ring(34, 26, 16, 90, 220) | ring(36, 40, 6, 90, 90)
+    vertical = np.zeros((50, 50), dtype=np.bool_)
+    for c in range(8, 48, 8):
+        vertical[6:44, c] = True
+        vertical[20:26, c] = False
+    circles = ring(24, 24, 6, 0, 40) | ring(24, 24, 12, 180, 30) | ring(24, 24, 18, 0, 25)
+    rng = np.random.default_rng(5)
+    shapes = np.zeros((50, 50), dtype=np.bool_)
+    for _ in range(30):
+        r, c = rng.integers(1, 45, 2)
+        height, width = rng.integers(1, 5, 2)
+        shapes[r : r + height, c : c + width] = True
+    shapes[23:26] = False
+    shapes[24, :47] = True
+    # The paper's x.y as (column, row): where wall and ends are told in words, its steps then come out.
+    yield "1a curved walls", query(curved, (13, 21), (17, 27)), "1531, 65, 3.82 s"
+    yield "2b overlapping curved walls", query(overlapping, (8, 26), (24, 25)), "1134, 43, 2.96 s"
+    yield "3c vertical rows", query(vertical, (49, 3), (0, 3)), "1208, 49, 2.98 s"
+    yield "4d concentric circles", query(circles, (24, 24), (45, 38)), "1689, 64, 4.08 s"
+    yield "5e many shapes", query(shapes, (4, 1), (48, 2)), "1541, 91, 5.64 s"
+    yield "5f the same, across the wall", query(shapes, (23, 16), (25, 15)), "1346, 66, 4.76 s"
+
+
+def hasan(quick: bool) -> Iterator[str]:
+    """hasan's planner where nothing moves."""
+    rows = []
+    for name, query, printed in environments():
+        planner = find_planner("mmas-dstar")
+        solve(planner, query, 0)
+        r = solve(planner, query, 0)
+        ours = f"{r.work}, {len(r.cells) - 1}, {seconds(r.wall_s)}"
+        rows.append([name, printed, ours, percent(r.cost / optimum(query) - 1), r.reason or "–"])
+    yield "Recreated environments of 50×50 cells, standing still; cells propagated, steps, time"
+    yield ""
+    yield from table(["environment", "printed", "`mmas-dstar`", "gap", "what it had to do"], rows)
+
+
+# han2007
+
+
+def han_map() -> Query:
+    """The thesis' map of fourteen obstacles in its own units: points (1, 1) to (20, 20), a point robot."""
+    places = [
+        (4, 6), (14, 12), (13, 11), (8, 10), (10, 10), (14, 10), (14, 4), (8, 14), (13, 14), (4, 10), (16, 14), (10, 16),
+        (17, 10), (19, 18),
+    ]  # fmt: skip
+    world = World("han2007-aco", (0.5, 0.5, 20.5, 20.5), tuple(Disc(float(x), float(y), 1.0) for x, y in places))
+    return Query(rasterise(world, 1.0), (0, 0), (19, 19))
+
+
+def han2007(quick: bool) -> Iterator[str]:
+    """The thesis' experiment 6: the mean of ten trials."""
+    query = han_map()
+    variants: dict[str, dict[str, Any]] = {
+        "`aco-han`": {},
+        "`aco-han`, elitism 100": {"elitism": 100},
+        "`aco-han`, listing, at most 50 steps": {"form": "listing", "deposit": 5.0, "max_steps": 50},
+        "`aco-han`, shortcut": {"shortcut": True},
+    }
+    yield f"Fourteen obstacles, 50 iterations, mean length of 10 trials (worst); the shortest is {optimum(query):.3f}"
+    yield ""
+    rows = [["han2007, printed", "45.357", "38.6223", "36.237"]]
+    for label, options in variants.items():
+        best, last = [label], [f"{label}: best of the last iteration"]
+        for ants in (10, 100, 500):
+            results = [solve(find_planner("aco-han", ants=ants, **options), query, seed) for seed in range(10)]
+            costs = [r.cost for r in results]
+            best.append(
+                f"{statistics.mean(costs):.3f} ({max(costs):.2f}), {seconds(statistics.median(r.wall_s for r in results))}"
+            )
+            ends = [r.history.iteration_best[-1] for r in results]
+            none = sum(map(math.isinf, ends))
+            mean = statistics.mean(e for e in ends if math.isfinite(e))
+            last.append(f"{mean:.3f}" + (f", none arrived in {none}" if none else ""))
+        rows += [best, last]
+    yield from table(["", "10 ants", "100 ants", "500 ants"], rows)
+    rows = []
+    for name in ("ants", "mmas", "ga-han", "hybrid"):
+        if name in PLANNERS and not getattr(PLANNERS[name], "needs_world", False):
+            results = [solve(find_planner(name), query, seed) for seed in range(3 if quick else 10)]
+            solved = [r for r in results if r.solved]
+            line = f"{statistics.mean(r.length or r.cost for r in solved):.3f}" if solved else "–"
+            grid = f"{statistics.mean(r.cost for r in solved):.3f}" if solved else "–"
+            rows.append(
+                [
+                    f"`{name}`",
+                    f"{len(solved)}/{len(results)}",
+                    grid,
+                    line,
+                    seconds(statistics.median(r.wall_s for r in results)),
+                ]
+            )
+    yield from table(["the same map", "arrived", "path of cells", "line driven", "time"], rows)
+
+
+# Speed
+
+
+def speed(quick: bool) -> Iterator[str]:
+    """ibraheem2016's settings, and the walking alone."""
+    printed = {10: 1.217, 20: 9.073, 30: 52.854, 40: 134.771}
+    planner = find_planner("as", ants=50, iterations=100)
+    rows = []
+    for size, paper in printed.items():
+        queries = [block_grid(size, size, size // 2, size // 4, seed) for seed in SEEDS]
+        solve(planner, queries[0], 0)
+        results = [solve(planner, query, seed) for seed, query in enumerate(queries)]
+        wall = statistics.median(r.wall_s for r in results)
+        rate = statistics.median(r.work / r.wall_s for r in results) / 1e6
+        rows.append([f"{size}×{size}", f"{paper:g} s", seconds(wall), f"{paper / wall:,.0f} ×", f"{rate:.1f} M"])
+    yield "`as`, 50 ants, 100 iterations (ibraheem2016); recreated maps"
+    yield ""
+    yield from table(["map", "printed", "ours", "ratio", "ant steps/s, all told"], rows)
+    rows = []
+    for size in (20, 40, 100):
+        query = random_grid(size, 0, 0.2)
+        for label, options in (("die in dead ends", {}), ("retreat", {"retreat": True})):
+            colony: Any = find_planner("as", ants=2000, **options)
+            ground, rng = Ground.of(query), np.random.default_rng(0)
+            walk = _Walk.of(colony, ground)
+            colony.weigh(ground, colony.lay(ground, rng), colony.desire(ground), walk.weights[0])
+            rates = []
+            for _ in range(5):
+                started = time.perf_counter()
+                _, steps = walk.go(rng)
+                rates.append(steps / (time.perf_counter() - started))
+            rows.append([f"{size}×{size}", label, f"{statistics.median(rates) / 1e6:.1f} M"])
+    yield "Walking alone, one core, 20 % blocked"
+    yield ""
+    yield from table(["grid", "ants", "ant steps/s"], rows)
+
+
+# A peer
+
+PEER = """
+import json, random, sys, time
+import numpy
+import python_motion_planning as pmp
+answers = []
+for seed, (free, start, goal) in enumerate(json.load(sys.stdin)):
+    random.seed(seed)
+    numpy.random.seed(seed)
+    rows, cols = len(free), len(free[0])
+    blocked = {(r + 1, c + 1) for r in range(rows) for c in range(cols) if not free[r][c]}
+    blocked |= {(r, c) for r in range(rows + 2) for c in (0, cols + 1)} | {(r, c) for r in (0, rows + 1) for c in range(cols + 2)}
+    world = pmp.Grid(rows + 2, cols + 2)
+    world.update(blocked)
+    planner = pmp.ACO(tuple(i + 1 for i in start), tuple(i + 1 for i in goal), world)
+    started = time.perf_counter()
+    try:
+        cells = [[r - 1, c - 1] for r, c in planner.plan()[1]]
+    except Exception:
+        cells = []
+    answers.append([time.perf_counter() - started, cells])
+print(json.dumps(answers))
+"""
+
+
+def path_length(cells: Sequence[Sequence[int]], query: Query) -> float:
+    """The length of a peer's path in either direction, inf if it is none."""
+    cells = [tuple(cell) for cell in cells]
+    if cells and cells[0] != query.start:
+        cells = cells[::-1]
+    if not cells or cells[0] != query.start or cells[-1] != query.goal:
+        return math.inf
+    length = 0.0
+    for (r, c), (q, d) in itertools.pairwise(cells):
+        if (q - r, d - c) not in DIRECTIONS or not int(query.grid.moves[r, c]) >> DIRECTIONS.index((q - r, d - c)) & 1:
+            return math.inf
+        length += math.hypot(q - r, d - c)
+    return length
+
+
+def peer(quick: bool, python: str) -> Iterator[str]:
+    """python_motion_planning's ACO, 50 ants and 100 iterations as it comes."""
+    kinds = [("10×10, 10 % blocked", 10, 0.1), ("20×20, 20 % blocked", 20, 0.2), ("30×30, 10 % blocked", 30, 0.1)]
+    seeds = SEEDS[: 2 if quick else 5]
+    rows = []
+    for kind, size, blocked in kinds[: 2 if quick else 3]:
+        queries = [random_grid(size, seed, blocked) for seed in seeds]
+        maps = [(q.grid.free.tolist(), q.start, q.goal) for q in queries]
+        done = subprocess.run([python, "-c", PEER], input=json.dumps(maps), capture_output=True, text=True, check=True)
+        answers = json.loads(done.stdout)
+        lengths = [path_length(cells, query) for (_, cells), query in zip(answers, queries, strict=True)]
+        theirs = statistics.median(wall for wall, _ in answers)
+        arrived = sum(map(math.isfinite, lengths))
+        gap = [length / optimum(q) - 1 for length, q in zip(lengths, queries, strict=True) if math.isfinite(length)]
+        middle = percent(statistics.median(gap)) if gap else "–"
+        label = "python_motion_planning 1.1.1"
+        rows.append([kind, label, f"{arrived}/{len(seeds)}", middle, seconds(theirs), "1", "–"])
+        for name, options in (
+            ("as", {"beta": 5.0, "evaporation": 0.1, "retreat": True, "shortcut": True}),
+            ("mmas", {}),
+            ("ants", {}),
+        ):
+            planner = find_planner(name, **options)
+            solve(planner, queries[0], 0)
+            results = [solve(planner, query, seed) for seed, query in enumerate(queries)]
+            gap = [r.cost / optimum(q) - 1 for r, q in zip(results, queries, strict=True) if r.solved]
+            ratio = statistics.median(t / r.wall_s for (t, _), r in zip(answers, results, strict=True))
+            longer = sum(r.cost > length + 1e-9 for r, length in zip(results, lengths, strict=True))
+            wall = statistics.median(r.wall_s for r in results)
+            label = f"`{name}`" + (", its settings, retreat, shortcut" if options else "")
+            rows.append([kind, label, f"{len(gap)}/{len(seeds)}", percent(statistics.median(gap)), seconds(wall), f"{ratio:,.0f}",
+                         str(longer)])  # fmt: skip
+    yield from table(["grid", "planner", "arrived", "gap", "time", "times faster", "longer than the peer's"], rows)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("tables", nargs="*", help="which to print")
+    parser.add_argument("--quick", action="store_true", help="fewer seeds and sizes")
+    parser.add_argument("--peer", metavar="PYTHON", help="an interpreter with python_motion_planning 1.1.1")
+    arguments = parser.parse_args()
+    makers = {f.__name__: f for f in (quality, papers, hasan, han2007, speed)}
+    for name in arguments.tables or [*makers, *(["peer"] if arguments.peer else [])]:
+        if name == "peer":
+            lines = peer(arguments.quick, arguments.peer or parser.error("peer: needs --peer PYTHON"))
+        elif name in makers:
+            lines = makers[name](arguments.quick)
+        else:
+            parser.error(f"no table is called {name!r}; choose from {', '.join([*makers, 'peer'])}")
+        print(f"## {name}\n")
+        for line in lines:
+            print(line, flush=True)
+
+
+if __name__ == "__main__":
+    main()
