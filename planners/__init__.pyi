@@ -25,6 +25,9 @@ from .plan import PlanResult as PlanResult
 from .plan import PlanStatus as PlanStatus
 from .plan import Query as Query
 from .plan import path_cost as path_cost
+from .refining import ROUTE_KINDS as ROUTE_KINDS
+from .refining import pull_taut as pull_taut
+from .refining import refine as refine
 from .registry import PLANNERS as PLANNERS
 from .registry import all_planners as all_planners
 from .registry import describe as describe

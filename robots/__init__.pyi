@@ -3,10 +3,14 @@ from .files import robot_schema as robot_schema
 from .files import robot_to_dict as robot_to_dict
 from .files import robots as robots
 from .footprint import footprint_clearance as footprint_clearance
+from .noise import Senses as Senses
+from .profile import SpeedProfile as SpeedProfile
+from .profile import speed_profile as speed_profile
 from .pursuit import LIMITERS as LIMITERS
 from .pursuit import Guide as Guide
 from .pursuit import Progress as Progress
 from .pursuit import PurePursuit as PurePursuit
 from .pursuit import Twist as Twist
 from .spec import Footprint as Footprint
+from .spec import Noise as Noise
 from .spec import RobotSpec as RobotSpec

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,8 +12,64 @@ from worlds._kernels import kernel, segment_clearance, wall_distance
 Array = Any
 
 NEAR = 0.25  # how far a list of near discs serves [m]
+
+
+class Line(NamedTuple):
+    """The route and, at every `ds` along it, what is allowed and what it is like."""
+
+    xy: Array  # (N, 2)
+    arc: Array  # (N,)
+    lookahead: Array  # (S,) longest clear lookahead
+    speed: Array  # (S,) speed limit
+    curvature: Array  # (S,) NaN where the carrot alone rounds corners
+    heading: Array  # (S,)
+
+
+class Known(NamedTuple):
+    """The obstacles that the controller knows of, by squares, see `bucket`."""
+
+    discs: Array
+    starts: Array
+    bounds: Array
+    side: float
+
+
+class Limits(NamedTuple):
+    """The robot's."""
+
+    speed: float
+    yaw_rate: float
+    acceleration: float
+    yaw_acceleration: float
+    lateral: float
+    half_track: float
+    rim: float
+
+
+class Tuning(NamedTuple):
+    """The controller's settings, and what follows from them for one robot."""
+
+    period: float
+    ds: float
+    guard: float  # from the centre to what carrot lines may touch
+    floor: float  # and the arc on which it can still stop
+    radius: float  # of the robot
+    look_time: float
+    look_min: float
+    look_max: float
+    look_floor: float
+    turn_from: float
+    turn_to: float
+    turn_rest: float
+    braking: float
+    creep: float
+    close: float
+    near_speed: float
+    near_time: float
+
+
 # The rules that can hold the speed, in the order of pursuit.LIMITERS.
-CRUISE, CURVATURE, ROUTE, YAW, GOAL, TURN, CREEP, CLEARANCE, DONE = range(9)
+CRUISE, CURVATURE, ROUTE, YAW, GOAL, TURN, CREEP, CLEARANCE, DONE, ROOM = range(10)
 
 
 @kernel
@@ -124,31 +180,6 @@ def clear_lookaheads(
                 break
             reach = length
         out[i] = reach
-
-
-@kernel
-def slow_for_corners(
-    xy: Array, arc: Array, ds: float, look_time: float, lateral: float, turn_from: float, limit: Array
-) -> None:
-    """Lower the speed limit at the route's corners.
-
-    A carrot v * look_time ahead rounds a corner of angle a with about 2 v sin(a / 2) / look_time of lateral acceleration.
-    From `turn_from` on the robot turns on the spot: there the limit is 0. The 45 degree corners of grid paths are left to
-    the curve that the robot drives in the end, which is wider.
-    """
-    for k in range(1, xy.shape[0] - 1):
-        ax, ay = xy[k, 0] - xy[k - 1, 0], xy[k, 1] - xy[k - 1, 1]
-        bx, by = xy[k + 1, 0] - xy[k, 0], xy[k + 1, 1] - xy[k, 1]
-        angle = abs(math.atan2(ax * by - ay * bx, ax * bx + ay * by))
-        if angle < 0.9:
-            continue
-        fastest = 0.0
-        if angle < turn_from:
-            fastest = lateral * look_time / (2.0 * math.sin(0.5 * angle) + 1e-9)
-        i = int(arc[k] / ds)
-        limit[i] = min(limit[i], fastest)
-        if i + 1 < limit.shape[0]:
-            limit[i + 1] = min(limit[i + 1], fastest)
 
 
 @kernel
@@ -282,6 +313,12 @@ def slow_for_yaw(curvature: float, yaw_rate: float, yaw_acceleration: float, tim
 
 
 @kernel
+def slow_for_room(room: float, slowest: float, time: float) -> float:
+    """The speed that so much room beside the robot allows: it grows by 1 m/s with each `time` metres."""
+    return slowest + max(room, 0.0) / time
+
+
+@kernel
 def brake_for_goal(remaining: float, deceleration: float) -> float:
     """The speed from which the robot can still stop in `remaining` metres."""
     return math.sqrt(2.0 * deceleration * max(remaining, 0.0))
@@ -310,27 +347,25 @@ def stopping_clearance(
 @kernel
 def pursue(
     x: float, y: float, yaw: float, v: float, w: float, progress: float, turning: bool,
-    xy: Array, arc: Array, lookaheads: Array, speeds: Array, buckets: Array, starts: Array, bounds: Array,
-    limits: Array, tuning: Array,
+    line: Line, known: Known, limits: Limits, tuning: Tuning,
 ) -> tuple[float, float, float, bool, int]:  # fmt: skip
     """One control period: the next command (speed, yaw rate), the progress, whether it turns on the spot, the limiter."""
-    max_v, max_w, acc, yaw_acc, lateral, half_track, rim = (
-        limits[0], limits[1], limits[2], limits[3], limits[4], limits[5], limits[6]
-    )  # fmt: skip
-    dt, ds, side, guard, look_time, look_min, look_max, turn_from, turn_to, brake, creep, close, floor = (
-        tuning[0], tuning[1], tuning[2], tuning[3], tuning[4], tuning[5], tuning[6], tuning[7], tuning[8], tuning[9],
-        tuning[10], tuning[11], tuning[12],
-    )  # fmt: skip
-    discs = nearby(x, y, buckets, starts, bounds, side)
-    s, k = project(x, y, progress, look_max, xy, arc)
+    xy, arc, lookaheads, speeds, curvatures, headings = line
+    acc, yaw_acc, max_w = limits.acceleration, limits.yaw_acceleration, limits.yaw_rate
+    dt, ds, look_min, creep = tuning.period, tuning.ds, tuning.look_min, tuning.creep
+    bounds = known.bounds
+    discs = nearby(x, y, known.discs, known.starts, bounds, known.side)
+    s, k = project(x, y, progress, tuning.look_max, xy, arc)
     remaining = arc[-1] - s
     i = min(int(s / ds), lookaheads.shape[0] - 1)
     j = min(i + 1, lookaheads.shape[0] - 1)
     reach = min(lookaheads[i], lookaheads[j])
 
     # Shrink the lookahead until the arc to the carrot keeps its distance: corners are cut only where there is room.
-    guard = min(guard, segment_clearance(x, y, x, y, discs, bounds) - 5e-4)
-    look = clip(look_time * v, look_min, min(reach, max(remaining, look_min)))  # to the end itself, not past it
+    room = segment_clearance(x, y, x, y, discs, bounds)
+    guard = min(tuning.guard, room - 5e-4)
+    end = max(0.35 * remaining, look_min)  # near the end it looks less far, to come to stand there and not beside it
+    look = clip(max(tuning.look_time * v, tuning.look_floor), look_min, min(reach, end))
     blocked = True
     cx, cy, left, ahead, distance, bearing = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     while True:
@@ -340,7 +375,7 @@ def pursue(
         left = math.cos(yaw) * dy - math.sin(yaw) * dx
         distance = math.hypot(dx, dy)
         bearing = math.atan2(left, ahead)
-        if abs(bearing) < turn_from:
+        if abs(bearing) < tuning.turn_from:
             kappa = 2.0 * left / (distance * distance)
             if arc_clearance(x, y, yaw, kappa, 2.0 * bearing, cx, cy, discs, bounds) >= guard:
                 blocked = False
@@ -349,10 +384,12 @@ def pursue(
             break
         look = max(0.75 * look, look_min)
 
-    stopped_at_goal = remaining <= close
+    stopped_at_goal = remaining <= tuning.close
     if turning:
-        turning = abs(bearing) > turn_to
-    elif (blocked and abs(bearing) > turn_to) or abs(bearing) > turn_from:
+        turning = abs(bearing) > tuning.turn_to
+    elif (blocked and abs(bearing) > tuning.turn_to) or abs(bearing) > (
+        tuning.turn_from if v > creep else tuning.turn_rest
+    ):
         turning = True
 
     limiter = CRUISE
@@ -364,22 +401,37 @@ def pursue(
         curvature = 0.0
     else:
         curvature = 2.0 * left / (distance * distance)
-        target = max_v
-        bound = slow_for_curvature(curvature, lateral, max_w)
+        if not math.isnan(curvatures[i]):
+            # On the route the carrot would cut its bends. So the route's own curvature is driven, a period ahead, and of the
+            # carrot's only what is due to being off the route.
+            f = min((s - i * ds) / ds, 1.0)
+            px, py, _ = point_at(s, k, xy, arc)
+            cx, cy = carrot_at(px, py, look, s, k, xy, arc)
+            facing = headings[i] + f * (headings[j] - headings[i])
+            left = math.cos(facing) * (cy - py) - math.sin(facing) * (cx - px)
+            curvature -= 2.0 * left / ((cx - px) * (cx - px) + (cy - py) * (cy - py))
+            ahead = min(s + v * dt, arc[-1]) / ds
+            h = min(int(ahead), curvatures.shape[0] - 2)
+            curvature += curvatures[h] + (ahead - h) * (curvatures[h + 1] - curvatures[h])
+        target = limits.speed
+        bound = slow_for_curvature(curvature, limits.lateral, max_w)
         if bound < target:
             target, limiter = bound, CURVATURE
         bound = min(speeds[i], speeds[j])
         if bound < target:
             target, limiter = bound, ROUTE
-        bound = slow_for_yaw(curvature, w, yaw_acc, 0.5 * look_time)
+        bound = slow_for_room(room - tuning.radius, tuning.near_speed, tuning.near_time)
+        if bound < target:
+            target, limiter = bound, ROOM
+        bound = slow_for_yaw(curvature, w, yaw_acc, 0.2)
         if bound < target:
             target, limiter = bound, YAW
-        bound = brake_for_goal(remaining - 0.5 * close, brake * acc)
+        bound = brake_for_goal(remaining - 0.5 * tuning.close, tuning.braking * acc)
         if bound < target:
             target, limiter = bound, GOAL
         if blocked:
             target, limiter = min(target, creep), CREEP
-        target = max(target, min(creep, max_v))
+        target = max(target, min(creep, limits.speed))
 
     new_v = clip(target, v - acc * dt, v + acc * dt)
     if turning and not stopped_at_goal:
@@ -392,11 +444,11 @@ def pursue(
     else:
         want = curvature * new_v
     new_w = clip(want, max(w - yaw_acc * dt, -max_w), min(w + yaw_acc * dt, max_w))
-    new_v, new_w = keep_wheels_within(new_v, new_w, half_track, rim)
+    new_v, new_w = keep_wheels_within(new_v, new_w, limits.half_track, limits.rim)
 
     # Whatever the rules above say: the arc on which the robot can still stop must be clear. It was for the last command, so
     # braking on that one's curve is safe.
-    if new_v > creep and stopping_clearance(x, y, yaw, new_v, new_w, acc, dt, discs, bounds) < min(floor, guard):
+    if new_v > creep and stopping_clearance(x, y, yaw, new_v, new_w, acc, dt, discs, bounds) < min(tuning.floor, guard):
         limiter = CLEARANCE
         new_v = max(v - acc * dt, 0.0)
         new_w = w * new_v / v if v > 0.0 else 0.0

@@ -33,22 +33,26 @@ def limit_speed(
 
 
 @kernel
-def reach_speed(
-    arc: Array, curvature: Array, change: Array, gain: float, loss: float, yaw_acceleration: float, speed: Array
+def brake_ahead(
+    arc: Array, curvature: Array, change: Array, loss: float, yaw_acceleration: float, speed: Array
 ) -> None:
-    """Lower each speed to what can be reached from the one before by `gain`, and left for the next one by `loss`."""
-    n = len(arc)
-    for i in range(1, n):
-        v2 = speed[i - 1] * speed[i - 1]
-        a = min(
-            most_gain(v2, curvature[i - 1], change[i - 1], gain, yaw_acceleration),
-            most_gain(v2, curvature[i], change[i], gain, yaw_acceleration),
-        )
-        speed[i] = min(speed[i], math.sqrt(v2 + 2.0 * a * (arc[i] - arc[i - 1])))
-    for i in range(n - 2, -1, -1):
+    """Lower each speed to one from which the next can be reached by braking with `loss`."""
+    for i in range(len(arc) - 2, -1, -1):
         v2 = speed[i + 1] * speed[i + 1]
         a = min(
             most_gain(v2, curvature[i + 1], -change[i + 1], loss, yaw_acceleration),
             most_gain(v2, curvature[i], -change[i], loss, yaw_acceleration),
         )
         speed[i] = min(speed[i], math.sqrt(v2 + 2.0 * a * (arc[i + 1] - arc[i])))
+
+
+@kernel
+def speed_up(arc: Array, curvature: Array, change: Array, gain: float, yaw_acceleration: float, speed: Array) -> None:
+    """Lower each speed to one that can be reached from the one before with `gain`."""
+    for i in range(1, len(arc)):
+        v2 = speed[i - 1] * speed[i - 1]
+        a = min(
+            most_gain(v2, curvature[i - 1], change[i - 1], gain, yaw_acceleration),
+            most_gain(v2, curvature[i], change[i], gain, yaw_acceleration),
+        )
+        speed[i] = min(speed[i], math.sqrt(v2 + 2.0 * a * (arc[i] - arc[i - 1])))

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from robots.spec import Footprint, RobotSpec
+from robots.spec import NOISE_RANGE, Footprint, Noise, RobotSpec
 from worlds.checks import SchemaVersion, check, suggest
 from worlds.documents import Document, input_error, read_document
 
@@ -43,6 +43,24 @@ class FootprintEntry(BaseModel):
         return Footprint.rectangle(self.length or 0.0, self.width or 0.0)
 
 
+def _level(key: str, told: str) -> Any:
+    low, high = NOISE_RANGE[key]
+    return Field(getattr(Noise(), key), ge=low, le=high, description=told)
+
+
+class NoiseEntry(BaseModel):
+    """How far the real robot is from a perfect one; what is left out is perfect."""
+
+    model_config = _RULES
+
+    pose_xy: float = _level("pose_xy", "standard deviation of a pose fix in x and in y [m]")
+    pose_yaw: float = _level("pose_yaw", "standard deviation of a pose fix's heading [rad]")
+    pose_rate: float = _level("pose_rate", "pose fixes a second; in between the robot reckons by its encoders [Hz]")
+    encoder: float = _level("encoder", "standard deviation of each wheel's measured speed, as a fraction of it")
+    slip: float = _level("slip", "standard deviation of each wheel's slip, as a fraction of its speed")
+    delay: float = _level("delay", "from a command to the motors [s]")
+
+
 class RobotFile(BaseModel):
     """A differential-drive robot, as written in a file: two driven wheels on one axle through the centre, two casters."""
 
@@ -66,6 +84,9 @@ class RobotFile(BaseModel):
     max_wheel_speed: Positive = Field(description="speed limit of each wheel [rad/s]")
     wheel_torque: Positive = Field(description="the most that one wheel's motor gives [N m]")
     wheel_friction: Positive = Field(1.5, description="Coulomb coefficient of the wheels on the floor")
+    noise: NoiseEntry = Field(
+        NoiseEntry(), description="what `--noise` scales: errors of pose, encoders and wheels, and delay"
+    )
 
 
 def robots() -> Mapping[str, Path]:
@@ -101,6 +122,7 @@ def robot_schema() -> dict[str, Any]:
 def _to_spec(entry: RobotFile, document: Document) -> RobotSpec:
     values = {name: getattr(entry, name) for name in RobotFile.model_fields if name != "schema_"}
     values["footprint"] = entry.footprint.footprint()
+    values["noise"] = Noise(**dict(entry.noise))
     try:
         return RobotSpec(**values)
     except ValueError as error:

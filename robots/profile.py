@@ -26,6 +26,8 @@ class SpeedProfile:
     speed: Floats  # (S,) [m/s], 0 at both ends
     time: Floats  # (S,) [s], from 0
     curvature: Floats  # (S,) of the line as it is driven, corners rounded [1/m]
+    heading: Floats  # (S,) of that line, turns on the spot included, never jumping by a whole turn [rad]
+    limit: Floats  # (S,) the speed there for a robot that need not gain it first: what it must not exceed [m/s]
 
     @property
     def duration(self) -> float:
@@ -69,12 +71,15 @@ def speed_profile(
     speeds: list[Floats] = []
     times: list[Floats] = []
     curvatures: list[Floats] = []
-    now = 0.0
+    facings: list[Floats] = []
+    limits: list[Floats] = []
+    now, spun = 0.0, 0.0
     for first, last, turn in zip([0.0, *stops], [*stops, route.length], [0.0, *turns], strict=True):
         now += turning_time(turn, robot)
+        spun += turn
         arc = np.linspace(first, last, max(3, math.ceil((last - first) / step) + 1))
-        curvature, change = _curvature(arc, places, headings, blend)
-        speed = np.empty(len(arc))
+        facing, curvature, change = _blended(arc, places, headings, blend)
+        limit = np.empty(len(arc))
         _kernels_profile.limit_speed(
             curvature,
             change,
@@ -84,16 +89,20 @@ def speed_profile(
             robot.max_yaw_acceleration,
             robot.track / 2,
             robot.max_wheel_speed * robot.wheel_radius,
-            speed,
+            limit,
         )
-        speed[[0, -1]] = 0.0
-        gain, loss = robot.max_acceleration, braking * robot.max_acceleration
-        _kernels_profile.reach_speed(arc, curvature, change, gain, loss, robot.max_yaw_acceleration, speed)
+        limit[-1] = 0.0
+        gain, yaw_gain = robot.max_acceleration, robot.max_yaw_acceleration
+        _kernels_profile.brake_ahead(arc, curvature, change, braking * gain, yaw_gain, limit)
+        speed = limit.copy()
+        speed[0] = 0.0
+        _kernels_profile.speed_up(arc, curvature, change, gain, yaw_gain, speed)
         time = now + np.concatenate(([0.0], np.cumsum(2.0 * np.diff(arc) / (speed[1:] + speed[:-1]))))
         now = float(time[-1])
-        for parts, part in zip((arcs, speeds, times, curvatures), (arc, speed, time, curvature), strict=True):
+        every = (arcs, speeds, times, curvatures, facings, limits)
+        for parts, part in zip(every, (arc, speed, time, curvature, facing + spun, limit), strict=True):
             parts.append(part)
-    return SpeedProfile(*(np.concatenate(parts) for parts in (arcs, speeds, times, curvatures)))
+    return SpeedProfile(*map(np.concatenate, every))
 
 
 def turning_time(angle: float, robot: RobotSpec) -> float:
@@ -130,19 +139,24 @@ def _headings(route: Route, stop_from: float) -> tuple[Floats, Floats, list[floa
     return places, headings, arc[1:-1][sharp].tolist(), turn[sharp].tolist()
 
 
-def _curvature(s: Floats, places: Floats, headings: Floats, blend: float) -> tuple[Floats, Floats]:
-    """Curvature and its growth per metre at s, weighed by a triangle that reaches `blend` to both sides."""
+def _blended(s: Floats, places: Floats, headings: Floats, blend: float) -> tuple[Floats, Floats, Floats]:
+    """Heading, curvature and its growth per metre at s, weighed by a triangle that reaches `blend` to both sides."""
     widths = np.diff(places)
-    turned = np.concatenate(([0.0], np.cumsum(widths * (headings[1:] + headings[:-1]) / 2)))  # integral of the heading
     slopes = np.diff(headings) / np.where(widths > 0, widths, 1.0)
+    once = np.concatenate(([0.0], np.cumsum(widths * (headings[1:] + headings[:-1]) / 2)))  # the heading's integral
+    growth = once[:-1] * widths + headings[:-1] * widths**2 / 2 + slopes * widths**3 / 6
+    twice = np.concatenate(([0.0], np.cumsum(growth)))  # and that one's
 
-    def at(t: Floats) -> tuple[Floats, Floats]:
+    def at(t: Floats) -> tuple[Floats, Floats, Floats]:
         inside = np.clip(t, places[0], places[-1])
         i = np.clip(np.searchsorted(places, inside, side="right") - 1, 0, len(slopes) - 1)
         d = inside - places[i]
         heading = headings[i] + slopes[i] * d
+        first = once[i] + headings[i] * d + slopes[i] * d**2 / 2
+        second = twice[i] + once[i] * d + headings[i] * d**2 / 2 + slopes[i] * d**3 / 6
         beyond = t - inside
-        return heading, turned[i] + (headings[i] + heading) / 2 * d + heading * beyond
+        return heading, first + heading * beyond, second + first * beyond + heading * beyond**2 / 2
 
-    (h0, i0), (h1, i1), (h2, i2) = at(s - blend), at(s), at(s + blend)
-    return (i2 - 2 * i1 + i0) / blend**2, (h2 - 2 * h1 + h0) / blend**2
+    before, here, after = at(s - blend), at(s), at(s + blend)
+    change, curvature, heading = ((a - 2 * h + b) / blend**2 for a, h, b in zip(after, here, before, strict=True))
+    return heading, curvature, change

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from robots import _kernels
+from robots.profile import speed_profile
 from robots.spec import RobotSpec
-from worlds import Floats, Pose, Route, World
+from worlds import Pose, Route, World
 
 #: What can hold the robot's speed, by the code in the log.
 LIMITERS: tuple[str, ...] = (
@@ -30,6 +30,7 @@ LIMITERS: tuple[str, ...] = (
     "creep",  # no clear arc: straight on, very slowly
     "clearance",  # the arc on which it can still stop is not clear: full braking
     "done",  # standing at the goal
+    "room",  # how little room there is beside the robot
 )
 
 
@@ -53,20 +54,16 @@ class Guide:
     """A route made ready for following: what the controller needs at every period, computed once."""
 
     route: Route
-    lookahead: Floats  # (S,) longest clear lookahead at i * ds along the route [m]
-    speed: Floats  # (S,) speed limit there, braking included [m/s]
-    arc: Floats  # (N,) length along the route at its points [m]
-    discs: Floats  # (M, 3) the obstacles known to the controller, repeated for each square that they are near to
-    starts: npt.NDArray[np.int64]  # where each square's rows of `discs` start
-    bounds: Floats  # (4,)
     goal_distance: float  # the robot stops when this little of the route remains [m]
-    limits: Floats  # the robot's limits, as `_kernels.pursue` unpacks them
-    tuning: Floats  # the controller's settings, as `_kernels.pursue` unpacks them
+    line: _kernels.Line
+    known: _kernels.Known
+    limits: _kernels.Limits
+    tuning: _kernels.Tuning
 
     @property
     def length(self) -> float:
         """Length of the route [m]."""
-        return float(self.arc[-1])
+        return float(self.line.arc[-1])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,19 +74,26 @@ class PurePursuit:
         ValueError: a setting outside its range.
     """
 
-    lookahead_time: float = 0.4  # the carrot is this far ahead in time
-    lookahead_min: float = 0.12
+    lookahead_time: float = 0.25  # the carrot is this far ahead in time
+    lookahead_floor: float = 0.3  # and not less than this where there is room
+    lookahead_min: float = 0.12  # the least that it ever is
     lookahead_max: float = 1.0
     guard: float = 0.4  # fraction of the margin that carrot lines and arcs must leave free
     floor: float = 0.2  # fraction of the margin that the stopping arc must leave free
     turn_from: float = 1.0  # turn on the spot when the carrot is farther off the heading than this
+    turn_rest: float = 0.2  # or, when standing, farther than this
     turn_to: float = 0.08  # and until it is nearer than this
     braking: float = 0.7  # fraction of the acceleration limit that planned braking uses
+    blend: float = 0.2  # over which changes of curvature are spread [m]
+    raw_lookahead_time: float = 0.4  # the same two for lines with corners, as cells give, which only the carrot rounds
+    raw_blend: float = 0.6
+    near_speed: float = 0.5  # allowed with no room left beside the robot [m/s], and faster the more there is:
+    near_time: float = 0.05  # a metre a second more for each room of this many metres
     creep: float = 0.04  # the slowest forward speed [m/s]
     goal_distance: float = 0.01  # the robot stops when this little of the route remains
 
     def __post_init__(self) -> None:
-        for key in ("lookahead_time", "lookahead_min", "lookahead_max", "turn_to", "creep", "goal_distance"):
+        for key in _LENGTHS_AND_TIMES:
             if not 1e-3 <= getattr(self, key) <= 100:
                 raise ValueError(f"{key}: must be between 0.001 and 100, got {getattr(self, key):g}")
         if self.lookahead_max < self.lookahead_min:
@@ -111,6 +115,8 @@ class PurePursuit:
         """
         goal_distance = min(self.goal_distance, tolerance / 2)
         ds = 0.02
+        raw = route.curvature is None
+        ahead, blend = (self.raw_lookahead_time, self.raw_blend) if raw else (self.lookahead_time, self.blend)
         guard = robot.radius + self.guard * margin
         arc = route.arc
         bounds = np.asarray(world.bounds, dtype=np.float64)
@@ -131,46 +137,60 @@ class PurePursuit:
             self.lookahead_max,
             lookahead,
         )
-        speed = np.minimum(lookahead / self.lookahead_time, robot.max_speed)
-        _kernels.slow_for_corners(
-            route.xy, arc, ds, self.lookahead_time, robot.max_lateral_acceleration, self.turn_from, speed
-        )
+        profile = speed_profile(route, robot, blend=blend, stop_from=self.turn_from, braking=self.braking)
+        at = ds * np.arange(len(lookahead))
+        speed = np.minimum(lookahead / ahead, np.interp(at, profile.arc, profile.limit))
+        curvature, heading = (np.interp(at, profile.arc, line) for line in (profile.curvature, profile.heading))
+        if raw:
+            curvature[:] = np.nan
+        for stop in profile.arc[:-1][np.diff(profile.arc) == 0]:
+            speed[int(stop / ds) : int(stop / ds) + 2] = 0.0
         _kernels.brake_backwards(speed, ds, self.braking * robot.max_acceleration)
-        limits = np.array(
-            [
-                robot.max_speed,
-                robot.max_yaw_rate,
-                robot.max_acceleration,
-                robot.max_yaw_acceleration,
-                robot.max_lateral_acceleration,
-                robot.track / 2,
-                robot.max_wheel_speed * robot.wheel_radius,
-            ]
+        return Guide(
+            route,
+            goal_distance,
+            _kernels.Line(route.xy, arc, lookahead, speed, curvature, heading),
+            _kernels.Known(discs, starts, bounds, side),
+            _kernels.Limits(
+                speed=robot.max_speed,
+                yaw_rate=robot.max_yaw_rate,
+                acceleration=robot.max_acceleration,
+                yaw_acceleration=robot.max_yaw_acceleration,
+                lateral=robot.max_lateral_acceleration,
+                half_track=robot.track / 2,
+                rim=robot.max_wheel_speed * robot.wheel_radius,
+            ),
+            _kernels.Tuning(
+                period=period,
+                ds=ds,
+                guard=guard,
+                floor=robot.radius + self.floor * margin,
+                radius=robot.radius,
+                look_time=ahead,
+                look_min=self.lookahead_min,
+                look_max=self.lookahead_max,
+                look_floor=self.lookahead_floor,
+                turn_from=self.turn_from,
+                turn_to=self.turn_to,
+                turn_rest=self.turn_rest,
+                braking=self.braking,
+                creep=self.creep,
+                close=goal_distance,
+                near_speed=self.near_speed,
+                near_time=self.near_time,
+            ),
         )
-        tuning = np.array(
-            [
-                period,
-                ds,
-                side,
-                guard,
-                self.lookahead_time,
-                self.lookahead_min,
-                self.lookahead_max,
-                self.turn_from,
-                self.turn_to,
-                self.braking,
-                self.creep,
-                goal_distance,
-                robot.radius + self.floor * margin,
-            ]
-        )
-        return Guide(route, lookahead, speed, arc, discs, starts, bounds, goal_distance, limits, tuning)
 
     def step(self, guide: Guide, pose: Pose, command: Twist, state: Progress) -> tuple[Twist, Progress]:
         """The next command, from the pose now and the command given last."""
         speed, yaw_rate, arc, turning, limiter = _kernels.pursue(
             *pose, *command, state.arc, state.turning,
-            guide.route.xy, guide.arc, guide.lookahead, guide.speed, guide.discs, guide.starts, guide.bounds,
-            guide.limits, guide.tuning,
+            guide.line, guide.known, guide.limits, guide.tuning,
         )  # fmt: skip
         return Twist(speed, yaw_rate), Progress(arc, turning, limiter)
+
+
+_LENGTHS_AND_TIMES = (
+    "lookahead_time", "lookahead_floor", "lookahead_min", "lookahead_max", "turn_to", "turn_rest", "blend",
+    "raw_lookahead_time", "raw_blend", "near_speed", "near_time", "creep", "goal_distance",
+)  # fmt: skip

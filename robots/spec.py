@@ -39,6 +39,45 @@ class Footprint:
         return math.hypot(self.half_length, self.half_width) + self.rounding
 
 
+NOISE_RANGE = {
+    "pose_xy": (0.0, 1.0), "pose_yaw": (0.0, 1.0), "pose_rate": (1.0, 1000.0), "encoder": (0.0, 0.5), "slip": (0.0, 0.5),
+    "delay": (0.0, 1.0),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Noise:
+    """How far a real robot is from a perfect one: standard deviations, the rate of pose fixes and the delay of commands.
+
+    Raises:
+        ValueError: a level that is negative, not finite, or beyond any robot.
+    """
+
+    pose_xy: float = 0.0  # of a pose fix, in x and in y [m]
+    pose_yaw: float = 0.0  # of a pose fix [rad]
+    pose_rate: float = 20.0  # pose fixes a second; in between the robot dead-reckons [Hz]
+    encoder: float = 0.0  # of each wheel's measured speed, as a fraction of it
+    slip: float = 0.0  # of each wheel's true speed, as a fraction; wanders over half a second
+    delay: float = 0.0  # from a command to the motors [s]
+
+    def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):
+            value = getattr(self, field.name)
+            low, high = NOISE_RANGE[field.name]
+            if not low <= value <= high:
+                raise ValueError(f"{field.name}: must be between {low:g} and {high:g}, got {value:g}")
+
+    def scaled(self, factor: float) -> Noise:
+        """The same robot with all errors and the delay `factor` times as large."""
+        levels = {f.name: getattr(self, f.name) * factor for f in dataclasses.fields(self) if f.name != "pose_rate"}
+        return dataclasses.replace(self, **levels)
+
+    @property
+    def loud(self) -> bool:
+        """Whether there is any."""
+        return any(getattr(self, f.name) for f in dataclasses.fields(self) if f.name != "pose_rate")
+
+
 @dataclass(frozen=True, kw_only=True)
 class RobotSpec:
     """A differential-drive robot: two driven wheels on one axle through the centre, and two casters.
@@ -61,6 +100,7 @@ class RobotSpec:
     max_wheel_speed: float  # [rad/s]
     wheel_torque: float  # the most one wheel's motor gives [N m]
     wheel_friction: float = 1.5  # Coulomb coefficient against the floor
+    noise: Noise = Noise()  # as documented; a drive scales it
     source: str | None = None
 
     def __post_init__(self) -> None:

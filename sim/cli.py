@@ -42,6 +42,10 @@ Margin = Annotated[float, typer.Option(min=0.0, max=100.0, help="Kept free aroun
 CellSize = Annotated[
     float | None, typer.Option(min=1e-6, max=1e6, help="Grid resolution [m]; the world's own by default.")
 ]
+Route = Annotated[str, typer.Option(help="What becomes of the plan's line: grid (as it is), taut or wide.")]
+Noise = Annotated[
+    float, typer.Option(min=0.0, max=100.0, help="How much of the robot's own noise; 0 is a perfect robot.")
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else.")]
 Out = Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the results.")]
 
@@ -55,6 +59,8 @@ def run(
     seed: Seed = 0,
     margin: Margin = 0.03,
     cell: CellSize = None,
+    route: Route = "wide",
+    noise: Noise = 0.0,
     unseen: Annotated[
         list[str] | None,
         typer.Option(metavar="X,Y,RADIUS", help="A cylinder that neither planner nor controller know of."),
@@ -69,7 +75,7 @@ def run(
     from sim.scenario import run as drive_it
 
     scenario = _scenario(
-        world, planner, settings, robot, seed=seed, margin=margin, cell=cell, time_limit=time_limit,
+        world, planner, settings, robot, seed=seed, margin=margin, cell=cell, route=route, noise=noise, time_limit=time_limit,
         unseen=tuple(_disc(text) for text in unseen or ()),
     )  # fmt: skip
     folder = out or Path("out") / _slug(scenario)
@@ -184,6 +190,65 @@ def verify(
             for problem in c.problems:
                 say(f"  {problem}")
     return SUCCEEDED if all(c.certified for c in checked.values()) else FAILED
+
+
+@app.command()
+def margin(
+    target: Annotated[
+        str | None, typer.Argument(metavar="[ROLLOUT.npz|WORLD]", help="A drive's log, or a world.")
+    ] = None,
+    kind: Annotated[str | None, typer.Option("--generate", help="Instead: a class of worlds, forest or barn.")] = None,
+    planner: Planner = "astar",
+    settings: Settings = None,
+    robot: Robot = "turtlebot",
+    seed: Seed = 0,
+    seeds: Annotated[int, typer.Option(min=1, max=10_000, help="How many drives, with seeds from --seed on.")] = 10,
+    cell: CellSize = None,
+    route: Route = "wide",
+    noise: Noise = 0.0,
+    speed: Annotated[float | None, typer.Option(min=1e-3, help="Drive no faster than this [m/s].")] = None,
+    reserve: Annotated[float, typer.Option(min=0.0, max=1.0, help="What must be left of the margin [m].")] = 0.005,
+    json: Json = False,
+) -> int:
+    """Split a drive's margin by what ate of it, or find the smallest margin that is safe; exit 0 when there is one."""
+    if target is not None and target.endswith(".npz"):
+        return _tell_budget(target, json)
+    if (target is None) == (kind is None):
+        raise InputError("margin: name a rollout, a world, or a class of worlds with --generate forest|barn")
+    from dataclasses import asdict, replace
+
+    from sim.margin import find_margin
+    from sim.scenario import run as drive_it
+
+    base = _scenario(target or "empty", planner, settings, robot, cell=cell, route=route, noise=noise)
+    if speed is not None:
+        base = replace(base, robot=replace(base.robot, max_speed=min(speed, base.robot.max_speed)))
+    tasks = {n: base.task if kind is None else _generated(kind, n) for n in range(seed, seed + seeds)}
+
+    def drive(wide: float, n: int) -> Any:
+        return drive_it(replace(base, task=tasks[n], margin=wide, seed=n))
+
+    trials = []
+    with planning("looking for the smallest safe margin"):
+        for trial in find_margin(drive, list(tasks), reserve=reserve):
+            trials.append(trial)
+    safe = [trial.margin for trial in trials if trial.safe]
+    facts: dict[str, Any] = {
+        "margin_m": min(safe) if safe else None, "reserve_m": reserve, "world": target or kind, "robot": base.robot.name,
+        "max_speed": base.robot.max_speed, "noise": noise, "planner": planner, "route": route, "seeds": [seed, seed + seeds - 1],
+        "trials": [asdict(trial) for trial in trials],
+    }  # fmt: skip
+    if json:
+        say_json(facts)
+    else:
+        table(
+            ("margin m", "driven", "closed", "least room left m", "failed"),
+            ((f"{t.margin:.3f}", str(t.drives), str(t.impassable), f"{t.left:.4f}" if t.drives else "-",
+              "" if t.failed is None else f"seed {t.failed}") for t in sorted(trials, key=lambda t: t.margin)),
+        )  # fmt: skip
+        found = f"{facts['margin_m']:.3f} m" if safe else "none up to 0.2 m"
+        say(f"smallest safe margin for {base.robot.name} at up to {base.robot.max_speed:g} m/s: {found}")
+    return SUCCEEDED if safe else FAILED
 
 
 @app.command()
@@ -389,6 +454,36 @@ def _pair(text: str) -> tuple[str, str]:
     if not mark or not key:
         raise InputError(f"--set {text}: write KEY=VALUE")
     return key.strip(), value.strip()
+
+
+def _generated(kind: str, seed: int) -> Task:
+    import numpy as np
+
+    from worlds import GENERATORS, generate
+
+    if kind not in GENERATORS:
+        raise InputError(f"--generate {kind}: unknown kind; choose from {', '.join(GENERATORS)}")
+    return generate(kind, np.random.default_rng(seed), {}, name=f"{kind}-{seed}", note=f"seed {seed}")
+
+
+def _tell_budget(path: str, json: bool) -> int:
+    from sim.margin import budget
+    from sim.rollout import Rollout
+
+    spent = budget(Rollout.load(Path(path)))
+    if json:
+        say_json(spent.as_dict())
+        return SUCCEEDED
+    where = f"({spent.x:.2f}, {spent.y:.2f}), t = {spent.t:.2f} s"
+    say(f"{path}: margin {spent.margin:.3f} m, least room left {spent.left:.4f} m at {where}")
+    table(
+        ("eaten by", "at most m", "at", "at the tightest place m"),
+        ((s.cause, f"{s.metres:.4f}", f"({s.x:.2f}, {s.y:.2f}), {s.t:.2f} s" if s.metres else "-", f"{s.at_tightest:+.4f}")
+         for s in spent.shares),
+    )  # fmt: skip
+    if spent.largest.metres:
+        say(f"the largest eater is {spent.largest.cause}")
+    return SUCCEEDED
 
 
 def _numbers(key: str, text: str | None, count: int) -> tuple[float, ...] | None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robots import Guide, Progress, PurePursuit, Twist, footprint_clearance
+from robots import Guide, Progress, PurePursuit, Senses, Twist, footprint_clearance
 from sim.engine import Engine
 from sim.rollout import Outcome
 from worlds import Floats, Task
@@ -16,7 +16,6 @@ from worlds import Floats, Task
 STOPPED_SPEED = 0.01  # slower than this counts as standing [m/s]
 STUCK_AFTER = 8.0  # without progress for this long the robot is stuck [s]
 STUCK_PROGRESS = 0.02  # what counts as progress along the route [m]
-STUCK_TURN = 0.1  # and, while turning on the spot, as progress in heading [rad]
 AFTER_CONTACT = 0.5  # a collision stays in the log for this long, braking [s]
 
 
@@ -33,6 +32,7 @@ class Drive:
     clearance: Floats  # (T,) [m]
     limiter: np.ndarray[tuple[int], np.dtype[np.uint8]]  # (T,)
     contacts: Floats  # (K, 4)
+    estimate: Floats  # (T, 3) where the robot believed to be; (0, 3) where it knew
 
 
 def drive(
@@ -43,11 +43,13 @@ def drive(
     *,
     control_hz: int = 60,
     time_limit: float,
+    senses: Senses | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Drive:
     """Drive along a guide until the robot stands at its end, touches something, is stuck or late.
 
-    `progress` is told the fraction of the route that is done, about ten times per simulated second.
+    With `senses` the robot sees and acts by them, else perfectly. `progress` is told the fraction of the route that is done,
+    about ten times per simulated second.
 
     Raises:
         ValueError: the control rate does not divide the physics rate.
@@ -57,37 +59,45 @@ def drive(
         raise ValueError(f"control_hz: must divide the physics rate {engine.physics_hz}, got {control_hz}")
     engine.place(task.start)
     rows = [(*engine.state(), 0.0, 0.0, 0)]
+    beliefs = [task.start] if senses else []
     contacts = [(0, *contact) for contact in engine.contacts()]
     outcome = Outcome.COLLIDED if contacts else None
     command, state = Twist(0.0, 0.0), Progress()
-    best, facing, best_at = 0.0, task.start[2], 0
+    best, idle, turned = 0.0, 0, 0  # the farthest on the route, and periods since then without and with turning
     reason = ""
     ticks = round(time_limit * control_hz)
     patience = round(STUCK_AFTER * control_hz)
+    full_turn = round(2 * math.pi / engine.robot.max_yaw_rate * control_hz)
     for tick in range(ticks):
         if outcome is not None:
             break
         x, y, yaw, speed, yaw_rate = rows[-1][:5]
-        command, state = controller.step(guide, (x, y, yaw), command, state)
+        believed = (x, y, yaw)
+        if senses:
+            senses.look(believed, Twist(speed, yaw_rate))
+            believed = senses.ahead()
+        command, state = controller.step(guide, believed, command, state)
         if guide.length - state.arc <= guide.goal_distance and _standing(speed, yaw_rate) and not any(command):
             left = math.dist((x, y), task.goal)
             outcome = Outcome.SUCCEEDED if left <= task.goal_tolerance else Outcome.STUCK
             if outcome is Outcome.STUCK:
                 reason = f"the route ends here, {left:.3f} m from the goal; the tolerance is {task.goal_tolerance:g} m"
             break
-        engine.command(*command)
+        engine.command(*(senses.act(command) if senses else command))
         for _ in range(substeps):
             touched = engine.step()
             rows.append((*engine.state(), *command, state.limiter))
+            if senses:
+                beliefs.append(senses.estimate)
             if touched:
                 contacts += [(len(rows) - 1, *contact) for contact in touched]
                 outcome = Outcome.COLLIDED
         if state.arc > best + STUCK_PROGRESS:
-            best, best_at = state.arc, tick
-        elif state.turning and abs(math.remainder(rows[-1][2] - facing, 2 * math.pi)) > STUCK_TURN:
-            facing, best_at = rows[-1][2], tick
-        elif tick - best_at >= patience:
-            outcome = Outcome.STUCK
+            best, idle, turned = state.arc, 0, 0
+        else:
+            idle, turned = idle + (not state.turning), turned + state.turning
+            if idle >= patience or turned >= patience + full_turn:
+                outcome = Outcome.STUCK
         if progress is not None and tick % (control_hz // 10 or 1) == 0:
             progress(state.arc / guide.length)
     if outcome is Outcome.COLLIDED:
@@ -95,6 +105,7 @@ def drive(
         for _ in range(round(AFTER_CONTACT * engine.physics_hz)):
             touched = engine.step()
             rows.append((*engine.state(), 0.0, 0.0, state.limiter))
+            beliefs += beliefs[-1:]
             contacts += [(len(rows) - 1, *contact) for contact in touched]
     log = np.array(rows)
     pose = np.ascontiguousarray(log[:, :3])
@@ -108,6 +119,7 @@ def drive(
         clearance=footprint_clearance(engine.world, engine.robot.footprint, pose),
         limiter=log[:, 7].astype(np.uint8),
         contacts=np.array(contacts, dtype=np.float64).reshape(-1, 4),
+        estimate=np.array(beliefs, dtype=np.float64).reshape(-1, 3),
     )
 
 

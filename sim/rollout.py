@@ -12,7 +12,7 @@ import math
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +50,9 @@ class Rollout:
     contacts: npt.NDArray[np.float64]  # (K, 4) step, obstacle index, distance [m], force [N]
     route: npt.NDArray[np.float64]  # (N, 2) the line that was followed [m]
     cells: npt.NDArray[np.int32]  # (N, 2) the planned cells (row, col)
+    estimate: npt.NDArray[np.float64] = field(
+        default_factory=lambda: np.empty((0, 3))
+    )  # (T, 3) where a noisy robot believed to be
     meta: Mapping[str, Any]  # world, planner, robot, seed, versions, outcome, times: see `Rollout.save`
 
     @property
@@ -120,6 +123,7 @@ class Rollout:
         shapes = {
             "t": (rows,), "pose": (rows, 3), "twist": (rows, 2), "command": (rows, 2), "clearance": (rows,),
             "limiter": (rows,), "contacts": (None, 4), "movers": (rows, None, 2), "route": (None, 2), "cells": (None, 2),
+            "estimate": (rows if np.size(self.estimate) else 0, 3),
         }  # fmt: skip
         if rows == 0:
             yield "t: the log is empty"
@@ -139,7 +143,7 @@ class Rollout:
             yield "contacts: a step outside the log"
 
 
-_ARRAYS = tuple(field.name for field in fields(Rollout) if field.name != "meta")
+_ARRAYS = tuple(f.name for f in fields(Rollout) if f.name != "meta")
 
 
 def _told(shape: tuple[int | None, ...]) -> str:

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from planners import PLANNERS, Planner, PlanResult, PlanStatus, Query, find_planner, route_along
-from robots import LIMITERS, PurePursuit, RobotSpec, load_robot
+from planners import PLANNERS, ROUTE_KINDS, Planner, PlanResult, PlanStatus, Query, find_planner, refine
+from robots import LIMITERS, PurePursuit, RobotSpec, Senses, load_robot
 from sim.certificate import Certificate, certify
 from sim.drive import Drive, drive
 from sim.engine import Engine
@@ -33,8 +33,10 @@ class Scenario:
     planner_name: str = ""  # what records call the planner; its class by default
     margin: float = 0.03  # kept free around the robot, on top of its radius [m]
     cell: float | None = None  # grid resolution [m]; None: the task's own
+    route: str = "wide"  # what becomes of the plan's line: grid, taut or wide, see `planners.refining`
     seed: int = 0
     controller: PurePursuit = field(default_factory=PurePursuit)
+    noise: float = 0.0  # how much of the robot's documented noise it has; 1 is all of it
     unseen: tuple[Disc, ...] = ()  # obstacles that neither planner nor controller know of
     time_limit: float | None = None  # simulated time allowed [s]; None: ample for the route
     physics_hz: int = 240
@@ -43,6 +45,12 @@ class Scenario:
     def __post_init__(self) -> None:
         if not self.margin >= 0:
             raise ValueError(f"margin: must be at least 0, got {self.margin:g}")
+        if self.route not in ROUTE_KINDS:
+            raise ValueError(f"route: unknown {self.route!r}; choose from {', '.join(ROUTE_KINDS)}")
+        try:
+            self.robot.noise.scaled(self.noise)
+        except ValueError as error:
+            raise ValueError(f"noise: {self.noise:g} times the robot's own is too much: {error}") from None
         if self.time_limit is not None and not self.time_limit > 0:
             raise ValueError(f"time_limit: must be greater than 0, got {self.time_limit:g}")
 
@@ -131,13 +139,24 @@ def run(
     grid, answer = planned or plan(s)
     if not answer.solved:
         return Run(s, grid, answer)
-    route = route_along(answer, grid, s.task)
+    route = refine(answer, grid, s.task, kind=s.route)
     guide = s.controller.guide(route, s.task.world, s.robot, s.margin, 1 / s.control_hz, s.task.goal_tolerance)
     built = dataclasses.replace(s.task.world, obstacles=s.task.world.obstacles + s.unseen)
     limit = s.time_limit or 30.0 + 10.0 * route.length / s.robot.max_speed
     started = time.perf_counter()
+    noise = s.robot.noise.scaled(s.noise)
+    senses = Senses(noise, s.robot.track, 1 / s.control_hz, s.task.start, s.rng("noise")) if noise.loud else None
     with Engine(built, s.robot, physics_hz=s.physics_hz) as engine:
-        log = drive(engine, s.controller, guide, s.task, control_hz=s.control_hz, time_limit=limit, progress=progress)
+        log = drive(
+            engine,
+            s.controller,
+            guide,
+            s.task,
+            control_hz=s.control_hz,
+            time_limit=limit,
+            senses=senses,
+            progress=progress,
+        )
     rollout = _record(s, grid, answer, route, log, limit, time.perf_counter() - started)
     return Run(s, grid, answer, rollout, certify(rollout))
 
@@ -158,6 +177,7 @@ def _record(
         limiter=log.limiter,
         movers=np.empty((len(log.t), 0, 2)),
         contacts=log.contacts,
+        estimate=log.estimate,
         route=route.xy,
         cells=answer.cells,
         meta={
@@ -177,6 +197,8 @@ def _record(
             "robot": dataclasses.asdict(s.robot),
             "controller": {"name": type(s.controller).__name__, **dataclasses.asdict(s.controller)},
             "limiters": list(LIMITERS),
+            "route": {"asked": s.route, "kind": route.kind, "note": route.note},
+            "noise": s.noise,
             "margin": s.margin,
             "inflate": s.inflate,
             "cell": grid.cell,

@@ -146,7 +146,7 @@ def check(p: SpeedProfile, robot: RobotSpec) -> None:
 
 def test_refined_routes_keep_the_limits_and_beat_the_grid(jackal: RobotSpec) -> None:
     from planners import AStar, Query
-    from planners.refine import refine
+    from planners.refining import refine
     from worlds import forest, rasterise
 
     for seed in range(4):

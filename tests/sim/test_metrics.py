@@ -16,6 +16,7 @@ def straight(**changes: Any) -> Rollout:
     pose = np.stack([t / 2, np.full(81, 0.1), np.clip(t - 7, 0, 1) * math.pi / 2], axis=1)
     meta = {
         "outcome": "succeeded", "physics_hz": hz, "times": {"plan_s": 0.25, "drive_wall_s": 1.5},
+        "task": {"goal": [4.0, 0.1], "goal_tolerance": 0.5},
         "plan": {"cost_m": 5.5, "length_m": 5.5, "grid_optimum_m": 5.0, "euclidean_optimum_m": 3.2},
     }  # fmt: skip
     log = Rollout(
@@ -35,12 +36,13 @@ def straight(**changes: Any) -> Rollout:
         ("gap_to_grid_optimum", 0.1),
         ("gap_to_euclidean_optimum", 0.25),
         ("spl", 0.8),
-        ("barn", 1.6 / 8.0),  # OT = 3.2 m / 2 m/s = 1.6 s
+        ("barn", 1.6 / 6.8),  # OT = 3.2 m / 2 m/s = 1.6 s
         ("min_clearance_m", 0.2),
         ("mean_clearance_m", 0.6),
         ("tracking_error_max_m", 0.1),
         ("tracking_error_p95_m", 0.1),
         ("duration_s", 8.0),
+        ("arrival_s", 6.8),  # from x = 0.1 m, at 0.2 s, to x = 3.5 m, at 7 s
         ("plan_s", 0.25),
         ("drive_wall_s", 1.5),
         ("turning_rad_per_m", math.pi / 8),

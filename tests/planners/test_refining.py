@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from worlds_to_solve import catalogue as small_worlds
 
 from planners import AStar, PlanResult, PlanStatus, Query, find_planner, path_cost, route_along
-from planners.refine import KINDS, pull_taut, refine
+from planners.refining import ROUTE_KINDS, pull_taut, refine
 from planners.tangent import Arc, Line, TangentPath, shortest
 from robots import load_robot
 from worlds import (
@@ -401,7 +401,7 @@ def test_grid_is_the_plans_own_line_and_misuse_is_refused() -> None:
             refine(plan, grid, task, **wrong)
     with pytest.raises(ValueError, match="no path"):
         refine(PlanResult(status=PlanStatus.NO_PATH), grid, task)
-    assert KINDS == ("grid", "taut", "wide")
+    assert ROUTE_KINDS == ("grid", "taut", "wide")
 
 
 def test_a_routes_curvature_follows_its_points() -> None:

@@ -32,7 +32,7 @@ if TYPE_CHECKING:  # brings the compiler with it
     from worlds import Grid
 
 #: What a route can be: the plan's own line, that line pulled taut, or one that keeps to the middle of gaps.
-KINDS: tuple[str, ...] = ("grid", "taut", "wide")
+ROUTE_KINDS: tuple[str, ...] = ("grid", "taut", "wide")
 
 SLACK = 1e-9  # m: what falls short of the clearance, or is longer than allowed, by no more than this is rounding
 SHRINK = 2e-9  # m: strings are first pulled among discs this much smaller, which the plan's line surely clears
@@ -59,8 +59,8 @@ def refine(
     Raises:
         ValueError: the plan has no path, an unknown kind, or a setting outside its range.
     """
-    if kind not in KINDS:
-        raise ValueError(f"kind: unknown route {kind!r}; choose from {', '.join(KINDS)}")
+    if kind not in ROUTE_KINDS:
+        raise ValueError(f"kind: unknown route {kind!r}; choose from {', '.join(ROUTE_KINDS)}")
     for key, value in (("clearance", clearance), ("stretch", stretch)):
         if not (math.isfinite(value) and value >= 0):
             raise ValueError(f"{key}: must be at least 0, got {value:g}")
@@ -85,7 +85,7 @@ def refine(
         curvature[-1] = np.append(curvature[-1][:-1], piece.curvature[0])
         xy.append(piece.xy[1:])
         curvature.append(piece.curvature[1:])
-    made = min(kinds, key=KINDS.index, default="grid")
+    made = min(kinds, key=ROUTE_KINDS.index, default="grid")
     return Route(np.vstack(xy), np.concatenate(curvature), made, "; ".join(dict.fromkeys(notes)))
 
 
