@@ -1,3 +1,7 @@
+from .cellmap import CellMap as CellMap
+from .cellmap import Cover as Cover
+from .cellmap import cell_map as cell_map
+from .cellmap import map_task as map_task
 from .errors import InputError as InputError
 from .files import catalogue as catalogue
 from .files import load_task as load_task
