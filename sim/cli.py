@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from worlds import Disc, Task
 
 SUCCEEDED, FAILED, WRONG_INPUT, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
+MANY = 5000  # cylinders of an imported map
 
 app = typer.Typer(
     name="antdrive",
@@ -380,32 +381,111 @@ def generate_world(
 
 @worlds_app.command("import")
 def import_world(
-    path: Annotated[Path, typer.Argument(metavar="FILE.world", help="Gazebo SDF with cylinders.")],
-    out: Annotated[Path, typer.Option("--out", "-o", help="The world file to write.")],
-    barn: Annotated[bool, typer.Option("--barn", help="With the start and goal of the BARN challenge.")] = False,
-    start: Annotated[str | None, typer.Option(metavar="X,Y,YAW")] = None,
-    goal: Annotated[str | None, typer.Option(metavar="X,Y")] = None,
-    bounds: Annotated[str | None, typer.Option(metavar="XMIN,YMIN,XMAX,YMAX")] = None,
+    path: Annotated[
+        Path, typer.Argument(metavar="FILE", help="Gazebo SDF (.sdf, .world), a map_server .yaml, or a MovingAI .map.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="The world file to write; by default FILE's name, here.")
+    ] = None,
+    barn: Annotated[bool, typer.Option("--barn", help="SDF: with the start and goal of the BARN challenge.")] = False,
+    start: Annotated[str | None, typer.Option(metavar="X,Y,YAW", help="Maps have none [m, m, rad].")] = None,
+    goal: Annotated[str | None, typer.Option(metavar="X,Y", help="Maps have none [m].")] = None,
+    bounds: Annotated[str | None, typer.Option(metavar="XMIN,YMIN,XMAX,YMAX", help="SDF: the walls [m].")] = None,
     cell: CellSize = None,
-    skip_unsupported: Annotated[bool, typer.Option(help="Leave out what is no cylinder.")] = False,
+    skip_unsupported: Annotated[bool, typer.Option(help="SDF: leave out what is no cylinder.")] = False,
+    unknown: Annotated[
+        str | None, typer.Option(help="map_server: unknown cells are blocked (default) or free.")
+    ] = None,
+    overhang: Annotated[
+        float | None,
+        typer.Option(
+            min=0, max=1e6, help="Maps: how far discs may reach beyond blocked cells [m]; default 0.207 cells."
+        ),
+    ] = None,
+    resolution: Annotated[
+        float | None, typer.Option(min=1e-6, max=1e6, help="MovingAI: the side of a cell [m], default 1.")
+    ] = None,
+    problem: Annotated[
+        int | None, typer.Option(min=0, help="MovingAI: start and goal of this problem of FILE.scen, from 0.")
+    ] = None,
+    json: Json = False,
 ) -> int:
-    """Turn a world of another simulator into a world file."""
-    from worlds import import_barn, import_sdf, save_task
+    """Turn a world or map of another program into a world file.
 
+    Worlds consist of upright cylinders. Those of an SDF file stay what they are. The blocked cells of a map are covered by
+    cylinders: wholly wherever free ground joined to the start or the goal touches them, with as little beyond them as
+    the disc around a single cell needs, so that what is driven here is never wider than the map. The world's source tells
+    how far they reach.
+    """
+    from worlds import import_barn, import_map_server, import_movingai_task, import_sdf, save_task
+
+    ends = {"start": _numbers("start", start, 3), "goal": _numbers("goal", goal, 2)}
     given: dict[str, Any] = {
-        "start": _numbers("start", start, 3), "goal": _numbers("goal", goal, 2), "bounds": _numbers("bounds", bounds, 4),
+        **ends, "bounds": _numbers("bounds", bounds, 4), "cell": cell, "unknown": unknown, "overhang": overhang,
+        "resolution": resolution, "problem": problem, "barn": barn or None, "skip_unsupported": skip_unsupported or None,
     }  # fmt: skip
-    if barn:
-        for key in given:
-            if given[key] is not None:
-                raise InputError(f"--{key}: --barn brings its own")
-        task = import_barn(path, **({} if cell is None else {"cell": cell}))
+    kinds: dict[str, tuple[str, tuple[str, ...]]] = {
+        "barn": ("--barn", ("barn", "cell")),
+        "sdf": ("an SDF world", ("start", "goal", "bounds", "cell", "skip_unsupported")),
+        "map_server": ("a map_server map", ("start", "goal", "cell", "unknown", "overhang")),
+        "movingai": ("a MovingAI map", ("start", "goal", "cell", "overhang", "resolution", "problem")),
+    }
+    kind = _kind_of(path)
+    about, known = kinds["barn" if barn and kind == "sdf" else kind]
+    options = {key: value for key, value in given.items() if value is not None}
+    for key in options:
+        if key not in known:
+            raise InputError(
+                f"--{key.replace('_', '-')}: {about} "
+                + ("brings its own" if key in ("start", "goal", "bounds") else f"takes {_flags(known)} only")
+            )
+    target = _target(path, out)
+    options.pop("barn", None)
+    if kind == "map_server":
+        word = options.pop("unknown", "blocked")
+        if word not in ("blocked", "free"):
+            raise InputError(f"--unknown {word}: write blocked or free")
+        task = import_map_server(path, unknown_is_free=word == "free", **options)
     else:
-        given["cell"] = cell
-        task = import_sdf(path, skip_unsupported=skip_unsupported, **{k: v for k, v in given.items() if v is not None})
-    save_task(task, out)
-    _tell_files({"world": str(out)})
+        task = {"sdf": import_barn if barn else import_sdf, "movingai": import_movingai_task}[kind](path, **options)
+    save_task(task, target)
+    if json:
+        say_json({**_task_facts(task), "files": {"world": str(target)}})
+    else:
+        say(f"{task.world.name}: {len(task.world.obstacles)} obstacles, {task.world.source}")
+        if "overhang" in known and len(task.world.obstacles) > MANY:
+            say("  so many make runs slow to start; a larger --overhang needs fewer")
+        _tell_files({"world": str(target)})
     return SUCCEEDED
+
+
+def _kind_of(path: Path) -> str:
+    """What a file to import is, by its suffix and, for YAML, by its keys."""
+    suffix = path.suffix.lower()
+    if suffix in (".sdf", ".world"):
+        return "sdf"
+    if suffix == ".map":
+        return "movingai"
+    if suffix in (".pgm", ".png", ".bmp"):
+        raise InputError(f"{path}: is an image; give the map's .yaml file, which tells how to read it")
+    if suffix not in (".yaml", ".yml"):
+        raise InputError(f"{path}: cannot be imported; .sdf, .world, .yaml (map_server) and .map (MovingAI) can")
+    return "map_server"
+
+
+def _target(path: Path, out: Path | None) -> Path:
+    """Where an imported world goes: never over what it comes from, nor unasked over another file."""
+    target = out or Path(f"{path.stem}.yaml")
+    if target.exists():
+        if path.exists() and target.samefile(path):
+            raise InputError(f"{target}: is the file to import; give another with --out")
+        if out is None:
+            raise InputError(f"{target}: exists; give --out to say where the world goes")
+    return target
+
+
+def _flags(keys: tuple[str, ...]) -> str:
+    return ", ".join(f"--{key.replace('_', '-')}" for key in keys)
 
 
 def _version(wanted: bool) -> None:

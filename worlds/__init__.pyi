@@ -21,6 +21,8 @@ from .grid import DIRECTIONS as DIRECTIONS
 from .grid import Grid as Grid
 from .grid import rasterise as rasterise
 from .importers import import_barn as import_barn
+from .importers import import_map_server as import_map_server
+from .importers import import_movingai_task as import_movingai_task
 from .importers import import_sdf as import_sdf
 from .movingai import MapProblem as MapProblem
 from .movingai import import_movingai_map as import_movingai_map

@@ -6,7 +6,11 @@ import math
 import os
 from pathlib import Path
 
+from worlds.cellmap import CellMap, map_task
 from worlds.documents import input_error
+from worlds.errors import InputError
+from worlds.map_server import read_map
+from worlds.movingai import import_movingai_problems, read_movingai_cells
 from worlds.sdf import parse_xml, read_models
 from worlds.world import Bounds, Disc, Point, Pose, Task, World
 
@@ -68,6 +72,89 @@ def import_sdf(
         made = World(file.stem, box, tuple(found.discs), f"imported from {file.name}")
         return Task(made, start, end, goal_tolerance, cell)
     except ValueError as error:
+        raise input_error(str(file), str(error)) from None
+
+
+def import_map_server(
+    path: str | os.PathLike[str],
+    *,
+    start: Pose | None = None,
+    goal: Point | None = None,
+    unknown_is_free: bool = False,
+    overhang: float | None = None,
+    cell: float | None = None,
+    goal_tolerance: float | None = None,
+) -> Task:
+    """A map of ROS's map_server, a YAML file and its image, as a world of discs; see `map_task` for what they stand for.
+
+    Cells that the map does not know block the way unless `unknown_is_free`. The start and the goal are needed, as maps have
+    none but those that `export_map_server` wrote.
+
+    Raises:
+        InputError: a file is wrong, or `map_task` has no use for the map.
+    """
+    file = Path(path)
+    served = read_map(file, unknown_is_free=unknown_is_free)
+    ends = served.ends
+    if ends is not None:
+        start = start or (ends.start[0], ends.start[1], ends.start[2])
+        goal = goal or (ends.goal[0], ends.goal[1])
+        goal_tolerance = goal_tolerance or ends.goal_tolerance
+    about = f"the map_server map {file.name}"
+    if served.unknown:
+        about += f" with {served.unknown} unknown cells taken for {'free' if unknown_is_free else 'blocked'}"
+    return _from_map(file, served.cells, start, goal, about, overhang, cell, goal_tolerance)
+
+
+def import_movingai_task(
+    path: str | os.PathLike[str],
+    *,
+    start: Pose | None = None,
+    goal: Point | None = None,
+    problem: int | None = None,
+    resolution: float = 1.0,
+    overhang: float | None = None,
+    cell: float | None = None,
+    goal_tolerance: float | None = None,
+) -> Task:
+    """A `.map` of the MovingAI benchmarks as a world of discs; see `map_task` for what they stand for.
+
+    Its cells get a side of `resolution` [m], the lower left one a corner at (0, 0). Start and goal are given, or are those
+    of a `problem` of the `.scen` file beside it, counted from 0. To plan on the very cells, use `import_movingai_map`.
+
+    Raises:
+        InputError: a file is wrong, there is no such problem, or `map_task` has no use for the map.
+    """
+    file = Path(path)
+    if not (math.isfinite(resolution) and resolution > 0):
+        raise input_error("resolution", f"must be greater than 0, got {resolution:g}")
+    cells = CellMap(read_movingai_cells(file), resolution)
+    about = f"the MovingAI map {file.name}"
+    if problem is not None:
+        if start is not None or goal is not None:
+            raise input_error("problem", "brings its own start and goal")
+        beside = file.with_name(f"{file.name}.scen")
+        known = import_movingai_problems(beside)
+        if not 0 <= problem < len(known):
+            raise input_error(str(beside), f"has the problems 0 to {len(known) - 1}, got {problem}")
+        (r0, c0), (r1, c1) = known[problem].start, known[problem].goal
+        start = ((c0 + 0.5) * resolution, (r0 + 0.5) * resolution, math.atan2(r1 - r0, c1 - c0))
+        goal = ((c1 + 0.5) * resolution, (r1 + 0.5) * resolution)
+        about += f", problem {problem} of optimal length {known[problem].printed} on its cells"
+    return _from_map(file, cells, start, goal, about, overhang, cell, goal_tolerance)
+
+
+def _from_map(
+    file: Path, cells: CellMap, start: Pose | None, goal: Point | None, about: str,
+    overhang: float | None, cell: float | None, goal_tolerance: float | None,
+) -> Task:  # fmt: skip
+    name = "".join(filter(str.isprintable, file.stem))[:200] or "map"
+    tolerance = 0.25 if goal_tolerance is None else goal_tolerance
+    try:
+        return map_task(
+            cells, start, goal, name=name, source=about, overhang=overhang, cell=cell, goal_tolerance=tolerance
+        )
+    except InputError as error:
         raise input_error(str(file), str(error)) from None
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from worlds.documents import input_error
 
@@ -47,6 +48,15 @@ def import_movingai_map(path: str | os.PathLike[str]) -> Grid:
     """
     from worlds.grid import Grid
 
+    return Grid.from_free(read_movingai_cells(path))
+
+
+def read_movingai_cells(path: str | os.PathLike[str]) -> npt.NDArray[np.bool_]:
+    """The cells of a `.map` file that are free, (R, C), the file's last line first.
+
+    Raises:
+        InputError: the file cannot be read or is not such a map.
+    """
     source, lines = _read(path)
     header: dict[str, str] = {}
     rest = iter(enumerate(lines, 1))
@@ -81,7 +91,7 @@ def import_movingai_map(path: str | os.PathLike[str]) -> Grid:
         letters = " ".join((PASSABLE + BLOCKED).decode())
         odd = _quote(bytes(picture[row, col : col + 1]))
         raise input_error(f"{source}:{cells[row][0]}", f"cell {col + 1} must be one of {letters}, got {odd}")
-    return Grid.from_free(np.isin(picture, np.frombuffer(PASSABLE, dtype=np.uint8))[::-1])
+    return np.isin(picture, np.frombuffer(PASSABLE, dtype=np.uint8))[::-1]
 
 
 def import_movingai_problems(path: str | os.PathLike[str]) -> list[MapProblem]:

@@ -11,7 +11,15 @@ import numpy as np
 import pytest
 
 from planners import Query, find_planner
-from worlds import Grid, InputError, MapProblem, import_movingai_map, import_movingai_problems
+from worlds import (
+    Grid,
+    InputError,
+    MapProblem,
+    import_movingai_map,
+    import_movingai_problems,
+    import_movingai_task,
+    rasterise,
+)
 
 ARCHIVE = Path(__file__).parents[3] / "shared" / "data" / "movingai" / "movingai_dev.tar.xz"
 MAPS = ("AR0011SR", "Paris_1_256", "maze512-8-0", "random512-25-0")
@@ -120,6 +128,21 @@ def test_files_that_cannot_be_read_are_named(tmp_path: Path, read: object) -> No
             read(path)
 
 
+def test_a_movingai_task_takes_a_problems_ends_at_the_centres_of_their_cells(tmp_path: Path) -> None:
+    (tmp_path / "w.map").write_text("type octile\nheight 2\nwidth 3\nmap\n..@\n...\n")
+    (tmp_path / "w.map.scen").write_text("version 1\n0\tw.map\t3\t2\t0\t0\t2\t1\t2.41421\n")
+    task = import_movingai_task(tmp_path / "w.map", problem=0, resolution=2.0)
+    assert (task.start, task.goal, task.cell) == ((1.0, 3.0, math.atan2(-1, 2)), (5.0, 1.0), 2.0)
+    assert task.world.bounds == (0.0, 0.0, 6.0, 4.0)
+    assert task.world.discs == pytest.approx(np.array([[5.0, 3.0, math.sqrt(2)]]))
+    with pytest.raises(InputError, match=r"w\.map\.scen: has the problems 0 to 0, got 1"):
+        import_movingai_task(tmp_path / "w.map", problem=1)
+    with pytest.raises(InputError, match="problem: brings its own start and goal"):
+        import_movingai_task(tmp_path / "w.map", problem=0, goal=(0.5, 0.5))
+    with pytest.raises(InputError, match="resolution: must be greater than 0"):
+        import_movingai_task(tmp_path / "w.map", problem=0, resolution=0.0)
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     if not ARCHIVE.exists():
@@ -181,3 +204,15 @@ def test_a_sample_of_printed_lengths_is_matched(folder: Path, name: str, search:
 @pytest.mark.parametrize("name", MAPS)
 def test_every_printed_length_is_matched(folder: Path, name: str, search: str) -> None:
     check(name, search, *loaded(folder, name))
+
+
+@pytest.mark.parametrize("name", ["Paris_1_256", "AR0011SR"])
+def test_worlds_of_discs_have_the_printed_lengths_too(folder: Path, name: str) -> None:
+    """What discs reach beyond blocked cells leaves a robot of a quarter cell every move of the map."""
+    problems = loaded(folder, name)[1]
+    for number in range(50, len(problems), len(problems) // 4):
+        task = import_movingai_task(folder / f"{name}.map", problem=number)
+        assert len(task.world.obstacles) < 5300
+        grid = rasterise(task.world, task.cell, 0.25)
+        result = find_planner("dijkstra").plan(Query.between(grid, task), np.random.default_rng(0))
+        assert abs(result.cost - problems[number].optimal) <= slack(name, problems[number])
