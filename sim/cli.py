@@ -28,7 +28,9 @@ app = typer.Typer(
     add_completion=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-worlds_app = typer.Typer(help="List, show, generate and import worlds.", no_args_is_help=True, rich_markup_mode=None)
+worlds_app = typer.Typer(
+    help="List, show, generate, import and export worlds.", no_args_is_help=True, rich_markup_mode=None
+)
 app.add_typer(worlds_app, name="worlds")
 
 World = Annotated[str, typer.Argument(metavar="WORLD", help="A name of the catalogue or a world file.")]
@@ -457,6 +459,67 @@ def import_world(
             say("  so many make runs slow to start; a larger --overhang needs fewer")
         _tell_files({"world": str(target)})
     return SUCCEEDED
+
+
+@worlds_app.command("export")
+def export_world(
+    world: World,
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="Gazebo: .sdf or .world; map_server: .yaml (and .pgm); MovingAI: .map.")
+    ],
+    resolution: Annotated[
+        float | None, typer.Option(min=1e-6, max=1e6, help="Maps: the side of a cell [m]; the world's own by default.")
+    ] = None,
+    json: Json = False,
+) -> int:
+    """Write a world for another program, told by the suffix.
+
+    SDF keeps everything. In a map, a cell is blocked when a cylinder reaches into it; a world can be had back from that, but
+    not the same. A .map gets a .scen beside it with the way from start to goal, if there is one on its cells.
+    """
+    from worlds import export_map_server, export_sdf, load_task
+
+    suffix = out.suffix.lower()
+    if suffix not in (".sdf", ".world", ".yaml", ".yml", ".map"):
+        raise InputError(f"--out {out}: worlds are written as .sdf, .world, .yaml (map_server) or .map (MovingAI)")
+    task = load_task(world)
+    if out.exists() and Path(world).exists() and out.samefile(world):
+        raise InputError(f"--out {out}: is the world itself; choose another name")
+    files = {"map" if suffix not in (".sdf", ".world") else "sdf": str(out)}
+    if suffix in (".sdf", ".world"):
+        if resolution is not None:
+            raise InputError("--resolution: an SDF world has no cells")
+        export_sdf(task, out)
+    elif suffix == ".map":
+        files |= _export_movingai(task, out, resolution)
+    else:
+        files["image"] = str(export_map_server(task, out, resolution=resolution))
+    if json:
+        say_json({"world": task.world.name, "files": files})
+    else:
+        _tell_files(files)
+    return SUCCEEDED
+
+
+def _export_movingai(task: Task, out: Path, resolution: float | None) -> dict[str, str]:
+    """Write the map and, where its cells have a way, the problem; the problem's file."""
+    import numpy as np
+
+    from planners import Query, find_planner
+    from worlds import Grid, MapProblem, export_movingai_map, export_movingai_problems
+
+    cells = export_movingai_map(task, out, resolution=resolution)
+    start, goal = cells.cell_at(*task.start[:2]), cells.cell_at(*task.goal)
+    beside = out.with_name(f"{out.name}.scen")
+    beside.unlink(missing_ok=True)  # an earlier one would belong to another map
+    if start is None or goal is None or not (cells.free[start] and cells.free[goal]):
+        return {}
+    answer = find_planner("dijkstra").plan(Query(Grid.from_free(cells.free), start, goal), np.random.default_rng(0))
+    if not answer.solved:
+        return {}
+    found = MapProblem(start, goal, answer.cost, f"{answer.cost:.8f}", out.name, int(answer.cost // 4))
+    export_movingai_problems([found], cells.free.shape, beside)
+    return {"problem": str(beside)}
 
 
 def _kind_of(path: Path) -> str:

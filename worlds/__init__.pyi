@@ -3,6 +3,10 @@ from .cellmap import Cover as Cover
 from .cellmap import cell_map as cell_map
 from .cellmap import map_task as map_task
 from .errors import InputError as InputError
+from .exporters import export_map_server as export_map_server
+from .exporters import export_movingai_map as export_movingai_map
+from .exporters import export_movingai_problems as export_movingai_problems
+from .exporters import export_sdf as export_sdf
 from .files import catalogue as catalogue
 from .files import load_task as load_task
 from .files import save_task as save_task

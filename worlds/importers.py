@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from worlds.cellmap import CellMap, map_task
 from worlds.documents import input_error
 from worlds.errors import InputError
 from worlds.map_server import read_map
 from worlds.movingai import import_movingai_problems, read_movingai_cells
-from worlds.sdf import parse_xml, read_models
+from worlds.sdf import TASK, parse_xml, read_models, read_task_element
 from worlds.world import Bounds, Disc, Point, Pose, Task, World
 
 MARGIN = 1.0  # room left around the cylinders when no bounds are given [m]
@@ -32,8 +34,8 @@ def import_sdf(
     start: Pose | None = None,
     goal: Point | None = None,
     bounds: Bounds | None = None,
-    cell: float = 0.25,
-    goal_tolerance: float = 0.25,
+    cell: float | None = None,
+    goal_tolerance: float | None = None,
     skip_unsupported: bool = False,
 ) -> Task:
     """The upright cylinders of a Gazebo world (SDF, `.world`) as a task.
@@ -42,7 +44,7 @@ def import_sdf(
     Gazebo. A cylinder's height is that of its top above z = 0. Ground planes, models without collision
     geometry and what lies below the floor are passed over. Without `bounds` the cylinders get 1 m of
     room on all sides; without `start` and `goal` the robot crosses that from the lower left to the upper
-    right corner.
+    right corner, on a grid of 0.25 m. A world that `export_sdf` wrote brings all of that itself.
 
     Raises:
         InputError: the file cannot be read, or holds what a world cannot: moving or included models, or
@@ -53,6 +55,7 @@ def import_sdf(
     world = root.find("world") if root.tag == "sdf" else None
     if world is None:
         raise input_error(str(file), f"must be an <sdf> with a <world> in it, got <{root.tag}>")
+    kept = read_task_element(world) or {}
     found = read_models(world)
     if found.unsupported and not skip_unsupported:
         more = len(found.unsupported) - 5
@@ -60,6 +63,9 @@ def import_sdf(
         raise input_error(
             str(file), f"only static models of upright cylinders can be imported; leave out or skip {names}"
         )
+    start = start or _kept(file, kept, "start", 3)
+    goal = goal or _kept(file, kept, "goal", 2)
+    bounds = bounds or _kept(file, kept, "bounds", 4)
     if bounds is None and not found.discs:
         raise input_error(str(file), "holds no upright cylinder; give the bounds")
     box = bounds if bounds is not None else _around(found.discs, start, goal)
@@ -68,11 +74,29 @@ def import_sdf(
     if start is None:
         x, y = xmin + MARGIN / 2, ymin + MARGIN / 2
         start = (x, y, math.atan2(end[1] - y, end[0] - x))
+    (tolerance,) = _kept(file, kept, "goal_tolerance", 1) or (0.25,)
+    (size,) = _kept(file, kept, "cell", 1) or (0.25,)
+    source = kept.get("source") if kept else f"imported from {file.name}"
     try:
-        made = World(file.stem, box, tuple(found.discs), f"imported from {file.name}")
-        return Task(made, start, end, goal_tolerance, cell)
+        made = World(kept.get("name", file.stem), box, tuple(found.discs), source)
+        return Task(
+            made, start, end, tolerance if goal_tolerance is None else goal_tolerance, size if cell is None else cell
+        )
     except ValueError as error:
         raise input_error(str(file), str(error)) from None
+
+
+def _kept(file: Path, kept: Mapping[str, str], key: str, count: int) -> Any:
+    """The numbers that an exported world keeps under a key, if it is one and has them."""
+    if key not in kept:
+        return None
+    try:
+        values = tuple(float(word) for word in kept[key].split())
+    except ValueError:
+        values = ()
+    if len(values) != count:
+        raise input_error(str(file), TASK, key, f"must be {count} numbers, got {kept[key][:40]!r}")
+    return values
 
 
 def import_map_server(

@@ -15,6 +15,9 @@ import numpy as np
 from worlds.documents import input_error
 from worlds.world import Disc, Floats
 
+#: What an exported world tells beyond SDF, in an element of our own as SDF allows, and its walls, which `bounds` brings back.
+TASK, NAMESPACE, WALLS = "antdrive:task", "urn:antdrive:task:1", "antdrive_walls"
+
 MAX_BYTES = 50_000_000  # BARN's worlds have 0.7 MB
 MAX_DEPTH = 100
 UPRIGHT = 1e-3  # how far a cylinder's axis may lean [rad]
@@ -100,6 +103,16 @@ def read_models(world: ET.Element) -> Found:
     for tag in ("actor", "population", "state/insertions/model"):
         found.unsupported.extend(f"{e.get('name', tag)} ({tag})" for e in world.findall(tag))
     return found
+
+
+def read_task_element(world: ET.Element) -> dict[str, str] | None:
+    """The attributes of the element that an exported <world> has for the way back; its walls are taken out."""
+    element = next((e for e in world if e.tag == TASK), None)
+    if element is None:
+        return None
+    for model in [m for m in world.findall("model") if m.get("name") == WALLS]:
+        world.remove(model)
+    return dict(element.attrib)
 
 
 def _cylinders(model: ET.Element, frame: Floats, static: bool, state: ET.Element | None) -> list[Disc]:
