@@ -38,5 +38,9 @@ from .route import route_along as route_along
 from .search import AStar as AStar
 from .search import Dijkstra as Dijkstra
 from .search import reachable as reachable
+from .space_time import Moving as Moving
+from .space_time import SafeIntervals as SafeIntervals
+from .space_time import TimedPlan as TimedPlan
+from .space_time import plan_in_time as plan_in_time
 from .tangent import Tangent as Tangent
 from .tangent import TangentPath as TangentPath

@@ -27,6 +27,7 @@ from planners.mmas_dstar import MaxMinDStar
 from planners.pfaco import PotentialFieldAnts
 from planners.plan import Planner
 from planners.search import AStar, Dijkstra
+from planners.space_time import SafeIntervals
 from planners.tangent import Tangent
 from worlds import InputError
 
@@ -37,6 +38,7 @@ PLANNERS: Mapping[str, Planner] = MappingProxyType(
         "astar": AStar(),
         "dstar": DStar(),
         "dstar-lite": DStarLite(),
+        "sipp": SafeIntervals(),
         "apf": PotentialField(),
         "aco-han": AcoHan(),
         "aco-han-elite": AcoHan(elitism=100),

@@ -9,7 +9,7 @@ from pathlib import Path
 
 CODE = """
 import numpy as np
-from planners import Query, find_planner
+from planners import Query, find_planner, plan_in_time
 from worlds import Grid
 free = np.ones((6, 7))
 free[1:5, 3] = 0
@@ -19,6 +19,12 @@ for name in ("astar", "dijkstra", "dstar", "dstar-lite", "apf", "mmas-dstar", *c
     options = {"ants": 4, "iterations": 3, "retreat": True, "shortcut": True} if name in colonies else {}
     result = find_planner(name, **options).plan(query, np.random.default_rng(0))
     print(name, result.status.name, round(result.cost, 9), result.cells.tolist(), result.work)
+class Mover:
+    radius = 0.4
+    def at(self, t):
+        return np.column_stack([np.abs((t / 2 % 4) - 2) + 2, 0 * t])
+result = plan_in_time(query, [Mover()], speed=1.0)
+print(result.status.name, result.arrive.round(9).tolist(), result.leave.round(9).tolist(), result.work)
 """
 
 
@@ -37,5 +43,5 @@ def run(**environment: str) -> str:
 
 def test_uncompiled_kernels_give_the_same_plans_without_a_warning() -> None:
     plain = run(NUMBA_DISABLE_JIT="1")
-    assert plain.count("SOLVED") == 12
+    assert plain.count("SOLVED") == 13
     assert plain == run(NUMBA_DISABLE_JIT="0")
