@@ -34,6 +34,9 @@ from .registry import describe as describe
 from .registry import find_planner as find_planner
 from .replan import Replanner as Replanner
 from .replan import ReplanningPlanner as ReplanningPlanner
+from .replanners import FromScratch as FromScratch
+from .replanners import WarmAnts as WarmAnts
+from .replanners import replanner_for as replanner_for
 from .route import route_along as route_along
 from .search import AStar as AStar
 from .search import Dijkstra as Dijkstra

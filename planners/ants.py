@@ -100,6 +100,14 @@ class Turn(NamedTuple):
     chance: float = 0.5  # a random number of this iteration's own, in [0, 1)
 
 
+@dataclass(eq=False)
+class Memory:
+    """What a colony leaves to one that walks the same cells after it. Filled in as it walks."""
+
+    trail: Floats | None = None  # as `Colony.lay`
+    tour: Walks | None = None  # the best one, alone
+
+
 class Season(NamedTuple):
     """One iteration of a colony, as its trails see it."""
 
@@ -189,8 +197,13 @@ class Colony(IterativePlanner):
 
     def iterate(self, query: Query, rng: np.random.Generator) -> Iterator[Iteration]:
         """Walk, rate, update, until nothing more is to be gained."""
+        return self.resume(query, rng, Memory())
+
+    def resume(self, query: Query, rng: np.random.Generator, memory: Memory) -> Iterator[Iteration]:
+        """Iterate on the trails of an earlier colony, whose best tour, as far as it can still be walked, is known."""
         ground = Ground.of(query)
-        trail, desire = self.lay(ground, rng), self.desire(ground)
+        trail = self.lay(ground, rng) if memory.trail is None else memory.trail
+        memory.trail, desire = trail, self.desire(ground)
         walk = _Walk.of(self, ground)
         scene = np.empty(ground.shape)
         best: Walks | None = None
@@ -202,11 +215,13 @@ class Colony(IterativePlanner):
                     self.weigh(ground, trail, desire, weights, Turn(caste, rng.random()))
                 walks, steps = walk.go(rng, pool)
                 tours = walk.cut(walks)
-                joint = self.join(ground, tours, best)
+                joint = self.join(ground, tours, best or memory.tour)
                 if _shortest(joint, tours) < (float(best.lengths[0]) - 1e-9 if best else math.inf):
                     best = joint if joint and joint.lengths[0] <= tours.lengths.min() else tours.shortest()
                     assert best is not None
                     path, found = ground.cells(best.cells[0]), number
+                if best is not None:
+                    memory.tour = best
                 season = Season(number, ground, walks, tours, joint, best, number - found, rng)
                 self.update(trail, season)
                 yield _report(query.grid.cell, season, path, trail, scene, steps)

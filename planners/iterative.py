@@ -79,6 +79,10 @@ class IterativePlanner(GridPlanner):
         """What `work` counts."""
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        return self.take(query, self.iterate(query, rng))
+
+    def take(self, query: Query, states: Iterator[Iteration]) -> PlanResult:
+        """The answer that iterations lead to, as many of them as there are to be; both ends are free."""
         if not reachable(query):
             return PlanResult(status=PlanStatus.NO_PATH, reason=NO_WAY, work_unit=self.work_unit)
         if query.start == query.goal:
@@ -87,15 +91,15 @@ class IterativePlanner(GridPlanner):
         done: list[Iteration] = []
         note = ""
         try:
-            note = self._improve(query, rng, done)
+            note = self._improve(states, done)
         except KeyboardInterrupt:
             note = f"interrupted after {len(done)} of {self.iterations} iterations"
         return self._conclude(query, done, note)
 
-    def _improve(self, query: Query, rng: np.random.Generator, done: list[Iteration]) -> str:
+    def _improve(self, states: Iterator[Iteration], done: list[Iteration]) -> str:
         deadline = math.inf if self.time_budget is None else time.perf_counter() + self.time_budget
         see = _watcher.get()
-        for state in itertools.islice(self.iterate(query, rng), self.iterations):
+        for state in itertools.islice(states, self.iterations):
             done.append(state)
             if see is not None:
                 see(Progress(len(done), self.iterations, done[-1].best))

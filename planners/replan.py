@@ -49,7 +49,7 @@ class Replanner(Protocol):
         ...
 
     def result(self) -> PlanResult:
-        """The shortest path from where the robot is; `work` and `wall_s` are those of this repair."""
+        """The planner's path from where the robot is; `work` and `wall_s` are those of this answer."""
         ...
 
 
@@ -65,8 +65,8 @@ class ReplanningPlanner(GridPlanner):
         return self.replanner(query).result()
 
 
-class Repair(abc.ABC):
-    """What replanners share: the grid as it is now, and the last path for as long as nothing has changed."""
+class Changing(abc.ABC):
+    """What replanners share: the query as it is now, and which cells have changed since the last answer."""
 
     def __init__(self, query: Query) -> None:
         from planners import _kernels_replan  # here, so that naming a planner does not load the compiler
@@ -76,7 +76,6 @@ class Repair(abc.ABC):
         self._closed: npt.NDArray[np.uint8] | None = None  # what else than blocked cells forbids, once needed
         self._seen = np.empty(self._moves.size, dtype=np.int64)  # where kernels list what they changed
         self._news: list[npt.NDArray[np.int64]] = []  # cells whose moves have changed since the last repair
-        self._path: Cells | None = None  # the last one
         self._query = dataclasses.replace(query, grid=self._view(query.grid))
 
     @property
@@ -122,24 +121,9 @@ class Repair(abc.ABC):
         self._closed = None
         return self._tell(int(self._common.adopt(self._moves, grid.moves, self._seen)))
 
-    def result(self) -> PlanResult:
-        """The shortest path from where the robot is; `work` and `wall_s` are those of this repair."""
-        started = time.perf_counter()
-        blocked = self._query.blocked_end
-        if blocked:
-            return PlanResult(status=PlanStatus.NO_PATH, reason=blocked, wall_s=time.perf_counter() - started)
-        cells, diagonal, work = self._onward() or self._renew()
-        self._path = cells
-        if not len(cells):
-            return PlanResult(status=PlanStatus.NO_PATH, reason=NO_WAY, work=work, wall_s=time.perf_counter() - started)
-        cost = self._query.grid.cell * (len(cells) - 1 - diagonal + math.sqrt(2.0) * diagonal)
-        return PlanResult(
-            status=PlanStatus.SOLVED, cells=cells, cost=cost, work=work, wall_s=time.perf_counter() - started
-        )
-
     @abc.abstractmethod
-    def _repair(self, changed: npt.NDArray[np.int64], start: int) -> tuple[Cells, int, int]:
-        """The path, empty if there is none, after these cells have changed; its diagonal steps; the cells expanded."""
+    def result(self) -> PlanResult:
+        """A path from where the robot is; `work` and `wall_s` are those of this answer."""
 
     def _index(self, cell: Cell) -> int:
         return int(cell[0] * self._moves.shape[1] + cell[1])
@@ -167,10 +151,41 @@ class Repair(abc.ABC):
             self._news.append(self._seen[:count].copy())
         return count
 
-    def _renew(self) -> tuple[Cells, int, int]:
+    def _changed(self) -> npt.NDArray[np.int64]:
+        """The cells whose moves have changed since this was last asked."""
         changed = self._news[0] if len(self._news) == 1 else np.concatenate([self._seen[:0], *self._news])
         self._news.clear()
-        return self._repair(changed, self._index(self._query.start))
+        return changed
+
+
+class Repair(Changing):
+    """A search that is repaired; its last path holds for as long as nothing has changed."""
+
+    def __init__(self, query: Query) -> None:
+        super().__init__(query)
+        self._path: Cells | None = None  # the last one
+
+    def result(self) -> PlanResult:
+        """The shortest path from where the robot is; `work` and `wall_s` are those of this repair."""
+        started = time.perf_counter()
+        blocked = self._query.blocked_end
+        if blocked:
+            return PlanResult(status=PlanStatus.NO_PATH, reason=blocked, wall_s=time.perf_counter() - started)
+        cells, diagonal, work = self._onward() or self._renew()
+        self._path = cells
+        if not len(cells):
+            return PlanResult(status=PlanStatus.NO_PATH, reason=NO_WAY, work=work, wall_s=time.perf_counter() - started)
+        cost = self._query.grid.cell * (len(cells) - 1 - diagonal + math.sqrt(2.0) * diagonal)
+        return PlanResult(
+            status=PlanStatus.SOLVED, cells=cells, cost=cost, work=work, wall_s=time.perf_counter() - started
+        )
+
+    @abc.abstractmethod
+    def _repair(self, changed: npt.NDArray[np.int64], start: int) -> tuple[Cells, int, int]:
+        """The path, empty if there is none, after these cells have changed; its diagonal steps; the cells expanded."""
+
+    def _renew(self) -> tuple[Cells, int, int]:
+        return self._repair(self._changed(), self._index(self._query.start))
 
     def _onward(self) -> tuple[Cells, int, int] | None:
         """What is left of the path, if nothing has changed and the robot is on it."""

@@ -9,7 +9,7 @@ import math
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Protocol, runtime_checkable
+from typing import ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -89,6 +89,8 @@ class SafeIntervals(GridPlanner):
     speed: float = 0.5  # [m/s] on every move
     horizon: float = 120.0  # the motions are known, and the goal must be reached, so long [s]
     stay: bool = False  # the goal must also be safe from the arrival to the horizon
+
+    needs_motions: ClassVar[bool] = True  # cells that are blocked now are not enough
 
     def __post_init__(self) -> None:
         require("speed", self.speed, above=0)
