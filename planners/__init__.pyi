@@ -15,6 +15,11 @@ from .iterative import watch as watch
 from .merging_ants import MergingAnts as MergingAnts
 from .mmas import MaxMinAnts as MaxMinAnts
 from .mmas_dstar import MaxMinDStar as MaxMinDStar
+from .online import Follower as Follower
+from .online import Online as Online
+from .online import OnlineAnt as OnlineAnt
+from .online import Tally as Tally
+from .online import online_for as online_for
 from .pfaco import PotentialFieldAnts as PotentialFieldAnts
 from .plan import Cell as Cell
 from .plan import Cells as Cells

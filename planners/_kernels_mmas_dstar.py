@@ -81,6 +81,26 @@ def propagate(mask: Array, offset: Array, start: int, goal: int, retained: float
 
 
 @kernel
+def decide(
+    mask: Array, offset: Array, cols: int, here: int, goal: int, alpha: float, beta: float, pheromone: Array
+) -> int:
+    """The allowed neighbour of the smallest pheromone^alpha * distance^beta; -1 where none has any pheromone."""
+    r1, c1 = goal // cols, goal % cols
+    least, to = np.inf, -1
+    for k in range(8):
+        if not mask[here] & (1 << k):
+            continue
+        j = here + offset[k]
+        if j == goal:
+            to = j
+            break
+        price = alpha * math.log(pheromone[j]) + beta * math.log(math.hypot(r1 - j // cols, c1 - j % cols))
+        if price < least:
+            least, to = price, j
+    return to
+
+
+@kernel
 def descend(
     mask: Array,
     offset: Array,
@@ -97,23 +117,11 @@ def descend(
     It ends at the goal, or negative where the walk would come back to one of its cells: it goes in circles.
     """
     been = np.zeros(len(mask), dtype=np.bool_)
-    r1, c1 = goal // cols, goal % cols
     walk[0], n = start, 1
     been[start] = True
     i = start
     while i != goal:
-        least, to = np.inf, -1
-        for k in range(8):
-            if not mask[i] & (1 << k):
-                continue
-            j = i + offset[k]
-            if j == goal:
-                to = j
-                break
-            distance = math.hypot(r1 - j // cols, c1 - j % cols)
-            price = alpha * math.log(pheromone[j]) + beta * math.log(distance)
-            if price < least:
-                least, to = price, j
+        to = decide(mask, offset, cols, i, goal, alpha, beta, pheromone)
         if to < 0 or been[to]:
             return -n
         i = to
@@ -121,3 +129,20 @@ def descend(
         walk[n] = i
         n += 1
     return n
+
+
+@kernel
+def close_cells(moves: Array, cells: Array) -> None:
+    """Take every move into, out of or diagonally past these cells (N, 2) out of `moves` (rows, cols)."""
+    rows, cols = moves.shape
+    for n in range(len(cells)):
+        r, c = cells[n, 0], cells[n, 1]
+        moves[r, c] = 0
+        for k in range(8):
+            rn, cn = r + DROW[k], c + DCOL[k]
+            if rn < 0 or rn >= rows or cn < 0 or cn >= cols:
+                continue
+            gone = 1 << ((k + 4) & 7)
+            if not k & 1:  # beside the cell: also the diagonals that pass it
+                gone |= 1 << ((k + 3) & 7) | 1 << ((k + 5) & 7)
+            moves[rn, cn] &= 255 - gone

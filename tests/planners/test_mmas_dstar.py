@@ -111,3 +111,16 @@ def test_without_distance_the_way_is_the_cheapest_at_one_and_one_point_four() ->
 def test_options_out_of_range_are_refused_by_name(key: str, value: float) -> None:
     with pytest.raises(ValueError, match=f"^{key}: must be"):
         MaxMinDStar(**{key: value})
+
+
+def test_closed_cells_leave_the_moves_that_a_picture_without_them_allows() -> None:
+    from planners._kernels_mmas_dstar import close_cells
+
+    rng = np.random.default_rng(6)
+    for _ in range(100):
+        free = rng.random(rng.integers(1, 9, 2)) >= 0.2
+        cells = rng.integers(0, free.shape, (int(rng.integers(0, 5)), 2))
+        moves = Grid.from_free(free).moves.copy()
+        close_cells(moves, cells)
+        free[tuple(cells.T)] = False
+        np.testing.assert_array_equal(moves, Grid.from_free(free).moves)
