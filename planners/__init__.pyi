@@ -25,6 +25,7 @@ from .plan import Cell as Cell
 from .plan import Cells as Cells
 from .plan import GridPlanner as GridPlanner
 from .plan import History as History
+from .plan import Moving as Moving
 from .plan import Planner as Planner
 from .plan import PlanResult as PlanResult
 from .plan import PlanStatus as PlanStatus
@@ -46,7 +47,6 @@ from .route import route_along as route_along
 from .search import AStar as AStar
 from .search import Dijkstra as Dijkstra
 from .search import reachable as reachable
-from .space_time import Moving as Moving
 from .space_time import SafeIntervals as SafeIntervals
 from .space_time import TimedPlan as TimedPlan
 from .space_time import plan_in_time as plan_in_time

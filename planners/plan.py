@@ -31,6 +31,20 @@ class PlanStatus(enum.Enum):
     STOPPED = "stopped before a path was found"
 
 
+@runtime_checkable
+class Moving(Protocol):
+    """A disc whose motion is known."""
+
+    @property
+    def radius(self) -> float:
+        """Its radius [m]."""
+        ...
+
+    def at(self, t: Floats) -> Floats:
+        """Its centre (T, 2) [m] at times (T,) [s]."""
+        ...
+
+
 @dataclass(frozen=True)
 class Query:
     """A grid with a start and a goal cell.
@@ -44,6 +58,7 @@ class Query:
     goal: Cell
     task: Task | None = None  # the world behind the grid, for planners that are not bound to cells
     unreachable: str = ""  # why an end cannot be used although its cell may be free
+    motions: tuple[Moving, ...] = ()  # what moves, for planners of space and time; t = 0 is when the robot sets out
 
     def __post_init__(self) -> None:
         rows, cols = self.grid.shape

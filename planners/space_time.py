@@ -9,33 +9,19 @@ import math
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import ClassVar, Protocol, runtime_checkable
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from planners.iterative import require
-from planners.plan import GridPlanner, PlanResult, PlanStatus, Query, path_cost
+from planners.plan import GridPlanner, Moving, PlanResult, PlanStatus, Query, path_cost
 from planners.search import NO_WAY, reachable
 from worlds import Floats
 
 STEP = 0.05  # s: how often a motion is looked at; turns in between are then looked for
 INSTANT = 1e-6  # s: a motion that is not straight over so short a time jumps
 TOLERANCE = 1e-3  # m: how far a motion may stray from the straight legs it is told by; kept in addition
-
-
-@runtime_checkable
-class Moving(Protocol):
-    """A disc that moves."""
-
-    @property
-    def radius(self) -> float:
-        """Its radius [m]."""
-        ...
-
-    def at(self, t: Floats) -> Floats:
-        """Its centre (T, 2) [m] at times (T,) [s]."""
-        ...
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -83,7 +69,7 @@ class TimedPlan(PlanResult):
 class SafeIntervals(GridPlanner):
     """The way that arrives first among movers whose motions are known, waiting where that helps: SIPP.
 
-    The movers are those of the query's world (`query.task.world.movers`). Without any it is the shortest path.
+    The motions are the query's. Without any it is the shortest path. The answer is a `TimedPlan`.
     """
 
     speed: float = 0.5  # [m/s] on every move
@@ -97,8 +83,7 @@ class SafeIntervals(GridPlanner):
         require("horizon", self.horizon, above=0)
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
-        movers = () if query.task is None else getattr(query.task.world, "movers", ())
-        return plan_in_time(query, movers, speed=self.speed, horizon=self.horizon, stay=self.stay)
+        return plan_in_time(query, query.motions, speed=self.speed, horizon=self.horizon, stay=self.stay)
 
 
 def plan_in_time(

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from worlds_to_solve import optimum, random_query
 
-from planners import Moving, PlanStatus, Query, TimedPlan, plan_in_time
+from planners import Moving, PlanStatus, Query, TimedPlan, find_planner, plan_in_time
 from planners.space_time import TOLERANCE, _legs, _samples
 from worlds import Grid
 
@@ -267,6 +267,17 @@ def test_without_movers_it_is_the_shortest_path() -> None:
         plan = plan_in_time(query, [], speed=2.0)
         assert plan.cost == pytest.approx(optimum(query))
         assert plan.duration == pytest.approx(optimum(query) / 2.0)
+
+
+def test_the_planner_of_the_registry_plans_among_the_motions_of_the_query() -> None:
+    mover = Passing(0.25, (0.5, -0.4), (0.0, 0.1))
+    query = dataclasses.replace(corridor(3), motions=(mover,))
+    plan = find_planner("sipp", speed=SPEED).plan(query, np.random.default_rng(0))
+    assert isinstance(plan, TimedPlan)
+    assert isinstance(mover, Moving)
+    np.testing.assert_array_equal(plan.leave, plan_in_time(query, [mover], speed=SPEED).leave)
+    assert plan.waited > 5
+    assert plan.options["horizon"] == 120.0
 
 
 def test_plans_begin_when_they_are_asked_to() -> None:
