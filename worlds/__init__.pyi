@@ -28,10 +28,15 @@ from .importers import import_barn as import_barn
 from .importers import import_map_server as import_map_server
 from .importers import import_movingai_task as import_movingai_task
 from .importers import import_sdf as import_sdf
+from .movers import Cruising as Cruising
+from .movers import Keyframed as Keyframed
+from .movers import Mover as Mover
+from .movers import Wandering as Wandering
 from .movingai import MapProblem as MapProblem
 from .movingai import import_movingai_map as import_movingai_map
 from .movingai import import_movingai_problems as import_movingai_problems
 from .route import Route as Route
+from .traffic import Traffic as Traffic
 from .world import Bounds as Bounds
 from .world import Disc as Disc
 from .world import Floats as Floats

@@ -100,9 +100,11 @@ def _model_at(model: type[BaseModel], location: Location) -> type[BaseModel]:
 
 
 def _describe(model: type[BaseModel], location: Location) -> str:
+    while location and isinstance(location[-1], int):  # an entry is described with its list
+        location = location[:-1]
     parent = _model_at(model, location[:-1])
     for name, info in parent.model_fields.items():
-        if (info.alias or name) == location[-1]:
+        if location and (info.alias or name) == location[-1]:
             return info.description or ""
     return ""
 

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from worlds.atomic import written_whole
 from worlds.checks import SchemaVersion, check, suggest, yaml_number
-from worlds.documents import Document, input_error, read_document
+from worlds.documents import Document, Location, input_error, read_document
+from worlds.movers import MAX_PHASE, MIN_PERIOD, Mover, mover_from_dict, mover_to_dict
 from worlds.world import Disc, Task, World
 
 LIMIT = 1e6  # farthest coordinate and largest size [m]: beyond it something was mistyped
@@ -20,6 +22,8 @@ MAX_CELLS = 25_000_000  # as in worlds.grid, which is not imported here because 
 
 Coordinate = Annotated[float, Field(ge=-LIMIT, le=LIMIT)]
 Size = Annotated[float, Field(gt=0, le=LIMIT)]
+Pair = Annotated[list[Coordinate], Field(min_length=2, max_length=2)]
+Keyframe = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
 
 _CATALOG = Path(__file__).with_name("catalog")
 _RULES = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
@@ -34,6 +38,33 @@ class DiscEntry(BaseModel):
     y: Coordinate = Field(description="the centre's y [m]")
     radius: Size = Field(description="the radius as built [m]")
     height: Size = Field(1.0, description="the height [m]")
+
+
+class WalkEntry(BaseModel):
+    """Goes, in every period, from a cell's centre to that of a random free neighbour."""
+
+    model_config = _RULES
+
+    cell: Size = Field(description="side of the cells it walks on [m]")
+    period: float = Field(ge=MIN_PERIOD, le=LIMIT, description="time for one cell [s]")
+    start: Pair | None = Field(None, description="write [x, y], where it begins; by default a random free cell")
+    seed: int | None = Field(None, ge=0, lt=2**63, description="of its own; by default the run's")
+
+
+class MoverEntry(BaseModel):
+    """A moving cylinder; one of keyframes, velocity and walk says how it moves."""
+
+    model_config = _RULES
+
+    radius: Size = Field(description="the radius as built [m]")
+    height: Size = Field(1.0, description="the height [m]")
+    phase: float = Field(0.0, ge=0, le=MAX_PHASE, description="how much of its motion has passed at the start [s]")
+    keyframes: list[Keyframe] | None = Field(None, max_length=10_000, description="write [t, x, y] for each")
+    loop: Literal["pingpong", "teleport", "once"] | None = Field(None, description="after the last keyframe")
+    interpolation: Literal["linear", "catmull-rom"] | None = Field(None, description="between keyframes")
+    position: Pair | None = Field(None, description="write [x, y], where it is at first")
+    velocity: Pair | None = Field(None, description="write [vx, vy] in m/s; it bounces off the walls")
+    walk: WalkEntry | None = Field(None, description="write {cell: 0.5, period: 1.0}")
 
 
 class TaskFile(BaseModel):
@@ -51,7 +82,8 @@ class TaskFile(BaseModel):
     goal_tolerance: Size = Field(0.25, description="the robot must stop this close to the goal [m]")
     cell: Size = Field(0.5, description="grid resolution a planner uses unless told otherwise [m]")
     obstacles: list[DiscEntry] = Field([], description="upright cylinders")
-    movers: list[Any] = Field([], max_length=0, description="moving cylinders; none in this version")
+    time_limit: Size | None = Field(None, description="simulated time allowed [s], by default ample for the route")
+    movers: list[MoverEntry] = Field([], max_length=1000, description="moving cylinders")
 
     @field_validator("name")
     @classmethod
@@ -60,17 +92,10 @@ class TaskFile(BaseModel):
             raise ValueError("must be one line of printable characters")
         return name
 
-    @field_validator("movers", mode="before")
-    @classmethod
-    def _no_movers(cls, movers: Any) -> Any:
-        if movers != []:
-            raise ValueError("moving obstacles are not supported in this version; remove the key")
-        return movers
-
 
 def catalogue() -> Mapping[str, Path]:
     """The worlds that come with the package, by name."""
-    return {path.stem: path for path in sorted(_CATALOG.glob("*.yaml"))}
+    return dict(sorted((path.stem, path) for path in _CATALOG.glob("*.yaml")))
 
 
 def load_task(world: str | os.PathLike[str]) -> Task:
@@ -116,10 +141,12 @@ def task_to_dict(task: Task) -> dict[str, Any]:
         "goal": [float(v) for v in task.goal],
         "goal_tolerance": float(task.goal_tolerance),
         "cell": float(task.cell),
+        **({} if task.time_limit is None else {"time_limit": float(task.time_limit)}),
         "obstacles": [
             {"x": float(d.x), "y": float(d.y), "radius": float(d.radius), "height": float(d.height)}
             for d in world.obstacles
         ],
+        **({"movers": [mover_to_dict(mover) for mover in world.movers]} if world.movers else {}),
     }
 
 
@@ -146,26 +173,49 @@ def _to_task(document: Document) -> Task:
         raise document.error(("cell",), f"{entry.cell:g} m cuts these bounds into more than {MAX_CELLS} cells")
     x, y, yaw = entry.start
     discs = tuple(Disc(d.x, d.y, d.radius, d.height) for d in entry.obstacles)
+    movers = tuple(_to_mover(document, i, mover) for i, mover in enumerate(entry.movers))
     try:
-        world = World(entry.name, (xmin, ymin, xmax, ymax), discs, entry.source)
-        return Task(world, (x, y, yaw), (entry.goal[0], entry.goal[1]), entry.goal_tolerance, entry.cell)
+        world = World(entry.name, (xmin, ymin, xmax, ymax), discs, entry.source, movers)
+        goal = entry.goal[0], entry.goal[1]
+        return Task(world, (x, y, yaw), goal, entry.goal_tolerance, entry.cell, entry.time_limit)
     except ValueError as error:
         key, _, problem = str(error).partition(": ")
-        raise document.error((key,), problem) from None
+        raise document.error(_location(key), problem) from None
+
+
+def _to_mover(document: Document, index: int, entry: MoverEntry) -> Mover:
+    try:
+        return mover_from_dict(entry.model_dump(exclude_unset=True))
+    except ValueError as error:
+        key, _, problem = str(error).partition(": ")
+        raise document.error(("movers", index, *_location(key)), problem) from None
+
+
+def _location(key: str) -> Location:
+    """The way to a value from how errors write it: movers[0].walk.start."""
+    parts = re.findall(r"[^.\[\]]+", key)
+    return tuple(int(part) if part.isdigit() else part for part in parts)
 
 
 def _to_yaml(task: Task) -> str:
     data = task_to_dict(task)
-    obstacles = data.pop("obstacles")
+    lists = {key: data.pop(key) for key in ("obstacles", "movers") if key in data}
     lines = []
     for key, value in data.items():
-        if isinstance(value, list):
-            lines.append(f"{key}: [{', '.join(map(yaml_number, value))}]\n")
-        elif isinstance(value, float):
-            lines.append(f"{key}: {yaml_number(value)}\n")
+        if isinstance(value, list | float):
+            lines.append(f"{key}: {_flow(value)}\n")
         else:
             lines.append(yaml.safe_dump({key: value}, allow_unicode=True, width=100))
-    lines.append("obstacles:\n" if obstacles else "obstacles: []\n")
-    for disc in obstacles:
-        lines.append(f"  - {{{', '.join(f'{key}: {yaml_number(value)}' for key, value in disc.items())}}}\n")
+    for key, entries in lists.items():
+        lines.append(f"{key}:\n" if entries else f"{key}: []\n")
+        lines += [f"  - {_flow(entry)}\n" for entry in entries]
     return "".join(lines)
+
+
+def _flow(value: Any) -> str:
+    """Plain data on one line."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key}: {_flow(inner)}" for key, inner in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_flow, value)) + "]"
+    return yaml_number(value) if isinstance(value, float) else str(value)

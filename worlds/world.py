@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -9,10 +10,14 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from worlds.movers import Cruising, Mover, Wandering, later
+
 Floats: TypeAlias = npt.NDArray[np.float64]
 Pose: TypeAlias = tuple[float, float, float]  # x [m], y [m], yaw [rad, counter-clockwise from +x]
 Point: TypeAlias = tuple[float, float]  # x [m], y [m]
 Bounds: TypeAlias = tuple[float, float, float, float]  # xmin, ymin, xmax, ymax [m]
+
+MAX_WALK_CELLS = 25_000_000  # as for grids
 
 
 @dataclass(frozen=True)
@@ -34,16 +39,17 @@ class Disc:
 
 @dataclass(frozen=True)
 class World:
-    """Cylinders inside four solid walls.
+    """Cylinders inside four solid walls; some of them may move.
 
     Raises:
-        ValueError: bounds that enclose nothing or are not finite.
+        ValueError: bounds that enclose nothing or are not finite, or a mover that has no room where it begins.
     """
 
     name: str
     bounds: Bounds  # the walls' inner faces [m]
     obstacles: tuple[Disc, ...] = ()
     source: str | None = None  # where it comes from, free text
+    movers: tuple[Mover, ...] = ()  # see `Traffic` for where they are
 
     def __post_init__(self) -> None:
         for value in self.bounds:
@@ -51,6 +57,34 @@ class World:
         xmin, ymin, xmax, ymax = self.bounds
         if not (xmin < xmax and ymin < ymax):
             raise ValueError(f"bounds: must be [xmin, ymin, xmax, ymax] with min < max, got {list(self.bounds)}")
+        for i, mover in enumerate(self.movers):
+            self._require_room(f"movers[{i}].", mover)
+
+    def later(self, seconds: float) -> World:
+        """The same world with `seconds` more of every mover's motion passed when a run starts."""
+        return dataclasses.replace(self, movers=tuple(later(mover, seconds) for mover in self.movers))
+
+    def _require_room(self, key: str, mover: Mover) -> None:
+        if isinstance(mover, Cruising):
+            xmin, ymin, xmax, ymax = self.bounds
+            (x, y), r = mover.position, mover.radius
+            if not (2 * r < min(self.size) and xmin + r <= x <= xmax - r and ymin + r <= y <= ymax - r):
+                raise ValueError(
+                    f"{key}position: ({x:g}, {y:g}) leaves no room for radius {r:g} within bounds {list(self.bounds)}"
+                )
+        if isinstance(mover, Wandering):
+            from worlds.traffic import home_cell
+
+            columns, rows = (side / mover.cell for side in self.size)
+            if columns * rows > MAX_WALK_CELLS:
+                raise ValueError(
+                    f"{key}walk.cell: {mover.cell:g} m cuts this world into more than {MAX_WALK_CELLS} cells"
+                )
+            if mover.start is not None:
+                try:
+                    home_cell(mover, self)
+                except ValueError as error:
+                    raise ValueError(f"{key}{error}") from None
 
     @property
     def discs(self) -> Floats:
@@ -77,19 +111,36 @@ class Task:
     goal: Point
     goal_tolerance: float = 0.25  # the robot must stop this close to the goal [m]
     cell: float = 0.5  # the grid resolution planners use unless told otherwise [m]
+    time_limit: float | None = None  # simulated time allowed unless told otherwise [s]; None: ample for the route
 
     def __post_init__(self) -> None:
         for key, values in (("start", self.start), ("goal", self.goal)):
             for value in values:
                 _require_finite(key, value)
-        for key in ("goal_tolerance", "cell"):
-            _require_finite(key, getattr(self, key))
-            if getattr(self, key) <= 0:
-                raise ValueError(f"{key}: must be greater than 0, got {getattr(self, key):g}")
+        for key in ("goal_tolerance", "cell", "time_limit"):
+            value = getattr(self, key)
+            if value is not None:
+                _require_finite(key, value)
+                if value <= 0:
+                    raise ValueError(f"{key}: must be greater than 0, got {value:g}")
         for key, (x, y) in (("start", self.start[:2]), ("goal", self.goal)):
             self._require_free(key, x, y)
         if self.goal == self.start[:2]:
             raise ValueError("goal: is where the robot starts; give it somewhere to go")
+        self._require_no_mover()
+
+    def _require_no_mover(self) -> None:
+        if not self.world.movers:
+            return
+        from worlds.traffic import Traffic
+
+        x, y = self.start[:2]
+        traffic = Traffic.of(self.world, (x, y))
+        for i, ((mx, my), radius) in enumerate(zip(traffic.positions(0.0)[0], traffic.radii, strict=True)):
+            if math.hypot(x - mx, y - my) <= radius:
+                raise ValueError(
+                    f"start: ({x:g}, {y:g}) is inside movers[{i}], which begins at ({mx:g}, {my:g}) with radius {radius:g}"
+                )
 
     def _require_free(self, key: str, x: float, y: float) -> None:
         xmin, ymin, xmax, ymax = self.world.bounds

@@ -31,6 +31,10 @@ def _disc(disc: str) -> str:
     return f"{GOOD}  - {disc}\n"
 
 
+def _mover(mover: str) -> str:
+    return f"{GOOD}movers:\n  - {mover}\n"
+
+
 def _bomb() -> str:
     """Nine levels of ten aliases each: a billion values in half a kilobyte."""
     lines = ["a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]"]
@@ -100,11 +104,6 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
         _disc("{x: 1.0, y: 5.0}"),
         "bad.yaml:10: obstacles[1].radius: missing; the radius as built [m]",
     ),
-    "movers": (
-        GOOD + "movers:\n  - {radius: 0.3, keyframes: [[0.0, 5.0, 1.0], [8.0, 5.0, 9.0]]}\n",
-        "bad.yaml:10: movers: moving obstacles are not supported in this version",
-    ),
-    "movers without a value": (GOOD + "movers:\n", "bad.yaml:10: movers: moving obstacles are not supported"),
     # kinds
     "newer schema": (_replace("schema: 1", "schema: 2"), "bad.yaml:1: schema: must be 1, got 2"),
     "schema as text": (_replace("schema: 1", 'schema: "1"'), 'bad.yaml:1: schema: must be 1, got "1"'),
@@ -257,4 +256,149 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
         _replace("[9.0, 9.0]", "[1.0, 1.0]"),
         "bad.yaml:5: goal: is where the robot starts",
     ),
+    # movers
+    "movers without a value": (GOOD + "movers:\n", "bad.yaml:10: movers: must be a list, got null"),
+    "movers is a mapping": (GOOD + "movers: {radius: 0.3}\n", "bad.yaml:10: movers: must be a list, got a mapping"),
+    "mover is a number": (_mover("0.3"), "bad.yaml:11: movers[0]: must be a mapping with the keys radius, got 0.3"),
+    "mover without a motion": (
+        _mover("{radius: 0.3}"),
+        "bad.yaml:11: movers[0]: must have one of the keys keyframes, velocity, walk",
+    ),
+    "mover without a radius": (
+        _mover("{velocity: [1, 0], position: [5, 2]}"),
+        "bad.yaml:11: movers[0].radius: missing; the radius as built [m]",
+    ),
+    "mover with a negative radius": (
+        _mover("{radius: -1, velocity: [1, 0], position: [5, 2]}"),
+        "bad.yaml:11: movers[0].radius: must be greater than 0, got -1",
+    ),
+    "mover of two minds": (
+        _mover("{radius: 0.3, keyframes: [[0, 5, 1], [8, 5, 9]], velocity: [1, 0]}"),
+        "bad.yaml:11: movers[0].velocity: stands beside keyframes; a mover moves in one way",
+    ),
+    "misspelt key of a mover": (
+        _mover("{radius: 0.3, keyframe: [[0, 5, 1], [8, 5, 9]]}"),
+        "bad.yaml:11: movers[0].keyframe: unknown key; did you mean keyframes?",
+    ),
+    "mover without places": (
+        _mover("{radius: 0.3, keyframes: []}"),
+        "bad.yaml:11: movers[0].keyframes: must have at least 2 entries [t, x, y], got 0",
+    ),
+    "mover with one place": (
+        _mover("{radius: 0.3, keyframes: [[0, 5, 1]]}"),
+        "bad.yaml:11: movers[0].keyframes: must have at least 2 entries",
+    ),
+    "keyframe without a time": (
+        _mover("{radius: 0.3, keyframes: [[0, 5, 1], [5, 9]]}"),
+        "bad.yaml:11: movers[0].keyframes[1]: must have 3 entries, got 2; write [t, x, y]",
+    ),
+    "keyframe is a number": (
+        _mover("{radius: 0.3, keyframes: [[0, 5, 1], 8]}"),
+        "bad.yaml:11: movers[0].keyframes[1]: must be a list, got 8",
+    ),
+    "keyframe of text": (
+        _mover("{radius: 0.3, keyframes: [[0, 5, 1], [8, 5, up]]}"),
+        'bad.yaml:11: movers[0].keyframes[1][2]: must be a number, got "up"',
+    ),
+    "keyframe that is not finite": (
+        _mover("{radius: 0.3, keyframes: [[0, 5, 1], [.inf, 5, 9]]}"),
+        "bad.yaml:11: movers[0].keyframes[1][0]: must be a finite number",
+    ),
+    "keyframes at one time": (
+        _mover("{radius: 0.3, keyframes: [[0, 5, 1], [3, 5, 9], [3, 5, 8]]}"),
+        "bad.yaml:11: movers[0].keyframes[2]: its time must be later than the 3 s before it, got 3",
+    ),
+    "keyframes back in time": (
+        _mover("{radius: 0.3, keyframes: [[8, 5, 1], [0, 5, 9]]}"),
+        "bad.yaml:11: movers[0].keyframes[1]: its time must be later than the 8 s",
+    ),
+    "keyframes at one place": (
+        _mover("{radius: 0.3, keyframes: [[0, 5, 1], [8, 5, 1]]}"),
+        "bad.yaml:11: movers[0].keyframes: all at one place; write what never moves under obstacles",
+    ),
+    "keyframes too fast": (
+        _mover("{radius: 0.3, keyframes: [[0, 5, 1], [0.1, 5, 9]]}"),
+        "bad.yaml:11: movers[0].keyframes[1]: is reached at 80 m/s; at most 20 m/s are allowed",
+    ),
+    "unknown loop": (
+        _mover("{radius: 0.3, loop: pong, keyframes: [[0, 5, 1], [8, 5, 9]]}"),
+        "bad.yaml:11: movers[0].loop: must be 'pingpong', 'teleport' or 'once', got \"pong\"",
+    ),
+    "unknown interpolation": (
+        _mover("{radius: 0.3, interpolation: cubic, keyframes: [[0, 5, 1], [8, 5, 9]]}"),
+        "bad.yaml:11: movers[0].interpolation: must be 'linear' or 'catmull-rom'",
+    ),
+    "loop without keyframes": (
+        _mover("{radius: 0.3, loop: once, velocity: [1, 0], position: [5, 2]}"),
+        "bad.yaml:11: movers[0].loop: belongs to keyframes, not to velocity; remove it",
+    ),
+    "negative phase": (
+        _mover("{radius: 0.3, phase: -2, keyframes: [[0, 5, 1], [8, 5, 9]]}"),
+        "bad.yaml:11: movers[0].phase: must be at least 0, got -2",
+    ),
+    "velocity without a position": (
+        _mover("{radius: 0.3, velocity: [1, 0]}"),
+        "bad.yaml:11: movers[0].position: missing; write [x, y], where it is at first",
+    ),
+    "velocity of nothing": (
+        _mover("{radius: 0.3, velocity: [0, 0], position: [5, 2]}"),
+        "bad.yaml:11: movers[0].velocity: must be a speed above 0 and at most 20 m/s, got 0",
+    ),
+    "velocity with three entries": (
+        _mover("{radius: 0.3, velocity: [1, 0, 0], position: [5, 2]}"),
+        "bad.yaml:11: movers[0].velocity: must have 2 entries, got 3; write [vx, vy]",
+    ),
+    "mover beyond the walls": (
+        _mover("{radius: 0.3, velocity: [1, 0], position: [9.9, 2]}"),
+        "bad.yaml:11: movers[0].position: (9.9, 2) leaves no room for radius 0.3 within bounds",
+    ),
+    "mover wider than the world": (
+        _mover("{radius: 6, velocity: [1, 0], position: [5, 5]}"),
+        "bad.yaml:11: movers[0].position: (5, 5) leaves no room",
+    ),
+    "walk without a period": (
+        _mover("{radius: 0.2, walk: {cell: 0.5}}"),
+        "bad.yaml:11: movers[0].walk.period: missing; time for one cell [s]",
+    ),
+    "walk is a number": (
+        _mover("{radius: 0.2, walk: 3}"),
+        "bad.yaml:11: movers[0].walk: must be a mapping with the keys cell, period, got 3",
+    ),
+    "walk with a seed that is not whole": (
+        _mover("{radius: 0.2, walk: {cell: 0.5, period: 1, seed: 1.5}}"),
+        "bad.yaml:11: movers[0].walk.seed: must be a whole number, got 1.5",
+    ),
+    "walk with a misspelt key": (
+        _mover("{radius: 0.2, walk: {cell: 0.5, periode: 1}}"),
+        "bad.yaml:11: movers[0].walk.periode: unknown key; did you mean period?",
+    ),
+    "walk in no time": (
+        _mover("{radius: 0.2, walk: {cell: 0.5, period: 0.001}}"),
+        "bad.yaml:11: movers[0].walk.period: must be at least 0.05, got 0.001",
+    ),
+    "walk too fast": (
+        _mover("{radius: 0.2, walk: {cell: 2, period: 0.1}}"),
+        "bad.yaml:11: movers[0].walk.period: a diagonal in 0.1 s is faster than 20 m/s",
+    ),
+    "walk on too many cells": (
+        _mover("{radius: 0.2, walk: {cell: 0.00001, period: 1}}"),
+        "bad.yaml:11: movers[0].walk.cell: 1e-05 m cuts this world into more than",
+    ),
+    "walk from an obstacle": (
+        _mover("{radius: 0.2, walk: {cell: 0.5, period: 1, start: [5, 5]}}"),
+        "bad.yaml:11: movers[0].walk.start: radius 0.2 has no room in the cell around (5.25, 5.25)",
+    ),
+    "walk from out of bounds": (
+        _mover("{radius: 0.2, walk: {cell: 0.5, period: 1, start: [15, 5]}}"),
+        "bad.yaml:11: movers[0].walk.start: (15, 5) is out of bounds",
+    ),
+    "walk without room": (
+        _mover("{radius: 4.9, walk: {cell: 0.5, period: 1}}"),
+        "bad.yaml:11: movers[0].walk: found no free cell of 0.5 m, 1 m from the robot's start, to begin in",
+    ),
+    "start in a mover": (
+        _mover("{radius: 0.5, keyframes: [[0, 1.2, 1], [8, 5, 9]]}"),
+        "bad.yaml:4: start: (1, 1) is inside movers[0], which begins at (1.2, 1) with radius 0.5",
+    ),
+    "time limit of nothing": (GOOD + "time_limit: 0\n", "bad.yaml:10: time_limit: must be greater than 0, got 0"),
 }

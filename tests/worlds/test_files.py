@@ -302,7 +302,7 @@ def test_a_written_file_may_be_read_like_any_other(tmp_path):
 def test_the_schema_tells_every_key_and_what_is_needed():
     schema = task_schema()
     json.dumps(schema)
-    assert set(schema["properties"]) == {*task_to_dict(TASK), "movers"}
+    assert set(schema["properties"]) == {*task_to_dict(TASK), "movers", "time_limit"}
     assert schema["required"] == ["schema", "bounds", "start", "goal"]
     assert schema["additionalProperties"] is False
     assert schema["properties"]["start"]["minItems"] == schema["properties"]["start"]["maxItems"] == 3

@@ -1,0 +1,359 @@
+"""Where movers are: against walks along the path that share no code, and against what their files say."""
+
+import dataclasses
+import json
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from worlds import (
+    Cruising,
+    Disc,
+    InputError,
+    Keyframed,
+    Task,
+    Traffic,
+    Wandering,
+    World,
+    load_task,
+    save_task,
+    task_from_dict,
+    task_to_dict,
+)
+from worlds.geometry import swept_clearance
+
+BOX = (0.0, 0.0, 10.0, 8.0)
+START = (1.0, 1.0)
+ELL = ((1.0, 2.0, 2.0), (3.0, 6.0, 2.0), (4.0, 6.0, 4.0))  # 2 m/s east from t = 1, then 2 m/s north
+FINE = np.linspace(0, 40, 4001)
+
+
+def traffic(*movers, seed=0, obstacles=()):
+    return Traffic.of(World("w", BOX, tuple(obstacles), movers=movers), START, seed)
+
+
+def at(mover, t):
+    return traffic(mover).positions(t)[:, 0]
+
+
+# Keyframes
+
+
+def walk(mover, t):
+    """Where a keyframed mover is, by walking from lap to lap."""
+    frames = list(mover.keyframes)
+    t = t + mover.phase
+    if t <= frames[0][0]:
+        return frames[0][1:]
+    first, last = frames[0][0], frames[-1][0]
+    while t > last:
+        if mover.loop == "once":
+            return frames[-1][1:]
+        t -= last - first
+        if mover.loop == "pingpong":
+            frames = [(first + last - when, x, y) for when, x, y in reversed(frames)]
+    return tuple(float(np.interp(t, [f[0] for f in frames], [f[k] for f in frames])) for k in (1, 2))
+
+
+places = st.tuples(st.floats(-50, 50), st.floats(-50, 50))
+
+
+@st.composite
+def keyframed(draw, loops=("pingpong", "teleport", "once"), interpolation="linear"):
+    gaps = draw(st.lists(st.floats(10.0, 20.0), min_size=1, max_size=5))
+    times = np.cumsum([draw(st.floats(0, 3)), *gaps]).tolist()
+    spots = draw(st.lists(places, min_size=len(times), max_size=len(times)).filter(lambda p: len(set(p)) > 1))
+    frames = tuple((t, x, y) for t, (x, y) in zip(times, spots, strict=True))
+    phase = draw(st.floats(0, 20))
+    return Keyframed(
+        radius=0.3, keyframes=frames, loop=draw(st.sampled_from(loops)), interpolation=interpolation, phase=phase
+    )
+
+
+@given(keyframed(), st.lists(st.floats(0, 300), min_size=1, max_size=20))
+def test_linear_keyframes_are_walked(mover, times):
+    cut = mover.keyframes[-1][0] - mover.keyframes[0][0]
+    times = [t for t in times if abs((t + mover.phase - mover.keyframes[0][0]) % cut) > 1e-6]
+    for t in times:
+        assert at(mover, t)[0] == pytest.approx(walk(mover, t), abs=1e-8)
+
+
+def test_before_the_first_keyframe_and_after_the_last_it_stands():
+    mover = Keyframed(radius=0.3, keyframes=ELL, loop="once")
+    assert at(mover, [0.0, 0.5, 1.0]).tolist() == [[2, 2]] * 3
+    assert at(mover, [4.0, 5.0, 99.0]).tolist() == [[6, 4]] * 3
+    velocity = traffic(mover).velocities([0.5, 1.0, 3.0, 3.5, 4.0])[:, 0]
+    np.testing.assert_allclose(velocity, [(0, 0), (2, 0), (0, 2), (0, 2), (0, 0)])
+
+
+def test_pingpong_comes_back_the_same_way():
+    mover = Keyframed(radius=0.3, keyframes=ELL)
+    np.testing.assert_allclose(at(mover, [4.5, 5.0, 6.0, 7.0, 8.0]), [(6, 3), (6, 2), (4, 2), (2, 2), (4, 2)])
+    np.testing.assert_allclose(
+        traffic(mover).velocities([4.0, 4.5, 5.0, 7.0])[:, 0], [(0, -2), (0, -2), (-2, 0), (2, 0)]
+    )
+
+
+def test_teleport_appears_at_the_first_place_and_says_when():
+    mover = Keyframed(radius=0.3, keyframes=ELL, loop="teleport")
+    moving = traffic(mover)
+    assert moving.teleports(10.5)[0].tolist() == [4.0, 7.0, 10.0]
+    np.testing.assert_allclose(at(mover, [3.999, 4.0, 4.5]), [(6, 3.998), (2, 2), (3, 2)])
+    t = np.arange(0, 11, 0.25)
+    assert t[1:][moving.jumps(t)[:, 0]].tolist() == [4.0, 7.0, 10.0]
+    later = traffic(dataclasses.replace(mover, phase=3.5))
+    assert later.teleports(4.0)[0].tolist() == [0.5, 3.5]
+
+
+@pytest.mark.parametrize("loop", ["pingpong", "once"])
+def test_what_does_not_teleport_never_jumps(loop):
+    moving = traffic(Keyframed(radius=0.3, keyframes=ELL, loop=loop))
+    assert not moving.jumps(FINE).any()
+    assert len(moving.teleports(40)[0]) == 0
+
+
+def test_a_closed_loop_does_not_jump():
+    mover = Keyframed(radius=0.3, keyframes=(*ELL, (6.0, 2.0, 2.0)), loop="teleport")
+    assert not traffic(mover).jumps(FINE).any()
+    assert len(traffic(mover).teleports(40)[0]) == 0
+
+
+@given(keyframed(interpolation="catmull-rom"))
+def test_the_cubic_goes_through_every_place(mover):
+    mover = dataclasses.replace(mover, phase=0.0)
+    knots = [frame[0] for frame in mover.keyframes[:-1]]
+    np.testing.assert_allclose(at(mover, knots), [frame[1:] for frame in mover.keyframes[:-1]], atol=1e-6)
+
+
+def test_the_cubic_has_the_tangents_of_catmull_and_rom():
+    mover = Keyframed(radius=0.3, keyframes=ELL, loop="once", interpolation="catmull-rom")
+    # Half the way from the place before to the one after, per segment: (4, 2) / 2 at the corner.
+    eps = 1e-6
+    before, after = (at(mover, 3 + eps) - at(mover, 3.0))[0] / eps, (at(mover, 3.0) - at(mover, 3 - eps))[0] / eps
+    np.testing.assert_allclose(after, np.array([2.0, 1.0]) / 2, atol=1e-4)  # the segment before lasts 2 s
+    np.testing.assert_allclose(before, np.array([2.0, 1.0]) / 1, atol=1e-4)
+    assert np.ptp(at(mover, FINE)[:, 1]) > 2.0  # it swings
+
+
+# Straight on
+
+
+def bounced(mover, t):
+    """Where a cruising mover is, from wall to wall."""
+    x, v = list(mover.position), list(mover.velocity)
+    left = t + mover.phase
+    for k in range(2):
+        low, high, rest = BOX[k] + mover.radius, BOX[k + 2] - mover.radius, left
+        while v[k] != 0:
+            until = ((high if v[k] > 0 else low) - x[k]) / v[k]
+            if until >= rest:
+                x[k] += v[k] * rest
+                break
+            x[k], v[k], rest = (high if v[k] > 0 else low), -v[k], rest - until
+    return x, v
+
+
+@given(
+    st.floats(0.3, 9.7), st.floats(0.3, 7.7), st.floats(-3, 3), st.floats(-3, 3).filter(lambda v: abs(v) > 0.01),
+    st.floats(0, 20), st.floats(0, 60),
+)  # fmt: skip
+def test_a_cruising_mover_bounces_like_a_ball(x, y, vx, vy, phase, t):
+    mover = Cruising(radius=0.3, position=(x, y), velocity=(vx, vy), phase=phase)
+    place, velocity = bounced(mover, t)
+    assert at(mover, t)[0] == pytest.approx(place, abs=1e-9)
+    rim = np.array([(0.3, 0.3), (9.7, 7.7)])
+    if np.abs(rim - place).min() > 1e-6:
+        assert traffic(mover).velocities(t)[0, 0] == pytest.approx(velocity)
+
+
+def test_at_the_wall_it_already_comes_back():
+    mover = Cruising(radius=0.5, position=(7.5, 4.0), velocity=(2.0, 0.0))
+    assert traffic(mover).velocities([0.999, 1.0, 1.5])[:, 0, 0].tolist() == [2, -2, -2]
+    back = Cruising(radius=0.5, position=(2.5, 4.0), velocity=(-2.0, 0.0))
+    assert traffic(back).velocities([0.999, 1.0, 1.5])[:, 0, 0].tolist() == [-2, 2, 2]
+
+
+# Wandering
+
+POSTS = tuple(Disc(2.25 + 1.5 * i, 1.75 + 1.5 * j, 0.35) for i in range(5) for j in range(4))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_wanderer_goes_from_cell_to_free_neighbouring_cell(seed):
+    mover = Wandering(radius=0.2, cell=0.5, period=0.4)
+    moving = traffic(mover, seed=seed, obstacles=POSTS)
+    stops = moving.positions(np.arange(300) * 0.4)[:, 0]
+    cells = (stops - 0.25) / 0.5
+    assert np.abs(cells - cells.round()).max() < 1e-9
+    steps = np.abs(np.diff(cells.round(), axis=0)).max(axis=1)
+    assert (steps <= 1).all()
+    assert (steps == 1).mean() > 0.9
+    assert len({tuple(step) for step in np.diff(cells.round(), axis=0)}) == 8
+    world = World("w", BOX, POSTS)
+    assert (swept_clearance(world, stops[:-1], stops[1:], mover.radius) > 0).all()
+    assert math.dist(stops[0], START) - mover.radius >= 1.0
+    middle = moving.positions([0.2])[0, 0]
+    np.testing.assert_allclose(middle, (stops[0] + stops[1]) / 2)
+
+
+def test_a_wanderer_that_is_boxed_in_waits():
+    ring = [Disc(5.25 + dx, 4.25 + dy, 0.2) for dx in (-0.5, 0, 0.5) for dy in (-0.5, 0, 0.5) if (dx, dy) != (0, 0)]
+    mover = Wandering(radius=0.2, cell=0.5, period=0.4, start=(5.3, 4.1))
+    moving = traffic(mover, obstacles=ring)
+    assert (moving.positions(FINE)[:, 0] == (5.25, 4.25)).all()
+    assert (moving.velocities(FINE) == 0).all()
+
+
+def test_chance_comes_from_the_run_unless_a_wanderer_has_a_seed_of_its_own():
+    own, shared = (Wandering(radius=0.2, cell=0.5, period=0.4, seed=seed) for seed in (7, None))
+    one, other = (traffic(own, shared, shared, seed=seed).positions(FINE) for seed in (0, 1))
+    assert (one[:, 0] == other[:, 0]).all()
+    assert (one[:, 1] != other[:, 1]).any()
+    assert (one[:, 1] != one[:, 2]).any()
+    assert (one == traffic(own, shared, shared, seed=0).positions(FINE)).all()
+
+
+def test_asking_for_more_of_a_walk_does_not_change_it():
+    mover = Wandering(radius=0.2, cell=0.5, period=0.4)
+    whole, parts = traffic(mover, obstacles=POSTS), traffic(mover, obstacles=POSTS)
+    asked = [parts.positions(t)[0] for t in FINE]
+    assert (whole.positions(FINE) == np.array(asked)).all()
+
+
+def test_without_a_free_cell_there_is_a_sentence():
+    with pytest.raises(InputError, match=r"movers\[0\].walk: found no free cell of 0.5 m"):
+        traffic(Wandering(radius=3.95, cell=0.5, period=1.0))
+
+
+# All kinds
+
+KINDS = [
+    *(Keyframed(radius=0.3, keyframes=ELL, loop=loop, phase=0.7) for loop in ("pingpong", "teleport", "once")),
+    *(
+        Keyframed(radius=0.3, keyframes=ELL, loop=loop, interpolation="catmull-rom")
+        for loop in ("pingpong", "teleport")
+    ),
+    Cruising(radius=0.3, position=(3.0, 4.0), velocity=(1.3, -0.7), phase=2.0),
+    Wandering(radius=0.2, cell=0.5, period=0.4, phase=1.1),
+]
+
+
+@pytest.mark.parametrize("mover", KINDS, ids=lambda m: f"{type(m).__name__} {getattr(m, 'loop', '')}")
+def test_velocity_is_how_the_place_changes_and_travel_never_less(mover):
+    moving = traffic(mover)
+    t = np.linspace(0, 20, 20001)
+    places, velocity = moving.positions(t)[:, 0], moving.velocities(t)[:, 0]
+    moved, jumped = np.diff(places, axis=0), moving.jumps(t)[:, 0]
+    error = np.abs(moved / np.diff(t)[:, None] - (velocity[:-1] + velocity[1:]) / 2).max(axis=1)
+    assert np.mean(error > 0.01) < 0.01  # but for corners
+    assert (np.hypot(*moved.T) <= moving.travel(t)[:, 0] + 1e-12)[~jumped].all()
+    coarse = t[::500]
+    length = np.add.reduceat(np.hypot(*moved.T) * ~jumped, np.arange(0, 20000, 500))
+    assert (length <= moving.travel(coarse)[:, 0] + 1e-9).all()
+    assert jumped.sum() == len(moving.teleports(20)[0])
+
+
+def test_a_time_has_the_same_bits_whatever_stands_beside_it():
+    moving = traffic(*KINDS)
+    whole = moving.positions(FINE)
+    assert (whole[::7] == moving.positions(FINE[::7])).all()
+    assert (whole[1234] == moving.positions(FINE[1234])[0]).all()
+
+
+def test_the_bits_are_the_same_in_another_process(tmp_path):
+    task = Task(World("w", BOX, POSTS, movers=tuple(KINDS)), (*START, 0.0), (9.0, 7.0))
+    save_task(task, tmp_path / "w.yaml")
+    code = (
+        "import sys, hashlib, numpy as np\n"
+        "from worlds import Traffic, load_task\n"
+        "task = load_task(sys.argv[1])\n"
+        "places = Traffic.of(task.world, task.start[:2], 5).positions(np.linspace(0, 40, 4001))\n"
+        "print(hashlib.sha256(places.tobytes()).hexdigest(), 'numba' in sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path / "w.yaml")], capture_output=True, text=True, check=True
+    )
+    import hashlib
+
+    here = Traffic.of(task.world, START, 5).positions(FINE)
+    assert done.stdout.split() == [hashlib.sha256(here.tobytes()).hexdigest(), "False"]
+
+
+@pytest.mark.parametrize("mover", KINDS[:3] + KINDS[5:], ids=lambda m: f"{type(m).__name__} {getattr(m, 'loop', '')}")
+def test_a_later_world_is_where_the_same_world_will_be(mover):
+    world = World("w", BOX, POSTS, movers=(mover,))
+    now, later = Traffic.of(world, START), Traffic.of(world.later(12.5), START)
+    np.testing.assert_allclose(later.positions(FINE), now.positions(FINE + 12.5), atol=1e-9)
+
+
+def test_a_world_without_movers_has_empty_traffic():
+    moving = traffic()
+    assert len(moving) == 0
+    assert moving.positions(FINE).shape == (4001, 0, 2)
+    assert moving.jumps(FINE).shape == moving.travel(FINE).shape == (4000, 0)
+
+
+def test_motions_tell_radius_and_place_one_by_one():
+    moving = traffic(*KINDS)
+    assert [motion.radius for motion in moving.motions] == moving.radii.tolist()
+    assert (moving.motions[0].at(FINE) == moving.positions(FINE)[:, 0]).all()
+
+
+# Files
+
+
+@settings(max_examples=50)
+@given(st.lists(keyframed() | keyframed(interpolation="catmull-rom"), max_size=3))
+def test_keyframes_survive_files_and_json(tmp_path_factory, movers):
+    world = World("w", (-100.0, -100.0, 100.0, 100.0), movers=(*movers, *KINDS[5:]))
+    if any(math.dist(place, (-90.0, -90.0)) < 1 for place in Traffic.of(world, (0, 0)).positions(0.0)[0]):
+        return
+    task = Task(world, (-90.0, -90.0, 0.0), (9.0, 7.0), time_limit=100.0)
+    path = tmp_path_factory.mktemp("w") / "task.yaml"
+    save_task(task, path)
+    assert load_task(path) == task
+    assert task_from_dict(json.loads(json.dumps(task_to_dict(task)))) == task
+
+
+def test_the_example_of_the_format_is_read(tmp_path):
+    path = tmp_path / "w.yaml"
+    path.write_text(
+        "schema: 1\nbounds: [0, 0, 10, 10]\nstart: [1, 1, 0]\ngoal: [9, 9]\nmovers:\n"
+        "  - {radius: 0.3, loop: pingpong, keyframes: [[0.0, 5.0, 1.0], [8.0, 5.0, 9.0]]}   # t, x, y\n"
+        "  - {radius: 0.3, position: [5, 2], velocity: [1, 0.5], height: 0.4}\n"
+        "  - {radius: 0.2, phase: 3, walk: {cell: 0.5, period: 0.8, start: [7, 7], seed: 4}}\n"
+    )
+    assert load_task(path).world.movers == (
+        Keyframed(radius=0.3, keyframes=((0.0, 5.0, 1.0), (8.0, 5.0, 9.0))),
+        Cruising(radius=0.3, height=0.4, position=(5.0, 2.0), velocity=(1.0, 0.5)),
+        Wandering(radius=0.2, phase=3.0, cell=0.5, period=0.8, start=(7.0, 7.0), seed=4),
+    )
+
+
+def test_a_world_that_stands_still_is_written_without_a_word_of_movers():
+    assert "movers" not in task_to_dict(Task(World("w", BOX), (1, 1, 0), (2, 2)))
+    assert "time_limit" not in task_to_dict(Task(World("w", BOX), (1, 1, 0), (2, 2)))
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: Keyframed(radius=0.0, keyframes=ELL), "radius: must be greater than 0"),
+        (lambda: Keyframed(radius=0.3, keyframes=ELL, loop="round"), "loop: must be one of pingpong, teleport, once"),
+        (lambda: Keyframed(radius=0.3, keyframes=((0, 1, 1), (1, math.nan, 1))), "keyframes\\[1\\]: must be finite"),
+        (lambda: Cruising(radius=0.3, position=(1, math.inf), velocity=(1, 1)), "position: must be 2 finite"),
+        (lambda: Cruising(radius=0.3, position=(1, 1), velocity=(30, 1)), "at most 20 m/s"),
+        (lambda: Wandering(radius=0.2, cell=0.0, period=1.0), "walk.cell: must be greater than 0"),
+        (lambda: Wandering(radius=0.2, cell=0.5, period=math.inf), "walk.period: must be at least"),
+        (lambda: Wandering(radius=0.2, cell=0.5, period=1.0, seed=-1), "walk.seed: must be a whole number"),
+        (lambda: Wandering(radius=0.2, cell=0.5, period=1.0, start=(1, math.nan)), "walk.start: must be 2 finite"),
+    ],
+)
+def test_what_cannot_move_is_refused(make, says):
+    with pytest.raises(ValueError, match=says):
+        make()
