@@ -4,7 +4,10 @@
 2. The closed-form distance between footprint and obstacles at every logged pose, computed here once more.
 3. A bound on what can happen between two logged poses: no point of the footprint moves farther than the axle's centre
    travels plus the footprint's radius times the turn, so the clearance in between is at least
-   (c_i + c_{i+1} - travel) / 2.
+   (c_i + c_{i+1} - travel) / 2. To a mover it is at least that with the mover's own travel added; while the mover
+   jumps, min(c_i, c_{i+1}) - travel.
+
+Movers are where the task's own definition and the run's seed put them, or the log is not certified.
 """
 
 from __future__ import annotations
@@ -16,7 +19,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from sim.contacts import STANDING, TOUCHED, touches_of
 from sim.rollout import Outcome, Rollout
+from worlds.traffic import Traffic
 
 Floats = npt.NDArray[np.float64]
 
@@ -27,15 +32,14 @@ AGREE = 0.012  # contact points describe the pose before a step, and a robot pus
 SLIP, SLIP_TURN = 0.001, 0.002  # [m], [rad]
 DRIFT, DRIFT_SHARE, DRIFT_TURN = 0.01, 0.06, 0.05  # [m], of the distance covered, [rad]
 WINDOW = 0.25  # [s]
-STANDING = 0.02  # [m/s]
 
 
 @dataclass(frozen=True)
 class Certificate:
     """What the log proves."""
 
-    certified: bool  # nothing was touched, and every reading agrees
-    contacts: int  # PyBullet's contact points with obstacles and walls
+    certified: bool  # robot and obstacles, moving or not, never touched, and every reading agrees
+    contacts: int  # PyBullet's contact points with obstacles, movers and walls
     min_clearance: float  # closed form, over all logged poses [m]
     bound: float  # the clearance that is certain also between the logged poses [m]
     problems: tuple[str, ...]  # a sentence each: why it is not certified
@@ -56,8 +60,13 @@ def certify(rollout: Rollout) -> Certificate:
     problems = rollout.problems()
     if problems:
         return Certificate(False, len(rollout.contacts), math.nan, math.nan, tuple(problems))
-    clearance = closed_form_clearance(rollout)
-    bound = float(_between_steps(rollout, clearance).min())
+    try:
+        traffic = rollout.traffic()
+    except ValueError as error:
+        return Certificate(False, len(rollout.contacts), math.nan, math.nan, (f"meta.task.{error}",))
+    still, moving = _clearances(rollout)
+    clearance = np.minimum(still, moving.min(axis=1, initial=math.inf))
+    bound = float(_between_steps(rollout, traffic, still, moving).min())
     least = float(clearance.min())
     touched = len(rollout.contacts)
     if touched:
@@ -74,15 +83,21 @@ def certify(rollout: Rollout) -> Certificate:
             problems.append("readings disagree: closed form overlaps, physics reports no contact")
     elif not bound > 0:
         problems.append(f"between two logged poses a contact cannot be ruled out (bound {bound:.4f} m)")
-    problems += _tampering(rollout, clearance)
+    problems += _tampering(rollout, traffic, clearance)
     return Certificate(not problems, touched, least, bound, tuple(problems))
 
 
 def closed_form_clearance(rollout: Rollout) -> Floats:
-    """Distance from footprint to the nearest disc surface or wall at each logged pose, shape (T,) [m].
+    """Distance from footprint to the nearest surface of disc, mover or wall at each logged pose, shape (T,) [m].
 
     Written independently of the compiled geometry that the drive uses, so that one checks the other.
     """
+    still, moving = _clearances(rollout)
+    return np.asarray(np.minimum(still, moving.min(axis=1, initial=math.inf)))
+
+
+def _clearances(rollout: Rollout) -> tuple[Floats, Floats]:
+    """Distances from the footprint to what stands still (T,) and to each mover (T, M) [m]."""
     foot = rollout.meta["robot"]["footprint"]
     half = np.array([foot["half_length"], foot["half_width"]])
     rounding = foot["rounding"]
@@ -94,22 +109,30 @@ def closed_form_clearance(rollout: Rollout) -> Floats:
     reach_x = half @ rotation + rounding
     reach_y = half[::-1] @ rotation + rounding
     best = np.minimum.reduce([x - reach_x - xmin, xmax - x - reach_x, y - reach_y - ymin, ymax - y - reach_y])
+
+    def distance(rows: npt.NDArray[np.int64], centres: npt.NDArray[np.complex128], radii: Floats) -> Floats:
+        body = (centres - (x + 1j * y)[rows, None]) * np.exp(-1j * yaw[rows, None])  # in the robot's frame
+        over = np.stack([np.abs(body.real) - half[0], np.abs(body.imag) - half[1]])
+        outside = np.linalg.norm(np.maximum(over, 0.0), axis=0)
+        return np.asarray(outside + np.minimum(over.max(axis=0), 0.0) - rounding - radii)
+
     for rows in np.array_split(np.arange(len(x)), 1 + len(x) * len(discs) // 1_000_000):
         if not len(discs):
             break
-        offset = (discs[None, :, 0] - x[rows, None]) + 1j * (discs[None, :, 1] - y[rows, None])
-        body = offset * np.exp(-1j * yaw[rows, None])  # the discs' centres in the robot's frame
-        over = np.stack([np.abs(body.real) - half[0], np.abs(body.imag) - half[1]])
-        outside = np.linalg.norm(np.maximum(over, 0.0), axis=0)
-        distance = outside + np.minimum(over.max(axis=0), 0.0) - rounding - discs[:, 2]
-        best[rows] = np.minimum(best[rows], distance.min(axis=1))
-    return np.asarray(best)
+        nearest = distance(rows, (discs[:, 0] + 1j * discs[:, 1])[None], discs[:, 2]).min(axis=1)
+        best[rows] = np.minimum(best[rows], nearest)
+    moving = np.empty(rollout.movers.shape[:2])
+    radii = np.array([mover["radius"] for mover in task.get("movers") or []])
+    for rows in np.array_split(np.arange(len(x)), 1 + moving.size // 1_000_000):
+        places = rollout.movers[rows]
+        moving[rows] = distance(rows, places[..., 0] + 1j * places[..., 1], radii)
+    return np.asarray(best), moving
 
 
-def _between_steps(rollout: Rollout, clearance: Floats) -> Floats:
+def _between_steps(rollout: Rollout, traffic: Traffic, still: Floats, moving: Floats) -> Floats:
     """A lower bound of the clearance in each interval between two rows (one interval of no length for one row)."""
-    if len(clearance) < 2:
-        return clearance
+    if len(still) < 2:
+        return np.asarray(np.minimum(still, moving.min(axis=1, initial=math.inf)))
     foot = rollout.meta["robot"]["footprint"]
     radius = math.hypot(foot["half_length"], foot["half_width"]) + foot["rounding"]
     dt = np.diff(rollout.t)
@@ -117,19 +140,31 @@ def _between_steps(rollout: Rollout, clearance: Floats) -> Floats:
     turned = np.abs(_wrapped(np.diff(rollout.pose[:, 2])))
     speed = np.maximum(*np.abs([rollout.twist[:-1], rollout.twist[1:]]))
     travel = np.maximum(moved, speed[:, 0] * dt) + radius * np.maximum(turned, speed[:, 1] * dt)
-    return np.asarray((clearance[:-1] + clearance[1:] - travel) / 2)
+    bound = (still[:-1] + still[1:] - travel) / 2
+    if traffic:
+        t = _clock(rollout)
+        both = travel[:, None] + traffic.travel(t)
+        steady = (moving[:-1] + moving[1:] - both) / 2
+        jumping = np.minimum(moving[:-1], moving[1:]) - both
+        bound = np.minimum(bound, np.where(traffic.jumps(t), jumping, steady).min(axis=1))
+    return np.asarray(bound)
+
+
+def _clock(rollout: Rollout) -> Floats:
+    """What the times of the rows must be, shape (T,) [s]."""
+    return np.asarray(np.arange(len(rollout.t)) / rollout.meta["physics_hz"])
 
 
 def _wrapped(angle: Floats) -> Floats:
     return np.asarray((angle + math.pi) % (2 * math.pi) - math.pi)
 
 
-def _tampering(rollout: Rollout, clearance: Floats) -> list[str]:
+def _tampering(rollout: Rollout, traffic: Traffic, clearance: Floats) -> list[str]:
     """Signs that a log does not tell of one drive: rows that do not follow from each other or from the task."""
     meta, pose, problems = rollout.meta, rollout.pose, []
     if meta.get("digest") not in (None, rollout.digest):
         problems.append("digest: the log was changed after it was written")
-    if not np.allclose(rollout.t, np.arange(len(rollout.t)) / meta["physics_hz"], rtol=0, atol=1e-9):
+    if not np.allclose(rollout.t, _clock(rollout), rtol=0, atol=1e-9):
         problems.append(f"t: rows are not {meta['physics_hz']} a second")
     if not np.abs(rollout.clearance - clearance).max() <= SAME:
         at = int(np.abs(rollout.clearance - clearance).argmax())
@@ -137,6 +172,13 @@ def _tampering(rollout: Rollout, clearance: Floats) -> list[str]:
             f"clearance: logged {rollout.clearance[at]:.4f} m at t = {rollout.t[at]:.3f} s, "
             f"closed form says {clearance[at]:.4f} m"
         )
+    if traffic:
+        astray = np.abs(rollout.movers - traffic.positions(_clock(rollout))).max(axis=2)
+        if not astray.max() <= SAME:
+            row, m = np.unravel_index(int(astray.argmax()), astray.shape)
+            problems.append(
+                f"movers: movers[{m}] is logged {astray[row, m]:.4f} m off its course at t = {rollout.t[row]:.3f} s"
+            )
     start = meta["task"]["start"]
     if np.hypot(*(pose[0, :2] - start[:2])) > 0.005 or abs(_wrapped(pose[0, 2] - start[2])) > 0.01:
         problems.append(f"pose: the first row is not the task's start {start}")
@@ -144,8 +186,12 @@ def _tampering(rollout: Rollout, clearance: Floats) -> list[str]:
     if broken is not None:
         problems.append(f"pose: the steps at t = {rollout.t[broken]:.3f} s do not follow from the measured speed")
     outcome = rollout.outcome
-    if (outcome is Outcome.COLLIDED) != bool(len(rollout.contacts)):
+    if (outcome in TOUCHED) != bool(len(rollout.contacts)):
         problems.append(f"outcome: {outcome.name.lower()}, with {len(rollout.contacts)} contacts")
+    elif outcome in TOUCHED:
+        first = touches_of(rollout)[0].outcome
+        if outcome is not first:
+            problems.append(f"outcome: {outcome.name.lower()}, but the first contact tells of {first.name.lower()}")
     if outcome is Outcome.SUCCEEDED:
         goal, tolerance = meta["task"]["goal"], meta["task"]["goal_tolerance"]
         left = float(np.hypot(*(pose[-1, :2] - goal)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,9 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from robots import Guide, Progress, PurePursuit, Senses, Twist, footprint_clearance
+from sim import _kernels_movers
+from sim.contacts import touches
 from sim.engine import Engine
 from sim.rollout import Outcome
-from worlds import Floats, Task
+from worlds import Floats, Task, Traffic
 
 STOPPED_SPEED = 0.01  # slower than this counts as standing [m/s]
 STUCK_AFTER = 8.0  # without progress for this long the robot is stuck [s]
@@ -31,6 +34,7 @@ class Drive:
     command: Floats  # (T, 2) in force when the row was reached
     clearance: Floats  # (T,) [m]
     limiter: np.ndarray[tuple[int], np.dtype[np.uint8]]  # (T,)
+    movers: Floats  # (T, M, 2) [m]
     contacts: Floats  # (K, 4)
     estimate: Floats  # (T, 3) where the robot believed to be; (0, 3) where it knew
 
@@ -46,7 +50,7 @@ def drive(
     senses: Senses | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Drive:
-    """Drive along a guide until the robot stands at its end, touches something, is stuck or late.
+    """Drive along a guide until the robot stands at its end, touches something or is touched, is stuck or late.
 
     With `senses` the robot sees and acts by them, else perfectly. `progress` is told the fraction of the route that is done,
     about ten times per simulated second.
@@ -108,19 +112,47 @@ def drive(
             beliefs += beliefs[-1:]
             contacts += [(len(rows) - 1, *contact) for contact in touched]
     log = np.array(rows)
+    t = np.arange(len(log)) / engine.physics_hz
     pose = np.ascontiguousarray(log[:, :3])
+    clearance = footprint_clearance(engine.world, engine.robot.footprint, pose)
+    movers = np.empty((len(t), 0, 2))
+    if engine.traffic:
+        movers = engine.traffic.positions(t)
+        foot = engine.robot.footprint
+        shape = np.array([foot.half_length, foot.half_width, foot.rounding])
+        _kernels_movers.lower_by_movers(pose, shape, movers, engine.traffic.radii, clearance)
+        if outcome is Outcome.COLLIDED:
+            outcome, reason = _blame(engine, engine.traffic, t, pose, log[:, 3:5], movers, np.array(contacts))
     return Drive(
         outcome=outcome or Outcome.TIMED_OUT,
         reason=reason,
-        t=np.arange(len(log)) / engine.physics_hz,
+        t=t,
         pose=pose,
         twist=np.ascontiguousarray(log[:, 3:5]),
         command=np.ascontiguousarray(log[:, 5:7]),
-        clearance=footprint_clearance(engine.world, engine.robot.footprint, pose),
+        clearance=clearance,
         limiter=log[:, 7].astype(np.uint8),
+        movers=movers,
         contacts=np.array(contacts, dtype=np.float64).reshape(-1, 4),
         estimate=np.array(beliefs, dtype=np.float64).reshape(-1, 3),
     )
+
+
+def _blame(
+    engine: Engine, traffic: Traffic, t: Floats, pose: Floats, twist: Floats, movers: Floats, contacts: Floats
+) -> tuple[Outcome, str]:
+    """Whose the first touch is, and a sentence about a mover's."""
+    discs = len(engine.world.obstacles)
+    first = touches(
+        contacts, pose, twist, movers, traffic.jumps(t),
+        hz=engine.physics_hz, discs=discs, radii=traffic.radii,
+        footprint=dataclasses.asdict(engine.robot.footprint), deceleration=engine.robot.max_acceleration,
+    )[0]  # fmt: skip
+    m, before = first.obstacle - discs, max(first.step - 1, 0)
+    if not 0 <= m < len(traffic):
+        return first.outcome, ""
+    fast = math.hypot(*traffic.velocities(t[before])[0, m])
+    return first.outcome, f"movers[{m}] at {fast:.2f} m/s, the robot at {abs(twist[before, 0]):.2f} m/s"
 
 
 def _standing(speed: float, yaw_rate: float) -> bool:

@@ -3,7 +3,8 @@
 The construction follows measurements: sphere wheels roll within 0.01 % of the commanded twist where URDF cylinders are off by
 5 %; casters hang 0.5 mm above the floor so that the wheels carry the weight; obstacles are sleeping maximal-coordinate bodies,
 so 400 of them cost hardly more than ten; collision groups let the chassis meet obstacles and walls only, so its contact list
-is exactly the list of collisions.
+is exactly the list of collisions. Movers are massless multibodies with a velocity: they integrate it exactly, nothing slows
+them, and the solver pushes the robot away instead of letting it be swallowed.
 """
 
 from __future__ import annotations
@@ -17,8 +18,11 @@ from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 from xml.sax.saxutils import quoteattr
 
+import numpy as np
+
 from robots.spec import RobotSpec
-from worlds.world import Pose, World
+from worlds.traffic import Traffic
+from worlds.world import Floats, Pose, World
 
 
 @functools.cache
@@ -52,7 +56,7 @@ def client() -> Iterator[int]:
 class Contact(NamedTuple):
     """The robot's chassis touching something at one physics step."""
 
-    obstacle: int  # index into the world's obstacles; beyond them the walls: left, right, bottom, top
+    obstacle: int  # index into the world's obstacles; beyond them its movers, then the walls: left, right, bottom, top
     distance: float  # [m], negative = overlapping
     force: float  # normal force [N]
 
@@ -74,12 +78,21 @@ class Engine:
     ...     engine.place(task.start)
     ...     engine.command(0.5, 0.0)
     ...     touched = engine.step()
+
+    Raises:
+        ValueError: the traffic is not that of the world's movers.
     """
 
-    def __init__(self, world: World, robot: RobotSpec, *, physics_hz: int = 240) -> None:
+    def __init__(
+        self, world: World, robot: RobotSpec, *, physics_hz: int = 240, traffic: Traffic | None = None
+    ) -> None:
+        if len(traffic or ()) != len(world.movers):
+            raise ValueError(f"traffic: must be that of the world's {len(world.movers)} movers")
         self.world = world
         self.robot = robot
         self.physics_hz = physics_hz
+        self.traffic = traffic
+        self._steps = 0  # since the robot was placed
         self._open = contextlib.ExitStack()
 
     def __enter__(self) -> Engine:
@@ -104,6 +117,9 @@ class Engine:
                 p.GEOM_CYLINDER, radius=disc.radius, height=height, physicsClientId=self._client
             )
             self._build_obstacle(shape, (disc.x, disc.y, height / 2))
+        self._movers = _Movers(self.traffic, self.physics_hz, self._client) if self.traffic else None
+        for body in self._movers.bodies if self._movers else ():
+            self._obstacles[body] = len(self._obstacles)
         for half, centre in _walls(self.world, max(2 * self.robot.height, 0.2)):
             shape = p.createCollisionShape(p.GEOM_BOX, halfExtents=half, physicsClientId=self._client)
             self._build_obstacle(shape, centre)
@@ -113,15 +129,20 @@ class Engine:
         self._open.close()
 
     def place(self, pose: Pose) -> None:
-        """Put the robot somewhere, at rest, and let it settle on its wheels."""
+        """Put the robot somewhere, at rest, and let it settle on its wheels; movers come when it has."""
         p, x, y, yaw = self._p, *pose
         height = self.robot.wheel_radius + 5e-4 - self._com_drop
         quaternion = (0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))
         p.resetBasePositionAndOrientation(self._robot, (x, y, height), quaternion, physicsClientId=self._client)
         p.resetBaseVelocity(self._robot, (0, 0, 0), (0, 0, 0), physicsClientId=self._client)
         self.command(0.0, 0.0)
+        self._steps = 0
+        if self._movers is not None:
+            self._movers.leave()
         for _ in range(round(0.1 * self.physics_hz)):
             p.stepSimulation(physicsClientId=self._client)
+        if self._movers is not None:
+            self._movers.begin()
 
     def command(self, speed: float, yaw_rate: float) -> None:
         """Ask the wheels' motors for a forward speed [m/s] and a yaw rate [rad/s], within their torque."""
@@ -138,6 +159,9 @@ class Engine:
 
     def step(self) -> list[Contact]:
         """Advance one physics step and tell what the chassis touches."""
+        if self._movers is not None:
+            self._movers.steer(self._steps)
+        self._steps += 1
         self._p.stepSimulation(physicsClientId=self._client)
         points = self._p.getContactPoints(bodyA=self._robot, linkIndexA=-1, physicsClientId=self._client)
         return self._touching(points) if points else []
@@ -157,6 +181,17 @@ class Engine:
         y += 2.0 * (qy * qz - qw * qx) * self._com_drop
         yaw = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
         return State(x, y, yaw, vx * math.cos(yaw) + vy * math.sin(yaw), yaw_rate)
+
+    @property
+    def time(self) -> float:
+        """How long ago the robot was placed [s]."""
+        return self._steps / self.physics_hz
+
+    def mover_places(self) -> Floats:
+        """Where the movers' bodies are in physics (M, 2) [m]: the traffic's positions at `time`, but for rounding."""
+        bodies = self._movers.bodies if self._movers else []
+        found = [self._p.getBasePositionAndOrientation(body, self._client)[0][:2] for body in bodies]
+        return np.array(found, dtype=np.float64).reshape(-1, 2)
 
     def _touching(self, points: Sequence[Any]) -> list[Contact]:
         # Bullet also lists points up to some mm apart; a pressing contact may read 0.05 mm apart, but has a force.
@@ -205,6 +240,79 @@ class Engine:
         self._obstacles[body] = len(self._obstacles)
 
 
+class _Movers:
+    """The bodies of movers, each with the velocity that takes it from one step's place exactly to the next's."""
+
+    def __init__(self, traffic: Traffic, hz: int, client: int) -> None:
+        p = self._p = bullet()
+        self._traffic, self._hz, self._client = traffic, hz, client
+        self._tall = [max(height, 0.05) / 2 for height in traffic.heights.tolist()]
+        self._chunk = _Chunk.of(traffic, hz, 0)
+        self.bodies: list[int] = []
+        for radius, half, (x, y) in zip(traffic.radii.tolist(), self._tall, self._chunk.places, strict=True):
+            shape = p.createCollisionShape(p.GEOM_CYLINDER, radius=radius, height=2 * half, physicsClientId=client)
+            # Neither maximal coordinates, with which it would not move, nor asleep.
+            body = p.createMultiBody(0, shape, basePosition=(x, y, half), physicsClientId=client)
+            p.setCollisionFilterGroupMask(body, -1, _OBSTACLE, _CHASSIS, physicsClientId=client)
+            self.bodies.append(body)
+
+    def leave(self) -> None:
+        """Go where nothing is met, and rest."""
+        for m, body in enumerate(self.bodies):
+            self._p.resetBasePositionAndOrientation(body, (0, 0, -1e3), (0, 0, 0, 1), physicsClientId=self._client)
+            self._push(m, 0.0, 0.0)
+
+    def begin(self) -> None:
+        """Stand where the first step sets out from."""
+        self._chunk = _Chunk.of(self._traffic, self._hz, 0)
+        for m, (x, y) in enumerate(self._chunk.places):
+            self._put(m, x, y)
+
+    def steer(self, step: int) -> None:
+        """Set the velocities, where they change, for the step that follows this many."""
+        if step >= self._chunk.end:
+            self._chunk = _Chunk.of(self._traffic, self._hz, step)
+        for m, vx, vy, jump in self._chunk.changes.get(step, ()):
+            if jump is not None:
+                self._put(m, *jump)
+            self._push(m, vx, vy)
+
+    def _put(self, m: int, x: float, y: float) -> None:
+        at = (x, y, self._tall[m])
+        self._p.resetBasePositionAndOrientation(self.bodies[m], at, (0, 0, 0, 1), physicsClientId=self._client)
+
+    def _push(self, m: int, vx: float, vy: float) -> None:
+        self._p.resetBaseVelocity(self.bodies[m], (vx, vy, 0), (0, 0, 0), physicsClientId=self._client)
+
+
+class _Chunk(NamedTuple):
+    """What to tell the bodies during some steps, worked out at once."""
+
+    end: int  # the first step that it does not cover
+    places: list[Any]  # (x, y) of each mover at its first step [m]
+    changes: dict[int, list[tuple[int, float, float, tuple[float, float] | None]]]  # by step: mover, velocity, jump to
+
+    @classmethod
+    def of(cls, traffic: Traffic, hz: int, first: int, *, length: int = 480) -> _Chunk:
+        """The steps from `first` on; all velocities are told at the first, later ones where they change."""
+        t = np.arange(first, first + length + 2) / hz
+        places = traffic.positions(t)
+        velocity = np.diff(places, axis=0) * hz
+        jumps = traffic.jumps(t)
+        # A body that jumps comes from where its new velocity would have brought it from.
+        velocity[:-1] = np.where(jumps[:-1, :, None], velocity[1:], velocity[:-1])
+        came_from = places[1:] - velocity / hz
+        told = np.ones(jumps[:-1].shape, dtype=np.bool_)
+        told[1:] = (np.abs(np.diff(velocity[:-1], axis=0)) > SAME_VELOCITY).any(axis=2) | jumps[:-2] | jumps[1:-1]
+        changes: dict[int, list[tuple[int, float, float, tuple[float, float] | None]]] = {}
+        for k, m in np.argwhere(told).tolist():
+            # At the first step of a chunk places are set, too, so that rounding never adds up.
+            jump = tuple(came_from[k, m].tolist()) if k == 0 or jumps[k, m] else None
+            changes.setdefault(first + k, []).append((m, *velocity[k, m].tolist(), jump))
+        return cls(first + length, [tuple(place) for place in places[0].tolist()], changes)
+
+
+SAME_VELOCITY = 1e-10  # closer velocities differ by rounding alone [m/s]
 _GROUND, _WHEELS, _CHASSIS, _OBSTACLE = 1, 2, 4, 8  # collision groups
 
 

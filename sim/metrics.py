@@ -9,6 +9,7 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
+from sim.contacts import touches_of
 from sim.rollout import Outcome, Rollout
 
 Floats = npt.NDArray[np.float64]
@@ -118,6 +119,21 @@ def jerk_rms(rollout: Rollout) -> float:
     return float(np.sqrt(np.mean(jerk**2)))
 
 
+def contacts_driving(rollout: Rollout) -> float:
+    """How often the robot touched something while it drove."""
+    return _touches(rollout, Outcome.COLLIDED)
+
+
+def contacts_standing(rollout: Rollout) -> float:
+    """How often a moving obstacle ran into the robot while it stood still."""
+    return _touches(rollout, Outcome.RUN_INTO)
+
+
+def contacts_teleported(rollout: Rollout) -> float:
+    """How often a moving obstacle appeared on the robot, or nearer than it could stop."""
+    return _touches(rollout, Outcome.JUMPED_ON)
+
+
 METRICS: Mapping[str, Callable[[Rollout], float]] = MappingProxyType(
     {
         "path_length_m": path_length_m,
@@ -137,6 +153,9 @@ METRICS: Mapping[str, Callable[[Rollout], float]] = MappingProxyType(
         "drive_wall_s": lambda rollout: float(rollout.meta["times"]["drive_wall_s"]),
         "turning_rad_per_m": turning_rad_per_m,
         "jerk_rms": jerk_rms,
+        "contacts_driving": contacts_driving,
+        "contacts_standing": contacts_standing,
+        "contacts_teleported": contacts_teleported,
     }
 )
 
@@ -169,6 +188,10 @@ def nearest_on_route(points: Floats, route: Floats) -> Floats:
         best = np.linalg.norm(points[rows, None, :] - feet, axis=2).argmin(axis=1)
         nearest[rows] = feet[np.arange(len(rows)), best]
     return nearest
+
+
+def _touches(rollout: Rollout, outcome: Outcome) -> float:
+    return float(sum(touch.outcome is outcome for touch in touches_of(rollout)))
 
 
 def _over(length: float, optimum: float) -> float:

@@ -21,15 +21,26 @@ import numpy.typing as npt
 
 from worlds.atomic import written_whole
 from worlds.errors import InputError
+from worlds.movers import mover_from_dict
+from worlds.traffic import Traffic
+from worlds.world import Disc, World
 
 SCHEMA = 1
 
 
 class Outcome(enum.Enum):
-    """How a run ended. The value is the sentence shown to people."""
+    """How a run ended. The value is the sentence shown to people.
+
+    The first contact ends a drive, and says whose it is. `COLLIDED`: the robot's own, also with a mover that comes
+    towards it while it drives. `RUN_INTO`: it stood still, and a mover came. `JUMPED_ON`: a mover whose loop teleports
+    appeared on the robot, or nearer than it could stop. The last two are not counted against the planner; but none of
+    the three is a success, and no drive with a contact is certified. See `sim.contacts` for the exact rule.
+    """
 
     SUCCEEDED = "stopped at the goal without contact"
     COLLIDED = "touched an obstacle"
+    RUN_INTO = "was run into by a moving obstacle while it stood still"
+    JUMPED_ON = "a moving obstacle appeared on the robot, or nearer than it could stop"
     TIMED_OUT = "the time limit passed before the goal was reached"
     STUCK = "stopped making progress"
     NO_PATH = "no path on this grid"
@@ -46,8 +57,8 @@ class Rollout:
     command: npt.NDArray[np.float64]  # (T, 2) commanded forward speed and yaw rate
     clearance: npt.NDArray[np.float64]  # (T,) robot's surface to the nearest disc's or wall's [m]
     limiter: npt.NDArray[np.uint8]  # (T,) the rule that held the speed, index into meta["limiters"]
-    movers: npt.NDArray[np.float64]  # (T, M, 2) centres of moving obstacles [m]
-    contacts: npt.NDArray[np.float64]  # (K, 4) step, obstacle index, distance [m], force [N]
+    movers: npt.NDArray[np.float64]  # (T, M, 2) centres of moving obstacles [m]; radii are in meta["task"]["movers"]
+    contacts: npt.NDArray[np.float64]  # (K, 4) step, obstacle index (discs, movers, walls), distance [m], force [N]
     route: npt.NDArray[np.float64]  # (N, 2) the line that was followed [m]
     cells: npt.NDArray[np.int32]  # (N, 2) the planned cells (row, col)
     estimate: npt.NDArray[np.float64] = field(
@@ -71,6 +82,23 @@ class Rollout:
         kept = {key: value for key, value in self.meta.items() if key not in ("digest", "times")}
         sha.update(json.dumps(kept, sort_keys=True).encode())
         return sha.hexdigest()
+
+    def traffic(self) -> Traffic:
+        """The movers as the log's own task and seed define them.
+
+        Raises:
+            ValueError: the task defines movers that cannot be.
+        """
+        task = self.meta["task"]
+        entries = task.get("movers") or []
+        if not entries:
+            return Traffic(np.empty(0), np.empty(0), ())
+        try:
+            discs = tuple(Disc(d["x"], d["y"], d["radius"], d["height"]) for d in task["obstacles"])
+            world = World("log", tuple(task["bounds"]), discs, movers=tuple(map(mover_from_dict, entries)))
+            return Traffic.of(world, (task["start"][0], task["start"][1]), self.meta["seed"])
+        except (KeyError, TypeError, AttributeError, OverflowError) as error:
+            raise ValueError(f"movers: {error!r}") from None
 
     def save(self, path: str | Path) -> Path:
         """Write the log, whole or not at all; the metadata gain the digest."""
@@ -141,6 +169,9 @@ class Rollout:
         steps = self.contacts[:, 0] if self.contacts.ndim == 2 and self.contacts.shape[1:] == (4,) else np.empty(0)
         if steps.size and steps.dtype.kind in "fiu" and not (steps.min() >= 0 and steps.max() < rows):
             yield "contacts: a step outside the log"
+        told = _mapping(self.meta.get("task")).get("movers") or []
+        if self.movers.ndim == 3 and isinstance(told, list) and self.movers.shape[1] != len(told):
+            yield f"movers: {self.movers.shape[1]} of them where the task has {len(told)}"
 
 
 _ARRAYS = tuple(f.name for f in fields(Rollout) if f.name != "meta")
@@ -156,7 +187,7 @@ def _meta_problems(meta: Mapping[str, Any]) -> Iterator[str]:
     foot = _mapping(robot.get("footprint"))
     checks: list[tuple[str, bool]] = [
         ("outcome", str(meta.get("outcome")).upper() in Outcome.__members__),
-        ("physics_hz", _numbers([meta.get("physics_hz")], 1) and meta["physics_hz"] > 0),
+        ("physics_hz", _numbers([meta.get("physics_hz")], 1) and meta["physics_hz"] >= 1),
         ("task.bounds", _numbers(task.get("bounds"), 4)),
         ("task.start", _numbers(task.get("start"), 3)),
         ("task.goal", _numbers(task.get("goal"), 2)),
@@ -176,6 +207,13 @@ def _meta_problems(meta: Mapping[str, Any]) -> Iterator[str]:
     for i, disc in enumerate(obstacles):
         if not (_numbers([_mapping(disc).get(k) for k in ("x", "y", "radius", "height")], 4) and disc["radius"] > 0):
             yield f"meta.task.obstacles[{i}]: missing or impossible"
+    movers = task.get("movers", [])
+    if not isinstance(movers, list):
+        yield "meta.task.movers: impossible"
+        return
+    for i, mover in enumerate(movers):
+        if not (_numbers([_mapping(mover).get("radius")], 1) and mover["radius"] > 0):
+            yield f"meta.task.movers[{i}]: missing or impossible"
 
 
 def _mapping(value: Any) -> Mapping[str, Any]:

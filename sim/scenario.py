@@ -20,7 +20,7 @@ from sim.drive import Drive, drive
 from sim.engine import Engine
 from sim.metrics import measure
 from sim.rollout import SCHEMA, Outcome, Rollout
-from worlds import Disc, Grid, Route, Task, load_task, rasterise, task_to_dict
+from worlds import Disc, Grid, Route, Task, Traffic, World, load_task, rasterise, task_to_dict
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +38,7 @@ class Scenario:
     controller: PurePursuit = field(default_factory=PurePursuit)
     noise: float = 0.0  # how much of the robot's documented noise it has; 1 is all of it
     unseen: tuple[Disc, ...] = ()  # obstacles that neither planner nor controller know of
-    time_limit: float | None = None  # simulated time allowed [s]; None: ample for the route
+    time_limit: float | None = None  # simulated time allowed [s]; None: the task's, or ample for the route
     physics_hz: int = 240
     control_hz: int = 60
 
@@ -62,6 +62,16 @@ class Scenario:
     def rng(self, purpose: str) -> np.random.Generator:
         """A stream of random numbers of its own for each purpose, from the one seed."""
         return np.random.default_rng([self.seed, zlib.crc32(purpose.encode())])
+
+    @property
+    def built(self) -> World:
+        """The world as it is driven in: with what is unseen."""
+        return dataclasses.replace(self.task.world, obstacles=self.task.world.obstacles + self.unseen)
+
+    @property
+    def traffic(self) -> Traffic:
+        """The world's movers as functions of time, drawn from the seed."""
+        return Traffic.of(self.built, self.task.start[:2], self.seed)
 
     @classmethod
     def of(
@@ -102,7 +112,7 @@ class Run:
 
     @property
     def succeeded(self) -> bool:
-        """Whether the robot stopped at the goal in time, and its log proves that it touched nothing."""
+        """Whether the robot stopped at the goal in time, and its log proves that nothing and it touched each other."""
         return self.outcome is Outcome.SUCCEEDED and self.certificate is not None and self.certificate.certified
 
     def as_dict(self) -> dict[str, Any]:
@@ -124,7 +134,7 @@ class Run:
 
 
 def plan(s: Scenario) -> tuple[Grid, PlanResult]:
-    """Rasterise the world and plan on it."""
+    """Rasterise the world and plan on it. Movers are not on the grid."""
     grid = rasterise(s.task.world, s.cell or s.task.cell, s.inflate)
     return grid, s.planner.plan(Query.between(grid, s.task), s.rng("planner"))
 
@@ -141,12 +151,11 @@ def run(
         return Run(s, grid, answer)
     route = refine(answer, grid, s.task, kind=s.route)
     guide = s.controller.guide(route, s.task.world, s.robot, s.margin, 1 / s.control_hz, s.task.goal_tolerance)
-    built = dataclasses.replace(s.task.world, obstacles=s.task.world.obstacles + s.unseen)
-    limit = s.time_limit or 30.0 + 10.0 * route.length / s.robot.max_speed
+    limit = s.time_limit or s.task.time_limit or 30.0 + 10.0 * route.length / s.robot.max_speed
     started = time.perf_counter()
     noise = s.robot.noise.scaled(s.noise)
     senses = Senses(noise, s.robot.track, 1 / s.control_hz, s.task.start, s.rng("noise")) if noise.loud else None
-    with Engine(built, s.robot, physics_hz=s.physics_hz) as engine:
+    with Engine(s.built, s.robot, physics_hz=s.physics_hz, traffic=s.traffic) as engine:
         log = drive(
             engine,
             s.controller,
@@ -175,7 +184,7 @@ def _record(
         command=log.command,
         clearance=log.clearance,
         limiter=log.limiter,
-        movers=np.empty((len(log.t), 0, 2)),
+        movers=log.movers,
         contacts=log.contacts,
         estimate=log.estimate,
         route=route.xy,

@@ -20,6 +20,8 @@ Picture = npt.NDArray[np.uint8]  # (H, W, 3)
 VERDICTS: dict[Outcome, tuple[str, Colour]] = {
     Outcome.SUCCEEDED: ("✓ SUCCEEDED", GOOD),
     Outcome.COLLIDED: ("✕ COLLIDED", BAD),
+    Outcome.RUN_INTO: ("✕ RUN INTO", DOUBT),
+    Outcome.JUMPED_ON: ("✕ JUMPED ON", DOUBT),
     Outcome.TIMED_OUT: ("TIMED OUT", DOUBT),
     Outcome.STUCK: ("STUCK", DOUBT),
     Outcome.NO_PATH: ("NO PATH", DOUBT),
@@ -133,7 +135,7 @@ def entries_for(scene: Scene, step: float) -> list[Entry]:
     if scene.unseen.any():
         found.append(Entry("dot", UNSEEN, "placed after planning"))
     if scene.mover_radii:
-        found.append(Entry("dot", MOVER, "moving obstacle"))
+        found.append(Entry("dot", MOVER, "moving obstacle, 1.5 s ahead"))
     return [*found, Entry("grid", MUTED, f"grid {step:g} m")]
 
 

@@ -47,6 +47,9 @@ def straight(**changes: Any) -> Rollout:
         ("drive_wall_s", 1.5),
         ("turning_rad_per_m", math.pi / 8),
         ("jerk_rms", 0.0),
+        ("contacts_driving", 0),
+        ("contacts_standing", 0),
+        ("contacts_teleported", 0),
     ],
 )
 def test_by_hand(name: str, value: float) -> None:
