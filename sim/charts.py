@@ -10,7 +10,7 @@ from matplotlib.collections import LineCollection, PatchCollection
 from matplotlib.colors import LinearSegmentedColormap, ListedColormap, Normalize
 from matplotlib.patches import Circle, Patch, Polygon, Rectangle
 
-from sim.colours import BAD, GOAL, KERB, MUTED, OBSTACLE, ROUTE, SHELL, SPEED_STOPS, START, UNSEEN, ZONE, hexed
+from sim.colours import BAD, GOAL, KERB, MOVER, MUTED, OBSTACLE, ROUTE, SHELL, SPEED_STOPS, START, UNSEEN, ZONE, hexed
 from sim.filming.replay import contact_point
 from sim.filming.scene import Scene
 from sim.rollout import Rollout
@@ -59,6 +59,12 @@ def draw_map(axes: Any, scene: Scene, *, floor: bool = True) -> None:
         bodies = PatchCollection(discs, facecolor=hexed(colour), edgecolor="white", linewidth=0.4, zorder=3)
         axes.add_collection(bodies)
         bodies.set_clip_path(inside)
+    for piece in scene.tracks:
+        axes.plot(*piece.T, color=hexed(MOVER), lw=1.0, alpha=0.45, zorder=2.5, solid_capstyle="round")
+    for (x, y), radius in zip(scene.movers, scene.mover_radii, strict=True):
+        body = Circle((x, y), radius, fc=hexed(MOVER), ec="white", lw=0.6, alpha=0.85, zorder=3.5)
+        axes.add_patch(body)
+        body.set_clip_path(inside)
     pale_goal = (*(channel / 255 for channel in GOAL), 0.18)
     axes.add_patch(Circle(scene.goal, scene.goal_tolerance, fc=pale_goal, ec=hexed(GOAL), lw=1.4, zorder=4))
     axes.plot(*scene.goal, marker="+", ms=7, mew=1.4, color=hexed(GOAL), zorder=7)
@@ -105,7 +111,7 @@ def draw_driven(figure: Any, axes: Any, scene: Scene, rollout: Rollout, cells: F
         _draw_robot(axes, scene, (end[0], end[1], end[2]), SHELL, 6)
     if len(rollout.contacts):
         step = min(int(rollout.contacts[0, 0]), len(rollout.pose) - 1)
-        at = contact_point(scene, rollout.pose[step], int(rollout.contacts[0, 1]))
+        at = contact_point(scene, rollout.pose[step], int(rollout.contacts[0, 1]), rollout.movers[step])
         handles += axes.plot(*at, "X", ms=9, color=hexed(BAD), mec="white", label="contact", zorder=8, ls="none")
     draw_legend(axes, handles, scene)
 
@@ -115,6 +121,8 @@ def draw_legend(axes: Any, handles: list[Any], scene: Scene) -> None:
     known = [Patch(fc=hexed(OBSTACLE), label="obstacle")]
     if scene.unseen.any():
         known.append(Patch(fc=hexed(UNSEEN), label="placed after planning"))
+    if scene.mover_radii:
+        known.append(Patch(fc=hexed(MOVER), label="moving obstacle"))
     if scene.inflate > 0:
         pale = tuple(1 - 0.22 * (1 - channel / 255) for channel in ZONE)
         known.append(Patch(fc=pale, ec=hexed(ZONE), lw=0.5, label=f"inflated {scene.inflate:.2f} m"))

@@ -288,6 +288,26 @@ def draw_trail(
 
 
 @kernel
+def blend_capsules(
+    frame: Array, visible: Array, fwd: Array, inv: Array, rows: Array, colour: Array, strength: float
+) -> None:
+    """Blend capsules (N, 5) of one colour into `frame` (H, W, 3), on the ground alone."""
+    height, width = visible.shape
+    for i in range(rows.shape[0]):
+        ax, ay, bx, by, half = rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3], rows[i, 4]
+        left, top, right, bottom = pixel_box(
+            fwd, inv, min(ax, bx) - half, min(ay, by) - half, max(ax, bx) + half, max(ay, by) + half, width, height
+        )
+        for row in range(top, bottom):
+            for col in range(left, right):
+                weight = capsule_cover(inv, row, col, ax, ay, bx, by, half) * strength * visible[row, col]
+                if weight > 0.0:
+                    for k in range(3):
+                        under = float(frame[row, col, k])
+                        frame[row, col, k] = np.uint8(under + (colour[k] - under) * weight + 0.5)
+
+
+@kernel
 def shade_body(
     frame: Array,
     visible: Array,

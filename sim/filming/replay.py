@@ -7,7 +7,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from sim.filming.scene import Scene
+from sim.filming.scene import Scene, jumping
 from sim.rollout import Rollout
 
 Floats = npt.NDArray[np.float64]
@@ -28,7 +28,8 @@ class Replay:
         self._twist = rollout.twist if len(rollout.twist) else np.zeros((rows, 2))
         self._clearance = rollout.clearance if len(rollout.clearance) else np.full(rows, np.nan)
         self._least = np.minimum.accumulate(self._clearance)
-        self._movers = rollout.movers
+        self._movers = rollout.movers if len(rollout.movers) else np.empty((rows, 0, 2))
+        self._jumping = jumping(self._movers)
         rim = self._twist[:, 1] * robot.track / 2
         steps = np.diff(self.t)
         self._angles = []
@@ -37,8 +38,8 @@ class Replay:
             self._angles.append(np.concatenate([[0.0], np.cumsum(turned)]))
         self._contact_times = self.t[np.clip(rollout.contacts[:, 0].astype(np.int64), 0, rows - 1)]
         self._contact_points = [
-            contact_point(scene, self._pose[min(int(step), rows - 1)], int(index))
-            for step, index in rollout.contacts[:1, :2]
+            contact_point(scene, self._pose[step], index, self._movers[step])
+            for step, index in np.minimum(rollout.contacts[:1, :2].astype(np.int64), (rows - 1, 2**31)).tolist()
         ]
 
     @property
@@ -63,10 +64,28 @@ class Replay:
         return left, right
 
     def movers(self, at: float) -> Floats:
-        """Where the moving obstacles are (M, 2)."""
-        count = self._movers.shape[1] if self._movers.ndim == 3 else 0
-        places = [[np.interp(at, self.t, self._movers[:, m, axis]) for axis in (0, 1)] for m in range(count)]
-        return np.array(places, dtype=np.float64).reshape(-1, 2)
+        """Where the moving obstacles are (M, 2); one that jumps is where it was until it has."""
+        row, share = self._between(at)
+        here = self._movers[row]
+        if share == 0.0:
+            return np.asarray(here)
+        step = np.where(self._jumping[row, :, None], 0.0, self._movers[row + 1] - here)
+        return np.asarray(here + share * step)
+
+    def mover_velocities(self, at: float) -> Floats:
+        """How the moving obstacles move (M, 2) [m/s]; 0 where the log does not say."""
+        if len(self.t) < 2:
+            return np.zeros((self._movers.shape[1], 2))
+        row = min(self._row(at), len(self.t) - 2)
+        step = np.where(self._jumping[row, :, None], 0.0, self._movers[row + 1] - self._movers[row])
+        return np.asarray(step / (self.t[row + 1] - self.t[row]))
+
+    def _between(self, at: float) -> tuple[int, float]:
+        """The last row at or before a moment, and the share of the way to the next."""
+        row = self._row(at)
+        if row + 1 >= len(self.t) or at <= self.t[row]:
+            return row, 0.0
+        return row, float((at - self.t[row]) / (self.t[row + 1] - self.t[row]))
 
     def speed(self, at: float) -> float:
         """The measured forward speed [m/s]; standing reads 0, not -0."""
@@ -99,15 +118,15 @@ class Replay:
         return int(np.clip(np.searchsorted(self.t, at + 1e-9, side="right") - 1, 0, len(self.t) - 1))
 
 
-def contact_point(scene: Scene, pose: npt.ArrayLike, index: int) -> tuple[float, float]:
-    """The point of an obstacle or wall (left, right, bottom, top) that is nearest to the robot's footprint."""
+def contact_point(scene: Scene, pose: npt.ArrayLike, index: int, movers: Floats) -> tuple[float, float]:
+    """The point of an obstacle, mover at (M, 2) or wall (left, right, bottom, top) that is nearest to the footprint."""
     x, y, yaw = (float(value) for value in np.asarray(pose))
     foot = scene.robot.footprint
-    if index >= len(scene.obstacles):
+    discs = np.vstack([scene.obstacles[:, :3], np.column_stack([movers, scene.mover_radii])])
+    if index >= len(discs):
         x0, y0, x1, y1 = scene.bounds
-        wall = index - len(scene.obstacles)
-        return ((x0, y), (x1, y), (x, y0), (x, y1))[wall % 4]
-    ox, oy, radius, _ = (float(value) for value in scene.obstacles[index])
+        return ((x0, y), (x1, y), (x, y0), (x, y1))[(index - len(discs)) % 4]
+    ox, oy, radius = (float(value) for value in discs[index])
     cosine, sine = math.cos(yaw), math.sin(yaw)
     ahead = min(max((ox - x) * cosine + (oy - y) * sine, -foot.half_length), foot.half_length)
     aside = min(max((oy - y) * cosine - (ox - x) * sine, -foot.half_width), foot.half_width)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -12,9 +13,14 @@ import numpy.typing as npt
 from robots.spec import Footprint, RobotSpec
 from sim.rollout import Rollout
 from worlds.errors import InputError
+from worlds.movers import Wandering
+from worlds.traffic import Traffic
 from worlds.world import Bounds, Point, Pose, Task
 
 Floats = npt.NDArray[np.float64]
+
+JUMP = 0.05  # a mover that moves less from row to row has not jumped [m]
+PLANNED_TRACK = 30.0  # how much of the movers' ways a plan's figure shows [s]
 
 
 @dataclass(frozen=True)
@@ -49,6 +55,8 @@ class Scene:
     margin: float  # [m]
     robot: Body
     mover_radii: tuple[float, ...] = ()  # [m]
+    movers: tuple[Point, ...] = ()  # where they are when the run ends, or at first before it began [m]
+    tracks: tuple[Floats, ...] = ()  # where each mover goes, (N, 2) a piece [m]; jumps part pieces
 
     @classmethod
     def of(cls, rollout: Rollout) -> Scene:
@@ -80,6 +88,8 @@ class Scene:
                     *(float(robot[key]) for key in ("height", "wheel_radius", "track", "max_speed")),
                 ),
                 mover_radii=tuple(float(mover["radius"]) for mover in task.get("movers") or []),
+                movers=tuple((float(x), float(y)) for x, y in rollout.movers[-1]) if len(rollout.movers) else (),
+                tracks=pieces(rollout.movers),
             )
         except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
             raise InputError(f"rollout: its metadata do not describe a world and a robot ({error!r})") from None
@@ -88,6 +98,9 @@ class Scene:
     def planned(cls, task: Task, robot: RobotSpec, inflate: float) -> Scene:
         """The scene of a plan that was not driven."""
         discs = [(disc.x, disc.y, disc.radius, disc.height) for disc in task.world.obstacles]
+        shown = [mover for mover in task.world.movers if not isinstance(mover, Wandering)]  # their way hangs on a seed
+        traffic = Traffic.of(dataclasses.replace(task.world, movers=tuple(shown)), task.start[:2])
+        ways = traffic.positions(np.arange(0.0, PLANNED_TRACK, 0.05))
         return cls(
             name=task.world.name,
             bounds=task.world.bounds,
@@ -99,6 +112,9 @@ class Scene:
             inflate=inflate,
             margin=max(0.0, inflate - robot.radius),
             robot=Body.of(robot),
+            mover_radii=tuple(traffic.radii.tolist()),
+            movers=tuple((x, y) for x, y in ways[0].tolist()),
+            tracks=pieces(ways),
         )
 
     def region(self, lines: Floats) -> tuple[Floats, Floats]:
@@ -115,6 +131,27 @@ class Scene:
         if np.prod(high - low) > 0.5 * np.prod(world_high - world_low):
             return world_low, world_high
         return low, high
+
+
+def jumping(movers: Floats) -> npt.NDArray[np.bool_]:
+    """Whether movers at places (T, M, 2) jump from one row to the next, (T - 1, M): far, and not as a part of motion."""
+    step = np.hypot(*np.moveaxis(np.diff(movers, axis=0), -1, 0))
+    around = np.zeros_like(step)
+    if len(step) > 1:
+        around[1:] = step[:-1]
+        around[:-1] = np.maximum(around[:-1], step[1:])
+    return np.asarray((step > JUMP) & (step > 3 * around))
+
+
+def pieces(movers: Floats) -> tuple[Floats, ...]:
+    """The ways (N, 2) of movers at places (T, M, 2), cut where they jump."""
+    cuts = jumping(movers)
+    return tuple(
+        piece
+        for m in range(movers.shape[1])
+        for piece in np.split(movers[:, m], np.flatnonzero(cuts[:, m]) + 1)
+        if len(piece) > 1
+    )
 
 
 def _discs(entries: list[Mapping[str, Any]]) -> Floats:

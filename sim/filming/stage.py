@@ -27,6 +27,7 @@ Picture = npt.NDArray[np.uint8]  # (H, W, 3)
 
 GHOST = 0.16  # how much of the robot shines through a cylinder in front of it
 SOFT = 0.05  # [m]
+FORETOLD = 1.5  # how far ahead movers' ways are drawn [s]
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,12 +102,21 @@ class Stage:
         self._paint_trail(rows, colours)
 
     def frame(
-        self, pose: npt.ArrayLike, wheels: tuple[float, float] = (0.0, 0.0), movers: npt.ArrayLike = ()
+        self,
+        pose: npt.ArrayLike,
+        wheels: tuple[float, float] = (0.0, 0.0),
+        movers: npt.ArrayLike = (),
+        velocities: npt.ArrayLike | None = None,
     ) -> Picture:
-        """The picture with the robot at a pose, its wheels turned by angles (left, right) and movers at (M, 2)."""
+        """The picture with the robot at a pose, its wheels turned by angles (left, right) and movers at (M, 2).
+
+        Movers' `velocities` (M, 2) [m/s] are drawn as lines to where they will be if they keep them.
+        """
         x, y, yaw = (float(value) for value in np.asarray(pose))
         places = np.asarray(movers, dtype=np.float64).reshape(-1, 2)
         frame = self._canvas.copy()
+        if velocities is not None:
+            self._foretell(frame, places, np.asarray(velocities, dtype=np.float64).reshape(-1, 2))
         self._shade(frame, np.array([x, y, yaw]), places)
         self._place(x, y, yaw, wheels, places)
         for box in merged(self._boxes(x, y, places)):
@@ -161,6 +171,20 @@ class Stage:
             self._canvas, self.backdrop.pixels, self.backdrop.visible, self._painted, self._forward, self._inverse, rows,
             colours,
         )  # fmt: skip
+
+    def _foretell(self, frame: Picture, places: Floats, velocities: Floats) -> None:
+        """A line from each mover to where it will be, with a dot at each half second."""
+        half = 1.1 * self.camera.pixel
+        ahead = places + FORETOLD * velocities
+        lines = np.column_stack([places, ahead, np.full(len(places), half)])
+        stops = [places + share * (ahead - places) for share in (1 / 3, 2 / 3, 1.0)]
+        moving = np.hypot(*velocities.T) > 0.01
+        dots = np.vstack([np.column_stack([stop, stop, np.full(len(stop), 2.2 * half)])[moving] for stop in stops])
+        for rows, strength in ((lines[moving], 0.45), (dots, 0.75)):
+            kernels.blend_capsules(
+                frame, self.backdrop.visible, self._forward, self._inverse, np.ascontiguousarray(rows),
+                np.array(MOVER, dtype=np.float64), strength,
+            )  # fmt: skip
 
     def _shade(self, frame: Picture, pose: Floats, movers: Floats) -> None:
         """The soft shadows of what moves."""

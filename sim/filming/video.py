@@ -172,7 +172,7 @@ class Shot:
         if at > self._shown:
             stage.drive(*replay.trail(self._shown, at))
             self._shown = at
-        view = stage.frame(replay.pose(at), replay.wheels(at), replay.movers(at))
+        view = stage.frame(replay.pose(at), replay.wheels(at), replay.movers(at), replay.mover_velocities(at))
         self._mark_contacts(view, at, flash, last=end is not None)
         unit = self._layout.unit
         if self._legend is not None:

@@ -12,7 +12,7 @@ from planners import History, PlanResult, PlanStatus, Query
 from planners.search import AStar
 from robots import Footprint, RobotSpec
 from sim.plots import overview, plan_figure
-from worlds import Disc, InputError, Task, World, rasterise
+from worlds import Disc, InputError, Keyframed, Task, Wandering, World, rasterise
 
 ROBOT = RobotSpec(
     name="disc", footprint=Footprint.disc(0.18), height=0.2, mass=3.0, wheel_radius=0.04, track=0.25, max_speed=1.0,
@@ -64,6 +64,20 @@ def test_unseen_obstacles_have_their_own_colour(made_up_drive, tmp_path):
     drive = made_up_drive()
     marked = dataclasses.replace(drive, meta={**drive.meta, "unseen": [0, 1]})
     assert near(pixels(overview(marked, tmp_path / "marked.png", dpi=80)), (196, 74, 138)) > 100
+
+
+def test_movers_and_their_ways_are_drawn(made_up_drive, planned, tmp_path):
+    amber = (228, 177, 65)
+    pictures = [pixels(overview(made_up_drive(movers=n), tmp_path / f"{n}.png", dpi=80)) for n in (0, 2)]
+    assert near(pictures[1], amber) > near(pictures[0], amber) + 100
+    task, grid, plan = planned
+    mover = Keyframed(radius=0.2, keyframes=((0.0, 0.5, 3.0), (5.0, 2.5, 3.5)))
+    moving = dataclasses.replace(
+        task, world=dataclasses.replace(task.world, movers=(mover, Wandering(radius=0.1, cell=0.5, period=1.0)))
+    )
+    picture = pixels(plan_figure(moving, grid, plan, ROBOT, tmp_path / "moving.png", dpi=80))
+    plain = pixels(plan_figure(task, grid, plan, ROBOT, tmp_path / "plain.png", dpi=80))
+    assert near(picture, amber) > near(plain, amber) + 100
 
 
 def test_a_rectangular_robot_and_planned_cells_are_drawn(made_up_drive, tmp_path):

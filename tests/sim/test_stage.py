@@ -3,11 +3,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sim.colours import MOVER
 from sim.engine import client
 from sim.filming import _kernels_paint as kernels
 from sim.filming import stage as staging
 from sim.filming.camera import CAMERAS, Camera, camera_for
-from sim.filming.model import robot_parts
+from sim.filming.model import cylinder, robot_parts
 from sim.filming.paint import paint_ground
 from sim.filming.scene import Scene
 from sim.filming.stage import Stage, drawn_height, part_pose, still_pieces
@@ -215,3 +216,47 @@ def test_metadata_without_a_world_or_a_robot_are_refused(drive, missing):
     meta = {key: value for key, value in drive.meta.items() if key != missing}
     with pytest.raises(InputError, match=missing):
         Scene.of(replace(drive, meta=meta))
+
+
+def test_a_movers_way_is_foretold_on_the_ground(drive, scene):
+    moving = replace(scene, mover_radii=(0.15,), obstacles=np.empty((0, 4)), unseen=np.zeros(0, dtype=bool))
+    places, velocities = np.array([(3.0, 0.6)]), np.array([(-1.0, 0.0)])
+    pose = (0.5, 2.5, 0.0)
+    with Stage(moving, camera(moving, size=(640, 480)), route=np.empty((0, 2))) as stage:
+        without = stage.frame(pose, (0, 0), places)
+        still = stage.frame(pose, (0, 0), places, 0 * velocities)
+        told = stage.frame(pose, (0, 0), places, velocities)
+        ahead, end = (around(stage, x, 0.6, half=5) for x in (2.3, 1.5))
+        beyond, behind = (around(stage, x, 0.6, half=5) for x in (1.2, 3.4))
+    assert (still == without).all()
+    difference = changed(told, without)
+    assert difference[ahead].max() > 30
+    assert difference[end].max() > 60
+    assert difference[beyond].max() == difference[behind].max() == 0
+
+
+def test_a_frame_among_movers_equals_a_render_of_everything_at_once(drive, scene, monkeypatch):
+    monkeypatch.setattr(staging, "GHOST", 0.0)
+    monkeypatch.setattr(Stage, "_shade", lambda *_: None)
+    moving = replace(scene, mover_radii=(0.15, 0.3))
+    view = camera(moving)
+    x, y, yaw = middle(drive)
+    places = np.array([(x + 0.2, y - 0.3), (3.4, 0.4)])
+    with Stage(moving, view, route=drive.route, fine=1) as stage, client() as number:
+        got = stage.frame((x, y, yaw), (0.4, 0.7), places)
+        for mesh, colour in still_pieces(moving, stage.tall):
+            add_mesh(number, mesh, colour)
+        for part in robot_parts(moving.robot):
+            body = add_mesh(number, part.mesh, part.colour)
+            place, turn = part_pose(part, x, y, yaw, (0.4, 0.7))
+            staging.bullet().resetBasePositionAndOrientation(body, place, turn, physicsClientId=number)
+        for (mx, my), radius in zip(places, moving.mover_radii, strict=True):
+            add_mesh(number, cylinder(radius, 0.0, drawn_height(moving), x=mx, y=my), MOVER)
+        image, _, seg = render(number, view, None, 1, stage._light)
+        visible = np.empty(SIZE[::-1], dtype=np.float32)
+        ground = np.empty(SIZE[::-1], dtype=np.bool_)
+        kernels.count_ground(seg, 1, visible, ground)
+        rgb = paint_ground(view, moving, drive.route, np.ones_like(ground), stage.tall, stage._sun)
+        expected = np.empty_like(got)
+        kernels.resolve(rgb, image, seg, 1, visible, expected)
+    assert (changed(got, expected) > 1).mean() <= 0.0005
