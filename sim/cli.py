@@ -314,10 +314,10 @@ def list_worlds(json: Json = False) -> int:
         say_json({name: _task_facts(task) for name, task in tasks.items()})
     else:
         table(
-            ("world", "size m", "obstacles", "cell m", "about"),
+            ("world", "size m", "obstacles", "movers", "cell m", "about"),
             (
-                (name, "{:g} x {:g}".format(*task.world.size), str(len(task.world.obstacles)), f"{task.cell:g}",
-                 task.world.source or "")
+                (name, "{:g} x {:g}".format(*task.world.size), str(len(task.world.obstacles)),
+                 str(len(task.world.movers)), f"{task.cell:g}", task.world.source or "")
                 for name, task in tasks.items()
             ),
         )  # fmt: skip
@@ -384,10 +384,14 @@ def generate_world(
 @worlds_app.command("import")
 def import_world(
     path: Annotated[
-        Path, typer.Argument(metavar="FILE", help="Gazebo SDF (.sdf, .world), a map_server .yaml, or a MovingAI .map.")
+        Path,
+        typer.Argument(
+            metavar="FILE", help="Gazebo SDF (.sdf, .world), a map_server .yaml, a MovingAI .map, or DynaBARN's .json."
+        ),
     ],
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="The world file to write; by default FILE's name, here.")
+        Path | None,
+        typer.Option("--out", "-o", help="The world file to write, by default FILE's name, here; for .json a folder."),
     ] = None,
     barn: Annotated[bool, typer.Option("--barn", help="SDF: with the start and goal of the BARN challenge.")] = False,
     start: Annotated[str | None, typer.Option(metavar="X,Y,YAW", help="Maps have none [m, m, rad].")] = None,
@@ -430,6 +434,7 @@ def import_world(
         "barn": ("--barn", ("barn", "cell")),
         "sdf": ("an SDF world", ("start", "goal", "bounds", "cell", "skip_unsupported")),
         "map_server": ("a map_server map", ("start", "goal", "cell", "unknown", "overhang")),
+        "dynabarn": ("DynaBARN", ("cell",)),
         "movingai": ("a MovingAI map", ("start", "goal", "cell", "overhang", "resolution", "problem")),
     }
     kind = _kind_of(path)
@@ -441,6 +446,8 @@ def import_world(
                 f"--{key.replace('_', '-')}: {about} "
                 + ("brings its own" if key in ("start", "goal", "bounds") else f"takes {_flags(known)} only")
             )
+    if kind == "dynabarn":
+        return _import_dynabarn(path, out or Path(path.stem), cell)
     target = _target(path, out)
     options.pop("barn", None)
     if kind == "map_server":
@@ -529,10 +536,14 @@ def _kind_of(path: Path) -> str:
         return "sdf"
     if suffix == ".map":
         return "movingai"
+    if suffix == ".json":
+        return "dynabarn"
     if suffix in (".pgm", ".png", ".bmp"):
         raise InputError(f"{path}: is an image; give the map's .yaml file, which tells how to read it")
     if suffix not in (".yaml", ".yml"):
-        raise InputError(f"{path}: cannot be imported; .sdf, .world, .yaml (map_server) and .map (MovingAI) can")
+        raise InputError(
+            f"{path}: cannot be imported; .sdf, .world, .yaml (map_server), .map (MovingAI) and .json (DynaBARN) can"
+        )
     return "map_server"
 
 
@@ -549,6 +560,20 @@ def _target(path: Path, out: Path | None) -> Path:
 
 def _flags(keys: tuple[str, ...]) -> str:
     return ", ".join(f"--{key.replace('_', '-')}" for key in keys)
+
+
+def _import_dynabarn(path: Path, out: Path, cell: float | None) -> int:
+    from worlds import import_dynabarn, save_task
+
+    tasks = import_dynabarn(path, **({} if cell is None else {"cell": cell}))
+    files = [out / f"{_file_name(task.world.name)}.yaml" for task in tasks]
+    twice = next((file for i, file in enumerate(files) if file in files[:i]), None)
+    if twice is not None:
+        raise InputError(f"{path}: two worlds would be written to {twice}; give them different names")
+    for task, file in zip(tasks, files, strict=True):
+        save_task(task, file)
+        _tell_files({"world": str(file)})
+    return SUCCEEDED
 
 
 def _version(wanted: bool) -> None:
@@ -667,7 +692,11 @@ def _size(text: str) -> tuple[int, int]:
 
 def _slug(scenario: Scenario) -> str:
     parts = (scenario.task.world.name, scenario.planner_name, scenario.robot.name, str(scenario.seed))
-    return "-".join("".join(c if c.isalnum() or c in "-_." else "_" for c in part) for part in parts)
+    return "-".join(map(_file_name, parts))
+
+
+def _file_name(name: str) -> str:
+    return "".join(c if c.isalnum() or c in "-_." else "_" for c in name)
 
 
 def _write(result: Run, folder: Path, video: Path | None) -> dict[str, str]:
@@ -762,7 +791,7 @@ def _task_facts(task: Task) -> dict[str, Any]:
     return {
         "name": task.world.name, "source": task.world.source, "bounds": list(task.world.bounds),
         "start": list(task.start), "goal": list(task.goal), "goal_tolerance": task.goal_tolerance,
-        "cell": task.cell, "obstacles": len(task.world.obstacles),
+        "cell": task.cell, "obstacles": len(task.world.obstacles), "movers": len(task.world.movers),
     }  # fmt: skip
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 from collections.abc import Iterable, Mapping
@@ -49,6 +50,26 @@ def read_document(path: str | os.PathLike[str]) -> Document:
     Raises:
         InputError: the file cannot be read, is not UTF-8 text, or is not plain YAML.
     """
+    return parse_document(_read_text(path, "YAML"), os.fspath(path))
+
+
+def read_json(path: str | os.PathLike[str]) -> Document:
+    """The JSON file at `path`; its lines are not known.
+
+    Raises:
+        InputError: the file cannot be read, is not UTF-8 text, or is not JSON.
+    """
+    source = os.fspath(path)
+    text = _read_text(path, "JSON")
+    try:
+        return Document(source, json.loads(text))
+    except json.JSONDecodeError as error:
+        raise input_error(f"{source}:{error.lineno}", f"not JSON: {error.msg}") from None
+    except (RecursionError, ValueError):  # ValueError: a number of thousands of digits
+        raise input_error(source, "not JSON: nested too deeply or numbers too long") from None
+
+
+def _read_text(path: str | os.PathLike[str], kind: str) -> str:
     source = os.fspath(path)
     try:
         with Path(path).open("rb") as stream:
@@ -56,17 +77,16 @@ def read_document(path: str | os.PathLike[str]) -> Document:
     except FileNotFoundError:
         raise input_error(source, "no such file") from None
     except IsADirectoryError:
-        raise input_error(source, "is a directory; give a YAML file") from None
+        raise input_error(source, f"is a directory; give a {kind} file") from None
     except (OSError, ValueError) as error:  # ValueError: a null character in the path
         raise input_error(source, f"cannot be read: {getattr(error, 'strerror', None) or error}") from None
     if len(content) > MAX_BYTES:
         raise input_error(source, f"is too large; the limit is {MAX_BYTES // 1_000_000} MB")
     try:
-        text = content.decode("utf-8-sig")
+        return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         raise input_error(f"{source}:{line}", "is not a text file in UTF-8") from None
-    return parse_document(text, source)
 
 
 def parse_document(text: str, source: str) -> Document:

@@ -9,8 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from worlds.cellmap import CellMap, map_task
-from worlds.documents import input_error
+from worlds.checks import show
+from worlds.documents import Document, Location, input_error, read_json
 from worlds.errors import InputError
+from worlds.files import task_from_dict
 from worlds.map_server import read_map
 from worlds.movingai import import_movingai_problems, read_movingai_cells
 from worlds.sdf import TASK, parse_xml, read_models, read_task_element
@@ -26,6 +28,9 @@ BARN_TOLERANCE = 1.0  # [m]
 BARN_BOUNDS: Bounds = (-4.5, 0.0, 0.0, 14.4)
 #: The lattice on which BARN's cylinders stand [m]; cells that lie on it lose no passage to rounding.
 BARN_CELL = 0.15
+
+DYNABARN_LIMIT = 100.0  # what the challenge allows [s]
+DYNABARN_CELL = 0.25
 
 
 def import_sdf(
@@ -191,6 +196,56 @@ def import_barn(path: str | os.PathLike[str], *, cell: float = BARN_CELL) -> Tas
     return import_sdf(
         path, start=BARN_START, goal=BARN_GOAL, bounds=BARN_BOUNDS, cell=cell, goal_tolerance=BARN_TOLERANCE
     )
+
+
+def import_dynabarn(path: str | os.PathLike[str], *, cell: float = DYNABARN_CELL) -> list[Task]:
+    """The worlds of a DynaBARN set whose trajectories are decoded into keyframes, one task for each world.
+
+    The file is JSON: a list of mappings with name, bounds, start, goal, goal_tolerance and movers; each mover has radius,
+    length, period, loop and keyframes_t_x_y. The challenge allows 100 s (Nair et al., *DynaBARN*, SSRR 2022).
+
+    Raises:
+        InputError: the file cannot be read or is no such set.
+    """
+    document = read_json(path)
+    if not isinstance(document.data, list) or not document.data:
+        raise document.error((), f"must be a list of worlds, got {show(document.data)}")
+    return [_dynabarn(document, i, world, cell) for i, world in enumerate(document.data)]
+
+
+def _dynabarn(document: Document, index: int, world: Any, cell: float) -> Task:
+    if not isinstance(world, dict) or not isinstance(world.get("movers"), list):
+        raise document.error(
+            (index,), f"must be a mapping with name, bounds, start, goal and movers, got {show(world)}"
+        )
+    movers = []
+    for i, mover in enumerate(world["movers"]):
+        at = (index, "movers", i)
+        if not isinstance(mover, dict):
+            raise document.error(
+                at, f"must be a mapping with radius, length, loop and keyframes_t_x_y, got {show(mover)}"
+            )
+        frames = mover.get("keyframes_t_x_y")
+        if not isinstance(frames, list):
+            raise document.error((*at, "keyframes_t_x_y"), "missing; write a list of [t, x, y]")
+        _check_period(document, at, frames, mover.get("period"))
+        kept = {"radius": mover.get("radius"), "height": mover.get("length", 1.0), "loop": mover.get("loop")}
+        movers.append({**kept, "keyframes": frames})
+    name = str(world.get("name", f"world {index}"))
+    kept = {key: world[key] for key in ("name", "bounds", "start", "goal", "goal_tolerance") if key in world}
+    source = f"DynaBARN, imported from {Path(document.source).name}; keyframes played back in straight lines"
+    task = {"schema": 1, **kept, "source": source, "cell": cell, "time_limit": DYNABARN_LIMIT, "movers": movers}
+    return task_from_dict(task, f"{document.source}: {name}")
+
+
+def _check_period(document: Document, at: Location, frames: list[Any], period: Any) -> None:
+    """The period must be the time from the first keyframe to the last, which is what a world file knows."""
+    try:
+        lasts = float(frames[-1][0]) - float(frames[0][0])
+    except (TypeError, ValueError, LookupError):
+        return  # told with the other faults of keyframes
+    if period is not None and not (isinstance(period, int | float) and abs(period - lasts) <= 0.01):
+        raise document.error((*at, "period"), f"must be {lasts:g}, which its keyframes last, got {show(period)}")
 
 
 def _around(discs: list[Disc], start: Pose | None, goal: Point | None) -> Bounds:

@@ -143,6 +143,8 @@ def test_there_are_at_least_30_malformed_worlds() -> None:
         (["worlds", "generate", "forest", "-o", "w.yaml", "--set", "cuont=3"], "count"),
         (["worlds", "generate", "forest", "-o", "w.yaml", "--set", "count=3000"], "no world with 3000"),
         (["worlds", "import", "nothing.world", "-o", "w.yaml"], "nothing.world: cannot be read"),
+        (["worlds", "import", "nothing.json", "-o", "folder"], "nothing.json: no such file"),
+        (["worlds", "import", "x.json", "-o", "folder", "--goal", "1,2"], "bring their own start, goal and bounds"),
         (["schema", "moon"], "world, robot"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
@@ -264,7 +266,10 @@ def test_a_map_of_a_building_is_imported_planned_and_driven(antdrive, tmp_path: 
     ("words", "says"),
     [
         (["map.pgm"], "map.pgm: is an image; give the map's .yaml file"),
-        (["map.txt"], "map.txt: cannot be imported; .sdf, .world, .yaml (map_server) and .map (MovingAI) can"),
+        (
+            ["map.txt"],
+            "map.txt: cannot be imported; .sdf, .world, .yaml (map_server), .map (MovingAI) and .json (DynaBARN) can",
+        ),
         (["w.yaml"], "w.yaml: names no image"),
         (["none.yaml"], "none.yaml: no such file"),
         (["none.map"], "none.map: no such file"),
@@ -362,6 +367,30 @@ def test_exports_that_cannot_be_are_one_line_and_exit_code_2(antdrive, words: li
     code, out, err = antdrive("worlds", "export", *words)
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert says in err
+
+
+def test_import_writes_one_world_file_for_each_of_dynabarn(antdrive, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    mover = {"radius": 0.5, "loop": "teleport", "keyframes_t_x_y": [[0, 5, 8], [8, 5, 9]]}
+    one = {
+        "bounds": [-12, -12, 12, 12],
+        "start": [11, 0, 3.14],
+        "goal": [9, 0],
+        "goal_tolerance": 1.0,
+        "movers": [mover],
+    }
+    (tmp_path / "set.json").write_text(json.dumps([{"name": "one", **one}, {"name": "a/b", **one}]))
+    code, out, _ = antdrive("worlds", "import", "set.json", "-o", "worlds")
+    assert code == 0
+    assert [line.split()[-1] for line in out.splitlines()] == ["worlds/one.yaml", "worlds/a_b.yaml"]
+    assert len(load_task("worlds/a_b.yaml").world.movers) == 1
+    code, out, _ = antdrive("run", "worlds/one.yaml", "--json")
+    assert code == 0
+    report = json.loads(out)
+    assert report["metrics"]["contacts_driving"] == 0
+    (tmp_path / "set.json").write_text(json.dumps([{"name": "one", **one}] * 2))
+    code, _, err = antdrive("worlds", "import", "set.json", "-o", "twice")
+    assert (code, "two worlds would be written to twice/one.yaml" in err) == (2, True)
+    assert not (tmp_path / "twice").exists()
 
 
 def test_render_films_again_from_another_camera(antdrive, small_run: Run, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
