@@ -1,12 +1,14 @@
 """The worlds that come along: sound, and passable for whom they are meant."""
 
 import dataclasses
+import itertools
 
 import numpy as np
 import pytest
 
+from benchmarks.planners import environments
 from tests.worlds.oracles import passable
-from worlds import Disc, Task, catalogue, forest, load_task, point_clearance, rasterise
+from worlds import Disc, Task, Traffic, catalogue, forest, load_task, point_clearance, rasterise
 
 TURTLEBOT, JACKAL = 0.18, 0.333  # radii [m]
 MARGIN = 0.05  # [m]
@@ -19,6 +21,18 @@ PASSABLE = {
     "han2007-aco": (True, True),
     "han2007-ga": (True, True),
     "han2007-single": (True, True),
+    "hasan-1a": (True, True),
+    "hasan-1a-moving": (True, True),
+    "hasan-2b": (True, True),
+    "hasan-2b-moving": (True, True),
+    "hasan-3c": (True, False),
+    "hasan-3c-moving": (True, False),
+    "hasan-4d": (True, True),
+    "hasan-4d-moving": (True, True),
+    "hasan-5e": (True, True),
+    "hasan-5e-moving": (True, True),
+    "hasan-5f": (True, False),
+    "hasan-5f-moving": (True, False),
     "no-path": (False, False),
     "slalom": (True, True),
     "u-trap": (True, True),
@@ -26,6 +40,11 @@ PASSABLE = {
 #: Grid points of the thesis' listings, 0.5 m each.
 ACO = [(4, 6), (14, 12), (13, 11), (8, 10), (10, 10), (14, 10), (14, 4)]
 ACO += [(8, 14), (13, 14), (4, 10), (16, 14), (10, 16), (17, 10), (19, 18)]
+#: hasan's six cases: start and goal of Table 1 as (column, row); 26.80 is read as 26.8.
+HASAN = {
+    "1a": ((21, 13), (27, 17)), "2b": ((26, 8), (25, 24)), "3c": ((3, 49), (3, 0)),
+    "4d": ((24, 24), (38, 45)), "5e": ((1, 4), (2, 48)), "5f": ((16, 23), (15, 25)),
+}  # fmt: skip
 GA = [(3, 3), (10, 10), (14, 10), (14, 4), (8, 14), (6, 18)]
 
 
@@ -45,7 +64,9 @@ def test_robots_get_through_where_the_table_says(task, radius, who):
 
 
 def test_both_ends_have_room_for_every_robot(task):
-    assert (point_clearance(task.world, [task.start[:2], task.goal]) > JACKAL + 0.2).all()
+    # hasan's ends lie in cells beside walls.
+    room = TURTLEBOT + MARGIN if task.world.name.startswith("hasan") else JACKAL + 0.2
+    assert (point_clearance(task.world, [task.start[:2], task.goal]) > room).all()
 
 
 def test_a_world_is_called_as_its_file_and_says_where_it_comes_from(task):
@@ -55,7 +76,7 @@ def test_a_world_is_called_as_its_file_and_says_where_it_comes_from(task):
 
 
 def test_a_world_has_the_size_of_a_room_and_a_grid_that_ants_can_walk(task):
-    assert all(6 <= side <= 15 for side in task.world.size)
+    assert all(6 <= side <= (25 if task.world.name.startswith("hasan") else 15) for side in task.world.size)
     rows, cols = rasterise(task.world, task.cell).shape
     assert 20 <= rows <= 60
     assert 20 <= cols <= 60
@@ -84,6 +105,53 @@ def test_the_thesis_worlds_stand_on_its_grid_points(name, points, radius, first,
         assert grid.xy([cell])[0].tolist() == pytest.approx([point / 2, point / 2])
     # One more cell outside the map on every side.
     assert grid.shape == (last - first + 3,) * 2
+
+
+@pytest.mark.parametrize("case", HASAN)
+def test_hasans_worlds_are_recreated_in_fifty_by_fifty_cells(case):
+    task, moving = load_task(f"hasan-{case}"), load_task(f"hasan-{case}-moving")
+    for world in (task.world, moving.world):
+        assert (world.source or "").startswith("recreated, not copied, after A. H. Hasan")
+    grid = rasterise(task.world, task.cell, TURTLEBOT + MARGIN)
+    assert grid.shape == (50, 50)
+    start, goal = ((row, col) for col, row in HASAN[case])
+    np.testing.assert_allclose(grid.xy([start, goal]), [task.start[:2], task.goal])
+    # A cylinder fills its cell and closes no other: what is free is what the paper's robot of one cell may enter.
+    blocked = {grid.cell_at(disc.x, disc.y) for disc in task.world.obstacles}
+    assert {tuple(cell) for cell in np.argwhere(~grid.free).tolist()} == blocked
+    assert set(np.unique([disc.radius for disc in task.world.obstacles])) == {task.cell / 2}
+    assert (moving.world.obstacles, moving.start, moving.goal) == (task.world.obstacles, task.start, task.goal)
+    assert (len(task.world.movers), len(moving.world.movers)) == (0, 1)
+
+
+def test_hasans_last_two_cases_share_their_environment():
+    assert load_task("hasan-5e").world.obstacles == load_task("hasan-5f").world.obstacles
+
+
+@pytest.mark.parametrize("case", HASAN)
+def test_hasans_mover_walks_over_free_cells_from_a_random_one(case):
+    task = load_task(f"hasan-{case}-moving")
+    free = rasterise(task.world, task.cell, 0.2)
+    homes = set()
+    for seed in range(5):
+        stops = Traffic.of(task.world, task.start[:2], seed).positions(np.arange(100) * 0.8)[:, 0]
+        cells = [free.cell_at(*stop) for stop in stops]
+        np.testing.assert_allclose(free.xy(cells), stops, atol=1e-9)
+        assert all(free.free[cell] for cell in cells)
+        assert all(max(abs(r - q), abs(c - d)) <= 1 for (r, c), (q, d) in itertools.pairwise(cells))
+        homes.add(cells[0])
+    assert len(homes) == 5
+
+
+def test_the_benchmarks_draw_the_same_environments():
+    drawn = {name.split()[0]: query for name, query, _ in environments()}
+    assert list(drawn) == list(HASAN)
+    for case, query in drawn.items():
+        task = load_task(f"hasan-{case}")
+        grid = rasterise(task.world, task.cell, TURTLEBOT + MARGIN)
+        assert (grid.free == query.grid.free).all()
+        assert (grid.moves == query.grid.moves).all()
+        assert [grid.cell_at(*end) for end in (task.start[:2], task.goal)] == [query.start, query.goal]
 
 
 def test_the_gate_is_just_wide_enough():
