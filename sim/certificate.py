@@ -121,9 +121,11 @@ def _clearances(rollout: Rollout) -> tuple[Floats, Floats]:
             break
         nearest = distance(rows, (discs[:, 0] + 1j * discs[:, 1])[None], discs[:, 2]).min(axis=1)
         best[rows] = np.minimum(best[rows], nearest)
-    moving = np.empty(rollout.movers.shape[:2])
     radii = np.array([mover["radius"] for mover in task.get("movers") or []])
+    moving = np.empty((len(x), len(radii)))
     for rows in np.array_split(np.arange(len(x)), 1 + moving.size // 1_000_000):
+        if not len(radii):
+            break
         places = rollout.movers[rows]
         moving[rows] = distance(rows, places[..., 0] + 1j * places[..., 1], radii)
     return np.asarray(best), moving
