@@ -10,12 +10,13 @@ from planners import PLANNERS
 from robots import load_robot
 from sim.filming.video import film
 from sim.scenario import Scenario, plan, run
-from worlds import Disc, Task, World
+from worlds import Cruising, Disc, Task, World
 
 
 def warm() -> None:
     """Plan with every planner drive once and film it, in a world so small that compiling is all it costs."""
-    world = World("warm", (0.0, 0.0, 3.0, 3.0), (Disc(1.5, 1.5, 0.2),))
+    mover = Cruising(radius=0.1, position=(0.2, 2.8), velocity=(0.1, 0.0))
+    world = World("warm", (0.0, 0.0, 3.0, 3.0), (Disc(1.5, 1.5, 0.2),), movers=(mover,))
     task = Task(world, (0.75, 0.75, 0.0), (2.25, 2.25), cell=0.25)
     scenario = Scenario(task=task, planner=PLANNERS["astar"], robot=load_robot("turtlebot"))
     for planner in PLANNERS.values():

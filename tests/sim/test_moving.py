@@ -425,8 +425,13 @@ def test_the_bound_holds_on_a_finer_walk_with_jumps(passed: Rollout) -> None:
     fine = np.linspace(0, len(passed.t) - 1, 10 * len(passed.t) - 9)
     rows = np.arange(len(passed.t))
     pose = np.stack([np.interp(fine, rows, np.unwrap(column)) for column in passed.pose.T], axis=1)
-    for frames in ([[0.0, 1.5, 0.8], [0.6301, 5.0, 0.8]], [[0.0, 5.0, 2.0], [1.2303, 0.6, 2.0]]):
-        log = grazed(passed, {"radius": 0.1, "loop": "teleport", "keyframes": frames}, 0.05)
+    for frames, phase in (
+        ([[0.0, 1.5, 0.8], [0.6301, 5.0, 0.8]], 0.0),
+        ([[0.0, 5.0, 2.0], [1.2303, 0.6, 2.0]], 0.0),
+        # Comes towards the robot and is gone 4.95 steps after the start, nearer than at any row.
+        ([[0.0, 0.6, 3.4], [0.4, 0.6, 1.9]], 0.4 - 4.95 / 240),
+    ):
+        log = grazed(passed, {"radius": 0.1, "loop": "teleport", "phase": phase, "keyframes": frames}, 0.05)
         moving = log.traffic().positions(fine / 240)
         finer = dataclasses.replace(log, pose=pose, movers=moving)
         assert log.traffic().jumps(log.t).any()
