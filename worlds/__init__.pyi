@@ -25,9 +25,9 @@ from .grid import DIRECTIONS as DIRECTIONS
 from .grid import Grid as Grid
 from .grid import rasterise as rasterise
 from .importers import import_barn as import_barn
+from .importers import import_dynabarn as import_dynabarn
 from .importers import import_map_server as import_map_server
 from .importers import import_movingai_task as import_movingai_task
-from .importers import import_dynabarn as import_dynabarn
 from .importers import import_sdf as import_sdf
 from .movers import Cruising as Cruising
 from .movers import Keyframed as Keyframed

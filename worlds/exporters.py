@@ -12,9 +12,10 @@ from worlds.atomic import written_whole
 from worlds.cellmap import CellMap, cell_map
 from worlds.checks import yaml_number
 from worlds.documents import input_error
+from worlds.errors import InputError
 from worlds.movingai import MapProblem
 from worlds.sdf import NAMESPACE, TASK, WALLS
-from worlds.world import Disc, Task
+from worlds.world import Disc, Task, World
 
 FREE, OCCUPIED = 254, 0  # the shades that map_saver writes
 WALL_THICKNESS, WALL_HEIGHT = 0.2, 1.0  # [m]
@@ -27,12 +28,13 @@ def export_sdf(task: Task, path: str | Path) -> None:
     `import_sdf` brings back the same task, every number to the last bit.
 
     Raises:
-        InputError: the file cannot be written.
+        InputError: the file cannot be written, or the world moves.
     """
-    world = task.world
+    world = _standing_still(task, path)
     facts = {
         "name": world.name, "bounds": _numbers(world.bounds), "start": _numbers(task.start), "goal": _numbers(task.goal),
         "goal_tolerance": repr(float(task.goal_tolerance)), "cell": repr(float(task.cell)),
+        **({} if task.time_limit is None else {"time_limit": repr(float(task.time_limit))}),
         **({} if world.source is None else {"source": world.source}),
     }  # fmt: skip
     attributes = " ".join(f"{key}={quoteattr(_xml_text(value))}" for key, value in facts.items())
@@ -61,10 +63,10 @@ def export_map_server(task: Task, path: str | Path, *, resolution: float | None 
     which map_server passes over and `import_map_server` reads.
 
     Raises:
-        InputError: a file cannot be written, or a resolution that makes no sense.
+        InputError: a file cannot be written, the world moves, or a resolution that makes no sense.
     """
     target = Path(path)
-    cells = cell_map(task.world, task.cell if resolution is None else resolution)
+    cells = cell_map(_standing_still(task, path), task.cell if resolution is None else resolution)
     rows, cols = cells.free.shape
     picture = np.where(cells.free[::-1], FREE, OCCUPIED).astype(np.uint8)
     image = target.with_suffix(".pgm")
@@ -96,9 +98,9 @@ def export_movingai_map(task: Task, path: str | Path, *, resolution: float | Non
     Cells are free as for `export_map_server`. The format knows neither their size nor where they lie.
 
     Raises:
-        InputError: the file cannot be written, or a resolution that makes no sense.
+        InputError: the file cannot be written, the world moves, or a resolution that makes no sense.
     """
-    cells = cell_map(task.world, task.cell if resolution is None else resolution)
+    cells = cell_map(_standing_still(task, path), task.cell if resolution is None else resolution)
     rows, cols = cells.free.shape
     lines = [bytes(row).decode("ascii") for row in np.where(cells.free[::-1], ord("."), ord("@")).astype(np.uint8)]
     with written_whole(path) as part:
@@ -168,3 +170,10 @@ def _xml_text(text: str) -> str:
     return "".join(
         c if c in "\t\r\n" or " " <= c < "\ud800" or "\ue000" <= c < "\ufffe" or c > "\uffff" else " " for c in text
     )
+
+
+def _standing_still(task: Task, path: str | Path) -> World:
+    """The task's world; movers would be lost."""
+    if task.world.movers:
+        raise InputError(f"{path}: cannot hold {task.world.name}'s movers; export a world in which nothing moves")
+    return task.world

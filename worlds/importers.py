@@ -81,11 +81,17 @@ def import_sdf(
         start = (x, y, math.atan2(end[1] - y, end[0] - x))
     (tolerance,) = _kept(file, kept, "goal_tolerance", 1) or (0.25,)
     (size,) = _kept(file, kept, "cell", 1) or (0.25,)
+    (limit,) = _kept(file, kept, "time_limit", 1) or (None,)
     source = kept.get("source") if kept else f"imported from {file.name}"
     try:
         made = World(kept.get("name", file.stem), box, tuple(found.discs), source)
         return Task(
-            made, start, end, tolerance if goal_tolerance is None else goal_tolerance, size if cell is None else cell
+            made,
+            start,
+            end,
+            tolerance if goal_tolerance is None else goal_tolerance,
+            size if cell is None else cell,
+            limit,
         )
     except ValueError as error:
         raise input_error(str(file), str(error)) from None

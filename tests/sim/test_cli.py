@@ -144,7 +144,7 @@ def test_there_are_at_least_30_malformed_worlds() -> None:
         (["worlds", "generate", "forest", "-o", "w.yaml", "--set", "count=3000"], "no world with 3000"),
         (["worlds", "import", "nothing.world", "-o", "w.yaml"], "nothing.world: cannot be read"),
         (["worlds", "import", "nothing.json", "-o", "folder"], "nothing.json: no such file"),
-        (["worlds", "import", "x.json", "-o", "folder", "--goal", "1,2"], "bring their own start, goal and bounds"),
+        (["worlds", "import", "x.json", "-o", "folder", "--goal", "1,2"], "--goal: DynaBARN brings its own"),
         (["schema", "moon"], "world, robot"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
