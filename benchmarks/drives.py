@@ -1,0 +1,203 @@
+"""How well paths are driven: `python -m benchmarks.drives [--worlds N] [--jobs N] [--barn FOLDER] [TABLE ...]`.
+
+Tables: barn (the challenge's worlds, by planner, route and noise), forests (random worlds, every failure with its seed) and
+refine (how far refined routes are from the exact optimum). `barn` needs the folder or archive of BARN's worlds.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import math
+import statistics
+import tarfile
+import tempfile
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from joblib import Parallel, delayed
+
+from benchmarks.planners import table
+from planners import Query, find_planner, pull_taut
+from planners._kernels_refine import encloses
+from planners.tangent import shortest
+from robots import load_robot
+from sim import Scenario, run
+from sim.metrics import measure, tracking_error
+from worlds import generate, import_barn, rasterise
+
+BARN = Path(__file__).parent.parent.parent / "shared" / "data" / "barn" / "barn50.tar.xz"
+
+
+class Result(NamedTuple):
+    """What one drive leaves behind."""
+
+    name: str
+    outcome: str
+    succeeded: bool
+    contacts: int
+    metrics: dict[str, float]
+    optimum: float  # the shortest path of the plane [m]
+    errors: dict[float, list[float]]  # tracking errors near a speed [m]
+
+
+def drive(name: str, task: Any, planner: str, robot: str, **settings: Any) -> Result:
+    """One drive; heavy arrays stay here."""
+    done = run(
+        Scenario(task=task, planner=find_planner(planner), planner_name=planner, robot=load_robot(robot), **settings)
+    )
+    log = done.rollout
+    if log is None:
+        return Result(name, done.outcome.name, False, 0, {}, math.nan, {})
+    error, speed = tracking_error(log), log.twist[:, 0]
+    near = {v: error[np.abs(speed - v) < 0.1 * v][::8].tolist() for v in (0.5, 1.0, 2.0)}
+    optimum = float(log.meta["plan"]["euclidean_optimum_m"])
+    return Result(name, done.outcome.name, done.succeeded, len(log.contacts), measure(log), optimum, near)
+
+
+def all_of(jobs: int, calls: Iterable[Any]) -> list[Result]:
+    return list(Parallel(n_jobs=jobs)(calls))
+
+
+def percentile(values: Sequence[float], share: float) -> str:
+    return f"{100 * float(np.percentile(values, share)):.2f} cm" if values else "–"
+
+
+def failures(results: Sequence[Result]) -> str:
+    wrong = [f"{r.name} ({r.outcome.lower()})" for r in results if not r.succeeded]
+    return ", ".join(wrong) or "none"
+
+
+def barn_tasks(source: Path) -> dict[str, Any]:
+    with tempfile.TemporaryDirectory() as folder:
+        if source.is_file():
+            with tarfile.open(source) as archive:
+                archive.extractall(folder, filter="data")
+            source = Path(folder)
+        files = sorted(source.rglob("world_*.world"), key=lambda p: int(p.stem.split("_")[1]))
+        return {path.stem: import_barn(path) for path in files}
+
+
+def barn(jobs: int, source: Path, worlds: int) -> Iterator[str]:
+    """BARN with jackal."""
+    tasks = barn_tasks(source)
+    rows = []
+    for planner, route, noise in (
+        ("astar", "wide", 0.0), ("astar", "taut", 0.0), ("astar", "grid", 0.0), ("ants", "wide", 0.0), ("aco-han", "wide", 0.0),
+        ("astar", "wide", 1.0),
+    ):  # fmt: skip
+        given = {"route": route, "noise": noise}
+        got = all_of(jobs, (delayed(drive)(name, task, planner, "jackal", **given) for name, task in tasks.items()))
+        driven = [r for r in got if r.metrics]
+        ratios = [r.metrics["arrival_s"] / (r.optimum / 2.0) for r in driven if r.succeeded]
+        rows.append(
+            [
+                f"`{planner}`",
+                route,
+                f"{noise:g}",
+                f"{sum(r.succeeded for r in got)} of {len(got)}",
+                str(sum(r.contacts for r in got)),
+                f"{statistics.mean(r.metrics.get('barn', 0.0) for r in got):.4f}",
+                f"{statistics.mean(ratios):.3f} / {max(ratios):.2f}",
+                f"{100 * min(r.metrics['min_clearance_m'] for r in driven):.1f} cm",
+                percentile([e for r in driven for e in r.errors[1.0]], 95),
+                percentile([e for r in driven for e in r.errors[2.0]], 95),
+                failures(got),
+            ]
+        )
+    heads = [
+        "planner", "route", "noise", "certified", "contacts", "mean score", "duration / OT: mean / most", "least clearance",
+        "off the route at 1 m/s, p95", "at 2 m/s", "failures",
+    ]  # fmt: skip
+    yield from table(heads, rows)
+
+
+def forests(jobs: int, source: Path, worlds: int) -> Iterator[str]:
+    """Half of the worlds by each generator's rule."""
+    rows, wrong = [], []
+    kinds = {
+        kind: [generate(kind, np.random.default_rng(n), {}, name=f"{kind} {n}", note="") for n in range(worlds // 2)]
+        for kind in ("forest", "barn")
+    }
+    for noise, (kind, tasks), robot in itertools.product((0.0, 1.0), kinds.items(), ("turtlebot", "jackal")):
+        given = {"planner": "astar", "robot": robot, "noise": noise}
+        got = all_of(jobs, (delayed(drive)(t.world.name, t, seed=n, **given) for n, t in enumerate(tasks)))
+        paths = [r for r in got if r.outcome != "NO_PATH"]
+        good = sum(r.succeeded for r in paths)
+        wrong += [f"{r.name}, {robot}, noise {noise:g}: {r.outcome.lower()}" for r in paths if not r.succeeded]
+        rows.append(
+            [
+                kind,
+                robot,
+                f"{noise:g}",
+                str(len(paths)),
+                str(len(got) - len(paths)),
+                f"{good} ({100 * good / max(1, len(paths)):.2f} %)",
+                str(sum(r.contacts > 0 for r in got)),
+                str(sum(r.contacts > 0 for r in got if r.succeeded)),
+                f"{100 * min((r.metrics['min_clearance_m'] for r in paths if r.metrics), default=math.nan):.1f} cm",
+            ]
+        )
+    heads = [
+        "worlds",
+        "robot",
+        "noise",
+        "with a path",
+        "without",
+        "certified",
+        "with contacts",
+        "both",
+        "least clearance",
+    ]
+    yield from table(heads, rows)
+    yield "Failures: " + ("; ".join(wrong) or "none.")
+    yield ""
+
+
+def refine(jobs: int, source: Path, worlds: int) -> Iterator[str]:
+    """Pulled taut from the grid's corridor, against the shortest path of the plane between the same ends."""
+    gaps: dict[str, list[float]] = {"the optimal one": [], "another": []}
+    for kind, n in itertools.product(("forest", "barn"), range(worlds // 2)):
+        task = generate(kind, np.random.default_rng(n), {}, name="", note="")
+        world = task.world
+        grid = rasterise(world, task.cell, load_robot("turtlebot").radius + 0.03)
+        plan = find_planner("astar").plan(Query.between(grid, task), np.random.default_rng(0))
+        if not plan.solved:
+            continue
+        line = grid.xy(plan.cells)
+        taut = pull_taut(line, world.discs, world.bounds, grid.inflate)
+        best = shortest(world.discs, world.bounds, grid.inflate, tuple(line[0]), tuple(line[-1]))
+        assert taut is not None
+        assert best is not None
+        same = not encloses(line, best.polyline(1e-4, world.discs, world.bounds, grid.inflate), world.discs)
+        gaps["the optimal one" if same else "another"].append(taut.length / best.length - 1)
+    yield from table(
+        ["corridor of the grid's path", "worlds", "gap to the optimum: median", "most"],
+        [
+            [k, str(len(v)), f"{100 * statistics.median(v):.4f} %", f"{100 * max(v):.4f} %"]
+            for k, v in gaps.items()
+            if v
+        ],
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("tables", nargs="*", help="which to print, all by default")
+    parser.add_argument("--worlds", type=int, default=1000, help="how many random worlds")
+    parser.add_argument("--jobs", type=int, default=-1, help="processes; -1: one a core")
+    parser.add_argument("--barn", type=Path, default=BARN, help="folder or archive of BARN's world_*.world")
+    arguments = parser.parse_args()
+    makers = {f.__name__: f for f in (barn, forests, refine)}
+    for name in arguments.tables or makers:
+        if name not in makers:
+            parser.error(f"no table is called {name!r}; choose from {', '.join(makers)}")
+        print(f"## {name}\n")
+        for line in makers[name](arguments.jobs, arguments.barn, arguments.worlds):
+            print(line, flush=True)
+
+
+if __name__ == "__main__":
+    main()
