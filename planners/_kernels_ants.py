@@ -37,6 +37,19 @@ def offsets(cols: int) -> Array:
 
 
 @kernel
+def walk_length(walk: Array, size: int, cols: int) -> float:
+    """Length of a walk [cells]."""
+    straight, diagonal = 0, 0
+    for s in range(size - 1):
+        step = abs(walk[s + 1] - walk[s])
+        if step == 1 or step == cols:
+            straight += 1
+        else:
+            diagonal += 1
+    return straight + SQRT2 * diagonal
+
+
+@kernel
 def walk_ants(
     weights: Array,
     mask: Array,
@@ -49,13 +62,14 @@ def walk_ants(
     seeds: Array,
     walks: Array,
     sizes: Array,
+    lengths: Array,
 ) -> int:
     """Send one ant per seed from start to goal; the steps taken by all.
 
-    Row a of `walks` receives the cells of ant a and sizes[a] their number, or 0 if it did not arrive: it died
-    where no move has any weight, or it took `limit` steps. A cell the ant has been to weighs `revisit`; at 0 it
-    never goes there again. An ant that may `retreat` steps back where it would die, and forgets the dead cell as
-    part of its walk, but not that it has been there.
+    Row a of `walks` receives the cells of ant a, sizes[a] their number and lengths[a] its length [cells]; they are
+    0 and inf if it did not arrive: it died where no move has any weight, or it took `limit` steps. A cell the ant
+    has been to weighs `revisit`; at 0 it never goes there again. An ant that may `retreat` steps back where it
+    would die, and forgets the dead cell as part of its walk, but not that it has been there.
     """
     pad = offset[1]  # no move leads further, so what surrounds the grid can be read without a check
     visited = np.zeros(len(mask) + 2 * pad, dtype=np.int32)  # the last ant that was there, from 1
@@ -122,33 +136,29 @@ def walk_ants(
             n += 1
         taken += limit - left
         sizes[a] = n if i == goal else 0
+        lengths[a] = walk_length(walk, n, offset[2]) if i == goal else np.inf
     return taken
 
 
 @kernel
-def walk_length(walk: Array, size: int, cols: int) -> float:
-    """Length of a walk [cells]."""
-    straight, diagonal = 0, 0
-    for s in range(size - 1):
-        step = abs(walk[s + 1] - walk[s])
-        if step == 1 or step == cols:
-            straight += 1
-        else:
-            diagonal += 1
-    return straight + SQRT2 * diagonal
+def tally(lengths: Array) -> tuple[int, float, int]:
+    """How many walks arrived, their mean length, and the shortest; lengths are inf of those that did not."""
+    count, total, first = 0, 0.0, 0
+    for a in range(len(lengths)):
+        if lengths[a] < np.inf:
+            count += 1
+            total += lengths[a]
+            if lengths[a] < lengths[first]:
+                first = a
+    return count, (total / count if count else np.inf), first
 
 
 @kernel
-def measure(walks: Array, sizes: Array, cols: int, lengths: Array) -> None:
-    """lengths[a] = length of walk a [cells], inf if the ant did not arrive."""
-    for a in range(len(sizes)):
-        lengths[a] = walk_length(walks[a], sizes[a], cols) if sizes[a] > 0 else np.inf
-
-
-@kernel
-def cut_loops(walks: Array, sizes: Array, cells: int, tours: Array, tour_sizes: Array) -> None:
+def cut_loops(
+    walks: Array, sizes: Array, mask: Array, offset: Array, tours: Array, tour_sizes: Array, lengths: Array
+) -> None:
     """Row a of `tours` receives walk a without loops: back at a cell, everything since is dropped."""
-    place = np.full(cells, -1, dtype=np.int32)
+    place = np.full(len(mask), -1, dtype=np.int32)
     for a in range(len(sizes)):
         n = 0
         for s in range(sizes[a]):
@@ -164,6 +174,7 @@ def cut_loops(walks: Array, sizes: Array, cells: int, tours: Array, tour_sizes: 
         for s in range(n):
             place[tours[a, s]] = -1
         tour_sizes[a] = n
+        lengths[a] = walk_length(tours[a], n, offset[2]) if n else np.inf
 
 
 @kernel
@@ -189,13 +200,17 @@ def cut_one_short(walk: Array, size: int, mask: Array, offset: Array, first: int
 
 
 @kernel
-def cut_short(walks: Array, sizes: Array, mask: Array, offset: Array, tours: Array, tour_sizes: Array) -> None:
+def cut_short(
+    walks: Array, sizes: Array, mask: Array, offset: Array, tours: Array, tour_sizes: Array, lengths: Array
+) -> None:
     """Row a of `tours` receives walk a cut short."""
     place = np.full(len(mask), -1, dtype=np.int64)
-    first = 0
+    first: Any = np.int64(0)  # a plain 0 would be compiled for as a type of its own
     for a in range(len(sizes)):
-        tour_sizes[a] = cut_one_short(walks[a], sizes[a], mask, offset, first, place, tours[a])
+        n = cut_one_short(walks[a], sizes[a], mask, offset, first, place, tours[a])
         first += sizes[a]
+        tour_sizes[a] = n
+        lengths[a] = walk_length(tours[a], n, offset[2]) if n else np.inf
 
 
 @kernel
@@ -291,14 +306,18 @@ def _power(trail: float, alpha: float) -> float:
 
 
 @kernel
-def union_moves(walks: Array, sizes: Array, mask: Array, offset: Array, moves: Array) -> None:
+def union_moves(walks: Array, sizes: Array, cols: int, moves: Array) -> None:
     """Add to moves[i], bit by bit, those that the walks make from cell i; the cells are flat indices."""
     for a in range(len(sizes)):
+        if sizes[a] == 0:
+            continue
+        i = np.int64(walks[a, 0])
+        row = i // cols
         for s in range(1, sizes[a]):
-            h, i = np.int64(walks[a, s - 1]), np.int64(walks[a, s])
-            for k in range(8):
-                if mask[h] & (1 << k) and h + offset[k] == i:
-                    moves[h] |= 1 << k
+            j = np.int64(walks[a, s])
+            row, k = row_and_move(i, j, row, cols)
+            moves[i] |= 1 << k
+            i = j
 
 
 @inline

@@ -5,7 +5,7 @@ from __future__ import annotations
 import abc
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from planners.iterative import Iteration, IterativePlanner, require
-from planners.plan import Cells, Query
+from planners.plan import Query
 from worlds import Floats
 
 Flat = npt.NDArray[np.int32]  # flat cell indices
@@ -84,13 +84,27 @@ class Walks:
 
     def shortest(self) -> Walks | None:
         """The shortest walk, alone; None if nobody arrived."""
-        first = int(self.lengths.argmin())
-        return self.only(first) if math.isfinite(self.lengths[first]) else None
+        tally = self.tally()
+        return self.only(tally.first) if tally.arrived else None
+
+    def tally(self) -> Tally:
+        """How the ants fared."""
+        from planners import _kernels_ants
+
+        return Tally(*_kernels_ants.tally(self.lengths))
 
     @classmethod
     def room(cls, ants: int, room: int) -> Walks:
         """Empty rows to be filled."""
         return cls(np.empty((ants, room), dtype=np.int32), np.zeros(ants, dtype=np.int64), np.empty(ants))
+
+
+class Tally(NamedTuple):
+    """How the ants of an iteration fared."""
+
+    arrived: int
+    mean: float  # length of those that arrived [cells], inf if nobody did
+    first: int  # who came the shortest way
 
 
 class Turn(NamedTuple):
@@ -205,7 +219,7 @@ class Colony(IterativePlanner):
         trail = self.lay(ground, rng) if memory.trail is None else memory.trail
         memory.trail, desire = trail, self.desire(ground)
         walk = _Walk.of(self, ground)
-        scene = np.empty(ground.shape)
+        cell, scene = query.grid.cell, np.empty(ground.shape)  # one picture, always of the latest trails
         best: Walks | None = None
         path, found = ground.cells(np.empty(0, dtype=np.int32)), 0
         with ExitStack() as stack:
@@ -216,15 +230,29 @@ class Colony(IterativePlanner):
                 walks, steps = walk.go(rng, pool)
                 tours = walk.cut(walks)
                 joint = self.join(ground, tours, best or memory.tour)
-                if _shortest(joint, tours) < (float(best.lengths[0]) - 1e-9 if best else math.inf):
-                    best = joint if joint and joint.lengths[0] <= tours.lengths.min() else tours.shortest()
-                    assert best is not None
+                tally = tours.tally()
+                shortest = float(tours.lengths[tally.first])
+                if joint is not None and joint.lengths[0] <= shortest:
+                    shortest, first = float(joint.lengths[0]), joint
+                else:
+                    first = None
+                if shortest < (float(best.lengths[0]) - 1e-9 if best else math.inf):
+                    best = first or tours.only(tally.first)
                     path, found = ground.cells(best.cells[0]), number
                 if best is not None:
                     memory.tour = best
                 season = Season(number, ground, walks, tours, joint, best, number - found, rng)
                 self.update(trail, season)
-                yield _report(query.grid.cell, season, path, trail, scene, steps)
+                _draw(trail, scene)
+                yield Iteration(
+                    cells=path,
+                    best=cell * float(best.lengths[0]) if best else math.inf,
+                    iteration_best=cell * shortest,
+                    iteration_mean=cell * tally.mean,
+                    arrived=tally.arrived,
+                    work=steps,
+                    landscape=scene,
+                )
                 if self.finished(season):
                     return
 
@@ -259,7 +287,6 @@ class _Walk:
             jobs += [(caste, first + i, first + min(i + each, count)) for i in range(0, count, each)]
             first += count
         steps = sum((pool.map if pool else map)(lambda job: self._send(seeds, *job), jobs))
-        _measure(self.walks, self.ground)
         return self.walks, steps
 
     def _send(self, seeds: npt.NDArray[np.uint64], caste: int, first: int, end: int) -> int:
@@ -278,6 +305,7 @@ class _Walk:
                 seeds[first:end],
                 self.walks.cells[first:end],
                 self.walks.sizes[first:end],
+                self.walks.lengths[first:end],
             )
         )
 
@@ -292,49 +320,27 @@ def without_loops(walks: Walks, ground: Ground, into: Walks | None = None) -> Wa
     """The same walks with their loops cut out."""
     from planners import _kernels_ants
 
-    tours = into or Walks.room(*walks.cells.shape)
-    _kernels_ants.cut_loops(walks.cells, walks.sizes, len(ground.mask), tours.cells, tours.sizes)
-    return _measure(tours, ground)
+    return _cut(_kernels_ants.cut_loops, walks, ground, into)
 
 
 def cut_short(walks: Walks, ground: Ground, into: Walks | None = None) -> Walks:
     """The same walks, each going on from every cell to the last of its cells that is one allowed move away."""
     from planners import _kernels_ants
 
+    return _cut(_kernels_ants.cut_short, walks, ground, into)
+
+
+def _cut(kernel: Callable[..., None], walks: Walks, ground: Ground, into: Walks | None) -> Walks:
     tours = into or Walks.room(*walks.cells.shape)
-    _kernels_ants.cut_short(walks.cells, walks.sizes, ground.mask, ground.offset, tours.cells, tours.sizes)
-    return _measure(tours, ground)
+    kernel(walks.cells, walks.sizes, ground.mask, ground.offset, tours.cells, tours.sizes, tours.lengths)
+    return tours
 
 
-def _shortest(joint: Walks | None, tours: Walks) -> float:
-    """Length of the best tour of an iteration [cells]."""
-    alone = float(tours.lengths.min())
-    return min(alone, float(joint.lengths[0])) if joint else alone
-
-
-def _measure(walks: Walks, ground: Ground) -> Walks:
-    from planners import _kernels_ants
-
-    _kernels_ants.measure(walks.cells, walks.sizes, ground.shape[1], walks.lengths)
-    return walks
-
-
-def _report(cell: float, season: Season, path: Cells, trail: Floats, scene: Floats, steps: int) -> Iteration:
-    """The iteration in metres; `scene` is one picture for all iterations, always of the latest trails."""
+def _draw(trail: Floats, scene: Floats) -> None:
+    """Trails as a picture: of arcs, the strongest that leaves each cell."""
     if trail.ndim == 1:
         scene.ravel()[:] = trail
     else:
         from planners import _kernels_ants
 
         _kernels_ants.strongest(trail, scene.ravel())
-    tours, best = season.tours, season.best
-    arrived = tours.lengths[tours.sizes > 0]
-    return Iteration(
-        cells=path,
-        best=cell * float(best.lengths[0]) if best else math.inf,
-        iteration_best=cell * _shortest(season.joint, tours),
-        iteration_mean=cell * float(arrived.sum()) / len(arrived) if len(arrived) else math.inf,
-        arrived=len(arrived),
-        work=steps,
-        landscape=scene,
-    )

@@ -89,7 +89,8 @@ class MergingAnts(MaxMinAnts):
         moves = np.zeros_like(ground.mask)
         for walks in (tours, best):
             if walks is not None:
-                _kernels_ants.union_moves(walks.cells, walks.sizes, ground.mask, ground.offset, moves)
+                _kernels_ants.union_moves(walks.cells, walks.sizes, ground.shape[1], moves)
+        moves.setflags(write=False)  # as a grid's own are, for which the search is compiled
         cols = ground.shape[1]
         cells, straight, diagonal, _ = _kernels_search.shortest_path(
             moves.reshape(ground.shape), *divmod(ground.start, cols), *divmod(ground.goal, cols), True

@@ -78,7 +78,9 @@ def test_the_wheel_gives_each_move_its_share() -> None:
     count = 40_000
     seeds = np.random.default_rng(1).bit_generator.random_raw(count).astype(np.uint64)
     cells, sizes = np.zeros((count, 2), dtype=np.int32), np.zeros(count, dtype=np.int64)
-    _kernels_ants.walk_ants(weights, ground.mask, ground.offset, 4, 0, 1, 0.0, False, seeds, cells, sizes)
+    _kernels_ants.walk_ants(
+        weights, ground.mask, ground.offset, 4, 0, 1, 0.0, False, seeds, cells, sizes, np.zeros(count)
+    )
     went = np.array([(cells[:, 1] == 4 + step).mean() for step in ground.offset])
     np.testing.assert_allclose(went, weights[4] / weights[4].sum(), atol=0.01)
     assert went[[2, 5]].max() == 0
