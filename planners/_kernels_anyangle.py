@@ -114,7 +114,7 @@ def corridor_moves(moves: Array, line: Array, width: float) -> Array:
                 max(0, math.ceil(min(ca, cb) - width)),
                 min(cols - 1, math.floor(max(ca, cb) + width)) + 1,
             ):
-                if segment_distance2(r, c, r0, c0, r1, c1) <= width * width:
+                if segment_distance2(float(r), float(c), r0, c0, r1, c1) <= width * width:
                     inside[r, c] = True
     out = np.zeros((rows, cols), dtype=np.uint8)
     for r in range(rows):

@@ -7,6 +7,8 @@ there. Moves go both ways. `h` is the cost to the goal and `back` the backpointe
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from planners._kernels_replan import COST, NEVER, offsets, put, take
@@ -87,7 +89,8 @@ def begin(goal: int, state: Array, h: Array, back: Array, heap: Array, place: Ar
     """Only the goal is known, and open."""
     h[:], back[:], place[:] = NEVER, 8, -1
     h[goal] = 0
-    state[0] = put(heap, place, 0, goal, 0, 0)
+    none: Any = np.int64(0)  # a plain 0 would be compiled for as a type of its own
+    state[0] = put(heap, place, none, goal, none, none)
 
 
 @kernel

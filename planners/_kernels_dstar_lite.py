@@ -6,6 +6,8 @@ S. Koenig and M. Likhachev, *D\\* Lite*, AAAI 2002, the optimised version (Figur
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from planners._kernels_replan import COST, NEVER, octile, offsets, put, take
@@ -114,7 +116,8 @@ def begin(moves: Array, start: int, goal: int, state: Array, g: Array, rhs: Arra
     g[:], rhs[:], place[:] = NEVER, NEVER, -1
     rhs[goal] = 0
     h = octile(goal // cols - start // cols, goal % cols - start % cols)
-    state[0], state[1], state[2] = put(heap, place, 0, goal, h, 0), 0, start
+    none: Any = np.int64(0)  # a plain 0 would be compiled for as a type of its own
+    state[0], state[1], state[2] = put(heap, place, none, goal, h, none), 0, start
 
 
 @kernel

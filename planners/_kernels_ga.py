@@ -71,6 +71,22 @@ def refill(
     return size, drawn, state
 
 
+@inline
+def copy_points(points: Array, first: int, into: Array) -> None:
+    """into[first:] = points[first:], for points (n, 2)."""
+    for k in range(first, points.shape[0]):
+        into[k, 0], into[k, 1] = points[k, 0], points[k, 1]
+
+
+@inline
+def shortest_of(lengths: Array, size: int) -> int:
+    """Index of the least of the first `size` lengths."""
+    first = 0
+    for i in range(1, size):
+        first = i if lengths[i] < lengths[first] else first
+    return first
+
+
 @kernel
 def next_generation(
     population: Array,
@@ -90,15 +106,18 @@ def next_generation(
     """
     room, n = population.shape[0], population.shape[1]
     # Natural selection: as many clones as there is room, drawn by fitness 1 / length.
-    share = np.cumsum(1.0 / lengths[:size])
+    share, total = np.empty(size, dtype=np.float64), 0.0
+    for i in range(size):
+        total += 1.0 / lengths[i]
+        share[i] = total
     bred = np.empty_like(population)
     keep = 1 if elitism else 0
     if elitism:
-        bred[0] = population[np.argmin(lengths[:size])]
+        copy_points(population[shortest_of(lengths, size)], 0, bred[0])
     for i in range(keep, room):
         state = next_random(state)
         parent = np.searchsorted(share, uniform(state) * share[size - 1], side="right")
-        bred[i] = population[min(parent, size - 1)]
+        copy_points(population[min(parent, size - 1)], 0, bred[i])
     # Crossover behind the same via point for all parents; the tails change hands in reversed order.
     if n > 1:
         state = next_random(state)
@@ -110,23 +129,24 @@ def next_generation(
             if uniform(state) < crossover:
                 parents[count] = i
                 count += 1
-        tails = np.empty((count, n - head, 2), dtype=np.float64)
+        tails = np.empty((count, n, 2), dtype=np.float64)
         for k in range(count):
-            tails[k] = bred[parents[count - 1 - k], head:]
+            copy_points(bred[parents[count - 1 - k]], head, tails[k])
         for k in range(count):
-            bred[parents[k], head:] = tails[k]
+            copy_points(tails[k], head, bred[parents[k]])
     # Mutation of single genes to any free grid point.
     for i in range(keep, room):
         for k in range(n):
             state = next_random(state)
             if uniform(state) < mutation:
                 state = next_random(state)
-                bred[i, k] = points[int(uniform(state) * points.shape[0])]
+                p = int(uniform(state) * points.shape[0])
+                bred[i, k, 0], bred[i, k, 1] = points[p, 0], points[p, 1]
     # Elimination.
     size = 0
     for i in range(room):
         if i < keep or feasible(bred[i], ends, land):
-            population[size] = bred[i]
+            copy_points(bred[i], 0, population[size])
             lengths[size] = length_of(bred[i], ends)
             size += 1
     return size, state
@@ -206,7 +226,7 @@ def refine_generation(
     """
     room, n = population.shape[0], population.shape[1]
     bred = np.empty_like(population)
-    bred[0] = population[np.argmin(lengths)]
+    copy_points(population[shortest_of(lengths, room)], 0, bred[0])
     for i in range(1, room):
         pick = np.empty(2, dtype=np.int64)
         for p in range(2):
@@ -215,14 +235,14 @@ def refine_generation(
             state = next_random(state)
             b = int(uniform(state) * room)
             pick[p] = a if lengths[a] <= lengths[b] else b
-        bred[i] = population[pick[0]]
+        copy_points(population[pick[0]], 0, bred[i])
         state = next_random(state)
         if n > 1 and uniform(state) < crossover:
             state = next_random(state)
             head = 1 + int(uniform(state) * (n - 1))
             other = population[pick[1]]
             if clear_line(land, bred[i, head - 1, 0], bred[i, head - 1, 1], other[head, 0], other[head, 1]):
-                bred[i, head:] = other[head:]
+                copy_points(other, head, bred[i])
         for k in range(n):
             state = next_random(state)
             if uniform(state) < mutation:
@@ -232,6 +252,6 @@ def refine_generation(
                 else:
                     state = shift(bred[i], k, ends, land, reach, state)
     for i in range(room):
-        population[i] = bred[i]
+        copy_points(bred[i], 0, population[i])
         lengths[i] = length_of(bred[i], ends)
     return state

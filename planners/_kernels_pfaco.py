@@ -120,7 +120,8 @@ def run_colony(
     `arrivals` receives the lengths of those that arrived.
     """
     share = np.empty(8, dtype=np.float64)
-    place, first = np.full(len(mask), -1, dtype=np.int64), 0
+    place = np.full(len(mask), -1, dtype=np.int64)
+    first: Any = np.int64(0)  # a plain 0 would be compiled for as a type of its own
     tour = np.empty_like(best)
     ended, new = 0, 0
     counts[ARRIVED] = 0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from worlds._kernels import DCOL, DROW, Array, inline, kernel
@@ -75,7 +77,7 @@ def sink(heap: Array, place: Array, size: int, i: int, first: int, second: int, 
 @kernel
 def put(heap: Array, place: Array, size: int, cell: int, first: int, second: int) -> int:
     """Insert a cell or give it a new key; the size then."""
-    i = place[cell]
+    i: Any = np.int64(place[cell])
     if i < 0:
         rise(heap, place, size, first, second, cell)
         return size + 1
@@ -89,7 +91,7 @@ def put(heap: Array, place: Array, size: int, cell: int, first: int, second: int
 @kernel
 def take(heap: Array, place: Array, size: int, cell: int) -> int:
     """Remove a cell that stands in the heap; the size then."""
-    i = place[cell]
+    i: Any = np.int64(place[cell])
     place[cell] = -1
     size -= 1
     if i < size:

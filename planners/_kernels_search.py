@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from worlds._kernels import DCOL, DROW, SQRT2, Array, inline, kernel
+from worlds._kernels import DCOL, DROW, SQRT2, Array, doubled, inline, kernel
 
 # Path costs are a + b sqrt(2) with whole a and b. Two different ones that could meet in one search differ by
 # far more than this, and rounding by far less.
@@ -121,8 +121,8 @@ def shortest_path(moves: Array, r0: int, c0: int, r1: int, c1: int, informed: bo
                 spare = entry_next[entry]
             else:
                 if entries == len(entry_cell):
-                    entry_cell = np.concatenate((entry_cell, np.empty_like(entry_cell)))
-                    entry_next = np.concatenate((entry_next, np.empty_like(entry_next)))
+                    entry_cell = doubled(entry_cell)
+                    entry_next = doubled(entry_next)
                 entry = np.int32(entries)
                 entries += 1
             entry_cell[entry] = j

@@ -8,10 +8,11 @@ around a disc is `1`, to the right `-1`; a line that leaves a disc in direction 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
-from worlds._kernels import Array, inline, kernel, segment_distance2
+from worlds._kernels import Array, doubled, doubled_rows, inline, kernel, segment_distance2
 
 EPS = 5e-10  # m: a gap no wider than this is closed; a line may lie this much deeper than the clearance
 TURN = 2.0 * math.pi
@@ -65,6 +66,7 @@ def free_arcs(discs: Array, bounds: Array) -> tuple[Array, Array, Array]:
     width = np.empty(4 * n + 16, dtype=np.float64)
     low = np.empty(2 * (n + 5), dtype=np.float64)
     high = np.empty(2 * (n + 5), dtype=np.float64)
+    order = np.empty(2 * (n + 5), dtype=np.int64)
     size = 0
     for i in range(n):
         x, y, r = discs[i, 0], discs[i, 1], discs[i, 2]
@@ -109,14 +111,18 @@ def free_arcs(discs: Array, bounds: Array) -> tuple[Array, Array, Array]:
         first[i] = size
         if gone:
             continue
-        if size + m + 1 > len(begin):
-            begin = np.concatenate((begin, np.empty(len(begin) + m + 1)))
-            width = np.concatenate((width, np.empty(len(width) + m + 1)))
+        while size + m + 1 > len(begin):
+            begin, width = doubled(begin), doubled(width)
         if m == 0:
             begin[size], width[size] = 0.0, TURN
             size += 1
             continue
-        order = np.argsort(low[:m])
+        for q in range(m):  # in order, by insertion: there are few
+            at = q
+            while at > 0 and low[order[at - 1]] > low[q]:
+                order[at] = order[at - 1]
+                at -= 1
+            order[at] = q
         # The gap that runs through the angle 0 comes last.
         reach = high[order[0]]
         for q in range(1, m):
@@ -180,7 +186,7 @@ def gates(discs: Array, bounds: Array) -> Array:
             if abs(gap) > 4.0 * EPS:
                 continue
             if size == len(out):
-                out = np.concatenate((out, np.empty_like(out)))
+                out = doubled_rows(out)
             out[size, 0], out[size, 1], out[size, 2], out[size, 3] = x, y, bx, by
             size += 1
     return out[:size]
@@ -289,8 +295,8 @@ def visible(
 def push(heap_f: Array, heap_e: Array, size: int, f: float, e: int) -> tuple[Array, Array, int]:
     """Add an entry to a binary heap."""
     if size == len(heap_f):
-        heap_f = np.concatenate((heap_f, np.empty_like(heap_f)))
-        heap_e = np.concatenate((heap_e, np.empty_like(heap_e)))
+        heap_f = doubled(heap_f)
+        heap_e = doubled(heap_e)
     at = size
     while at > 0:
         up = (at - 1) >> 1
@@ -348,7 +354,7 @@ def shortest_path(discs: Array, bounds: Array, ends: Array) -> tuple[Array, floa
     lines = 0
     span = np.full((2 * n + 1, 2), -1, dtype=np.int64)  # by disc and turn, the start last: lines that leave
     heap_f, heap_e = np.empty(256, dtype=np.float64), np.empty(256, dtype=np.int64)
-    waiting = 0
+    waiting: Any = np.int64(0)  # a plain 0 would be compiled for as a type of its own
     # Arrivals that were followed, as linked lists by arc and turn.
     arrived = np.full(2 * len(begin), -1, dtype=np.int64)
     earlier = np.full(room, -1, dtype=np.int64)
@@ -399,11 +405,12 @@ def shortest_path(discs: Array, bounds: Array, ends: Array) -> tuple[Array, floa
                     if not visible(ax, ay, bx, by, i, j, discs, bounds, start, items, shape, cell, gate):
                         continue
                     if lines == room:
-                        num = np.concatenate((num, np.empty_like(num)))
-                        ref = np.concatenate((ref, np.empty_like(ref)))
-                        best = np.concatenate((best, np.empty_like(best)))
-                        earlier = np.concatenate((earlier, np.empty_like(earlier)))
-                        done = np.concatenate((done, np.zeros(room, dtype=np.bool_)))
+                        num = doubled_rows(num)
+                        ref = doubled_rows(ref)
+                        best = doubled(best)
+                        earlier = doubled(earlier)
+                        done = doubled(done)
+                        done[room:] = False
                         room *= 2
                     num[lines, 0], num[lines, 1] = leave, reach
                     num[lines, 2] = math.sqrt(max(0.0, d * d - across * across))

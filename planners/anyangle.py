@@ -98,6 +98,7 @@ def cells_along(query: Query, waypoints: npt.ArrayLike) -> Cells:
     while True:
         within = width < max(query.grid.shape)
         near = _kernels_anyangle.corridor_moves(moves, line, width) if within else moves
+        near.setflags(write=False)  # as a grid's own are, for which the search is compiled
         cells, _, _, _ = _kernels_search.shortest_path(near, *query.start, *query.goal, True)
         if len(cells) or not within:
             return np.asarray(cells, dtype=np.int32)

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from worlds._kernels import kernel, segment_clearance, wall_distance
+from worlds._kernels import doubled_rows, kernel, segment_clearance, wall_distance
 
 Array = Any
 
@@ -127,8 +127,8 @@ def bucket(discs: Array, bounds: Array, side: float, reach: float) -> tuple[Arra
             dy = max(max(y_lo - discs[j, 1], discs[j, 1] - y_lo - side), 0.0)
             if math.hypot(dx, dy) - discs[j, 2] <= reach:
                 if count == found.shape[0]:
-                    found = np.concatenate((found, np.empty_like(found)))
-                found[count] = discs[j]
+                    found = doubled_rows(found)
+                found[count, 0], found[count, 1], found[count, 2] = discs[j, 0], discs[j, 1], discs[j, 2]
                 count += 1
         starts[b + 1] = count
     return found[:count].copy(), starts

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+
+from joblib import Parallel, delayed
 
 from planners import PLANNERS
 from robots import load_robot
@@ -12,19 +15,45 @@ from sim.filming.video import film
 from sim.scenario import Scenario, plan, run
 from worlds import Cruising, Disc, Task, World
 
+# What shares kernels is compiled by one process; the longest first.
+TOGETHER = (
+    ("tangent",),
+    ("aco-han", "as", "pfaco"),
+    ("ga-han", "hybrid"),
+    ("dstar-lite", "dstar"),
+    ("apf", "mmas-dstar"),
+)
 
-def warm() -> None:
-    """Plan with every planner drive once and film it, in a world so small that compiling is all it costs."""
+
+def _scenario() -> Scenario:
+    """A world so small that compiling is all it costs."""
     mover = Cruising(radius=0.1, position=(0.2, 2.8), velocity=(0.1, 0.0))
     world = World("warm", (0.0, 0.0, 3.0, 3.0), (Disc(1.5, 1.5, 0.2),), movers=(mover,))
     task = Task(world, (0.75, 0.75, 0.0), (2.25, 2.25), cell=0.25)
-    scenario = Scenario(task=task, planner=PLANNERS["astar"], robot=load_robot("turtlebot"))
-    for planner in PLANNERS.values():
-        plan(replace(scenario, planner=planner))
-    log = run(scenario).rollout
+    return Scenario(task=task, planner=PLANNERS["astar"], robot=load_robot("turtlebot"))
+
+
+def plan_with(names: Sequence[str]) -> None:
+    """Plan with these planners."""
+    for name in names:
+        plan(replace(_scenario(), planner=PLANNERS[name]))
+
+
+def drive_and_film() -> None:
+    """Drive once and film it."""
+    log = run(_scenario()).rollout
     assert log is not None
     with tempfile.TemporaryDirectory() as folder:
         film(log, Path(folder) / "warm.mp4", size=(160, 160), fps=2)
+
+
+def warm(jobs: int = -1) -> None:
+    """Plan with every planner, drive once and film it, on as many processes as there are cores unless told."""
+    plan_with(["astar"])  # what all need
+    Parallel(jobs)([delayed(plan_with)(TOGETHER[0]), delayed(drive_and_film)(), *map(delayed(plan_with), TOGETHER[1:])])
+    # Once more from the cache; what two processes wrote at the same moment, and one of them lost, is compiled now.
+    plan_with(list(PLANNERS))
+    drive_and_film()
 
 
 if __name__ == "__main__":

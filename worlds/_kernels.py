@@ -21,6 +21,25 @@ DCOL = np.array([1, 1, 0, -1, -1, -1, 0, 1], dtype=np.int64)
 
 
 @kernel
+def doubled(array: Array) -> Array:
+    """A vector with room for as many entries again, which are left undefined."""
+    out = np.empty(2 * len(array), dtype=array.dtype)
+    for i in range(len(array)):
+        out[i] = array[i]
+    return out
+
+
+@kernel
+def doubled_rows(array: Array) -> Array:
+    """The same for a table (N, M)."""
+    out = np.empty((2 * len(array), array.shape[1]), dtype=array.dtype)
+    for i in range(len(array)):
+        for j in range(array.shape[1]):
+            out[i, j] = array[i, j]
+    return out
+
+
+@kernel
 def segment_distance2(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
     """Squared distance from a point to the closed segment ab."""
     dx, dy = bx - ax, by - ay
