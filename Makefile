@@ -32,7 +32,7 @@ $(VENV)/.dev: $(VENV)/.core
 warm: $(VENV)/.warm
 
 demo: $(VENV)/.warm
-	@$(BIN)/antdrive run forest --planner aco-han --robot turtlebot --out $(DEMO) --video $(DEMO)/film.mp4
+	@$(BIN)/antdrive run forest --out $(DEMO) --video $(DEMO)/film.mp4
 
 test: $(VENV)/.dev $(VENV)/.warm
 	@$(BIN)/ruff check --quiet .

@@ -56,7 +56,7 @@ Out = Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the re
 @app.command()
 def run(
     world: World,
-    planner: Planner = "astar",
+    planner: Planner = "ants",
     settings: Settings = None,
     robot: Robot = "turtlebot",
     seed: Seed = 0,
@@ -103,7 +103,7 @@ def run(
 @app.command()
 def plan(
     world: World,
-    planner: Planner = "astar",
+    planner: Planner = "ants",
     settings: Settings = None,
     robot: Robot = "turtlebot",
     seed: Seed = 0,
@@ -137,7 +137,7 @@ def plan(
         say_json(facts)
     else:
         say(f"{scenario.task.world.name}: {planner} {answer.status.value}" + _because(answer.reason))
-        if answer.solved:
+        if len(answer.cells):
             say(f"  length {answer.line_length:.3f} m over {len(answer.cells)} cells, {answer.work} {answer.work_unit}")
         say(f"  planned in {answer.wall_s * 1000:.1f} ms on {grid.shape[0]} x {grid.shape[1]} cells of {grid.cell:g} m")
         _tell_files(files)

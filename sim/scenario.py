@@ -75,7 +75,7 @@ class Scenario:
 
     @classmethod
     def of(
-        cls, world: str, planner: str = "astar", robot: str = "turtlebot", *, options: dict[str, Any] | None = None,
+        cls, world: str, planner: str = "ants", robot: str = "turtlebot", *, options: dict[str, Any] | None = None,
         **settings: Any,
     ) -> Scenario:  # fmt: skip
         """A scenario by names: of a world and a robot (or their files) and of a planner with its options."""

@@ -60,7 +60,8 @@ def test_run_tells_people_what_happened(antdrive, small: Path) -> None:  # type:
 
 def test_a_collision_is_exit_code_1_and_the_log_fails_verify(antdrive, small: Path, collided_run: Run) -> None:  # type: ignore[no-untyped-def]
     disc = collided_run.scenario.unseen[0]
-    code, out, _ = antdrive("run", small, "--unseen", f"{disc.x},{disc.y},{disc.radius}", "--json", "--out", "r")
+    hidden = f"{disc.x},{disc.y},{disc.radius}"
+    code, out, _ = antdrive("run", small, "-p", "astar", "--unseen", hidden, "--json", "--out", "r")
     facts = json.loads(out)
     assert code == 1
     assert facts["outcome"] == "collided"
