@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import abc
+import dataclasses
 import itertools
 import math
 import time
@@ -57,8 +58,8 @@ def watch(see: Callable[[Progress], None]) -> Iterator[None]:
 class IterativePlanner(GridPlanner):
     """A planner that improves its answer in iterations.
 
-    It ends after `iterations`, at the `time_budget`, or at Ctrl-C; the last two still return the best path so
-    far, with a note in `reason`. A time budget gives up repeatability: a faster machine gets further.
+    It ends after `iterations`, or with the best path so far at the `time_budget`, with a note in `reason`. A time
+    budget gives up repeatability: a faster machine gets further. At Ctrl-C it hands over the best so far as `STOPPED`.
     """
 
     iterations: int = 100
@@ -94,6 +95,7 @@ class IterativePlanner(GridPlanner):
             note = self._improve(states, done)
         except KeyboardInterrupt:
             note = f"interrupted after {len(done)} of {self.iterations} iterations"
+            return dataclasses.replace(self._conclude(query, done, note), status=PlanStatus.STOPPED)
         return self._conclude(query, done, note)
 
     def _improve(self, states: Iterator[Iteration], done: list[Iteration]) -> str:

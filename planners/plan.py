@@ -28,7 +28,7 @@ class PlanStatus(enum.Enum):
 
     SOLVED = "found a path"
     NO_PATH = "no path on this grid"
-    STOPPED = "stopped before a path was found"
+    STOPPED = "stopped early"
 
 
 @runtime_checkable
@@ -141,12 +141,13 @@ class History:
 class PlanResult:
     """A planner's answer, in cells.
 
-    `cells` runs along allowed moves of the grid from start to goal and `cost` is its length. A planner that is not bound
+    `cells` runs along allowed moves of the grid from start to goal and `cost` is its length. One that was interrupted
+    hands over the best path so far, if it has one, as `STOPPED`: to be looked at, not to be driven. A planner that is not bound
     to the grid's eight directions also gives `waypoints`, the polyline to be driven, in fractional cells.
     """
 
     status: PlanStatus
-    cells: Cells = field(default_factory=lambda: np.empty((0, 2), dtype=np.int32))  # (N, 2), empty unless solved
+    cells: Cells = field(default_factory=lambda: np.empty((0, 2), dtype=np.int32))  # (N, 2), empty if there is none
     cost: float = math.inf  # length of `cells` [m]
     waypoints: Floats | None = None  # (M, 2) any-angle polyline in (row, col); None: the cells themselves
     length: float | None = None  # exact length of what `waypoints` stand for, arcs included [m]; None: `cost`
@@ -160,7 +161,7 @@ class PlanResult:
 
     @property
     def solved(self) -> bool:
-        """Whether there is a path."""
+        """Whether there is a path to be driven."""
         return self.status is PlanStatus.SOLVED
 
     @property

@@ -125,7 +125,7 @@ def plan_figure(
             draw_landscape(figure, chart, grid, plan.landscape)
         draw_map(chart, scene, floor=plan.landscape is None)
         handles: list[Any] = []
-        if plan.solved:
+        if len(plan.cells):
             cells, line = grid.xy(plan.cells), grid.xy(plan.line)
             handles += chart.plot(*cells.T, ".", ms=3.4, color=hexed(ROUTE), label="planned cells", zorder=5)
             handles += chart.plot(*line.T, "-", lw=1.9, color=hexed(SHELL), label="planned path", zorder=6)
@@ -136,7 +136,8 @@ def plan_figure(
         draw_legend(chart, handles, scene)
         if iterations:
             draw_history(figure.add_subplot(areas[0, 1]), plan.history)
-        length = f"{plan.cost:.2f} m" if plan.solved else plan.status.value
+        length = f"{plan.cost:.2f} m" if len(plan.cells) else plan.status.value
+        length += ", stopped early" if len(plan.cells) and not plan.solved else ""
         figure.suptitle(
             f"{scene.name}   ·   {length}   ·   {plan.work:,} {plan.work_unit}",
             x=0.012,

@@ -44,7 +44,7 @@ class Outcome(enum.Enum):
     TIMED_OUT = "the time limit passed before the goal was reached"
     STUCK = "stopped making progress"
     NO_PATH = "no path on this grid"
-    STOPPED = "stopped before a path was found"
+    STOPPED = "planning stopped early"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -192,7 +192,10 @@ def interrupt_after(count: int) -> list[Progress]:
 def test_ctrl_c_returns_the_best_so_far() -> None:
     with watch(interrupt_after(3).append):
         result = AcoHan(ants=20, iterations=50).plan(catalogue()["empty"], np.random.default_rng(0))
-    assert result.solved
+    assert result.status is PlanStatus.STOPPED
+    assert not result.solved
+    assert result.cost == pytest.approx(result.history.best[-1])
+    assert result.cells[0].tolist() == list(catalogue()["empty"].start)
     assert result.reason == "interrupted after 3 of 50 iterations"
     assert len(result.history) == 3
 

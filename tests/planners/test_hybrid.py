@@ -86,7 +86,7 @@ def test_stopped_while_ants_forage_it_answers_with_their_pulled_path() -> None:
 
     with watch(stop):
         result = solve(query)
-    assert result.solved
+    assert result.status is PlanStatus.STOPPED
     assert result.reason == "interrupted after 3 of 200 iterations"
     assert result.length == pytest.approx(result.history.best[-1])
 

@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planners import find_planner
+from planners import Progress, find_planner, watch
 from robots import PurePursuit, RobotSpec
 from sim import Engine, Outcome, Run, Scenario, measure, run
 from sim.drive import drive
+from sim.plots import plan_figure
 from worlds import Disc, InputError, Route, Task, World, catalogue, load_task
 
 
@@ -124,6 +125,24 @@ def test_a_budget_that_ends_first_is_told(small_scenario: Scenario) -> None:
     result = run(replace(small_scenario, planner=blind))
     assert result.outcome is Outcome.STOPPED
     assert result.plan.reason
+
+
+def test_the_planner_is_our_ants_unless_told() -> None:
+    assert Scenario.of("empty").planner_name == "ants"
+
+
+def test_ctrl_c_while_planning_keeps_the_best_path_and_does_not_drive(small_scenario: Scenario, tmp_path: Path) -> None:
+    def stop(progress: Progress) -> None:
+        if progress.done == 2:
+            raise KeyboardInterrupt
+
+    s = replace(small_scenario, planner=find_planner("aco-han", ants=50))
+    with watch(stop):
+        result = run(s)
+    assert result.outcome is Outcome.STOPPED
+    assert result.rollout is None
+    assert len(result.plan.cells)
+    assert plan_figure(s.task, result.grid, result.plan, s.robot, tmp_path / "p.png").exists()
 
 
 def test_time_runs_out(small_scenario: Scenario) -> None:
