@@ -43,8 +43,8 @@ class PotentialFieldAnts(IterativePlanner):
     attraction: float = 1.0  # k_att of eq. 9
     repulsion: float = 10.0  # k_rep of eq. 11
     influence: float = 2.0  # d0 of eq. 11 [cells]
-    deposit: float = 0.1  # on each cell of a path of the first rank; the last gets next to nothing
-    least: float = 0.01  # pheromone does not decay below this
+    deposit: float = 2.0  # on each cell of a path of the first rank; the last gets next to nothing
+    least: float = 0.001  # pheromone does not decay below this
     converged: float = 0.02  # the field has converged when an iteration changes its sum by less than this share
     max_steps: int | None = None  # a walk that takes more ends; None: a step per cell, within 100 to 20 000
     retreat: bool = False  # an ant in a dead end steps back out of it; else it starts again
