@@ -46,6 +46,11 @@ class MergingAnts(MaxMinAnts):
         require("lane_pull", self.lane_pull, at_least=0)
         require("lane_spread", self.lane_spread, at_least=0)
         require("settled", self.settled, at_least=1)
+        for key, unset in (("beta", None), ("heuristic", "goal")):
+            if getattr(self, key) != unset:
+                raise ValueError(
+                    f"{key}: must be {unset!r}, as these ants are drawn by `greed`; got {getattr(self, key)!r}"
+                )
 
     @property
     def castes(self) -> tuple[int, ...]:

@@ -20,6 +20,7 @@ TOGETHER = (
     ("tangent",),
     ("aco-han", "as", "pfaco"),
     ("ga-han", "hybrid"),
+    ("sipp",),
     ("dstar-lite", "dstar"),
     ("apf", "mmas-dstar"),
 )

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from worlds_to_solve import catalogue, optimum, random_query
 
 from planners import (
+    PLANNERS,
     AgeingAnts,
     AntSystem,
     Colony,
@@ -23,6 +24,7 @@ from planners import (
     PlanStatus,
     Query,
     _kernels_ants,
+    find_planner,
 )
 from planners.ant_system import ibraheem_beta
 from planners.ants import Ground, Season, Turn, Walks, _Walk, cut_short
@@ -139,6 +141,19 @@ def test_threads_do_not_change_the_plan(planner: Colony, threads: int) -> None:
     np.testing.assert_array_equal(alone.history.iteration_mean, shared.history.iteration_mean)
     np.testing.assert_array_equal(alone.landscape, shared.landscape)  # type: ignore[arg-type]
     assert alone.work == shared.work
+
+
+@pytest.mark.parametrize("world", ["trap", "forest"])
+@pytest.mark.parametrize("name", [name for name, planner in PLANNERS.items() if hasattr(planner, "retreat")])
+def test_every_ant_planner_arrives_that_retreats_and_cuts_short(name: str, world: str) -> None:
+    options = {"ants": 5, "iterations": 3, "retreat": True, "shortcut": True}
+    query = catalogue()[world]
+    result = find_planner(name, **options).plan(query, np.random.default_rng(0))
+    assert result.solved
+    ground = Ground.of(query)
+    flat = (result.cells @ [ground.shape[1], 1]).astype(np.int32)[np.newaxis]
+    again = cut_short(Walks(flat, np.array([flat.size]), np.array([result.cost])), ground)
+    assert again.sizes[0] == flat.size  # nothing is left to be cut
 
 
 # Cutting short
@@ -384,6 +399,7 @@ def test_merging_ants_get_through_a_maze() -> None:
         (AntSystem, "heuristic", "smell"), (AgeingAnts, "least", 0.0), (AgeingAnts, "most", 0.01),
         (ExploringAnts, "explorers", -1), (ExploringAnts, "elite", -1.0), (MaxMinAnts, "p_best", 1.0),
         (MaxMinAnts, "patience", 0), (MergingAnts, "scouts", -1), (MergingAnts, "settled", 0),
+        (MergingAnts, "beta", 2.0), (MergingAnts, "heuristic", "step"),
     ],
 )  # fmt: skip
 def test_options_out_of_range_are_refused_by_name(kind: type[Colony], key: str, value: object) -> None:
