@@ -1,8 +1,8 @@
 """How good and how fast the planners are: `python -m benchmarks.planners [--quick] [--peer PYTHON] [TABLE ...]`.
 
-Tables: quality, papers, hasan, han2007, speed, peer; all but the last by default. Everything runs in one go on one
-core, on the same grids; figures are medians over seeds. A gap is how much longer a path is than the shortest over
-the same moves.
+Tables: quality, hard, papers, hasan, han2007, speed, peer; all but the last by default. Everything runs in one go on one
+core, on the same grids; figures are medians over seeds, times those of the processor. A gap is how much longer a path
+is than the shortest over the same moves.
 
 The papers' own maps are known as pictures only. Maps here that stand for them are called recreated: random ones of the same size
 and kind, judged by their own optimum. The papers' figures stand beside them, and are not of the same map.
@@ -13,6 +13,7 @@ The peer is python_motion_planning 1.1.1 (GPL, hence never imported here): PYTHO
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import itertools
 import json
 import math
@@ -76,12 +77,43 @@ def block_grid(rows: int, cols: int, count: int, largest: int, seed: int) -> Que
     return crossable(draw, seed)
 
 
+def maze(size: int, seed: int, opened: float = 0.0) -> Query:
+    """A maze of size × size cells (odd) with one way only, but that a share of its walls is then opened."""
+    rng, n = np.random.default_rng(seed), size // 2
+    free = np.zeros((size, size), dtype=np.bool_)
+    free[1, 1] = True
+    stack = [(0, 0)]
+    while stack:
+        r, c = stack[-1]
+        ahead = [(r + dr, c + dc) for dr, dc in ((0, 1), (1, 0), (0, -1), (-1, 0))]
+        ahead = [(q, d) for q, d in ahead if 0 <= q < n and 0 <= d < n and not free[2 * q + 1, 2 * d + 1]]
+        if not ahead:
+            stack.pop()
+            continue
+        q, d = ahead[rng.integers(len(ahead))]
+        free[2 * q + 1, 2 * d + 1] = free[r + q + 1, c + d + 1] = True
+        stack.append((q, d))
+    free[1:-1, 1:-1] |= rng.random((size - 2, size - 2)) < opened
+    return Query(Grid.from_free(free), (1, 1), (size - 2, size - 2))
+
+
+def cup(size: int) -> Query:
+    """The start deep in a cup that is closed towards the goal."""
+    free = np.ones((size, size), dtype=np.bool_)
+    low, high = size // 6, 5 * size // 6
+    free[low : high + 1, high] = free[low, low:high] = free[high, low:high] = False
+    return Query(Grid.from_free(free), (size // 2, size // 2), (size // 2, size - 2))
+
+
 def optimum(query: Query) -> float:
     return find_planner("astar").plan(query, np.random.default_rng(0)).cost
 
 
 def solve(planner: Planner, query: Query, seed: int) -> PlanResult:
-    return planner.plan(query, np.random.default_rng(seed))
+    """The plan, its time that of the processor: nothing here runs on a second core, and others may be at work."""
+    started = time.process_time()
+    result = planner.plan(query, np.random.default_rng(seed))
+    return dataclasses.replace(result, wall_s=time.process_time() - started)
 
 
 # Tables
@@ -132,6 +164,27 @@ def quality(quick: bool) -> Iterator[str]:
         yield f"{kind.capitalize()}; arrived, gap median / most, time"
         yield ""
         yield from table(heads, rows)
+
+
+def hard(quick: bool) -> Iterator[str]:
+    """`ants` where a way is hard to find or long."""
+    kinds: dict[str, Callable[[int], Query]] = {
+        "200×200, 25 % blocked": lambda seed: random_grid(200, seed),
+        "100×100, 35 % blocked": lambda seed: random_grid(100, seed, 0.35),
+        "200×200 cylinders": lambda seed: cylinder_grid(200, seed),
+        "101×101 maze, one way": lambda seed: maze(101, seed),
+        "201×201 maze, 5 % of its walls open": lambda seed: maze(201, seed, 0.05),
+        "100×100, in a cup": lambda seed: cup(100),
+    }
+    planner, rows = find_planner("ants"), []
+    solve(planner, cup(20), 0)
+    for label, make in kinds.items():
+        queries = [make(seed) for seed in SEEDS[: 2 if quick else 5]]
+        arrived, gaps, wall = summary(planner, queries)
+        gap = f"{percent(statistics.median(gaps))} / {percent(max(gaps))}" if gaps else "–"
+        length = statistics.median(len(solve(find_planner("astar"), query, 0).cells) for query in queries)
+        rows.append([label, f"{length:.0f}", f"{arrived}/{len(queries)}", gap, seconds(wall)])
+    yield from table(["map", "cells of the shortest way", "`ants` arrived", "gap median / most", "time"], rows)
 
 
 def paper_maps(quick: bool) -> Iterator[tuple[str, str, str, dict[str, Any], list[Query], str]]:
@@ -372,9 +425,9 @@ def speed(quick: bool) -> Iterator[str]:
             colony.weigh(ground, colony.lay(ground, rng), colony.desire(ground), walk.weights[0])
             rates = []
             for _ in range(5):
-                started = time.perf_counter()
+                started = time.process_time()
                 _, steps = walk.go(rng)
-                rates.append(steps / (time.perf_counter() - started))
+                rates.append(steps / (time.process_time() - started))
             rows.append([f"{size}×{size}", label, f"{statistics.median(rates) / 1e6:.1f} M"])
     yield "Walking alone, one core, 20 % blocked"
     yield ""
@@ -423,7 +476,7 @@ def path_length(cells: Sequence[Sequence[int]], query: Query) -> float:
 
 
 def peer(quick: bool, python: str) -> Iterator[str]:
-    """python_motion_planning's ACO, 50 ants and 100 iterations as it comes; times of the processor, on one core."""
+    """python_motion_planning's ACO, 50 ants and 100 iterations as it comes."""
     kinds = [("10×10, 10 % blocked", 10, 0.1), ("20×20, 20 % blocked", 20, 0.2), ("30×30, 10 % blocked", 30, 0.1)]
     seeds = SEEDS[: 2 if quick else 5]
     rows = []
@@ -449,9 +502,8 @@ def peer(quick: bool, python: str) -> Iterator[str]:
             solve(planner, queries[0], 0)
             results, walls = [], []
             for seed, query in enumerate(queries):
-                started = time.process_time()
                 trials = [solve(planner, query, seed) for _ in range(10)]
-                walls.append((time.process_time() - started) / len(trials))
+                walls.append(statistics.median(r.wall_s for r in trials))
                 results.append(trials[0])
             gap = [r.cost / optimum(q) - 1 for r, q in zip(results, queries, strict=True) if r.solved]
             ratio = statistics.median(t / w for (t, _), w in zip(answers, walls, strict=True))
@@ -473,7 +525,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="fewer seeds and sizes")
     parser.add_argument("--peer", metavar="PYTHON", help="an interpreter with python_motion_planning 1.1.1")
     arguments = parser.parse_args()
-    makers = {f.__name__: f for f in (quality, papers, hasan, han2007, speed)}
+    makers = {f.__name__: f for f in (quality, hard, papers, hasan, han2007, speed)}
     for name in arguments.tables or [*makers, *(["peer"] if arguments.peer else [])]:
         if name == "peer":
             lines = peer(arguments.quick, arguments.peer or parser.error("peer: needs --peer PYTHON"))
