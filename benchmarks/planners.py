@@ -129,7 +129,7 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
 
 
 def seconds(value: float) -> str:
-    return f"{1e3 * value:.2g} ms" if value < 0.1 else f"{1e3 * value:.0f} ms" if value < 1 else f"{value:.2f} s"
+    return f"{1e3 * value:.2g} ms" if value < 0.0995 else f"{1e3 * value:.0f} ms" if value < 1 else f"{value:.2f} s"
 
 
 def percent(share: float) -> str:
