@@ -95,6 +95,7 @@ class MergingAnts(MaxMinAnts):
         for walks in (tours, best):
             if walks is not None:
                 _kernels_ants.union_moves(walks.cells, walks.sizes, ground.shape[1], moves)
+        moves &= ground.mask  # the best may be of before a change
         moves.setflags(write=False)  # as a grid's own are, for which the search is compiled
         cols = ground.shape[1]
         cells, straight, diagonal, _ = _kernels_search.shortest_path(

@@ -32,8 +32,10 @@ class Senses:
         self._ticks_per_fix = max(1, round(1 / (noise.pose_rate * period)))
         self._tick = 0
         self.estimate = start
-        drift = (noise.encoder**2 + noise.slip**2) * (1.0 / noise.pose_rate) ** 2
-        self._gain = _steady_gain(drift, noise.pose_xy**2), _steady_gain(4 * drift, noise.pose_yaw**2)
+        # What reckoning at 1 m/s loses between two fixes; slip lasts, so that it adds up over several.
+        lasting = max(1.0, 2 * SLIP_TIME * noise.pose_rate)
+        drift = (noise.encoder**2 + lasting * noise.slip**2) / noise.pose_rate**2
+        self._gain = _steady_gain(drift / 2, noise.pose_xy**2), _steady_gain(2 * drift / track**2, noise.pose_yaw**2)
 
     def look(self, pose: Pose, twist: Twist) -> Pose:
         """Where the robot, now truly at `pose` and moving by `twist`, believes to be."""

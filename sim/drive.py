@@ -63,7 +63,7 @@ def drive(
         raise ValueError(f"control_hz: must divide the physics rate {engine.physics_hz}, got {control_hz}")
     engine.place(task.start)
     rows = [(*engine.state(), 0.0, 0.0, 0)]
-    beliefs = [task.start] if senses else []
+    errors = [(0.0, 0.0, 0.0)]  # of the belief, a row each: it moves with the robot between two looks
     contacts = [(0, *contact) for contact in engine.contacts()]
     outcome = Outcome.COLLIDED if contacts else None
     command, state = Twist(0.0, 0.0), Progress()
@@ -78,7 +78,8 @@ def drive(
         x, y, yaw, speed, yaw_rate = rows[-1][:5]
         believed = (x, y, yaw)
         if senses:
-            senses.look(believed, Twist(speed, yaw_rate))
+            estimate = senses.look(believed, Twist(speed, yaw_rate))
+            errors[-1] = (estimate[0] - x, estimate[1] - y, math.remainder(estimate[2] - yaw, 2 * math.pi))
             believed = senses.ahead()
         command, state = controller.step(guide, believed, command, state)
         if guide.length - state.arc <= guide.goal_distance and _standing(speed, yaw_rate) and not any(command):
@@ -91,8 +92,7 @@ def drive(
         for _ in range(substeps):
             touched = engine.step()
             rows.append((*engine.state(), *command, state.limiter))
-            if senses:
-                beliefs.append(senses.estimate)
+            errors.append(errors[-1])
             if touched:
                 contacts += [(len(rows) - 1, *contact) for contact in touched]
                 outcome = Outcome.COLLIDED
@@ -109,7 +109,7 @@ def drive(
         for _ in range(round(AFTER_CONTACT * engine.physics_hz)):
             touched = engine.step()
             rows.append((*engine.state(), 0.0, 0.0, state.limiter))
-            beliefs += beliefs[-1:]
+            errors.append(errors[-1])
             contacts += [(len(rows) - 1, *contact) for contact in touched]
     log = np.array(rows)
     t = np.arange(len(log)) / engine.physics_hz
@@ -134,7 +134,7 @@ def drive(
         limiter=log[:, 7].astype(np.uint8),
         movers=movers,
         contacts=np.array(contacts, dtype=np.float64).reshape(-1, 4),
-        estimate=np.array(beliefs, dtype=np.float64).reshape(-1, 3),
+        estimate=pose + np.array(errors) if senses else np.empty((0, 3)),
     )
 
 

@@ -98,12 +98,12 @@ def test_a_robot_file_may_tell_its_noise(tmp_path) -> None:
 
     text = robots()["turtlebot"].read_text()
     path = tmp_path / "mine.yaml"
-    path.write_text(text.replace("slip: 0.03", "slip: 0.1"))
+    path.write_text(text.replace("slip: 0.02", "slip: 0.1"))
     assert load_robot(path).noise.slip == 0.1
     path.write_text("\n".join(line for line in text.splitlines() if not line.startswith("noise")))
     assert not load_robot(path).noise.loud
     for wrong, says in (("slip: 2", "slip"), ("slop: 0.1", "slop"), ("slip: often", "slip")):
-        path.write_text(text.replace("slip: 0.03", wrong))
+        path.write_text(text.replace("slip: 0.02", wrong))
         with pytest.raises(InputError, match=says) as error:
             load_robot(path)
         assert "mine.yaml" in str(error.value)
