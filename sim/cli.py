@@ -50,6 +50,9 @@ Noise = Annotated[
     float, typer.Option(min=0.0, max=100.0, help="How much of the robot's own noise; 0 is a perfect robot.")
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else.")]
+Prelude = Annotated[
+    float, typer.Option("--prelude", min=0.0, max=60.0, help="The film begins with so many seconds of planning.")
+]
 Out = Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the results.")]
 
 
@@ -71,6 +74,7 @@ def run(
     time_limit: Annotated[float | None, typer.Option(min=1e-3, max=1e6, help="Simulated time allowed [s].")] = None,
     out: Out = None,
     video: Annotated[Path | None, typer.Option(help="Also film it: .mp4, .gif or .webp.")] = None,
+    prelude: Prelude = 0.0,
     json: Json = False,
 ) -> int:
     """Plan, drive in physics, certify; exit 0 when the robot stopped at the goal and touched nothing."""
@@ -90,7 +94,7 @@ def run(
         grid, answer = make_plan(scenario)
     with bar("driving") as progress:
         result = drive_it(scenario, planned=(grid, answer), progress=progress)
-    files = _write(result, folder, video)
+    files = _write(result, folder, video, prelude)
     report = {**result.as_dict(), "files": files, "command": _command()}
     _write_json(folder / "result.json", report)
     if json:
@@ -152,6 +156,7 @@ def render(
     size: Annotated[str, typer.Option(help="Width x height in pixels.")] = "1280x720",
     fps: Annotated[int, typer.Option(min=1, max=240)] = 30,
     speed: Annotated[float, typer.Option(min=0.01, max=100, help="2 is twice as fast as life.")] = 1.0,
+    prelude: Prelude = 0.0,
     json: Json = False,
 ) -> int:
     """Film a rollout, from any camera, without simulating again."""
@@ -165,7 +170,7 @@ def render(
         still(log, out, camera=camera, size=shape, note=_note(log))
         facts: dict[str, Any] = {"file": str(out), "frames": 1}
     else:
-        facts = _film(log, out, camera=camera, size=shape, fps=fps, speed=speed)
+        facts = _film(log, out, camera=camera, size=shape, fps=fps, speed=speed, prelude=prelude)
     if json:
         say_json(facts)
     else:
@@ -699,7 +704,7 @@ def _file_name(name: str) -> str:
     return "".join(c if c.isalnum() or c in "-_." else "_" for c in name)
 
 
-def _write(result: Run, folder: Path, video: Path | None) -> dict[str, str]:
+def _write(result: Run, folder: Path, video: Path | None, prelude: float) -> dict[str, str]:
     files = {"result": str(folder / "result.json")}
     if result.rollout is None:
         (folder / "rollout.npz").unlink(missing_ok=True)  # of an earlier run; it would belie this one's result
@@ -713,7 +718,7 @@ def _write(result: Run, folder: Path, video: Path | None) -> dict[str, str]:
     files["rollout"] = str(result.rollout.save(folder / "rollout.npz"))
     files["figure"] = str(overview(result.rollout, folder / "overview.png"))
     if video is not None:
-        files["film"] = _film(result.rollout, video)["file"]
+        files["film"] = _film(result.rollout, video, prelude=prelude)["file"]
     return files
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import zlib
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import TypeAlias
 
 import numpy as np
@@ -48,9 +51,47 @@ SPEED_STOPS: tuple[Colour, ...] = (
 )
 
 
+#: A planner's field, such as pheromone, from none to much.
+FIELD_STOPS: tuple[Colour, ...] = ((244, 246, 249), (213, 228, 243), (143, 188, 224), (63, 131, 191), (18, 63, 122))
+
+#: Okabe & Ito's colours, told apart by the colour-blind, without the yellow that a white page swallows.
+DISTINCT: tuple[Colour, ...] = (
+    (0, 114, 178), (213, 94, 0), (0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180, 233), (27, 35, 51),
+)  # fmt: skip
+
+#: The family decides: each planner has its colour and dash everywhere.
+PLANNER_STYLES: Mapping[str, tuple[Colour, str]] = MappingProxyType(
+    {
+        name: (DISTINCT[k % len(DISTINCT)], ("solid", "dashed", "dotted")[k // len(DISTINCT)])
+        for k, name in enumerate(
+            (
+                *("aco-han", "ants", "mmas", "pfaco", "iaco", "maco", "as"),
+                *("ga-han", "hybrid", "tangent", "aco-han-elite", "mmas-dstar", "astar", "dijkstra"),
+                *("dstar-lite", "dstar", "apf"),
+            )
+        )
+    }
+)
+
+
+def planner_style(name: str) -> tuple[Colour, str]:
+    """A planner's colour and line style, the same in every picture; others' planners get one by their name."""
+    k = zlib.crc32(name.encode())
+    return PLANNER_STYLES.get(name, (DISTINCT[k % len(DISTINCT)], "dashdot"))
+
+
+def field_colours(level: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """Colours (N, 3), 0..255, of a field's levels (N,), 0 to 1."""
+    return _along(FIELD_STOPS, level)
+
+
 def speed_colours(fraction: npt.ArrayLike) -> npt.NDArray[np.float64]:
     """Colours (N, 3), 0..255, of speeds given as fractions (N,) of the robot's top speed."""
-    stops = np.array(SPEED_STOPS, dtype=np.float64)
+    return _along(SPEED_STOPS, fraction)
+
+
+def _along(colours: tuple[Colour, ...], fraction: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    stops = np.array(colours, dtype=np.float64)
     at = np.clip(np.asarray(fraction, dtype=np.float64).reshape(-1), 0.0, 1.0)
     knots = np.linspace(0.0, 1.0, len(stops))
     return np.stack([np.interp(at, knots, stops[:, channel]) for channel in range(3)], axis=1)

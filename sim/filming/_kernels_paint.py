@@ -408,3 +408,23 @@ def flash(frame: Array, colour: Array, border: float, edge: float, tint: float) 
                 for k in range(3):
                     under = float(frame[row, col, k])
                     frame[row, col, k] = np.uint8(under + (colour[k] - under) * share + 0.5)
+
+
+@kernel
+def lay_field(
+    frame: Array, visible: Array, inv: Array, levels: Array, x0: float, y0: float, cell: float, tints: Array
+) -> None:
+    """Tint the ground by a field (R, C), 0 to 1 or NaN, whose cell (0, 0) is centred at x0, y0; `tints` (256, 3)."""
+    for row in range(frame.shape[0]):
+        for col in range(frame.shape[1]):
+            if visible[row, col] <= 0.0:
+                continue
+            x, y, _ = _at(inv, col + 0.5, row + 0.5)
+            r, c = math.floor((y - y0) / cell + 0.5), math.floor((x - x0) / cell + 0.5)
+            if r < 0 or c < 0 or r >= levels.shape[0] or c >= levels.shape[1] or math.isnan(levels[r, c]):
+                continue
+            level = levels[r, c]
+            weight = 0.9 * min(1.0, 2.5 * level) * visible[row, col]
+            for k in range(3):
+                under = float(frame[row, col, k])
+                frame[row, col, k] = np.uint8(under + (tints[int(255 * level), k] - under) * weight + 0.5)

@@ -90,3 +90,15 @@ def burst(size: int, colour: Colour) -> Sprite:
         r, line = 0.52 * reach + rim * reach / 2, max(1, round(rim * reach))
         draw.ellipse((middle - r, middle - r, middle + r, middle + r), outline=fill, width=line)
     return np.asarray(image.resize((size, size), Image.Resampling.LANCZOS))
+
+
+@functools.cache
+def glow(size: int, colour: Colour) -> Sprite:
+    """A soft disc with a thin rim."""
+    along = (np.arange(size) + 0.5) / size * 2 - 1
+    away = np.hypot(along[:, None], along)
+    rim = np.clip(1 - np.abs(away - 0.9) * size / 3, 0, 1)
+    sprite = np.empty((size, size, 4), dtype=np.uint8)
+    sprite[..., :3] = colour
+    sprite[..., 3] = 255 * np.maximum(0.75 * rim, np.where(away < 0.9, 0.16, 0.0))
+    return sprite

@@ -57,8 +57,9 @@ def kerb_width(scene: Scene) -> float:
 
 def grid_step(camera: Camera) -> float:
     """The distance between grid lines [m]: the finest of 0.1, 0.25, 0.5, 1, 2, 5, ... that is not too fine to see."""
+    least = max(34.0, camera.size[0] / 24)
     for step in (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0):
-        if step / camera.pixel >= 34:
+        if step / camera.pixel >= least:
             return step
     return 100.0
 
@@ -68,14 +69,10 @@ def dashes(line: Floats, on: float, off: float, half: float) -> Floats:
     steps = np.hypot(*np.diff(line, axis=0).T)
     arc = np.concatenate([[0.0], np.cumsum(steps)])
     starts = np.arange(0.0, arc[-1], on + off)
-    rows = []
-    for first in starts:
-        last = min(first + on, float(arc[-1]))
-        inner = arc[(arc > first) & (arc < last)]
-        at = np.concatenate([[first], inner, [last]])
-        points = np.column_stack([np.interp(at, arc, line[:, 0]), np.interp(at, arc, line[:, 1])])
-        rows.append(np.column_stack([points[:-1], points[1:], np.full(len(at) - 1, half)]))
-    return np.vstack(rows) if rows else np.empty((0, 5))
+    at = np.unique(np.concatenate([arc, starts, np.minimum(starts + on, arc[-1])]))
+    points = np.column_stack([np.interp(at, arc, line[:, 0]), np.interp(at, arc, line[:, 1])])
+    rows = np.column_stack([points[:-1], points[1:], np.full(len(at) - 1, half)])
+    return np.ascontiguousarray(rows[(at[:-1] + at[1:]) / 2 % (on + off) < on])
 
 
 class _Brush:

@@ -14,6 +14,9 @@ Floats = npt.NDArray[np.float64]
 
 SMOOTHING = 0.6  # a following camera looks at the mean place of this long before and after [s]
 
+SLOW = 4.0  # a film is this much slower around a contact
+AROUND = (0.3, 0.1)  # from so long before to so long after it, at the film's usual speed [s]
+
 
 class Replay:
     """A run as functions of time [s]."""
@@ -46,6 +49,13 @@ class Replay:
     def duration(self) -> float:
         """How long the run took [s]."""
         return float(self.t[-1] - self.t[0])
+
+    def slow(self, speed: float) -> tuple[float, float] | None:
+        """The part of the run around the first contact that is shown slowly in a film of a speed; None without one."""
+        if not len(self._contact_times):
+            return None
+        first = float(self._contact_times[0])
+        return max(0.0, first - AROUND[0] * speed), min(self.duration, first + AROUND[1] * speed)
 
     def pose(self, at: float) -> tuple[float, float, float]:
         """Where the robot is."""

@@ -1,7 +1,8 @@
 """A stage for films: everything that stands still is rendered once, each frame adds what moves.
 
-PyBullet's TinyRenderer draws the bodies. The still picture keeps its depth, so that a frame costs only the pixels around the
-robot: they are rendered through a crop of the same camera and blended in where they are nearer than what stood there.
+PyBullet's TinyRenderer draws the bodies; for a camera that moves, those that stand still are cast by rays. The still picture
+keeps its depth, so that a frame costs only the pixels around the robot: they are rendered through a crop of the same camera and
+blended in where they are nearer than what stood there.
 """
 
 from __future__ import annotations
@@ -9,18 +10,24 @@ from __future__ import annotations
 import contextlib
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from sim.colours import KERB, MOVER, OBSTACLE, UNSEEN, Colour, speed_colours
+from sim.colours import KERB, MOVER, OBSTACLE, SHELL, UNSEEN, Colour, field_colours, speed_colours
 from sim.engine import bullet, client
 from sim.filming import _kernels_paint as kernels
 from sim.filming.camera import Camera
+from sim.filming.cast import Solids
+from sim.filming.lettering import glow
 from sim.filming.model import Mesh, Part, cylinder, join, kerb, robot_height, robot_parts
 from sim.filming.paint import kerb_width, paint_ground
 from sim.filming.scene import Scene
 from sim.filming.tiny import Box, add_mesh, merged, render
+
+if TYPE_CHECKING:
+    from worlds import Grid
 
 Floats = npt.NDArray[np.float64]
 Picture = npt.NDArray[np.uint8]  # (H, W, 3)
@@ -48,10 +55,11 @@ class Stage:
     ...     picture = stage.frame(pose, wheels)
     """
 
-    def __init__(self, scene: Scene, camera: Camera, *, route: Floats, fine: int = 2) -> None:
+    def __init__(self, scene: Scene, camera: Camera, *, route: Floats, fine: int = 2, moves: bool = False) -> None:
         self.scene = scene
         self.camera = camera
         self.fine = fine  # each pixel is the mean of fine x fine
+        self._moves = moves  # the camera does, so that nothing can be kept from frame to frame
         self.tall = np.minimum(scene.obstacles[:, 3], drawn_height(scene))
         self._route = np.ascontiguousarray(route, dtype=np.float64).reshape(-1, 2)
         self._sun, self._light = _sun(camera)
@@ -64,6 +72,7 @@ class Stage:
         self._still = self._open.enter_context(client())
         self._moving = self._open.enter_context(client())
         self._pieces = still_pieces(self.scene, self.tall)
+        self._solids = solids(self._pieces, self.scene, self.tall)
         balls = [mesh.ball for mesh, _ in self._pieces]
         self._centres = np.array([centre for centre, _ in balls])
         self._radii = np.array([radius for _, radius in balls])
@@ -89,8 +98,12 @@ class Stage:
         self._painted = np.zeros((height, width, 4), dtype=np.uint8)
         for sprite in self._written:
             self._lay(*sprite)
-        for rows, colours in self._trail:
-            self._paint_trail(rows, colours)
+        if self._trail:
+            rows, colours = (np.concatenate(part) for part in zip(*self._trail, strict=True))
+            ends = rows[:, :4].reshape(-1, 2, 2)
+            middles = np.column_stack([ends.mean(axis=1), np.zeros(len(rows))])
+            seen = camera.sees(middles, np.hypot(*(ends[:, 1] - ends[:, 0]).T) / 2 + self._trail_width)
+            self._paint_trail(rows[seen], colours[seen])
 
     def drive(self, points: Floats, speeds: npt.ArrayLike) -> None:
         """Continue the driven trail along points (N, 2), N >= 2, at speeds (N,) [m/s]."""
@@ -123,12 +136,31 @@ class Stage:
             self._put(frame, box)
         return frame
 
+    def field(self, grid: Grid, levels: Floats, line: Floats) -> Picture:
+        """The picture without a robot: a field (R, C) of a grid, 0 to 1, on the ground, and a line (N, 2) over it."""
+        frame = self.backdrop.pixels.copy()
+        tints = field_colours(np.linspace(0, 1, 256))
+        visible, (x, y) = self.backdrop.visible, grid.origin
+        kernels.lay_field(frame, visible, self._inverse, np.ascontiguousarray(levels), x, y, grid.cell, tints)
+        half = np.full(max(0, len(line) - 1), 1.6 * self.camera.pixel)
+        rows = np.ascontiguousarray(np.column_stack([line[:-1], line[1:], half]))
+        painted = np.zeros((*visible.shape, 4), dtype=np.uint8)
+        colours = np.tile(np.array(SHELL, dtype=np.float64), (len(rows), 1))
+        kernels.draw_trail(frame, frame.copy(), visible, painted, self._forward, self._inverse, rows, colours)
+        for sprite, x, y, reach in self._written:
+            self._put_label(frame, sprite, x, y, reach)
+        return frame
+
     def write(self, sprite: Picture, x: float, y: float, reach: float) -> None:
         """Lay an RGBA picture on the ground's picture, centred below (or above) a disc of radius `reach` at x, y."""
         self._written.append((sprite, x, y, reach))
         self._lay(sprite, x, y, reach)
 
     def _lay(self, sprite: Picture, x: float, y: float, reach: float) -> None:
+        for picture in (self.backdrop.pixels, self._canvas):
+            self._put_label(picture, sprite, x, y, reach)
+
+    def _put_label(self, frame: Picture, sprite: Picture, x: float, y: float, reach: float) -> None:
         height, width = self.backdrop.visible.shape
         high, wide = sprite.shape[:2]
         px = self.pixel(x, y)[0]
@@ -136,8 +168,7 @@ class Stage:
         rim = [self.pixel(x + reach * math.cos(a), y + reach * math.sin(a))[1] for a in turn]
         top = max(rim) + 1 if max(rim) + 1 + high < height else min(rim) - 1 - high
         left = min(max(px - wide / 2, 0), width - wide) if -wide < px < width + wide else px
-        for picture in (self.backdrop.pixels, self._canvas):
-            kernels.put_sprite(picture, sprite, round(left), round(top), 1.0)
+        kernels.put_sprite(frame, sprite, round(left), round(top), 1.0)
 
     def pixel(self, x: float, y: float, z: float = 0.0) -> tuple[float, float]:
         """Where a point appears [px]."""
@@ -154,8 +185,11 @@ class Stage:
         self._loaded = chosen
 
     def _render_still(self, camera: Camera) -> Backdrop:
-        self._load(camera.sees(self._centres, self._radii))
-        image, depth, seg = render(self._still, camera, None, self.fine, self._light)
+        if self._moves:
+            image, depth, seg = self._solids.seen(camera, self.fine, self._light)
+        else:
+            self._load(camera.sees(self._centres, self._radii))
+            image, depth, seg = render(self._still, camera, None, self.fine, self._light)
         width, height = camera.size
         visible = np.empty((height, width), dtype=np.float32)
         ground = np.empty((height, width), dtype=np.bool_)
@@ -187,10 +221,15 @@ class Stage:
             )  # fmt: skip
 
     def _shade(self, frame: Picture, pose: Floats, movers: Floats) -> None:
-        """The soft shadows of what moves."""
+        """The soft shadows of what moves, and a glow under a robot too small to be found at a glance."""
         tall, foot = robot_height(self.scene.robot), self.scene.robot.footprint
         shape = np.array([foot.half_length, foot.half_width, foot.rounding])
         self._shadow(frame, pose, shape, tall, SOFT + 0.3 * tall)
+        wide = round(2 * foot.radius / self.camera.pixel)
+        if wide < 0.05 * frame.shape[1]:
+            px, py = self.pixel(pose[0], pose[1], tall / 2)
+            halo = glow(2 * wide + round(0.02 * frame.shape[1]), SHELL)
+            kernels.put_sprite(frame, halo, round(px - len(halo) / 2), round(py - len(halo) / 2), 1.0)
         for (x, y), radius in zip(movers, self.scene.mover_radii, strict=True):
             tall = drawn_height(self.scene)
             self._shadow(frame, np.array([x, y, 0.0]), np.array([0.0, 0.0, radius]), tall, SOFT + 0.3 * tall)
@@ -249,6 +288,14 @@ def still_pieces(scene: Scene, tall: Floats) -> list[tuple[Mesh, Colour]]:
     for (x, y, radius, _), z, unseen in zip(scene.obstacles, tall, scene.unseen, strict=True):
         found.append((cylinder(radius, 0.0, float(z), x=x, y=y), UNSEEN if unseen else OBSTACLE))
     return found
+
+
+def solids(pieces: list[tuple[Mesh, Colour]], scene: Scene, tall: Floats) -> Solids:
+    """The same, for casting rays."""
+    kerbs = [mesh.vertices for mesh, colour in pieces if colour == KERB]
+    boxes = np.array([np.concatenate([corners.min(axis=0), corners.max(axis=0)]) for corners in kerbs])
+    cylinders = np.column_stack([scene.obstacles[:, :3], tall])
+    return Solids.of(cylinders, [UNSEEN if unseen else OBSTACLE for unseen in scene.unseen], boxes, KERB)
 
 
 def grouped(pieces: list[tuple[Mesh, Colour]]) -> list[tuple[Mesh, Colour]]:

@@ -11,6 +11,8 @@ from sim.engine import bullet
 from sim.filming.camera import Camera
 from sim.filming.model import Mesh
 
+AMBIENT, DIFFUSE = 0.62, 0.46  # light from everywhere and from the lamp
+
 Box: TypeAlias = tuple[int, int, int, int]  # x0, y0, x1, y1 [px], the last ones excluded
 
 
@@ -44,8 +46,8 @@ def render(
         projection,
         lightDirection=light,
         lightColor=[1, 1, 1],
-        lightAmbientCoeff=0.62,
-        lightDiffuseCoeff=0.46,
+        lightAmbientCoeff=AMBIENT,
+        lightDiffuseCoeff=DIFFUSE,
         lightSpecularCoeff=0.0,
         shadow=0,
         renderer=p.ER_TINY_RENDERER,

@@ -5,24 +5,42 @@ Frames go straight to the encoder, one at a time; a film's length costs no memor
 
 from __future__ import annotations
 
+import itertools
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
-from sim.colours import CONTACT, GOAL, START
+from sim.colours import CONTACT, GOAL, START, Colour
 from sim.filming import _kernels_paint as kernels
 from sim.filming.camera import CAMERAS, Camera, camera_for
-from sim.filming.caption import DRIVING, VERDICTS, Band, Layout, Reading, banner, entries_for, legend_card
+from sim.filming.caption import (
+    DRIVEN,
+    DRIVING,
+    PLANNING,
+    SEARCHED,
+    SLOWED,
+    VERDICTS,
+    Band,
+    Layout,
+    Reading,
+    Values,
+    banner,
+    entries_for,
+    legend_card,
+)
 from sim.filming.encode import ENCODERS as ENCODERS
 from sim.filming.encode import encoding, known_suffix
 from sim.filming.lettering import Sprite, burst, label
 from sim.filming.model import robot_height
 from sim.filming.paint import grid_step
+from sim.filming.parallel import WORTH, pictures, processes
+from sim.filming.replay import SLOW as SLOW
 from sim.filming.replay import Replay
 from sim.filming.scene import Scene
 from sim.filming.stage import Stage, drawn_height
@@ -30,6 +48,7 @@ from sim.rollout import Rollout
 from worlds.atomic import written_whole
 from worlds.errors import InputError
 
+Floats = npt.NDArray[np.float64]
 Picture = npt.NDArray[np.uint8]  # (H, W, 3)
 
 HOLD = 1.0  # the last picture stays this long [s]
@@ -46,7 +65,11 @@ class FilmInfo:
     fps: float
     camera: str
     wall_s: float  # how long rendering and encoding took [s]
-    renderer: str = "TinyRenderer"
+
+    @property
+    def renderer(self) -> str:
+        """What drew the bodies."""
+        return "TinyRenderer and rays" if self.camera == "follow" else "TinyRenderer"
 
     @property
     def duration_s(self) -> float:
@@ -63,11 +86,16 @@ def film(
     fps: float = 30.0,
     speed: float = 1.0,
     note: str | None = None,
+    prelude: float = 0.0,
+    jobs: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> FilmInfo:
     """Film a run as MP4 (H.264), GIF or WebP by the file's suffix, `speed` times as fast as it happened.
 
     `note` is a line of the caption, for example what a certificate says. `progress` is told the fraction that is done.
+    With `prelude` the film begins with that many seconds of planning: the field of an iterative planner on the ground and
+    its best path so far, planned anew from the run's seed. Around a contact the film is `SLOW` times slower.
+    A camera that moves renders in `jobs` processes, by default one for each core; the film is the same for any number.
 
     Raises:
         InputError: an unknown camera or suffix, an odd or tiny size, a rate or speed that is not positive.
@@ -77,21 +105,41 @@ def film(
     known_suffix(target)
     _check(camera, size, fps, speed)
     started = time.perf_counter()
-    with Shot(rollout, camera=camera, size=size, note=note) as shot, written_whole(target) as temporary:
-        times = frame_times(shot.replay.duration, fps, speed)
-        hold = round(HOLD * fps)
-        total = len(times) + hold
-        with encoding(temporary, size, fps) as send:
-            for k, at in enumerate(times):
-                send(shot.picture(at, flash=FLASH * speed))
-                if progress is not None:
-                    progress((k + 1) / total)
-            last = shot.ending(flash=FLASH * speed)
-            for k in range(hold):
-                send(last)
-                if progress is not None:
-                    progress((len(times) + k + 1) / total)
+    setting = {"camera": camera, "size": size, "note": note, "speed": speed}
+    replay = Replay(rollout)
+    times = frame_times(replay.duration, fps, speed, replay.slow(speed))
+    before, hold = round(prelude * fps), round(HOLD * fps)
+    total = before + len(times) + hold
+    if before:
+        from sim.filming.prelude import check_field
+
+        check_field(rollout)
+    with written_whole(target) as temporary, encoding(temporary, size, fps) as send:
+        for k, picture in enumerate(_pictures(rollout, setting, before, times, hold, jobs)):
+            send(picture)
+            if progress is not None:
+                progress((k + 1) / total)
     return FilmInfo(target, total, size, float(fps), camera, time.perf_counter() - started)
+
+
+def _pictures(
+    rollout: Rollout, setting: dict[str, Any], before: int, times: Floats, hold: int, jobs: int | None
+) -> Iterator[Picture]:
+    """Every frame of a film in turn: how it was planned, the drive, how it ended."""
+    if before:
+        from sim.filming.prelude import planning_pictures
+
+        yield from planning_pictures(rollout, setting, before)
+    with Shot(rollout, **setting) as shot:
+        jobs = processes() if jobs is None else jobs
+        if setting["camera"] == "follow" and jobs > 1 and len(times) > WORTH:
+            yield from pictures(rollout, setting, times, jobs)
+            for at in times:
+                shot.drive(at)
+        else:
+            for at in times:
+                yield shot.picture(at)
+        yield from itertools.repeat(shot.ending(), hold)
 
 
 def still(
@@ -119,33 +167,55 @@ def still(
     return target
 
 
-def frame_times(duration: float, fps: float, speed: float) -> npt.NDArray[np.float64]:
-    """The moments of a run [s] that a film's frames show: the first is 0, the last the end or less than a frame before."""
-    return np.arange(int(duration * fps / speed + 1e-9) + 1, dtype=np.float64) * (speed / fps)
+def frame_times(duration: float, fps: float, speed: float, slow: tuple[float, float] | None = None) -> Floats:
+    """The moments of a run [s] that a film's frames show: the first is 0, the last the end or less than a frame before.
+
+    Between the moments `slow`, the film is `SLOW` times slower.
+    """
+    if slow is None:
+        return np.arange(int(duration * fps / speed + 1e-9) + 1, dtype=np.float64) * (speed / fps)
+    run = np.array([0.0, *slow, duration])
+    shown = np.concatenate([[0.0], np.cumsum(np.diff(run) * [1, SLOW, 1])]) / speed
+    return np.asarray(np.interp(np.arange(int(shown[-1] * fps + 1e-9) + 1) / fps, shown, run))
 
 
 class Shot:
     """A run before a camera, shown at moments that never go back. Use it in a `with` block."""
 
-    def __init__(self, rollout: Rollout, *, camera: str, size: tuple[int, int], note: str | None = None) -> None:
+    def __init__(
+        self,
+        rollout: Rollout,
+        *,
+        camera: str,
+        size: tuple[int, int],
+        note: str | None = None,
+        speed: float = 1.0,
+        planning: bool = False,
+    ) -> None:
         self.replay = Replay(rollout)
+        self.slow = self.replay.slow(speed)
+        self._flash = FLASH * speed
         self.scene = scene = Scene.of(rollout)
         self.outcome = rollout.outcome
         self._follows = camera == "follow"
         for card in (True, False):
             self._layout = layout = Layout.of(size, card)
             self._camera = self._aim(camera, rollout, (size[0], size[1] - layout.height))
-            entries = entries_for(scene, grid_step(self._camera))
+            entries = entries_for(scene, grid_step(self._camera), self._camera.pixel, planning=planning)
             self._legend = legend_card(entries, layout) if card else None
             if self._legend is not None and self._free(self._legend):
                 break
         planner = str(rollout.meta.get("planner", {}).get("name", "?"))
         subtitle = f"planner {planner}  ·  robot {scene.robot.name}"
-        self._band = Band(layout, scene.name, subtitle, note, entries)
+        self._band = Band(
+            layout, scene.name, subtitle, None if planning else note, entries, SEARCHED if planning else DRIVEN
+        )
         fine = 3 if size[0] * size[1] <= 400_000 and not self._follows else 2
-        self._stage = Stage(scene, self._camera, route=rollout.route, fine=fine)
+        self._stage = Stage(
+            scene, self._camera, route=rollout.route[: 0 if planning else None], fine=fine, moves=self._follows
+        )
         self._end = banner(self.outcome, layout)
-        self._shown = 0.0
+        self.shown = 0.0  # the trail reaches this moment [s]
 
     def __enter__(self) -> Shot:
         self._stage.__enter__()
@@ -155,34 +225,52 @@ class Shot:
     def __exit__(self, *problem: object) -> None:
         self._stage.__exit__(*problem)
 
-    def picture(self, at: float, *, flash: float = FLASH) -> Picture:
-        """The frame (H, W, 3) at a moment of the run [s]; contacts flash for `flash` seconds of it."""
-        return self._compose(at, flash, DRIVING, None)
+    def picture(self, at: float) -> Picture:
+        """The frame (H, W, 3) at a moment of the run [s]."""
+        slow = self.slow is not None and self.slow[0] <= at < self.slow[1]
+        return self._framed(self.view(at), at, SLOWED if slow else DRIVING)
 
-    def ending(self, *, flash: float = FLASH) -> Picture:
+    def ending(self) -> Picture:
         """The frame that tells how it ended."""
-        return self._compose(self.replay.duration, flash, VERDICTS[self.outcome], self._end)
+        at = self.replay.duration
+        view = self.view(at, last=True)
+        unit = self._layout.unit
+        high = self._stage.pixel(*self.replay.pose(at)[:2])[1] < 0.4 * view.shape[0]  # the robot is: say it below
+        top = view.shape[0] - self._end.shape[0] - round(1.2 * unit) if high else round(1.2 * unit)
+        kernels.put_sprite(view, self._end, (view.shape[1] - self._end.shape[1]) // 2, top, 1.0)
+        return self._framed(view, at, VERDICTS[self.outcome])
 
-    def _compose(
-        self, at: float, flash: float, verdict: tuple[str, tuple[int, int, int]], end: Sprite | None
-    ) -> Picture:
+    def planning(self, values: Values, paint: Callable[[Stage], Picture]) -> Picture:
+        """A frame before the drive: what `paint` makes of the ground, with values of its own in the band."""
+        view = paint(self._stage)
+        self._lay_legend(view)
+        return np.vstack([view, self._band.draw(values, PLANNING)])
+
+    def drive(self, at: float) -> None:
+        """Continue the trail to a moment [s]."""
+        if at > self.shown:
+            self._stage.drive(*self.replay.trail(self.shown, at))
+            self.shown = at
+
+    def view(self, at: float, *, last: bool = False) -> Picture:
+        """What the camera sees at a moment, without the band below; contacts flash."""
         replay, stage = self.replay, self._stage
         if self._follows:
             stage.look(self._camera.moved(*replay.smooth(at)))
-        if at > self._shown:
-            stage.drive(*replay.trail(self._shown, at))
-            self._shown = at
+        self.drive(at)
         view = stage.frame(replay.pose(at), replay.wheels(at), replay.movers(at), replay.mover_velocities(at))
-        self._mark_contacts(view, at, flash, last=end is not None)
-        unit = self._layout.unit
-        if self._legend is not None:
-            kernels.put_sprite(view, self._legend, unit, unit, 1.0)
-        if end is not None:
-            high = stage.pixel(*replay.pose(at)[:2])[1] < 0.4 * view.shape[0]  # the robot is: say it below
-            top = view.shape[0] - end.shape[0] - round(1.2 * unit) if high else round(1.2 * unit)
-            kernels.put_sprite(view, end, (view.shape[1] - end.shape[1]) // 2, top, 1.0)
+        self._mark_contacts(view, at, self._flash, last)
+        self._lay_legend(view)
+        return view
+
+    def _framed(self, view: Picture, at: float, verdict: tuple[str, Colour]) -> Picture:
+        replay = self.replay
         reading = Reading(at, replay.speed(at), replay.clearance(at), replay.least_clearance(at))
-        return np.vstack([view, self._band.draw(reading, verdict)])
+        return np.vstack([view, self._band.draw(reading.told, verdict)])
+
+    def _lay_legend(self, view: Picture) -> None:
+        if self._legend is not None:
+            kernels.put_sprite(view, self._legend, self._layout.unit, self._layout.unit, 1.0)
 
     def _aim(self, camera: str, rollout: Rollout, size: tuple[int, int]) -> Camera:
         """A camera that sees the whole task or, where it follows, the robot's surroundings."""

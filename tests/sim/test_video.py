@@ -238,3 +238,44 @@ def test_wrong_input_is_named(drive, tmp_path, path, options, message):
 def test_a_still_is_a_png(drive, tmp_path):
     with pytest.raises(InputError, match=r"choose .png"):
         still(drive, tmp_path / "a.jpg")
+
+
+def test_a_film_is_slow_around_a_contact(crash):
+    with Shot(crash, camera="oblique", size=SIZE) as shot:
+        end, (first, last) = shot.replay.duration, shot.slow
+        times = frame_times(end, 30, 1.0, shot.slow)
+        word = [shot.picture(at)[-100:, -120:] for at in (first - 0.1, first + 0.1)]
+    steps = np.diff(times)
+    slowly = (times[:-1] >= first) & (times[1:] <= last)
+    assert steps[slowly] == pytest.approx(1 / 30 / video.SLOW)
+    assert steps[: slowly.argmax() - 1] == pytest.approx(1 / 30)
+    assert times[0] == 0
+    assert end - times[-1] < 1 / 30
+    red = [((part[..., 0].astype(int) - part[..., 1]) > 120).sum() for part in word]
+    assert red[0] == 0
+    assert red[1] > 100, "it says that it is slow"
+
+
+@pytest.mark.parametrize("jobs", [2])
+def test_processes_share_the_frames_of_a_moving_camera_and_change_nothing(drive, jobs):
+    from sim.filming.parallel import pictures
+
+    setting = {"camera": "follow", "size": SIZE, "note": None, "speed": 1.0}
+    times = frame_times(0.6, 60, 1.0)
+    shared = list(pictures(drive, setting, times, jobs))
+    with Shot(drive, **setting) as shot:
+        alone = [shot.picture(at) for at in times]
+    assert len(shared) == len(alone) == len(times)
+    assert all((a == b).all() for a, b in zip(shared, alone, strict=True))
+
+
+def test_a_small_robot_gets_a_glow_and_a_large_one_none(made_up_drive):
+    for size, found in (((30.0, 22.0), True), ((4.0, 3.0), False)):
+        with Shot(made_up_drive(size=size, obstacles=0), camera="top", size=SIZE) as shot:
+            stage, pose = shot._stage, shot.replay.pose(0.5)
+            px, py = (round(value) for value in stage.pixel(*pose[:2]))
+            tinted = stage.frame(pose).astype(int) - stage.backdrop.pixels
+        ring = np.abs(tinted[py - 14 : py + 14, px - 14 : px + 14, 2]).max()
+        aside = np.abs(tinted[py, px + 5 : px + 9]).max() if found else 0
+        assert ring > 100
+        assert (aside > 20) == found

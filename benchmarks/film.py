@@ -1,0 +1,126 @@
+"""Frames a second of a film, rendering and encoding: `python -m benchmarks.film`.
+
+Beside it the bare cost of drawing each frame in full with the same renderer, without anything painted and without a file. With
+`--memory`, the peak memory of films of ten seconds and of five minutes instead, each in a process of its own.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from sim.engine import client
+from sim.filming.camera import camera_for
+from sim.filming.model import robot_parts
+from sim.filming.parallel import processes
+from sim.filming.scene import Scene
+from sim.filming.stage import drawn_height, grouped, still_pieces
+from sim.filming.tiny import add_mesh, render
+from sim.filming.video import film
+from sim.rollout import Rollout
+from sim.scenario import Scenario, run
+
+SIZES = ((640, 480), (1280, 720))
+FOLLOWED = 4.0  # seconds of the run that a moving camera films
+
+
+def bare_fps(rollout: Rollout, camera: str, size: tuple[int, int], *, fine: int = 1) -> float:
+    """Full frames a second of PyBullet's renderer alone."""
+    scene = Scene.of(rollout)
+    tall = np.minimum(scene.obstacles[:, 3], drawn_height(scene))
+    low, high = scene.region(np.vstack([rollout.pose[:, :2], rollout.route]))
+    view = camera_for(camera, low, high, float(tall.max()), size)
+    if camera == "follow":
+        reach = max(1.2, 7 * scene.robot.footprint.radius)
+        at = rollout.pose[len(rollout.pose) // 2]
+        view = camera_for(camera, (-reach, -0.6 * reach), (reach, 0.6 * reach), float(tall.max()), size).moved(*at[:2])
+    with client() as number:
+        for mesh, colour in grouped(still_pieces(scene, tall)):
+            add_mesh(number, mesh, colour)
+        for part in robot_parts(scene.robot):
+            add_mesh(number, part.mesh, part.colour)
+        best = np.inf
+        for _ in range(6):
+            started = time.perf_counter()
+            render(number, view, None, fine, (0.0, 0.0, 1.0))
+            best = min(best, time.perf_counter() - started)
+    return float(1 / best)
+
+
+def cut(rollout: Rollout, seconds: float) -> Rollout:
+    """The first part of a run, or, where it is too short, the run again and again."""
+    import dataclasses
+
+    step = float(rollout.t[1] - rollout.t[0])
+    rows = np.arange(round(seconds / step) + 1) % len(rollout.t)
+    arrays = {
+        name: getattr(rollout, name)[rows] for name in ("pose", "twist", "command", "clearance", "limiter", "movers")
+    }
+    return dataclasses.replace(rollout, t=np.arange(len(rows)) * step, contacts=np.empty((0, 4)), **arrays)
+
+
+def speed(rollout: Rollout) -> None:
+    print(
+        f"{len(rollout.meta['task']['obstacles'])} cylinders; best of 3; a moving camera renders in {processes()} processes"
+    )
+    print("camera    size        film fps   on one core   full frames, bare   2x2 finer, bare")
+    with tempfile.TemporaryDirectory() as folder:
+        for camera in ("top", "oblique", "follow"):
+            for size in SIZES:
+                seconds = FOLLOWED if camera == "follow" else 10.0
+                part, rates = cut(rollout, seconds), []
+                for jobs in (None, 1):
+                    runs = [film(part, Path(folder) / "a.mp4", camera=camera, size=size, jobs=jobs) for _ in range(3)]
+                    rates.append(max(info.frames / info.wall_s for info in runs))
+                bare = [bare_fps(rollout, camera, size, fine=fine) for fine in (1, 2)]
+                print(
+                    f"{camera:8}  {size[0]:4}x{size[1]:<4} {rates[0]:9.0f} {rates[1]:13.0f} {bare[0]:19.1f} {bare[1]:17.1f}"
+                )
+
+
+def memory(path: Path) -> None:
+    """Peak memory of this process and its encoder, film by film in a process of its own."""
+    for camera in ("oblique", "follow"):
+        peaks = []
+        for seconds in (10, 300):
+            code = f"from benchmarks.film import peak; peak({str(path)!r}, {camera!r}, {seconds})"
+            said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+            peaks.append(float(said.stdout))
+        print(
+            f"{camera:8} 640x480   10 s: {peaks[0]:.0f} MB   5 min: {peaks[1]:.0f} MB   difference {peaks[1] - peaks[0]:.0f} MB"
+        )
+
+
+def peak(path: str, camera: str, seconds: float) -> None:
+    log = cut(Rollout.load(path), seconds)
+    fps = 30 if camera == "oblique" else 2  # a moving camera's frames are the same few at a time at any rate
+    with tempfile.TemporaryDirectory() as folder:
+        film(log, Path(folder) / "a.mp4", camera=camera, size=(640, 480), fps=fps, jobs=1)
+    own, child = (resource.getrusage(who).ru_maxrss / 1024 for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    print(own + child)
+
+
+def main() -> None:
+    reader = argparse.ArgumentParser(description=__doc__)
+    reader.add_argument("--memory", action="store_true")
+    wanted = reader.parse_args()
+    log = run(Scenario.of("forest")).rollout
+    assert log is not None
+    if not wanted.memory:
+        speed(log)
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        memory(log.save(Path(folder) / "rollout.npz"))
+
+
+if __name__ == "__main__":
+    os.environ.setdefault("PYTHONPATH", os.getcwd())
+    main()
