@@ -86,6 +86,13 @@ def run(
         unseen=tuple(_disc(text) for text in unseen or ()),
     )  # fmt: skip
     folder = out or Path("out") / _slug(scenario)
+    if prelude > 0:
+        from planners import IterativePlanner
+
+        if video is None:
+            raise InputError("--prelude: belongs to a film; give --video, too")
+        if not isinstance(scenario.planner, IterativePlanner):
+            raise InputError(f"--prelude: {planner} does not plan in iterations; there is no field to show")
     if video is not None:
         _check_film(video)
         _make_folder(video.parent)
@@ -150,7 +157,7 @@ def plan(
 
 @app.command()
 def render(
-    rollout: Annotated[Path, typer.Argument(metavar="ROLLOUT.npz")],
+    rollouts: Annotated[list[Path], typer.Argument(metavar="ROLLOUT.npz...", help="Several are shown side by side.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="The film: .mp4, .gif or .webp; .png gives one frame.")],
     camera: Annotated[str, typer.Option(help="oblique, top or follow.")] = "oblique",
     size: Annotated[str, typer.Option(help="Width x height in pixels.")] = "1280x720",
@@ -159,16 +166,20 @@ def render(
     prelude: Prelude = 0.0,
     json: Json = False,
 ) -> int:
-    """Film a rollout, from any camera, without simulating again."""
+    """Film rollouts, from any camera, without simulating again; two to six side by side."""
     from sim.rollout import Rollout
 
-    log = Rollout.load(rollout)
-    shape = _size(size)
-    if out.suffix.lower() == ".png":
+    logs = [Rollout.load(path) for path in rollouts]
+    log, shape = logs[0], _size(size)
+    if len(logs) > 1:
+        if prelude or out.suffix.lower() == ".png":
+            raise InputError(f"--out {out}: several rollouts give a film, without a prelude")
+        facts: dict[str, Any] = _compare_film(logs, out, camera=camera, size=shape, fps=fps, speed=speed)
+    elif out.suffix.lower() == ".png":
         from sim.filming.video import still
 
         still(log, out, camera=camera, size=shape, note=_note(log))
-        facts: dict[str, Any] = {"file": str(out), "frames": 1}
+        facts = {"file": str(out), "frames": 1}
     else:
         facts = _film(log, out, camera=camera, size=shape, fps=fps, speed=speed, prelude=prelude)
     if json:
@@ -176,6 +187,52 @@ def render(
     else:
         _tell_files({"film": facts["file"]})
     return SUCCEEDED
+
+
+@app.command()
+def compare(
+    world: World,
+    planner: Annotated[list[str], typer.Option("--planner", "-p", help="Once for each planner.")],
+    robot: Robot = "turtlebot",
+    seed: Seed = 0,
+    margin: Margin = 0.03,
+    cell: CellSize = None,
+    out: Out = None,
+    video: Annotated[Path | None, typer.Option(help="Film them side by side: .mp4, .gif or .webp.")] = None,
+    speed: Annotated[float, typer.Option(min=0.01, max=100, help="Of the film; 2 is twice as fast as life.")] = 1.0,
+    json: Json = False,
+) -> int:
+    """Drive the same task with several planners; exit 0 when every run succeeded."""
+    from sim.scenario import run as drive_it
+
+    scenarios = [_scenario(world, name, None, robot, seed=seed, margin=margin, cell=cell) for name in planner]
+    folder = out or Path("out") / f"compare-{scenarios[0].task.world.name}"
+    if video is not None:
+        _check_film(video)
+        _make_folder(video.parent)
+    results, files = {}, {}
+    for name, scenario in zip(planner, scenarios, strict=True):
+        _make_folder(folder / name)
+        with planning(f"planning and driving with {name}"):
+            results[name] = result = drive_it(scenario)
+        written = _write(result, folder / name, None, 0.0)
+        _write_json(
+            folder / name / "result.json",
+            {**result.as_dict(), "files": written, "command": _alone(scenario, world, name)},
+        )
+        files[name] = str(folder / name)
+    logs = [result.rollout for result in results.values() if result.rollout is not None]
+    if video is not None and len(logs) > 1:
+        files["film"] = _compare_film(logs, video, speed=speed)["file"]
+    if json:
+        say_json({"runs": {name: result.as_dict() for name, result in results.items()}, "files": files})
+    else:
+        table(
+            ("planner", "plan m", "driven m", "s", "least m", "outcome"),
+            ((name, *_numbers_of(result), result.outcome.value) for name, result in results.items()),
+        )
+        _tell_files(files)
+    return SUCCEEDED if all(result.succeeded for result in results.values()) else FAILED
 
 
 @app.command()
@@ -743,6 +800,34 @@ def _film(log: Any, path: Path, **options: Any) -> dict[str, Any]:
         "fps": info.fps,
         "renderer": info.renderer,
     }
+
+
+def _compare_film(logs: list[Any], path: Path, **options: Any) -> dict[str, Any]:
+    from sim.filming.compare import compare_film
+
+    with bar("filming") as progress:
+        info = compare_film(logs, path, progress=progress, **options)
+    return {
+        "file": str(path), "frames": info.frames, "size": list(info.size), "fps": info.fps, "renderer": info.renderer,
+    }  # fmt: skip
+
+
+def _alone(scenario: Scenario, world: str, planner: str) -> str:
+    """The command that makes one of several runs again."""
+    import shlex
+
+    given = {"--planner": planner, "--robot": scenario.robot.name, "--seed": scenario.seed, "--margin": scenario.margin}
+    words = [str(word) for pair in given.items() for word in pair]
+    cell = [] if scenario.cell is None else ["--cell", str(scenario.cell)]
+    return shlex.join(["antdrive", "run", world, *words, *cell])
+
+
+def _numbers_of(result: Run) -> tuple[str, ...]:
+    if result.rollout is None:
+        return ("-",) * 4
+    facts = result.as_dict()["metrics"]
+    names = ("path_length_m", "driven_length_m", "duration_s", "min_clearance_m")
+    return tuple(f"{facts[name]:.3f}" for name in names)
 
 
 def _check_film(path: Path) -> None:

@@ -103,7 +103,7 @@ def film(
     """
     target = Path(path)
     known_suffix(target)
-    _check(camera, size, fps, speed)
+    check_options(camera, size, fps, speed)
     started = time.perf_counter()
     setting = {"camera": camera, "size": size, "note": note, "speed": speed}
     replay = Replay(rollout)
@@ -159,7 +159,7 @@ def still(
     target = Path(path)
     if target.suffix.lower() != ".png":
         raise InputError(f"{target}: unknown suffix {target.suffix!r}; choose .png")
-    _check(camera, size, 1.0, 1.0)
+    check_options(camera, size, 1.0, 1.0)
     with Shot(rollout, camera=camera, size=size, note=note) as shot:
         picture = shot.ending() if t is None else shot.picture(min(max(float(t), 0.0), shot.replay.duration))
     with written_whole(target) as temporary:
@@ -191,6 +191,7 @@ class Shot:
         note: str | None = None,
         speed: float = 1.0,
         planning: bool = False,
+        bare: bool = False,
     ) -> None:
         self.replay = Replay(rollout)
         self.slow = self.replay.slow(speed)
@@ -200,9 +201,10 @@ class Shot:
         self._follows = camera == "follow"
         for card in (True, False):
             self._layout = layout = Layout.of(size, card)
-            self._camera = self._aim(camera, rollout, (size[0], size[1] - layout.height))
+            band = 0 if bare else layout.height
+            self._camera = self._aim(camera, rollout, (size[0], size[1] - band))
             entries = entries_for(scene, grid_step(self._camera), self._camera.pixel, planning=planning)
-            self._legend = legend_card(entries, layout) if card else None
+            self._legend = legend_card(entries, layout) if card and not bare else None
             if self._legend is not None and self._free(self._legend):
                 break
         planner = str(rollout.meta.get("planner", {}).get("name", "?"))
@@ -320,7 +322,12 @@ class Shot:
             kernels.flash(view, np.array(CONTACT, dtype=np.float64), 0.9 * self._layout.unit, edge, tint)
 
 
-def _check(camera: str, size: tuple[int, int], fps: float, speed: float) -> None:
+def check_options(camera: str, size: tuple[int, int], fps: float, speed: float) -> None:
+    """Refuse what no film can be.
+
+    Raises:
+        InputError: an unknown camera, an odd or tiny size, a rate or speed that is not positive.
+    """
     if camera not in CAMERAS:
         raise InputError(f"camera: unknown camera {camera!r}; choose one of {', '.join(CAMERAS)}")
     if len(size) != 2 or any(side % 2 or not 160 <= side <= 4096 for side in size):

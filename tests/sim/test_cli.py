@@ -423,3 +423,30 @@ def test_ctrl_c_is_one_line(antdrive, monkeypatch: pytest.MonkeyPatch) -> None: 
     code, _, err = antdrive("run", "empty")
     assert code == 130
     assert err == "antdrive: interrupted\n"
+
+
+def test_planners_are_compared_in_one_command(antdrive, small: Path, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    words = ("--out", "c", "--video", "c.mp4", "--speed", "20")
+    code, out, err = antdrive("compare", small, "-p", "astar", "-p", "tangent", *words, "--json")
+    facts = json.loads(out)
+    assert (code, err) == (0, "")
+    assert set(facts["runs"]) == {"astar", "tangent"}
+    for name in facts["runs"]:
+        result = json.loads((tmp_path / "c" / name / "result.json").read_text())
+        assert result["command"].startswith("antdrive run ")
+        assert f"--planner {name}" in result["command"]
+    assert Path("c.mp4").stat().st_size > 1000
+    logs = [tmp_path / "c" / name / "rollout.npz" for name in facts["runs"]]
+    assert antdrive("render", *logs, "-o", "again.gif", "--size", "320x240", "--speed", "30")[0] == 0
+    assert Path("again.gif").exists()
+
+
+def test_a_prelude_needs_a_film_and_iterations(antdrive) -> None:  # type: ignore[no-untyped-def]
+    for words, says in (
+        (["-p", "as", "--prelude", "2"], "--video"),
+        (["-p", "astar", "--prelude", "2", "--video", "a.mp4"], "astar does not plan in iterations"),
+    ):
+        code, out, err = antdrive("run", "empty", *words)
+        assert (code, out) == (2, "")
+        assert says in err
+        assert err.count("\n") == 1
