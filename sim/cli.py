@@ -53,6 +53,7 @@ Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on std
 Prelude = Annotated[
     float, typer.Option("--prelude", min=0.0, max=60.0, help="The film begins with so many seconds of planning.")
 ]
+Vector = Annotated[bool, typer.Option("--vector", help="Write figures as PDF, too.")]
 Out = Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the results.")]
 
 
@@ -75,6 +76,7 @@ def run(
     out: Out = None,
     video: Annotated[Path | None, typer.Option(help="Also film it: .mp4, .gif or .webp.")] = None,
     prelude: Prelude = 0.0,
+    vector: Vector = False,
     json: Json = False,
 ) -> int:
     """Plan, drive in physics, certify; exit 0 when the robot stopped at the goal and touched nothing."""
@@ -101,7 +103,7 @@ def run(
         grid, answer = make_plan(scenario)
     with bar("driving") as progress:
         result = drive_it(scenario, planned=(grid, answer), progress=progress)
-    files = _write(result, folder, video, prelude)
+    files = _write(result, folder, video, prelude, vector=vector)
     report = {**result.as_dict(), "files": files, "command": _command()}
     _write_json(folder / "result.json", report)
     if json:
@@ -121,6 +123,7 @@ def plan(
     margin: Margin = 0.03,
     cell: CellSize = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Also draw the plan into this folder.")] = None,
+    vector: Vector = False,
     json: Json = False,
 ) -> int:
     """Plan without driving; exit 0 when there is a path."""
@@ -131,9 +134,10 @@ def plan(
         grid, answer = make_plan(scenario)
     files = {}
     if out is not None:
-        from sim.plots import plan_figure
+        from sim.figures import plan_figures
 
-        files["plan"] = str(plan_figure(scenario.task, grid, answer, scenario.robot, out / "plan.png"))
+        made = plan_figures(scenario.task, grid, answer, scenario.robot, out, name=planner, suffixes=_suffixes(vector))
+        files = {name: str(path) for name, path in made.items()}
     facts = {
         "world": scenario.task.world.name, "planner": planner, "robot": scenario.robot.name, "seed": seed,
         "status": answer.status.name.lower(), "sentence": answer.status.value, "reason": answer.reason,
@@ -222,6 +226,11 @@ def compare(
         )
         files[name] = str(folder / name)
     logs = [result.rollout for result in results.values() if result.rollout is not None]
+    if len(logs) > 1:
+        from sim.figures import comparison_figure
+
+        named = {name: result.rollout for name, result in results.items() if result.rollout is not None}
+        files["figure"] = str(comparison_figure(named, folder / "comparison.png"))
     if video is not None and len(logs) > 1:
         files["film"] = _compare_film(logs, video, speed=speed)["file"]
     if json:
@@ -761,22 +770,33 @@ def _file_name(name: str) -> str:
     return "".join(c if c.isalnum() or c in "-_." else "_" for c in name)
 
 
-def _write(result: Run, folder: Path, video: Path | None, prelude: float) -> dict[str, str]:
+def _write(result: Run, folder: Path, video: Path | None, prelude: float, *, vector: bool = False) -> dict[str, str]:
+    from sim.figures import certificate_figure, plan_figures
+    from sim.plots import overview, plan_figure
+
+    s = result.scenario
     files = {"result": str(folder / "result.json")}
+    suffixes = _suffixes(vector)
     if result.rollout is None:
         (folder / "rollout.npz").unlink(missing_ok=True)  # of an earlier run; it would belie this one's result
-        from sim.plots import plan_figure
-
-        s = result.scenario
         files["figure"] = str(plan_figure(s.task, result.grid, result.plan, s.robot, folder / "overview.png"))
         return files
-    from sim.plots import overview
-
     files["rollout"] = str(result.rollout.save(folder / "rollout.npz"))
-    files["figure"] = str(overview(result.rollout, folder / "overview.png"))
+    for suffix in suffixes:
+        end = "" if suffix == suffixes[0] else f" {suffix[1:]}"
+        files["figure" + end] = str(overview(result.rollout, folder / f"overview{suffix}"))
+        if result.certificate is not None:
+            path = certificate_figure(result.rollout, result.certificate, folder / f"certificate{suffix}")
+            files["certificate" + end] = str(path)
+    made = plan_figures(s.task, result.grid, result.plan, s.robot, folder, name=s.planner_name, suffixes=suffixes)
+    files |= {name: str(path) for name, path in made.items()}
     if video is not None:
         files["film"] = _film(result.rollout, video, prelude=prelude)["file"]
     return files
+
+
+def _suffixes(vector: bool) -> tuple[str, ...]:
+    return (".png", ".pdf") if vector else (".png",)
 
 
 def _make_folder(folder: Path) -> None:

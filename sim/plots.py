@@ -65,7 +65,8 @@ _STYLE: Any = {
 }
 
 
-def _styled() -> Any:
+def styled() -> Any:
+    """The look of all figures, as a context."""
     return matplotlib.rc_context(_STYLE)
 
 
@@ -78,12 +79,12 @@ def overview(rollout: Rollout, path: str | Path, *, cells: Floats | None = None,
         InputError: a suffix that is none of .png, .pdf, .svg.
     """
     scene = Scene.of(rollout)
-    target = _checked(path)
-    with _styled():
+    target = checked(path)
+    with styled():
         shape = _shape(scene)
         high = float(np.clip(5.6 * shape, 3.9, 6.4))
         wide = float(np.clip(high / shape, 3.2, 7.0))
-        figure = _figure(wide + 5.6, high + 0.9)
+        figure = new_figure(wide + 5.6, high + 0.9)
         grid = figure.add_gridspec(3, 2, width_ratios=[wide, 5.2], height_ratios=[1.0, 1.0, 0.11])
         chart = figure.add_subplot(grid[:, 0])
         draw_map(chart, scene)
@@ -100,7 +101,7 @@ def overview(rollout: Rollout, path: str | Path, *, cells: Floats | None = None,
             f"{scene.name}   ·   {planner}   ·   {scene.robot.name}", x=0.012, ha="left", fontsize=12, weight="bold"
         )
         figure.text(0.988, 0.982, name, ha="right", va="top", fontsize=11, weight="bold", color=hexed(colour))
-        return _write(figure, target, dpi)
+        return write_figure(figure, target, dpi)
 
 
 def plan_figure(
@@ -111,14 +112,14 @@ def plan_figure(
     Raises:
         InputError: a suffix that is none of .png, .pdf, .svg.
     """
-    target = _checked(path)
+    target = checked(path)
     scene = Scene.planned(task, robot, grid.inflate)
     iterations = len(plan.history)
-    with _styled():
+    with styled():
         shape = _shape(scene)
         high = float(np.clip(5.6 * shape, 3.9, 6.4))
         wide = float(np.clip(high / shape, 3.2, 7.0)) + (0.9 if plan.landscape is not None else 0.0)
-        figure = _figure(wide + (4.6 if iterations else 0.6), high + 0.9)
+        figure = new_figure(wide + (4.6 if iterations else 0.6), high + 0.9)
         areas = figure.add_gridspec(1, 2 if iterations else 1, width_ratios=[wide, 4.2] if iterations else [1])
         chart = figure.add_subplot(areas[0, 0])
         if plan.landscape is not None:
@@ -145,10 +146,11 @@ def plan_figure(
             fontsize=12,
             weight="bold",
         )
-        return _write(figure, target, dpi)
+        return write_figure(figure, target, dpi)
 
 
-def _figure(width: float, height: float) -> Figure:
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure, width by height [inches], that needs no screen."""
     figure = Figure(figsize=(width, height), layout="constrained", facecolor="white")
     FigureCanvasAgg(figure)
     return figure
@@ -159,14 +161,20 @@ def _shape(scene: Scene) -> float:
     return (y1 - y0) / (x1 - x0)
 
 
-def _checked(path: str | Path) -> Path:
+def checked(path: str | Path) -> Path:
+    """The path of a figure.
+
+    Raises:
+        InputError: a suffix that is none of .png, .pdf, .svg.
+    """
     target = Path(path)
     if target.suffix.lower() not in SUFFIXES:
         raise InputError(f"{target}: unknown suffix {target.suffix!r}; choose one of {', '.join(SUFFIXES)}")
     return target
 
 
-def _write(figure: Figure, target: Path, dpi: float) -> Path:
+def write_figure(figure: Figure, target: Path, dpi: float) -> Path:
+    """Write a figure by its suffix, whole or not at all, without dates."""
     kind = target.suffix.lower()[1:]
     # These are what the formats would write the date, or the library's version, into.
     empty: dict[str, Any] = {
