@@ -326,6 +326,36 @@ def margin(
 
 
 @app.command()
+def reproduce(
+    paper: Annotated[
+        str, typer.Argument(metavar="PAPER", help="han2007, suganthi2019, ibraheem2016, lee2008, hasan or all.")
+    ],
+    out: Out = None,
+    seeds: Annotated[int, typer.Option(min=1, max=1000, help="Trials of each experiment.")] = 10,
+    jobs: Annotated[int, typer.Option(min=1, max=256, help="Processes.")] = 1,
+    vector: Vector = False,
+    json: Json = False,
+) -> int:
+    """Measure a paper's experiments again: printed beside measured, and the paper's figures."""
+    from sim.papers.experiments import PAPERS
+    from sim.papers.reproduce import HEADS, row_cells
+    from sim.papers.reproduce import reproduce as measure_again
+
+    folder = out or Path("out") / f"reproduce-{paper}"
+    chosen = list(PAPERS) if paper == "all" else [paper]
+    with bar("planning") as progress:
+        rows, files = measure_again(
+            chosen, folder, seeds=seeds, suffixes=_suffixes(vector), jobs=jobs, progress=progress
+        )
+    if json:
+        say_json({"rows": [vars(row) for row in rows], "files": files})
+    else:
+        table(HEADS, map(row_cells, rows))
+        _tell_files(files)
+    return SUCCEEDED
+
+
+@app.command()
 def planners(json: Json = False) -> int:
     """List the planners with their options."""
     from planners import all_planners, describe

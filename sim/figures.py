@@ -116,8 +116,9 @@ def contours_figure(
 
 
 def history_figure(
-    histories: Mapping[str, Sequence[History]], path: str | Path, *, optimum: float | None = None, dpi: float = 160
-) -> Path:
+    histories: Mapping[str, Sequence[History]], path: str | Path, *, optimum: float | None = None, unit: str = "m",
+    dpi: float = 160,
+) -> Path:  # fmt: skip
     """Best length by iteration of one or more planners; of several seeds the median and the range."""
     target = checked(path)
     with styled():
@@ -137,7 +138,7 @@ def history_figure(
                                   color=hexed(colour), alpha=0.15, lw=0)  # fmt: skip
         if optimum is not None:
             axes.axhline(optimum, color=hexed(MUTED), ls="--", lw=1.0, label="shortest on these moves")
-        axes.set(xlabel="iteration", ylabel="best path so far [m]")
+        axes.set(xlabel="iteration", ylabel=f"best path so far [{unit}]")
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.legend(loc="upper right")
         return write_figure(figure, target, dpi)

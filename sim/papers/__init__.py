@@ -1,0 +1,1 @@
+"""The papers' experiments, measured again: `reproduce` is the way in."""

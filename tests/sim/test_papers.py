@@ -1,0 +1,58 @@
+import csv
+import math
+
+import numpy as np
+import pytest
+
+from sim.papers import maps, reproduce
+from sim.papers.experiments import PAPERS
+from sim.papers.reproduce import reproduce as measure_again
+from worlds import InputError
+
+
+@pytest.mark.parametrize("paper", PAPERS)
+def test_every_trial_can_be_solved_and_says_whether_its_map_is_the_papers(paper):
+    for trial in PAPERS[paper]():
+        query = trial.query(0)
+        assert trial.paper == paper
+        assert math.isfinite(maps.optimum(query))
+        assert trial.printed > 0
+        assert trial.recreated == (paper != "han2007")
+
+
+def test_known_maps_are_those_of_the_thesis():
+    assert maps.optimum(maps.han_ants()) == pytest.approx(31.556, abs=1e-3)
+    free = maps.han_genes((10.0, 10.0, 5.0)).grid.free
+    rows, cols = np.indices(free.shape)
+    assert (free == (np.hypot(rows - 10, cols - 10) > 5 + 1e-9)).all()  # touching is not free
+
+
+def test_a_recreated_map_is_the_same_for_a_seed_and_another_for_another():
+    one, same, other = (maps.scattered(12, 0.15, seed).grid.free for seed in (1, 1, 2))
+    assert (one == same).all()
+    assert (one != other).any()
+
+
+def test_a_paper_is_measured_and_written_down(tmp_path, monkeypatch):
+    monkeypatch.setattr(reproduce, "PC", (0.25,))
+    monkeypatch.setattr(reproduce, "PM", (0.1, 0.2))
+    few = [trial for trial in PAPERS["han2007"]() if trial.options.get("ants", 0) < 500]
+    monkeypatch.setattr(reproduce, "PAPERS", {"han2007": lambda: few})
+    seen = []
+    rows, files = measure_again(["han2007"], tmp_path, seeds=2, suffixes=(".png",), progress=seen.append)
+    assert seen[-1] == 1
+    assert [row.printed for row in rows] == [45.357, 38.6223, 33.1798]
+    for row in rows:
+        assert row.best <= row.mean
+        assert row.arrived == row.seeds == 2
+        assert row.gap > -0.15
+    assert set(files) == {"table", "csv", "han2007 history", "han2007 ants", "han2007 sweep"}
+    table = (tmp_path / "table.md").read_text()
+    assert "38.6223" in table
+    with (tmp_path / "table.csv").open(newline="") as file:
+        assert [float(line["mean"]) for line in csv.DictReader(file)] == [row.mean for row in rows]
+
+
+def test_an_unknown_paper_is_refused(tmp_path):
+    with pytest.raises(InputError, match="unknown paper 'nobody'; choose from han2007"):
+        measure_again(["nobody"], tmp_path, seeds=1, suffixes=(".png",))
