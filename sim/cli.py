@@ -356,6 +356,26 @@ def reproduce(
 
 
 @app.command()
+def report(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Holds folders that `run --out` wrote.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="The page: .html, or .md for a pull request.")],
+    title: Annotated[str | None, typer.Option(help="The folder's name by default.")] = None,
+    embed_films: Annotated[bool, typer.Option("--embed-films", help="Put films into the page.")] = False,
+    json: Json = False,
+) -> int:
+    """Write one page about many runs: a table to sort and filter, films, figures, and the commands that repeat them."""
+    from sim.reporting import write_report
+
+    count = write_report(folder, out, title=title, embed_films=embed_films)
+    if json:
+        say_json({"file": str(out), "runs": count, "bytes": out.stat().st_size})
+    else:
+        say(f"{count} runs, {out.stat().st_size / 1e6:.2f} MB")
+        _tell_files({"report": str(out)})
+    return SUCCEEDED
+
+
+@app.command()
 def planners(json: Json = False) -> int:
     """List the planners with their options."""
     from planners import all_planners, describe
