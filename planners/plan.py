@@ -174,6 +174,14 @@ class PlanResult:
         """The polyline to drive, (M, 2) fractional cells: the planner's own, else its cells."""
         return self.cells.astype(np.float64) if self.waypoints is None else self.waypoints
 
+    def _repr_html_(self) -> str:
+        from worlds.drawing import card, curve_svg, path_svg
+
+        picture = (path_svg(self.line[:, ::-1]) if self.solved else "") + curve_svg(self.history.best)
+        facts = {"length": f"{self.line_length:.3f} m", "work": f"{self.work:,} {self.work_unit}",
+                 "time": f"{1000 * self.wall_s:.1f} ms"}  # fmt: skip
+        return card(picture, self.status.value + (f": {self.reason}" if self.reason else ""), facts)
+
 
 @runtime_checkable
 class Planner(Protocol):

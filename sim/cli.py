@@ -77,6 +77,7 @@ def run(
     video: Annotated[Path | None, typer.Option(help="Also film it: .mp4, .gif or .webp.")] = None,
     prelude: Prelude = 0.0,
     vector: Vector = False,
+    gui: Annotated[bool, typer.Option("--gui", help="Then replay it in a window; needs a screen.")] = False,
     json: Json = False,
 ) -> int:
     """Plan, drive in physics, certify; exit 0 when the robot stopped at the goal and touched nothing."""
@@ -88,6 +89,10 @@ def run(
         unseen=tuple(_disc(text) for text in unseen or ()),
     )  # fmt: skip
     folder = out or Path("out") / _slug(scenario)
+    if gui:
+        from sim.live import check_display
+
+        check_display()
     if prelude > 0:
         from planners import IterativePlanner
 
@@ -110,6 +115,10 @@ def run(
         say_json(report)
     else:
         _tell(result, files)
+    if gui and result.rollout is not None:
+        from sim.live import show
+
+        show(result.rollout)
     return SUCCEEDED if result.succeeded else FAILED
 
 

@@ -142,6 +142,17 @@ class Rollout:
             raise InputError(f"{path}: {problems[0]}")
         return loaded
 
+    def _repr_html_(self) -> str:
+        from worlds import task_from_dict
+        from worlds.drawing import LINE, card, world_svg
+
+        task = task_from_dict(self.meta["task"], "rollout")
+        lines = [(self.route, "#182242", True), (self.pose[::12, :2], LINE, False)]
+        picture = world_svg(task.world, start=task.start, goal=(*task.goal, task.goal_tolerance), lines=lines)
+        facts = {"planner": self.meta["planner"]["name"], "robot": self.meta["robot"]["name"], "time": f"{self.t[-1]:.1f} s",
+                 "least clearance": f"{self.clearance.min():.3f} m"}  # fmt: skip
+        return card(picture, f"{task.world.name}: {self.outcome.value}", facts)
+
     def problems(self) -> list[str]:
         """What no log of a drive can look like: a sentence for each array or entry of wrong shape or kind."""
         return [*self._array_problems(), *_meta_problems(self.meta)]

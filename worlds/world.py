@@ -97,6 +97,12 @@ class World:
         xmin, ymin, xmax, ymax = self.bounds
         return xmax - xmin, ymax - ymin
 
+    def _repr_html_(self) -> str:
+        from worlds.drawing import card, world_svg
+
+        facts = {"obstacles": len(self.obstacles), "size": "{:g} × {:g} m".format(*self.size)}
+        return card(world_svg(self), self.name, facts)
+
 
 @dataclass(frozen=True)
 class Task:
@@ -152,6 +158,11 @@ class Task:
                     f"{key}: ({x:g}, {y:g}) is inside obstacles[{i}] "
                     f"at ({disc.x:g}, {disc.y:g}) with radius {disc.radius:g}"
                 )
+
+    def _repr_html_(self) -> str:
+        from worlds.drawing import task_card
+
+        return task_card(self)
 
 
 def _require_finite(key: str, value: float) -> None:

@@ -450,3 +450,11 @@ def test_a_prelude_needs_a_film_and_iterations(antdrive) -> None:  # type: ignor
         assert (code, out) == (2, "")
         assert says in err
         assert err.count("\n") == 1
+
+
+def test_a_window_needs_a_display(antdrive, monkeypatch: pytest.MonkeyPatch) -> None:  # type: ignore[no-untyped-def]
+    monkeypatch.delenv("DISPLAY", raising=False)
+    code, out, err = antdrive("run", "empty", "--gui")
+    assert (code, out) == (2, "")
+    assert "no display" in err
+    assert err.count("\n") == 1

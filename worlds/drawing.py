@@ -1,0 +1,105 @@
+"""Drawings for notebooks: small SVG written by hand, so that nothing heavy is imported to look at a world."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from html import escape
+from typing import TYPE_CHECKING
+
+from worlds.world import Floats, Pose, World
+
+if TYPE_CHECKING:
+    from worlds.world import Task
+
+WIDE = 420  # the longer side of a drawing [px]
+OBSTACLE, WALL, START, GOAL, LINE = "#7988a0", "#c4cbd5", "#345cbe", "#008a5c", "#ff7a0e"
+
+
+def world_svg(
+    world: World, *, start: Pose | None = None, goal: tuple[float, float, float] | None = None,
+    lines: Iterable[tuple[Floats, str, bool]] = (),
+) -> str:  # fmt: skip
+    """A world from above as SVG; `goal` is x, y, tolerance [m]; lines are points (N, 2) [m], a colour, whether dashed."""
+    x0, y0, x1, y1 = world.bounds
+    scale = WIDE / max(x1 - x0, y1 - y0)
+    pen = 1.6 / scale
+    parts = [f'<rect x="{x0:.4g}" y="{y0:.4g}" width="{x1 - x0:.4g}" height="{y1 - y0:.4g}" fill="#f3f5f8"/>']
+    parts += [f'<circle cx="{d.x:.4g}" cy="{d.y:.4g}" r="{d.radius:.4g}" fill="{OBSTACLE}"/>' for d in world.obstacles]
+    for points, colour, dashed in lines:
+        path = " ".join(f"{x:.4g},{y:.4g}" for x, y in points)
+        dash = f' stroke-dasharray="{5 * pen:.3g} {3 * pen:.3g}"' if dashed else ""
+        parts.append(f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="{1.4 * pen:.3g}"{dash}/>')
+    if goal is not None:
+        parts.append(f'<circle cx="{goal[0]:.4g}" cy="{goal[1]:.4g}" r="{goal[2]:.4g}" fill="{GOAL}33" stroke="{GOAL}" '
+                     f'stroke-width="{pen:.3g}"/>')  # fmt: skip
+    if start is not None:
+        x, y, yaw = start
+        r = 7 * pen
+        corners = [(x + r * math.cos(yaw + a), y + r * math.sin(yaw + a)) for a in (0.0, 2.5, -2.5)]
+        tip = " ".join(f"{a:.4g},{b:.4g}" for a, b in corners)
+        parts.append(f'<polygon points="{tip}" fill="{START}"/>')
+    parts.append(f'<rect x="{x0:.4g}" y="{y0:.4g}" width="{x1 - x0:.4g}" height="{y1 - y0:.4g}" fill="none" '
+                 f'stroke="{WALL}" stroke-width="{3 * pen:.3g}"/>')  # fmt: skip
+    return _svg((x0, y0, x1, y1), parts, WIDE)
+
+
+def path_svg(points: Floats, wide: int = 240) -> str:
+    """A line (N, 2) alone, x right and y up, as SVG."""
+    (x0, y0), (x1, y1) = points.min(axis=0) - 1, points.max(axis=0) + 1
+    pen = 2.0 * max(x1 - x0, y1 - y0) / wide
+    path = " ".join(f"{x:.4g},{y:.4g}" for x, y in points)
+    line = f'<polyline points="{path}" fill="none" stroke="{LINE}" stroke-width="{pen:.3g}"/>'
+    ends = [
+        f'<circle cx="{x:.4g}" cy="{y:.4g}" r="{2 * pen:.3g}" fill="{colour}"/>'
+        for (x, y), colour in ((points[0], START), (points[-1], GOAL))
+    ]
+    return _svg((float(x0), float(y0), float(x1), float(y1)), [line, *ends], wide)
+
+
+def curve_svg(values: Floats, wide: int = 240, high: int = 90) -> str:
+    """Values by iteration (N,), as SVG; those that are not finite are left out."""
+    known = [(k, float(value)) for k, value in enumerate(values) if math.isfinite(value)]
+    if len(known) < 2:
+        return ""
+    low, top = min(v for _, v in known), max(v for _, v in known)
+    room = max(top - low, 1e-9)
+    path = " ".join(
+        f"{4 + (wide - 8) * k / (len(values) - 1):.1f},{high - 6 - (high - 12) * (v - low) / room:.1f}"
+        for k, v in known
+    )
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{wide}" height="{high}" viewBox="0 0 {wide} {high}">'
+        f'<polyline points="{path}" fill="none" stroke="{START}" stroke-width="1.6"/></svg>'
+    )
+
+
+def card(picture: str, title: str, facts: Mapping[str, object]) -> str:
+    """A picture with a title and facts below, as HTML."""
+    rows = "".join(
+        f'<tr><td style="color:#5b6576;text-align:left">{escape(str(key))}</td>'
+        f'<td style="text-align:left">{escape(str(value))}</td></tr>'
+        for key, value in facts.items()
+    )
+    return f'<div style="max-width:480px">{picture}<div><b>{escape(title)}</b></div><table>{rows}</table></div>'
+
+
+def task_card(task: Task) -> str:
+    """A task as HTML, picture first."""
+    world = task.world
+    picture = world_svg(world, start=task.start, goal=(*task.goal, task.goal_tolerance))
+    facts = {"obstacles": len(world.obstacles), "size": "{:g} × {:g} m".format(*world.size),
+             "start": "{:g}, {:g}".format(*task.start[:2]), "goal": "{:g}, {:g}".format(*task.goal)}  # fmt: skip
+    return card(picture, world.name, facts)
+
+
+def _svg(bounds: tuple[float, float, float, float], parts: list[str], wide: int) -> str:
+    """Parts in metres, y up, in a picture whose longer side is `wide` pixels."""
+    x0, y0, x1, y1 = bounds
+    pad = 0.02 * max(x1 - x0, y1 - y0)
+    width, height = x1 - x0 + 2 * pad, y1 - y0 + 2 * pad
+    scale = wide / max(width, height)
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width * scale:.0f}" height="{height * scale:.0f}" '
+        f'viewBox="{x0 - pad:.4g} {-y1 - pad:.4g} {width:.4g} {height:.4g}"><g transform="scale(1 -1)">{"".join(parts)}</g></svg>'
+    )
