@@ -43,9 +43,13 @@ def plan_with(names: Sequence[str]) -> None:
 def drive_and_film() -> None:
     """Drive once and film it."""
     log = run(_scenario()).rollout
+    ants = run(replace(_scenario(), planner=PLANNERS["as"], planner_name="as")).rollout
     assert log is not None
+    assert ants is not None
     with tempfile.TemporaryDirectory() as folder:
         film(log, Path(folder) / "warm.mp4", size=(160, 160), fps=2)
+        film(log, Path(folder) / "warm.mp4", size=(160, 160), fps=2, camera="follow")
+        film(ants, Path(folder) / "warm.mp4", size=(160, 160), fps=2, prelude=1.0)
 
 
 def warm(jobs: int = -1) -> None:
