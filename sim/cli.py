@@ -220,6 +220,8 @@ def compare(
 
     scenarios = [_scenario(world, name, None, robot, seed=seed, margin=margin, cell=cell) for name in planner]
     folder = out or Path("out") / f"compare-{scenarios[0].task.world.name}"
+    if len(set(planner)) < len(planner) or not 2 <= len(planner) <= 6:
+        raise InputError(f"--planner {' '.join(planner)}: name two to six different planners")
     if video is not None:
         _check_film(video)
         _make_folder(video.parent)

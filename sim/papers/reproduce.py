@@ -97,11 +97,15 @@ def _row(trial: Trial, results: Sequence[PlanResult], optima: Sequence[float]) -
 
 def row_cells(row: Row) -> list[str]:
     """The row as a table shows it."""
-    digits = 0 if row.what == "steps" else 3
+
+    def number(value: float) -> str:
+        return f"{value:.{0 if row.what == 'steps' else 3}f}" if math.isfinite(value) else "–"
+
     place = row.map + (" (recreated)" if row.recreated else "")
     return [
-        row.paper, place, row.planner, row.what, f"{row.printed:g}", f"{row.mean:.{digits}f}", f"{row.best:.{digits}f}",
-        f"{row.arrived}/{row.seeds}", f"{row.optimum:.3f}", f"{100 * row.gap:.1f} %", f"{row.plan_s:.3f} s",
+        row.paper, place, row.planner, row.what, f"{row.printed:g}", number(row.mean), number(row.best),
+        f"{row.arrived}/{row.seeds}", f"{row.optimum:.3f}",
+        f"{100 * row.gap:.1f} %" if row.arrived else "–", f"{row.plan_s:.3f} s",
     ]  # fmt: skip
 
 

@@ -147,6 +147,11 @@ def test_there_are_at_least_30_malformed_worlds() -> None:
         (["worlds", "import", "nothing.json", "-o", "folder"], "nothing.json: no such file"),
         (["worlds", "import", "x.json", "-o", "folder", "--goal", "1,2"], "--goal: DynaBARN brings its own"),
         (["schema", "moon"], "world, robot"),
+        (["compare", "empty", "-p", "astar"], "two to six different planners"),
+        (["compare", "empty", "-p", "astar", "-p", "astar"], "two to six different planners"),
+        (["reproduce", "nobody"], "choose from han2007"),
+        (["report", "nowhere", "-o", "r.html"], "nowhere: no such folder"),
+        (["report", ".", "-o", "r.pdf"], "choose .html or .md"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
