@@ -17,13 +17,13 @@ import numpy as np
 from robots import _kernels
 from robots.profile import speed_profile
 from robots.spec import RobotSpec
-from worlds import Pose, Route, World
+from worlds import Pose, Route, World, point_clearance
 
 #: What can hold the robot's speed, by the code in the log.
 LIMITERS: tuple[str, ...] = (
     "cruise",  # the robot's own top speed
     "curvature",  # lateral acceleration or yaw rate in a curve
-    "route",  # the route's corners, or how far its lines of sight are clear, here or within braking distance
+    "route",  # the route's bends, its lines of sight or the room beside it, here or within braking distance
     "yaw",  # the yaw rate of the curve must be reached first
     "goal",  # braking distance to the goal
     "turn",  # turning on the spot
@@ -143,6 +143,9 @@ class PurePursuit:
         curvature, heading = (np.interp(at, profile.arc, line) for line in (profile.curvature, profile.heading))
         if raw:
             curvature[:] = np.nan
+        places = np.stack([np.interp(at, arc, line) for line in route.xy.T], axis=1)
+        room = point_clearance(world, places) - robot.radius
+        speed = np.minimum(speed, self.near_speed + np.maximum(room, 0.0) / self.near_time)
         for stop in profile.arc[:-1][np.diff(profile.arc) == 0]:
             speed[int(stop / ds) : int(stop / ds) + 2] = 0.0
         _kernels.brake_backwards(speed, ds, self.braking * robot.max_acceleration)

@@ -746,7 +746,12 @@ def _scenario(world: str, planner: str, settings: list[str] | None, robot: str, 
         controller = PurePursuit(**values)
     except ValueError as error:
         raise InputError(f"controller.{error}") from None
-    return Scenario.of(world, planner, robot, options=groups["planner"], controller=controller, **rest)
+    try:
+        return Scenario.of(world, planner, robot, options=groups["planner"], controller=controller, **rest)
+    except InputError:
+        raise
+    except ValueError as error:
+        raise InputError(f"--{error}") from None
 
 
 def _pair(text: str) -> tuple[str, str]:

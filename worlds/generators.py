@@ -77,7 +77,9 @@ def forest(
         return gap is None or all(_distance(disc, (o.x, o.y)) - o.radius >= gap for o in others)
 
     source = f"the random worlds of han2007, section 3, with {count} cylinders"
-    for _ in range(tries):
+    for _ in range(
+        min(tries, max(20, 60_000 // max(count, 1)))
+    ):  # where so many hardly fit, more tries would only take long
         discs = _scatter(count, tries, draw, fits)
         if discs is None:
             continue

@@ -90,6 +90,71 @@ def test_corners_are_cut_only_where_there_is_room(jackal: RobotSpec) -> None:
     assert point_clearance(post, guarded[:, :2]).min() > jackal.radius + 0.35 * margin
 
 
+def bends(radius: float, bulge: float = 5e-4) -> Route:
+    """Straight on, a half turn to the left and one to the right, straight on; as refined routes are drawn."""
+    points, curvature = [(0.0, 0.0)], [0.0]
+    for centre, begin, turn in (((3.0, radius), -math.pi / 2, 1), ((3.0, 3 * radius), -math.pi / 2, -1)):
+        count = math.ceil(math.pi / (2 * math.acos(radius / (radius + bulge))))
+        for i in range(count):
+            angle = begin + turn * math.pi * (i + 0.5) / count
+            reach = radius / math.cos(math.pi / count / 2)
+            points.append((centre[0] + reach * math.cos(angle), centre[1] + reach * math.sin(angle)))
+            curvature.append(turn / radius)
+    points += [(3.0, 4 * radius), (6.0, 4 * radius)]
+    curvature += [0.0, 0.0]
+    return Route(np.array(points), np.array(curvature))
+
+
+def off(poses: np.ndarray, route: Route) -> np.ndarray:
+    a, along = route.xy[:-1], np.diff(route.xy, axis=0)
+    offset = poses[:, None, :2] - a
+    f = np.clip((offset * along).sum(axis=2) / (along**2).sum(axis=1), 0, 1)
+    return np.linalg.norm(offset - f[:, :, None] * along, axis=2).min(axis=1)
+
+
+@pytest.mark.parametrize(("radius", "speed"), [(0.5, 1.0), (2.0, 2.0)])
+def test_bends_of_known_curvature_are_followed_not_cut(radius: float, speed: float, jackal: RobotSpec) -> None:
+    """At the speed that lateral acceleration allows in the bend; the carrot alone would cut it."""
+    route = bends(radius)
+    poses, commands, _ = follow(jackal, route, (0, 0, 0))
+    fast = commands[:, 0] > 0.7 * speed
+    assert fast.sum() > 100
+    error = float(np.percentile(off(poses[fast], route), 95))
+    assert error < 0.01
+    raw, commands, _ = follow(jackal, Route(route.xy), (0, 0, 0))
+    assert float(np.percentile(off(raw[commands[:, 0] > 0.4], route), 95)) > 2 * error
+
+
+def test_the_whole_drive_takes_as_long_as_its_profile_says(jackal: RobotSpec) -> None:
+    from robots import speed_profile
+
+    route = bends(0.8)
+    _, commands, _ = follow(jackal, route, (0, 0, 0))
+    assert len(commands) * DT == pytest.approx(speed_profile(route, jackal, braking=0.7).duration, rel=0.05)
+
+
+def test_standing_it_turns_to_the_route_first_but_moving_it_does_not_stop_for_that(jackal: RobotSpec) -> None:
+    straight = Route(np.array([(0.0, 0.0), (5.0, 0.0)]))
+    poses, _, states = follow(jackal, straight, (0, 0, 0.5))
+    assert states[1].turning
+    assert np.abs(poses[:, 1]).max() < 0.02  # else it would swing out
+    controller = PurePursuit()
+    guide = controller.guide(straight, OPEN, jackal, 0.05, DT)
+    _, state = controller.step(guide, (1.0, 0.0, 0.5), Twist(1.0, 0.0), Progress(1.0))
+    assert not state.turning
+
+
+def test_it_is_slow_where_the_room_beside_it_is_small_and_says_so(jackal: RobotSpec) -> None:
+    gate = World("gate", OPEN.bounds, tuple(Disc(5, side * (jackal.radius + 0.02 + 0.3), 0.3) for side in (1, -1)))
+    poses, commands, states = follow(
+        jackal, Route(np.array([(0.0, 0.0), (10.0, 0.0)]), np.zeros(2)), (0, 0, 0), gate, 0.02
+    )
+    inside = np.abs(poses[:, 0] - 5) < 0.1
+    assert commands[inside, 0].max() < 1.5
+    assert {LIMITERS[states[i].limiter] for i in np.flatnonzero(inside)} <= {"route", "room"}
+    assert commands[:, 0].max() == pytest.approx(2.0)
+
+
 @settings(max_examples=25)
 @given(
     turns=st.lists(st.sampled_from([-135, -90, -45, 0, 45, 90, 135]), min_size=1, max_size=6),

@@ -42,6 +42,12 @@ def test_a_yaw_rate_out_of_reach_slows_down() -> None:
     assert k.slow_for_yaw(4.0, -2.0, 8.0, 0.1) == 0.0  # turning the other way: stop first
 
 
+def test_little_room_beside_the_robot_slows_down() -> None:
+    assert k.slow_for_room(0.0, 0.5, 0.05) == 0.5
+    assert k.slow_for_room(0.05, 0.5, 0.05) == pytest.approx(1.5)
+    assert k.slow_for_room(-0.1, 0.5, 0.05) == 0.5
+
+
 def test_speeds_are_lowered_backwards_by_braking_distance() -> None:
     limit = np.array([2.0, 2.0, 2.0, 0.0])
     k.brake_backwards(limit, 0.5, 1.0)

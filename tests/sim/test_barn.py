@@ -1,13 +1,16 @@
-"""BARN's worlds, which nobody here made: driven with the jackal, on raw grid paths."""
+"""BARN's worlds, which nobody here made: driven with the jackal."""
 
 import tarfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from planners import find_planner
 from robots import RobotSpec
 from sim import Scenario, run
+from sim.metrics import barn as barn_score
+from sim.metrics import tracking_error
 from tests.conftest import SHARED
 from worlds import import_barn
 
@@ -29,4 +32,22 @@ def barn(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_jackal_drives_a_barn_world(number: int, barn: Path, jackal: RobotSpec) -> None:
     task = import_barn(barn / f"world_{number}.world")
     result = run(Scenario(task=task, planner=find_planner("astar"), robot=jackal))
+    assert result.succeeded, (result.outcome, result.certificate)
+    assert result.rollout is not None
+    assert barn_score(result.rollout) == pytest.approx(0.5)  # the most there is
+    error, speed = tracking_error(result.rollout), result.rollout.twist[:, 0]
+    assert np.percentile(error[np.abs(speed - 1) < 0.1], 95) < 0.02
+    assert np.percentile(error[speed > 1.8], 95) < 0.01
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("planner", "noise", "route"), [("ants", 0.0, "wide"), ("aco-han", 0.0, "taut"), ("astar", 1.0, "wide")]
+)
+@pytest.mark.parametrize("number", WORLDS)
+def test_no_planners_path_is_unsafe_to_follow(
+    number: int, planner: str, noise: float, route: str, barn: Path, jackal: RobotSpec
+) -> None:
+    task = import_barn(barn / f"world_{number}.world")
+    result = run(Scenario(task=task, planner=find_planner(planner), robot=jackal, noise=noise, route=route))
     assert result.succeeded, (result.outcome, result.certificate)

@@ -142,11 +142,17 @@ def test_there_are_at_least_30_malformed_worlds() -> None:
         (["render", "nothing.npz", "-o", "f.mp4"], "no such file"),
         (["worlds", "generate", "desert", "-o", "w.yaml"], "forest"),
         (["worlds", "generate", "forest", "-o", "w.yaml", "--set", "cuont=3"], "count"),
-        (["worlds", "generate", "forest", "-o", "w.yaml", "--set", "count=3000"], "no world with 3000"),
+        (["worlds", "generate", "forest", "-o", "w.yaml", "--set", "count=1000"], "no world with 1000"),
         (["worlds", "import", "nothing.world", "-o", "w.yaml"], "nothing.world: cannot be read"),
         (["worlds", "import", "nothing.json", "-o", "folder"], "nothing.json: no such file"),
         (["worlds", "import", "x.json", "-o", "folder", "--goal", "1,2"], "--goal: DynaBARN brings its own"),
         (["schema", "moon"], "world, robot"),
+        (["run", "empty", "--route", "straight"], "route: unknown 'straight'; choose from grid, taut, wide"),
+        (["run", "empty", "--noise", "60"], "noise: 60 times the robot's own is too much: encoder"),
+        (["margin"], "name a rollout, a world, or a class"),
+        (["margin", "empty", "--generate", "barn"], "name a rollout, a world, or a class"),
+        (["margin", "--generate", "desert"], "choose from forest, barn"),
+        (["margin", "nothing.npz"], "nothing.npz: no such file"),
         (["compare", "empty", "-p", "astar"], "two to six different planners"),
         (["compare", "empty", "-p", "astar", "-p", "astar"], "two to six different planners"),
         (["reproduce", "nobody"], "choose from han2007"),
@@ -161,6 +167,32 @@ def test_wrong_words_are_one_line_and_exit_code_2(antdrive, words: list[str], sa
     assert out == ""
     assert err.count("\n") == 1
     assert says in err
+
+
+def test_a_noisy_drive_tells_what_ate_its_margin(antdrive, small: Path) -> None:  # type: ignore[no-untyped-def]
+    code, out, _ = antdrive("run", small, "--noise", "1", "--route", "taut", "--out", "r", "--json")
+    facts = json.loads(out)
+    assert code == 0
+    with np.load("r/rollout.npz") as log:
+        assert log["estimate"].shape == log["pose"].shape
+        assert json.loads(str(log["meta"]))["route"] == {"asked": "taut", "kind": "taut", "note": ""}
+    code, out, _ = antdrive("margin", facts["files"]["rollout"], "--json")
+    spent = json.loads(out)
+    assert code == 0
+    assert spent["left"] >= facts["certificate"]["min_clearance_m"] - 1e-9  # of the disc around a disc robot
+    assert sum(share["at_tightest"] for share in spent["shares"]) == pytest.approx(spent["margin"] - spent["left"])
+    code, out, _ = antdrive("margin", facts["files"]["rollout"])
+    assert code == 0
+    assert "localisation" in out
+
+
+def test_the_smallest_safe_margin_is_told(antdrive, small: Path) -> None:  # type: ignore[no-untyped-def]
+    code, out, err = antdrive("margin", small, "--seeds", "1", "--json", "-p", "astar", "--route", "taut")
+    facts = json.loads(out)
+    assert (code, err) == (0, "")
+    assert 0 <= facts["margin_m"] <= 0.03
+    assert facts["trials"][0]["margin"] == pytest.approx(0.2)
+    assert "smallest safe margin" in antdrive("margin", small, "--seeds", "1", "-p", "astar", "--speed", "0.3")[1]
 
 
 def test_lists(antdrive) -> None:  # type: ignore[no-untyped-def]

@@ -249,6 +249,29 @@ def test_the_same_scenario_gives_the_same_bits_in_another_process(small_run: Run
     assert done.stdout.split()[-1] == small_run.rollout.digest
 
 
+def test_noise_is_seeded_logged_and_survived(small_scenario: Scenario, small_run: Run) -> None:
+    noisy = replace(small_scenario, noise=1.0)
+    first, again, other = run(noisy), run(noisy), run(replace(noisy, seed=noisy.seed + 1))
+    assert first.rollout is not None
+    assert again.rollout is not None
+    assert other.rollout is not None
+    assert small_run.rollout is not None
+    assert first.succeeded
+    assert first.rollout.digest == again.rollout.digest != other.rollout.digest
+    gone = np.hypot(*(first.rollout.estimate - first.rollout.pose)[:, :2].T)
+    assert 0.001 < np.percentile(gone, 95) < 0.03  # the robot's fixes err by a centimetre
+    assert small_run.rollout.estimate.shape == (0, 3)
+    assert not (first.rollout.pose[:500] == small_run.rollout.pose[:500]).all()
+
+
+@pytest.mark.parametrize("kind", ["grid", "taut", "wide"])
+def test_every_kind_of_route_is_driven_and_told(kind: str, small_scenario: Scenario) -> None:
+    result = run(replace(small_scenario, route=kind))
+    assert result.succeeded
+    assert result.rollout is not None
+    assert result.rollout.meta["route"] == {"asked": kind, "kind": kind, "note": ""}
+
+
 def test_settings_out_of_range_are_refused(small_scenario: Scenario) -> None:
     with pytest.raises(ValueError, match="margin: must be at least 0"):
         replace(small_scenario, margin=-0.1)
