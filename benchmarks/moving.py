@@ -1,6 +1,6 @@
 """hasan's six cases among moving obstacles, online: `python -m benchmarks.moving [--seeds N]`. Prints Markdown.
 
-The environments are recreated (`benchmarks.planners.environments`), with the paper's start and goal. So many movers, the paper
+The environments are recreated (`sim.papers.maps`), with the paper's start and goal. So many movers, the paper
 has one, begin on random free cells. At every step each goes to a random free neighbouring cell, not the robot's, and then
 the robot decides. The same seed moves them alike for every planner, until they meet the robot. `mmas-dstar` has one rule for
 its exponents everywhere; where the paper needed other ones, they are told. Total cost is as the paper's: the cost of the way
@@ -17,8 +17,9 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.planners import environments, seconds, table
+from benchmarks.planners import seconds, table
 from planners import Cell, Online, Query, find_planner, online_for
+from sim.papers.maps import environments
 from worlds import DIRECTIONS, Grid
 
 #: hasan, Table 1: alpha/beta, cells propagated, steps, total cost, seconds; basic D*'s total cost and seconds.
@@ -84,7 +85,7 @@ def main() -> None:
     seeds = range(parser.parse_args().seeds)
     for count in (1, 10):
         rows = []
-        for case, query, _ in environments():
+        for case, query in environments().items():
             exponents, cells, steps, cost, wall, dstar_cost, dstar_wall = PRINTED[case[:2]]
             rows.append([case, "hasan, printed", exponents, "", str(steps), f"{cost:g}", str(cells), "", f"{wall:g} s"])
             rows.append(["", "its D*", "", "", "", f"{dstar_cost:g}", "", "", f"{dstar_wall:g} s"])

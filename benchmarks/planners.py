@@ -24,33 +24,21 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from planners import PLANNERS, Planner, PlanResult, Query, find_planner
 from planners.ants import Ground, _Walk
+from sim.papers.maps import blocks, environments, han_ants, optimum, scattered
 from worlds import DIRECTIONS, Disc, Grid, Task, World, forest, rasterise
 
-Picture = npt.NDArray[np.bool_]
 SEEDS = range(10)
 
 
 # Grids
 
 
-def crossable(draw: Callable[[np.random.Generator], Picture], seed: int) -> Query:
-    """Corner to corner over the first picture drawn that can be crossed."""
-    rng = np.random.default_rng(seed)
-    while True:
-        free = draw(rng)
-        free[0, 0] = free[-1, -1] = True
-        query = Query(Grid.from_free(free), (0, 0), (free.shape[0] - 1, free.shape[1] - 1))
-        if math.isfinite(optimum(query)):
-            return query
-
-
 def random_grid(size: int, seed: int, blocked: float = 0.25) -> Query:
     """Each cell blocked with one probability."""
-    return crossable(lambda rng: rng.random((size, size)) >= blocked, seed)
+    return scattered(size, blocked, seed)
 
 
 def cylinder_grid(size: int, seed: int) -> Query:
@@ -60,21 +48,6 @@ def cylinder_grid(size: int, seed: int) -> Query:
     rng = np.random.default_rng(seed)
     task = forest(rng, size=side, count=count, radius=(0.2, 0.8), clearance=0.6, robot_radius=0.2, cell=0.25)
     return Query.between(rasterise(task.world, 0.25, 0.2), task)
-
-
-def block_grid(rows: int, cols: int, count: int, largest: int, seed: int) -> Query:
-    """`count` upright rectangles of 1 to `largest` cells a side, two cells clear of both corners."""
-
-    def draw(rng: np.random.Generator) -> Picture:
-        free = np.ones((rows, cols), dtype=np.bool_)
-        for _ in range(count):
-            height, width = rng.integers(1, largest + 1, 2)
-            r, c = rng.integers(0, rows - height + 1), rng.integers(0, cols - width + 1)
-            free[r : r + height, c : c + width] = False
-        free[:3, :3] = free[-3:, -3:] = True
-        return free
-
-    return crossable(draw, seed)
 
 
 def maze(size: int, seed: int, opened: float = 0.0) -> Query:
@@ -103,10 +76,6 @@ def cup(size: int) -> Query:
     low, high = size // 6, 5 * size // 6
     free[low : high + 1, high] = free[low, low:high] = free[high, low:high] = False
     return Query(Grid.from_free(free), (size // 2, size // 2), (size // 2, size - 2))
-
-
-def optimum(query: Query) -> float:
-    return find_planner("astar").plan(query, np.random.default_rng(0)).cost
 
 
 def solve(planner: Planner, query: Query, seed: int) -> PlanResult:
@@ -208,7 +177,7 @@ def paper_maps(quick: bool) -> Iterator[tuple[str, str, str, dict[str, Any], lis
         (10, 5, (15.07, 1.217, 15.07, 1.155)), (20, 10, (28.6274, 9.073, 28.6274, 7.839)),
         (30, 15, (45.9411, 52.854, 45.1127, 52.017)), (40, 20, (62.6690, 134.771, 61.8406, 132.678)),
     ):  # fmt: skip
-        queries = [block_grid(size, size, count, size // 4, seed) for seed in seeds]
+        queries = [blocks(size, size, count, size // 4, seed) for seed in seeds]
         options = {"ants": 50, "iterations": 100, "evaporation": 0.3}
         for name, length, wall in (("as", *figures[:2]), ("maco", *figures[2:])):
             yield "ibraheem2016", f"{size}×{size}, {count} obstacles", name, options, queries, f"{length:g}, {wall:g} s"
@@ -218,7 +187,7 @@ def paper_maps(quick: bool) -> Iterator[tuple[str, str, str, dict[str, Any], lis
         (3, (100, 100), (154.2376, 16552, 123.6102, 1063)), (4, (100, 100), (175.2376, 17953, 135.8234, 1201)),
         (5, (100, 100), (168.6518, 22641, 131.6812, 1593)),
     ):  # fmt: skip
-        queries = [block_grid(rows, cols, 25, max(rows, cols) // 6, 100 * number + seed) for seed in seeds]
+        queries = [blocks(rows, cols, 25, max(rows, cols) // 6, 100 * number + seed) for seed in seeds]
         place = f"{number}: {rows}×{cols}, 25 obstacles"
         # How many iterations is not told; its times are hours for the one, minutes for the other.
         old = {"ants": 500, "beta": 2.0, "evaporation": 0.01, "iterations": 1000}
@@ -260,48 +229,19 @@ def papers(quick: bool) -> Iterator[str]:
 # hasan's environments, 50×50
 
 
-def environments() -> Iterator[tuple[str, Query, str]]:
+def hasan_cases() -> Iterator[tuple[str, Query, str]]:
     """Name, recreated environment with the paper's start and goal, and what it printed."""
-    row, col = np.mgrid[:50, :50]
-
-    def ring(r: float, c: float, radius: float, opening: float, wide: float) -> Picture:
-        angle = np.degrees(np.arctan2(row - r, col - c)) - opening
-        shut = np.abs((angle + 180) % 360 - 180) > wide / 2
-        return (np.abs(np.hypot(row - r, col - c) - radius) < 0.8) & shut
-
-    def query(blocked: Picture, start: tuple[int, int], goal: tuple[int, int]) -> Query:
-        free = ~blocked
-        free[start] = free[goal] = True
-        return Query(Grid.from_free(free), start, goal)
-
-    curved = ring(5, 8, 18.6, 185, 170) | ring(38, 30, 7, 90, 90) | ring(36, 8, 6, 270, 90) | ring(14, 40, 6, 0, 90)
-    overlapping = ring(2, 26, 11, 270, 220) | ring(34, 26, 16, 90, 220) | ring(36, 40, 6, 90, 90)
-    vertical = np.zeros((50, 50), dtype=np.bool_)
-    for c in range(8, 48, 8):
-        vertical[6:44, c] = True
-        vertical[20:26, c] = False
-    circles = ring(24, 24, 6, 0, 40) | ring(24, 24, 12, 180, 30) | ring(24, 24, 18, 0, 25)
-    rng = np.random.default_rng(5)
-    shapes = np.zeros((50, 50), dtype=np.bool_)
-    for _ in range(30):
-        r, c = rng.integers(1, 45, 2)
-        height, width = rng.integers(1, 5, 2)
-        shapes[r : r + height, c : c + width] = True
-    shapes[23:26] = False
-    shapes[24, :47] = True
-    # The paper's x.y as (column, row): where wall and ends are told in words, its steps then come out.
-    yield "1a curved walls", query(curved, (13, 21), (17, 27)), "1531, 65, 3.82 s"
-    yield "2b overlapping curved walls", query(overlapping, (8, 26), (24, 25)), "1134, 43, 2.96 s"
-    yield "3c vertical rows", query(vertical, (49, 3), (0, 3)), "1208, 49, 2.98 s"
-    yield "4d concentric circles", query(circles, (24, 24), (45, 38)), "1689, 64, 4.08 s"
-    yield "5e many shapes", query(shapes, (4, 1), (48, 2)), "1541, 91, 5.64 s"
-    yield "5f the same, across the wall", query(shapes, (23, 16), (25, 15)), "1346, 66, 4.76 s"
+    printed = (
+        "1531, 65, 3.82 s", "1134, 43, 2.96 s", "1208, 49, 2.98 s", "1689, 64, 4.08 s", "1541, 91, 5.64 s", "1346, 66, 4.76 s",
+    )  # fmt: skip
+    for (name, query), figures in zip(environments().items(), printed, strict=True):
+        yield name, query, figures
 
 
 def hasan(quick: bool) -> Iterator[str]:
     """hasan's planner where nothing moves."""
     rows = []
-    for name, query, printed in environments():
+    for name, query, printed in hasan_cases():
         planner = find_planner("mmas-dstar")
         solve(planner, query, 0)
         r = solve(planner, query, 0)
@@ -313,16 +253,6 @@ def hasan(quick: bool) -> Iterator[str]:
 
 
 # han2007
-
-
-def han_map() -> Query:
-    """The thesis' map of fourteen obstacles in its own units: points (1, 1) to (20, 20), a point robot."""
-    places = [
-        (4, 6), (14, 12), (13, 11), (8, 10), (10, 10), (14, 10), (14, 4), (8, 14), (13, 14), (4, 10), (16, 14), (10, 16),
-        (17, 10), (19, 18),
-    ]  # fmt: skip
-    world = World("han2007-aco", (0.5, 0.5, 20.5, 20.5), tuple(Disc(float(x), float(y), 1.0) for x, y in places))
-    return Query(rasterise(world, 1.0), (0, 0), (19, 19))
 
 
 def han_disc() -> Query:
@@ -354,7 +284,7 @@ def han2007(quick: bool) -> Iterator[str]:
     yield f"One disc of radius 5, length of the line, 20 seeds; the shortest (`tangent`) is {floor:.3f}"
     yield ""
     yield from table(["", "median", "gap", "best", "worst", "time"], rows)
-    query = han_map()
+    query = han_ants()
     variants: dict[str, dict[str, Any]] = {
         "`aco-han`": {},
         "`aco-han`, elitism 100": {"elitism": 100},
@@ -406,7 +336,7 @@ def speed(quick: bool) -> Iterator[str]:
     planner = find_planner("as", ants=50, iterations=100)
     rows = []
     for size, paper in printed.items():
-        queries = [block_grid(size, size, size // 2, size // 4, seed) for seed in SEEDS]
+        queries = [blocks(size, size, size // 2, size // 4, seed) for seed in SEEDS]
         solve(planner, queries[0], 0)
         results = [solve(planner, query, seed) for seed, query in enumerate(queries)]
         wall = statistics.median(r.wall_s for r in results)

@@ -54,7 +54,7 @@ def blocks(rows: int, cols: int, count: int, largest: int, seed: int) -> Query:
             height, width = rng.integers(1, largest + 1, 2)
             row, col = rng.integers(0, rows - height + 1), rng.integers(0, cols - width + 1)
             free[row : row + height, col : col + width] = False
-        free[:2, :2] = free[-2:, -2:] = True
+        free[:3, :3] = free[-3:, -3:] = True
         return free
 
     return _crossable(draw, seed)

@@ -9,7 +9,6 @@ import pytest
 from worlds_to_solve import catalogue, optimum, random_query, sealed
 
 from benchmarks.moving import Strollers, drive
-from benchmarks.planners import environments
 from planners import (
     Follower,
     MaxMinDStar,
@@ -20,9 +19,10 @@ from planners import (
     online_for,
 )
 from planners.online import PATIENCE
+from sim.papers.maps import environments
 from worlds import DIRECTIONS, Grid
 
-CASES = {name[:2]: query for name, query, _ in environments()}
+CASES = {name[:2]: query for name, query in environments().items()}
 NOBODY: list[tuple[int, int]] = []
 
 

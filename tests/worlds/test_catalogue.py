@@ -6,7 +6,7 @@ import itertools
 import numpy as np
 import pytest
 
-from benchmarks.planners import environments
+from sim.papers.maps import environments
 from tests.worlds.oracles import passable
 from worlds import Disc, Task, Traffic, catalogue, forest, load_task, point_clearance, rasterise
 
@@ -144,7 +144,7 @@ def test_hasans_mover_walks_over_free_cells_from_a_random_one(case):
 
 
 def test_the_benchmarks_draw_the_same_environments():
-    drawn = {name.split()[0]: query for name, query, _ in environments()}
+    drawn = {name.split()[0]: query for name, query in environments().items()}
     assert list(drawn) == list(HASAN)
     for case, query in drawn.items():
         task = load_task(f"hasan-{case}")
