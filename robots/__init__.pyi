@@ -14,3 +14,5 @@ from .pursuit import Twist as Twist
 from .spec import Footprint as Footprint
 from .spec import Noise as Noise
 from .spec import RobotSpec as RobotSpec
+from .yielding import Resolve as Resolve
+from .yielding import Yielding as Yielding

@@ -410,7 +410,7 @@ def pursue(
             facing = headings[i] + f * (headings[j] - headings[i])
             left = math.cos(facing) * (cy - py) - math.sin(facing) * (cx - px)
             curvature -= 2.0 * left / ((cx - px) * (cx - px) + (cy - py) * (cy - py))
-            ahead = min(s + v * dt, arc[-1]) / ds
+            ahead = min(s + max(v, 0.0) * dt, arc[-1]) / ds
             h = min(int(ahead), curvatures.shape[0] - 2)
             curvature += curvatures[h] + (ahead - h) * (curvatures[h + 1] - curvatures[h])
         target = limits.speed

@@ -31,6 +31,7 @@ LIMITERS: tuple[str, ...] = (
     "clearance",  # the arc on which it can still stop is not clear: full braking
     "done",  # standing at the goal
     "room",  # how little room there is beside the robot
+    "yield",  # a mover that would be met
 )
 
 

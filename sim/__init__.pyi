@@ -4,6 +4,7 @@ from .engine import Engine as Engine
 from .filming.video import FilmInfo as FilmInfo
 from .filming.video import film as film
 from .filming.video import still as still
+from .knowledge import Knowledge as Knowledge
 from .metrics import METRICS as METRICS
 from .metrics import measure as measure
 from .plots import overview as overview

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import signal
 import sys
 from pathlib import Path
@@ -13,6 +14,7 @@ from sim.console import as_json, bar, complain, planning, say, say_json, table
 from worlds.errors import InputError
 
 if TYPE_CHECKING:
+    from sim.knowledge import Knowledge
     from sim.scenario import Run, Scenario
     from worlds import Disc, Task
 
@@ -73,6 +75,10 @@ def run(
         typer.Option(metavar="X,Y,RADIUS", help="A cylinder that neither planner nor controller know of."),
     ] = None,
     time_limit: Annotated[float | None, typer.Option(min=1e-3, max=1e6, help="Simulated time allowed [s].")] = None,
+    yields: Annotated[bool, typer.Option("--yield/--no-yield", help="Give way to movers.")] = True,
+    sees: Annotated[
+        str, typer.Option(metavar="WHAT[:METRES]", help="Of movers: positions, velocities or motions, within a reach.")
+    ] = "velocities",
     out: Out = None,
     video: Annotated[Path | None, typer.Option(help="Also film it: .mp4, .gif or .webp.")] = None,
     prelude: Prelude = 0.0,
@@ -86,7 +92,8 @@ def run(
 
     scenario = _scenario(
         world, planner, settings, robot, seed=seed, margin=margin, cell=cell, route=route, noise=noise, time_limit=time_limit,
-        unseen=tuple(_disc(text) for text in unseen or ()),
+        unseen=tuple(_disc(text) for text in unseen or ()), knowledge=_knowledge(sees),
+        **({} if yields else {"yielding": None}),
     )  # fmt: skip
     folder = out or Path("out") / _slug(scenario)
     if gui:
@@ -752,6 +759,16 @@ def _scenario(world: str, planner: str, settings: list[str] | None, robot: str, 
         raise
     except ValueError as error:
         raise InputError(f"--{error}") from None
+
+
+def _knowledge(text: str) -> Knowledge:
+    from sim.knowledge import Knowledge
+
+    told, mark, reach = text.partition(":")
+    try:
+        return Knowledge(told=told, reach=float(reach) if mark else math.inf)  # type: ignore[arg-type]
+    except ValueError as error:
+        raise InputError(f"--sees {text}: {error}") from None
 
 
 def _pair(text: str) -> tuple[str, str]:

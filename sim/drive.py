@@ -9,16 +9,30 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robots import Guide, Progress, PurePursuit, Senses, Twist, footprint_clearance
+from robots import (
+    LIMITERS,
+    Guide,
+    Progress,
+    PurePursuit,
+    Resolve,
+    RobotSpec,
+    Senses,
+    Twist,
+    Yielding,
+    footprint_clearance,
+)
 from sim import _kernels_movers
 from sim.contacts import touches
 from sim.engine import Engine
+from sim.knowledge import Knowledge, Watch
 from sim.rollout import Outcome
-from worlds import Floats, Task, Traffic
+from worlds import Floats, Pose, Task, Traffic
 
 STOPPED_SPEED = 0.01  # slower than this counts as standing [m/s]
 STUCK_AFTER = 8.0  # without progress for this long the robot is stuck [s]
 STUCK_PROGRESS = 0.02  # what counts as progress along the route [m]
+YIELD = LIMITERS.index("yield")
+KNOWN = Knowledge()
 AFTER_CONTACT = 0.5  # a collision stays in the log for this long, braking [s]
 
 
@@ -48,10 +62,13 @@ def drive(
     control_hz: int = 60,
     time_limit: float,
     senses: Senses | None = None,
+    yielding: Yielding | None = None,
+    knowledge: Knowledge = KNOWN,
     progress: Callable[[float], None] | None = None,
 ) -> Drive:
     """Drive along a guide until the robot stands at its end, touches something or is touched, is stuck or late.
 
+    With `yielding` it keeps clear of the engine's traffic by what it has `knowledge` of; waiting is then no being stuck.
     With `senses` the robot sees and acts by them, else perfectly. `progress` is told the fraction of the route that is done,
     about ten times per simulated second.
 
@@ -68,6 +85,8 @@ def drive(
     outcome = Outcome.COLLIDED if contacts else None
     command, state = Twist(0.0, 0.0), Progress()
     best, idle, turned = 0.0, 0, 0  # the farthest on the route, and periods since then without and with turning
+    watch = Watch(engine.traffic, knowledge, control_hz) if engine.traffic and yielding else None
+    resolve = Resolve()
     reason = ""
     ticks = round(time_limit * control_hz)
     patience = round(STUCK_AFTER * control_hz)
@@ -81,7 +100,23 @@ def drive(
             estimate = senses.look(believed, Twist(speed, yaw_rate))
             errors[-1] = (estimate[0] - x, estimate[1] - y, math.remainder(estimate[2] - yaw, 2 * math.pi))
             believed = senses.ahead()
-        command, state = controller.step(guide, believed, command, state)
+        last, before = command, state
+        command, state = controller.step(guide, believed, last, before)
+        if watch and yielding:
+            settles = before.limiter == YIELD and _within(believed, last, task, engine.robot)
+            if settles:
+                if _standing(speed, yaw_rate):
+                    outcome = (
+                        Outcome.SUCCEEDED if math.dist((x, y), task.goal) <= task.goal_tolerance else Outcome.STUCK
+                    )
+                    break
+                command = _brake(last, engine.robot, control_hz)
+            expected = watch.expected(tick, believed[:2], yielding.ahead)
+            command, yields, resolve = yielding.step_aside(
+                guide, engine.robot, believed, last, before, command, resolve, *expected
+            )
+            if yields or settles:
+                state = state._replace(turning=before.turning, limiter=YIELD)
         if guide.length - state.arc <= guide.goal_distance and _standing(speed, yaw_rate) and not any(command):
             left = math.dist((x, y), task.goal)
             outcome = Outcome.SUCCEEDED if left <= task.goal_tolerance else Outcome.STUCK
@@ -99,7 +134,8 @@ def drive(
         if state.arc > best + STUCK_PROGRESS:
             best, idle, turned = state.arc, 0, 0
         else:
-            idle, turned = idle + (not state.turning), turned + state.turning
+            waits = state.limiter == YIELD
+            idle, turned = idle + (not state.turning and not waits), turned + (state.turning and not waits)
             if idle >= patience or turned >= patience + full_turn:
                 outcome = Outcome.STUCK
         if progress is not None and tick % (control_hz // 10 or 1) == 0:
@@ -153,6 +189,19 @@ def _blame(
         return first.outcome, ""
     fast = math.hypot(*traffic.velocities(t[before])[0, m])
     return first.outcome, f"movers[{m}] at {fast:.2f} m/s, the robot at {abs(twist[before, 0]):.2f} m/s"
+
+
+def _within(pose: Pose, command: Twist, task: Task, robot: RobotSpec) -> bool:
+    """Whether a robot that brakes now stops within the goal's tolerance."""
+    x, y, yaw = pose
+    way = command.speed * abs(command.speed) / (2 * robot.max_acceleration)
+    end = (x + way * math.cos(yaw), y + way * math.sin(yaw))
+    return max(math.dist((x, y), task.goal), math.dist(end, task.goal)) < 0.95 * task.goal_tolerance
+
+
+def _brake(command: Twist, robot: RobotSpec, hz: int) -> Twist:
+    less = max(0.0, 1 - robot.max_acceleration / hz / abs(command.speed)) if command.speed else 0.0
+    return Twist(command.speed * less, command.yaw_rate * less)
 
 
 def _standing(speed: float, yaw_rate: float) -> bool:

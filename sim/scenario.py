@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import platform
 import time
 import zlib
@@ -14,10 +15,11 @@ from typing import Any
 import numpy as np
 
 from planners import PLANNERS, ROUTE_KINDS, Planner, PlanResult, PlanStatus, Query, find_planner, refine
-from robots import LIMITERS, PurePursuit, RobotSpec, Senses, load_robot
+from robots import LIMITERS, PurePursuit, RobotSpec, Senses, Yielding, load_robot
 from sim.certificate import Certificate, certify
 from sim.drive import Drive, drive
 from sim.engine import Engine
+from sim.knowledge import Knowledge
 from sim.metrics import measure
 from sim.rollout import SCHEMA, Outcome, Rollout
 from worlds import Disc, Grid, Route, Task, Traffic, World, load_task, rasterise, task_to_dict
@@ -37,6 +39,8 @@ class Scenario:
     seed: int = 0
     controller: PurePursuit = field(default_factory=PurePursuit)
     noise: float = 0.0  # how much of the robot's documented noise it has; 1 is all of it
+    knowledge: Knowledge = field(default_factory=Knowledge)  # what the robot knows of movers
+    yielding: Yielding | None = field(default_factory=Yielding)  # how it keeps clear of them; None: not at all
     unseen: tuple[Disc, ...] = ()  # obstacles that neither planner nor controller know of
     time_limit: float | None = None  # simulated time allowed [s]; None: the task's, or ample for the route
     physics_hz: int = 240
@@ -164,6 +168,8 @@ def run(
             control_hz=s.control_hz,
             time_limit=limit,
             senses=senses,
+            yielding=s.yielding,
+            knowledge=s.knowledge,
             progress=progress,
         )
     rollout = _record(s, grid, answer, route, log, limit, time.perf_counter() - started)
@@ -205,6 +211,7 @@ def _record(
             },
             "robot": dataclasses.asdict(s.robot),
             "controller": {"name": type(s.controller).__name__, **dataclasses.asdict(s.controller)},
+            **(_among_movers(s) if s.built.movers else {}),
             "limiters": list(LIMITERS),
             "route": {"asked": s.route, "kind": route.kind, "note": route.note},
             "noise": s.noise,
@@ -222,6 +229,15 @@ def _record(
             "times": {"plan_s": answer.wall_s, "drive_wall_s": wall},
         },
     )
+
+
+def _among_movers(s: Scenario) -> dict[str, Any]:
+    """What records tell of a drive among movers."""
+    reach = s.knowledge.reach
+    return {
+        "knowledge": {"told": s.knowledge.told, "reach_m": reach if math.isfinite(reach) else None},
+        "yielding": dataclasses.asdict(s.yielding) if s.yielding else None,
+    }
 
 
 def versions() -> dict[str, str]:

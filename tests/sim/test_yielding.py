@@ -1,0 +1,141 @@
+"""Robots that give way to movers."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from planners import find_planner
+from robots import LIMITERS, RobotSpec, Yielding
+from sim import Knowledge, Outcome, Run, Scenario, certify, run
+from sim.knowledge import Watch
+from worlds import Cruising, Disc, Keyframed, Mover, Task, Traffic, World
+
+HALL = World("hall", (0.0, 0.0, 9.0, 6.0))
+TASK = Task(HALL, (1.0, 3.0, 0.0), (8.0, 3.0), cell=0.25)
+AISLE = World("aisle", (0.0, 0.0, 9.0, 1.0))
+
+
+def keyframed(*frames: tuple[float, float, float], radius: float = 0.3, **rest: str) -> Keyframed:
+    return Keyframed(radius=radius, keyframes=frames, **{"loop": "once", **rest})  # type: ignore[arg-type]
+
+
+def among(*movers: Mover, robot: RobotSpec, task: Task = TASK, **settings: object) -> Run:
+    task = dataclasses.replace(task, world=dataclasses.replace(task.world, movers=movers))
+    return run(Scenario(task=task, planner=find_planner("astar"), planner_name="astar", robot=robot, **settings))  # type: ignore[arg-type]
+
+
+CROSSING = keyframed((0.0, 4.5, 0.6), (10.7, 4.5, 5.4))  # on the robot's way when the robot is there
+HEAD_ON = keyframed((0.0, 8.4, 3.0), (12.0, 0.6, 3.0), (13.0, 0.6, 5.0))
+OVERTAKING = keyframed((0.0, -0.9, 3.0), (8.0, 10.3, 3.0))
+SLOW = keyframed((0.0, 3.0, 3.0), (50.0, 8.0, 3.0), (52.0, 8.0, 5.0))
+
+
+@pytest.mark.parametrize("mover", [CROSSING, HEAD_ON, SLOW], ids=["crossing", "head on", "slower, ahead"])
+def test_what_would_be_hit_is_given_way_to(mover: Keyframed, turtlebot: RobotSpec) -> None:
+    """Each of them is in the way: a robot that does not yield proves it."""
+    blind = among(mover, robot=turtlebot, yielding=None)
+    assert blind.outcome is Outcome.COLLIDED
+    seeing = among(mover, robot=turtlebot)
+    assert seeing.succeeded, (seeing.outcome, seeing.reason, seeing.certificate)
+    assert seeing.rollout is not None
+    assert "yield" in {LIMITERS[k] for k in np.unique(seeing.rollout.limiter)}
+    assert seeing.rollout.clearance.min() > 0.03
+
+
+def test_a_faster_mover_from_behind_is_let_past(turtlebot: RobotSpec) -> None:
+    blind, seeing = (among(OVERTAKING, robot=turtlebot, yielding=y) for y in (None, Yielding()))
+    assert blind.outcome is Outcome.COLLIDED
+    assert seeing.succeeded, (seeing.outcome, seeing.reason)
+
+
+def test_in_a_narrow_aisle_the_robot_stops_before_what_crosses_and_goes_on(turtlebot: RobotSpec) -> None:
+    crossing = keyframed((0.0, 4.5, -1.0), (4.0, 4.5, 0.4), (7.5, 4.5, 0.6), (9.0, 4.5, 2.5), radius=0.2)
+    task = Task(AISLE, (1.0, 0.5, 0.0), (8.0, 0.5), cell=0.1)
+    assert among(crossing, robot=turtlebot, task=task, yielding=None).outcome is Outcome.COLLIDED
+    done = among(crossing, robot=turtlebot, task=task)
+    assert done.succeeded, (done.outcome, done.reason)
+    assert done.rollout is not None
+    speed = done.rollout.twist[:, 0]
+    assert speed[240:-240].min() < 0.1, "it waits"
+    assert np.abs(done.rollout.pose[:, 1] - 0.5).max() < 0.15
+
+
+def test_in_a_narrow_aisle_the_robot_backs_off_from_what_comes_for_it(turtlebot: RobotSpec) -> None:
+    comes = keyframed((0.0, 6.0, 0.5), (12.0, 2.0, 0.5), (20.0, 8.7, 0.5), radius=0.2)
+    task = Task(AISLE, (3.0, 0.5, 0.0), (7.0, 0.5), cell=0.1, time_limit=40.0)
+    assert among(comes, robot=turtlebot, task=task, yielding=None).outcome is Outcome.COLLIDED
+    done = among(comes, robot=turtlebot, task=task)
+    assert done.rollout is not None
+    assert not len(done.rollout.contacts), (done.outcome, done.reason)
+    assert done.rollout.pose[:, 0].min() < 2.0, "it went back behind where it started"
+
+
+def test_what_comes_for_a_standing_robot_is_dodged(turtlebot: RobotSpec) -> None:
+    """It has come to the goal's tolerance too late to be let stand there."""
+    comes = Cruising(radius=0.3, position=(4.0, 3.0), velocity=(-0.6, 0.0))
+    done = among(comes, robot=turtlebot)
+    assert done.rollout is not None
+    assert done.succeeded, (done.outcome, done.reason)
+
+
+def test_where_contact_cannot_be_avoided_the_robot_meets_it_standing(turtlebot: RobotSpec) -> None:
+    """A piston as wide as the aisle, faster than the robot."""
+    piston = keyframed((0.0, 8.0, 0.5), (4.0, 0.0, 0.5), radius=0.45)
+    done = among(piston, robot=turtlebot, task=Task(AISLE, (1.0, 0.5, 0.0), (8.0, 0.5), cell=0.1))
+    assert done.outcome is Outcome.RUN_INTO, done.reason
+
+
+def test_the_same_seed_gives_the_same_bits_and_a_valid_certificate(turtlebot: RobotSpec) -> None:
+    first, again = (among(CROSSING, HEAD_ON, robot=turtlebot, seed=5, noise=1.0).rollout for _ in range(2))
+    assert first is not None
+    assert again is not None
+    assert first.digest == again.digest
+    assert certify(first).certified
+
+
+def test_what_stands_is_kept_clear_of_while_yielding(turtlebot: RobotSpec) -> None:
+    posts = tuple(Disc(x, y, 0.15) for x in (2.5, 4.0, 5.5) for y in (2.2, 3.8))
+    task = dataclasses.replace(TASK, world=dataclasses.replace(HALL, obstacles=posts))
+    done = among(CROSSING, HEAD_ON, robot=turtlebot, task=task)
+    assert done.rollout is not None
+    assert not any(done.rollout.contacts[:, 1] < len(posts))
+
+
+def test_a_robot_that_sees_less_yields_to_less(turtlebot: RobotSpec) -> None:
+    near = among(CROSSING, robot=turtlebot, knowledge=Knowledge(reach=1e-3))
+    assert near.outcome is Outcome.COLLIDED
+    for told in ("positions", "motions"):
+        known = among(CROSSING, robot=turtlebot, knowledge=Knowledge(told=told))  # type: ignore[arg-type]
+        assert known.rollout is not None
+        assert known.rollout.meta["knowledge"] == {"told": told, "reach_m": None}
+
+
+@given(st.integers(0, 2000), st.sampled_from(["positions", "velocities", "motions"]))
+def test_movers_are_expected_where_knowledge_puts_them(tick: int, told: str) -> None:
+    movers = (CROSSING, Cruising(radius=0.2, position=(2.0, 2.0), velocity=(0.5, 0.3)))
+    traffic = Traffic.of(dataclasses.replace(HALL, movers=movers), (1.0, 3.0))
+    ahead = Yielding().ahead
+    places, radii = Watch(traffic, Knowledge(told=told), 60).expected(tick, (0.0, 0.0), ahead)  # type: ignore[arg-type]
+    now, speed = traffic.positions(tick / 60)[0], traffic.velocities(tick / 60)[0]
+    expected = {
+        "positions": np.repeat(now[None], len(ahead), axis=0),
+        "velocities": now + ahead[:, None, None] * speed,
+        "motions": traffic.positions(tick / 60 + ahead),
+    }[told]
+    np.testing.assert_allclose(places, expected, atol=1e-12)
+    assert radii.tolist() == [0.3, 0.2]
+
+
+def test_nonsense_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"told: unknown 'all'; choose from positions, velocities, motions"):
+        Knowledge(told="all")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="reach: must be greater than 0, got 0"):
+        Knowledge(reach=0.0)
+    with pytest.raises(ValueError, match="horizon: must be greater than 0 and at most 60, got 0"):
+        Yielding(horizon=0.0)
+    with pytest.raises(ValueError, match="keep: must be at least 0, got nan"):
+        Yielding(keep=math.nan)
