@@ -9,6 +9,7 @@ from .metrics import METRICS as METRICS
 from .metrics import measure as measure
 from .plots import overview as overview
 from .plots import plan_figure as plan_figure
+from .replanning import Replanning as Replanning
 from .reporting import write_report as write_report
 from .rollout import Outcome as Outcome
 from .rollout import Rollout as Rollout

@@ -76,6 +76,9 @@ def run(
     ] = None,
     time_limit: Annotated[float | None, typer.Option(min=1e-3, max=1e6, help="Simulated time allowed [s].")] = None,
     yields: Annotated[bool, typer.Option("--yield/--no-yield", help="Give way to movers.")] = True,
+    replan: Annotated[
+        bool, typer.Option("--replan/--no-replan", help="Look for new routes around movers on the way.")
+    ] = True,
     sees: Annotated[
         str, typer.Option(metavar="WHAT[:METRES]", help="Of movers: positions, velocities or motions, within a reach.")
     ] = "velocities",
@@ -93,7 +96,7 @@ def run(
     scenario = _scenario(
         world, planner, settings, robot, seed=seed, margin=margin, cell=cell, route=route, noise=noise, time_limit=time_limit,
         unseen=tuple(_disc(text) for text in unseen or ()), knowledge=_knowledge(sees),
-        **({} if yields else {"yielding": None}),
+        **({} if yields else {"yielding": None}), **({} if replan else {"replanning": None}),
     )  # fmt: skip
     folder = out or Path("out") / _slug(scenario)
     if gui:

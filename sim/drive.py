@@ -24,7 +24,8 @@ from robots import (
 from sim import _kernels_movers
 from sim.contacts import touches
 from sim.engine import Engine
-from sim.knowledge import Knowledge, Watch
+from sim.knowledge import Watch
+from sim.replanning import Rerouter
 from sim.rollout import Outcome
 from worlds import Floats, Pose, Task, Traffic
 
@@ -32,7 +33,7 @@ STOPPED_SPEED = 0.01  # slower than this counts as standing [m/s]
 STUCK_AFTER = 8.0  # without progress for this long the robot is stuck [s]
 STUCK_PROGRESS = 0.02  # what counts as progress along the route [m]
 YIELD = LIMITERS.index("yield")
-KNOWN = Knowledge()
+SLOW = 0.1  # a robot that yields and is no faster waits [m/s]
 AFTER_CONTACT = 0.5  # a collision stays in the log for this long, braking [s]
 
 
@@ -63,12 +64,14 @@ def drive(
     time_limit: float,
     senses: Senses | None = None,
     yielding: Yielding | None = None,
-    knowledge: Knowledge = KNOWN,
+    watch: Watch | None = None,
+    rerouter: Rerouter | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Drive:
     """Drive along a guide until the robot stands at its end, touches something or is touched, is stuck or late.
 
-    With `yielding` it keeps clear of the engine's traffic by what it has `knowledge` of; waiting is then no being stuck.
+    With `yielding` it keeps clear of the movers that it has a `watch` on; waiting is then no being stuck. With a `rerouter`
+    it goes on by a new route where that sees a cause.
     With `senses` the robot sees and acts by them, else perfectly. `progress` is told the fraction of the route that is done,
     about ten times per simulated second.
 
@@ -85,7 +88,6 @@ def drive(
     outcome = Outcome.COLLIDED if contacts else None
     command, state = Twist(0.0, 0.0), Progress()
     best, idle, turned = 0.0, 0, 0  # the farthest on the route, and periods since then without and with turning
-    watch = Watch(engine.traffic, knowledge, control_hz) if engine.traffic and yielding else None
     resolve = Resolve()
     reason = ""
     ticks = round(time_limit * control_hz)
@@ -100,6 +102,12 @@ def drive(
             estimate = senses.look(believed, Twist(speed, yaw_rate))
             errors[-1] = (estimate[0] - x, estimate[1] - y, math.remainder(estimate[2] - yaw, 2 * math.pi))
             believed = senses.ahead()
+        if rerouter:
+            waits = state.limiter == YIELD and abs(speed) < SLOW
+            cause = rerouter.cause(tick, believed, waits, guide, state.arc)
+            renewed = rerouter.again(tick, believed, cause) if cause else None
+            if renewed:
+                guide, state, best = renewed, Progress(limiter=state.limiter), 0.0
         last, before = command, state
         command, state = controller.step(guide, believed, last, before)
         if watch and yielding:

@@ -19,8 +19,9 @@ from robots import LIMITERS, PurePursuit, RobotSpec, Senses, Yielding, load_robo
 from sim.certificate import Certificate, certify
 from sim.drive import Drive, drive
 from sim.engine import Engine
-from sim.knowledge import Knowledge
+from sim.knowledge import Knowledge, Watch
 from sim.metrics import measure
+from sim.replanning import Replan, Replanning, Rerouter
 from sim.rollout import SCHEMA, Outcome, Rollout
 from worlds import Disc, Grid, Route, Task, Traffic, World, load_task, rasterise, task_to_dict
 
@@ -41,6 +42,7 @@ class Scenario:
     noise: float = 0.0  # how much of the robot's documented noise it has; 1 is all of it
     knowledge: Knowledge = field(default_factory=Knowledge)  # what the robot knows of movers
     yielding: Yielding | None = field(default_factory=Yielding)  # how it keeps clear of them; None: not at all
+    replanning: Replanning | None = field(default_factory=Replanning)  # when it looks for a new route among them
     unseen: tuple[Disc, ...] = ()  # obstacles that neither planner nor controller know of
     time_limit: float | None = None  # simulated time allowed [s]; None: the task's, or ample for the route
     physics_hz: int = 240
@@ -159,7 +161,15 @@ def run(
     started = time.perf_counter()
     noise = s.robot.noise.scaled(s.noise)
     senses = Senses(noise, s.robot.track, 1 / s.control_hz, s.task.start, s.rng("noise")) if noise.loud else None
-    with Engine(s.built, s.robot, physics_hz=s.physics_hz, traffic=s.traffic) as engine:
+    traffic = s.traffic
+    watch = Watch(traffic, s.knowledge, s.control_hz) if traffic else None
+    rerouter = None
+    if watch and s.replanning:
+        rerouter = Rerouter(
+            s.replanning, s.planner, grid, s.task, s.rng("replanner"),
+            watch=watch, robot=s.robot, controller=s.controller, margin=s.margin, kind=s.route, hz=s.control_hz,
+        )  # fmt: skip
+    with Engine(s.built, s.robot, physics_hz=s.physics_hz, traffic=traffic) as engine:
         log = drive(
             engine,
             s.controller,
@@ -169,15 +179,25 @@ def run(
             time_limit=limit,
             senses=senses,
             yielding=s.yielding,
-            knowledge=s.knowledge,
+            watch=watch,
+            rerouter=rerouter,
             progress=progress,
         )
-    rollout = _record(s, grid, answer, route, log, limit, time.perf_counter() - started)
+    rollout = _record(
+        s, grid, answer, route, log, rerouter.log if rerouter else [], limit, time.perf_counter() - started
+    )
     return Run(s, grid, answer, rollout, certify(rollout))
 
 
 def _record(
-    s: Scenario, grid: Grid, answer: PlanResult, route: Route, log: Drive, limit: float, wall: float
+    s: Scenario,
+    grid: Grid,
+    answer: PlanResult,
+    route: Route,
+    log: Drive,
+    replans: list[Replan],
+    limit: float,
+    wall: float,
 ) -> Rollout:
     task = task_to_dict(s.task)
     known = len(s.task.world.obstacles)
@@ -211,7 +231,7 @@ def _record(
             },
             "robot": dataclasses.asdict(s.robot),
             "controller": {"name": type(s.controller).__name__, **dataclasses.asdict(s.controller)},
-            **(_among_movers(s) if s.built.movers else {}),
+            **(_among_movers(s, replans) if s.built.movers else {}),
             "limiters": list(LIMITERS),
             "route": {"asked": s.route, "kind": route.kind, "note": route.note},
             "noise": s.noise,
@@ -226,18 +246,24 @@ def _record(
             "outcome": log.outcome.name.lower(),
             "reason": log.reason,
             "versions": versions(),
-            "times": {"plan_s": answer.wall_s, "drive_wall_s": wall},
+            "times": {"plan_s": answer.wall_s, "drive_wall_s": wall, **_replan_times(replans)},
         },
     )
 
 
-def _among_movers(s: Scenario) -> dict[str, Any]:
+def _among_movers(s: Scenario, replans: list[Replan]) -> dict[str, Any]:
     """What records tell of a drive among movers."""
     reach = s.knowledge.reach
     return {
         "knowledge": {"told": s.knowledge.told, "reach_m": reach if math.isfinite(reach) else None},
         "yielding": dataclasses.asdict(s.yielding) if s.yielding else None,
+        "replanning": dataclasses.asdict(s.replanning) if s.replanning else None,
+        "replans": [replan.as_dict() for replan in replans],
     }
+
+
+def _replan_times(replans: list[Replan]) -> dict[str, list[float]]:
+    return {"replans_s": [replan.wall_s for replan in replans]} if replans else {}
 
 
 def versions() -> dict[str, str]:

@@ -134,7 +134,7 @@ BESIDE = (
 
 def among(*movers: Mover, robot: RobotSpec, **settings: Any) -> Run:
     """A drive among movers, by a robot that gives way to none."""
-    settings = {"yielding": None, **settings}
+    settings = {"yielding": None, "replanning": None, **settings}
     task = dataclasses.replace(TASK, world=dataclasses.replace(ROOM, movers=movers))
     return run(Scenario(task=task, planner=find_planner("astar"), planner_name="astar", robot=robot, **settings))
 

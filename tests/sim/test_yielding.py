@@ -24,6 +24,8 @@ def keyframed(*frames: tuple[float, float, float], radius: float = 0.3, **rest: 
 
 
 def among(*movers: Mover, robot: RobotSpec, task: Task = TASK, **settings: object) -> Run:
+    """A drive by the one route, unless told otherwise."""
+    settings = {"replanning": None, **settings}
     task = dataclasses.replace(task, world=dataclasses.replace(task.world, movers=movers))
     return run(Scenario(task=task, planner=find_planner("astar"), planner_name="astar", robot=robot, **settings))  # type: ignore[arg-type]
 

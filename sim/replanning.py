@@ -1,0 +1,193 @@
+"""New routes while driving: around movers, or back to where the robot was going.
+
+A replan takes the planner's own replanner: what movers cover soon is blocked, grown exactly as the grid's obstacles are, and
+what they have left is cleared. Planners of the plane plan anew among discs in the movers' places; planners of space and
+time, which need no replan for what they foresaw, are stood in for by A*.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from planners import PLANNERS, Planner, PlanResult, Query, refine, replanner_for
+from robots import Guide, PurePursuit, RobotSpec
+from sim.knowledge import Watch
+from worlds import Disc, Floats, Grid, Pose, Route, Task, rasterise
+
+if TYPE_CHECKING:
+    from planners import Replanner
+
+
+@dataclass(frozen=True, kw_only=True)
+class Replanning:
+    """When the robot looks for a new route.
+
+    Raises:
+        ValueError: a setting outside its range.
+    """
+
+    around: bool = True  # movers count as obstacles; else the route is only renewed where the robot has left it
+    within: float = 3.0  # a mover that is expected on the route so near ahead is a cause [m]
+    patience: float = 2.0  # and so is having waited so long [s]
+    strayed: float = 0.75  # and being so far off the route [m]
+    pause: float = 1.0  # the least time between two replans [s]
+    ahead: float = 1.0  # what a mover covers in this time is blocked [s]
+
+    def __post_init__(self) -> None:
+        for key in ("within", "patience", "strayed", "pause", "ahead"):
+            if not 0 <= getattr(self, key) < math.inf:
+                raise ValueError(f"{key}: must be at least 0, got {getattr(self, key):g}")
+
+
+@dataclass(frozen=True)
+class Replan:
+    """One renewal of the route."""
+
+    t: float  # [s]
+    cause: str
+    solved: bool
+    cost: float  # of the new plan [m]; inf without one
+    work: int
+    route: Floats  # (N, 2) [m]; empty without one
+    wall_s: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, for JSON; what it took of wall time is not among them."""
+        cost = self.cost if math.isfinite(self.cost) else None
+        return {"t": self.t, "cause": self.cause, "solved": self.solved, "cost_m": cost, "work": self.work,
+                "route": np.round(self.route, 4).tolist()}  # fmt: skip
+
+
+class Rerouter:
+    """One drive's replanner: it knows the world that stands, and of movers what the robot does."""
+
+    def __init__(
+        self, settings: Replanning, planner: Planner, grid: Grid, task: Task, rng: np.random.Generator, *,
+        watch: Watch, robot: RobotSpec, controller: PurePursuit, margin: float, kind: str, hz: int,
+    ) -> None:  # fmt: skip
+        self.settings, self.log = settings, list[Replan]()
+        self._planner, self._grid, self._rng, self._watch, self._hz = planner, grid, rng, watch, hz
+        self._task = dataclasses.replace(task, world=dataclasses.replace(task.world, movers=()))
+        self._robot, self._controller, self._margin, self._kind = robot, controller, margin, kind
+        self._search: Replanner | None = None
+        self._blocked = np.zeros(grid.shape, dtype=np.bool_)
+        self._rest = -math.inf  # when the last replan was
+        self._wait_began = math.nan
+
+    def cause(self, tick: int, pose: Pose, waits: bool, guide: Guide, arc: float) -> str:
+        """Why a new route is due; empty if none is."""
+        now, s = tick / self._hz, self.settings
+        if not waits:
+            self._wait_began = math.nan
+        elif math.isnan(self._wait_began):
+            self._wait_began = now
+        if now - self._rest < s.pause:
+            return ""
+        x, y = _place(guide.route, arc)
+        if math.dist((x, y), pose[:2]) > s.strayed:
+            return "strayed"
+        if now - self._wait_began >= s.patience:
+            return "waited"
+        if s.around and self._obstructed(tick, pose, guide, arc):
+            return "obstructed"
+        return ""
+
+    def again(self, tick: int, pose: Pose, cause: str) -> Guide | None:
+        """A new route from a pose, made ready for following; None where there is none."""
+        self._rest, self._wait_began = tick / self._hz, math.nan
+        started = time.perf_counter()
+        discs = self._discs(tick, pose) if self.settings.around else []
+        try:
+            task = dataclasses.replace(self._task, start=pose)
+        except ValueError:  # the robot believes to be where it cannot be
+            return None
+        answer = self._answer(task, discs)
+        route = None
+        if answer.solved and len(answer.cells):
+            route = refine(answer, self._grid, _with(task, discs), kind=self._kind)
+        self.log.append(
+            Replan(
+                tick / self._hz, cause, route is not None, answer.cost if route else math.inf, answer.work,
+                route.xy if route else np.empty((0, 2)), time.perf_counter() - started,
+            )
+        )  # fmt: skip
+        return self._guide(route) if route else None
+
+    def _guide(self, route: Route) -> Guide:
+        task = self._task
+        return self._controller.guide(route, task.world, self._robot, self._margin, 1 / self._hz, task.goal_tolerance)
+
+    def _answer(self, task: Task, discs: list[Disc]) -> PlanResult:
+        if getattr(self._planner, "needs_world", False):
+            around = _with(task, discs)
+            grid = rasterise(around.world, self._grid.cell, self._grid.inflate)
+            return self._planner.plan(Query.between(grid, around), self._rng)
+        query = Query.between(self._grid, task)
+        if self._search is None:
+            planner = PLANNERS["astar"] if getattr(self._planner, "needs_motions", False) else self._planner
+            self._search = replanner_for(planner, query, self._rng)
+        blocked = self._cells(discs)
+        blocked[query.start] = blocked[query.goal] = False
+        self._search.clear(np.argwhere(self._blocked & ~blocked))
+        self._search.block(np.argwhere(blocked & ~self._blocked))
+        self._blocked = blocked
+        self._search.move(query.start)
+        return self._search.result()
+
+    def _discs(self, tick: int, pose: Pose) -> list[Disc]:
+        """What movers cover soon, as discs; none so large that the robot would stand within its inflation."""
+        steps = np.linspace(0.0, self.settings.ahead, 1 + math.ceil(self.settings.ahead / 0.25))
+        places, radii = self._watch.expected(tick, pose[:2], steps)
+        inflate, cell = self._grid.inflate, self._grid.cell
+        room = np.hypot(*np.moveaxis(places - np.array(pose[:2]), -1, 0)) - inflate - cell
+        radius = np.minimum(radii, room)
+        return [
+            Disc(float(places[k, m, 0]), float(places[k, m, 1]), float(radius[k, m]))
+            for k, m in np.argwhere(radius > 0.01).tolist()
+        ]
+
+    def _cells(self, discs: list[Disc]) -> npt.NDArray[np.bool_]:
+        """The free cells whose centres are closer to a disc than planners keep."""
+        grid = self._grid
+        rows, cols = grid.shape
+        x = grid.origin[0] + grid.cell * np.arange(cols)
+        y = grid.origin[1] + grid.cell * np.arange(rows)
+        blocked = np.zeros(grid.shape, dtype=np.bool_)
+        for disc in discs:
+            reach = disc.radius + grid.inflate
+            c0, c1 = np.searchsorted(x, (disc.x - reach, disc.x + reach))
+            r0, r1 = np.searchsorted(y, (disc.y - reach, disc.y + reach))
+            near = np.hypot(x[None, c0:c1] - disc.x, y[r0:r1, None] - disc.y) <= reach
+            blocked[r0:r1, c0:c1] |= near
+        return blocked & grid.free
+
+    def _obstructed(self, tick: int, pose: Pose, guide: Guide, arc: float) -> bool:
+        """Whether a mover covers a place of the route ahead soon."""
+        discs = self._discs(tick, pose)
+        if not discs:
+            return False
+        ahead = np.arange(arc, min(arc + self.settings.within, guide.length), 0.1)
+        if not len(ahead):
+            return False
+        line = np.stack([np.interp(ahead, guide.route.arc, guide.route.xy[:, k]) for k in (0, 1)], axis=1)
+        movers = np.array([(d.x, d.y, d.radius) for d in discs])
+        gaps = np.hypot(*np.moveaxis(line[:, None] - movers[None, :, :2], -1, 0)) - movers[:, 2]
+        return bool((gaps < self._grid.inflate).any())
+
+
+def _with(task: Task, discs: list[Disc]) -> Task:
+    """A task among more discs, but for those over its goal."""
+    more = tuple(disc for disc in discs if math.dist((disc.x, disc.y), task.goal) > disc.radius)
+    return dataclasses.replace(task, world=dataclasses.replace(task.world, obstacles=task.world.obstacles + more))
+
+
+def _place(route: Route, arc: float) -> tuple[float, float]:
+    x, y = (float(np.interp(arc, route.arc, route.xy[:, k])) for k in (0, 1))
+    return x, y

@@ -1,0 +1,72 @@
+"""New routes while driving."""
+
+import dataclasses
+import json
+import math
+
+import numpy as np
+import pytest
+
+from planners import PLANNERS, find_planner
+from robots import RobotSpec
+from sim import Outcome, Replanning, Rollout, Run, Scenario, certify, run
+from worlds import Disc, Keyframed, Mover, Task, World
+
+# A wall with two gates; the way through the nearer one is shorter.
+POSTS = tuple(Disc(4.0, y, 0.25) for y in np.arange(0.25, 6.0, 0.5) if not (2.2 < y < 3.8 or y > 5.0))
+HALL = World("hall", (0.0, 0.0, 8.0, 6.5), POSTS)
+TASK = Task(HALL, (1.0, 3.0, 0.0), (7.0, 3.0), cell=0.25)
+PLUG = Keyframed(radius=0.45, keyframes=((0.0, 4.0, 3.0), (100.0, 4.0, 3.01)), loop="once")
+
+
+def among(*movers: Mover, robot: RobotSpec, planner: str = "dstar-lite", **settings: object) -> Run:
+    task = dataclasses.replace(TASK, world=dataclasses.replace(HALL, movers=movers))
+    return run(Scenario(task=task, planner=find_planner(planner), planner_name=planner, robot=robot, **settings))  # type: ignore[arg-type]
+
+
+def test_a_closed_gate_is_gone_round_only_by_replanning(turtlebot: RobotSpec) -> None:
+    waiting = among(PLUG, robot=turtlebot, replanning=None, time_limit=30.0)
+    assert waiting.outcome is Outcome.TIMED_OUT
+    done = among(PLUG, robot=turtlebot)
+    assert done.succeeded, (done.outcome, done.reason)
+    assert done.rollout is not None
+    replans = done.rollout.meta["replans"]
+    assert replans[0]["cause"] == "obstructed"
+    assert 0 <= replans[0]["t"] < done.rollout.t[-1]
+    assert replans[0]["cost_m"] > 4.0
+    assert len(done.rollout.meta["times"]["replans_s"]) == len(replans)
+    through = done.rollout.pose[np.abs(done.rollout.pose[:, 0] - 4.0).argmin()]
+    assert through[1] > 4.5, "by the other gate"
+
+
+def test_replans_repeat_and_stay_with_the_log(turtlebot: RobotSpec, tmp_path: object) -> None:
+    first, again = (among(PLUG, robot=turtlebot, planner="ants", seed=2).rollout for _ in range(2))
+    assert first is not None
+    assert again is not None
+    assert first.digest == again.digest
+    loaded = Rollout.load(first.save(f"{tmp_path}/run.npz"))
+    assert loaded.meta["replans"] == json.loads(json.dumps(first.meta["replans"]))
+    assert certify(loaded).certified == certify(first).certified
+
+
+@pytest.mark.parametrize("planner", PLANNERS)
+def test_every_planner_replans(planner: str, turtlebot: RobotSpec) -> None:
+    done = among(PLUG, robot=turtlebot, planner=planner, time_limit=2.0)
+    if done.rollout is None:  # a planner that is not complete found no way at first
+        assert not getattr(find_planner(planner), "complete", False)
+        return
+    assert done.rollout.meta["replans"]
+    assert not len(done.rollout.contacts)
+
+
+def test_where_nothing_is_in_the_way_nothing_is_replanned(turtlebot: RobotSpec) -> None:
+    far = Keyframed(radius=0.2, keyframes=((0.0, 0.5, 0.5), (9.0, 1.5, 0.5)))
+    done = among(far, robot=turtlebot)
+    assert done.succeeded
+    assert done.rollout is not None
+    assert done.rollout.meta["replans"] == []
+
+
+def test_nonsense_is_refused() -> None:
+    with pytest.raises(ValueError, match="patience: must be at least 0, got nan"):
+        Replanning(patience=math.nan)
