@@ -77,7 +77,11 @@ def run(
     time_limit: Annotated[float | None, typer.Option(min=1e-3, max=1e6, help="Simulated time allowed [s].")] = None,
     yields: Annotated[bool, typer.Option("--yield/--no-yield", help="Give way to movers.")] = True,
     replan: Annotated[
-        bool, typer.Option("--replan/--no-replan", help="Look for new routes around movers on the way.")
+        bool,
+        typer.Option(
+            "--replan/--no-replan",
+            help="Go round movers by new routes; else only back to a route left.",
+        ),
     ] = True,
     sees: Annotated[
         str, typer.Option(metavar="WHAT[:METRES]", help="Of movers: positions, velocities or motions, within a reach.")
@@ -90,13 +94,14 @@ def run(
     json: Json = False,
 ) -> int:
     """Plan, drive in physics, certify; exit 0 when the robot stopped at the goal and touched nothing."""
+    from sim.replanning import Replanning
     from sim.scenario import plan as make_plan
     from sim.scenario import run as drive_it
 
     scenario = _scenario(
         world, planner, settings, robot, seed=seed, margin=margin, cell=cell, route=route, noise=noise, time_limit=time_limit,
         unseen=tuple(_disc(text) for text in unseen or ()), knowledge=_knowledge(sees),
-        **({} if yields else {"yielding": None}), **({} if replan else {"replanning": None}),
+        **({} if yields else {"yielding": None}), replanning=Replanning(around=replan),
     )  # fmt: skip
     folder = out or Path("out") / _slug(scenario)
     if gui:

@@ -25,7 +25,7 @@ from sim import _kernels_movers
 from sim.contacts import touches
 from sim.engine import Engine
 from sim.knowledge import Watch
-from sim.replanning import Rerouter
+from sim.replanning import MISSED, Rerouter
 from sim.rollout import Outcome
 from worlds import Floats, Pose, Task, Traffic
 
@@ -127,10 +127,16 @@ def drive(
                 state = state._replace(turning=before.turning, limiter=YIELD)
         if guide.length - state.arc <= guide.goal_distance and _standing(speed, yaw_rate) and not any(command):
             left = math.dist((x, y), task.goal)
-            outcome = Outcome.SUCCEEDED if left <= task.goal_tolerance else Outcome.STUCK
-            if outcome is Outcome.STUCK:
-                reason = f"the route ends here, {left:.3f} m from the goal; the tolerance is {task.goal_tolerance:g} m"
-            break
+            missed = left > task.goal_tolerance
+            renewed = rerouter.again(tick, believed, MISSED) if rerouter and missed else None
+            if renewed is None:
+                outcome = Outcome.STUCK if missed else Outcome.SUCCEEDED
+                if missed:
+                    reason = (
+                        f"the route ends here, {left:.3f} m from the goal; the tolerance is {task.goal_tolerance:g} m"
+                    )
+                break
+            guide, state, best = renewed, Progress(limiter=state.limiter), 0.0
         engine.command(*(senses.act(command) if senses else command))
         for _ in range(substeps):
             touched = engine.step()

@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from planners import Replanner
 
 
+MISSED = "missed the goal"
+
+
 @dataclass(frozen=True, kw_only=True)
 class Replanning:
     """When the robot looks for a new route.
@@ -93,7 +96,7 @@ class Rerouter:
         x, y = _place(guide.route, arc)
         if math.dist((x, y), pose[:2]) > s.strayed:
             return "strayed"
-        if now - self._wait_began >= s.patience:
+        if s.around and now - self._wait_began >= s.patience:
             return "waited"
         if s.around and self._obstructed(tick, pose, guide, arc):
             return "obstructed"
@@ -103,7 +106,8 @@ class Rerouter:
         """A new route from a pose, made ready for following; None where there is none."""
         self._rest, self._wait_began = tick / self._hz, math.nan
         started = time.perf_counter()
-        discs = self._discs(tick, pose) if self.settings.around else []
+        around = self.settings.around and cause != MISSED  # at the goal it is enough to yield
+        discs = self._discs(tick, pose) if around else []
         try:
             task = dataclasses.replace(self._task, start=pose)
         except ValueError:  # the robot believes to be where it cannot be

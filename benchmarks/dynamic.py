@@ -1,0 +1,209 @@
+"""Drives among movers: `python -m benchmarks.dynamic [--quick] [--jobs N] [--dynabarn FILE] [TABLE ...]`.
+
+Tables: dynabarn (ten of its worlds, each from ten moments on, by what the robot may do), random (worlds with 1 to 10 movers as
+fast as the robot; every outcome but success with its seed) and hasan (his cases, driven).
+"""
+
+from __future__ import annotations
+
+import argparse
+import collections
+import dataclasses
+import itertools
+import math
+import statistics
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from joblib import Parallel, delayed
+
+from benchmarks.planners import table
+from planners import Query, find_planner, plan_in_time
+from robots import load_robot
+from sim import Knowledge, Outcome, Replanning, Scenario, run
+from worlds import (
+    Cruising,
+    Disc,
+    Keyframed,
+    Mover,
+    Task,
+    Traffic,
+    World,
+    catalogue,
+    import_dynabarn,
+    load_task,
+    rasterise,
+)
+
+DYNABARN = Path(__file__).parent.parent.parent / "shared" / "data" / "dynabarn" / "dynabarn10.json"
+CLASSES = {"easy": range(20), "medium": range(20, 40), "hard": range(40, 60)}
+APART = 7.3  # between the moments at which drives in one world begin [s]
+KNOWN = Knowledge(told="motions")
+POLICIES: dict[str, dict[str, Any]] = {
+    "neither": {"yielding": None, "replanning": None},
+    "yield": {"replanning": Replanning(around=False)},
+    "replan": {"yielding": None},
+    "yield and replan": {},
+    "the same, motions known": {"knowledge": KNOWN},
+}
+
+
+class Result(NamedTuple):
+    """What one drive leaves behind."""
+
+    name: str
+    outcome: Outcome
+    duration: float  # [s]
+    replans: int
+    certified: bool
+    reason: str
+    proved: bool = True  # whether the space-time planner finds a way
+
+
+def drive(name: str, task: Task, planner: str, robot: str, seed: int = 0, **settings: Any) -> Result:
+    """One drive; heavy arrays stay here."""
+    scenario = Scenario(
+        task=task, planner=find_planner(planner), planner_name=planner, robot=load_robot(robot), seed=seed, **settings
+    )
+    done = run(scenario)
+    log = done.rollout
+    if log is None:
+        return Result(name, done.outcome, math.nan, 0, False, done.reason)
+    return Result(
+        name, done.outcome, float(log.t[-1]), len(log.meta.get("replans", ())), done.succeeded, done.reason
+    )  # fmt: skip
+
+
+def told(results: Sequence[Result]) -> list[str]:
+    """The columns that every table has: succeeded, the three kinds of contact, other ends, time."""
+    ends = collections.Counter(r.outcome for r in results)
+    touches = [str(ends.pop(kind, 0)) for kind in (Outcome.COLLIDED, Outcome.RUN_INTO, Outcome.JUMPED_ON)]
+    good = [r.duration for r in results if r.certified]
+    ends.pop(Outcome.SUCCEEDED, 0)
+    others = ", ".join(f"{n} {end.name.lower()}" for end, n in sorted(ends.items(), key=lambda e: e[0].name)) or "–"
+    share = f"{len(good)} of {len(results)} ({100 * len(good) / max(1, len(results)):.0f} %)"
+    return [share, *touches, others, f"{statistics.mean(good):.1f} s" if good else "–",
+            f"{statistics.mean(r.replans for r in results):.1f}" if results else "–"]  # fmt: skip
+
+
+HEADS = ("certified successes", "contacts driving", "standing", "jumped on", "other ends", "mean time", "replans")
+
+
+def dynabarn(jobs: int, source: Path, quick: bool) -> Iterator[str]:
+    """DynaBARN with jackal."""
+    tasks = import_dynabarn(source)
+    offsets = [APART * k for k in range(2 if quick else 10)]
+    cases = [
+        (f"{task.world.name}+{off:g}s", dataclasses.replace(task, world=task.world.later(off)))
+        for task, off in itertools.product(tasks, offsets)
+    ]
+    rows, wrong = [], []
+    for policy, settings in POLICIES.items():
+        calls = (delayed(drive)(name, task, "dstar-lite", "jackal", **settings) for name, task in cases)
+        got = list(Parallel(n_jobs=jobs)(calls))
+        for kind, numbers in CLASSES.items():
+            some = [r for r in got if int(r.name.split("-")[1].split("+")[0]) in numbers]
+            rows.append([policy if kind == "easy" else "", kind, *told(some)])
+        if policy == "yield and replan":
+            wrong = [f"- {r.name}: {r.outcome.name.lower()} ({r.reason})" for r in got if not r.certified]
+    yield from table(["the robot may", "worlds", *HEADS], rows)
+    yield "\nWhat did not succeed with yielding and replanning:\n"
+    yield from wrong
+
+
+def random_task(seed: int) -> tuple[Task, int]:
+    """A hall of 10 m with some columns and 1 to 10 movers at up to the turtlebot's own speed."""
+    rng = np.random.default_rng([seed, 77])
+    start, goal = (1.0, 1.0, 0.785), (9.0, 9.0)
+    count, fastest = int(rng.integers(1, 11)), load_robot("turtlebot").max_speed
+    discs: list[Disc] = []
+    while len(discs) < 8:
+        x, y = rng.uniform(1.0, 9.0, 2)
+        radius = rng.uniform(0.15, 0.4)
+        if min(math.dist((x, y), start[:2]), math.dist((x, y), goal)) > radius + 0.8:
+            discs.append(Disc(float(x), float(y), float(radius)))
+    movers: list[Mover] = []
+    while len(movers) < count:
+        radius, speed = float(rng.uniform(0.15, 0.4)), float(rng.uniform(0.1, fastest))
+        places = rng.uniform(0.5, 9.5, (int(rng.integers(2, 6)), 2))
+        angle = rng.uniform(0, 2 * math.pi)
+        if math.dist(places[0], start[:2]) < 2.0:
+            continue
+        if len(movers) % 2:
+            velocity = (speed * math.cos(angle), speed * math.sin(angle))
+            movers.append(
+                Cruising(radius=radius, position=(float(places[0, 0]), float(places[0, 1])), velocity=velocity)
+            )
+        else:
+            times = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(places, axis=0).T) / speed)))
+            frames = tuple((float(t), float(x), float(y)) for t, (x, y) in zip(times, places, strict=True))
+            movers.append(Keyframed(radius=radius, keyframes=frames, loop="pingpong"))
+    world = World(f"random-{seed}", (0.0, 0.0, 10.0, 10.0), tuple(discs), movers=tuple(movers))
+    return Task(world, start, goal, cell=0.25), count
+
+
+def random_drive(seed: int, settings: dict[str, Any]) -> Result:
+    """One of them; whether a way is proved is asked at the robot's own speed."""
+    task, _ = random_task(seed)
+    robot = load_robot("turtlebot")
+    grid = rasterise(task.world, task.cell, robot.radius + 0.03)
+    query = Query.between(grid, task)
+    motions = Traffic.of(task.world, task.start[:2], seed).motions
+    proof = plan_in_time(query, motions, speed=robot.max_speed, horizon=60.0)
+    result = drive(f"seed {seed}", task, "dstar-lite", "turtlebot", seed=seed, **settings)
+    return result._replace(proved=proof.solved)
+
+
+def random(jobs: int, source: Path, quick: bool) -> Iterator[str]:
+    """Random worlds with turtlebot."""
+    seeds, rows, wrong = range(20 if quick else 500), [], []
+    for policy in ("neither", "yield and replan"):
+        got = list(Parallel(n_jobs=jobs)(delayed(random_drive)(seed, POLICIES[policy]) for seed in seeds))
+        proved = [r for r in got if r.proved]
+        rows.append([policy, f"{len(proved)} with a way proved", *told(proved)])
+        rows.append(["", f"{len(got) - len(proved)} without", *told([r for r in got if not r.proved])])
+        wrong = [
+            f"- {r.name}: {r.outcome.name.lower()} ({r.reason}){'' if r.proved else ', no way proved'}"
+            for r in got
+            if not r.certified
+        ]
+    yield from table(["the robot may", "worlds", *HEADS], rows)
+    yield "\nWhat did not succeed with yielding and replanning:\n"
+    yield from wrong
+
+
+def hasan(jobs: int, source: Path, quick: bool) -> Iterator[str]:
+    """hasan's cases with turtlebot."""
+    names = [name for name in catalogue() if name.startswith("hasan") and load_task(name).world.movers]
+    rows = []
+    for planner in ("mmas-dstar", "dstar"):
+        for name in names:
+            calls = (
+                delayed(drive)(name, load_task(name), planner, "turtlebot", seed=k) for k in range(1 if quick else 5)
+            )
+            rows.append([f"`{planner}`", name, *told(list(Parallel(n_jobs=jobs)(calls)))])
+    yield from table(["planner", "case", *HEADS], rows)
+
+
+TABLES = {"dynabarn": dynabarn, "random": random, "hasan": hasan}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("tables", nargs="*", metavar="TABLE", default=list(TABLES), help=", ".join(TABLES))
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--quick", action="store_true", help="fewer drives")
+    parser.add_argument("--dynabarn", type=Path, default=DYNABARN, metavar="FILE")
+    given = parser.parse_args()
+    for name in given.tables:
+        if name not in TABLES:
+            parser.error(f"unknown table {name!r}; choose from {', '.join(TABLES)}")
+        print(f"## {name}: {TABLES[name].__doc__}\n")
+        print("\n".join(TABLES[name](given.jobs, given.dynabarn, given.quick)), flush=True)
+        print()
+
+
+if __name__ == "__main__":
+    main()
