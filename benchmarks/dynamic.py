@@ -47,6 +47,7 @@ POLICIES: dict[str, dict[str, Any]] = {
     "replan": {"yielding": None},
     "yield and replan": {},
     "the same, motions known": {"knowledge": KNOWN},
+    "keep to a plan in space and time": {"planner": "sipp", "options": {"speed": "1.5"}, "margin": 0.15},
 }
 
 
@@ -62,10 +63,23 @@ class Result(NamedTuple):
     proved: bool = True  # whether the space-time planner finds a way
 
 
-def drive(name: str, task: Task, planner: str, robot: str, seed: int = 0, **settings: Any) -> Result:
+def drive(
+    name: str,
+    task: Task,
+    planner: str,
+    robot: str,
+    seed: int = 0,
+    options: dict[str, str] | None = None,
+    **settings: Any,
+) -> Result:
     """One drive; heavy arrays stay here."""
     scenario = Scenario(
-        task=task, planner=find_planner(planner), planner_name=planner, robot=load_robot(robot), seed=seed, **settings
+        task=task,
+        planner=find_planner(planner, **(options or {})),
+        planner_name=planner,
+        robot=load_robot(robot),
+        seed=seed,
+        **settings,
     )
     done = run(scenario)
     log = done.rollout
@@ -101,7 +115,10 @@ def dynabarn(jobs: int, source: Path, quick: bool) -> Iterator[str]:
     ]
     rows, wrong = [], []
     for policy, settings in POLICIES.items():
-        calls = (delayed(drive)(name, task, "dstar-lite", "jackal", **settings) for name, task in cases)
+        calls = (
+            delayed(drive)(name, task, **{"planner": "dstar-lite", "robot": "jackal", **settings})
+            for name, task in cases
+        )
         got = list(Parallel(n_jobs=jobs)(calls))
         for kind, numbers in CLASSES.items():
             some = [r for r in got if int(r.name.split("-")[1].split("+")[0]) in numbers]

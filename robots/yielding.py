@@ -72,18 +72,21 @@ class Yielding:
         resolve: Resolve,
         places: Floats,
         radii: Floats,
+        top: float = math.inf,
     ) -> tuple[Twist, bool, Resolve]:
         """The command to give instead of the controller's `wanted`, whether it differs, and what was decided.
 
         `last` is the command before, `before` the controller's memory then; `places` (K + 1, M, 2) are where movers of
-        `radii` (M,) are expected `ahead` from now [m].
+        `radii` (M,) are expected `ahead` from now [m]; `top` is how fast it wants to be at most [m/s].
         """
         care = kernels.Care(
             self.step, guide.tuning.radius + self.keep, self.comfort, self.worth, self.lateral, self.turn
         )
         ways = _ways(robot.max_speed, robot.max_yaw_rate, robot.max_lateral_acceleration)
-        if resolve.way:
+        if resolve.way or top < robot.max_speed:
             ways = ways.copy()
+        ways[0, 1] = min(robot.max_speed, top)
+        if resolve.way:
             ways[1] = (*resolve.way[:3], resolve.left, *resolve.way[4:])
         chosen, late, _ = kernels.choose(
             *pose, *last, before.arc, before.turning, ways,

@@ -27,6 +27,7 @@ from sim.engine import Engine
 from sim.knowledge import Watch
 from sim.replanning import MISSED, Rerouter
 from sim.rollout import Outcome
+from sim.schedule import held
 from worlds import Floats, Pose, Task, Traffic
 
 STOPPED_SPEED = 0.01  # slower than this counts as standing [m/s]
@@ -110,6 +111,10 @@ def drive(
                 guide, state, best = renewed, Progress(limiter=state.limiter), 0.0
         last, before = command, state
         command, state = controller.step(guide, believed, last, before)
+        schedule, top = rerouter.schedule if rerouter else None, math.inf
+        if schedule:
+            top = schedule.speed(tick / control_hz, state.arc)
+            command = held(command, last, top, engine.robot.max_acceleration / control_hz)
         if watch and yielding:
             settles = before.limiter == YIELD and _within(believed, last, task, engine.robot)
             if settles:
@@ -121,7 +126,7 @@ def drive(
                 command = _brake(last, engine.robot, control_hz)
             expected = watch.expected(tick, believed[:2], yielding.ahead)
             command, yields, resolve = yielding.step_aside(
-                guide, engine.robot, believed, last, before, command, resolve, *expected
+                guide, engine.robot, believed, last, before, command, resolve, *expected, top=top
             )
             if yields or settles:
                 state = state._replace(turning=before.turning, limiter=YIELD)
@@ -148,7 +153,7 @@ def drive(
         if state.arc > best + STUCK_PROGRESS:
             best, idle, turned = state.arc, 0, 0
         else:
-            waits = state.limiter == YIELD
+            waits = state.limiter == YIELD or top < SLOW
             idle, turned = idle + (not state.turning and not waits), turned + (state.turning and not waits)
             if idle >= patience or turned >= patience + full_turn:
                 outcome = Outcome.STUCK

@@ -41,7 +41,7 @@ class Watch:
     """The movers of one drive, as the robot knows them, at multiples of its control period."""
 
     def __init__(self, traffic: Traffic, knowledge: Knowledge, hz: int) -> None:
-        self._traffic, self._knowledge, self._hz = traffic, knowledge, hz
+        self.traffic, self._knowledge, self._hz = traffic, knowledge, hz
         self._first, self._places, self._speeds = 0, np.empty((0, 0, 2)), np.empty((0, 0, 2))
 
     def expected(self, tick: int, robot: tuple[float, float], ahead: Floats) -> tuple[Floats, Floats]:
@@ -49,19 +49,19 @@ class Watch:
         places, speeds = self._now(tick)
         seen = self.sensed(tick, robot)
         if self._knowledge.told == "motions":
-            places = self._traffic.positions(ahead + tick / self._hz)
-            return np.ascontiguousarray(places[:, seen]), self._traffic.radii[seen]
+            places = self.traffic.positions(ahead + tick / self._hz)
+            return np.ascontiguousarray(places[:, seen]), self.traffic.radii[seen]
         if self._knowledge.told == "positions":
             speeds = np.zeros_like(speeds)
-        return places[seen] + ahead[:, None, None] * speeds[seen], self._traffic.radii[seen]
+        return places[seen] + ahead[:, None, None] * speeds[seen], self.traffic.radii[seen]
 
     def sensed(self, tick: int, robot: tuple[float, float]) -> npt.NDArray[np.int64]:
         """Which movers (S,) are within reach."""
-        away = np.hypot(*(self._now(tick)[0] - robot).T) - self._traffic.radii
+        away = np.hypot(*(self._now(tick)[0] - robot).T) - self.traffic.radii
         return np.flatnonzero(away <= self._knowledge.reach)
 
     def _now(self, tick: int) -> tuple[Floats, Floats]:
         if not self._first <= tick < self._first + len(self._places):
             t = np.arange(tick, tick + CHUNK) / self._hz
-            self._first, self._places, self._speeds = tick, self._traffic.positions(t), self._traffic.velocities(t)
+            self._first, self._places, self._speeds = tick, self.traffic.positions(t), self.traffic.velocities(t)
         return self._places[tick - self._first], self._speeds[tick - self._first]

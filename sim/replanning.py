@@ -1,8 +1,8 @@
 """New routes while driving: around movers, or back to where the robot was going.
 
 A replan takes the planner's own replanner: what movers cover soon is blocked, grown exactly as the grid's obstacles are, and
-what they have left is cleared. Planners of the plane plan anew among discs in the movers' places; planners of space and
-time, which need no replan for what they foresaw, are stood in for by A*.
+what they have left is cleared. Planners of the plane plan anew among discs in the movers' places. One of space and time plans
+anew where the robot is late.
 """
 
 from __future__ import annotations
@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from planners import PLANNERS, Planner, PlanResult, Query, refine, replanner_for
+from planners import Planner, PlanResult, Query, SafeIntervals, TimedPlan, plan_in_time, refine, replanner_for
 from robots import Guide, PurePursuit, RobotSpec
 from sim.knowledge import Watch
+from sim.schedule import Schedule
 from worlds import Disc, Floats, Grid, Pose, Route, Task, rasterise
 
 if TYPE_CHECKING:
@@ -83,6 +84,12 @@ class Rerouter:
         self._blocked = np.zeros(grid.shape, dtype=np.bool_)
         self._rest = -math.inf  # when the last replan was
         self._wait_began = math.nan
+        self._timed = planner if isinstance(planner, SafeIntervals) else None
+        self.schedule: Schedule | None = None  # where the route says when
+
+    def follows(self, answer: PlanResult, route: Route) -> None:
+        """The robot sets out by this plan."""
+        self.schedule = Schedule.of(answer, route) if isinstance(answer, TimedPlan) and self._timed else None
 
     def cause(self, tick: int, pose: Pose, waits: bool, guide: Guide, arc: float) -> str:
         """Why a new route is due; empty if none is."""
@@ -96,6 +103,8 @@ class Rerouter:
         x, y = _place(guide.route, arc)
         if math.dist((x, y), pose[:2]) > s.strayed:
             return "strayed"
+        if self._timed:
+            return "late" if self.schedule is None or self.schedule.late(now, arc) else ""
         if s.around and now - self._wait_began >= s.patience:
             return "waited"
         if s.around and self._obstructed(tick, pose, guide, arc):
@@ -107,15 +116,17 @@ class Rerouter:
         self._rest, self._wait_began = tick / self._hz, math.nan
         started = time.perf_counter()
         around = self.settings.around and cause != MISSED  # at the goal it is enough to yield
-        discs = self._discs(tick, pose) if around else []
+        discs = self._discs(tick, pose) if around and not self._timed else []
         try:
             task = dataclasses.replace(self._task, start=pose)
         except ValueError:  # the robot believes to be where it cannot be
             return None
-        answer = self._answer(task, discs)
+        answer = self._in_time(task, tick / self._hz) if self._timed else self._answer(task, discs)
         route = None
         if answer.solved and len(answer.cells):
-            route = refine(answer, self._grid, _with(task, discs), kind=self._kind)
+            kind = "grid" if self._timed else self._kind  # times are those of the cells
+            route = refine(answer, self._grid, _with(task, discs), kind=kind)
+            self.follows(answer, route)
         self.log.append(
             Replan(
                 tick / self._hz, cause, route is not None, answer.cost if route else math.inf, answer.work,
@@ -128,6 +139,14 @@ class Rerouter:
         task = self._task
         return self._controller.guide(route, task.world, self._robot, self._margin, 1 / self._hz, task.goal_tolerance)
 
+    def _in_time(self, task: Task, now: float) -> PlanResult:
+        assert self._timed is not None
+        motions = self._watch.traffic.motions
+        query = Query.between(self._grid, task)
+        return plan_in_time(
+            query, motions, speed=self._timed.speed, start_time=now, horizon=self._timed.horizon, stay=self._timed.stay
+        )
+
     def _answer(self, task: Task, discs: list[Disc]) -> PlanResult:
         if getattr(self._planner, "needs_world", False):
             around = _with(task, discs)
@@ -135,8 +154,7 @@ class Rerouter:
             return self._planner.plan(Query.between(grid, around), self._rng)
         query = Query.between(self._grid, task)
         if self._search is None:
-            planner = PLANNERS["astar"] if getattr(self._planner, "needs_motions", False) else self._planner
-            self._search = replanner_for(planner, query, self._rng)
+            self._search = replanner_for(self._planner, query, self._rng)
         blocked = self._cells(discs)
         blocked[query.start] = blocked[query.goal] = False
         self._search.clear(np.argwhere(self._blocked & ~blocked))

@@ -65,6 +65,11 @@ class Scenario:
         """What planners keep between the robot's centre and every surface [m]."""
         return self.robot.radius + self.margin
 
+    @property
+    def timed(self) -> bool:
+        """Whether the planner plans in space and time, among movers."""
+        return bool(self.built.movers) and getattr(self.planner, "needs_motions", False)
+
     def rng(self, purpose: str) -> np.random.Generator:
         """A stream of random numbers of its own for each purpose, from the one seed."""
         return np.random.default_rng([self.seed, zlib.crc32(purpose.encode())])
@@ -140,9 +145,12 @@ class Run:
 
 
 def plan(s: Scenario) -> tuple[Grid, PlanResult]:
-    """Rasterise the world and plan on it. Movers are not on the grid."""
+    """Rasterise the world and plan on it. Movers are not on the grid; a planner of space and time is told their motions."""
     grid = rasterise(s.task.world, s.cell or s.task.cell, s.inflate)
-    return grid, s.planner.plan(Query.between(grid, s.task), s.rng("planner"))
+    query = Query.between(grid, s.task)
+    if s.timed:
+        query = dataclasses.replace(query, motions=s.traffic.motions)
+    return grid, s.planner.plan(query, s.rng("planner"))
 
 
 def run(
@@ -155,20 +163,26 @@ def run(
     grid, answer = planned or plan(s)
     if not answer.solved:
         return Run(s, grid, answer)
-    route = refine(answer, grid, s.task, kind=s.route)
+    route = refine(answer, grid, s.task, kind="grid" if s.timed else s.route)
     guide = s.controller.guide(route, s.task.world, s.robot, s.margin, 1 / s.control_hz, s.task.goal_tolerance)
     limit = s.time_limit or s.task.time_limit or 30.0 + 10.0 * route.length / s.robot.max_speed
     started = time.perf_counter()
     noise = s.robot.noise.scaled(s.noise)
     senses = Senses(noise, s.robot.track, 1 / s.control_hz, s.task.start, s.rng("noise")) if noise.loud else None
     traffic = s.traffic
-    watch = Watch(traffic, s.knowledge, s.control_hz) if traffic else None
+    # Whose planner knows the motions, knows them while it drives.
+    knowledge = Knowledge(told="motions") if s.timed else s.knowledge
+    watch = Watch(traffic, knowledge, s.control_hz) if traffic else None
     rerouter = None
     if watch and s.replanning:
         rerouter = Rerouter(
             s.replanning, s.planner, grid, s.task, s.rng("replanner"),
             watch=watch, robot=s.robot, controller=s.controller, margin=s.margin, kind=s.route, hz=s.control_hz,
         )  # fmt: skip
+        rerouter.follows(answer, route)
+    yielding = s.yielding
+    if yielding and s.timed:  # what the plan foresees comes to pass; only what is near is looked at again
+        yielding = dataclasses.replace(yielding, horizon=min(yielding.horizon, 1.0))
     with Engine(s.built, s.robot, physics_hz=s.physics_hz, traffic=traffic) as engine:
         log = drive(
             engine,
@@ -178,7 +192,7 @@ def run(
             control_hz=s.control_hz,
             time_limit=limit,
             senses=senses,
-            yielding=s.yielding,
+            yielding=yielding,
             watch=watch,
             rerouter=rerouter,
             progress=progress,
@@ -253,9 +267,12 @@ def _record(
 
 def _among_movers(s: Scenario, replans: list[Replan]) -> dict[str, Any]:
     """What records tell of a drive among movers."""
-    reach = s.knowledge.reach
+    reach = math.inf if s.timed else s.knowledge.reach
     return {
-        "knowledge": {"told": s.knowledge.told, "reach_m": reach if math.isfinite(reach) else None},
+        "knowledge": {
+            "told": "motions" if s.timed else s.knowledge.told,
+            "reach_m": reach if math.isfinite(reach) else None,
+        },
         "yielding": dataclasses.asdict(s.yielding) if s.yielding else None,
         "replanning": dataclasses.asdict(s.replanning) if s.replanning else None,
         "replans": [replan.as_dict() for replan in replans],

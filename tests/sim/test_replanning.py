@@ -6,11 +6,14 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from planners import PLANNERS, find_planner
-from robots import RobotSpec
+from planners import PLANNERS, PlanStatus, TimedPlan, find_planner
+from robots import RobotSpec, Twist
 from sim import Outcome, Replanning, Rollout, Run, Scenario, certify, run
-from worlds import Disc, Keyframed, Mover, Task, World
+from sim.schedule import LATE, Schedule, held
+from worlds import Disc, Keyframed, Mover, Route, Task, World
 
 # A wall with two gates; the way through the nearer one is shorter.
 POSTS = tuple(Disc(4.0, y, 0.25) for y in np.arange(0.25, 6.0, 0.5) if not (2.2 < y < 3.8 or y > 5.0))
@@ -49,8 +52,11 @@ def test_replans_repeat_and_stay_with_the_log(turtlebot: RobotSpec, tmp_path: ob
     assert certify(loaded).certified == certify(first).certified
 
 
-@pytest.mark.parametrize("planner", [name for name in PLANNERS if name not in ("ga-han", "hybrid", "pfaco", "as")])
+@pytest.mark.parametrize(
+    "planner", [name for name in PLANNERS if name not in ("ga-han", "hybrid", "pfaco", "as", "sipp")]
+)
 def test_every_planner_replans(planner: str, turtlebot: RobotSpec) -> None:
+    """The slowest ones aside, and the one that knows better."""
     done = among(PLUG, robot=turtlebot, planner=planner, time_limit=2.0)
     if done.rollout is None:  # a planner that is not complete found no way at first
         assert not getattr(find_planner(planner), "complete", False)
@@ -65,6 +71,41 @@ def test_where_nothing_is_in_the_way_nothing_is_replanned(turtlebot: RobotSpec) 
     assert done.succeeded
     assert done.rollout is not None
     assert done.rollout.meta["replans"] == []
+
+
+GATEKEEPER = Keyframed(radius=0.45, keyframes=((0.0, 4.0, 3.0), (9.0, 4.0, 3.0001), (12.0, 1.5, 5.5)), loop="once")
+
+
+def test_a_plan_in_space_and_time_is_kept_to(turtlebot: RobotSpec) -> None:
+    """It waits for the gate to open, and arrives when it planned to."""
+    done = among(GATEKEEPER, robot=turtlebot, planner="sipp", margin=0.1)
+    assert isinstance(done.plan, TimedPlan)
+    assert done.succeeded, (done.outcome, done.reason)
+    assert done.rollout is not None
+    assert done.rollout.t[-1] == pytest.approx(done.plan.arrive[-1], abs=3.0)
+    assert done.rollout.meta["knowledge"]["told"] == "motions"
+
+
+@given(st.floats(0.0, 30.0), st.floats(0.0, 10.0))
+def test_a_schedule_is_late_only_when_behind(t: float, arc: float) -> None:
+    route = Route(np.array([[0.0, 0.0], [4.0, 0.0]]))
+    xy = np.array([[0.0, 0.0], [2.0, 0.0], [4.0, 0.0]])
+    plan = TimedPlan(
+        status=PlanStatus.SOLVED, arrive=np.array([0.0, 4.0, 12.0]), leave=np.array([0.0, 8.0, 12.0]), xy=xy
+    )
+    schedule = Schedule.of(plan, route)
+    due = float(plan.at(t)[0])
+    assert schedule.due(t) == pytest.approx(due)
+    assert schedule.late(t, arc) == (due - arc > LATE)
+    if 4.0 < t < 7.5 and arc >= 2.0:
+        assert schedule.speed(t, arc) == 0.0
+
+
+def test_a_command_is_held_no_harder_than_the_robot_brakes() -> None:
+    fast = Twist(0.6, 0.3)
+    assert held(fast, fast, math.inf, 0.02) == fast
+    assert held(fast, fast, 0.0, 0.02) == pytest.approx(Twist(0.58, 0.29))
+    assert held(Twist(0.01, 0.3), Twist(0.01, 0.3), 0.0, 0.02).speed == 0.0
 
 
 def test_nonsense_is_refused() -> None:
