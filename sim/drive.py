@@ -134,14 +134,15 @@ def drive(
             left = math.dist((x, y), task.goal)
             missed = left > task.goal_tolerance
             renewed = rerouter.again(tick, believed, MISSED) if rerouter and missed else None
-            if renewed is None:
+            if renewed:
+                guide, state, best = renewed, Progress(limiter=state.limiter), 0.0
+            elif not (rerouter and rerouter.waits and missed):
                 outcome = Outcome.STUCK if missed else Outcome.SUCCEEDED
                 if missed:
                     reason = (
                         f"the route ends here, {left:.3f} m from the goal; the tolerance is {task.goal_tolerance:g} m"
                     )
                 break
-            guide, state, best = renewed, Progress(limiter=state.limiter), 0.0
         engine.command(*(senses.act(command) if senses else command))
         for _ in range(substeps):
             touched = engine.step()

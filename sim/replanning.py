@@ -2,7 +2,7 @@
 
 A replan takes the planner's own replanner: what movers cover soon is blocked, grown exactly as the grid's obstacles are, and
 what they have left is cleared. Planners of the plane plan anew among discs in the movers' places. One of space and time plans
-anew where the robot is late.
+anew where the robot is late. hasan's ant decides at every cell.
 """
 
 from __future__ import annotations
@@ -16,7 +16,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from planners import Planner, PlanResult, Query, SafeIntervals, TimedPlan, plan_in_time, refine, replanner_for
+from planners import (
+    Planner,
+    PlanResult,
+    Query,
+    SafeIntervals,
+    TimedPlan,
+    online_for,
+    plan_in_time,
+    refine,
+    replanner_for,
+)
 from robots import Guide, PurePursuit, RobotSpec
 from sim.knowledge import Watch
 from sim.schedule import Schedule
@@ -27,6 +37,7 @@ if TYPE_CHECKING:
 
 
 MISSED = "missed the goal"
+DECIDE = 0.2  # between two decisions of a robot that decides cell by cell, at least [s]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,6 +82,8 @@ class Replan:
 
 class Rerouter:
     """One drive's replanner: it knows the world that stands, and of movers what the robot does."""
+
+    waits = False  # whether it may have a way on later where it has none now
 
     def __init__(
         self, settings: Replanning, planner: Planner, grid: Grid, task: Task, rng: np.random.Generator, *,
@@ -163,9 +176,10 @@ class Rerouter:
         self._search.move(query.start)
         return self._search.result()
 
-    def _discs(self, tick: int, pose: Pose) -> list[Disc]:
+    def _discs(self, tick: int, pose: Pose, ahead: float | None = None) -> list[Disc]:
         """What movers cover soon, as discs; none so large that the robot would stand within its inflation."""
-        steps = np.linspace(0.0, self.settings.ahead, 1 + math.ceil(self.settings.ahead / 0.25))
+        ahead = self.settings.ahead if ahead is None else ahead
+        steps = np.linspace(0.0, ahead, 1 + math.ceil(ahead / 0.25))
         places, radii = self._watch.expected(tick, pose[:2], steps)
         inflate, cell = self._grid.inflate, self._grid.cell
         room = np.hypot(*np.moveaxis(places - np.array(pose[:2]), -1, 0)) - inflate - cell
@@ -202,6 +216,46 @@ class Rerouter:
         movers = np.array([(d.x, d.y, d.radius) for d in discs])
         gaps = np.hypot(*np.moveaxis(line[:, None] - movers[None, :, :2], -1, 0)) - movers[:, 2]
         return bool((gaps < self._grid.inflate).any())
+
+
+class Stepper(Rerouter):
+    """A robot that decides cell by cell, as hasan's does: the route is never longer than the cells decided on."""
+
+    waits = True
+
+    def __init__(self, *given: Any, **named: Any) -> None:
+        super().__init__(*given, **named)
+        query = Query.between(self._grid, self._task)
+        self._online = online_for(self._planner, query, self._rng)
+        self._goal = query.goal
+
+    def cause(self, tick: int, pose: Pose, waits: bool, guide: Guide, arc: float) -> str:
+        """A decision is due before the end of the last is reached, and again and again while the robot waits."""
+        if tick == 0:
+            return "decision"
+        if self._online.arrived or tick / self._hz - self._rest < DECIDE:
+            return ""
+        return "decision" if guide.length - arc < 0.6 * self._grid.cell else ""
+
+    def again(self, tick: int, pose: Pose, cause: str) -> Guide | None:
+        """The way on to the next cell; None: wait."""
+        if cause == MISSED and self._online.arrived:
+            return super().again(tick, pose, cause)
+        self._rest, started = tick / self._hz, time.perf_counter()
+        here, propagated = self._online.cell, self._online.tally.propagated
+        blocked = self._cells(self._discs(tick, pose, 0.0))
+        to = self._online.step(np.argwhere(blocked))
+        ends = self._grid.xy(np.array([here, to or here]))
+        if to == self._goal:
+            ends[1] = self._task.goal
+        far = math.dist(pose[:2], ends[0]) > 0.25 * self._grid.cell and tick > 0
+        xy = np.vstack([pose[:2], ends[0 if far else 1 :]])
+        moved = to is not None and bool((np.diff(xy, axis=0) != 0).any(axis=1).all())
+        cost = float(np.hypot(*np.diff(xy, axis=0).T).sum())
+        work = self._online.tally.propagated - propagated
+        if moved:
+            self.log.append(Replan(tick / self._hz, cause, True, cost, work, xy, time.perf_counter() - started))
+        return self._guide(Route(xy)) if moved else None
 
 
 def _with(task: Task, discs: list[Disc]) -> Task:

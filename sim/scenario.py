@@ -14,14 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from planners import PLANNERS, ROUTE_KINDS, Planner, PlanResult, PlanStatus, Query, find_planner, refine
+from planners import PLANNERS, ROUTE_KINDS, MaxMinDStar, Planner, PlanResult, PlanStatus, Query, find_planner, refine
 from robots import LIMITERS, PurePursuit, RobotSpec, Senses, Yielding, load_robot
 from sim.certificate import Certificate, certify
 from sim.drive import Drive, drive
 from sim.engine import Engine
 from sim.knowledge import Knowledge, Watch
 from sim.metrics import measure
-from sim.replanning import Replan, Replanning, Rerouter
+from sim.replanning import Replan, Replanning, Rerouter, Stepper
 from sim.rollout import SCHEMA, Outcome, Rollout
 from worlds import Disc, Grid, Route, Task, Traffic, World, load_task, rasterise, task_to_dict
 
@@ -175,7 +175,7 @@ def run(
     watch = Watch(traffic, knowledge, s.control_hz) if traffic else None
     rerouter = None
     if watch and s.replanning:
-        rerouter = Rerouter(
+        rerouter = (Stepper if isinstance(s.planner, MaxMinDStar) and s.replanning.around else Rerouter)(
             s.replanning, s.planner, grid, s.task, s.rng("replanner"),
             watch=watch, robot=s.robot, controller=s.controller, margin=s.margin, kind=s.route, hz=s.control_hz,
         )  # fmt: skip

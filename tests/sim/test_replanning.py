@@ -86,6 +86,20 @@ def test_a_plan_in_space_and_time_is_kept_to(turtlebot: RobotSpec) -> None:
     assert done.rollout.meta["knowledge"]["told"] == "motions"
 
 
+def test_the_ant_decides_cell_by_cell_and_waits_where_there_is_no_way(turtlebot: RobotSpec) -> None:
+    done = among(GATEKEEPER, robot=turtlebot, planner="mmas-dstar")
+    assert done.succeeded, (done.outcome, done.reason)
+    assert done.rollout is not None
+    decisions = done.rollout.meta["replans"]
+    assert {d["cause"] for d in decisions} == {"decision"}
+    assert len(decisions) > 20
+    steps = [math.dist(d["route"][-2], d["route"][-1]) for d in decisions[1:-1]]
+    assert max(steps) < 0.25 * 2**0.5 + 0.25
+    again = among(GATEKEEPER, robot=turtlebot, planner="mmas-dstar").rollout
+    assert again is not None
+    assert again.digest == done.rollout.digest
+
+
 @given(st.floats(0.0, 30.0), st.floats(0.0, 10.0))
 def test_a_schedule_is_late_only_when_behind(t: float, arc: float) -> None:
     route = Route(np.array([[0.0, 0.0], [4.0, 0.0]]))
