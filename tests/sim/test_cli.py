@@ -135,6 +135,9 @@ def test_there_are_at_least_30_malformed_worlds() -> None:
         (["run", "empty", "--unseen", "1e300,1,1"], "none beyond a million"),
         (["worlds", "import", "x.world", "-o", "w.yaml", "--barn", "--goal", "1,2"], "--barn brings its own"),
         (["run", "empty", "--unseen", "1,2"], "3 numbers"),
+        (["run", "empty", "--sees", "all"], "positions, velocities, motions"),
+        (["run", "empty", "--sees", "positions:far"], "--sees positions:far"),
+        (["run", "empty", "--sees", "positions:-1"], "reach: must be greater than 0"),
         (["run", "empty", "--unseen", "1,2,-3"], "radius: must be greater than 0"),
         (["run", "empty", "--video", "film.avi"], ".mp4"),
         (["run", "empty", "--out", "/proc/nowhere"], "cannot be written"),
@@ -193,6 +196,19 @@ def test_the_smallest_safe_margin_is_told(antdrive, small: Path) -> None:  # typ
     assert 0 <= facts["margin_m"] <= 0.03
     assert facts["trials"][0]["margin"] == pytest.approx(0.2)
     assert "smallest safe margin" in antdrive("margin", small, "--seeds", "1", "-p", "astar", "--speed", "0.3")[1]
+
+
+def test_a_run_tells_of_its_replans_and_yields_unless_told_not_to(antdrive, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    world = tmp_path / "crossing.yaml"
+    world.write_text(
+        "schema: 1\nname: crossing\nbounds: [0, 0, 6, 4]\nstart: [1, 2, 0]\ngoal: [5, 2]\ncell: 0.25\n"
+        "movers: [{radius: 0.3, loop: once, keyframes: [[0, 3, 0.5], [3.5, 3, 1.9], [8, 3, 3.5]]}]\n"
+    )
+    words = ["run", str(world), "-p", "dstar-lite", "--out", str(tmp_path), "--json"]
+    assert antdrive(*words)[0] == 0
+    code, out, _ = antdrive(*words, "--no-yield", "--no-replan")
+    assert code == 1
+    assert json.loads(out)["outcome"] == "collided"
 
 
 def test_lists(antdrive) -> None:  # type: ignore[no-untyped-def]
