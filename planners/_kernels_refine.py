@@ -183,7 +183,8 @@ def settle(
     disc = np.empty(room, dtype=np.int64)
     turn = np.empty(room, dtype=np.float64)
     sweep = np.empty(room, dtype=np.float64)
-    disc[:count], turn[:count], sweep[:count] = first_disc, first_turn, first_sweep
+    for i in range(count):
+        disc[i], turn[i], sweep[i] = first_disc[i], first_turn[i], first_sweep[i]
     links = np.empty((room + 1, 4), dtype=np.float64)
     heading = np.empty(room + 1, dtype=np.float64)
     for _ in range(3 * room):

@@ -94,7 +94,7 @@ def footprint_clearances(poses: Array, shape: Array, discs: Array, bounds: Array
             count = 0
             for j in range(discs.shape[0]):
                 if math.hypot(discs[j, 0] - x, discs[j, 1] - y) - discs[j, 2] <= closest + radius + 2.0 * NEAR:
-                    near[count] = discs[j]
+                    near[count, 0], near[count, 1], near[count, 2] = discs[j, 0], discs[j, 1], discs[j, 2]
                     count += 1
         reach_x = hx * abs(cos) + hy * abs(sin) + rounding
         reach_y = hx * abs(sin) + hy * abs(cos) + rounding

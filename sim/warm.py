@@ -54,11 +54,10 @@ def drive_and_film() -> None:
 
 def warm(jobs: int = -1) -> None:
     """Plan with every planner, drive once and film it, on as many processes as there are cores unless told."""
-    plan_with(["astar"])  # what all need
-    Parallel(jobs)([delayed(plan_with)(TOGETHER[0]), delayed(drive_and_film)(), *map(delayed(plan_with), TOGETHER[1:])])
+    pool = Parallel(jobs)
+    pool([delayed(plan_with)(TOGETHER[0]), delayed(drive_and_film)(), *map(delayed(plan_with), TOGETHER[1:])])
     # Once more from the cache; what two processes wrote at the same moment, and one of them lost, is compiled now.
-    plan_with(list(PLANNERS))
-    drive_and_film()
+    pool([delayed(plan_with)(list(PLANNERS)), delayed(drive_and_film)()])
 
 
 if __name__ == "__main__":
