@@ -971,6 +971,10 @@ def _tell(result: Run, files: dict[str, str]) -> None:
             f"  drove {facts['driven_length_m']:.2f} m in {facts['duration_s']:.1f} s "
             f"(route {facts['route_length_m']:.2f} m); tracking error at most {facts['tracking_error_max_m']:.3f} m"
         )
+        if facts["replans"] or facts["yielding_s"]:
+            say(
+                f"  replanned {facts['replans']:.0f} times, gave way to moving obstacles for {facts['yielding_s']:.1f} s"
+            )
         c = result.certificate
         verdict = "certified collision-free" if c.certified else "NOT certified"
         say(f"  {verdict}: least clearance {c.min_clearance:.4f} m, between steps at least {c.bound:.4f} m")

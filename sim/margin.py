@@ -77,7 +77,10 @@ def budget(rollout: Rollout) -> Budget:
     world, radius, margin = _known(rollout), _radius(rollout), float(rollout.meta["margin"])
     true = np.ascontiguousarray(rollout.pose[:, :2])
     believed = np.ascontiguousarray(rollout.estimate[:, :2]) if len(rollout.estimate) else true
-    foot = nearest_on_route(believed, rollout.route)
+    foot, cutting = np.empty_like(true), np.empty(len(true), dtype=np.bool_)
+    for rows, line in rollout.legs():
+        foot[rows] = nearest_on_route(believed[rows], line)
+        cutting[rows] = _near_corner(foot[rows], line)
 
     def room(points: Floats) -> Floats:
         return point_clearance(world, points) - radius
@@ -85,7 +88,6 @@ def budget(rollout: Rollout) -> Budget:
     left, by_belief, on_route = room(true), room(believed), room(foot)
     off = on_route - by_belief
     slip = np.clip(room(_commanded(rollout)) - left, 0.0, np.maximum(off, 0.0))
-    cutting = _near_corner(foot, rollout.route)
     eaten = {
         "rounding": margin - on_route,
         "cutting": np.where(cutting, off - slip, 0.0),

@@ -71,7 +71,7 @@ def mean_clearance_m(rollout: Rollout) -> float:
 
 
 def tracking_error_max_m(rollout: Rollout) -> float:
-    """Largest distance of the axle's centre from the route."""
+    """Largest distance of the axle's centre from the route that it followed then."""
     return float(tracking_error(rollout).max())
 
 
@@ -134,6 +134,19 @@ def contacts_teleported(rollout: Rollout) -> float:
     return _touches(rollout, Outcome.JUMPED_ON)
 
 
+def replans(rollout: Rollout) -> float:
+    """How often a new route was looked for while driving."""
+    return float(len(rollout.meta.get("replans", ())))
+
+
+def yielding_s(rollout: Rollout) -> float:
+    """Simulated time for which the robot gave way to moving obstacles."""
+    limiters = rollout.meta.get("limiters", ())
+    if "yield" not in limiters:
+        return 0.0
+    return float((rollout.limiter == limiters.index("yield")).sum() / rollout.meta["physics_hz"])
+
+
 METRICS: Mapping[str, Callable[[Rollout], float]] = MappingProxyType(
     {
         "path_length_m": path_length_m,
@@ -156,6 +169,8 @@ METRICS: Mapping[str, Callable[[Rollout], float]] = MappingProxyType(
         "contacts_driving": contacts_driving,
         "contacts_standing": contacts_standing,
         "contacts_teleported": contacts_teleported,
+        "replans": replans,
+        "yielding_s": yielding_s,
     }
 )
 
@@ -171,9 +186,9 @@ def succeeded(rollout: Rollout) -> bool:
 
 
 def tracking_error(rollout: Rollout) -> Floats:
-    """Distance of the axle's centre from the route at each row, shape (T,) [m]."""
+    """Distance of the axle's centre from the route in force at each row, shape (T,) [m]."""
     xy = rollout.pose[:, :2]
-    return np.asarray(np.hypot(*(nearest_on_route(xy, rollout.route) - xy).T))
+    return np.concatenate([np.hypot(*(nearest_on_route(xy[rows], line) - xy[rows]).T) for rows, line in rollout.legs()])
 
 
 def nearest_on_route(points: Floats, route: Floats) -> Floats:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import enum
 import hashlib
+import itertools
 import json
 import math
 import zipfile
@@ -82,6 +83,13 @@ class Rollout:
         kept = {key: value for key, value in self.meta.items() if key not in ("digest", "times")}
         sha.update(json.dumps(kept, sort_keys=True).encode())
         return sha.hexdigest()
+
+    def legs(self) -> list[tuple[slice, npt.NDArray[np.float64]]]:
+        """The lines (N, 2) that were followed [m], each with the rows in which it was: the first, then what replans led to."""
+        renewed = [(float(entry["t"]), entry["route"]) for entry in self.meta.get("replans", ()) if entry["solved"]]
+        lines = [self.route, *(np.array(route, dtype=np.float64) for _, route in renewed)]
+        rows = [0, *np.searchsorted(self.t, [t - 1e-9 for t, _ in renewed]).tolist(), len(self.t)]
+        return [(slice(*ends), line) for ends, line in zip(itertools.pairwise(rows), lines, strict=True)]
 
     def traffic(self) -> Traffic:
         """The movers as the log's own task and seed define them.

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from sim import METRICS, Rollout, measure
+from sim.metrics import tracking_error
 
 
 def straight(**changes: Any) -> Rollout:
@@ -50,6 +51,8 @@ def straight(**changes: Any) -> Rollout:
         ("contacts_driving", 0),
         ("contacts_standing", 0),
         ("contacts_teleported", 0),
+        ("replans", 0),
+        ("yielding_s", 0),
     ],
 )
 def test_by_hand(name: str, value: float) -> None:
@@ -84,3 +87,20 @@ def test_jerk_of_a_known_motion() -> None:
 def test_the_tracking_error_is_to_the_nearest_part_of_the_route() -> None:
     corner = straight(route=np.array([(0.0, 0.0), (2.0, 0.0), (2.0, 2.0)]))
     assert METRICS["tracking_error_max_m"](corner) == pytest.approx(2.0)  # (4, 0.1) is 2 m from x = 2
+
+
+def test_after_a_replan_the_tracking_error_is_to_the_new_route() -> None:
+    """At 4 s, at (2, 0.1), the robot turns to a line 0.3 m beside its way; a replan that fails changes nothing."""
+    log = straight()
+    new = {"t": 4.0, "cause": "obstructed", "solved": True, "route": [[2.0, 0.4], [4.0, 0.4]]}
+    entries = [new, {**new, "t": 5.0, "solved": False, "route": []}]
+    renewed = replace(log, meta={**log.meta, "replans": entries})
+    assert [(rows.start, rows.stop) for rows, _ in renewed.legs()] == [(0, 40), (40, 81)]
+    error = tracking_error(renewed)
+    np.testing.assert_allclose(error, np.repeat([0.1, 0.3], [40, 41]), atol=1e-12)
+    assert METRICS["replans"](renewed) == 2
+
+
+def test_the_time_of_giving_way_is_that_of_its_limiter() -> None:
+    log = straight(limiter=np.arange(81, dtype=np.uint8) // 61)
+    assert METRICS["yielding_s"](replace(log, meta={**log.meta, "limiters": ["path", "yield"]})) == pytest.approx(2.0)
