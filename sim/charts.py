@@ -95,6 +95,10 @@ def draw_driven(figure: Any, axes: Any, scene: Scene, rollout: Rollout, cells: F
     if len(rollout.route) > 1:
         style = {"ls": (0, (4, 2.5)), "lw": 1.0, "color": hexed(ROUTE)}
         handles += axes.plot(*rollout.route.T, **style, label="route", zorder=4.8)
+        renewed = [line for _, line in rollout.legs()[1:]]
+        for k, line in enumerate(renewed):
+            drawn = axes.plot(*line.T, **{**style, "lw": 0.7, "alpha": 0.45}, label="new routes", zorder=4.7)
+            handles += drawn if k == 0 else []
     if len(rollout.t) > 1:
         keep = np.unique(np.linspace(0, len(rollout.t) - 1, 1500).astype(int))
         points = rollout.pose[keep, :2]

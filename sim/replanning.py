@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
 
 MISSED = "missed the goal"
+DECISION = "decision"  # of a robot that decides at every cell
 DECIDE = 0.2  # between two decisions of a robot that decides cell by cell, at least [s]
 
 
@@ -232,10 +233,10 @@ class Stepper(Rerouter):
     def cause(self, tick: int, pose: Pose, waits: bool, guide: Guide, arc: float) -> str:
         """A decision is due before the end of the last is reached, and again and again while the robot waits."""
         if tick == 0:
-            return "decision"
+            return DECISION
         if self._online.arrived or tick / self._hz - self._rest < DECIDE:
             return ""
-        return "decision" if guide.length - arc < 0.6 * self._grid.cell else ""
+        return DECISION if guide.length - arc < 0.6 * self._grid.cell else ""
 
     def again(self, tick: int, pose: Pose, cause: str) -> Guide | None:
         """The way on to the next cell; None: wait."""

@@ -164,7 +164,9 @@ class Entry(NamedTuple):
     wide: float = 0.0  # of a scale bar [px]
 
 
-def entries_for(scene: Scene, step: float, pixel: float, *, planning: bool = False) -> list[Entry]:
+def entries_for(
+    scene: Scene, step: float, pixel: float, *, planning: bool = False, replans: bool = False
+) -> list[Entry]:
     """What the legend of a scene tells: grid lines every `step` metres, `pixel` metres a pixel in the middle."""
     found = (
         [Entry("field", INK, "planner's field"), Entry("line", SHELL, "best path so far")]
@@ -174,6 +176,8 @@ def entries_for(scene: Scene, step: float, pixel: float, *, planning: bool = Fal
             Entry("dash", ROUTE, "planned route"),
         ]
     )
+    if replans:
+        found.append(Entry("dot", ROUTE, "new route"))
     if scene.inflate > 0:
         found.append(Entry("zone", ZONE, f"inflated by {scene.inflate:.2f} m"))
     if scene.unseen.any():

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from sim.filming.scene import Scene, jumping
+from sim.replanning import DECISION
 from sim.rollout import Rollout
 
 Floats = npt.NDArray[np.float64]
@@ -16,6 +18,22 @@ SMOOTHING = 0.6  # a following camera looks at the mean place of this long befor
 
 SLOW = 4.0  # a film is this much slower around a contact
 AROUND = (0.3, 0.1)  # from so long before to so long after it, at the film's usual speed [s]
+
+
+class Renewal(NamedTuple):
+    """A replan, as a film tells it."""
+
+    t: float  # [s]
+    cause: str
+    solved: bool
+    route: Floats  # (N, 2) followed from then on [m]
+
+    @property
+    def told(self) -> str:
+        """In words; empty for the decisions of a robot that decides at every cell."""
+        if self.cause == DECISION:
+            return ""
+        return f"{'new route' if self.solved else 'no new route'}: {self.cause}"
 
 
 class Replay:
@@ -33,6 +51,11 @@ class Replay:
         self._least = np.minimum.accumulate(self._clearance)
         self._movers = rollout.movers if len(rollout.movers) else np.empty((rows, 0, 2))
         self._jumping = jumping(self._movers)
+        self.renewals: list[Renewal] = []
+        route = rollout.route
+        for entry in rollout.meta.get("replans", ()):
+            route = np.array(entry["route"], dtype=np.float64) if entry["solved"] else route
+            self.renewals.append(Renewal(float(entry["t"]), str(entry["cause"]), bool(entry["solved"]), route))
         rim = self._twist[:, 1] * robot.track / 2
         steps = np.diff(self.t)
         self._angles = []
@@ -96,6 +119,10 @@ class Replay:
         if row + 1 >= len(self.t) or at <= self.t[row]:
             return row, 0.0
         return row, float((at - self.t[row]) / (self.t[row + 1] - self.t[row]))
+
+    def renewed(self, at: float) -> int:
+        """How many replans there were until a moment."""
+        return sum(renewal.t <= at + 1e-9 for renewal in self.renewals)
 
     def speed(self, at: float) -> float:
         """The measured forward speed [m/s]; standing reads 0, not -0."""

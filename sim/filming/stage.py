@@ -15,14 +15,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from sim.colours import KERB, MOVER, OBSTACLE, SHELL, UNSEEN, Colour, field_colours, speed_colours
+from sim.colours import KERB, MOVER, OBSTACLE, ROUTE, SHELL, UNSEEN, Colour, field_colours, speed_colours
 from sim.engine import bullet, client
 from sim.filming import _kernels_paint as kernels
 from sim.filming.camera import Camera
 from sim.filming.cast import Solids
 from sim.filming.lettering import glow
 from sim.filming.model import Mesh, Part, cylinder, join, kerb, robot_height, robot_parts
-from sim.filming.paint import kerb_width, paint_ground
+from sim.filming.paint import dashes, kerb_width, paint_ground
 from sim.filming.scene import Scene
 from sim.filming.tiny import Box, add_mesh, merged, render
 
@@ -66,6 +66,7 @@ class Stage:
         self._trail_width = trail_width(scene, camera)
         self._trail: list[tuple[Floats, Floats]] = []
         self._written: list[tuple[Picture, float, float, float]] = []
+        self._renewed = (np.empty((0, 5)), np.empty((0, 5)))
         self._open = contextlib.ExitStack()
 
     def __enter__(self) -> Stage:
@@ -114,6 +115,12 @@ class Stage:
         self._trail.append((rows, colours))
         self._paint_trail(rows, colours)
 
+    def reroute(self, line: Floats, places: Floats) -> None:
+        """Draw a line (N, 2), from now on, in place of the last, and marks at places (M, 2) where new lines were found."""
+        half = 1.5 * self.camera.pixel
+        dots = np.column_stack([places, places, np.full(len(places), 2.4 * half)])
+        self._renewed = (dashes(line, 7 * half, 5 * half, 0.9 * half), np.ascontiguousarray(dots))
+
     def frame(
         self,
         pose: npt.ArrayLike,
@@ -128,6 +135,8 @@ class Stage:
         x, y, yaw = (float(value) for value in np.asarray(pose))
         places = np.asarray(movers, dtype=np.float64).reshape(-1, 2)
         frame = self._canvas.copy()
+        for rows in self._renewed:
+            self._blend(frame, rows, ROUTE, 0.85)
         if velocities is not None:
             self._foretell(frame, places, np.asarray(velocities, dtype=np.float64).reshape(-1, 2))
         self._shade(frame, np.array([x, y, yaw]), places)
@@ -215,10 +224,12 @@ class Stage:
         moving = np.hypot(*velocities.T) > 0.01
         dots = np.vstack([np.column_stack([stop, stop, np.full(len(stop), 2.2 * half)])[moving] for stop in stops])
         for rows, strength in ((lines[moving], 0.45), (dots, 0.75)):
-            kernels.blend_capsules(
-                frame, self.backdrop.visible, self._forward, self._inverse, np.ascontiguousarray(rows),
-                np.array(MOVER, dtype=np.float64), strength,
-            )  # fmt: skip
+            self._blend(frame, np.ascontiguousarray(rows), MOVER, strength)
+
+    def _blend(self, frame: Picture, rows: Floats, colour: Colour, strength: float) -> None:
+        """Draw thick segments (N, 5) on the ground."""
+        tint = np.array(colour, dtype=np.float64)
+        kernels.blend_capsules(frame, self.backdrop.visible, self._forward, self._inverse, rows, tint, strength)
 
     def _shade(self, frame: Picture, pose: Floats, movers: Floats) -> None:
         """The soft shadows of what moves, and a glow under a robot too small to be found at a glance."""

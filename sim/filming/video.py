@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
-from sim.colours import CONTACT, GOAL, START, Colour
+from sim.colours import CONTACT, GOAL, ROUTE, START, Colour
 from sim.filming import _kernels_paint as kernels
 from sim.filming.camera import CAMERAS, Camera, camera_for
 from sim.filming.caption import (
@@ -41,7 +41,7 @@ from sim.filming.model import robot_height
 from sim.filming.paint import grid_step
 from sim.filming.parallel import WORTH, pictures, processes
 from sim.filming.replay import SLOW as SLOW
-from sim.filming.replay import Replay
+from sim.filming.replay import Renewal, Replay
 from sim.filming.scene import Scene
 from sim.filming.stage import Stage, drawn_height
 from sim.rollout import Rollout
@@ -53,6 +53,7 @@ Picture = npt.NDArray[np.uint8]  # (H, W, 3)
 
 HOLD = 1.0  # the last picture stays this long [s]
 FLASH = 0.45  # a contact flashes this long [s]
+NEWS = 1.5  # the cause of a new route is told this long [s]
 
 
 @dataclass(frozen=True)
@@ -199,11 +200,14 @@ class Shot:
         self.scene = scene = Scene.of(rollout)
         self.outcome = rollout.outcome
         self._follows = camera == "follow"
+        replans = not planning and any(renewal.told for renewal in self.replay.renewals)
         for card in (True, False):
             self._layout = layout = Layout.of(size, card)
             band = 0 if bare else layout.height
             self._camera = self._aim(camera, rollout, (size[0], size[1] - band))
-            entries = entries_for(scene, grid_step(self._camera), self._camera.pixel, planning=planning)
+            entries = entries_for(
+                scene, grid_step(self._camera), self._camera.pixel, planning=planning, replans=replans
+            )
             self._legend = legend_card(entries, layout) if card and not bare else None
             if self._legend is not None and self._free(self._legend):
                 break
@@ -213,15 +217,20 @@ class Shot:
             layout, scene.name, subtitle, None if planning else note, entries, SEARCHED if planning else DRIVEN
         )
         fine = 3 if size[0] * size[1] <= 400_000 and not self._follows else 2
+        stays = not (planning or self.replay.renewals)  # else the route is drawn in every frame
         self._stage = Stage(
-            scene, self._camera, route=rollout.route[: 0 if planning else None], fine=fine, moves=self._follows
+            scene, self._camera, route=rollout.route[: None if stays else 0], fine=fine, moves=self._follows
         )
+        self._news = NEWS * speed
         self._end = banner(self.outcome, layout)
+        self._route, self._renewed = rollout.route, 0
         self.shown = 0.0  # the trail reaches this moment [s]
 
     def __enter__(self) -> Shot:
         self._stage.__enter__()
         self._lay_labels()
+        if self.replay.renewals:
+            self._reroute(0)
         return self
 
     def __exit__(self, *problem: object) -> None:
@@ -260,7 +269,12 @@ class Shot:
         if self._follows:
             stage.look(self._camera.moved(*replay.smooth(at)))
         self.drive(at)
+        renewed = replay.renewed(at)
+        if renewed != self._renewed:
+            self._reroute(renewed)
         view = stage.frame(replay.pose(at), replay.wheels(at), replay.movers(at), replay.mover_velocities(at))
+        if renewed:
+            self._tell_replan(view, at, replay.renewals[renewed - 1])
         self._mark_contacts(view, at, self._flash, last)
         self._lay_legend(view)
         return view
@@ -307,6 +321,25 @@ class Shot:
             (start, "START", START), ((*scene.goal, scene.goal_tolerance), "GOAL", GOAL)
         ):  # fmt: skip
             self._stage.write(label(text, round(0.95 * size), colour), x, y, reach)
+
+    def _reroute(self, count: int) -> None:
+        """Show the route after so many replans, and where they were."""
+        replay = self.replay
+        route = replay.renewals[count - 1].route if count else self._route
+        told = [replay.pose(renewal.t)[:2] for renewal in replay.renewals[:count] if renewal.told]
+        self._stage.reroute(route, np.array(told).reshape(-1, 2))
+        self._renewed = count
+
+    def _tell_replan(self, view: Picture, at: float, renewal: Renewal) -> None:
+        """What the last replan was for, above the robot, for a while."""
+        if not renewal.told or at - renewal.t > self._news:
+            return
+        sprite = label(renewal.told, self._layout.unit, ROUTE)
+        x, y, _ = self.replay.pose(at)
+        px, py = self._stage.pixel(x, y, robot_height(self.scene.robot))
+        left = min(max(px - sprite.shape[1] / 2, 0), view.shape[1] - sprite.shape[1])
+        top = py - 2.2 * self._layout.unit - sprite.shape[0]
+        kernels.put_sprite(view, sprite, round(left), round(max(top, 0)), 1.0)
 
     def _mark_contacts(self, view: Picture, at: float, flash: float, last: bool) -> None:
         touched = self.replay.touched(at)

@@ -279,3 +279,42 @@ def test_a_small_robot_gets_a_glow_and_a_large_one_none(made_up_drive):
         aside = np.abs(tinted[py, px + 5 : px + 9]).max() if found else 0
         assert ring > 100
         assert (aside > 20) == found
+
+
+def test_a_replan_is_shown_from_its_moment_on(drive):
+    """The old line goes, the new one comes, a dot marks the place; the cause is told for a while."""
+    ahead, new = np.array([(1.0, 0.4), (3.5, 0.4)]), {"t": 0.3, "cause": "obstructed", "solved": True}
+    entries = [{**new, "route": ahead.tolist()}, {**new, "t": 0.8, "cause": "waited", "solved": False, "route": []}]
+    replanned = replace(drive, meta={**drive.meta, "replans": entries})
+
+    def views(rollout, news, *times):
+        with Shot(rollout, camera="top", size=SIZE, bare=True) as shot:
+            shot._news = news
+            return [shot.view(at).astype(int) for at in times]
+
+    kept, plain = views(drive, 0.0, 0.2, 0.5)
+    before, after, failed = views(replanned, 0.0, 0.2, 0.5, 0.85)
+    told = views(replanned, 1.0, 0.5)[0]
+    with Shot(drive, camera="top", size=SIZE, bare=True) as shot:
+        new_line = [shot._stage.pixel(x, 0.4) for x in np.linspace(1.0, 3.5, 200)]
+        x = np.linspace(2.4, 3.1, 100)
+        old_line = [shot._stage.pixel(*at) for at in zip(x, np.interp(x, *drive.route.T), strict=True)]
+
+    def dark(view, line):
+        return np.mean([view[round(py), round(px)].sum() < 300 for px, py in line])
+
+    assert np.abs(before - kept).max(axis=-1).mean() < 2, "drawn again in every frame, to about the same effect"
+    assert dark(plain, new_line) == dark(before, new_line) == 0
+    assert dark(after, new_line) > 0.3
+    assert dark(failed, new_line) > 0.3
+    assert dark(plain, old_line) > 0.2
+    assert dark(after, old_line) == 0
+    assert (np.abs(told - after).max(axis=-1) > 60).sum() > 100
+
+
+def test_decisions_at_every_cell_are_not_told(drive):
+    entry = {"t": 0.0, "cause": "decision", "solved": True, "route": [[1.0, 1.0], [1.5, 1.0]]}
+    decided = replace(drive, meta={**drive.meta, "replans": [entry]})
+    with Shot(decided, camera="top", size=SIZE) as shot:
+        assert [renewal.told for renewal in shot.replay.renewals] == [""]
+        shot.picture(0.5)
