@@ -35,6 +35,9 @@ class Care(NamedTuple):
     worth: float  # metres of the route that a metre of that room is worth
     lateral: float  # and a metre off the route
     turn: float  # and a radian off its heading
+    doubt: float  # a mover may turn back within this time [s]
+    berth: float  # beyond `keep`, the room to where it would be then [m]
+    wary: float  # metres of the route that each metre less is worth
 
 
 @kernel
@@ -60,21 +63,32 @@ def first_contact(
 
 
 @kernel
+def intrusion(x: float, y: float, places: Array, k: int, radii: Array, near: Array, reach: float) -> float:
+    """How much closer than `reach` a point is to where some mover would be at the k-th instant, had it turned back at once."""
+    most = 0.0
+    for m in near:
+        back_x, back_y = 2.0 * places[0, m, 0] - places[k, m, 0], 2.0 * places[0, m, 1] - places[k, m, 1]
+        most = max(most, radii[m] + reach - math.hypot(x - back_x, y - back_y))
+    return most
+
+
+@kernel
 def follow(
     x: float, y: float, yaw: float, v: float, w: float, s: float, turning: bool, way: Array,
     line: Line, known: Known, limits: Limits, tuning: Tuning, care: Care,
     places: Array, radii: Array, near: Array,
-) -> tuple[float, float, float, float, float, float]:  # fmt: skip
+) -> tuple[float, float, float, float, float, float, float]:  # fmt: skip
     """A way followed through all of `places` (K + 1, M, 2), `care.step` apart, as a control period of that length would.
 
-    When it first meets something [s] (inf: never), the least room to movers before, and where it ends: x, y, yaw, speed.
+    When it first meets something [s] (inf: never), the least room to movers before, the deepest intrusion, and where it ends:
+    x, y, yaw, speed.
     """
     capped = Limits(
         min(limits.speed, way[1]), limits.yaw_rate, limits.acceleration, limits.yaw_acceleration, limits.lateral,
         limits.half_track, limits.rim,
     )  # fmt: skip
     floor = min(tuning.floor, own_clearance(x, y, known) - 1e-3)
-    least, now = math.inf, 0.0
+    least, risk, now = math.inf, 0.0, 0.0
     for k in range(places.shape[0] - 1):
         if way[0] == PURSUE:
             v1, w1, s, turning, _ = pursue(x, y, yaw, v, w, s, turning, line, known, capped, tuning)
@@ -92,13 +106,15 @@ def follow(
         x1, y1 = x + length * math.cos(middle), y + length * math.sin(middle)
         share, room = first_contact(x, y, x1, y1, places, k, radii, near, care.keep)
         if share <= 1.0:
-            return now + share * care.step, least, x, y, yaw, v
+            return now + share * care.step, least, risk, x, y, yaw, v
+        if care.wary > 0.0 and now < care.doubt:
+            risk = max(risk, intrusion(x1, y1, places, k + 1, radii, near, care.keep + care.berth))
         discs = nearby(x, y, known.discs, known.starts, known.bounds, known.side)
         if abs(length) > 1e-6 and segment_clearance(x, y, x1, y1, discs, known.bounds) < floor:
-            return now, least, x, y, yaw, v
+            return now, least, risk, x, y, yaw, v
         least = min(least, room)
         x, y, yaw, v, w, now = x1, y1, yaw + 0.5 * (w + w1) * care.step, v1, w1, now + care.step
-    return math.inf, least, x, y, yaw, v
+    return math.inf, least, risk, x, y, yaw, v
 
 
 @kernel
@@ -116,7 +132,7 @@ def choose(
 ) -> tuple[int, float, float]:  # fmt: skip
     """Which of the ways (N, WIDTH) to take; when that meets something (inf: never) [s]; the room it has.
 
-    Row 0 is taken if it has all the room that is worth something. Else that which gets farthest, room counted in.
+    Row 0 is taken if it has all the room that is worth something, and no risk. Else that which gets farthest, room counted in.
     If each meets something, the one that does so last.
     """
     near = np.empty(radii.shape[0], np.int64)
@@ -136,11 +152,11 @@ def choose(
     xy, arc = line.xy, line.arc
     best, best_score, best_late, best_room = 0, -math.inf, -1.0, 0.0
     for n in range(ways.shape[0]):
-        late, room, ex, ey, eyaw, ev = follow(
+        late, room, risk, ex, ey, eyaw, ev = follow(
             x, y, yaw, v, w, s, turning, ways[n], line, known, limits, tuning, care, places, radii, near
         )
         free = late == math.inf
-        if n == 0 and free and room >= care.comfort:
+        if n == 0 and free and room >= care.comfort and risk == 0.0:
             return 0, late, room
         if not free:
             if best_late < math.inf and late > best_late + 1e-9:
@@ -153,6 +169,7 @@ def choose(
         bearing = math.atan2(qy - ey, qx - ex)
         astray = abs((eyaw - bearing + math.pi) % (2.0 * math.pi) - math.pi) if arc[-1] - end > 0.1 else 0.0
         score = end - care.lateral * off - care.turn * astray + 0.3 * ev * math.cos(astray)
+        score -= care.wary * risk
         score -= care.worth * max(care.comfort - room, 0.0)
         if n <= 1:
             score += 0.05  # as it wants to, or as it last decided, where others are no better

@@ -47,12 +47,15 @@ class Yielding:
     worth: float = 1.5  # metres of the route that each metre of it is worth
     lateral: float = 0.6  # and each metre off the route
     turn: float = 0.3  # and each radian off its heading
+    doubt: float = 0.6  # a mover may turn back at any time: it is thought of for so long [s]
+    berth: float = 0.05  # and beyond `keep`, this room is kept to where it would be [m]
+    wary: float = 6.0  # metres of the route that each metre less is worth; 0: movers do as predicted
 
     def __post_init__(self) -> None:
         for key in ("horizon", "step"):
             if not 0 < getattr(self, key) <= 60:
                 raise ValueError(f"{key}: must be greater than 0 and at most 60, got {getattr(self, key):g}")
-        for key in ("keep", "comfort", "worth", "lateral", "turn"):
+        for key in ("keep", "comfort", "worth", "lateral", "turn", "doubt", "berth", "wary"):
             if not 0 <= getattr(self, key) < math.inf:
                 raise ValueError(f"{key}: must be at least 0, got {getattr(self, key):g}")
 
@@ -80,8 +83,9 @@ class Yielding:
         `radii` (M,) are expected `ahead` from now [m]; `top` is how fast it wants to be at most [m/s].
         """
         care = kernels.Care(
-            self.step, guide.tuning.radius + self.keep, self.comfort, self.worth, self.lateral, self.turn
-        )
+            self.step, guide.tuning.radius + self.keep, self.comfort, self.worth, self.lateral, self.turn,
+            self.doubt, self.berth, self.wary,
+        )  # fmt: skip
         ways = _ways(robot.max_speed, robot.max_yaw_rate, robot.max_lateral_acceleration)
         if resolve.way or top < robot.max_speed:
             ways = ways.copy()

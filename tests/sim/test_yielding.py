@@ -84,6 +84,23 @@ def test_what_comes_for_a_standing_robot_is_dodged(turtlebot: RobotSpec) -> None
     assert done.succeeded, (done.outcome, done.reason)
 
 
+@pytest.mark.parametrize(("speed", "t"), [(0.3, 5.4), (0.5, 5.0), (0.5, 6.2)])
+def test_what_has_just_gone_by_may_turn_back(speed: float, t: float, turtlebot: RobotSpec) -> None:
+    """A robot that trusts its predictions drives close behind it, and is met there."""
+    begin = t - 2.5 / speed
+    frames = ((0.0, 4.6, 3.5 - speed * t),) if begin < 0 else ((0.0, 4.6, 1.0), (begin, 4.6, 1.0))
+    turns = keyframed(*frames, (t, 4.6, 3.5), (t + 4.0, 4.6, 3.5 - 4.0 * speed), radius=0.25)
+    trusting, wary = (among(turns, robot=turtlebot, yielding=y) for y in (Yielding(wary=0.0), Yielding()))
+    assert trusting.outcome is Outcome.COLLIDED
+    assert wary.succeeded, (wary.outcome, wary.reason)
+    known = Knowledge(told="motions")
+    one, other = (among(turns, robot=turtlebot, yielding=y, knowledge=known) for y in (Yielding(wary=0.0), Yielding()))
+    assert one.rollout is not None
+    assert other.rollout is not None
+    assert one.succeeded
+    assert (one.rollout.pose == other.rollout.pose).all(), "there is no doubt about what is known"
+
+
 def test_where_contact_cannot_be_avoided_the_robot_meets_it_standing(turtlebot: RobotSpec) -> None:
     """A piston as wide as the aisle, faster than the robot."""
     piston = keyframed((0.0, 8.0, 0.5), (4.0, 0.0, 0.5), radius=0.45)
