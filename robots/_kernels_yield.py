@@ -23,6 +23,8 @@ from robots._kernels import (
 from worlds._kernels import kernel, segment_clearance
 
 PURSUE, TWISTS = 0.0, 1.0  # the kinds of ways: along the route up to a speed; one twist after another
+LEAST = 0.005  # of the room to movers, if need be [m]
+SLACK = 0.05  # so much closer a mover that is near already may come while the robot gets going [m]
 WIDTH = 6  # of a way's row: its kind, then the top speed, or the first twist, how long it lasts [s], and the second
 
 
@@ -149,6 +151,13 @@ def choose(
     near = near[:count]
     if count == 0:
         return 0, math.inf, math.inf
+    closest = math.inf
+    for m in near:
+        closest = min(closest, math.hypot(places[0, m, 0] - x, places[0, m, 1] - y) - radii[m])
+    keep = max(
+        tuning.radius + LEAST, min(care.keep, closest - SLACK)
+    )  # else no way out of too little room would be free
+    care = Care(care.step, keep, care.comfort, care.worth, care.lateral, care.turn, care.doubt, care.berth, care.wary)
     xy, arc = line.xy, line.arc
     best, best_score, best_late, best_room = 0, -math.inf, -1.0, 0.0
     for n in range(ways.shape[0]):

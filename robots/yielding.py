@@ -100,7 +100,7 @@ class Yielding:
             return wanted, False, Resolve()
         limits, dt = guide.limits, guide.tuning.period
         way = ways[chosen]
-        if late < abs(last.speed) / limits.acceleration:  # it will be met in any case: better standing
+        if late < abs(last.speed) / limits.acceleration + self.step:  # met in any case: better standing
             v, w = 0.0, 0.0
             resolve = Resolve()
         elif way[0] == kernels.PURSUE:

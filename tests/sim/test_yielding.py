@@ -88,7 +88,7 @@ def test_what_comes_for_a_standing_robot_is_dodged(turtlebot: RobotSpec) -> None
 def test_what_has_just_gone_by_may_turn_back(speed: float, t: float, turtlebot: RobotSpec) -> None:
     """A robot that trusts its predictions drives close behind it, and is met there."""
     begin = t - 2.5 / speed
-    frames = ((0.0, 4.6, 3.5 - speed * t),) if begin < 0 else ((0.0, 4.6, 1.0), (begin, 4.6, 1.0))
+    frames = ((0.0, 4.6, 3.5 - speed * t),) if begin <= 0 else ((0.0, 4.6, 1.0), (begin, 4.6, 1.0))
     turns = keyframed(*frames, (t, 4.6, 3.5), (t + 4.0, 4.6, 3.5 - 4.0 * speed), radius=0.25)
     trusting, wary = (among(turns, robot=turtlebot, yielding=y) for y in (Yielding(wary=0.0), Yielding()))
     assert trusting.outcome is Outcome.COLLIDED
@@ -158,3 +158,11 @@ def test_nonsense_is_refused() -> None:
         Yielding(horizon=0.0)
     with pytest.raises(ValueError, match="keep: must be at least 0, got nan"):
         Yielding(keep=math.nan)
+
+
+def test_a_robot_with_too_little_room_makes_more(turtlebot: RobotSpec) -> None:
+    """What creeps up on it at less than the room it keeps is got away from."""
+    creeps = keyframed((0.0, 1.51, 3.0), (20.0, -2.5, 3.0), radius=0.25)
+    assert among(creeps, robot=turtlebot, yielding=None).outcome is Outcome.COLLIDED
+    done = among(creeps, robot=turtlebot)
+    assert done.succeeded, (done.outcome, done.reason)
