@@ -11,6 +11,7 @@ from .hybrid import Hybrid as Hybrid
 from .iterative import Iteration as Iteration
 from .iterative import IterativePlanner as IterativePlanner
 from .iterative import Progress as Progress
+from .iterative import keep_best as keep_best
 from .iterative import watch as watch
 from .merging_ants import MergingAnts as MergingAnts
 from .mmas import MaxMinAnts as MaxMinAnts

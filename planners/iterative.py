@@ -54,12 +54,29 @@ def watch(see: Callable[[Progress], None]) -> Iterator[None]:
         _watcher.reset(token)
 
 
+_keeping: ContextVar[bool] = ContextVar("_keeping", default=False)
+
+
+@contextmanager
+def keep_best() -> Iterator[None]:
+    """Within this block, Ctrl-C makes a planner hand over its best path so far, as `STOPPED`.
+
+    Elsewhere it is raised, so that it ends what plans many times instead of passing for one more result.
+    """
+    token = _keeping.set(True)
+    try:
+        yield
+    finally:
+        _keeping.reset(token)
+
+
 @dataclass(frozen=True, kw_only=True)
 class IterativePlanner(GridPlanner):
     """A planner that improves its answer in iterations.
 
     It ends after `iterations`, or with the best path so far at the `time_budget`, with a note in `reason`. A time
-    budget gives up repeatability: a faster machine gets further. At Ctrl-C it hands over the best so far as `STOPPED`.
+    budget gives up repeatability: a faster machine gets further. At Ctrl-C within `keep_best` it hands over the best so
+    far as `STOPPED`.
     """
 
     iterations: int = 100
@@ -94,6 +111,8 @@ class IterativePlanner(GridPlanner):
         try:
             note = self._improve(states, done)
         except KeyboardInterrupt:
+            if not _keeping.get():
+                raise
             note = f"interrupted after {len(done)} of {self.iterations} iterations"
             return dataclasses.replace(self._conclude(query, done, note), status=PlanStatus.STOPPED)
         return self._conclude(query, done, note)

@@ -94,6 +94,7 @@ def run(
     json: Json = False,
 ) -> int:
     """Plan, drive in physics, certify; exit 0 when the robot stopped at the goal and touched nothing."""
+    from planners import keep_best
     from sim.replanning import Replanning
     from sim.scenario import plan as make_plan
     from sim.scenario import run as drive_it
@@ -119,7 +120,7 @@ def run(
         _check_film(video)
         _make_folder(video.parent)
     _make_folder(folder)
-    with planning(f"planning with {planner}"):
+    with planning(f"planning with {planner}"), keep_best():
         grid, answer = make_plan(scenario)
     with bar("driving") as progress:
         result = drive_it(scenario, planned=(grid, answer), progress=progress)
@@ -151,10 +152,11 @@ def plan(
     json: Json = False,
 ) -> int:
     """Plan without driving; exit 0 when there is a path."""
+    from planners import keep_best
     from sim.scenario import plan as make_plan
 
     scenario = _scenario(world, planner, settings, robot, seed=seed, margin=margin, cell=cell)
-    with planning(f"planning with {planner}"):
+    with planning(f"planning with {planner}"), keep_best():
         grid, answer = make_plan(scenario)
     files = {}
     if out is not None:

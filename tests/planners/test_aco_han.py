@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from worlds_to_solve import catalogue
 
-from planners import AcoHan, Iteration, PlanStatus, Progress, Query, watch
+from planners import AcoHan, Iteration, PlanStatus, Progress, Query, keep_best, watch
 from planners.ants import Ground, Season, Walks, _Walk, without_loops
 from worlds import Floats, Grid
 
@@ -189,8 +189,13 @@ def interrupt_after(count: int) -> list[Progress]:
     return Impatient()
 
 
+def test_ctrl_c_is_raised_where_nobody_asked_to_keep_the_best() -> None:
+    with watch(interrupt_after(3).append), pytest.raises(KeyboardInterrupt):
+        AcoHan(ants=20, iterations=50).plan(catalogue()["empty"], np.random.default_rng(0))
+
+
 def test_ctrl_c_returns_the_best_so_far() -> None:
-    with watch(interrupt_after(3).append):
+    with watch(interrupt_after(3).append), keep_best():
         result = AcoHan(ants=20, iterations=50).plan(catalogue()["empty"], np.random.default_rng(0))
     assert result.status is PlanStatus.STOPPED
     assert not result.solved
@@ -201,7 +206,7 @@ def test_ctrl_c_returns_the_best_so_far() -> None:
 
 
 def test_ctrl_c_before_any_path_is_stopped() -> None:
-    with watch(interrupt_after(1).append):
+    with watch(interrupt_after(1).append), keep_best():
         result = AcoHan(ants=5, max_steps=2).plan(catalogue()["empty"], np.random.default_rng(0))
     assert result.status is PlanStatus.STOPPED
     assert "interrupted" in result.reason

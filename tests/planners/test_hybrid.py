@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from worlds_to_solve import catalogue, optimum
 
-from planners import AcoHan, Hybrid, PlanResult, PlanStatus, Query, Tangent, find_planner, watch
+from planners import AcoHan, Hybrid, PlanResult, PlanStatus, Query, Tangent, find_planner, keep_best, watch
 from planners.anyangle import polyline_length
 from planners.iterative import Progress
 from worlds import Disc, Grid, InputError, Task, World, load_task, polyline_clearance, rasterise
@@ -84,7 +84,7 @@ def test_stopped_while_ants_forage_it_answers_with_their_pulled_path() -> None:
         if progress.done == 3:
             raise KeyboardInterrupt
 
-    with watch(stop):
+    with watch(stop), keep_best():
         result = solve(query)
     assert result.status is PlanStatus.STOPPED
     assert result.reason == "interrupted after 3 of 200 iterations"

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from planners import Progress, watch
 from sim import Run
 from sim.cli import main
 from tests.worlds.malformed import MALFORMED
@@ -476,6 +477,26 @@ def test_ctrl_c_is_one_line(antdrive, monkeypatch: pytest.MonkeyPatch) -> None: 
     code, _, err = antdrive("run", "empty")
     assert code == 130
     assert err == "antdrive: interrupted\n"
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["compare", "WORLD", "-p", "aco-han", "-p", "astar"],
+        ["margin", "WORLD", "-p", "aco-han", "--seeds", "1"],
+        ["reproduce", "lee2008", "--seeds", "1"],
+    ],
+)
+def test_ctrl_c_while_planning_ends_what_plans_many_times(
+    antdrive, small: Path, tmp_path: Path, words: list[str]
+) -> None:  # type: ignore[no-untyped-def]
+    def stop(progress: Progress) -> None:
+        raise KeyboardInterrupt
+
+    with watch(stop):
+        code, out, err = antdrive(*(str(small) if word == "WORLD" else word for word in words))
+    assert (code, out, err) == (130, "", "antdrive: interrupted\n")
+    assert not list((tmp_path / "out").rglob("*.*"))
 
 
 def test_planners_are_compared_in_one_command(antdrive, small: Path, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planners import Progress, find_planner, watch
+from planners import Progress, find_planner, keep_best, watch
 from robots import PurePursuit, RobotSpec
 from sim import Engine, Outcome, Run, Scenario, measure, run
 from sim.drive import drive
@@ -137,7 +137,7 @@ def test_ctrl_c_while_planning_keeps_the_best_path_and_does_not_drive(small_scen
             raise KeyboardInterrupt
 
     s = replace(small_scenario, planner=find_planner("aco-han", ants=50))
-    with watch(stop):
+    with watch(stop), keep_best():
         result = run(s)
     assert result.outcome is Outcome.STOPPED
     assert result.rollout is None
