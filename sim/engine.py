@@ -20,6 +20,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from robots.footprint import footprint_clearance
 from robots.spec import RobotSpec
 from worlds.traffic import Traffic
 from worlds.world import Floats, Pose, World
@@ -129,7 +130,10 @@ class Engine:
         self._open.close()
 
     def place(self, pose: Pose) -> None:
-        """Put the robot somewhere, at rest, and let it settle on its wheels; movers come when it has."""
+        """Put the robot somewhere, at rest, and let it settle on its wheels; movers come when it has.
+
+        Where it would stand in something it does not settle: that would push it out before the first look at contacts.
+        """
         p, x, y, yaw = self._p, *pose
         height = self.robot.wheel_radius + 5e-4 - self._com_drop
         quaternion = (0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))
@@ -139,7 +143,8 @@ class Engine:
         self._steps = 0
         if self._movers is not None:
             self._movers.leave()
-        for _ in range(round(0.1 * self.physics_hz)):
+        free = footprint_clearance(self.world, self.robot.footprint, [pose])[0] > 0
+        for _ in range(round(0.1 * self.physics_hz) if free else 0):
             p.stepSimulation(physicsClientId=self._client)
         if self._movers is not None:
             self._movers.begin()

@@ -190,12 +190,17 @@ def test_no_obstacle_is_too_low_to_be_felt(small_scenario: Scenario, collided_ru
     assert run(replace(small_scenario, unseen=(low,))).outcome is Outcome.COLLIDED
 
 
-def test_a_start_that_touches_is_a_collision_at_once(turtlebot: RobotSpec) -> None:
-    task = Task(World("w", (0, 0, 4, 3), (Disc(0.6, 1.5, 0.1),)), (0.85, 1.5, 0), (3.4, 1.5), cell=0.2)
+@pytest.mark.parametrize("gap", [-0.03, -0.08, -0.15])
+def test_a_start_that_touches_is_a_collision_at_once(turtlebot: RobotSpec, gap: float) -> None:
+    start = (0.6 + 0.1 + turtlebot.radius + gap, 1.5, 0)
+    task = Task(World("w", (0, 0, 4, 3), (Disc(0.6, 1.5, 0.1),)), start, (3.4, 1.5), cell=0.2)
     result = run(Scenario(task=task, planner=find_planner("astar"), robot=turtlebot))
     assert result.outcome is Outcome.COLLIDED
     assert result.rollout is not None
     assert result.rollout.contacts[0, 0] == 0
+    assert result.rollout.clearance[0] == pytest.approx(gap, abs=0.005)
+    assert result.certificate is not None
+    assert not any("disagree" in problem or "start" in problem for problem in result.certificate.problems)
 
 
 def test_a_route_through_an_obstacle_ends_in_contact_not_in_a_loop(turtlebot: RobotSpec) -> None:
