@@ -118,7 +118,6 @@ def run(
             raise InputError(f"--prelude: {planner} does not plan in iterations; there is no field to show")
     if video is not None:
         _check_film(video)
-        _make_folder(video.parent)
     _make_folder(folder)
     with planning(f"planning with {planner}"), keep_best():
         grid, answer = make_plan(scenario)
@@ -241,7 +240,6 @@ def compare(
         raise InputError(f"--planner {' '.join(planner)}: name two to six different planners")
     if video is not None:
         _check_film(video)
-        _make_folder(video.parent)
     results, files = {}, {}
     for name, scenario in zip(planner, scenarios, strict=True):
         _make_folder(folder / name)
@@ -366,11 +364,13 @@ def reproduce(
 ) -> int:
     """Measure a paper's experiments again: printed beside measured, and the paper's figures."""
     from sim.papers.experiments import PAPERS
-    from sim.papers.reproduce import HEADS, row_cells
+    from sim.papers.reproduce import HEADS, check_papers, row_cells
     from sim.papers.reproduce import reproduce as measure_again
 
     folder = out or Path("out") / f"reproduce-{paper}"
     chosen = list(PAPERS) if paper == "all" else [paper]
+    check_papers(chosen)
+    _make_folder(folder)
     with bar("planning") as progress:
         rows, files = measure_again(
             chosen, folder, seeds=seeds, suffixes=_suffixes(vector), jobs=jobs, progress=progress
@@ -774,9 +774,13 @@ def _scenario(world: str, planner: str, settings: list[str] | None, robot: str, 
 def _knowledge(text: str) -> Knowledge:
     from sim.knowledge import Knowledge
 
-    told, mark, reach = text.partition(":")
+    told, mark, metres = text.partition(":")
     try:
-        return Knowledge(told=told, reach=float(reach) if mark else math.inf)  # type: ignore[arg-type]
+        reach = float(metres) if mark else math.inf
+    except ValueError:
+        raise InputError(f"--sees {text}: write WHAT or WHAT:METRES, such as positions:3") from None
+    try:
+        return Knowledge(told=told, reach=reach)  # type: ignore[arg-type]
     except ValueError as error:
         raise InputError(f"--sees {text}: {error}") from None
 
@@ -896,9 +900,13 @@ def _make_folder(folder: Path) -> None:
     """Make sure, before the work, that its results can be written."""
     from worlds.atomic import written_whole
 
-    with written_whole(folder / ".antdrive") as probe:
-        probe.touch()
-    (folder / ".antdrive").unlink(missing_ok=True)
+    probe = folder / ".antdrive"
+    try:
+        with written_whole(probe) as temporary:
+            temporary.touch()
+    except InputError as error:
+        raise InputError(str(error).replace(str(probe), str(folder), 1)) from None
+    probe.unlink(missing_ok=True)
 
 
 def _film(log: Any, path: Path, **options: Any) -> dict[str, Any]:
@@ -948,6 +956,9 @@ def _check_film(path: Path) -> None:
 
     if path.suffix.lower() not in ENCODERS:
         raise InputError(f"--video {path}: films are written as {', '.join(ENCODERS)}")
+    if path.is_dir():
+        raise InputError(f"--video {path}: is a directory; name a file")
+    _make_folder(path.parent)
 
 
 def _note(log: Any) -> str:
@@ -986,8 +997,9 @@ def _tell(result: Run, files: dict[str, str]) -> None:
 
 
 def _tell_files(files: dict[str, str]) -> None:
+    width = max([8, *map(len, files)])
     for name, path in files.items():
-        say(f"  {name:8} {path}")
+        say(f"  {name:{width}} {path}")
 
 
 def _because(reason: str) -> str:
@@ -1022,6 +1034,13 @@ def _command() -> str:
 _USAGE_ERROR: Any = typer.BadParameter.__mro__[2]
 
 
+def _subcommand(context: Any) -> list[str]:
+    """The words that name what was being called, below the program's own name."""
+    if context is None or context.parent is None:
+        return []
+    return [*_subcommand(context.parent), context.info_name]
+
+
 def main() -> None:
     """Run the command line; the exit code says how it went."""
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(TERMINATED))  # so that half-written files are cleared away
@@ -1039,7 +1058,7 @@ def main() -> None:
         if type(error).__name__ == "NoArgsIsHelpError":
             say(error.format_message())
             sys.exit(WRONG_INPUT)
-        complain(f"{error.format_message()} (see antdrive --help)")
+        complain(f"{error.format_message()} (see {' '.join(['antdrive', *_subcommand(error.ctx)])} --help)")
         code = WRONG_INPUT
     if code == INTERRUPTED:
         complain("interrupted")

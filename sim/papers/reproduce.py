@@ -53,9 +53,7 @@ def reproduce(
     Raises:
         InputError: no such paper.
     """
-    for paper in papers:
-        if paper not in PAPERS:
-            raise InputError(f"reproduce: unknown paper {paper!r}; choose from {', '.join([*PAPERS, 'all'])}")
+    check_papers(papers)
     trials = [trial for paper in papers for trial in PAPERS[paper]()]
     found: list[list[PlanResult]] = []
     rows = []
@@ -72,6 +70,17 @@ def reproduce(
         chosen = [(t, r) for t, r in zip(trials, found, strict=True) if t.paper == paper]
         files |= _figures(paper, chosen, folder, seeds, suffixes)
     return rows, files
+
+
+def check_papers(papers: Sequence[str]) -> None:
+    """Refuse what is no paper.
+
+    Raises:
+        InputError: names the papers there are.
+    """
+    for paper in papers:
+        if paper not in PAPERS:
+            raise InputError(f"reproduce: unknown paper {paper!r}; choose from {', '.join([*PAPERS, 'all'])}")
 
 
 def _solve(planner: str, options: Any, query: Any, seed: int) -> PlanResult:

@@ -137,11 +137,17 @@ def test_there_are_at_least_30_malformed_worlds() -> None:
         (["worlds", "import", "x.world", "-o", "w.yaml", "--barn", "--goal", "1,2"], "--barn brings its own"),
         (["run", "empty", "--unseen", "1,2"], "3 numbers"),
         (["run", "empty", "--sees", "all"], "positions, velocities, motions"),
-        (["run", "empty", "--sees", "positions:far"], "--sees positions:far"),
+        (["run", "empty", "--sees", "positions:far"], "--sees positions:far: write WHAT or WHAT:METRES"),
         (["run", "empty", "--sees", "positions:-1"], "reach: must be greater than 0"),
         (["run", "empty", "--unseen", "1,2,-3"], "radius: must be greater than 0"),
         (["run", "empty", "--video", "film.avi"], ".mp4"),
-        (["run", "empty", "--out", "/proc/nowhere"], "cannot be written"),
+        (["run", "empty", "--out", "/proc/nowhere"], "/proc/nowhere: cannot be written"),
+        (["run", "empty", "--video", "folder.mp4"], "--video folder.mp4: is a directory"),
+        (["run", "empty", "--bogus"], "(see antdrive run --help)"),
+        (["worlds", "show"], "(see antdrive worlds show --help)"),
+        (["nothing"], "(see antdrive --help)"),
+        (["reproduce", "lee2008", "--out", "/proc/nowhere"], "/proc/nowhere: cannot be written"),
+        (["worlds", "generate", "forest", "-o", "folder.mp4"], "folder.mp4: cannot be written (Is a directory)"),
         (["verify", "nothing.npz"], "no such file"),
         (["render", "nothing.npz", "-o", "f.mp4"], "no such file"),
         (["worlds", "generate", "desert", "-o", "w.yaml"], "forest"),
@@ -165,7 +171,8 @@ def test_there_are_at_least_30_malformed_worlds() -> None:
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
-def test_wrong_words_are_one_line_and_exit_code_2(antdrive, words: list[str], says: str) -> None:  # type: ignore[no-untyped-def]
+def test_wrong_words_are_one_line_and_exit_code_2(antdrive, words: list[str], says: str, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    (tmp_path / "folder.mp4").mkdir()
     code, out, err = antdrive(*words)
     assert code == 2, (out, err)
     assert out == ""
