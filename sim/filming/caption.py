@@ -246,12 +246,12 @@ def _key(draw: ImageDraw.ImageDraw, entry: Entry, x: int, y: float, wide: int, s
             draw.line([(end, y - 0.35 * size), (end, y + 0.35 * size)], fill=colour, width=line)
 
 
-def banner(outcome: Outcome, layout: Layout) -> Sprite:
-    """The outcome as a sentence, for the end of a film."""
+def banner(outcome: Outcome, layout: Layout, room: int) -> Sprite:
+    """The outcome as a sentence, for the end of a film, within `room` [px]."""
     name, colour = VERDICTS[outcome]
     sentence = outcome.value[0].upper() + outcome.value[1:]
     size = round(1.5 * layout.unit)
     text = f"{name[0]}  {sentence}" if name[0] in "✓✕" else sentence
-    while size > 8 and text_width(text, size, True) > 0.86 * layout.width:
+    while size > 8 and text_width(text, size, True) > 0.86 * room:
         size -= 1
     return pill(text, size, colour)

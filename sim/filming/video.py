@@ -222,8 +222,9 @@ class Shot:
             scene, self._camera, route=rollout.route[: None if stays else 0], fine=fine, moves=self._follows
         )
         self._news = NEWS * speed
-        self._end = banner(self.outcome, layout)
         self._route, self._renewed = rollout.route, 0
+        self._beside = 0 if self._legend is None else self._legend.shape[1] + 2 * layout.unit  # the legend's card [px]
+        self._end = banner(self.outcome, layout, max(size[0] - self._beside, size[0] // 2))
         self.shown = 0.0  # the trail reaches this moment [s]
 
     def __enter__(self) -> Shot:
@@ -247,8 +248,10 @@ class Shot:
         view = self.view(at, last=True)
         unit = self._layout.unit
         high = self._stage.pixel(*self.replay.pose(at)[:2])[1] < 0.4 * view.shape[0]  # the robot is: say it below
-        top = view.shape[0] - self._end.shape[0] - round(1.2 * unit) if high else round(1.2 * unit)
-        kernels.put_sprite(view, self._end, (view.shape[1] - self._end.shape[1]) // 2, top, 1.0)
+        low = high or self._beside + self._end.shape[1] > view.shape[1]
+        top = view.shape[0] - self._end.shape[0] - round(1.2 * unit) if low else round(1.2 * unit)
+        left = max((view.shape[1] - self._end.shape[1]) // 2, 0 if low else self._beside)
+        kernels.put_sprite(view, self._end, left, top, 1.0)
         return self._framed(view, at, VERDICTS[self.outcome])
 
     def planning(self, values: Values, paint: Callable[[Stage], Picture]) -> Picture:

@@ -240,6 +240,15 @@ def test_a_still_is_a_png(drive, tmp_path):
         still(drive, tmp_path / "a.jpg")
 
 
+@pytest.mark.parametrize("size", [(320, 240), (640, 480), (1280, 720)])
+def test_the_last_sentence_leaves_the_legend_readable(drive, size):
+    with Shot(drive, camera="follow", size=size) as shot:
+        before, after = shot.picture(shot.replay.duration), shot.ending()
+        high, wide = (shot._layout.unit + side for side in shot._legend.shape[:2])
+    assert np.array_equal(before[:high, :wide], after[:high, :wide])
+    assert not np.array_equal(before, after)
+
+
 def test_a_film_is_slow_around_a_contact(crash):
     with Shot(crash, camera="oblique", size=SIZE) as shot:
         end, (first, last) = shot.replay.duration, shot.slow
