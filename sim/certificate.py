@@ -55,6 +55,11 @@ class Certificate:
         }
 
 
+def in_metres(value: float) -> str:
+    """A distance to a tenth of a millimetre, finer where that would read as nothing."""
+    return f"{value:.4f} m" if abs(value) >= 5e-5 or value == 0 else f"{value:.1e} m"
+
+
 def certify(rollout: Rollout) -> Certificate:
     """Check a drive from its log alone."""
     problems = rollout.problems()
@@ -78,7 +83,9 @@ def certify(rollout: Rollout) -> Certificate:
             )
     if not least > 0:
         at = int(clearance.argmin())
-        problems.append(f"closed form: the robot overlaps an obstacle by {-least:.4f} m at t = {rollout.t[at]:.3f} s")
+        problems.append(
+            f"closed form: the robot overlaps an obstacle by {in_metres(-least)} at t = {rollout.t[at]:.3f} s"
+        )
         if not touched:
             problems.append("readings disagree: closed form overlaps, physics reports no contact")
     elif not bound > 0:

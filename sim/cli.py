@@ -276,7 +276,7 @@ def verify(
     json: Json = False,
 ) -> int:
     """Check drives again from their logs alone; exit 0 when each is certified to have touched nothing."""
-    from sim.certificate import certify
+    from sim.certificate import certify, in_metres
     from sim.rollout import Rollout
 
     checked = {str(path): certify(Rollout.load(path)) for path in rollouts}
@@ -286,7 +286,9 @@ def verify(
     else:
         for path, c in checked.items():
             verdict = "certified collision-free" if c.certified else "NOT certified"
-            say(f"{path}: {verdict}: least clearance {c.min_clearance:.4f} m, between steps at least {c.bound:.4f} m")
+            say(
+                f"{path}: {verdict}: least clearance {in_metres(c.min_clearance)}, between steps at least {in_metres(c.bound)}"
+            )
             for problem in c.problems:
                 say(f"  {problem}")
     return SUCCEEDED if all(c.certified for c in checked.values()) else FAILED
@@ -976,6 +978,8 @@ def _write_json(path: Path, value: Any) -> None:
 
 
 def _tell(result: Run, files: dict[str, str]) -> None:
+    from sim.certificate import in_metres
+
     s = result.scenario
     say(f"{s.task.world.name}: {s.robot.name} with {s.planner_name}: {result.outcome.value}" + _because(result.reason))
     if result.rollout is not None and result.certificate is not None:
@@ -990,7 +994,7 @@ def _tell(result: Run, files: dict[str, str]) -> None:
             )
         c = result.certificate
         verdict = "certified collision-free" if c.certified else "NOT certified"
-        say(f"  {verdict}: least clearance {c.min_clearance:.4f} m, between steps at least {c.bound:.4f} m")
+        say(f"  {verdict}: least clearance {in_metres(c.min_clearance)}, between steps at least {in_metres(c.bound)}")
         for problem in c.problems:
             say(f"    {problem}")
     _tell_files(files)

@@ -232,14 +232,16 @@ def certificate_figure(rollout: Rollout, certificate: Certificate, path: str | P
 
 def _tell_certificate(axes: Any, certificate: Certificate, rollout: Rollout) -> None:
     """The three readings and the verdict, as lines."""
+    from sim.certificate import in_metres
+
     axes.axis("off")
     readings = (
         (certificate.contacts == 0, f"physics: {certificate.contacts} contacts in {len(rollout.t) - 1:,} steps"),
         (
             certificate.min_clearance > 0,
-            f"geometry: never closer than {certificate.min_clearance:.4f} m at a logged pose",
+            f"geometry: never closer than {in_metres(certificate.min_clearance)} at a logged pose",
         ),
-        (certificate.bound > 0, f"in between: at least {certificate.bound:.4f} m between any two of them"),
+        (certificate.bound > 0, f"in between: at least {in_metres(certificate.bound)} between any two of them"),
     )
     lines = [*readings, *((False, problem) for problem in certificate.problems[:3])]
     verdict = "certified collision-free" if certificate.certified else "NOT certified collision-free"

@@ -136,7 +136,8 @@ class Rollout:
         except RecursionError:
             raise InputError(f"{path}: meta: nested too deeply") from None
         except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-            raise InputError(f"{path}: not a rollout ({str(error).splitlines()[0]})") from None
+            problem = getattr(error, "strerror", None) or str(error).splitlines()[0]
+            raise InputError(f"{path}: not a rollout ({problem})") from None
         if not isinstance(meta, dict) or meta.get("schema") != SCHEMA:
             found = meta.get("schema") if isinstance(meta, dict) else meta
             raise InputError(

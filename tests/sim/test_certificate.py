@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from sim import Outcome, Rollout, Run, certify
-from sim.certificate import closed_form_clearance
+from sim.certificate import closed_form_clearance, in_metres
 from worlds import InputError
 
 
@@ -34,6 +34,15 @@ def test_a_clean_log_is_certified(log: Rollout) -> None:
     assert certificate.certified
     assert certificate.problems == ()
     assert 0 < certificate.bound < certificate.min_clearance
+
+
+def test_no_distance_reads_as_nothing_that_is_not_nothing() -> None:
+    assert [in_metres(value) for value in (0.21154, 0.0, -2.7e-5, -0.08)] == [
+        "0.2115 m",
+        "0.0000 m",
+        "-2.7e-05 m",
+        "-0.0800 m",
+    ]
 
 
 def test_the_closed_form_shares_no_code_and_agrees(log: Rollout) -> None:

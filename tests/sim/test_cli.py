@@ -149,6 +149,7 @@ def test_there_are_at_least_30_malformed_worlds() -> None:
         (["reproduce", "lee2008", "--out", "/proc/nowhere"], "/proc/nowhere: cannot be written"),
         (["worlds", "generate", "forest", "-o", "folder.mp4"], "folder.mp4: cannot be written (Is a directory)"),
         (["verify", "nothing.npz"], "no such file"),
+        (["verify", "folder.mp4"], "folder.mp4: not a rollout (Is a directory)"),
         (["render", "nothing.npz", "-o", "f.mp4"], "no such file"),
         (["worlds", "generate", "desert", "-o", "w.yaml"], "forest"),
         (["worlds", "generate", "forest", "-o", "w.yaml", "--set", "cuont=3"], "count"),
