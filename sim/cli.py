@@ -869,6 +869,10 @@ def _file_name(name: str) -> str:
     return "".join(c if c.isalnum() or c in "-_." else "_" for c in name)
 
 
+FIGURES = ("overview", "certificate", "plan", "tour", "history", "field-bars", "field-contours")
+OWN_FILES = ("result.json", "rollout.npz", *(name + suffix for name in FIGURES for suffix in (".png", ".pdf")))
+
+
 def _write(result: Run, folder: Path, video: Path | None, prelude: float, *, vector: bool = False) -> dict[str, str]:
     from sim.figures import certificate_figure, plan_figures
     from sim.plots import overview, plan_figure
@@ -876,8 +880,9 @@ def _write(result: Run, folder: Path, video: Path | None, prelude: float, *, vec
     s = result.scenario
     files = {"result": str(folder / "result.json")}
     suffixes = _suffixes(vector)
+    for name in OWN_FILES:
+        (folder / name).unlink(missing_ok=True)  # of an earlier run; it would belie this one's result
     if result.rollout is None:
-        (folder / "rollout.npz").unlink(missing_ok=True)  # of an earlier run; it would belie this one's result
         files["figure"] = str(plan_figure(s.task, result.grid, result.plan, s.robot, folder / "overview.png"))
         return files
     files["rollout"] = str(result.rollout.save(folder / "rollout.npz"))

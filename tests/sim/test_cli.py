@@ -83,6 +83,15 @@ def test_no_path_is_exit_code_1(antdrive) -> None:  # type: ignore[no-untyped-de
     assert antdrive("plan", "no-path")[0] == 1
 
 
+def test_a_run_leaves_nothing_of_an_earlier_one_in_its_folder(antdrive, small: Path, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    antdrive(
+        "run", small, "-p", "aco-han", "-s", "planner.ants=50", "-s", "planner.iterations=5", "--vector", "--out", "o"
+    )
+    (tmp_path / "o" / "mine.txt").touch()
+    antdrive("run", "no-path", "-p", "astar", "--out", "o")
+    assert {path.name for path in (tmp_path / "o").iterdir()} == {"result.json", "overview.png", "mine.txt"}
+
+
 def test_plan_needs_no_physics(antdrive, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
     code, out, _ = antdrive("plan", "han2007-aco", "--planner", "aco-han", "--json", "--out", tmp_path / "p")
     facts = json.loads(out)
