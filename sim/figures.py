@@ -266,13 +266,17 @@ def comparison_figure(rollouts: Mapping[str, Rollout], path: str | Path, *, dpi:
     target = checked(path)
     scene = Scene.of(next(iter(rollouts.values())))
     with styled():
-        figure = new_figure(6.6, 6.4)
+        xmin, ymin, xmax, ymax = scene.bounds
+        figure = new_figure(6.6, float(np.clip(5.6 * (ymax - ymin) / (xmax - xmin), 2.0, 9.0)) + 1.0)
         axes: Any = figure.add_subplot()
         draw_map(axes, scene)
         handles: list[Any] = []
-        for name, rollout in rollouts.items():
+        for over, (name, rollout) in zip(reversed(range(len(rollouts))), rollouts.items(), strict=True):
             colour, dash = planner_style(name)
             label = f"{name}, {float(rollout.t[-1]):.1f} s"
-            handles += axes.plot(*rollout.pose[::8, :2].T, color=hexed(colour), ls=dash, lw=2.2, label=label, zorder=6)
+            width = 2.2 + 1.4 * over  # a way that later ones cover shows at both sides of them
+            handles += axes.plot(
+                *rollout.pose[::8, :2].T, color=hexed(colour), ls=dash, lw=width, label=label, zorder=6
+            )
         draw_legend(axes, handles, scene)
         return write_figure(figure, target, dpi)
