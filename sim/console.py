@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -78,11 +79,13 @@ def as_json(value: Any) -> str:
 
 
 def table(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Aligned columns on stdout; the last one is as long as it is."""
+    """Aligned columns on stdout; on a terminal a line ends where it does, elsewhere the last column is as long as it is."""
     lines = [tuple(headers), *(tuple(row) for row in rows)]
     widths = [max(len(line[i]) for line in lines) for i in range(len(headers) - 1)]
+    room = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
     for line in lines:
-        say("  ".join([*(cell.ljust(width) for cell, width in zip(line, widths, strict=False)), line[-1]]).rstrip())
+        text = "  ".join([*(cell.ljust(width) for cell, width in zip(line, widths, strict=False)), line[-1]]).rstrip()
+        say(text if room is None or len(text) <= room else text[: room - 1] + "…")
 
 
 def _strict(value: Any) -> Any:

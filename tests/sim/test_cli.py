@@ -245,6 +245,15 @@ def test_lists(antdrive) -> None:  # type: ignore[no-untyped-def]
         assert json.loads(out)
 
 
+def test_a_table_is_no_wider_than_the_terminal(antdrive, monkeypatch: pytest.MonkeyPatch) -> None:  # type: ignore[no-untyped-def]
+    full = antdrive("worlds", "list")[1].splitlines()
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    monkeypatch.setenv("COLUMNS", "90")
+    cut = antdrive("worlds", "list")[1].splitlines()
+    assert max(map(len, full)) > 90
+    assert cut == [line if len(line) <= 90 else line[:89] + "…" for line in full]
+
+
 def test_show_tells_whether_a_robot_fits(antdrive, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
     code, out, _ = antdrive("worlds", "show", "gate", "--out", tmp_path / "gate.png")
     assert code == 0
