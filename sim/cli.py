@@ -56,6 +56,7 @@ Prelude = Annotated[
     float, typer.Option("--prelude", min=0.0, max=60.0, help="The film begins with so many seconds of planning.")
 ]
 Vector = Annotated[bool, typer.Option("--vector", help="Write figures as PDF, too.")]
+Figures = Annotated[bool, typer.Option(help="Draw them.")]
 Out = Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the results.")]
 
 
@@ -90,6 +91,7 @@ def run(
     video: Annotated[Path | None, typer.Option(help="Also film it: .mp4, .gif or .webp.")] = None,
     prelude: Prelude = 0.0,
     vector: Vector = False,
+    figures: Figures = True,
     gui: Annotated[bool, typer.Option("--gui", help="Then replay it in a window; needs a screen.")] = False,
     json: Json = False,
 ) -> int:
@@ -123,9 +125,12 @@ def run(
         grid, answer = make_plan(scenario)
     with bar("driving") as progress:
         result = drive_it(scenario, planned=(grid, answer), progress=progress)
-    files = _write(result, folder, video, prelude, vector=vector)
+    files = _write(result, folder, vector=vector, figures=figures)
     report = {**result.as_dict(), "files": files, "command": _command()}
     _write_json(folder / "result.json", report)
+    if video is not None and result.rollout is not None:
+        files["film"] = _film(result.rollout, video, prelude=prelude)["file"]
+        _write_json(folder / "result.json", report)
     if json:
         say_json(report)
     else:
@@ -226,7 +231,10 @@ def compare(
     seed: Seed = 0,
     margin: Margin = 0.03,
     cell: CellSize = None,
+    route: Route = "wide",
+    noise: Noise = 0.0,
     out: Out = None,
+    figures: Figures = True,
     video: Annotated[Path | None, typer.Option(help="Film them side by side: .mp4, .gif or .webp.")] = None,
     speed: Annotated[float, typer.Option(min=0.01, max=100, help="Of the film; 2 is twice as fast as life.")] = 1.0,
     json: Json = False,
@@ -234,7 +242,10 @@ def compare(
     """Drive the same task with several planners; exit 0 when every run succeeded."""
     from sim.scenario import run as drive_it
 
-    scenarios = [_scenario(world, name, None, robot, seed=seed, margin=margin, cell=cell) for name in planner]
+    scenarios = [
+        _scenario(world, name, None, robot, seed=seed, margin=margin, cell=cell, route=route, noise=noise)
+        for name in planner
+    ]
     folder = out or Path("out") / f"compare-{scenarios[0].task.world.name}"
     if len(set(planner)) < len(planner) or not 2 <= len(planner) <= 6:
         raise InputError(f"--planner {' '.join(planner)}: name two to six different planners")
@@ -245,14 +256,14 @@ def compare(
         _make_folder(folder / name)
         with planning(f"planning and driving with {name}"):
             results[name] = result = drive_it(scenario)
-        written = _write(result, folder / name, None, 0.0)
+        written = _write(result, folder / name, figures=figures)
         _write_json(
             folder / name / "result.json",
             {**result.as_dict(), "files": written, "command": _alone(scenario, world, name)},
         )
         files[name] = str(folder / name)
     logs = [result.rollout for result in results.values() if result.rollout is not None]
-    if len(logs) > 1:
+    if len(logs) > 1 and figures:
         from sim.figures import comparison_figure
 
         named = {name: result.rollout for name, result in results.items() if result.rollout is not None}
@@ -267,6 +278,10 @@ def compare(
             ((name, *_numbers_of(result), result.outcome.value) for name, result in results.items()),
         )
         _tell_files(files)
+    if len(logs) < 2:
+        complain(
+            f"{'only one planner' if logs else 'no planner'} found a path: there is nothing to compare in a figure or film"
+        )
     return SUCCEEDED if all(result.succeeded for result in results.values()) else FAILED
 
 
@@ -296,6 +311,7 @@ def verify(
 
 @app.command()
 def margin(
+    context: typer.Context,
     target: Annotated[
         str | None, typer.Argument(metavar="[ROLLOUT.npz|WORLD]", help="A drive's log, or a world.")
     ] = None,
@@ -314,6 +330,11 @@ def margin(
 ) -> int:
     """Split a drive's margin by what ate of it, or find the smallest margin that is safe; exit 0 when there is one."""
     if target is not None and target.endswith(".npz"):
+        for name in context.params.keys() - {"target", "json"}:
+            source = context.get_parameter_source(name)
+            if source is not None and source.name == "COMMANDLINE":
+                word = {"kind": "generate", "settings": "set"}.get(name, name)
+                raise InputError(f"--{word}: {target} has been driven already; this is for a world, or for --generate")
         return _tell_budget(target, json)
     if (target is None) == (kind is None):
         raise InputError("margin: name a rollout, a world, or a class of worlds with --generate forest|barn")
@@ -813,7 +834,7 @@ def _tell_budget(path: str, json: bool) -> int:
         say_json(spent.as_dict())
         return SUCCEEDED
     where = f"({spent.x:.2f}, {spent.y:.2f}), t = {spent.t:.2f} s"
-    say(f"{path}: margin {spent.margin:.3f} m, least room left {spent.left:.4f} m at {where}")
+    say(f"{path}: margin {spent.margin:.3f} m, least room left around its disc {spent.left:.4f} m at {where}")
     table(
         ("eaten by", "at most m", "at", "at the tightest place m"),
         ((s.cause, f"{s.metres:.4f}", f"({s.x:.2f}, {s.y:.2f}), {s.t:.2f} s" if s.metres else "-", f"{s.at_tightest:+.4f}")
@@ -849,13 +870,7 @@ def _disc(text: str) -> Disc:
 
 def _size(text: str) -> tuple[int, int]:
     width, _, height = text.partition("x")
-    if not (
-        text.isascii()
-        and width.isdigit()
-        and height.isdigit()
-        and 64 <= int(width) <= 7680
-        and 64 <= int(height) <= 4320
-    ):
+    if not (text.isascii() and width.isdigit() and height.isdigit()):
         raise InputError(f"--size {text}: write WIDTHxHEIGHT in pixels, such as 1280x720")
     return int(width), int(height)
 
@@ -873,7 +888,7 @@ FIGURES = ("overview", "certificate", "plan", "tour", "history", "field-bars", "
 OWN_FILES = ("result.json", "rollout.npz", *(name + suffix for name in FIGURES for suffix in (".png", ".pdf")))
 
 
-def _write(result: Run, folder: Path, video: Path | None, prelude: float, *, vector: bool = False) -> dict[str, str]:
+def _write(result: Run, folder: Path, *, vector: bool = False, figures: bool = True) -> dict[str, str]:
     from sim.figures import certificate_figure, plan_figures
     from sim.plots import overview, plan_figure
 
@@ -882,6 +897,8 @@ def _write(result: Run, folder: Path, video: Path | None, prelude: float, *, vec
     suffixes = _suffixes(vector)
     for name in OWN_FILES:
         (folder / name).unlink(missing_ok=True)  # of an earlier run; it would belie this one's result
+    if not figures:
+        return files | ({} if result.rollout is None else {"rollout": str(result.rollout.save(folder / "rollout.npz"))})
     if result.rollout is None:
         files["figure"] = str(plan_figure(s.task, result.grid, result.plan, s.robot, folder / "overview.png"))
         return files
@@ -893,10 +910,7 @@ def _write(result: Run, folder: Path, video: Path | None, prelude: float, *, vec
             path = certificate_figure(result.rollout, result.certificate, folder / f"certificate{suffix}")
             files["certificate" + end] = str(path)
     made = plan_figures(s.task, result.grid, result.plan, s.robot, folder, name=s.planner_name, suffixes=suffixes)
-    files |= {name: str(path) for name, path in made.items()}
-    if video is not None:
-        files["film"] = _film(result.rollout, video, prelude=prelude)["file"]
-    return files
+    return files | {name: str(path) for name, path in made.items()}
 
 
 def _suffixes(vector: bool) -> tuple[str, ...]:
@@ -944,7 +958,8 @@ def _alone(scenario: Scenario, world: str, planner: str) -> str:
     """The command that makes one of several runs again."""
     import shlex
 
-    given = {"--planner": planner, "--robot": scenario.robot.name, "--seed": scenario.seed, "--margin": scenario.margin}
+    given = {"--planner": planner, "--robot": scenario.robot.name, "--seed": scenario.seed, "--margin": scenario.margin,
+             "--route": scenario.route, "--noise": scenario.noise}  # fmt: skip
     words = [str(word) for pair in given.items() for word in pair]
     cell = [] if scenario.cell is None else ["--cell", str(scenario.cell)]
     return shlex.join(["antdrive", "run", world, *words, *cell])

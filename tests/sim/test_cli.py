@@ -223,10 +223,37 @@ def test_a_run_tells_of_its_replans_and_yields_unless_told_not_to(antdrive, tmp_
         "movers: [{radius: 0.3, loop: once, keyframes: [[0, 3, 0.5], [3.5, 3, 1.9], [8, 3, 3.5]]}]\n"
     )
     words = ["run", str(world), "-p", "dstar-lite", "--out", str(tmp_path), "--json"]
-    assert antdrive(*words)[0] == 0
+    code, out, _ = antdrive(*words)
+    measured = json.loads(out)["metrics"]
+    assert code == 0
+    assert measured["replans"] + measured["yielding_s"] > 0
+    assert measured["tracking_error_max_m"] < 1.0, "from the route that it followed then"
+    assert "gave way to moving obstacles for" in antdrive(*words[:-1])[1]
     code, out, _ = antdrive(*words, "--no-yield", "--no-replan")
     assert code == 1
     assert json.loads(out)["outcome"] == "collided"
+    assert json.loads(out)["metrics"]["replans"] == json.loads(out)["metrics"]["yielding_s"] == 0
+
+
+def test_without_figures_a_run_leaves_its_log_and_result(antdrive, small: Path) -> None:  # type: ignore[no-untyped-def]
+    assert antdrive("run", small, "-p", "astar", "--no-figures", "--out", "bare")[0] == 0
+    assert sorted(path.name for path in Path("bare").iterdir()) == ["result.json", "rollout.npz"]
+
+
+def test_what_does_not_apply_to_a_rollout_is_not_ignored(antdrive, small: Path) -> None:  # type: ignore[no-untyped-def]
+    assert antdrive("run", small, "-p", "astar", "--no-figures", "--out", "r")[0] == 0
+    assert antdrive("margin", "r/rollout.npz")[0] == 0
+    for words in (["--noise", "1"], ["--generate", "barn"], ["--set", "planner.x=1"]):
+        code, _, err = antdrive("margin", "r/rollout.npz", *words)
+        assert code == 2
+        assert err.startswith(f"antdrive: {words[0]}: ") or words[0] + ":" in err
+
+
+def test_a_comparison_of_fewer_than_two_says_so(antdrive, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    words = ["compare", "no-path", "-p", "astar", "-p", "dijkstra", "--out", str(tmp_path / "c"), "--no-figures"]
+    code, _, err = antdrive(*words)
+    assert code == 1
+    assert "nothing to compare" in err
 
 
 def test_lists(antdrive) -> None:  # type: ignore[no-untyped-def]
