@@ -158,7 +158,7 @@ def drive(
         else:
             waits = state.limiter == YIELD or top < SLOW
             idle, turned = idle + (not state.turning and not waits), turned + (state.turning and not waits)
-            if idle >= patience or turned >= patience + full_turn:
+            if outcome is None and (idle >= patience or turned >= patience + full_turn):
                 outcome = Outcome.STUCK
         if progress is not None and tick % (control_hz // 10 or 1) == 0:
             progress(state.arc / guide.length)

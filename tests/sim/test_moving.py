@@ -242,6 +242,20 @@ def test_a_robot_that_starts_in_touch_with_a_mover_was_run_into(turtlebot: Robot
     assert result.rollout.contacts[0, 0] == 0
 
 
+def test_what_is_touched_in_the_period_that_would_end_as_stuck_was_touched(standing: Scenario) -> None:
+    rigid = dataclasses.replace(standing.robot, wheel_torque=1e-12)
+    alone = run(dataclasses.replace(standing, robot=rigid)).rollout
+    assert alone is not None
+    assert alone.outcome is Outcome.STUCK
+    touching = float(alone.t[-1]) - 1.5 / 240  # it comes after the last period's first step
+    mover = Cruising(radius=0.3, position=(5.0, 1.4), velocity=(-(4.4 - 0.48) / touching, 0.0))
+    task = dataclasses.replace(TASK, world=dataclasses.replace(ROOM, movers=(mover,)))
+    result = run(dataclasses.replace(standing, task=task, robot=rigid, yielding=None, replanning=None))
+    assert result.outcome is Outcome.RUN_INTO
+    assert result.rollout is not None
+    assert alone.t[-1] - 1 / 60 < result.rollout.t[int(result.rollout.contacts[0, 0])] <= alone.t[-1]
+
+
 def test_the_time_limit_of_a_task_counts_unless_another_is_given(small_scenario: Scenario) -> None:
     task = dataclasses.replace(small_scenario.task, time_limit=1.0)
     short = run(dataclasses.replace(small_scenario, task=task))
