@@ -84,8 +84,6 @@ class Replan:
 class Rerouter:
     """One drive's replanner: it knows the world that stands, and of movers what the robot does."""
 
-    waits = False  # whether it may have a way on later where it has none now
-
     def __init__(
         self, settings: Replanning, planner: Planner, grid: Grid, task: Task, rng: np.random.Generator, *,
         watch: Watch, robot: RobotSpec, controller: PurePursuit, margin: float, kind: str, hz: int,
@@ -100,6 +98,11 @@ class Rerouter:
         self._wait_began = math.nan
         self._timed = planner if isinstance(planner, SafeIntervals) else None
         self.schedule: Schedule | None = None  # where the route says when
+
+    @property
+    def waits(self) -> bool:
+        """Whether it may have a way on later where it has none now."""
+        return False
 
     def follows(self, answer: PlanResult, route: Route) -> None:
         """The robot sets out by this plan."""
@@ -222,13 +225,16 @@ class Rerouter:
 class Stepper(Rerouter):
     """A robot that decides cell by cell, as hasan's does: the route is never longer than the cells decided on."""
 
-    waits = True
-
     def __init__(self, *given: Any, **named: Any) -> None:
         super().__init__(*given, **named)
         query = Query.between(self._grid, self._task)
         self._online = online_for(self._planner, query, self._rng)
         self._goal = query.goal
+
+    @property
+    def waits(self) -> bool:
+        """Whether it may have a way on later where it has none now."""
+        return not self._online.arrived
 
     def cause(self, tick: int, pose: Pose, waits: bool, guide: Guide, arc: float) -> str:
         """A decision is due before the end of the last is reached, and again and again while the robot waits."""
@@ -240,8 +246,8 @@ class Stepper(Rerouter):
 
     def again(self, tick: int, pose: Pose, cause: str) -> Guide | None:
         """The way on to the next cell; None: wait."""
-        if cause == MISSED and self._online.arrived:
-            return super().again(tick, pose, cause)
+        if cause == MISSED:  # or else it waits, and the next decision is due in a while
+            return super().again(tick, pose, cause) if self._online.arrived else None
         self._rest, started = tick / self._hz, time.perf_counter()
         here, propagated = self._online.cell, self._online.tally.propagated
         blocked = self._cells(self._discs(tick, pose, 0.0))
@@ -256,7 +262,9 @@ class Stepper(Rerouter):
         work = self._online.tally.propagated - propagated
         if moved:
             self.log.append(Replan(tick / self._hz, cause, True, cost, work, xy, time.perf_counter() - started))
-        return self._guide(Route(xy)) if moved else None
+        if not moved and tick == 0:  # it waits where it is, and does not set out by the plan of all the way
+            xy = np.array(pose[:2]) + 1e-4 * np.array([(0.0, 0.0), (math.cos(pose[2]), math.sin(pose[2]))])
+        return self._guide(Route(xy)) if moved or tick == 0 else None
 
 
 def _with(task: Task, discs: list[Disc]) -> Task:

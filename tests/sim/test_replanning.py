@@ -100,6 +100,23 @@ def test_the_ant_decides_cell_by_cell_and_waits_where_there_is_no_way(turtlebot:
     assert again.digest == done.rollout.digest
 
 
+def test_the_ant_stays_where_it_is_when_there_is_no_way_at_first(turtlebot: RobotSpec) -> None:
+    """A lane of one cell's width, and something before the robot until 4 s have passed."""
+    lane = World("lane", (0.0, 0.0, 4.0, 0.6))
+    task = Task(lane, (0.36, 0.375, 0.0), (3.0, 0.375), cell=0.25, time_limit=30.0)
+    lid = Keyframed(radius=0.2, keyframes=((0.0, 0.985, 0.3), (4.0, 0.985, 0.3001), (6.0, 3.7, 0.3)), loop="once")
+    task = dataclasses.replace(task, world=dataclasses.replace(lane, movers=(lid,)))
+    # It gives way to nothing, so that nothing but its decisions keeps it.
+    planner = find_planner("mmas-dstar")
+    log = run(Scenario(task=task, planner=planner, robot=turtlebot, yielding=None)).rollout
+    assert log is not None
+    assert np.ptp(log.pose[log.t < 4.0, 0]) < 0.01
+    decisions = log.meta["replans"]
+    assert {d["cause"] for d in decisions} == {"decision"}
+    assert decisions[0]["t"] > 4.0
+    assert max(math.dist(d["route"][0], d["route"][-1]) for d in decisions[:-1]) < 0.5
+
+
 @given(st.floats(0.0, 30.0), st.floats(0.0, 10.0))
 def test_a_schedule_is_late_only_when_behind(t: float, arc: float) -> None:
     route = Route(np.array([[0.0, 0.0], [4.0, 0.0]]))
