@@ -135,10 +135,11 @@ def drive(
         if guide.length - state.arc <= guide.goal_distance and _standing(speed, yaw_rate) and not any(command):
             left = math.dist((x, y), task.goal)
             missed = left > task.goal_tolerance
-            renewed = rerouter.again(tick, believed, MISSED) if rerouter and missed else None
+            knows = missed and math.dist(believed[:2], task.goal) > task.goal_tolerance
+            renewed = rerouter.again(tick, believed, MISSED) if rerouter and knows else None
             if renewed:
                 guide, state, best = renewed, Progress(limiter=state.limiter), 0.0
-            elif not (rerouter and rerouter.waits and missed):
+            elif not (rerouter and knows and rerouter.waits):
                 outcome = Outcome.STUCK if missed else Outcome.SUCCEEDED
                 if missed:
                     reason = (

@@ -117,6 +117,30 @@ def test_the_ant_stays_where_it_is_when_there_is_no_way_at_first(turtlebot: Robo
     assert max(math.dist(d["route"][0], d["route"][-1]) for d in decisions[:-1]) < 0.5
 
 
+def test_a_robot_that_does_not_know_that_it_missed_the_goal_does_not_go_again(turtlebot: RobotSpec) -> None:
+    """Its pose is measured to a centimetre, the goal asks for less: among movers the drive ends as it does alone."""
+    far = Keyframed(radius=0.2, keyframes=((0.0, 0.5, 0.5), (9.0, 1.5, 0.5)))
+    tight = Scenario(
+        task=Task(World("hall", (0.0, 0.0, 8.0, 6.0)), (1.0, 3.0, 0.0), (3.0, 3.0), cell=0.25, goal_tolerance=0.004),
+        planner=find_planner("dstar-lite"),
+        robot=turtlebot,
+        noise=1.0,
+    )
+    moving = dataclasses.replace(tight.task, world=dataclasses.replace(tight.task.world, movers=(far,)))
+    ends = []
+    for seed in range(8):
+        alone = run(dataclasses.replace(tight, seed=seed))
+        among_them = run(dataclasses.replace(tight, seed=seed, task=moving))
+        assert alone.rollout is not None
+        assert among_them.rollout is not None
+        believed = math.dist(alone.rollout.estimate[-1, :2], tight.task.goal)
+        if believed <= 0.003:
+            assert among_them.outcome is alone.outcome
+            assert among_them.rollout.meta["replans"] == []
+            ends.append(alone.outcome)
+    assert {Outcome.STUCK, Outcome.SUCCEEDED} <= set(ends), ends
+
+
 @given(st.floats(0.0, 30.0), st.floats(0.0, 10.0))
 def test_a_schedule_is_late_only_when_behind(t: float, arc: float) -> None:
     route = Route(np.array([[0.0, 0.0], [4.0, 0.0]]))
