@@ -70,6 +70,18 @@ class Scenario:
         """Whether the planner plans in space and time, among movers."""
         return bool(self.built.movers) and getattr(self.planner, "needs_motions", False)
 
+    @property
+    def sees(self) -> Knowledge:
+        """What the robot knows of movers: whose planner knows the motions, knows them while it drives."""
+        return Knowledge(told="motions") if self.timed else self.knowledge
+
+    @property
+    def yields(self) -> Yielding | None:
+        """How it keeps clear of them. What a timed plan foresees comes to pass; only what is near is looked at again."""
+        if self.yielding and self.timed:
+            return dataclasses.replace(self.yielding, horizon=min(self.yielding.horizon, 1.0))
+        return self.yielding
+
     def rng(self, purpose: str) -> np.random.Generator:
         """A stream of random numbers of its own for each purpose, from the one seed."""
         return np.random.default_rng([self.seed, zlib.crc32(purpose.encode())])
@@ -170,9 +182,7 @@ def run(
     noise = s.robot.noise.scaled(s.noise)
     senses = Senses(noise, s.robot.track, 1 / s.control_hz, s.task.start, s.rng("noise")) if noise.loud else None
     traffic = s.traffic
-    # Whose planner knows the motions, knows them while it drives.
-    knowledge = Knowledge(told="motions") if s.timed else s.knowledge
-    watch = Watch(traffic, knowledge, s.control_hz) if traffic else None
+    watch = Watch(traffic, s.sees, s.control_hz) if traffic else None
     rerouter = None
     if watch and s.replanning:
         rerouter = (Stepper if isinstance(s.planner, MaxMinDStar) and s.replanning.around else Rerouter)(
@@ -180,9 +190,6 @@ def run(
             watch=watch, robot=s.robot, controller=s.controller, margin=s.margin, kind=s.route, hz=s.control_hz,
         )  # fmt: skip
         rerouter.follows(answer, route)
-    yielding = s.yielding
-    if yielding and s.timed:  # what the plan foresees comes to pass; only what is near is looked at again
-        yielding = dataclasses.replace(yielding, horizon=min(yielding.horizon, 1.0))
     with Engine(s.built, s.robot, physics_hz=s.physics_hz, traffic=traffic) as engine:
         log = drive(
             engine,
@@ -192,7 +199,7 @@ def run(
             control_hz=s.control_hz,
             time_limit=limit,
             senses=senses,
-            yielding=yielding,
+            yielding=s.yields,
             watch=watch,
             rerouter=rerouter,
             progress=progress,
@@ -267,13 +274,10 @@ def _record(
 
 def _among_movers(s: Scenario, replans: list[Replan]) -> dict[str, Any]:
     """What records tell of a drive among movers."""
-    reach = math.inf if s.timed else s.knowledge.reach
+    sees, yields = s.sees, s.yields
     return {
-        "knowledge": {
-            "told": "motions" if s.timed else s.knowledge.told,
-            "reach_m": reach if math.isfinite(reach) else None,
-        },
-        "yielding": dataclasses.asdict(s.yielding) if s.yielding else None,
+        "knowledge": {"told": sees.told, "reach_m": sees.reach if math.isfinite(sees.reach) else None},
+        "yielding": dataclasses.asdict(yields) if yields else None,
         "replanning": dataclasses.asdict(s.replanning) if s.replanning else None,
         "replans": [replan.as_dict() for replan in replans],
     }

@@ -84,6 +84,7 @@ def test_a_plan_in_space_and_time_is_kept_to(turtlebot: RobotSpec) -> None:
     assert done.rollout is not None
     assert done.rollout.t[-1] == pytest.approx(done.plan.arrive[-1], abs=3.0)
     assert done.rollout.meta["knowledge"]["told"] == "motions"
+    assert done.rollout.meta["yielding"]["horizon"] == 1.0, "as it was in force"
 
 
 def test_the_ant_decides_cell_by_cell_and_waits_where_there_is_no_way(turtlebot: RobotSpec) -> None:
