@@ -30,7 +30,7 @@ from planners import (
 from robots import Guide, PurePursuit, RobotSpec
 from sim.knowledge import Watch
 from sim.schedule import Schedule
-from worlds import Disc, Floats, Grid, Pose, Route, Task, rasterise
+from worlds import Disc, Floats, Grid, Pose, Route, Task, rasterise, segment_clearance
 
 if TYPE_CHECKING:
     from planners import Replanner
@@ -253,11 +253,11 @@ class Stepper(Rerouter):
         blocked = self._cells(self._discs(tick, pose, 0.0))
         to = self._online.step(np.argwhere(blocked))
         ends = self._grid.xy(np.array([here, to or here]))
-        if to == self._goal:
+        if to == self._goal and self._clear(ends[0], self._task.goal):
             ends[1] = self._task.goal
-        far = math.dist(pose[:2], ends[0]) > 0.25 * self._grid.cell and tick > 0
-        xy = np.vstack([pose[:2], ends[0 if far else 1 :]])
-        moved = to is not None and bool((np.diff(xy, axis=0) != 0).any(axis=1).all())
+        near = math.dist(pose[:2], ends[0]) <= 0.25 * self._grid.cell or tick == 0
+        xy = np.vstack([pose[:2], ends[1 if near and self._clear(pose[:2], ends[1]) else 0 :]])
+        moved = to is not None and bool(np.ptp(xy, axis=0).any())
         cost = float(np.hypot(*np.diff(xy, axis=0).T).sum())
         work = self._online.tally.propagated - propagated
         if moved:
@@ -265,6 +265,10 @@ class Stepper(Rerouter):
         if not moved and tick == 0:  # it waits where it is, and does not set out by the plan of all the way
             xy = np.array(pose[:2]) + 1e-4 * np.array([(0.0, 0.0), (math.cos(pose[2]), math.sin(pose[2]))])
         return self._guide(Route(xy)) if moved or tick == 0 else None
+
+    def _clear(self, a: tuple[float, ...] | Floats, b: tuple[float, ...] | Floats) -> bool:
+        """Whether the straight way between two points keeps what planners keep from all that stands."""
+        return bool(segment_clearance(self._task.world, np.array([a]), np.array([b]))[0] >= self._grid.inflate - 1e-9)
 
 
 def _with(task: Task, discs: list[Disc]) -> Task:

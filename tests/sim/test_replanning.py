@@ -13,7 +13,7 @@ from planners import PLANNERS, PlanStatus, TimedPlan, find_planner
 from robots import RobotSpec, Twist
 from sim import Outcome, Replanning, Rollout, Run, Scenario, certify, run
 from sim.schedule import LATE, Schedule, held
-from worlds import Disc, Keyframed, Mover, Route, Task, World
+from worlds import Disc, Keyframed, Mover, Route, Task, World, polyline_clearance
 
 # A wall with two gates; the way through the nearer one is shorter.
 POSTS = tuple(Disc(4.0, y, 0.25) for y in np.arange(0.25, 6.0, 0.5) if not (2.2 < y < 3.8 or y > 5.0))
@@ -116,6 +116,23 @@ def test_the_ant_stays_where_it_is_when_there_is_no_way_at_first(turtlebot: Robo
     assert {d["cause"] for d in decisions} == {"decision"}
     assert decisions[0]["t"] > 4.0
     assert max(math.dist(d["route"][0], d["route"][-1]) for d in decisions[:-1]) < 0.5
+
+
+@pytest.mark.parametrize(
+    ("post", "start", "goal"),
+    [(Disc(8.0, 2.6, 0.25), (1.0, 3.0), (8.0, 3.0)), (Disc(1.4, 2.7, 0.2), (1.05, 3.0), (3.0, 3.0))],
+    ids=["the goal has little room", "the straight way to the second cell has little room"],
+)
+def test_the_ant_keeps_from_what_stands_what_planners_keep(
+    post: Disc, start: tuple[float, float], goal: tuple[float, float], turtlebot: RobotSpec
+) -> None:
+    far = Keyframed(radius=0.2, keyframes=((0.0, 0.5, 0.5), (9.0, 1.5, 0.5)))
+    task = Task(World("hall", (0.0, 0.0, 9.0, 6.0), (post,), movers=(far,)), (*start, 0.0), goal, cell=0.25)
+    done = run(Scenario(task=task, planner=find_planner("mmas-dstar"), robot=turtlebot))
+    assert done.succeeded, (done.outcome, done.reason)
+    assert done.rollout is not None
+    for decision in done.rollout.meta["replans"][:-1]:
+        assert polyline_clearance(task.world, np.array(decision["route"])) > 0.21 - 2e-4, decision
 
 
 def test_a_robot_that_does_not_know_that_it_missed_the_goal_does_not_go_again(turtlebot: RobotSpec) -> None:
