@@ -24,7 +24,7 @@ from worlds._kernels import kernel, segment_clearance
 
 PURSUE, TWISTS = 0.0, 1.0  # the kinds of ways: along the route up to a speed; one twist after another
 LEAST = 0.005  # of the room to movers, if need be [m]
-SLACK = 0.05  # so much closer a mover that is near already may come while the robot gets going [m]
+START = 0.25  # that a robot takes to get going [s]
 WIDTH = 6  # of a way's row: its kind, then the top speed, or the first twist, how long it lasts [s], and the second
 
 
@@ -44,20 +44,24 @@ class Care(NamedTuple):
 
 @kernel
 def first_contact(
-    x0: float, y0: float, x1: float, y1: float, places: Array, k: int, radii: Array, near: Array, keep: float
-) -> tuple[float, float]:
-    """The share of a step after which a mover comes closer than `keep`, 2 if none, and the least room beyond that."""
+    x0: float, y0: float, x1: float, y1: float, places: Array, k: int, radii: Array, near: Array, reaches: Array,
+    keep: float,
+) -> tuple[float, float]:  # fmt: skip
+    """The share of a step after which a mover's centre comes within its reach, 2 if none does.
+
+    And the least room to their surfaces beyond `keep`.
+    """
     share, room = 2.0, math.inf
     for m in near:
         ax, ay = places[k, m, 0] - x0, places[k, m, 1] - y0
         ux, uy = places[k + 1, m, 0] - x1 - ax, places[k + 1, m, 1] - y1 - ay
-        reach = radii[m] + keep
+        reach = reaches[m]
         length2 = ux * ux + uy * uy
         along = ax * ux + ay * uy
         f = clip(-along / length2, 0.0, 1.0) if length2 > 0.0 else 0.0
-        gap = math.hypot(ax + f * ux, ay + f * uy) - reach
-        room = min(room, gap)
-        if gap < 0.0:
+        away = math.hypot(ax + f * ux, ay + f * uy)
+        room = min(room, away - radii[m] - keep)
+        if away < reach:
             over = ax * ax + ay * ay - reach * reach
             root = math.sqrt(max(along * along - length2 * over, 0.0))
             share = min(share, max(0.0, (-along - root) / length2) if over > 0.0 and length2 > 0.0 else 0.0)
@@ -78,7 +82,7 @@ def intrusion(x: float, y: float, places: Array, k: int, radii: Array, near: Arr
 def follow(
     x: float, y: float, yaw: float, v: float, w: float, s: float, turning: bool, way: Array,
     line: Line, known: Known, limits: Limits, tuning: Tuning, care: Care,
-    places: Array, radii: Array, near: Array,
+    places: Array, radii: Array, near: Array, reaches: Array,
 ) -> tuple[float, float, float, float, float, float, float]:  # fmt: skip
     """A way followed through all of `places` (K + 1, M, 2), `care.step` apart, as a control period of that length would.
 
@@ -106,7 +110,7 @@ def follow(
         middle = yaw + 0.25 * (w + w1) * care.step
         length = 0.5 * (v + v1) * care.step
         x1, y1 = x + length * math.cos(middle), y + length * math.sin(middle)
-        share, room = first_contact(x, y, x1, y1, places, k, radii, near, care.keep)
+        share, room = first_contact(x, y, x1, y1, places, k, radii, near, reaches, care.keep)
         if share <= 1.0:
             return now + share * care.step, least, risk, x, y, yaw, v
         if care.wary > 0.0 and now < care.doubt:
@@ -137,7 +141,7 @@ def choose(
     Row 0 is taken if it has all the room that is worth something, and no risk. Else that which gets farthest, room counted in.
     If each meets something, the one that does so last.
     """
-    near = np.empty(radii.shape[0], np.int64)
+    near, reaches = np.empty(radii.shape[0], np.int64), np.empty(radii.shape[0])
     count = 0
     span = care.step * (places.shape[0] - 1)
     for m in range(radii.shape[0]):
@@ -148,21 +152,21 @@ def choose(
         if closest - radii[m] - care.keep <= care.comfort:
             near[count] = m
             count += 1
+            # What has come nearer already may come nearer only while the robot gets going; else nothing but to be met
+            # would be left to choose.
+            away = math.hypot(places[0, m, 0] - x, places[0, m, 1] - y)
+            reaches[m] = radii[m] + care.keep
+            if away < reaches[m]:
+                pace = math.hypot(places[1, m, 0] - places[0, m, 0], places[1, m, 1] - places[0, m, 1]) / care.step
+                reaches[m] = max(min(radii[m] + tuning.radius + LEAST, away - 1e-3), away - 1e-3 - START * pace)
     near = near[:count]
     if count == 0:
         return 0, math.inf, math.inf
-    closest = math.inf
-    for m in near:
-        closest = min(closest, math.hypot(places[0, m, 0] - x, places[0, m, 1] - y) - radii[m])
-    keep = max(
-        tuning.radius + LEAST, min(care.keep, closest - SLACK)
-    )  # else no way out of too little room would be free
-    care = Care(care.step, keep, care.comfort, care.worth, care.lateral, care.turn, care.doubt, care.berth, care.wary)
     xy, arc = line.xy, line.arc
     best, best_score, best_late, best_room = 0, -math.inf, -1.0, 0.0
     for n in range(ways.shape[0]):
         late, room, risk, ex, ey, eyaw, ev = follow(
-            x, y, yaw, v, w, s, turning, ways[n], line, known, limits, tuning, care, places, radii, near
+            x, y, yaw, v, w, s, turning, ways[n], line, known, limits, tuning, care, places, radii, near, reaches
         )
         free = late == math.inf
         if n == 0 and free and room >= care.comfort and risk == 0.0:

@@ -42,7 +42,7 @@ class Yielding:
 
     horizon: float = 2.5  # movers are predicted so far ahead [s]
     step: float = 0.1  # and looked at so often [s]
-    keep: float = 0.1  # room to movers that a way must have [m]
+    keep: float = 0.1  # room to movers that a way must have, or what is left of it [m]
     comfort: float = 0.4  # and, beyond that, room that is worth a detour [m]
     worth: float = 1.5  # metres of the route that each metre of it is worth
     lateral: float = 0.6  # and each metre off the route
@@ -100,7 +100,9 @@ class Yielding:
             return wanted, False, Resolve()
         limits, dt = guide.limits, guide.tuning.period
         way = ways[chosen]
-        if late < abs(last.speed) / limits.acceleration + self.step:  # met in any case: better standing
+        away = np.hypot(*(places[0] - pose[:2]).T) - radii
+        soon = 2 * self.step if away.min(initial=math.inf) < care.keep else 0.0
+        if late < max(abs(last.speed) / limits.acceleration, soon):  # it will be met in any case: better standing
             v, w = 0.0, 0.0
             resolve = Resolve()
         elif way[0] == kernels.PURSUE:

@@ -92,8 +92,6 @@ def drive(
     resolve = Resolve()
     reason = ""
     ticks = round(time_limit * control_hz)
-    if watch and yielding and watch.certain:
-        yielding = dataclasses.replace(yielding, wary=0.0)
     patience = round(STUCK_AFTER * control_hz)
     full_turn = round(2 * math.pi / engine.robot.max_yaw_rate * control_hz)
     for tick in range(ticks):

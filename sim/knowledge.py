@@ -44,11 +44,6 @@ class Watch:
         self.traffic, self._knowledge, self._hz = traffic, knowledge, hz
         self._first, self._places, self._speeds = 0, np.empty((0, 0, 2)), np.empty((0, 0, 2))
 
-    @property
-    def certain(self) -> bool:
-        """Whether movers do what is expected."""
-        return self._knowledge.told == "motions"
-
     def expected(self, tick: int, robot: tuple[float, float], ahead: Floats) -> tuple[Floats, Floats]:
         """Where movers are expected (K, M, 2) [m] `ahead` (K,) [s] of a tick, and their radii (M,) [m]."""
         places, speeds = self._now(tick)

@@ -77,10 +77,12 @@ class Scenario:
 
     @property
     def yields(self) -> Yielding | None:
-        """How it keeps clear of them. What a timed plan foresees comes to pass; only what is near is looked at again."""
-        if self.yielding and self.timed:
-            return dataclasses.replace(self.yielding, horizon=min(self.yielding.horizon, 1.0))
-        return self.yielding
+        """How it keeps clear of them. Whose motions are known do not turn back unforeseen; what a timed plan foresees comes
+        to pass, so that only what is near is looked at again."""
+        if self.yielding is None or self.sees.told != "motions":
+            return self.yielding
+        horizon = min(self.yielding.horizon, 1.0) if self.timed else self.yielding.horizon
+        return dataclasses.replace(self.yielding, wary=0.0, horizon=horizon)
 
     def rng(self, purpose: str) -> np.random.Generator:
         """A stream of random numbers of its own for each purpose, from the one seed."""

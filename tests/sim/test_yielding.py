@@ -108,6 +108,29 @@ def test_where_contact_cannot_be_avoided_the_robot_meets_it_standing(turtlebot: 
     assert done.outcome is Outcome.RUN_INTO, done.reason
 
 
+@pytest.mark.parametrize("gap", [0.02, 0.08])
+@pytest.mark.parametrize("told", ["positions", "velocities"])
+def test_what_stands_nearer_than_is_kept_is_not_driven_into(turtlebot: RobotSpec, told: str, gap: float) -> None:
+    """Nothing goes past it in the aisle, and nothing pushes."""
+    plug = keyframed((0.0, 1.48 + gap, 0.5), (100.0, 1.48 + gap, 0.501))
+    task = Task(AISLE, (1.0, 0.5, 0.0), (8.0, 0.5), cell=0.1, time_limit=12.0)
+    done = among(plug, robot=turtlebot, task=task, knowledge=Knowledge(told=told))  # type: ignore[arg-type]
+    assert done.outcome is Outcome.TIMED_OUT
+    assert done.rollout is not None
+    assert np.abs(done.rollout.twist[:, 0]).max() < 1e-3
+
+
+def test_a_robot_that_cannot_get_away_does_not_twitch(turtlebot: RobotSpec) -> None:
+    """A wall behind it, and before it what comes on faster than it could turn: it is met as it stands."""
+    comes = keyframed((0.0, 2.2, 0.5), (4.0, 0.2, 0.5), radius=0.4)
+    task = Task(AISLE, (0.4, 0.5, math.pi / 2), (8.0, 0.5), cell=0.1)
+    done = among(comes, robot=turtlebot, task=task)
+    assert done.outcome is Outcome.RUN_INTO, done.reason
+    assert done.rollout is not None
+    end = int(done.rollout.contacts[0, 0])
+    assert np.abs(done.rollout.twist[end - 24 : end]).max() < 1e-3
+
+
 def test_the_same_seed_gives_the_same_bits_and_a_valid_certificate(turtlebot: RobotSpec) -> None:
     first, again = (among(CROSSING, HEAD_ON, robot=turtlebot, seed=5, noise=1.0).rollout for _ in range(2))
     assert first is not None
