@@ -5,7 +5,7 @@ into is part of the push. A touch is
 
 - `JUMPED_ON` if the mover's loop has just teleported it, and at that moment its surface was no farther from the robot's
   than the robot's braking distance (0 when it stands), so that it could not have stopped;
-- `RUN_INTO` if it is a mover's and no point of the robot moved faster than 0.02 m/s just before;
+- `RUN_INTO` if it is a mover's, and just before no point of the robot moved faster than 0.02 m/s, nor than the mover;
 - `COLLIDED` otherwise: the robot drove. What stands still is always met this way.
 """
 
@@ -72,7 +72,8 @@ def touches(
                 return Outcome.JUMPED_ON
         radius = math.hypot(footprint["half_length"], footprint["half_width"]) + footprint["rounding"]
         fastest = abs(float(twist[before, 0])) + radius * abs(float(twist[before, 1]))
-        return Outcome.RUN_INTO if fastest <= STANDING else Outcome.COLLIDED
+        came = math.dist(movers[step, m], movers[before, m]) * hz
+        return Outcome.RUN_INTO if fastest <= min(STANDING, came) or step == 0 else Outcome.COLLIDED
 
     for step, obstacle in contacts[:, :2].astype(np.int64).tolist():
         if step - last > WAKE * hz:

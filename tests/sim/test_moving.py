@@ -299,17 +299,22 @@ def _contacts(log: Rollout) -> tuple[float, ...]:
 
 
 def told(contacts: list[tuple[int, int]], *, speed: float = 0.0, turn: float = 0.0, jump: int | None = None,
-         place: float = 0.5) -> list[Touch]:  # fmt: skip
-    """The touches of a robot of 0.2 m at the origin, one disc, a mover of 0.3 m at `place`, 100 rows a second."""
+         place: float = 0.5, comes: float = 0.1) -> list[Touch]:  # fmt: skip
+    """The touches of a robot of 0.2 m at the origin, one disc, a mover of 0.3 m at `place`, 100 rows a second.
+
+    It moves to and fro by `comes` [m/s].
+    """
     rows = 400
     jumps = np.zeros((rows - 1, 1), dtype=np.bool_)
     if jump is not None:
         jumps[jump - 1, 0] = True
+    movers = np.full((rows, 1, 2), [place, 0.0])
+    movers[::2, :, 1] = comes / 100
     return touches(
         np.array([(step, obstacle, -0.001, 5.0) for step, obstacle in contacts]),
         np.zeros((rows, 3)),
         np.tile([speed, turn], (rows, 1)),
-        np.full((rows, 1, 2), [place, 0.0]),
+        movers,
         jumps,
         hz=100, discs=1, radii=np.array([0.3]), deceleration=1.0,
         footprint={"half_length": 0.0, "half_width": 0.0, "rounding": 0.2},
@@ -321,6 +326,9 @@ def test_whose_a_contact_is() -> None:
     assert told([(9, 1)], speed=0.019)[0].outcome is Outcome.RUN_INTO
     assert told([(9, 1)], speed=-0.021)[0].outcome is Outcome.COLLIDED
     assert told([(9, 1)], turn=0.2)[0].outcome is Outcome.COLLIDED
+    assert told([(9, 1)], speed=0.009, comes=0.01)[0].outcome is Outcome.RUN_INTO
+    assert told([(9, 1)], speed=0.011, comes=0.01)[0].outcome is Outcome.COLLIDED, "rather the robot crept into it"
+    assert told([(0, 1)], comes=0.0)[0].outcome is Outcome.RUN_INTO, "nobody moved yet"
     assert [told([(9, i)])[0].outcome for i in (0, 2, 5)] == [Outcome.COLLIDED] * 3, "discs and walls do not come"
 
 
