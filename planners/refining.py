@@ -52,9 +52,9 @@ def refine(
 
     A wide route keeps up to `clearance` [m] more from discs than the grid asks and is at most `stretch` longer than the
     taut one. Corners stand off arcs by at most `bulge` [m]. A refined route keeps the grid's clearance exactly, passes
-    every disc on the same side as the plan's line and is never longer than it; what cannot be refined so stays
-    as planned, and the route's note tells why. Where the plan's line itself comes closer than the grid asks, as a start
-    with too little room does, it is kept.
+    every disc on the same side as the plan's line and is never longer than it, or than the plan's cells. What cannot be
+    refined so stays as planned, and the route's note tells why. Where the plan's line itself comes closer than the grid
+    asks, as a start with too little room does, it is kept.
 
     Raises:
         ValueError: the plan has no path, an unknown kind, or a setting outside its range.
@@ -77,6 +77,7 @@ def refine(
         piece = Piece(run, np.zeros(len(run)))
         if clear:
             piece = _refined(run, world, inflate, extra, stretch, spare, bulge)
+            spare -= max(0.0, _length(piece.xy) - _length(run))
             kinds.append(piece.kind)
         elif len(run) > 2 or not (run[0] == line.xy[0]).all():
             piece = replace(piece, note="the plan's line comes closer than the clearance and is kept there")
@@ -183,7 +184,7 @@ def _refined(
     line: Floats, world: World, inflate: float, extra: float, stretch: float, spare: float, bulge: float
 ) -> Piece:
     """A clear polyline refined as far as its checks allow."""
-    own = float(np.hypot(*np.diff(line, axis=0).T).sum())
+    own = _length(line)
     taut = _pulled(line, world.discs, inflate)
     if taut is None:
         return Piece(line, np.zeros(len(line)), note="the line could not be pulled taut")
@@ -232,13 +233,17 @@ def _fault(string: String, xy: Floats, line: Floats, world: World, inflate: floa
     """What is wrong with a refined line, empty if nothing."""
     from planners import _kernels_refine
 
-    if float(np.hypot(*np.diff(xy, axis=0).T).sum()) > longest + SLACK:
+    if _length(xy) > longest + SLACK:
         return "the refined line would be longer than the plan's"
     if min(string.clearance(world), polyline_clearance(world, xy)) < inflate - SLACK:
         return "the refined line would come closer than the clearance"
     if _kernels_refine.encloses(line, xy, world.discs):
         return "the refined line would pass an obstacle on its other side"
     return ""
+
+
+def _length(xy: Floats) -> float:
+    return float(np.hypot(*np.diff(xy, axis=0).T).sum())
 
 
 def _widened(

@@ -380,6 +380,23 @@ def test_a_plan_that_comes_too_close_is_kept_there_with_a_note() -> None:
     assert pull_taut(over, task.world.discs, task.world.bounds, 0.3) is None
 
 
+def test_what_may_be_longer_may_be_so_once() -> None:
+    """Two parts of a line, with one that has too little room between them, and a centimetre to spare for all."""
+    posts = ((5.0, -0.5, 0.5), (5.0, 2.6, 0.5), (10.0, 0.45, 0.3), (15.0, -0.5, 0.5), (15.0, 2.6, 0.5))
+    task = Task(
+        World("w", (0.0, -3.0, 20.0, 3.0), tuple(Disc(*post) for post in posts)), (1.0, 0.25, 0.0), (19.0, 0.25)
+    )
+    grid = rasterise(task.world, 0.5, 0.2)
+    xy = np.array(
+        [(1, 0.25), (4.2, 0.25), (5.8, 0.25), (9, 0), (10, 0), (11, 0), (14.2, 0.25), (15.8, 0.25), (19, 0.25)]
+    )
+    waypoints = (xy - grid.origin)[:, ::-1] / grid.cell
+    cost = float(np.hypot(*np.diff(xy, axis=0).T).sum()) + 0.01
+    route = refine(PlanResult(status=PlanStatus.SOLVED, waypoints=waypoints, cost=cost), grid, task, kind="wide")
+    assert route.kind == "wide"
+    assert route.length <= cost + 1e-9
+
+
 def test_no_room_for_a_wider_line_leaves_the_taut_one() -> None:
     """The taut line of a plan whose own is taut already cannot be widened without making it longer."""
     task, grid, plan = one_disc(1)
