@@ -198,7 +198,7 @@ def nearest_on_route(points: Floats, route: Floats) -> Floats:
     nearest = np.empty((len(points), 2))
     for rows in np.array_split(np.arange(len(points)), 1 + len(points) * len(a) // 1_000_000):
         offset = points[rows, None, :] - a
-        f = np.clip((offset * along).sum(axis=2) / length2, 0, 1)
+        f = np.clip((offset * along).sum(axis=2) / np.where(length2 > 0, length2, 1.0), 0, 1)
         feet = a + f[:, :, None] * along
         best = np.linalg.norm(points[rows, None, :] - feet, axis=2).argmin(axis=1)
         nearest[rows] = feet[np.arange(len(rows)), best]

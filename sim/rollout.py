@@ -227,6 +227,19 @@ def _meta_problems(meta: Mapping[str, Any]) -> Iterator[str]:
     for i, disc in enumerate(obstacles):
         if not (_numbers([_mapping(disc).get(k) for k in ("x", "y", "radius", "height")], 4) and disc["radius"] > 0):
             yield f"meta.task.obstacles[{i}]: missing or impossible"
+    replans = meta.get("replans", [])
+    if not isinstance(replans, list):
+        yield "meta.replans: impossible"
+        return
+    now = 0.0
+    for i, replan in enumerate(replans):
+        route: Any = _mapping(replan).get("route")
+        fine = _numbers([_mapping(replan).get("t")], 1) and isinstance(route, list)
+        fine = fine and isinstance(replan.get("cause"), str) and replan.get("solved") is (len(route) > 1)
+        if not (fine and replan["t"] >= now and all(_numbers(point, 2) for point in route)):
+            yield f"meta.replans[{i}]: missing or impossible"
+            return
+        now = replan["t"]
     movers = task.get("movers", [])
     if not isinstance(movers, list):
         yield "meta.task.movers: impossible"

@@ -367,6 +367,11 @@ def shifted(log: Rollout, by: float) -> Rollout:
     return dataclasses.replace(log, movers=movers)
 
 
+def replanned(log: Rollout, replans: Any) -> Rollout:
+    return dataclasses.replace(log, meta={**log.meta, "replans": replans})
+
+
+FAILED = {"t": 1.0, "cause": "waited", "solved": False, "route": []}
 TAMPERINGS: dict[str, tuple[Callable[[Rollout], Rollout], str]] = {
     "a mover's places": (lambda log: shifted(log, 0.01), "movers[1] is logged 0.0100 m off its course at t = 0.833 s"),
     "a mover's radius": (lambda log: edited(log, 0, "radius", 0.1), "closed form says"),
@@ -391,6 +396,14 @@ TAMPERINGS: dict[str, tuple[Callable[[Rollout], Rollout], str]] = {
     "a NaN radius": (lambda log: edited(log, 0, "radius", math.nan), "impossible"),
     "a walk of numbers": (lambda log: edited(log, 2, "walk", 3), "meta.task."),
     "a walk without end": (lambda log: edited(log, 2, "walk", "period", 1e-9), "walk.period: must be at least"),
+    "replans that are no list": (lambda log: replanned(log, 3), "meta.replans: impossible"),
+    "a replan of text": (lambda log: replanned(log, ["soon"]), "meta.replans[0]: missing or impossible"),
+    "a replan without a time": (lambda log: replanned(log, [{**FAILED, "t": "soon"}]), "meta.replans[0]"),
+    "replans in disorder": (
+        lambda log: replanned(log, [{**FAILED, "t": 2.0}, FAILED]), "meta.replans[1]"),
+    "a replan's route of one number": (lambda log: replanned(log, [{**FAILED, "route": [[1.0]]}]), "meta.replans[0]"),
+    "a replan without a cause": (lambda log: replanned(log, [{**FAILED, "cause": None}]), "meta.replans[0]"),
+    "a replan solved without a route": (lambda log: replanned(log, [{**FAILED, "solved": True}]), "meta.replans[0]"),
     "the seed as text": (lambda log: dataclasses.replace(
         edited(log, 2, "walk", "seed", None), meta={**edited(log, 2, "walk", "seed", None).meta, "seed": "x"}), "meta.task."),
 }  # fmt: skip

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from planners import PLANNERS, PlanStatus, TimedPlan, find_planner
 from robots import RobotSpec, Twist
 from sim import Outcome, Replanning, Rollout, Run, Scenario, certify, run
+from sim.metrics import tracking_error_max_m
 from sim.schedule import LATE, Schedule, held
 from worlds import Disc, Keyframed, Mover, Route, Task, World, polyline_clearance
 
@@ -38,6 +39,7 @@ def test_a_closed_gate_is_gone_round_only_by_replanning(turtlebot: RobotSpec) ->
     assert 0 <= replans[0]["t"] < done.rollout.t[-1]
     assert replans[0]["cost_m"] > 4.0
     assert len(done.rollout.meta["times"]["replans_s"]) == len(replans)
+    assert tracking_error_max_m(done.rollout) < 0.25, "off the route of the time, as it gave way"
     through = done.rollout.pose[np.abs(done.rollout.pose[:, 0] - 4.0).argmin()]
     assert through[1] > 4.5, "by the other gate"
 
