@@ -3,16 +3,19 @@
 import dataclasses
 import json
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planners import PLANNERS, PlanStatus, TimedPlan, find_planner
-from robots import RobotSpec, Twist
-from sim import Outcome, Replanning, Rollout, Run, Scenario, certify, run
+from planners import PLANNERS, PlanStatus, TimedPlan, find_planner, refine
+from robots import Guide, RobotSpec, Twist
+from sim import Outcome, Replanning, Rollout, Run, Scenario, certify, plan, run
+from sim.knowledge import Watch
 from sim.metrics import tracking_error_max_m
+from sim.replanning import Rerouter
 from sim.schedule import LATE, Schedule, held
 from worlds import Disc, Keyframed, Mover, Route, Task, World, polyline_clearance
 
@@ -159,6 +162,76 @@ def test_a_robot_that_does_not_know_that_it_missed_the_goal_does_not_go_again(tu
             assert among_them.rollout.meta["replans"] == []
             ends.append(alone.outcome)
     assert {Outcome.STUCK, Outcome.SUCCEEDED} <= set(ends), ends
+
+
+# Rerouters, without physics: at 60 control periods a second, on the way from (1, 3) to (7, 3) through the nearer gate
+
+PASSING = Keyframed(radius=0.45, keyframes=((0.0, 4.0, 3.0), (4.0, 4.0, 3.01), (5.0, 1.0, 6.0)), loop="once")
+ASIDE = Keyframed(radius=0.3, keyframes=((0.0, 7.0, 0.5), (100.0, 7.0, 0.51)), loop="once")
+
+
+def rerouter(*movers: Mover, robot: RobotSpec, planner: str = "dstar-lite", **settings: Any) -> tuple[Rerouter, Guide]:
+    task = dataclasses.replace(TASK, world=dataclasses.replace(HALL, movers=movers))
+    s = Scenario(task=task, planner=find_planner(planner), robot=robot)
+    grid, answer = plan(s)
+    route = refine(answer, grid, task, kind="grid" if s.timed else "wide")
+    made = Rerouter(
+        Replanning(**settings), s.planner, grid, task, s.rng("replanner"), watch=Watch(s.traffic, s.sees, 60), robot=robot,
+        controller=s.controller, margin=s.margin, kind="wide", hz=60,
+    )  # fmt: skip
+    made.follows(answer, route)
+    return made, s.controller.guide(route, task.world, robot, s.margin, 1 / 60)
+
+
+def test_a_robot_that_is_off_its_route_has_strayed(turtlebot: RobotSpec) -> None:
+    made, guide = rerouter(ASIDE, robot=turtlebot)
+    assert made.cause(0, (1.5, 3.7, 0.0), False, guide, 0.5) == ""
+    assert made.cause(0, (1.5, 3.8, 0.0), False, guide, 0.5) == "strayed"
+
+
+def test_it_rests_between_two_replans(turtlebot: RobotSpec) -> None:
+    made, guide = rerouter(PASSING, robot=turtlebot, pause=1.0, within=0.0)
+    astray = (1.5, 3.8, 0.0)
+    assert made.again(0, astray, "strayed") is not None
+    assert [made.cause(tick, astray, False, guide, 0.5) for tick in (1, 59, 60)] == ["", "", "strayed"]
+
+
+def test_only_waiting_on_end_is_a_cause(turtlebot: RobotSpec) -> None:
+    made, guide = rerouter(ASIDE, robot=turtlebot, patience=2.0)
+    causes = [made.cause(tick, TASK.start, tick != 60, guide, 0.0) for tick in range(240)]
+    assert causes.index("waited") == 61 + 120
+    never, guide = rerouter(ASIDE, robot=turtlebot, around=False)
+    assert not any(never.cause(tick, TASK.start, True, guide, 0.0) for tick in range(240))
+
+
+@pytest.mark.parametrize("planner", ["dstar-lite", "ants", "tangent"])
+def test_what_a_mover_has_left_is_free_again(planner: str, turtlebot: RobotSpec) -> None:
+    made, _ = rerouter(PASSING, robot=turtlebot, planner=planner)
+    first, again = made.again(0, TASK.start, "obstructed"), made.again(360, TASK.start, "obstructed")
+    assert first is not None
+    assert again is not None
+    beside = World("mover", HALL.bounds, (Disc(4.0, 3.0, 0.45),))
+    assert polyline_clearance(beside, first.route.xy) > 0.2
+    assert again.length < 6.05
+    assert [replan.solved for replan in made.log] == [True, True]
+
+
+def test_only_a_robot_that_may_goes_round_movers(turtlebot: RobotSpec) -> None:
+    made, _ = rerouter(PASSING, robot=turtlebot, around=False)
+    straight = made.again(0, TASK.start, "strayed")
+    assert straight is not None
+    assert straight.length < 6.05
+
+
+def test_a_timed_plan_is_made_anew_from_where_the_robot_is_late(turtlebot: RobotSpec) -> None:
+    made, guide = rerouter(GATEKEEPER, robot=turtlebot, planner="sipp")
+    assert made.schedule is not None
+    on_time = made.schedule.due(20.0)
+    place = (float(np.interp(on_time, guide.route.arc, guide.route.xy[:, 0])), 3.0, 0.0)
+    assert made.cause(1200, place, False, guide, on_time - LATE + 0.01) == ""
+    assert made.cause(1200, place, False, guide, on_time - LATE - 0.01) == "late"
+    assert made.again(1200, TASK.start, "late") is not None
+    assert made.schedule.t[0] == pytest.approx(20.0)
 
 
 @given(st.floats(0.0, 30.0), st.floats(0.0, 10.0))
