@@ -180,13 +180,20 @@ class Rerouter:
         self._search.move(query.start)
         return self._search.result()
 
-    def _discs(self, tick: int, pose: Pose, ahead: float | None = None) -> list[Disc]:
-        """What movers cover soon, as discs; none so large that the robot would stand within its inflation."""
-        ahead = self.settings.ahead if ahead is None else ahead
+    def _discs(self, tick: int, pose: Pose) -> list[Disc]:
+        """What movers cover soon; they close neither of the ends."""
+        return self._covered(tick, np.array([pose[:2], self._task.goal]), self.settings.ahead)
+
+    def _covered(self, tick: int, ends: Floats, ahead: float) -> list[Disc]:
+        """What movers cover within a time, as discs; none so large that an end (N, 2) lies within its inflation.
+
+        The first of the ends is where the robot is.
+        """
+        x, y = ends[0].tolist()
         steps = np.linspace(0.0, ahead, 1 + math.ceil(ahead / 0.25))
-        places, radii = self._watch.expected(tick, pose[:2], steps)
+        places, radii = self._watch.expected(tick, (x, y), steps)
         inflate, cell = self._grid.inflate, self._grid.cell
-        room = np.hypot(*np.moveaxis(places - np.array(pose[:2]), -1, 0)) - inflate - cell
+        room = np.hypot(*np.moveaxis(places[:, :, None] - ends, -1, 0)).min(axis=-1) - inflate - cell
         radius = np.minimum(radii, room)
         return [
             Disc(float(places[k, m, 0]), float(places[k, m, 1]), float(radius[k, m]))
@@ -250,7 +257,7 @@ class Stepper(Rerouter):
             return super().again(tick, pose, cause) if self._online.arrived else None
         self._rest, started = tick / self._hz, time.perf_counter()
         here, propagated = self._online.cell, self._online.tally.propagated
-        blocked = self._cells(self._discs(tick, pose, 0.0))
+        blocked = self._cells(self._covered(tick, np.array([pose[:2]]), 0.0))
         to = self._online.step(np.argwhere(blocked))
         ends = self._grid.xy(np.array([here, to or here]))
         if to == self._goal and self._clear(ends[0], self._task.goal):
@@ -272,9 +279,9 @@ class Stepper(Rerouter):
 
 
 def _with(task: Task, discs: list[Disc]) -> Task:
-    """A task among more discs, but for those over its goal."""
-    more = tuple(disc for disc in discs if math.dist((disc.x, disc.y), task.goal) > disc.radius)
-    return dataclasses.replace(task, world=dataclasses.replace(task.world, obstacles=task.world.obstacles + more))
+    """A task among more discs."""
+    obstacles = (*task.world.obstacles, *discs)
+    return dataclasses.replace(task, world=dataclasses.replace(task.world, obstacles=obstacles))
 
 
 def _place(route: Route, arc: float) -> tuple[float, float]:

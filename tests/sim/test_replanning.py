@@ -223,6 +223,16 @@ def test_only_a_robot_that_may_goes_round_movers(turtlebot: RobotSpec) -> None:
     assert straight.length < 6.05
 
 
+@pytest.mark.parametrize("planner", ["dstar-lite", "tangent"])
+def test_a_mover_over_the_goal_does_not_close_the_way(planner: str, turtlebot: RobotSpec) -> None:
+    """It may be gone by then, and else is given way to."""
+    mover = Keyframed(radius=0.3, keyframes=((0.0, 7.1, 3.0), (100.0, 7.1, 3.01)), loop="once")
+    made, _ = rerouter(mover, robot=turtlebot, planner=planner)
+    guide = made.again(0, TASK.start, "strayed")
+    assert guide is not None
+    assert guide.route.xy[-1] == pytest.approx(TASK.goal)
+
+
 def test_a_timed_plan_is_made_anew_from_where_the_robot_is_late(turtlebot: RobotSpec) -> None:
     made, guide = rerouter(GATEKEEPER, robot=turtlebot, planner="sipp")
     assert made.schedule is not None
