@@ -34,6 +34,7 @@ PASSABLE = {
     "hasan-5f": (True, False),
     "hasan-5f-moving": (True, False),
     "no-path": (False, False),
+    "plaza-moving": (True, True),
     "slalom": (True, True),
     "u-trap": (True, True),
 }
