@@ -85,9 +85,8 @@ def drive(
     log = done.rollout
     if log is None:
         return Result(name, done.outcome, math.nan, 0, False, done.reason)
-    return Result(
-        name, done.outcome, float(log.t[-1]), len(log.meta.get("replans", ())), done.succeeded, done.reason
-    )  # fmt: skip
+    replans = len(log.meta.get("replans", ()))
+    return Result(name, done.outcome, float(log.t[-1]), replans, done.succeeded, done.reason)
 
 
 def told(results: Sequence[Result]) -> list[str]:
@@ -95,8 +94,9 @@ def told(results: Sequence[Result]) -> list[str]:
     ends = collections.Counter(r.outcome for r in results)
     touches = [str(ends.pop(kind, 0)) for kind in (Outcome.COLLIDED, Outcome.RUN_INTO, Outcome.JUMPED_ON)]
     good = [r.duration for r in results if r.certified]
-    ends.pop(Outcome.SUCCEEDED, 0)
-    others = ", ".join(f"{n} {end.name.lower()}" for end, n in sorted(ends.items(), key=lambda e: e[0].name)) or "–"
+    unsure = ends.pop(Outcome.SUCCEEDED, 0) - len(good)
+    named = {end.name.lower(): n for end, n in ends.items()} | ({"not certified": unsure} if unsure else {})
+    others = ", ".join(f"{n} {name}" for name, n in sorted(named.items())) or "–"
     share = f"{len(good)} of {len(results)} ({100 * len(good) / max(1, len(results)):.0f} %)"
     return [share, *touches, others, f"{statistics.mean(good):.1f} s" if good else "–",
             f"{statistics.mean(r.replans for r in results):.1f}" if results else "–"]  # fmt: skip

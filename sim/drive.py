@@ -119,9 +119,7 @@ def drive(
             settles = before.limiter == YIELD and _within(believed, last, task, engine.robot)
             if settles:
                 if _standing(speed, yaw_rate):
-                    outcome = (
-                        Outcome.SUCCEEDED if math.dist((x, y), task.goal) <= task.goal_tolerance else Outcome.STUCK
-                    )
+                    outcome, reason = _arrived(x, y, task)
                     break
                 command = _brake(last, engine.robot, control_hz)
             expected = watch.expected(tick, believed[:2], yielding.ahead)
@@ -131,18 +129,13 @@ def drive(
             if yields or settles:
                 state = state._replace(turning=before.turning, limiter=YIELD)
         if guide.length - state.arc <= guide.goal_distance and _standing(speed, yaw_rate) and not any(command):
-            left = math.dist((x, y), task.goal)
-            missed = left > task.goal_tolerance
-            knows = missed and math.dist(believed[:2], task.goal) > task.goal_tolerance
+            end, why = _arrived(x, y, task)
+            knows = end is Outcome.STUCK and math.dist(believed[:2], task.goal) > task.goal_tolerance
             renewed = rerouter.again(tick, believed, MISSED) if rerouter and knows else None
             if renewed:
                 guide, state, best = renewed, Progress(limiter=state.limiter), 0.0
             elif not (rerouter and knows and rerouter.waits):
-                outcome = Outcome.STUCK if missed else Outcome.SUCCEEDED
-                if missed:
-                    reason = (
-                        f"the route ends here, {left:.3f} m from the goal; the tolerance is {task.goal_tolerance:g} m"
-                    )
+                outcome, reason = end, why
                 break
         engine.command(*(senses.act(command) if senses else command))
         for _ in range(substeps):
@@ -210,6 +203,14 @@ def _blame(
         return first.outcome, ""
     fast = math.hypot(*traffic.velocities(t[before])[0, m])
     return first.outcome, f"movers[{m}] at {fast:.2f} m/s, the robot at {abs(twist[before, 0]):.2f} m/s"
+
+
+def _arrived(x: float, y: float, task: Task) -> tuple[Outcome, str]:
+    """How a drive ends that ends here, by the robot's own will, and why."""
+    left = math.dist((x, y), task.goal)
+    if left <= task.goal_tolerance:
+        return Outcome.SUCCEEDED, ""
+    return Outcome.STUCK, f"the route ends here, {left:.3f} m from the goal; the tolerance is {task.goal_tolerance:g} m"
 
 
 def _within(pose: Pose, command: Twist, task: Task, robot: RobotSpec) -> bool:

@@ -137,6 +137,7 @@ class Rerouter:
         try:
             task = dataclasses.replace(self._task, start=pose)
         except ValueError:  # the robot believes to be where it cannot be
+            self.log.append(Replan(tick / self._hz, cause, False, math.inf, 0, np.empty((0, 2)), 0.0))
             return None
         answer = self._in_time(task, tick / self._hz) if self._timed else self._answer(task, discs)
         route = None

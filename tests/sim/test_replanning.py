@@ -189,6 +189,12 @@ def test_a_robot_that_is_off_its_route_has_strayed(turtlebot: RobotSpec) -> None
     assert made.cause(0, (1.5, 3.8, 0.0), False, guide, 0.5) == "strayed"
 
 
+def test_a_replan_from_where_the_robot_cannot_be_is_logged_as_failed(turtlebot: RobotSpec) -> None:
+    made, _ = rerouter(ASIDE, robot=turtlebot)
+    assert made.again(0, (-1.0, 3.0, 0.0), "strayed") is None
+    assert [(replan.cause, replan.solved, replan.cost) for replan in made.log] == [("strayed", False, math.inf)]
+
+
 def test_it_rests_between_two_replans(turtlebot: RobotSpec) -> None:
     made, guide = rerouter(PASSING, robot=turtlebot, pause=1.0, within=0.0)
     astray = (1.5, 3.8, 0.0)
