@@ -97,7 +97,7 @@ def told(results: Sequence[Result]) -> list[str]:
     unsure = ends.pop(Outcome.SUCCEEDED, 0) - len(good)
     named = {end.name.lower(): n for end, n in ends.items()} | ({"not certified": unsure} if unsure else {})
     others = ", ".join(f"{n} {name}" for name, n in sorted(named.items())) or "–"
-    share = f"{len(good)} of {len(results)} ({100 * len(good) / max(1, len(results)):.0f} %)"
+    share = f"{len(good)} of {len(results)} ({100 * len(good) / max(1, len(results)):.1f} %)"
     return [share, *touches, others, f"{statistics.mean(good):.1f} s" if good else "–",
             f"{statistics.mean(r.replans for r in results):.1f}" if results else "–"]  # fmt: skip
 

@@ -151,7 +151,7 @@ def drive(
             waits = state.limiter == YIELD or top < SLOW
             idle, turned = idle + (not state.turning and not waits), turned + (state.turning and not waits)
             if outcome is None and (idle >= patience or turned >= patience + full_turn):
-                outcome = Outcome.STUCK
+                outcome, reason = Outcome.STUCK, f"no progress along the route for {STUCK_AFTER:g} s"
         if progress is not None and tick % (control_hz // 10 or 1) == 0:
             progress(state.arc / guide.length)
     if outcome is Outcome.COLLIDED:

@@ -53,11 +53,12 @@ class Replanning:
     within: float = 3.0  # a mover that is expected on the route so near ahead is a cause [m]
     patience: float = 2.0  # and so is having waited so long [s]
     strayed: float = 0.75  # and being so far off the route [m]
+    beside: float = 0.25  # and so much farther from its end than what is left of it [m]
     pause: float = 1.0  # the least time between two replans [s]
     ahead: float = 1.0  # what a mover covers in this time is blocked [s]
 
     def __post_init__(self) -> None:
-        for key in ("within", "patience", "strayed", "pause", "ahead"):
+        for key in ("within", "patience", "strayed", "beside", "pause", "ahead"):
             if not 0 <= getattr(self, key) < math.inf:
                 raise ValueError(f"{key}: must be at least 0, got {getattr(self, key):g}")
 
@@ -118,7 +119,8 @@ class Rerouter:
         if now - self._rest < s.pause:
             return ""
         x, y = _place(guide.route, arc)
-        if math.dist((x, y), pose[:2]) > s.strayed:
+        beside = math.dist(guide.route.xy[-1], pose[:2]) - (guide.length - arc)
+        if math.dist((x, y), pose[:2]) > s.strayed or beside > s.beside:
             return "strayed"
         if self._timed:
             return "late" if self.schedule is None or self.schedule.late(now, arc) else ""

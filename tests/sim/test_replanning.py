@@ -187,6 +187,8 @@ def test_a_robot_that_is_off_its_route_has_strayed(turtlebot: RobotSpec) -> None
     made, guide = rerouter(ASIDE, robot=turtlebot)
     assert made.cause(0, (1.5, 3.7, 0.0), False, guide, 0.5) == ""
     assert made.cause(0, (1.5, 3.8, 0.0), False, guide, 0.5) == "strayed"
+    assert made.cause(0, (7.0, 3.3, 0.0), False, guide, guide.length - 0.1) == "", "(7, 3) is 0.3 m away, 0.1 m is left"
+    assert made.cause(0, (7.0, 3.4, 0.0), False, guide, guide.length - 0.1) == "strayed"
 
 
 def test_a_replan_from_where_the_robot_cannot_be_is_logged_as_failed(turtlebot: RobotSpec) -> None:
