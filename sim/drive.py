@@ -122,7 +122,9 @@ def drive(
                     outcome, reason = _arrived(x, y, task)
                     break
                 command = _brake(last, engine.robot, control_hz)
-            expected = watch.expected(tick, believed[:2], yielding.ahead)
+            # Once it stands there it has arrived: then only what comes until that matters.
+            ahead = yielding.ahead[: 2 + math.ceil(_stopping(last, engine.robot) / yielding.step) if settles else None]
+            expected = watch.expected(tick, believed[:2], ahead)
             command, yields, resolve = yielding.step_aside(
                 guide, engine.robot, believed, last, before, command, resolve, *expected, top=top
             )
@@ -219,6 +221,11 @@ def _within(pose: Pose, command: Twist, task: Task, robot: RobotSpec) -> bool:
     way = command.speed * abs(command.speed) / (2 * robot.max_acceleration)
     end = (x + way * math.cos(yaw), y + way * math.sin(yaw))
     return max(math.dist((x, y), task.goal), math.dist(end, task.goal)) < 0.95 * task.goal_tolerance
+
+
+def _stopping(command: Twist, robot: RobotSpec) -> float:
+    """How long a robot takes to stand still [s]."""
+    return max(abs(command.speed) / robot.max_acceleration, abs(command.yaw_rate) / robot.max_yaw_acceleration)
 
 
 def _brake(command: Twist, robot: RobotSpec, hz: int) -> Twist:

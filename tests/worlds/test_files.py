@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
@@ -254,8 +255,7 @@ obstacles:
 
 
 def test_numpy_numbers_are_written_as_numbers(tmp_path):
-    numpy = pytest.importorskip("numpy")
-    task = Task(World("n", (0, 0, 9, 9), (Disc(*numpy.array([5.0, 5.0, 1e-5])),)), (1, 1, 0), (8, 8))
+    task = Task(World("n", (0, 0, 9, 9), (Disc(*np.array([5.0, 5.0, 1e-5])),)), (1, 1, 0), (8, 8))
     save_task(task, tmp_path / "n.yaml")
     assert load_task(tmp_path / "n.yaml") == task
 
