@@ -189,3 +189,12 @@ def test_a_robot_with_too_little_room_makes_more(turtlebot: RobotSpec) -> None:
     assert among(creeps, robot=turtlebot, yielding=None).outcome is Outcome.COLLIDED
     done = among(creeps, robot=turtlebot)
     assert done.succeeded, (done.outcome, done.reason)
+
+
+def test_a_robot_that_can_stand_at_its_goal_in_time_is_not_driven_off(turtlebot: RobotSpec) -> None:
+    """What comes later would be given way to, were the drive to go on."""
+    comes = keyframed((0.0, 8.0, 5.7), (9.5, 8.0, 5.7), (13.5, 8.0, 2.9), radius=0.25)
+    done = among(comes, robot=turtlebot)
+    assert done.succeeded, (done.outcome, done.reason)
+    assert done.rollout is not None
+    assert done.rollout.t[-1] < 11.0
