@@ -19,9 +19,9 @@ $(VENV)/.core: pyproject.toml tools/find-python
 	@$(PIP) install --editable .
 	@touch $@
 
-$(VENV)/.warm: $(VENV)/.core $(wildcard */_kernels*.py */*/_kernels*.py)
+$(VENV)/.warm: $(VENV)/.core $(wildcard */_kernels*.py */*/_kernels*.py */*/*/_kernels*.py)
 	@echo "Compiling the kernels, once"
-	@$(BIN)/python -m sim.warm
+	@$(BIN)/python -m antdrive.sim.warm
 	@touch $@
 
 $(VENV)/.dev: $(VENV)/.core

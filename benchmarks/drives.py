@@ -19,14 +19,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from joblib import Parallel, delayed
 
+from antdrive.planners import Query, find_planner, pull_taut
+from antdrive.planners.anyangle.tangent import shortest
+from antdrive.planners.smoothing._kernels_smooth import encloses
+from antdrive.robots import load_robot
+from antdrive.sim import Scenario, run
+from antdrive.sim.log.metrics import measure, tracking_error
+from antdrive.worlds import generate, import_barn, rasterise
 from benchmarks.planners import table
-from planners import Query, find_planner, pull_taut
-from planners._kernels_refine import encloses
-from planners.tangent import shortest
-from robots import load_robot
-from sim import Scenario, run
-from sim.metrics import measure, tracking_error
-from worlds import generate, import_barn, rasterise
 
 BARN = Path(__file__).parent.parent.parent / "shared" / "data" / "barn" / "barn50.tar.xz"
 
@@ -85,10 +85,11 @@ def barn(jobs: int, source: Path, worlds: int) -> Iterator[str]:
     tasks = barn_tasks(source)
     rows = []
     for planner, route, noise in (
-        ("astar", "wide", 0.0), ("astar", "taut", 0.0), ("astar", "grid", 0.0), ("ants", "wide", 0.0), ("aco-han", "wide", 0.0),
-        ("astar", "wide", 1.0),
+        ("astar", "clearance", 0.0), ("astar", "taut", 0.0), ("astar", "none", 0.0), ("ants", "clearance", 0.0),
+        ("aco-han", "clearance", 0.0),
+        ("astar", "clearance", 1.0),
     ):  # fmt: skip
-        given = {"route": route, "noise": noise}
+        given = {"smoothing": route, "noise": noise}
         got = all_of(jobs, (delayed(drive)(name, task, planner, "jackal", **given) for name, task in tasks.items()))
         driven = [r for r in got if r.metrics]
         ratios = [r.metrics["arrival_s"] / (r.optimum / 2.0) for r in driven if r.succeeded]
@@ -156,7 +157,7 @@ def forests(jobs: int, source: Path, worlds: int) -> Iterator[str]:
     yield ""
 
 
-def refine(jobs: int, source: Path, worlds: int) -> Iterator[str]:
+def smooth(jobs: int, source: Path, worlds: int) -> Iterator[str]:
     """Pulled taut from the grid's corridor, against the shortest path of the plane between the same ends."""
     gaps: dict[str, list[float]] = {"the optimal one": [], "another": []}
     for kind, n in itertools.product(("forest", "barn"), range(worlds // 2)):
@@ -190,7 +191,7 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=-1, help="processes; -1: one a core")
     parser.add_argument("--barn", type=Path, default=BARN, help="folder or archive of BARN's world_*.world")
     arguments = parser.parse_args()
-    makers = {f.__name__: f for f in (barn, forests, refine)}
+    makers = {f.__name__: f for f in (barn, forests, smooth)}
     for name in arguments.tables or makers:
         if name not in makers:
             parser.error(f"no table is called {name!r}; choose from {', '.join(makers)}")

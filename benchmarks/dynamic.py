@@ -19,31 +19,31 @@ from typing import Any, NamedTuple
 import numpy as np
 from joblib import Parallel, delayed
 
-from benchmarks.planners import table
-from planners import Query, find_planner, plan_in_time
-from robots import load_robot
-from sim import Knowledge, Outcome, Replanning, Scenario, run
-from worlds import (
+from antdrive.planners import Query, find_planner, plan_in_time
+from antdrive.robots import load_robot
+from antdrive.sim import Outcome, Perception, ReplanPolicy, Scenario, run
+from antdrive.worlds import (
     Cruising,
     Disc,
     Keyframed,
     Mover,
     Task,
-    Traffic,
+    Trajectories,
     World,
     catalogue,
     import_dynabarn,
     load_task,
     rasterise,
 )
+from benchmarks.planners import table
 
 DYNABARN = Path(__file__).parent.parent.parent / "shared" / "data" / "dynabarn" / "dynabarn10.json"
 CLASSES = {"easy": range(20), "medium": range(20, 40), "hard": range(40, 60)}
 APART = 7.3  # between the moments at which drives in one world begin [s]
-KNOWN = Knowledge(told="motions")
+KNOWN = Perception(told="motions")
 POLICIES: dict[str, dict[str, Any]] = {
     "neither": {"yielding": None, "replanning": None},
-    "yield": {"replanning": Replanning(around=False)},
+    "yield": {"replanning": ReplanPolicy(around=False)},
     "replan": {"yielding": None},
     "yield and replan": {},
     "the same, motions known": {"knowledge": KNOWN},
@@ -167,7 +167,7 @@ def random_drive(seed: int, settings: dict[str, Any]) -> Result:
     robot = load_robot("turtlebot")
     grid = rasterise(task.world, task.cell, robot.radius + 0.03)
     query = Query.between(grid, task)
-    motions = Traffic.of(task.world, task.start[:2], seed).motions
+    motions = Trajectories.of(task.world, task.start[:2], seed).motions
     proof = plan_in_time(query, motions, speed=robot.max_speed, horizon=60.0)
     result = drive(f"seed {seed}", task, "dstar-lite", "turtlebot", seed=seed, **settings)
     return result._replace(proved=proof.solved)

@@ -17,16 +17,16 @@ from pathlib import Path
 
 import numpy as np
 
-from sim.engine import client
-from sim.filming.camera import camera_for
-from sim.filming.model import robot_parts
-from sim.filming.parallel import processes
-from sim.filming.scene import Scene
-from sim.filming.stage import drawn_height, grouped, still_pieces
-from sim.filming.tiny import add_mesh, render
-from sim.filming.video import film
-from sim.rollout import Rollout
-from sim.scenario import Scenario, run
+from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.physics.engine import client
+from antdrive.sim.pipeline import Scenario, run
+from antdrive.sim.view.film.camera import camera_for
+from antdrive.sim.view.film.model import robot_parts
+from antdrive.sim.view.film.parallel import processes
+from antdrive.sim.view.film.stage import drawn_height, grouped, still_pieces
+from antdrive.sim.view.film.tiny import add_mesh, render
+from antdrive.sim.view.film.video import film
+from antdrive.sim.view.scene import Scene
 
 ROUNDS = 3
 SIZES = ((640, 480), (1280, 720))

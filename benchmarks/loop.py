@@ -11,10 +11,10 @@ import time
 
 import numpy as np
 
-from robots import PurePursuit, load_robot
-from sim.drive import drive
-from sim.engine import Engine, bullet
-from worlds import Disc, Route, Task, World
+from antdrive.robots import PurePursuit, load_robot
+from antdrive.sim.driving.drive import drive
+from antdrive.sim.physics.engine import Engine, bullet
+from antdrive.worlds import Disc, Route, Task, World
 
 ROUNDS = 9
 

@@ -17,10 +17,10 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
+from antdrive.planners import Cell, OnlinePlanner, Query, find_planner, online_for
+from antdrive.sim.papers.maps import environments
+from antdrive.worlds import DIRECTIONS, Grid
 from benchmarks.planners import seconds, table
-from planners import Cell, Online, Query, find_planner, online_for
-from sim.papers.maps import environments
-from worlds import DIRECTIONS, Grid
 
 #: hasan, Table 1: alpha/beta, cells propagated, steps, total cost, seconds; basic D*'s total cost and seconds.
 PRINTED = {
@@ -57,7 +57,7 @@ class Strollers:
                 self._cells[n] = near[int(draw * len(near))]
 
 
-def drive(robot: Online, query: Query, movers: Strollers, limit: int = 5000) -> bool:
+def drive(robot: OnlinePlanner, query: Query, movers: Strollers, limit: int = 5000) -> bool:
     """Step until the goal is reached; whether it was, within so many decisions. Nobody is ever run into."""
     for _ in range(limit):
         if robot.arrived:
@@ -71,7 +71,7 @@ def drive(robot: Online, query: Query, movers: Strollers, limit: int = 5000) -> 
     return robot.arrived
 
 
-def runs(name: str, query: Query, count: int, seeds: range) -> Iterator[tuple[bool, Online, float]]:
+def runs(name: str, query: Query, count: int, seeds: range) -> Iterator[tuple[bool, OnlinePlanner, float]]:
     for seed in seeds:
         movers = Strollers(query.grid, count, np.random.default_rng([seed, count]), (query.start, query.goal))
         started = time.perf_counter()

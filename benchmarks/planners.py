@@ -25,10 +25,10 @@ from typing import Any
 
 import numpy as np
 
-from planners import PLANNERS, Planner, PlanResult, Query, find_planner
-from planners.ants import Ground, _Walk
-from sim.papers.maps import blocks, environments, han_ants, optimum, scattered
-from worlds import DIRECTIONS, Disc, Grid, Task, World, forest, rasterise
+from antdrive.planners import PLANNERS, Planner, PlanResult, Query, find_planner
+from antdrive.planners.colonies.colony import ColonyGraph, _Walk
+from antdrive.sim.papers.maps import blocks, environments, han_ants, optimum, scattered
+from antdrive.worlds import DIRECTIONS, Disc, Grid, Task, World, forest, rasterise
 
 SEEDS = range(10)
 
@@ -350,7 +350,7 @@ def speed(quick: bool) -> Iterator[str]:
         query = random_grid(size, 0, 0.2)
         for label, options in (("die in dead ends", {}), ("retreat", {"retreat": True})):
             colony: Any = find_planner("as", ants=2000, **options)
-            ground, rng = Ground.of(query), np.random.default_rng(0)
+            ground, rng = ColonyGraph.of(query), np.random.default_rng(0)
             walk = _Walk.of(colony, ground)
             colony.weigh(ground, colony.lay(ground, rng), colony.desire(ground), walk.weights[0])
             rates = []

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from planners import Planner, Query, find_planner, replanner_for
-from worlds import Disc, Grid, World, rasterise
+from antdrive.planners import Planner, Query, find_planner, replanner_for
+from antdrive.worlds import Disc, Grid, World, rasterise
 
 SIDE, CHANGES, WORLDS, ANT_WORLDS = 200, 12, 40, 4
 

@@ -29,9 +29,9 @@ from w9_pathfinding.envs import DiagonalMovement
 from w9_pathfinding.envs import Grid as W9Grid
 from w9_pathfinding.pf import AStar as W9AStar
 
-from planners import Query, find_planner
-from worlds import Disc, Grid, World, rasterise
-from worlds.movingai import import_movingai_map, import_movingai_problems
+from antdrive.planners import Query, find_planner
+from antdrive.worlds import Disc, Grid, World, rasterise
+from antdrive.worlds.formats.movingai import import_movingai_map, import_movingai_problems
 
 Cell = tuple[int, int]
 Solve = Callable[[Cell, Cell], Any]  # the peer's own kind of path

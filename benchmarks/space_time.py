@@ -14,9 +14,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from antdrive.planners import Moving, Query, TimedPlan, plan_in_time, reachable
+from antdrive.worlds import Floats, Grid
 from benchmarks.planners import seconds, table
-from planners import Moving, Query, TimedPlan, plan_in_time, reachable
-from worlds import Floats, Grid
 
 CELL, SPEED, INFLATE, WORLDS = 0.2, 0.5, 0.25, 20
 

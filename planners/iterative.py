@@ -15,9 +15,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.plan import Cells, GridPlanner, History, PlanResult, PlanStatus, Query, path_cost
-from planners.search import NO_WAY, reachable
-from worlds import Floats
+from antdrive.planners.graph.search import NO_WAY, reachable
+from antdrive.planners.plan import Cells, GridPlanner, History, PlanResult, PlanStatus, Query, path_cost
+from antdrive.worlds import Floats
 
 
 class Iteration(NamedTuple):

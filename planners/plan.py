@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from worlds import Floats, Point, Task
+from antdrive.worlds import Floats, Point, Task
 
 if TYPE_CHECKING:  # a grid brings the compiler with it; naming a planner should not
-    from worlds import Grid
+    from antdrive.worlds import Grid
 
 Cell: TypeAlias = tuple[int, int]  # (row, col)
 Cells: TypeAlias = npt.NDArray[np.int32]  # (N, 2)
@@ -72,7 +72,7 @@ class Query:
 
         Where an end has no such cell, `unreachable` says so and planners answer `NO_PATH`.
         """
-        from worlds.geometry import point_clearance  # brings the compiler with it
+        from antdrive.worlds.geometry import point_clearance  # brings the compiler with it
 
         room = float(point_clearance(task.world, [task.goal])[0])
         start, out = _enter(grid, task, task.start[:2], math.inf)
@@ -98,7 +98,7 @@ class Query:
 
 def _enter(grid: Grid, task: Task, point: Point, within: float) -> tuple[Cell, bool]:
     """The free cell nearest to a point whose centre a straight line reaches; without one, the point's own and False."""
-    from worlds.geometry import point_clearance, segment_clearance
+    from antdrive.worlds.geometry import point_clearance, segment_clearance
 
     row, col = grid.cell_at(*point)
     rows, cols = grid.shape
@@ -175,7 +175,7 @@ class PlanResult:
         return self.cells.astype(np.float64) if self.waypoints is None else self.waypoints
 
     def _repr_html_(self) -> str:
-        from worlds.drawing import card, curve_svg, path_svg
+        from antdrive.worlds.drawing import card, curve_svg, path_svg
 
         picture = (path_svg(self.line[:, ::-1]) if self.solved else "") + curve_svg(self.history.best)
         facts = {"length": f"{self.line_length:.3f} m", "work": f"{self.work:,} {self.work_unit}",

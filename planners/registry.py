@@ -14,22 +14,22 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Any, Literal, Union
 
-from planners.aco_han import AcoHan
-from planners.ant_system import AgeingAnts, AntSystem, ExploringAnts
-from planners.apf import PotentialField
-from planners.dstar import DStar
-from planners.dstar_lite import DStarLite
-from planners.ga_han import GaHan
-from planners.hybrid import Hybrid
-from planners.merging_ants import MergingAnts
-from planners.mmas import MaxMinAnts
-from planners.mmas_dstar import MaxMinDStar
-from planners.pfaco import PotentialFieldAnts
-from planners.plan import Planner
-from planners.search import AStar, Dijkstra
-from planners.space_time import SafeIntervals
-from planners.tangent import Tangent
-from worlds import InputError
+from antdrive.planners.anyangle.ga_han import GaHan
+from antdrive.planners.anyangle.hybrid import Hybrid
+from antdrive.planners.anyangle.tangent import Tangent
+from antdrive.planners.colonies.aco_han import AcoHan
+from antdrive.planners.colonies.ant_system import AgeingAnts, AntSystem, ExploringAnts
+from antdrive.planners.colonies.merging_ants import MergingAnts
+from antdrive.planners.colonies.mmas import MaxMinAnts
+from antdrive.planners.colonies.mmas_dstar import MaxMinDStar
+from antdrive.planners.colonies.pfaco import PotentialFieldAnts
+from antdrive.planners.graph.apf import PotentialField
+from antdrive.planners.graph.dstar import DStar
+from antdrive.planners.graph.dstar_lite import DStarLite
+from antdrive.planners.graph.search import AStar, Dijkstra
+from antdrive.planners.graph.sipp import SafeIntervals
+from antdrive.planners.plan import Planner
+from antdrive.worlds import InputError
 
 #: The planners of this package.
 PLANNERS: Mapping[str, Planner] = MappingProxyType(

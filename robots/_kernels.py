@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from worlds._kernels import doubled_rows, kernel, segment_clearance, wall_distance
+from antdrive.worlds._kernels import doubled_rows, kernel, segment_clearance, wall_distance
 
 Array = Any
 

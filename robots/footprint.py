@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from robots import _kernels
-from robots.spec import Footprint
-from worlds import Floats, World
+from antdrive.robots import _kernels
+from antdrive.robots.spec import Footprint
+from antdrive.worlds import Floats, World
 
 
 def footprint_clearance(world: World, footprint: Footprint, poses: npt.ArrayLike) -> Floats:

@@ -10,9 +10,9 @@ from collections import deque
 
 import numpy as np
 
-from robots.pursuit import Twist
-from robots.spec import Noise
-from worlds import Floats, Pose
+from antdrive.robots.control.pursuit import Twist
+from antdrive.robots.spec import Noise
+from antdrive.worlds import Floats, Pose
 
 SLIP_TIME = 0.5  # over which slip forgets itself [s]
 

@@ -9,11 +9,11 @@ from pathlib import Path
 
 from joblib import Parallel, delayed
 
-from planners import PLANNERS
-from robots import load_robot
-from sim.filming.video import film
-from sim.scenario import Scenario, plan, run
-from worlds import Cruising, Disc, Task, World
+from antdrive.planners import PLANNERS
+from antdrive.robots import load_robot
+from antdrive.sim.pipeline import Scenario, plan, run
+from antdrive.sim.view.film.video import film
+from antdrive.worlds import Cruising, Disc, Task, World
 
 # What shares kernels is compiled by one process; the longest first.
 TOGETHER = (

@@ -5,10 +5,10 @@ from pathlib import Path
 import hypothesis
 import pytest
 
-from planners import find_planner
-from robots import RobotSpec, load_robot
-from sim import Run, Scenario, run
-from worlds import Disc, Task, World
+from antdrive.planners import find_planner
+from antdrive.robots import RobotSpec, load_robot
+from antdrive.sim import Run, Scenario, run
+from antdrive.worlds import Disc, Task, World
 
 hypothesis.settings.register_profile("repeatable", derandomize=True, deadline=None)
 hypothesis.settings.load_profile("repeatable")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from worlds import load_task
+from antdrive.worlds import load_task
 
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text()
@@ -32,7 +32,7 @@ def test_the_world_file_is_driven(tmp_path: Path) -> None:
     (tmp_path / "two-posts.yaml").write_text(text)
     assert len(load_task(tmp_path / "two-posts.yaml").world.obstacles) == 2
     done = subprocess.run(
-        [sys.executable, "-m", "sim", "run", "two-posts.yaml"],
+        [sys.executable, "-m", "antdrive", "run", "two-posts.yaml"],
         cwd=tmp_path,
         capture_output=True,
         text=True,
@@ -47,7 +47,7 @@ def test_the_commands_work(tmp_path: Path) -> None:
     assert len(commands) >= 5
     for command, fails in commands:
         done = subprocess.run(
-            [sys.executable, "-m", "sim", *command[1:]],
+            [sys.executable, "-m", "antdrive", *command[1:]],
             cwd=tmp_path,
             capture_output=True,
             text=True,

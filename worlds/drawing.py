@@ -7,10 +7,10 @@ from collections.abc import Iterable, Mapping
 from html import escape
 from typing import TYPE_CHECKING
 
-from worlds.world import Floats, Pose, World
+from antdrive.worlds.world import Floats, Pose, World
 
 if TYPE_CHECKING:
-    from worlds.world import Task
+    from antdrive.worlds.world import Task
 
 WIDE = 420  # the longer side of a drawing [px]
 OBSTACLE, WALL, START, GOAL, LINE = "#7988a0", "#c4cbd5", "#345cbe", "#008a5c", "#ff7a0e"

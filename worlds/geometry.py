@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from worlds import _kernels
-from worlds.world import Floats, World
+from antdrive.worlds import _kernels
+from antdrive.worlds.world import Floats, World
 
 
 def point_clearance(world: World, points: npt.ArrayLike) -> Floats:

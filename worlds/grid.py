@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from worlds import _kernels
-from worlds.errors import InputError
-from worlds.world import Floats, Point, World
+from antdrive.worlds import _kernels
+from antdrive.worlds.errors import InputError
+from antdrive.worlds.world import Floats, Point, World
 
 #: The eight moves by bit of `Grid.moves`, as (row, column) steps: E, NE, N, NW, W, SW, S, SE.
 DIRECTIONS: tuple[tuple[int, int], ...] = ((0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1))

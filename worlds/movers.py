@@ -1,7 +1,7 @@
 """Moving cylinders as a world declares them: along keyframes, straight on between the walls, or wandering from cell to cell.
 
 Movers keep to their course whatever is in the way: they pass through each other and through standing cylinders (wanderers
-keep off those by choice), and a robot does not stop them. `worlds.traffic` says where they are at any time.
+keep off those by choice), and a robot does not stop them. `antdrive.worlds.trajectories` says where they are at any time.
 """
 
 from __future__ import annotations

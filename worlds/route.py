@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from worlds.world import Floats
+from antdrive.worlds.world import Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,7 +19,7 @@ class Route:
 
     xy: Floats  # (N, 2) [m], N >= 2, read-only, no two neighbours equal
     curvature: Floats | None = None  # (N,) of the exact line from each point on to the next [1/m]; None: not known
-    kind: str = "grid"  # how the line was made
+    kind: str = "none"  # how the line was made
     note: str = ""  # why it was not made as asked, if so
 
     def __post_init__(self) -> None:

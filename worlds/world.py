@@ -10,7 +10,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from worlds.movers import Cruising, Mover, Wandering, later
+from antdrive.worlds.movers import Cruising, Mover, Wandering, later
 
 Floats: TypeAlias = npt.NDArray[np.float64]
 Pose: TypeAlias = tuple[float, float, float]  # x [m], y [m], yaw [rad, counter-clockwise from +x]
@@ -49,7 +49,7 @@ class World:
     bounds: Bounds  # the walls' inner faces [m]
     obstacles: tuple[Disc, ...] = ()
     source: str | None = None  # where it comes from, free text
-    movers: tuple[Mover, ...] = ()  # see `Traffic` for where they are
+    movers: tuple[Mover, ...] = ()  # see `Trajectories` for where they are
 
     def __post_init__(self) -> None:
         for value in self.bounds:
@@ -73,7 +73,7 @@ class World:
                     f"{key}position: ({x:g}, {y:g}) leaves no room for radius {r:g} within bounds {list(self.bounds)}"
                 )
         if isinstance(mover, Wandering):
-            from worlds.traffic import home_cell
+            from antdrive.worlds.trajectories import home_cell
 
             columns, rows = (side / mover.cell for side in self.size)
             if columns * rows > MAX_WALK_CELLS:
@@ -98,7 +98,7 @@ class World:
         return xmax - xmin, ymax - ymin
 
     def _repr_html_(self) -> str:
-        from worlds.drawing import card, world_svg
+        from antdrive.worlds.drawing import card, world_svg
 
         facts = {"obstacles": len(self.obstacles), "size": "{:g} × {:g} m".format(*self.size)}
         return card(world_svg(self), self.name, facts)
@@ -138,10 +138,10 @@ class Task:
     def _require_no_mover(self) -> None:
         if not self.world.movers:
             return
-        from worlds.traffic import Traffic
+        from antdrive.worlds.trajectories import Trajectories
 
         x, y = self.start[:2]
-        traffic = Traffic.of(self.world, (x, y))
+        traffic = Trajectories.of(self.world, (x, y))
         for i, ((mx, my), radius) in enumerate(zip(traffic.positions(0.0)[0], traffic.radii, strict=True)):
             if math.hypot(x - mx, y - my) <= radius:
                 raise ValueError(
@@ -160,7 +160,7 @@ class Task:
                 )
 
     def _repr_html_(self) -> str:
-        from worlds.drawing import task_card
+        from antdrive.worlds.drawing import task_card
 
         return task_card(self)
 

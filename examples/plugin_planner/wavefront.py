@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planners import GridPlanner, PlanResult, PlanStatus, Query, path_cost
-from worlds import DIRECTIONS
+from antdrive.planners import GridPlanner, PlanResult, PlanStatus, Query, path_cost
+from antdrive.worlds import DIRECTIONS
 
 
 @dataclass(frozen=True, kw_only=True)

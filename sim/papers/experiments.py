@@ -8,8 +8,8 @@ from functools import partial
 from types import MappingProxyType
 from typing import Any
 
-from planners import Query
-from sim.papers import maps
+from antdrive.planners import Query
+from antdrive.sim.papers import maps
 
 
 @dataclass(frozen=True, kw_only=True)

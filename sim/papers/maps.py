@@ -8,8 +8,8 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from planners import PLANNERS, Query
-from worlds import Disc, Grid, World, rasterise
+from antdrive.planners import PLANNERS, Query
+from antdrive.worlds import Disc, Grid, World, rasterise
 
 Picture = npt.NDArray[np.bool_]
 

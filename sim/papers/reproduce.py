@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Any
 import joblib
 import numpy as np
 
-from planners import PlanResult, find_planner
-from sim.papers import maps
-from sim.papers.experiments import PAPERS, Trial
-from worlds.atomic import written_whole
-from worlds.errors import InputError
+from antdrive.planners import PlanResult, find_planner
+from antdrive.sim.papers import maps
+from antdrive.sim.papers.experiments import PAPERS, Trial
+from antdrive.worlds.errors import InputError
+from antdrive.worlds.files.atomic import written_whole
 
 if TYPE_CHECKING:
-    from planners import History
+    from antdrive.planners import History
 
 PC, PM = (0.1, 0.25, 0.5, 0.75, 0.9), (0.05, 0.1, 0.2, 0.4, 0.6)  # han2007's sweep
 
@@ -144,7 +144,7 @@ def _figures(
     paper: str, found: Sequence[tuple[Trial, list[PlanResult]]], folder: Path, seeds: int, suffixes: Sequence[str]
 ) -> dict[str, str]:
     """What the paper draws: length by iteration on its second map, and, for han2007, ants and Pc / Pm."""
-    from sim.figures import ants_figure, history_figure, sweep_figure
+    from antdrive.sim.view.figures.figures import ants_figure, history_figure, sweep_figure
 
     files: dict[str, str] = {}
     places = list(dict.fromkeys(trial.place for trial, _ in found))

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from worlds_to_solve import catalogue, optimum, random_query, sealed
 
-from planners import PLANNERS, Planner, PlanResult, PlanStatus, Query, find_planner, path_cost
-from worlds import DIRECTIONS, Grid, InputError, polyline_clearance
+from antdrive.planners import PLANNERS, Planner, PlanResult, PlanStatus, Query, find_planner, path_cost
+from antdrive.worlds import DIRECTIONS, Grid, InputError, polyline_clearance
+from tests.planners.worlds_to_solve import catalogue, optimum, random_query, sealed
 
 CATALOGUE = catalogue()
 # What planners may declare: that they plan in the world itself, or that they may miss a path that exists.

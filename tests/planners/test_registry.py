@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from worlds_to_solve import catalogue, optimum
 
-from planners import PLANNERS, AcoHan, all_planners, describe, find_planner
-from worlds import InputError
+from antdrive.planners import PLANNERS, AcoHan, all_planners, describe, find_planner
+from antdrive.worlds import InputError
+from tests.planners.worlds_to_solve import catalogue, optimum
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "plugin_planner"

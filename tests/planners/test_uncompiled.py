@@ -7,13 +7,13 @@ import subprocess
 import sys
 from pathlib import Path
 
-from planners import PLANNERS
+from antdrive.planners import PLANNERS
 
 CODE = """
 import dataclasses
 import numpy as np
-from planners import PLANNERS, Query, plan_in_time
-from worlds import Disc, Grid, Task, World, rasterise
+from antdrive.planners import PLANNERS, Query, plan_in_time
+from antdrive.worlds import Disc, Grid, Task, World, rasterise
 free = np.ones((6, 7))
 free[1:5, 3] = 0
 bare = Query(Grid.from_free(free), (2, 1), (3, 5))

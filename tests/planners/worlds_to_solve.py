@@ -11,8 +11,8 @@ import numpy.typing as npt
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from planners import Query
-from worlds import DIRECTIONS, Disc, Grid, Task, World, rasterise
+from antdrive.planners import Query
+from antdrive.worlds import DIRECTIONS, Disc, Grid, Task, World, rasterise
 
 
 def optimum(query: Query) -> float:

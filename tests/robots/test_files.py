@@ -2,8 +2,8 @@ from pathlib import Path
 
 import pytest
 
-from robots import load_robot, robot_schema, robots
-from worlds import InputError
+from antdrive.robots import load_robot, robot_schema, robots
+from antdrive.worlds import InputError
 
 GOOD = """\
 schema: 1

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robots import Footprint, footprint_clearance
-from worlds import Disc, World
+from antdrive.robots import Footprint, footprint_clearance
+from antdrive.worlds import Disc, World
 
 coordinate = st.floats(-3, 3)
 FOOTPRINTS = [Footprint.disc(0.3), Footprint.rectangle(0.5, 0.4), Footprint(0.2, 0.1, 0.05)]

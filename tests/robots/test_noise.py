@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from robots import Noise, RobotSpec, Senses, Twist, load_robot
-from worlds import InputError
+from antdrive.robots import Noise, RobotSpec, Senses, Twist, load_robot
+from antdrive.worlds import InputError
 
 DT = 1 / 60
 
@@ -94,7 +94,7 @@ def test_impossible_levels_are_refused_by_name(key: str, value: float) -> None:
 
 
 def test_a_robot_file_may_tell_its_noise(tmp_path) -> None:
-    from robots import robots
+    from antdrive.robots import robots
 
     text = robots()["turtlebot"].read_text()
     path = tmp_path / "mine.yaml"

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sim.rollout import Rollout
+from antdrive.sim.log.rollout import Rollout
 
 
 @pytest.fixture(scope="session")

@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planners import find_planner
-from robots import RobotSpec
-from sim import Scenario, run
-from sim.metrics import barn as barn_score
-from sim.metrics import tracking_error
+from antdrive.planners import find_planner
+from antdrive.robots import RobotSpec
+from antdrive.sim import Scenario, run
+from antdrive.sim.log.metrics import barn as barn_score
+from antdrive.sim.log.metrics import tracking_error
+from antdrive.worlds import import_barn
 from tests.conftest import SHARED
-from worlds import import_barn
 
 ARCHIVE = SHARED / "barn" / "barn50.tar.xz"
 WORLDS = range(0, 300, 6)
@@ -42,12 +42,13 @@ def test_the_jackal_drives_a_barn_world(number: int, barn: Path, jackal: RobotSp
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("planner", "noise", "route"), [("ants", 0.0, "wide"), ("aco-han", 0.0, "taut"), ("astar", 1.0, "wide")]
+    ("planner", "noise", "smoothing"),
+    [("ants", 0.0, "clearance"), ("aco-han", 0.0, "taut"), ("astar", 1.0, "clearance")],
 )
 @pytest.mark.parametrize("number", WORLDS)
 def test_no_planners_path_is_unsafe_to_follow(
-    number: int, planner: str, noise: float, route: str, barn: Path, jackal: RobotSpec
+    number: int, planner: str, noise: float, smoothing: str, barn: Path, jackal: RobotSpec
 ) -> None:
     task = import_barn(barn / f"world_{number}.world")
-    result = run(Scenario(task=task, planner=find_planner(planner), robot=jackal, noise=noise, route=route))
+    result = run(Scenario(task=task, planner=find_planner(planner), robot=jackal, noise=noise, smoothing=smoothing))
     assert result.succeeded, (result.outcome, result.certificate)

@@ -4,10 +4,10 @@ import math
 import numpy as np
 import pytest
 
-from sim.papers import maps, reproduce
-from sim.papers.experiments import PAPERS
-from sim.papers.reproduce import reproduce as measure_again
-from worlds import InputError
+from antdrive.sim.papers import maps, reproduce
+from antdrive.sim.papers.experiments import PAPERS
+from antdrive.sim.papers.reproduce import reproduce as measure_again
+from antdrive.worlds import InputError
 
 
 @pytest.mark.parametrize("paper", PAPERS)

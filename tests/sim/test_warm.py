@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from planners import PLANNERS
-from sim.warm import TOGETHER
+from antdrive.planners import PLANNERS
+from antdrive.sim.warm import TOGETHER
 
 
 def test_each_group_of_planners_is_known_and_none_is_compiled_twice() -> None:

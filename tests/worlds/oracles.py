@@ -7,7 +7,7 @@ from collections import deque
 import numpy as np
 from hypothesis import strategies as st
 
-from worlds import DIRECTIONS, Disc, Grid, Task, World
+from antdrive.worlds import DIRECTIONS, Disc, Grid, Task, World
 
 
 def clearance_of_point(world: World, x: float, y: float) -> float:

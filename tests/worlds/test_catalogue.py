@@ -6,9 +6,9 @@ import itertools
 import numpy as np
 import pytest
 
-from sim.papers.maps import environments
+from antdrive.sim.papers.maps import environments
+from antdrive.worlds import Disc, Task, Trajectories, catalogue, forest, load_task, point_clearance, rasterise
 from tests.worlds.oracles import passable
-from worlds import Disc, Task, Traffic, catalogue, forest, load_task, point_clearance, rasterise
 
 TURTLEBOT, JACKAL = 0.18, 0.333  # radii [m]
 MARGIN = 0.05  # [m]
@@ -135,7 +135,7 @@ def test_hasans_mover_walks_over_free_cells_from_a_random_one(case):
     free = rasterise(task.world, task.cell, 0.2)
     homes = set()
     for seed in range(5):
-        stops = Traffic.of(task.world, task.start[:2], seed).positions(np.arange(100) * 0.8)[:, 0]
+        stops = Trajectories.of(task.world, task.start[:2], seed).positions(np.arange(100) * 0.8)[:, 0]
         cells = [free.cell_at(*stop) for stop in stops]
         np.testing.assert_allclose(free.xy(cells), stops, atol=1e-9)
         assert all(free.free[cell] for cell in cells)

@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.worlds.oracles import clearance_of_point, clearance_of_segment, coordinates, worlds
-from worlds import (
+from antdrive.worlds import (
     Disc,
     World,
     point_clearance,
@@ -17,6 +16,7 @@ from worlds import (
     segment_clearance,
     swept_clearance,
 )
+from tests.worlds.oracles import clearance_of_point, clearance_of_segment, coordinates, worlds
 
 points = st.tuples(coordinates(-7, 7), coordinates(-7, 7))
 

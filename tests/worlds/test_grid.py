@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from antdrive.worlds import DIRECTIONS, Disc, Grid, World, rasterise
 from tests.worlds.oracles import clearance_of_point, moves_by_force, worlds
-from worlds import DIRECTIONS, Disc, Grid, World, rasterise
 
 
 def bits(grid: Grid) -> np.ndarray:

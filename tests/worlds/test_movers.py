@@ -11,13 +11,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from worlds import (
+from antdrive.worlds import (
     Cruising,
     Disc,
     InputError,
     Keyframed,
     Task,
-    Traffic,
+    Trajectories,
     Wandering,
     World,
     load_task,
@@ -25,7 +25,7 @@ from worlds import (
     task_from_dict,
     task_to_dict,
 )
-from worlds.geometry import swept_clearance
+from antdrive.worlds.geometry import swept_clearance
 
 BOX = (0.0, 0.0, 10.0, 8.0)
 START = (1.0, 1.0)
@@ -34,7 +34,7 @@ FINE = np.linspace(0, 40, 4001)
 
 
 def traffic(*movers, seed=0, obstacles=()):
-    return Traffic.of(World("w", BOX, tuple(obstacles), movers=movers), START, seed)
+    return Trajectories.of(World("w", BOX, tuple(obstacles), movers=movers), START, seed)
 
 
 def at(mover, t):
@@ -270,9 +270,9 @@ def test_the_bits_are_the_same_in_another_process(tmp_path):
     save_task(task, tmp_path / "w.yaml")
     code = (
         "import sys, hashlib, numpy as np\n"
-        "from worlds import Traffic, load_task\n"
+        "from worlds import Trajectories, load_task\n"
         "task = load_task(sys.argv[1])\n"
-        "places = Traffic.of(task.world, task.start[:2], 5).positions(np.linspace(0, 40, 4001))\n"
+        "places = Trajectories.of(task.world, task.start[:2], 5).positions(np.linspace(0, 40, 4001))\n"
         "print(hashlib.sha256(places.tobytes()).hexdigest(), 'numba' in sys.modules)"
     )
     done = subprocess.run(
@@ -280,14 +280,14 @@ def test_the_bits_are_the_same_in_another_process(tmp_path):
     )
     import hashlib
 
-    here = Traffic.of(task.world, START, 5).positions(FINE)
+    here = Trajectories.of(task.world, START, 5).positions(FINE)
     assert done.stdout.split() == [hashlib.sha256(here.tobytes()).hexdigest(), "False"]
 
 
 @pytest.mark.parametrize("mover", KINDS[:3] + KINDS[5:], ids=lambda m: f"{type(m).__name__} {getattr(m, 'loop', '')}")
 def test_a_later_world_is_where_the_same_world_will_be(mover):
     world = World("w", BOX, POSTS, movers=(mover,))
-    now, later = Traffic.of(world, START), Traffic.of(world.later(12.5), START)
+    now, later = Trajectories.of(world, START), Trajectories.of(world.later(12.5), START)
     np.testing.assert_allclose(later.positions(FINE), now.positions(FINE + 12.5), atol=1e-9)
 
 
@@ -311,7 +311,7 @@ def test_motions_tell_radius_and_place_one_by_one():
 @given(st.lists(keyframed() | keyframed(interpolation="catmull-rom"), max_size=3))
 def test_keyframes_survive_files_and_json(tmp_path_factory, movers):
     world = World("w", (-100.0, -100.0, 100.0, 100.0), movers=(*movers, *KINDS[5:]))
-    if any(math.dist(place, (-90.0, -90.0)) < 1 for place in Traffic.of(world, (0, 0)).positions(0.0)[0]):
+    if any(math.dist(place, (-90.0, -90.0)) < 1 for place in Trajectories.of(world, (0, 0)).positions(0.0)[0]):
         return
     task = Task(world, (-90.0, -90.0, 0.0), (9.0, 7.0), time_limit=100.0)
     path = tmp_path_factory.mktemp("w") / "task.yaml"

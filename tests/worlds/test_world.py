@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from worlds import Disc, Route, Task, World
+from antdrive.worlds import Disc, Route, Task, World
 
 ROOM = World("room", (0.0, 0.0, 10.0, 8.0), (Disc(5.0, 4.0, 1.0), Disc(2.0, 6.0, 0.5)))
 

@@ -1,0 +1,231 @@
+"""The floor under every planner's length: the shortest path of the plane among inflated discs.
+
+A shortest path among discs consists of lines tangent to two of them and of arcs along their rims, as told for
+polygons by Lozano-Pérez & Wesley (*An algorithm for planning collision-free paths among polyhedral obstacles*, CACM
+22, 1979) and for curved obstacles by Liu & Arimoto (*Path planning using a tangent graph for mobile robots among
+polygonal and curved obstacles*, IJRR 11, 1992).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import time
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.planners.anyangle.lines import Ends, cells_along, cells_under, ends, polyline_length
+from antdrive.planners.iterative import require
+from antdrive.planners.plan import GridPlanner, PlanResult, PlanStatus, Query, path_cost
+from antdrive.worlds import Bounds, Floats, InputError, Point, Task
+
+NO_GAP = "discs and walls leave no way from the start to the goal for this clearance"
+
+
+@dataclass(frozen=True)
+class Line:
+    """A straight piece of a path."""
+
+    start: Point  # [m]
+    end: Point  # [m]
+
+    @property
+    def length(self) -> float:
+        """[m]."""
+        return math.dist(self.start, self.end)
+
+
+@dataclass(frozen=True)
+class Arc:
+    """A piece of a path along the rim of a disc."""
+
+    centre: Point  # [m]
+    radius: float  # [m]
+    begin: float  # the angle of its first point, seen from the centre [rad]
+    sweep: float  # [rad], positive counter-clockwise
+
+    @property
+    def length(self) -> float:
+        """[m]."""
+        return self.radius * abs(self.sweep)
+
+    def at(self, angle: float, stretch: float = 1.0) -> Point:
+        """The point `angle` rad past the beginning, `stretch` radii away from the centre."""
+        direction = self.begin + math.copysign(angle, self.sweep)
+        reach = self.radius * stretch
+        return self.centre[0] + reach * math.cos(direction), self.centre[1] + reach * math.sin(direction)
+
+    @property
+    def start(self) -> Point:
+        """[m]."""
+        return self.at(0.0)
+
+    @property
+    def end(self) -> Point:
+        """[m]."""
+        return self.at(abs(self.sweep))
+
+
+@dataclass(frozen=True)
+class TangentPath:
+    """Lines and arcs, each beginning where the one before ends and in its direction."""
+
+    pieces: tuple[Line | Arc, ...]
+    work: int = 0  # lines looked at to find it
+
+    @property
+    def length(self) -> float:
+        """[m]."""
+        return math.fsum(piece.length for piece in self.pieces)
+
+    def polyline(self, bulge: float, discs: npt.ArrayLike, bounds: Bounds, inflate: float) -> Floats:
+        """The path as a polyline (M, 2) [m] whose corners stand off the arcs, outside, by at most `bulge`.
+
+        So it never cuts into the disc it goes round. In a gap narrower than that, corners stand off less.
+        """
+        points = [self.pieces[0].start]
+        for piece in self.pieces:
+            if isinstance(piece, Arc):
+                points += _around(piece, bulge, np.asarray(discs, dtype=np.float64), bounds, inflate)
+            points.append(piece.end)
+        return np.array(points)
+
+
+def shortest(discs: npt.ArrayLike, bounds: Bounds, inflate: float, start: Point, goal: Point) -> TangentPath | None:
+    """The shortest path that stays `inflate` [m] from all discs (N, 3: x, y, radius) and inside the bounds.
+
+    None where there is none: contact closes a gap, so two discs exactly 2 `inflate` apart, or a disc that far from a
+    wall, let nothing pass. The ends must have the clearance; they may just have it.
+    """
+    from antdrive.planners.anyangle import _kernels_tangent
+
+    inflated = np.array(discs, dtype=np.float64).reshape(-1, 3)
+    inflated[:, 2] += inflate
+    box = np.array([bounds[0] + inflate, bounds[1] + inflate, bounds[2] - inflate, bounds[3] - inflate])
+    if not (box[0] <= box[2] and box[1] <= box[3]):
+        return None
+    both = np.array([start, goal], dtype=np.float64)
+    for x, y in both:
+        rim = np.hypot(inflated[:, 0] - x, inflated[:, 1] - y) - inflated[:, 2]
+        if min(x - box[0], y - box[1], box[2] - x, box[3] - y, *rim) < -_kernels_tangent.EPS:
+            return None
+    inflated = np.ascontiguousarray(inflated[_kernels_tangent.keep_outer(inflated, box)])
+    way, _, looked = _kernels_tangent.shortest_path(inflated, box, both)
+    if not len(way):
+        return None
+    pieces = _pieces(way, inflated) or [Line(start, goal)]  # the ends may be one point
+    return TangentPath(tuple(pieces), int(looked))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tangent(GridPlanner):
+    """The shortest path of the plane, over the tangents between inflated discs: no grid, the floor for every length.
+
+    It plans in the world behind the query, so it may find a way where the grid's cells are too coarse for one, and
+    then `cells` are those that the way passes over, with an infinite `cost`. Ends with too little room are left and
+    reached through the centres of their cells, as for all planners.
+
+    Raises:
+        InputError: the query has no task, so there is no world to plan in.
+    """
+
+    bulge: float = 1e-3  # how far the corners of the driven polyline may stand off an arc [m]
+
+    needs_world: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        require("bulge", self.bulge, above=0)
+
+    def plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        """Find the shortest path from the exact start to the exact goal."""
+        started = time.perf_counter()
+        result = self._plan(query, rng)  # whether the ends' cells are free does not matter here
+        options = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        return dataclasses.replace(result, options=options, wall_s=time.perf_counter() - started)
+
+    def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        if query.task is None:
+            raise InputError("query: has no task; the tangent planner needs the discs themselves, not a grid alone")
+        grid, world = query.grid, query.task.world
+        way = ends(query, touching=True)
+        reason = _shut(query, query.task, way)
+        found = None if reason else shortest(world.discs, world.bounds, grid.inflate, way.first, way.last)
+        if found is None:
+            return PlanResult(status=PlanStatus.NO_PATH, reason=reason or NO_GAP, work_unit=WORK_UNIT)
+        xy = way.joined(found.polyline(self.bulge, world.discs, world.bounds, grid.inflate))
+        waypoints = grid.fractional(xy)
+        cells = cells_along(query, waypoints) if query.blocked_end is None else np.empty((0, 2), dtype=np.int32)
+        cost = path_cost(cells, grid.cell) if len(cells) else math.inf
+        if not len(cells):
+            cells = cells_under(query, waypoints)
+        extra = polyline_length([*way.before, way.first]) + polyline_length([way.last, *way.after])
+        return PlanResult(
+            status=PlanStatus.SOLVED,
+            cells=cells,
+            cost=cost,
+            waypoints=waypoints,
+            length=found.length + extra,
+            work=found.work,
+            work_unit=WORK_UNIT,
+        )
+
+
+WORK_UNIT = "tangents checked"
+
+
+def _shut(query: Query, task: Task, way: Ends) -> str:
+    """Which end has neither room itself nor a free cell whose centre it can be passed through; empty: none."""
+    from antdrive.worlds.geometry import point_clearance, segment_clearance
+
+    shut = []
+    legs = (("start", task.start[:2], way.first, query.start, math.inf),
+            ("goal", task.goal, way.last, query.goal, task.goal_tolerance))  # fmt: skip
+    for key, exact, used, cell, within in legs:
+        if math.dist(exact, used) < 1e-9:
+            continue
+        own = float(point_clearance(task.world, [exact])[0])
+        clear = segment_clearance(task.world, [exact], [used])[0] >= min(query.grid.inflate, own) - 1e-9
+        if not (query.grid.free[cell] and clear and math.dist(exact, used) <= within):
+            shut.append(f"the {key} has too little room and no free cell near it can be reached")
+    return "; ".join(shut)
+
+
+def _pieces(way: Floats, discs: Floats) -> list[Line | Arc]:
+    """The kernel's lines with the arcs between them; what has no length is left out."""
+    pieces: list[Line | Arc] = []
+    for k, (ax, ay, bx, by, disc, turn) in enumerate(way):
+        if math.dist((ax, ay), (bx, by)) > 0.0:
+            pieces.append(Line((float(ax), float(ay)), (float(bx), float(by))))
+        if disc < 0:
+            break
+        x, y, radius = (float(v) for v in discs[int(disc)])
+        begin = math.atan2(by - y, bx - x)
+        leave = math.atan2(way[k + 1, 1] - y, way[k + 1, 0] - x)
+        sweep = (turn * (leave - begin)) % math.tau
+        if 1e-9 < sweep < math.tau - 1e-7:
+            pieces.append(Arc((x, y), radius, begin, float(turn * sweep)))
+    return pieces
+
+
+def _around(arc: Arc, bulge: float, discs: Floats, bounds: Bounds, inflate: float) -> list[Point]:
+    """Corners between the two ends of an arc: where its tangents meet, at evenly spaced points or closer ones."""
+    from antdrive.worlds._kernels import segment_clearances
+
+    half = math.acos(arc.radius / (arc.radius + bulge))
+    count = max(1, math.ceil(abs(arc.sweep) / (2.0 * half)))
+    cuts = np.linspace(0.0, abs(arc.sweep), count + 1)
+    while True:
+        half_widths, middles = np.diff(cuts) / 2.0, (cuts[1:] + cuts[:-1]) / 2.0
+        rim = np.array([arc.at(cut) for cut in cuts])
+        corners = np.array([arc.at(m, 1.0 / math.cos(h)) for m, h in zip(middles, half_widths, strict=True)])
+        room = np.empty((2, len(corners)))
+        box = np.asarray(bounds, dtype=np.float64)
+        segment_clearances(np.ascontiguousarray(rim[:-1]), corners, discs, box, room[0])
+        segment_clearances(corners, np.ascontiguousarray(rim[1:]), discs, box, room[1])
+        tight = (room.min(axis=0) < inflate - 1e-9) & (half_widths > 1e-5)
+        if not tight.any():
+            return [(float(x), float(y)) for x, y in corners]
+        cuts = np.sort(np.concatenate((cuts, middles[tight])))

@@ -1,0 +1,1 @@
+"""Graph search on the grid, and its incremental and space-time forms."""

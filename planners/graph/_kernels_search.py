@@ -1,0 +1,172 @@
+"""Compiled graph search over `Grid.moves`: arrays in, arrays out, nothing validated."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from antdrive.worlds._kernels import DCOL, DROW, SQRT2, Array, doubled, inline, kernel
+
+# Path costs are a + b sqrt(2) with whole a and b. Two different ones that could meet in one search differ by
+# far more than this, and rounding by far less.
+TIE = 1e-6
+
+# The open list is a ring of buckets, each a stack. One bucket spans 1/16 of a cell side; a move raises g + h
+# by at most 2 sqrt(2) = 2.83 cell sides, so 64 buckets never wrap onto each other.
+BUCKETS = 64
+PER_CELL = 16.0
+
+SEEN = 8  # bits of `mark`: 0-2 the move a cell was entered by, then seen, then closed
+CLOSED = 16
+
+
+def _shunned() -> Array:
+    """By entering move and mask of the cell before: the moves that the cell before makes as cheaply."""
+    step = {(int(r), int(c)): k for k, (r, c) in enumerate(zip(DROW, DCOL, strict=True))}
+    table = np.zeros((8, 256), dtype=np.uint8)
+    for entered in range(8):
+        for k in range(8):
+            row, col = int(DROW[entered] + DROW[k]), int(DCOL[entered] + DCOL[k])
+            if row == 0 and col == 0:
+                table[entered] |= 1 << k
+            elif (row, col) in step:
+                able = (np.arange(256) >> step[row, col]) & 1 == 1
+                table[entered, able] |= 1 << k
+    return table
+
+
+SHUNNED = _shunned()
+
+
+@inline
+def octile(rows: int, cols: int) -> float:
+    """Length of the shortest way over open ground [cells]."""
+    rows, cols = abs(rows), abs(cols)
+    return max(rows, cols) + (SQRT2 - 1.0) * min(rows, cols)
+
+
+@kernel
+def shortest_path(moves: Array, r0: int, c0: int, r1: int, c1: int, informed: bool) -> tuple[Array, int, int, int]:
+    """The cheapest path (N, 2), empty if there is none; its straight and diagonal steps; the cells expanded.
+
+    A* with the octile heuristic when `informed`, else Dijkstra. Within a bucket cells may come out of order,
+    so a cell whose cost drops after it was closed is opened again, and the search ends only when nothing
+    cheaper is open.
+    """
+    rows, cols = moves.shape
+    mask = moves.ravel()
+    offset = np.empty(8, dtype=np.int64)
+    for k in range(8):
+        offset[k] = DROW[k] * cols + DCOL[k]
+    start, goal = r0 * cols + c0, r1 * cols + c1
+
+    mark = np.zeros(rows * cols, dtype=np.uint8)
+    cost = np.empty(rows * cols, dtype=np.float64)  # only read where seen
+    head = np.full(BUCKETS, -1, dtype=np.int32)
+    entry_cell = np.empty(1024, dtype=np.int32)
+    entry_next = np.empty(1024, dtype=np.int32)
+    entries, spare = 0, -1  # entries ever made; a list of those that can be used again
+
+    origin = octile(r1 - r0, c1 - c0) if informed else 0.0
+    mark[start] = SEEN
+    cost[start] = 0.0
+    entry_cell[0], entry_next[0] = start, -1
+    head[0], entries = 0, 1
+    waiting, bucket, expanded = 1, 0, 0
+    limit = np.inf
+
+    while waiting > 0:
+        slot = bucket & (BUCKETS - 1)
+        entry = head[slot]
+        if entry < 0:
+            if mark[goal] & CLOSED:
+                break
+            bucket += 1
+            continue
+        head[slot] = entry_next[entry]
+        entry_next[entry] = spare
+        spare = entry
+        waiting -= 1
+        i = np.int64(entry_cell[entry])
+        if mark[i] & CLOSED:
+            continue
+        mark[i] |= CLOSED
+        g = cost[i]
+        if i == goal:
+            limit = g - TIE
+            continue
+        row = i // cols
+        col = i - row * cols
+        if limit < np.inf:  # finishing the goal's own bucket
+            h = octile(r1 - row, c1 - col) if informed else 0.0
+            if g + h >= limit:
+                continue
+        expanded += 1
+        entered = mark[i] & 7
+        todo = mask[i]
+        if i != start:
+            todo &= ~SHUNNED[entered, mask[i - offset[entered]]]
+        for k in range(8):
+            if not todo & (1 << k):
+                continue
+            j = i + offset[k]
+            g_new = g + (SQRT2 if k & 1 else 1.0)
+            if mark[j] & SEEN and g_new >= cost[j] - TIE:
+                continue
+            mark[j] = SEEN | k
+            cost[j] = g_new
+            h = octile(r1 - row - DROW[k], c1 - col - DCOL[k]) if informed else 0.0
+            slot = max(bucket, int((g_new + h - origin) * PER_CELL + TIE)) & (BUCKETS - 1)
+            if spare >= 0:
+                entry = spare
+                spare = entry_next[entry]
+            else:
+                if entries == len(entry_cell):
+                    entry_cell = doubled(entry_cell)
+                    entry_next = doubled(entry_next)
+                entry = np.int32(entries)
+                entries += 1
+            entry_cell[entry] = j
+            entry_next[entry] = head[slot]
+            head[slot] = entry
+            waiting += 1
+
+    if not mark[goal] & SEEN:
+        return np.empty((0, 2), dtype=np.int32), 0, 0, expanded
+    n = 1
+    i = goal
+    while i != start:
+        i -= offset[mark[i] & 7]
+        n += 1
+    cells = np.empty((n, 2), dtype=np.int32)
+    diagonal = 0
+    i = goal
+    for step in range(n - 1, -1, -1):
+        cells[step, 0] = i // cols
+        cells[step, 1] = i % cols
+        if step > 0:
+            diagonal += mark[i] & 1
+            i -= offset[mark[i] & 7]
+    return cells, n - 1 - diagonal, diagonal, expanded
+
+
+@kernel
+def connected(moves: Array, r0: int, c0: int, r1: int, c1: int) -> bool:
+    """Whether moves lead from one cell to another: a flood fill."""
+    rows, cols = moves.shape
+    mask = moves.ravel()
+    start, goal = r0 * cols + c0, r1 * cols + c1
+    seen = np.zeros(rows * cols, dtype=np.uint8)
+    stack = np.empty(rows * cols, dtype=np.int32)
+    stack[0], size = start, 1
+    seen[start] = 1
+    while size > 0 and not seen[goal]:
+        size -= 1
+        i = np.int64(stack[size])
+        for k in range(8):
+            if mask[i] & (1 << k):
+                j = i + DROW[k] * cols + DCOL[k]
+                if not seen[j]:
+                    seen[j] = 1
+                    stack[size] = j
+                    size += 1
+    return bool(seen[goal])

@@ -1,0 +1,48 @@
+"""D* Lite (S. Koenig and M. Likhachev, *D\\* Lite*, AAAI 2002): A* from the goal that is repaired, not repeated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.planners.graph.incremental import IncrementalSearch, ReplanningPlanner
+from antdrive.planners.plan import Cells, Query
+
+
+@dataclass(frozen=True, kw_only=True)
+class DStarLite(ReplanningPlanner):
+    """The shortest path over the grid's moves, by D* Lite (Koenig & Likhachev 2002); replans while driving."""
+
+    def replanner(self, query: Query) -> DStarLiteSearch:
+        """A search that goes on after its first answer."""
+        return DStarLiteSearch(query)
+
+
+class DStarLiteSearch(IncrementalSearch):
+    """D* Lite at work: the optimised version, Figure 4 of the paper, in exact whole-number costs."""
+
+    def __init__(self, query: Query) -> None:
+        super().__init__(query)
+        from antdrive.planners.graph import _kernels_dstar_lite
+
+        self._kernels = _kernels_dstar_lite
+        cells = self._moves.size
+        self._goal = self._index(query.goal)
+        self._state = np.empty(3, dtype=np.int64)  # the queue's size, k_m, s_last
+        self._g = np.empty(cells, dtype=np.int64)
+        self._rhs = np.empty(cells, dtype=np.int64)
+        self._heap = np.empty((cells, 3), dtype=np.int64)
+        self._place = np.empty(cells, dtype=np.int32)
+        self._kernels.begin(
+            self._moves, self._index(query.start), self._goal,
+            self._state, self._g, self._rhs, self._heap, self._place,
+        )  # fmt: skip
+
+    def _repair(self, changed: npt.NDArray[np.int64], start: int) -> tuple[Cells, int, int]:
+        found: tuple[Cells, int, int] = self._kernels.repair(
+            changed, self._moves, start, self._goal,
+            self._state, self._g, self._rhs, self._heap, self._place,
+        )  # fmt: skip
+        return found

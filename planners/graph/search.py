@@ -1,0 +1,49 @@
+"""The grid optimum: Dijkstra's algorithm and A* (Hart, Nilsson & Raphael 1968)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from antdrive.planners.plan import GridPlanner, PlanResult, PlanStatus, Query
+
+
+@dataclass(frozen=True, kw_only=True)
+class Dijkstra(GridPlanner):
+    """The shortest path over the grid's moves, by Dijkstra's algorithm."""
+
+    def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        return shortest(query, informed=False)
+
+
+@dataclass(frozen=True, kw_only=True)
+class AStar(GridPlanner):
+    """The shortest path over the grid's moves, by A* with the octile heuristic."""
+
+    def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        return shortest(query, informed=True)
+
+
+def shortest(query: Query, *, informed: bool = True) -> PlanResult:
+    """The shortest path between two free cells, or `NO_PATH`."""
+    from antdrive.planners.graph import _kernels_search  # here, so that naming a planner does not load the compiler
+
+    cells, straight, diagonal, expanded = _kernels_search.shortest_path(
+        query.grid.moves, *query.start, *query.goal, informed
+    )
+    if not len(cells):
+        return PlanResult(status=PlanStatus.NO_PATH, reason=NO_WAY, work=expanded)
+    cost = query.grid.cell * (straight + math.sqrt(2.0) * diagonal)
+    return PlanResult(status=PlanStatus.SOLVED, cells=cells, cost=cost, work=expanded)
+
+
+NO_WAY = "no sequence of allowed moves leads from the start to the goal"
+
+
+def reachable(query: Query) -> bool:
+    """Whether allowed moves lead from the start to the goal."""
+    from antdrive.planners.graph import _kernels_search
+
+    return bool(_kernels_search.connected(query.grid.moves, *query.start, *query.goal))

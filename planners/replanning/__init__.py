@@ -1,0 +1,1 @@
+"""Planners that answer again while the world changes."""

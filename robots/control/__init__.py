@@ -1,0 +1,1 @@
+"""Control: pure pursuit, its speed rules, and local avoidance."""

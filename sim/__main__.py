@@ -1,5 +1,0 @@
-"""`python -m sim` is the same as `antdrive`."""
-
-from sim.cli import main
-
-main()

@@ -1,0 +1,3 @@
+"""The command line."""
+
+from antdrive.sim.cli.commands import main as main

@@ -1,0 +1,1 @@
+"""The log of a drive and everything computed from it alone."""

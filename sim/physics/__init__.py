@@ -1,0 +1,1 @@
+"""Physics: the only package that imports PyBullet."""

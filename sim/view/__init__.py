@@ -1,0 +1,1 @@
+"""Figures, films, reports and the live window."""

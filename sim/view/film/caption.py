@@ -1,0 +1,257 @@
+"""What a film says: a band below the picture with names and numbers, a legend in its corner, the outcome at its end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image, ImageDraw
+
+from antdrive.sim.log.rollout import Outcome
+from antdrive.sim.view.film import _kernels_paint as kernels
+from antdrive.sim.view.film.lettering import Sprite, fitted, font, pill, plate, text_width
+from antdrive.sim.view.film.replay import SLOW
+from antdrive.sim.view.scene import Scene
+from antdrive.sim.view.style import (
+    BAD,
+    BAND,
+    CALM,
+    DOUBT,
+    GOOD,
+    INK,
+    MOVER,
+    MUTED,
+    ROUTE,
+    SHELL,
+    UNSEEN,
+    ZONE,
+    Colour,
+    field_colours,
+    speed_colours,
+)
+
+Picture = npt.NDArray[np.uint8]  # (H, W, 3)
+
+VERDICTS: dict[Outcome, tuple[str, Colour]] = {
+    Outcome.SUCCEEDED: ("✓ SUCCEEDED", GOOD),
+    Outcome.COLLIDED: ("✕ COLLIDED", BAD),
+    Outcome.RUN_INTO: ("✕ RUN INTO", DOUBT),
+    Outcome.JUMPED_ON: ("✕ JUMPED ON", DOUBT),
+    Outcome.TIMED_OUT: ("TIMED OUT", DOUBT),
+    Outcome.STUCK: ("STUCK", DOUBT),
+    Outcome.NO_PATH: ("NO PATH", DOUBT),
+    Outcome.STOPPED: ("STOPPED", DOUBT),
+}
+DRIVING = ("DRIVING", CALM)
+PLANNING = ("PLANNING", CALM)
+SLOWED = (f"SLOW ×1/{SLOW:g}", BAD)
+
+#: What the four numbers of the band are called: while it drives, and while it plans.
+DRIVEN = ("TIME", "SPEED", "CLEARANCE", "MINIMUM")
+SEARCHED = ("ITERATION", "BEST PATH", "MEAN", "ARRIVED")
+
+Values: TypeAlias = list[tuple[str, bool]]  # a text and whether it is alarming
+
+
+@dataclass(frozen=True)
+class Reading:
+    """The numbers of one frame."""
+
+    time: float  # [s]
+    speed: float  # [m/s]
+    clearance: float  # [m]
+    least: float  # the smallest clearance so far [m]
+
+    @property
+    def told(self) -> Values:
+        """As the band shows them."""
+        return [
+            (f"{self.time:.1f} s", False),
+            (f"{max(self.speed, 0.0):.2f} m/s", False),
+            (_metres(self.clearance), self.clearance <= 0),
+            (_metres(self.least), self.least <= 0),
+        ]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Sizes of lettering and band for a frame [px]."""
+
+    width: int
+    unit: int  # height of small text
+    wide: bool  # whether names, numbers and outcome fit beside each other
+    card: bool  # whether the legend is a card in the picture's corner; else it is a row of the band
+    height: int  # of the band
+
+    @classmethod
+    def of(cls, size: tuple[int, int], card: bool) -> Layout:
+        """The layout for a frame of a size."""
+        width, height = size
+        wide = width >= 1.5 * height and width >= 900
+        unit = max(8, round(min(height / 46, width / (82 if wide else 56))))
+        rows = (4.7 if wide else 7.8) + (0.0 if card else 1.9)
+        return cls(width, unit, wide, card, 2 * round(rows * unit / 2))
+
+
+class Band:
+    """The band below the picture. What never changes is drawn once."""
+
+    def __init__(
+        self,
+        layout: Layout,
+        title: str,
+        subtitle: str,
+        note: str | None,
+        entries: list[Entry],
+        names: tuple[str, ...] = DRIVEN,
+    ) -> None:
+        self.layout = layout
+        unit, width, wide = layout.unit, layout.width, layout.wide
+        self._blank = Image.new("RGB", (width, layout.height), BAND)
+        draw = ImageDraw.Draw(self._blank)
+        draw.line([(0, 0), (width, 0)], fill=(210, 216, 225), width=max(1, unit // 8))
+        pad, big, small = unit, round(1.35 * unit), round(0.86 * unit)
+        numbers, column = (round(0.36 * width), 8 * unit) if wide else (pad, (width - pad) // 4)
+        self._fields = [(numbers + k * column, round((0.75 if wide else 4.25) * unit)) for k in range(4)]
+        note_room = width - self._fields[3][0] - column - pad if wide else width // 2
+        shown = fitted(note or "", note_room, small, True)
+        room = numbers - 2 * pad if wide else width - _widest_verdict(unit) - 3 * pad
+        subroom = room if wide else width - text_width(shown, small, True) - 3 * pad
+        draw.text((pad, 0.6 * unit), fitted(title, room, big, True), font=font(big, True), fill=INK)
+        draw.text((pad, 2.45 * unit), fitted(subtitle, subroom, unit), font=font(unit), fill=MUTED)
+        draw.text((width - pad, (3.75 if wide else 3.3) * unit), shown, font=font(small, True), fill=CALM, anchor="rm")
+        for (x, y), name in zip(self._fields, names, strict=True):
+            draw.text((x, y), name, font=font(round(0.82 * unit), True), fill=MUTED)
+        if not layout.card:
+            _legend_row(draw, entries, layout)
+
+    def draw(self, values: Values, verdict: tuple[str, Colour]) -> Picture:
+        """The band (h, W, 3) with the four numbers of one frame."""
+        unit = self.layout.unit
+        image = self._blank.copy()
+        draw = ImageDraw.Draw(image)
+        for (x, y), (text, bad) in zip(self._fields, values, strict=True):
+            draw.text((x, y + 1.15 * unit), text, font=font(round(1.4 * unit), True), fill=BAD if bad else INK)
+        band = np.array(image)
+        plate_ = pill(verdict[0], round(1.08 * unit), verdict[1])
+        kernels.put_sprite(band, plate_, self.layout.width - unit - plate_.shape[1], round(0.5 * unit), 1.0)
+        return band
+
+
+def _widest_verdict(unit: int) -> int:
+    size = round(1.08 * unit)
+    widest = max(text_width(text, size, True) for text, _ in (*VERDICTS.values(), DRIVING, PLANNING, SLOWED))
+    return widest + 2 * round(0.75 * size)
+
+
+def _metres(value: float) -> str:
+    if not abs(value) < 99:
+        return "—"
+    return f"{value + 0.0 if abs(value) >= 5e-4 else 0.0:.3f} m"
+
+
+WIDE = ("ramp", "field", "line", "dash", "zone")  # kinds of entries with a wide sample
+
+
+class Entry(NamedTuple):
+    """A line of the legend."""
+
+    kind: str  # how its sample is drawn
+    colour: Colour
+    text: str
+    wide: float = 0.0  # of a scale bar [px]
+
+
+def entries_for(
+    scene: Scene, step: float, pixel: float, *, planning: bool = False, replans: bool = False
+) -> list[Entry]:
+    """What the legend of a scene tells: grid lines every `step` metres, `pixel` metres a pixel in the middle."""
+    found = (
+        [Entry("field", INK, "planner's field"), Entry("line", SHELL, "best path so far")]
+        if planning
+        else [
+            Entry("ramp", INK, f"speed, 0 to {scene.robot.max_speed:.3g} m/s"),
+            Entry("dash", ROUTE, "planned route"),
+        ]
+    )
+    if replans:
+        found.append(Entry("dot", ROUTE, "new route"))
+    if scene.inflate > 0:
+        found.append(Entry("zone", ZONE, f"inflated by {scene.inflate:.2f} m"))
+    if scene.unseen.any():
+        found.append(Entry("dot", UNSEEN, "placed after planning"))
+    if scene.mover_radii:
+        found.append(Entry("dot", MOVER, "moving obstacle, 1.5 s ahead"))
+    return [*found, Entry("scale", INK, f"{step:g} m (grid)", step / pixel)]
+
+
+def legend_card(entries: list[Entry], layout: Layout) -> Sprite:
+    """The legend as a card."""
+    size = max(8, round(0.9 * layout.unit))
+    line, pad, key = round(1.55 * size), round(0.8 * size), round(max(2.6 * size, *(entry.wide for entry in entries)))
+    wide = 2 * pad + key + size // 2 + max(text_width(entry.text, size) for entry in entries)
+    image = plate(wide, 2 * pad + line * len(entries), (255, 255, 255), 222, radius=size // 2)
+    draw = ImageDraw.Draw(image)
+    for k, entry in enumerate(entries):
+        middle = pad + line * k + line / 2
+        _key(draw, entry, pad, middle, key, size)
+        draw.text((pad + key + size // 2, middle), entry.text, font=font(size), fill=INK, anchor="lm")
+    return np.array(image)
+
+
+def _legend_row(draw: ImageDraw.ImageDraw, entries: list[Entry], layout: Layout) -> None:
+    """The legend as the last row of a band."""
+    unit = layout.unit
+    middle = layout.height - 1.15 * unit
+    draw.line([(unit, middle - 1.05 * unit), (layout.width - unit, middle - 1.05 * unit)], fill=(226, 230, 237))
+    size = max(7, round(0.9 * unit))
+    while True:
+        keys = [round(entry.wide or (2.2 if entry.kind in WIDE else 1.0) * size) for entry in entries]
+        widths = [key + 0.5 * size + text_width(entry.text, size) for key, entry in zip(keys, entries, strict=True)]
+        gap = (layout.width - 2 * unit - sum(widths)) / max(1, len(entries) - 1)
+        if gap >= size or size <= 7:
+            break
+        size -= 1
+    x, gap = float(unit), min(gap, 2.5 * size)
+    for entry, key, width in zip(entries, keys, widths, strict=True):
+        _key(draw, entry, round(x), middle, key, size)
+        draw.text((x + key + 0.5 * size, middle), entry.text, font=font(size), fill=INK, anchor="lm")
+        x += width + gap
+
+
+def _key(draw: ImageDraw.ImageDraw, entry: Entry, x: int, y: float, wide: int, size: int) -> None:
+    """The sample beside a line of the legend."""
+    kind, colour = entry.kind, entry.colour
+    r = 0.42 * size
+    if kind in ("ramp", "field"):
+        colours = speed_colours if kind == "ramp" else field_colours
+        for i, tint in enumerate(colours(np.linspace(0, 1, wide))):
+            draw.line([(x + i, y - 0.22 * size), (x + i, y + 0.22 * size)], fill=tuple(int(c) for c in tint))
+    elif kind == "dash":
+        for start in np.arange(x, x + wide - 1, wide / 3):
+            draw.line([(start, y), (start + wide / 5, y)], fill=colour, width=max(2, size // 6))
+    elif kind == "line":
+        draw.line([(x, y), (x + wide, y)], fill=colour, width=max(2, size // 5))
+    elif kind == "zone":
+        pale = tuple(round(238 + (c - 238) * 0.3) for c in colour)
+        draw.rounded_rectangle((x, y - 0.4 * size, x + wide, y + 0.4 * size), size // 4, fill=pale, outline=colour)
+    elif kind == "dot":
+        draw.ellipse((x + wide / 2 - r, y - r, x + wide / 2 + r, y + r), fill=colour)
+    else:  # a scale bar
+        line = max(1, size // 7)
+        draw.line([(x, y), (x + entry.wide, y)], fill=colour, width=line)
+        for end in (x, x + entry.wide):
+            draw.line([(end, y - 0.35 * size), (end, y + 0.35 * size)], fill=colour, width=line)
+
+
+def banner(outcome: Outcome, layout: Layout, room: int) -> Sprite:
+    """The outcome as a sentence, for the end of a film, within `room` [px]."""
+    name, colour = VERDICTS[outcome]
+    sentence = outcome.value[0].upper() + outcome.value[1:]
+    size = round(1.5 * layout.unit)
+    text = f"{name[0]}  {sentence}" if name[0] in "✓✕" else sentence
+    while size > 8 and text_width(text, size, True) > 0.86 * room:
+        size -= 1
+    return pill(text, size, colour)

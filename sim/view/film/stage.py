@@ -1,0 +1,341 @@
+"""A stage for films: everything that stands still is rendered once, each frame adds what moves.
+
+PyBullet's TinyRenderer draws the bodies; for a camera that moves, those that stand still are cast by rays. The still picture
+keeps its depth, so that a frame costs only the pixels around the robot: they are rendered through a crop of the same camera and
+blended in where they are nearer than what stood there.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.sim.physics.engine import bullet, client
+from antdrive.sim.view.film import _kernels_paint as kernels
+from antdrive.sim.view.film.camera import Camera
+from antdrive.sim.view.film.cast import Solids
+from antdrive.sim.view.film.lettering import glow
+from antdrive.sim.view.film.model import Mesh, Part, cylinder, join, kerb, robot_height, robot_parts
+from antdrive.sim.view.film.paint import dashes, kerb_width, paint_ground
+from antdrive.sim.view.film.tiny import Box, add_mesh, merged, render
+from antdrive.sim.view.scene import Scene
+from antdrive.sim.view.style import KERB, MOVER, OBSTACLE, ROUTE, SHELL, UNSEEN, Colour, field_colours, speed_colours
+
+if TYPE_CHECKING:
+    from antdrive.worlds import Grid
+
+Floats = npt.NDArray[np.float64]
+Picture = npt.NDArray[np.uint8]  # (H, W, 3)
+
+GHOST = 0.16  # how much of the robot shines through a cylinder in front of it
+SOFT = 0.05  # [m]
+FORETOLD = 1.5  # how far ahead movers' ways are drawn [s]
+
+
+@dataclass(frozen=True, eq=False)
+class Backdrop:
+    """What a camera sees of everything that stands still."""
+
+    camera: Camera
+    pixels: Picture
+    visible: npt.NDArray[np.float32]  # (H, W) the part of each pixel that is ground
+    depth: npt.NDArray[np.float32]  # (fine H, fine W) of bodies; 1 where there are none
+
+
+class Stage:
+    """A scene before one camera. Use it in a `with` block.
+
+    >>> with Stage(scene, camera, route=rollout.route) as stage:
+    ...     stage.drive(points, speeds)
+    ...     picture = stage.frame(pose, wheels)
+    """
+
+    def __init__(self, scene: Scene, camera: Camera, *, route: Floats, fine: int = 2, moves: bool = False) -> None:
+        self.scene = scene
+        self.camera = camera
+        self.fine = fine  # each pixel is the mean of fine x fine
+        self._moves = moves  # the camera does, so that nothing can be kept from frame to frame
+        self.tall = np.minimum(scene.obstacles[:, 3], drawn_height(scene))
+        self._route = np.ascontiguousarray(route, dtype=np.float64).reshape(-1, 2)
+        self._sun, self._light = _sun(camera)
+        self._trail_width = trail_width(scene, camera)
+        self._trail: list[tuple[Floats, Floats]] = []
+        self._written: list[tuple[Picture, float, float, float]] = []
+        self._renewed = (np.empty((0, 5)), np.empty((0, 5)))
+        self._open = contextlib.ExitStack()
+
+    def __enter__(self) -> Stage:
+        self._still = self._open.enter_context(client())
+        self._moving = self._open.enter_context(client())
+        self._pieces = still_pieces(self.scene, self.tall)
+        self._solids = solids(self._pieces, self.scene, self.tall)
+        balls = [mesh.ball for mesh, _ in self._pieces]
+        self._centres = np.array([centre for centre, _ in balls])
+        self._radii = np.array([radius for _, radius in balls])
+        self._loaded = np.zeros(len(balls), dtype=np.bool_)
+        self._parts = robot_parts(self.scene.robot)
+        self._bodies = [add_mesh(self._moving, part.mesh, part.colour) for part in self._parts]
+        tall = drawn_height(self.scene)
+        self._movers = [add_mesh(self._moving, cylinder(radius, 0.0, tall), MOVER) for radius in self.scene.mover_radii]
+        self.look(self.camera)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._open.close()
+
+    def look(self, camera: Camera) -> None:
+        """Render everything that stands still through a camera."""
+        self.camera = camera
+        self.backdrop = self._render_still(camera)
+        self._forward = camera.ground
+        self._inverse = np.linalg.inv(self._forward)
+        height, width = self.backdrop.visible.shape
+        self._canvas = self.backdrop.pixels.copy()
+        self._painted = np.zeros((height, width, 4), dtype=np.uint8)
+        for sprite in self._written:
+            self._lay(*sprite)
+        if self._trail:
+            rows, colours = (np.concatenate(part) for part in zip(*self._trail, strict=True))
+            ends = rows[:, :4].reshape(-1, 2, 2)
+            middles = np.column_stack([ends.mean(axis=1), np.zeros(len(rows))])
+            seen = camera.sees(middles, np.hypot(*(ends[:, 1] - ends[:, 0]).T) / 2 + self._trail_width)
+            self._paint_trail(rows[seen], colours[seen])
+
+    def drive(self, points: Floats, speeds: npt.ArrayLike) -> None:
+        """Continue the driven trail along points (N, 2), N >= 2, at speeds (N,) [m/s]."""
+        share = np.abs(np.asarray(speeds, dtype=np.float64)) / self.scene.robot.max_speed
+        half = np.full(len(points) - 1, self._trail_width / 2)
+        rows = np.ascontiguousarray(np.column_stack([points[:-1], points[1:], half]))
+        colours = speed_colours((share[:-1] + share[1:]) / 2)
+        self._trail.append((rows, colours))
+        self._paint_trail(rows, colours)
+
+    def reroute(self, line: Floats, places: Floats) -> None:
+        """Draw a line (N, 2), from now on, in place of the last, and marks at places (M, 2) where new lines were found."""
+        half = 1.5 * self.camera.pixel
+        dots = np.column_stack([places, places, np.full(len(places), 2.4 * half)])
+        self._renewed = (dashes(line, 7 * half, 5 * half, 0.9 * half), np.ascontiguousarray(dots))
+
+    def frame(
+        self,
+        pose: npt.ArrayLike,
+        wheels: tuple[float, float] = (0.0, 0.0),
+        movers: npt.ArrayLike = (),
+        velocities: npt.ArrayLike | None = None,
+    ) -> Picture:
+        """The picture with the robot at a pose, its wheels turned by angles (left, right) and movers at (M, 2).
+
+        Movers' `velocities` (M, 2) [m/s] are drawn as lines to where they will be if they keep them.
+        """
+        x, y, yaw = (float(value) for value in np.asarray(pose))
+        places = np.asarray(movers, dtype=np.float64).reshape(-1, 2)
+        frame = self._canvas.copy()
+        for rows in self._renewed:
+            self._blend(frame, rows, ROUTE, 0.85)
+        if velocities is not None:
+            self._foretell(frame, places, np.asarray(velocities, dtype=np.float64).reshape(-1, 2))
+        self._shade(frame, np.array([x, y, yaw]), places)
+        self._place(x, y, yaw, wheels, places)
+        for box in merged(self._boxes(x, y, places)):
+            self._put(frame, box)
+        return frame
+
+    def field(self, grid: Grid, levels: Floats, line: Floats) -> Picture:
+        """The picture without a robot: a field (R, C) of a grid, 0 to 1, on the ground, and a line (N, 2) over it."""
+        frame = self.backdrop.pixels.copy()
+        tints = field_colours(np.linspace(0, 1, 256))
+        visible, (x, y) = self.backdrop.visible, grid.origin
+        kernels.lay_field(frame, visible, self._inverse, np.ascontiguousarray(levels), x, y, grid.cell, tints)
+        half = np.full(max(0, len(line) - 1), 1.6 * self.camera.pixel)
+        rows = np.ascontiguousarray(np.column_stack([line[:-1], line[1:], half]))
+        painted = np.zeros((*visible.shape, 4), dtype=np.uint8)
+        colours = np.tile(np.array(SHELL, dtype=np.float64), (len(rows), 1))
+        kernels.draw_trail(frame, frame.copy(), visible, painted, self._forward, self._inverse, rows, colours)
+        for sprite, x, y, reach in self._written:
+            self._put_label(frame, sprite, x, y, reach)
+        return frame
+
+    def write(self, sprite: Picture, x: float, y: float, reach: float) -> None:
+        """Lay an RGBA picture on the ground's picture, centred below (or above) a disc of radius `reach` at x, y."""
+        self._written.append((sprite, x, y, reach))
+        self._lay(sprite, x, y, reach)
+
+    def _lay(self, sprite: Picture, x: float, y: float, reach: float) -> None:
+        for picture in (self.backdrop.pixels, self._canvas):
+            self._put_label(picture, sprite, x, y, reach)
+
+    def _put_label(self, frame: Picture, sprite: Picture, x: float, y: float, reach: float) -> None:
+        height, width = self.backdrop.visible.shape
+        high, wide = sprite.shape[:2]
+        px = self.pixel(x, y)[0]
+        turn = np.linspace(0, 2 * math.pi, 17)
+        rim = [self.pixel(x + reach * math.cos(a), y + reach * math.sin(a))[1] for a in turn]
+        top = max(rim) + 1 if max(rim) + 1 + high < height else min(rim) - 1 - high
+        left = min(max(px - wide / 2, 0), width - wide) if -wide < px < width + wide else px
+        kernels.put_sprite(frame, sprite, round(left), round(top), 1.0)
+
+    def pixel(self, x: float, y: float, z: float = 0.0) -> tuple[float, float]:
+        """Where a point appears [px]."""
+        at = self.camera.pixels([(x, y, z)])[0]
+        return float(at[0]), float(at[1])
+
+    def _load(self, chosen: npt.NDArray[np.bool_]) -> None:
+        """Have just these pieces in the client: what cannot be seen need not be drawn."""
+        if (chosen == self._loaded).all():
+            return
+        bullet().resetSimulation(physicsClientId=self._still)
+        for mesh, colour in grouped([self._pieces[k] for k in np.flatnonzero(chosen)]):
+            add_mesh(self._still, mesh, colour)
+        self._loaded = chosen
+
+    def _render_still(self, camera: Camera) -> Backdrop:
+        if self._moves:
+            image, depth, seg = self._solids.seen(camera, self.fine, self._light)
+        else:
+            self._load(camera.sees(self._centres, self._radii))
+            image, depth, seg = render(self._still, camera, None, self.fine, self._light)
+        width, height = camera.size
+        visible = np.empty((height, width), dtype=np.float32)
+        ground = np.empty((height, width), dtype=np.bool_)
+        kernels.count_ground(seg, self.fine, visible, ground)
+        depth[seg < 0] = 1.0
+        rgb = paint_ground(camera, self.scene, self._route, ground, self.tall, self._sun)
+        pixels = np.empty((height, width, 3), dtype=np.uint8)
+        kernels.resolve(rgb, image, seg, self.fine, visible, pixels)
+        return Backdrop(camera, pixels, visible, depth)
+
+    def _paint_trail(self, rows: Floats, colours: Floats) -> None:
+        kernels.draw_trail(
+            self._canvas, self.backdrop.pixels, self.backdrop.visible, self._painted, self._forward, self._inverse, rows,
+            colours,
+        )  # fmt: skip
+
+    def _foretell(self, frame: Picture, places: Floats, velocities: Floats) -> None:
+        """A line from each mover to where it will be, with a dot at each half second."""
+        half = 1.1 * self.camera.pixel
+        ahead = places + FORETOLD * velocities
+        lines = np.column_stack([places, ahead, np.full(len(places), half)])
+        stops = [places + share * (ahead - places) for share in (1 / 3, 2 / 3, 1.0)]
+        moving = np.hypot(*velocities.T) > 0.01
+        dots = np.vstack([np.column_stack([stop, stop, np.full(len(stop), 2.2 * half)])[moving] for stop in stops])
+        for rows, strength in ((lines[moving], 0.45), (dots, 0.75)):
+            self._blend(frame, np.ascontiguousarray(rows), MOVER, strength)
+
+    def _blend(self, frame: Picture, rows: Floats, colour: Colour, strength: float) -> None:
+        """Draw thick segments (N, 5) on the ground."""
+        tint = np.array(colour, dtype=np.float64)
+        kernels.blend_capsules(frame, self.backdrop.visible, self._forward, self._inverse, rows, tint, strength)
+
+    def _shade(self, frame: Picture, pose: Floats, movers: Floats) -> None:
+        """The soft shadows of what moves, and a glow under a robot too small to be found at a glance."""
+        tall, foot = robot_height(self.scene.robot), self.scene.robot.footprint
+        shape = np.array([foot.half_length, foot.half_width, foot.rounding])
+        self._shadow(frame, pose, shape, tall, SOFT + 0.3 * tall)
+        wide = round(2 * foot.radius / self.camera.pixel)
+        if wide < 0.05 * frame.shape[1]:
+            px, py = self.pixel(pose[0], pose[1], tall / 2)
+            halo = glow(2 * wide + round(0.02 * frame.shape[1]), SHELL)
+            kernels.put_sprite(frame, halo, round(px - len(halo) / 2), round(py - len(halo) / 2), 1.0)
+        for (x, y), radius in zip(movers, self.scene.mover_radii, strict=True):
+            tall = drawn_height(self.scene)
+            self._shadow(frame, np.array([x, y, 0.0]), np.array([0.0, 0.0, radius]), tall, SOFT + 0.3 * tall)
+
+    def _shadow(self, frame: Picture, pose: Floats, shape: Floats, tall: float, soft: float) -> None:
+        sun = np.array(self._sun) * tall
+        for reach, blur, strength in ((sun, soft, 0.30), (np.zeros(2), 0.5 * shape.sum(), 0.22)):
+            kernels.shade_body(
+                frame, self.backdrop.visible, self._forward, self._inverse, pose, shape, reach, float(blur), strength
+            )
+
+    def _place(self, x: float, y: float, yaw: float, wheels: tuple[float, float], movers: Floats) -> None:
+        p = bullet()
+        for part, body in zip(self._parts, self._bodies, strict=True):
+            at, quaternion = part_pose(part, x, y, yaw, wheels)
+            p.resetBasePositionAndOrientation(body, at, quaternion, physicsClientId=self._moving)
+        for (mx, my), body in zip(movers, self._movers, strict=True):
+            p.resetBasePositionAndOrientation(body, (mx, my, 0.0), (0, 0, 0, 1), physicsClientId=self._moving)
+
+    def _boxes(self, x: float, y: float, movers: Floats) -> list[Box]:
+        """The pixels that each moving body may cover."""
+        tall = drawn_height(self.scene)
+        robot = self.scene.robot
+        bodies = [(x, y, 1.05 * robot.footprint.radius, 1.2 * max(robot_height(robot), 2.2 * robot.wheel_radius))]
+        bodies += [(mx, my, r, tall) for (mx, my), r in zip(movers, self.scene.mover_radii, strict=True)]
+        width, height = self.camera.size
+        boxes = []
+        for bx, by, radius, top in bodies:
+            corners = [(bx + i * radius, by + j * radius, z) for i in (-1, 1) for j in (-1, 1) for z in (0.0, top)]
+            at = self.camera.pixels(corners)
+            x0, y0 = np.maximum(np.floor(at.min(axis=0)).astype(int) - 1, 0)
+            x1, y1 = np.minimum(np.ceil(at.max(axis=0)).astype(int) + 1, (width, height))
+            if x0 < x1 and y0 < y1:
+                boxes.append((int(x0), int(y0), int(x1), int(y1)))
+        return boxes
+
+    def _put(self, frame: Picture, box: Box) -> None:
+        image, depth, seg = render(self._moving, self.camera, box, self.fine, self._light)
+        kernels.put_bodies(frame, image, depth, seg, self.backdrop.depth, box[0], box[1], self.fine, GHOST)
+
+
+def drawn_height(scene: Scene) -> float:
+    """Cylinders are drawn no taller than this [m], so that they hide little of the robot."""
+    return max(0.3, 2.0 * robot_height(scene.robot))
+
+
+def trail_width(scene: Scene, camera: Camera) -> float:
+    """The width of the driven trail [m]: a part of the robot's, but never a hair line."""
+    return max(0.32 * scene.robot.footprint.radius, 4.0 * camera.pixel)
+
+
+def still_pieces(scene: Scene, tall: Floats) -> list[tuple[Mesh, Colour]]:
+    """What stands still: the kerb in pieces, and the cylinders, `tall` (N,) high."""
+    width = kerb_width(scene)
+    found = [(mesh, KERB) for mesh in kerb(scene.bounds, width, 0.8 * width)]
+    for (x, y, radius, _), z, unseen in zip(scene.obstacles, tall, scene.unseen, strict=True):
+        found.append((cylinder(radius, 0.0, float(z), x=x, y=y), UNSEEN if unseen else OBSTACLE))
+    return found
+
+
+def solids(pieces: list[tuple[Mesh, Colour]], scene: Scene, tall: Floats) -> Solids:
+    """The same, for casting rays."""
+    kerbs = [mesh.vertices for mesh, colour in pieces if colour == KERB]
+    boxes = np.array([np.concatenate([corners.min(axis=0), corners.max(axis=0)]) for corners in kerbs])
+    cylinders = np.column_stack([scene.obstacles[:, :3], tall])
+    return Solids.of(cylinders, [UNSEEN if unseen else OBSTACLE for unseen in scene.unseen], boxes, KERB)
+
+
+def grouped(pieces: list[tuple[Mesh, Colour]]) -> list[tuple[Mesh, Colour]]:
+    """The pieces, those of one colour joined."""
+    found = []
+    for colour in dict.fromkeys(colour for _, colour in pieces):
+        meshes = [mesh for mesh, c in pieces if c == colour]
+        # PyBullet takes at most 131072 vertices a mesh.
+        found += [(join(*meshes[i : i + 400]), colour) for i in range(0, len(meshes), 400)]
+    return found
+
+
+def part_pose(
+    part: Part, x: float, y: float, yaw: float, wheels: tuple[float, float]
+) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
+    """Where a part of the robot is, and its orientation."""
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    ax, ay, az = part.axle
+    angle = 0.0 if part.wheel == 0 else wheels[0] if part.wheel > 0 else wheels[1]
+    cy, sy, ca, sa = math.cos(yaw / 2), math.sin(yaw / 2), math.cos(angle / 2), math.sin(angle / 2)
+    at = (x + cosine * ax - sine * ay, y + sine * ax + cosine * ay, az)
+    return at, (-sy * sa, cy * sa, sy * ca, cy * ca)
+
+
+def _sun(camera: Camera) -> tuple[tuple[float, float], tuple[float, float, float]]:
+    """How far a shadow reaches per metre of height, and the direction to the lamp: from the left, in front."""
+    right = camera.view[0, :3]
+    ahead = np.array([-right[1], right[0], 0.0])
+    reach = 0.55 * right + 0.28 * ahead
+    lamp = -0.62 * right - 0.25 * ahead + np.array([0.0, 0.0, 0.74])
+    lamp /= np.linalg.norm(lamp)
+    return (float(reach[0]), float(reach[1])), (float(lamp[0]), float(lamp[1]), float(lamp[2]))

@@ -1,0 +1,74 @@
+"""PyBullet's software renderer: meshes in, pictures with depth out."""
+
+from __future__ import annotations
+
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from antdrive.sim.physics.engine import bullet
+from antdrive.sim.view.film.camera import Camera
+from antdrive.sim.view.film.model import Mesh
+from antdrive.sim.view.style import Colour
+
+AMBIENT, DIFFUSE = 0.62, 0.46  # light from everywhere and from the lamp
+
+Box: TypeAlias = tuple[int, int, int, int]  # x0, y0, x1, y1 [px], the last ones excluded
+
+
+def add_mesh(number: int, mesh: Mesh, colour: Colour) -> int:
+    """Put a mesh into a PyBullet client, for the eye only; returns the body."""
+    p = bullet()
+    shape = p.createVisualShape(
+        p.GEOM_MESH,
+        vertices=mesh.vertices.tolist(),
+        normals=mesh.normals.tolist(),
+        indices=mesh.triangles.ravel().tolist(),
+        rgbaColor=[*(channel / 255 for channel in colour), 1.0],
+        physicsClientId=number,
+    )
+    body: int = p.createMultiBody(0, -1, shape, physicsClientId=number)
+    return body
+
+
+def render(
+    number: int, camera: Camera, box: Box | None, fine: int, light: tuple[float, float, float]
+) -> tuple[Any, Any, Any]:
+    """TinyRenderer's picture (h, w, 4), depth and body numbers (h, w), `fine` times the pixels of (a box of) a camera's."""
+    p = bullet()
+    x0, y0, x1, y1 = box or (0, 0, *camera.size)
+    view, projection = camera.matrices(box)
+    width, height = (x1 - x0) * fine, (y1 - y0) * fine
+    _, _, image, depth, seg = p.getCameraImage(
+        width,
+        height,
+        view,
+        projection,
+        lightDirection=light,
+        lightColor=[1, 1, 1],
+        lightAmbientCoeff=AMBIENT,
+        lightDiffuseCoeff=DIFFUSE,
+        lightSpecularCoeff=0.0,
+        shadow=0,
+        renderer=p.ER_TINY_RENDERER,
+        physicsClientId=number,
+    )
+    return (
+        np.reshape(np.asarray(image, dtype=np.uint8), (height, width, 4)),
+        np.array(depth, dtype=np.float32).reshape(height, width),
+        np.reshape(np.asarray(seg, dtype=np.int32), (height, width)),
+    )
+
+
+def merged(boxes: list[Box]) -> list[Box]:
+    """The boxes, with those that overlap made one: a crop shows all that moves, so each pixel must be blended once."""
+    done: list[Box] = []
+    for box in boxes:
+        while True:
+            hit = next((b for b in done if b[0] < box[2] and box[0] < b[2] and b[1] < box[3] and box[1] < b[3]), None)
+            if hit is None:
+                break
+            done.remove(hit)
+            box = (min(hit[0], box[0]), min(hit[1], box[1]), max(hit[2], box[2]), max(hit[3], box[3]))
+        done.append(box)
+    return done

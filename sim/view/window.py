@@ -1,0 +1,62 @@
+"""A window on a run, for people with a screen: PyBullet's own viewer replays the log at the speed of life."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+
+import numpy as np
+
+from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.physics.engine import bullet
+from antdrive.sim.view.film.model import robot_parts
+from antdrive.sim.view.film.replay import Replay
+from antdrive.sim.view.film.stage import drawn_height, grouped, part_pose, still_pieces
+from antdrive.sim.view.film.tiny import add_mesh
+from antdrive.sim.view.scene import Scene
+from antdrive.worlds.errors import InputError
+
+
+def check_display() -> None:
+    """See, before the work, whether a window can open.
+
+    Raises:
+        InputError: there is no display.
+    """
+    if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
+        raise InputError("--gui: no display (DISPLAY is not set); films need none: --video FILE.mp4")
+
+
+def show(rollout: Rollout, *, hold: float = 3.0) -> None:
+    """Replay a run in a window, then hold the last picture for some seconds; closing the window ends it.
+
+    Raises:
+        InputError: there is no display, or the viewer did not open.
+    """
+    check_display()
+    p = bullet()
+    number = p.connect(p.GUI)
+    if number < 0:
+        raise InputError("--gui: PyBullet's viewer did not open")
+    try:
+        p.configureDebugVisualizer(p.COV_ENABLE_GUI, 0, physicsClientId=number)
+        scene, replay = Scene.of(rollout), Replay(rollout)
+        for mesh, colour in grouped(still_pieces(scene, np.minimum(scene.obstacles[:, 3], drawn_height(scene)))):
+            add_mesh(number, mesh, colour)
+        robot = [(part, add_mesh(number, part.mesh, part.colour)) for part in robot_parts(scene.robot)]
+        for a, b in zip(rollout.route[:-1], rollout.route[1:], strict=True):
+            p.addUserDebugLine([*a, 0.01], [*b, 0.01], [0.1, 0.13, 0.26], 2, physicsClientId=number)
+        x0, y0, x1, y1 = scene.bounds
+        middle = [(x0 + x1) / 2, (y0 + y1) / 2, 0.0]
+        p.resetDebugVisualizerCamera(0.9 * max(x1 - x0, y1 - y0), 0, -52, middle, physicsClientId=number)
+        started = time.monotonic()
+        while (at := time.monotonic() - started) < replay.duration + hold and p.isConnected(physicsClientId=number):
+            now = min(at, replay.duration)
+            for part, body in robot:
+                place, turn = part_pose(part, *replay.pose(now), replay.wheels(now))
+                p.resetBasePositionAndOrientation(body, place, turn, physicsClientId=number)
+            time.sleep(1 / 60)
+    finally:
+        if p.isConnected(physicsClientId=number):
+            p.disconnect(number)

@@ -1,0 +1,357 @@
+"""The exact shortest path among discs, against closed forms and against polygons that share no code with it."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
+
+from antdrive.planners import AStar, PlanStatus, Query, Tangent, route_along
+from antdrive.planners.anyangle.tangent import Arc, Line, TangentPath, shortest
+from antdrive.worlds import Disc, InputError, Task, World, forest, polyline_clearance, rasterise
+from tests.planners.worlds_to_solve import catalogue, random_query
+
+Discs = Sequence[tuple[float, float, float]]
+RNG = np.random.default_rng(0)  # nothing is drawn from it
+BOX = (-2.0, -2.0, 22.0, 22.0)
+WIDE = (-100.0, -100.0, 100.0, 100.0)
+
+
+# -- an oracle: shortest paths among polygons in place of discs
+
+
+def polygon_bound(
+    discs: Discs, box: tuple[float, ...], ends: Sequence[tuple[float, float]], *, inside: bool, sides: int = 24
+) -> float:
+    """The shortest path among polygons: within the discs (a lower bound) or about them (an upper bound)."""
+    angles = np.arange(sides) * math.tau / sides
+    stretch = 1.0 if inside else 1.0 / math.cos(math.pi / sides)
+    normals = np.stack((np.cos(angles + math.pi / sides), np.sin(angles + math.pi / sides)), axis=1)
+    corners = [np.array(ends)]
+    corners += [np.stack((x + stretch * r * np.cos(angles), y + stretch * r * np.sin(angles)), 1) for x, y, r in discs]
+    points = np.vstack(corners)
+    fits = (points[:, 0] >= box[0]) & (points[:, 0] <= box[2]) & (points[:, 1] >= box[1]) & (points[:, 1] <= box[3])
+    points = points[fits]
+    rows, cols = np.triu_indices(len(points), 1)
+    a, b = points[rows], points[cols]
+    clear = np.ones(len(a), dtype=np.bool_)
+    for x, y, r in discs:  # the part of each segment within all half planes of the polygon (Cyrus & Beck)
+        apothem = stretch * r * math.cos(math.pi / sides)
+        low, high = np.zeros(len(a)), np.ones(len(a))
+        hit = np.ones(len(a), dtype=np.bool_)
+        for normal in normals:
+            depth_a, depth_b = ((p - (x, y)) @ normal - apothem + 1e-9 for p in (a, b))
+            with np.errstate(divide="ignore", invalid="ignore"):
+                t = depth_a / (depth_a - depth_b)
+            low = np.where(depth_a > depth_b, np.maximum(low, t), low)
+            high = np.where(depth_a < depth_b, np.minimum(high, t), high)
+            hit &= ~((depth_a == depth_b) & (depth_a >= 0))
+        clear &= ~(hit & (low < high))
+    lengths = np.hypot(*(a - b).T)
+    edges = (lengths[clear], (rows[clear], cols[clear]))
+    graph = csr_matrix(edges, shape=(len(points), len(points)))
+    return float(dijkstra(graph, directed=False, indices=0)[1])
+
+
+def random_discs(rng: np.random.Generator, count: int) -> list[tuple[float, float, float]]:
+    discs = [tuple(map(float, (*rng.uniform(0, 10, 2), rng.uniform(0.3, 2.4)))) for _ in range(count)]
+    return [d for d in discs if min(math.dist(d[:2], end) for end in ((0.5, 0.5), (9.5, 9.5))) > d[2] + 0.05]
+
+
+def test_length_lies_between_the_bounds_of_polygons() -> None:
+    rng = np.random.default_rng(7)
+    solved = sealed = 0
+    for count in (1, 2, 3, 4, 5, 6, 8, 10, 12, 14) * 3:
+        discs, ends, box = random_discs(rng, count), ((0.5, 0.5), (9.5, 9.5)), (0.0, 0.0, 10.0, 10.0)
+        found = shortest(discs, box, 0.0, *ends)
+        low, high = (polygon_bound(discs, box, ends, inside=inside) for inside in (True, False))
+        if found is None:
+            sealed += 1
+            assert math.isinf(high)
+        else:
+            solved += 1
+            assert low - 1e-6 <= found.length <= high + 1e-6
+    assert solved >= 15
+    assert sealed >= 2
+
+
+# -- worlds worked by hand
+
+
+def test_one_disc_has_its_closed_form() -> None:
+    """The radius-5 world of Han's thesis (2007): 30.071, where his genetic algorithm reached 33.1798."""
+    found = shortest([(10, 10, 5)], BOX, 0.0, (0, 0), (20, 20))
+    to_centre = math.hypot(10, 10)
+    by_hand = 2 * math.sqrt(to_centre**2 - 25) + 5 * (math.pi - 2 * math.acos(5 / to_centre))
+    assert found is not None
+    assert found.length == pytest.approx(by_hand, abs=1e-12)
+    assert found.length == pytest.approx(30.071, abs=5e-4)
+    assert [type(piece) for piece in found.pieces] == [Line, Arc, Line]
+
+
+def test_two_overlapping_discs_are_passed_over_their_outer_tangent() -> None:
+    found = shortest([(-1, 0, 1.5), (1, 0, 1.5)], WIDE, 0.0, (-5, 0), (5, 0))
+    tilt = math.acos(1.5 / 4)
+    by_hand = 2 * math.sqrt(16 - 2.25) + 2 * 1.5 * (math.pi / 2 - tilt) + 2
+    assert found is not None
+    assert found.length == pytest.approx(by_hand, abs=1e-12)
+
+
+def test_two_discs_are_passed_between_them_by_an_inner_tangent() -> None:
+    start, goal = (-1.0, 0.0), (5.0, 0.0)  # each on the rim of a disc, on opposite sides of the gap
+    found = shortest([(0, 0, 1), (4, 0, 1)], WIDE, 0.0, start, goal)
+    across = shortest([(0, 0, 1), (4, 0, 1)], WIDE, 0.0, (0, 1), (4, -1))
+    assert found is not None
+    assert found.length == pytest.approx(math.pi + 4, abs=1e-9)
+    tilt = math.acos(2 / 4)  # of the inner tangent's contact from the line of centres
+    assert across is not None
+    assert across.length == pytest.approx(2 * (math.pi / 2 - tilt) + math.sqrt(16 - 4), abs=1e-9)
+
+
+def test_contact_closes_a_gap_between_discs_and_at_walls() -> None:
+    box = (0.0, 0.0, 10.0, 10.0)
+    column = [(5.0, 1.0 + 2 * k, 1.0) for k in range(5)]  # wall to wall, each touching the next
+    assert shortest(column, box, 0.0, (1, 5), (9, 5)) is None
+    lower = [(x, y - 1e-6 * (k == 0), r) for k, (x, y, r) in enumerate(column)]
+    through = shortest(lower, box, 0.0, (1, 5), (9, 5))
+    assert through is not None
+    assert shortest([(x, y, r - 0.1) for x, y, r in column], box, 0.1, (1, 5), (9, 5)) is None
+    assert shortest([(5, 4, 4)], box, 0.0, (1, 9), (9, 9)) is not None
+    assert shortest([(5, 4, 4), (5, 9, 1)], box, 0.0, (1, 9), (9, 9)) is None
+
+
+def test_a_straight_line_that_only_grazes_discs_is_the_path() -> None:
+    found = shortest([(3, 1, 1), (5, -1, 1), (7, 1, 1)], WIDE, 0.0, (0, 0), (10, 0))
+    assert found is not None
+    assert found.length == pytest.approx(10, abs=1e-9)
+
+
+def test_a_disc_in_the_wall_is_passed_on_the_open_side_alone() -> None:
+    box = (0.0, 0.0, 10.0, 4.0)
+    found = shortest([(5, 0.5, 1.5)], box, 0.0, (1, 0.2), (9, 0.2))
+    assert found is not None
+    assert all(piece.start[1] >= 0.2 - 1e-9 for piece in found.pieces)
+    assert found.length > shortest([(5, 0.5, 1.5)], WIDE, 0.0, (1, 0.2), (9, 0.2)).length  # type: ignore[union-attr]
+
+
+def test_an_end_without_the_clearance_has_no_path() -> None:
+    assert shortest([(5, 5, 1)], WIDE, 0.5, (3.6, 5), (0, 0)) is None
+    assert shortest([(5, 5, 1)], WIDE, 0.5, (3.5, 5), (0, 0)) is not None
+    assert shortest([], (0, 0, 10, 10), 0.5, (0.4, 5), (5, 5)) is None
+    assert shortest([], (0, 0, 1, 10), 0.6, (0.5, 5), (0.5, 6)) is None
+
+
+def test_ends_that_are_one_point_have_a_path_of_no_length() -> None:
+    found = shortest([(5, 5, 1)], WIDE, 0.1, (1, 1), (1, 1))
+    assert found is not None
+    assert found.length == 0.0
+    assert len(found.polyline(1e-3, [(5, 5, 1)], WIDE, 0.1)) == 2
+
+
+def test_discs_within_others_and_copies_change_nothing() -> None:
+    discs = [(3.0, 3.0, 1.5), (6.0, 7.0, 2.0)]
+    more = [*discs, discs[0], (3.2, 3.1, 0.4), (6.0, 8.0, 1.0)]  # a copy, one within, one touching from within
+    lengths = {
+        round(shortest(order, BOX, 0.1, (0, 0), (9, 9)).length, 9)  # type: ignore[union-attr]
+        for order in (discs, more, more[::-1])
+    }
+    assert len(lengths) == 1
+
+
+# -- properties
+
+coordinate = st.floats(0.0, 10.0).map(lambda v: round(v, 2))
+START, GOAL, WALLS = (0.5, 1.0), (9.5, 8.0), (0.0, 0.0, 10.0, 10.0)
+some_discs = st.lists(st.tuples(coordinate, coordinate, st.sampled_from([0.2, 0.5, 1.0, 1.7])), max_size=12).map(
+    lambda discs: [d for d in discs if all(math.dist(d[:2], end) > d[2] + 0.11 for end in (START, GOAL))]
+)
+
+
+def length(discs: Discs, start: tuple[float, float] = START, goal: tuple[float, float] = GOAL) -> float:
+    found = shortest(discs, WALLS, 0.1, start, goal)
+    return math.inf if found is None else found.length
+
+
+@settings(max_examples=150)
+@given(some_discs)
+def test_length_ignores_which_end_is_the_start_and_how_the_world_is_turned(discs: Discs) -> None:
+    expected = pytest.approx(length(discs), abs=1e-7)
+    assert length(discs, GOAL, START) == expected
+    for turn in (
+        lambda x, y: (10 - x, y),
+        lambda x, y: (y, x),
+        lambda x, y: (10 - y, x),
+        lambda x, y: (10 - x, 10 - y),
+    ):
+        assert length([(*turn(x, y), r) for x, y, r in discs], turn(*START), turn(*GOAL)) == expected
+
+
+@settings(max_examples=100)
+@given(some_discs, st.floats(0, math.tau), st.floats(-50, 50), st.floats(-50, 50))
+def test_length_ignores_a_rigid_motion_far_from_walls(discs: Discs, angle: float, dx: float, dy: float) -> None:
+    assume(not nearly_touching(discs, 0.1))
+
+    def moved(x: float, y: float) -> tuple[float, float]:
+        return math.cos(angle) * x - math.sin(angle) * y + dx, math.sin(angle) * x + math.cos(angle) * y + dy
+
+    here = shortest(discs, WIDE, 0.1, START, GOAL)
+    there = shortest([(*moved(x, y), r) for x, y, r in discs], WIDE, 0.1, moved(*START), moved(*GOAL))
+    assert (here is None) == (there is None)
+    if here and there:
+        assert here.length == pytest.approx(there.length, abs=1e-7)
+
+
+def nearly_touching(discs: Discs, inflate: float) -> bool:
+    return any(
+        abs(math.dist(a[:2], b[:2]) - a[2] - b[2] - 2 * inflate) < 1e-6 for a, b in itertools.combinations(discs, 2)
+    )
+
+
+@settings(max_examples=100)
+@given(some_discs, st.tuples(coordinate, coordinate, st.sampled_from([0.2, 1.0])))
+def test_another_disc_never_shortens_the_path(discs: Discs, more: tuple[float, float, float]) -> None:
+    assume(all(math.dist(more[:2], end) > more[2] + 0.11 for end in (START, GOAL)))
+    assert length([*discs, more]) >= length(discs) - 1e-7
+
+
+@settings(max_examples=100)
+@given(some_discs, st.sampled_from([1e-1, 1e-3, 1e-5]))
+def test_the_polyline_keeps_the_clearance_and_stays_close(discs: Discs, bulge: float) -> None:
+    found = shortest(discs, WALLS, 0.1, START, GOAL)
+    assume(found is not None)
+    assert isinstance(found, TangentPath)
+    line = found.polyline(bulge, np.array(discs).reshape(-1, 3), WALLS, 0.1)
+    world = World("w", WALLS, tuple(Disc(*d) for d in discs))
+    assert polyline_clearance(world, line) >= 0.1 - 1e-9
+    longer = np.hypot(*np.diff(line, axis=0).T).sum() - found.length
+    assert -1e-7 <= longer <= 20 * bulge
+    for before, after in itertools.pairwise(found.pieces):
+        assert math.dist(before.end, after.start) < 1e-7
+    for arc in (piece for piece in found.pieces if isinstance(piece, Arc)):
+        rim = np.array([arc.at(abs(arc.sweep) * k / 50) for k in range(51)])
+        assert polyline_clearance(world, rim[25:26]) >= 0.1 - 1e-9
+        assert min(polyline_clearance(world, point[None]) for point in rim) >= 0.1 - 1e-9
+
+
+@settings(max_examples=60)
+@given(some_discs, st.lists(st.tuples(coordinate, coordinate), min_size=1, max_size=3))
+def test_no_clear_polyline_is_shorter(discs: Discs, via: list[tuple[float, float]]) -> None:
+    line = np.array([START, *via, GOAL])
+    assume(line[1:-1].min() > 0.1)
+    assume(line[1:-1].max() < 9.9)
+    apart = [d for d in discs if polyline_clearance(World("w", (-9, -9, 19, 19), (Disc(*d),)), line) > 0.1]
+    assert length(apart) <= np.hypot(*np.diff(line, axis=0).T).sum() + 1e-9
+
+
+# -- the planner
+
+
+@pytest.mark.parametrize("world", catalogue())
+def test_the_planner_is_below_the_grid_and_keeps_the_clearance(world: str) -> None:
+    query = catalogue()[world]
+    assert query.task is not None
+    result = Tangent().plan(query, RNG)
+    assert result.solved
+    assert result.length is not None
+    xy = query.grid.xy(result.line)
+    np.testing.assert_allclose(xy[[0, -1]], [query.task.start[:2], query.task.goal], atol=1e-12)
+    assert polyline_clearance(query.task.world, xy) >= query.grid.inflate - 1e-9
+    ends = query.grid.xy([query.start, query.goal])
+    slack = math.dist(ends[0], query.task.start[:2]) + math.dist(ends[1], query.task.goal)
+    assert result.length <= AStar().plan(query, RNG).cost + slack
+    route = route_along(result, query.grid, query.task)
+    assert route.length == pytest.approx(result.length, abs=0.02)
+
+
+def test_a_start_without_room_is_left_through_the_centre_of_its_cell() -> None:
+    task = Task(World("w", (0, 0, 10, 10), (Disc(2, 2, 0.5),)), (2.6, 2.0, 0.0), (8.0, 8.0))
+    query = Query.between(rasterise(task.world, 0.5, 0.4), task)
+    result = Tangent().plan(query, RNG)
+    xy = query.grid.xy(result.line)
+    np.testing.assert_allclose(xy[0], (2.6, 2.0))
+    np.testing.assert_allclose(xy[1], query.grid.xy([query.start])[0])
+    assert polyline_clearance(task.world, xy[1:]) >= 0.4 - 1e-9
+    assert result.length == pytest.approx(np.hypot(*np.diff(xy, axis=0).T).sum(), abs=1e-3)
+
+
+def test_a_goal_without_room_is_reached_at_the_centre_of_its_cell() -> None:
+    task = Task(World("w", (0, 0, 10, 10), (Disc(8, 8, 0.5),)), (2.0, 2.0, 0.0), (7.4, 7.8), goal_tolerance=0.7)
+    query = Query.between(rasterise(task.world, 0.5, 0.3), task)
+    result = Tangent().plan(query, RNG)
+    xy = query.grid.xy(result.line)
+    np.testing.assert_allclose(xy[-1], query.grid.xy([query.goal])[0])
+    assert polyline_clearance(task.world, xy) >= 0.3 - 1e-9
+
+
+def test_an_end_without_room_or_a_cell_to_reach_has_no_path_with_a_reason() -> None:
+    fence = [Disc(2 + 0.7 * math.cos(a), 2 + 0.7 * math.sin(a), 0.3) for a in np.linspace(0, math.tau, 8)]
+    world = World("w", (0, 0, 10, 10), tuple(fence))
+    for start, goal, end in (((2.0, 2.0), (8.0, 8.0), "start"), ((8.0, 8.0), (2.0, 2.0), "goal")):
+        task = Task(world, (*start, 0.0), goal)
+        result = Tangent().plan(Query.between(rasterise(world, 0.5, 0.45), task), RNG)
+        assert result.status is PlanStatus.NO_PATH
+        assert result.reason.startswith(f"the {end} has too little room")
+
+
+def test_a_gap_too_narrow_for_the_grid_is_found() -> None:
+    discs = [Disc(5.0, y, 1.0) for y in (0.5, 2.5, 4.5)] + [Disc(5.0, y, 1.0) for y in (7.2, 9.2)]
+    task = Task(World("w", (0, 0, 10, 10), tuple(discs)), (2.0, 2.0, 0.0), (8.0, 2.0))
+    query = Query.between(rasterise(task.world, 1.0, 0.3), task)
+    assert not AStar().plan(query, RNG).solved
+    result = Tangent().plan(query, RNG)
+    assert result.solved
+    assert math.isinf(result.cost)
+    assert np.abs(np.diff(result.cells, axis=0)).max() == 1
+    assert tuple(result.cells[0]) == query.start
+    assert polyline_clearance(task.world, route_along(result, query.grid, task).xy) >= 0.3 - 1e-9
+
+
+def test_a_ring_around_the_goal_has_no_path_with_a_reason() -> None:
+    ring = [Disc(7 + 2 * math.cos(a), 7 + 2 * math.sin(a), 0.4) for a in np.linspace(0, math.tau, 16, endpoint=False)]
+    task = Task(World("w", (0, 0, 10, 10), tuple(ring)), (1.0, 1.0, 0.0), (7.0, 7.0))
+    result = Tangent().plan(Query.between(rasterise(task.world, 0.25, 0.1), task), RNG)
+    assert result.status is PlanStatus.NO_PATH
+    assert "no way" in result.reason
+
+
+def test_a_bare_grid_is_refused() -> None:
+    with pytest.raises(InputError, match="has no task"):
+        Tangent().plan(random_query(np.random.default_rng(0)), RNG)
+    with pytest.raises(ValueError, match="bulge: must be above 0"):
+        Tangent(bulge=0.0)
+
+
+def test_a_forest_of_400_discs_is_quick() -> None:
+    task = forest(
+        np.random.default_rng(1), size=40, count=400, radius=(0.3, 0.7), clearance=1, spacing=0.1, robot_radius=0.25
+    )
+    query = Query.between(rasterise(task.world, 0.25, 0.3), task)
+    Tangent().plan(query, RNG)
+    seconds = min(Tangent().plan(query, RNG).wall_s for _ in range(3))
+    assert seconds < 0.25
+
+
+def test_discs_on_a_lattice_that_all_touch_are_no_trouble() -> None:
+    """As the worlds of the BARN set: a lattice whose discs touch, so that rims meet in threes and fours."""
+    rng: npt.NDArray[np.bool_] = np.random.default_rng(5).random((30, 30)) < 0.25
+    rng[:4, :4] = rng[-4:, -4:] = False
+    discs = [(0.15 * c, 0.15 * r, 0.075) for r, c in np.argwhere(rng)]
+    box, ends = (-0.5, -0.5, 5.0, 5.0), ((0.0, 0.0), (4.4, 4.4))
+    for inflate in (0.0, 0.075, 0.1):
+        found = shortest(discs, box, inflate, *ends)
+        world = World("w", box, tuple(Disc(*d) for d in discs))
+        grid = rasterise(world, 0.05, inflate)
+        query = Query(grid, *(grid.cell_at(*end) for end in ends))
+        optimum = AStar().plan(query, RNG)
+        assert (found is not None) or not optimum.solved
+        if found is not None:
+            assert found.length <= optimum.cost + 0.2
+            assert polyline_clearance(world, found.polyline(1e-3, discs, box, inflate)) >= inflate - 1e-9

@@ -1,0 +1,126 @@
+from __future__ import annotations
+
+import heapq
+import math
+
+import numpy as np
+import pytest
+
+from antdrive.planners import MaxMinDStar, PlanResult, Query
+from antdrive.worlds import DIRECTIONS, Grid
+from tests.planners.worlds_to_solve import catalogue, optimum, random_query
+
+
+def solve(planner: MaxMinDStar, query: Query) -> PlanResult:
+    return planner.plan(query, np.random.default_rng(0))
+
+
+def environment_5f() -> Query:
+    """As hasan's: a horizontal wall, closed on the left and open on the right, between start and goal on the left."""
+    free = np.random.default_rng(5).random((50, 50)) >= 0.06
+    free[23:26] = True
+    free[24, :47] = False
+    return Query(Grid.from_free(free), (23, 16), (25, 15))
+
+
+def pheromone_by_heap(query: Query) -> dict[tuple[int, int], float]:
+    """Cost of the way to the goal, at 1 or 1.4 a move, times 0.98."""
+    cost, queue = {query.goal: 0.0}, [(0.0, query.goal)]
+    while queue:
+        here, cell = heapq.heappop(queue)
+        for k, (dr, dc) in enumerate(DIRECTIONS):
+            if int(query.grid.moves[cell]) >> k & 1:
+                near, there = (cell[0] + dr, cell[1] + dc), here + (1.4 if dr and dc else 1.0)
+                if there < cost.get(near, math.inf) - 1e-9:
+                    cost[near] = there
+                    heapq.heappush(queue, (there, near))
+    return {cell: 0.98 * value for cell, value in cost.items()}
+
+
+def test_pheromone_is_cost_times_what_is_retained() -> None:
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        query = random_query(rng, largest=15)
+        expected = pheromone_by_heap(query)
+        if query.start not in expected:
+            continue
+        _, pheromone, work, notes = MaxMinDStar(gates=False).spread(query)
+        field = pheromone.reshape(query.grid.shape)
+        assert not notes
+        assert work == np.isfinite(field).sum()
+        # What is nearer to the goal than the start is final; spreading stops there.
+        for cell, value in expected.items():
+            if value < expected[query.start] - 1e-9:
+                assert field[cell] == pytest.approx(value)
+
+
+@pytest.mark.parametrize("alpha_max", [26.0, 1.0])
+def test_circles_before_a_wall_are_noticed_and_left(alpha_max: float) -> None:
+    query = environment_5f()
+    result = solve(MaxMinDStar(alpha_max=alpha_max), query)
+    assert result.solved
+    assert "went in circles" in result.reason
+    assert ("beta was set to 0" in result.reason) == (alpha_max == 1.0)
+    assert len({tuple(cell) for cell in result.cells}) == len(result.cells)
+    assert result.cost <= 1.1 * optimum(query)
+    assert result.work_unit == "cells propagated"
+
+
+def test_on_open_ground_nothing_needs_to_be_raised() -> None:
+    result = solve(MaxMinDStar(), catalogue()["empty"])
+    assert result.reason == ""
+    assert result.cost == pytest.approx(optimum(catalogue()["empty"]))
+    assert result.landscape is not None
+    assert np.isfinite(result.landscape).all()
+
+
+def test_gate_cells_are_closed_unless_there_is_no_other_way() -> None:
+    free = np.fliplr(~np.eye(9, dtype=np.bool_))  # a wall from corner to corner
+    free[4, 4] = True  # between two of its cells: a gate
+    gate = Query(Grid.from_free(free), (1, 1), (7, 7))
+    result = solve(MaxMinDStar(), gate)
+    assert "opened 1 gate cells again" in result.reason
+    assert result.cost == pytest.approx(optimum(gate))
+    free[6:9, :3] = True  # a wider way round
+    wide = Query(Grid.from_free(free), (1, 1), (7, 7))
+    around = solve(MaxMinDStar(), wide)
+    assert "gate" not in around.reason
+    assert [4, 4] not in around.cells.tolist()
+    assert solve(MaxMinDStar(gates=False), wide).cost == pytest.approx(optimum(wide))
+
+
+def test_it_always_arrives() -> None:
+    rng = np.random.default_rng(8)
+    for _ in range(60):
+        query = random_query(rng)
+        assert solve(MaxMinDStar(), query).solved == math.isfinite(optimum(query))
+
+
+def test_without_distance_the_way_is_the_cheapest_at_one_and_one_point_four() -> None:
+    rng = np.random.default_rng(9)
+    for _ in range(20):
+        query = random_query(rng)
+        expected = pheromone_by_heap(query)
+        if query.start in expected and query.start != query.goal:
+            cells = solve(MaxMinDStar(beta=0.0, gates=False), query).cells
+            steps = np.abs(np.diff(cells, axis=0)).sum(axis=1)
+            assert 0.98 * np.where(steps == 2, 1.4, 1.0).sum() == pytest.approx(expected[query.start])
+
+
+@pytest.mark.parametrize(("key", "value"), [("alpha", 0.0), ("beta", -1.0), ("alpha_max", 0.5), ("evaporation", 1.0)])
+def test_options_out_of_range_are_refused_by_name(key: str, value: float) -> None:
+    with pytest.raises(ValueError, match=f"^{key}: must be"):
+        MaxMinDStar(**{key: value})
+
+
+def test_closed_cells_leave_the_moves_that_a_picture_without_them_allows() -> None:
+    from antdrive.planners.colonies._kernels_mmas_dstar import close_cells
+
+    rng = np.random.default_rng(6)
+    for _ in range(100):
+        free = rng.random(rng.integers(1, 9, 2)) >= 0.2
+        cells = rng.integers(0, free.shape, (int(rng.integers(0, 5)), 2))
+        moves = Grid.from_free(free).moves.copy()
+        close_cells(moves, cells)
+        free[tuple(cells.T)] = False
+        np.testing.assert_array_equal(moves, Grid.from_free(free).moves)

@@ -1,0 +1,238 @@
+"""What every replanner promises."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from antdrive.planners import DStar, DStarLite, PlanStatus, Query, Replanner
+from antdrive.planners.graph.incremental import ReplanningPlanner
+from antdrive.worlds import Grid
+from tests.planners.replanning.agreement import World, agree, change_at_random
+from tests.planners.worlds_to_solve import catalogue, random_discs, random_query, sealed
+
+BOTH = pytest.mark.parametrize("planner", [DStar(), DStarLite()], ids=lambda p: type(p).__name__)
+RNG = np.random.default_rng(0)  # searches draw nothing from it
+
+
+def open_ground(rows: int = 12, cols: int = 12) -> Query:
+    return Query(Grid.from_free(np.ones((rows, cols))), (1, 1), (rows - 2, cols - 2))
+
+
+@BOTH
+def test_a_replanner_is_one(planner: ReplanningPlanner) -> None:
+    assert isinstance(planner.replanner(open_ground()), Replanner)
+
+
+@BOTH
+def test_plans_equal_the_oracle(planner: ReplanningPlanner) -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(200):
+        for query in (random_query(rng), random_discs(rng)):
+            floor = World(query.grid).optimum(query.start, query.goal)
+            result = planner.plan(query, RNG)
+            assert result.cost == pytest.approx(floor, abs=1e-9)
+            assert result.solved == math.isfinite(floor)
+
+
+@BOTH
+def test_repairs_equal_the_oracle(planner: ReplanningPlanner) -> None:
+    rng = np.random.default_rng(2)
+    solved = sum(
+        change_at_random(planner.replanner, make(rng), rng, 8)
+        for _ in range(100)
+        for make in (random_query, random_discs)
+    )
+    assert solved > 600  # the test would say little if most were without a path
+
+
+@pytest.mark.slow
+@BOTH
+@pytest.mark.parametrize("seed", range(4))
+def test_repairs_equal_the_oracle_in_thousands_of_sequences(planner: ReplanningPlanner, seed: int) -> None:
+    rng = np.random.default_rng([3, seed])
+    for _ in range(500):
+        change_at_random(planner.replanner, random_query(rng, largest=40), rng, 15)
+        change_at_random(planner.replanner, random_discs(rng, count=int(rng.integers(1, 60))), rng, 15)
+
+
+changes = st.lists(
+    st.tuples(
+        st.sampled_from(["block", "clear", "move", "ask"]),
+        st.lists(st.tuples(st.integers(0, 5), st.integers(0, 6)), min_size=1, max_size=4),
+    ),
+    max_size=14,
+)
+
+
+@BOTH
+@settings(max_examples=150, deadline=None)
+@given(bits=st.lists(st.booleans(), min_size=42, max_size=42), told=changes)
+def test_any_sequence_of_changes(
+    planner: ReplanningPlanner, bits: list[bool], told: list[tuple[str, list[tuple[int, int]]]]
+) -> None:
+    free = np.array(bits).reshape(6, 7)
+    query = Query(Grid.from_free(free), (0, 0), (5, 6))
+    world, replanner = World(query.grid), planner.replanner(query)
+    for what, cells in told:
+        if what == "ask":
+            agree(replanner, world)
+        elif what == "move":
+            replanner.move(cells[0])
+        else:
+            getattr(replanner, what)(cells)
+            world.free[tuple(np.transpose(cells))] = what == "clear"
+    agree(replanner, world)
+
+
+@BOTH
+@pytest.mark.parametrize("seed", range(3))
+def test_driving_through_unknown_ground(planner: ReplanningPlanner, seed: int) -> None:
+    """The robot sees three cells far, believes the rest to be free, and replans at every step."""
+    rng = np.random.default_rng(seed)
+    truth = rng.random((40, 40)) >= 0.25
+    truth[1, 1] = truth[38, 38] = True
+    replanner = planner.replanner(open_ground(40, 40))
+    world = World(replanner.query.grid)
+    steps = 0
+    while replanner.query.start != replanner.query.goal and steps < 2000:
+        (r, c), steps = replanner.query.start, steps + 1
+        window = np.s_[max(0, r - 3) : r + 4, max(0, c - 3) : c + 4]
+        seen = np.argwhere(~truth[window]) + [max(0, r - 3), max(0, c - 3)]
+        replanner.block(seen)
+        world.free[tuple(seen.T)] = False
+        if not agree(replanner, world):
+            break
+        replanner.move(tuple(map(int, replanner.result().cells[1])))
+    assert steps > 39
+
+
+@BOTH
+def test_walking_along_the_path_costs_nothing(planner: ReplanningPlanner) -> None:
+    replanner = planner.replanner(catalogue()["slalom"])
+    first = replanner.result()
+    assert first.work > 0
+    replanner.move(tuple(map(int, first.cells[5])))
+    rest = replanner.result()
+    assert rest.work == 0
+    np.testing.assert_array_equal(rest.cells, first.cells[5:])
+    assert agree(replanner, World(replanner.query.grid))
+
+
+@BOTH
+def test_a_wall_closes_and_opens_the_way(planner: ReplanningPlanner) -> None:
+    replanner = planner.replanner(open_ground())
+    before = replanner.result()
+    wall = [(6, c) for c in range(12)]
+    assert replanner.block(wall) == 36  # the wall and the rows beside it
+    shut = replanner.result()
+    assert shut.status is PlanStatus.NO_PATH
+    assert "allowed moves" in shut.reason
+    assert math.isinf(shut.cost)
+    assert len(shut.cells) == 0
+    assert replanner.clear(wall) == 36
+    assert replanner.result().cost == before.cost
+
+
+@BOTH
+def test_a_sealed_goal_has_no_path_until_a_door_opens(planner: ReplanningPlanner) -> None:
+    replanner = planner.replanner(sealed())
+    assert replanner.result().status is PlanStatus.NO_PATH
+    replanner.clear([(4, 4)])
+    result = replanner.result()
+    assert result.solved
+    assert [4, 4] in result.cells.tolist()
+
+
+@BOTH
+@pytest.mark.parametrize("end", ["start", "goal"])
+def test_a_blocked_end_is_named_and_can_be_cleared(planner: ReplanningPlanner, end: str) -> None:
+    replanner = planner.replanner(open_ground())
+    cost = replanner.result().cost
+    replanner.block([getattr(replanner.query, end)])
+    blocked = replanner.result()
+    assert blocked.status is PlanStatus.NO_PATH
+    assert f"the {end} cell" in blocked.reason
+    replanner.clear([getattr(replanner.query, end)])
+    assert replanner.result().cost == cost
+
+
+@BOTH
+def test_the_end_of_an_isolated_cell_can_be_blocked(planner: ReplanningPlanner) -> None:
+    free = np.zeros((3, 3))
+    free[1, 1] = 1
+    replanner = planner.replanner(Query(Grid.from_free(free), (1, 1), (1, 1)))
+    assert replanner.result().cost == 0
+    assert replanner.block([(1, 1)]) == 0  # it had no moves to lose
+    assert replanner.result().status is PlanStatus.NO_PATH
+
+
+@BOTH
+def test_a_blocked_cell_closes_the_diagonals_past_its_corners(planner: ReplanningPlanner) -> None:
+    replanner = planner.replanner(Query(Grid.from_free(np.ones((2, 2))), (0, 0), (1, 1)))
+    assert replanner.result().cost == pytest.approx(math.sqrt(2))
+    replanner.block([(0, 1)])
+    assert replanner.result().cost == pytest.approx(2.0)
+
+
+@BOTH
+def test_moves_that_discs_close_stay_closed(planner: ReplanningPlanner) -> None:
+    rng = np.random.default_rng(7)
+    for _ in range(30):
+        query = random_discs(rng)
+        replanner = planner.replanner(query)
+        cells = rng.choice(np.argwhere(query.grid.free), size=6)
+        replanner.block(cells)
+        replanner.clear(cells)
+        np.testing.assert_array_equal(replanner.query.grid.moves, query.grid.moves)
+        np.testing.assert_array_equal(replanner.query.grid.free, query.grid.free)
+
+
+@BOTH
+def test_the_first_query_is_left_as_it_was_and_the_present_one_cannot_be_written(planner: ReplanningPlanner) -> None:
+    query = open_ground()
+    replanner = planner.replanner(query)
+    replanner.block([(5, 5)])
+    assert query.grid.free.all()
+    now = replanner.query.grid
+    assert not now.free[5, 5]
+    assert now.moves[5, 5] == 0
+    with pytest.raises(ValueError, match="read-only"):
+        now.free[0, 0] = False
+
+
+@BOTH
+def test_a_local_change_takes_a_fraction_of_the_work(planner: ReplanningPlanner) -> None:
+    rng = np.random.default_rng(0)
+    shares = []
+    for _ in range(10):
+        free = rng.random((200, 200)) >= 0.2
+        free[0, 0] = free[199, 199] = True
+        replanner = planner.replanner(Query(Grid.from_free(free), (0, 0), (199, 199)))
+        path = replanner.result().cells
+        if len(path):
+            replanner.block([path[8]])
+            repaired = replanner.result()
+            anew = planner.plan(replanner.query, RNG)
+            assert repaired.cost == pytest.approx(anew.cost, abs=1e-9)
+            shares.append(repaired.work / anew.work)
+    assert len(shares) > 5
+    assert np.median(shares) < 0.02
+
+
+@BOTH
+def test_misuse_is_refused_and_changes_nothing(planner: ReplanningPlanner) -> None:
+    replanner = planner.replanner(open_ground())
+    with pytest.raises(ValueError, match=r"^cells: \(3, 12\) is outside the grid of 12 rows and 12 columns"):
+        replanner.block([(2, 2), (3, 12)])
+    assert replanner.query.grid.free.all()
+    with pytest.raises(ValueError, match=r"^start: cell"):
+        replanner.move((-1, 0))
+    with pytest.raises(ValueError, match=r"^grid: must have the shape \(12, 12\), got \(3, 3\)"):
+        replanner.change(Grid.from_free(np.ones((3, 3))))
+    assert replanner.block([]) == 0
+    assert replanner.result().solved

@@ -1,0 +1,159 @@
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from antdrive.planners import AStar, Dijkstra, Query, path_cost, reachable
+from antdrive.worlds import DIRECTIONS, Grid
+from tests.planners.worlds_to_solve import optimum, optimum_by_scipy, random_discs, random_query, thinned
+
+RNG = np.random.default_rng(0)  # searches draw nothing from it
+SEARCHES = [Dijkstra(), AStar()]
+
+
+def check(query: Query) -> None:
+    floor = optimum(query)
+    assert reachable(query) == math.isfinite(floor)
+    for search in SEARCHES:
+        result = search.plan(query, RNG)
+        assert result.solved == math.isfinite(floor)
+        assert result.cost == pytest.approx(floor, abs=1e-9)
+        if result.solved:
+            assert result.cost == pytest.approx(path_cost(result.cells, query.grid.cell), abs=1e-9)
+
+
+def test_costs_equal_the_oracle_on_random_pictures() -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(300):
+        check(random_query(rng))
+
+
+def test_costs_equal_the_oracle_among_random_discs() -> None:
+    rng = np.random.default_rng(2)
+    for _ in range(100):
+        check(random_discs(rng))
+
+
+@pytest.mark.slow
+def test_costs_equal_the_oracle_on_thousands_of_grids() -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(3000):
+        check(random_query(rng, largest=40))
+        check(random_discs(rng, count=int(rng.integers(1, 60))))
+
+
+@pytest.mark.parametrize("side", [9, 40])
+def test_costs_equal_the_oracle_for_any_set_of_two_way_moves(side: int) -> None:
+    """Nothing may rely on how the moves of neighbouring cells hang together."""
+    rng = np.random.default_rng(4)
+    for _ in range(200):
+        query = thinned(rng, side, cut=0.3)
+        floor = optimum_by_scipy(query)
+        for search in SEARCHES:
+            assert search.plan(query, RNG).cost == pytest.approx(floor, abs=1e-9)
+
+
+def test_the_first_way_to_close_the_goal_may_not_be_the_best() -> None:
+    """Two corridors of 24 straight (24) and 17 diagonal moves (24.04): both end in one bucket of the open list."""
+    rows_of_diagonals = [20, 21, 22, 21, 20, 21, 22, 21, 20, 21, 20, 19, 20, 19, 18, 17, 16, 15]
+    diagonals = [(row, 5 + i) for i, row in enumerate(rows_of_diagonals)]
+    turns = [
+        (20, 5),
+        (18, 5),
+        (18, 6),
+        (17, 6),
+        (17, 10),
+        (16, 10),
+        (16, 14),
+        (15, 14),
+        (15, 17),
+        (16, 17),
+        (16, 19),
+    ]
+    straights = _corridor([*turns, (15, 19), (15, 22)])
+    tail = [(15, 22), (15, 23), (15, 24), (16, 25), (17, 26), (18, 27), (19, 28), (20, 29)]
+    assert (len(straights), len(diagonals)) == (25, 18)
+
+    moves = np.zeros((30, 40), dtype=np.uint8)
+    for path in (diagonals, straights, tail):
+        for (r, c), (rn, cn) in itertools.pairwise(path):
+            k = DIRECTIONS.index((rn - r, cn - c))
+            moves[r, c] |= 1 << k
+            moves[rn, cn] |= 1 << (k + 4) % 8
+    query = Query(Grid(moves > 0, moves), (20, 5), (20, 29))
+    for search in SEARCHES:
+        assert search.plan(query, RNG).cost == pytest.approx(26 + 5 * math.sqrt(2), abs=1e-9)
+
+
+def _corridor(turns: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    cells = [turns[0]]
+    for row, col in turns[1:]:
+        while cells[-1] != (row, col):
+            r, c = cells[-1]
+            cells.append((r + int(np.sign(row - r)), c + int(np.sign(col - c))))
+    return cells
+
+
+def test_a_long_maze_fits_the_ring_of_buckets() -> None:
+    free = np.ones((61, 61), dtype=np.bool_)
+    free[1::4, :-1] = False
+    free[3::4, 1:] = False
+    check(Query(Grid.from_free(free), (0, 0), (60, 60)))
+
+
+def test_an_open_list_larger_than_its_first_allotment() -> None:
+    """From the middle of open ground the front holds more than the 1024 entries there is room for at first."""
+    query = Query(Grid.from_free(np.ones((701, 701))), (350, 350), (700, 699))
+    result = Dijkstra().plan(query, RNG)
+    assert result.cost == pytest.approx(1 + 349 * math.sqrt(2), abs=1e-9)
+    assert result.work > 480_000
+
+
+def test_astar_expands_no_more_than_dijkstra_on_open_ground() -> None:
+    query = Query(Grid.from_free(np.ones((50, 50))), (25, 5), (30, 45))
+    informed, blind = (s.plan(query, RNG).work for s in (AStar(), Dijkstra()))
+    assert informed <= 41 < blind
+
+
+pictures = st.integers(2, 12).flatmap(
+    lambda rows: st.integers(2, 12).flatmap(
+        lambda cols: st.lists(st.booleans(), min_size=rows * cols, max_size=rows * cols).map(
+            lambda bits: np.array(bits).reshape(rows, cols) | (np.arange(rows * cols).reshape(rows, cols) % 3 == 0)
+        )
+    )
+)
+
+
+def cost(free: np.ndarray, start: tuple[int, int], goal: tuple[int, int]) -> float:
+    return AStar().plan(Query(Grid.from_free(free), start, goal), RNG).cost
+
+
+@settings(max_examples=150, deadline=None)
+@given(pictures, st.data())
+def test_cost_ignores_how_the_world_is_turned(free: np.ndarray, data: st.DataObject) -> None:
+    cells = [tuple(map(int, c)) for c in np.argwhere(free)]
+    start, goal = data.draw(st.sampled_from(cells)), data.draw(st.sampled_from(cells))
+    rows, cols = free.shape
+    expected = pytest.approx(cost(free, start, goal), abs=1e-9)
+    assert cost(free, goal, start) == expected  # ends swapped
+    assert cost(free[::-1], (rows - 1 - start[0], start[1]), (rows - 1 - goal[0], goal[1])) == expected  # mirrored
+    assert cost(free.T, start[::-1], goal[::-1]) == expected  # reflected
+    turned = [(cols - 1 - c, r) for r, c in (start, goal)]
+    assert cost(np.rot90(free), *turned) == expected  # rotated
+    moved = np.pad(free, ((2, 1), (3, 0)))
+    assert cost(moved, (start[0] + 2, start[1] + 3), (goal[0] + 2, goal[1] + 3)) == expected  # translated
+
+
+@settings(max_examples=80, deadline=None)
+@given(pictures, st.data())
+def test_freeing_a_cell_never_lengthens_a_path(free: np.ndarray, data: st.DataObject) -> None:
+    cells = [tuple(map(int, c)) for c in np.argwhere(free)]
+    start, goal = data.draw(st.sampled_from(cells)), data.draw(st.sampled_from(cells))
+    freed = free.copy()
+    freed[data.draw(st.integers(0, free.shape[0] - 1)), data.draw(st.integers(0, free.shape[1] - 1))] = True
+    assert cost(freed, start, goal) <= cost(free, start, goal) + 1e-9

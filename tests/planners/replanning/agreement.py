@@ -1,0 +1,108 @@
+"""An oracle for replanners that shares no code with them: scipy's Dijkstra on a graph built here."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import dijkstra
+
+from antdrive.planners import Query, Replanner
+from antdrive.worlds import Grid
+
+Cell = tuple[int, int]
+HALF = {0: (0, 1), 1: (1, 1), 2: (1, 0), 3: (1, -1)}  # bit: (row, column); each two-way move once
+
+
+def ends(shape: tuple[int, int], dr: int, dc: int) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
+    """Where a move starts and where it ends, for all cells at once."""
+    rows, cols = shape
+    here = (slice(0, rows - dr), slice(max(0, -dc), cols - max(0, dc)))
+    there = (slice(dr, rows), slice(max(0, dc), cols - max(0, -dc)))
+    return here, there
+
+
+def pictured(free: np.ndarray) -> dict[int, np.ndarray]:
+    """By direction, the moves that free cells allow."""
+    able = {}
+    for k, (dr, dc) in HALF.items():
+        here, there = ends(free.shape, dr, dc)
+        able[k] = free[here] & free[there] & free[there[0], here[1]] & free[here[0], there[1]]
+    return able
+
+
+class World:
+    """Free cells and closed moves, kept by the test."""
+
+    def __init__(self, grid: Grid) -> None:
+        self.reset(grid)
+
+    def reset(self, grid: Grid) -> None:
+        self.cell, self.free = grid.cell, grid.free.copy()
+        self.closed = {}
+        for k, able in pictured(self.free).items():
+            here, _ = ends(grid.shape, *HALF[k])
+            self.closed[k] = able & ((grid.moves[here] >> k & 1) == 0)
+
+    def optimum(self, start: Cell, goal: Cell) -> float:
+        if not (self.free[start] and self.free[goal]):
+            return math.inf
+        index = np.arange(self.free.size).reshape(self.free.shape)
+        a, b, w = [], [], []
+        for k, able in pictured(self.free).items():
+            here, there = ends(self.free.shape, *HALF[k])
+            yes = able & ~self.closed[k]
+            a.append(index[here][yes])
+            b.append(index[there][yes])
+            w.append(np.full(yes.sum(), math.hypot(*HALF[k])))
+        graph = coo_array((np.concatenate(w), (np.concatenate(a), np.concatenate(b))), shape=(self.free.size,) * 2)
+        return self.cell * float(dijkstra(graph.tocsr(), directed=False, indices=index[start])[index[goal]])
+
+
+def agree(replanner: Replanner, world: World) -> bool:
+    """Assert that the result is a path of the oracle's length; whether there is one."""
+    query, result = replanner.query, replanner.result()
+    floor = world.optimum(query.start, query.goal)
+    assert result.solved == math.isfinite(floor)
+    if not result.solved:
+        assert result.reason
+        return False
+    assert abs(result.cost - floor) < 1e-9
+    assert tuple(result.cells[0]) == query.start
+    assert tuple(result.cells[-1]) == query.goal
+    steps = np.diff(result.cells, axis=0)
+    bit = {(0, 1): 0, (1, 1): 1, (1, 0): 2, (1, -1): 3, (0, -1): 4, (-1, -1): 5, (-1, 0): 6, (-1, 1): 7}
+    for cell, step in zip(result.cells, steps, strict=False):
+        assert query.grid.moves[tuple(cell)] >> bit[tuple(map(int, step))] & 1
+    assert abs(world.cell * np.hypot(*steps.T).sum() - result.cost) < 1e-9
+    return True
+
+
+def change_at_random(make: Callable[[Query], Replanner], query: Query, rng: np.random.Generator, turns: int) -> int:
+    """Tell a replanner of random changes and compare it with the oracle after each; how often there was a path."""
+    world, replanner = World(query.grid), make(query)
+    shape = query.grid.shape
+    solved = 0
+    for _ in range(turns):
+        solved += agree(replanner, world)
+        for _ in range(rng.integers(1, 3)):  # sometimes several changes between two results
+            cells = rng.integers(0, shape, (int(rng.integers(0, 6)), 2))
+            what = rng.random()
+            if what < 0.45:
+                replanner.block(cells)
+                world.free[tuple(cells.T)] = False
+            elif what < 0.92:
+                replanner.clear(cells)
+                world.free[tuple(cells.T)] = True
+            else:
+                grid = Grid.from_free(rng.random(shape) < rng.uniform(0.5, 1.0), cell=query.grid.cell)
+                replanner.change(grid)
+                world.reset(grid)
+        path = replanner.result().cells if rng.random() < 0.5 else []
+        if len(path) and rng.random() < 0.7:  # along the path
+            replanner.move(tuple(map(int, path[min(len(path) - 1, int(rng.integers(0, 4)))])))
+        elif rng.random() < 0.3:  # carried off
+            replanner.move((int(rng.integers(0, shape[0])), int(rng.integers(0, shape[1]))))
+    return solved

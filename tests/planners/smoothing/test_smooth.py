@@ -1,0 +1,450 @@
+"""Refined routes: exact clearance, the plan's own corridor, never longer, and the optimum where the corridor is its own."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+import tarfile
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from antdrive.planners import AStar, PlanResult, PlanStatus, Query, find_planner, path_cost, route_along
+from antdrive.planners.anyangle.tangent import Arc, Line, TangentPath, shortest
+from antdrive.planners.smoothing.smooth import SMOOTHINGS, pull_taut, smooth
+from antdrive.robots import load_robot
+from antdrive.worlds import (
+    Disc,
+    Floats,
+    Grid,
+    Route,
+    Task,
+    World,
+    catalogue,
+    forest,
+    import_barn,
+    load_task,
+    point_clearance,
+    polyline_clearance,
+    rasterise,
+)
+from tests.planners.worlds_to_solve import catalogue as small_worlds
+
+RNG = np.random.default_rng(0)  # nothing that counts is drawn from it
+BARN = Path(__file__).parents[4] / "shared" / "data" / "barn" / "barn50.tar.xz"
+REFINED = ("taut", "clearance")
+
+
+# -- oracles that share no code with the refinement
+
+
+def word(xy: Floats, centres: Floats) -> list[tuple[int, bool]]:
+    """The homotopy class of a line among points: which of their parallel rays it crosses and in which sense, reduced."""
+    angle = 0.7390851  # no ray may pass through another point
+    turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+    line, points = xy @ turn.T, np.unique(centres @ turn.T, axis=0)
+    reduced: list[tuple[int, bool]] = []
+    for a, b in itertools.pairwise(line):
+        k = np.flatnonzero((a[0] < points[:, 0]) != (b[0] < points[:, 0]))
+        t = (points[k, 0] - a[0]) / (b[0] - a[0])
+        above = a[1] + t * (b[1] - a[1]) > points[k, 1]
+        for j in k[above][np.argsort(t[above])]:
+            if reduced and reduced[-1] == (int(j), bool(b[0] <= a[0])):
+                reduced.pop()
+            else:
+                reduced.append((int(j), bool(b[0] > a[0])))
+    return reduced
+
+
+def sampled(path: TangentPath, count: int = 60) -> Floats:
+    points = []
+    for piece in path.pieces:
+        if isinstance(piece, Arc):
+            points += [piece.at(abs(piece.sweep) * k / count) for k in range(count + 1)]
+        else:
+            a, b = np.array(piece.start), np.array(piece.end)
+            points += list(a + np.linspace(0, 1, count + 1)[:, None] * (b - a))
+    return np.array(points)
+
+
+def wander(seed: int) -> tuple[Task, Grid, PlanResult]:
+    """A plan through random places of a random world of overlapping discs: loops, spirals, dead ends."""
+    rng = np.random.default_rng(seed)
+    while True:
+        largest = rng.choice([0.2, 0.6, 1.8])
+        discs = [Disc(*rng.uniform(-0.3, 10.3, 2), rng.uniform(0.05, largest)) for _ in range(rng.integers(1, 40))]
+        if rng.random() < 0.3:  # a lattice, where tangents coincide
+            discs = [Disc(*at, 0.2) for at in {(round(2 * d.x) / 2, round(2 * d.y) / 2) for d in discs}]
+        world = World("wander", (0, 0, 10, 10), tuple(discs))
+        grid = rasterise(world, float(rng.choice([0.1, 0.25, 0.4])), float(rng.choice([0.05, 0.2, 0.3])))
+        free = np.argwhere(grid.free)
+        if len(free) < 5:
+            continue
+        stops = [tuple(map(int, cell)) for cell in rng.choice(free, size=int(rng.integers(2, 7)))]
+        legs = [AStar().plan(Query(grid, a, b), rng).cells for a, b in itertools.pairwise(stops)]
+        legs = list(itertools.takewhile(len, legs))
+        cells = np.vstack([legs[0][:1], *(leg[1:] for leg in legs)]) if legs else np.empty((0, 2))
+        if len(cells) < 2 or (cells[0] == cells[-1]).all():
+            continue
+        start, goal = grid.xy(cells[[0, -1]]) + rng.uniform(-0.1, 0.1, (2, 2)) * grid.cell
+        if point_clearance(world, [start, goal]).min() <= 0:
+            continue
+        task = Task(world, (float(start[0]), float(start[1]), 0.0), (float(goal[0]), float(goal[1])))
+        cost = path_cost(cells, grid.cell)
+        return task, grid, PlanResult(status=PlanStatus.SOLVED, cells=cells.astype(np.int32), cost=cost)
+
+
+def check(route: Route, line: Route, task: Task, inflate: float, *, longest: float = math.inf) -> None:
+    world = task.world
+    np.testing.assert_allclose(route.xy[[0, -1]], line.xy[[0, -1]], atol=1e-9)
+    assert route.length <= min(max(line.length, longest if route.kind == "clearance" else 0.0), longest) + 1e-9
+    assert polyline_clearance(world, route.xy) >= min(inflate, polyline_clearance(world, line.xy)) - 1e-9
+    assert word(route.xy, world.discs[:, :2]) == word(line.xy, world.discs[:, :2])
+    assert route.curvature is not None
+    assert len(route.curvature) == len(route.xy)
+
+
+# -- by hand
+
+
+def one_disc(side: float) -> tuple[Task, Grid, PlanResult]:
+    """The radius-5 world of Han's thesis (2007), its disc passed on one side."""
+    task = Task(World("han", (-2, -2, 22, 22), (Disc(10, 10, 5),)), (0.0, 0.0, 0.0), (20.0, 20.0))
+    grid = rasterise(task.world, 0.5)
+    corner = (0.0, 20.0) if side > 0 else (20.0, 0.0)
+    waypoints = grid.fractional([(0, 0), corner, (20, 20)])
+    return task, grid, PlanResult(status=PlanStatus.SOLVED, waypoints=waypoints, cost=40.0)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_one_disc_has_its_closed_form(side: int) -> None:
+    task, grid, plan = one_disc(side)
+    route = smooth(plan, grid, task)
+    to_centre = math.hypot(10, 10)
+    by_hand = 2 * math.sqrt(to_centre**2 - 25) + 5 * (math.pi - 2 * math.acos(5 / to_centre))
+    path = pull_taut(grid.xy(plan.line), task.world.discs, task.world.bounds, 0.0)
+    assert path is not None
+    assert [type(piece) for piece in path.pieces] == [Line, Arc, Line]
+    assert path.length == pytest.approx(by_hand, abs=1e-9)
+    assert route.length == pytest.approx(by_hand, rel=1e-4)
+    assert route.kind == "taut"
+    assert route.note == ""
+    assert route.curvature is not None
+    np.testing.assert_allclose(route.curvature[1:-2], -side / 5)
+    np.testing.assert_allclose(route.curvature[[0, -2, -1]], 0.0)
+    assert route.xy[len(route.xy) // 2] @ (-1, 1) * side > 0
+    off = np.hypot(*(route.xy[1:-1] - 10).T) - 5
+    assert off.min() >= -1e-9
+    assert off.max() <= 5e-4 + 1e-9
+
+
+def test_wide_keeps_the_preferred_clearance_where_there_is_room() -> None:
+    task, grid, plan = one_disc(1)
+    route = smooth(plan, grid, task, kind="clearance", clearance=0.4)
+    assert route.kind == "clearance"
+    assert polyline_clearance(task.world, route.xy) == pytest.approx(0.4, abs=1e-9)
+    assert route.length == pytest.approx(
+        shortest([(10, 10, 5.4)], task.world.bounds, 0, (0, 0), (20, 20)).length, rel=1e-4
+    )  # type: ignore[union-attr]
+    short = smooth(plan, grid, task, kind="clearance", clearance=0.4, stretch=0.01)
+    taut = smooth(plan, grid, task)
+    assert taut.length < short.length <= 1.01 * taut.length + 1e-3
+    assert 0.1 < polyline_clearance(task.world, short.xy) < 0.4
+    assert (smooth(plan, grid, task, kind="clearance", clearance=0.0).xy == taut.xy).all()
+
+
+def test_wide_takes_the_middle_of_a_gap_between_discs_and_of_one_at_a_wall() -> None:
+    gap = (Disc(5, 3.7, 1.0), Disc(5, 6.5, 1.0))  # 0.8 m between them, middle at y = 5.1
+    task = Task(World("gap", (0, 0, 10, 10), gap), (1.0, 2.0, 0.0), (9.0, 2.0))
+    grid = rasterise(task.world, 0.25, 0.3)
+    over = grid.fractional([(1, 2), (1.5, 5.1), (8.5, 5.1), (9, 2)])
+    plan = PlanResult(status=PlanStatus.SOLVED, waypoints=over)
+    route = smooth(plan, grid, task, kind="clearance", clearance=0.5, stretch=0.1)
+    assert np.interp(5.0, *route.xy.T) == pytest.approx(5.1, abs=0.01)
+    assert np.interp(5.0, *smooth(plan, grid, task).xy.T) == pytest.approx(5.0, abs=1e-3)
+    task = Task(World("wall", (0, 0, 10, 10), (Disc(5, 8.0, 1.0),)), (1.0, 5.0, 0.0), (9.0, 5.0))
+    plan = PlanResult(status=PlanStatus.SOLVED, waypoints=grid.fractional([(1, 5), (1.5, 9.5), (8.5, 9.5), (9, 5)]))
+    route = smooth(plan, grid, task, kind="clearance", clearance=0.5, stretch=0.2)
+    assert np.interp(5.0, *route.xy.T) == pytest.approx(9.5, abs=0.01)
+
+
+def test_a_string_around_a_disc_more_than_once_keeps_its_windings() -> None:
+    angles = np.linspace(0, 2 * math.tau + math.pi / 2, 60)
+    loops = np.stack((5 + 3 * np.cos(angles), 5 + 3 * np.sin(angles)), axis=1)
+    path = pull_taut(loops, [(5, 5, 1)], (0, 0, 10, 10), 0.5)
+    assert path is not None
+    (arc,) = (piece for piece in path.pieces if isinstance(piece, Arc))
+    by_hand = 2 * math.tau + math.pi / 2 - 2 * math.acos(1.5 / 3)
+    assert arc.sweep == pytest.approx(by_hand, abs=1e-9)
+    assert path.length == pytest.approx(1.5 * by_hand + 2 * math.sqrt(9 - 2.25), abs=1e-9)
+    unwound = pull_taut(np.vstack([loops, loops[-2::-1] + 1e-3]), [(5, 5, 1)], (0, 0, 10, 10), 0.5)
+    assert unwound is not None
+    assert unwound.length == pytest.approx(math.hypot(1e-3, 1e-3))
+
+
+# -- properties
+
+
+@settings(max_examples=120)
+@given(st.integers(0, 10**6))
+def test_any_plan_of_any_forest(seed: int) -> None:
+    task, grid, plan = wander(seed)
+    world, inflate = task.world, grid.inflate
+    line = smooth(plan, grid, task, kind="none")
+    for kind in REFINED:
+        route = smooth(plan, grid, task, kind=kind)
+        check(route, line, task, inflate, longest=max(line.length, plan.cost))
+        assert route.kind == kind
+        redone = dataclasses.replace(plan, waypoints=grid.fractional(route.xy))
+        assert smooth(redone, grid, task, kind=kind).length == pytest.approx(route.length, abs=1e-7)
+    if polyline_clearance(world, line.xy) < inflate - 1e-9:
+        return
+    there, back = (pull_taut(xy, world.discs, world.bounds, inflate) for xy in (line.xy, line.xy[::-1]))
+    optimum = shortest(world.discs, world.bounds, inflate, tuple(line.xy[0]), tuple(line.xy[-1]))
+    assert there is not None
+    assert back is not None
+    assert optimum is not None
+    assert point_clearance(world, sampled(there)).min() >= inflate - 1e-9
+    for before, after in itertools.pairwise(there.pieces):
+        assert math.dist(before.end, after.start) < 1e-9
+    assert back.length == pytest.approx(there.length, abs=1e-7)
+    assert there.length >= optimum.length - 1e-7
+    best = pull_taut(optimum.polyline(1e-3, world.discs, world.bounds, inflate), world.discs, world.bounds, inflate)
+    assert best is not None
+    assert best.length == pytest.approx(optimum.length, abs=1e-7)
+    if word(sampled(there), world.discs[:, :2]) == word(sampled(optimum), world.discs[:, :2]):
+        assert there.length == pytest.approx(optimum.length, abs=1e-7)
+
+
+@settings(max_examples=40)
+@given(st.integers(0, 10**6), st.floats(0, math.tau), st.booleans(), st.sampled_from(REFINED))
+def test_a_turned_or_mirrored_world_has_a_turned_or_mirrored_route(
+    seed: int, angle: float, mirror: bool, kind: str
+) -> None:
+    task, grid, plan = wander(seed)
+    flip = -1.0 if mirror else 1.0
+    turn = np.array([[math.cos(angle), -flip * math.sin(angle)], [math.sin(angle), flip * math.cos(angle)]])
+
+    def told(matrix: Floats) -> Route:
+        discs = tuple(Disc(*map(float, matrix @ (d.x, d.y)), d.radius) for d in task.world.obstacles)
+        ends = [matrix @ np.array(end) for end in (task.start[:2], task.goal)]
+        far = Task(World("far", (-99, -99, 99, 99), discs), (*ends[0], 0.0), tuple(ends[1]))  # walls do not turn
+        moved = dataclasses.replace(plan, waypoints=grid.fractional(grid.xy(plan.cells) @ matrix.T))
+        return smooth(moved, grid, far, kind=kind)
+
+    here, there = told(np.eye(2)), told(turn)
+    assert there.length == pytest.approx(here.length, abs=1e-6)
+    s = np.linspace(0, 1, 50)
+    ours, theirs = (np.stack([np.interp(s * r.length, r.arc, axis) for axis in r.xy.T], axis=1) for r in (here, there))
+    np.testing.assert_allclose(theirs, ours @ turn.T, atol=1e-3)
+
+
+PLANNERS = (
+    "dijkstra",
+    "astar",
+    "dstar-lite",
+    "aco-han",
+    "as",
+    "pfaco",
+    "mmas",
+    "mmas-dstar",
+    "ants",
+    "ga-han",
+    "hybrid",
+    "tangent",
+)
+
+
+@pytest.mark.parametrize("name", PLANNERS)
+def test_every_planners_plans_are_refined(name: str) -> None:
+    solved = 0
+    for query in small_worlds().values():
+        assert query.task is not None
+        plan = find_planner(name).plan(query, np.random.default_rng(1))
+        if not plan.solved:
+            continue
+        solved += 1
+        line = route_along(plan, query.grid, query.task)
+        longest = max(line.length, plan.cost if math.isfinite(plan.cost) else 0.0)
+        taut, wide = (smooth(plan, query.grid, query.task, kind=kind) for kind in REFINED)
+        check(taut, line, query.task, query.grid.inflate)
+        check(wide, line, query.task, query.grid.inflate, longest=longest)
+        assert (taut.kind, taut.note, wide.note) == ("taut", "", "")
+        assert taut.length <= wide.length + 1e-9
+        if name == "tangent":
+            assert plan.length is not None
+            assert taut.length == pytest.approx(plan.length, rel=5e-4)
+    assert solved
+
+
+@pytest.mark.parametrize("robot", ["turtlebot", "jackal"])
+def test_the_catalogue_with_both_robots(robot: str) -> None:
+    for path in catalogue().values():
+        task = load_task(path)
+        grid = rasterise(task.world, task.cell, load_robot(robot).radius + 0.03)
+        query = Query.between(grid, task)
+        for name in ("astar", "tangent"):
+            plan = find_planner(name).plan(query, RNG)
+            if not plan.solved:
+                continue
+            line = route_along(plan, grid, task)
+            longest = max(line.length, plan.cost if math.isfinite(plan.cost) else 0.0)
+            for kind in REFINED:
+                route = smooth(plan, grid, task, kind=kind)
+                check(route, line, task, grid.inflate, longest=longest)
+                assert route.kind == kind
+
+
+# -- BARN
+
+
+@cache
+def barn() -> tuple[Task, ...]:
+    return tuple(_barn())
+
+
+def _barn() -> Iterator[Task]:
+    import tempfile
+
+    with tempfile.TemporaryDirectory() as folder, tarfile.open(BARN) as archive:
+        archive.extractall(folder, filter="data")
+        for n in range(0, 300, 6):
+            yield import_barn(Path(folder) / f"world_{n}.world")
+
+
+@pytest.mark.skipif(not BARN.exists(), reason="BARN's worlds are not in ../shared/data")
+@pytest.mark.parametrize("cell", [0.15, 0.05])
+def test_barn_in_the_best_corridor_is_the_optimum(cell: float) -> None:
+    """At 0.363 m, Jackal's radius and 3 cm."""
+    gaps = []
+    for task in barn():
+        grid = rasterise(task.world, cell, 0.363)
+        plan = AStar().plan(Query.between(grid, task), RNG)
+        assert plan.solved
+        line = route_along(plan, grid, task)
+        for kind in REFINED:
+            route = smooth(plan, grid, task, kind=kind)
+            check(route, line, task, 0.363)
+            assert (route.kind, route.note) == (kind, "")
+            if kind == "clearance":
+                continue
+            best = shortest(task.world.discs, task.world.bounds, 0.363, task.start[:2], task.goal)
+            assert best is not None
+            gap = route.length / best.length - 1
+            same = word(route.xy, task.world.discs[:, :2]) == word(sampled(best), task.world.discs[:, :2])
+            assert gap <= (1.5e-4 if same else 0.02)
+            gaps.append((gap, same))
+    assert sum(same for _, same in gaps) >= 45
+
+
+# -- what cannot be refined, and misuse
+
+
+def test_a_start_without_room_is_left_as_planned() -> None:
+    task = Task(World("w", (0, 0, 10, 10), (Disc(2, 2, 0.5), Disc(5, 5, 1.0))), (2.6, 2.0, 0.0), (8.0, 8.0))
+    grid = rasterise(task.world, 0.5, 0.4)
+    query = Query.between(grid, task)
+    plan = AStar().plan(query, RNG)
+    route = smooth(plan, grid, task)
+    np.testing.assert_allclose(route.xy[:2], [task.start[:2], grid.xy([query.start])[0]])
+    assert polyline_clearance(task.world, route.xy[1:]) >= 0.4 - 1e-9
+    assert (route.kind, route.note) == ("taut", "")
+    assert route.length == pytest.approx(find_planner("tangent").plan(query, RNG).length, rel=1e-3)
+
+
+def test_a_goal_without_room_is_reached_where_the_plan_ends() -> None:
+    task = Task(World("w", (0, 0, 10, 10), (Disc(8, 8, 0.5),)), (2.0, 2.0, 0.0), (7.4, 7.8), goal_tolerance=0.7)
+    grid = rasterise(task.world, 0.5, 0.3)
+    query = Query.between(grid, task)
+    route = smooth(AStar().plan(query, RNG), grid, task)
+    np.testing.assert_allclose(route.xy[-1], grid.xy([query.goal])[0])
+    assert polyline_clearance(task.world, route.xy) >= 0.3 - 1e-9
+
+
+def test_a_plan_that_comes_too_close_is_kept_there_with_a_note() -> None:
+    task = Task(World("w", (0, 0, 10, 10), (Disc(5, 5, 1.0),)), (1.0, 5.0, 0.0), (9.0, 5.0))
+    grid = rasterise(task.world, 0.5, 0.3)
+    over = [(1.0, 5.0), (1.0, 8.0), (4.0, 6.2), (6.0, 6.2), (9.0, 8.0), (9.0, 5.0)]
+    plan = PlanResult(status=PlanStatus.SOLVED, waypoints=grid.fractional(over))
+    for kind in REFINED:
+        route = smooth(plan, grid, task, kind=kind)
+        assert "closer than the clearance" in route.note
+        assert all((np.abs(route.xy - point) < 1e-9).all(axis=1).any() for point in over[2:4])
+        assert route.length < route_along(plan, grid, task).length
+    assert pull_taut(over, task.world.discs, task.world.bounds, 0.3) is None
+
+
+def test_what_may_be_longer_may_be_so_once() -> None:
+    """Two parts of a line, with one that has too little room between them, and a centimetre to spare for all."""
+    posts = ((5.0, -0.5, 0.5), (5.0, 2.6, 0.5), (10.0, 0.45, 0.3), (15.0, -0.5, 0.5), (15.0, 2.6, 0.5))
+    task = Task(
+        World("w", (0.0, -3.0, 20.0, 3.0), tuple(Disc(*post) for post in posts)), (1.0, 0.25, 0.0), (19.0, 0.25)
+    )
+    grid = rasterise(task.world, 0.5, 0.2)
+    xy = np.array(
+        [(1, 0.25), (4.2, 0.25), (5.8, 0.25), (9, 0), (10, 0), (11, 0), (14.2, 0.25), (15.8, 0.25), (19, 0.25)]
+    )
+    waypoints = (xy - grid.origin)[:, ::-1] / grid.cell
+    cost = float(np.hypot(*np.diff(xy, axis=0).T).sum()) + 0.01
+    route = smooth(PlanResult(status=PlanStatus.SOLVED, waypoints=waypoints, cost=cost), grid, task, kind="clearance")
+    assert route.kind == "clearance"
+    assert route.length <= cost + 1e-9
+
+
+def test_no_room_for_a_wider_line_leaves_the_taut_one() -> None:
+    """The taut line of a plan whose own is taut already cannot be widened without making it longer."""
+    task, grid, plan = one_disc(1)
+    taut = smooth(plan, grid, task)
+    again = PlanResult(status=PlanStatus.SOLVED, waypoints=grid.fractional(taut.xy))
+    route = smooth(again, grid, task, kind="clearance")
+    assert route.length <= taut.length + 1e-9
+
+
+def test_grid_is_the_plans_own_line_and_misuse_is_refused() -> None:
+    task, grid, plan = one_disc(1)
+    route = smooth(plan, grid, task, kind="none")
+    assert (route.xy == route_along(plan, grid, task).xy).all()
+    assert (route.kind, route.curvature) == ("none", None)
+    with pytest.raises(ValueError, match="kind: unknown route 'tight'; choose from none, taut, clearance"):
+        smooth(plan, grid, task, kind="tight")
+    for wrong in ({"clearance": -0.1}, {"stretch": math.nan}, {"bulge": 0.0}):
+        with pytest.raises(ValueError, match=next(iter(wrong))):
+            smooth(plan, grid, task, **wrong)
+    with pytest.raises(ValueError, match="no path"):
+        smooth(PlanResult(status=PlanStatus.NO_PATH), grid, task)
+    assert SMOOTHINGS == ("none", "taut", "clearance")
+
+
+def test_a_routes_curvature_follows_its_points() -> None:
+    route = Route([[0, 0], [0, 0], [1, 0], [1, 0], [2, 0]], [1.0, 2.0, 3.0, 4.0, 5.0])
+    np.testing.assert_allclose(route.xy, [[0, 0], [1, 0], [2, 0]])
+    assert route.curvature is not None
+    np.testing.assert_allclose(route.curvature, [2.0, 4.0, 5.0])
+    assert not route.curvature.flags.writeable
+    for wrong in ([1.0], [1.0, math.inf]):
+        with pytest.raises(ValueError, match="curvature: must be 2 finite numbers"):
+            Route([[0, 0], [1, 0]], wrong)
+
+
+def test_a_forest_of_400_discs_is_quick() -> None:
+    import time
+
+    task = forest(
+        np.random.default_rng(1), size=40, count=400, radius=(0.3, 0.7), clearance=1, spacing=0.1, robot_radius=0.25
+    )
+    grid = rasterise(task.world, 0.25, 0.3)
+    plan = AStar().plan(Query.between(grid, task), RNG)
+    for kind in REFINED:
+        smooth(plan, grid, task, kind=kind)
+        spent = []
+        for _ in range(3):
+            started = time.perf_counter()
+            smooth(plan, grid, task, kind=kind)
+            spent.append(time.perf_counter() - started)
+        assert min(spent) < 0.1

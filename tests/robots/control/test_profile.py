@@ -1,0 +1,167 @@
+"""Speed profiles against numbers worked by hand, and their limits on random routes."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from antdrive.robots import RobotSpec
+from antdrive.robots.control.profile import SpeedProfile, speed_profile, turning_time
+from antdrive.worlds import Floats, Route
+
+
+def straight(length: float) -> Route:
+    return Route([[0.0, 0.0], [length, 0.0]])
+
+
+def around(radius: float, sweep: float, bulge: float = 5e-4) -> Route:
+    """An arc drawn as refined routes draw it: corners that stand off outside."""
+    count = math.ceil(abs(sweep) / (2 * math.acos(radius / (radius + bulge))))
+    half = sweep / count / 2
+    angles = np.concatenate(([0.0], half * (2 * np.arange(count) + 1), [sweep]))
+    reach = np.full(len(angles), radius / math.cos(half))
+    reach[[0, -1]] = radius
+    curvature = np.full(len(angles), math.copysign(1 / radius, sweep))
+    return Route(np.stack((reach * np.cos(angles), reach * np.sin(angles)), axis=1), curvature)
+
+
+def test_a_straight_line_is_a_trapezoid(turtlebot: RobotSpec) -> None:
+    """0.7 m/s at 1 m/s^2: 0.7 s and 0.245 m to speed up, and as much to brake."""
+    p = speed_profile(straight(2.0), turtlebot, step=0.005)
+    assert p.duration == pytest.approx(2.0 / 0.7 + 0.7, abs=1e-4)
+    assert p.speed.max() == pytest.approx(0.7)
+    assert np.interp(0.125, p.arc, p.speed) == pytest.approx(0.5, abs=1e-3)
+    assert np.interp(2.0 - 0.02, p.arc, p.speed) == pytest.approx(0.2, abs=1e-3)
+    assert np.interp(1.0, p.arc, p.time) == pytest.approx(p.duration / 2)
+    assert p.speed[0] == p.speed[-1] == 0.0
+    assert not p.curvature.any()
+
+
+def test_a_short_line_is_a_triangle_and_softer_brakes_move_its_peak(turtlebot: RobotSpec) -> None:
+    p = speed_profile(straight(0.32), turtlebot, step=0.0025)
+    assert p.duration == pytest.approx(2 * math.sqrt(0.32), abs=1e-4)
+    assert p.speed.max() == pytest.approx(math.sqrt(0.32), abs=1e-3)
+    soft = speed_profile(straight(0.36), turtlebot, step=0.0025, braking=0.5)  # v^2 = 2 s1 = s2, s1 + s2 = 0.36
+    assert soft.speed.max() == pytest.approx(math.sqrt(0.24), abs=2e-3)
+    assert soft.duration == pytest.approx(math.sqrt(0.24) * 3, abs=1e-3)
+    assert speed_profile(straight(1e-4), turtlebot).duration == pytest.approx(0.02, rel=0.01)
+
+
+def test_a_long_arc_is_driven_at_the_least_of_its_limits(turtlebot: RobotSpec, jackal: RobotSpec) -> None:
+    def cruise(robot: RobotSpec, radius: float) -> float:
+        p = speed_profile(around(radius, 3.0), robot)
+        return float(np.interp(p.arc[-1] / 2, p.arc, p.speed))
+
+    assert cruise(jackal, 0.5) == pytest.approx(1.0, rel=1e-3)  # sqrt(2 m/s^2 * 0.5 m)
+    assert cruise(turtlebot, 0.36) == pytest.approx(0.6, rel=1e-3)  # sqrt(1 * 0.36)
+    slow_turner = dataclasses.replace(jackal, max_yaw_rate=1.2)
+    assert cruise(slow_turner, 0.5) == pytest.approx(0.6, rel=1e-3)  # 1.2 rad/s * 0.5 m
+    weak = dataclasses.replace(jackal, max_wheel_speed=8.0)  # rim 0.784 m/s = v (1 + 0.3756 / 2 / 0.5)
+    assert cruise(weak, 0.5) == pytest.approx(0.784 / 1.3756, rel=1e-3)
+
+
+def test_speeding_up_on_an_arc_keeps_the_yaw_acceleration(jackal: RobotSpec) -> None:
+    sluggish = dataclasses.replace(jackal, max_yaw_acceleration=1.0)
+    p = speed_profile(around(2.0, 2.5), dataclasses.replace(sluggish, max_lateral_acceleration=50.0), blend=0.05)
+    a = np.diff(p.speed**2) / 2 / np.diff(p.arc)
+    middle = (p.arc[1:] > 0.5) & (p.arc[1:] < 1.0)
+    np.testing.assert_allclose(a[middle], 2.0, rtol=2e-3)  # 1 rad/s^2 at a radius of 2 m, as the robot's own 2 m/s^2
+    tighter = speed_profile(around(1.0, 2.5), dataclasses.replace(sluggish, max_lateral_acceleration=50.0), blend=0.05)
+    a = np.diff(tighter.speed**2) / 2 / np.diff(tighter.arc)
+    middle = (tighter.arc[1:] > 0.3) & (tighter.arc[1:] < 0.6)
+    np.testing.assert_allclose(a[middle], 1.0, rtol=2e-3)
+
+
+def test_a_sharp_corner_is_a_stop_with_a_turn_on_the_spot(turtlebot: RobotSpec) -> None:
+    route = Route([[0, 0], [1, 0], [1, 1]])
+    p = speed_profile(route, turtlebot, step=0.005)
+    leg = 1.0 / 0.7 + 0.7
+    turn = (math.pi / 2) / 3.14 + 3.14 / 8.0
+    assert p.duration == pytest.approx(2 * leg + turn, abs=2e-3)
+    assert turning_time(math.pi / 2, turtlebot) == pytest.approx(turn)
+    assert turning_time(-0.5, turtlebot) == pytest.approx(2 * math.sqrt(0.5 / 8.0))
+    at = np.flatnonzero(p.arc == 1.0)
+    assert len(at) == 2
+    assert not p.speed[at].any()
+    assert np.diff(p.time[at])[0] == pytest.approx(turn)
+    assert not p.curvature.any()
+    through = speed_profile(route, turtlebot, stop_from=2.0)
+    assert (through.speed[1:-1] > 0.0).all()
+    assert through.duration < p.duration
+
+
+def test_a_slight_corner_is_rounded_within_the_blend(turtlebot: RobotSpec) -> None:
+    route = Route([[0, 0], [2, 0], [2 + math.cos(0.5), math.sin(0.5)]])
+    p = speed_profile(route, turtlebot, blend=0.25, step=0.005)
+    peak = np.interp(2.0, p.arc, p.curvature)
+    assert peak == pytest.approx(0.5 / 0.25, rel=0.03)  # a triangle that holds the corner's angle
+    assert np.interp(2.0 - 0.26, p.arc, p.curvature) == pytest.approx(0.0, abs=1e-9)
+    assert np.sum(np.diff(p.arc) * p.curvature[:-1]) == pytest.approx(0.5, abs=1e-6)
+    assert np.interp(2.0, p.arc, p.speed) <= math.sqrt(1.0 / 2.0) * 1.02
+    assert p.speed[200:-200].min() > 0.4
+
+
+def test_curvature_of_a_drawn_arc_is_exact_and_even() -> None:
+    from antdrive.robots.files import load_robot
+
+    p = speed_profile(around(0.44, -2.5), load_robot("jackal"), blend=0.1)
+    inner = (p.arc > 0.15) & (p.arc < p.arc[-1] - 0.15)
+    np.testing.assert_allclose(p.curvature[inner], -1 / 0.44, rtol=2e-3)
+
+
+@given(st.lists(st.tuples(st.floats(0.05, 1.5), st.floats(-1.5, 1.5)), min_size=1, max_size=8), st.booleans())
+def test_all_limits_hold_on_random_routes(legs: list[tuple[float, float]], bold: bool) -> None:
+    from antdrive.robots.files import load_robot
+
+    robot = load_robot("jackal" if bold else "turtlebot")
+    heading, points = 0.0, [np.zeros(2)]
+    for length, turn in legs:
+        points.append(points[-1] + length * np.array([math.cos(heading), math.sin(heading)]))
+        heading += turn
+    p = speed_profile(Route(np.array(points)), robot)
+    check(p, robot)
+
+
+def check(p: SpeedProfile, robot: RobotSpec) -> None:
+    v, k = p.speed, np.abs(p.curvature)
+    assert np.isfinite(p.time).all()
+    assert (np.diff(p.time) > 0).all()
+    assert v[0] == v[-1] == 0.0
+    assert (v <= robot.max_speed + 1e-12).all()
+    assert (v * k <= robot.max_yaw_rate + 1e-9).all()
+    assert (v * v * k <= robot.max_lateral_acceleration + 1e-9).all()
+    assert (v + v * k * robot.track / 2 <= robot.max_wheel_speed * robot.wheel_radius + 1e-9).all()
+    ds = np.diff(p.arc)
+    moving = ds > 0
+    a: Floats = (np.diff(v**2)[moving] / 2) / ds[moving]
+    assert (np.abs(a) <= robot.max_acceleration + 1e-6).all()
+    yaw = np.diff(p.yaw_rate)[moving] / np.diff(p.time)[moving]
+    assert (np.abs(yaw) <= 1.25 * robot.max_yaw_acceleration).all()  # between samples curvature is not quite linear
+
+
+def test_refined_routes_keep_the_limits_and_beat_the_grid(jackal: RobotSpec) -> None:
+    from antdrive.planners import AStar, Query
+    from antdrive.planners.smoothing.smooth import smooth
+    from antdrive.worlds import forest, rasterise
+
+    for seed in range(4):
+        task = forest(np.random.default_rng(seed), count=8, radius=(0.5, 1.5), clearance=1.0)
+        grid = rasterise(task.world, 0.25, 0.38)
+        plan = AStar().plan(Query.between(grid, task), np.random.default_rng(0))
+        slow, *fast = (
+            speed_profile(smooth(plan, grid, task, kind=kind), jackal) for kind in ("none", "taut", "clearance")
+        )
+        for p in fast:
+            check(p, jackal)
+            assert p.duration < slow.duration
+
+
+def test_settings_out_of_range_are_refused(turtlebot: RobotSpec) -> None:
+    for wrong in ({"blend": 0.0}, {"step": -1.0}, {"stop_from": math.nan}, {"braking": 1.5}, {"braking": 0.0}):
+        with pytest.raises(ValueError, match=next(iter(wrong))):
+            speed_profile(straight(1.0), turtlebot, **wrong)

@@ -1,0 +1,475 @@
+"""Worlds that move: in physics, in logs, in certificates."""
+
+import dataclasses
+import json
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from antdrive.planners import find_planner
+from antdrive.robots import PurePursuit, RobotSpec
+from antdrive.sim import Engine, Outcome, Rollout, Run, Scenario, certify, measure, run
+from antdrive.sim.driving.drive import drive
+from antdrive.sim.log.certificate import closed_form_clearance
+from antdrive.sim.log.contacts import Touch, touches
+from antdrive.worlds import Cruising, Disc, Floats, Keyframed, Mover, Route, Task, Trajectories, Wandering, World
+
+OPEN = (-10.0, -10.0, 10.0, 10.0)
+ZIGZAG = ((0.0, -3.0, 3.0), (2.0, 0.0, 4.0), (2.5, 1.0, 4.0), (4.0, 1.0, 6.0))
+
+
+def placed(engine: Engine, steps: int) -> tuple[list[int], Floats, Floats]:
+    """Where movers' bodies and traffic are at each of some steps, and at which the robot was touched."""
+    engine.place((0.0, 0.0, 0.0))
+    bodies, touched = [engine.mover_places()], []
+    for k in range(steps):
+        if engine.step():
+            touched.append(k)
+        bodies.append(engine.mover_places())
+    assert engine.traffic is not None
+    return touched, np.array(bodies), engine.traffic.positions(np.arange(steps + 1) / engine.physics_hz)
+
+
+def built(*movers: Mover, obstacles: tuple[Disc, ...] = ()) -> tuple[World, Trajectories]:
+    world = World("w", OPEN, obstacles, movers=movers)
+    return world, Trajectories.of(world, (0.0, 0.0))
+
+
+# Physics
+
+
+def test_bodies_are_where_the_traffic_is_at_every_step(turtlebot: RobotSpec) -> None:
+    world, traffic = built(
+        *(Keyframed(radius=0.3, keyframes=ZIGZAG, loop=loop, phase=0.3) for loop in ("pingpong", "teleport", "once")),
+        Keyframed(radius=0.3, keyframes=ZIGZAG, loop="teleport", interpolation="catmull-rom"),
+        Cruising(radius=0.3, position=(-5.0, 5.0), velocity=(9.7, 6.3)),
+        Wandering(radius=0.2, cell=0.5, period=0.21),
+        obstacles=(Disc(5.0, 5.0, 1.0),),
+    )
+    with Engine(world, turtlebot, traffic=traffic) as engine:
+        for _ in range(2):  # placed again, everything begins again
+            _, bodies, expected = placed(engine, 1600)
+            assert np.abs(bodies - expected).max() < 1e-9
+
+
+@pytest.mark.parametrize("speed", [0.25, 1.0, 4.0, 17.0])
+@pytest.mark.parametrize("robot", ["turtlebot", "jackal"])
+def test_what_crosses_a_standing_robot_is_felt_and_what_passes_is_not(
+    robot: str, speed: float, request: pytest.FixtureRequest
+) -> None:
+    """At 4 m/s a mover covers 17 mm a step, and a graze of 1 mm is shorter than 40 mm: no step may be missed."""
+    spec: RobotSpec = request.getfixturevalue(robot)
+    radius, reach = 0.2, spec.footprint.half_width + spec.footprint.rounding
+    graze = 0.001 if speed <= 4 else 0.03
+    for phase in np.linspace(0.0, 1.0, 5) / 240:
+        for aside, expected in ((0.0, True), (reach + radius - graze, True), (reach + radius + 0.002, False)):
+            lead = 0.75 + speed * float(phase)
+            mover = Cruising(radius=radius, position=(-lead, aside), velocity=(speed, 0.0))
+            world, traffic = built(mover)
+            with Engine(world, spec, traffic=traffic) as engine:
+                touched, bodies, way = placed(engine, math.ceil(1.3 * lead / speed * 240))
+            assert bool(touched) == expected, (phase, aside)
+            assert np.abs(bodies - way).max() < 1e-9, "nothing slows a mover"
+
+
+def test_a_mover_pushes_the_robot_before_it(turtlebot: RobotSpec) -> None:
+    world, traffic = built(Cruising(radius=0.3, position=(-1.0, 0.0), velocity=(1.0, 0.0)))
+    with Engine(world, turtlebot, traffic=traffic) as engine:
+        engine.place((0.0, 0.0, 0.0))
+        contacts = [contact for _ in range(480) for contact in engine.step()]
+        x, y = engine.state()[:2]
+        (place,) = engine.mover_places()
+    assert {contact.obstacle for contact in contacts} == {0}
+    assert place[0] == pytest.approx(1.0)
+    assert math.dist((x, y), place) > 0.3 + 0.18 - 0.01
+    assert min(contact.distance for contact in contacts) > -0.01
+
+
+@pytest.mark.parametrize(("yaw", "index"), [(0.0, 0), (math.pi, 1), (math.pi / 2, 2), (-math.pi / 2, 5)])
+def test_movers_are_numbered_after_the_discs_and_before_the_walls(turtlebot: RobotSpec, yaw: float, index: int) -> None:
+    movers = (
+        Cruising(radius=0.1, position=(-0.5, 0.0), velocity=(0.0, 0.01)),
+        Keyframed(radius=0.1, keyframes=((0.0, 0.0, 0.5), (9.0, 0.0, 0.6))),
+    )
+    world = World("w", (-2.0, -0.5, 2.0, 2.0), (Disc(0.5, 0.0, 0.1),), movers=movers)
+    with Engine(world, turtlebot, traffic=Trajectories.of(world, (0.0, 0.0))) as engine:
+        engine.place((0.0, 0.0, yaw))
+        engine.command(0.5, 0.0)
+        touched = [contact.obstacle for _ in range(240) for contact in engine.step()]
+    assert set(touched) == {index}
+
+
+def test_movers_pass_through_each_other_and_through_what_stands(turtlebot: RobotSpec) -> None:
+    world, traffic = built(
+        Cruising(radius=0.5, position=(-5.0, 5.0), velocity=(2.0, 0.0)),
+        Cruising(radius=0.5, position=(5.0, 5.0), velocity=(-2.0, 0.0)),
+        obstacles=(Disc(2.0, 5.0, 0.5),),
+    )
+    with Engine(world, turtlebot, traffic=traffic) as engine:
+        _, bodies, way = placed(engine, 1200)
+    assert np.abs(bodies - way).max() < 1e-9
+
+
+def test_an_engine_wants_the_traffic_of_its_world(turtlebot: RobotSpec) -> None:
+    world, traffic = built(Cruising(radius=0.5, position=(-5.0, 5.0), velocity=(2.0, 0.0)))
+    with pytest.raises(ValueError, match="traffic: must be that of the world's 1 movers"):
+        Engine(world, turtlebot)
+    with pytest.raises(ValueError, match="traffic: must be that of the world's 0 movers"):
+        Engine(World("w", OPEN), turtlebot, traffic=traffic)
+
+
+# Runs
+
+ROOM = World("room", (0.0, 0.0, 6.0, 4.0), (Disc(3.0, 3.0, 0.3),))
+TASK = Task(ROOM, (0.6, 1.4, 0.0), (5.4, 1.4), cell=0.2)
+BESIDE = (
+    Keyframed(radius=0.3, keyframes=((0.0, 3.0, 0.4), (4.0, 5.0, 0.4)), loop="teleport"),
+    Cruising(radius=0.2, position=(1.0, 3.5), velocity=(0.5, 0.0)),
+    Wandering(radius=0.15, cell=0.4, period=0.8, start=(5.5, 3.5), seed=1),
+)
+
+
+def among(*movers: Mover, robot: RobotSpec, **settings: Any) -> Run:
+    """A drive among movers, by a robot that gives way to none."""
+    settings = {"yielding": None, "replanning": None, **settings}
+    task = dataclasses.replace(TASK, world=dataclasses.replace(ROOM, movers=movers))
+    return run(Scenario(task=task, planner=find_planner("astar"), planner_name="astar", robot=robot, **settings))
+
+
+@pytest.fixture(scope="module")
+def passed(turtlebot: RobotSpec) -> Rollout:
+    """A drive past three movers."""
+    result = among(*BESIDE, robot=turtlebot, seed=3)
+    assert result.succeeded, (result.outcome, result.certificate)
+    assert result.rollout is not None
+    return result.rollout
+
+
+@pytest.fixture(scope="module")
+def standing(turtlebot: RobotSpec) -> Scenario:
+    """A robot whose motors are too weak to move it, and its goal."""
+    return Scenario(task=TASK, planner=find_planner("astar"), robot=dataclasses.replace(turtlebot, wheel_torque=1e-4))
+
+
+def test_the_log_holds_every_mover_at_every_row(passed: Rollout) -> None:
+    assert passed.movers.shape == (len(passed.t), 3, 2)
+    assert [mover["radius"] for mover in passed.meta["task"]["movers"]] == [0.3, 0.2, 0.15]
+    assert (passed.movers == passed.traffic().positions(passed.t)).all()
+
+
+def test_clearance_is_to_movers_too(passed: Rollout) -> None:
+    np.testing.assert_allclose(closed_form_clearance(passed), passed.clearance, atol=1e-12)
+    centre = np.hypot(*np.moveaxis(passed.movers - passed.pose[:, None, :2], -1, 0)) - [0.3, 0.2, 0.15] - 0.18
+    assert (passed.clearance <= centre.min(axis=1) + 1e-12).all()
+    assert (np.abs(passed.clearance - centre.min(axis=1)) < 1e-9).sum() > 100
+
+
+def test_the_same_moving_scenario_gives_the_same_bits(passed: Rollout, turtlebot: RobotSpec) -> None:
+    again = among(*BESIDE, robot=turtlebot, seed=3).rollout
+    assert again is not None
+    assert again.digest == passed.digest
+
+
+def test_movers_far_away_change_nothing_of_the_drive(passed: Rollout, turtlebot: RobotSpec) -> None:
+    """Movers are not on the grid, and none was near."""
+    alone = among(robot=turtlebot, seed=3).rollout
+    assert alone is not None
+    assert (alone.cells == passed.cells).all()
+    np.testing.assert_allclose(alone.pose, passed.pose, atol=1e-6)
+
+
+def test_driving_into_a_mover_is_a_collision(turtlebot: RobotSpec) -> None:
+    mover = Keyframed(radius=0.3, keyframes=((0.0, 3.0, 0.4), (4.0, 3.0, 1.4), (9.0, 3.0, 1.5)))
+    result = among(mover, robot=turtlebot)
+    assert result.outcome is Outcome.COLLIDED
+    assert "movers[0] at 0." in result.reason
+    log, certificate = result.rollout, result.certificate
+    assert log is not None
+    assert certificate is not None
+    assert not result.succeeded
+    assert not certificate.certified
+    assert not any("disagree" in problem for problem in certificate.problems)
+    assert set(log.contacts[:, 1]) == {1}  # after the one disc
+    assert _contacts(log) == (1, 0, 0)
+
+
+def test_being_run_into_while_standing_is_told_apart(standing: Scenario) -> None:
+    mover = Keyframed(radius=0.3, keyframes=((0.0, 3.0, 1.4), (4.0, 0.0, 1.4)))
+    task = dataclasses.replace(TASK, world=dataclasses.replace(ROOM, movers=(mover,)))
+    result = run(dataclasses.replace(standing, task=task))
+    assert result.outcome is Outcome.RUN_INTO
+    assert not result.succeeded
+    assert "movers[0] at 0.75 m/s, the robot at 0.00 m/s" in result.reason
+    assert result.rollout is not None
+    assert _contacts(result.rollout) == (0, 1, 0)
+    assert result.certificate is not None
+    assert not result.certificate.certified
+    assert not any("outcome" in problem or "disagree" in problem for problem in result.certificate.problems)
+
+
+@pytest.mark.parametrize("place", [(0.7, 1.4), (0.6, 1.0)])
+def test_a_mover_that_jumps_onto_the_robot_is_told_apart(standing: Scenario, place: tuple[float, float]) -> None:
+    frames = ((0.0, *place), (2.0, 3.0, 1.4))
+    mover = Keyframed(radius=0.3, keyframes=frames, loop="teleport", phase=1.0)
+    task = dataclasses.replace(TASK, world=dataclasses.replace(ROOM, movers=(mover,)))
+    result = run(dataclasses.replace(standing, task=task))
+    assert result.outcome is Outcome.JUMPED_ON
+    assert result.rollout is not None
+    assert result.rollout.t[int(result.rollout.contacts[0, 0])] == pytest.approx(1.0, abs=0.02)
+    assert _contacts(result.rollout) == (0, 0, 1)
+
+
+def test_a_mover_that_appears_nearer_than_the_robot_can_stop_has_jumped_on_it(turtlebot: RobotSpec) -> None:
+    """At 0.7 m/s the turtlebot brakes over 0.245 m; it appears 0.1 m before it, or 0.4 m."""
+    clean = among(robot=turtlebot).rollout
+    assert clean is not None
+    x = float(clean.pose[600, 0])  # at 2.5 s
+    for gap, outcome in ((0.1, Outcome.JUMPED_ON), (0.4, Outcome.COLLIDED)):
+        ahead = x + 0.18 + 0.3 + gap
+        frames = ((0.0, ahead, 1.4), (4.0, ahead + 0.001, 1.4), (4.5, ahead + 1.0, 3.5))
+        mover = Keyframed(radius=0.3, keyframes=frames, loop="teleport", phase=2.0)
+        assert among(mover, robot=turtlebot).outcome is outcome
+
+
+def test_a_robot_that_starts_in_touch_with_a_mover_was_run_into(turtlebot: RobotSpec) -> None:
+    mover = Keyframed(radius=0.3, keyframes=((0.0, 0.6, 1.0), (9.0, 3.0, 1.4)))
+    result = among(mover, robot=turtlebot)
+    assert result.outcome is Outcome.RUN_INTO
+    assert result.rollout is not None
+    assert result.rollout.contacts[0, 0] == 0
+
+
+def test_what_is_touched_in_the_period_that_would_end_as_stuck_was_touched(standing: Scenario) -> None:
+    rigid = dataclasses.replace(standing.robot, wheel_torque=1e-12)
+    alone = run(dataclasses.replace(standing, robot=rigid)).rollout
+    assert alone is not None
+    assert alone.outcome is Outcome.STUCK
+    touching = float(alone.t[-1]) - 1.5 / 240  # it comes after the last period's first step
+    mover = Cruising(radius=0.3, position=(5.0, 1.4), velocity=(-(4.4 - 0.48) / touching, 0.0))
+    task = dataclasses.replace(TASK, world=dataclasses.replace(ROOM, movers=(mover,)))
+    result = run(dataclasses.replace(standing, task=task, robot=rigid, yielding=None, replanning=None))
+    assert result.outcome is Outcome.RUN_INTO
+    assert result.rollout is not None
+    assert alone.t[-1] - 1 / 60 < result.rollout.t[int(result.rollout.contacts[0, 0])] <= alone.t[-1]
+
+
+def test_the_time_limit_of_a_task_counts_unless_another_is_given(small_scenario: Scenario) -> None:
+    task = dataclasses.replace(small_scenario.task, time_limit=1.0)
+    short = run(dataclasses.replace(small_scenario, task=task))
+    assert short.outcome is Outcome.TIMED_OUT
+    assert short.rollout is not None
+    assert short.rollout.meta["time_limit"] == 1.0
+    assert run(dataclasses.replace(small_scenario, task=task, time_limit=60.0)).succeeded
+
+
+def test_wanderers_keep_off_what_is_unseen(turtlebot: RobotSpec) -> None:
+    task = dataclasses.replace(TASK, world=dataclasses.replace(ROOM, movers=BESIDE[2:]))
+    scenario = Scenario(
+        task=task, planner=find_planner("astar"), robot=turtlebot, unseen=(Disc(5.0, 3.4, 0.2), Disc(5.5, 2.6, 0.2))
+    )
+    places = scenario.traffic.positions(np.arange(0, 60, 0.05))[:, 0]
+    for disc in scenario.unseen:
+        assert np.hypot(*(places - (disc.x, disc.y)).T).min() > disc.radius + 0.15
+    log = run(scenario).rollout
+    assert log is not None
+    assert (log.movers == log.traffic().positions(log.t)).all()
+
+
+def test_a_robot_drives_among_movers_without_a_scenario(turtlebot: RobotSpec) -> None:
+    """What a drive needs of an engine: its traffic."""
+    world = dataclasses.replace(ROOM, movers=BESIDE)
+    controller = PurePursuit()
+    guide = controller.guide(Route(np.array([(0.6, 1.4), (5.4, 1.4)])), world, turtlebot, 0.05, 1 / 60)
+    with Engine(world, turtlebot, traffic=Trajectories.of(world, TASK.start[:2])) as engine:
+        log = drive(engine, controller, guide, TASK, time_limit=60)
+        assert engine.time == pytest.approx(log.t[-1])
+    assert log.outcome is Outcome.SUCCEEDED
+    assert log.movers.shape == (len(log.t), 3, 2)
+
+
+def _contacts(log: Rollout) -> tuple[float, ...]:
+    m = measure(log)
+    return m["contacts_driving"], m["contacts_standing"], m["contacts_teleported"]
+
+
+# Whose a contact is
+
+
+def told(contacts: list[tuple[int, int]], *, speed: float = 0.0, turn: float = 0.0, jump: int | None = None,
+         place: float = 0.5, comes: float = 0.1) -> list[Touch]:  # fmt: skip
+    """The touches of a robot of 0.2 m at the origin, one disc, a mover of 0.3 m at `place`, 100 rows a second.
+
+    It moves to and fro by `comes` [m/s].
+    """
+    rows = 400
+    jumps = np.zeros((rows - 1, 1), dtype=np.bool_)
+    if jump is not None:
+        jumps[jump - 1, 0] = True
+    movers = np.full((rows, 1, 2), [place, 0.0])
+    movers[::2, :, 1] = comes / 100
+    return touches(
+        np.array([(step, obstacle, -0.001, 5.0) for step, obstacle in contacts]),
+        np.zeros((rows, 3)),
+        np.tile([speed, turn], (rows, 1)),
+        movers,
+        jumps,
+        hz=100, discs=1, radii=np.array([0.3]), deceleration=1.0,
+        footprint={"half_length": 0.0, "half_width": 0.0, "rounding": 0.2},
+    )  # fmt: skip
+
+
+def test_whose_a_contact_is() -> None:
+    assert told([(9, 1)]) == [Touch(9, 1, Outcome.RUN_INTO)]
+    assert told([(9, 1)], speed=0.019)[0].outcome is Outcome.RUN_INTO
+    assert told([(9, 1)], speed=-0.021)[0].outcome is Outcome.COLLIDED
+    assert told([(9, 1)], turn=0.2)[0].outcome is Outcome.COLLIDED
+    assert told([(9, 1)], speed=0.009, comes=0.01)[0].outcome is Outcome.RUN_INTO
+    assert told([(9, 1)], speed=0.011, comes=0.01)[0].outcome is Outcome.COLLIDED, "rather the robot crept into it"
+    assert told([(0, 1)], comes=0.0)[0].outcome is Outcome.RUN_INTO, "nobody moved yet"
+    assert [told([(9, i)])[0].outcome for i in (0, 2, 5)] == [Outcome.COLLIDED] * 3, "discs and walls do not come"
+
+
+def test_when_a_mover_has_jumped_on_a_robot() -> None:
+    assert told([(9, 1)], jump=9)[0].outcome is Outcome.JUMPED_ON
+    assert told([(8, 1)], jump=9)[0].outcome is Outcome.RUN_INTO, "it jumped later"
+    assert told([(60, 1)], jump=9)[0].outcome is Outcome.RUN_INTO, "it jumped long ago"
+    assert told([(9, 0)], jump=9)[0].outcome is Outcome.COLLIDED, "another one did"
+    # Braking from 1 m/s takes 0.5 m and 1 s.
+    assert told([(60, 1)], jump=9, speed=1.0, place=0.95)[0].outcome is Outcome.JUMPED_ON
+    assert told([(60, 1)], jump=9, speed=1.0, place=1.05)[0].outcome is Outcome.COLLIDED
+    assert told([(120, 1)], jump=9, speed=1.0, place=0.95)[0].outcome is Outcome.COLLIDED
+
+
+def test_what_follows_within_half_a_second_is_one_touch() -> None:
+    assert told([(9, 1), (20, 0), (65, 1)]) == [Touch(9, 1, Outcome.RUN_INTO)]
+    assert told([(9, 1), (60, 0)]) == [Touch(9, 1, Outcome.RUN_INTO), Touch(60, 0, Outcome.COLLIDED)]
+
+
+# Certificates
+
+
+def edited(log: Rollout, *path_and_value: Any) -> Rollout:
+    *path, last, value = path_and_value
+    meta = json.loads(json.dumps(dict(log.meta)))
+    place = meta["task"]["movers"]
+    for key in path:
+        place = place[key]
+    place[last] = value
+    return dataclasses.replace(log, meta=meta)
+
+
+def shifted(log: Rollout, by: float) -> Rollout:
+    movers = log.movers.copy()
+    movers[200:, 1, 1] += by
+    return dataclasses.replace(log, movers=movers)
+
+
+def replanned(log: Rollout, replans: Any) -> Rollout:
+    return dataclasses.replace(log, meta={**log.meta, "replans": replans})
+
+
+FAILED = {"t": 1.0, "cause": "waited", "solved": False, "route": []}
+TAMPERINGS: dict[str, tuple[Callable[[Rollout], Rollout], str]] = {
+    "a mover's places": (lambda log: shifted(log, 0.01), "movers[1] is logged 0.0100 m off its course at t = 0.833 s"),
+    "a mover's radius": (lambda log: edited(log, 0, "radius", 0.1), "closed form says"),
+    "a keyframe": (lambda log: edited(log, 0, "keyframes", 1, 1, 5.5), "movers[0] is logged"),
+    "a loop": (lambda log: edited(log, 0, "loop", "pingpong"), "movers[0] is logged"),
+    "a velocity": (lambda log: edited(log, 1, "velocity", 0, 0.51), "movers[1] is logged"),
+    "a walk's seed": (lambda log: edited(log, 2, "walk", "seed", 2), "movers[2] is logged"),
+    "a mover less in the task": (
+        lambda log: dataclasses.replace(log, meta={**log.meta, "task": {**log.meta["task"], "movers": []}}),
+        "3 of them where the task has 0"),
+    "no mover left": (
+        lambda log: dataclasses.replace(log, movers=log.movers[:, :0], meta={
+            **log.meta, "task": {**log.meta["task"], "movers": []}}), "closed form says"),
+    "a mover less in the log": (lambda log: dataclasses.replace(log, movers=log.movers[:, :2]), "2 of them"),
+    "movers that are no list": (
+        lambda log: dataclasses.replace(log, meta={**log.meta, "task": {**log.meta["task"], "movers": 3}}), "impossible"),
+    "a mover without a motion": (
+        lambda log: dataclasses.replace(log, meta={**log.meta, "task": {**log.meta["task"], "movers": [{"radius": 1.0}] * 3}}),
+        "must have one of the keys"),
+    "a motion of text": (lambda log: edited(log, 0, "keyframes", "soon"), "meta.task."),
+    "a velocity of text": (lambda log: edited(log, 1, "velocity", ["a", "b"]), "meta.task."),
+    "a NaN radius": (lambda log: edited(log, 0, "radius", math.nan), "impossible"),
+    "a walk of numbers": (lambda log: edited(log, 2, "walk", 3), "meta.task."),
+    "a walk without end": (lambda log: edited(log, 2, "walk", "period", 1e-9), "walk.period: must be at least"),
+    "replans that are no list": (lambda log: replanned(log, 3), "meta.replans: impossible"),
+    "a replan of text": (lambda log: replanned(log, ["soon"]), "meta.replans[0]: missing or impossible"),
+    "a replan without a time": (lambda log: replanned(log, [{**FAILED, "t": "soon"}]), "meta.replans[0]"),
+    "replans in disorder": (
+        lambda log: replanned(log, [{**FAILED, "t": 2.0}, FAILED]), "meta.replans[1]"),
+    "a replan's route of one number": (lambda log: replanned(log, [{**FAILED, "route": [[1.0]]}]), "meta.replans[0]"),
+    "a replan without a cause": (lambda log: replanned(log, [{**FAILED, "cause": None}]), "meta.replans[0]"),
+    "a replan solved without a route": (lambda log: replanned(log, [{**FAILED, "solved": True}]), "meta.replans[0]"),
+    "the seed as text": (lambda log: dataclasses.replace(
+        edited(log, 2, "walk", "seed", None), meta={**edited(log, 2, "walk", "seed", None).meta, "seed": "x"}), "meta.task."),
+}  # fmt: skip
+
+
+def test_a_clean_moving_log_is_certified(passed: Rollout) -> None:
+    certificate = certify(passed)
+    assert certificate.certified, certificate.problems
+    assert 0 < certificate.bound < certificate.min_clearance
+
+
+@pytest.mark.parametrize("what", TAMPERINGS)
+def test_a_moving_log_edited_by_hand_is_found_out(passed: Rollout, what: str) -> None:
+    tamper, says = TAMPERINGS[what]
+    log = tamper(passed)
+    certificate = certify(dataclasses.replace(log, meta={**log.meta, "digest": log.digest}))
+    assert not certificate.certified
+    assert any(says in problem for problem in certificate.problems), certificate.problems
+
+
+@pytest.mark.parametrize("name", ["collided", "jumped_on", "succeeded"])
+def test_a_contact_cannot_be_blamed_on_another(standing: Scenario, name: str) -> None:
+    mover = Keyframed(radius=0.3, keyframes=((0.0, 3.0, 1.4), (4.0, 0.0, 1.4)))
+    task = dataclasses.replace(TASK, world=dataclasses.replace(ROOM, movers=(mover,)))
+    log = run(dataclasses.replace(standing, task=task)).rollout
+    assert log is not None
+    assert not any("outcome" in problem for problem in certify(log).problems)
+    problems = certify(dataclasses.replace(log, meta={**log.meta, "outcome": name})).problems
+    assert any(f"outcome: {name}" in problem for problem in problems)
+
+
+def grazed(passed: Rollout, mover: dict[str, Any], gap: float) -> Rollout:
+    """The log with only one mover, of the radius that leaves `gap` at the nearest row."""
+    task = {**passed.meta["task"], "movers": [mover]}
+    log = dataclasses.replace(passed, movers=passed.movers[:, :1], meta={**passed.meta, "task": task})
+    places = log.traffic().positions(log.t)
+    log = dataclasses.replace(log, movers=places)
+    nearest = np.hypot(*np.moveaxis(places - log.pose[:, None, :2], -1, 0)).min()
+    mover["radius"] = float(nearest) - 0.18 - gap
+    return dataclasses.replace(log, clearance=closed_form_clearance(log))
+
+
+def test_the_bound_between_rows_counts_the_movers_speed(passed: Rollout) -> None:
+    """A mover passes before the robot with 20 mm to spare at the rows: enough at 1 m/s, not at 18 m/s."""
+    for speed, fine in ((1.0, True), (18.0, False)):
+        frames = [[0.0, 5.8, 3.5], [7.0 / speed, 5.8, -3.5]]
+        mover = {"radius": 0.1, "loop": "teleport", "keyframes": frames}
+        log = grazed(passed, mover, 0.02)
+        certificate = certify(log)
+        assert certificate.min_clearance == pytest.approx(0.02)
+        assert (certificate.bound > 0) == fine
+        assert any("cannot be ruled out" in problem for problem in certificate.problems) != fine
+
+
+def test_the_bound_holds_on_a_finer_walk_with_jumps(passed: Rollout) -> None:
+    fine = np.linspace(0, len(passed.t) - 1, 10 * len(passed.t) - 9)
+    rows = np.arange(len(passed.t))
+    pose = np.stack([np.interp(fine, rows, np.unwrap(column)) for column in passed.pose.T], axis=1)
+    for frames, phase in (
+        ([[0.0, 1.5, 0.8], [0.6301, 5.0, 0.8]], 0.0),
+        ([[0.0, 5.0, 2.0], [1.2303, 0.6, 2.0]], 0.0),
+        # Comes towards the robot and is gone 4.95 steps after the start, nearer than at any row.
+        ([[0.0, 0.6, 3.4], [0.4, 0.6, 1.9]], 0.4 - 4.95 / 240),
+    ):
+        log = grazed(passed, {"radius": 0.1, "loop": "teleport", "phase": phase, "keyframes": frames}, 0.05)
+        moving = log.traffic().positions(fine / 240)
+        finer = dataclasses.replace(log, pose=pose, movers=moving)
+        assert log.traffic().jumps(log.t).any()
+        assert closed_form_clearance(finer).min() >= certify(log).bound

@@ -1,0 +1,281 @@
+"""New routes while driving."""
+
+import dataclasses
+import json
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from antdrive.planners import PLANNERS, PlanStatus, TimedPlan, find_planner, smooth
+from antdrive.robots import RobotSpec, TrackedPath, Twist
+from antdrive.sim import Outcome, ReplanPolicy, Rollout, Run, Scenario, certify, plan, run
+from antdrive.sim.driving.perception import Predictor
+from antdrive.sim.driving.replanning import ReplanMonitor
+from antdrive.sim.driving.schedule import LATE, Schedule, held
+from antdrive.sim.log.metrics import tracking_error_max_m
+from antdrive.worlds import Disc, Keyframed, Mover, Route, Task, World, polyline_clearance
+
+# A wall with two gates; the way through the nearer one is shorter.
+POSTS = tuple(Disc(4.0, y, 0.25) for y in np.arange(0.25, 6.0, 0.5) if not (2.2 < y < 3.8 or y > 5.0))
+HALL = World("hall", (0.0, 0.0, 8.0, 6.5), POSTS)
+TASK = Task(HALL, (1.0, 3.0, 0.0), (7.0, 3.0), cell=0.25)
+PLUG = Keyframed(radius=0.45, keyframes=((0.0, 4.0, 3.0), (100.0, 4.0, 3.01)), loop="once")
+
+
+def among(*movers: Mover, robot: RobotSpec, planner: str = "dstar-lite", **settings: object) -> Run:
+    task = dataclasses.replace(TASK, world=dataclasses.replace(HALL, movers=movers))
+    return run(Scenario(task=task, planner=find_planner(planner), planner_name=planner, robot=robot, **settings))  # type: ignore[arg-type]
+
+
+def test_a_closed_gate_is_gone_round_only_by_replanning(turtlebot: RobotSpec) -> None:
+    waiting = among(PLUG, robot=turtlebot, replanning=None, time_limit=30.0)
+    assert waiting.outcome is Outcome.TIMED_OUT
+    done = among(PLUG, robot=turtlebot)
+    assert done.succeeded, (done.outcome, done.reason)
+    assert done.rollout is not None
+    replans = done.rollout.meta["replans"]
+    assert replans[0]["cause"] == "obstructed"
+    assert 0 <= replans[0]["t"] < done.rollout.t[-1]
+    assert replans[0]["cost_m"] > 4.0
+    assert len(done.rollout.meta["times"]["replans_s"]) == len(replans)
+    assert tracking_error_max_m(done.rollout) < 0.25, "off the route of the time, as it gave way"
+    through = done.rollout.pose[np.abs(done.rollout.pose[:, 0] - 4.0).argmin()]
+    assert through[1] > 4.5, "by the other gate"
+
+
+def test_replans_repeat_and_stay_with_the_log(turtlebot: RobotSpec, tmp_path: object) -> None:
+    first, again = (among(PLUG, robot=turtlebot, planner="ants", seed=2).rollout for _ in range(2))
+    assert first is not None
+    assert again is not None
+    assert first.digest == again.digest
+    loaded = Rollout.load(first.save(f"{tmp_path}/run.npz"))
+    assert loaded.meta["replans"] == json.loads(json.dumps(first.meta["replans"]))
+    assert certify(loaded).certified == certify(first).certified
+
+
+@pytest.mark.parametrize(
+    "planner", [name for name in PLANNERS if name not in ("ga-han", "hybrid", "pfaco", "as", "sipp")]
+)
+def test_every_planner_replans(planner: str, turtlebot: RobotSpec) -> None:
+    """The slowest ones aside, and the one that knows better."""
+    done = among(PLUG, robot=turtlebot, planner=planner, time_limit=2.0)
+    if done.rollout is None:  # a planner that is not complete found no way at first
+        assert not getattr(find_planner(planner), "complete", False)
+        return
+    assert done.rollout.meta["replans"]
+    assert not len(done.rollout.contacts)
+
+
+def test_where_nothing_is_in_the_way_nothing_is_replanned(turtlebot: RobotSpec) -> None:
+    far = Keyframed(radius=0.2, keyframes=((0.0, 0.5, 0.5), (9.0, 1.5, 0.5)))
+    done = among(far, robot=turtlebot)
+    assert done.succeeded
+    assert done.rollout is not None
+    assert done.rollout.meta["replans"] == []
+
+
+GATEKEEPER = Keyframed(radius=0.45, keyframes=((0.0, 4.0, 3.0), (9.0, 4.0, 3.0001), (12.0, 1.5, 5.5)), loop="once")
+
+
+def test_a_plan_in_space_and_time_is_kept_to(turtlebot: RobotSpec) -> None:
+    """It waits for the gate to open, and arrives when it planned to."""
+    done = among(GATEKEEPER, robot=turtlebot, planner="sipp", margin=0.1)
+    assert isinstance(done.plan, TimedPlan)
+    assert done.succeeded, (done.outcome, done.reason)
+    assert done.rollout is not None
+    assert done.rollout.t[-1] == pytest.approx(done.plan.arrive[-1], abs=3.0)
+    assert done.rollout.meta["knowledge"]["told"] == "motions"
+    assert done.rollout.meta["yielding"]["horizon"] == 1.0, "as it was in force"
+
+
+def test_the_ant_decides_cell_by_cell_and_waits_where_there_is_no_way(turtlebot: RobotSpec) -> None:
+    done = among(GATEKEEPER, robot=turtlebot, planner="mmas-dstar")
+    assert done.succeeded, (done.outcome, done.reason)
+    assert done.rollout is not None
+    decisions = done.rollout.meta["replans"]
+    assert {d["cause"] for d in decisions} == {"decision"}
+    assert len(decisions) > 20
+    steps = [math.dist(d["route"][-2], d["route"][-1]) for d in decisions[1:-1]]
+    assert max(steps) < 0.25 * 2**0.5 + 0.25
+    again = among(GATEKEEPER, robot=turtlebot, planner="mmas-dstar").rollout
+    assert again is not None
+    assert again.digest == done.rollout.digest
+
+
+def test_the_ant_stays_where_it_is_when_there_is_no_way_at_first(turtlebot: RobotSpec) -> None:
+    """A lane of one cell's width, and something before the robot until 4 s have passed."""
+    lane = World("lane", (0.0, 0.0, 4.0, 0.6))
+    task = Task(lane, (0.36, 0.375, 0.0), (3.0, 0.375), cell=0.25, time_limit=30.0)
+    lid = Keyframed(radius=0.2, keyframes=((0.0, 0.985, 0.3), (4.0, 0.985, 0.3001), (6.0, 3.7, 0.3)), loop="once")
+    task = dataclasses.replace(task, world=dataclasses.replace(lane, movers=(lid,)))
+    # It gives way to nothing, so that nothing but its decisions keeps it.
+    planner = find_planner("mmas-dstar")
+    log = run(Scenario(task=task, planner=planner, robot=turtlebot, yielding=None)).rollout
+    assert log is not None
+    assert np.ptp(log.pose[log.t < 4.0, 0]) < 0.01
+    decisions = log.meta["replans"]
+    assert {d["cause"] for d in decisions} == {"decision"}
+    assert decisions[0]["t"] > 4.0
+    assert max(math.dist(d["route"][0], d["route"][-1]) for d in decisions[:-1]) < 0.5
+
+
+@pytest.mark.parametrize(
+    ("post", "start", "goal"),
+    [(Disc(8.0, 2.6, 0.25), (1.0, 3.0), (8.0, 3.0)), (Disc(1.4, 2.7, 0.2), (1.05, 3.0), (3.0, 3.0))],
+    ids=["the goal has little room", "the straight way to the second cell has little room"],
+)
+def test_the_ant_keeps_from_what_stands_what_planners_keep(
+    post: Disc, start: tuple[float, float], goal: tuple[float, float], turtlebot: RobotSpec
+) -> None:
+    far = Keyframed(radius=0.2, keyframes=((0.0, 0.5, 0.5), (9.0, 1.5, 0.5)))
+    task = Task(World("hall", (0.0, 0.0, 9.0, 6.0), (post,), movers=(far,)), (*start, 0.0), goal, cell=0.25)
+    done = run(Scenario(task=task, planner=find_planner("mmas-dstar"), robot=turtlebot))
+    assert done.succeeded, (done.outcome, done.reason)
+    assert done.rollout is not None
+    for decision in done.rollout.meta["replans"][:-1]:
+        assert polyline_clearance(task.world, np.array(decision["route"])) > 0.21 - 2e-4, decision
+
+
+def test_a_robot_that_does_not_know_that_it_missed_the_goal_does_not_go_again(turtlebot: RobotSpec) -> None:
+    """Its pose is measured to a centimetre, the goal asks for less: among movers the drive ends as it does alone."""
+    far = Keyframed(radius=0.2, keyframes=((0.0, 0.5, 0.5), (9.0, 1.5, 0.5)))
+    tight = Scenario(
+        task=Task(World("hall", (0.0, 0.0, 8.0, 6.0)), (1.0, 3.0, 0.0), (3.0, 3.0), cell=0.25, goal_tolerance=0.004),
+        planner=find_planner("dstar-lite"),
+        robot=turtlebot,
+        noise=1.0,
+    )
+    moving = dataclasses.replace(tight.task, world=dataclasses.replace(tight.task.world, movers=(far,)))
+    ends = []
+    for seed in range(8):
+        alone = run(dataclasses.replace(tight, seed=seed))
+        among_them = run(dataclasses.replace(tight, seed=seed, task=moving))
+        assert alone.rollout is not None
+        assert among_them.rollout is not None
+        believed = math.dist(alone.rollout.estimate[-1, :2], tight.task.goal)
+        if believed <= 0.003:
+            assert among_them.outcome is alone.outcome
+            assert among_them.rollout.meta["replans"] == []
+            ends.append(alone.outcome)
+    assert {Outcome.STUCK, Outcome.SUCCEEDED} <= set(ends), ends
+
+
+# Rerouters, without physics: at 60 control periods a second, on the way from (1, 3) to (7, 3) through the nearer gate
+
+PASSING = Keyframed(radius=0.45, keyframes=((0.0, 4.0, 3.0), (4.0, 4.0, 3.01), (5.0, 1.0, 6.0)), loop="once")
+ASIDE = Keyframed(radius=0.3, keyframes=((0.0, 7.0, 0.5), (100.0, 7.0, 0.51)), loop="once")
+
+
+def rerouter(
+    *movers: Mover, robot: RobotSpec, planner: str = "dstar-lite", **settings: Any
+) -> tuple[ReplanMonitor, TrackedPath]:
+    task = dataclasses.replace(TASK, world=dataclasses.replace(HALL, movers=movers))
+    s = Scenario(task=task, planner=find_planner(planner), robot=robot)
+    grid, answer = plan(s)
+    route = smooth(answer, grid, task, kind="none" if s.timed else "clearance")
+    made = ReplanMonitor(
+        ReplanPolicy(**settings), s.planner, grid, task, s.rng("replanner"), watch=Predictor(s.traffic, s.sees, 60), robot=robot,
+        controller=s.controller, margin=s.margin, kind="clearance", hz=60,
+    )  # fmt: skip
+    made.follows(answer, route)
+    return made, s.controller.guide(route, task.world, robot, s.margin, 1 / 60)
+
+
+def test_a_robot_that_is_off_its_route_has_strayed(turtlebot: RobotSpec) -> None:
+    made, guide = rerouter(ASIDE, robot=turtlebot)
+    assert made.cause(0, (1.5, 3.7, 0.0), False, guide, 0.5) == ""
+    assert made.cause(0, (1.5, 3.8, 0.0), False, guide, 0.5) == "strayed"
+    assert made.cause(0, (7.0, 3.3, 0.0), False, guide, guide.length - 0.1) == "", "(7, 3) is 0.3 m away, 0.1 m is left"
+    assert made.cause(0, (7.0, 3.4, 0.0), False, guide, guide.length - 0.1) == "strayed"
+
+
+def test_a_replan_from_where_the_robot_cannot_be_is_logged_as_failed(turtlebot: RobotSpec) -> None:
+    made, _ = rerouter(ASIDE, robot=turtlebot)
+    assert made.again(0, (-1.0, 3.0, 0.0), "strayed") is None
+    assert [(replan.cause, replan.solved, replan.cost) for replan in made.log] == [("strayed", False, math.inf)]
+
+
+def test_it_rests_between_two_replans(turtlebot: RobotSpec) -> None:
+    made, guide = rerouter(PASSING, robot=turtlebot, pause=1.0, within=0.0)
+    astray = (1.5, 3.8, 0.0)
+    assert made.again(0, astray, "strayed") is not None
+    assert [made.cause(tick, astray, False, guide, 0.5) for tick in (1, 59, 60)] == ["", "", "strayed"]
+
+
+def test_only_waiting_on_end_is_a_cause(turtlebot: RobotSpec) -> None:
+    made, guide = rerouter(ASIDE, robot=turtlebot, patience=2.0)
+    causes = [made.cause(tick, TASK.start, tick != 60, guide, 0.0) for tick in range(240)]
+    assert causes.index("waited") == 61 + 120
+    never, guide = rerouter(ASIDE, robot=turtlebot, around=False)
+    assert not any(never.cause(tick, TASK.start, True, guide, 0.0) for tick in range(240))
+
+
+@pytest.mark.parametrize("planner", ["dstar-lite", "ants", "tangent"])
+def test_what_a_mover_has_left_is_free_again(planner: str, turtlebot: RobotSpec) -> None:
+    made, _ = rerouter(PASSING, robot=turtlebot, planner=planner)
+    first, again = made.again(0, TASK.start, "obstructed"), made.again(360, TASK.start, "obstructed")
+    assert first is not None
+    assert again is not None
+    beside = World("mover", HALL.bounds, (Disc(4.0, 3.0, 0.45),))
+    assert polyline_clearance(beside, first.route.xy) > 0.2
+    assert again.length < 6.05
+    assert [replan.solved for replan in made.log] == [True, True]
+
+
+def test_only_a_robot_that_may_goes_round_movers(turtlebot: RobotSpec) -> None:
+    made, _ = rerouter(PASSING, robot=turtlebot, around=False)
+    straight = made.again(0, TASK.start, "strayed")
+    assert straight is not None
+    assert straight.length < 6.05
+
+
+@pytest.mark.parametrize("planner", ["dstar-lite", "tangent"])
+def test_a_mover_over_the_goal_does_not_close_the_way(planner: str, turtlebot: RobotSpec) -> None:
+    """It may be gone by then, and else is given way to."""
+    mover = Keyframed(radius=0.3, keyframes=((0.0, 7.1, 3.0), (100.0, 7.1, 3.01)), loop="once")
+    made, _ = rerouter(mover, robot=turtlebot, planner=planner)
+    guide = made.again(0, TASK.start, "strayed")
+    assert guide is not None
+    assert guide.route.xy[-1] == pytest.approx(TASK.goal)
+
+
+def test_a_timed_plan_is_made_anew_from_where_the_robot_is_late(turtlebot: RobotSpec) -> None:
+    made, guide = rerouter(GATEKEEPER, robot=turtlebot, planner="sipp")
+    assert made.schedule is not None
+    on_time = made.schedule.due(20.0)
+    place = (float(np.interp(on_time, guide.route.arc, guide.route.xy[:, 0])), 3.0, 0.0)
+    assert made.cause(1200, place, False, guide, on_time - LATE + 0.01) == ""
+    assert made.cause(1200, place, False, guide, on_time - LATE - 0.01) == "late"
+    assert made.again(1200, TASK.start, "late") is not None
+    assert made.schedule.t[0] == pytest.approx(20.0)
+
+
+@given(st.floats(0.0, 30.0), st.floats(0.0, 10.0))
+def test_a_schedule_is_late_only_when_behind(t: float, arc: float) -> None:
+    route = Route(np.array([[0.0, 0.0], [4.0, 0.0]]))
+    xy = np.array([[0.0, 0.0], [2.0, 0.0], [4.0, 0.0]])
+    plan = TimedPlan(
+        status=PlanStatus.SOLVED, arrive=np.array([0.0, 4.0, 12.0]), leave=np.array([0.0, 8.0, 12.0]), xy=xy
+    )
+    schedule = Schedule.of(plan, route)
+    due = float(plan.at(t)[0])
+    assert schedule.due(t) == pytest.approx(due)
+    assert schedule.late(t, arc) == (due - arc > LATE)
+    if 4.0 < t < 7.5 and arc >= 2.0:
+        assert schedule.speed(t, arc) == 0.0
+
+
+def test_a_command_is_held_no_harder_than_the_robot_brakes() -> None:
+    fast = Twist(0.6, 0.3)
+    assert held(fast, fast, math.inf, 0.02) == fast
+    assert held(fast, fast, 0.0, 0.02) == pytest.approx(Twist(0.58, 0.29))
+    assert held(Twist(0.01, 0.3), Twist(0.01, 0.3), 0.0, 0.02).speed == 0.0
+
+
+def test_nonsense_is_refused() -> None:
+    with pytest.raises(ValueError, match="patience: must be at least 0, got nan"):
+        ReplanPolicy(patience=math.nan)

@@ -1,0 +1,137 @@
+import dataclasses
+import math
+import sys
+import threading
+
+import matplotlib
+import numpy as np
+import pytest
+from PIL import Image
+
+from antdrive.planners import History, PlanResult, PlanStatus, Query
+from antdrive.planners.graph.search import AStar
+from antdrive.robots import Footprint, RobotSpec
+from antdrive.sim.view.figures.plots import overview, plan_figure
+from antdrive.worlds import Disc, InputError, Keyframed, Task, Wandering, World, rasterise
+
+ROBOT = RobotSpec(
+    name="disc", footprint=Footprint.disc(0.18), height=0.2, mass=3.0, wheel_radius=0.04, track=0.25, max_speed=1.0,
+    max_yaw_rate=3.0, max_acceleration=1.0, max_yaw_acceleration=8.0, max_lateral_acceleration=1.0,
+    max_wheel_speed=25.0, wheel_torque=1.5,
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def planned():
+    world = World("three", (0.0, 0.0, 5.0, 4.0), (Disc(1.5, 2.0, 0.4), Disc(3.0, 1.2, 0.3), Disc(3.6, 3.0, 0.3)))
+    task = Task(world, (0.5, 0.5, 0.0), (4.4, 3.5), cell=0.25)
+    grid = rasterise(world, 0.25, 0.23)
+    return task, grid, AStar().plan(Query.between(grid, task), np.random.default_rng(0))
+
+
+def pixels(path):
+    with Image.open(path) as picture:
+        return np.asarray(picture.convert("RGB")).astype(int)
+
+
+def near(picture, colour, within=24):
+    return int((np.abs(picture - np.array(colour)).max(axis=-1) < within).sum())
+
+
+@pytest.mark.parametrize("suffix", [".png", ".pdf", ".svg"])
+def test_the_same_run_gives_the_same_file(made_up_drive, tmp_path, suffix):
+    drive = made_up_drive()
+    one = overview(drive, tmp_path / f"one{suffix}", dpi=60).read_bytes()
+    other = overview(drive, tmp_path / f"other{suffix}", dpi=60).read_bytes()
+    assert one == other
+    assert one[:5] in (b"\x89PNG\r", b"%PDF-", b"<?xml")
+
+
+def test_an_overview_shows_obstacles_trail_and_contact(made_up_drive, tmp_path):
+    drive = made_up_drive(collide=True)
+    full = pixels(overview(drive, tmp_path / "full.png", dpi=80))
+    task = {**drive.meta["task"], "obstacles": drive.meta["task"]["obstacles"][-1:]}
+    contacts = drive.contacts * [1, 0, 1, 1]
+    bare = dataclasses.replace(drive, contacts=contacts, meta={**drive.meta, "task": task})
+    few = pixels(overview(bare, tmp_path / "few.png", dpi=80))
+    assert near(full, (121, 136, 160)) > 3 * near(few, (121, 136, 160))
+    clean = dataclasses.replace(drive, contacts=np.empty((0, 4)), meta={**drive.meta, "outcome": "stuck"})
+    untouched = pixels(overview(clean, tmp_path / "clean.png", dpi=80))
+    assert near(full, (204, 32, 42)) > near(untouched, (204, 32, 42)) + 50
+
+
+def test_unseen_obstacles_have_their_own_colour(made_up_drive, tmp_path):
+    drive = made_up_drive()
+    marked = dataclasses.replace(drive, meta={**drive.meta, "unseen": [0, 1]})
+    assert near(pixels(overview(marked, tmp_path / "marked.png", dpi=80)), (196, 74, 138)) > 100
+
+
+def test_movers_and_their_ways_are_drawn(made_up_drive, planned, tmp_path):
+    amber = (228, 177, 65)
+    pictures = [pixels(overview(made_up_drive(movers=n), tmp_path / f"{n}.png", dpi=80)) for n in (0, 2)]
+    assert near(pictures[1], amber) > near(pictures[0], amber) + 100
+    task, grid, plan = planned
+    mover = Keyframed(radius=0.2, keyframes=((0.0, 0.5, 3.0), (5.0, 2.5, 3.5)))
+    moving = dataclasses.replace(
+        task, world=dataclasses.replace(task.world, movers=(mover, Wandering(radius=0.1, cell=0.5, period=1.0)))
+    )
+    picture = pixels(plan_figure(moving, grid, plan, ROBOT, tmp_path / "moving.png", dpi=80))
+    plain = pixels(plan_figure(task, grid, plan, ROBOT, tmp_path / "plain.png", dpi=80))
+    assert near(picture, amber) > near(plain, amber) + 100
+
+
+def test_a_rectangular_robot_and_planned_cells_are_drawn(made_up_drive, tmp_path):
+    drive = made_up_drive(square=True)
+    assert overview(drive, tmp_path / "square.png", cells=np.array([(0.5, 1.5), (0.75, 1.5)]), dpi=60).exists()
+
+
+def test_a_run_that_never_drove_has_an_overview(made_up_drive, tmp_path):
+    drive = made_up_drive(outcome="no_path")
+    empty = dataclasses.replace(
+        drive, t=drive.t[:0], pose=drive.pose[:0], twist=drive.twist[:0], command=drive.command[:0],
+        clearance=drive.clearance[:0], limiter=drive.limiter[:0], route=np.empty((0, 2)),
+    )  # fmt: skip
+    assert overview(empty, tmp_path / "empty.png", dpi=60).stat().st_size > 5000
+
+
+def test_a_plan_is_drawn_on_the_map(planned, tmp_path):
+    task, grid, plan = planned
+    picture = pixels(plan_figure(task, grid, plan, ROBOT, tmp_path / "plan.png", dpi=80))
+    assert near(picture, (255, 122, 14)) > 300
+
+
+def test_an_iterative_planner_gets_its_history_and_landscape(planned, tmp_path):
+    task, grid, plan = planned
+    best = plan.cost * (1 + np.exp(-np.arange(30) / 6))
+    mean = best + 1
+    mean[:4] = math.inf
+    history = History(best=best, iteration_best=best + 0.2, iteration_mean=mean, arrived=np.full(30, 9))
+    learnt = dataclasses.replace(plan, history=history, landscape=np.random.default_rng(0).random(grid.shape))
+    picture = pixels(plan_figure(task, grid, learnt, ROBOT, tmp_path / "learnt.png", dpi=80))
+    assert near(picture, (18, 63, 122), 40) > 500, "the landscape's dark end"
+    plain = pixels(plan_figure(task, grid, plan, ROBOT, tmp_path / "plain.png", dpi=80))
+    assert picture.shape[1] > 1.3 * plain.shape[1]
+
+
+def test_a_plan_that_failed_says_why(planned, tmp_path):
+    task, grid, _ = planned
+    failed = PlanResult(status=PlanStatus.NO_PATH, reason="walled in")
+    assert near(pixels(plan_figure(task, grid, failed, ROBOT, tmp_path / "failed.png", dpi=80)), (204, 32, 42)) > 100
+
+
+def test_an_unknown_suffix_is_refused(made_up_drive, planned, tmp_path):
+    with pytest.raises(InputError, match=r"choose one of .png, .pdf, .svg"):
+        overview(made_up_drive(), tmp_path / "a.bmp")
+    with pytest.raises(InputError, match="choose one of"):
+        plan_figure(*planned, ROBOT, tmp_path / "a")
+    assert not list(tmp_path.iterdir())
+
+
+def test_figures_work_in_a_thread_without_pyplot_and_leave_settings_alone(made_up_drive, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)  # importing it fails
+    before = matplotlib.rcParams.copy()
+    thread = threading.Thread(target=overview, args=(made_up_drive(), tmp_path / "a.png"), kwargs={"dpi": 50})
+    thread.start()
+    thread.join()
+    assert (tmp_path / "a.png").exists()
+    assert matplotlib.rcParams.copy() == before

@@ -1,0 +1,61 @@
+"""Pictures as they were looked at and found good, one set for each renderer; `python -m tests.sim.test_golden` paints them anew.
+
+Pictures of two renderers are never compared: the fixed cameras' bodies are TinyRenderer's, a moving camera's are cast by rays.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from antdrive.sim.view.film.camera import CAMERAS
+from antdrive.sim.view.film.video import Shot
+from tests.sim.conftest import _made_up_drive
+
+GOLDEN = Path(__file__).with_name("golden")
+SIZE = (320, 200)
+
+
+def picture(camera, **changes):
+    drive = _made_up_drive(collide=camera == "oblique", square=camera == "top", **changes)
+    with Shot(drive, camera=camera, size=SIZE, bare=True) as shot:
+        return shot.view(0.55).astype(int)
+
+
+def differs(one, other):
+    """The share of pixels that differ clearly: rounding and another compiler's last digits do not count."""
+    return float((np.abs(one - other).max(axis=-1) > 24).mean())
+
+
+@pytest.fixture(params=CAMERAS)
+def golden(request):
+    with Image.open(GOLDEN / f"{request.param}.png") as stored:
+        return request.param, np.asarray(stored.convert("RGB")).astype(int)
+
+
+def test_a_picture_is_as_it_was(golden):
+    camera, stored = golden
+    assert differs(picture(camera), stored) < 0.002
+
+
+def test_the_comparison_would_see_what_is_missing(golden, monkeypatch):
+    from antdrive.sim.view.film import stage
+
+    camera, stored = golden
+    assert differs(picture(camera, obstacles=12), stored) > 0.002, "obstacles"
+    with monkeypatch.context() as without:
+        without.setattr(stage.Stage, "_put", lambda *_: None)
+        assert differs(picture(camera), stored) > 0.002, "the robot"
+    with monkeypatch.context() as without:
+        without.setattr(stage.Stage, "drive", lambda *_: None)
+        assert differs(picture(camera), stored) > 0.002, "the driven way"
+
+
+def main():
+    for camera in CAMERAS:
+        Image.fromarray(picture(camera).astype(np.uint8)).save(GOLDEN / f"{camera}.png", optimize=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,76 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from antdrive.sim.pipeline import Scenario, run
+from antdrive.sim.view.film import prelude
+from antdrive.sim.view.film.prelude import field_levels, planning_pictures, search
+from antdrive.sim.view.film.video import film
+from antdrive.worlds import Disc, InputError, Task, World, rasterise
+
+SETTING = {"camera": "top", "size": (320, 240), "note": None, "speed": 1.0}
+
+
+@pytest.fixture(scope="module")
+def walked(tmp_path_factory):
+    """A short run by ants."""
+    from antdrive.worlds import save_task
+
+    world = World("posts", (0.0, 0.0, 3.0, 2.4), (Disc(1.5, 1.2, 0.25),))
+    path = tmp_path_factory.mktemp("worlds") / "posts.yaml"
+    save_task(Task(world, (0.5, 0.5, 0.0), (2.5, 1.9), cell=0.15), path)
+    return run(Scenario.of(str(path), "as", options={"ants": 8, "iterations": 12}, seed=3)).rollout
+
+
+def test_planning_again_gives_the_logged_path(walked):
+    _, total, states = search(walked)
+    assert total == 12
+    *_, last = states
+    assert np.array_equal(last.cells, walked.cells)
+
+
+def test_a_prelude_shows_the_field_and_goes_on_to_the_last_iteration(walked):
+    frames = list(planning_pictures(walked, SETTING, 5))
+    assert len(frames) == 5
+    assert all(frame.shape == (240, 320, 3) for frame in frames)
+    blue = [(frame[..., 2].astype(int) - frame[..., 0] > 60).sum() for frame in frames]
+    assert min(blue) > 150, "the dark end of the field"
+    assert (frames[0] != frames[-1]).any()
+
+
+def test_a_film_is_longer_by_its_prelude(walked, tmp_path):
+    lengths = [film(walked, tmp_path / "a.mp4", size=(320, 240), fps=4, prelude=p).frames for p in (0.0, 2.0)]
+    assert lengths[1] == lengths[0] + 8
+
+
+def test_a_log_that_planning_does_not_lead_to_is_refused(walked):
+    other = replace(walked, cells=walked.cells[::-1])
+    with pytest.raises(InputError, match="another path"):
+        list(planning_pictures(other, SETTING, 2))
+
+
+@pytest.mark.parametrize(
+    ("planner", "message"),
+    [
+        ({"name": "astar", "options": {}}, "astar does not plan in iterations"),
+        ({"name": "as", "options": {"time_budget": 1.0}}, "time budget"),
+        ({"name": "nobody", "options": {}}, "nobody"),
+    ],
+)
+def test_planners_without_a_field_are_refused_before_anything_is_drawn(walked, tmp_path, planner, message):
+    with pytest.raises(InputError, match=message):
+        film(replace(walked, meta={**walked.meta, "planner": planner}), tmp_path / "a.mp4", prelude=1.0)
+    assert not list(tmp_path.iterdir())
+
+
+def test_levels_run_from_nothing_to_much_and_leave_blocked_cells_out():
+    grid = rasterise(World("one", (0, 0, 3, 3), (Disc(1.5, 1.5, 0.4),)), 0.3, 0.1)
+    field = np.arange(np.prod(grid.shape), dtype=float).reshape(grid.shape)
+    levels = field_levels(grid, field)
+    assert np.isnan(levels[~grid.free]).all()
+    free = levels[grid.free]
+    assert free.min() == 0
+    assert free.max() == 1
+    assert (np.diff(free) >= 0).all()
+    assert not np.nanmax(prelude.field_levels(grid, np.ones(grid.shape)))

@@ -1,0 +1,56 @@
+"""A log read between its rows, where something jumps or touches."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from antdrive.sim.view.film.replay import Replay, contact_point
+from antdrive.sim.view.scene import Scene, jumping, pieces
+
+
+@pytest.fixture(scope="module")
+def jumped(made_up_drive):
+    """Two movers: one at 0.5 m/s that jumps back before row 120, one that stands."""
+    drive = made_up_drive(movers=2)
+    movers = drive.movers.copy()
+    movers[:, 0] = np.column_stack([0.5 * drive.t, 0 * drive.t])
+    movers[120:, 0, 0] -= movers[120, 0, 0]
+    movers[:, 1] = (3.5, 0.5)
+    return replace(drive, movers=movers)
+
+
+def test_a_mover_that_jumps_is_on_one_side_or_the_other(jumped):
+    replay = Replay(jumped)
+    before, after = jumped.movers[119, 0, 0], jumped.movers[120, 0, 0]
+    assert replay.movers(119.9 / 240)[0, 0] == before
+    assert replay.movers(120 / 240)[0, 0] == after
+    assert replay.movers(60.5 / 240)[0, 0] == pytest.approx(0.5 * 60.5 / 240)
+
+
+def test_movers_have_the_velocity_of_their_rows(jumped):
+    replay = Replay(jumped)
+    np.testing.assert_allclose(replay.mover_velocities(0.1), [(0.5, 0), (0, 0)], atol=1e-9)
+    np.testing.assert_allclose(replay.mover_velocities(119.5 / 240), [(0, 0), (0, 0)], atol=1e-9)
+    np.testing.assert_allclose(replay.mover_velocities(99.0), [(0.5, 0), (0, 0)], atol=1e-9)
+
+
+def test_tracks_are_cut_at_jumps_and_nowhere_else(jumped):
+    assert np.argwhere(jumping(jumped.movers)).tolist() == [[119, 0]]
+    one, two, stood = pieces(jumped.movers)
+    assert (len(one), len(two), len(stood)) == (120, len(jumped.t) - 120, len(jumped.t))
+    fast = np.zeros((100, 1, 2))
+    fast[:, 0, 0] = np.arange(100) * 20 / 240
+    assert not jumping(fast).any(), "20 m/s is fast, but no jump"
+    assert Scene.of(jumped).movers == ((float(jumped.movers[-1, 0, 0]), 0.0), (3.5, 0.5))
+
+
+def test_contacts_with_discs_movers_and_walls_have_their_points(jumped):
+    scene = Scene.of(jumped)
+    count, movers = len(scene.obstacles), jumped.movers[0]
+    x, y = contact_point(scene, (3.0, 0.5, 0.0), count + 1, movers)
+    assert (x, y) == pytest.approx((3.5 - 0.12, 0.5))
+    assert contact_point(scene, (0.2, 1.0, 0.0), count + 2, movers) == (0.0, 1.0)
+    assert contact_point(scene, (0.2, 1.0, 0.0), count + 5, movers) == (0.2, 3.0)
+    ox, oy, radius, _ = scene.obstacles[0]
+    assert contact_point(scene, (ox + 1.0, oy, 0.0), 0, movers) == pytest.approx((ox + radius, oy))

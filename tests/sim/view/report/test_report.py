@@ -1,0 +1,181 @@
+"""The report, as text and in a real browser: it loads without errors, sorts, filters, plays films and fits a phone."""
+
+import html
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from antdrive.sim.view.figures.plots import overview
+from antdrive.sim.view.report.report import ROOM, write_report
+from antdrive.worlds import InputError
+
+BROWSER = next(
+    (found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None
+)
+needs_browser = pytest.mark.skipif(BROWSER is None, reason="no chromium on this machine")
+
+PROBE = """<script>
+window.faults = [];
+window.onerror = (message) => { faults.push(String(message)); };
+const lost = (e) => { if (e.target !== window) faults.push("cannot load " + (e.target.src || e.target.href)); };
+window.addEventListener("error", lost, true);
+window.onload = async () => {
+  const rows = () => [...document.querySelectorAll("#runs tbody tr")].filter((r) => !r.hidden);
+  const column = (k) => rows().map((r) => r.cells[k].textContent);
+  const heads = [...document.querySelectorAll("#runs th button")], said = {};
+  const named = (name) => heads.find((h) => h.textContent === name);
+  named("planner").click(); said.up = column(1);
+  named("planner").click(); said.down = column(1);
+  named("driven m").click(); said.driven = column(6);
+  const filter = document.querySelector("#filter");
+  filter.value = "astar COLLIDED"; filter.dispatchEvent(new Event("input"));
+  said.filtered = column(0); said.sections = [...document.querySelectorAll("section")].filter((s) => !s.hidden).length;
+  filter.value = "nothing at all"; filter.dispatchEvent(new Event("input"));
+  said.nothing = !document.querySelector("#none").hidden;
+  filter.value = ""; filter.dispatchEvent(new Event("input"));
+  const outcome = document.querySelector("#outcome"); outcome.value = "succeeded"; outcome.dispatchEvent(new Event("change"));
+  said.succeeded = rows().length;
+  said.pictures = [...document.images].every((i) => i.complete && i.naturalWidth > 0);
+  said.overflow = document.documentElement.scrollWidth - document.documentElement.clientWidth;
+  const film = document.querySelector("video");
+  if (film) {
+    film.muted = true;
+    await film.play();
+    for (let k = 0, x = 0; k < 300 && !(film.currentTime > 0.1); k++) {
+      await new Promise((r) => setTimeout(r, 50));
+      for (let i = 0; i < 2e6; i++) x += Math.sqrt(i);  // the page's time is virtual; the decoder needs some of ours
+    }
+    said.film = [film.videoWidth, film.videoHeight, film.currentTime > 0.1, film.error && film.error.message];
+  }
+  said.faults = faults;
+  const out = document.createElement("pre"); out.id = "said"; out.textContent = JSON.stringify(said); document.body.append(out);
+};
+</script>"""
+
+
+@pytest.fixture(scope="module")
+def runs(made_up_drive, tmp_path_factory):
+    """Three runs as the command line leaves them, one with a film, one that collided."""
+    from antdrive.sim.view.film.video import film
+
+    folder = tmp_path_factory.mktemp("runs")
+    for k, (planner, outcome) in enumerate((("mmas", "succeeded"), ("astar", "collided"), ("<b>odd</b>", "succeeded"))):
+        drive = made_up_drive(collide=outcome == "collided", outcome=outcome)
+        place = folder / f"run {k}"
+        place.mkdir()
+        overview(drive, place / "overview.png", dpi=60)
+        facts = {
+            "world": "made-up", "planner": planner, "robot": "turtlebot", "seed": k, "outcome": outcome, "reason": "",
+            "sentence": "touched an obstacle" if outcome == "collided" else "stopped at the goal without contact",
+            "succeeded": outcome == "succeeded", "command": f"antdrive run made-up --planner '{planner}'", "digest": "0",
+            "metrics": {"path_length_m": 3.0, "driven_length_m": (10.5, 9.25, 100.0)[k], "duration_s": 1.0},
+            "certificate": {"certified": outcome == "succeeded", "bound_m": 0.1, "problems": ["it touched"] * (k == 1)},
+        }  # fmt: skip
+        (place / "result.json").write_text(json.dumps(facts))
+    film(made_up_drive(), folder / "run 0" / "film.mp4", size=(320, 240), fps=10)
+    return folder
+
+
+def dumped(page: Path, *words: str) -> dict:
+    """What a page says about itself in a browser."""
+    common = ("--headless", "--no-sandbox", "--disable-gpu", "--autoplay-policy=no-user-gesture-required",
+              "--allow-file-access-from-files", "--virtual-time-budget=20000", "--dump-dom", *words)  # fmt: skip
+    done = subprocess.run([BROWSER, *common, page.as_uri()], capture_output=True, text=True, timeout=120, check=True)
+    return json.loads(html.unescape(re.search(r'<pre id="said">(.*?)</pre>', done.stdout, re.S).group(1)))
+
+
+def with_probe(page: Path) -> Path:
+    other = page.with_name("probed.html")
+    other.write_text(page.read_text().replace("<head>", "<head>" + PROBE, 1))
+    return other
+
+
+@needs_browser
+@pytest.mark.parametrize("embed", [False, True])
+def test_in_a_browser_it_sorts_filters_and_plays(runs, tmp_path, embed):
+    page = (tmp_path if embed else runs) / "report.html"
+    write_report(runs, page, embed_films=embed)
+    said = dumped(with_probe(page))
+    assert said["faults"] == []
+    assert said["up"] == ["<b>odd</b>", "astar", "mmas"]
+    assert said["down"] == said["up"][::-1]
+    assert said["driven"] == ["9.25", "10.50", "100.00"], "as numbers, not as text"
+    assert said["filtered"] == ["made-up"]
+    assert said["sections"] == 1
+    assert said["nothing"]
+    assert said["succeeded"] == 2
+    assert said["pictures"]
+    assert said["film"] == [320, 240, True, None]
+
+
+@needs_browser
+def test_on_a_phone_the_page_is_as_wide_as_the_screen(runs, tmp_path):
+    write_report(runs, tmp_path / "report.html")
+    with_probe(tmp_path / "report.html")
+    copy = "document.body.append(f.contentDocument.querySelector('#said').cloneNode(true))"
+    (tmp_path / "phone.html").write_text(
+        f"<script>onload = () => setTimeout(() => {{ {copy} }}, 18000)</script>"
+        "<iframe id=f width=390 height=800 src=probed.html></iframe>"
+    )
+    said = dumped(tmp_path / "phone.html")
+    assert said["overflow"] == 0
+
+
+def test_the_page_holds_everything_and_calls_nobody(runs, tmp_path):
+    assert write_report(runs, tmp_path / "report.html", title="Ours & theirs") == 3
+    text = (tmp_path / "report.html").read_text()
+    assert "Ours &amp; theirs" in text
+    assert "<b>odd</b>" not in text, "what files say is shown, not run"
+    assert not re.search(r"(src|href)=\"(https?:)?//", text)
+    assert text.count("data:image/webp") == 3
+    assert "run%200/film.mp4" in text
+    assert "antdrive run made-up --planner &#39;mmas&#39;" in text
+
+
+def test_films_can_be_embedded(runs, tmp_path):
+    write_report(runs, tmp_path / "with.html", embed_films=True)
+    assert "data:video/mp4;base64," in (tmp_path / "with.html").read_text()
+
+
+def test_it_stays_small_by_linking_what_does_not_fit(runs, tmp_path, monkeypatch):
+    from antdrive.sim.view.report import report as reporting
+
+    write_report(runs, tmp_path / "all.html")
+    assert (tmp_path / "all.html").stat().st_size < 5_000_000
+    assert ROOM < 5_000_000
+    monkeypatch.setattr(reporting, "ROOM", 1.5 * len(reporting._shrunk(runs / "run 0" / "overview.png", "").source))
+    write_report(runs, tmp_path / "few.html")
+    text = (tmp_path / "few.html").read_text()
+    assert text.count("data:image/webp") == 1
+    assert "run%201/overview.png" in text
+
+
+def test_the_markdown_is_a_table_with_pictures_and_commands(runs, tmp_path):
+    write_report(runs, runs / "report.md")
+    text = (runs / "report.md").read_text()
+    lines = text.splitlines()
+    start = next(i for i, line in enumerate(lines) if line.startswith("| world"))
+    table = lines[start : start + 5]
+    assert all(line.startswith("|") for line in table)
+    assert len({line.count("|") for line in table}) == 1
+    assert "![overview.png](run%200/overview.png)" in lines
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("result.json", "{", "result.json: cannot be read"),
+        ("result.json", "[]", "world: missing"),
+        ("other", "", "no runs"),
+    ],
+)
+def test_wrong_folders_are_named(tmp_path, name, content, message):
+    (tmp_path / name).write_text(content)
+    with pytest.raises(InputError, match=message):
+        write_report(tmp_path, tmp_path / "report.html")
+    with pytest.raises(InputError, match=r"choose .html or .md"):
+        write_report(tmp_path, tmp_path / "report.pdf")

@@ -1,0 +1,64 @@
+"""What notebooks show of worlds, plans and rollouts: a picture first, and well-formed."""
+
+import re
+import subprocess
+import sys
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from antdrive.planners import PlanResult, PlanStatus, Query, find_planner
+from antdrive.worlds import Disc, Task, World, load_task, rasterise
+
+TASK = load_task("slalom")
+
+
+def plan(name="as", **options):
+    grid = rasterise(TASK.world, TASK.cell, 0.21)
+    return find_planner(name, **options).plan(Query.between(grid, TASK), np.random.default_rng(0))
+
+
+@pytest.mark.parametrize(
+    "shown",
+    [
+        TASK,
+        TASK.world,
+        plan(ants=5, iterations=5),
+        plan("tangent"),
+        PlanResult(status=PlanStatus.NO_PATH, reason="a < b"),
+    ],
+    ids=["task", "world", "ants", "tangent", "no path"],
+)
+def test_what_is_shown_is_well_formed_and_starts_with_a_picture(shown):
+    html = shown._repr_html_()
+    root = ElementTree.fromstring(html.replace("&nbsp;", " "))
+    if not isinstance(shown, PlanResult) or shown.solved:
+        assert root[0].tag.endswith("svg")
+
+
+def test_every_obstacle_is_drawn_where_it_is():
+    world = World("two", (0, 0, 4, 2), (Disc(1, 0.5, 0.25), Disc(3, 1.5, 0.125)))
+    html = Task(world, (0.5, 1.5, 0), (3.5, 0.5))._repr_html_()
+    assert '<circle cx="1" cy="0.5" r="0.25"' in html
+    assert '<circle cx="3" cy="1.5" r="0.125"' in html
+    assert "scale(1 -1)" in html, "y runs up"
+
+
+def test_names_are_shown_not_run():
+    assert "<script>" not in World("<script>", (0, 0, 1, 1))._repr_html_()
+
+
+def test_a_rollout_shows_its_route_and_its_drive(small_run):
+    html = small_run.rollout._repr_html_()
+    assert html.count("<polyline") == 2
+    assert re.search(r"stopped at the goal", html)
+
+
+def test_looking_at_a_world_imports_nothing_heavy():
+    code = (
+        "import sys; from worlds import load_task; load_task('slalom')._repr_html_(); "
+        "print([m for m in ('matplotlib', 'numba', 'sim', 'pybullet') if m in sys.modules])"
+    )
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert said.stdout.strip() == "[]"

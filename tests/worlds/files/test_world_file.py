@@ -1,0 +1,321 @@
+"""World files: read, written, refused, listed."""
+
+import json
+import math
+import os
+import stat
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from antdrive.worlds import (
+    Disc,
+    InputError,
+    Task,
+    World,
+    catalogue,
+    load_task,
+    save_task,
+    task_from_dict,
+    task_schema,
+    task_to_dict,
+)
+from antdrive.worlds.files.document import input_error, parse_document
+from tests.worlds.malformed import GOOD, MALFORMED
+
+TASK = Task(
+    World("one", (0.0, 0.0, 10.0, 8.0), (Disc(5.0, 4.0, 1.0), Disc(2.5, 6.125, 0.5, 2.0)), "made up"),
+    (1.0, 1.0, math.pi / 2),
+    (9.0, 7.0),
+    0.3,
+    0.25,
+)
+
+
+def write(folder: Path, content: str | bytes, name: str = "bad.yaml") -> Path:
+    path = folder / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return path
+
+
+def refusal(call: Callable[[], object]) -> str | None:
+    """The message of the InputError, if there is one."""
+    try:
+        call()
+    except InputError as error:
+        return str(error)
+    return None
+
+
+# Refused files
+
+
+@pytest.mark.parametrize("case", MALFORMED)
+def test_a_wrong_file_gets_one_line_that_says_where_and_what(case, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    content, expected = MALFORMED[case]
+    write(tmp_path, content)
+    with pytest.raises(InputError) as caught:
+        load_task("bad.yaml")
+    message = str(caught.value)
+    assert expected in message
+    assert message.startswith("bad.yaml:")
+    assert message.isprintable()
+    assert len(message) < 300
+
+
+def test_there_are_many_ways_to_be_wrong_and_one_to_be_right(tmp_path):
+    assert len(MALFORMED) >= 30
+    assert load_task(write(tmp_path, GOOD)).world.name == "bad"
+
+
+@pytest.mark.parametrize("case", ["alias bomb", "deep nesting", "five thousand digits"])
+def test_a_hostile_file_is_refused_quickly(case, tmp_path):
+    path = write(tmp_path, MALFORMED[case][0])
+    started = time.perf_counter()
+    with pytest.raises(InputError):
+        load_task(path)
+    assert time.perf_counter() - started < 5
+
+
+def test_a_file_too_large_is_not_parsed(tmp_path):
+    path = write(tmp_path, GOOD + "# " + "x" * 3_000_000)
+    with pytest.raises(InputError, match="too large"):
+        load_task(path)
+
+
+@given(st.text(max_size=200))
+@example("\ud800")
+@example("a: &a [*a]")
+@example("? ? ?")
+@settings(max_examples=300)
+def test_any_text_is_a_document_or_an_input_error(text):
+    message = refusal(lambda: parse_document(text, "text"))
+    assert message is None or (message.startswith("text") and message.isprintable())
+
+
+plain = st.recursive(
+    st.none() | st.booleans() | st.floats() | st.integers() | st.text(),
+    lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner),
+    max_leaves=8,
+)
+
+
+@given(plain, st.sampled_from([*task_to_dict(TASK), "movers", "other"]))
+def test_any_value_for_any_key_is_a_task_or_an_input_error(value, key):
+    message = refusal(lambda: task_from_dict(task_to_dict(TASK) | {key: value}))
+    assert message is None or (message.startswith(f"task: {key}") and message.isprintable())
+
+
+def test_a_missing_file_names_close_worlds_of_the_catalogue():
+    with pytest.raises(InputError, match=r"^gat: no such file, nor a world of the catalogue; did you mean gate\?$"):
+        load_task("gat")
+    with pytest.raises(InputError, match=r"did you mean gate\?"):
+        load_task("somewhere/gate.yaml")
+    with pytest.raises(InputError, match="choose from empty, forest, gate"):
+        load_task("zzzzzz")
+
+
+@pytest.mark.parametrize("name", ["", "\x00", "a\nb", "x" * 5000])
+def test_strange_names_are_told_on_one_line(name):
+    with pytest.raises(InputError) as caught:
+        load_task(name)
+    assert str(caught.value).isprintable()
+
+
+def test_a_folder_is_no_world(tmp_path):
+    with pytest.raises(InputError, match=r"is a directory; give a YAML file$"):
+        load_task(tmp_path)
+
+
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="needs a user who may not read everything")
+def test_a_file_that_may_not_be_read_says_so(tmp_path):
+    path = write(tmp_path, GOOD)
+    path.chmod(0)
+    with pytest.raises(InputError, match="cannot be read: Permission denied"):
+        load_task(path)
+
+
+def test_a_dangling_link_is_a_missing_file(tmp_path):
+    (tmp_path / "link.yaml").symlink_to(tmp_path / "nowhere")
+    with pytest.raises(InputError, match=r"no such file"):
+        load_task(tmp_path / "link.yaml")
+
+
+def test_the_first_unknown_key_is_told_before_what_it_left_missing():
+    with pytest.raises(InputError, match=r"^task: strat: unknown key; did you mean start\?$"):
+        task_from_dict({k if k != "start" else "strat": v for k, v in task_to_dict(TASK).items()})
+
+
+def test_an_error_is_one_line_whatever_it_quotes():
+    assert str(input_error("a\nb", "c\u2028d\x1b[31m")) == "a\\nb: c\\u2028d\\x1b[31m"
+
+
+# Accepted files
+
+
+def test_whole_numbers_are_numbers(tmp_path):
+    text = GOOD.replace("0.0, 0.0, 10.0, 10.0", "0, 0, 10, 10").replace("cell: 0.5", "cell: 1")
+    task = load_task(write(tmp_path, text))
+    assert task.world.bounds == (0.0, 0.0, 10.0, 10.0)
+    assert isinstance(task.world.bounds[2], float)
+    assert task.cell == 1.0
+
+
+def test_what_may_be_left_out_gets_its_default(tmp_path):
+    text = "schema: 1\nbounds: [0, 0, 9, 9]\nstart: [1, 1, 0]\ngoal: [8, 8]\nmovers: []\n"
+    task = load_task(write(tmp_path, text, "my world.yaml"))
+    assert task.world == World("my world", (0.0, 0.0, 9.0, 9.0))
+    assert (task.goal_tolerance, task.cell) == (0.25, 0.5)
+
+
+def test_a_disc_is_one_metre_high_unless_told(tmp_path):
+    assert load_task(write(tmp_path, GOOD)).world.obstacles[0].height == 1.0
+
+
+def test_a_byte_order_mark_and_windows_lines_are_fine(tmp_path):
+    assert load_task(write(tmp_path, b"\xef\xbb\xbf" + GOOD.replace("\n", "\r\n").encode())).world.name == "bad"
+
+
+def test_harmless_aliases_are_followed(tmp_path):
+    text = GOOD.replace("radius: 0.5", "radius: &r 0.5") + "  - {x: 7.0, y: 5.0, radius: *r}\n"
+    assert [d.radius for d in load_task(write(tmp_path, text)).world.obstacles] == [0.5, 0.5]
+
+
+def test_a_catalogue_name_wins_over_a_file_of_that_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path, GOOD, "gate")
+    assert load_task("gate").world.name == "gate"
+    assert load_task("./gate").world.name == "bad"
+    assert load_task(Path("gate")).world.name == "bad"
+
+
+# Written files
+
+numbers = st.floats(-1e6, 1e6, allow_nan=False)
+sizes = st.floats(1e-300, 1e6)
+names = st.text(min_size=1, max_size=30).filter(str.isprintable)
+
+
+@st.composite
+def tasks(draw: st.DrawFn) -> Task:
+    start = (draw(numbers), draw(numbers), draw(numbers))
+    goal = (draw(numbers), draw(numbers))
+    discs = [
+        d
+        for d in draw(st.lists(st.builds(Disc, numbers, numbers, sizes, sizes), max_size=4))
+        if all(math.hypot(x - d.x, y - d.y) > d.radius for x, y in (start[:2], goal))
+    ]
+    bounds = (-1e6, -1e6, 1e6, 1e6)
+    world = World(draw(names), bounds, tuple(discs), draw(st.none() | st.text(max_size=200)))
+    if goal == start[:2]:
+        goal = (goal[0] / 2 + 1, goal[1])
+        if any(math.hypot(goal[0] - d.x, goal[1] - d.y) <= d.radius for d in discs):
+            world = World(world.name, bounds)
+    return Task(world, start, goal, draw(sizes), draw(st.floats(401.0, 1e6)))
+
+
+@settings(max_examples=150)
+@given(tasks())
+def test_a_written_task_reads_back_exactly(tmp_path_factory, task):
+    path = tmp_path_factory.mktemp("w") / "task.yaml"
+    save_task(task, path)
+    assert load_task(path) == task
+
+
+@settings(max_examples=100)
+@given(tasks())
+def test_a_task_survives_json(task):
+    assert task_from_dict(json.loads(json.dumps(task_to_dict(task)))) == task
+
+
+def test_a_written_file_is_what_people_would_write(tmp_path):
+    save_task(TASK, tmp_path / "one.yaml")
+    assert (
+        (tmp_path / "one.yaml").read_text()
+        == """\
+schema: 1
+name: one
+source: made up
+bounds: [0.0, 0.0, 10.0, 8.0]
+start: [1.0, 1.0, 1.5707963267948966]
+goal: [9.0, 7.0]
+goal_tolerance: 0.3
+cell: 0.25
+obstacles:
+  - {x: 5.0, y: 4.0, radius: 1.0, height: 1.0}
+  - {x: 2.5, y: 6.125, radius: 0.5, height: 2.0}
+"""
+    )
+
+
+def test_numpy_numbers_are_written_as_numbers(tmp_path):
+    task = Task(World("n", (0, 0, 9, 9), (Disc(*np.array([5.0, 5.0, 1e-5])),)), (1, 1, 0), (8, 8))
+    save_task(task, tmp_path / "n.yaml")
+    assert load_task(tmp_path / "n.yaml") == task
+
+
+def test_what_no_file_may_hold_is_not_written(tmp_path):
+    with pytest.raises(ValueError, match="name"):
+        save_task(Task(World("", (0, 0, 9, 9)), (1, 1, 0), (8, 8)), tmp_path / "w.yaml")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch):
+    path = tmp_path / "w.yaml"
+    path.write_text("the old one")
+
+    def fail(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_text", fail)
+    with pytest.raises((InputError, OSError)):
+        save_task(TASK, path)
+    assert [p.name for p in tmp_path.iterdir()] == ["w.yaml"]
+    assert path.read_bytes() == b"the old one"
+
+
+def test_a_place_that_cannot_be_written_is_wrong_input(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="cannot be written"):
+        save_task(TASK, tmp_path / "file" / "w.yaml")
+    with pytest.raises(InputError, match="cannot be written"):
+        save_task(TASK, tmp_path)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="permissions are those of POSIX")
+def test_a_written_file_may_be_read_like_any_other(tmp_path):
+    save_task(TASK, tmp_path / "w.yaml")
+    (tmp_path / "plain").write_text("")
+    modes = [stat.S_IMODE((tmp_path / name).stat().st_mode) for name in ("w.yaml", "plain")]
+    assert modes[0] == modes[1]
+
+
+# Schema
+
+
+def test_the_schema_tells_every_key_and_what_is_needed():
+    schema = task_schema()
+    json.dumps(schema)
+    assert set(schema["properties"]) == {*task_to_dict(TASK), "movers", "time_limit"}
+    assert schema["required"] == ["schema", "bounds", "start", "goal"]
+    assert schema["additionalProperties"] is False
+    assert schema["properties"]["start"]["minItems"] == schema["properties"]["start"]["maxItems"] == 3
+    assert schema["$defs"]["DiscEntry"]["properties"]["radius"]["exclusiveMinimum"] == 0
+
+
+def test_the_limit_on_cells_is_that_of_grids():
+    from antdrive.worlds import grid
+    from antdrive.worlds.files import world_file as files
+
+    assert files.MAX_CELLS == grid.MAX_CELLS
+
+
+def test_the_catalogue_is_the_files_that_come_along():
+    assert all(path.is_file() for path in catalogue().values())
+    assert list(catalogue()) == sorted(catalogue())

@@ -1,0 +1,292 @@
+"""Gazebo worlds and the BARN set."""
+
+import math
+import tarfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from antdrive.worlds import Disc, InputError, import_barn, import_sdf, load_task, point_clearance, rasterise, save_task
+from tests.worlds.oracles import passable
+
+BARN = Path(__file__).parents[4] / "shared" / "data" / "barn" / "barn50.tar.xz"
+
+GROUND = """
+<model name='ground_plane'><static>1</static><link name='link'><collision name='c'>
+  <geometry><plane><normal>0 0 1</normal><size>100 100</size></plane></geometry>
+</collision></link></model>"""
+
+
+def cylinder(name="can", pose="0 0 0 0 0 0", link="", collision="", radius=0.5, length=1.0, static="true") -> str:
+    return f"""
+<model name='{name}'><static>{static}</static><pose frame=''>{pose}</pose>
+  <link name='link'>{f"<pose>{link}</pose>" if link else ""}
+    <collision name='c'>{f"<pose>{collision}</pose>" if collision else ""}
+      <geometry><cylinder><radius>{radius}</radius><length>{length}</length></cylinder></geometry>
+    </collision>
+    <visual name='v'><geometry><mesh><uri>model://can.dae</uri></mesh></geometry></visual>
+  </link>
+</model>"""
+
+
+def shape(tag: str, inside: str = "", name: str = "thing") -> str:
+    return f"""
+<model name='{name}'><static>1</static><link name='l'><collision name='c'>
+  <geometry><{tag}>{inside}</{tag}></geometry></collision></link></model>"""
+
+
+def world(tmp_path: Path, *parts: str) -> Path:
+    path = tmp_path / "made.world"
+    path.write_text(
+        f"<?xml version='1.0'?><sdf version='1.6'><world name='default'>{GROUND}{''.join(parts)}</world></sdf>"
+    )
+    return path
+
+
+def discs(path: Path, **options: object) -> tuple[Disc, ...]:
+    return import_sdf(path, bounds=(-50, -50, 50, 50), **options).world.obstacles
+
+
+def test_cylinders_become_discs(tmp_path):
+    path = world(tmp_path, cylinder("a", "1 2 0.5 0 0 0"), cylinder("b", "-3 4 0.5 0 0 1", radius=0.25))
+    assert discs(path) == (Disc(1.0, 2.0, 0.5, 1.0), Disc(-3.0, 4.0, 0.25, 1.0))
+
+
+def test_poses_of_model_link_and_collision_are_composed(tmp_path):
+    half = math.pi / 2
+    path = world(tmp_path, cylinder(pose=f"1 2 0.5 0 0 {half}", link=f"3 0 0 0 0 {half}", collision="1 0 0 0 0 0"))
+    (disc,) = discs(path)
+    assert (disc.x, disc.y) == pytest.approx((1 - 1, 2 + 3))
+
+
+def test_two_tilts_that_cancel_leave_an_upright_cylinder(tmp_path):
+    half = math.pi / 2
+    path = world(tmp_path, cylinder(pose=f"1 2 0 {half} 0 0", collision=f"0 0.25 -5 {-half} 0 0", length=0.5))
+    (disc,) = discs(path)
+    assert (disc.x, disc.y, disc.height) == pytest.approx((1, 2 + 5, 0.25 + 0.25))
+
+
+def test_composition_is_that_of_rotation_matrices(tmp_path):
+    rng = np.random.default_rng(0)
+
+    def about(axis: int, angle: float) -> np.ndarray:
+        c, s = math.cos(angle), math.sin(angle)
+        i, j = [(1, 2), (2, 0), (0, 1)][axis]
+        turn = np.eye(3)
+        turn[i, i] = turn[j, j] = c
+        turn[i, j], turn[j, i] = -s, s
+        return turn
+
+    for _ in range(20):
+        place, (roll, pitch, yaw) = rng.uniform(-5, 5, 3), rng.uniform(-3, 3, 3)
+        turn = about(2, yaw) @ about(1, pitch) @ about(0, roll)
+        # A link that turns back what its model turned, expressed as roll, pitch and yaw.
+        back = turn.T
+        angles = (
+            math.atan2(back[2, 1], back[2, 2]),
+            -math.asin(back[2, 0]),
+            math.atan2(back[1, 0], back[0, 0]),
+        )
+        offset = rng.uniform(-2, 2, 3)
+        pose = " ".join(map(str, [*place, roll, pitch, yaw]))
+        link = " ".join(map(str, [*offset, *angles]))
+        (disc,) = discs(world(tmp_path, cylinder(pose=pose, link=link, length=100)))
+        x, y, z = place + turn @ offset
+        assert (disc.x, disc.y, disc.height) == pytest.approx((x, y, z + 50), abs=1e-9)
+
+
+def test_a_cylinder_is_as_high_as_its_top_above_the_floor(tmp_path):
+    parts = (
+        cylinder("a", "0 0 0 0 0 0"),
+        cylinder("b", "2 0 0 3.14159265 0 0"),
+        cylinder("c", "4 0 -0.5 0 0 0"),
+    )
+    assert [(d.x, d.height) for d in discs(world(tmp_path, *parts))] == [(0.0, 0.5), (2.0, 0.5)]
+
+
+def test_models_without_collisions_and_floors_are_passed_over(tmp_path):
+    path = world(tmp_path, "<model name='sign'><static>1</static><link name='l'/></model>", cylinder())
+    assert len(discs(path)) == 1
+
+
+def test_several_links_collisions_and_nested_models_count(tmp_path):
+    inner = cylinder("inner", "0 1 0.5 0 0 0", static="false")
+    path = world(tmp_path, f"<model name='o'><static>1</static><pose>5 0 0 0 0 0</pose>{inner}</model>", cylinder())
+    assert {(d.x, d.y) for d in discs(path)} == {(5.0, 1.0), (0.0, 0.0)}
+
+
+def state(body: str) -> str:
+    return f"<state world_name='default'>{body}</state>"
+
+
+def test_poses_in_the_state_win(tmp_path):
+    path = world(
+        tmp_path,
+        cylinder("a", "1 1 0.5 0 0 0", link="0.25 0 0 0 0 0"),
+        cylinder("b", "2 2 0.5 0 0 0"),
+        cylinder("c", "3 3 0.5 0 0 0"),
+        state(
+            "<model name='a'><pose>7 7 0.5 0 0 0</pose></model>"
+            "<model name='b'><pose>8 8 0 0 0 0</pose><link name='link'><pose>8 9 0.5 0 0 0</pose></link></model>"
+        ),
+    )
+    assert [(d.x, d.y) for d in discs(path)] == [(7.25, 7.0), (8.0, 9.0), (3.0, 3.0)]
+
+
+def test_the_scale_in_the_state_stretches(tmp_path):
+    scaled = "<model name='can'><pose>1 1 0 0 0 0</pose><scale>{}</scale></model>"
+    path = world(tmp_path, cylinder(), state(scaled.format("0.5 0.5 4")))
+    assert discs(path) == (Disc(1.0, 1.0, 0.25, 2.0),)
+    with pytest.raises(InputError, match=r"can \(scaled to something that is no cylinder\)"):
+        discs(world(tmp_path, cylinder(), state(scaled.format("0.5 0.6 1"))))
+
+
+def test_degrees_are_degrees(tmp_path):
+    model = cylinder(link="2 0 0.5 0 0 0").replace("<pose frame=''>0 0 0 0 0 0", "<pose degrees='true'>0 0 0 0 0 90")
+    (disc,) = discs(world(tmp_path, model))
+    assert (disc.x, disc.y) == pytest.approx((0.0, 2.0))
+
+
+UNSUPPORTED = {
+    "box": (shape("box", "<size>1 1 1</size>", "crate"), "crate (box)"),
+    "sphere": (shape("sphere", "<radius>1</radius>", "ball"), "ball (sphere)"),
+    "mesh": (shape("mesh", "<uri>model://x.dae</uri>", "statue"), "statue (mesh)"),
+    "tilted": (cylinder("pisa", "0 0 0 0.1 0 0"), "pisa (a tilted cylinder)"),
+    "lying": (cylinder("log", collision="0 0 0 0 1.5708 0"), "log (a tilted cylinder)"),
+    "standing plane": (shape("plane", "<normal>1 0 0</normal>", "wall"), "wall (a plane that is no floor)"),
+    "not static": (cylinder("cart", static="0"), "cart (not static)"),
+    "other frame": (
+        cylinder("tied").replace("<pose frame=''>", "<pose relative_to='other'>"),
+        "tied (a pose with relative_to='other')",
+    ),
+    "short pose": (cylinder("odd", "1 2 3"), "odd (pose must be 6 numbers, got '1 2 3')"),
+    "pose of words": (cylinder("odd", "a b c d e f"), "odd (pose must be 6 numbers, got 'a b c d e f')"),
+    "infinite pose": (cylinder("odd", "inf 0 0 0 0 0"), "odd (pose must be 6 numbers"),
+    "negative radius": (cylinder("odd", radius=-1.0), "odd (a cylinder of radius -1 and length 1)"),
+    "included": ("<include><uri>model://house</uri></include>", "model://house (included from another file)"),
+    "actor": ("<actor name='walker'/>", "walker (actor)"),
+}
+
+
+@pytest.mark.parametrize("case", UNSUPPORTED)
+def test_what_is_no_upright_cylinder_is_named_or_skipped(case, tmp_path):
+    part, expected = UNSUPPORTED[case]
+    path = world(tmp_path, cylinder("good", "5 5 0.5 0 0 0"), part)
+    with pytest.raises(InputError) as caught:
+        discs(path)
+    assert expected in str(caught.value)
+    assert str(caught.value).isprintable()
+    assert discs(path, skip_unsupported=True) == (Disc(5.0, 5.0, 0.5),)
+
+
+def test_many_unsupported_models_are_counted(tmp_path):
+    parts = [shape("box", name=f"box{i}") for i in range(9)]
+    with pytest.raises(InputError, match=r"box0 \(box\), .*box4 \(box\) and 4 more$"):
+        discs(world(tmp_path, *parts))
+
+
+def test_the_usual_includes_are_passed_over(tmp_path):
+    includes = [f"<include><uri>model://{name}</uri></include>" for name in ("sun", "ground_plane")]
+    assert len(discs(world(tmp_path, *includes, cylinder()))) == 1
+
+
+BAD_XML = {
+    "no xml": ("hello", r"bad\.world:1: not XML: syntax error"),
+    "empty": ("", r"bad\.world:1: not XML: no element found"),
+    "cut off": ("<sdf>\n<world>\n", r"bad\.world:3: not XML: no element found"),
+    "no sdf": ("<robot name='r'/>", r"must be an <sdf> with a <world> in it, got <robot>"),
+    "no world": ("<sdf version='1.6'><model name='m'/></sdf>", "must be an <sdf> with a <world>"),
+    "no cylinder": ("<sdf><world name='w'/></sdf>", "holds no upright cylinder; give the bounds"),
+    "entities": (
+        "<!DOCTYPE sdf [<!ENTITY a 'b'>]><sdf><world>&a;</world></sdf>",
+        "document type or entities",
+    ),
+    "external entity": ("<!DOCTYPE s SYSTEM 'file:///etc/passwd'><sdf/>", "document type or entities"),
+    "deep": ("<a>" * 5000 + "</a>" * 5000, "nested deeper than 100 levels"),
+    "unknown encoding": ("<?xml version='1.0' encoding='x-nothing'?><sdf/>", "not XML"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_XML)
+def test_a_wrong_file_gets_one_line(case, tmp_path):
+    text, message = BAD_XML[case]
+    path = tmp_path / "bad.world"
+    path.write_text(text)
+    with pytest.raises(InputError, match=message) as caught:
+        import_sdf(path)
+    assert str(caught.value).isprintable()
+
+
+def test_a_missing_file_and_a_folder_are_told(tmp_path):
+    with pytest.raises(InputError, match="cannot be read: No such file or directory"):
+        import_sdf(tmp_path / "nowhere.world")
+    with pytest.raises(InputError, match="cannot be read: Is a directory"):
+        import_barn(tmp_path)
+
+
+def test_without_bounds_the_robot_walks_around_the_cylinders(tmp_path):
+    task = import_sdf(world(tmp_path, cylinder("a", "0 0 0.5 0 0 0"), cylinder("b", "4 2 0.5 0 0 0")))
+    assert task.world.bounds == (-1.5, -1.5, 5.5, 3.5)
+    assert task.start == pytest.approx((-1.0, -1.0, math.atan2(4, 6)))
+    assert task.goal == (5.0, 3.0)
+    assert task.world.name == "made"
+    assert (point_clearance(task.world, [task.start[:2], task.goal]) >= 0.5).all()
+
+
+def test_given_ends_are_inside_the_bounds(tmp_path):
+    task = import_sdf(world(tmp_path, cylinder()), start=(9.0, 0.0, 0.0), goal=(0.0, -7.0))
+    assert task.world.bounds == (-1.5, -8.0, 10.0, 1.5)
+
+
+def test_ends_that_cannot_be_are_told_with_the_file(tmp_path):
+    path = world(tmp_path, cylinder())
+    with pytest.raises(InputError, match=r"made\.world: start: \(0, 0\) is inside obstacles\[0\]"):
+        import_sdf(path, start=(0.0, 0.0, 0.0))
+    with pytest.raises(InputError, match=r"made\.world: bounds: must be"):
+        import_sdf(path, bounds=(1, 1, 0, 0))
+
+
+def test_an_imported_world_can_be_kept(tmp_path):
+    task = import_sdf(world(tmp_path, cylinder("a", "0.1 0.2 0.5 0 0 0.3", radius=0.123456789)))
+    save_task(task, tmp_path / "kept.yaml")
+    assert load_task(tmp_path / "kept.yaml") == task
+
+
+# The benchmark's own worlds
+
+
+@pytest.fixture(scope="module")
+def barn_worlds(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    if not BARN.exists():
+        pytest.skip(f"the BARN worlds are not there ({BARN.name})")
+    folder = tmp_path_factory.mktemp("barn")
+    with tarfile.open(BARN) as archive:
+        archive.extractall(folder, filter="data")
+    worlds = sorted(folder.rglob("world_*.world"), key=lambda p: int(p.stem.split("_")[1]))
+    assert len(worlds) == 50
+    return worlds
+
+
+def test_every_barn_world_lets_a_jackal_through(barn_worlds):
+    for path in barn_worlds:
+        task = import_barn(path)
+        assert 181 <= len(task.world.obstacles) <= 365
+        assert {(d.radius, d.height) for d in task.world.obstacles} == {(0.075, 0.5)}
+        assert passable(task, rasterise(task.world, task.cell, 0.333 + 0.04)), path.name
+
+
+def test_a_barn_world_is_walled_by_cylinders_that_touch_the_bounds(barn_worlds):
+    task = import_barn(barn_worlds[0])
+    x, y, radius = task.world.discs.T
+    assert (task.world.name, task.start, task.goal) == ("world_0", (-2.25, 3.0, math.pi / 2), (-2.25, 13.0))
+    assert ((x - radius).min(), (x + radius).max(), (y - radius).min()) == pytest.approx((-4.5, 0.0, 0.0))
+    assert task.world.bounds[3] - task.goal[1] > task.goal_tolerance
+
+
+def test_the_reference_path_of_a_barn_world_leads_between_its_cylinders(barn_worlds):
+    for path in barn_worlds[:10]:
+        task = import_barn(path)
+        cells = np.load(path.with_name(path.name.replace("world_", "path_")).with_suffix(".npy"))
+        xy = np.column_stack([0.15 * cells[:, 0] - 4.425, 0.15 * cells[:, 1] + 5.175])
+        assert point_clearance(task.world, xy).min() > 0.1

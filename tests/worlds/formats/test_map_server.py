@@ -1,0 +1,189 @@
+"""Maps of ROS's map_server: what a pixel means, which row is which, and what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from PIL import Image
+
+from antdrive.worlds import InputError, import_map_server, load_task, save_task
+from antdrive.worlds.formats.map_server import read_map
+
+GOOD = """\
+image: made.pgm
+resolution: 0.5
+origin: [-1.0, 2.0, 0.0]
+negate: 0
+occupied_thresh: 0.65
+free_thresh: 0.196
+"""
+#: Two rows: free, unknown, occupied above; all free below.
+PGM = b"P5\n# by hand\n3 2\n255\n" + bytes([254, 205, 0, 254, 254, 254])
+
+
+def written(folder: Path, text: str = GOOD, image: bytes | None = PGM) -> Path:
+    if image is not None:
+        (folder / "made.pgm").write_bytes(image)
+    path = folder / "made.yaml"
+    path.write_text(text)
+    return path
+
+
+def rows_of(path: Path, **options: bool) -> list[list[int]]:
+    """1 where a cell is free, from the lowest row."""
+    return read_map(path, **options).cells.free.astype(int).tolist()
+
+
+def test_the_images_last_row_is_the_lowest_and_unknown_cells_block(tmp_path: Path) -> None:
+    served = read_map(written(tmp_path))
+    assert served.cells.free.astype(int).tolist() == [[1, 1, 1], [1, 0, 0]]
+    assert served.unknown == 1
+    assert (served.cells.resolution, served.cells.origin, served.cells.bounds) == (
+        0.5,
+        (-1.0, 2.0),
+        (-1.0, 2.0, 0.5, 3.0),
+    )
+    assert rows_of(written(tmp_path), unknown_is_free=True) == [[1, 1, 1], [1, 1, 0]]
+
+
+@given(st.integers(1, 6), st.integers(1, 6), st.data())
+@settings(max_examples=40)
+def test_cell_r_c_is_the_pixel_r_rows_from_below(
+    tmp_path_factory: pytest.TempPathFactory, rows: int, cols: int, data: st.DataObject
+) -> None:
+    folder = tmp_path_factory.mktemp("flip")
+    level = data.draw(
+        st.lists(st.lists(st.integers(0, 255), min_size=cols, max_size=cols), min_size=rows, max_size=rows)
+    )
+    plain = f"P2\n{cols} {rows}\n255\n" + "\n".join(" ".join(map(str, row)) for row in level) + "\n"
+    free = read_map(written(folder, image=plain.encode())).cells.free
+    for r in range(rows):
+        for c in range(cols):
+            assert free[r, c] == ((255 - level[rows - 1 - r][c]) / 255 < 0.196)
+
+
+def strip(*levels: int) -> bytes:
+    return b"P5 %d 1 255\n" % len(levels) + bytes(levels)
+
+
+def test_thresholds_are_compared_strictly_as_map_server_does(tmp_path: Path) -> None:
+    # (255 - 204) / 255 is 0.2 to the last bit, (255 - 51) / 255 is 0.8.
+    text = GOOD.replace("0.196", "0.2").replace("0.65", "0.8")
+    path = written(tmp_path, text, strip(205, 204, 51, 50))
+    assert rows_of(path) == [[1, 0, 0, 0]]
+    assert rows_of(path, unknown_is_free=True) == [[1, 1, 1, 0]]
+
+
+def test_negate_turns_black_and_white_around(tmp_path: Path) -> None:
+    for word in ("1", "true"):
+        path = written(tmp_path, GOOD.replace("negate: 0", f"negate: {word}"), strip(0, 49, 50, 255))
+        assert rows_of(path) == [[1, 1, 0, 0]]
+
+
+def test_raw_shades_are_percent_and_never_negated(tmp_path: Path) -> None:
+    for negate in "01":
+        text = GOOD.replace("negate: 0", f"negate: {negate}") + "mode: raw\n"
+        path = written(tmp_path, text, strip(0, 19, 20, 65, 66, 100, 101, 255))
+        assert rows_of(path) == [[1, 1, 0, 0, 0, 0, 0, 0]]
+        assert rows_of(path, unknown_is_free=True) == [[1, 1, 1, 1, 0, 0, 1, 1]]
+        assert read_map(path).unknown == 4
+
+
+def test_what_is_not_opaque_is_unknown_in_scale_and_averaged_in_trinary(tmp_path: Path) -> None:
+    pixels = np.array([[[255, 255], [255, 254], [0, 255], [0, 0]]], dtype=np.uint8)
+    Image.fromarray(pixels).save(tmp_path / "made.png")
+    text = GOOD.replace("made.pgm", "made.png")
+    scale = written(tmp_path, text + "mode: scale\n")
+    assert rows_of(scale) == [[1, 0, 0, 0]]
+    assert rows_of(scale, unknown_is_free=True) == [[1, 1, 0, 1]]
+    assert rows_of(written(tmp_path, text)) == [[1, 1, 0, 0]]
+    assert rows_of(written(tmp_path, text), unknown_is_free=True) == [[1, 1, 1, 0]]
+
+
+def test_colours_are_averaged_and_other_depths_understood(tmp_path: Path) -> None:
+    path = written(tmp_path, image=b"P6 2 1 255\n" + bytes([255, 255, 255, 255, 255, 90]))
+    assert rows_of(path) == [[1, 0]]
+    assert rows_of(written(tmp_path, image=b"P2 3 1 65535\n65535 60000 0\n")) == [[1, 1, 0]]
+    assert rows_of(written(tmp_path, image=b"P2 3 1 100\n100 90 0\n")) == [[1, 1, 0]]
+    assert rows_of(written(tmp_path, image=b"P1 3 1\n0 1 0\n")) == [[1, 0, 1]]
+    palette = Image.fromarray(np.array([[0, 1]], dtype=np.uint8)).convert("P")
+    palette.putpalette([255, 255, 255, 9, 9, 9])
+    palette.save(tmp_path / "made.png")
+    assert rows_of(written(tmp_path, GOOD.replace("made.pgm", "made.png"))) == [[1, 0]]
+
+
+def test_keys_of_other_tools_are_passed_over(tmp_path: Path) -> None:
+    assert rows_of(written(tmp_path, GOOD + "name: office\n")) == [[1, 1, 1], [1, 0, 0]]
+
+
+def test_the_task_tells_where_it_comes_from_and_can_be_kept(tmp_path: Path) -> None:
+    task = import_map_server(written(tmp_path), start=(-0.7, 2.2, 0.0), goal=(0.2, 2.2))
+    assert task.world.name == "made"
+    assert task.world.source == (
+        "the map_server map made.yaml with 1 unknown cells taken for blocked, 2 x 3 cells of 0.5 m; the 2 blocked cells next "
+        "to free ground are wholly covered by 2 cylinders that reach at most 0.1036 m beyond blocked cells"
+    )
+    assert task.cell == 0.5
+    save_task(task, tmp_path / "kept.yaml")
+    assert load_task(tmp_path / "kept.yaml") == task
+
+
+def _without(key: str) -> str:
+    return "".join(line for line in GOOD.splitlines(keepends=True) if not line.startswith(key))
+
+
+#: What is wrong: the YAML, the image, and what the one line must say.
+BAD: dict[str, tuple[str, bytes | None, str]] = {
+    "empty": ("", PGM, "made.yaml: is empty"),
+    "a list": ("- 1\n", PGM, "made.yaml: must be a mapping with the keys image, resolution, origin, negate"),
+    "a world": ("schema: 1\nbounds: [0, 0, 1, 1]\n", PGM, "made.yaml: names no image, so it is no map of map_server"),
+    **{
+        f"no {key}": (_without(key), PGM, f"made.yaml: {key}: missing; ")
+        for key in ("resolution", "origin", "negate", "occupied_thresh", "free_thresh")
+    },
+    "image is a number": (GOOD.replace("made.pgm", "7"), PGM, "made.yaml:1: image: must be text, got 7"),
+    "resolution 0": (GOOD.replace("0.5", "0.0"), PGM, "made.yaml:2: resolution: must be greater than 0, got 0"),
+    "resolution text": (GOOD.replace("0.5", "5e-2"), PGM, "resolution: must be a number, got \"5e-2\" (text); write 5.0e-2"),
+    "resolution nan": (GOOD.replace("0.5", ".nan"), PGM, "resolution: must be a finite number, got .nan"),
+    "origin without yaw": (GOOD.replace(", 0.0]", "]"), PGM, "made.yaml:3: origin: must have 3 entries, got 2; write [x"),
+    "turned": (GOOD.replace(", 0.0]", ", 0.1]"), PGM, "made.yaml:3: origin: a map turned by 0.1 rad is not supported"),
+    "negate 2": (GOOD.replace("negate: 0", "negate: 2"), PGM, "made.yaml:4: negate: must be true or false, got 2"),
+    "threshold 65": (GOOD.replace("0.65", "65"), PGM, "made.yaml:5: occupied_thresh: must be at most 1, got 65"),
+    "threshold below 0": (GOOD.replace("0.196", "-0.1"), PGM, "made.yaml:6: free_thresh: must be at least 0, got -0.1"),
+    "thresholds crossed": (
+        GOOD.replace("0.196", "0.7"), PGM, "made.yaml:6: free_thresh: must not be above occupied_thresh, 0.65, got 0.7",
+    ),
+    "mode": (GOOD + "mode: binary\n", PGM, "made.yaml:7: mode: must be 'trinary', 'scale' or 'raw', got \"binary\""),
+    "bad ends": (GOOD + "antdrive: {start: [0.0, 0.0]}\n", PGM, "made.yaml:7: antdrive.start: must have 3 entries"),
+    "no image": (GOOD, None, "made.pgm: no such file"),
+    "image is a folder": (GOOD.replace("made.pgm", "."), PGM, "cannot be read: Is a directory"),
+    "no picture": (GOOD, b"hello", "made.pgm is no PGM, PNG or BMP image"),
+    "wrong magic": (GOOD, PGM.replace(b"P5", b"P9"), "made.pgm is no PGM, PNG or BMP image"),
+    "gif": (GOOD, b"GIF89a\x01\x00\x01\x00\x80\x00\x00", "made.pgm is no PGM, PNG or BMP image"),
+    "cut off": (GOOD, PGM[:-2], "made.pgm cannot be read: image file is truncated"),
+    "cut off in plain": (GOOD, b"P2 3 2 255\n1 2 3", "made.pgm cannot be read: not enough image data"),
+    "cut off in the header": (GOOD, b"P5\n3", "made.pgm cannot be read: Reached EOF while reading header"),
+    "no pixels": (GOOD, b"P5\n0 2\n255\n", "made.pgm is no PGM, PNG or BMP image"),
+    "word for a pixel": (GOOD, b"P2 3 1 255\n1 x 3", "made.pgm cannot be read: invalid literal"),
+    "pixel too bright": (GOOD, b"P2 3 1 255\n1 600 3", "made.pgm cannot be read: Channel value too large"),
+    "maxval": (GOOD, b"P5 3 1 0\n123", "made.pgm cannot be read: maxval must be greater than 0"),
+    "huge": (GOOD, b"P5 9999 9999 255\n123", "made.pgm cannot be read: has 9999 x 9999 pixels; the limit is 25000000"),
+    "a bomb": (GOOD, b"P5 99999 99999 255\n123", "made.pgm cannot be read: Image size (9999800001 pixels) exceeds"),
+    "float pixels": (GOOD, b"Pf\n1 1\n-1.0\n\0\0\0\0", "made.pgm cannot be read: Pillow reads it as F; save it in grey"),
+    "nothing free": (GOOD, strip(0, 0), "start: (-0.7, 2.2) is on a blocked cell"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_malformed_maps_get_one_line(case: str, tmp_path: Path) -> None:
+    text, image, says = BAD[case]
+    path = written(tmp_path, text, image)
+    with pytest.raises(InputError) as caught:
+        import_map_server(path, start=(-0.7, 2.2, 0.0), goal=(0.2, 2.2))
+    assert str(caught.value).startswith(str(path))
+    assert says in str(caught.value)
+    assert str(caught.value).isprintable()

@@ -1,0 +1,172 @@
+"""Documents checked against pydantic models; a fault becomes one line that says what would be right."""
+
+from __future__ import annotations
+
+import difflib
+import json
+import math
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Any, Literal, TypeVar, get_args
+
+from pydantic import BaseModel, BeforeValidator, ValidationError
+
+from antdrive.worlds.files.document import Document, Location
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def _exactly_one(value: Any) -> Any:
+    # To Python, and so to pydantic, true and 1.0 equal 1.
+    if type(value) is not int:
+        raise ValueError(f"must be 1, got {show(value)}")
+    return value
+
+
+#: The version of a file's form, of which there has been one.
+SchemaVersion = Annotated[Literal[1], BeforeValidator(_exactly_one)]
+
+
+def check(model: type[Model], document: Document) -> Model:
+    """The document as `model`.
+
+    Raises:
+        InputError: something in it is wrong; of several faults the first is told, unknown keys before others.
+    """
+    if not isinstance(document.data, dict):
+        raise document.error((), f"must be {_mapping_of(model)}, got {show(document.data)}")
+    try:
+        return model.model_validate(document.data)
+    except ValidationError as error:
+        faults = error.errors(include_url=False)
+    unknown = [f for f in faults if f["type"] == "extra_forbidden"]
+    fault = (unknown or faults)[0]
+    location = tuple(fault["loc"])
+    raise document.error(location, _problem(model, location, fault))
+
+
+def suggest(word: str, choices: Iterable[str]) -> str:
+    """A hint at what `word` should have been: the close choice, or all of them."""
+    valid = list(choices)
+    close = difflib.get_close_matches(word, valid, n=1)
+    return f"did you mean {close[0]}?" if close else f"choose from {', '.join(valid)}"
+
+
+def show(value: Any, limit: int = 40) -> str:
+    """A value as people would write it in a file, cut to a length that fits a line."""
+    if isinstance(value, Mapping):
+        return "a mapping"
+    if isinstance(value, list) and len(value) > 6:
+        return f"a list of {len(value)}"
+    if isinstance(value, float):
+        return yaml_number(value)
+    try:
+        text = json.dumps(value, ensure_ascii=False)
+    except (TypeError, ValueError):
+        text = repr(value)
+    return text if len(text) <= limit else text[: limit - 3] + "..."
+
+
+def yaml_number(value: float) -> str:
+    """The shortest text that YAML 1.1 reads back as this number: it wants a point and the exponent's sign."""
+    if not math.isfinite(value):
+        return ".nan" if math.isnan(value) else (".inf" if value > 0 else "-.inf")
+    text = repr(float(value))
+    mantissa, mark, exponent = text.partition("e")
+    return f"{mantissa}.0e{exponent}" if mark and "." not in mantissa else text
+
+
+def _keys(model: type[BaseModel]) -> list[str]:
+    return [info.alias or name for name, info in model.model_fields.items()]
+
+
+def _mapping_of(model: type[BaseModel]) -> str:
+    needed = [info.alias or name for name, info in model.model_fields.items() if info.is_required()]
+    return f"a mapping with the keys {', '.join(needed)}" if needed else "a mapping"
+
+
+def _model_at(model: type[BaseModel], location: Location) -> type[BaseModel]:
+    """The model of the mapping at `location`, found along annotations such as list[Inner]."""
+    for part in location:
+        if isinstance(part, int):
+            continue
+        todo: list[Any] = [next(i.annotation for n, i in model.model_fields.items() if (i.alias or n) == part)]
+        while todo:
+            kind = todo.pop()
+            if isinstance(kind, type) and issubclass(kind, BaseModel):
+                model = kind
+                break
+            todo.extend(get_args(kind))
+    return model
+
+
+def _describe(model: type[BaseModel], location: Location) -> str:
+    while location and isinstance(location[-1], int):  # an entry is described with its list
+        location = location[:-1]
+    parent = _model_at(model, location[:-1])
+    for name, info in parent.model_fields.items():
+        if location and (info.alias or name) == location[-1]:
+            return info.description or ""
+    return ""
+
+
+_KINDS = {
+    "float_type": "a number",
+    "int_type": "a whole number",
+    "string_type": "text",
+    "bool_type": "true or false",
+    "list_type": "a list",
+    "dict_type": "a mapping",
+}
+_BOUNDS = {
+    "greater_than": ("greater than", "gt"),
+    "greater_than_equal": ("at least", "ge"),
+    "less_than": ("less than", "lt"),
+    "less_than_equal": ("at most", "le"),
+}
+
+
+def _problem(model: type[BaseModel], location: Location, fault: Mapping[str, Any]) -> str:
+    """What is wrong and what would be right, for one fault found by pydantic."""
+    kind, value, context = fault["type"], fault["input"], fault.get("ctx", {})
+    if kind == "extra_forbidden":
+        return f"unknown key; {suggest(str(location[-1]), _keys(_model_at(model, location[:-1])))}"
+    if kind == "missing":
+        return f"missing; {_describe(model, location) or 'this key is needed'}"
+    if kind in _BOUNDS:
+        words, bound = _BOUNDS[kind]
+        return f"must be {words} {context[bound]:g}, got {show(value)}"
+    if kind == "finite_number":
+        return f"must be a finite number, got {show(value)}"
+    if kind in ("too_short", "too_long") and isinstance(value, list):
+        count = context.get("min_length", context.get("max_length"))
+        words = _describe(model, location)
+        return f"must have {count} entries, got {len(value)}" + (f"; {words}" if words else "")
+    if kind == "literal_error":
+        return f"must be {context['expected']}, got {show(value)}"
+    if kind == "model_type":
+        return f"must be {_mapping_of(_model_at(model, location))}, got {show(value)}"
+    if kind == "value_error":
+        return str(context["error"])
+    if kind in _KINDS:
+        hint = _as_number(value) if "number" in _KINDS[kind] else ""
+        return f"must be {_KINDS[kind]}, got {show(value)}{hint}"
+    return f"{fault['msg'][0].lower()}{fault['msg'][1:]}, got {show(value)}"
+
+
+def _as_number(value: Any) -> str:
+    """For text that means a number: how YAML wants that number written."""
+    if not isinstance(value, str):
+        return ""
+    try:
+        number = float(value)
+    except ValueError:
+        return ""
+    if not math.isfinite(number):
+        return ""
+    mantissa, mark, exponent = value.lower().partition("e")
+    if mark and exponent.isascii() and exponent.lstrip("+-").isdigit():
+        mantissa = mantissa if "." in mantissa else f"{mantissa}.0"
+        right = f"{mantissa}e{exponent if exponent[0] in '+-' else '+' + exponent}"
+    else:
+        right = yaml_number(number)
+    return f" (text); write {right}"

@@ -1,0 +1,204 @@
+"""Files that people write: plain YAML with the line on which each value stands."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import yaml
+
+from antdrive.worlds.errors import InputError
+
+Location: TypeAlias = tuple[str | int, ...]  # the way to a value: ("obstacles", 0, "radius")
+
+MAX_BYTES = 2_000_000  # a world of 20 000 obstacles; more is a mistake
+MAX_DEPTH = 20  # nesting that no file of ours needs; also ends aliases that contain themselves
+MAX_VALUES = 200_000  # values after aliases are followed, against files that unfold to gigabytes
+
+_NUMBER = re.compile(r"[-+]?(0|[1-9]\d*|(?=\.\d))(\.\d*)?([eE][-+]?\d+)?|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
+_TAG = "tag:yaml.org,2002:"
+
+
+@dataclass(frozen=True, eq=False)
+class Document:
+    """Plain data with the line on which each value stands."""
+
+    source: str  # the file's path, or what else people call it
+    data: Any
+    lines: Mapping[Location, int] = field(default_factory=dict)  # from 1
+
+    def error(self, location: Location, problem: str) -> InputError:
+        """The error for a value: source, line where known, key, problem."""
+        line = next((self.lines[p] for p in _prefixes(location) if p in self.lines), None)
+        place = self.source if line is None else f"{self.source}:{line}"
+        return input_error(place, *([_key(location)] if location else []), problem)
+
+
+def input_error(*parts: str) -> InputError:
+    """An InputError whose parts are joined by colons on one line of printable characters."""
+    return InputError("".join(c if c.isprintable() else repr(c)[1:-1] for c in ": ".join(parts)))
+
+
+def read_document(path: str | os.PathLike[str]) -> Document:
+    """The YAML file at `path`.
+
+    Raises:
+        InputError: the file cannot be read, is not UTF-8 text, or is not plain YAML.
+    """
+    return parse_document(_read_text(path, "YAML"), os.fspath(path))
+
+
+def read_json(path: str | os.PathLike[str]) -> Document:
+    """The JSON file at `path`; its lines are not known.
+
+    Raises:
+        InputError: the file cannot be read, is not UTF-8 text, or is not JSON.
+    """
+    source = os.fspath(path)
+    text = _read_text(path, "JSON")
+    try:
+        return Document(source, json.loads(text))
+    except json.JSONDecodeError as error:
+        raise input_error(f"{source}:{error.lineno}", f"not JSON: {error.msg}") from None
+    except (RecursionError, ValueError):  # ValueError: a number of thousands of digits
+        raise input_error(source, "not JSON: nested too deeply or numbers too long") from None
+
+
+def _read_text(path: str | os.PathLike[str], kind: str) -> str:
+    source = os.fspath(path)
+    try:
+        with Path(path).open("rb") as stream:
+            content = stream.read(MAX_BYTES + 1)
+    except FileNotFoundError:
+        raise input_error(source, "no such file") from None
+    except IsADirectoryError:
+        raise input_error(source, f"is a directory; give a {kind} file") from None
+    except (OSError, ValueError) as error:  # ValueError: a null character in the path
+        raise input_error(source, f"cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    if len(content) > MAX_BYTES:
+        raise input_error(source, f"is too large; the limit is {MAX_BYTES // 1_000_000} MB")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise input_error(f"{source}:{line}", "is not a text file in UTF-8") from None
+
+
+def parse_document(text: str, source: str) -> Document:
+    """The YAML in `text`: mappings, lists, decimal numbers, text, true, false and null, nothing else.
+
+    Raises:
+        InputError: not YAML, a duplicate key, or nested or unfolding beyond reason.
+    """
+    try:
+        node = _compose(text)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        place = f"{source}:{mark.line + 1}" if mark else source
+        problem = error.problem or "cannot be parsed"
+        if "'\\t'" in problem:
+            problem = "a tab; indent with spaces"
+        raise input_error(place, f"not YAML: {problem}") from None
+    except yaml.reader.ReaderError as error:
+        line = text.count("\n", 0, error.position) + 1
+        raise input_error(f"{source}:{line}", f"not YAML: a special character {chr(error.character)!r}") from None
+    if node is None:
+        raise input_error(source, "is empty")
+    builder = _Builder(Document(source, None, {}))
+    data = builder.build(node, ())
+    return Document(source, data, builder.lines)
+
+
+class _Loader(yaml.SafeLoader):
+    """Stops at a bounded depth, where PyYAML would exhaust the interpreter's stack."""
+
+    depth = 0
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        self.depth += 1
+        if self.depth > MAX_DEPTH:
+            raise yaml.MarkedYAMLError(problem=f"nested deeper than {MAX_DEPTH} levels", problem_mark=self.get_mark())
+        node = super().compose_node(parent, index)
+        self.depth -= 1
+        return node
+
+
+def _compose(text: str) -> yaml.Node | None:
+    loader = _Loader(text)
+    try:
+        return loader.get_single_node()
+    finally:
+        loader.dispose()
+
+
+@dataclass
+class _Builder:
+    document: Document  # only for its errors
+    count: int = 0
+
+    @property
+    def lines(self) -> dict[Location, int]:
+        assert isinstance(self.document.lines, dict)
+        return self.document.lines
+
+    def build(self, node: yaml.Node, location: Location) -> Any:
+        self.lines.setdefault(location, node.start_mark.line + 1)
+        self.count += 1
+        if self.count > MAX_VALUES or len(location) > MAX_DEPTH:
+            raise self.document.error(location[:1], "unfolds to too much; write the values out without aliases")
+        if isinstance(node, yaml.ScalarNode):
+            return self.scalar(node, location)
+        if isinstance(node, yaml.SequenceNode) and node.tag == _TAG + "seq":
+            return [self.build(child, (*location, i)) for i, child in enumerate(node.value)]
+        if isinstance(node, yaml.MappingNode) and node.tag == _TAG + "map":
+            return self.mapping(node, location)
+        raise self.document.error(location, f"must be plain data, got the tag {node.tag.replace(_TAG, '!!')}")
+
+    def mapping(self, node: yaml.MappingNode, location: Location) -> dict[str, Any]:
+        data: dict[str, Any] = {}
+        for key_node, value_node in node.value:
+            if not isinstance(key_node, yaml.ScalarNode):
+                place = f"{self.document.source}:{key_node.start_mark.line + 1}"
+                raise input_error(place, "a key must be a word")
+            key = key_node.value
+            here = (*location, key)
+            if key in data:
+                line = key_node.start_mark.line + 1
+                first = self.lines[here]
+                self.lines[here] = line
+                raise self.document.error(here, f"is given twice, first on line {first}; keep one")
+            self.lines[here] = key_node.start_mark.line + 1
+            data[key] = self.build(value_node, here)
+        return data
+
+    def scalar(self, node: yaml.ScalarNode, location: Location) -> Any:
+        kind, text = node.tag.removeprefix(_TAG), node.value
+        if kind == "null":
+            return None
+        if kind == "bool":
+            return text.lower() in ("true", "yes", "on")
+        if kind in ("int", "float"):
+            # YAML 1.1 also reads 010 as 8, 1:30 as 90 and 1_0 as 10, which nobody who writes a world means.
+            if not _NUMBER.fullmatch(text):
+                raise self.document.error(location, f"must be a plain decimal number, got {text[:40]}")
+            if text.lower().lstrip("+-").startswith((".inf", ".nan")):
+                return float(text.replace(".", "", 1))
+            return int(text) if kind == "int" and len(text) < 20 else float(text)
+        if kind in ("str", "timestamp", "value", "merge"):
+            return text
+        raise self.document.error(location, f"must be plain data, got the tag {node.tag.replace(_TAG, '!!')}")
+
+
+def _prefixes(location: Location) -> Iterable[Location]:
+    """The location and the ones around it, but not the whole file: its first line says nothing."""
+    return (location[:n] for n in range(len(location), 0, -1))
+
+
+def _key(location: Location) -> str:
+    parts = (f"[{part}]" if isinstance(part, int) else f".{part}" for part in location)
+    return "".join(parts).removeprefix(".")

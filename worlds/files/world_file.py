@@ -1,0 +1,221 @@
+"""World files: tasks read from YAML and written to it, and the catalogue that comes with the package."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+
+from antdrive.worlds.files.atomic import written_whole
+from antdrive.worlds.files.checks import SchemaVersion, check, suggest, yaml_number
+from antdrive.worlds.files.document import Document, Location, input_error, read_document
+from antdrive.worlds.movers import MAX_PHASE, MIN_PERIOD, Mover, mover_from_dict, mover_to_dict
+from antdrive.worlds.world import Disc, Task, World
+
+LIMIT = 1e6  # farthest coordinate and largest size [m]: beyond it something was mistyped
+MAX_CELLS = 25_000_000  # as in worlds.grid, which is not imported here because it loads the compiler
+
+Coordinate = Annotated[float, Field(ge=-LIMIT, le=LIMIT)]
+Size = Annotated[float, Field(gt=0, le=LIMIT)]
+Pair = Annotated[list[Coordinate], Field(min_length=2, max_length=2)]
+Keyframe = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
+
+_CATALOG = Path(__file__).parent.with_name("catalog")
+_RULES = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
+
+
+class DiscEntry(BaseModel):
+    """An upright cylinder. The radius is as built, never inflated."""
+
+    model_config = _RULES
+
+    x: Coordinate = Field(description="the centre's x [m]")
+    y: Coordinate = Field(description="the centre's y [m]")
+    radius: Size = Field(description="the radius as built [m]")
+    height: Size = Field(1.0, description="the height [m]")
+
+
+class WalkEntry(BaseModel):
+    """Goes, in every period, from a cell's centre to that of a random free neighbour."""
+
+    model_config = _RULES
+
+    cell: Size = Field(description="side of the cells it walks on [m]")
+    period: float = Field(ge=MIN_PERIOD, le=LIMIT, description="time for one cell [s]")
+    start: Pair | None = Field(None, description="write [x, y], where it begins; by default a random free cell")
+    seed: int | None = Field(None, ge=0, lt=2**63, description="of its own; by default the run's")
+
+
+class MoverEntry(BaseModel):
+    """A moving cylinder; one of keyframes, velocity and walk says how it moves."""
+
+    model_config = _RULES
+
+    radius: Size = Field(description="the radius as built [m]")
+    height: Size = Field(1.0, description="the height [m]")
+    phase: float = Field(0.0, ge=0, le=MAX_PHASE, description="how much of its motion has passed at the start [s]")
+    keyframes: list[Keyframe] | None = Field(None, max_length=10_000, description="write [t, x, y] for each")
+    loop: Literal["pingpong", "teleport", "once"] | None = Field(None, description="after the last keyframe")
+    interpolation: Literal["linear", "catmull-rom"] | None = Field(None, description="between keyframes")
+    position: Pair | None = Field(None, description="write [x, y], where it is at first")
+    velocity: Pair | None = Field(None, description="write [vx, vy] in m/s; it bounces off the walls")
+    walk: WalkEntry | None = Field(None, description="write {cell: 0.5, period: 1.0}")
+
+
+class TaskFile(BaseModel):
+    """A world with a start and a goal, as written in a file."""
+
+    model_config = _RULES
+
+    # "schema" is also a method of BaseModel, hence the alias.
+    schema_: SchemaVersion = Field(alias="schema", description="write schema: 1")
+    name: str = Field(min_length=1, max_length=200, description="what the world is called, by default the file's name")
+    source: str | None = Field(None, description="where the world comes from, free text")
+    bounds: list[Coordinate] = Field(min_length=4, max_length=4, description="write [xmin, ymin, xmax, ymax] in metres")
+    start: list[Coordinate] = Field(min_length=3, max_length=3, description="write [x, y, yaw] in metres and radians")
+    goal: list[Coordinate] = Field(min_length=2, max_length=2, description="write [x, y] in metres")
+    goal_tolerance: Size = Field(0.25, description="the robot must stop this close to the goal [m]")
+    cell: Size = Field(0.5, description="grid resolution a planner uses unless told otherwise [m]")
+    obstacles: list[DiscEntry] = Field([], description="upright cylinders")
+    time_limit: Size | None = Field(None, description="simulated time allowed [s], by default ample for the route")
+    movers: list[MoverEntry] = Field([], max_length=1000, description="moving cylinders")
+
+    @field_validator("name")
+    @classmethod
+    def _one_line(cls, name: str) -> str:
+        if not name.isprintable():
+            raise ValueError("must be one line of printable characters")
+        return name
+
+
+def catalogue() -> Mapping[str, Path]:
+    """The worlds that come with the package, by name."""
+    return dict(sorted((path.stem, path) for path in _CATALOG.glob("*.yaml")))
+
+
+def load_task(world: str | os.PathLike[str]) -> Task:
+    """The task in a world file, or in the catalogue under a name.
+
+    A text without a folder or a suffix is taken for a name of the catalogue first.
+
+    Raises:
+        InputError: there is no such world or something in the file is wrong.
+    """
+    known = catalogue()
+    path = known[world] if isinstance(world, str) and world in known else Path(world)
+    if not os.path.lexists(path):
+        hint = suggest(path.stem, known)
+        raise input_error(os.fspath(world), f"no such file, nor a world of the catalogue; {hint}")
+    document = read_document(path)
+    if isinstance(document.data, dict):
+        document.data.setdefault("name", "".join(filter(str.isprintable, path.stem))[:200] or "world")
+    return _to_task(document)
+
+
+def save_task(task: Task, path: str | Path) -> None:
+    """Write a task as a world file, whole or not at all.
+
+    Raises:
+        InputError: the file cannot be written.
+        ValueError: the task holds what a world file cannot, such as an empty name.
+    """
+    _to_task(Document("task", task_to_dict(task)))
+    with written_whole(path) as part:
+        part.write_text(_to_yaml(task), encoding="utf-8")
+
+
+def task_to_dict(task: Task) -> dict[str, Any]:
+    """A task as plain data, in the same form as in a file and ready for JSON."""
+    world = task.world
+    return {
+        "schema": 1,
+        "name": world.name,
+        **({} if world.source is None else {"source": world.source}),
+        "bounds": [float(v) for v in world.bounds],
+        "start": [float(v) for v in task.start],
+        "goal": [float(v) for v in task.goal],
+        "goal_tolerance": float(task.goal_tolerance),
+        "cell": float(task.cell),
+        **({} if task.time_limit is None else {"time_limit": float(task.time_limit)}),
+        "obstacles": [
+            {"x": float(d.x), "y": float(d.y), "radius": float(d.radius), "height": float(d.height)}
+            for d in world.obstacles
+        ],
+        **({"movers": [mover_to_dict(mover) for mover in world.movers]} if world.movers else {}),
+    }
+
+
+def task_from_dict(data: Mapping[str, Any], source: str = "task") -> Task:
+    """The task in plain data, as `task_to_dict` gives it; `source` is what errors call it.
+
+    Raises:
+        InputError: something in it is wrong.
+    """
+    return _to_task(Document(source, dict(data)))
+
+
+def task_schema() -> dict[str, Any]:
+    """The JSON Schema of a world file, for editors."""
+    schema = TaskFile.model_json_schema(by_alias=True)
+    schema["required"] = [key for key in schema["required"] if key != "name"]
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "antdrive world"}
+
+
+def _to_task(document: Document) -> Task:
+    entry = check(TaskFile, document)
+    xmin, ymin, xmax, ymax = entry.bounds
+    if (xmax - xmin) / entry.cell * (ymax - ymin) / entry.cell > MAX_CELLS:
+        raise document.error(("cell",), f"{entry.cell:g} m cuts these bounds into more than {MAX_CELLS} cells")
+    x, y, yaw = entry.start
+    discs = tuple(Disc(d.x, d.y, d.radius, d.height) for d in entry.obstacles)
+    movers = tuple(_to_mover(document, i, mover) for i, mover in enumerate(entry.movers))
+    try:
+        world = World(entry.name, (xmin, ymin, xmax, ymax), discs, entry.source, movers)
+        goal = entry.goal[0], entry.goal[1]
+        return Task(world, (x, y, yaw), goal, entry.goal_tolerance, entry.cell, entry.time_limit)
+    except ValueError as error:
+        key, _, problem = str(error).partition(": ")
+        raise document.error(_location(key), problem) from None
+
+
+def _to_mover(document: Document, index: int, entry: MoverEntry) -> Mover:
+    try:
+        return mover_from_dict(entry.model_dump(exclude_unset=True))
+    except ValueError as error:
+        key, _, problem = str(error).partition(": ")
+        raise document.error(("movers", index, *_location(key)), problem) from None
+
+
+def _location(key: str) -> Location:
+    """The way to a value from how errors write it: movers[0].walk.start."""
+    parts = re.findall(r"[^.\[\]]+", key)
+    return tuple(int(part) if part.isdigit() else part for part in parts)
+
+
+def _to_yaml(task: Task) -> str:
+    data = task_to_dict(task)
+    lists = {key: data.pop(key) for key in ("obstacles", "movers") if key in data}
+    lines = []
+    for key, value in data.items():
+        if isinstance(value, list | float):
+            lines.append(f"{key}: {_flow(value)}\n")
+        else:
+            lines.append(yaml.safe_dump({key: value}, allow_unicode=True, width=100))
+    for key, entries in lists.items():
+        lines.append(f"{key}:\n" if entries else f"{key}: []\n")
+        lines += [f"  - {_flow(entry)}\n" for entry in entries]
+    return "".join(lines)
+
+
+def _flow(value: Any) -> str:
+    """Plain data on one line."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key}: {_flow(inner)}" for key, inner in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_flow, value)) + "]"
+    return yaml_number(value) if isinstance(value, float) else str(value)

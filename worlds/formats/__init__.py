@@ -1,0 +1,1 @@
+"""Other formats: Gazebo SDF, ROS map_server, MovingAI, BARN and DynaBARN."""

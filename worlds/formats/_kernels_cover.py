@@ -1,0 +1,155 @@
+"""Compiled work on maps of cells: what can be reached, and discs that cover cells.
+
+Lengths are in half cells: the corners, edge middles and centres of cells are then points (i, j) of a lattice of whole
+numbers, cell (r, c) spans 2r..2r+2 by 2c..2c+2, and every distance from such a point to a cell is the root of a whole number.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from antdrive.worlds._kernels import Array, kernel
+
+DROW4 = np.array([0, 1, 0, -1], dtype=np.int64)
+DCOL4 = np.array([1, 0, -1, 0], dtype=np.int64)
+
+
+@kernel
+def flood(free: Array, row: int, col: int, reached: Array) -> None:
+    """Mark the free cells that steps over shared sides lead to."""
+    rows, cols = free.shape
+    if not free[row, col] or reached[row, col]:
+        return
+    todo = np.empty(rows * cols, dtype=np.int64)
+    todo[0], count = row * cols + col, 1
+    reached[row, col] = True
+    while count:
+        count -= 1
+        r, c = todo[count] // cols, todo[count] % cols
+        for k in range(4):
+            rn, cn = r + DROW4[k], c + DCOL4[k]
+            if 0 <= rn < rows and 0 <= cn < cols and free[rn, cn] and not reached[rn, cn]:
+                reached[rn, cn] = True
+                todo[count] = rn * cols + cn
+                count += 1
+
+
+@kernel
+def squared_distances(free: Array, cap: int, out: Array) -> None:
+    """out[i, j] = squared distance from a lattice point to the nearest free cell, at most cap squared.
+
+    From such a point, the nearest point of a cell is one of the lattice's, so whole numbers tell it exactly: along columns
+    first, then along rows.
+    """
+    height, width = out.shape
+    column = np.full((height, width), cap, dtype=np.int32)
+    for r in range(free.shape[0]):
+        for c in range(free.shape[1]):
+            if free[r, c]:
+                column[2 * r : 2 * r + 3, 2 * c : 2 * c + 3] = 0
+    for i in range(1, height):
+        for j in range(width):
+            column[i, j] = min(column[i, j], column[i - 1, j] + 1)
+    for i in range(height - 2, -1, -1):
+        for j in range(width):
+            column[i, j] = min(column[i, j], column[i + 1, j] + 1)
+    for i in range(height):
+        for j in range(width):
+            best = column[i, j] ** 2
+            step = 1
+            while step * step < best and step <= cap:
+                if j >= step:
+                    best = min(best, step * step + column[i, j - step] ** 2)
+                if j + step < width:
+                    best = min(best, step * step + column[i, j + step] ** 2)
+                step += 1
+            out[i, j] = best
+
+
+@kernel
+def span(low: int, centre_i: int, centre_j: int, reach2: float, cols: int) -> tuple[int, int]:
+    """First and last-but-one column of the cells in the row that begins at `low` and lie wholly in the disc."""
+    far = max(abs(low - centre_i), abs(low + 2 - centre_i))
+    rest = reach2 - far * far
+    if rest < 0.0:
+        return 0, 0
+    half = math.sqrt(rest)
+    first = max(0, int(math.ceil((centre_j - half) / 2)))
+    last = min(cols, int(math.floor((centre_j + half) / 2)))
+    return first, max(first, last)
+
+
+@kernel
+def greedy_cover(needed: Array, distance2: Array, extra: float, chosen: Array) -> int:
+    """Choose discs until each needed cell lies wholly in one; how many they are.
+
+    Candidates are centred on lattice points and reach `extra` beyond the nearest free cell. Each time one that holds most of
+    the cells not yet covered is taken (Chvátal, *A greedy heuristic for the set-covering problem*, 1979) and shrunk to
+    those cells. A row of `chosen` is a centre i, j, the squared radius and the centre's squared distance to free cells.
+    """
+    rows, cols = needed.shape
+    height, width = distance2.shape
+    # before[r, c] = number of needed cells ahead of cell (r, c), row by row: a span of a row is a range of their list
+    before = np.zeros((rows, cols + 1), dtype=np.int64)
+    count = 0
+    for r in range(rows):
+        for c in range(cols):
+            before[r, c] = count
+            count += needed[r, c]
+        before[r, cols] = count
+    column_of = np.empty(count, dtype=np.int64)
+    for r in range(rows):
+        for c in range(cols):
+            if needed[r, c]:
+                column_of[before[r, c]] = c
+    left, covered = count, np.zeros(count, dtype=np.bool_)
+
+    gain = np.zeros(height * width, dtype=np.int32)
+    for i in range(height):
+        for j in range(width):
+            if distance2[i, j] > 0:
+                reach = math.sqrt(distance2[i, j]) + extra
+                reach2 = reach * reach + 1e-9
+                for r in range(max(0, int((i - reach) / 2)), min(rows, int((i + reach) / 2) + 1)):
+                    first, last = span(2 * r, i, j, reach2, cols)
+                    gain[i * width + j] += before[r, last] - before[r, first]
+    # Candidates wait in stacks by what they held when last looked at, which only shrinks.
+    best = gain.max() if count else 0
+    head, below = np.full(best + 1, -1, dtype=np.int32), np.empty(height * width, dtype=np.int32)
+    for candidate in range(height * width - 1, -1, -1):
+        below[candidate], head[gain[candidate]] = head[gain[candidate]], candidate
+
+    taken = 0
+    while left and best:
+        candidate = head[best]
+        if candidate < 0:
+            best -= 1
+            continue
+        head[best] = below[candidate]
+        i, j = candidate // width, candidate % width
+        reach = math.sqrt(distance2[i, j]) + extra
+        reach2 = reach * reach + 1e-9
+        low, high = max(0, int((i - reach) / 2)), min(rows, int((i + reach) / 2) + 1)
+        now = 0
+        for r in range(low, high):
+            first, last = span(2 * r, i, j, reach2, cols)
+            for n in range(before[r, first], before[r, last]):
+                now += not covered[n]
+        if now < best:
+            below[candidate], head[now] = head[now], candidate
+            continue
+        radius2 = 0
+        for r in range(low, high):
+            first, last = span(2 * r, i, j, reach2, cols)
+            far_i = max(abs(2 * r - i), abs(2 * r + 2 - i))
+            for n in range(before[r, first], before[r, last]):
+                if not covered[n]:
+                    covered[n] = True
+                    far_j = max(abs(2 * column_of[n] - j), abs(2 * column_of[n] + 2 - j))
+                    radius2 = max(radius2, far_i * far_i + far_j * far_j)
+        left -= now
+        chosen[taken, 0], chosen[taken, 1], chosen[taken, 2], chosen[taken, 3] = i, j, radius2, distance2[i, j]
+        taken += 1
+    return taken
