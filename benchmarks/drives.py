@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from joblib import Parallel, delayed
 
-from antdrive.planners import Query, find_planner, pull_taut
+from antdrive.planners import Query, load_planner, pull_taut
 from antdrive.planners.anyangle.tangent import shortest
 from antdrive.planners.smoothing._kernels_smooth import encloses
 from antdrive.robots import load_robot
@@ -46,7 +46,7 @@ class Result(NamedTuple):
 def drive(name: str, task: Any, planner: str, robot: str, **settings: Any) -> Result:
     """One drive; heavy arrays stay here."""
     done = run(
-        Scenario(task=task, planner=find_planner(planner), planner_name=planner, robot=load_robot(robot), **settings)
+        Scenario(task=task, planner=load_planner(planner), planner_name=planner, robot=load_robot(robot), **settings)
     )
     log = done.rollout
     if log is None:
@@ -164,7 +164,7 @@ def smooth(jobs: int, source: Path, worlds: int) -> Iterator[str]:
         task = generate(kind, np.random.default_rng(n), {}, name="", note="")
         world = task.world
         grid = rasterise(world, task.cell, load_robot("turtlebot").radius + 0.03)
-        plan = find_planner("astar").plan(Query.between(grid, task), np.random.default_rng(0))
+        plan = load_planner("astar").plan(Query.between(grid, task), np.random.default_rng(0))
         if not plan.solved:
             continue
         line = grid.xy(plan.cells)

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from joblib import Parallel, delayed
 
-from antdrive.planners import Query, find_planner, plan_in_time
+from antdrive.planners import Query, load_planner, plan_in_time
 from antdrive.robots import load_robot
 from antdrive.sim import Outcome, Perception, ReplanPolicy, Scenario, run
 from antdrive.worlds import (
@@ -30,8 +30,8 @@ from antdrive.worlds import (
     Task,
     Trajectories,
     World,
-    catalogue,
     import_dynabarn,
+    list_worlds,
     load_task,
     rasterise,
 )
@@ -75,7 +75,7 @@ def drive(
     """One drive; heavy arrays stay here."""
     scenario = Scenario(
         task=task,
-        planner=find_planner(planner, **(options or {})),
+        planner=load_planner(planner, **(options or {})),
         planner_name=planner,
         robot=load_robot(robot),
         seed=seed,
@@ -193,7 +193,7 @@ def random(jobs: int, source: Path, quick: bool) -> Iterator[str]:
 
 def hasan(jobs: int, source: Path, quick: bool) -> Iterator[str]:
     """hasan's cases with turtlebot."""
-    names = [name for name in catalogue() if name.startswith("hasan") and load_task(name).world.movers]
+    names = [name for name in list_worlds() if name.startswith("hasan") and load_task(name).world.movers]
     rows = []
     for planner in ("mmas-dstar", "dstar"):
         for name in names:

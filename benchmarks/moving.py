@@ -17,7 +17,7 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.planners import Cell, OnlinePlanner, Query, find_planner, online_for
+from antdrive.planners import Cell, OnlinePlanner, Query, load_planner, online_for
 from antdrive.sim.papers.maps import environments
 from antdrive.worlds import DIRECTIONS, Grid
 from benchmarks.planners import seconds, table
@@ -75,7 +75,7 @@ def runs(name: str, query: Query, count: int, seeds: range) -> Iterator[tuple[bo
     for seed in seeds:
         movers = Strollers(query.grid, count, np.random.default_rng([seed, count]), (query.start, query.goal))
         started = time.perf_counter()
-        robot = online_for(find_planner(name), query, np.random.default_rng(seed))
+        robot = online_for(load_planner(name), query, np.random.default_rng(seed))
         yield drive(robot, query, movers), robot, time.perf_counter() - started
 
 

@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from antdrive.planners import PLANNERS, Planner, PlanResult, Query, find_planner
+from antdrive.planners import PLANNERS, Planner, PlanResult, Query, load_planner
 from antdrive.planners.colonies.colony import ColonyGraph, _Walk
 from antdrive.sim.papers.maps import blocks, environments, han_ants, optimum, scattered
 from antdrive.worlds import DIRECTIONS, Disc, Grid, Task, World, forest, rasterise
@@ -145,13 +145,13 @@ def hard(quick: bool) -> Iterator[str]:
         "201×201 maze, 5 % of its walls open": lambda seed: maze(201, seed, 0.05),
         "100×100, in a cup": lambda seed: cup(100),
     }
-    planner, rows = find_planner("ants"), []
+    planner, rows = load_planner("ants"), []
     solve(planner, cup(20), 0)
     for label, make in kinds.items():
         queries = [make(seed) for seed in SEEDS[: 2 if quick else 5]]
         arrived, gaps, wall = summary(planner, queries)
         gap = f"{percent(statistics.median(gaps))} / {percent(max(gaps))}" if gaps else "–"
-        length = statistics.median(len(solve(find_planner("astar"), query, 0).cells) for query in queries)
+        length = statistics.median(len(solve(load_planner("astar"), query, 0).cells) for query in queries)
         rows.append([label, f"{length:.0f}", f"{arrived}/{len(queries)}", gap, seconds(wall)])
     yield from table(["map", "cells of the shortest way", "`ants` arrived", "gap median / most", "time"], rows)
 
@@ -201,8 +201,8 @@ def papers(quick: bool) -> Iterator[str]:
     rows = []
     for paper, place, name, options, queries, printed in paper_maps(quick):
         row = [paper, place, f"`{name}`", printed]
-        helped = find_planner(name, **{**options, "iterations": 100, "retreat": True, "shortcut": True})
-        for planner in (find_planner(name, **options), helped, find_planner("ants")):
+        helped = load_planner(name, **{**options, "iterations": 100, "retreat": True, "shortcut": True})
+        for planner in (load_planner(name, **options), helped, load_planner("ants")):
             solve(planner, queries[0], 0)
             arrived, gaps, wall = summary(planner, queries)
             gap = f"{percent(statistics.median(gaps))} / {percent(max(gaps))}" if gaps else "–"
@@ -242,7 +242,7 @@ def hasan(quick: bool) -> Iterator[str]:
     """hasan's planner where nothing moves."""
     rows = []
     for name, query, printed in hasan_cases():
-        planner = find_planner("mmas-dstar")
+        planner = load_planner("mmas-dstar")
         solve(planner, query, 0)
         r = solve(planner, query, 0)
         ours = f"{r.work}, {len(r.cells) - 1}, {seconds(r.wall_s)}"
@@ -265,13 +265,13 @@ def han_disc() -> Query:
 def han2007(quick: bool) -> Iterator[str]:
     """The thesis' genetic algorithm on one disc, and its experiment 6 with ants: the mean of ten trials."""
     query = han_disc()
-    floor = solve(find_planner("tangent"), query, 0).line_length
+    floor = solve(load_planner("tangent"), query, 0).line_length
     rows = [["han2007, printed, 3 via points", "33.1798", "", "", "", ""]]
     for name, options in (
         *(("ga-han", {"via_points": n}) for n in (1, 2, 3, 6)),
         *(("hybrid", {"colony": colony}) for colony in ("aco-han", "ants")),
     ):
-        planner = find_planner(name, **options)
+        planner = load_planner(name, **options)
         solve(planner, query, 0)
         results = [solve(planner, query, seed) for seed in range(20)]
         lengths = [r.line_length for r in results]
@@ -297,7 +297,7 @@ def han2007(quick: bool) -> Iterator[str]:
     for label, options in variants.items():
         best, last = [label], [f"{label}: best of the last iteration"]
         for ants in (10, 100, 500):
-            results = [solve(find_planner("aco-han", ants=ants, **options), query, seed) for seed in range(10)]
+            results = [solve(load_planner("aco-han", ants=ants, **options), query, seed) for seed in range(10)]
             costs = [r.cost for r in results]
             best.append(
                 f"{statistics.mean(costs):.3f} ({max(costs):.2f}), {seconds(statistics.median(r.wall_s for r in results))}"
@@ -311,7 +311,7 @@ def han2007(quick: bool) -> Iterator[str]:
     rows = []
     for name in ("ants", "mmas", "ga-han", "hybrid"):
         if name in PLANNERS and not getattr(PLANNERS[name], "needs_world", False):
-            results = [solve(find_planner(name), query, seed) for seed in range(3 if quick else 10)]
+            results = [solve(load_planner(name), query, seed) for seed in range(3 if quick else 10)]
             solved = [r for r in results if r.solved]
             line = f"{statistics.mean(r.length or r.cost for r in solved):.3f}" if solved else "–"
             grid = f"{statistics.mean(r.cost for r in solved):.3f}" if solved else "–"
@@ -333,7 +333,7 @@ def han2007(quick: bool) -> Iterator[str]:
 def speed(quick: bool) -> Iterator[str]:
     """ibraheem2016's settings, and the walking alone."""
     printed = {10: 1.217, 20: 9.073, 30: 52.854, 40: 134.771}
-    planner = find_planner("as", ants=50, iterations=100)
+    planner = load_planner("as", ants=50, iterations=100)
     rows = []
     for size, paper in printed.items():
         queries = [blocks(size, size, size // 2, size // 4, seed) for seed in SEEDS]
@@ -349,7 +349,7 @@ def speed(quick: bool) -> Iterator[str]:
     for size in (20, 40, 100):
         query = random_grid(size, 0, 0.2)
         for label, options in (("die in dead ends", {}), ("retreat", {"retreat": True})):
-            colony: Any = find_planner("as", ants=2000, **options)
+            colony: Any = load_planner("as", ants=2000, **options)
             ground, rng = ColonyGraph.of(query), np.random.default_rng(0)
             walk = _Walk.of(colony, ground)
             colony.weigh(ground, colony.lay(ground, rng), colony.desire(ground), walk.weights[0])
@@ -428,7 +428,7 @@ def peer(quick: bool, python: str) -> Iterator[str]:
             ("mmas", {}),
             ("ants", {}),
         ):
-            planner = find_planner(name, **options)
+            planner = load_planner(name, **options)
             solve(planner, queries[0], 0)
             results, walls = [], []
             for seed, query in enumerate(queries):

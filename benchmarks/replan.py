@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from antdrive.planners import Planner, Query, find_planner, replanner_for
+from antdrive.planners import Planner, Query, load_planner, replanner_for
 from antdrive.worlds import Disc, Grid, World, rasterise
 
 SIDE, CHANGES, WORLDS, ANT_WORLDS = 200, 12, 40, 4
@@ -45,7 +45,7 @@ def timed(call: Callable[[], Any]) -> tuple[float, Any]:
 
 def drive(planner: Planner, query: Query, rng: np.random.Generator) -> list[tuple[float, ...]]:
     """By change: seconds of repair, of planning anew, and of `astar`; what both lengths lack to the optimum."""
-    replanner, astar = replanner_for(planner, query, rng), find_planner("astar")
+    replanner, astar = replanner_for(planner, query, rng), load_planner("astar")
     replanner.block([])  # what a replanner looks up once for a grid
     blocked: list[Any] = []
     rows = []
@@ -92,7 +92,7 @@ def main() -> None:
     print("|---|---|---|---|---|---|---|---|---|")
     for kind in (discs, scattered):
         for name in ("dstar-lite", "dstar"):
-            repair, anew, astar, *gaps = measured(find_planner(name), kind, WORLDS)
+            repair, anew, astar, *gaps = measured(load_planner(name), kind, WORLDS)
             assert np.abs(gaps).max() < 1e-12
             spread = " | ".join(f"{q:.0f}" for q in np.percentile(repair * 1e6, [50, 90, 99]))
             print(
@@ -104,7 +104,7 @@ def main() -> None:
     )
     print("|---|---|---|---|---|---|---|---|---|")
     for kind in (discs, scattered):
-        warm, cold, _, *gaps = measured(find_planner("ants"), kind, ANT_WORLDS)
+        warm, cold, _, *gaps = measured(load_planner("ants"), kind, ANT_WORLDS)
         spread = " | ".join(f"{q:.0f}" for q in np.percentile(warm * 1e3, [50, 90]))
         lacks = [f"{100 * np.median(gap):.2f} % | {100 * gap.max():.2f} %" for gap in gaps]
         print(

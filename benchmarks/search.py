@@ -29,7 +29,7 @@ from w9_pathfinding.envs import DiagonalMovement
 from w9_pathfinding.envs import Grid as W9Grid
 from w9_pathfinding.pf import AStar as W9AStar
 
-from antdrive.planners import Query, find_planner
+from antdrive.planners import Query, load_planner
 from antdrive.worlds import Disc, Grid, World, rasterise
 from antdrive.worlds.formats.movingai import import_movingai_map, import_movingai_problems
 
@@ -60,7 +60,7 @@ class Solver:
 
 
 def antdrive(free: Any) -> Solve:
-    grid, planner = Grid.from_free(free), find_planner("astar")
+    grid, planner = Grid.from_free(free), load_planner("astar")
     return lambda start, goal: planner.plan(Query(grid, start, goal), RNG).cells
 
 
@@ -175,7 +175,7 @@ def disc_picture(rng: np.random.Generator) -> Any:
 
 def far_queries(free: Any, count: int, rng: np.random.Generator) -> list[tuple[Cell, Cell]]:
     """Pairs of connected cells, at least half the grid's side apart."""
-    cells, grid, planner = np.argwhere(free), Grid.from_free(free), find_planner("astar")
+    cells, grid, planner = np.argwhere(free), Grid.from_free(free), load_planner("astar")
     found: list[tuple[Cell, Cell]] = []
     while len(found) < count:
         (r0, c0), (r1, c1) = rng.choice(cells, size=2).tolist()

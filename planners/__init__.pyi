@@ -38,9 +38,9 @@ from .plan import PlanStatus as PlanStatus
 from .plan import Query as Query
 from .plan import path_cost as path_cost
 from .registry import PLANNERS as PLANNERS
-from .registry import all_planners as all_planners
 from .registry import describe as describe
-from .registry import find_planner as find_planner
+from .registry import list_planners as list_planners
+from .registry import load_planner as load_planner
 from .replanning.online import Follower as Follower
 from .replanning.online import OnlineAnt as OnlineAnt
 from .replanning.online import OnlinePlanner as OnlinePlanner

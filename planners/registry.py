@@ -59,7 +59,7 @@ PLANNERS: Mapping[str, Planner] = MappingProxyType(
 GROUP = "antdrive.planners"
 
 
-def find_planner(name: str, /, **options: Any) -> Planner:
+def load_planner(name: str, /, **options: Any) -> Planner:
     """The planner of that name, with options set. Option values may be text, as from a command line.
 
     Raises:
@@ -74,7 +74,7 @@ def find_planner(name: str, /, **options: Any) -> Planner:
     return _with_options(name, planner, options)
 
 
-def all_planners() -> Mapping[str, Planner]:
+def list_planners() -> Mapping[str, Planner]:
     """Every planner by name, other packages' last. One that cannot be loaded is left out with a warning."""
     found = dict(PLANNERS)
     for name, entry in _plugins().items():

@@ -7,10 +7,10 @@ from .control.pursuit import Progress as Progress
 from .control.pursuit import PurePursuit as PurePursuit
 from .control.pursuit import TrackedPath as TrackedPath
 from .control.pursuit import Twist as Twist
+from .files import list_robots as list_robots
 from .files import load_robot as load_robot
 from .files import robot_schema as robot_schema
 from .files import robot_to_dict as robot_to_dict
-from .files import robots as robots
 from .footprint import footprint_clearance as footprint_clearance
 from .noise import Senses as Senses
 from .spec import Footprint as Footprint

@@ -89,7 +89,7 @@ class RobotFile(BaseModel):
     )
 
 
-def robots() -> Mapping[str, Path]:
+def list_robots() -> Mapping[str, Path]:
     """The robots that come with the package, by name."""
     return {path.stem: path for path in sorted(_CATALOG.glob("*.yaml"))}
 
@@ -100,7 +100,7 @@ def load_robot(robot: str | os.PathLike[str]) -> RobotSpec:
     Raises:
         InputError: there is no such robot or something in the file is wrong.
     """
-    known = robots()
+    known = list_robots()
     path = known[robot] if isinstance(robot, str) and robot in known else Path(robot)
     if not os.path.lexists(path):
         hint = suggest(path.stem, known)

@@ -22,7 +22,7 @@ from antdrive.planners import (
     PlanResult,
     PlanStatus,
     Query,
-    find_planner,
+    load_planner,
     smooth,
 )
 from antdrive.robots import LIMITERS, Avoidance, PurePursuit, RobotSpec, Senses, load_robot
@@ -118,7 +118,7 @@ class Scenario:
         """A scenario by names: of a world and a robot (or their files) and of a planner with its options."""
         return cls(
             task=load_task(world),
-            planner=find_planner(planner, **(options or {})),
+            planner=load_planner(planner, **(options or {})),
             planner_name=planner,
             robot=load_robot(robot),
             **settings,

@@ -5,7 +5,7 @@ from pathlib import Path
 import hypothesis
 import pytest
 
-from antdrive.planners import find_planner
+from antdrive.planners import load_planner
 from antdrive.robots import RobotSpec, load_robot
 from antdrive.sim import Run, Scenario, run
 from antdrive.worlds import Disc, Task, World
@@ -35,7 +35,7 @@ def small_task() -> Task:
 
 @pytest.fixture(scope="session")
 def small_scenario(small_task: Task, turtlebot: RobotSpec) -> Scenario:
-    return Scenario(task=small_task, planner=find_planner("astar"), planner_name="astar", robot=turtlebot)
+    return Scenario(task=small_task, planner=load_planner("astar"), planner_name="astar", robot=turtlebot)
 
 
 @pytest.fixture(scope="session")

@@ -1,5 +1,5 @@
 from .errors import InputError as InputError
-from .files.world_file import catalogue as catalogue
+from .files.world_file import list_worlds as list_worlds
 from .files.world_file import load_task as load_task
 from .files.world_file import save_task as save_task
 from .files.world_file import task_from_dict as task_from_dict

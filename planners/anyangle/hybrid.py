@@ -86,9 +86,9 @@ class Hybrid(ViaPlanner):
             yield from self._refine(query, leader, via, rng)
 
     def _ants(self) -> Colony:
-        from antdrive.planners.registry import PLANNERS, find_planner  # the registry knows this planner too
+        from antdrive.planners.registry import PLANNERS, load_planner  # the registry knows this planner too
 
-        found = find_planner(self.colony)
+        found = load_planner(self.colony)
         if not isinstance(found, Colony):
             names = ", ".join(name for name, planner in PLANNERS.items() if isinstance(planner, Colony))
             raise InputError(f"planner.colony: must be an ant planner, one of {names}; got {self.colony!r}")

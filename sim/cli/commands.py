@@ -431,9 +431,9 @@ def report(
 @app.command()
 def planners(json: Json = False) -> int:
     """List the planners with their options."""
-    from antdrive.planners import all_planners, describe
+    from antdrive.planners import describe, list_planners
 
-    known = all_planners()
+    known = list_planners()
     if json:
         say_json({
             name: {"about": describe(p), "options": {f.name: _plain(getattr(p, f.name)) for f in _fields(p)}}
@@ -451,10 +451,9 @@ def planners(json: Json = False) -> int:
 @app.command()
 def robots(json: Json = False) -> int:
     """List the robots of the catalogue."""
-    from antdrive.robots import load_robot, robot_to_dict
-    from antdrive.robots import robots as catalogue
+    from antdrive.robots import list_robots, load_robot, robot_to_dict
 
-    specs = [load_robot(name) for name in catalogue()]
+    specs = [load_robot(name) for name in list_robots()]
     if json:
         say_json({spec.name: robot_to_dict(spec) for spec in specs})
     else:
@@ -481,9 +480,9 @@ def schema(kind: Annotated[str, typer.Argument(help="world or robot.")] = "world
 @worlds_app.command("list")
 def list_worlds(json: Json = False) -> int:
     """List the catalogue."""
-    from antdrive.worlds import catalogue, load_task
+    from antdrive.worlds import list_worlds, load_task
 
-    tasks = {name: load_task(name) for name in catalogue()}
+    tasks = {name: load_task(name) for name in list_worlds()}
     if json:
         say_json({name: _task_facts(task) for name, task in tasks.items()})
     else:
@@ -507,7 +506,7 @@ def show_world(
     json: Json = False,
 ) -> int:
     """Tell what a world holds and whether a robot can pass it, and draw it."""
-    from antdrive.planners import Query, find_planner, reachable
+    from antdrive.planners import Query, load_planner, reachable
     from antdrive.robots import load_robot
     from antdrive.worlds import load_task, rasterise, task_to_dict
 
@@ -520,7 +519,7 @@ def show_world(
 
         from antdrive.sim.view.figures.plots import plan_figure
 
-        plan_figure(task, grid, find_planner("astar").plan(query, np.random.default_rng(0)), spec, out)
+        plan_figure(task, grid, load_planner("astar").plan(query, np.random.default_rng(0)), spec, out)
     if json:
         say_json({**task_to_dict(task), "passable": passable, "robot": spec.name, "margin": margin})
         return SUCCEEDED
@@ -686,7 +685,7 @@ def _export_movingai(task: Task, out: Path, resolution: float | None) -> dict[st
     """Write the map and, where its cells have a way, the problem; the problem's file."""
     import numpy as np
 
-    from antdrive.planners import Query, find_planner
+    from antdrive.planners import Query, load_planner
     from antdrive.worlds import Grid, MapProblem, export_movingai_map, export_movingai_problems
 
     cells = export_movingai_map(task, out, resolution=resolution)
@@ -695,7 +694,7 @@ def _export_movingai(task: Task, out: Path, resolution: float | None) -> dict[st
     beside.unlink(missing_ok=True)  # an earlier one would belong to another map
     if start is None or goal is None or not (cells.free[start] and cells.free[goal]):
         return {}
-    answer = find_planner("dijkstra").plan(Query(Grid.from_free(cells.free), start, goal), np.random.default_rng(0))
+    answer = load_planner("dijkstra").plan(Query(Grid.from_free(cells.free), start, goal), np.random.default_rng(0))
     if not answer.solved:
         return {}
     found = MapProblem(start, goal, answer.cost, f"{answer.cost:.8f}", out.name, int(answer.cost // 4))

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import joblib
 import numpy as np
 
-from antdrive.planners import PlanResult, find_planner
+from antdrive.planners import PlanResult, load_planner
 from antdrive.sim.papers import maps
 from antdrive.sim.papers.experiments import PAPERS, Trial
 from antdrive.worlds.errors import InputError
@@ -84,7 +84,7 @@ def check_papers(papers: Sequence[str]) -> None:
 
 
 def _solve(planner: str, options: Any, query: Any, seed: int) -> PlanResult:
-    return find_planner(planner, **options).plan(query, np.random.default_rng(seed))
+    return load_planner(planner, **options).plan(query, np.random.default_rng(seed))
 
 
 def _measured(trial: Trial, result: PlanResult) -> float:

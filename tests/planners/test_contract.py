@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from antdrive.planners import PLANNERS, Planner, PlanResult, PlanStatus, Query, find_planner, path_cost
+from antdrive.planners import PLANNERS, Planner, PlanResult, PlanStatus, Query, load_planner, path_cost
 from antdrive.worlds import DIRECTIONS, Grid, InputError, polyline_clearance
 from tests.planners.worlds_to_solve import catalogue, optimum, random_query, sealed
 
@@ -25,7 +25,7 @@ def quick(name: str) -> Planner:
     planner: Any = PLANNERS[name]
     small = {"ants": 60, "iterations": 12}
     known = {f.name for f in dataclasses.fields(planner)}
-    return find_planner(name, **{key: value for key, value in small.items() if key in known})
+    return load_planner(name, **{key: value for key, value in small.items() if key in known})
 
 
 def solve(name: str, query: Query, seed: int = 0) -> PlanResult:

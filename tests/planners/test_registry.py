@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from antdrive.planners import PLANNERS, AcoHan, all_planners, describe, find_planner
+from antdrive.planners import PLANNERS, AcoHan, describe, list_planners, load_planner
 from antdrive.worlds import InputError
 from tests.planners.worlds_to_solve import catalogue, optimum
 
@@ -52,15 +52,15 @@ def test_the_example_plugin_joins_through_its_entry_point(site: Site) -> None:
     source = (EXAMPLE / "wavefront.py").read_text()
     site.install(name, {"wavefront": source}, entries)
 
-    assert "wavefront" in all_planners()
+    assert "wavefront" in list_planners()
     query = catalogue()["slalom"]
-    result = find_planner("wavefront").plan(query, np.random.default_rng(0))
+    result = load_planner("wavefront").plan(query, np.random.default_rng(0))
     assert result.solved
     assert result.cost >= optimum(query) - 1e-9
-    straight = find_planner("wavefront", straight="true").plan(query, np.random.default_rng(0))
+    straight = load_planner("wavefront", straight="true").plan(query, np.random.default_rng(0))
     assert (np.abs(np.diff(straight.cells, axis=0)).sum(axis=1) == 1).all()
     with pytest.raises(InputError, match="option of wavefront"):
-        find_planner("wavefront", strait="true")
+        load_planner("wavefront", strait="true")
 
 
 def test_a_broken_plugin_is_named_and_left_out(site: Site) -> None:
@@ -70,35 +70,35 @@ def test_a_broken_plugin_is_named_and_left_out(site: Site) -> None:
         {"broken": "broken_ants:Planner"},
     )
     with pytest.warns(UserWarning, match="'broken' of antdrive-broken cannot be loaded .*no licence"):
-        known = all_planners()
+        known = list_planners()
     assert set(known) == set(PLANNERS)
     with pytest.raises(InputError, match="antdrive-broken cannot be loaded"):
-        find_planner("broken")
+        load_planner("broken")
 
 
 def test_a_plugin_that_is_no_planner_is_refused(site: Site) -> None:
     site.install("antdrive-odd", {"odd_ants": "thing = 3"}, {"odd": "odd_ants:thing"})
     with pytest.raises(InputError, match=r"antdrive-odd is not a planner .*plan\(query, rng\)"):
-        find_planner("odd")
+        load_planner("odd")
 
 
 def test_a_plugin_cannot_take_a_name_of_ours(site: Site) -> None:
     site.install("antdrive-thief", {"thief": "raise AssertionError('must not load')"}, {"astar": "thief:AStar"})
     with pytest.warns(UserWarning, match="'astar' of antdrive-thief is left out: antdrive has one of that name"):
-        assert all_planners()["astar"] is PLANNERS["astar"]
-    assert find_planner("astar") is PLANNERS["astar"]
+        assert list_planners()["astar"] is PLANNERS["astar"]
+    assert load_planner("astar") is PLANNERS["astar"]
 
 
 def test_an_unknown_planner_is_answered_with_close_names() -> None:
     with pytest.raises(InputError, match=r"'aco_han'; did you mean aco-han .*choose from .*astar, dijkstra"):
-        find_planner("aco_han")
+        load_planner("aco_han")
 
 
 def test_an_unknown_option_is_answered_with_the_options() -> None:
     with pytest.raises(InputError, match=r"planner\.antz: .*did you mean ants\? choose from ants, attraction"):
-        find_planner("aco-han", antz=5)
+        load_planner("aco-han", antz=5)
     with pytest.raises(InputError, match=r"planner\.ants: no option of astar .* there are none"):
-        find_planner("astar", ants=5)
+        load_planner("astar", ants=5)
 
 
 @pytest.mark.parametrize(
@@ -114,7 +114,7 @@ def test_an_unknown_option_is_answered_with_the_options() -> None:
     ],
 )
 def test_options_are_read_by_their_type(options: dict[str, object], field: str, value: object) -> None:
-    read = getattr(find_planner("aco-han", **options), field)
+    read = getattr(load_planner("aco-han", **options), field)
     assert read == value
     assert type(read) is type(value)
 
@@ -135,7 +135,7 @@ def test_options_are_read_by_their_type(options: dict[str, object], field: str, 
 )
 def test_wrong_option_values_are_refused_by_name(options: dict[str, object], message: str) -> None:
     with pytest.raises(InputError) as refused:
-        find_planner("aco-han", **options)
+        load_planner("aco-han", **options)
     assert str(refused.value) == message
 
 
@@ -150,7 +150,7 @@ def test_every_planner_says_what_it_does_in_one_line() -> None:
 
 def test_naming_planners_does_not_load_the_compiler() -> None:
     code = (
-        "import sys; from planners import all_planners, find_planner, describe; all_planners();"
-        "find_planner('aco-han', ants=3); assert 'numba' not in sys.modules, 'numba was imported'"
+        "import sys; from planners import list_planners, load_planner, describe; list_planners();"
+        "load_planner('aco-han', ants=3); assert 'numba' not in sys.modules, 'numba was imported'"
     )
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)

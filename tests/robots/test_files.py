@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from antdrive.robots import load_robot, robot_schema, robots
+from antdrive.robots import load_robot, robot_schema
 from antdrive.worlds import InputError
 
 GOOD = """\
@@ -23,7 +23,7 @@ wheel_torque: 2.0
 
 
 def test_catalogue_robots_load() -> None:
-    assert set(robots()) >= {"turtlebot", "jackal"}
+    assert set(list_robots()) >= {"turtlebot", "jackal"}
     jackal = load_robot("jackal")
     assert jackal.radius == pytest.approx(0.333, abs=1e-3)
     assert jackal.max_speed == 2.0

@@ -94,9 +94,9 @@ def test_impossible_levels_are_refused_by_name(key: str, value: float) -> None:
 
 
 def test_a_robot_file_may_tell_its_noise(tmp_path) -> None:
-    from antdrive.robots import robots
+    from antdrive.robots import list_robots
 
-    text = robots()["turtlebot"].read_text()
+    text = list_robots()["turtlebot"].read_text()
     path = tmp_path / "mine.yaml"
     path.write_text(text.replace("slip: 0.02", "slip: 0.1"))
     assert load_robot(path).noise.slip == 0.1

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from antdrive.planners import find_planner
+from antdrive.planners import load_planner
 from antdrive.robots import RobotSpec
 from antdrive.sim import Scenario, run
 from antdrive.sim.log.metrics import barn as barn_score
@@ -31,7 +31,7 @@ def barn(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize("number", [pytest.param(n, marks=[] if n % 30 == 0 else [pytest.mark.slow]) for n in WORLDS])
 def test_the_jackal_drives_a_barn_world(number: int, barn: Path, jackal: RobotSpec) -> None:
     task = import_barn(barn / f"world_{number}.world")
-    result = run(Scenario(task=task, planner=find_planner("astar"), robot=jackal))
+    result = run(Scenario(task=task, planner=load_planner("astar"), robot=jackal))
     assert result.succeeded, (result.outcome, result.certificate)
     assert result.rollout is not None
     assert barn_score(result.rollout) == pytest.approx(0.5)  # the most there is
@@ -50,5 +50,5 @@ def test_no_planners_path_is_unsafe_to_follow(
     number: int, planner: str, noise: float, smoothing: str, barn: Path, jackal: RobotSpec
 ) -> None:
     task = import_barn(barn / f"world_{number}.world")
-    result = run(Scenario(task=task, planner=find_planner(planner), robot=jackal, noise=noise, smoothing=smoothing))
+    result = run(Scenario(task=task, planner=load_planner(planner), robot=jackal, noise=noise, smoothing=smoothing))
     assert result.succeeded, (result.outcome, result.certificate)

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from antdrive.planners import Progress, find_planner, keep_best, watch
+from antdrive.planners import Progress, keep_best, load_planner, watch
 from antdrive.robots import PurePursuit, RobotSpec
 from antdrive.sim import Engine, Outcome, Run, Scenario, measure, run
 from antdrive.sim.driving.drive import drive
 from antdrive.sim.view.figures.plots import plan_figure
-from antdrive.worlds import Disc, InputError, Route, Task, World, catalogue, load_task
+from antdrive.worlds import Disc, InputError, Route, Task, World, list_worlds, load_task
 
 
 def test_a_run_ends_at_the_goal_certified(small_run: Run) -> None:
@@ -43,7 +43,7 @@ def test_metrics_have_sensible_values(small_run: Run) -> None:
     assert m["duration_s"] > direct / 0.7
 
 
-STILL = [name for name in catalogue() if not name.endswith("-moving")]
+STILL = [name for name in list_worlds() if not name.endswith("-moving")]
 
 
 @pytest.mark.parametrize("planner", ["astar", "aco-han"])
@@ -68,7 +68,7 @@ def test_a_large_world_is_driven_in_the_fast_suite_too() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("name", sorted(set(catalogue()) - set(STILL)))
+@pytest.mark.parametrize("name", sorted(set(list_worlds()) - set(STILL)))
 def test_every_moving_world_is_driven_and_what_came_of_it_is_certain(name: str, seed: int) -> None:
     """Nobody promises that each is; whether a drive was met, all three readings agree."""
     result = run(Scenario.of(name, seed=seed))
@@ -115,7 +115,7 @@ def test_no_path_is_an_outcome_with_a_reason(turtlebot: RobotSpec) -> None:
     wall = tuple(Disc(2, 0.1 + 0.2 * i, 0.11) for i in range(15))
     task = Task(World("cut", (0, 0, 4, 3), wall), (0.6, 1.5, 0), (3.4, 1.5), cell=0.2)
     for planner in ("astar", "aco-han"):
-        result = run(Scenario(task=task, planner=find_planner(planner), robot=turtlebot))
+        result = run(Scenario(task=task, planner=load_planner(planner), robot=turtlebot))
         assert result.outcome is Outcome.NO_PATH
         assert result.rollout is None
         assert result.plan.reason
@@ -124,15 +124,15 @@ def test_no_path_is_an_outcome_with_a_reason(turtlebot: RobotSpec) -> None:
 def test_a_goal_without_room_is_no_path(turtlebot: RobotSpec) -> None:
     """The goal lies 2 cm from a disc: nothing within the tolerance lets the robot stand."""
     task = Task(World("w", (0, 0, 4, 3), (Disc(3, 1.5, 0.3),)), (0.6, 1.5, 0), (2.68, 1.5), 0.05, 0.2)
-    result = run(Scenario(task=task, planner=find_planner("astar"), robot=turtlebot))
+    result = run(Scenario(task=task, planner=load_planner("astar"), robot=turtlebot))
     assert result.outcome is Outcome.NO_PATH
     assert "goal" in result.plan.reason
     near = replace(task, goal_tolerance=0.35)
-    assert run(Scenario(task=near, planner=find_planner("astar"), robot=turtlebot)).succeeded
+    assert run(Scenario(task=near, planner=load_planner("astar"), robot=turtlebot)).succeeded
 
 
 def test_a_budget_that_ends_first_is_told(small_scenario: Scenario) -> None:
-    blind = find_planner("aco-han", ants=1, iterations=1, max_steps=2)
+    blind = load_planner("aco-han", ants=1, iterations=1, max_steps=2)
     result = run(replace(small_scenario, planner=blind))
     assert result.outcome is Outcome.STOPPED
     assert result.plan.reason
@@ -147,7 +147,7 @@ def test_ctrl_c_while_planning_keeps_the_best_path_and_does_not_drive(small_scen
         if progress.done == 2:
             raise KeyboardInterrupt
 
-    s = replace(small_scenario, planner=find_planner("aco-han", ants=50))
+    s = replace(small_scenario, planner=load_planner("aco-han", ants=50))
     with watch(stop), keep_best():
         result = run(s)
     assert result.outcome is Outcome.STOPPED
@@ -177,20 +177,20 @@ def test_a_robot_that_cannot_move_is_stuck(small_scenario: Scenario) -> None:
 def test_a_robot_that_only_turns_slowly_is_not_stuck(turtlebot: RobotSpec) -> None:
     slow = replace(turtlebot, max_yaw_rate=0.25)  # half a turn takes 12 s
     task = Task(World("w", (0, 0, 4, 3)), (3.0, 1.5, 0.0), (1.0, 1.5), cell=0.2)
-    assert run(Scenario(task=task, planner=find_planner("astar"), robot=slow)).succeeded
+    assert run(Scenario(task=task, planner=load_planner("astar"), robot=slow)).succeeded
 
 
 @pytest.mark.parametrize("robot", ["turtlebot", "jackal"])
 def test_a_small_tolerance_is_met(robot: str, request: pytest.FixtureRequest) -> None:
     task = Task(World("w", (0, 0, 4, 3), (Disc(2, 1.5, 0.3),)), (0.6, 1.4, 0), (3.4, 1.7), 0.02, 0.2)
-    result = run(Scenario(task=task, planner=find_planner("astar"), robot=request.getfixturevalue(robot)))
+    result = run(Scenario(task=task, planner=load_planner("astar"), robot=request.getfixturevalue(robot)))
     assert result.succeeded, result.reason
 
 
 def test_a_robot_that_stands_where_it_should_need_not_drive(turtlebot: RobotSpec) -> None:
     """The goal has no room, and the only cell near it is the one that the robot starts in."""
     task = Task(World("w", (0, 0, 1, 1)), (0.5, 0.5, 0.0), (0.5, 0.3), 0.25, 1.0)
-    result = run(Scenario(task=task, planner=find_planner("astar"), robot=turtlebot, margin=0.15))
+    result = run(Scenario(task=task, planner=load_planner("astar"), robot=turtlebot, margin=0.15))
     assert result.succeeded
     assert result.rollout is not None
     assert len(result.rollout.t) == 1
@@ -205,7 +205,7 @@ def test_no_obstacle_is_too_low_to_be_felt(small_scenario: Scenario, collided_ru
 def test_a_start_that_touches_is_a_collision_at_once(turtlebot: RobotSpec, gap: float) -> None:
     start = (0.6 + 0.1 + turtlebot.radius + gap, 1.5, 0)
     task = Task(World("w", (0, 0, 4, 3), (Disc(0.6, 1.5, 0.1),)), start, (3.4, 1.5), cell=0.2)
-    result = run(Scenario(task=task, planner=find_planner("astar"), robot=turtlebot))
+    result = run(Scenario(task=task, planner=load_planner("astar"), robot=turtlebot))
     assert result.outcome is Outcome.COLLIDED
     assert result.rollout is not None
     assert result.rollout.contacts[0, 0] == 0
@@ -237,7 +237,7 @@ def test_other_rates_arrive_too(small_scenario: Scenario) -> None:
 def test_the_same_scenario_gives_the_same_bits_in_any_order(small_scenario: Scenario, small_run: Run) -> None:
     assert small_run.rollout is not None
     digest = small_run.rollout.digest
-    ants = replace(small_scenario, planner=find_planner("aco-han", ants=50, iterations=5))
+    ants = replace(small_scenario, planner=load_planner("aco-han", ants=50, iterations=5))
     first = run(ants).rollout
     run(replace(small_scenario, unseen=(Disc(1.5, 2.5, 0.2),)))
     again, second = run(small_scenario).rollout, run(ants).rollout

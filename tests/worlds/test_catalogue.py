@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from antdrive.sim.papers.maps import environments
-from antdrive.worlds import Disc, Task, Trajectories, catalogue, forest, load_task, point_clearance, rasterise
+from antdrive.worlds import Disc, Task, Trajectories, forest, list_worlds, load_task, point_clearance, rasterise
 from tests.worlds.oracles import passable
 
 TURTLEBOT, JACKAL = 0.18, 0.333  # radii [m]
@@ -55,7 +55,7 @@ def task(request: pytest.FixtureRequest) -> Task:
 
 
 def test_the_table_names_the_whole_catalogue():
-    assert list(catalogue()) == list(PASSABLE)
+    assert list(list_worlds()) == list(PASSABLE)
 
 
 @pytest.mark.parametrize(("radius", "who"), [(TURTLEBOT, 0), (JACKAL, 1)])

@@ -93,7 +93,7 @@ class TaskFile(BaseModel):
         return name
 
 
-def catalogue() -> Mapping[str, Path]:
+def list_worlds() -> Mapping[str, Path]:
     """The worlds that come with the package, by name."""
     return dict(sorted((path.stem, path) for path in _CATALOG.glob("*.yaml")))
 
@@ -106,7 +106,7 @@ def load_task(world: str | os.PathLike[str]) -> Task:
     Raises:
         InputError: there is no such world or something in the file is wrong.
     """
-    known = catalogue()
+    known = list_worlds()
     path = known[world] if isinstance(world, str) and world in known else Path(world)
     if not os.path.lexists(path):
         hint = suggest(path.stem, known)

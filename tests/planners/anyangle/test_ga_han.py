@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from antdrive.planners import GaHan, PlanStatus, Query, find_planner
+from antdrive.planners import GaHan, PlanStatus, Query, load_planner
 from antdrive.planners.anyangle.lines import polyline_length
 from antdrive.worlds import Disc, Grid, Task, World, load_task, polyline_clearance, rasterise
 from tests.planners.worlds_to_solve import catalogue, random_query, sealed
@@ -134,4 +134,4 @@ def test_options_are_checked() -> None:
     ):
         with pytest.raises(ValueError, match=message):
             dataclasses.replace(GaHan(), **options)
-    assert find_planner("ga-han", via_points="2", elitism="no") == GaHan(via_points=2, elitism=False)
+    assert load_planner("ga-han", via_points="2", elitism="no") == GaHan(via_points=2, elitism=False)

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from antdrive.planners import AcoHan, Hybrid, PlanResult, PlanStatus, Query, Tangent, find_planner, keep_best, watch
+from antdrive.planners import AcoHan, Hybrid, PlanResult, PlanStatus, Query, Tangent, keep_best, load_planner, watch
 from antdrive.planners.anyangle.lines import polyline_length
 from antdrive.planners.iterative import Progress
 from antdrive.worlds import Disc, Grid, InputError, Task, World, load_task, polyline_clearance, rasterise
@@ -114,4 +114,4 @@ def test_the_colony_must_be_one() -> None:
         solve(single(), colony="astar")
     with pytest.raises(InputError, match="aco-han"):
         solve(single(), colony="aco-ham")
-    assert find_planner("hybrid", colony="aco-han-elite").plan(single(), np.random.default_rng(0)).solved
+    assert load_planner("hybrid", colony="aco-han-elite").plan(single(), np.random.default_rng(0)).solved

@@ -22,7 +22,7 @@ from antdrive.planners import (
     PlanResult,
     PlanStatus,
     Query,
-    find_planner,
+    load_planner,
 )
 from antdrive.planners.colonies import _kernels_colony as _kernels_ants
 from antdrive.planners.colonies.ant_system import ibraheem_beta
@@ -148,7 +148,7 @@ def test_threads_do_not_change_the_plan(planner: Colony, threads: int) -> None:
 def test_every_ant_planner_arrives_that_retreats_and_cuts_short(name: str, world: str) -> None:
     options = {"ants": 5, "iterations": 3, "retreat": True, "shortcut": True}
     query = catalogue()[world]
-    result = find_planner(name, **options).plan(query, np.random.default_rng(0))
+    result = load_planner(name, **options).plan(query, np.random.default_rng(0))
     assert result.solved
     ground = ColonyGraph.of(query)
     flat = (result.cells @ [ground.shape[1], 1]).astype(np.int32)[np.newaxis]

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from antdrive.planners import Moving, PlanStatus, Query, TimedPlan, find_planner, plan_in_time
+from antdrive.planners import Moving, PlanStatus, Query, TimedPlan, load_planner, plan_in_time
 from antdrive.planners.graph.sipp import TOLERANCE, _legs, _samples
 from antdrive.worlds import Grid
 from tests.planners.worlds_to_solve import optimum, random_query
@@ -272,7 +272,7 @@ def test_without_movers_it_is_the_shortest_path() -> None:
 def test_the_planner_of_the_registry_plans_among_the_motions_of_the_query() -> None:
     mover = Passing(0.25, (0.5, -0.4), (0.0, 0.1))
     query = dataclasses.replace(corridor(3), motions=(mover,))
-    plan = find_planner("sipp", speed=SPEED).plan(query, np.random.default_rng(0))
+    plan = load_planner("sipp", speed=SPEED).plan(query, np.random.default_rng(0))
     assert isinstance(plan, TimedPlan)
     assert isinstance(mover, Moving)
     np.testing.assert_array_equal(plan.leave, plan_in_time(query, [mover], speed=SPEED).leave)

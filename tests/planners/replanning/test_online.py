@@ -13,7 +13,7 @@ from antdrive.planners import (
     OnlineAnt,
     OnlinePlanner,
     Query,
-    find_planner,
+    load_planner,
     online_for,
 )
 from antdrive.planners.replanning.online import PATIENCE
@@ -27,7 +27,7 @@ NOBODY: list[tuple[int, int]] = []
 
 
 def robot_by(name: str, query: Query) -> OnlinePlanner:
-    robot = online_for(find_planner(name), query, np.random.default_rng(0))
+    robot = online_for(load_planner(name), query, np.random.default_rng(0))
     assert isinstance(robot, OnlinePlanner)
     return robot
 
@@ -52,13 +52,13 @@ def test_hasans_six_cases_are_arrived_in_with_one_rule(case: str, name: str, cou
         tally = robot.tally
         assert tally.decisions == tally.steps + tally.waits
         assert tally.length >= optimum(query) - 1e-9
-        assert tally.steps <= 1.6 * len(find_planner("astar").plan(query, np.random.default_rng(0)).cells) + count
+        assert tally.steps <= 1.6 * len(load_planner("astar").plan(query, np.random.default_rng(0)).cells) + count
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_pheromone_is_spread_once(case: str) -> None:
     robot = robot_by("mmas-dstar", CASES[case])
-    assert robot.tally.propagated == find_planner("mmas-dstar").plan(CASES[case], np.random.default_rng(0)).work
+    assert robot.tally.propagated == load_planner("mmas-dstar").plan(CASES[case], np.random.default_rng(0)).work
     spread = robot.tally.propagated
     assert alone(robot)
     assert robot.tally.propagated == spread
@@ -188,7 +188,7 @@ def test_cells_outside_blocked_anyway_or_its_own_change_nothing(name: str) -> No
 
 def test_planners_online() -> None:
     query, rng = catalogue()["empty"], np.random.default_rng(0)
-    assert isinstance(online_for(find_planner("mmas-dstar"), query, rng), OnlineAnt)
-    assert isinstance(online_for(find_planner("astar"), query, rng), Follower)
+    assert isinstance(online_for(load_planner("mmas-dstar"), query, rng), OnlineAnt)
+    assert isinstance(online_for(load_planner("astar"), query, rng), Follower)
     with pytest.raises(ValueError, match="cannot be told"):
-        online_for(find_planner("tangent"), query, rng)
+        online_for(load_planner("tangent"), query, rng)

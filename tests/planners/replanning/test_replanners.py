@@ -18,7 +18,7 @@ from antdrive.planners import (
     ReplanFromScratch,
     Replanner,
     WarmStartedColony,
-    find_planner,
+    load_planner,
     path_cost,
     replanner_for,
 )
@@ -39,7 +39,7 @@ MAY_MISS = {name for name in ON_CELLS if not getattr(PLANNERS[name], "complete",
 def quick(name: str) -> Planner:
     planner: Any = PLANNERS[name]
     known = {f.name for f in dataclasses.fields(planner)}
-    return find_planner(name, **{k: v for k, v in {"ants": 30, "iterations": 8}.items() if k in known})
+    return load_planner(name, **{k: v for k, v in {"ants": 30, "iterations": 8}.items() if k in known})
 
 
 def made(name: str, query: Query, seed: int = 0) -> Replanner:

@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from antdrive.planners import AStar, PlanResult, PlanStatus, Query, find_planner, path_cost, route_along
+from antdrive.planners import AStar, PlanResult, PlanStatus, Query, load_planner, path_cost, route_along
 from antdrive.planners.anyangle.tangent import Arc, Line, TangentPath, shortest
 from antdrive.planners.smoothing.smooth import SMOOTHINGS, pull_taut, smooth
 from antdrive.robots import load_robot
@@ -26,9 +26,9 @@ from antdrive.worlds import (
     Route,
     Task,
     World,
-    catalogue,
     forest,
     import_barn,
+    list_worlds,
     load_task,
     point_clearance,
     polyline_clearance,
@@ -266,7 +266,7 @@ def test_every_planners_plans_are_refined(name: str) -> None:
     solved = 0
     for query in small_worlds().values():
         assert query.task is not None
-        plan = find_planner(name).plan(query, np.random.default_rng(1))
+        plan = load_planner(name).plan(query, np.random.default_rng(1))
         if not plan.solved:
             continue
         solved += 1
@@ -285,12 +285,12 @@ def test_every_planners_plans_are_refined(name: str) -> None:
 
 @pytest.mark.parametrize("robot", ["turtlebot", "jackal"])
 def test_the_catalogue_with_both_robots(robot: str) -> None:
-    for path in catalogue().values():
+    for path in list_worlds().values():
         task = load_task(path)
         grid = rasterise(task.world, task.cell, load_robot(robot).radius + 0.03)
         query = Query.between(grid, task)
         for name in ("astar", "tangent"):
-            plan = find_planner(name).plan(query, RNG)
+            plan = load_planner(name).plan(query, RNG)
             if not plan.solved:
                 continue
             line = route_along(plan, grid, task)
@@ -355,7 +355,7 @@ def test_a_start_without_room_is_left_as_planned() -> None:
     np.testing.assert_allclose(route.xy[:2], [task.start[:2], grid.xy([query.start])[0]])
     assert polyline_clearance(task.world, route.xy[1:]) >= 0.4 - 1e-9
     assert (route.kind, route.note) == ("taut", "")
-    assert route.length == pytest.approx(find_planner("tangent").plan(query, RNG).length, rel=1e-3)
+    assert route.length == pytest.approx(load_planner("tangent").plan(query, RNG).length, rel=1e-3)
 
 
 def test_a_goal_without_room_is_reached_where_the_plan_ends() -> None:

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from antdrive.planners import find_planner
+from antdrive.planners import load_planner
 from antdrive.robots import LIMITERS, Avoidance, RobotSpec
 from antdrive.sim import Outcome, Perception, Run, Scenario, certify, run
 from antdrive.sim.driving.perception import Predictor
@@ -27,7 +27,7 @@ def among(*movers: Mover, robot: RobotSpec, task: Task = TASK, **settings: objec
     """A drive by the one route, unless told otherwise."""
     settings = {"replanning": None, **settings}
     task = dataclasses.replace(task, world=dataclasses.replace(task.world, movers=movers))
-    return run(Scenario(task=task, planner=find_planner("astar"), planner_name="astar", robot=robot, **settings))  # type: ignore[arg-type]
+    return run(Scenario(task=task, planner=load_planner("astar"), planner_name="astar", robot=robot, **settings))  # type: ignore[arg-type]
 
 
 CROSSING = keyframed((0.0, 4.5, 0.6), (10.7, 4.5, 5.4))  # on the robot's way when the robot is there

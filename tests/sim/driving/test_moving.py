@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from antdrive.planners import find_planner
+from antdrive.planners import load_planner
 from antdrive.robots import PurePursuit, RobotSpec
 from antdrive.sim import Engine, Outcome, Rollout, Run, Scenario, certify, measure, run
 from antdrive.sim.driving.drive import drive
@@ -136,7 +136,7 @@ def among(*movers: Mover, robot: RobotSpec, **settings: Any) -> Run:
     """A drive among movers, by a robot that gives way to none."""
     settings = {"yielding": None, "replanning": None, **settings}
     task = dataclasses.replace(TASK, world=dataclasses.replace(ROOM, movers=movers))
-    return run(Scenario(task=task, planner=find_planner("astar"), planner_name="astar", robot=robot, **settings))
+    return run(Scenario(task=task, planner=load_planner("astar"), planner_name="astar", robot=robot, **settings))
 
 
 @pytest.fixture(scope="module")
@@ -151,7 +151,7 @@ def passed(turtlebot: RobotSpec) -> Rollout:
 @pytest.fixture(scope="module")
 def standing(turtlebot: RobotSpec) -> Scenario:
     """A robot whose motors are too weak to move it, and its goal."""
-    return Scenario(task=TASK, planner=find_planner("astar"), robot=dataclasses.replace(turtlebot, wheel_torque=1e-4))
+    return Scenario(task=TASK, planner=load_planner("astar"), robot=dataclasses.replace(turtlebot, wheel_torque=1e-4))
 
 
 def test_the_log_holds_every_mover_at_every_row(passed: Rollout) -> None:
@@ -268,7 +268,7 @@ def test_the_time_limit_of_a_task_counts_unless_another_is_given(small_scenario:
 def test_wanderers_keep_off_what_is_unseen(turtlebot: RobotSpec) -> None:
     task = dataclasses.replace(TASK, world=dataclasses.replace(ROOM, movers=BESIDE[2:]))
     scenario = Scenario(
-        task=task, planner=find_planner("astar"), robot=turtlebot, unseen=(Disc(5.0, 3.4, 0.2), Disc(5.5, 2.6, 0.2))
+        task=task, planner=load_planner("astar"), robot=turtlebot, unseen=(Disc(5.0, 3.4, 0.2), Disc(5.5, 2.6, 0.2))
     )
     places = scenario.traffic.positions(np.arange(0, 60, 0.05))[:, 0]
     for disc in scenario.unseen:

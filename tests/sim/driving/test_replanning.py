@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from antdrive.planners import PLANNERS, PlanStatus, TimedPlan, find_planner, smooth
+from antdrive.planners import PLANNERS, PlanStatus, TimedPlan, load_planner, smooth
 from antdrive.robots import RobotSpec, TrackedPath, Twist
 from antdrive.sim import Outcome, ReplanPolicy, Rollout, Run, Scenario, certify, plan, run
 from antdrive.sim.driving.perception import Predictor
@@ -28,7 +28,7 @@ PLUG = Keyframed(radius=0.45, keyframes=((0.0, 4.0, 3.0), (100.0, 4.0, 3.01)), l
 
 def among(*movers: Mover, robot: RobotSpec, planner: str = "dstar-lite", **settings: object) -> Run:
     task = dataclasses.replace(TASK, world=dataclasses.replace(HALL, movers=movers))
-    return run(Scenario(task=task, planner=find_planner(planner), planner_name=planner, robot=robot, **settings))  # type: ignore[arg-type]
+    return run(Scenario(task=task, planner=load_planner(planner), planner_name=planner, robot=robot, **settings))  # type: ignore[arg-type]
 
 
 def test_a_closed_gate_is_gone_round_only_by_replanning(turtlebot: RobotSpec) -> None:
@@ -64,7 +64,7 @@ def test_every_planner_replans(planner: str, turtlebot: RobotSpec) -> None:
     """The slowest ones aside, and the one that knows better."""
     done = among(PLUG, robot=turtlebot, planner=planner, time_limit=2.0)
     if done.rollout is None:  # a planner that is not complete found no way at first
-        assert not getattr(find_planner(planner), "complete", False)
+        assert not getattr(load_planner(planner), "complete", False)
         return
     assert done.rollout.meta["replans"]
     assert not len(done.rollout.contacts)
@@ -113,7 +113,7 @@ def test_the_ant_stays_where_it_is_when_there_is_no_way_at_first(turtlebot: Robo
     lid = Keyframed(radius=0.2, keyframes=((0.0, 0.985, 0.3), (4.0, 0.985, 0.3001), (6.0, 3.7, 0.3)), loop="once")
     task = dataclasses.replace(task, world=dataclasses.replace(lane, movers=(lid,)))
     # It gives way to nothing, so that nothing but its decisions keeps it.
-    planner = find_planner("mmas-dstar")
+    planner = load_planner("mmas-dstar")
     log = run(Scenario(task=task, planner=planner, robot=turtlebot, yielding=None)).rollout
     assert log is not None
     assert np.ptp(log.pose[log.t < 4.0, 0]) < 0.01
@@ -133,7 +133,7 @@ def test_the_ant_keeps_from_what_stands_what_planners_keep(
 ) -> None:
     far = Keyframed(radius=0.2, keyframes=((0.0, 0.5, 0.5), (9.0, 1.5, 0.5)))
     task = Task(World("hall", (0.0, 0.0, 9.0, 6.0), (post,), movers=(far,)), (*start, 0.0), goal, cell=0.25)
-    done = run(Scenario(task=task, planner=find_planner("mmas-dstar"), robot=turtlebot))
+    done = run(Scenario(task=task, planner=load_planner("mmas-dstar"), robot=turtlebot))
     assert done.succeeded, (done.outcome, done.reason)
     assert done.rollout is not None
     for decision in done.rollout.meta["replans"][:-1]:
@@ -145,7 +145,7 @@ def test_a_robot_that_does_not_know_that_it_missed_the_goal_does_not_go_again(tu
     far = Keyframed(radius=0.2, keyframes=((0.0, 0.5, 0.5), (9.0, 1.5, 0.5)))
     tight = Scenario(
         task=Task(World("hall", (0.0, 0.0, 8.0, 6.0)), (1.0, 3.0, 0.0), (3.0, 3.0), cell=0.25, goal_tolerance=0.004),
-        planner=find_planner("dstar-lite"),
+        planner=load_planner("dstar-lite"),
         robot=turtlebot,
         noise=1.0,
     )
@@ -174,7 +174,7 @@ def rerouter(
     *movers: Mover, robot: RobotSpec, planner: str = "dstar-lite", **settings: Any
 ) -> tuple[ReplanMonitor, TrackedPath]:
     task = dataclasses.replace(TASK, world=dataclasses.replace(HALL, movers=movers))
-    s = Scenario(task=task, planner=find_planner(planner), robot=robot)
+    s = Scenario(task=task, planner=load_planner(planner), robot=robot)
     grid, answer = plan(s)
     route = smooth(answer, grid, task, kind="none" if s.timed else "clearance")
     made = ReplanMonitor(

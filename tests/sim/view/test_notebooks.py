@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from antdrive.planners import PlanResult, PlanStatus, Query, find_planner
+from antdrive.planners import PlanResult, PlanStatus, Query, load_planner
 from antdrive.worlds import Disc, Task, World, load_task, rasterise
 
 TASK = load_task("slalom")
@@ -16,7 +16,7 @@ TASK = load_task("slalom")
 
 def plan(name="as", **options):
     grid = rasterise(TASK.world, TASK.cell, 0.21)
-    return find_planner(name, **options).plan(Query.between(grid, TASK), np.random.default_rng(0))
+    return load_planner(name, **options).plan(Query.between(grid, TASK), np.random.default_rng(0))
 
 
 @pytest.mark.parametrize(

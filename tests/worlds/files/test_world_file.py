@@ -18,7 +18,7 @@ from antdrive.worlds import (
     InputError,
     Task,
     World,
-    catalogue,
+    list_worlds,
     load_task,
     save_task,
     task_from_dict,
@@ -317,5 +317,5 @@ def test_the_limit_on_cells_is_that_of_grids():
 
 
 def test_the_catalogue_is_the_files_that_come_along():
-    assert all(path.is_file() for path in catalogue().values())
-    assert list(catalogue()) == sorted(catalogue())
+    assert all(path.is_file() for path in list_worlds().values())
+    assert list(list_worlds()) == sorted(list_worlds())

@@ -18,7 +18,6 @@ from antdrive.worlds import (
     MapProblem,
     Task,
     World,
-    catalogue,
     cell_map,
     export_map_server,
     export_movingai_map,
@@ -28,6 +27,7 @@ from antdrive.worlds import (
     import_movingai_map,
     import_movingai_problems,
     import_sdf,
+    list_worlds,
     load_task,
 )
 from antdrive.worlds.formats.map_server import read_map
@@ -58,7 +58,7 @@ def test_sdf_out_and_in_is_the_same_task_to_the_last_bit(tmp_path_factory: pytes
     assert again.world.discs.tobytes() == (task.world.discs + 0.0).tobytes()  # -0.0 comes back as 0.0
 
 
-@pytest.mark.parametrize("name", catalogue())
+@pytest.mark.parametrize("name", list_worlds())
 def test_every_world_of_the_catalogue_comes_back_from_sdf(name: str, tmp_path: Path) -> None:
     task = load_task(name)
     if task.world.movers:

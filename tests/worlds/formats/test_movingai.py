@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from antdrive.planners import Query, find_planner
+from antdrive.planners import Query, load_planner
 from antdrive.worlds import (
     Grid,
     InputError,
@@ -168,7 +168,7 @@ def slack(name: str, problem: MapProblem) -> float:
 
 
 def check(name: str, search: str, grid: Grid, problems: list[MapProblem]) -> None:
-    planner, rng = find_planner(search), np.random.default_rng(0)
+    planner, rng = load_planner(search), np.random.default_rng(0)
     for problem in problems:
         assert problem.map_name == f"{name}.map"
         result = planner.plan(Query(grid, problem.start, problem.goal), rng)
@@ -214,5 +214,5 @@ def test_worlds_of_discs_have_the_printed_lengths_too(folder: Path, name: str) -
         task = import_movingai_task(folder / f"{name}.map", problem=number)
         assert len(task.world.obstacles) < 5300
         grid = rasterise(task.world, task.cell, 0.25)
-        result = find_planner("dijkstra").plan(Query.between(grid, task), np.random.default_rng(0))
+        result = load_planner("dijkstra").plan(Query.between(grid, task), np.random.default_rng(0))
         assert abs(result.cost - problems[number].optimal) <= slack(name, problems[number])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from antdrive.planners import History, Query, find_planner
+from antdrive.planners import History, Query, load_planner
 from antdrive.robots import load_robot
 from antdrive.sim.log.certificate import Certificate
 from antdrive.sim.view.figures import figures
@@ -26,7 +26,7 @@ def planned():
     world = World("three", (0.0, 0.0, 5.0, 4.0), (Disc(1.5, 2.0, 0.4), Disc(3.0, 1.2, 0.3), Disc(3.6, 3.0, 0.3)))
     task = Task(world, (0.5, 0.5, 0.0), (4.4, 3.5), cell=0.25)
     grid = rasterise(world, 0.25, 0.23)
-    plan = find_planner("as", ants=10, iterations=8).plan(Query.between(grid, task), np.random.default_rng(0))
+    plan = load_planner("as", ants=10, iterations=8).plan(Query.between(grid, task), np.random.default_rng(0))
     return task, grid, plan
 
 
@@ -55,7 +55,7 @@ def test_a_plan_has_the_papers_kinds_of_figures_in_pixels_and_vectors(planned, t
 
 def test_a_search_has_neither_history_nor_field(planned, tmp_path):
     task, grid, _ = planned
-    plan = find_planner("astar").plan(Query.between(grid, task), np.random.default_rng(0))
+    plan = load_planner("astar").plan(Query.between(grid, task), np.random.default_rng(0))
     made = plan_figures(task, grid, plan, load_robot("turtlebot"), tmp_path, name="astar", suffixes=(".png",))
     assert set(made) == {"plan"}
 
