@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from antdrive.robots import load_robot, robot_schema
+from antdrive.robots import list_robots, load_robot, robot_schema
 from antdrive.worlds import InputError
 
 GOOD = """\
