@@ -40,13 +40,13 @@ from benchmarks.planners import table
 DYNABARN = Path(__file__).parent.parent.parent / "shared" / "data" / "dynabarn" / "dynabarn10.json"
 CLASSES = {"easy": range(20), "medium": range(20, 40), "hard": range(40, 60)}
 APART = 7.3  # between the moments at which drives in one world begin [s]
-KNOWN = Perception(told="motions")
+KNOWN = Perception(kind="motions")
 POLICIES: dict[str, dict[str, Any]] = {
-    "neither": {"yielding": None, "replanning": None},
-    "yield": {"replanning": ReplanPolicy(around=False)},
-    "replan": {"yielding": None},
+    "neither": {"avoidance": None, "replanning": None},
+    "yield": {"replanning": ReplanPolicy(around_movers=False)},
+    "replan": {"avoidance": None},
     "yield and replan": {},
-    "the same, motions known": {"knowledge": KNOWN},
+    "the same, motions known": {"perception": KNOWN},
     "keep to a plan in space and time": {"planner": "sipp", "options": {"speed": "1.5"}, "margin": 0.15},
 }
 

@@ -13,7 +13,8 @@ import numpy as np
 
 from antdrive.robots import PurePursuit, load_robot
 from antdrive.sim.driving.drive import drive
-from antdrive.sim.physics.engine import Engine, bullet
+from antdrive.sim.physics.bullet import bullet
+from antdrive.sim.physics.engine import Engine
 from antdrive.worlds import Disc, Route, Task, World
 
 ROUNDS = 9
@@ -39,14 +40,14 @@ def main() -> None:
         task = task_among(count)
         x = np.linspace(1, 19, 73)
         route = Route(np.stack([x, 10 + 0.4 * np.sin((x - 1) * np.pi / 3)], axis=1))
-        guide = controller.guide(route, task.world, robot, 0.05, 1 / 60)
-        engines[count] = (Engine(task.world, robot).__enter__(), task, guide)
+        tracked = controller.guide(route, task.world, robot, 0.05, 1 / 60)
+        engines[count] = (Engine(task.world, robot).__enter__(), task, tracked)
     bare: dict[int, list[float]] = {count: [] for count in engines}
     loop: dict[int, list[float]] = {count: [] for count in engines}
     for turn in range(ROUNDS + 1):
-        for count, (engine, task, guide) in engines.items():
+        for count, (engine, task, tracked) in engines.items():
             started = time.perf_counter()
-            log = drive(engine, controller, guide, task, time_limit=120)
+            log = drive(engine, controller, tracked, task, time_limit=120)
             middle = time.perf_counter()
             assert log.outcome.name == "SUCCEEDED", log.outcome
             commands = log.command[1::4].tolist()

@@ -48,7 +48,7 @@ def test_a_climbing_import_would_be_seen(tmp_path: Path) -> None:
 
 
 def test_pybullet_is_imported_by_one_module_and_numba_by_kernels() -> None:
-    assert [p.name for p in MODULES if "pybullet" in imported(p)] == ["engine.py"]
+    assert [p.name for p in MODULES if "pybullet" in imported(p)] == ["bullet.py"]
     assert all(p.name.startswith("_kernels") for p in MODULES if "numba" in imported(p))
 
 

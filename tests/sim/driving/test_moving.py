@@ -24,13 +24,13 @@ ZIGZAG = ((0.0, -3.0, 3.0), (2.0, 0.0, 4.0), (2.5, 1.0, 4.0), (4.0, 1.0, 6.0))
 def placed(engine: Engine, steps: int) -> tuple[list[int], Floats, Floats]:
     """Where movers' bodies and traffic are at each of some steps, and at which the robot was touched."""
     engine.place((0.0, 0.0, 0.0))
-    bodies, touched = [engine.mover_places()], []
+    bodies, touched = [engine.mover_positions()], []
     for k in range(steps):
         if engine.step():
             touched.append(k)
-        bodies.append(engine.mover_places())
-    assert engine.traffic is not None
-    return touched, np.array(bodies), engine.traffic.positions(np.arange(steps + 1) / engine.physics_hz)
+        bodies.append(engine.mover_positions())
+    assert engine.trajectories is not None
+    return touched, np.array(bodies), engine.trajectories.positions(np.arange(steps + 1) / engine.physics_hz)
 
 
 def built(*movers: Mover, obstacles: tuple[Disc, ...] = ()) -> tuple[World, Trajectories]:
@@ -49,7 +49,7 @@ def test_bodies_are_where_the_traffic_is_at_every_step(turtlebot: RobotSpec) -> 
         Wandering(radius=0.2, cell=0.5, period=0.21),
         obstacles=(Disc(5.0, 5.0, 1.0),),
     )
-    with Engine(world, turtlebot, traffic=traffic) as engine:
+    with Engine(world, turtlebot, trajectories=traffic) as engine:
         for _ in range(2):  # placed again, everything begins again
             _, bodies, expected = placed(engine, 1600)
             assert np.abs(bodies - expected).max() < 1e-9
@@ -69,7 +69,7 @@ def test_what_crosses_a_standing_robot_is_felt_and_what_passes_is_not(
             lead = 0.75 + speed * float(phase)
             mover = Cruising(radius=radius, position=(-lead, aside), velocity=(speed, 0.0))
             world, traffic = built(mover)
-            with Engine(world, spec, traffic=traffic) as engine:
+            with Engine(world, spec, trajectories=traffic) as engine:
                 touched, bodies, way = placed(engine, math.ceil(1.3 * lead / speed * 240))
             assert bool(touched) == expected, (phase, aside)
             assert np.abs(bodies - way).max() < 1e-9, "nothing slows a mover"
@@ -77,11 +77,11 @@ def test_what_crosses_a_standing_robot_is_felt_and_what_passes_is_not(
 
 def test_a_mover_pushes_the_robot_before_it(turtlebot: RobotSpec) -> None:
     world, traffic = built(Cruising(radius=0.3, position=(-1.0, 0.0), velocity=(1.0, 0.0)))
-    with Engine(world, turtlebot, traffic=traffic) as engine:
+    with Engine(world, turtlebot, trajectories=traffic) as engine:
         engine.place((0.0, 0.0, 0.0))
         contacts = [contact for _ in range(480) for contact in engine.step()]
         x, y = engine.state()[:2]
-        (place,) = engine.mover_places()
+        (place,) = engine.mover_positions()
     assert {contact.obstacle for contact in contacts} == {0}
     assert place[0] == pytest.approx(1.0)
     assert math.dist((x, y), place) > 0.3 + 0.18 - 0.01
@@ -95,7 +95,7 @@ def test_movers_are_numbered_after_the_discs_and_before_the_walls(turtlebot: Rob
         Keyframed(radius=0.1, keyframes=((0.0, 0.0, 0.5), (9.0, 0.0, 0.6))),
     )
     world = World("w", (-2.0, -0.5, 2.0, 2.0), (Disc(0.5, 0.0, 0.1),), movers=movers)
-    with Engine(world, turtlebot, traffic=Trajectories.of(world, (0.0, 0.0))) as engine:
+    with Engine(world, turtlebot, trajectories=Trajectories.of(world, (0.0, 0.0))) as engine:
         engine.place((0.0, 0.0, yaw))
         engine.command(0.5, 0.0)
         touched = [contact.obstacle for _ in range(240) for contact in engine.step()]
@@ -108,17 +108,17 @@ def test_movers_pass_through_each_other_and_through_what_stands(turtlebot: Robot
         Cruising(radius=0.5, position=(5.0, 5.0), velocity=(-2.0, 0.0)),
         obstacles=(Disc(2.0, 5.0, 0.5),),
     )
-    with Engine(world, turtlebot, traffic=traffic) as engine:
+    with Engine(world, turtlebot, trajectories=traffic) as engine:
         _, bodies, way = placed(engine, 1200)
     assert np.abs(bodies - way).max() < 1e-9
 
 
 def test_an_engine_wants_the_traffic_of_its_world(turtlebot: RobotSpec) -> None:
     world, traffic = built(Cruising(radius=0.5, position=(-5.0, 5.0), velocity=(2.0, 0.0)))
-    with pytest.raises(ValueError, match="traffic: must be that of the world's 1 movers"):
+    with pytest.raises(ValueError, match="trajectories: must be those of the world's 1 movers"):
         Engine(world, turtlebot)
-    with pytest.raises(ValueError, match="traffic: must be that of the world's 0 movers"):
-        Engine(World("w", OPEN), turtlebot, traffic=traffic)
+    with pytest.raises(ValueError, match="trajectories: must be those of the world's 0 movers"):
+        Engine(World("w", OPEN), turtlebot, trajectories=traffic)
 
 
 # Runs
@@ -134,7 +134,7 @@ BESIDE = (
 
 def among(*movers: Mover, robot: RobotSpec, **settings: Any) -> Run:
     """A drive among movers, by a robot that gives way to none."""
-    settings = {"yielding": None, "replanning": None, **settings}
+    settings = {"avoidance": None, "replanning": None, **settings}
     task = dataclasses.replace(TASK, world=dataclasses.replace(ROOM, movers=movers))
     return run(Scenario(task=task, planner=load_planner("astar"), planner_name="astar", robot=robot, **settings))
 
@@ -250,7 +250,7 @@ def test_what_is_touched_in_the_period_that_would_end_as_stuck_was_touched(stand
     touching = float(alone.t[-1]) - 1.5 / 240  # it comes after the last period's first step
     mover = Cruising(radius=0.3, position=(5.0, 1.4), velocity=(-(4.4 - 0.48) / touching, 0.0))
     task = dataclasses.replace(TASK, world=dataclasses.replace(ROOM, movers=(mover,)))
-    result = run(dataclasses.replace(standing, task=task, robot=rigid, yielding=None, replanning=None))
+    result = run(dataclasses.replace(standing, task=task, robot=rigid, avoidance=None, replanning=None))
     assert result.outcome is Outcome.RUN_INTO
     assert result.rollout is not None
     assert alone.t[-1] - 1 / 60 < result.rollout.t[int(result.rollout.contacts[0, 0])] <= alone.t[-1]
@@ -270,7 +270,7 @@ def test_wanderers_keep_off_what_is_unseen(turtlebot: RobotSpec) -> None:
     scenario = Scenario(
         task=task, planner=load_planner("astar"), robot=turtlebot, unseen=(Disc(5.0, 3.4, 0.2), Disc(5.5, 2.6, 0.2))
     )
-    places = scenario.traffic.positions(np.arange(0, 60, 0.05))[:, 0]
+    places = scenario.trajectories.positions(np.arange(0, 60, 0.05))[:, 0]
     for disc in scenario.unseen:
         assert np.hypot(*(places - (disc.x, disc.y)).T).min() > disc.radius + 0.15
     log = run(scenario).rollout
@@ -282,9 +282,9 @@ def test_a_robot_drives_among_movers_without_a_scenario(turtlebot: RobotSpec) ->
     """What a drive needs of an engine: its traffic."""
     world = dataclasses.replace(ROOM, movers=BESIDE)
     controller = PurePursuit()
-    guide = controller.guide(Route(np.array([(0.6, 1.4), (5.4, 1.4)])), world, turtlebot, 0.05, 1 / 60)
-    with Engine(world, turtlebot, traffic=Trajectories.of(world, TASK.start[:2])) as engine:
-        log = drive(engine, controller, guide, TASK, time_limit=60)
+    tracked = controller.guide(Route(np.array([(0.6, 1.4), (5.4, 1.4)])), world, turtlebot, 0.05, 1 / 60)
+    with Engine(world, turtlebot, trajectories=Trajectories.of(world, TASK.start[:2])) as engine:
+        log = drive(engine, controller, tracked, TASK, time_limit=60)
         assert engine.time == pytest.approx(log.t[-1])
     assert log.outcome is Outcome.SUCCEEDED
     assert log.movers.shape == (len(log.t), 3, 2)

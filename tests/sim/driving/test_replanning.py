@@ -15,7 +15,7 @@ from antdrive.robots import RobotSpec, TrackedPath, Twist
 from antdrive.sim import Outcome, ReplanPolicy, Rollout, Run, Scenario, certify, plan, run
 from antdrive.sim.driving.perception import Predictor
 from antdrive.sim.driving.replanning import ReplanMonitor
-from antdrive.sim.driving.schedule import LATE, Schedule, held
+from antdrive.sim.driving.schedule import MAX_LAG, Schedule, slow_down
 from antdrive.sim.log.metrics import tracking_error_max_m
 from antdrive.worlds import Disc, Keyframed, Mover, Route, Task, World, polyline_clearance
 
@@ -114,7 +114,7 @@ def test_the_ant_stays_where_it_is_when_there_is_no_way_at_first(turtlebot: Robo
     task = dataclasses.replace(task, world=dataclasses.replace(lane, movers=(lid,)))
     # It gives way to nothing, so that nothing but its decisions keeps it.
     planner = load_planner("mmas-dstar")
-    log = run(Scenario(task=task, planner=planner, robot=turtlebot, yielding=None)).rollout
+    log = run(Scenario(task=task, planner=planner, robot=turtlebot, avoidance=None)).rollout
     assert log is not None
     assert np.ptp(log.pose[log.t < 4.0, 0]) < 0.01
     decisions = log.meta["replans"]
@@ -178,46 +178,57 @@ def rerouter(
     grid, answer = plan(s)
     route = smooth(answer, grid, task, kind="none" if s.timed else "clearance")
     made = ReplanMonitor(
-        ReplanPolicy(**settings), s.planner, grid, task, s.rng("replanner"), watch=Predictor(s.traffic, s.sees, 60), robot=robot,
-        controller=s.controller, margin=s.margin, kind="clearance", hz=60,
-    )  # fmt: skip
-    made.follows(answer, route)
+        ReplanPolicy(**settings),
+        s.planner,
+        grid,
+        task,
+        s.rng("replanner"),
+        predictor=Predictor(s.trajectories, s.effective_perception, 60),
+        robot=robot,
+        controller=s.controller,
+        margin=s.margin,
+        smoothing="clearance",
+        hz=60,
+    )
+    made.track(answer, route)
     return made, s.controller.guide(route, task.world, robot, s.margin, 1 / 60)
 
 
 def test_a_robot_that_is_off_its_route_has_strayed(turtlebot: RobotSpec) -> None:
-    made, guide = rerouter(ASIDE, robot=turtlebot)
-    assert made.cause(0, (1.5, 3.7, 0.0), False, guide, 0.5) == ""
-    assert made.cause(0, (1.5, 3.8, 0.0), False, guide, 0.5) == "strayed"
-    assert made.cause(0, (7.0, 3.3, 0.0), False, guide, guide.length - 0.1) == "", "(7, 3) is 0.3 m away, 0.1 m is left"
-    assert made.cause(0, (7.0, 3.4, 0.0), False, guide, guide.length - 0.1) == "strayed"
+    made, tracked = rerouter(ASIDE, robot=turtlebot)
+    assert made.trigger(0, (1.5, 3.7, 0.0), False, tracked, 0.5) == ""
+    assert made.trigger(0, (1.5, 3.8, 0.0), False, tracked, 0.5) == "strayed"
+    assert made.trigger(0, (7.0, 3.3, 0.0), False, tracked, tracked.length - 0.1) == "", (
+        "(7, 3) is 0.3 m away, 0.1 m is left"
+    )
+    assert made.trigger(0, (7.0, 3.4, 0.0), False, tracked, tracked.length - 0.1) == "strayed"
 
 
 def test_a_replan_from_where_the_robot_cannot_be_is_logged_as_failed(turtlebot: RobotSpec) -> None:
     made, _ = rerouter(ASIDE, robot=turtlebot)
-    assert made.again(0, (-1.0, 3.0, 0.0), "strayed") is None
+    assert made.replan(0, (-1.0, 3.0, 0.0), "strayed") is None
     assert [(replan.cause, replan.solved, replan.cost) for replan in made.log] == [("strayed", False, math.inf)]
 
 
 def test_it_rests_between_two_replans(turtlebot: RobotSpec) -> None:
-    made, guide = rerouter(PASSING, robot=turtlebot, pause=1.0, within=0.0)
+    made, tracked = rerouter(PASSING, robot=turtlebot, min_interval=1.0, obstruction_range=0.0)
     astray = (1.5, 3.8, 0.0)
-    assert made.again(0, astray, "strayed") is not None
-    assert [made.cause(tick, astray, False, guide, 0.5) for tick in (1, 59, 60)] == ["", "", "strayed"]
+    assert made.replan(0, astray, "strayed") is not None
+    assert [made.trigger(tick, astray, False, tracked, 0.5) for tick in (1, 59, 60)] == ["", "", "strayed"]
 
 
 def test_only_waiting_on_end_is_a_cause(turtlebot: RobotSpec) -> None:
-    made, guide = rerouter(ASIDE, robot=turtlebot, patience=2.0)
-    causes = [made.cause(tick, TASK.start, tick != 60, guide, 0.0) for tick in range(240)]
+    made, tracked = rerouter(ASIDE, robot=turtlebot, max_wait=2.0)
+    causes = [made.trigger(tick, TASK.start, tick != 60, tracked, 0.0) for tick in range(240)]
     assert causes.index("waited") == 61 + 120
-    never, guide = rerouter(ASIDE, robot=turtlebot, around=False)
-    assert not any(never.cause(tick, TASK.start, True, guide, 0.0) for tick in range(240))
+    never, tracked = rerouter(ASIDE, robot=turtlebot, around_movers=False)
+    assert not any(never.trigger(tick, TASK.start, True, tracked, 0.0) for tick in range(240))
 
 
 @pytest.mark.parametrize("planner", ["dstar-lite", "ants", "tangent"])
 def test_what_a_mover_has_left_is_free_again(planner: str, turtlebot: RobotSpec) -> None:
     made, _ = rerouter(PASSING, robot=turtlebot, planner=planner)
-    first, again = made.again(0, TASK.start, "obstructed"), made.again(360, TASK.start, "obstructed")
+    first, again = made.replan(0, TASK.start, "obstructed"), made.replan(360, TASK.start, "obstructed")
     assert first is not None
     assert again is not None
     beside = World("mover", HALL.bounds, (Disc(4.0, 3.0, 0.45),))
@@ -227,8 +238,8 @@ def test_what_a_mover_has_left_is_free_again(planner: str, turtlebot: RobotSpec)
 
 
 def test_only_a_robot_that_may_goes_round_movers(turtlebot: RobotSpec) -> None:
-    made, _ = rerouter(PASSING, robot=turtlebot, around=False)
-    straight = made.again(0, TASK.start, "strayed")
+    made, _ = rerouter(PASSING, robot=turtlebot, around_movers=False)
+    straight = made.replan(0, TASK.start, "strayed")
     assert straight is not None
     assert straight.length < 6.05
 
@@ -238,19 +249,19 @@ def test_a_mover_over_the_goal_does_not_close_the_way(planner: str, turtlebot: R
     """It may be gone by then, and else is given way to."""
     mover = Keyframed(radius=0.3, keyframes=((0.0, 7.1, 3.0), (100.0, 7.1, 3.01)), loop="once")
     made, _ = rerouter(mover, robot=turtlebot, planner=planner)
-    guide = made.again(0, TASK.start, "strayed")
-    assert guide is not None
-    assert guide.route.xy[-1] == pytest.approx(TASK.goal)
+    tracked = made.replan(0, TASK.start, "strayed")
+    assert tracked is not None
+    assert tracked.route.xy[-1] == pytest.approx(TASK.goal)
 
 
 def test_a_timed_plan_is_made_anew_from_where_the_robot_is_late(turtlebot: RobotSpec) -> None:
-    made, guide = rerouter(GATEKEEPER, robot=turtlebot, planner="sipp")
+    made, tracked = rerouter(GATEKEEPER, robot=turtlebot, planner="sipp")
     assert made.schedule is not None
     on_time = made.schedule.due(20.0)
-    place = (float(np.interp(on_time, guide.route.arc, guide.route.xy[:, 0])), 3.0, 0.0)
-    assert made.cause(1200, place, False, guide, on_time - LATE + 0.01) == ""
-    assert made.cause(1200, place, False, guide, on_time - LATE - 0.01) == "late"
-    assert made.again(1200, TASK.start, "late") is not None
+    place = (float(np.interp(on_time, tracked.route.arc, tracked.route.xy[:, 0])), 3.0, 0.0)
+    assert made.trigger(1200, place, False, tracked, on_time - MAX_LAG + 0.01) == ""
+    assert made.trigger(1200, place, False, tracked, on_time - MAX_LAG - 0.01) == "late"
+    assert made.replan(1200, TASK.start, "late") is not None
     assert made.schedule.t[0] == pytest.approx(20.0)
 
 
@@ -264,18 +275,18 @@ def test_a_schedule_is_late_only_when_behind(t: float, arc: float) -> None:
     schedule = Schedule.of(plan, route)
     due = float(plan.at(t)[0])
     assert schedule.due(t) == pytest.approx(due)
-    assert schedule.late(t, arc) == (due - arc > LATE)
+    assert schedule.late(t, arc) == (due - arc > MAX_LAG)
     if 4.0 < t < 7.5 and arc >= 2.0:
-        assert schedule.speed(t, arc) == 0.0
+        assert schedule.speed_limit(t, arc) == 0.0
 
 
 def test_a_command_is_held_no_harder_than_the_robot_brakes() -> None:
     fast = Twist(0.6, 0.3)
-    assert held(fast, fast, math.inf, 0.02) == fast
-    assert held(fast, fast, 0.0, 0.02) == pytest.approx(Twist(0.58, 0.29))
-    assert held(Twist(0.01, 0.3), Twist(0.01, 0.3), 0.0, 0.02).speed == 0.0
+    assert slow_down(fast, fast, math.inf, 0.02) == fast
+    assert slow_down(fast, fast, 0.0, 0.02) == pytest.approx(Twist(0.58, 0.29))
+    assert slow_down(Twist(0.01, 0.3), Twist(0.01, 0.3), 0.0, 0.02).speed == 0.0
 
 
 def test_nonsense_is_refused() -> None:
-    with pytest.raises(ValueError, match="patience: must be at least 0, got nan"):
-        ReplanPolicy(patience=math.nan)
+    with pytest.raises(ValueError, match="max_wait: must be at least 0 and finite, got nan"):
+        ReplanPolicy(max_wait=math.nan)

@@ -7,7 +7,7 @@ import pytest
 
 from antdrive.robots import RobotSpec, footprint_clearance
 from antdrive.sim import Engine
-from antdrive.sim.physics.engine import bullet, client
+from antdrive.sim.physics.bullet import bullet, client
 from antdrive.worlds import Disc, World
 
 OPEN = World("open", (-10, -10, 10, 10))
