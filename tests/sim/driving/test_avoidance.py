@@ -49,7 +49,7 @@ def test_what_would_be_hit_is_given_way_to(mover: Keyframed, turtlebot: RobotSpe
 
 
 def test_a_faster_mover_from_behind_is_let_past(turtlebot: RobotSpec) -> None:
-    blind, seeing = (among(OVERTAKING, robot=turtlebot, yielding=y) for y in (None, Avoidance()))
+    blind, seeing = (among(OVERTAKING, robot=turtlebot, avoidance=y) for y in (None, Avoidance()))
     assert blind.outcome is Outcome.COLLIDED
     assert seeing.succeeded, (seeing.outcome, seeing.reason)
 
@@ -90,12 +90,12 @@ def test_what_has_just_gone_by_may_turn_back(speed: float, t: float, turtlebot: 
     begin = t - 2.5 / speed
     frames = ((0.0, 4.6, 3.5 - speed * t),) if begin <= 0 else ((0.0, 4.6, 1.0), (begin, 4.6, 1.0))
     turns = keyframed(*frames, (t, 4.6, 3.5), (t + 4.0, 4.6, 3.5 - 4.0 * speed), radius=0.25)
-    trusting, wary = (among(turns, robot=turtlebot, yielding=y) for y in (Avoidance(wary=0.0), Avoidance()))
+    trusting, wary = (among(turns, robot=turtlebot, avoidance=y) for y in (Avoidance(wary=0.0), Avoidance()))
     assert trusting.outcome is Outcome.COLLIDED
     assert wary.succeeded, (wary.outcome, wary.reason)
     known = Perception(kind="motions")
     one, other = (
-        among(turns, robot=turtlebot, yielding=y, knowledge=known) for y in (Avoidance(wary=0.0), Avoidance())
+        among(turns, robot=turtlebot, avoidance=y, perception=known) for y in (Avoidance(wary=0.0), Avoidance())
     )
     assert one.rollout is not None
     assert other.rollout is not None
