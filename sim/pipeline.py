@@ -120,9 +120,12 @@ class Scenario:
         physics_hz: int = 240,
         control_hz: int = 60,
     ) -> Scenario:
-        """A scenario from names, files or objects. The settings after `options` are those of `Scenario`.
+        """A scenario from names, files or objects.
 
         >>> Scenario.of("forest", "aco-han", "jackal", options={"ants": 30}, noise=1.0, seed=2)
+
+        The settings margin, cell, smoothing, seed, controller, noise, perception, avoidance, replanning, unseen,
+        time_limit, physics_hz and control_hz are the fields of `Scenario`, which describes them.
 
         Args:
             world: a world of the catalogue, a world file, or a task
@@ -333,6 +336,7 @@ def run(
     """Plan and drive one scenario.
 
     Args:
+        s: the scenario
         planned: what `plan` returned for the scenario; None: plan first
         progress: is called with the fraction of the route that is done
     """

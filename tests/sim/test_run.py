@@ -1,21 +1,22 @@
 """The whole job: plan, drive, certify."""
 
+import inspect
 import json
 import math
 import subprocess
 import sys
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from antdrive.planners import Progress, keep_best, load_planner, watch
-from antdrive.robots import PurePursuit, RobotSpec
+from antdrive.robots import PurePursuit, RobotSpec, load_robot
 from antdrive.sim import Engine, Outcome, Run, Scenario, measure, run
 from antdrive.sim.driving.drive import drive
 from antdrive.sim.view.figures.plots import plan_figure
-from antdrive.worlds import Disc, InputError, Route, Task, World, list_worlds, load_task
+from antdrive.worlds import Disc, InputError, Route, Task, World, list_worlds, load_task, save_task
 
 
 def test_a_run_ends_at_the_goal_certified(small_run: Run) -> None:
@@ -252,12 +253,10 @@ def test_the_same_scenario_gives_the_same_bits_in_any_order(small_scenario: Scen
 
 
 def test_the_same_scenario_gives_the_same_bits_in_another_process(small_run: Run, tmp_path: Path) -> None:
-    from antdrive.worlds import save_task
-
     assert small_run.rollout is not None
     save_task(small_run.scenario.task, tmp_path / "small.yaml")
     code = (
-        "import sys; from sim import Scenario, run\n"
+        "import sys; from antdrive.sim import Scenario, run\n"
         "print(run(Scenario.of(sys.argv[1], 'astar', 'turtlebot')).rollout.digest)"
     )
     command = [sys.executable, "-c", code, str(tmp_path / "small.yaml")]
@@ -293,6 +292,35 @@ def test_settings_out_of_range_are_refused(small_scenario: Scenario) -> None:
         replace(small_scenario, margin=-0.1)
     with pytest.raises(InputError, match="did you mean"):
         Scenario.of("empti")
+
+
+def test_a_scenario_is_made_of_names_files_or_objects(tmp_path: Path) -> None:
+    task, robot, planner = load_task("empty"), load_robot("jackal"), load_planner("astar")
+    save_task(task, tmp_path / "copy.yaml")
+    of_objects = Scenario.of(task, planner, robot)
+    assert (of_objects.task, of_objects.planner, of_objects.robot) == (task, planner, robot)
+    assert of_objects.planner_name == ""
+    assert Scenario.of(tmp_path / "copy.yaml", "astar").task.goal == task.goal
+    assert Scenario.of("empty", "aco-han", options={"ants": 3}).planner == load_planner("aco-han", ants=3)
+    with pytest.raises(ValueError, match="options: need a planner's name"):
+        Scenario.of("empty", planner, options={"ants": 3})
+
+
+def test_a_scenario_made_of_names_has_the_same_defaults() -> None:
+    parameters = inspect.signature(Scenario.of).parameters
+    for setting in fields(Scenario):
+        if setting.name not in ("task", "planner", "robot", "planner_name"):
+            assert parameters[setting.name].default == setting.default, setting.name
+
+
+def test_metrics_of_a_run_without_a_rollout_say_why(small_run: Run) -> None:
+    assert small_run.metrics["spl"] == small_run.metric("spl")
+    with pytest.raises(ValueError, match=r"metric: unknown 'speed'; choose from path_length_m, .*spl"):
+        small_run.metric("speed")
+    nowhere = run(Scenario.of("no-path", "astar"))
+    for ask in (lambda: nowhere.metrics, lambda: nowhere.metric("spl")):
+        with pytest.raises(ValueError, match="no rollout: planning ended with no_path: "):
+            ask()
 
 
 def test_the_planner_does_not_see_what_is_unseen(small_run: Run, collided_run: Run) -> None:
