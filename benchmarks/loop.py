@@ -1,7 +1,7 @@
-"""What the drive loop costs beside bare physics: `make bench`.
+"""The cost of the drive loop compared with bare physics: `make bench`.
 
-The same world, robot and commands are stepped twice in turn: once by the whole loop (control, contacts, clearance, log), once by
-`stepSimulation` alone. Ratios are taken pair by pair within one run.
+The same world, robot and commands are stepped twice in turn: by the whole loop (control, contacts, clearance, log) and by
+`stepSimulation` alone. The table shows the median over all rounds of the ratio within a round.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ ROUNDS = 9
 
 
 def task_among(count: int) -> Task:
-    """A 20 m drive between `count` thin cylinders."""
+    """An 18 m drive among `count` thin cylinders."""
     rng = np.random.default_rng(0)
     discs: list[Disc] = []
     while len(discs) < count:
@@ -59,7 +59,7 @@ def main() -> None:
                 for _ in range(4):
                     p.stepSimulation(client)
             ended = time.perf_counter()
-            if turn:  # the first round warms up
+            if turn:  # the first round compiles and fills caches
                 loop[count].append((middle - started) / steps * 1e6)
                 bare[count].append((ended - before) / steps * 1e6)
     for count in engines:
