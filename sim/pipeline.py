@@ -36,6 +36,7 @@ from antdrive.sim.log.metrics import METRICS, measure
 from antdrive.sim.log.rollout import SCHEMA, Outcome, Rollout
 from antdrive.sim.physics.engine import Engine
 from antdrive.worlds import Disc, Grid, Route, Task, Trajectories, World, load_task, rasterise, task_to_dict
+from antdrive.worlds.drawing import LINE, card, world_svg
 
 CONTROLLER, PERCEPTION, AVOIDANCE, REPLANNING = PurePursuit(), Perception(), Avoidance(), ReplanPolicy()
 ROUTE_COLOUR = "#182242"  # of routes in notebooks
@@ -201,8 +202,6 @@ class Scenario:
         return np.random.default_rng([self.seed, zlib.crc32(purpose.encode())])
 
     def _repr_html_(self) -> str:
-        from antdrive.worlds.drawing import card, world_svg
-
         task = self.task
         facts = {
             "planner": _name(self),
@@ -297,8 +296,6 @@ class Run:
         }
 
     def _repr_html_(self) -> str:
-        from antdrive.worlds.drawing import LINE, card, world_svg
-
         s = self.scenario
         task = s.task
         facts: dict[str, object] = {"planner": _name(s), "robot": s.robot.name}
@@ -348,7 +345,7 @@ def run(
     limit = s.time_limit or s.task.time_limit or 30.0 + 10.0 * route.length / s.robot.max_speed
     started = time.perf_counter()
     noise = s.robot.noise.scaled(s.noise)
-    senses = Senses(noise, s.robot.track, 1 / s.control_hz, s.task.start, s.rng("noise")) if noise.loud else None
+    noise_model = Senses(noise, s.robot.track, 1 / s.control_hz, s.task.start, s.rng("noise")) if noise.loud else None
     trajectories = s.trajectories
     predictor = Predictor(trajectories, s.effective_perception, s.control_hz) if trajectories else None
     monitor = _monitor(s, grid, predictor)
@@ -362,7 +359,7 @@ def run(
             s.task,
             control_hz=s.control_hz,
             time_limit=limit,
-            senses=senses,
+            noise_model=noise_model,
             avoidance=s.effective_avoidance,
             predictor=predictor,
             monitor=monitor,

@@ -25,7 +25,7 @@ def drive(
     *,
     control_hz: int = 60,
     time_limit: float,
-    senses: Senses | None = None,
+    noise_model: Senses | None = None,
     avoidance: Avoidance | None = None,
     predictor: Predictor | None = None,
     monitor: ReplanMonitor | None = None,
@@ -40,7 +40,7 @@ def drive(
         task: start, goal and goal tolerance
         control_hz: control periods per simulated second; must divide the physics rate
         time_limit: simulated time after which the drive ends [s]
-        senses: the robot's noise in sensing and acting; None: the robot senses and acts perfectly
+        noise_model: the robot's errors in sensing and acting; None: the robot senses and acts perfectly
         avoidance: how the robot avoids the movers that `predictor` predicts; None: it does not
         predictor: predicts the movers; None: the robot does not perceive them
         monitor: finds new routes on the way; None: the robot keeps to its path
@@ -53,12 +53,12 @@ def drive(
     if rest or substeps < 1:
         raise ValueError(f"control_hz: must divide the physics rate {engine.physics_hz}, got {control_hz}")
     driver = Driver(controller, tracked, task, engine.robot, control_hz, avoidance, predictor, monitor)
-    log = Recorder(engine, task.start, noisy=senses is not None)
+    log = Recorder(engine, task.start, noisy=noise_model is not None)
     ending = Ending(Outcome.COLLIDED) if log.touched else None
     for tick in range(round(time_limit * control_hz)):
         if ending:
             break
-        ending = _control_period(tick, engine, driver, log, senses, substeps)
+        ending = _control_period(tick, engine, driver, log, noise_model, substeps)
         if progress is not None and tick % (control_hz // PROGRESS_HZ or 1) == 0:
             progress(driver.fraction)
     if log.touched:
@@ -68,17 +68,17 @@ def drive(
 
 
 def _control_period(
-    tick: int, engine: Engine, driver: Driver, log: Recorder, senses: Senses | None, substeps: int
+    tick: int, engine: Engine, driver: Driver, log: Recorder, noise_model: Senses | None, substeps: int
 ) -> Ending | None:
     """Sense, decide, act and log for one control period; how the drive ends in it, if it does."""
     pose = log.state.pose
-    if senses:
-        log.note_estimate(senses.look(pose, Twist(log.state.speed, log.state.yaw_rate)))
-        pose = senses.ahead()
+    if noise_model:
+        log.note_estimate(noise_model.look(pose, Twist(log.state.speed, log.state.yaw_rate)))
+        pose = noise_model.ahead()
     ending = driver.decide(tick, pose, log.state)
     if ending:
         return ending
-    engine.command(*(senses.act(driver.command) if senses else driver.command))
+    engine.command(*(noise_model.act(driver.command) if noise_model else driver.command))
     log.advance(substeps, driver.command, driver.pursuit.limiter)
     if log.touched:
         return Ending(Outcome.COLLIDED)

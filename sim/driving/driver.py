@@ -75,7 +75,7 @@ class Driver:
         predictor: Predictor | None,
         monitor: ReplanMonitor | None,
     ) -> None:
-        self.tracked, self.pursuit, self.command = tracked, Progress(), Twist(0.0, 0.0)
+        self.tracked, self.command, self.pursuit = tracked, Twist(0.0, 0.0), Progress()
         self._controller, self._task, self._robot, self._hz = controller, task, robot, control_hz
         self._avoidance, self._predictor, self._monitor = avoidance, predictor, monitor
         self._avoidance_state = AvoidanceState()

@@ -86,7 +86,7 @@ class Replan:
 
     Attributes:
         t: simulated time of the attempt [s]
-        cause: what triggered it
+        trigger: what caused it
         solved: whether a new route was found
         cost: length of the new plan [m]; inf without one
         work: the planner's work, in its own unit
@@ -95,7 +95,7 @@ class Replan:
     """
 
     t: float
-    cause: str
+    trigger: str
     solved: bool
     cost: float
     work: int
@@ -106,7 +106,7 @@ class Replan:
         """Plain values, for JSON. The wall time is left out, because it differs from run to run."""
         return {
             "t": self.t,
-            "cause": self.cause,
+            "cause": self.trigger,
             "solved": self.solved,
             "cost_m": self.cost if math.isfinite(self.cost) else None,
             "work": self.work,

@@ -207,7 +207,7 @@ def test_a_robot_too_far_off_its_route_has_strayed(turtlebot: RobotSpec) -> None
 def test_a_replan_from_an_impossible_pose_is_logged_as_failed(turtlebot: RobotSpec) -> None:
     made, _ = monitor_of(ASIDE, robot=turtlebot)
     assert made.replan(0, (-1.0, 3.0, 0.0), "strayed") is None
-    assert [(replan.cause, replan.solved, replan.cost) for replan in made.log] == [("strayed", False, math.inf)]
+    assert [(replan.trigger, replan.solved, replan.cost) for replan in made.log] == [("strayed", False, math.inf)]
 
 
 def test_two_replans_are_at_least_the_minimum_interval_apart(turtlebot: RobotSpec) -> None:
