@@ -1,8 +1,10 @@
-"""How well paths are driven: `python -m benchmarks.drives [--worlds N] [--jobs N] [--barn FOLDER] [TABLE ...]`.
+"""Drives by planner, smoothing and noise: `python -m benchmarks.drives [--worlds N] [--jobs N] [TABLE ...]`.
 
-Tables: barn (the BARN challenge's worlds, by planner, smoothing and noise), forests (random worlds; every failure is listed with
-its seed) and smooth (how much longer taut routes are than the exact optimum). `barn` needs the folder or archive of BARN's
-worlds.
+Tables:
+
+- barn: the BARN challenge's worlds, by planner, smoothing and noise; needs their folder or archive (`--barn`)
+- forests: random worlds; every failure is listed with its seed
+- smooth: how much longer taut routes are than the exact optimum
 """
 
 from __future__ import annotations

@@ -1,7 +1,10 @@
 """Drives among movers: `python -m benchmarks.dynamic [--quick] [--jobs N] [--dynabarn FILE] [TABLE ...]`.
 
-Tables: dynabarn (ten DynaBARN worlds, each started at ten moments, by what the robot may do), random (worlds with 1 to 10
-movers as fast as the robot; every failure is listed with its seed) and hasan (the cases of hasan's paper, driven).
+Tables:
+
+- dynabarn: ten DynaBARN worlds, each started at ten moments, by what the robot may do
+- random: worlds with 1 to 10 movers as fast as the robot; every failure is listed with its seed
+- hasan: the cases of hasan's paper, driven
 """
 
 from __future__ import annotations
@@ -149,7 +152,7 @@ def dynabarn(jobs: int, source: Path, quick: bool) -> Iterator[str]:
 
 
 def random_task(seed: int) -> tuple[Task, int]:
-    """A square hall of 10 m with 8 columns and 1 to 10 movers, at most as fast as the turtlebot; and how many movers."""
+    """A hall of 10 m with 8 columns and 1 to 10 movers, at most as fast as the turtlebot; the number of movers."""
     rng = np.random.default_rng([seed, 77])
     start, goal = (1.0, 1.0, 0.785), (9.0, 9.0)
     count, fastest = int(rng.integers(1, 11)), load_robot("turtlebot").max_speed

@@ -1,7 +1,8 @@
 """The cost of the drive loop compared with bare physics: `make bench`.
 
-The same world, robot and commands are stepped twice in turn: by the whole loop (control, contacts, clearance, log) and by
-`stepSimulation` alone. The table shows the median over all rounds of the ratio within a round.
+The same world, robot and commands are stepped twice in turn: by the whole loop (control, contacts,
+clearance, log) and by `stepSimulation` alone. The table shows the median over all rounds of the ratio
+within a round.
 """
 
 from __future__ import annotations

@@ -1,10 +1,11 @@
-"""hasan's six cases with moving obstacles, cell by cell: `python -m benchmarks.moving [--seeds N]`. Prints Markdown.
+"""hasan's six cases with movers, cell by cell: `python -m benchmarks.moving [--seeds N]`. Prints Markdown.
 
-The environments are recreated (`antdrive.sim.papers.maps`) with the paper's start and goal. The paper has one mover; here 1
-and 10 start on random free cells. In every step each mover goes to a random free neighbouring cell other than the robot's,
-then the robot decides. With the same seed, movers go the same way for every planner until they meet the robot. `mmas-dstar`
-uses one rule for its exponents in all cases; the table shows the exponents that the paper chose for each case. The total
-cost is defined as in the paper: the cost-to-go in cells, summed over all cells visited.
+The environments are recreated (`antdrive.sim.papers.maps`) with the paper's start and goal. The paper has
+one mover; here 1 and 10 start on random free cells. In every step each mover goes to a random free
+neighbouring cell other than the robot's, then the robot decides. With the same seed, movers go the same way
+for every planner until they meet the robot. `mmas-dstar` uses one rule for its exponents in all cases; the
+table shows the exponents that the paper chose for each case. The total cost is defined as in the paper: the
+cost-to-go in cells, summed over all cells visited.
 """
 
 from __future__ import annotations
@@ -51,14 +52,14 @@ class Strollers:
         for n, (r, c) in enumerate(self._cells):
             moves = int(self._grid.moves[r, c])
             near = [(r + dr, c + dc) for k, (dr, dc) in enumerate(DIRECTIONS) if moves >> k & 1]
-            draw = self._rng.random()  # one number per step, so that the robot does not change the movers' sequence
+            draw = self._rng.random()  # one number per step, whatever the robot does
             near = [cell for cell in near if cell != robot and cell not in self._cells]
             if near:
                 self._cells[n] = near[int(draw * len(near))]
 
 
 def drive(robot: OnlinePlanner, query: Query, movers: Strollers, limit: int = 5000) -> bool:
-    """Step until the goal is reached; whether it was reached within `limit` decisions. Moves into movers are refused."""
+    """Whether the robot reaches the goal within `limit` decisions. A move into a mover fails the benchmark."""
     for _ in range(limit):
         if robot.arrived:
             return True

@@ -125,8 +125,8 @@ class Scenario:
 
         >>> Scenario.of("forest", "aco-han", "jackal", options={"ants": 30}, noise=1.0, seed=2)
 
-        The settings margin, cell, smoothing, seed, controller, noise, perception, avoidance, replanning, unseen,
-        time_limit, physics_hz and control_hz are the fields of `Scenario`, which describes them.
+        The settings margin, cell, smoothing, seed, controller, noise, perception, avoidance, replanning,
+        unseen, time_limit, physics_hz and control_hz are the fields of `Scenario`, which describes them.
 
         Args:
             world: a world of the catalogue, a world file, or a task
@@ -182,15 +182,15 @@ class Scenario:
 
     @property
     def effective_perception(self) -> Perception:
-        """What the robot knows of movers. A planner that is given their motions implies that the robot knows them too."""
+        """What the robot perceives of movers: their motions, if the planner is given them."""
         return Perception(kind="motions") if self.timed else self.perception
 
     @property
     def effective_avoidance(self) -> Avoidance | None:
         """How the robot avoids movers, given what it knows of them.
 
-        Movers whose motions are known do not turn back unexpectedly, so reversals are not considered. A timed plan has
-        avoided the movers already, so the horizon is short.
+        Movers whose motions are known do not turn back unexpectedly, so reversals are not considered. A
+        timed plan has avoided the movers already, so the horizon is short.
         """
         if self.avoidance is None or self.effective_perception.kind != "motions":
             return self.avoidance

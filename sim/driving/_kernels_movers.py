@@ -9,7 +9,7 @@ from antdrive.worlds._kernels import Array, kernel
 
 @kernel
 def lower_by_movers(poses: Array, footprint: Array, movers: Array, radii: Array, clearance: Array) -> None:
-    """Lower clearance[i] to the distance from the footprint at poses[i] to the nearest mover at movers[i] (M, 2).
+    """Lower clearance[i] to the distance from the footprint at poses[i] to the nearest of movers[i] (M, 2).
 
     `footprint` holds half length, half width and rounding of a rounded rectangle.
     """

@@ -18,8 +18,8 @@ MIN_RADIUS = 0.01  # smaller discs are left out [m]
 def covered_discs(predictor: Predictor, tick: int, ends: Floats, duration: float, grid: Grid) -> list[Disc]:
     """The discs that movers cover within `duration` [s] of a tick.
 
-    Discs are made smaller where an end (N, 2) [m] would lie within the inflation around them: movers close neither end.
-    The first of the ends is the robot's position.
+    Discs are made smaller where an end (N, 2) [m] would lie within the inflation around them: movers close
+    neither end. The first of the ends is the robot's position.
     """
     x, y = ends[0].tolist()
     times = np.linspace(0.0, duration, 1 + math.ceil(duration / STEP))

@@ -20,7 +20,7 @@ AT_CELL = 0.25  # a robot this close to its cell's centre, in cells, need not dr
 
 
 class CellwiseMonitor(ReplanMonitor):
-    """Drives a robot that decides on one cell after the other; its route never goes beyond the cell decided on."""
+    """Monitors a robot that decides cell by cell: its route never goes beyond the next cell."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -34,7 +34,7 @@ class CellwiseMonitor(ReplanMonitor):
         return not self._online.arrived
 
     def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
-        """A decision is due before the end of the last one is reached, and repeatedly while the robot waits."""
+        """A decision is due shortly before the robot reaches its cell, and repeatedly while it waits."""
         if tick == 0:
             return DECISION
         if self._online.arrived or tick / self._hz - self._replanned_at < DECISION_PAUSE:

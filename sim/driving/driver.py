@@ -85,7 +85,7 @@ class Driver:
 
     @property
     def stuck(self) -> bool:
-        """Whether the robot has made no progress for too long; turning on the spot may take a full turn longer."""
+        """Whether the robot has made no progress for too long; turning may take a full turn longer."""
         clock = self._clock
         return clock.driving >= self._patience or clock.turning >= self._patience + self._full_turn
 
@@ -114,13 +114,14 @@ class Driver:
             stopping = before.limiter == AVOIDING and self._stops_at_goal(pose, last)
             if stopping and _standing(state):
                 return self._arrival(state)
-            self._avoid_movers(self._avoidance, self._predictor, tick, pose, last, before, speed_limit, stopping)
+            self._avoid_movers(tick, pose, last, before, speed_limit, stopping)
         ending = self._end_of_route(tick, pose, state)
         waiting = self.pursuit.limiter == AVOIDING or speed_limit < WAITING_SPEED
         self._clock = self._clock.after(self.pursuit, waiting)
         return ending
 
     def _replan_if_triggered(self, tick: int, pose: Pose, state: State) -> None:
+        """Go on along a new path, if one is due and there is one."""
         assert self._monitor is not None
         waiting = self.pursuit.limiter == AVOIDING and abs(state.speed) < WAITING_SPEED
         trigger = self._monitor.trigger(tick, pose, waiting, self.tracked, self.pursuit.arc)
@@ -128,7 +129,7 @@ class Driver:
             self._follow(self._monitor.replan(tick, pose, trigger))
 
     def _follow(self, tracked: TrackedPath | None) -> bool:
-        """Go on along a new path, if there is one; whether there is."""
+        """Go on along a new path; whether there is one."""
         if tracked is None:
             return False
         self.tracked, self.pursuit = tracked, Progress(limiter=self.pursuit.limiter)
@@ -136,7 +137,7 @@ class Driver:
         return True
 
     def _keep_to_schedule(self, tick: int, last: Twist) -> float:
-        """Slow the command down to the schedule, if there is one; the speed that the schedule allows [m/s]."""
+        """Slow the command down to the schedule, if there is one. Returns the speed that it allows [m/s]."""
         schedule = self._monitor.schedule if self._monitor is not None else None
         if schedule is None:
             return math.inf
@@ -145,23 +146,18 @@ class Driver:
         return limit
 
     def _avoid_movers(
-        self,
-        avoidance: Avoidance,
-        predictor: Predictor,
-        tick: int,
-        pose: Pose,
-        last: Twist,
-        before: Progress,
-        speed_limit: float,
-        stopping: bool,
+        self, tick: int, pose: Pose, last: Twist, before: Progress, speed_limit: float, stopping: bool
     ) -> None:
-        """Replace the command where movers come too close; `stopping`: brake for the goal, which is near enough."""
+        """Replace the command where movers come too close. A robot that is `stopping` brakes for the goal."""
+        avoidance = self._avoidance
+        assert avoidance is not None
+        assert self._predictor is not None
         ahead = avoidance.ahead
         if stopping:
             self.command = _brake(last, self._robot, self._hz)
             # A robot that stands at the goal has arrived, so only the time until it stands matters.
             ahead = ahead[: 2 + math.ceil(_stopping_time(last, self._robot) / avoidance.step)]
-        movers, radii = predictor.predict(tick, pose[:2], ahead)
+        movers, radii = self._predictor.predict(tick, pose[:2], ahead)
         self.command, avoids, self._avoidance_state = avoidance.avoid(
             self.tracked,
             self._robot,
@@ -184,8 +180,8 @@ class Driver:
             return None
         ending, monitor, task = self._arrival(state), self._monitor, self._task
         # A robot that estimates to be at the goal does not know that it missed it, and stays.
-        missed = ending.outcome is not Outcome.SUCCEEDED and math.dist(pose[:2], task.goal) > task.goal_tolerance
-        if monitor is None or not missed:
+        knows = math.dist(pose[:2], task.goal) > task.goal_tolerance
+        if monitor is None or ending.outcome is Outcome.SUCCEEDED or not knows:
             return ending
         if self._follow(monitor.replan(tick, pose, MISSED)) or monitor.may_wait:
             return None

@@ -20,9 +20,9 @@ class Perception:
     """What the robot perceives of movers in every control period, without error.
 
     Attributes:
-        kind: `positions`: where movers are; the robot predicts that they stay there. `velocities`: their velocities too;
-            the robot predicts constant velocity. `motions`: their positions at any time, turns and teleports included;
-            the prediction is exact.
+        kind: `positions`: where movers are; the robot predicts that they stay there. `velocities`: their
+            velocities too; the robot predicts constant velocity. `motions`: their positions at any time,
+            turns and teleports included; the prediction is exact.
         range: movers are perceived if their surface is within this distance of the robot's centre [m]
 
     Raises:

@@ -74,7 +74,7 @@ class Recorder:
         self._rows: list[tuple[float, ...]] = [(*self.state, 0.0, 0.0, 0)]
         self._contacts: list[tuple[float, ...]] = []
         self._add_contacts(engine.contacts())
-        # The errors of the estimate, a row each: between two measurements the estimate moves along with the robot.
+        # The error of the estimate in each row. Between two measurements it stays the same.
         self._errors: list[tuple[float, float, float]] | None = [(0.0, 0.0, 0.0)] if noisy else None
 
     @property
@@ -105,7 +105,7 @@ class Recorder:
         """The whole log. A collision is attributed to the robot or to the mover."""
         engine, rows = self._engine, np.array(self._rows)
         t = np.arange(len(rows)) / engine.physics_hz
-        pose, twist, command = (np.ascontiguousarray(rows[:, k]) for k in (slice(0, 3), slice(3, 5), slice(5, 7)))
+        pose, twist = np.ascontiguousarray(rows[:, :3]), np.ascontiguousarray(rows[:, 3:5])
         clearance = footprint_clearance(engine.world, engine.robot.footprint, pose)
         movers = np.empty((len(t), 0, 2))
         contacts = np.array(self._contacts, dtype=np.float64).reshape(-1, 4)
@@ -122,7 +122,7 @@ class Recorder:
             t=t,
             pose=pose,
             twist=twist,
-            command=command,
+            command=np.ascontiguousarray(rows[:, 5:7]),
             clearance=clearance,
             limiter=rows[:, 7].astype(np.uint8),
             movers=movers,

@@ -2,8 +2,8 @@
 
 How a planner replans:
 
-- Most planners use their own replanner on the grid. Cells that movers will cover soon are blocked, grown exactly as the
-  grid's obstacles are; cells that movers have left are cleared.
+- Most planners use their own replanner on the grid. Cells that movers will cover soon are blocked, grown
+  exactly as the grid's obstacles are; cells that movers have left are cleared.
 - Planners that need the world plan again in a world with discs in the movers' places.
 - Planners in space and time plan again when the robot is late.
 - Cell-by-cell planners decide on one cell after the other, see `cellwise`.
@@ -52,12 +52,13 @@ class ReplanPolicy:
     """When the robot looks for a new route.
 
     Attributes:
-        around_movers: movers count as obstacles; otherwise the robot replans only after it has strayed from its route
+        around_movers: movers count as obstacles; otherwise the robot replans only after it has strayed from
+            its route
         obstruction_range: replan when a mover is predicted on the route within this distance ahead [m]
         max_wait: replan when the robot has waited for movers for this long [s]
         max_deviation: replan when the robot is farther off its route than this [m]
-        max_shortfall: replan when the straight-line distance to the route's end exceeds the remaining route by this
-            much [m]
+        max_shortfall: replan when the straight-line distance to the route's end exceeds the remaining route
+            by this much [m]
         min_interval: the shortest time between two replans [s]
         prediction_time: whatever movers are predicted to cover within this time is blocked [s]
 
@@ -122,7 +123,8 @@ class ReplanMonitor:
     Attributes:
         policy: when to replan
         log: the attempts so far
-        schedule: where the robot should be at each time; None unless the route comes from a plan in space and time
+        schedule: where the robot should be at each time; None unless the route comes from a plan in space
+            and time
 
     Args:
         margin: distance kept free around the robot, on top of its radius [m]
@@ -241,7 +243,7 @@ class ReplanMonitor:
         )
 
     def _plan(self, task: Task, discs: list[Disc]) -> PlanResult:
-        """A plan around discs: by the planner itself if it needs the world, else by its replanner on the grid."""
+        """A plan around discs: by the planner itself if it needs the world, else by its replanner."""
         if getattr(self._planner, "needs_world", False):
             around = with_obstacles(task, discs)
             grid = rasterise(around.world, self._grid.cell, self._grid.inflate)

@@ -35,7 +35,7 @@ class Schedule:
         return cls(np.stack([plan.arrive, plan.leave], axis=1).ravel(), np.repeat(share * route.length, 2))
 
     def due(self, t: float) -> float:
-        """The distance along the route where the robot should be at time `t` [s] [m]."""
+        """How far along the route [m] the robot should be at time `t` [s]."""
         return float(np.interp(t, self.t, self.arc))
 
     def late(self, t: float, arc: float) -> bool:
@@ -43,7 +43,7 @@ class Schedule:
         return self.due(t) - arc > MAX_LAG
 
     def speed_limit(self, t: float, arc: float) -> float:
-        """The speed [m/s] at which a robot at distance `arc` [m] at time `t` [s] does not get ahead; inf at the end."""
+        """The speed [m/s] that keeps a robot at `arc` [m] from getting ahead at time `t` [s]; inf at the end."""
         if t + LOOKAHEAD >= self.t[-1]:
             return math.inf
         return max(0.0, self.due(t + LOOKAHEAD) - arc) / LOOKAHEAD

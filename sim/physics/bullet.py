@@ -8,7 +8,8 @@ import os
 from collections.abc import Iterator
 from typing import Any
 
-# Collision groups. The chassis meets obstacles and walls only, so its contact list is exactly the list of collisions.
+# Collision groups. The chassis meets obstacles and walls only, so its contact list is exactly the list of
+# collisions.
 GROUND, WHEELS, CHASSIS, OBSTACLE = 1, 2, 4, 8
 
 

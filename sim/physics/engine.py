@@ -1,7 +1,7 @@
 """A world and a robot in physics: place, command, step, state, contacts.
 
-Obstacles are sleeping maximal-coordinate bodies, so 400 of them were measured to cost hardly more than ten. Collision
-groups let the chassis meet obstacles, movers and walls only; the wheels meet only the floor.
+Obstacles are sleeping maximal-coordinate bodies, so 400 of them were measured to cost hardly more than ten.
+Collision groups let the chassis meet obstacles, movers and walls only; the wheels meet only the floor.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import math
 import os
 import tempfile
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -23,6 +23,8 @@ from antdrive.sim.physics.urdf import CASTER_GAP, robot_urdf
 from antdrive.worlds.trajectories import Trajectories
 from antdrive.worlds.world import Floats, Pose, World
 
+Point3: TypeAlias = tuple[float, float, float]  # [m]
+
 MIN_HEIGHT = 0.05  # of obstacles: the chassis hangs 5 mm above the floor and must not pass over anything [m]
 SETTLING_TIME = 0.1  # in which a placed robot sinks onto its wheels [s]
 TOUCHING_DISTANCE = 1e-4  # surfaces closer than this touch [m]
@@ -33,8 +35,8 @@ class Contact(NamedTuple):
     """The robot's chassis touching something at one physics step.
 
     Attributes:
-        obstacle: what is touched; indices count the world's obstacles, then its movers, then the walls in the order left,
-            right, bottom, top
+        obstacle: what is touched; indices count the world's obstacles, then its movers, then the walls in
+            the order left, right, bottom, top
         distance: distance of the surfaces [m]; negative where they overlap
         force: normal force [N]
     """
@@ -131,7 +133,8 @@ class Engine:
     def place(self, pose: Pose) -> None:
         """Put the robot at a pose, at rest on its wheels, and restart the movers at time 0.
 
-        If the robot overlaps an obstacle, settling is skipped: the solver would push it out before contacts are checked.
+        If the robot overlaps an obstacle, settling is skipped: the solver would push it out before contacts
+        are checked.
         """
         p, x, y, yaw = self._p, *pose
         height = self.robot.wheel_radius + CASTER_GAP - self._com_drop
@@ -185,7 +188,8 @@ class Engine:
         p = self._p
         (x, y, _), (qx, qy, qz, qw) = p.getBasePositionAndOrientation(self._robot, self._client)
         (vx, vy, _), (_, _, yaw_rate) = p.getBaseVelocity(self._robot, self._client)
-        # PyBullet reports the centre of mass, which hangs below the axle: subtract the offset along the tilted z axis.
+        # PyBullet reports the centre of mass, which hangs below the axle: subtract the offset along the
+        # tilted z axis.
         x += 2.0 * (qx * qz + qw * qy) * self._com_drop
         y += 2.0 * (qy * qz - qw * qx) * self._com_drop
         yaw = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
@@ -203,7 +207,8 @@ class Engine:
         return np.array(found, dtype=np.float64).reshape(-1, 2)
 
     def _touching(self, points: Sequence[Any]) -> list[Contact]:
-        # Bullet also lists points some millimetres apart. A pressing contact may read 0.05 mm apart, but has a force.
+        # Bullet also lists points some millimetres apart. A pressing contact may read 0.05 mm apart, but
+        # has a force.
         return [
             Contact(self._obstacles[point[2]], point[8], point[9])
             for point in points
@@ -241,7 +246,7 @@ class Engine:
             group, mask = (CHASSIS, OBSTACLE) if link == -1 else (WHEELS, GROUND)
             p.setCollisionFilterGroupMask(self._robot, link, group, mask, physicsClientId=self._client)
 
-    def _build_obstacle(self, shape: int, centre: tuple[float, float, float]) -> None:
+    def _build_obstacle(self, shape: int, centre: Point3) -> None:
         p = self._p
         body = p.createMultiBody(0, shape, basePosition=centre, useMaximalCoordinates=1, physicsClientId=self._client)
         p.changeDynamics(body, -1, activationState=p.ACTIVATION_STATE_SLEEP, physicsClientId=self._client)
@@ -249,7 +254,7 @@ class Engine:
         self._obstacles[body] = len(self._obstacles)
 
 
-def _walls(world: World, height: float) -> Iterator[tuple[tuple[float, float, float], tuple[float, float, float]]]:
+def _walls(world: World, height: float) -> Iterator[tuple[Point3, Point3]]:
     """Half extents and centres of the walls [m]: left, right, bottom, top."""
     xmin, ymin, xmax, ymax = world.bounds
     width, depth = world.size

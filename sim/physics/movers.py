@@ -1,7 +1,7 @@
 """Bodies of moving obstacles in physics.
 
-Movers are massless multibodies with a velocity: PyBullet integrates the velocity exactly, nothing slows them down, and
-the solver pushes the robot away from them instead of letting it sink in.
+Movers are massless multibodies with a velocity: PyBullet integrates the velocity exactly, nothing slows
+them down, and the solver pushes the robot away from them instead of letting it sink in.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ SAME_VELOCITY = 1e-10  # velocities closer than this differ by rounding only [m/
 CHUNK = 480  # physics steps whose velocities are computed at once
 PARKED = (0.0, 0.0, -1e3)  # a place where bodies meet nothing [m]
 
-Change: TypeAlias = tuple[int, float, float, tuple[float, float] | None]  # mover, vx, vy [m/s], position to jump to [m]
+#: A mover's index, its velocity x and y [m/s], and a position to set first [m]
+Change: TypeAlias = tuple[int, float, float, tuple[float, float] | None]
 
 
 class MoverBodies:
@@ -80,7 +81,7 @@ class _Chunk(NamedTuple):
 
     @classmethod
     def of(cls, trajectories: Trajectories, hz: int, first: int) -> _Chunk:
-        """The steps from `first` on. The first step sets every velocity; later steps only those that change."""
+        """The steps from `first` on. The first step sets all velocities, later steps those that change."""
         t = np.arange(first, first + CHUNK + 2) / hz
         positions = trajectories.positions(t)
         velocity = np.diff(positions, axis=0) * hz

@@ -1,7 +1,7 @@
 """The robot's URDF description for the physics engine.
 
-Sphere wheels roll within 0.01 % of the commanded twist; URDF cylinders were measured to be off by 5 %. The casters hang
-0.5 mm above the floor, because coplanar casters would carry most of the weight.
+Sphere wheels roll within 0.01 % of the commanded twist; URDF cylinders were measured to be off by 5 %. The
+casters hang 0.5 mm above the floor, because coplanar casters would carry most of the weight.
 """
 
 from __future__ import annotations
