@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from antdrive.sim.log.rollout import Rollout
-from antdrive.sim.physics.engine import client
+from antdrive.sim.physics.bullet import client
 from antdrive.sim.pipeline import Scenario, run
 from antdrive.sim.view.film.camera import camera_for
 from antdrive.sim.view.film.model import robot_parts

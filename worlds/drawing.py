@@ -7,12 +7,16 @@ from collections.abc import Iterable, Mapping
 from html import escape
 from typing import TYPE_CHECKING
 
+import numpy as np
+import numpy.typing as npt
+
 from antdrive.worlds.world import Floats, Pose, World
 
 if TYPE_CHECKING:
     from antdrive.worlds.world import Task
 
 WIDE = 420  # the longer side of a drawing [px]
+MAX_DRAWN = 200  # cells along the longer side of a drawn grid; more would make notebooks slow
 OBSTACLE, WALL, START, GOAL, LINE = "#7988a0", "#c4cbd5", "#345cbe", "#008a5c", "#ff7a0e"
 
 
@@ -55,6 +59,23 @@ def path_svg(points: Floats, wide: int = 240) -> str:
         for (x, y), colour in ((points[0], START), (points[-1], GOAL))
     ]
     return _svg((float(x0), float(y0), float(x1), float(y1)), [line, *ends], wide)
+
+
+def cells_svg(free: npt.NDArray[np.bool_]) -> str:
+    """The blocked cells of a grid (R, C) as SVG, rows upwards. Large grids are drawn coarser."""
+    coarse = -(-max(free.shape) // MAX_DRAWN)
+    blocked = np.pad(~free, [(0, -side % coarse) for side in free.shape], constant_values=False)
+    rows, cols = blocked.shape[0] // coarse, blocked.shape[1] // coarse
+    blocked = np.any(blocked.reshape(rows, coarse, cols, coarse), axis=(1, 3)).reshape(rows, cols)
+    parts = [f'<rect x="0" y="0" width="{cols}" height="{rows}" fill="#f3f5f8" stroke="{WALL}" stroke-width="0.1"/>']
+    edges = np.diff(np.pad(blocked, ((0, 0), (1, 1))).astype(np.int8), axis=1)
+    runs = [
+        f"M{start} {row}h{end - start}v1h{start - end}z"
+        for row, steps in enumerate(edges)
+        for start, end in zip(np.flatnonzero(steps > 0).tolist(), np.flatnonzero(steps < 0).tolist(), strict=True)
+    ]
+    parts.append(f'<path d="{"".join(runs)}" fill="{OBSTACLE}"/>')
+    return _svg((0.0, 0.0, float(cols), float(rows)), parts, WIDE)
 
 
 def curve_svg(values: Floats, wide: int = 240, high: int = 90) -> str:

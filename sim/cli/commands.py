@@ -104,8 +104,8 @@ def run(
     scenario = _scenario(
         world, planner, settings, robot, seed=seed, margin=margin, cell=cell, smoothing=smoothing, noise=noise,
         time_limit=time_limit,
-        unseen=tuple(_disc(text) for text in unseen or ()), knowledge=_knowledge(sees),
-        **({} if yields else {"yielding": None}), replanning=ReplanPolicy(around=replan),
+        unseen=tuple(_disc(text) for text in unseen or ()), perception=_knowledge(sees),
+        **({} if yields else {"avoidance": None}), replanning=ReplanPolicy(around_movers=replan),
     )  # fmt: skip
     folder = out or Path("out") / _slug(scenario)
     if gui:
@@ -804,7 +804,7 @@ def _knowledge(text: str) -> Perception:
     except ValueError:
         raise InputError(f"--sees {text}: write WHAT or WHAT:METRES, such as positions:3") from None
     try:
-        return Perception(told=told, reach=reach)  # type: ignore[arg-type]
+        return Perception(kind=told, range=reach)  # type: ignore[arg-type]
     except ValueError as error:
         raise InputError(f"--sees {text}: {error}") from None
 

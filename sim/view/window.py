@@ -9,7 +9,7 @@ import time
 import numpy as np
 
 from antdrive.sim.log.rollout import Rollout
-from antdrive.sim.physics.engine import bullet
+from antdrive.sim.physics.bullet import bullet
 from antdrive.sim.view.film.model import robot_parts
 from antdrive.sim.view.film.replay import Replay
 from antdrive.sim.view.film.stage import drawn_height, grouped, part_pose, still_pieces

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from antdrive.sim.physics.engine import client
+from antdrive.sim.physics.bullet import client
 from antdrive.sim.view.film import _kernels_paint as kernels
 from antdrive.sim.view.film import stage as staging
 from antdrive.sim.view.film.camera import CAMERAS, Camera, camera_for
