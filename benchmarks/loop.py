@@ -39,7 +39,7 @@ def main() -> None:
         task = task_among(count)
         x = np.linspace(1, 19, 73)
         route = Route(np.stack([x, 10 + 0.4 * np.sin((x - 1) * np.pi / 3)], axis=1))
-        guide = controller.guide(route, task.world, robot, 0.05, 1 / 60)
+        guide = controller.prepare(route, task.world, robot, 0.05, 1 / 60)
         engines[count] = (Engine(task.world, robot).__enter__(), task, guide)
     bare: dict[int, list[float]] = {count: [] for count in engines}
     loop: dict[int, list[float]] = {count: [] for count in engines}

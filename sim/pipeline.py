@@ -94,7 +94,7 @@ class Scenario:
         if self.yielding is None or self.sees.told != "motions":
             return self.yielding
         horizon = min(self.yielding.horizon, 1.0) if self.timed else self.yielding.horizon
-        return dataclasses.replace(self.yielding, wary=0.0, horizon=horizon)
+        return dataclasses.replace(self.yielding, reversal_weight=0.0, horizon=horizon)
 
     def rng(self, purpose: str) -> np.random.Generator:
         """A stream of random numbers of its own for each purpose, from the one seed."""
@@ -190,7 +190,7 @@ def run(
     if not answer.solved:
         return Run(s, grid, answer)
     route = smooth(answer, grid, s.task, kind="none" if s.timed else s.smoothing)
-    guide = s.controller.guide(route, s.task.world, s.robot, s.margin, 1 / s.control_hz, s.task.goal_tolerance)
+    guide = s.controller.prepare(route, s.task.world, s.robot, s.margin, 1 / s.control_hz, s.task.goal_tolerance)
     limit = s.time_limit or s.task.time_limit or 30.0 + 10.0 * route.length / s.robot.max_speed
     started = time.perf_counter()
     noise = s.robot.noise.scaled(s.noise)

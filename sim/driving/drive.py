@@ -13,8 +13,8 @@ from antdrive.robots import (
     LIMITERS,
     Avoidance,
     AvoidanceState,
-    Progress,
     PurePursuit,
+    PursuitState,
     RobotSpec,
     Senses,
     TrackedPath,
@@ -33,7 +33,7 @@ from antdrive.worlds import Floats, Pose, Task, Trajectories
 STOPPED_SPEED = 0.01  # slower than this counts as standing [m/s]
 STUCK_AFTER = 8.0  # without progress for this long the robot is stuck [s]
 STUCK_PROGRESS = 0.02  # what counts as progress along the route [m]
-YIELD = LIMITERS.index("yield")
+YIELD = LIMITERS.index("avoid")
 SLOW = 0.1  # a robot that yields and is no faster waits [m/s]
 AFTER_CONTACT = 0.5  # a collision stays in the log for this long, braking [s]
 
@@ -87,7 +87,7 @@ def drive(
     errors = [(0.0, 0.0, 0.0)]  # of the belief, a row each: it moves with the robot between two looks
     contacts = [(0, *contact) for contact in engine.contacts()]
     outcome = Outcome.COLLIDED if contacts else None
-    command, state = Twist(0.0, 0.0), Progress()
+    command, state = Twist(0.0, 0.0), PursuitState()
     best, idle, turned = 0.0, 0, 0  # the farthest on the route, and periods since then without and with turning
     resolve = AvoidanceState()
     reason = ""
@@ -108,7 +108,7 @@ def drive(
             cause = rerouter.cause(tick, believed, waits, guide, state.arc)
             renewed = rerouter.again(tick, believed, cause) if cause else None
             if renewed:
-                guide, state, best = renewed, Progress(limiter=state.limiter), 0.0
+                guide, state, best = renewed, PursuitState(limiter=state.limiter), 0.0
         last, before = command, state
         command, state = controller.step(guide, believed, last, before)
         schedule, top = rerouter.schedule if rerouter else None, math.inf
@@ -123,10 +123,12 @@ def drive(
                     break
                 command = _brake(last, engine.robot, control_hz)
             # Once it stands there it has arrived: then only what comes until that matters.
-            ahead = yielding.ahead[: 2 + math.ceil(_stopping(last, engine.robot) / yielding.step) if settles else None]
+            ahead = yielding.prediction_times[
+                : 2 + math.ceil(_stopping(last, engine.robot) / yielding.step) if settles else None
+            ]
             expected = watch.expected(tick, believed[:2], ahead)
             command, yields, resolve = yielding.avoid(
-                guide, engine.robot, believed, last, before, command, resolve, *expected, top=top
+                guide, engine.robot, believed, last, before, command, resolve, *expected, speed_limit=top
             )
             if yields or settles:
                 state = state._replace(turning=before.turning, limiter=YIELD)
@@ -135,7 +137,7 @@ def drive(
             knows = end is Outcome.STUCK and math.dist(believed[:2], task.goal) > task.goal_tolerance
             renewed = rerouter.again(tick, believed, MISSED) if rerouter and knows else None
             if renewed:
-                guide, state, best = renewed, Progress(limiter=state.limiter), 0.0
+                guide, state, best = renewed, PursuitState(limiter=state.limiter), 0.0
             elif not (rerouter and knows and rerouter.waits):
                 outcome, reason = end, why
                 break

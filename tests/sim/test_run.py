@@ -218,7 +218,7 @@ def test_a_route_through_an_obstacle_ends_in_contact_not_in_a_loop(turtlebot: Ro
     """The controller trusts no planner: it creeps up to the obstacle and the outcome is told."""
     task = Task(World("w", (0, 0, 4, 3), (Disc(2, 1.5, 0.3),)), (0.6, 1.5, 0), (3.4, 1.5))
     controller = PurePursuit()
-    guide = controller.guide(Route(np.array([(0.6, 1.5), (3.4, 1.5)])), task.world, turtlebot, 0.05, 1 / 60)
+    guide = controller.prepare(Route(np.array([(0.6, 1.5), (3.4, 1.5)])), task.world, turtlebot, 0.05, 1 / 60)
     with Engine(task.world, turtlebot) as engine:
         log = drive(engine, controller, guide, task, time_limit=120)
     assert log.outcome in (Outcome.COLLIDED, Outcome.STUCK)

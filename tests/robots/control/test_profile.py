@@ -90,7 +90,7 @@ def test_a_sharp_corner_is_a_stop_with_a_turn_on_the_spot(turtlebot: RobotSpec) 
     assert not p.speed[at].any()
     assert np.diff(p.time[at])[0] == pytest.approx(turn)
     assert not p.curvature.any()
-    through = speed_profile(route, turtlebot, stop_from=2.0)
+    through = speed_profile(route, turtlebot, rotate_in_place_above=2.0)
     assert (through.speed[1:-1] > 0.0).all()
     assert through.duration < p.duration
 
@@ -162,6 +162,12 @@ def test_refined_routes_keep_the_limits_and_beat_the_grid(jackal: RobotSpec) -> 
 
 
 def test_settings_out_of_range_are_refused(turtlebot: RobotSpec) -> None:
-    for wrong in ({"blend": 0.0}, {"step": -1.0}, {"stop_from": math.nan}, {"braking": 1.5}, {"braking": 0.0}):
+    for wrong in (
+        {"blend": 0.0},
+        {"step": -1.0},
+        {"rotate_in_place_above": math.nan},
+        {"braking": 1.5},
+        {"braking": 0.0},
+    ):
         with pytest.raises(ValueError, match=next(iter(wrong))):
             speed_profile(straight(1.0), turtlebot, **wrong)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from antdrive.robots import LIMITERS, Progress, PurePursuit, RobotSpec, Twist
+from antdrive.robots import LIMITERS, PurePursuit, PursuitState, RobotSpec, Twist
 from antdrive.worlds import Disc, Route, World, point_clearance
 
 OPEN = World("open", (-20, -20, 20, 20))
@@ -20,10 +20,10 @@ def follow(
     pose: tuple[float, float, float],
     world: World = OPEN,
     margin: float = 0.05,
-) -> tuple[np.ndarray, np.ndarray, list[Progress]]:
+) -> tuple[np.ndarray, np.ndarray, list[PursuitState]]:
     controller = PurePursuit()
-    guide = controller.guide(route, world, robot, margin, DT)
-    command, state = Twist(0, 0), Progress()
+    guide = controller.prepare(route, world, robot, margin, DT)
+    command, state = Twist(0, 0), PursuitState()
     poses, commands, states = [pose], [command], [state]
     for _ in range(60 * 120):
         command, state = controller.step(guide, pose, command, state)
@@ -139,8 +139,8 @@ def test_standing_it_turns_to_the_route_first_but_moving_it_does_not_stop_for_th
     assert states[1].turning
     assert np.abs(poses[:, 1]).max() < 0.02  # else it would swing out
     controller = PurePursuit()
-    guide = controller.guide(straight, OPEN, jackal, 0.05, DT)
-    _, state = controller.step(guide, (1.0, 0.0, 0.5), Twist(1.0, 0.0), Progress(1.0))
+    guide = controller.prepare(straight, OPEN, jackal, 0.05, DT)
+    _, state = controller.step(guide, (1.0, 0.0, 0.5), Twist(1.0, 0.0), PursuitState(1.0))
     assert not state.turning
 
 
@@ -151,7 +151,7 @@ def test_it_is_slow_where_the_room_beside_it_is_small_and_says_so(jackal: RobotS
     )
     inside = np.abs(poses[:, 0] - 5) < 0.1
     assert commands[inside, 0].max() < 1.5
-    assert {LIMITERS[states[i].limiter] for i in np.flatnonzero(inside)} <= {"route", "room"}
+    assert {LIMITERS[states[i].limiter] for i in np.flatnonzero(inside)} <= {"route", "clearance"}
     assert commands[:, 0].max() == pytest.approx(2.0)
 
 
@@ -175,10 +175,10 @@ def test_any_grid_like_route_is_driven_to_its_end(turns: list[int], step: float)
     ("key", "value", "says"),
     [
         ("lookahead_time", 0.0, "between 0.001 and 100"),
-        ("guard", 1.5, "between 0 and 1"),
+        ("lookahead_margin", 1.5, "between 0 and 1"),
         ("braking", 0.0, "between 0 and 1"),
         ("lookahead_max", 0.01, "at least lookahead_min"),
-        ("turn_from", 3.0, "between turn_to and pi/2"),
+        ("rotate_in_place_above", 3.0, "between rotate_in_place_until and pi/2"),
     ],
 )
 def test_settings_out_of_range_are_refused_by_name(key: str, value: float, says: str) -> None:

@@ -7,7 +7,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from antdrive.robots import _kernels as k
+from antdrive.robots.control._kernels_obstacles import ObstacleIndex, arc_clearance, index_discs, nearby
+from antdrive.robots.control._kernels_path import brake_backwards, carrot_at, clear_lookaheads, point_at, project
+from antdrive.robots.control._kernels_pursuit import (
+    brake_for_goal,
+    keep_wheels_within,
+    slow_for_clearance,
+    slow_for_curvature,
+    slow_for_yaw_rate,
+)
 
 BOUNDS = np.array([-50.0, -50.0, 50.0, 50.0])
 NO_DISCS = np.empty((0, 3))
@@ -17,7 +25,7 @@ CORNER_ARC = np.array([0.0, 1.0, 2.0])
 
 @given(v=st.floats(-3, 3), w=st.floats(-6, 6), half_track=st.floats(0.05, 0.4), fastest=st.floats(0.1, 2))
 def test_saturated_wheels_keep_the_curvature(v: float, w: float, half_track: float, fastest: float) -> None:
-    new_v, new_w = k.keep_wheels_within(v, w, half_track, fastest)
+    new_v, new_w = keep_wheels_within(v, w, half_track, fastest)
     assert abs(new_v) + abs(new_w) * half_track <= fastest * (1 + 1e-12)
     assert new_v * w == pytest.approx(v * new_w, abs=1e-9)
     if abs(v) + abs(w) * half_track <= fastest:
@@ -25,40 +33,40 @@ def test_saturated_wheels_keep_the_curvature(v: float, w: float, half_track: flo
 
 
 def test_curves_are_taken_at_the_lateral_limit() -> None:
-    assert k.slow_for_curvature(0.5, 2.0, 4.0) == pytest.approx(2.0)  # v^2 * 0.5 = 2
-    assert k.slow_for_curvature(8.0, 2.0, 4.0) == pytest.approx(0.5)  # 8 v = 4 rad/s comes first? sqrt(2/8) = 0.5
-    assert k.slow_for_curvature(0.0, 2.0, 4.0) == math.inf
+    assert slow_for_curvature(0.5, 2.0, 4.0) == pytest.approx(2.0)  # v^2 * 0.5 = 2
+    assert slow_for_curvature(8.0, 2.0, 4.0) == pytest.approx(0.5)  # 8 v = 4 rad/s comes first? sqrt(2/8) = 0.5
+    assert slow_for_curvature(0.0, 2.0, 4.0) == math.inf
 
 
 def test_braking_for_the_goal_ends_there() -> None:
-    assert k.brake_for_goal(1.0, 2.0) == pytest.approx(2.0)
-    assert k.brake_for_goal(-0.1, 2.0) == 0.0
+    assert brake_for_goal(1.0, 2.0) == pytest.approx(2.0)
+    assert brake_for_goal(-0.1, 2.0) == 0.0
 
 
 def test_a_yaw_rate_out_of_reach_slows_down() -> None:
     # 0.1 s at 8 rad/s^2 from standing: 0.8 rad/s; on a curve of 4 / m that is 0.2 m/s
-    assert k.slow_for_yaw(4.0, 0.0, 8.0, 0.1) == pytest.approx(0.2)
-    assert k.slow_for_yaw(-4.0, 0.0, 8.0, 0.1) == pytest.approx(0.2)
-    assert k.slow_for_yaw(4.0, -2.0, 8.0, 0.1) == 0.0  # turning the other way: stop first
+    assert slow_for_yaw_rate(4.0, 0.0, 8.0, 0.1) == pytest.approx(0.2)
+    assert slow_for_yaw_rate(-4.0, 0.0, 8.0, 0.1) == pytest.approx(0.2)
+    assert slow_for_yaw_rate(4.0, -2.0, 8.0, 0.1) == 0.0  # turning the other way: stop first
 
 
 def test_little_room_beside_the_robot_slows_down() -> None:
-    assert k.slow_for_room(0.0, 0.5, 0.05) == 0.5
-    assert k.slow_for_room(0.05, 0.5, 0.05) == pytest.approx(1.5)
-    assert k.slow_for_room(-0.1, 0.5, 0.05) == 0.5
+    assert slow_for_clearance(0.0, 0.5, 0.05) == 0.5
+    assert slow_for_clearance(0.05, 0.5, 0.05) == pytest.approx(1.5)
+    assert slow_for_clearance(-0.1, 0.5, 0.05) == 0.5
 
 
 def test_speeds_are_lowered_backwards_by_braking_distance() -> None:
     limit = np.array([2.0, 2.0, 2.0, 0.0])
-    k.brake_backwards(limit, 0.5, 1.0)
+    brake_backwards(limit, 0.5, 1.0)
     np.testing.assert_allclose(limit, [math.sqrt(3), math.sqrt(2), 1.0, 0.0])
 
 
 @given(x=st.floats(-0.3, 1.3), y=st.floats(-0.3, 1.3), look=st.floats(0.1, 0.6))
 def test_the_carrot_is_at_the_true_lookahead_distance(x: float, y: float, look: float) -> None:
-    s, segment = k.project(x, y, 0.0, 10.0, CORNER, CORNER_ARC)
-    px, py, _ = k.point_at(s, segment, CORNER, CORNER_ARC)
-    cx, cy = k.carrot_at(x, y, look, s, segment, CORNER, CORNER_ARC)
+    s, segment = project(x, y, 0.0, 10.0, CORNER, CORNER_ARC)
+    px, py, _ = point_at(s, segment, CORNER, CORNER_ARC)
+    cx, cy = carrot_at(x, y, look, s, segment, CORNER, CORNER_ARC)
     off = math.hypot(px - x, py - y)
     if off < look:
         assert math.hypot(cx - x, cy - y) == pytest.approx(look)
@@ -71,9 +79,9 @@ def test_the_carrot_is_at_the_true_lookahead_distance(x: float, y: float, look: 
 def test_projection_never_falls_back_nor_jumps_across_a_hairpin() -> None:
     hairpin = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 0.4], [0.0, 0.4]])
     arc = np.array([0.0, 3.0, 3.4, 6.4])
-    s, _ = k.project(1.0, 0.25, 0.9, 1.0, hairpin, arc)  # nearer to the way back, 4.4 m later
+    s, _ = project(1.0, 0.25, 0.9, 1.0, hairpin, arc)  # nearer to the way back, 4.4 m later
     assert s == pytest.approx(1.0)
-    s, _ = k.project(0.2, 0.0, 0.9, 1.0, hairpin, arc)
+    s, _ = project(0.2, 0.0, 0.9, 1.0, hairpin, arc)
     assert s == pytest.approx(0.9)
 
 
@@ -102,7 +110,7 @@ def test_arc_clearance_is_that_of_its_points(
         (points - bounds[:2]).min(),
         (bounds[2:] - points).min(),
     )
-    exact = k.arc_clearance(0.0, 0.0, yaw, curvature, sweep, points[-1, 0], points[-1, 1], discs, bounds)
+    exact = arc_clearance(0.0, 0.0, yaw, curvature, sweep, points[-1, 0], points[-1, 1], discs, bounds)
     assert exact == pytest.approx(brute, abs=5e-3)
     assert exact <= brute + 1e-9
 
@@ -111,11 +119,13 @@ def test_lookahead_is_short_only_where_the_straight_line_is_blocked() -> None:
     inner = np.array([[0.9, 0.2, 0.05]])  # inside the corner: a line that cuts it comes too close
     starts = np.array([0, 1])
     out = np.empty(21)
-    k.clear_lookaheads(CORNER, CORNER_ARC, inner, starts, 1000.0, BOUNDS, 0.1, 0.1, 0.1, 1.0, out)
+    clear_lookaheads(CORNER, CORNER_ARC, ObstacleIndex(inner, starts, BOUNDS, 1000.0), 0.1, 0.1, 0.1, 1.0, out)
     assert out[0] == pytest.approx(1.0, abs=0.06)
     assert out[7] < 0.7
     free = np.empty(21)
-    k.clear_lookaheads(CORNER, CORNER_ARC, NO_DISCS, np.array([0, 0]), 1000.0, BOUNDS, 0.1, 0.1, 0.1, 1.0, free)
+    clear_lookaheads(
+        CORNER, CORNER_ARC, ObstacleIndex(NO_DISCS, np.array([0, 0]), BOUNDS, 1000.0), 0.1, 0.1, 0.1, 1.0, free
+    )
     assert (free == 1.0).all()
 
 
@@ -126,7 +136,7 @@ def test_lookahead_is_short_only_where_the_straight_line_is_blocked() -> None:
 def test_buckets_hold_every_disc_within_reach(discs: list[tuple[float, float, float]], seed: int) -> None:
     table = np.array(discs).reshape(-1, 3)
     bounds = np.array([-4.0, -4.0, 4.0, 4.0])
-    rows, starts = k.bucket(table, bounds, 0.7, 0.9)
+    rows, starts = index_discs(table, bounds, 0.7, 0.9)
     x, y = np.random.default_rng(seed).uniform(-4, 4, 2)
-    near = {tuple(row) for row in k.nearby(x, y, rows, starts, bounds, 0.7)}
+    near = {tuple(row) for row in nearby(x, y, ObstacleIndex(rows, starts, bounds, 0.7))}
     assert {d for d in discs if math.hypot(d[0] - x, d[1] - y) - d[2] <= 0.9} <= near

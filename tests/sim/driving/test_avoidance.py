@@ -44,7 +44,7 @@ def test_what_would_be_hit_is_given_way_to(mover: Keyframed, turtlebot: RobotSpe
     seeing = among(mover, robot=turtlebot)
     assert seeing.succeeded, (seeing.outcome, seeing.reason, seeing.certificate)
     assert seeing.rollout is not None
-    assert "yield" in {LIMITERS[k] for k in np.unique(seeing.rollout.limiter)}
+    assert "avoid" in {LIMITERS[k] for k in np.unique(seeing.rollout.limiter)}
     assert seeing.rollout.clearance.min() > 0.03
 
 
@@ -90,12 +90,13 @@ def test_what_has_just_gone_by_may_turn_back(speed: float, t: float, turtlebot: 
     begin = t - 2.5 / speed
     frames = ((0.0, 4.6, 3.5 - speed * t),) if begin <= 0 else ((0.0, 4.6, 1.0), (begin, 4.6, 1.0))
     turns = keyframed(*frames, (t, 4.6, 3.5), (t + 4.0, 4.6, 3.5 - 4.0 * speed), radius=0.25)
-    trusting, wary = (among(turns, robot=turtlebot, yielding=y) for y in (Avoidance(wary=0.0), Avoidance()))
+    trusting, wary = (among(turns, robot=turtlebot, yielding=y) for y in (Avoidance(reversal_weight=0.0), Avoidance()))
     assert trusting.outcome is Outcome.COLLIDED
     assert wary.succeeded, (wary.outcome, wary.reason)
     known = Perception(told="motions")
     one, other = (
-        among(turns, robot=turtlebot, yielding=y, knowledge=known) for y in (Avoidance(wary=0.0), Avoidance())
+        among(turns, robot=turtlebot, yielding=y, knowledge=known)
+        for y in (Avoidance(reversal_weight=0.0), Avoidance())
     )
     assert one.rollout is not None
     assert other.rollout is not None
@@ -162,7 +163,7 @@ def test_a_robot_that_sees_less_yields_to_less(turtlebot: RobotSpec) -> None:
 def test_movers_are_expected_where_knowledge_puts_them(tick: int, told: str) -> None:
     movers = (CROSSING, Cruising(radius=0.2, position=(2.0, 2.0), velocity=(0.5, 0.3)))
     traffic = Trajectories.of(dataclasses.replace(HALL, movers=movers), (1.0, 3.0))
-    ahead = Avoidance().ahead
+    ahead = Avoidance().prediction_times
     places, radii = Predictor(traffic, Perception(told=told), 60).expected(tick, (0.0, 0.0), ahead)  # type: ignore[arg-type]
     now, speed = traffic.positions(tick / 60)[0], traffic.velocities(tick / 60)[0]
     expected = {
@@ -181,8 +182,8 @@ def test_nonsense_is_refused() -> None:
         Perception(reach=0.0)
     with pytest.raises(ValueError, match="horizon: must be greater than 0 and at most 60, got 0"):
         Avoidance(horizon=0.0)
-    with pytest.raises(ValueError, match="keep: must be at least 0, got nan"):
-        Avoidance(keep=math.nan)
+    with pytest.raises(ValueError, match="min_clearance: must be at least 0, got nan"):
+        Avoidance(min_clearance=math.nan)
 
 
 def test_a_robot_with_too_little_room_makes_more(turtlebot: RobotSpec) -> None:

@@ -282,7 +282,7 @@ def test_a_robot_drives_among_movers_without_a_scenario(turtlebot: RobotSpec) ->
     """What a drive needs of an engine: its traffic."""
     world = dataclasses.replace(ROOM, movers=BESIDE)
     controller = PurePursuit()
-    guide = controller.guide(Route(np.array([(0.6, 1.4), (5.4, 1.4)])), world, turtlebot, 0.05, 1 / 60)
+    guide = controller.prepare(Route(np.array([(0.6, 1.4), (5.4, 1.4)])), world, turtlebot, 0.05, 1 / 60)
     with Engine(world, turtlebot, traffic=Trajectories.of(world, TASK.start[:2])) as engine:
         log = drive(engine, controller, guide, TASK, time_limit=60)
         assert engine.time == pytest.approx(log.t[-1])

@@ -182,7 +182,7 @@ def rerouter(
         controller=s.controller, margin=s.margin, kind="clearance", hz=60,
     )  # fmt: skip
     made.follows(answer, route)
-    return made, s.controller.guide(route, task.world, robot, s.margin, 1 / 60)
+    return made, s.controller.prepare(route, task.world, robot, s.margin, 1 / 60)
 
 
 def test_a_robot_that_is_off_its_route_has_strayed(turtlebot: RobotSpec) -> None:
