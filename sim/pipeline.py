@@ -194,7 +194,7 @@ def run(
     limit = s.time_limit or s.task.time_limit or 30.0 + 10.0 * route.length / s.robot.max_speed
     started = time.perf_counter()
     noise = s.robot.noise.scaled(s.noise)
-    senses = Senses(noise, s.robot.track, 1 / s.control_hz, s.task.start, s.rng("noise")) if noise.loud else None
+    senses = Senses(noise, s.robot.track, 1 / s.control_hz, s.task.start, s.rng("noise")) if noise.nonzero else None
     traffic = s.traffic
     watch = Predictor(traffic, s.sees, s.control_hz) if traffic else None
     rerouter = None

@@ -258,7 +258,7 @@ class PurePursuit:
         at = SPACING * np.arange(len(lookahead))
         xy = np.stack([np.interp(at, route.arc, values) for values in route.xy.T], axis=1)
         clearance = point_clearance(world, xy) - robot.radius
-        speed = np.minimum(lookahead / time, np.interp(at, profile.arc, profile.limit))
+        speed: Floats = np.minimum(lookahead / time, np.interp(at, profile.arc, profile.limit))
         speed = np.minimum(speed, self.min_speed_near_obstacles + np.maximum(clearance, 0.0) / self.clearance_time)
         for stop in profile.arc[:-1][np.diff(profile.arc) == 0]:
             speed[int(stop / SPACING) : int(stop / SPACING) + 2] = 0.0

@@ -83,8 +83,8 @@ def test_levels_scale_but_the_rate_of_fixes_does_not() -> None:
     noise = Noise(pose_xy=0.01, slip=0.02, delay=0.1, pose_rate=5.0)
     half = noise.scaled(0.5)
     assert half == Noise(pose_xy=0.005, slip=0.01, delay=0.05, pose_rate=5.0)
-    assert noise.loud
-    assert not noise.scaled(0.0).loud
+    assert noise.nonzero
+    assert not noise.scaled(0.0).nonzero
 
 
 @pytest.mark.parametrize(("key", "value"), [("slip", 0.6), ("pose_xy", -0.1), ("delay", math.nan), ("pose_rate", 0.5)])
@@ -101,7 +101,7 @@ def test_a_robot_file_may_tell_its_noise(tmp_path) -> None:
     path.write_text(text.replace("slip: 0.02", "slip: 0.1"))
     assert load_robot(path).noise.slip == 0.1
     path.write_text("\n".join(line for line in text.splitlines() if not line.startswith("noise")))
-    assert not load_robot(path).noise.loud
+    assert not load_robot(path).noise.nonzero
     for wrong, says in (("slip: 2", "slip"), ("slop: 0.1", "slop"), ("slip: often", "slip")):
         path.write_text(text.replace("slip: 0.02", wrong))
         with pytest.raises(InputError, match=says) as error:
