@@ -25,7 +25,7 @@ from antdrive.planners import (
     load_planner,
     smooth,
 )
-from antdrive.robots import LIMITERS, Avoidance, PurePursuit, RobotSpec, Senses, load_robot
+from antdrive.robots import LIMITERS, Avoidance, NoiseModel, PurePursuit, RobotSpec, load_robot
 from antdrive.sim.driving.drive import Drive, drive
 from antdrive.sim.driving.perception import Perception, Predictor
 from antdrive.sim.driving.replanning import CellwiseMonitor, Replan, ReplanMonitor, ReplanPolicy
@@ -194,7 +194,9 @@ def run(
     limit = s.time_limit or s.task.time_limit or 30.0 + 10.0 * route.length / s.robot.max_speed
     started = time.perf_counter()
     noise = s.robot.noise.scaled(s.noise)
-    senses = Senses(noise, s.robot.track, 1 / s.control_hz, s.task.start, s.rng("noise")) if noise.nonzero else None
+    noise_model = (
+        NoiseModel(noise, s.robot.track, 1 / s.control_hz, s.task.start, s.rng("noise")) if noise.nonzero else None
+    )
     traffic = s.traffic
     watch = Predictor(traffic, s.sees, s.control_hz) if traffic else None
     rerouter = None
@@ -212,7 +214,7 @@ def run(
             s.task,
             control_hz=s.control_hz,
             time_limit=limit,
-            senses=senses,
+            noise_model=noise_model,
             yielding=s.yields,
             watch=watch,
             rerouter=rerouter,

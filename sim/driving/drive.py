@@ -13,10 +13,10 @@ from antdrive.robots import (
     LIMITERS,
     Avoidance,
     AvoidanceState,
+    NoiseModel,
     PurePursuit,
     PursuitState,
     RobotSpec,
-    Senses,
     TrackedPath,
     Twist,
     footprint_clearance,
@@ -63,7 +63,7 @@ def drive(
     *,
     control_hz: int = 60,
     time_limit: float,
-    senses: Senses | None = None,
+    noise_model: NoiseModel | None = None,
     yielding: Avoidance | None = None,
     watch: Predictor | None = None,
     rerouter: ReplanMonitor | None = None,
@@ -73,7 +73,7 @@ def drive(
 
     With `yielding` it keeps clear of the movers that it has a `watch` on; waiting is then no being stuck. With a `rerouter`
     it goes on by a new route where that sees a cause.
-    With `senses` the robot sees and acts by them, else perfectly. `progress` is told the fraction of the route that is done,
+    With a `noise_model` the robot sees and acts by it, else perfectly. `progress` is told the fraction of the route that is done,
     about ten times per simulated second.
 
     Raises:
@@ -99,10 +99,10 @@ def drive(
             break
         x, y, yaw, speed, yaw_rate = rows[-1][:5]
         believed = (x, y, yaw)
-        if senses:
-            estimate = senses.look(believed, Twist(speed, yaw_rate))
+        if noise_model:
+            estimate = noise_model.estimate_pose(believed, Twist(speed, yaw_rate))
             errors[-1] = (estimate[0] - x, estimate[1] - y, math.remainder(estimate[2] - yaw, 2 * math.pi))
-            believed = senses.ahead()
+            believed = noise_model.pose_after_delay()
         if rerouter:
             waits = state.limiter == YIELD and abs(speed) < SLOW
             cause = rerouter.cause(tick, believed, waits, guide, state.arc)
@@ -141,7 +141,7 @@ def drive(
             elif not (rerouter and knows and rerouter.waits):
                 outcome, reason = end, why
                 break
-        engine.command(*(senses.act(command) if senses else command))
+        engine.command(*(noise_model.actuate(command) if noise_model else command))
         for _ in range(substeps):
             touched = engine.step()
             rows.append((*engine.state(), *command, state.limiter))
@@ -188,7 +188,7 @@ def drive(
         limiter=log[:, 7].astype(np.uint8),
         movers=movers,
         contacts=np.array(contacts, dtype=np.float64).reshape(-1, 4),
-        estimate=pose + np.array(errors) if senses else np.empty((0, 3)),
+        estimate=pose + np.array(errors) if noise_model else np.empty((0, 3)),
     )
 
 
