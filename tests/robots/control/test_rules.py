@@ -1,4 +1,4 @@
-"""The controller's rules and geometry, one by one."""
+"""The controller's speed rules and its geometry, each by itself."""
 
 import math
 
@@ -32,25 +32,25 @@ def test_saturated_wheels_keep_the_curvature(v: float, w: float, half_track: flo
         assert (new_v, new_w) == (v, w)
 
 
-def test_curves_are_taken_at_the_lateral_limit() -> None:
+def test_speed_in_curves_is_limited_by_lateral_acceleration_and_yaw_rate() -> None:
     assert slow_for_curvature(0.5, 2.0, 4.0) == pytest.approx(2.0)  # v^2 * 0.5 = 2
-    assert slow_for_curvature(8.0, 2.0, 4.0) == pytest.approx(0.5)  # 8 v = 4 rad/s comes first? sqrt(2/8) = 0.5
+    assert slow_for_curvature(8.0, 9.0, 4.0) == pytest.approx(0.5)  # 8 v = 4 rad/s
     assert slow_for_curvature(0.0, 2.0, 4.0) == math.inf
 
 
-def test_braking_for_the_goal_ends_there() -> None:
+def test_the_robot_can_brake_within_what_remains() -> None:
     assert brake_for_goal(1.0, 2.0) == pytest.approx(2.0)
     assert brake_for_goal(-0.1, 2.0) == 0.0
 
 
-def test_a_yaw_rate_out_of_reach_slows_down() -> None:
+def test_a_yaw_rate_out_of_reach_limits_the_speed() -> None:
     # 0.1 s at 8 rad/s^2 from standing: 0.8 rad/s; on a curve of 4 / m that is 0.2 m/s
     assert slow_for_yaw_rate(4.0, 0.0, 8.0, 0.1) == pytest.approx(0.2)
     assert slow_for_yaw_rate(-4.0, 0.0, 8.0, 0.1) == pytest.approx(0.2)
-    assert slow_for_yaw_rate(4.0, -2.0, 8.0, 0.1) == 0.0  # turning the other way: stop first
+    assert slow_for_yaw_rate(4.0, -2.0, 8.0, 0.1) == 0.0  # it turns the other way and must stop first
 
 
-def test_little_room_beside_the_robot_slows_down() -> None:
+def test_close_obstacles_limit_the_speed() -> None:
     assert slow_for_clearance(0.0, 0.5, 0.05) == 0.5
     assert slow_for_clearance(0.05, 0.5, 0.05) == pytest.approx(1.5)
     assert slow_for_clearance(-0.1, 0.5, 0.05) == 0.5
@@ -71,15 +71,15 @@ def test_the_carrot_is_at_the_true_lookahead_distance(x: float, y: float, look: 
     if off < look:
         assert math.hypot(cx - x, cy - y) == pytest.approx(look)
         on_route = min(abs(cy) if cx <= 1 else math.inf, abs(cx - 1) if cy >= 0 else math.inf)
-        assert on_route < 1e-9  # the last segment is prolonged beyond y = 1
+        assert on_route < 1e-9  # the last segment extends beyond y = 1
     else:
         assert (cx, cy) == pytest.approx((px, py))
 
 
-def test_projection_never_falls_back_nor_jumps_across_a_hairpin() -> None:
+def test_projection_never_moves_back_and_never_jumps_across_a_hairpin() -> None:
     hairpin = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 0.4], [0.0, 0.4]])
     arc = np.array([0.0, 3.0, 3.4, 6.4])
-    s, _ = project(1.0, 0.25, 0.9, 1.0, hairpin, arc)  # nearer to the way back, 4.4 m later
+    s, _ = project(1.0, 0.25, 0.9, 1.0, hairpin, arc)  # closer to the second leg, 4.4 m later
     assert s == pytest.approx(1.0)
     s, _ = project(0.2, 0.0, 0.9, 1.0, hairpin, arc)
     assert s == pytest.approx(0.9)
@@ -99,7 +99,7 @@ def sampled_arc(yaw: float, curvature: float, sweep: float) -> np.ndarray:
     angle=st.floats(0.01, 2.8),
     disc=st.tuples(st.floats(-3, 3), st.floats(-3, 3), st.floats(0.05, 0.5)),
 )
-def test_arc_clearance_is_that_of_its_points(
+def test_an_arcs_clearance_is_that_of_its_points(
     yaw: float, curvature: float, angle: float, disc: tuple[float, float, float]
 ) -> None:
     sweep = math.copysign(angle, curvature)
@@ -116,7 +116,7 @@ def test_arc_clearance_is_that_of_its_points(
 
 
 def test_lookahead_is_short_only_where_the_straight_line_is_blocked() -> None:
-    inner = np.array([[0.9, 0.2, 0.05]])  # inside the corner: a line that cuts it comes too close
+    inner = np.array([[0.9, 0.2, 0.05]])  # on the inside of the corner, where a line that cuts it comes too close
     starts = np.array([0, 1])
     out = np.empty(21)
     clear_lookaheads(CORNER, CORNER_ARC, ObstacleIndex(inner, starts, BOUNDS, 1000.0), 0.1, 0.1, 0.1, 1.0, out)
@@ -133,7 +133,7 @@ def test_lookahead_is_short_only_where_the_straight_line_is_blocked() -> None:
     st.lists(st.tuples(st.floats(-4, 4), st.floats(-4, 4), st.floats(0.05, 1)), max_size=20),
     st.integers(0, 10**6),
 )
-def test_buckets_hold_every_disc_within_reach(discs: list[tuple[float, float, float]], seed: int) -> None:
+def test_a_square_lists_every_disc_within_the_distance(discs: list[tuple[float, float, float]], seed: int) -> None:
     table = np.array(discs).reshape(-1, 3)
     bounds = np.array([-4.0, -4.0, 4.0, 4.0])
     rows, starts = index_discs(table, bounds, 0.7, 0.9)
