@@ -8,7 +8,8 @@ import numpy as np
 
 from antdrive.worlds._kernels import Array, kernel
 
-NEAR = 0.25  # a list of nearby discs is reused while the robot stays within this distance of where it was made [m]
+# A list of nearby discs is used again while the robot stays within this distance of where it was made [m].
+NEAR = 0.25
 
 
 @kernel
@@ -45,7 +46,7 @@ def footprint_clearances(poses: Array, shape: Array, discs: Array, bounds: Array
 
 @kernel
 def discs_near(x: float, y: float, slack: float, discs: Array, out: Array) -> int:
-    """Write to `out` every disc that is at most `slack` farther from (x, y) than the closest one; return their number.
+    """Write the discs at most `slack` farther from (x, y) than the closest one to `out`; return their number.
 
     While the robot is within NEAR of (x, y), only these can be the disc closest to its footprint.
     """

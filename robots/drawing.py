@@ -79,7 +79,8 @@ def robot_card(robot: RobotSpec) -> str:
 def _wheel_thickness(robot: RobotSpec) -> float:
     """How thick the wheels are drawn, so that they stay within the footprint [m]."""
     foot = robot.footprint
-    edge = foot.half_width + math.sqrt(max(foot.rounding**2 - max(robot.wheel_radius - foot.half_length, 0) ** 2, 0))
+    beyond = max(robot.wheel_radius - foot.half_length, 0)
+    edge = foot.half_width + math.sqrt(max(foot.rounding**2 - beyond**2, 0))
     room = 2 * (edge - robot.track / 2)
     return max(min(2 * robot.wheel_radius * WHEEL_ASPECT, room), 0.02 * robot.track)
 

@@ -56,13 +56,13 @@ class NoiseEntry(BaseModel):
     pose_xy: float = _level("pose_xy", "standard deviation of a pose fix in x and in y [m]")
     pose_yaw: float = _level("pose_yaw", "standard deviation of a pose fix's heading [rad]")
     pose_rate: float = _level("pose_rate", "rate of pose fixes; between two fixes the robot uses odometry [Hz]")
-    encoder: float = _level("encoder", "standard deviation of each wheel's measured speed, as a fraction of the speed")
+    encoder: float = _level("encoder", "standard deviation of each wheel's measured speed, as a fraction")
     slip: float = _level("slip", "standard deviation of each wheel's slip, as a fraction of its speed")
     delay: float = _level("delay", "time from a command to the motors [s]")
 
 
 class RobotFile(BaseModel):
-    """A differential-drive robot, as a file describes it: two driven wheels on one axle through the centre, two casters."""
+    """A differential-drive robot: two driven wheels on one axle through the centre, and two casters."""
 
     model_config = _RULES
 

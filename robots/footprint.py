@@ -13,8 +13,8 @@ from antdrive.worlds import Floats, World
 def footprint_clearance(world: World, footprint: Footprint, poses: npt.ArrayLike) -> Floats:
     """Distance from the footprint at each pose to the nearest disc surface or wall, shape (N,) [m].
 
-    It is negative where the footprint overlaps a disc or a wall. Its size is then a bound on the depth of the overlap,
-    not the exact depth.
+    It is negative where the footprint overlaps a disc or a wall. Its size is then a bound on the depth of the
+    overlap, not the exact depth.
 
     Args:
         world: the discs and walls

@@ -1,7 +1,7 @@
-"""The noise of a real robot: wheels that slip, inexact encoders, delayed commands and a pose that is only estimated.
+"""The noise of a real robot: wheels that slip, inexact encoders, delayed commands and an estimated pose.
 
-A robot's file holds the levels (`Noise`). A drive scales them; at 0 the robot is perfect. All random numbers come from
-the generator that the caller passes.
+A robot's file holds the levels (`Noise`). A drive scales them; at 0 the robot is perfect. All random numbers
+come from the generator that the caller passes.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ MIN_GAIN = 0.05  # of the filter, so that fixes always correct the estimate some
 class NoiseModel:
     """The noise of one drive: what the wheels make of commands, and what the robot estimates its pose to be.
 
-    Between two pose fixes the robot uses odometry. A fix corrects the estimate with the gain of a steady-state Kalman
-    filter. Slip is a first-order Gauss-Markov process, a factor on each wheel's speed. Encoders count turns of the
-    wheels, so they do not measure it.
+    Between two pose fixes the robot uses odometry. A fix corrects the estimate with the gain of a
+    steady-state Kalman filter. Slip is a first-order Gauss-Markov process, a factor on each wheel's speed.
+    Encoders count turns of the wheels, so they do not measure it.
 
     Attributes:
         estimate: the estimated pose at the last control period: x, y [m] and yaw [rad]
@@ -44,7 +44,8 @@ class NoiseModel:
         self._ticks_per_fix = max(1, round(1 / (noise.pose_rate * period)))
         self._tick = 0
         self.estimate = start
-        # The variance of odometry at 1 m/s between two fixes. Slip is correlated, so its errors add up over several.
+        # The variance of odometry at 1 m/s between two fixes. Slip is correlated, so its errors add up over
+        # several.
         correlated = max(1.0, 2 * SLIP_TIME * noise.pose_rate)
         drift = (noise.encoder**2 + correlated * noise.slip**2) / noise.pose_rate**2
         self._gain = _steady_gain(drift / 2, noise.pose_xy**2), _steady_gain(2 * drift / track**2, noise.pose_yaw**2)
@@ -68,14 +69,18 @@ class NoiseModel:
         return self.estimate
 
     def pose_after_delay(self) -> Pose:
-        """The pose expected when the next command takes effect: the estimate, moved by the commands still pending."""
+        """The pose expected when the next command takes effect: the estimate moved by pending commands."""
         pose = self.estimate
         for twist in self._pending:
             pose = _moved(pose, twist, self._period)
         return pose
 
     def actuate(self, command: Twist) -> Twist:
-        """The velocity that the wheels produce now, from an earlier command and with slip; `command` becomes pending."""
+        """The velocity that the wheels produce now, from a delayed command and with slip.
+
+        Args:
+            command: the new command, which takes effect after the delay
+        """
         self._pending.append(command)
         delayed = self._pending.popleft()
         keep = math.exp(-self._period / SLIP_TIME)
@@ -103,7 +108,7 @@ def _moved(pose: Pose, twist: Twist, time: float) -> Pose:
 
 
 def _steady_gain(drift: float, error: float) -> float:
-    """The steady-state gain of a scalar Kalman filter, from the variance gained between fixes and that of a fix."""
+    """The steady-state gain of a scalar Kalman filter, from the variances of drift and of a fix."""
     if error == 0:
         return 1.0
     ratio = drift / error

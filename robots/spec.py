@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Footprint:
-    """The robot's outline from above, centred on the axle: a rectangle whose outline is moved outwards by `rounding`.
+    """The robot's outline from above: a rectangle, centred on the axle, moved outwards by `rounding`.
 
     A disc is a rectangle of size zero with a rounding, so one distance formula serves every footprint.
 

@@ -1,4 +1,4 @@
-"""Compiled local avoidance: simulate candidate motions among predicted movers and choose one. Arrays in, arrays out."""
+"""Compiled local avoidance: simulate candidate motions among predicted movers, and choose one."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from antdrive.robots.control._kernels_path import PathSamples, point_at, project
 from antdrive.robots.control._kernels_pursuit import MotionLimits, PursuitTuning, clip, pursue, reachable_twist
 from antdrive.worlds._kernels import Array, kernel, segment_clearance
 
-# The columns of a table of candidates: the kind; the speed (of FOLLOW_ROUTE the highest, of TWO_TWISTS the first) and
-# the yaw rate of the first twist, how long that lasts [s], and the second twist.
+# The columns of a table of candidates: the kind; the speed (of FOLLOW_ROUTE the highest, of TWO_TWISTS the
+# first) and the yaw rate of the first twist, how long that lasts [s], and the second twist.
 KIND, SPEED, YAW_RATE, DURATION, NEXT_SPEED, NEXT_YAW_RATE = range(6)
 # The kinds: pure pursuit along the route up to a speed; one twist and then another.
 FOLLOW_ROUTE, TWO_TWISTS = 0.0, 1.0
@@ -80,10 +80,10 @@ def first_contact(
     x0: float, y0: float, x1: float, y1: float, places: Array, k: int, radii: Array, near: Array,
     contact_distances: Array, min_distance: float,
 ) -> tuple[float, float]:  # fmt: skip
-    """The share of a step after which a mover's centre is within its contact distance, 2 if none is, and the clearance.
+    """The share of a step after which a mover is at its contact distance, 2 if none is, and the clearance.
 
-    The robot moves straight from (x0, y0) to (x1, y1), and each mover straight between its places k and k + 1. The
-    clearance is the least to a mover's surface, beyond `min_distance`.
+    The robot moves straight from (x0, y0) to (x1, y1), and each mover straight between its places k and k +
+    1. The clearance is the least to a mover's surface, beyond `min_distance`.
     """
     share, clearance = 2.0, math.inf
     for m in near:
@@ -118,12 +118,12 @@ def simulate(
     path: PathSamples, obstacles: ObstacleIndex, limits: MotionLimits, tuning: PursuitTuning,
     weights: AvoidanceWeights, places: Array, radii: Array, near: Array, contact_distances: Array,
 ) -> Simulated:  # fmt: skip
-    """A candidate followed through all instants of `places` (K + 1, M, 2), with a control period of `weights.step`."""
+    """A candidate followed through the instants of `places` (K + 1, M, 2), `weights.step` apart."""
     capped = MotionLimits(
         min(limits.speed, candidate[SPEED]), limits.yaw_rate, limits.acceleration, limits.yaw_acceleration,
         limits.lateral_acceleration, limits.half_track, limits.rim_speed,
     )  # fmt: skip
-    step = weights.step
+    step, min_distance = weights.step, weights.min_distance
     required = min(tuning.stopping_clearance, clearance_at(x, y, obstacles) - 1e-3)
     least, risk, now = math.inf, 0.0, 0.0
     for k in range(places.shape[0] - 1):
@@ -137,7 +137,7 @@ def simulate(
         middle = yaw + 0.25 * (w + w1) * step
         length = 0.5 * (v + v1) * step
         x1, y1 = x + length * math.cos(middle), y + length * math.sin(middle)
-        share, clearance = first_contact(x, y, x1, y1, places, k, radii, near, contact_distances, weights.min_distance)
+        share, clearance = first_contact(x, y, x1, y1, places, k, radii, near, contact_distances, min_distance)
         if share <= 1.0:
             return Simulated(now + share * step, least, risk, x, y, yaw, v)
         if weights.reversal_weight > 0.0 and now < weights.reversal_time:
@@ -155,10 +155,10 @@ def relevant_movers(
     x: float, y: float, limits: MotionLimits, tuning: PursuitTuning, weights: AvoidanceWeights, places: Array,
     radii: Array,
 ) -> tuple[Array, Array]:  # fmt: skip
-    """The movers that the robot can get near to (N,), and for every mover the distance that counts as contact (M,) [m].
+    """The movers that the robot can get near to (N,), and the distance that counts as contact (M,) [m].
 
-    A mover that is already closer than the minimum may come closer still while the robot starts moving: otherwise every
-    candidate would begin with a contact, and there would be nothing to choose.
+    A mover that is already closer than the minimum may come closer still while the robot starts moving:
+    otherwise every candidate would begin with a contact, and there would be nothing to choose.
     """
     near, contact_distances = np.empty(radii.shape[0], np.int64), np.empty(radii.shape[0])
     count = 0
@@ -185,7 +185,7 @@ def relevant_movers(
 def score(
     end: Simulated, s: float, window: float, path: PathSamples, tuning: PursuitTuning, weights: AvoidanceWeights
 ) -> float:
-    """What a candidate without contact is worth, in metres of the route: its progress, less what each shortcoming costs.
+    """What a candidate without contact is worth: its progress, less what its shortcomings cost [m].
 
     `s` is the progress now [m], `window` how much farther the candidate can get at most [m].
     """
@@ -213,8 +213,9 @@ def choose(
 ) -> tuple[int, float]:  # fmt: skip
     """Which of the candidates (N, 6) to take, and when that meets something [s], inf if never.
 
-    Row 0 is the controller's own motion, row 1 the last decision. Row 0 is taken if it has the preferred clearance and
-    no risk; otherwise the candidate without contact that scores best; if each has a contact, the one whose comes last.
+    Row 0 is the controller's own motion, row 1 the last decision. Row 0 is taken if it has the preferred
+    clearance and no risk; otherwise the candidate without contact that scores best; if each has a contact,
+    the one whose comes last.
     """
     near, contact_distances = relevant_movers(x, y, limits, tuning, weights, places, radii)
     if near.shape[0] == 0:

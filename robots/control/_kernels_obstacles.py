@@ -1,4 +1,4 @@
-"""Compiled queries about the obstacles that the controller knows: which are near, and how near an arc passes them."""
+"""Compiled queries about obstacles: which are near a place, and how near an arc passes them."""
 
 from __future__ import annotations
 
@@ -94,7 +94,8 @@ def arc_clearance(
     for j in range(discs.shape[0]):
         px, py = discs[j, 0], discs[j, 1]
         d = min(math.hypot(px - x, py - y), math.hypot(px - ex, py - ey))
-        if d - discs[j, 2] - radius * abs(sweep) > best:  # no point of the arc is farther than its length from an end
+        # No point of the arc is farther from one of its ends than its length.
+        if d - discs[j, 2] - radius * abs(sweep) > best:
             continue
         if on_arc(math.atan2(py - cy, px - cx), first, sweep):
             d = min(d, abs(math.hypot(px - cx, py - cy) - radius))

@@ -1,4 +1,4 @@
-"""Compiled queries about the path that the controller tracks: the nearest point, the carrot, how far it may look ahead."""
+"""Compiled queries about the tracked path: the nearest point, the carrot, clear lookaheads, braking."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ class PathSamples(NamedTuple):
         arc: length along the route at each point (N,) [m]
         lookahead: the longest lookahead with a clear line to the carrot (S,) [m]
         speed: the speed limit (S,) [m/s]
-        curvature: the route's curvature (S,) [1/m], NaN for a route with corners, which only the carrot rounds
+        curvature: the route's curvature (S,) [1/m], NaN for a route with corners, which only the carrot
+            rounds
         heading: the route's heading (S,) [rad]
     """
 
@@ -31,7 +32,7 @@ class PathSamples(NamedTuple):
 
 @kernel
 def point_at(s: float, k: int, xy: Array, arc: Array) -> tuple[float, float, int]:
-    """The point at arc length s, and its segment, searched from segment k on; the last segment extends past the end."""
+    """The point at arc length s and its segment, from segment k on; the last one extends past the end."""
     n = xy.shape[0]
     while k < n - 2 and arc[k + 1] < s:
         k += 1
@@ -41,7 +42,7 @@ def point_at(s: float, k: int, xy: Array, arc: Array) -> tuple[float, float, int
 
 @kernel
 def project(x: float, y: float, progress: float, window: float, xy: Array, arc: Array) -> tuple[float, int]:
-    """Arc length and segment of the route point nearest to (x, y), between `progress` and `window` beyond it."""
+    """Arc length and segment of the point nearest to (x, y), between `progress` and `window` beyond it."""
     n = xy.shape[0]
     k = 0
     while k < n - 2 and arc[k + 1] < progress:
@@ -69,7 +70,7 @@ def carrot_at(x: float, y: float, lookahead: float, s: float, k: int, xy: Array,
     """
     n = xy.shape[0]
     ax, ay, k = point_at(s, k, xy, arc)
-    if math.hypot(ax - x, ay - y) >= lookahead:  # the route is beyond the lookahead distance: go straight back to it
+    if math.hypot(ax - x, ay - y) >= lookahead:  # too far from the route: go straight back to it
         return ax, ay
     while True:
         bx, by = xy[k + 1, 0], xy[k + 1, 1]
@@ -90,9 +91,10 @@ def clear_lookaheads(
     xy: Array, arc: Array, obstacles: ObstacleIndex, clearance: float, spacing: float, low: float, high: float,
     out: Array,
 ) -> None:  # fmt: skip
-    """out[i] = the longest lookahead at arc length i * spacing whose straight line to the carrot keeps `clearance`.
+    """out[i] = the longest lookahead at i * spacing whose straight line to the carrot keeps `clearance`.
 
-    At least `low`, at most `high`. Where the route itself comes closer, the line may come as close as the route.
+    At least `low`, at most `high`. Where the route itself comes closer, the line may come as close as the
+    route.
     """
     bounds = obstacles.bounds
     step = 0.5 * low

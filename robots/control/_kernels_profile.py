@@ -9,7 +9,7 @@ from antdrive.worlds._kernels import Array, inline, kernel
 
 @inline
 def allowed_gain(v2: float, curvature: float, change: float, acceleration: float, yaw_acceleration: float) -> float:
-    """The acceleration a that the robot's own and its yaw acceleration, `change v^2 + curvature a`, allow at speed v."""
+    """The acceleration a at speed v that also keeps the yaw acceleration, `change v^2 + curvature a`."""
     k = abs(curvature)
     if k * acceleration <= 1e-12:
         return acceleration
@@ -21,7 +21,7 @@ def limit_speed(
     curvature: Array, change: Array, max_speed: float, lateral_acceleration: float, yaw_rate: float,
     yaw_acceleration: float, half_track: float, rim_speed: float, out: Array,
 ) -> None:  # fmt: skip
-    """out[i] = the highest speed at curvature[i], which grows by change[i] a metre, whatever the acceleration."""
+    """out[i] = the highest speed at curvature[i], which grows by change[i] a metre, at constant speed."""
     for i in range(len(curvature)):
         k, dk = abs(curvature[i]), abs(change[i])
         v = min(max_speed, rim_speed / (1.0 + k * half_track))

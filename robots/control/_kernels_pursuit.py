@@ -1,4 +1,4 @@
-"""One compiled control period of pure pursuit: the carrot, the speed rules, the robot's limits, the stopping check."""
+"""Compiled pure pursuit: the carrot, the speed rules, the robot's limits, the check that it can stop."""
 
 from __future__ import annotations
 
@@ -46,7 +46,8 @@ class PursuitTuning(NamedTuple):
         period: control period [s]
         spacing: distance between the path's samples [m]
         lookahead_clearance: what the arc to the carrot keeps between the robot's centre and obstacles [m]
-        stopping_clearance: what the arc on which the robot can stop keeps between its centre and obstacles [m]
+        stopping_clearance: what the arc on which the robot can stop keeps between its centre and obstacles
+            [m]
         robot_radius: circumscribed radius of the robot [m]
         lookahead_time: the lookahead is the speed times this [s]
         lookahead_min: shortest lookahead [m]
@@ -107,7 +108,7 @@ def clip(value: float, low: float, high: float) -> float:
 
 @kernel
 def keep_wheels_within(v: float, w: float, half_track: float, rim_speed: float) -> tuple[float, float]:
-    """Speed and yaw rate, scaled together so that no wheel's rim exceeds `rim_speed` [m/s]; the curvature stays."""
+    """Speed and yaw rate, scaled together so that no wheel's rim exceeds `rim_speed` [m/s]."""
     rim = abs(v) + abs(w) * half_track
     if rim > rim_speed:
         v, w = v * rim_speed / rim, w * rim_speed / rim
@@ -153,10 +154,10 @@ def slow_for_yaw_rate(curvature: float, yaw_rate: float, yaw_acceleration: float
 
 @kernel
 def slow_for_clearance(clearance: float, min_speed: float, time: float) -> float:
-    """The speed allowed so close to obstacles: `min_speed` without clearance, and clearance / time more with it.
+    """The speed allowed near obstacles: `min_speed` without clearance, and clearance / time more with it.
 
-    After the proximity heuristic of S. Macenski et al., Regulated pure pursuit for robot path tracking, Autonomous
-    Robots 47, 2023, with the clearance in place of the costmap's cost.
+    After the proximity heuristic of S. Macenski et al., Regulated pure pursuit for robot path tracking,
+    Autonomous Robots 47, 2023, with the clearance in place of the costmap's cost.
     """
     return min_speed + max(clearance, 0.0) / time
 
@@ -194,8 +195,8 @@ def find_carrot(
 ) -> Carrot:  # fmt: skip
     """The carrot at the longest lookahead, at most `longest`, whose arc keeps `clearance`.
 
-    The lookahead shrinks until the arc is clear, so corners are cut only where there is room. If no arc is clear, the
-    carrot is that of the shortest lookahead.
+    The lookahead shrinks until the arc is clear, so corners are cut only where there is room. If no arc is
+    clear, the carrot is that of the shortest lookahead.
     """
     shortest = tuning.lookahead_min
     look = clip(max(tuning.lookahead_time * v, tuning.preferred_lookahead_min), shortest, longest)
@@ -230,9 +231,9 @@ def curvature_to_drive(
 ) -> float:
     """The curvature of the arc to the carrot (Coulter 1992), corrected where the route's own is known.
 
-    The arc to a carrot on a bend cuts the bend. So the route's own curvature is driven, one period ahead, and the
-    carrot contributes only what is due to the robot being off the route: the difference between its arc and the arc
-    to the same carrot from the route itself.
+    The arc to a carrot on a bend cuts the bend. So the route's own curvature is driven, one period ahead, and
+    the carrot contributes only what is due to the robot being off the route: the difference between its arc
+    and the arc to the same carrot from the route itself.
     """
     curvature = 2.0 * carrot.left / (carrot.distance * carrot.distance)
     if math.isnan(path.curvature[i]):
@@ -279,8 +280,8 @@ def speed_limit(
 def rotation(new_v: float, v: float, w: float, bearing: float, limits: MotionLimits, tuning: PursuitTuning) -> float:
     """The yaw rate of a robot that is to rotate in place.
 
-    It brakes on its present curve first and rotates once it (nearly) stands, so that the footprint stays where it was
-    checked. The square root lets the yaw rate fall to 0 where the bearing does.
+    It brakes on its present curve first and rotates once it (nearly) stands, so that the footprint stays
+    where it was checked. The square root lets the yaw rate fall to 0 where the bearing does.
     """
     if abs(new_v) < tuning.creep_speed:
         return math.copysign(min(limits.yaw_rate, math.sqrt(limits.yaw_acceleration * abs(bearing))), bearing)
@@ -292,7 +293,7 @@ def pursue(
     x: float, y: float, yaw: float, v: float, w: float, progress: float, rotating: bool,
     path: PathSamples, obstacles: ObstacleIndex, limits: MotionLimits, tuning: PursuitTuning,
 ) -> tuple[float, float, float, bool, int]:  # fmt: skip
-    """One control period: the next speed and yaw rate, the progress, whether the robot rotates in place, the limiter."""
+    """One control period: the next speed and yaw rate, the progress, whether to rotate, the limiter."""
     bounds, period = obstacles.bounds, tuning.period
     discs = nearby(x, y, obstacles)
     s, k = project(x, y, progress, tuning.lookahead_max, path.xy, path.arc)
@@ -329,8 +330,8 @@ def pursue(
     new_w = reachable_yaw_rate(wanted, w, period, limits)
     new_v, new_w = keep_wheels_within(new_v, new_w, limits.half_track, limits.rim_speed)
 
-    # Whatever the rules above allow, the arc on which the robot can still stop must be clear. The last command passed
-    # this check, so braking on its curve is safe.
+    # Whatever the rules above allow, the arc on which the robot can still stop must be clear. The last
+    # command passed this check, so braking on its curve is safe.
     if new_v > tuning.creep_speed and stopping_clearance(
         x, y, yaw, new_v, new_w, limits.acceleration, period, discs, bounds
     ) < min(tuning.stopping_clearance, clearance):

@@ -1,11 +1,11 @@
 """Local avoidance of movers: slow down, stop, back off or go around them, then resume the route.
 
-In every control period the controller's own motion is simulated ahead among the predicted movers. If it keeps the
-preferred clearance, it is taken unchanged. Otherwise it competes with other candidates: the same route at lower speeds,
-and pairs of constant twists, forwards and backwards, one after the other, within the robot's dynamic window (after D.
-Fox, W. Burgard and S. Thrun, *The dynamic window approach to collision avoidance*, IEEE Robotics & Automation Magazine
-4, 1997). Every candidate must keep clear of static obstacles. Standing still is simulated like any other candidate, so
-the robot moves out of the way of a mover that approaches it.
+In every control period the controller's own motion is simulated ahead among the predicted movers. If it keeps
+the preferred clearance, it is taken unchanged. Otherwise it competes with other candidates: the same route at
+lower speeds, and pairs of constant twists, forwards and backwards, one after the other, within the robot's
+dynamic window (after D. Fox, W. Burgard and S. Thrun, *The dynamic window approach to collision avoidance*,
+IEEE Robotics & Automation Magazine 4, 1997). Every candidate must keep clear of static obstacles. Standing
+still is simulated like any other candidate, so the robot moves out of the way of a mover that approaches it.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ class AvoidanceState(NamedTuple):
     """What avoidance remembers between two control periods.
 
     Attributes:
-        candidate: the pair of twists that is being executed, a row of the table of candidates; empty if there is none
+        candidate: the pair of twists that is being executed, a row of the table of candidates; empty if there
+            is none
         remaining: how long its first twist still lasts [s]
     """
 
@@ -119,28 +120,31 @@ class Avoidance:
             return wanted, False, AvoidanceState()
         limits, period = tracked.limits, tracked.tuning.period
         candidate = candidates[chosen]
-        if contact < max(abs(last.speed) / limits.acceleration, self._too_late(tracked, pose, places[0], radii)):
+        stopping = abs(last.speed) / limits.acceleration
+        if contact < max(stopping, self._too_late(tracked, pose, places[0], radii)):
             # The robot cannot avoid the contact, so it stops: a contact while standing is the mover's.
             speed, yaw_rate, state = 0.0, 0.0, AvoidanceState()
         elif candidate[kernels.KIND] == kernels.FOLLOW_ROUTE:
-            speed = min(wanted.speed, max(float(candidate[kernels.SPEED]), last.speed - limits.acceleration * period))
+            slowest = last.speed - limits.acceleration * period
+            speed = min(wanted.speed, max(float(candidate[kernels.SPEED]), slowest))
             yaw_rate = wanted.yaw_rate * (speed / wanted.speed if wanted.speed > 0 else 1.0)
             return Twist(speed, yaw_rate), True, AvoidanceState()
         else:
             first = candidate[kernels.DURATION] > 1e-9
             speed = float(candidate[kernels.SPEED if first else kernels.NEXT_SPEED])
             yaw_rate = float(candidate[kernels.YAW_RATE if first else kernels.NEXT_YAW_RATE])
-            state = AvoidanceState(tuple(candidate.tolist()), max(0.0, float(candidate[kernels.DURATION]) - period))
+            remaining = max(0.0, float(candidate[kernels.DURATION]) - period)
+            state = AvoidanceState(tuple(candidate.tolist()), remaining)
         return Twist(*reachable_twist(speed, yaw_rate, *last, period, limits)), True, state
 
     def _too_late(self, tracked: TrackedPath, pose: Pose, places: Floats, radii: Floats) -> float:
-        """With a mover closer than the least clearance, a contact sooner than this is taken to be unavoidable [s]."""
+        """A contact sooner than this is unavoidable where a mover is closer than the least clearance [s]."""
         away = np.hypot(*(places - pose[:2]).T) - radii
         close = away.min(initial=math.inf) < tracked.tuning.robot_radius + self.min_clearance
         return 2 * self.step if close else 0.0
 
     def _candidates(self, robot: RobotSpec, state: AvoidanceState, speed_limit: float) -> Floats:
-        """The robot's candidates (N, 6); row 0 keeps the speed limit, row 1 goes on with the last decision."""
+        """The robot's candidates (N, 6): row 0 keeps the speed limit, row 1 is the last decision."""
         table = _candidate_table(robot.max_speed, robot.max_yaw_rate, robot.max_lateral_acceleration)
         if not state.candidate and speed_limit >= robot.max_speed:
             return table
@@ -182,11 +186,13 @@ _NOT_NEGATIVE = (
 
 @functools.cache
 def _candidate_table(max_speed: float, max_yaw_rate: float, lateral_acceleration: float) -> Floats:
-    """What a robot chooses from (N, 6): the controller's own motion twice, that more slowly, and pairs of twists.
+    """What a robot chooses from (N, 6): the controller's motion twice, the same more slowly, pairs of twists.
 
-    Row 1 is the place of the last decision. The second twist of a pair goes straight on or stands; it never turns.
+    Row 1 is the place of the last decision. The second twist of a pair goes straight on or stands; it never
+    turns.
     """
-    rows = [(kernels.FOLLOW_ROUTE, share * max_speed, 0.0, 0.0, 0.0, 0.0) for share in (1.0, 1.0, 0.7, 0.45, 0.2)]
+    shares = (1.0, 1.0, 0.7, 0.45, 0.2)
+    rows = [(kernels.FOLLOW_ROUTE, share * max_speed, 0.0, 0.0, 0.0, 0.0) for share in shares]
     rows.append((kernels.TWO_TWISTS, 0.0, 0.0, 0.0, 0.0, 0.0))
     for speed in (1.0, 0.6, 0.3, 0.0, -0.3, -0.6, -1.0):
         v = speed * max_speed

@@ -1,10 +1,11 @@
 """How fast a robot may drive along a route: a forward and a backward pass under the robot's limits.
 
-On a fixed path, the fastest speeds follow from a limit at each place: a forward pass lowers them to what accelerating
-can reach, and a backward pass to what braking can still obey (Bobrow, Dubowsky & Gibson, *Time-optimal control of
-robotic manipulators along specified paths*, IJRR 4, 1985; in this form Lipp & Boyd, *Minimum-time speed optimisation
-over a fixed path*, Int. J. Control 87, 2014). Here the yaw acceleration is checked with the speed at the slower end of
-each step, so the result is the fastest up to the length of a step.
+On a fixed path, the fastest speeds follow from a limit at each place: a forward pass lowers them to what
+accelerating can reach, and a backward pass to what braking can still obey (Bobrow, Dubowsky & Gibson,
+*Time-optimal control of robotic manipulators along specified paths*, IJRR 4, 1985; in this form Lipp & Boyd,
+*Minimum-time speed optimisation over a fixed path*, Int. J. Control 87, 2014). Here the yaw acceleration is
+checked with the speed at the slower end of each step, so the result is the fastest up to the length of a
+step.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from antdrive.worlds import Floats, Route
 
 @dataclass(frozen=True, eq=False)
 class SpeedProfile:
-    """The speeds along a route and when each place is reached. Places where the robot rotates in place come twice.
+    """The speeds along a route and when each place is reached; places where the robot rotates come twice.
 
     Attributes:
         arc: length along the route, from 0 (S,) [m]
@@ -62,9 +63,10 @@ def speed_profile(
 
     Args:
         route: the route
-        robot: its limits are those of speed, acceleration, lateral acceleration, yaw rate, yaw acceleration and wheels
-        blend: the route's curvature is averaged over this distance on both sides, with weights that fall linearly: no
-            robot follows a corner or a jump in curvature at speed [m]
+        robot: its limits are those of speed, acceleration, lateral acceleration, yaw rate, yaw acceleration
+            and wheels
+        blend: the route's curvature is averaged over this distance on both sides, with weights that fall
+            linearly: no robot follows a corner or a jump in curvature at speed [m]
         rotate_in_place_above: at corners of at least this angle, the robot stops and rotates in place [rad]
         braking: share of the robot's deceleration that braking may use
         step: longest distance between two samples [m]
@@ -94,7 +96,7 @@ def speed_profile(
 
 
 def _speeds(arc: Floats, curvature: Floats, change: Floats, robot: RobotSpec, braking: float) -> tuple[Floats, Floats]:
-    """Speed and limit at the samples of a leg that begins and ends standing; the limit may begin at any speed."""
+    """Speed and limit along a leg that begins and ends standing; the limit may begin at any speed."""
     from antdrive.robots.control import _kernels_profile
 
     limit = np.empty(len(arc))
@@ -128,10 +130,10 @@ def turning_time(angle: float, robot: RobotSpec) -> float:
 
 
 def _headings(route: Route, rotate_in_place_above: float) -> tuple[Floats, Floats, list[float], list[float]]:
-    """The heading along the route as a piecewise linear function, and where the robot rotates in place, by how much.
+    """The heading along the route, piecewise linear, and where the robot rotates in place, by how much.
 
-    The function is given by places [m] and the headings there [rad]. On an arc the heading grows linearly; at a corner
-    a place comes twice. Rotations in place are left out of it.
+    The function is given by places [m] and the headings there [rad]. On an arc the heading grows linearly; at
+    a corner a place comes twice. Rotations in place are left out of it.
     """
     steps = np.diff(route.xy, axis=0)
     heading = np.arctan2(steps[:, 1], steps[:, 0])
@@ -154,10 +156,10 @@ def _headings(route: Route, rotate_in_place_above: float) -> tuple[Floats, Float
 
 
 def _blended(s: Floats, places: Floats, headings: Floats, blend: float) -> tuple[Floats, Floats, Floats]:
-    """Heading, curvature and its growth per metre at arc lengths s, averaged with a triangle of half width `blend`.
+    """Heading, curvature and its growth per metre at arc lengths s, averaged over `blend` on both sides.
 
-    The heading is piecewise linear, so its average and the average's derivatives are exact second differences of its
-    first and second integrals.
+    The weights are a triangle. The heading is piecewise linear, so its average and the average's derivatives
+    are exact second differences of its first and second integrals.
     """
     widths = np.diff(places)
     slopes = np.diff(headings) / np.where(widths > 0, widths, 1.0)

@@ -1,9 +1,10 @@
 """Pure pursuit that cuts corners only where there is room (after R. C. Coulter, CMU-RI-TR-92-01, 1992).
 
-The carrot is the point of the route at the true lookahead distance from the robot. Before a drive, the controller
-computes for samples along the route how far ahead the robot may look so that the straight line to the carrot keeps
-clear of obstacles. During the drive it shortens the lookahead further until the arc to the carrot is clear. The robot
-is slow where the lookahead is short, and rotates in place where not even the shortest arc is clear.
+The carrot is the point of the route at the true lookahead distance from the robot. Before a drive, the
+controller computes for samples along the route how far ahead the robot may look so that the straight line to
+the carrot keeps clear of obstacles. During the drive it shortens the lookahead further until the arc to the
+carrot is clear. The robot is slow where the lookahead is short, and rotates in place where not even the
+shortest arc is clear.
 """
 
 from __future__ import annotations
@@ -190,7 +191,8 @@ class PurePursuit:
             rotate_in_place_above=self.rotate_in_place_above,
             braking=self.braking,
         )
-        curvature, heading = (np.interp(at, profile.arc, values) for values in (profile.curvature, profile.heading))
+        curvature = np.interp(at, profile.arc, profile.curvature)
+        heading = np.interp(at, profile.arc, profile.heading)
         if route.curvature is None:
             curvature[:] = np.nan
         speed = self._speed_limits(route, world, robot, profile, lookahead, tuning.lookahead_time)
@@ -245,21 +247,23 @@ class PurePursuit:
         )
 
     def _index(self, world: World, clearance: float) -> ObstacleIndex:
-        """The world's obstacles, each listed for every square from which the longest lookahead can come close to it."""
+        """The world's obstacles, by the squares from which the longest lookahead can come close to them."""
         bounds = np.asarray(world.bounds, dtype=np.float64)
         side = max(SQUARE, math.sqrt(math.prod(world.size) / MAX_SQUARES))
-        discs, starts = _kernels_obstacles.index_discs(world.discs, bounds, side, self.lookahead_max + clearance + side)
+        distance = self.lookahead_max + clearance + side
+        discs, starts = _kernels_obstacles.index_discs(world.discs, bounds, side, distance)
         return ObstacleIndex(discs, starts, bounds, side)
 
     def _speed_limits(
         self, route: Route, world: World, robot: RobotSpec, profile: SpeedProfile, lookahead: Floats, time: float
     ) -> Floats:
-        """The speed limit (S,) at the samples, where the robot may look ahead `lookahead` (S,) and so far in `time`."""
+        """The speed limit (S,) at the samples: `lookahead` (S,) in `time`, the profile, the obstacles."""
         at = SPACING * np.arange(len(lookahead))
         xy = np.stack([np.interp(at, route.arc, values) for values in route.xy.T], axis=1)
         clearance = point_clearance(world, xy) - robot.radius
         speed: Floats = np.minimum(lookahead / time, np.interp(at, profile.arc, profile.limit))
-        speed = np.minimum(speed, self.min_speed_near_obstacles + np.maximum(clearance, 0.0) / self.clearance_time)
+        near_obstacles = self.min_speed_near_obstacles + np.maximum(clearance, 0.0) / self.clearance_time
+        speed = np.minimum(speed, near_obstacles)
         for stop in profile.arc[:-1][np.diff(profile.arc) == 0]:
             speed[int(stop / SPACING) : int(stop / SPACING) + 2] = 0.0
         _kernels_path.brake_backwards(speed, SPACING, self.braking * robot.max_acceleration)
