@@ -12,10 +12,14 @@ from antdrive.robots.control._kernels_path import PathSamples, point_at, project
 from antdrive.robots.control._kernels_pursuit import MotionLimits, PursuitTuning, clip, pursue, reachable_twist
 from antdrive.worlds._kernels import Array, kernel, segment_clearance
 
-# The columns of a table of candidates: the kind; the speed (of FOLLOW_ROUTE the highest, of TWO_TWISTS the
-# first) and the yaw rate of the first twist, how long that lasts [s], and the second twist.
-KIND, SPEED, YAW_RATE, DURATION, NEXT_SPEED, NEXT_YAW_RATE = range(6)
-# The kinds: pure pursuit along the route up to a speed; one twist and then another.
+# The columns of a table of candidates.
+KIND = 0  # FOLLOW_ROUTE or TWO_TWISTS
+SPEED = 1  # the highest speed on the route, or the speed of the first twist [m/s]
+YAW_RATE = 2  # of the first twist [rad/s]
+DURATION = 3  # of the first twist [s]
+NEXT_SPEED, NEXT_YAW_RATE = 4, 5  # of the second twist
+
+# The kinds of candidates: pure pursuit along the route up to a speed, or one constant twist and then another.
 FOLLOW_ROUTE, TWO_TWISTS = 0.0, 1.0
 
 CONTACT_MARGIN = 0.005  # a mover that is already closer than the minimum counts as met at this clearance [m]
@@ -82,8 +86,8 @@ def first_contact(
 ) -> tuple[float, float]:  # fmt: skip
     """The share of a step after which a mover is at its contact distance, 2 if none is, and the clearance.
 
-    The robot moves straight from (x0, y0) to (x1, y1), and each mover straight between its places k and k +
-    1. The clearance is the least to a mover's surface, beyond `min_distance`.
+    The robot moves straight from (x0, y0) to (x1, y1), and each mover straight from its place k to the next.
+    The clearance is the least to a mover's surface, beyond `min_distance`.
     """
     share, clearance = 2.0, math.inf
     for m in near:

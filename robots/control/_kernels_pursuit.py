@@ -135,7 +135,10 @@ def reachable_twist(
 
 @kernel
 def slow_for_curvature(curvature: float, lateral_acceleration: float, yaw_rate: float) -> float:
-    """The speed at which a curve needs no more than the given lateral acceleration and yaw rate."""
+    """The speed at which a curve needs no more than the given lateral acceleration and yaw rate.
+
+    v^2 |k| <= a and v |k| <= w.
+    """
     k = abs(curvature)
     if k < 1e-9:
         return math.inf
@@ -144,7 +147,10 @@ def slow_for_curvature(curvature: float, lateral_acceleration: float, yaw_rate: 
 
 @kernel
 def slow_for_yaw_rate(curvature: float, yaw_rate: float, yaw_acceleration: float, time: float) -> float:
-    """The speed at which the yaw rate of a curve can be reached within `time` from the present `yaw_rate`."""
+    """The speed at which the yaw rate of a curve can be reached within `time` from the present one.
+
+    v |k| <= w + a t, with the yaw rate w counted in the direction of the curve.
+    """
     k = abs(curvature)
     if k < 1e-9:
         return math.inf
@@ -164,7 +170,7 @@ def slow_for_clearance(clearance: float, min_speed: float, time: float) -> float
 
 @kernel
 def brake_for_goal(remaining: float, deceleration: float) -> float:
-    """The speed from which the robot can still stop in `remaining` metres."""
+    """The speed from which the robot can still stop in `remaining` metres: v^2 = 2 a d."""
     return math.sqrt(2.0 * deceleration * max(remaining, 0.0))
 
 
@@ -180,7 +186,11 @@ def stopping_clearance(
     discs: Array,
     bounds: Array,
 ) -> float:
-    """The clearance of the arc that the robot still drives if it brakes after one more period."""
+    """The clearance of the arc that the robot still drives if it brakes after one more period.
+
+    A velocity is admissible if the robot can stop before the next obstacle on its arc (D. Fox, W. Burgard and
+    S. Thrun, The dynamic window approach to collision avoidance, IEEE Robotics & Automation Magazine 4, 1997).
+    """
     length = v * period + 0.5 * v * v / deceleration
     sweep = w / v * length
     chord = length if abs(sweep) < 1e-6 else 2.0 * v / w * math.sin(0.5 * sweep)
@@ -219,10 +229,12 @@ def find_carrot(
 @kernel
 def should_rotate(rotating: bool, v: float, carrot: Carrot, tuning: PursuitTuning) -> bool:
     """Whether to rotate in place: with hysteresis, and sooner where no arc is clear or the robot stands."""
-    off = abs(carrot.bearing)
-    if rotating or (not carrot.clear and off > tuning.rotate_until):
-        return off > tuning.rotate_until
-    return off > (tuning.rotate_above if v > tuning.creep_speed else tuning.rotate_above_at_rest)
+    limit = tuning.rotate_above if v > tuning.creep_speed else tuning.rotate_above_at_rest
+    if rotating:
+        limit = tuning.rotate_until
+    elif not carrot.clear:
+        limit = min(limit, tuning.rotate_until)
+    return abs(carrot.bearing) > limit
 
 
 @kernel
@@ -281,7 +293,7 @@ def rotation(new_v: float, v: float, w: float, bearing: float, limits: MotionLim
     """The yaw rate of a robot that is to rotate in place.
 
     It brakes on its present curve first and rotates once it (nearly) stands, so that the footprint stays
-    where it was checked. The square root lets the yaw rate fall to 0 where the bearing does.
+    where it was checked. The yaw rate falls to 0 together with the bearing.
     """
     if abs(new_v) < tuning.creep_speed:
         return math.copysign(min(limits.yaw_rate, math.sqrt(limits.yaw_acceleration * abs(bearing))), bearing)

@@ -42,19 +42,19 @@ class AvoidanceState(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Avoidance:
-    """The settings of local avoidance. Weights trade what they weigh for progress along the route.
+    """The settings of local avoidance. A weight is the progress along the route that a shortcoming costs.
 
     Attributes:
         horizon: how far ahead movers are predicted [s]
         step: time between two predicted instants [s]
         min_clearance: the least clearance to movers; where it is less already, that much is kept [m]
         preferred_clearance: clearance beyond the least from which more makes no difference [m]
-        clearance_weight: progress traded for each metre of clearance that is missing [m/m]
-        cross_track_weight: progress traded for each metre less off the route [m/m]
-        heading_weight: progress traded for each radian less off the route's direction [m/rad]
+        clearance_weight: progress that each metre of missing clearance costs [m/m]
+        cross_track_weight: progress that each metre off the route costs [m/m]
+        heading_weight: progress that each radian off the route's direction costs [m/rad]
         reversal_time: how far ahead a sudden reversal of a mover is considered [s]
-        reversal_margin: clearance kept, beyond the least, to where a mover would be had it reversed [m]
-        reversal_weight: progress traded for each metre of that clearance [m/m]; 0 trusts the prediction
+        reversal_margin: clearance, beyond the least, to where a mover would be had it reversed [m]
+        reversal_weight: progress that each metre less than that costs [m/m]; 0 trusts the prediction
 
     Raises:
         ValueError: a setting is out of range.
@@ -188,8 +188,7 @@ _NOT_NEGATIVE = (
 def _candidate_table(max_speed: float, max_yaw_rate: float, lateral_acceleration: float) -> Floats:
     """What a robot chooses from (N, 6): the controller's motion twice, the same more slowly, pairs of twists.
 
-    Row 1 is the place of the last decision. The second twist of a pair goes straight on or stands; it never
-    turns.
+    Row 1 is the place of the last decision. The second twist of a pair drives straight or stands.
     """
     shares = (1.0, 1.0, 0.7, 0.45, 0.2)
     rows = [(kernels.FOLLOW_ROUTE, share * max_speed, 0.0, 0.0, 0.0, 0.0) for share in shares]
