@@ -10,11 +10,23 @@ from hypothesis import strategies as st
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex, arc_clearance, index_discs, nearby
 from antdrive.robots.control._kernels_path import brake_backwards, carrot_at, clear_lookaheads, point_at, project
 from antdrive.robots.control._kernels_pursuit import (
+    CREEP,
+    CRUISE,
+    CURVATURE,
+    GOAL,
+    ROUTE,
+    YAW_RATE,
+    Carrot,
+    MotionLimits,
+    PursuitTuning,
     brake_for_goal,
     keep_wheels_within,
+    reachable_twist,
+    should_rotate,
     slow_for_clearance,
     slow_for_curvature,
     slow_for_yaw_rate,
+    speed_limit,
 )
 
 BOUNDS = np.array([-50.0, -50.0, 50.0, 50.0])
@@ -54,6 +66,78 @@ def test_close_obstacles_limit_the_speed() -> None:
     assert slow_for_clearance(0.0, 0.5, 0.05) == 0.5
     assert slow_for_clearance(0.05, 0.5, 0.05) == pytest.approx(1.5)
     assert slow_for_clearance(-0.1, 0.5, 0.05) == 0.5
+
+
+LIMITS = MotionLimits(
+    speed=1.0,
+    yaw_rate=3.0,
+    acceleration=1.0,
+    yaw_acceleration=8.0,
+    lateral_acceleration=1.0,
+    half_track=0.1,
+    rim_speed=2.0,
+)
+TUNING = PursuitTuning(
+    period=0.1,
+    spacing=0.02,
+    lookahead_clearance=0.2,
+    stopping_clearance=0.2,
+    robot_radius=0.2,
+    lookahead_time=0.25,
+    lookahead_min=0.1,
+    lookahead_max=1.0,
+    preferred_lookahead_min=0.3,
+    rotate_above=1.0,
+    rotate_above_at_rest=0.2,
+    rotate_until=0.1,
+    braking=0.5,
+    creep_speed=0.04,
+    goal_distance=0.02,
+    min_speed_near_obstacles=0.5,
+    clearance_time=0.05,
+)
+
+
+@pytest.mark.parametrize(
+    ("curvature", "route_speed", "remaining", "clear", "speed", "limiter"),
+    [
+        (0.0, 2.0, 10.0, True, 1.0, CRUISE),
+        (2.0, 2.0, 10.0, True, math.sqrt(0.5), CURVATURE),
+        (4.0, 2.0, 10.0, True, 0.4, YAW_RATE),  # 8 rad/s^2 for 0.2 s
+        (4.0, 0.3, 10.0, True, 0.3, ROUTE),
+        (0.0, 2.0, 0.17, True, 0.4, GOAL),  # 0.16 m at 0.5 m/s^2
+        (0.0, 2.0, 10.0, False, 0.04, CREEP),
+    ],
+)
+def test_the_lowest_rule_limits_the_speed(
+    curvature: float, route_speed: float, remaining: float, clear: bool, speed: float, limiter: int
+) -> None:
+    allowed, rule = speed_limit(0.0, curvature, route_speed, 1.0, remaining, clear, LIMITS, TUNING)
+    assert allowed == pytest.approx(speed)
+    assert rule == limiter
+
+
+@pytest.mark.parametrize(
+    ("rotating", "speed", "bearing", "clear", "rotates"),
+    [
+        (False, 0.5, 0.9, True, False),
+        (False, 0.5, -1.1, True, True),
+        (False, 0.0, 0.3, True, True),  # at rest
+        (False, 0.0, 0.15, True, False),
+        (False, 0.5, 0.15, False, True),  # no arc is clear
+        (True, 0.0, 0.15, True, True),  # it goes on until the bearing is below 0.1
+        (True, 0.0, 0.05, False, False),
+    ],
+)
+def test_a_robot_rotates_in_place_for_a_large_bearing_until_it_is_small(
+    rotating: bool, speed: float, bearing: float, clear: bool, rotates: bool
+) -> None:
+    assert should_rotate(rotating, speed, Carrot(0.3, 0.0, 0.3, bearing, clear), TUNING) is rotates
+
+
+def test_a_command_changes_no_faster_than_the_robot_can() -> None:
+    assert reachable_twist(1.0, 2.0, 0.2, -0.5, 0.1, LIMITS) == pytest.approx((0.3, 0.3))
+    assert reachable_twist(-1.0, 0.1, 0.2, 0.0, 0.1, LIMITS) == pytest.approx((0.1, 0.1))
 
 
 def test_speeds_are_lowered_backwards_by_braking_distance() -> None:
