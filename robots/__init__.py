@@ -1,6 +1,6 @@
-"""Who drives: robot specifications, the differential drive and its controller."""
+"""Robots: specifications, the controller, local avoidance and noise."""
 
 import lazy_loader
 
-# What this package offers is listed, with its types, in __init__.pyi; each name is imported when first used.
+# __init__.pyi lists the public names and their types. Each name is imported when it is first used.
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

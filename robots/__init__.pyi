@@ -3,8 +3,8 @@ from .control.avoidance import AvoidanceState as AvoidanceState
 from .control.profile import SpeedProfile as SpeedProfile
 from .control.profile import speed_profile as speed_profile
 from .control.pursuit import LIMITERS as LIMITERS
-from .control.pursuit import Progress as Progress
 from .control.pursuit import PurePursuit as PurePursuit
+from .control.pursuit import PursuitState as PursuitState
 from .control.pursuit import TrackedPath as TrackedPath
 from .control.pursuit import Twist as Twist
 from .files import list_robots as list_robots
@@ -12,7 +12,7 @@ from .files import load_robot as load_robot
 from .files import robot_schema as robot_schema
 from .files import robot_to_dict as robot_to_dict
 from .footprint import footprint_clearance as footprint_clearance
-from .noise import Senses as Senses
+from .noise import NoiseModel as NoiseModel
 from .spec import Footprint as Footprint
 from .spec import Noise as Noise
 from .spec import RobotSpec as RobotSpec

@@ -1,4 +1,4 @@
-"""Robot files: specifications read from YAML, and the catalogue that comes with the package."""
+"""Robot files: specifications read from YAML, and the catalogue of robots that the package contains."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Positive = Annotated[float, Field(gt=0, le=1e6)]
 
 
 class FootprintEntry(BaseModel):
-    """A disc by its radius, or a rectangle by length (along the robot) and width."""
+    """A disc, given by its radius, or a rectangle, given by its length (along the heading) and width."""
 
     model_config = _RULES
 
@@ -37,38 +37,38 @@ class FootprintEntry(BaseModel):
         return self
 
     def footprint(self) -> Footprint:
-        """The footprint it tells of."""
+        """The footprint that this entry describes."""
         if self.radius is not None:
             return Footprint.disc(self.radius)
         return Footprint.rectangle(self.length or 0.0, self.width or 0.0)
 
 
-def _level(key: str, told: str) -> Any:
+def _level(key: str, description: str) -> Any:
     low, high = NOISE_RANGE[key]
-    return Field(getattr(Noise(), key), ge=low, le=high, description=told)
+    return Field(getattr(Noise(), key), ge=low, le=high, description=description)
 
 
 class NoiseEntry(BaseModel):
-    """How far the real robot is from a perfect one; what is left out is perfect."""
+    """How the real robot differs from a perfect one; a level that is left out is that of a perfect robot."""
 
     model_config = _RULES
 
     pose_xy: float = _level("pose_xy", "standard deviation of a pose fix in x and in y [m]")
     pose_yaw: float = _level("pose_yaw", "standard deviation of a pose fix's heading [rad]")
-    pose_rate: float = _level("pose_rate", "pose fixes a second; in between the robot reckons by its encoders [Hz]")
-    encoder: float = _level("encoder", "standard deviation of each wheel's measured speed, as a fraction of it")
+    pose_rate: float = _level("pose_rate", "rate of pose fixes; between two fixes the robot uses odometry [Hz]")
+    encoder: float = _level("encoder", "standard deviation of each wheel's measured speed, as a fraction")
     slip: float = _level("slip", "standard deviation of each wheel's slip, as a fraction of its speed")
-    delay: float = _level("delay", "from a command to the motors [s]")
+    delay: float = _level("delay", "time from a command to the motors [s]")
 
 
 class RobotFile(BaseModel):
-    """A differential-drive robot, as written in a file: two driven wheels on one axle through the centre, two casters."""
+    """A differential-drive robot: two driven wheels on one axle through the centre, and two casters."""
 
     model_config = _RULES
 
     schema_: SchemaVersion = Field(alias="schema", description="write schema: 1")
-    name: str = Field(min_length=1, max_length=200, description="what the robot is called, by default the file's name")
-    source: str | None = Field(None, description="where the figures come from, free text")
+    name: str = Field(min_length=1, max_length=200, description="name of the robot, by default that of the file")
+    source: str | None = Field(None, description="where these values come from, free text")
     footprint: FootprintEntry = Field(
         description="write {radius: 0.18} for a disc or {length: 0.5, width: 0.4} for a rectangle [m]"
     )
@@ -76,35 +76,38 @@ class RobotFile(BaseModel):
     mass: Positive = Field(description="mass of the whole robot [kg]")
     wheel_radius: Positive = Field(description="radius of the driven wheels [m]")
     track: Positive = Field(description="distance between the driven wheels [m]")
-    max_speed: Positive = Field(description="forward speed limit [m/s]")
-    max_yaw_rate: Positive = Field(description="yaw rate limit [rad/s]")
-    max_acceleration: Positive = Field(description="limit on speeding up and braking [m/s^2]")
-    max_yaw_acceleration: Positive = Field(description="limit on the change of the yaw rate [rad/s^2]")
-    max_lateral_acceleration: Positive = Field(description="limit on speed times yaw rate in curves [m/s^2]")
-    max_wheel_speed: Positive = Field(description="speed limit of each wheel [rad/s]")
-    wheel_torque: Positive = Field(description="the most that one wheel's motor gives [N m]")
-    wheel_friction: Positive = Field(1.5, description="Coulomb coefficient of the wheels on the floor")
+    max_speed: Positive = Field(description="limit of the forward speed [m/s]")
+    max_yaw_rate: Positive = Field(description="limit of the yaw rate [rad/s]")
+    max_acceleration: Positive = Field(description="limit of acceleration and deceleration [m/s^2]")
+    max_yaw_acceleration: Positive = Field(description="limit of the change of the yaw rate [rad/s^2]")
+    max_lateral_acceleration: Positive = Field(description="limit of speed times yaw rate [m/s^2]")
+    max_wheel_speed: Positive = Field(description="limit of each wheel's speed [rad/s]")
+    wheel_torque: Positive = Field(description="highest torque of each wheel's motor [N m]")
+    wheel_friction: Positive = Field(1.5, description="Coulomb friction coefficient of the wheels on the floor")
     noise: NoiseEntry = Field(
-        NoiseEntry(), description="what `--noise` scales: errors of pose, encoders and wheels, and delay"
+        NoiseEntry(), description="errors of pose, encoders and wheels, and delay; `--noise` multiplies them"
     )
 
 
 def list_robots() -> Mapping[str, Path]:
-    """The robots that come with the package, by name."""
+    """The files of the robots in the package's catalogue, by name."""
     return {path.stem: path for path in sorted(_CATALOG.glob("*.yaml"))}
 
 
 def load_robot(robot: str | os.PathLike[str]) -> RobotSpec:
-    """The robot in a file, or in the catalogue under a name.
+    """The robot that a file describes.
+
+    Args:
+        robot: the file's path, or a name from `list_robots`
 
     Raises:
-        InputError: there is no such robot or something in the file is wrong.
+        InputError: the file does not exist, or something in it is wrong.
     """
     known = list_robots()
     path = known[robot] if isinstance(robot, str) and robot in known else Path(robot)
     if not os.path.lexists(path):
         hint = suggest(path.stem, known)
-        raise input_error(os.fspath(robot), f"no such file, nor a robot of the catalogue; {hint}")
+        raise input_error(os.fspath(robot), f"no such file and no such robot in the catalogue; {hint}")
     document = read_document(path)
     if isinstance(document.data, dict):
         document.data.setdefault("name", path.stem)
@@ -113,7 +116,7 @@ def load_robot(robot: str | os.PathLike[str]) -> RobotSpec:
 
 
 def robot_schema() -> dict[str, Any]:
-    """The JSON Schema of a robot file, for editors."""
+    """The JSON Schema of robot files, for editors."""
     schema = RobotFile.model_json_schema(by_alias=True)
     schema["required"] = [key for key in schema["required"] if key != "name"]
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "antdrive robot"}
@@ -131,5 +134,5 @@ def _to_spec(entry: RobotFile, document: Document) -> RobotSpec:
 
 
 def robot_to_dict(robot: RobotSpec) -> dict[str, Any]:
-    """A robot as plain data, for records."""
+    """A robot as plain data, as it stands in a rollout's record."""
     return dataclasses.asdict(robot)

@@ -5,18 +5,25 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.robots import _kernels
+from antdrive.robots import _kernels_footprint
 from antdrive.robots.spec import Footprint
 from antdrive.worlds import Floats, World
 
 
 def footprint_clearance(world: World, footprint: Footprint, poses: npt.ArrayLike) -> Floats:
-    """Distance from the footprint at each pose (N, 3) to the nearest disc surface or wall, shape (N,) [m].
+    """Distance from the footprint at each pose to the nearest disc surface or wall, shape (N,) [m].
 
-    It is negative where the footprint overlaps a disc or a wall; then its size is a bound on the depth, not the exact depth.
+    It is negative where the footprint overlaps a disc or a wall. Its size is then a bound on the depth of the
+    overlap, not the exact depth.
+
+    Args:
+        world: the discs and walls
+        footprint: the robot's footprint
+        poses: x, y and yaw of the robot's centre, shape (N, 3) [m, rad]
     """
     rows = np.ascontiguousarray(poses, dtype=np.float64).reshape(-1, 3)
     shape = np.array([footprint.half_length, footprint.half_width, footprint.rounding])
     out = np.empty(len(rows))
-    _kernels.footprint_clearances(rows, shape, world.discs, np.asarray(world.bounds, dtype=np.float64), out)
+    bounds = np.asarray(world.bounds, dtype=np.float64)
+    _kernels_footprint.footprint_clearances(rows, shape, world.discs, bounds, out)
     return out

@@ -1,6 +1,7 @@
-"""What a real robot adds: wheels that slip, encoders that err, commands that come late, a pose that is only measured.
+"""The noise of a real robot: wheels that slip, inexact encoders, delayed commands and an estimated pose.
 
-The levels stand in the robot's file; a drive scales them, 0 being the perfect robot. All chance comes from the generator given.
+A robot's file holds the levels (`Noise`). A drive scales them; at 0 the robot is perfect. All random numbers
+come from the generator that the caller passes.
 """
 
 from __future__ import annotations
@@ -14,15 +15,26 @@ from antdrive.robots.control.pursuit import Twist
 from antdrive.robots.spec import Noise
 from antdrive.worlds import Floats, Pose
 
-SLIP_TIME = 0.5  # over which slip forgets itself [s]
+SLIP_TIME = 0.5  # correlation time of slip [s]
+MIN_GAIN = 0.05  # of the filter, so that fixes always correct the estimate somewhat
 
 
-class Senses:
-    """One drive of a noisy robot: what its wheels make of commands, and where it believes to be.
+class NoiseModel:
+    """The noise of one drive: what the wheels make of commands, and what the robot estimates its pose to be.
 
-    Between two fixes of its pose the robot reckons by its encoders; a fix moves the belief by the gain of a steady Kalman
-    filter. Slip is a factor on each wheel's speed that wanders as a first-order Gauss-Markov process and that encoders, which
-    count the wheel's turns, do not see.
+    Between two pose fixes the robot uses odometry. A fix corrects the estimate with the gain of a
+    steady-state Kalman filter. Slip is a first-order Gauss-Markov process, a factor on each wheel's speed.
+    Encoders count turns of the wheels, so they do not measure it.
+
+    Attributes:
+        estimate: the estimated pose at the last control period: x, y [m] and yaw [rad]
+
+    Args:
+        noise: the levels
+        track: distance between the wheels [m]
+        period: control period [s]
+        start: the pose at the start, which the robot knows
+        rng: where all random numbers come from
     """
 
     def __init__(self, noise: Noise, track: float, period: float, start: Pose, rng: np.random.Generator) -> None:
@@ -32,13 +44,17 @@ class Senses:
         self._ticks_per_fix = max(1, round(1 / (noise.pose_rate * period)))
         self._tick = 0
         self.estimate = start
-        # What reckoning at 1 m/s loses between two fixes; slip lasts, so that it adds up over several.
-        lasting = max(1.0, 2 * SLIP_TIME * noise.pose_rate)
-        drift = (noise.encoder**2 + lasting * noise.slip**2) / noise.pose_rate**2
+        # The variance of odometry at 1 m/s between two fixes. Slip is correlated, so its errors add up over
+        # several.
+        correlated = max(1.0, 2 * SLIP_TIME * noise.pose_rate)
+        drift = (noise.encoder**2 + correlated * noise.slip**2) / noise.pose_rate**2
         self._gain = _steady_gain(drift / 2, noise.pose_xy**2), _steady_gain(2 * drift / track**2, noise.pose_yaw**2)
 
-    def look(self, pose: Pose, twist: Twist) -> Pose:
-        """Where the robot, now truly at `pose` and moving by `twist`, believes to be."""
+    def estimate_pose(self, pose: Pose, twist: Twist) -> Pose:
+        """The estimated pose of a robot whose true pose is `pose` and whose true velocity is `twist`.
+
+        To be called once in every control period, before `actuate`.
+        """
         noise, rng = self._noise, self._rng
         rolled = self._wheels(twist) / (1 + self._slip) * (1 + noise.encoder * rng.standard_normal(2))
         fix = np.asarray(pose) + rng.standard_normal(3) * (noise.pose_xy, noise.pose_xy, noise.pose_yaw)
@@ -46,27 +62,31 @@ class Senses:
             self.estimate = _moved(self.estimate, self._twist(*rolled), self._period)
         if self._tick % self._ticks_per_fix == 0:
             x, y, yaw = self.estimate
-            by_xy, by_yaw = self._gain
+            gain_xy, gain_yaw = self._gain
             turned = math.remainder(fix[2] - yaw, 2 * math.pi)
-            self.estimate = (x + by_xy * (fix[0] - x), y + by_xy * (fix[1] - y), yaw + by_yaw * turned)
+            self.estimate = (x + gain_xy * (fix[0] - x), y + gain_xy * (fix[1] - y), yaw + gain_yaw * turned)
         self._tick += 1
         return self.estimate
 
-    def ahead(self) -> Pose:
-        """Where it will believe to be when the next command takes effect: the delay is known, and what is under way."""
+    def pose_after_delay(self) -> Pose:
+        """The pose expected when the next command takes effect: the estimate moved by pending commands."""
         pose = self.estimate
         for twist in self._pending:
             pose = _moved(pose, twist, self._period)
         return pose
 
-    def act(self, command: Twist) -> Twist:
-        """What the wheels do now: an earlier command, with slip."""
+    def actuate(self, command: Twist) -> Twist:
+        """The velocity that the wheels produce now, from a delayed command and with slip.
+
+        Args:
+            command: the new command, which takes effect after the delay
+        """
         self._pending.append(command)
-        late = self._pending.popleft()
+        delayed = self._pending.popleft()
         keep = math.exp(-self._period / SLIP_TIME)
         fresh = self._noise.slip * math.sqrt(1 - keep * keep)
         self._slip = keep * self._slip + fresh * self._rng.standard_normal(2)
-        return self._twist(*(self._wheels(late) * (1 + self._slip)))
+        return self._twist(*(self._wheels(delayed) * (1 + self._slip)))
 
     def _wheels(self, twist: Twist) -> Floats:
         rim = twist.yaw_rate * self._half_track
@@ -77,7 +97,7 @@ class Senses:
 
 
 def _moved(pose: Pose, twist: Twist, time: float) -> Pose:
-    """A pose after driving on for a time."""
+    """A pose after driving with a twist for a time."""
     x, y, yaw = pose
     middle = yaw + twist.yaw_rate * time / 2
     return (
@@ -88,8 +108,8 @@ def _moved(pose: Pose, twist: Twist, time: float) -> Pose:
 
 
 def _steady_gain(drift: float, error: float) -> float:
-    """A scalar Kalman filter's gain in the long run, from the variances between two fixes and of a fix."""
+    """The steady-state gain of a scalar Kalman filter, from the variances of drift and of a fix."""
     if error == 0:
         return 1.0
     ratio = drift / error
-    return min(1.0, max(0.05, (math.sqrt(ratio * ratio + 4 * ratio) - ratio) / 2))
+    return min(1.0, max(MIN_GAIN, (math.sqrt(ratio * ratio + 4 * ratio) - ratio) / 2))

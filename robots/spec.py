@@ -1,4 +1,4 @@
-"""What a robot is: its footprint, its drive and its limits."""
+"""What a robot is: its footprint, its drive, its limits and how noisy it is."""
 
 from __future__ import annotations
 
@@ -9,56 +9,74 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Footprint:
-    """The robot seen from above: a rectangle whose edge is moved outwards by `rounding`, centred on the axle.
+    """The robot's outline from above: a rectangle, centred on the axle, moved outwards by `rounding`.
 
-    A disc is a rectangle without extent; so one distance formula serves both.
+    A disc is a rectangle of size zero with a rounding, so one distance formula serves every footprint.
+
+    Attributes:
+        half_length: half the rectangle's length, along the robot's heading [m]
+        half_width: half its width [m]
+        rounding: how far the outline is moved outwards [m]
     """
 
-    half_length: float = 0.0  # along +x of the robot [m]
-    half_width: float = 0.0  # along +y of the robot [m]
-    rounding: float = 0.0  # [m]
+    half_length: float = 0.0
+    half_width: float = 0.0
+    rounding: float = 0.0
 
     @classmethod
     def disc(cls, radius: float) -> Footprint:
-        """A round robot."""
+        """A disc of the given radius [m]."""
         return cls(rounding=radius)
 
     @classmethod
     def rectangle(cls, length: float, width: float) -> Footprint:
-        """A rectangular robot."""
+        """A rectangle of the given length, along the robot's heading, and width [m]."""
         return cls(half_length=length / 2, half_width=width / 2)
 
     @property
     def is_disc(self) -> bool:
-        """Whether the footprint is the same in every direction."""
+        """Whether the footprint is a disc."""
         return self.half_length == 0 and self.half_width == 0
 
     @property
     def radius(self) -> float:
-        """The radius of the smallest disc around it, centred on the axle [m]."""
+        """Radius of the smallest disc around the footprint, centred on the axle [m]."""
         return math.hypot(self.half_length, self.half_width) + self.rounding
 
 
+#: The lowest and highest value of each field of `Noise`.
 NOISE_RANGE = {
-    "pose_xy": (0.0, 1.0), "pose_yaw": (0.0, 1.0), "pose_rate": (1.0, 1000.0), "encoder": (0.0, 0.5), "slip": (0.0, 0.5),
+    "pose_xy": (0.0, 1.0),
+    "pose_yaw": (0.0, 1.0),
+    "pose_rate": (1.0, 1000.0),
+    "encoder": (0.0, 0.5),
+    "slip": (0.0, 0.5),
     "delay": (0.0, 1.0),
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Noise:
-    """How far a real robot is from a perfect one: standard deviations, the rate of pose fixes and the delay of commands.
+    """How a real robot differs from a perfect one. Levels are standard deviations.
+
+    Attributes:
+        pose_xy: error of a pose fix in x and in y [m]
+        pose_yaw: error of a pose fix in heading [rad]
+        pose_rate: rate of pose fixes; between two fixes the robot uses odometry [Hz]
+        encoder: error of each wheel's measured speed, as a fraction of the speed
+        slip: slip of each wheel, as a fraction of its speed; it changes over about half a second
+        delay: time from a command to the motors [s]
 
     Raises:
-        ValueError: a level that is negative, not finite, or beyond any robot.
+        ValueError: a value is outside its NOISE_RANGE.
     """
 
-    pose_xy: float = 0.0  # of a pose fix, in x and in y [m]
-    pose_yaw: float = 0.0  # of a pose fix [rad]
-    pose_rate: float = 20.0  # pose fixes a second; in between the robot dead-reckons [Hz]
-    encoder: float = 0.0  # of each wheel's measured speed, as a fraction of it
-    slip: float = 0.0  # of each wheel's true speed, as a fraction; wanders over half a second
-    delay: float = 0.0  # from a command to the motors [s]
+    pose_xy: float = 0.0
+    pose_yaw: float = 0.0
+    pose_rate: float = 20.0
+    encoder: float = 0.0
+    slip: float = 0.0
+    delay: float = 0.0
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
@@ -68,13 +86,13 @@ class Noise:
                 raise ValueError(f"{field.name}: must be between {low:g} and {high:g}, got {value:g}")
 
     def scaled(self, factor: float) -> Noise:
-        """The same robot with all errors and the delay `factor` times as large."""
+        """The noise with all errors and the delay multiplied by `factor`."""
         levels = {f.name: getattr(self, f.name) * factor for f in dataclasses.fields(self) if f.name != "pose_rate"}
         return dataclasses.replace(self, **levels)
 
     @property
-    def loud(self) -> bool:
-        """Whether there is any."""
+    def nonzero(self) -> bool:
+        """Whether there is any error or delay."""
         return any(getattr(self, f.name) for f in dataclasses.fields(self) if f.name != "pose_rate")
 
 
@@ -82,25 +100,43 @@ class Noise:
 class RobotSpec:
     """A differential-drive robot: two driven wheels on one axle through the centre, and two casters.
 
+    Attributes:
+        name: what the robot is called
+        footprint: its outline from above
+        height: height of its body [m]
+        mass: mass of the whole robot [kg]
+        wheel_radius: radius of the driven wheels [m]
+        track: distance between the driven wheels [m]
+        max_speed: limit of the forward speed [m/s]
+        max_yaw_rate: limit of the yaw rate [rad/s]
+        max_acceleration: limit of acceleration and deceleration [m/s^2]
+        max_yaw_acceleration: limit of the change of the yaw rate [rad/s^2]
+        max_lateral_acceleration: limit of speed times yaw rate [m/s^2]
+        max_wheel_speed: limit of each wheel's speed [rad/s]
+        wheel_torque: highest torque of each wheel's motor [N m]
+        wheel_friction: Coulomb friction coefficient of the wheels on the floor
+        noise: the robot's noise at a scenario's noise level of 1
+        source: where these values come from
+
     Raises:
-        ValueError: a value that no robot can have.
+        ValueError: a value is not positive, or the wheels stand outside the footprint.
     """
 
     name: str
     footprint: Footprint
-    height: float  # [m]
-    mass: float  # [kg]
-    wheel_radius: float  # [m]
-    track: float  # between the wheels' contact points [m]
-    max_speed: float  # [m/s]
-    max_yaw_rate: float  # [rad/s]
-    max_acceleration: float  # [m/s^2]
-    max_yaw_acceleration: float  # [rad/s^2]
-    max_lateral_acceleration: float  # [m/s^2]
-    max_wheel_speed: float  # [rad/s]
-    wheel_torque: float  # the most one wheel's motor gives [N m]
-    wheel_friction: float = 1.5  # Coulomb coefficient against the floor
-    noise: Noise = Noise()  # as documented; a drive scales it
+    height: float
+    mass: float
+    wheel_radius: float
+    track: float
+    max_speed: float
+    max_yaw_rate: float
+    max_acceleration: float
+    max_yaw_acceleration: float
+    max_lateral_acceleration: float
+    max_wheel_speed: float
+    wheel_torque: float
+    wheel_friction: float = 1.5
+    noise: Noise = Noise()
     source: str | None = None
 
     def __post_init__(self) -> None:
@@ -109,8 +145,8 @@ class RobotSpec:
             if isinstance(value, float | int) and not (math.isfinite(value) and value > 0):
                 raise ValueError(f"{field.name}: must be greater than 0, got {value:g}")
         if not self.footprint.radius > 0:
-            raise ValueError("footprint: must have an extent")
-        # Contacts are felt by the chassis alone, so no part of the wheels may stand outside it.
+            raise ValueError("footprint: must be larger than a point")
+        # Only the chassis detects contacts, so no part of a wheel may stand outside it.
         foot, half_track = self.footprint, self.track / 2
         if foot.is_disc and math.hypot(half_track, self.wheel_radius) > foot.rounding:
             raise ValueError(
@@ -123,5 +159,11 @@ class RobotSpec:
 
     @property
     def radius(self) -> float:
-        """The radius planners inflate by: the footprint's circumscribed circle [m]."""
+        """Radius of the footprint's circumscribed circle, by which planners inflate obstacles [m]."""
         return self.footprint.radius
+
+    def _repr_html_(self) -> str:
+        """The robot as notebooks show it."""
+        from antdrive.robots.drawing import robot_card
+
+        return robot_card(self)

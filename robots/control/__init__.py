@@ -1,1 +1,1 @@
-"""Control: pure pursuit, its speed rules, and local avoidance."""
+"""Control: pure pursuit, speed profiles and local avoidance."""

@@ -8,51 +8,53 @@ from antdrive.worlds._kernels import Array, inline, kernel
 
 
 @inline
-def most_gain(v2: float, bend: float, change: float, acceleration: float, yaw_acceleration: float) -> float:
-    """The acceleration that the robot and its yaw acceleration `change v^2 + bend a` allow."""
-    k = abs(bend)
+def allowed_gain(v2: float, curvature: float, change: float, acceleration: float, yaw_acceleration: float) -> float:
+    """The acceleration a at speed v that also keeps the yaw acceleration, `change v^2 + curvature a`."""
+    k = abs(curvature)
     if k * acceleration <= 1e-12:
         return acceleration
-    return min(acceleration, max(0.0, yaw_acceleration - math.copysign(1.0, bend) * change * v2) / k)
+    return min(acceleration, max(0.0, yaw_acceleration - math.copysign(1.0, curvature) * change * v2) / k)
 
 
 @kernel
 def limit_speed(
-    curvature: Array, change: Array, top: float, lateral: float, yaw_rate: float, yaw_acceleration: float,
-    half_track: float, rim: float, out: Array,
+    curvature: Array, change: Array, max_speed: float, lateral_acceleration: float, yaw_rate: float,
+    yaw_acceleration: float, half_track: float, rim_speed: float, out: Array,
 ) -> None:  # fmt: skip
-    """out[i] = the speed that every limit but the acceleration allows at curvature[i], which grows by change[i] a metre."""
+    """out[i] = the highest speed at curvature[i], which grows by change[i] a metre, at constant speed."""
     for i in range(len(curvature)):
         k, dk = abs(curvature[i]), abs(change[i])
-        v = min(top, rim / (1.0 + k * half_track))
+        v = min(max_speed, rim_speed / (1.0 + k * half_track))
         if k > 1e-12:
-            v = min(v, min(math.sqrt(lateral / k), yaw_rate / k))
+            v = min(v, min(math.sqrt(lateral_acceleration / k), yaw_rate / k))
         if dk > 1e-12:
             v = min(v, math.sqrt(yaw_acceleration / dk))
         out[i] = v
 
 
 @kernel
-def brake_ahead(
-    arc: Array, curvature: Array, change: Array, loss: float, yaw_acceleration: float, speed: Array
+def limit_braking(
+    arc: Array, curvature: Array, change: Array, deceleration: float, yaw_acceleration: float, speed: Array
 ) -> None:
-    """Lower each speed to one from which the next can be reached by braking with `loss`."""
+    """Lower each speed until braking reaches the next (backward pass)."""
     for i in range(len(arc) - 2, -1, -1):
         v2 = speed[i + 1] * speed[i + 1]
         a = min(
-            most_gain(v2, curvature[i + 1], -change[i + 1], loss, yaw_acceleration),
-            most_gain(v2, curvature[i], -change[i], loss, yaw_acceleration),
+            allowed_gain(v2, curvature[i + 1], -change[i + 1], deceleration, yaw_acceleration),
+            allowed_gain(v2, curvature[i], -change[i], deceleration, yaw_acceleration),
         )
         speed[i] = min(speed[i], math.sqrt(v2 + 2.0 * a * (arc[i + 1] - arc[i])))
 
 
 @kernel
-def speed_up(arc: Array, curvature: Array, change: Array, gain: float, yaw_acceleration: float, speed: Array) -> None:
-    """Lower each speed to one that can be reached from the one before with `gain`."""
+def limit_acceleration(
+    arc: Array, curvature: Array, change: Array, acceleration: float, yaw_acceleration: float, speed: Array
+) -> None:
+    """Lower each speed until accelerating from the previous reaches it (forward pass)."""
     for i in range(1, len(arc)):
         v2 = speed[i - 1] * speed[i - 1]
         a = min(
-            most_gain(v2, curvature[i - 1], change[i - 1], gain, yaw_acceleration),
-            most_gain(v2, curvature[i], change[i], gain, yaw_acceleration),
+            allowed_gain(v2, curvature[i - 1], change[i - 1], acceleration, yaw_acceleration),
+            allowed_gain(v2, curvature[i], change[i], acceleration, yaw_acceleration),
         )
         speed[i] = min(speed[i], math.sqrt(v2 + 2.0 * a * (arc[i] - arc[i - 1])))

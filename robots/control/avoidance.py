@@ -1,10 +1,11 @@
-"""Keeping clear of what moves, whatever the route: slow down, stop, back off or go round, and resume.
+"""Local avoidance of movers: slow down, stop, back off or go around them, then resume the route.
 
-In every control period the way that the controller would drive on is followed ahead in time, among the movers as they are
-predicted. Where it has room, nothing is changed. Where it has not, it competes with others: the same route more slowly,
-and pairs of twists, one after the other, as the dynamic window allows (after D. Fox, W. Burgard and S. Thrun, *The dynamic
-window approach to collision avoidance*, 1997), backwards too. All keep clear of what stands still; what would be met by
-standing is met by stopping, too, so a robot gives way to a mover that comes for it.
+In every control period the controller's own motion is simulated ahead among the predicted movers. If it keeps
+the preferred clearance, it is taken unchanged. Otherwise it competes with other candidates: the same route at
+lower speeds, and pairs of constant twists, forwards and backwards, one after the other, within the robot's
+dynamic window (after D. Fox, W. Burgard and S. Thrun, *The dynamic window approach to collision avoidance*,
+IEEE Robotics & Automation Magazine 4, 1997). Every candidate must keep clear of static obstacles. Standing
+still is simulated like any other candidate, so the robot moves out of the way of a mover that approaches it.
 """
 
 from __future__ import annotations
@@ -16,127 +17,192 @@ from typing import NamedTuple
 
 import numpy as np
 
-from antdrive.robots._kernels import clip, keep_wheels_within
 from antdrive.robots.control import _kernels_avoidance as kernels
-from antdrive.robots.control.pursuit import LIMITERS, Progress, TrackedPath, Twist
+from antdrive.robots.control._kernels_pursuit import reachable_twist
+from antdrive.robots.control.pursuit import PursuitState, TrackedPath, Twist
 from antdrive.robots.spec import RobotSpec
 from antdrive.worlds import Floats, Pose
 
-YIELD = LIMITERS.index("yield")
+SPEED_WEIGHT = 0.3  # metres of the route that 1 m/s of final speed along the route is worth [s]
+PERSISTENCE = 0.05  # metres of the route that keeping to the last decision is worth
 
 
 class AvoidanceState(NamedTuple):
-    """What the robot last decided, and is still about."""
+    """What avoidance remembers between two control periods.
 
-    way: tuple[float, ...] = ()  # a pair of twists, see `_kernels_yield`; empty: the controller's own
-    left: float = 0.0  # of the first [s]
+    Attributes:
+        candidate: the pair of twists that is being executed, a row of the table of candidates; empty if there
+            is none
+        remaining: how long its first twist still lasts [s]
+    """
+
+    candidate: tuple[float, ...] = ()
+    remaining: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Avoidance:
-    """The settings of yielding.
+    """The settings of local avoidance. A weight is the progress along the route that a shortcoming costs.
+
+    Attributes:
+        horizon: how far ahead movers are predicted [s]
+        step: time between two predicted instants [s]
+        min_clearance: the least clearance to movers; where it is less already, that much is kept [m]
+        preferred_clearance: clearance beyond the least from which more makes no difference [m]
+        clearance_weight: progress that each metre of missing clearance costs [m/m]
+        cross_track_weight: progress that each metre off the route costs [m/m]
+        heading_weight: progress that each radian off the route's direction costs [m/rad]
+        reversal_time: how far ahead a sudden reversal of a mover is considered [s]
+        reversal_margin: clearance, beyond the least, to where a mover would be had it reversed [m]
+        reversal_weight: progress that each metre less than that costs [m/m]; 0 trusts the prediction
 
     Raises:
-        ValueError: a setting outside its range.
+        ValueError: a setting is out of range.
     """
 
-    horizon: float = 2.5  # movers are predicted so far ahead [s]
-    step: float = 0.1  # and looked at so often [s]
-    keep: float = 0.1  # room to movers that a way must have, or what is left of it [m]
-    comfort: float = 0.4  # and, beyond that, room that is worth a detour [m]
-    worth: float = 1.5  # metres of the route that each metre of it is worth
-    lateral: float = 0.6  # and each metre off the route
-    turn: float = 0.3  # and each radian off its heading
-    doubt: float = 0.6  # a mover may turn back at any time: it is thought of for so long [s]
-    berth: float = 0.05  # and beyond `keep`, this room is kept to where it would be [m]
-    wary: float = 6.0  # metres of the route that each metre less is worth; 0: movers do as predicted
+    horizon: float = 2.5
+    step: float = 0.1
+    min_clearance: float = 0.1
+    preferred_clearance: float = 0.4
+    clearance_weight: float = 1.5
+    cross_track_weight: float = 0.6
+    heading_weight: float = 0.3
+    reversal_time: float = 0.6
+    reversal_margin: float = 0.05
+    reversal_weight: float = 6.0
 
     def __post_init__(self) -> None:
         for key in ("horizon", "step"):
             if not 0 < getattr(self, key) <= 60:
                 raise ValueError(f"{key}: must be greater than 0 and at most 60, got {getattr(self, key):g}")
-        for key in ("keep", "comfort", "worth", "lateral", "turn", "doubt", "berth", "wary"):
+        for key in _NOT_NEGATIVE:
             if not 0 <= getattr(self, key) < math.inf:
                 raise ValueError(f"{key}: must be at least 0, got {getattr(self, key):g}")
 
     @property
-    def ahead(self) -> Floats:
-        """The times from now (K + 1,) at which movers' places are asked for [s]."""
+    def prediction_times(self) -> Floats:
+        """The times from now (K + 1,) for which `avoid` needs the movers' places [s]."""
         return np.arange(math.ceil(self.horizon / self.step - 1e-9) + 1) * np.float64(self.step)
 
     def avoid(
         self,
-        guide: TrackedPath,
+        tracked: TrackedPath,
         robot: RobotSpec,
         pose: Pose,
         last: Twist,
-        before: Progress,
+        before: PursuitState,
         wanted: Twist,
-        resolve: AvoidanceState,
+        state: AvoidanceState,
         places: Floats,
         radii: Floats,
-        top: float = math.inf,
+        speed_limit: float = math.inf,
     ) -> tuple[Twist, bool, AvoidanceState]:
-        """The command to give instead of the controller's `wanted`, whether it differs, and what was decided.
+        """The next command, whether avoidance changed it, and the state for the next period.
 
-        `last` is the command before, `before` the controller's memory then; `places` (K + 1, M, 2) are where movers of
-        `radii` (M,) are expected `ahead` from now [m]; `top` is how fast it wants to be at most [m/s].
+        Args:
+            tracked: the path that the controller follows
+            robot: the robot
+            pose: its estimated pose
+            last: the command of the last period
+            before: the controller's state before it chose `wanted`
+            wanted: the controller's command for this period
+            state: what this method returned in the last period
+            places: the movers' predicted places at the `prediction_times` (K + 1, M, 2) [m]
+            radii: their radii (M,) [m]
+            speed_limit: the speed that the schedule of a timed plan allows [m/s]
         """
-        care = kernels.AvoidanceWeights(
-            self.step, guide.tuning.radius + self.keep, self.comfort, self.worth, self.lateral, self.turn,
-            self.doubt, self.berth, self.wary,
+        candidates = self._candidates(robot, state, speed_limit)
+        chosen, contact = kernels.choose(
+            *pose, *last, before.arc, before.turning, candidates, tracked.samples, tracked.obstacles,
+            tracked.limits, tracked.tuning._replace(period=self.step), self._weights(tracked), places, radii,
         )  # fmt: skip
-        ways = _ways(robot.max_speed, robot.max_yaw_rate, robot.max_lateral_acceleration)
-        if resolve.way or top < robot.max_speed:
-            ways = ways.copy()
-        ways[0, 1] = min(robot.max_speed, top)
-        if resolve.way:
-            ways[1] = (*resolve.way[:3], resolve.left, *resolve.way[4:])
-        chosen, late, _ = kernels.choose(
-            *pose, *last, before.arc, before.turning, ways,
-            guide.line, guide.known, guide.limits, guide.tuning._replace(period=self.step), care, places, radii,
-        )  # fmt: skip
-        if chosen == 0 and late == math.inf:
+        if chosen == 0 and contact == math.inf:
             return wanted, False, AvoidanceState()
-        limits, dt = guide.limits, guide.tuning.period
-        way = ways[chosen]
-        away = np.hypot(*(places[0] - pose[:2]).T) - radii
-        soon = 2 * self.step if away.min(initial=math.inf) < care.keep else 0.0
-        if late < max(abs(last.speed) / limits.acceleration, soon):  # it will be met in any case: better standing
-            v, w = 0.0, 0.0
-            resolve = AvoidanceState()
-        elif way[0] == kernels.PURSUE:
-            top = float(way[1])
-            v = min(wanted.speed, max(top, last.speed - limits.acceleration * dt))
-            w = wanted.yaw_rate * (v / wanted.speed if wanted.speed > 0 else 1.0)
-            return Twist(v, w), True, AvoidanceState()
+        limits, period = tracked.limits, tracked.tuning.period
+        candidate = candidates[chosen]
+        stopping = abs(last.speed) / limits.acceleration
+        if contact < max(stopping, self._too_late(tracked, pose, places[0], radii)):
+            # The robot cannot avoid the contact, so it stops: a contact while standing is the mover's.
+            speed, yaw_rate, state = 0.0, 0.0, AvoidanceState()
+        elif candidate[kernels.KIND] == kernels.FOLLOW_ROUTE:
+            slowest = last.speed - limits.acceleration * period
+            speed = min(wanted.speed, max(float(candidate[kernels.SPEED]), slowest))
+            yaw_rate = wanted.yaw_rate * (speed / wanted.speed if wanted.speed > 0 else 1.0)
+            return Twist(speed, yaw_rate), True, AvoidanceState()
         else:
-            first = way[3] > 1e-9
-            v, w = (float(way[1]), float(way[2])) if first else (float(way[4]), float(way[5]))
-            resolve = AvoidanceState(tuple(way.tolist()), max(0.0, float(way[3]) - dt))
-        v = clip(v, last.speed - limits.acceleration * dt, last.speed + limits.acceleration * dt)
-        turn = limits.yaw_acceleration * dt
-        w = clip(w, max(last.yaw_rate - turn, -limits.yaw_rate), min(last.yaw_rate + turn, limits.yaw_rate))
-        return Twist(*keep_wheels_within(v, w, limits.half_track, limits.rim)), True, resolve
+            first = candidate[kernels.DURATION] > 1e-9
+            speed = float(candidate[kernels.SPEED if first else kernels.NEXT_SPEED])
+            yaw_rate = float(candidate[kernels.YAW_RATE if first else kernels.NEXT_YAW_RATE])
+            remaining = max(0.0, float(candidate[kernels.DURATION]) - period)
+            state = AvoidanceState(tuple(candidate.tolist()), remaining)
+        return Twist(*reachable_twist(speed, yaw_rate, *last, period, limits)), True, state
+
+    def _too_late(self, tracked: TrackedPath, pose: Pose, places: Floats, radii: Floats) -> float:
+        """A contact sooner than this is unavoidable where a mover is closer than the least clearance [s]."""
+        away = np.hypot(*(places - pose[:2]).T) - radii
+        close = away.min(initial=math.inf) < tracked.tuning.robot_radius + self.min_clearance
+        return 2 * self.step if close else 0.0
+
+    def _candidates(self, robot: RobotSpec, state: AvoidanceState, speed_limit: float) -> Floats:
+        """The robot's candidates (N, 6): row 0 keeps the speed limit, row 1 is the last decision."""
+        table = _candidate_table(robot.max_speed, robot.max_yaw_rate, robot.max_lateral_acceleration)
+        if not state.candidate and speed_limit >= robot.max_speed:
+            return table
+        table = table.copy()
+        table[0, kernels.SPEED] = min(robot.max_speed, speed_limit)
+        if state.candidate:
+            table[1] = state.candidate
+            table[1, kernels.DURATION] = state.remaining
+        return table
+
+    def _weights(self, tracked: TrackedPath) -> kernels.AvoidanceWeights:
+        radius = tracked.tuning.robot_radius
+        return kernels.AvoidanceWeights(
+            step=self.step,
+            min_distance=radius + self.min_clearance,
+            preferred_clearance=self.preferred_clearance,
+            clearance_weight=self.clearance_weight,
+            cross_track_weight=self.cross_track_weight,
+            heading_weight=self.heading_weight,
+            speed_weight=SPEED_WEIGHT,
+            persistence=PERSISTENCE,
+            reversal_time=self.reversal_time,
+            reversal_distance=radius + self.min_clearance + self.reversal_margin,
+            reversal_weight=self.reversal_weight,
+        )
+
+
+_NOT_NEGATIVE = (
+    "min_clearance",
+    "preferred_clearance",
+    "clearance_weight",
+    "cross_track_weight",
+    "heading_weight",
+    "reversal_time",
+    "reversal_margin",
+    "reversal_weight",
+)
 
 
 @functools.cache
-def _ways(fastest: float, yaw_rate: float, lateral: float) -> Floats:
-    """What a robot chooses from (N, 6): the controller's own way twice, that more slowly, and pairs of twists.
+def _candidate_table(max_speed: float, max_yaw_rate: float, lateral_acceleration: float) -> Floats:
+    """What a robot chooses from (N, 6): the controller's motion twice, the same more slowly, pairs of twists.
 
-    The second of a pair goes on with the first, or straight ahead, or stands.
+    Row 1 is the place of the last decision. The second twist of a pair drives straight or stands.
     """
-    rows = [(kernels.PURSUE, share * fastest, 0.0, 0.0, 0.0, 0.0) for share in (1.0, 1.0, 0.7, 0.45, 0.2)]
-    rows.append((kernels.TWISTS, 0.0, 0.0, 0.0, 0.0, 0.0))
+    shares = (1.0, 1.0, 0.7, 0.45, 0.2)
+    rows = [(kernels.FOLLOW_ROUTE, share * max_speed, 0.0, 0.0, 0.0, 0.0) for share in shares]
+    rows.append((kernels.TWO_TWISTS, 0.0, 0.0, 0.0, 0.0, 0.0))
     for speed in (1.0, 0.6, 0.3, 0.0, -0.3, -0.6, -1.0):
-        v = speed * fastest
-        most = min(yaw_rate, lateral / abs(v)) if v else yaw_rate
+        v = speed * max_speed
+        most = min(max_yaw_rate, lateral_acceleration / abs(v)) if v else max_yaw_rate
         for turn in (0.0, 0.25, -0.25, 0.6, -0.6, 1.0, -1.0):
             w = turn * most
             if not (v or w):
                 continue
-            rows.append((kernels.TWISTS, v, w, math.inf, 0.0, 0.0))
-            for lasts in (0.4, 0.9):
-                rows.append((kernels.TWISTS, v, w, lasts, 0.0, 0.0))
-                rows += [(kernels.TWISTS, v, w, lasts, on, 0.0) for on in ((v,) if v else (fastest, -fastest)) if w]
+            rows.append((kernels.TWO_TWISTS, v, w, math.inf, 0.0, 0.0))
+            for duration in (0.4, 0.9):
+                rows.append((kernels.TWO_TWISTS, v, w, duration, 0.0, 0.0))
+                ahead = (v,) if v else (max_speed, -max_speed)
+                rows += [(kernels.TWO_TWISTS, v, w, duration, next_speed, 0.0) for next_speed in ahead if w]
     return np.array(rows)

@@ -1,9 +1,10 @@
-"""Pure pursuit that cuts corners only where there is room (after Coulter 1992).
+"""Pure pursuit that cuts corners only where there is room (after R. C. Coulter, CMU-RI-TR-92-01, 1992).
 
-The carrot is the route point at the true lookahead distance from the robot. Before a drive the controller measures how far
-ahead the robot may look at every place of the route so that the straight line to the carrot keeps its distance from
-everything; during it, the lookahead shrinks further until the arc to be driven does. Where that is short the robot is slow,
-and where not even the shortest arc is clear it turns on the spot.
+The carrot is the point of the route at the true lookahead distance from the robot. Before a drive, the
+controller computes for samples along the route how far ahead the robot may look so that the straight line to
+the carrot keeps clear of obstacles. During the drive it shortens the lookahead further until the arc to the
+carrot is clear. The robot is slow where the lookahead is short, and rotates in place where not even the
+shortest arc is clear.
 """
 
 from __future__ import annotations
@@ -14,187 +15,273 @@ from typing import NamedTuple
 
 import numpy as np
 
-from antdrive.robots import _kernels
-from antdrive.robots.control.profile import speed_profile
+from antdrive.robots.control import _kernels_obstacles, _kernels_path, _kernels_pursuit
+from antdrive.robots.control._kernels_obstacles import ObstacleIndex
+from antdrive.robots.control._kernels_path import PathSamples
+from antdrive.robots.control._kernels_pursuit import MotionLimits, PursuitTuning
+from antdrive.robots.control.profile import SpeedProfile, speed_profile
 from antdrive.robots.spec import RobotSpec
-from antdrive.worlds import Pose, Route, World, point_clearance
+from antdrive.worlds import Floats, Pose, Route, World, point_clearance
 
-#: What can hold the robot's speed, by the code in the log.
+SPACING = 0.02  # between the samples along a route [m]
+SQUARE = 0.5  # side of the squares that the obstacles are sorted into, larger in worlds of many squares [m]
+MAX_SQUARES = 250_000
+
+#: The rules that can limit the robot's speed. Logs hold a rule's index.
 LIMITERS: tuple[str, ...] = (
-    "cruise",  # the robot's own top speed
+    "cruise",  # none: the robot drives at its top speed
     "curvature",  # lateral acceleration or yaw rate in a curve
-    "route",  # the route's bends, its lines of sight or the room beside it, here or within braking distance
-    "yaw",  # the yaw rate of the curve must be reached first
-    "goal",  # braking distance to the goal
-    "turn",  # turning on the spot
-    "creep",  # no clear arc: straight on, very slowly
-    "clearance",  # the arc on which it can still stop is not clear: full braking
+    "route",  # the route's bends, lines of sight or clearance, here or within braking distance
+    "yaw rate",  # the yaw rate of the curve is not reached yet
+    "goal",  # braking for the goal
+    "rotate",  # rotating in place
+    "creep",  # no arc to the carrot is clear: the robot advances very slowly
+    "braking",  # the arc on which the robot can stop is not clear: full braking
     "done",  # standing at the goal
-    "room",  # how little room there is beside the robot
-    "yield",  # a mover that would be met
+    "clearance",  # the obstacles beside the robot are close
+    "avoid",  # local avoidance of a mover
 )
 
 
 class Twist(NamedTuple):
-    """A body velocity."""
+    """A velocity of the robot.
 
-    speed: float  # forward [m/s]
-    yaw_rate: float  # counter-clockwise [rad/s]
+    Attributes:
+        speed: forward speed [m/s]
+        yaw_rate: counter-clockwise yaw rate [rad/s]
+    """
+
+    speed: float
+    yaw_rate: float
 
 
-class Progress(NamedTuple):
-    """What the controller remembers between two periods."""
+class PursuitState(NamedTuple):
+    """What the controller remembers between two control periods.
 
-    arc: float = 0.0  # how far along the route the robot has got [m]; never falls
-    turning: bool = False  # whether it is turning on the spot
-    limiter: int = 0  # index into LIMITERS: the rule that held the speed
+    Attributes:
+        arc: how far along the route the robot has got [m]; it never decreases
+        turning: whether the robot rotates in place
+        limiter: index into LIMITERS of the rule that limited the speed
+    """
+
+    arc: float = 0.0
+    turning: bool = False
+    limiter: int = 0
 
 
 @dataclass(frozen=True, eq=False)
 class TrackedPath:
-    """A route made ready for following: what the controller needs at every period, computed once."""
+    """A route prepared for tracking: what the controller needs in every period, computed once.
+
+    Attributes:
+        route: the route
+        goal_distance: the robot stops when this much of the route remains [m]
+        samples: speed limits, lookaheads and headings along the route
+        obstacles: the obstacles that the controller knows, by place
+        limits: what the robot's drive can do
+        tuning: the controller's settings for this robot and route
+    """
 
     route: Route
-    goal_distance: float  # the robot stops when this little of the route remains [m]
-    line: _kernels.Line
-    known: _kernels.Known
-    limits: _kernels.Limits
-    tuning: _kernels.Tuning
+    goal_distance: float
+    samples: PathSamples
+    obstacles: ObstacleIndex
+    limits: MotionLimits
+    tuning: PursuitTuning
 
     @property
     def length(self) -> float:
         """Length of the route [m]."""
-        return float(self.line.arc[-1])
+        return float(self.samples.arc[-1])
 
 
 @dataclass(frozen=True, kw_only=True)
 class PurePursuit:
-    """The controller's settings. Distances in metres, angles in radians, times in seconds.
+    """The controller and its settings.
+
+    Attributes:
+        lookahead_time: the lookahead is the speed times this [s]
+        preferred_lookahead_min: shortest lookahead where there is room for it [m]
+        lookahead_min: shortest lookahead anywhere [m]
+        lookahead_max: longest lookahead [m]
+        lookahead_margin: share of the safety margin that lines and arcs to the carrot keep free
+        stopping_margin: share of the safety margin that the arc on which the robot can stop keeps free
+        rotate_in_place_above: the robot rotates in place when the carrot's bearing exceeds this [rad]
+        rotate_in_place_above_at_rest: the same for a robot that stands [rad]
+        rotate_in_place_until: rotating in place ends when the bearing falls below this [rad]
+        braking: share of the robot's deceleration that planned braking uses
+        blend: distance over which changes of the route's curvature are spread [m]
+        corner_lookahead_time: `lookahead_time` for routes with corners, such as those through cells [s]
+        corner_blend: `blend` for such routes [m]
+        min_speed_near_obstacles: speed allowed without any clearance beside the robot [m/s]
+        clearance_time: clearance divided by this is the speed allowed in addition [s]
+        creep_speed: slowest forward speed [m/s]
+        goal_distance: the robot stops when this much of the route remains [m]
 
     Raises:
-        ValueError: a setting outside its range.
+        ValueError: a setting is out of range.
     """
 
-    lookahead_time: float = 0.25  # the carrot is this far ahead in time
-    lookahead_floor: float = 0.3  # and not less than this where there is room
-    lookahead_min: float = 0.12  # the least that it ever is
+    lookahead_time: float = 0.25
+    preferred_lookahead_min: float = 0.3
+    lookahead_min: float = 0.12
     lookahead_max: float = 1.0
-    guard: float = 0.4  # fraction of the margin that carrot lines and arcs must leave free
-    floor: float = 0.2  # fraction of the margin that the stopping arc must leave free
-    turn_from: float = 1.0  # turn on the spot when the carrot is farther off the heading than this
-    turn_rest: float = 0.2  # or, when standing, farther than this
-    turn_to: float = 0.08  # and until it is nearer than this
-    braking: float = 0.7  # fraction of the acceleration limit that planned braking uses
-    blend: float = 0.2  # over which changes of curvature are spread [m]
-    raw_lookahead_time: float = 0.4  # the same two for lines with corners, as cells give, which only the carrot rounds
-    raw_blend: float = 0.6
-    near_speed: float = 0.5  # allowed with no room left beside the robot [m/s], and faster the more there is:
-    near_time: float = 0.05  # a metre a second more for each room of this many metres
-    creep: float = 0.04  # the slowest forward speed [m/s]
-    goal_distance: float = 0.01  # the robot stops when this little of the route remains
+    lookahead_margin: float = 0.4
+    stopping_margin: float = 0.2
+    rotate_in_place_above: float = 1.0
+    rotate_in_place_above_at_rest: float = 0.2
+    rotate_in_place_until: float = 0.08
+    braking: float = 0.7
+    blend: float = 0.2
+    corner_lookahead_time: float = 0.4
+    corner_blend: float = 0.6
+    min_speed_near_obstacles: float = 0.5
+    clearance_time: float = 0.05
+    creep_speed: float = 0.04
+    goal_distance: float = 0.01
 
     def __post_init__(self) -> None:
-        for key in _LENGTHS_AND_TIMES:
+        for key in _POSITIVE:
             if not 1e-3 <= getattr(self, key) <= 100:
                 raise ValueError(f"{key}: must be between 0.001 and 100, got {getattr(self, key):g}")
         if self.lookahead_max < self.lookahead_min:
             raise ValueError(f"lookahead_max: must be at least lookahead_min ({self.lookahead_min:g})")
-        for key in ("guard", "floor"):
+        for key in ("lookahead_margin", "stopping_margin"):
             if not 0 <= getattr(self, key) <= 1:
                 raise ValueError(f"{key}: must be between 0 and 1, got {getattr(self, key):g}")
         if not 0 < self.braking <= 1:
             raise ValueError(f"braking: must be between 0 and 1, got {self.braking:g}")
-        if not self.turn_to < self.turn_from < math.pi / 2:
-            raise ValueError(f"turn_from: must lie between turn_to and pi/2, got {self.turn_from:g}")
+        if not self.rotate_in_place_until < self.rotate_in_place_above < math.pi / 2:
+            raise ValueError(
+                "rotate_in_place_above: must lie between rotate_in_place_until and pi/2, "
+                f"got {self.rotate_in_place_above:g}"
+            )
 
-    def guide(
-        self, route: Route, world: World, robot: RobotSpec, margin: float, period: float, tolerance: float = math.inf
+    def prepare(
+        self,
+        route: Route,
+        world: World,
+        robot: RobotSpec,
+        margin: float,
+        period: float,
+        tolerance: float = math.inf,
     ) -> TrackedPath:
-        """Prepare a route for a robot that keeps `margin` [m] and is controlled every `period` [s].
+        """Prepare a route for tracking.
 
-        Where the goal's `tolerance` [m] is small, the robot drives closer to the route's end than it would otherwise.
+        Args:
+            route: the route
+            world: the world as the controller knows it
+            robot: the robot
+            margin: the safety margin that the route keeps beyond the robot's radius [m]
+            period: control period [s]
+            tolerance: goal tolerance [m]; where it is small, the robot stops closer to the route's end
         """
-        goal_distance = min(self.goal_distance, tolerance / 2)
-        ds = 0.02
-        raw = route.curvature is None
-        ahead, blend = (self.raw_lookahead_time, self.raw_blend) if raw else (self.lookahead_time, self.blend)
-        guard = robot.radius + self.guard * margin
-        arc = route.arc
-        bounds = np.asarray(world.bounds, dtype=np.float64)
-        # The known obstacles are sorted into squares: of half a metre, or more where the world is huge.
-        side = max(0.5, math.sqrt(math.prod(world.size) / 250_000))
-        discs, starts = _kernels.bucket(world.discs, bounds, side, self.lookahead_max + guard + side)
-        lookahead = np.empty(int(arc[-1] / ds) + 2)
-        _kernels.clear_lookaheads(
-            route.xy,
-            arc,
-            discs,
-            starts,
-            side,
-            bounds,
-            guard,
-            ds,
-            self.lookahead_min,
-            self.lookahead_max,
-            lookahead,
-        )
-        profile = speed_profile(route, robot, blend=blend, stop_from=self.turn_from, braking=self.braking)
-        at = ds * np.arange(len(lookahead))
-        speed = np.minimum(lookahead / ahead, np.interp(at, profile.arc, profile.limit))
-        curvature, heading = (np.interp(at, profile.arc, line) for line in (profile.curvature, profile.heading))
-        if raw:
-            curvature[:] = np.nan
-        places = np.stack([np.interp(at, arc, line) for line in route.xy.T], axis=1)
-        room = point_clearance(world, places) - robot.radius
-        speed = np.minimum(speed, self.near_speed + np.maximum(room, 0.0) / self.near_time)
-        for stop in profile.arc[:-1][np.diff(profile.arc) == 0]:
-            speed[int(stop / ds) : int(stop / ds) + 2] = 0.0
-        _kernels.brake_backwards(speed, ds, self.braking * robot.max_acceleration)
-        return TrackedPath(
-            route,
-            goal_distance,
-            _kernels.Line(route.xy, arc, lookahead, speed, curvature, heading),
-            _kernels.Known(discs, starts, bounds, side),
-            _kernels.Limits(
-                speed=robot.max_speed,
-                yaw_rate=robot.max_yaw_rate,
-                acceleration=robot.max_acceleration,
-                yaw_acceleration=robot.max_yaw_acceleration,
-                lateral=robot.max_lateral_acceleration,
-                half_track=robot.track / 2,
-                rim=robot.max_wheel_speed * robot.wheel_radius,
-            ),
-            _kernels.Tuning(
-                period=period,
-                ds=ds,
-                guard=guard,
-                floor=robot.radius + self.floor * margin,
-                radius=robot.radius,
-                look_time=ahead,
-                look_min=self.lookahead_min,
-                look_max=self.lookahead_max,
-                look_floor=self.lookahead_floor,
-                turn_from=self.turn_from,
-                turn_to=self.turn_to,
-                turn_rest=self.turn_rest,
-                braking=self.braking,
-                creep=self.creep,
-                close=goal_distance,
-                near_speed=self.near_speed,
-                near_time=self.near_time,
-            ),
-        )
-
-    def step(self, guide: TrackedPath, pose: Pose, command: Twist, state: Progress) -> tuple[Twist, Progress]:
-        """The next command, from the pose now and the command given last."""
-        speed, yaw_rate, arc, turning, limiter = _kernels.pursue(
-            *pose, *command, state.arc, state.turning,
-            guide.line, guide.known, guide.limits, guide.tuning,
+        tuning = self._tuning(route, robot, margin, period, min(self.goal_distance, tolerance / 2))
+        obstacles = self._index(world, tuning.lookahead_clearance)
+        lookahead: Floats = np.empty(int(route.arc[-1] / SPACING) + 2)
+        _kernels_path.clear_lookaheads(
+            route.xy, route.arc, obstacles, tuning.lookahead_clearance, SPACING, self.lookahead_min,
+            self.lookahead_max, lookahead,
         )  # fmt: skip
-        return Twist(speed, yaw_rate), Progress(arc, turning, limiter)
+        at = SPACING * np.arange(len(lookahead))
+        profile = speed_profile(
+            route,
+            robot,
+            blend=self.blend if route.curvature is not None else self.corner_blend,
+            rotate_in_place_above=self.rotate_in_place_above,
+            braking=self.braking,
+        )
+        curvature = np.interp(at, profile.arc, profile.curvature)
+        heading = np.interp(at, profile.arc, profile.heading)
+        if route.curvature is None:
+            curvature[:] = np.nan
+        speed = self._speed_limits(route, world, robot, profile, lookahead, tuning.lookahead_time)
+        limits = MotionLimits(
+            speed=robot.max_speed,
+            yaw_rate=robot.max_yaw_rate,
+            acceleration=robot.max_acceleration,
+            yaw_acceleration=robot.max_yaw_acceleration,
+            lateral_acceleration=robot.max_lateral_acceleration,
+            half_track=robot.track / 2,
+            rim_speed=robot.max_wheel_speed * robot.wheel_radius,
+        )
+        samples = PathSamples(route.xy, route.arc, lookahead, speed, curvature, heading)
+        return TrackedPath(route, tuning.goal_distance, samples, obstacles, limits, tuning)
+
+    def step(self, tracked: TrackedPath, pose: Pose, command: Twist, state: PursuitState) -> tuple[Twist, PursuitState]:
+        """The next command and the state for the next period.
+
+        Args:
+            tracked: the path to follow, from `prepare`
+            pose: the robot's estimated pose
+            command: the command of the last period
+            state: the state that the last call returned; at first a `PursuitState()`
+        """
+        speed, yaw_rate, arc, turning, limiter = _kernels_pursuit.pursue(
+            *pose, *command, state.arc, state.turning,
+            tracked.samples, tracked.obstacles, tracked.limits, tracked.tuning,
+        )  # fmt: skip
+        return Twist(speed, yaw_rate), PursuitState(arc, turning, limiter)
+
+    def _tuning(
+        self, route: Route, robot: RobotSpec, margin: float, period: float, goal_distance: float
+    ) -> PursuitTuning:
+        return PursuitTuning(
+            period=period,
+            spacing=SPACING,
+            lookahead_clearance=robot.radius + self.lookahead_margin * margin,
+            stopping_clearance=robot.radius + self.stopping_margin * margin,
+            robot_radius=robot.radius,
+            lookahead_time=self.corner_lookahead_time if route.curvature is None else self.lookahead_time,
+            lookahead_min=self.lookahead_min,
+            lookahead_max=self.lookahead_max,
+            preferred_lookahead_min=self.preferred_lookahead_min,
+            rotate_above=self.rotate_in_place_above,
+            rotate_above_at_rest=self.rotate_in_place_above_at_rest,
+            rotate_until=self.rotate_in_place_until,
+            braking=self.braking,
+            creep_speed=self.creep_speed,
+            goal_distance=goal_distance,
+            min_speed_near_obstacles=self.min_speed_near_obstacles,
+            clearance_time=self.clearance_time,
+        )
+
+    def _index(self, world: World, clearance: float) -> ObstacleIndex:
+        """The world's obstacles, by the squares from which the longest lookahead can come close to them."""
+        bounds = np.asarray(world.bounds, dtype=np.float64)
+        side = max(SQUARE, math.sqrt(math.prod(world.size) / MAX_SQUARES))
+        distance = self.lookahead_max + clearance + side
+        discs, starts = _kernels_obstacles.index_discs(world.discs, bounds, side, distance)
+        return ObstacleIndex(discs, starts, bounds, side)
+
+    def _speed_limits(
+        self, route: Route, world: World, robot: RobotSpec, profile: SpeedProfile, lookahead: Floats, time: float
+    ) -> Floats:
+        """The speed limit (S,) at the samples: `lookahead` (S,) in `time`, the profile, the obstacles."""
+        at = SPACING * np.arange(len(lookahead))
+        xy = np.stack([np.interp(at, route.arc, values) for values in route.xy.T], axis=1)
+        clearance = point_clearance(world, xy) - robot.radius
+        speed: Floats = np.minimum(lookahead / time, np.interp(at, profile.arc, profile.limit))
+        near_obstacles = self.min_speed_near_obstacles + np.maximum(clearance, 0.0) / self.clearance_time
+        speed = np.minimum(speed, near_obstacles)
+        for stop in profile.arc[:-1][np.diff(profile.arc) == 0]:
+            speed[int(stop / SPACING) : int(stop / SPACING) + 2] = 0.0
+        _kernels_path.brake_backwards(speed, SPACING, self.braking * robot.max_acceleration)
+        return speed
 
 
-_LENGTHS_AND_TIMES = (
-    "lookahead_time", "lookahead_floor", "lookahead_min", "lookahead_max", "turn_to", "turn_rest", "blend",
-    "raw_lookahead_time", "raw_blend", "near_speed", "near_time", "creep", "goal_distance",
-)  # fmt: skip
+_POSITIVE = (
+    "lookahead_time",
+    "preferred_lookahead_min",
+    "lookahead_min",
+    "lookahead_max",
+    "rotate_in_place_above_at_rest",
+    "rotate_in_place_until",
+    "blend",
+    "corner_lookahead_time",
+    "corner_blend",
+    "min_speed_near_obstacles",
+    "clearance_time",
+    "creep_speed",
+    "goal_distance",
+)

@@ -229,7 +229,7 @@ class ReplanMonitor:
 
     def _prepare(self, route: Route) -> TrackedPath:
         task = self._task
-        return self._controller.guide(route, task.world, self._robot, self._margin, 1 / self._hz, task.goal_tolerance)
+        return self._controller.prepare(route, task.world, self._robot, self._margin, 1 / self._hz, task.goal_tolerance)
 
     def _plan_in_time(self, task: Task, now: float) -> PlanResult:
         assert self._timed is not None

@@ -142,9 +142,9 @@ def replans(rollout: Rollout) -> float:
 def yielding_s(rollout: Rollout) -> float:
     """Simulated time for which the robot gave way to moving obstacles."""
     limiters = rollout.meta.get("limiters", ())
-    if "yield" not in limiters:
+    if "avoid" not in limiters:
         return 0.0
-    return float((rollout.limiter == limiters.index("yield")).sum() / rollout.meta["physics_hz"])
+    return float((rollout.limiter == limiters.index("avoid")).sum() / rollout.meta["physics_hz"])
 
 
 METRICS: Mapping[str, Callable[[Rollout], float]] = MappingProxyType(

@@ -30,7 +30,7 @@ def test_catalogue_robots_load() -> None:
     assert load_robot("turtlebot").footprint.is_disc
 
 
-def test_a_robot_is_one_file(tmp_path: Path) -> None:
+def test_a_robot_is_described_by_one_file(tmp_path: Path) -> None:
     path = tmp_path / "mine.yaml"
     path.write_text(GOOD)
     mine = load_robot(path)
@@ -38,7 +38,7 @@ def test_a_robot_is_one_file(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "says"),
+    ("old", "new", "expected"),
     [
         ("mass: 5.0", "mass: -5.0", "mass: must be greater than 0, got -5.0"),
         ("mass: 5.0", "mass: heavy", "mass: must be a number"),
@@ -54,7 +54,9 @@ def test_a_robot_is_one_file(tmp_path: Path) -> None:
         ("schema: 1", "schema: 9", "schema: must be 1, got 9"),
     ],
 )
-def test_faults_are_one_line_that_names_file_and_key(tmp_path: Path, old: str, new: str, says: str) -> None:
+def test_an_error_is_one_line_that_names_the_file_and_the_key(
+    tmp_path: Path, old: str, new: str, expected: str
+) -> None:
     path = tmp_path / "mine.yaml"
     assert old in GOOD
     path.write_text(GOOD.replace(old, new))
@@ -62,16 +64,16 @@ def test_faults_are_one_line_that_names_file_and_key(tmp_path: Path, old: str, n
         load_robot(path)
     message = str(caught.value)
     assert str(path) in message
-    assert says in message
+    assert expected in message
     assert "\n" not in message
 
 
-def test_unknown_robot_suggests_a_known_one() -> None:
+def test_an_unknown_name_suggests_a_robot_of_the_catalogue() -> None:
     with pytest.raises(InputError, match="did you mean jackal"):
         load_robot("jackel")
 
 
-def test_schema_asks_for_what_the_file_needs() -> None:
+def test_the_schema_requires_what_the_file_requires() -> None:
     schema = robot_schema()
     assert set(schema["required"]) >= {"schema", "footprint", "mass", "track"}
     assert "name" not in schema["required"]

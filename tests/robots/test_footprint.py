@@ -13,7 +13,7 @@ FOOTPRINTS = [Footprint.disc(0.3), Footprint.rectangle(0.5, 0.4), Footprint(0.2,
 
 
 def outline(foot: Footprint, pose: tuple[float, float, float]) -> np.ndarray:
-    """Points along the edge of a footprint, made from its definition: a rectangle's edge moved outwards."""
+    """Points on a footprint's outline, from its definition: a rectangle's outline moved outwards."""
     sides = np.linspace(-1, 1, 801)
     hx, hy = foot.half_length, foot.half_width
     edge = np.concatenate(
@@ -53,8 +53,8 @@ def test_distance_to_the_walls_is_that_of_the_outline(foot: Footprint, x: float,
     assert footprint_clearance(world, foot, [(x, y, yaw)])[0] == pytest.approx(brute, abs=1e-4)
 
 
-def test_a_long_way_among_many_discs_is_measured_exactly() -> None:
-    """The list of near discs that the kernel carries along never misses the nearest one."""
+def test_many_poses_at_once_give_the_same_distances_as_one_by_one() -> None:
+    """The kernel reuses a list of nearby discs; it must never lack the nearest one."""
     rng = np.random.default_rng(1)
     world = World("w", (-10, -10, 10, 10), tuple(Disc(*rng.uniform(-9, 9, 2), 0.1) for _ in range(200)))
     foot = Footprint.rectangle(0.5, 0.4)
@@ -64,6 +64,6 @@ def test_a_long_way_among_many_discs_is_measured_exactly() -> None:
     np.testing.assert_array_equal(together, alone)
 
 
-def test_radius_is_the_circumscribed_one() -> None:
+def test_the_radius_is_that_of_the_circumscribed_circle() -> None:
     assert Footprint.rectangle(0.508, 0.430).radius == pytest.approx(0.3328, abs=1e-4)
     assert Footprint.disc(0.18).radius == 0.18

@@ -1,4 +1,4 @@
-"""Speed profiles against numbers worked by hand, and their limits on random routes."""
+"""Speed profiles: results worked out by hand, and the robot's limits on random routes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def straight(length: float) -> Route:
 
 
 def around(radius: float, sweep: float, bulge: float = 5e-4) -> Route:
-    """An arc drawn as refined routes draw it: corners that stand off outside."""
+    """An arc as smoothed routes contain it: a polyline whose vertices lie outside the arc."""
     count = math.ceil(abs(sweep) / (2 * math.acos(radius / (radius + bulge))))
     half = sweep / count / 2
     angles = np.concatenate(([0.0], half * (2 * np.arange(count) + 1), [sweep]))
@@ -30,8 +30,8 @@ def around(radius: float, sweep: float, bulge: float = 5e-4) -> Route:
     return Route(np.stack((reach * np.cos(angles), reach * np.sin(angles)), axis=1), curvature)
 
 
-def test_a_straight_line_is_a_trapezoid(turtlebot: RobotSpec) -> None:
-    """0.7 m/s at 1 m/s^2: 0.7 s and 0.245 m to speed up, and as much to brake."""
+def test_speeds_on_a_straight_line_form_a_trapezoid(turtlebot: RobotSpec) -> None:
+    """0.7 m/s at 1 m/s^2: 0.7 s and 0.245 m to accelerate, and the same to brake."""
     p = speed_profile(straight(2.0), turtlebot, step=0.005)
     assert p.duration == pytest.approx(2.0 / 0.7 + 0.7, abs=1e-4)
     assert p.speed.max() == pytest.approx(0.7)
@@ -42,7 +42,7 @@ def test_a_straight_line_is_a_trapezoid(turtlebot: RobotSpec) -> None:
     assert not p.curvature.any()
 
 
-def test_a_short_line_is_a_triangle_and_softer_brakes_move_its_peak(turtlebot: RobotSpec) -> None:
+def test_speeds_on_a_short_line_form_a_triangle_whose_peak_depends_on_the_braking(turtlebot: RobotSpec) -> None:
     p = speed_profile(straight(0.32), turtlebot, step=0.0025)
     assert p.duration == pytest.approx(2 * math.sqrt(0.32), abs=1e-4)
     assert p.speed.max() == pytest.approx(math.sqrt(0.32), abs=1e-3)
@@ -52,7 +52,7 @@ def test_a_short_line_is_a_triangle_and_softer_brakes_move_its_peak(turtlebot: R
     assert speed_profile(straight(1e-4), turtlebot).duration == pytest.approx(0.02, rel=0.01)
 
 
-def test_a_long_arc_is_driven_at_the_least_of_its_limits(turtlebot: RobotSpec, jackal: RobotSpec) -> None:
+def test_a_long_arc_is_driven_at_the_lowest_of_its_speed_limits(turtlebot: RobotSpec, jackal: RobotSpec) -> None:
     def cruise(robot: RobotSpec, radius: float) -> float:
         p = speed_profile(around(radius, 3.0), robot)
         return float(np.interp(p.arc[-1] / 2, p.arc, p.speed))
@@ -65,19 +65,19 @@ def test_a_long_arc_is_driven_at_the_least_of_its_limits(turtlebot: RobotSpec, j
     assert cruise(weak, 0.5) == pytest.approx(0.784 / 1.3756, rel=1e-3)
 
 
-def test_speeding_up_on_an_arc_keeps_the_yaw_acceleration(jackal: RobotSpec) -> None:
+def test_acceleration_on_an_arc_respects_the_yaw_acceleration(jackal: RobotSpec) -> None:
     sluggish = dataclasses.replace(jackal, max_yaw_acceleration=1.0)
     p = speed_profile(around(2.0, 2.5), dataclasses.replace(sluggish, max_lateral_acceleration=50.0), blend=0.05)
     a = np.diff(p.speed**2) / 2 / np.diff(p.arc)
     middle = (p.arc[1:] > 0.5) & (p.arc[1:] < 1.0)
-    np.testing.assert_allclose(a[middle], 2.0, rtol=2e-3)  # 1 rad/s^2 at a radius of 2 m, as the robot's own 2 m/s^2
+    np.testing.assert_allclose(a[middle], 2.0, rtol=2e-3)  # 1 rad/s^2 at a radius of 2 m is 2 m/s^2
     tighter = speed_profile(around(1.0, 2.5), dataclasses.replace(sluggish, max_lateral_acceleration=50.0), blend=0.05)
     a = np.diff(tighter.speed**2) / 2 / np.diff(tighter.arc)
     middle = (tighter.arc[1:] > 0.3) & (tighter.arc[1:] < 0.6)
     np.testing.assert_allclose(a[middle], 1.0, rtol=2e-3)
 
 
-def test_a_sharp_corner_is_a_stop_with_a_turn_on_the_spot(turtlebot: RobotSpec) -> None:
+def test_at_a_sharp_corner_the_robot_stops_and_rotates_in_place(turtlebot: RobotSpec) -> None:
     route = Route([[0, 0], [1, 0], [1, 1]])
     p = speed_profile(route, turtlebot, step=0.005)
     leg = 1.0 / 0.7 + 0.7
@@ -90,7 +90,7 @@ def test_a_sharp_corner_is_a_stop_with_a_turn_on_the_spot(turtlebot: RobotSpec) 
     assert not p.speed[at].any()
     assert np.diff(p.time[at])[0] == pytest.approx(turn)
     assert not p.curvature.any()
-    through = speed_profile(route, turtlebot, stop_from=2.0)
+    through = speed_profile(route, turtlebot, rotate_in_place_above=2.0)
     assert (through.speed[1:-1] > 0.0).all()
     assert through.duration < p.duration
 
@@ -99,14 +99,14 @@ def test_a_slight_corner_is_rounded_within_the_blend(turtlebot: RobotSpec) -> No
     route = Route([[0, 0], [2, 0], [2 + math.cos(0.5), math.sin(0.5)]])
     p = speed_profile(route, turtlebot, blend=0.25, step=0.005)
     peak = np.interp(2.0, p.arc, p.curvature)
-    assert peak == pytest.approx(0.5 / 0.25, rel=0.03)  # a triangle that holds the corner's angle
+    assert peak == pytest.approx(0.5 / 0.25, rel=0.03)  # the area of a triangle is the corner's angle
     assert np.interp(2.0 - 0.26, p.arc, p.curvature) == pytest.approx(0.0, abs=1e-9)
     assert np.sum(np.diff(p.arc) * p.curvature[:-1]) == pytest.approx(0.5, abs=1e-6)
     assert np.interp(2.0, p.arc, p.speed) <= math.sqrt(1.0 / 2.0) * 1.02
     assert p.speed[200:-200].min() > 0.4
 
 
-def test_curvature_of_a_drawn_arc_is_exact_and_even() -> None:
+def test_the_curvature_of_an_arc_is_exact_and_constant() -> None:
     from antdrive.robots.files import load_robot
 
     p = speed_profile(around(0.44, -2.5), load_robot("jackal"), blend=0.1)
@@ -115,10 +115,10 @@ def test_curvature_of_a_drawn_arc_is_exact_and_even() -> None:
 
 
 @given(st.lists(st.tuples(st.floats(0.05, 1.5), st.floats(-1.5, 1.5)), min_size=1, max_size=8), st.booleans())
-def test_all_limits_hold_on_random_routes(legs: list[tuple[float, float]], bold: bool) -> None:
+def test_all_limits_hold_on_random_routes(legs: list[tuple[float, float]], fast_robot: bool) -> None:
     from antdrive.robots.files import load_robot
 
-    robot = load_robot("jackal" if bold else "turtlebot")
+    robot = load_robot("jackal" if fast_robot else "turtlebot")
     heading, points = 0.0, [np.zeros(2)]
     for length, turn in legs:
         points.append(points[-1] + length * np.array([math.cos(heading), math.sin(heading)]))
@@ -141,10 +141,10 @@ def check(p: SpeedProfile, robot: RobotSpec) -> None:
     a: Floats = (np.diff(v**2)[moving] / 2) / ds[moving]
     assert (np.abs(a) <= robot.max_acceleration + 1e-6).all()
     yaw = np.diff(p.yaw_rate)[moving] / np.diff(p.time)[moving]
-    assert (np.abs(yaw) <= 1.25 * robot.max_yaw_acceleration).all()  # between samples curvature is not quite linear
+    assert (np.abs(yaw) <= 1.25 * robot.max_yaw_acceleration).all()  # the curvature is not quite linear between samples
 
 
-def test_refined_routes_keep_the_limits_and_beat_the_grid(jackal: RobotSpec) -> None:
+def test_smoothed_routes_respect_the_limits_and_are_faster_than_cell_paths(jackal: RobotSpec) -> None:
     from antdrive.planners import AStar, Query
     from antdrive.planners.smoothing.smooth import smooth
     from antdrive.worlds import forest, rasterise
@@ -162,6 +162,12 @@ def test_refined_routes_keep_the_limits_and_beat_the_grid(jackal: RobotSpec) -> 
 
 
 def test_settings_out_of_range_are_refused(turtlebot: RobotSpec) -> None:
-    for wrong in ({"blend": 0.0}, {"step": -1.0}, {"stop_from": math.nan}, {"braking": 1.5}, {"braking": 0.0}):
+    for wrong in (
+        {"blend": 0.0},
+        {"step": -1.0},
+        {"rotate_in_place_above": math.nan},
+        {"braking": 1.5},
+        {"braking": 0.0},
+    ):
         with pytest.raises(ValueError, match=next(iter(wrong))):
             speed_profile(straight(1.0), turtlebot, **wrong)

@@ -1,4 +1,4 @@
-"""The controller in a loop with perfect wheels, without physics."""
+"""The controller in closed loop with perfect wheels, without physics."""
 
 import math
 
@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from antdrive.robots import LIMITERS, Progress, PurePursuit, RobotSpec, Twist
+from antdrive.robots import LIMITERS, PurePursuit, PursuitState, RobotSpec, Twist
 from antdrive.worlds import Disc, Route, World, point_clearance
 
 OPEN = World("open", (-20, -20, 20, 20))
@@ -20,13 +20,13 @@ def follow(
     pose: tuple[float, float, float],
     world: World = OPEN,
     margin: float = 0.05,
-) -> tuple[np.ndarray, np.ndarray, list[Progress]]:
+) -> tuple[np.ndarray, np.ndarray, list[PursuitState]]:
     controller = PurePursuit()
-    guide = controller.guide(route, world, robot, margin, DT)
-    command, state = Twist(0, 0), Progress()
+    tracked = controller.prepare(route, world, robot, margin, DT)
+    command, state = Twist(0, 0), PursuitState()
     poses, commands, states = [pose], [command], [state]
     for _ in range(60 * 120):
-        command, state = controller.step(guide, pose, command, state)
+        command, state = controller.step(tracked, pose, command, state)
         x, y, yaw = pose
         middle = yaw + command.yaw_rate * DT / 2
         pose = (
@@ -47,7 +47,7 @@ STAIRCASE = Route(np.array([(0.5 * ((i + 1) // 2), 0.5 * (i // 2)) for i in rang
 
 @pytest.mark.parametrize("robot", ["turtlebot", "jackal"])
 @pytest.mark.parametrize("yaw", [0.0, math.pi / 2, math.pi, -2.5])
-def test_it_arrives_from_any_heading_within_the_robots_limits(
+def test_the_robot_arrives_from_any_heading_within_its_limits(
     robot: str, yaw: float, request: pytest.FixtureRequest
 ) -> None:
     spec: RobotSpec = request.getfixturevalue(robot)
@@ -65,33 +65,35 @@ def test_it_arrives_from_any_heading_within_the_robots_limits(
     assert arcs == sorted(arcs)
 
 
-def test_it_turns_on_the_spot_where_the_route_starts_behind_it(turtlebot: RobotSpec) -> None:
+def test_the_robot_rotates_in_place_if_the_route_starts_behind_it(turtlebot: RobotSpec) -> None:
     poses, _, states = follow(turtlebot, Route(np.array([(0.0, 0.0), (-3.0, 0.0)])), (0, 0, 0))
     assert states[1].turning
-    assert poses[:, 0].max() < 0.01  # it does not drive a loop
+    assert poses[:, 0].max() < 0.01  # it does not drive a curve
     assert poses[-1, 0] == pytest.approx(-3, abs=0.02)
 
 
-def test_it_keeps_to_the_middle_of_a_straight_route(jackal: RobotSpec) -> None:
+def test_the_robot_converges_to_a_straight_route(jackal: RobotSpec) -> None:
     poses, commands, _ = follow(jackal, Route(np.array([(0.0, 0.0), (10.0, 0.0)])), (0, 0.1, 0))
     assert np.abs(poses[len(poses) // 2 :, 1]).max() < 0.005
     assert commands[:, 0].max() == pytest.approx(2.0)
 
 
 def test_corners_are_cut_only_where_there_is_room(jackal: RobotSpec) -> None:
-    """The same corner with and without a thin post inside it."""
+    """The same corner without and with a thin post on its inside."""
     route = Route(np.array([(0.0, 0.0), (3.0, 0.0), (5.0, 2.0)]))
     margin = 0.05
-    keep = jackal.radius + margin + 0.01  # the route keeps its distance, and no more, from the post
+    keep = jackal.radius + margin + 0.01  # the route just keeps its clearance to the post
     post = World("post", OPEN.bounds, (Disc(3 - keep * math.tan(math.pi / 8), keep, 0.01),))
     free, _, _ = follow(jackal, route, (0, 0, 0), OPEN, margin)
     guarded, _, _ = follow(jackal, route, (0, 0, 0), post, margin)
-    assert point_clearance(post, free[:, :2]).min() < jackal.radius + 0.2 * margin  # with nothing there it cuts
+    assert (
+        point_clearance(post, free[:, :2]).min() < jackal.radius + 0.2 * margin
+    )  # without the post, the corner is cut
     assert point_clearance(post, guarded[:, :2]).min() > jackal.radius + 0.35 * margin
 
 
 def bends(radius: float, bulge: float = 5e-4) -> Route:
-    """Straight on, a half turn to the left and one to the right, straight on; as refined routes are drawn."""
+    """A straight line, a half circle to the left, one to the right and a straight line, as smoothed routes contain them."""
     points, curvature = [(0.0, 0.0)], [0.0]
     for centre, begin, turn in (((3.0, radius), -math.pi / 2, 1), ((3.0, 3 * radius), -math.pi / 2, -1)):
         count = math.ceil(math.pi / (2 * math.acos(radius / (radius + bulge))))
@@ -105,7 +107,7 @@ def bends(radius: float, bulge: float = 5e-4) -> Route:
     return Route(np.array(points), np.array(curvature))
 
 
-def off(poses: np.ndarray, route: Route) -> np.ndarray:
+def cross_track(poses: np.ndarray, route: Route) -> np.ndarray:
     a, along = route.xy[:-1], np.diff(route.xy, axis=0)
     offset = poses[:, None, :2] - a
     f = np.clip((offset * along).sum(axis=2) / (along**2).sum(axis=1), 0, 1)
@@ -113,19 +115,19 @@ def off(poses: np.ndarray, route: Route) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("radius", "speed"), [(0.5, 1.0), (2.0, 2.0)])
-def test_bends_of_known_curvature_are_followed_not_cut(radius: float, speed: float, jackal: RobotSpec) -> None:
-    """At the speed that lateral acceleration allows in the bend; the carrot alone would cut it."""
+def test_bends_of_known_curvature_are_followed_and_not_cut(radius: float, speed: float, jackal: RobotSpec) -> None:
+    """They are driven at the speed that the lateral acceleration allows. Steering for the carrot alone cuts them."""
     route = bends(radius)
     poses, commands, _ = follow(jackal, route, (0, 0, 0))
     fast = commands[:, 0] > 0.7 * speed
     assert fast.sum() > 100
-    error = float(np.percentile(off(poses[fast], route), 95))
+    error = float(np.percentile(cross_track(poses[fast], route), 95))
     assert error < 0.01
     raw, commands, _ = follow(jackal, Route(route.xy), (0, 0, 0))
-    assert float(np.percentile(off(raw[commands[:, 0] > 0.4], route), 95)) > 2 * error
+    assert float(np.percentile(cross_track(raw[commands[:, 0] > 0.4], route), 95)) > 2 * error
 
 
-def test_the_whole_drive_takes_as_long_as_its_profile_says(jackal: RobotSpec) -> None:
+def test_a_drive_takes_as_long_as_its_speed_profile_predicts(jackal: RobotSpec) -> None:
     from antdrive.robots import speed_profile
 
     route = bends(0.8)
@@ -133,25 +135,25 @@ def test_the_whole_drive_takes_as_long_as_its_profile_says(jackal: RobotSpec) ->
     assert len(commands) * DT == pytest.approx(speed_profile(route, jackal, braking=0.7).duration, rel=0.05)
 
 
-def test_standing_it_turns_to_the_route_first_but_moving_it_does_not_stop_for_that(jackal: RobotSpec) -> None:
+def test_a_standing_robot_turns_to_the_route_first_and_a_moving_one_does_not_stop_for_it(jackal: RobotSpec) -> None:
     straight = Route(np.array([(0.0, 0.0), (5.0, 0.0)]))
     poses, _, states = follow(jackal, straight, (0, 0, 0.5))
     assert states[1].turning
-    assert np.abs(poses[:, 1]).max() < 0.02  # else it would swing out
+    assert np.abs(poses[:, 1]).max() < 0.02  # otherwise it would leave the route
     controller = PurePursuit()
-    guide = controller.guide(straight, OPEN, jackal, 0.05, DT)
-    _, state = controller.step(guide, (1.0, 0.0, 0.5), Twist(1.0, 0.0), Progress(1.0))
+    tracked = controller.prepare(straight, OPEN, jackal, 0.05, DT)
+    _, state = controller.step(tracked, (1.0, 0.0, 0.5), Twist(1.0, 0.0), PursuitState(1.0))
     assert not state.turning
 
 
-def test_it_is_slow_where_the_room_beside_it_is_small_and_says_so(jackal: RobotSpec) -> None:
+def test_the_robot_is_slow_between_close_obstacles_and_the_limiter_is_clearance(jackal: RobotSpec) -> None:
     gate = World("gate", OPEN.bounds, tuple(Disc(5, side * (jackal.radius + 0.02 + 0.3), 0.3) for side in (1, -1)))
     poses, commands, states = follow(
         jackal, Route(np.array([(0.0, 0.0), (10.0, 0.0)]), np.zeros(2)), (0, 0, 0), gate, 0.02
     )
     inside = np.abs(poses[:, 0] - 5) < 0.1
     assert commands[inside, 0].max() < 1.5
-    assert {LIMITERS[states[i].limiter] for i in np.flatnonzero(inside)} <= {"route", "room"}
+    assert {LIMITERS[states[i].limiter] for i in np.flatnonzero(inside)} <= {"route", "clearance"}
     assert commands[:, 0].max() == pytest.approx(2.0)
 
 
@@ -172,15 +174,15 @@ def test_any_grid_like_route_is_driven_to_its_end(turns: list[int], step: float)
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "says"),
+    ("key", "value", "message"),
     [
         ("lookahead_time", 0.0, "between 0.001 and 100"),
-        ("guard", 1.5, "between 0 and 1"),
+        ("lookahead_margin", 1.5, "between 0 and 1"),
         ("braking", 0.0, "between 0 and 1"),
         ("lookahead_max", 0.01, "at least lookahead_min"),
-        ("turn_from", 3.0, "between turn_to and pi/2"),
+        ("rotate_in_place_above", 3.0, "between rotate_in_place_until and pi/2"),
     ],
 )
-def test_settings_out_of_range_are_refused_by_name(key: str, value: float, says: str) -> None:
-    with pytest.raises(ValueError, match=f"{key}: .*{says}"):
+def test_settings_out_of_range_are_refused_by_name(key: str, value: float, message: str) -> None:
+    with pytest.raises(ValueError, match=f"{key}: .*{message}"):
         PurePursuit(**{key: value})

@@ -1,4 +1,4 @@
-"""The controller's rules and geometry, one by one."""
+"""The controller's speed rules and its geometry, each by itself."""
 
 import math
 
@@ -7,7 +7,27 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from antdrive.robots import _kernels as k
+from antdrive.robots.control._kernels_obstacles import ObstacleIndex, arc_clearance, index_discs, nearby
+from antdrive.robots.control._kernels_path import brake_backwards, carrot_at, clear_lookaheads, point_at, project
+from antdrive.robots.control._kernels_pursuit import (
+    CREEP,
+    CRUISE,
+    CURVATURE,
+    GOAL,
+    ROUTE,
+    YAW_RATE,
+    Carrot,
+    MotionLimits,
+    PursuitTuning,
+    brake_for_goal,
+    keep_wheels_within,
+    reachable_twist,
+    should_rotate,
+    slow_for_clearance,
+    slow_for_curvature,
+    slow_for_yaw_rate,
+    speed_limit,
+)
 
 BOUNDS = np.array([-50.0, -50.0, 50.0, 50.0])
 NO_DISCS = np.empty((0, 3))
@@ -17,63 +37,135 @@ CORNER_ARC = np.array([0.0, 1.0, 2.0])
 
 @given(v=st.floats(-3, 3), w=st.floats(-6, 6), half_track=st.floats(0.05, 0.4), fastest=st.floats(0.1, 2))
 def test_saturated_wheels_keep_the_curvature(v: float, w: float, half_track: float, fastest: float) -> None:
-    new_v, new_w = k.keep_wheels_within(v, w, half_track, fastest)
+    new_v, new_w = keep_wheels_within(v, w, half_track, fastest)
     assert abs(new_v) + abs(new_w) * half_track <= fastest * (1 + 1e-12)
     assert new_v * w == pytest.approx(v * new_w, abs=1e-9)
     if abs(v) + abs(w) * half_track <= fastest:
         assert (new_v, new_w) == (v, w)
 
 
-def test_curves_are_taken_at_the_lateral_limit() -> None:
-    assert k.slow_for_curvature(0.5, 2.0, 4.0) == pytest.approx(2.0)  # v^2 * 0.5 = 2
-    assert k.slow_for_curvature(8.0, 2.0, 4.0) == pytest.approx(0.5)  # 8 v = 4 rad/s comes first? sqrt(2/8) = 0.5
-    assert k.slow_for_curvature(0.0, 2.0, 4.0) == math.inf
+def test_speed_in_curves_is_limited_by_lateral_acceleration_and_yaw_rate() -> None:
+    assert slow_for_curvature(0.5, 2.0, 4.0) == pytest.approx(2.0)  # v^2 * 0.5 = 2
+    assert slow_for_curvature(8.0, 9.0, 4.0) == pytest.approx(0.5)  # 8 v = 4 rad/s
+    assert slow_for_curvature(0.0, 2.0, 4.0) == math.inf
 
 
-def test_braking_for_the_goal_ends_there() -> None:
-    assert k.brake_for_goal(1.0, 2.0) == pytest.approx(2.0)
-    assert k.brake_for_goal(-0.1, 2.0) == 0.0
+def test_the_robot_can_brake_within_what_remains() -> None:
+    assert brake_for_goal(1.0, 2.0) == pytest.approx(2.0)
+    assert brake_for_goal(-0.1, 2.0) == 0.0
 
 
-def test_a_yaw_rate_out_of_reach_slows_down() -> None:
+def test_a_yaw_rate_out_of_reach_limits_the_speed() -> None:
     # 0.1 s at 8 rad/s^2 from standing: 0.8 rad/s; on a curve of 4 / m that is 0.2 m/s
-    assert k.slow_for_yaw(4.0, 0.0, 8.0, 0.1) == pytest.approx(0.2)
-    assert k.slow_for_yaw(-4.0, 0.0, 8.0, 0.1) == pytest.approx(0.2)
-    assert k.slow_for_yaw(4.0, -2.0, 8.0, 0.1) == 0.0  # turning the other way: stop first
+    assert slow_for_yaw_rate(4.0, 0.0, 8.0, 0.1) == pytest.approx(0.2)
+    assert slow_for_yaw_rate(-4.0, 0.0, 8.0, 0.1) == pytest.approx(0.2)
+    assert slow_for_yaw_rate(4.0, -2.0, 8.0, 0.1) == 0.0  # it turns the other way and must stop first
 
 
-def test_little_room_beside_the_robot_slows_down() -> None:
-    assert k.slow_for_room(0.0, 0.5, 0.05) == 0.5
-    assert k.slow_for_room(0.05, 0.5, 0.05) == pytest.approx(1.5)
-    assert k.slow_for_room(-0.1, 0.5, 0.05) == 0.5
+def test_close_obstacles_limit_the_speed() -> None:
+    assert slow_for_clearance(0.0, 0.5, 0.05) == 0.5
+    assert slow_for_clearance(0.05, 0.5, 0.05) == pytest.approx(1.5)
+    assert slow_for_clearance(-0.1, 0.5, 0.05) == 0.5
+
+
+LIMITS = MotionLimits(
+    speed=1.0,
+    yaw_rate=3.0,
+    acceleration=1.0,
+    yaw_acceleration=8.0,
+    lateral_acceleration=1.0,
+    half_track=0.1,
+    rim_speed=2.0,
+)
+TUNING = PursuitTuning(
+    period=0.1,
+    spacing=0.02,
+    lookahead_clearance=0.2,
+    stopping_clearance=0.2,
+    robot_radius=0.2,
+    lookahead_time=0.25,
+    lookahead_min=0.1,
+    lookahead_max=1.0,
+    preferred_lookahead_min=0.3,
+    rotate_above=1.0,
+    rotate_above_at_rest=0.2,
+    rotate_until=0.1,
+    braking=0.5,
+    creep_speed=0.04,
+    goal_distance=0.02,
+    min_speed_near_obstacles=0.5,
+    clearance_time=0.05,
+)
+
+
+@pytest.mark.parametrize(
+    ("curvature", "route_speed", "remaining", "clear", "speed", "limiter"),
+    [
+        (0.0, 2.0, 10.0, True, 1.0, CRUISE),
+        (2.0, 2.0, 10.0, True, math.sqrt(0.5), CURVATURE),
+        (4.0, 2.0, 10.0, True, 0.4, YAW_RATE),  # 8 rad/s^2 for 0.2 s
+        (4.0, 0.3, 10.0, True, 0.3, ROUTE),
+        (0.0, 2.0, 0.17, True, 0.4, GOAL),  # 0.16 m at 0.5 m/s^2
+        (0.0, 2.0, 10.0, False, 0.04, CREEP),
+    ],
+)
+def test_the_lowest_rule_limits_the_speed(
+    curvature: float, route_speed: float, remaining: float, clear: bool, speed: float, limiter: int
+) -> None:
+    allowed, rule = speed_limit(0.0, curvature, route_speed, 1.0, remaining, clear, LIMITS, TUNING)
+    assert allowed == pytest.approx(speed)
+    assert rule == limiter
+
+
+@pytest.mark.parametrize(
+    ("rotating", "speed", "bearing", "clear", "rotates"),
+    [
+        (False, 0.5, 0.9, True, False),
+        (False, 0.5, -1.1, True, True),
+        (False, 0.0, 0.3, True, True),  # at rest
+        (False, 0.0, 0.15, True, False),
+        (False, 0.5, 0.15, False, True),  # no arc is clear
+        (True, 0.0, 0.15, True, True),  # it goes on until the bearing is below 0.1
+        (True, 0.0, 0.05, False, False),
+    ],
+)
+def test_a_robot_rotates_in_place_for_a_large_bearing_until_it_is_small(
+    rotating: bool, speed: float, bearing: float, clear: bool, rotates: bool
+) -> None:
+    assert should_rotate(rotating, speed, Carrot(0.3, 0.0, 0.3, bearing, clear), TUNING) is rotates
+
+
+def test_a_command_changes_no_faster_than_the_robot_can() -> None:
+    assert reachable_twist(1.0, 2.0, 0.2, -0.5, 0.1, LIMITS) == pytest.approx((0.3, 0.3))
+    assert reachable_twist(-1.0, 0.1, 0.2, 0.0, 0.1, LIMITS) == pytest.approx((0.1, 0.1))
 
 
 def test_speeds_are_lowered_backwards_by_braking_distance() -> None:
     limit = np.array([2.0, 2.0, 2.0, 0.0])
-    k.brake_backwards(limit, 0.5, 1.0)
+    brake_backwards(limit, 0.5, 1.0)
     np.testing.assert_allclose(limit, [math.sqrt(3), math.sqrt(2), 1.0, 0.0])
 
 
 @given(x=st.floats(-0.3, 1.3), y=st.floats(-0.3, 1.3), look=st.floats(0.1, 0.6))
 def test_the_carrot_is_at_the_true_lookahead_distance(x: float, y: float, look: float) -> None:
-    s, segment = k.project(x, y, 0.0, 10.0, CORNER, CORNER_ARC)
-    px, py, _ = k.point_at(s, segment, CORNER, CORNER_ARC)
-    cx, cy = k.carrot_at(x, y, look, s, segment, CORNER, CORNER_ARC)
+    s, segment = project(x, y, 0.0, 10.0, CORNER, CORNER_ARC)
+    px, py, _ = point_at(s, segment, CORNER, CORNER_ARC)
+    cx, cy = carrot_at(x, y, look, s, segment, CORNER, CORNER_ARC)
     off = math.hypot(px - x, py - y)
     if off < look:
         assert math.hypot(cx - x, cy - y) == pytest.approx(look)
         on_route = min(abs(cy) if cx <= 1 else math.inf, abs(cx - 1) if cy >= 0 else math.inf)
-        assert on_route < 1e-9  # the last segment is prolonged beyond y = 1
+        assert on_route < 1e-9  # the last segment extends beyond y = 1
     else:
         assert (cx, cy) == pytest.approx((px, py))
 
 
-def test_projection_never_falls_back_nor_jumps_across_a_hairpin() -> None:
+def test_projection_never_moves_back_and_never_jumps_across_a_hairpin() -> None:
     hairpin = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 0.4], [0.0, 0.4]])
     arc = np.array([0.0, 3.0, 3.4, 6.4])
-    s, _ = k.project(1.0, 0.25, 0.9, 1.0, hairpin, arc)  # nearer to the way back, 4.4 m later
+    s, _ = project(1.0, 0.25, 0.9, 1.0, hairpin, arc)  # closer to the second leg, 4.4 m later
     assert s == pytest.approx(1.0)
-    s, _ = k.project(0.2, 0.0, 0.9, 1.0, hairpin, arc)
+    s, _ = project(0.2, 0.0, 0.9, 1.0, hairpin, arc)
     assert s == pytest.approx(0.9)
 
 
@@ -91,7 +183,7 @@ def sampled_arc(yaw: float, curvature: float, sweep: float) -> np.ndarray:
     angle=st.floats(0.01, 2.8),
     disc=st.tuples(st.floats(-3, 3), st.floats(-3, 3), st.floats(0.05, 0.5)),
 )
-def test_arc_clearance_is_that_of_its_points(
+def test_an_arcs_clearance_is_that_of_its_points(
     yaw: float, curvature: float, angle: float, disc: tuple[float, float, float]
 ) -> None:
     sweep = math.copysign(angle, curvature)
@@ -102,20 +194,22 @@ def test_arc_clearance_is_that_of_its_points(
         (points - bounds[:2]).min(),
         (bounds[2:] - points).min(),
     )
-    exact = k.arc_clearance(0.0, 0.0, yaw, curvature, sweep, points[-1, 0], points[-1, 1], discs, bounds)
+    exact = arc_clearance(0.0, 0.0, yaw, curvature, sweep, points[-1, 0], points[-1, 1], discs, bounds)
     assert exact == pytest.approx(brute, abs=5e-3)
     assert exact <= brute + 1e-9
 
 
 def test_lookahead_is_short_only_where_the_straight_line_is_blocked() -> None:
-    inner = np.array([[0.9, 0.2, 0.05]])  # inside the corner: a line that cuts it comes too close
+    inner = np.array([[0.9, 0.2, 0.05]])  # on the inside of the corner, where a line that cuts it comes too close
     starts = np.array([0, 1])
     out = np.empty(21)
-    k.clear_lookaheads(CORNER, CORNER_ARC, inner, starts, 1000.0, BOUNDS, 0.1, 0.1, 0.1, 1.0, out)
+    clear_lookaheads(CORNER, CORNER_ARC, ObstacleIndex(inner, starts, BOUNDS, 1000.0), 0.1, 0.1, 0.1, 1.0, out)
     assert out[0] == pytest.approx(1.0, abs=0.06)
     assert out[7] < 0.7
     free = np.empty(21)
-    k.clear_lookaheads(CORNER, CORNER_ARC, NO_DISCS, np.array([0, 0]), 1000.0, BOUNDS, 0.1, 0.1, 0.1, 1.0, free)
+    clear_lookaheads(
+        CORNER, CORNER_ARC, ObstacleIndex(NO_DISCS, np.array([0, 0]), BOUNDS, 1000.0), 0.1, 0.1, 0.1, 1.0, free
+    )
     assert (free == 1.0).all()
 
 
@@ -123,10 +217,10 @@ def test_lookahead_is_short_only_where_the_straight_line_is_blocked() -> None:
     st.lists(st.tuples(st.floats(-4, 4), st.floats(-4, 4), st.floats(0.05, 1)), max_size=20),
     st.integers(0, 10**6),
 )
-def test_buckets_hold_every_disc_within_reach(discs: list[tuple[float, float, float]], seed: int) -> None:
+def test_a_square_lists_every_disc_within_the_distance(discs: list[tuple[float, float, float]], seed: int) -> None:
     table = np.array(discs).reshape(-1, 3)
     bounds = np.array([-4.0, -4.0, 4.0, 4.0])
-    rows, starts = k.bucket(table, bounds, 0.7, 0.9)
+    rows, starts = index_discs(table, bounds, 0.7, 0.9)
     x, y = np.random.default_rng(seed).uniform(-4, 4, 2)
-    near = {tuple(row) for row in k.nearby(x, y, rows, starts, bounds, 0.7)}
+    near = {tuple(row) for row in nearby(x, y, ObstacleIndex(rows, starts, bounds, 0.7))}
     assert {d for d in discs if math.hypot(d[0] - x, d[1] - y) - d[2] <= 0.9} <= near

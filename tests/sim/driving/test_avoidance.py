@@ -1,4 +1,4 @@
-"""Robots that give way to movers."""
+"""Robots that avoid movers."""
 
 import dataclasses
 import math
@@ -24,37 +24,37 @@ def keyframed(*frames: tuple[float, float, float], radius: float = 0.3, **rest: 
 
 
 def among(*movers: Mover, robot: RobotSpec, task: Task = TASK, **settings: object) -> Run:
-    """A drive by the one route, unless told otherwise."""
+    """A drive among movers; without replanning, unless the settings say otherwise."""
     settings = {"replanning": None, **settings}
     task = dataclasses.replace(task, world=dataclasses.replace(task.world, movers=movers))
     return run(Scenario(task=task, planner=load_planner("astar"), planner_name="astar", robot=robot, **settings))  # type: ignore[arg-type]
 
 
-CROSSING = keyframed((0.0, 4.5, 0.6), (10.7, 4.5, 5.4))  # on the robot's way when the robot is there
+CROSSING = keyframed((0.0, 4.5, 0.6), (10.7, 4.5, 5.4))  # crosses the route where the robot is at that time
 HEAD_ON = keyframed((0.0, 8.4, 3.0), (12.0, 0.6, 3.0), (13.0, 0.6, 5.0))
 OVERTAKING = keyframed((0.0, -0.9, 3.0), (8.0, 10.3, 3.0))
 SLOW = keyframed((0.0, 3.0, 3.0), (50.0, 8.0, 3.0), (52.0, 8.0, 5.0))
 
 
-@pytest.mark.parametrize("mover", [CROSSING, HEAD_ON, SLOW], ids=["crossing", "head on", "slower, ahead"])
-def test_what_would_be_hit_is_given_way_to(mover: Keyframed, turtlebot: RobotSpec) -> None:
-    """Each of them is in the way: a robot that does not yield proves it."""
-    blind = among(mover, robot=turtlebot, avoidance=None)
+@pytest.mark.parametrize("mover", [CROSSING, HEAD_ON, SLOW], ids=["crossing", "head on", "slower in front"])
+def test_a_mover_on_the_route_is_avoided(mover: Keyframed, turtlebot: RobotSpec) -> None:
+    """A robot without avoidance collides with each of them."""
+    blind = among(mover, robot=turtlebot, yielding=None)
     assert blind.outcome is Outcome.COLLIDED
     seeing = among(mover, robot=turtlebot)
     assert seeing.succeeded, (seeing.outcome, seeing.reason, seeing.certificate)
     assert seeing.rollout is not None
-    assert "yield" in {LIMITERS[k] for k in np.unique(seeing.rollout.limiter)}
+    assert "avoid" in {LIMITERS[k] for k in np.unique(seeing.rollout.limiter)}
     assert seeing.rollout.clearance.min() > 0.03
 
 
-def test_a_faster_mover_from_behind_is_let_past(turtlebot: RobotSpec) -> None:
-    blind, seeing = (among(OVERTAKING, robot=turtlebot, avoidance=y) for y in (None, Avoidance()))
+def test_a_faster_mover_from_behind_is_let_pass(turtlebot: RobotSpec) -> None:
+    blind, seeing = (among(OVERTAKING, robot=turtlebot, yielding=y) for y in (None, Avoidance()))
     assert blind.outcome is Outcome.COLLIDED
     assert seeing.succeeded, (seeing.outcome, seeing.reason)
 
 
-def test_in_a_narrow_aisle_the_robot_stops_before_what_crosses_and_goes_on(turtlebot: RobotSpec) -> None:
+def test_in_a_narrow_aisle_the_robot_stops_for_a_crossing_mover_and_goes_on(turtlebot: RobotSpec) -> None:
     crossing = keyframed((0.0, 4.5, -1.0), (4.0, 4.5, 0.4), (7.5, 4.5, 0.6), (9.0, 4.5, 2.5), radius=0.2)
     task = Task(AISLE, (1.0, 0.5, 0.0), (8.0, 0.5), cell=0.1)
     assert among(crossing, robot=turtlebot, task=task, avoidance=None).outcome is Outcome.COLLIDED
@@ -62,22 +62,22 @@ def test_in_a_narrow_aisle_the_robot_stops_before_what_crosses_and_goes_on(turtl
     assert done.succeeded, (done.outcome, done.reason)
     assert done.rollout is not None
     speed = done.rollout.twist[:, 0]
-    assert speed[240:-240].min() < 0.1, "it waits"
+    assert speed[240:-240].min() < 0.1, "the robot waits"
     assert np.abs(done.rollout.pose[:, 1] - 0.5).max() < 0.15
 
 
-def test_in_a_narrow_aisle_the_robot_backs_off_from_what_comes_for_it(turtlebot: RobotSpec) -> None:
+def test_in_a_narrow_aisle_the_robot_backs_off_from_an_approaching_mover(turtlebot: RobotSpec) -> None:
     comes = keyframed((0.0, 6.0, 0.5), (12.0, 2.0, 0.5), (20.0, 8.7, 0.5), radius=0.2)
     task = Task(AISLE, (3.0, 0.5, 0.0), (7.0, 0.5), cell=0.1, time_limit=40.0)
     assert among(comes, robot=turtlebot, task=task, avoidance=None).outcome is Outcome.COLLIDED
     done = among(comes, robot=turtlebot, task=task)
     assert done.rollout is not None
     assert not len(done.rollout.contacts), (done.outcome, done.reason)
-    assert done.rollout.pose[:, 0].min() < 2.0, "it went back behind where it started"
+    assert done.rollout.pose[:, 0].min() < 2.0, "the robot went back past its start"
 
 
-def test_what_comes_for_a_standing_robot_is_dodged(turtlebot: RobotSpec) -> None:
-    """It has come to the goal's tolerance too late to be let stand there."""
+def test_a_robot_near_its_goal_gets_out_of_the_way_of_an_approaching_mover(turtlebot: RobotSpec) -> None:
+    """The mover comes before the robot can stop within the goal tolerance."""
     comes = Cruising(radius=0.3, position=(4.0, 3.0), velocity=(-0.6, 0.0))
     done = among(comes, robot=turtlebot)
     assert done.rollout is not None
@@ -85,25 +85,28 @@ def test_what_comes_for_a_standing_robot_is_dodged(turtlebot: RobotSpec) -> None
 
 
 @pytest.mark.parametrize(("speed", "t"), [(0.3, 5.4), (0.5, 5.0), (0.5, 6.2)])
-def test_what_has_just_gone_by_may_turn_back(speed: float, t: float, turtlebot: RobotSpec) -> None:
-    """A robot that trusts its predictions drives close behind it, and is met there."""
+def test_a_mover_that_has_just_passed_may_reverse(speed: float, t: float, turtlebot: RobotSpec) -> None:
+    """A robot that trusts the prediction drives close behind the mover and is hit when it reverses."""
     begin = t - 2.5 / speed
     frames = ((0.0, 4.6, 3.5 - speed * t),) if begin <= 0 else ((0.0, 4.6, 1.0), (begin, 4.6, 1.0))
     turns = keyframed(*frames, (t, 4.6, 3.5), (t + 4.0, 4.6, 3.5 - 4.0 * speed), radius=0.25)
-    trusting, wary = (among(turns, robot=turtlebot, avoidance=y) for y in (Avoidance(wary=0.0), Avoidance()))
+    trusting, careful = (
+        among(turns, robot=turtlebot, yielding=y) for y in (Avoidance(reversal_weight=0.0), Avoidance())
+    )
     assert trusting.outcome is Outcome.COLLIDED
-    assert wary.succeeded, (wary.outcome, wary.reason)
-    known = Perception(kind="motions")
+    assert careful.succeeded, (careful.outcome, careful.reason)
+    known = Perception(told="motions")
     one, other = (
-        among(turns, robot=turtlebot, avoidance=y, perception=known) for y in (Avoidance(wary=0.0), Avoidance())
+        among(turns, robot=turtlebot, yielding=y, knowledge=known)
+        for y in (Avoidance(reversal_weight=0.0), Avoidance())
     )
     assert one.rollout is not None
     assert other.rollout is not None
     assert one.succeeded
-    assert (one.rollout.pose == other.rollout.pose).all(), "there is no doubt about what is known"
+    assert (one.rollout.pose == other.rollout.pose).all(), "a mover whose motion is known is not expected to reverse"
 
 
-def test_where_contact_cannot_be_avoided_the_robot_meets_it_standing(turtlebot: RobotSpec) -> None:
+def test_where_contact_cannot_be_avoided_the_robot_stands_still(turtlebot: RobotSpec) -> None:
     """A piston as wide as the aisle, faster than the robot."""
     piston = keyframed((0.0, 8.0, 0.5), (4.0, 0.0, 0.5), radius=0.45)
     done = among(piston, robot=turtlebot, task=Task(AISLE, (1.0, 0.5, 0.0), (8.0, 0.5), cell=0.1))
@@ -112,8 +115,10 @@ def test_where_contact_cannot_be_avoided_the_robot_meets_it_standing(turtlebot: 
 
 @pytest.mark.parametrize("gap", [0.02, 0.08])
 @pytest.mark.parametrize("told", ["positions", "velocities"])
-def test_what_stands_nearer_than_is_kept_is_not_driven_into(turtlebot: RobotSpec, told: str, gap: float) -> None:
-    """Nothing goes past it in the aisle, and nothing pushes."""
+def test_a_standing_mover_closer_than_the_least_clearance_is_not_driven_into(
+    turtlebot: RobotSpec, told: str, gap: float
+) -> None:
+    """The mover blocks the aisle, and the robot waits in front of it."""
     plug = keyframed((0.0, 1.48 + gap, 0.5), (100.0, 1.48 + gap, 0.501))
     task = Task(AISLE, (1.0, 0.5, 0.0), (8.0, 0.5), cell=0.1, time_limit=12.0)
     done = among(plug, robot=turtlebot, task=task, perception=Perception(kind=told))  # type: ignore[arg-type]
@@ -122,8 +127,8 @@ def test_what_stands_nearer_than_is_kept_is_not_driven_into(turtlebot: RobotSpec
     assert np.abs(done.rollout.twist[:, 0]).max() < 1e-3
 
 
-def test_a_robot_that_cannot_get_away_does_not_twitch(turtlebot: RobotSpec) -> None:
-    """A wall behind it, and before it what comes on faster than it could turn: it is met as it stands."""
+def test_a_robot_that_cannot_escape_stands_still(turtlebot: RobotSpec) -> None:
+    """A wall is behind the robot, and the mover arrives before the robot could turn."""
     comes = keyframed((0.0, 2.2, 0.5), (4.0, 0.2, 0.5), radius=0.4)
     task = Task(AISLE, (0.4, 0.5, math.pi / 2), (8.0, 0.5), cell=0.1)
     done = among(comes, robot=turtlebot, task=task)
@@ -141,7 +146,7 @@ def test_the_same_seed_gives_the_same_bits_and_a_valid_certificate(turtlebot: Ro
     assert certify(first).certified
 
 
-def test_what_stands_is_kept_clear_of_while_yielding(turtlebot: RobotSpec) -> None:
+def test_static_obstacles_are_kept_clear_of_while_movers_are_avoided(turtlebot: RobotSpec) -> None:
     posts = tuple(Disc(x, y, 0.15) for x in (2.5, 4.0, 5.5) for y in (2.2, 3.8))
     task = dataclasses.replace(TASK, world=dataclasses.replace(HALL, obstacles=posts))
     done = among(CROSSING, HEAD_ON, robot=turtlebot, task=task)
@@ -149,8 +154,8 @@ def test_what_stands_is_kept_clear_of_while_yielding(turtlebot: RobotSpec) -> No
     assert not any(done.rollout.contacts[:, 1] < len(posts))
 
 
-def test_a_robot_that_sees_less_yields_to_less(turtlebot: RobotSpec) -> None:
-    near = among(CROSSING, robot=turtlebot, perception=Perception(range=1e-3))
+def test_a_robot_does_not_avoid_what_it_does_not_see(turtlebot: RobotSpec) -> None:
+    near = among(CROSSING, robot=turtlebot, knowledge=Perception(reach=1e-3))
     assert near.outcome is Outcome.COLLIDED
     for told in ("positions", "motions"):
         known = among(CROSSING, robot=turtlebot, perception=Perception(kind=told))  # type: ignore[arg-type]
@@ -159,11 +164,11 @@ def test_a_robot_that_sees_less_yields_to_less(turtlebot: RobotSpec) -> None:
 
 
 @given(st.integers(0, 2000), st.sampled_from(["positions", "velocities", "motions"]))
-def test_movers_are_expected_where_knowledge_puts_them(tick: int, told: str) -> None:
+def test_movers_are_predicted_as_the_perception_allows(tick: int, told: str) -> None:
     movers = (CROSSING, Cruising(radius=0.2, position=(2.0, 2.0), velocity=(0.5, 0.3)))
     traffic = Trajectories.of(dataclasses.replace(HALL, movers=movers), (1.0, 3.0))
-    ahead = Avoidance().ahead
-    places, radii = Predictor(traffic, Perception(kind=told), 60).predict(tick, (0.0, 0.0), ahead)  # type: ignore[arg-type]
+    ahead = Avoidance().prediction_times
+    places, radii = Predictor(traffic, Perception(told=told), 60).expected(tick, (0.0, 0.0), ahead)  # type: ignore[arg-type]
     now, speed = traffic.positions(tick / 60)[0], traffic.velocities(tick / 60)[0]
     expected = {
         "positions": np.repeat(now[None], len(ahead), axis=0),
@@ -174,27 +179,27 @@ def test_movers_are_expected_where_knowledge_puts_them(tick: int, told: str) -> 
     assert radii.tolist() == [0.3, 0.2]
 
 
-def test_nonsense_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"kind: unknown 'all'; choose from positions, velocities, motions"):
-        Perception(kind="all")  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="range: must be greater than 0, got 0"):
-        Perception(range=0.0)
+def test_settings_out_of_range_are_refused() -> None:
+    with pytest.raises(ValueError, match=r"told: unknown 'all'; choose from positions, velocities, motions"):
+        Perception(told="all")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="reach: must be greater than 0, got 0"):
+        Perception(reach=0.0)
     with pytest.raises(ValueError, match="horizon: must be greater than 0 and at most 60, got 0"):
         Avoidance(horizon=0.0)
-    with pytest.raises(ValueError, match="keep: must be at least 0, got nan"):
-        Avoidance(keep=math.nan)
+    with pytest.raises(ValueError, match="min_clearance: must be at least 0, got nan"):
+        Avoidance(min_clearance=math.nan)
 
 
-def test_a_robot_with_too_little_room_makes_more(turtlebot: RobotSpec) -> None:
-    """What creeps up on it at less than the room it keeps is got away from."""
+def test_a_robot_with_too_little_clearance_gains_more(turtlebot: RobotSpec) -> None:
+    """A mover that starts closer than the least clearance follows it slowly."""
     creeps = keyframed((0.0, 1.51, 3.0), (20.0, -2.5, 3.0), radius=0.25)
     assert among(creeps, robot=turtlebot, avoidance=None).outcome is Outcome.COLLIDED
     done = among(creeps, robot=turtlebot)
     assert done.succeeded, (done.outcome, done.reason)
 
 
-def test_a_robot_that_can_stand_at_its_goal_in_time_is_not_driven_off(turtlebot: RobotSpec) -> None:
-    """What comes later would be given way to, were the drive to go on."""
+def test_a_robot_that_can_stop_at_its_goal_in_time_does_so(turtlebot: RobotSpec) -> None:
+    """A mover arrives there later; if the drive went on, the robot would avoid it."""
     comes = keyframed((0.0, 8.0, 5.7), (9.5, 8.0, 5.7), (13.5, 8.0, 2.9), radius=0.25)
     done = among(comes, robot=turtlebot)
     assert done.succeeded, (done.outcome, done.reason)

@@ -103,4 +103,4 @@ def test_after_a_replan_the_tracking_error_is_to_the_new_route() -> None:
 
 def test_the_time_of_giving_way_is_that_of_its_limiter() -> None:
     log = straight(limiter=np.arange(81, dtype=np.uint8) // 61)
-    assert METRICS["yielding_s"](replace(log, meta={**log.meta, "limiters": ["path", "yield"]})) == pytest.approx(2.0)
+    assert METRICS["yielding_s"](replace(log, meta={**log.meta, "limiters": ["path", "avoid"]})) == pytest.approx(2.0)

@@ -1,0 +1,61 @@
+"""Compiled distances from a robot's footprint to obstacles: arrays in, arrays out."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from antdrive.worlds._kernels import Array, kernel
+
+# A list of nearby discs is used again while the robot stays within this distance of where it was made [m].
+NEAR = 0.25
+
+
+@kernel
+def footprint_clearances(poses: Array, shape: Array, discs: Array, bounds: Array, out: Array) -> None:
+    """out[i] = distance from the footprint at poses[i] to the nearest disc surface or wall.
+
+    `shape` holds half length, half width and rounding of a rounded rectangle.
+    """
+    hx, hy, rounding = shape[0], shape[1], shape[2]
+    radius = math.hypot(hx, hy) + rounding
+    near = np.empty_like(discs)
+    count = 0
+    anchor_x, anchor_y = math.inf, math.inf
+    for i in range(poses.shape[0]):
+        x, y, cos, sin = poses[i, 0], poses[i, 1], math.cos(poses[i, 2]), math.sin(poses[i, 2])
+        if not math.hypot(x - anchor_x, y - anchor_y) <= NEAR:
+            anchor_x, anchor_y = x, y
+            count = discs_near(x, y, radius + 2.0 * NEAR, discs, near)
+        extent_x = hx * abs(cos) + hy * abs(sin) + rounding
+        extent_y = hx * abs(sin) + hy * abs(cos) + rounding
+        best = min(
+            min(x - extent_x - bounds[0], bounds[2] - x - extent_x),
+            min(y - extent_y - bounds[1], bounds[3] - y - extent_y),
+        )
+        for j in range(count):
+            dx, dy = near[j, 0] - x, near[j, 1] - y
+            qx = abs(cos * dx + sin * dy) - hx
+            qy = abs(cos * dy - sin * dx) - hy
+            outside = math.hypot(max(qx, 0.0), max(qy, 0.0))
+            inside = min(max(qx, qy), 0.0)
+            best = min(best, outside + inside - rounding - near[j, 2])
+        out[i] = best
+
+
+@kernel
+def discs_near(x: float, y: float, slack: float, discs: Array, out: Array) -> int:
+    """Write the discs at most `slack` farther from (x, y) than the closest one to `out`; return their number.
+
+    While the robot is within NEAR of (x, y), only these can be the disc closest to its footprint.
+    """
+    closest = math.inf
+    for j in range(discs.shape[0]):
+        closest = min(closest, math.hypot(discs[j, 0] - x, discs[j, 1] - y) - discs[j, 2])
+    count = 0
+    for j in range(discs.shape[0]):
+        if math.hypot(discs[j, 0] - x, discs[j, 1] - y) - discs[j, 2] <= closest + slack:
+            out[count, 0], out[count, 1], out[count, 2] = discs[j, 0], discs[j, 1], discs[j, 2]
+            count += 1
+    return count

@@ -1,0 +1,112 @@
+"""Compiled queries about obstacles: which are near a place, and how near an arc passes them."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from antdrive.worlds._kernels import Array, doubled_rows, kernel, segment_clearance, wall_distance
+
+
+class ObstacleIndex(NamedTuple):
+    """The obstacles that the controller knows, sorted into the squares of a coarse grid.
+
+    Attributes:
+        discs: x, y and radius of the discs near each square, square by square (K, 3) [m]
+        starts: the row of `discs` at which each square's discs start (squares + 1,)
+        bounds: the walls: x_min, y_min, x_max, y_max (4,) [m]
+        side: side of a square [m]
+    """
+
+    discs: Array
+    starts: Array
+    bounds: Array
+    side: float
+
+
+@kernel
+def index_discs(discs: Array, bounds: Array, side: float, distance: float) -> tuple[Array, Array]:
+    """The discs that come within `distance` of each square, as `discs` and `starts` of an ObstacleIndex."""
+    cols = int((bounds[2] - bounds[0]) / side) + 1
+    rows = int((bounds[3] - bounds[1]) / side) + 1
+    starts = np.zeros(rows * cols + 1, np.int64)
+    found = np.empty((16 + discs.shape[0], 3))
+    count = 0
+    for b in range(rows * cols):
+        x_min, y_min = bounds[0] + (b % cols) * side, bounds[1] + (b // cols) * side
+        for j in range(discs.shape[0]):
+            dx = max(max(x_min - discs[j, 0], discs[j, 0] - x_min - side), 0.0)
+            dy = max(max(y_min - discs[j, 1], discs[j, 1] - y_min - side), 0.0)
+            if math.hypot(dx, dy) - discs[j, 2] <= distance:
+                if count == found.shape[0]:
+                    found = doubled_rows(found)
+                found[count, 0], found[count, 1], found[count, 2] = discs[j, 0], discs[j, 1], discs[j, 2]
+                count += 1
+        starts[b + 1] = count
+    return found[:count].copy(), starts
+
+
+@kernel
+def nearby(x: float, y: float, obstacles: ObstacleIndex) -> Array:
+    """The discs (N, 3) that matter near (x, y)."""
+    bounds, side = obstacles.bounds, obstacles.side
+    cols = int((bounds[2] - bounds[0]) / side) + 1
+    rows = int((bounds[3] - bounds[1]) / side) + 1
+    c = min(max(int((x - bounds[0]) / side), 0), cols - 1)
+    r = min(max(int((y - bounds[1]) / side), 0), rows - 1)
+    return obstacles.discs[obstacles.starts[r * cols + c] : obstacles.starts[r * cols + c + 1]]
+
+
+@kernel
+def clearance_at(x: float, y: float, obstacles: ObstacleIndex) -> float:
+    """Distance from a point to the nearest disc surface or wall."""
+    return segment_clearance(x, y, x, y, nearby(x, y, obstacles), obstacles.bounds)
+
+
+@kernel
+def arc_clearance(
+    x: float,
+    y: float,
+    yaw: float,
+    curvature: float,
+    sweep: float,
+    ex: float,
+    ey: float,
+    discs: Array,
+    bounds: Array,
+) -> float:
+    """Distance from a circular arc to the nearest disc surface or wall.
+
+    The arc leaves (x, y) along `yaw`, turns by `sweep` and ends at (ex, ey).
+    """
+    if abs(sweep) < 1e-6:
+        return segment_clearance(x, y, ex, ey, discs, bounds)
+    radius = 1.0 / abs(curvature)
+    cx, cy = x - math.sin(yaw) / curvature, y + math.cos(yaw) / curvature
+    first = math.atan2(y - cy, x - cx)
+    best = min(wall_distance(x, y, bounds), wall_distance(ex, ey, bounds))
+    for q in range(4):  # the arc's extreme points in x and y
+        angle = q * 0.5 * math.pi
+        if on_arc(angle, first, sweep):
+            best = min(best, wall_distance(cx + radius * math.cos(angle), cy + radius * math.sin(angle), bounds))
+    for j in range(discs.shape[0]):
+        px, py = discs[j, 0], discs[j, 1]
+        d = min(math.hypot(px - x, py - y), math.hypot(px - ex, py - ey))
+        # No point of the arc is farther from one of its ends than its length.
+        if d - discs[j, 2] - radius * abs(sweep) > best:
+            continue
+        if on_arc(math.atan2(py - cy, px - cx), first, sweep):
+            d = min(d, abs(math.hypot(px - cx, py - cy) - radius))
+        best = min(best, d - discs[j, 2])
+    return best
+
+
+@kernel
+def on_arc(angle: float, first: float, sweep: float) -> bool:
+    """Whether an angle lies on the arc that starts at `first` and turns by `sweep`."""
+    turn = (angle - first) % (2.0 * math.pi)
+    if sweep < 0:
+        turn = (2.0 * math.pi - turn) % (2.0 * math.pi)
+    return bool(turn <= abs(sweep))

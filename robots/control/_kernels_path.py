@@ -1,0 +1,123 @@
+"""Compiled queries about the tracked path: the nearest point, the carrot, clear lookaheads, braking."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from antdrive.robots.control._kernels_obstacles import ObstacleIndex, nearby
+from antdrive.worlds._kernels import Array, kernel, segment_clearance
+
+
+class PathSamples(NamedTuple):
+    """The route, and what holds at samples along it, which are a constant spacing apart.
+
+    Attributes:
+        xy: the route's points (N, 2) [m]
+        arc: length along the route at each point (N,) [m]
+        lookahead: the longest lookahead with a clear line to the carrot (S,) [m]
+        speed: the speed limit (S,) [m/s]
+        curvature: the route's curvature (S,) [1/m], NaN for a route with corners, which only the carrot
+            rounds
+        heading: the route's heading (S,) [rad]
+    """
+
+    xy: Array
+    arc: Array
+    lookahead: Array
+    speed: Array
+    curvature: Array
+    heading: Array
+
+
+@kernel
+def point_at(s: float, k: int, xy: Array, arc: Array) -> tuple[float, float, int]:
+    """The point at arc length s and its segment, from segment k on; the last one extends past the end."""
+    n = xy.shape[0]
+    while k < n - 2 and arc[k + 1] < s:
+        k += 1
+    f = (s - arc[k]) / (arc[k + 1] - arc[k])
+    return xy[k, 0] + f * (xy[k + 1, 0] - xy[k, 0]), xy[k, 1] + f * (xy[k + 1, 1] - xy[k, 1]), k
+
+
+@kernel
+def project(x: float, y: float, progress: float, window: float, xy: Array, arc: Array) -> tuple[float, int]:
+    """Arc length and segment of the point nearest to (x, y), between `progress` and `window` beyond it."""
+    n = xy.shape[0]
+    k = 0
+    while k < n - 2 and arc[k + 1] < progress:
+        k += 1
+    best, best_s, best_k = math.inf, progress, k
+    while k < n - 1 and arc[k] <= progress + window:
+        ax, ay = xy[k, 0], xy[k, 1]
+        length = arc[k + 1] - arc[k]
+        ux, uy = (xy[k + 1, 0] - ax) / length, (xy[k + 1, 1] - ay) / length
+        f = (x - ax) * ux + (y - ay) * uy
+        f = min(max(f, progress - arc[k]), min(length, progress + window - arc[k]))
+        f = max(f, 0.0)
+        d = math.hypot(ax + f * ux - x, ay + f * uy - y)
+        if d < best - 1e-12:
+            best, best_s, best_k = d, arc[k] + f, k
+        k += 1
+    return best_s, best_k
+
+
+@kernel
+def carrot_at(x: float, y: float, lookahead: float, s: float, k: int, xy: Array, arc: Array) -> tuple[float, float]:
+    """The first route point beyond arc length s at distance `lookahead` from the robot at (x, y).
+
+    Past the route's end it lies on the extension of the last segment.
+    """
+    n = xy.shape[0]
+    ax, ay, k = point_at(s, k, xy, arc)
+    if math.hypot(ax - x, ay - y) >= lookahead:  # too far from the route: go straight back to it
+        return ax, ay
+    while True:
+        bx, by = xy[k + 1, 0], xy[k + 1, 1]
+        last = k == n - 2
+        if last or math.hypot(bx - x, by - y) >= lookahead:
+            length = arc[k + 1] - arc[k]
+            ux, uy = (bx - xy[k, 0]) / length, (by - xy[k, 1]) / length
+            along = (ax - x) * ux + (ay - y) * uy
+            off2 = (ax - x) * (ax - x) + (ay - y) * (ay - y) - lookahead * lookahead
+            f = -along + math.sqrt(max(along * along - off2, 0.0))
+            return ax + f * ux, ay + f * uy
+        ax, ay = bx, by
+        k += 1
+
+
+@kernel
+def clear_lookaheads(
+    xy: Array, arc: Array, obstacles: ObstacleIndex, clearance: float, spacing: float, low: float, high: float,
+    out: Array,
+) -> None:  # fmt: skip
+    """out[i] = the longest lookahead at i * spacing whose straight line to the carrot keeps `clearance`.
+
+    At least `low`, at most `high`. Where the route itself comes closer, the line may come as close as the
+    route.
+    """
+    bounds = obstacles.bounds
+    step = 0.5 * low
+    k = 0
+    for i in range(out.shape[0]):
+        s = min(i * spacing, arc[-1])
+        ax, ay, k = point_at(s, k, xy, arc)
+        discs = nearby(ax, ay, obstacles)
+        required = min(clearance, segment_clearance(ax, ay, ax, ay, discs, bounds))
+        clear, kk, length = low, k, low
+        while length < high:
+            length = min(length + step, high)
+            t = min(s + length, arc[-1])
+            bx, by, kk = point_at(t, kk, xy, arc)
+            c = segment_clearance(ax, ay, bx, by, discs, bounds)
+            if c < required - 1e-9 and c < segment_clearance(bx, by, bx, by, discs, bounds) - 1e-9:
+                break
+            clear = length
+        out[i] = clear
+
+
+@kernel
+def brake_backwards(limit: Array, spacing: float, deceleration: float) -> None:
+    """Lower each speed until braking reaches the next: v_i^2 <= v_{i+1}^2 + 2 a ds."""
+    for i in range(limit.shape[0] - 2, -1, -1):
+        limit[i] = min(limit[i], math.sqrt(limit[i + 1] * limit[i + 1] + 2.0 * deceleration * spacing))

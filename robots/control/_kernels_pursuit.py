@@ -1,0 +1,353 @@
+"""Compiled pure pursuit: the carrot, the speed rules, the robot's limits, the check that it can stop."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from antdrive.robots.control._kernels_obstacles import ObstacleIndex, arc_clearance, nearby
+from antdrive.robots.control._kernels_path import PathSamples, carrot_at, point_at, project
+from antdrive.worlds._kernels import Array, kernel, segment_clearance
+
+# The rules that can limit the speed, as indices into pursuit.LIMITERS.
+CRUISE, CURVATURE, ROUTE, YAW_RATE, GOAL, ROTATE, CREEP, BRAKING, DONE, CLEARANCE = range(10)
+
+YAW_RATE_TIME = 0.2  # the yaw rate of a curve must be reachable within this time [s]
+END_LOOKAHEAD = 0.35  # near the goal, the lookahead is at most this share of the remaining route
+START_TOLERANCE = 5e-4  # an arc may come this much closer to obstacles than the robot is now [m]
+
+
+class MotionLimits(NamedTuple):
+    """What the robot's drive can do.
+
+    Attributes:
+        speed: forward speed [m/s]
+        yaw_rate: yaw rate [rad/s]
+        acceleration: acceleration and deceleration [m/s^2]
+        yaw_acceleration: change of the yaw rate [rad/s^2]
+        lateral_acceleration: speed times yaw rate [m/s^2]
+        half_track: distance from the centre to a wheel [m]
+        rim_speed: speed of a wheel's rim [m/s]
+    """
+
+    speed: float
+    yaw_rate: float
+    acceleration: float
+    yaw_acceleration: float
+    lateral_acceleration: float
+    half_track: float
+    rim_speed: float
+
+
+class PursuitTuning(NamedTuple):
+    """The controller's settings as they apply to one robot on one route.
+
+    Attributes:
+        period: control period [s]
+        spacing: distance between the path's samples [m]
+        lookahead_clearance: what the arc to the carrot keeps between the robot's centre and obstacles [m]
+        stopping_clearance: what the arc on which the robot can stop keeps between its centre and obstacles
+            [m]
+        robot_radius: circumscribed radius of the robot [m]
+        lookahead_time: the lookahead is the speed times this [s]
+        lookahead_min: shortest lookahead [m]
+        lookahead_max: longest lookahead [m]
+        preferred_lookahead_min: shortest lookahead where there is room for a longer one [m]
+        rotate_above: bearing of the carrot above which a driving robot rotates in place [rad]
+        rotate_above_at_rest: the same for a robot that stands [rad]
+        rotate_until: bearing at which rotating in place ends [rad]
+        braking: share of the deceleration that planned braking uses
+        creep_speed: slowest forward speed [m/s]
+        goal_distance: the robot stops when this much of the route remains [m]
+        min_speed_near_obstacles: speed allowed without any clearance [m/s]
+        clearance_time: clearance divided by this is the speed allowed in addition [s]
+    """
+
+    period: float
+    spacing: float
+    lookahead_clearance: float
+    stopping_clearance: float
+    robot_radius: float
+    lookahead_time: float
+    lookahead_min: float
+    lookahead_max: float
+    preferred_lookahead_min: float
+    rotate_above: float
+    rotate_above_at_rest: float
+    rotate_until: float
+    braking: float
+    creep_speed: float
+    goal_distance: float
+    min_speed_near_obstacles: float
+    clearance_time: float
+
+
+class Carrot(NamedTuple):
+    """The route point that the robot steers for, relative to the robot.
+
+    Attributes:
+        lookahead: lookahead distance that found it [m]
+        left: its offset to the left of the robot's heading [m]
+        distance: its distance [m]
+        bearing: its direction relative to the heading [rad]
+        clear: whether the arc to it keeps clear of obstacles
+    """
+
+    lookahead: float
+    left: float
+    distance: float
+    bearing: float
+    clear: bool
+
+
+@kernel
+def clip(value: float, low: float, high: float) -> float:
+    """The value, moved into [low, high]."""
+    return min(max(value, low), high)
+
+
+@kernel
+def keep_wheels_within(v: float, w: float, half_track: float, rim_speed: float) -> tuple[float, float]:
+    """Speed and yaw rate, scaled together so that no wheel's rim exceeds `rim_speed` [m/s]."""
+    rim = abs(v) + abs(w) * half_track
+    if rim > rim_speed:
+        v, w = v * rim_speed / rim, w * rim_speed / rim
+    return v, w
+
+
+@kernel
+def reachable_yaw_rate(wanted: float, w: float, period: float, limits: MotionLimits) -> float:
+    """The yaw rate closest to the wanted one that can be reached from `w` within a period."""
+    change = limits.yaw_acceleration * period
+    return clip(wanted, max(w - change, -limits.yaw_rate), min(w + change, limits.yaw_rate))
+
+
+@kernel
+def reachable_twist(
+    speed: float, yaw_rate: float, v: float, w: float, period: float, limits: MotionLimits
+) -> tuple[float, float]:
+    """The speed and yaw rate closest to the wanted ones that can be reached from (v, w) within a period."""
+    change = limits.acceleration * period
+    new_v = clip(speed, v - change, v + change)
+    new_w = reachable_yaw_rate(yaw_rate, w, period, limits)
+    return keep_wheels_within(new_v, new_w, limits.half_track, limits.rim_speed)
+
+
+@kernel
+def slow_for_curvature(curvature: float, lateral_acceleration: float, yaw_rate: float) -> float:
+    """The speed at which a curve needs no more than the given lateral acceleration and yaw rate.
+
+    v^2 |k| <= a and v |k| <= w.
+    """
+    k = abs(curvature)
+    if k < 1e-9:
+        return math.inf
+    return min(math.sqrt(lateral_acceleration / k), yaw_rate / k)
+
+
+@kernel
+def slow_for_yaw_rate(curvature: float, yaw_rate: float, yaw_acceleration: float, time: float) -> float:
+    """The speed at which the yaw rate of a curve can be reached within `time` from the present one.
+
+    v |k| <= w + a t, with the yaw rate w counted in the direction of the curve.
+    """
+    k = abs(curvature)
+    if k < 1e-9:
+        return math.inf
+    turning = yaw_rate if curvature > 0 else -yaw_rate
+    return max(turning + yaw_acceleration * time, 0.0) / k
+
+
+@kernel
+def slow_for_clearance(clearance: float, min_speed: float, time: float) -> float:
+    """The speed allowed near obstacles: `min_speed` without clearance, and clearance / time more with it.
+
+    After the proximity heuristic of S. Macenski et al., Regulated pure pursuit for robot path tracking,
+    Autonomous Robots 47, 2023, with the clearance in place of the costmap's cost.
+    """
+    return min_speed + max(clearance, 0.0) / time
+
+
+@kernel
+def brake_for_goal(remaining: float, deceleration: float) -> float:
+    """The speed from which the robot can still stop in `remaining` metres: v^2 = 2 a d."""
+    return math.sqrt(2.0 * deceleration * max(remaining, 0.0))
+
+
+@kernel
+def stopping_clearance(
+    x: float,
+    y: float,
+    yaw: float,
+    v: float,
+    w: float,
+    deceleration: float,
+    period: float,
+    discs: Array,
+    bounds: Array,
+) -> float:
+    """The clearance of the arc that the robot still drives if it brakes after one more period.
+
+    A velocity is admissible if the robot can stop before the next obstacle on its arc (D. Fox, W. Burgard and
+    S. Thrun, The dynamic window approach to collision avoidance, IEEE Robotics & Automation Magazine 4, 1997).
+    """
+    length = v * period + 0.5 * v * v / deceleration
+    sweep = w / v * length
+    chord = length if abs(sweep) < 1e-6 else 2.0 * v / w * math.sin(0.5 * sweep)
+    ex, ey = x + chord * math.cos(yaw + 0.5 * sweep), y + chord * math.sin(yaw + 0.5 * sweep)
+    return arc_clearance(x, y, yaw, w / v, sweep, ex, ey, discs, bounds)
+
+
+@kernel
+def find_carrot(
+    x: float, y: float, yaw: float, v: float, s: float, k: int, clearance: float, longest: float,
+    discs: Array, bounds: Array, path: PathSamples, tuning: PursuitTuning,
+) -> Carrot:  # fmt: skip
+    """The carrot at the longest lookahead, at most `longest`, whose arc keeps `clearance`.
+
+    The lookahead shrinks until the arc is clear, so corners are cut only where there is room. If no arc is
+    clear, the carrot is that of the shortest lookahead.
+    """
+    shortest = tuning.lookahead_min
+    look = clip(max(tuning.lookahead_time * v, tuning.preferred_lookahead_min), shortest, longest)
+    while True:
+        cx, cy = carrot_at(x, y, look, s, k, path.xy, path.arc)
+        dx, dy = cx - x, cy - y
+        ahead = math.cos(yaw) * dx + math.sin(yaw) * dy
+        left = math.cos(yaw) * dy - math.sin(yaw) * dx
+        distance = math.hypot(dx, dy)
+        bearing = math.atan2(left, ahead)
+        if abs(bearing) < tuning.rotate_above:
+            curvature = 2.0 * left / (distance * distance)
+            if arc_clearance(x, y, yaw, curvature, 2.0 * bearing, cx, cy, discs, bounds) >= clearance:
+                return Carrot(look, left, distance, bearing, True)
+        if look <= shortest:
+            return Carrot(look, left, distance, bearing, False)
+        look = max(0.75 * look, shortest)
+
+
+@kernel
+def should_rotate(rotating: bool, v: float, carrot: Carrot, tuning: PursuitTuning) -> bool:
+    """Whether to rotate in place: with hysteresis, and sooner where no arc is clear or the robot stands."""
+    limit = tuning.rotate_above if v > tuning.creep_speed else tuning.rotate_above_at_rest
+    if rotating:
+        limit = tuning.rotate_until
+    elif not carrot.clear:
+        limit = min(limit, tuning.rotate_until)
+    return abs(carrot.bearing) > limit
+
+
+@kernel
+def curvature_to_drive(
+    v: float, s: float, k: int, i: int, j: int, carrot: Carrot, path: PathSamples, tuning: PursuitTuning
+) -> float:
+    """The curvature of the arc to the carrot (Coulter 1992), corrected where the route's own is known.
+
+    The arc to a carrot on a bend cuts the bend. So the route's own curvature is driven, one period ahead, and
+    the carrot contributes only what is due to the robot being off the route: the difference between its arc
+    and the arc to the same carrot from the route itself.
+    """
+    curvature = 2.0 * carrot.left / (carrot.distance * carrot.distance)
+    if math.isnan(path.curvature[i]):
+        return curvature
+    f = min((s - i * tuning.spacing) / tuning.spacing, 1.0)
+    px, py, _ = point_at(s, k, path.xy, path.arc)
+    cx, cy = carrot_at(px, py, carrot.lookahead, s, k, path.xy, path.arc)
+    facing = path.heading[i] + f * (path.heading[j] - path.heading[i])
+    left = math.cos(facing) * (cy - py) - math.sin(facing) * (cx - px)
+    curvature -= 2.0 * left / ((cx - px) * (cx - px) + (cy - py) * (cy - py))
+    ahead = min(s + max(v, 0.0) * tuning.period, path.arc[-1]) / tuning.spacing
+    h = min(int(ahead), path.curvature.shape[0] - 2)
+    curvature += path.curvature[h] + (ahead - h) * (path.curvature[h + 1] - path.curvature[h])
+    return float(curvature)
+
+
+@kernel
+def speed_limit(
+    w: float, curvature: float, route_speed: float, clearance: float, remaining: float, clear: bool,
+    limits: MotionLimits, tuning: PursuitTuning,
+) -> tuple[float, int]:  # fmt: skip
+    """The lowest speed that a rule allows, and which rule that is."""
+    target, limiter = limits.speed, CRUISE
+    bound = slow_for_curvature(curvature, limits.lateral_acceleration, limits.yaw_rate)
+    if bound < target:
+        target, limiter = bound, CURVATURE
+    if route_speed < target:
+        target, limiter = route_speed, ROUTE
+    bound = slow_for_clearance(clearance, tuning.min_speed_near_obstacles, tuning.clearance_time)
+    if bound < target:
+        target, limiter = bound, CLEARANCE
+    bound = slow_for_yaw_rate(curvature, w, limits.yaw_acceleration, YAW_RATE_TIME)
+    if bound < target:
+        target, limiter = bound, YAW_RATE
+    bound = brake_for_goal(remaining - 0.5 * tuning.goal_distance, tuning.braking * limits.acceleration)
+    if bound < target:
+        target, limiter = bound, GOAL
+    if not clear:
+        target, limiter = min(target, tuning.creep_speed), CREEP
+    return max(target, min(tuning.creep_speed, limits.speed)), limiter
+
+
+@kernel
+def rotation(new_v: float, v: float, w: float, bearing: float, limits: MotionLimits, tuning: PursuitTuning) -> float:
+    """The yaw rate of a robot that is to rotate in place.
+
+    It brakes on its present curve first and rotates once it (nearly) stands, so that the footprint stays
+    where it was checked. The yaw rate falls to 0 together with the bearing.
+    """
+    if abs(new_v) < tuning.creep_speed:
+        return math.copysign(min(limits.yaw_rate, math.sqrt(limits.yaw_acceleration * abs(bearing))), bearing)
+    return w * new_v / v if v > 0.0 else 0.0
+
+
+@kernel
+def pursue(
+    x: float, y: float, yaw: float, v: float, w: float, progress: float, rotating: bool,
+    path: PathSamples, obstacles: ObstacleIndex, limits: MotionLimits, tuning: PursuitTuning,
+) -> tuple[float, float, float, bool, int]:  # fmt: skip
+    """One control period: the next speed and yaw rate, the progress, whether to rotate, the limiter."""
+    bounds, period = obstacles.bounds, tuning.period
+    discs = nearby(x, y, obstacles)
+    s, k = project(x, y, progress, tuning.lookahead_max, path.xy, path.arc)
+    remaining = path.arc[-1] - s
+    i = min(int(s / tuning.spacing), path.lookahead.shape[0] - 1)
+    j = min(i + 1, path.lookahead.shape[0] - 1)
+
+    distance = segment_clearance(x, y, x, y, discs, bounds)
+    clearance = min(tuning.lookahead_clearance, distance - START_TOLERANCE)
+    # Near the end a shorter lookahead makes the robot stop at the route's end and not beside it.
+    near_end = max(END_LOOKAHEAD * remaining, tuning.lookahead_min)
+    longest = min(min(path.lookahead[i], path.lookahead[j]), near_end)
+    carrot = find_carrot(x, y, yaw, v, s, k, clearance, longest, discs, bounds, path, tuning)
+
+    rotating = should_rotate(rotating, v, carrot, tuning)
+    at_goal = remaining <= tuning.goal_distance
+    curvature = 0.0
+    if at_goal:
+        target, limiter = 0.0, DONE
+    elif rotating:
+        target, limiter = 0.0, ROTATE
+    else:
+        curvature = curvature_to_drive(v, s, k, i, j, carrot, path, tuning)
+        route_speed = min(path.speed[i], path.speed[j])
+        target, limiter = speed_limit(
+            w, curvature, route_speed, distance - tuning.robot_radius, remaining, carrot.clear, limits, tuning
+        )
+
+    new_v = clip(target, v - limits.acceleration * period, v + limits.acceleration * period)
+    if rotating and not at_goal:
+        wanted = rotation(new_v, v, w, carrot.bearing, limits, tuning)
+    else:
+        wanted = curvature * new_v
+    new_w = reachable_yaw_rate(wanted, w, period, limits)
+    new_v, new_w = keep_wheels_within(new_v, new_w, limits.half_track, limits.rim_speed)
+
+    # Whatever the rules above allow, the arc on which the robot can still stop must be clear. The last
+    # command passed this check, so braking on its curve is safe.
+    if new_v > tuning.creep_speed and stopping_clearance(
+        x, y, yaw, new_v, new_w, limits.acceleration, period, discs, bounds
+    ) < min(tuning.stopping_clearance, clearance):
+        limiter = BRAKING
+        new_v = max(v - limits.acceleration * period, 0.0)
+        new_w = w * new_v / v if v > 0.0 else 0.0
+    return new_v, new_w, s, rotating, limiter

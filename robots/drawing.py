@@ -1,0 +1,91 @@
+"""How notebooks show a robot: an SVG drawing to scale and its main values, made without heavy imports."""
+
+from __future__ import annotations
+
+import math
+
+from antdrive.robots.spec import RobotSpec
+from antdrive.worlds.drawing import card
+
+WIDTH = 240  # of a drawing [px]
+BODY, BODY_EDGE, WHEEL, HEADING, RULER = "#e8ecf6", "#345cbe", "#39424f", "#ff7a0e", "#5b6576"
+WHEEL_ASPECT = 0.4  # a wheel's drawn thickness as a fraction of its diameter: robot files do not give it
+MM = 1000.0  # the drawing's unit, because browsers render text in units of a metre badly
+
+
+def robot_svg(robot: RobotSpec) -> str:
+    """A robot from above as SVG, heading right, to scale: footprint, wheels, heading and a ruler.
+
+    Its coordinates are millimetres from the robot's centre, y upwards.
+    """
+    foot = robot.footprint
+    half_x, half_y = MM * (foot.half_length + foot.rounding), MM * (foot.half_width + foot.rounding)
+    pad = 0.12 * max(half_x, half_y)
+    left, bottom, width, height = -half_x - pad, -half_y - 3 * pad, 2 * (half_x + pad), 2 * half_y + 4 * pad
+    pen = 1.6 * width / WIDTH
+    parts = [
+        f'<rect class="footprint" x="{-half_x:.6g}" y="{-half_y:.6g}" width="{2 * half_x:.6g}" '
+        f'height="{2 * half_y:.6g}" rx="{MM * foot.rounding:.6g}" fill="{BODY}" stroke="{BODY_EDGE}" '
+        f'stroke-width="{pen:.3g}"/>'
+    ]
+    radius, thickness = MM * robot.wheel_radius, MM * _wheel_thickness(robot)
+    for y in (MM * robot.track / 2, -MM * robot.track / 2):
+        parts.append(
+            f'<rect class="wheel" x="{-radius:.6g}" y="{y - thickness / 2:.6g}" width="{2 * radius:.6g}" '
+            f'height="{thickness:.6g}" rx="{min(radius, thickness) / 4:.3g}" fill="{WHEEL}"/>'
+        )
+    tip, barb = 0.85 * half_x, 0.14 * half_x
+    parts.append(
+        f'<path class="heading" d="M 0 0 H {tip:.4g} M {tip - barb:.4g} {barb:.4g} L {tip:.4g} 0 '
+        f'L {tip - barb:.4g} {-barb:.4g}" fill="none" stroke="{HEADING}" stroke-width="{1.4 * pen:.3g}"/>'
+    )
+    ruler = _ruler_length(2 * half_x / MM)
+    parts.append(
+        f'<path class="ruler" d="M {-MM * ruler / 2:.6g} {bottom + pad:.6g} h {MM * ruler:.6g}" stroke="{RULER}" '
+        f'stroke-width="{pen:.3g}"/>'
+    )
+    # The label stays outside the group, whose flipped y axis would turn it upside down.
+    label = (
+        f'<text x="0" y="{-bottom - 1.25 * pad:.4g}" font-size="{1.1 * pad:.3g}" text-anchor="middle" '
+        f'font-family="sans-serif" fill="{RULER}">{ruler:g} m</text>'
+    )
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{WIDTH * height / width:.0f}" '
+        f'viewBox="{left:.6g} {-bottom - height:.6g} {width:.6g} {height:.6g}">'
+        f'<g transform="scale(1 -1)">{"".join(parts)}</g>{label}</svg>'
+    )
+
+
+def robot_card(robot: RobotSpec) -> str:
+    """A robot as HTML: its drawing, then its main values."""
+    foot, noise = robot.footprint, robot.noise
+    length, width = 2 * (foot.half_length + foot.rounding), 2 * (foot.half_width + foot.rounding)
+    noisy = (
+        f"pose ±{noise.pose_xy:g} m, ±{noise.pose_yaw:g} rad; encoders ±{100 * noise.encoder:g} %; "
+        f"slip ±{100 * noise.slip:g} %; delay {noise.delay:g} s"
+    )
+    facts = {
+        "footprint": f"disc, diameter {length:g} m" if foot.is_disc else f"{length:g} × {width:g} m",
+        "body": f"{robot.height:g} m high, {robot.mass:g} kg",
+        "wheels": f"radius {robot.wheel_radius:g} m, {robot.track:g} m apart",
+        "speed": f"up to {robot.max_speed:g} m/s, {robot.max_yaw_rate:g} rad/s",
+        "acceleration": f"up to {robot.max_acceleration:g} m/s², {robot.max_yaw_acceleration:g} rad/s²; "
+        f"lateral {robot.max_lateral_acceleration:g} m/s²",
+        "noise": noisy if noise.nonzero else "none",
+    }
+    return card(robot_svg(robot), robot.name, facts)
+
+
+def _wheel_thickness(robot: RobotSpec) -> float:
+    """How thick the wheels are drawn, so that they stay within the footprint [m]."""
+    foot = robot.footprint
+    beyond = max(robot.wheel_radius - foot.half_length, 0)
+    edge = foot.half_width + math.sqrt(max(foot.rounding**2 - beyond**2, 0))
+    room = 2 * (edge - robot.track / 2)
+    return max(min(2 * robot.wheel_radius * WHEEL_ASPECT, room), 0.02 * robot.track)
+
+
+def _ruler_length(most: float) -> float:
+    """The longest round length (1, 2 or 5 times a power of ten) up to `most` [m]."""
+    lengths = (digit * 10.0**power for power in range(-6, 7) for digit in (1, 2, 5))
+    return max((length for length in lengths if length <= most), default=most)
