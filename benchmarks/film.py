@@ -21,10 +21,10 @@ from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.physics.engine import client
 from antdrive.sim.pipeline import Scenario, run
 from antdrive.sim.view.film.camera import camera_for
-from antdrive.sim.view.film.model import robot_parts
-from antdrive.sim.view.film.parallel import processes
-from antdrive.sim.view.film.stage import drawn_height, grouped, still_pieces
-from antdrive.sim.view.film.tiny import add_mesh, render
+from antdrive.sim.view.film.compositor import drawn_height, merged_by_colour, still_meshes
+from antdrive.sim.view.film.meshes import robot_parts
+from antdrive.sim.view.film.parallel import process_count
+from antdrive.sim.view.film.tiny_renderer import add_mesh, render
 from antdrive.sim.view.film.video import film
 from antdrive.sim.view.scene import Scene
 
@@ -44,7 +44,7 @@ def bare_fps(rollout: Rollout, camera: str, size: tuple[int, int], *, fine: int 
         at = rollout.pose[len(rollout.pose) // 2]
         view = camera_for(camera, (-reach, -0.6 * reach), (reach, 0.6 * reach), float(tall.max()), size).moved(*at[:2])
     with client() as number:
-        for mesh, colour in grouped(still_pieces(scene, tall)):
+        for mesh, colour in merged_by_colour(still_meshes(scene, tall)):
             add_mesh(number, mesh, colour)
         for part in robot_parts(scene.robot):
             add_mesh(number, part.mesh, part.colour)
@@ -70,7 +70,7 @@ def cut(rollout: Rollout, seconds: float) -> Rollout:
 
 def speed(rollout: Rollout) -> None:
     count = len(rollout.meta["task"]["obstacles"])
-    print(f"{count} cylinders; best of {ROUNDS}; a moving camera renders in {processes()} processes")
+    print(f"{count} cylinders; best of {ROUNDS}; a moving camera renders in {process_count()} processes")
     print("camera    size        film fps   on one core   full frames, bare   2x2 finer, bare")
     with tempfile.TemporaryDirectory() as folder:
         for camera in ("top", "oblique", "follow"):

@@ -144,7 +144,7 @@ def _figures(
     paper: str, found: Sequence[tuple[Trial, list[PlanResult]]], folder: Path, seeds: int, suffixes: Sequence[str]
 ) -> dict[str, str]:
     """What the paper draws: length by iteration on its second map, and, for han2007, ants and Pc / Pm."""
-    from antdrive.sim.view.figures.figures import ants_figure, history_figure, sweep_figure
+    from antdrive.sim.view.figures.paper_figures import ants_figure, history_figure, sweep_figure
 
     files: dict[str, str] = {}
     places = list(dict.fromkeys(trial.place for trial, _ in found))

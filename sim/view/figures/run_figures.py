@@ -1,79 +1,41 @@
-"""Figures for papers and reports: a run at a glance, and a plan with what the planner learned on the way.
-
-The suffix chooses PNG, PDF or SVG. The same run gives the same file, byte for byte: no dates are written.
-"""
+"""Figures of driven runs: one at a glance, what its certificate rests on, and several runs on one map."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import matplotlib
 import numpy as np
 import numpy.typing as npt
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
+from matplotlib.collections import LineCollection
+from matplotlib.colors import LinearSegmentedColormap
 
+from antdrive.sim.log.certificate import Certificate, in_metres
+from antdrive.sim.log.metrics import tracking_error
 from antdrive.sim.log.rollout import Rollout
-from antdrive.sim.view.figures.charts import (
-    draw_clearance,
-    draw_driven,
-    draw_history,
-    draw_landscape,
-    draw_legend,
-    draw_limiters,
-    draw_map,
-    draw_speed,
-)
-from antdrive.sim.view.film.caption import VERDICTS
+from antdrive.sim.view.figures.canvas import checked, map_size, new_figure, styled, write_figure
+from antdrive.sim.view.figures.curves import draw_clearance, draw_limiters, draw_speed
+from antdrive.sim.view.figures.map_chart import draw_driven, draw_legend, draw_map
 from antdrive.sim.view.scene import Scene
-from antdrive.sim.view.style import BAD, INK, MUTED, ROUTE, SHELL, hexed
-from antdrive.worlds.errors import InputError
-from antdrive.worlds.files.atomic import written_whole
-
-if TYPE_CHECKING:
-    from antdrive.planners.plan import PlanResult
-    from antdrive.robots.spec import RobotSpec
-    from antdrive.worlds.grid import Grid
-    from antdrive.worlds.world import Task
+from antdrive.sim.view.style import BAD, GOOD, ROUTE, SHELL, VERDICTS, hexed, planner_style
 
 Floats = npt.NDArray[np.float64]
 
-SUFFIXES = (".png", ".pdf", ".svg")
-
-_STYLE: Any = {
-    "font.family": "DejaVu Sans",
-    "font.size": 9.0,
-    "axes.edgecolor": "#aab2bf",
-    "axes.labelcolor": hexed(INK),
-    "axes.titlesize": 10.0,
-    "axes.titleweight": "bold",
-    "axes.titlelocation": "left",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#e6e9ee",
-    "grid.linewidth": 0.7,
-    "axes.axisbelow": True,
-    "xtick.color": hexed(MUTED),
-    "ytick.color": hexed(MUTED),
-    "text.color": hexed(INK),
-    "legend.frameon": False,
-    "legend.fontsize": 8.0,
-    "svg.hashsalt": "antdrive",
-    "pdf.compression": 6,
-}
-
-
-def styled() -> Any:
-    """The look of all figures, as a context."""
-    return matplotlib.rc_context(_STYLE)
+ERROR = LinearSegmentedColormap.from_list("error", ["#ffd9a0", "#ff7a0e", "#7a1f00"])
 
 
 def overview(rollout: Rollout, path: str | Path, *, cells: Floats | None = None, dpi: float = 160) -> Path:
-    """A run at a glance: the map to scale, and clearance, speed and the active speed rule over time.
+    """Draw a run at a glance: the map to scale, and clearance, speed and the rule that limited it over time.
 
-    `cells` (N, 2) are the planned cells' centres [m], drawn as dots where given.
+    Args:
+        rollout: the run's log
+        path: the file to write; its suffix chooses PNG, PDF or SVG
+        cells: the centres of the planned cells (N, 2) [m], to be drawn as dots
+        dpi: pixels per inch
+
+    Returns:
+        The file's path.
 
     Raises:
         InputError: a suffix that is none of .png, .pdf, .svg.
@@ -81,107 +43,113 @@ def overview(rollout: Rollout, path: str | Path, *, cells: Floats | None = None,
     scene = Scene.of(rollout)
     target = checked(path)
     with styled():
-        shape = _shape(scene)
-        high = float(np.clip(5.6 * shape, 3.9, 6.4))
-        wide = float(np.clip(high / shape, 3.2, 7.0))
+        wide, high = map_size(scene)
         figure = new_figure(wide + 5.6, high + 0.9)
         grid = figure.add_gridspec(3, 2, width_ratios=[wide, 5.2], height_ratios=[1.0, 1.0, 0.11])
         chart = figure.add_subplot(grid[:, 0])
         draw_map(chart, scene)
         draw_driven(figure, chart, scene, rollout, cells)
-        gap = figure.add_subplot(grid[0, 1])
-        draw_clearance(gap, scene, rollout)
-        speed = figure.add_subplot(grid[1, 1], sharex=gap)
-        draw_speed(speed, scene, rollout)
-        strip = figure.add_subplot(grid[2, 1], sharex=gap)
-        draw_limiters(strip, rollout)
+        clearance = figure.add_subplot(grid[0, 1])
+        draw_clearance(clearance, scene, rollout)
+        draw_speed(figure.add_subplot(grid[1, 1], sharex=clearance), scene, rollout)
+        draw_limiters(figure.add_subplot(grid[2, 1], sharex=clearance), rollout)
         name, colour = VERDICTS[rollout.outcome]
         planner = rollout.meta.get("planner", {}).get("name", "?")
-        figure.suptitle(
-            f"{scene.name}   ·   {planner}   ·   {scene.robot.name}", x=0.012, ha="left", fontsize=12, weight="bold"
-        )
+        title = f"{scene.name}   ·   {planner}   ·   {scene.robot.name}"
+        figure.suptitle(title, x=0.012, ha="left", fontsize=12, weight="bold")
         figure.text(0.988, 0.982, name, ha="right", va="top", fontsize=11, weight="bold", color=hexed(colour))
         return write_figure(figure, target, dpi)
 
 
-def plan_figure(
-    task: Task, grid: Grid, plan: PlanResult, robot: RobotSpec, path: str | Path, *, dpi: float = 160
-) -> Path:
-    """A plan on the map with the planner's landscape; beside it, for an iterative planner, length by iteration.
+def certificate_figure(rollout: Rollout, certificate: Certificate, path: str | Path, *, dpi: float = 160) -> Path:
+    """Draw the driven path over the route, their distance over time, and the readings of the certificate.
+
+    Args:
+        rollout: the run's log
+        certificate: as `certify` gives it
+        path: the file to write; its suffix chooses PNG, PDF or SVG
+        dpi: pixels per inch
+
+    Returns:
+        The file's path.
 
     Raises:
         InputError: a suffix that is none of .png, .pdf, .svg.
     """
     target = checked(path)
-    scene = Scene.planned(task, robot, grid.inflate)
-    iterations = len(plan.history)
+    scene = Scene.of(rollout)
+    error = tracking_error(rollout) if len(rollout.route) > 1 else np.zeros(len(rollout.t))
+    keep = np.unique(np.linspace(0, len(rollout.t) - 1, 1500).astype(int))
     with styled():
-        shape = _shape(scene)
-        high = float(np.clip(5.6 * shape, 3.9, 6.4))
-        wide = float(np.clip(high / shape, 3.2, 7.0)) + (0.9 if plan.landscape is not None else 0.0)
-        figure = new_figure(wide + (4.6 if iterations else 0.6), high + 0.9)
-        areas = figure.add_gridspec(1, 2 if iterations else 1, width_ratios=[wide, 4.2] if iterations else [1])
-        chart = figure.add_subplot(areas[0, 0])
-        if plan.landscape is not None:
-            draw_landscape(figure, chart, grid, plan.landscape)
-        draw_map(chart, scene, floor=plan.landscape is None)
-        handles: list[Any] = []
-        if len(plan.cells):
-            cells, line = grid.xy(plan.cells), grid.xy(plan.line)
-            handles += chart.plot(*cells.T, ".", ms=3.4, color=hexed(ROUTE), label="planned cells", zorder=5)
-            handles += chart.plot(*line.T, "-", lw=1.9, color=hexed(SHELL), label="planned path", zorder=6)
-        else:
-            words = plan.reason or plan.status.value
-            chart.text(0.5, 0.5, words, transform=chart.transAxes, ha="center", va="center", wrap=True, zorder=9,
-                       weight="bold", color=hexed(BAD), bbox={"fc": "white", "ec": hexed(BAD), "pad": 6})  # fmt: skip
+        figure = new_figure(10.6, 5.6)
+        areas = figure.add_gridspec(2, 2, width_ratios=[1.0, 0.85], height_ratios=[1.0, 0.9])
+        chart: Any = figure.add_subplot(areas[:, 0])
+        draw_map(chart, scene)
+        points = rollout.pose[keep, :2]
+        lines = LineCollection(list(np.stack([points[:-1], points[1:]], axis=1)), cmap=ERROR, lw=3.0, zorder=5)
+        lines.set_array(1000 * error[keep[:-1]])
+        chart.add_collection(lines)
+        handles = chart.plot(*rollout.route.T, "--", color=hexed(ROUTE), lw=1.0, label="route", zorder=6)
+        bar = figure.colorbar(lines, ax=chart, orientation="horizontal", shrink=0.6, aspect=34, pad=0.02)
+        bar.set_label("driven path: distance from the route [mm]")
+        bar.outline.set_visible(False)
         draw_legend(chart, handles, scene)
-        if iterations:
-            draw_history(figure.add_subplot(areas[0, 1]), plan.history)
-        length = f"{plan.cost:.2f} m" if len(plan.cells) else plan.status.value
-        length += ", stopped early" if len(plan.cells) and not plan.solved else ""
-        figure.suptitle(
-            f"{scene.name}   ·   {length}   ·   {plan.work:,} {plan.work_unit}",
-            x=0.012,
-            ha="left",
-            fontsize=12,
-            weight="bold",
-        )
+        curve: Any = figure.add_subplot(areas[0, 1])
+        curve.plot(rollout.t[keep], 1000 * error[keep], color=hexed(SHELL), lw=1.4)
+        curve.set(title="distance from the route [mm]", xlabel="time [s]", ylim=(0, None))
+        _draw_readings(figure.add_subplot(areas[1, 1]), certificate, rollout)
         return write_figure(figure, target, dpi)
 
 
-def new_figure(width: float, height: float) -> Figure:
-    """An empty figure, width by height [inches], that needs no screen."""
-    figure = Figure(figsize=(width, height), layout="constrained", facecolor="white")
-    FigureCanvasAgg(figure)
-    return figure
+def _draw_readings(axes: Any, certificate: Certificate, rollout: Rollout) -> None:
+    """Write the verdict and the three readings, a line each, and the first problems."""
+    axes.axis("off")
+    contacts = f"physics: {certificate.contacts} contacts in {len(rollout.t) - 1:,} steps"
+    closest = f"geometry: min clearance {in_metres(certificate.min_clearance)} at the logged poses"
+    bound = f"bound: at least {in_metres(certificate.bound)} between logged poses, too"
+    readings = (
+        (certificate.contacts == 0, contacts),
+        (certificate.min_clearance > 0, closest),
+        (certificate.bound > 0, bound),
+    )
+    lines = [*readings, *((False, problem) for problem in certificate.problems[:3])]
+    verdict = "certified collision-free" if certificate.certified else "NOT certified collision-free"
+    colour = hexed(GOOD if certificate.certified else BAD)
+    axes.text(0, 0.97, verdict, weight="bold", fontsize=12, color=colour, va="top", transform=axes.transAxes)
+    for k, (fine, words) in enumerate(lines):
+        place: dict[str, Any] = {"y": 0.78 - 0.13 * k, "va": "top", "transform": axes.transAxes}
+        axes.text(x=0, s="✓" if fine else "✕", color=hexed(GOOD if fine else BAD), weight="bold", **place)
+        axes.text(x=0.05, s=words, wrap=True, **place)
 
 
-def _shape(scene: Scene) -> float:
-    x0, y0, x1, y1 = scene.bounds
-    return (y1 - y0) / (x1 - x0)
+def comparison_figure(rollouts: Mapping[str, Rollout], path: str | Path, *, dpi: float = 160) -> Path:
+    """Draw the driven paths of several planners on one map, each in its planner's colour.
 
+    Args:
+        rollouts: the logs of the runs, by planner
+        path: the file to write; its suffix chooses PNG, PDF or SVG
+        dpi: pixels per inch
 
-def checked(path: str | Path) -> Path:
-    """The path of a figure.
+    Returns:
+        The file's path.
 
     Raises:
         InputError: a suffix that is none of .png, .pdf, .svg.
     """
-    target = Path(path)
-    if target.suffix.lower() not in SUFFIXES:
-        raise InputError(f"{target}: unknown suffix {target.suffix!r}; choose one of {', '.join(SUFFIXES)}")
-    return target
-
-
-def write_figure(figure: Figure, target: Path, dpi: float) -> Path:
-    """Write a figure by its suffix, whole or not at all, without dates."""
-    kind = target.suffix.lower()[1:]
-    # These are what the formats would write the date, or the library's version, into.
-    empty: dict[str, Any] = {
-        "png": {"Software": None},
-        "pdf": {"CreationDate": None, "Producer": None, "Creator": None},
-        "svg": {"Date": None, "Creator": None},
-    }[kind]
-    with written_whole(target) as temporary:
-        figure.savefig(temporary, format=kind, dpi=dpi, metadata=empty)
-    return target
+    target = checked(path)
+    scene = Scene.of(next(iter(rollouts.values())))
+    with styled():
+        xmin, ymin, xmax, ymax = scene.bounds
+        figure = new_figure(6.6, float(np.clip(5.6 * (ymax - ymin) / (xmax - xmin), 2.0, 9.0)) + 1.0)
+        axes: Any = figure.add_subplot()
+        draw_map(axes, scene)
+        handles: list[Any] = []
+        for over, (name, rollout) in zip(reversed(range(len(rollouts))), rollouts.items(), strict=True):
+            colour, dash = planner_style(name)
+            label = f"{name}, {float(rollout.t[-1]):.1f} s"
+            width = 2.2 + 1.4 * over  # the first are the widest, to stay visible below the later ones
+            handles += axes.plot(
+                *rollout.pose[::8, :2].T, color=hexed(colour), ls=dash, lw=width, label=label, zorder=6
+            )
+        draw_legend(axes, handles, scene)
+        return write_figure(figure, target, dpi)

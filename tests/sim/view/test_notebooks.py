@@ -57,8 +57,8 @@ def test_a_rollout_shows_its_route_and_its_drive(small_run):
 
 def test_looking_at_a_world_imports_nothing_heavy():
     code = (
-        "import sys; from worlds import load_task; load_task('slalom')._repr_html_(); "
-        "print([m for m in ('matplotlib', 'numba', 'sim', 'pybullet') if m in sys.modules])"
+        "import sys; from antdrive.worlds import load_task; load_task('slalom')._repr_html_(); "
+        "print([m for m in ('matplotlib', 'numba', 'antdrive.sim', 'pybullet') if m in sys.modules])"
     )
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert said.stdout.strip() == "[]"

@@ -7,16 +7,10 @@ from PIL import Image
 from antdrive.planners import History, Query, load_planner
 from antdrive.robots import load_robot
 from antdrive.sim.log.certificate import Certificate
-from antdrive.sim.view.figures import figures
-from antdrive.sim.view.figures.figures import (
-    ants_figure,
-    bars_figure,
-    certificate_figure,
-    comparison_figure,
-    history_figure,
-    plan_figures,
-    sweep_figure,
-)
+from antdrive.sim.view.figures import plan_figures as module
+from antdrive.sim.view.figures.paper_figures import ants_figure, history_figure, sweep_figure
+from antdrive.sim.view.figures.plan_figures import bars_figure, plan_figures
+from antdrive.sim.view.figures.run_figures import certificate_figure, comparison_figure
 from antdrive.sim.view.style import BAD, GOOD, planner_style
 from antdrive.worlds import Disc, InputError, Task, World, rasterise
 
@@ -78,7 +72,7 @@ def test_a_large_field_is_drawn_with_fewer_bars_that_keep_its_peaks(tmp_path, mo
     field = np.zeros(grid.shape)
     field[:, 100] = 3.0
     bars_figure(grid, field, tmp_path / "a.png", dpi=50)
-    assert len(heights[0]) <= figures.BARS**2
+    assert len(heights[0]) <= module.MAX_BARS**2
     assert heights[0].max() == pytest.approx(3.0)
 
 

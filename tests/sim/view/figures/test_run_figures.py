@@ -11,7 +11,8 @@ from PIL import Image
 from antdrive.planners import History, PlanResult, PlanStatus, Query
 from antdrive.planners.graph.search import AStar
 from antdrive.robots import Footprint, RobotSpec
-from antdrive.sim.view.figures.plots import overview, plan_figure
+from antdrive.sim.view.figures.plan_figures import plan_figure
+from antdrive.sim.view.figures.run_figures import overview
 from antdrive.worlds import Disc, InputError, Keyframed, Task, Wandering, World, rasterise
 
 ROBOT = RobotSpec(

@@ -6,9 +6,8 @@ import pytest
 from PIL import Image
 
 from antdrive.sim.log.rollout import Outcome
-from antdrive.sim.view.film.caption import VERDICTS
-from antdrive.sim.view.film.compare import Split, compare_film
-from antdrive.sim.view.style import PLANNER_STYLES, planner_style
+from antdrive.sim.view.film.compare import SplitScreen, compare_film
+from antdrive.sim.view.style import PLANNER_STYLES, VERDICTS, planner_style
 from antdrive.worlds import InputError
 
 SIZE = (640, 360)
@@ -23,9 +22,9 @@ def drives(made_up_drive):
 
 
 def test_runs_are_side_by_side_at_the_same_moment_and_wait_for_the_last(drives):
-    with Split(drives, "top", SIZE) as split:
-        at = [split.picture(t) for t in (0.3, 0.7, 0.8)]
-        alone = split._tiles[1].shot.replay.pose(0.8)
+    with SplitScreen(drives, "top", SIZE) as screen:
+        at = [screen.frame(t) for t in (0.3, 0.7, 0.8)]
+        alone = screen._tiles[1].shot.replay.pose(0.8)
     assert all(picture.shape == (*SIZE[::-1], 3) for picture in at)
     left, right = np.s_[:, :318], np.s_[:, 320:]
     assert (at[1][left] == at[2][left]).all(), "over"
@@ -35,8 +34,8 @@ def test_runs_are_side_by_side_at_the_same_moment_and_wait_for_the_last(drives):
 
 
 def test_each_run_has_its_planners_colour_and_its_outcome(drives):
-    with Split(drives, "top", SIZE) as split:
-        end = split.picture(np.inf)
+    with SplitScreen(drives, "top", SIZE) as screen:
+        end = screen.frame(np.inf)
     for k, log in enumerate(drives):
         colour = np.array(planner_style(log.meta["planner"]["name"])[0])
         assert np.abs(end[2, 320 * k + 2].astype(int) - colour).max() == 0
@@ -46,10 +45,10 @@ def test_each_run_has_its_planners_colour_and_its_outcome(drives):
 
 @pytest.mark.parametrize("count", [2, 3, 4, 5, 6])
 def test_up_to_six_fit(drives, count):
-    with Split((drives * 3)[:count], "oblique", SIZE) as split:
-        assert len(set(split._corners)) == count
-        for (x, y), tile in zip(split._corners, split._tiles, strict=True):
-            high, wide, _ = tile.picture(0.1).shape
+    with SplitScreen((drives * 3)[:count], "oblique", SIZE) as screen:
+        assert len(set(screen._corners)) == count
+        for (x, y), tile in zip(screen._corners, screen._tiles, strict=True):
+            high, wide, _ = tile.frame(0.1).shape
             assert x + wide <= SIZE[0]
             assert y + high <= SIZE[1]
 

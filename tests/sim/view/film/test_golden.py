@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from antdrive.sim.view.film.camera import CAMERAS
-from antdrive.sim.view.film.video import Shot
+from antdrive.sim.view.film.shot import Shot
 from tests.sim.conftest import _made_up_drive
 
 GOLDEN = Path(__file__).with_name("golden")
@@ -40,15 +40,15 @@ def test_a_picture_is_as_it_was(golden):
 
 
 def test_the_comparison_would_see_what_is_missing(golden, monkeypatch):
-    from antdrive.sim.view.film import stage
+    from antdrive.sim.view.film import compositor
 
     camera, stored = golden
     assert differs(picture(camera, obstacles=12), stored) > 0.002, "obstacles"
     with monkeypatch.context() as without:
-        without.setattr(stage.Stage, "_put", lambda *_: None)
+        without.setattr(compositor.Compositor, "_put_bodies", lambda *_: None)
         assert differs(picture(camera), stored) > 0.002, "the robot"
     with monkeypatch.context() as without:
-        without.setattr(stage.Stage, "drive", lambda *_: None)
+        without.setattr(compositor.Compositor, "extend_trail", lambda *_: None)
         assert differs(picture(camera), stored) > 0.002, "the driven way"
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from antdrive.sim.pipeline import Scenario, run
 from antdrive.sim.view.film import prelude
-from antdrive.sim.view.film.prelude import field_levels, planning_pictures, search
+from antdrive.sim.view.film.prelude import field_levels, plan_again, planning_frames
 from antdrive.sim.view.film.video import film
 from antdrive.worlds import Disc, InputError, Task, World, rasterise
 
@@ -24,14 +24,14 @@ def walked(tmp_path_factory):
 
 
 def test_planning_again_gives_the_logged_path(walked):
-    _, total, states = search(walked)
+    _, total, states = plan_again(walked)
     assert total == 12
     *_, last = states
     assert np.array_equal(last.cells, walked.cells)
 
 
 def test_a_prelude_shows_the_field_and_goes_on_to_the_last_iteration(walked):
-    frames = list(planning_pictures(walked, SETTING, 5))
+    frames = list(planning_frames(walked, SETTING, 5))
     assert len(frames) == 5
     assert all(frame.shape == (240, 320, 3) for frame in frames)
     blue = [(frame[..., 2].astype(int) - frame[..., 0] > 60).sum() for frame in frames]
@@ -47,7 +47,7 @@ def test_a_film_is_longer_by_its_prelude(walked, tmp_path):
 def test_a_log_that_planning_does_not_lead_to_is_refused(walked):
     other = replace(walked, cells=walked.cells[::-1])
     with pytest.raises(InputError, match="another path"):
-        list(planning_pictures(other, SETTING, 2))
+        list(planning_frames(other, SETTING, 2))
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from antdrive.sim.view.film.replay import Replay, contact_point
-from antdrive.sim.view.scene import Scene, jumping, pieces
+from antdrive.sim.view.film.replay import Replay
+from antdrive.sim.view.scene import Scene, contact_point, jumps, mover_tracks
 
 
 @pytest.fixture(scope="module")
@@ -36,12 +36,12 @@ def test_movers_have_the_velocity_of_their_rows(jumped):
 
 
 def test_tracks_are_cut_at_jumps_and_nowhere_else(jumped):
-    assert np.argwhere(jumping(jumped.movers)).tolist() == [[119, 0]]
-    one, two, stood = pieces(jumped.movers)
+    assert np.argwhere(jumps(jumped.movers)).tolist() == [[119, 0]]
+    one, two, stood = mover_tracks(jumped.movers)
     assert (len(one), len(two), len(stood)) == (120, len(jumped.t) - 120, len(jumped.t))
     fast = np.zeros((100, 1, 2))
     fast[:, 0, 0] = np.arange(100) * 20 / 240
-    assert not jumping(fast).any(), "20 m/s is fast, but no jump"
+    assert not jumps(fast).any(), "20 m/s is fast, but no jump"
     assert Scene.of(jumped).movers == ((float(jumped.movers[-1, 0, 0]), 0.0), (3.5, 0.5))
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from antdrive.sim.view.figures.plots import overview
+from antdrive.sim.view.figures.run_figures import overview
 from antdrive.sim.view.report.report import ROOM, write_report
 from antdrive.worlds import InputError
 
