@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from antdrive.sim.view.figures.run_figures import overview
-from antdrive.sim.view.report.report import ROOM, write_report
+from antdrive.sim.view.report.report import EMBEDDED_BYTES, write_report
 from antdrive.worlds import InputError
 
 BROWSER = next(
@@ -30,7 +30,7 @@ window.onload = async () => {
   const named = (name) => heads.find((h) => h.textContent === name);
   named("planner").click(); said.up = column(1);
   named("planner").click(); said.down = column(1);
-  named("driven m").click(); said.driven = column(6);
+  named("driven [m]").click(); said.driven = column(6);
   const filter = document.querySelector("#filter");
   filter.value = "astar COLLIDED"; filter.dispatchEvent(new Event("input"));
   said.filtered = column(0); said.sections = [...document.querySelectorAll("section")].filter((s) => !s.hidden).length;
@@ -146,8 +146,9 @@ def test_it_stays_small_by_linking_what_does_not_fit(runs, tmp_path, monkeypatch
 
     write_report(runs, tmp_path / "all.html")
     assert (tmp_path / "all.html").stat().st_size < 5_000_000
-    assert ROOM < 5_000_000
-    monkeypatch.setattr(reporting, "ROOM", 1.5 * len(reporting._shrunk(runs / "run 0" / "overview.png", "").source))
+    assert EMBEDDED_BYTES < 5_000_000
+    one = len(reporting._embedded(runs / "run 0" / "overview.png", "").source)
+    monkeypatch.setattr(reporting, "EMBEDDED_BYTES", 1.5 * one)
     write_report(runs, tmp_path / "few.html")
     text = (tmp_path / "few.html").read_text()
     assert text.count("data:image/webp") == 1
