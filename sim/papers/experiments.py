@@ -20,10 +20,12 @@ class Experiment:
         paper: the paper's short name
         map: the map in words
         planner: the planner's name
-        query: gives the map with start and goal for a seed; a map that the paper specifies is the same for every seed
+        query: gives the map with start and goal for a seed; a map that the paper specifies is the same for
+            every seed
         printed: the paper's value; lengths in cells
         options: the planner's parameters
-        recreated: the paper shows its map as a picture only, so a random map of the same size and kind takes its place
+        recreated: the paper shows its map as a picture only; a random map of the same size and kind takes its
+            place
         quantity: the value that is printed and measured: `length` or `steps`
     """
 
@@ -74,7 +76,14 @@ def han2007() -> list[Experiment]:
 
 def suganthi2019() -> list[Experiment]:
     """Table 2: four sizes, three planners."""
-    common = {"alpha": 1.0, "beta": 1.0, "evaporation": 0.3, "deposit": 1.0, "heuristic": "step", "iterations": 100}
+    common = {
+        "alpha": 1.0,
+        "beta": 1.0,
+        "evaporation": 0.3,
+        "deposit": 1.0,
+        "heuristic": "step",
+        "iterations": 100,
+    }
     options: dict[str, dict[str, Any]] = {
         "as": {"ants": 50, **common},
         "pfaco": {"ants": 50, "iterations": 100, "listed": 15},

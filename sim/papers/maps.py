@@ -1,4 +1,4 @@
-"""The papers' maps. Where a paper only shows a picture of its map, a random map of the same size and kind takes its place."""
+"""The papers' maps. Where a paper only shows a picture, a random map of the same size and kind takes its place."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ def han_ants() -> Query:
 
 
 def han_genes(*discs: tuple[float, float, float]) -> Query:
-    """han2007's map for the genetic algorithm, with the listing's six obstacles or with `discs` (x, y, radius)."""
+    """han2007's map for the genetic algorithm, with the listing's obstacles or with `discs` (x, y, radius)."""
     found = discs or tuple((float(x), float(y), 1.0) for x, y in HAN_GENES)
     world = World("han2007-ga", (-0.5, -0.5, 20.5, 20.5), tuple(Disc(*disc) for disc in found))
     return Query(rasterise(world, 1.0), (0, 0), (20, 20))
 
 
 def scattered(size: int, blocked: float, seed: int) -> Query:
-    """A recreated map of size x size cells, each blocked with the probability `blocked`, from corner to corner."""
+    """A recreated map of size x size cells, each blocked with probability `blocked`, from corner to corner."""
     return _crossable(lambda rng: rng.random((size, size)) >= blocked, seed)
 
 
@@ -64,7 +64,7 @@ def blocks(rows: int, cols: int, count: int, largest: int, seed: int) -> Query:
 
 
 def environments() -> dict[str, Query]:
-    """hasan's six environments of 50 x 50 cells, recreated from the paper's description, with its starts and goals."""
+    """hasan's six environments of 50 x 50 cells, recreated from the paper's text, with its starts and goals."""
     row, col = np.mgrid[:50, :50]
 
     def arc(r: float, c: float, radius: float, opening: float, wide: float) -> Picture:

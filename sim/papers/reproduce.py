@@ -1,4 +1,4 @@
-"""Run the papers' experiments again: a table of printed and measured values, and the papers' kinds of figures."""
+"""Run the papers' experiments again: a table of printed and measured values, and the papers' figures."""
 
 from __future__ import annotations
 
@@ -100,7 +100,10 @@ def reproduce(
         rows.append(_row(experiment, results, [maps.optimum(query) for query in queries]))
         if progress is not None:
             progress((k + 1) / len(experiments))
-    files = {"table": str(_write_table(rows, folder / "table.md")), "csv": str(_write_csv(rows, folder / "table.csv"))}
+    files = {
+        "table": str(_write_table(rows, folder / "table.md")),
+        "csv": str(_write_csv(rows, folder / "table.csv")),
+    }
     for paper in papers:
         chosen = [(e, r) for e, r in zip(experiments, found, strict=True) if e.paper == paper]
         files |= _figures(paper, chosen, folder, seeds, suffixes)
@@ -150,7 +153,19 @@ def _row(experiment: Experiment, results: Sequence[PlanResult], optima: Sequence
 
 
 #: The headings of the table; lengths are in cells.
-HEADS = ("paper", "map", "planner", "quantity", "printed", "mean", "best", "solved", "shortest", "gap", "planning")
+HEADS = (
+    "paper",
+    "map",
+    "planner",
+    "quantity",
+    "printed",
+    "mean",
+    "best",
+    "solved",
+    "shortest",
+    "gap",
+    "planning",
+)
 
 
 def row_cells(row: ResultRow) -> list[str]:
@@ -177,8 +192,8 @@ def row_cells(row: ResultRow) -> list[str]:
 def _write_table(rows: Sequence[ResultRow], path: Path) -> Path:
     lines = [HEADS, ["---"] * len(HEADS), *map(row_cells, rows)]
     note = (
-        "The paper shows some maps as pictures only. Recreated maps have the same size and kind, but their lengths cannot be\n"
-        "compared with the printed ones, only with the shortest path on the same map (`shortest`, `gap`).\n"
+        "Some papers show their maps as pictures only. Recreated maps have the same size and kind, but their lengths\n"
+        "cannot be compared with the printed ones, only with the shortest path on the same map (`shortest`, `gap`).\n"
         "All lengths are in cells.\n\n"
     )
     with written_whole(path) as temporary:
@@ -202,7 +217,7 @@ def _figures(
     seeds: int,
     suffixes: Sequence[str],
 ) -> dict[str, str]:
-    """Draw length by iteration on the paper's second map and, for han2007, lengths by ants and by Pc and Pm."""
+    """Draw length by iteration on the paper's second map and, for han2007, by ants and by Pc and Pm."""
     from antdrive.sim.view.figures.paper_figures import history_figure
 
     files: dict[str, str] = {}
@@ -245,7 +260,7 @@ def _han_figures(
 
 
 def _sweep(seeds: int) -> dict[bool, Any]:
-    """The mean length of the genetic algorithm's paths by crossover and mutation, with and without elitism."""
+    """Mean length of the genetic algorithm's paths by crossover and mutation, with and without elitism."""
     query = maps.han_genes()
     found = {}
     for elitism in (True, False):

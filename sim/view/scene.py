@@ -1,4 +1,4 @@
-"""What films and figures draw of a run besides its motion: world, start, goal and the robot's shape, read from the log."""
+"""The scene that films and figures draw: world, start, goal and the robot's shape, read from a run's log."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ class Scene:
         )
 
     def region(self, points: Floats) -> tuple[Floats, Floats]:
-        """The corners (2,), (2,) [m] of the part of the world to show: that around start, goal and points (N, 2).
+        """The corners (2,), (2,) [m] of the part of the world to show: around start, goal and points (N, 2).
 
         If this part is more than half of the world, the whole world is shown.
         """
@@ -192,8 +192,8 @@ def contact_point(scene: Scene, pose: npt.ArrayLike, index: int, movers: Floats)
 def jumps(movers: Floats) -> npt.NDArray[np.bool_]:
     """Whether movers at positions (T, M, 2) jump between consecutive rows, shape (T - 1, M).
 
-    A jump is a step longer than `MIN_JUMP` that is also more than three times the steps before and after: a fast mover
-    makes long steps, too, but all alike.
+    A jump is a step longer than `MIN_JUMP` that is also more than three times the steps before and after it: a fast
+    mover makes long steps, too, but all alike.
     """
     step = np.hypot(*np.moveaxis(np.diff(movers, axis=0), -1, 0))
     around = np.zeros_like(step)

@@ -1,4 +1,4 @@
-"""What films, figures and reports share: their colours and each planner's style, chosen for readers with any colour vision."""
+"""The colours of films, figures and reports, and each planner's style; chosen for readers of any colour vision."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ VERDICTS: Mapping[Outcome, tuple[str, Colour]] = MappingProxyType(
     }
 )
 
-#: Colours from standing to the robot's top speed: viridis without its palest end, which is lost on a light ground.
+#: Colours from standing to the robot's top speed: viridis without the palest end, which a light ground would hide.
 SPEED_STOPS: tuple[Colour, ...] = (
     (72, 26, 108),
     (68, 58, 131),
@@ -71,12 +71,26 @@ SPEED_STOPS: tuple[Colour, ...] = (
 
 
 #: Colours of a planner's field, such as pheromone, from its low to its high values.
-FIELD_STOPS: tuple[Colour, ...] = ((244, 246, 249), (213, 228, 243), (143, 188, 224), (63, 131, 191), (18, 63, 122))
+FIELD_STOPS: tuple[Colour, ...] = (
+    (244, 246, 249),
+    (213, 228, 243),
+    (143, 188, 224),
+    (63, 131, 191),
+    (18, 63, 122),
+)
 
-#: One colour per planner. The first seven are Okabe and Ito's, without the yellow that is lost on white; the others are
-#: chosen to lie far apart (CIELAB) from all before, for full colour vision and for deuteranopia.
+#: One colour per planner. The first seven are Okabe and Ito's, without the yellow that white would hide; each other one
+#: is far (CIELAB) from those before it, for full colour vision and for deuteranopia.
 PLANNER_COLOURS: tuple[Colour, ...] = (
-    *((0, 114, 178), (213, 94, 0), (0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180, 233), (27, 35, 51)),
+    *(
+        (0, 114, 178),
+        (213, 94, 0),
+        (0, 158, 115),
+        (204, 121, 167),
+        (230, 159, 0),
+        (86, 180, 233),
+        (27, 35, 51),
+    ),
     *((17, 68, 204), (85, 68, 0), (221, 187, 136), (119, 0, 51), (170, 0, 136), (221, 51, 68), (68, 34, 119)),
     *((170, 204, 85), (153, 204, 170), (204, 51, 255), (119, 85, 102)),
 )

@@ -1,4 +1,4 @@
-"""The canvas of all figures: one look, no screen needed, and files that are the same byte for byte for the same data.
+"""The canvas of all figures: one look, no screen needed, and the same file, byte for byte, for the same data.
 
 A file's suffix chooses PNG, PDF or SVG. No dates or versions are written into files.
 """

@@ -1,4 +1,4 @@
-"""Charts of numbers over time or iterations, each drawn into axes: clearance, speed, speed limits, path lengths."""
+"""Charts over time or iterations, each drawn into axes: clearance, speed, speed limits, path lengths."""
 
 from __future__ import annotations
 
@@ -72,9 +72,17 @@ def draw_limiters(axes: Any, rollout: Rollout) -> None:
     used = [k for k in np.unique(rollout.limiter) if k < count]
     handles = [Patch(fc=LIMITER_COLOURS[k % len(LIMITER_COLOURS)], label=names[k]) for k in used]
     axes.legend(
-        handles=handles, loc="lower left", bbox_to_anchor=(0.0, 0.95), ncols=len(handles), handlelength=0.9,
-        columnspacing=1.0, borderaxespad=0.1, title="speed limited by", title_fontsize=8, alignment="left",
-    )  # fmt: skip
+        handles=handles,
+        loc="lower left",
+        bbox_to_anchor=(0.0, 0.95),
+        ncols=len(handles),
+        handlelength=0.9,
+        columnspacing=1.0,
+        borderaxespad=0.1,
+        title="speed limited by",
+        title_fontsize=8,
+        alignment="left",
+    )
 
 
 def draw_history(axes: Any, history: History) -> None:

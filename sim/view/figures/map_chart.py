@@ -60,9 +60,11 @@ def draw_map(axes: Any, scene: Scene, *, floor: bool = True) -> None:
         zones = [Circle((x, y), r + scene.inflate) for x, y, r, _ in known]
         i = scene.inflate
         zones_walls = [
-            Rectangle((x0, y0), i, y1 - y0), Rectangle((x1 - i, y0), i, y1 - y0),
-            Rectangle((x0, y0), x1 - x0, i), Rectangle((x0, y1 - i), x1 - x0, i),
-        ]  # fmt: skip
+            Rectangle((x0, y0), i, y1 - y0),
+            Rectangle((x1 - i, y0), i, y1 - y0),
+            Rectangle((x0, y0), x1 - x0, i),
+            Rectangle((x0, y1 - i), x1 - x0, i),
+        ]
         pale = tuple(1 - 0.22 * (1 - channel / 255) for channel in ZONE)
         layer = PatchCollection([*zones, *zones_walls], facecolor=pale, edgecolor="none", zorder=1.2)
         if not floor:
@@ -92,7 +94,13 @@ def _draw_robot(axes: Any, scene: Scene, pose: tuple[float, float, float], colou
     foot = scene.robot.footprint
     turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
     ahead = turn @ [foot.half_length + foot.rounding, 0.0]
-    style: dict[str, Any] = {"fill": True, "fc": (1, 1, 1, 0.55), "ec": hexed(colour), "lw": 1.3, "zorder": zorder}
+    style: dict[str, Any] = {
+        "fill": True,
+        "fc": (1, 1, 1, 0.55),
+        "ec": hexed(colour),
+        "lw": 1.3,
+        "zorder": zorder,
+    }
     if foot.is_disc:
         axes.add_patch(Circle((x, y), foot.rounding, **style))
     else:
@@ -125,9 +133,13 @@ def draw_driven(figure: Any, axes: Any, scene: Scene, rollout: Rollout, cells: F
         keep = np.unique(np.linspace(0, len(rollout.t) - 1, 1500).astype(int))
         points = rollout.pose[keep, :2]
         lines = LineCollection(
-            list(np.stack([points[:-1], points[1:]], axis=1)), cmap=SPEEDS, norm=Normalize(0, scene.robot.max_speed),
-            linewidth=2.6, capstyle="round", zorder=5,
-        )  # fmt: skip
+            list(np.stack([points[:-1], points[1:]], axis=1)),
+            cmap=SPEEDS,
+            norm=Normalize(0, scene.robot.max_speed),
+            linewidth=2.6,
+            capstyle="round",
+            zorder=5,
+        )
         lines.set_array(np.abs(rollout.twist[keep[:-1], 0]))
         axes.add_collection(lines)
         bar = figure.colorbar(lines, ax=axes, orientation="horizontal", shrink=0.6, aspect=34, pad=0.02)
@@ -143,7 +155,7 @@ def draw_driven(figure: Any, axes: Any, scene: Scene, rollout: Rollout, cells: F
 
 
 def draw_legend(axes: Any, handles: list[Any], scene: Scene) -> None:
-    """Draw the map's legend above its upper left corner: `handles` first, then obstacles, movers and zones."""
+    """Draw the map's legend above its upper left corner: `handles`, then obstacles, movers and zones."""
     known = [Patch(fc=hexed(OBSTACLE), label="obstacle")]
     if scene.unseen.any():
         known.append(Patch(fc=hexed(UNSEEN), label="placed after planning"))
@@ -153,9 +165,14 @@ def draw_legend(axes: Any, handles: list[Any], scene: Scene) -> None:
         pale = tuple(1 - 0.22 * (1 - channel / 255) for channel in ZONE)
         known.append(Patch(fc=pale, ec=hexed(ZONE), lw=0.5, label=f"inflated by {scene.inflate:.2f} m"))
     axes.legend(
-        handles=[*handles, *known], loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, handlelength=1.6,
-        columnspacing=1.2, borderaxespad=0.2,
-    )  # fmt: skip
+        handles=[*handles, *known],
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=3,
+        handlelength=1.6,
+        columnspacing=1.2,
+        borderaxespad=0.2,
+    )
 
 
 def draw_field(figure: Any, axes: Any, grid: Grid, field: Floats) -> None:
@@ -167,9 +184,11 @@ def draw_field(figure: Any, axes: Any, grid: Grid, field: Floats) -> None:
     rows, cols = grid.shape
     half = grid.cell / 2
     extent = (
-        grid.origin[0] - half, grid.origin[0] + (cols - 0.5) * grid.cell,
-        grid.origin[1] - half, grid.origin[1] + (rows - 0.5) * grid.cell,
-    )  # fmt: skip
+        grid.origin[0] - half,
+        grid.origin[0] + (cols - 0.5) * grid.cell,
+        grid.origin[1] - half,
+        grid.origin[1] + (rows - 0.5) * grid.cell,
+    )
     low, high = np.quantile(finite, (0.02, 0.995))
     image = axes.imshow(
         values,

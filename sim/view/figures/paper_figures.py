@@ -1,4 +1,4 @@
-"""The kinds of figures that papers print: path length by iteration, by number of ants, and over a sweep of parameters."""
+"""Figures as papers print them: path length by iteration, by number of ants, and over a sweep of parameters."""
 
 from __future__ import annotations
 
@@ -21,13 +21,18 @@ Floats = npt.NDArray[np.float64]
 
 
 def history_figure(
-    histories: Mapping[str, Sequence[History]], path: str | Path, *, optimum: float | None = None, unit: str = "m",
+    histories: Mapping[str, Sequence[History]],
+    path: str | Path,
+    *,
+    optimum: float | None = None,
+    unit: str = "m",
     dpi: float = 160,
-) -> Path:  # fmt: skip
+) -> Path:
     """Draw the best path length so far by iteration for one or more planners.
 
     Args:
-        histories: by planner, the history of each seed; of several seeds the median is drawn, and the range as a band
+        histories: by planner, the history of each seed; of several seeds the median is drawn, and the range as
+            a band
         path: the file to write; its suffix chooses PNG, PDF or SVG
         optimum: the shortest length on the same moves, drawn as a line
         unit: of the lengths
@@ -50,11 +55,25 @@ def history_figure(
             best = np.where(np.isfinite(best), best, np.nan)
             turns = np.arange(1, longest + 1)
             known = np.isfinite(best).all(axis=0)
-            axes.plot(turns[known], np.median(best[:, known], axis=0), color=hexed(colour), ls=dash, lw=2.0, label=name,
-                      drawstyle="steps-post")  # fmt: skip
+            axes.plot(
+                turns[known],
+                np.median(best[:, known], axis=0),
+                color=hexed(colour),
+                ls=dash,
+                lw=2.0,
+                label=name,
+                drawstyle="steps-post",
+            )
             if len(runs) > 1:
-                axes.fill_between(turns[known], best[:, known].min(axis=0), best[:, known].max(axis=0), step="post",
-                                  color=hexed(colour), alpha=0.15, lw=0)  # fmt: skip
+                axes.fill_between(
+                    turns[known],
+                    best[:, known].min(axis=0),
+                    best[:, known].max(axis=0),
+                    step="post",
+                    color=hexed(colour),
+                    alpha=0.15,
+                    lw=0,
+                )
         if optimum is not None:
             axes.axhline(optimum, color=hexed(MUTED), ls="--", lw=1.0, label="shortest on these moves")
         axes.set(xlabel="iteration", ylabel=f"best path so far [{unit}]")
@@ -64,9 +83,15 @@ def history_figure(
 
 
 def ants_figure(
-    lengths: Mapping[int, Sequence[float]], path: str | Path, *, planner: str, optimum: float,
-    printed: Mapping[int, float] | None = None, unit: str = "m", dpi: float = 160,
-) -> Path:  # fmt: skip
+    lengths: Mapping[int, Sequence[float]],
+    path: str | Path,
+    *,
+    planner: str,
+    optimum: float,
+    printed: Mapping[int, float] | None = None,
+    unit: str = "m",
+    dpi: float = 160,
+) -> Path:
     """Draw path length by number of ants: every seed, the mean, and the values that a paper prints.
 
     Args:
@@ -94,12 +119,23 @@ def ants_figure(
             axes.plot([count] * len(lengths[count]), lengths[count], "o", ms=4, color=colour, alpha=0.35, mew=0)
         means = [float(np.mean(lengths[count])) for count in counts]
         axes.plot(
-            counts, means, "-o", ms=6, color=colour, lw=2.0, label=f"{planner}, mean of {len(lengths[counts[0]])}"
+            counts,
+            means,
+            "-o",
+            ms=6,
+            color=colour,
+            lw=2.0,
+            label=f"{planner}, mean of {len(lengths[counts[0]])}",
         )
         if printed:
             known = sorted(printed)
             axes.plot(
-                known, [printed[count] for count in known], "s--", color=hexed(INK), mfc="white", label="in the paper"
+                known,
+                [printed[count] for count in known],
+                "s--",
+                color=hexed(INK),
+                mfc="white",
+                label="in the paper",
             )
         axes.axhline(optimum, color=hexed(MUTED), ls="--", lw=1.0, label="shortest on these moves")
         axes.set(xscale="log", xlabel="number of ants", ylabel=f"path length [{unit}]")
@@ -110,14 +146,20 @@ def ants_figure(
 
 
 def sweep_figure(
-    pc: Sequence[float], pm: Sequence[float], lengths: Mapping[bool, Floats], path: str | Path, *, dpi: float = 160
+    pc: Sequence[float],
+    pm: Sequence[float],
+    lengths: Mapping[bool, Floats],
+    path: str | Path,
+    *,
+    dpi: float = 160,
 ) -> Path:
-    """Draw the mean path length over crossover and mutation probabilities, with and without elitism side by side.
+    """Draw the mean path length by crossover and mutation probability, with and without elitism side by side.
 
     Args:
         pc: crossover probabilities (P,)
         pm: mutation probabilities (M,)
-        lengths: with elitism (True) and without (False), the mean lengths (P, M); nan where no seed found a path
+        lengths: with elitism (True) and without (False), the mean lengths (P, M); nan where no seed found a
+            path
         path: the file to write; its suffix chooses PNG, PDF or SVG
         dpi: pixels per inch
 
@@ -145,8 +187,15 @@ def sweep_figure(
             axes.grid(False)
             for (i, j), value in np.ndenumerate(values):
                 dark = value > (finite.min() + finite.max()) / 2
-                axes.text(j, i, f"{value:.2f}" if math.isfinite(value) else "–", ha="center", va="center", fontsize=7.5,
-                          color="white" if dark else hexed(INK))  # fmt: skip
+                axes.text(
+                    j,
+                    i,
+                    f"{value:.2f}" if math.isfinite(value) else "–",
+                    ha="center",
+                    va="center",
+                    fontsize=7.5,
+                    color="white" if dark else hexed(INK),
+                )
         bar = figure.colorbar(drawn, ax=figure.axes, shrink=0.85, aspect=26)
         bar.set_label("mean path length [cells]")
         bar.outline.set_visible(False)

@@ -26,13 +26,14 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
-MAX_BARS = 40  # per side; in a larger field a bar stands for several cells and is as high as the highest of them
+#: Bars per side. In a larger field each bar stands for several cells and is as high as the highest of them.
+MAX_BARS = 40
 
 
 def plan_figure(
     task: Task, grid: Grid, plan: PlanResult, robot: RobotSpec, path: str | Path, *, dpi: float = 160
 ) -> Path:
-    """Draw a plan on the map, over the planner's field; for an iterative planner, path lengths by iteration beside it.
+    """Draw a plan on the map, over the planner's field; an iterative planner gets path lengths by iteration, too.
 
     Args:
         task: the world with start and goal
@@ -79,15 +80,28 @@ def plan_figure(
 
 def _draw_reason(axes: Any, reason: str) -> None:
     """Write in the middle of the map why there is no path."""
-    place: dict[str, Any] = {"transform": axes.transAxes, "ha": "center", "va": "center", "wrap": True, "zorder": 9}
+    place: dict[str, Any] = {
+        "transform": axes.transAxes,
+        "ha": "center",
+        "va": "center",
+        "wrap": True,
+        "zorder": 9,
+    }
     frame = {"fc": "white", "ec": hexed(BAD), "pad": 6}
     axes.text(0.5, 0.5, reason, weight="bold", color=hexed(BAD), bbox=frame, **place)
 
 
 def plan_figures(
-    task: Task, grid: Grid, plan: PlanResult, robot: RobotSpec, folder: Path, *, name: str, suffixes: Sequence[str]
+    task: Task,
+    grid: Grid,
+    plan: PlanResult,
+    robot: RobotSpec,
+    folder: Path,
+    *,
+    name: str,
+    suffixes: Sequence[str],
 ) -> dict[str, Path]:
-    """Draw every figure of a plan: on the map with the field, alone as tour, by iteration, its field as bars and contours.
+    """Draw every figure of a plan: with the field, alone, by iteration, and its field as bars and as contours.
 
     Args:
         task: the world with start and goal
@@ -116,7 +130,7 @@ def plan_figures(
 
 
 def bars_figure(grid: Grid, field: Floats, path: str | Path, *, dpi: float = 160) -> Path:
-    """Draw a planner's field (R, C) as three-dimensional bars on the grid's cells; blocked cells have none."""
+    """Draw a planner's field (R, C) as three-dimensional bars on the free cells."""
     target = checked(path)
     step = max(1, math.ceil(max(grid.shape) / MAX_BARS))
     values = np.where(grid.free, np.asarray(field, dtype=np.float64), np.nan)

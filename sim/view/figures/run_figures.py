@@ -57,7 +57,7 @@ def overview(rollout: Rollout, path: str | Path, *, cells: Floats | None = None,
         planner = rollout.meta.get("planner", {}).get("name", "?")
         title = f"{scene.name}   ·   {planner}   ·   {scene.robot.name}"
         figure.suptitle(title, x=0.012, ha="left", fontsize=12, weight="bold")
-        figure.text(0.988, 0.982, name, ha="right", va="top", fontsize=11, weight="bold", color=hexed(colour))
+        figure.text(0.988, 0.993, name, ha="right", va="top", fontsize=11, weight="bold", color=hexed(colour))
         return write_figure(figure, target, dpi)
 
 

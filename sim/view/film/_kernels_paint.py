@@ -1,7 +1,7 @@
-"""Compiled painting on the ground plane and blending of rendered crops: arrays in, arrays out, nothing validated.
+"""Compiled painting on the ground plane and blending of rendered crops: arrays in, arrays out, no validation.
 
-`inv` (3, 3) takes pixels to the ground, `fwd` (3, 3) the ground to pixels. Edges are anti-aliased by the exact distance to
-them, divided by what one pixel covers across the edge.
+`inv` (3, 3) takes pixels to the ground, `fwd` (3, 3) the ground to pixels. Edges are anti-aliased by the exact
+distance to them, divided by the extent of one pixel across the edge.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def pixel_box(
 ) -> tuple[int, int, int, int]:
     """The pixels x0, y0, x1, y1 that a ground rectangle may cover; empty when it lies behind the camera."""
     left, top, right, bottom = 1e30, 1e30, -1e30, -1e30
-    # Edges are cut where they are nearer than any ground in the picture: near the camera's own plane, boxes would be huge.
+    # Edges are cut where they are nearer than any ground in the picture: close to the camera, boxes would be huge.
     left_edge = max(inv[2, 2], inv[2, 1] * height + inv[2, 2])
     near = 0.5 / max(left_edge, left_edge + inv[2, 0] * width)
     for i in range(4):
@@ -81,7 +81,14 @@ def _span(inv: Array, x: float, y: float, w: float, nx: float, ny: float) -> flo
 
 @kernel
 def lay_floor(
-    rgb: Array, ground: Array, inside: Array, inv: Array, bounds: Array, step: float, weight: float, colours: Array
+    rgb: Array,
+    ground: Array,
+    inside: Array,
+    inv: Array,
+    bounds: Array,
+    step: float,
+    weight: float,
+    colours: Array,
 ) -> None:
     """Paint the floor (H, W, 3) where `ground` is true, and set `inside` to the ground within the bounds.
 
@@ -110,9 +117,9 @@ def lay_floor(
 
 @kernel
 def cast_shadows(shade: Array, fwd: Array, inv: Array, discs: Array, sun_x: float, sun_y: float, depth: float) -> None:
-    """Darken `shade` (H, W), 1 = fully lit, where cylinders (N, 4) x, y, radius, height block the sun or part of the sky.
+    """Darken `shade` (H, W), 1 = fully lit, where cylinders (N, 4) x, y, radius, height block the sun or the sky.
 
-    A cylinder's shadow is its disc swept along (sun_x, sun_y) times its height; the edge softens with that distance.
+    A cylinder's shadow is its disc swept along (sun_x, sun_y) times its height; the edge softens with the distance.
     """
     height, width = shade.shape
     for i in range(discs.shape[0]):
@@ -152,7 +159,14 @@ def cover_capsules(cover: Array, fwd: Array, inv: Array, rows: Array) -> None:
     for i in range(rows.shape[0]):
         ax, ay, bx, by, half = rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3], rows[i, 4]
         left, top, right, bottom = pixel_box(
-            fwd, inv, min(ax, bx) - half, min(ay, by) - half, max(ax, bx) + half, max(ay, by) + half, width, height
+            fwd,
+            inv,
+            min(ax, bx) - half,
+            min(ay, by) - half,
+            max(ax, bx) + half,
+            max(ay, by) + half,
+            width,
+            height,
         )
         for row in range(top, bottom):
             for col in range(left, right):
@@ -224,7 +238,7 @@ def multiply(rgb: Array, shade: Array) -> None:
 
 @kernel
 def count_ground(seg: Array, factor: int, visible: Array, ground: Array) -> None:
-    """Set `visible` to the fraction of each pixel (`factor` x `factor` of `seg`) that no body covers, `ground` to whether any."""
+    """Set `visible` to the fraction of each pixel (`factor` x `factor` of `seg`) without a body, `ground` to > 0."""
     for row in range(visible.shape[0]):
         for col in range(visible.shape[1]):
             seen = 0
@@ -238,14 +252,18 @@ def count_ground(seg: Array, factor: int, visible: Array, ground: Array) -> None
 
 @kernel
 def resolve(rgb: Array, image: Array, seg: Array, factor: int, visible: Array, out: Array) -> None:
-    """Join the painted ground (H, W, 3) and the bodies, rendered `factor` times as fine, to one picture `out` uint8."""
+    """Join the painted ground (H, W, 3) and the bodies, rendered `factor` times as fine, to a picture `out`."""
     count = factor * factor
     for row in range(out.shape[0]):
         for col in range(out.shape[1]):
             share = visible[row, col]
             red, green, blue = 0.0, 0.0, 0.0
             if share > 0.0:
-                red, green, blue = rgb[row, col, 0] * share, rgb[row, col, 1] * share, rgb[row, col, 2] * share
+                red, green, blue = (
+                    rgb[row, col, 0] * share,
+                    rgb[row, col, 1] * share,
+                    rgb[row, col, 2] * share,
+                )
             if share < 1.0:
                 for i in range(factor):
                     for j in range(factor):
@@ -261,14 +279,28 @@ def resolve(rgb: Array, image: Array, seg: Array, factor: int, visible: Array, o
 
 @kernel
 def draw_trail(
-    canvas: Array, base: Array, visible: Array, trail: Array, fwd: Array, inv: Array, rows: Array, colours: Array
+    canvas: Array,
+    base: Array,
+    visible: Array,
+    trail: Array,
+    fwd: Array,
+    inv: Array,
+    rows: Array,
+    colours: Array,
 ) -> None:
-    """Paint capsules (N, 5) in colours (N, 3) into `canvas`; `trail` (H, W, 4) uint8 holds colour and coverage so far."""
+    """Paint capsules (N, 5) in colours (N, 3) into `canvas`; `trail` (H, W, 4) holds colour and coverage so far."""
     height, width = canvas.shape[0], canvas.shape[1]
     for i in range(rows.shape[0]):
         ax, ay, bx, by, half = rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3], rows[i, 4]
         left, top, right, bottom = pixel_box(
-            fwd, inv, min(ax, bx) - half, min(ay, by) - half, max(ax, bx) + half, max(ay, by) + half, width, height
+            fwd,
+            inv,
+            min(ax, bx) - half,
+            min(ay, by) - half,
+            max(ax, bx) + half,
+            max(ay, by) + half,
+            width,
+            height,
         )
         for row in range(top, bottom):
             for col in range(left, right):
@@ -296,7 +328,14 @@ def blend_capsules(
     for i in range(rows.shape[0]):
         ax, ay, bx, by, half = rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3], rows[i, 4]
         left, top, right, bottom = pixel_box(
-            fwd, inv, min(ax, bx) - half, min(ay, by) - half, max(ax, bx) + half, max(ay, by) + half, width, height
+            fwd,
+            inv,
+            min(ax, bx) - half,
+            min(ay, by) - half,
+            max(ax, bx) + half,
+            max(ay, by) + half,
+            width,
+            height,
         )
         for row in range(top, bottom):
             for col in range(left, right):
@@ -319,7 +358,7 @@ def shade_body(
     soft: float,
     strength: float,
 ) -> None:
-    """Darken the ground under a rounded rectangle (half length, half width, rounding) swept along `sun` [m]."""
+    """Darken the ground below a rounded rectangle (half length, half width, rounding) swept along `sun` [m]."""
     height, width = visible.shape
     cx, cy, yaw = pose[0], pose[1], pose[2]
     cosine, sine = math.cos(yaw), math.sin(yaw)
@@ -353,9 +392,17 @@ def shade_body(
 
 @kernel
 def put_bodies(
-    frame: Array, image: Array, z: Array, seg: Array, depth: Array, x0: int, y0: int, factor: int, ghost: float
+    frame: Array,
+    image: Array,
+    z: Array,
+    seg: Array,
+    depth: Array,
+    x0: int,
+    y0: int,
+    factor: int,
+    ghost: float,
 ) -> None:
-    """Blend a crop rendered `factor` times as fine into `frame` at x0, y0, where its depth `z` is less than `depth`.
+    """Blend a crop, rendered `factor` times as fine, into `frame` at x0, y0, where its depth `z` is below `depth`.
 
     Elsewhere the crop is hidden, and shines through with the strength `ghost`.
     """

@@ -13,7 +13,11 @@ Floats = npt.NDArray[np.float64]
 CAMERAS: tuple[str, ...] = ("oblique", "top", "follow")
 
 _TILT = {"oblique": 52.0, "top": 90.0, "follow": 46.0}  # above the horizon [degrees]
-_FOV = {"oblique": 30.0, "top": 6.0, "follow": 34.0}  # vertical [degrees]; TinyRenderer has no orthographic view
+_FOV = {
+    "oblique": 30.0,
+    "top": 6.0,
+    "follow": 34.0,
+}  # vertical [degrees]; TinyRenderer has no orthographic view
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,8 +61,8 @@ class Camera:
         x, y, depth = seen[:, 0], seen[:, 1], -seen[:, 2]
         tan_y = math.tan(math.radians(fov) / 2)
         tan_x = tan_y * size[0] / size[1]
-        # A point is right of the left edge if x - cx >= left (depth - cz): linear in the camera's position cx, cz. The same
-        # holds for the other edges, so the nearest position follows from the extreme points alone.
+        # A point is right of the left edge if x - cx >= left (depth - cz): linear in the camera's position cx, cz.
+        # The same holds for the other edges, so the nearest position follows from the extreme points alone.
         left, right_edge = -tan_x * (1 - 2 * pad[0]), tan_x * (1 - 2 * pad[1])
         top, bottom = tan_y * (1 - 2 * pad[2]), -tan_y * (1 - 2 * pad[3])
         ax, bx = float((x - left * depth).min()), float((x - right_edge * depth).max())
@@ -107,7 +111,7 @@ class Camera:
         return np.column_stack([(1 + ndc[:, 0]) * width / 2, (1 - ndc[:, 1]) * height / 2])
 
     def sees(self, centres: Floats, radii: Floats) -> npt.NDArray[np.bool_]:
-        """Which balls at centres (N, 3) with radii (N,) [m] may be in sight; one that reaches behind the camera is not."""
+        """Which balls at centres (N, 3) with radii (N,) [m] may be in sight; none that reaches behind the camera."""
         x, y, z = (centres @ self.view[:3, :3].T + self.view[:3, 3]).T
         depth = -z
         inside: npt.NDArray[np.bool_] = depth > radii
@@ -122,7 +126,7 @@ class Camera:
         return Camera(self.view @ shift, self.projection, self.size)
 
     def matrices(self, box: tuple[int, int, int, int] | None = None) -> tuple[list[float], list[float]]:
-        """View and projection in OpenGL's column order, of the whole picture or of the pixels x0, y0, x1, y1 alone."""
+        """View and projection in OpenGL's column order, of the whole picture or of the pixels in `box`."""
         projection = self.projection
         if box is not None:
             width, height = self.size

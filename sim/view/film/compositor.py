@@ -1,8 +1,9 @@
-"""Compose the pictures of a film: everything that stands still is rendered once, and each frame adds what moves.
+"""Compose the pictures of a film: everything that stands still is rendered once; each frame adds robot and movers.
 
-PyBullet's TinyRenderer draws the bodies. The backdrop of standing bodies keeps its depth, so a frame costs only the pixels
-around the robot and the movers: these are rendered through a crop of the same camera and blended in where they are nearer
-than the backdrop. A camera that moves needs a new backdrop in every frame; rays (`raycast`) draw it faster than triangles.
+PyBullet's TinyRenderer draws the bodies. The backdrop of standing bodies keeps its depth, so a frame costs only the
+pixels around the robot and the movers: these are rendered through a crop of the same camera and blended in where they
+are nearer than the backdrop. A camera that moves needs a new backdrop in every frame; ray casting draws it faster
+than TinyRenderer.
 """
 
 from __future__ import annotations
@@ -24,7 +25,17 @@ from antdrive.sim.view.film.raycast import Solids
 from antdrive.sim.view.film.text import glow
 from antdrive.sim.view.film.tiny_renderer import Box, add_mesh, merged, render
 from antdrive.sim.view.scene import Scene
-from antdrive.sim.view.style import KERB, MOVER, OBSTACLE, ROUTE, SHELL, UNSEEN, Colour, field_colours, speed_colours
+from antdrive.sim.view.style import (
+    KERB,
+    MOVER,
+    OBSTACLE,
+    ROUTE,
+    SHELL,
+    UNSEEN,
+    Colour,
+    field_colours,
+    speed_colours,
+)
 
 if TYPE_CHECKING:
     from antdrive.worlds import Grid
@@ -64,7 +75,7 @@ class Compositor:
     Args:
         scene: what stands still
         camera: where the pictures are taken from
-        route: a polyline (N, 2) [m] to paint on the ground for good; a route that changes is given to `show_route`
+        route: a polyline (N, 2) [m] that stays on the ground; for a route that changes, use `show_route`
         fine: each pixel is the mean of fine x fine rendered ones
         moving_camera: the camera will move, so the backdrop is cast by rays
     """
@@ -192,7 +203,7 @@ class Compositor:
         return frame
 
     def add_label(self, sprite: Picture, x: float, y: float, reach: float) -> None:
-        """Put an RGBA picture on the ground for good, centred below (or above) the disc of radius `reach` at x, y [m]."""
+        """Put an RGBA picture on the ground for good, below (or above) the disc of radius `reach` at x, y [m]."""
         self._labels.append((sprite, x, y, reach))
         self._put_on_ground(sprite, x, y, reach)
 
@@ -243,7 +254,14 @@ class Compositor:
     def _paint_trail(self, rows: Floats, colours: Floats) -> None:
         visible = self.backdrop.visible
         kernels.draw_trail(
-            self._canvas, self.backdrop.pixels, visible, self._painted, self._forward, self._inverse, rows, colours
+            self._canvas,
+            self.backdrop.pixels,
+            visible,
+            self._painted,
+            self._forward,
+            self._inverse,
+            rows,
+            colours,
         )
 
     def _draw_forecast(self, frame: Picture, places: Floats, velocities: Floats) -> None:
@@ -282,7 +300,15 @@ class Compositor:
         sun = np.array(self._sun) * tall
         for reach, blur, strength in ((sun, soft, 0.30), (np.zeros(2), 0.5 * shape.sum(), 0.22)):
             kernels.shade_body(
-                frame, self.backdrop.visible, self._forward, self._inverse, pose, shape, reach, float(blur), strength
+                frame,
+                self.backdrop.visible,
+                self._forward,
+                self._inverse,
+                pose,
+                shape,
+                reach,
+                float(blur),
+                strength,
             )
 
     def _place_bodies(self, x: float, y: float, yaw: float, wheels: tuple[float, float], movers: Floats) -> None:
@@ -327,7 +353,7 @@ def trail_width(scene: Scene, camera: Camera) -> float:
 
 
 def still_meshes(scene: Scene, tall: Floats) -> list[tuple[Mesh, Colour]]:
-    """Everything that stands still as coloured meshes: the kerb in short pieces, and cylinders of heights `tall` (N,) [m]."""
+    """Everything that stands still as coloured meshes: the kerb in pieces, and cylinders of heights `tall` (N,) [m]."""
     width = kerb_width(scene)
     found = [(mesh, KERB) for mesh in kerb(scene.bounds, width, 0.8 * width)]
     for (x, y, radius, _), z, unseen in zip(scene.obstacles, tall, scene.unseen, strict=True):
@@ -344,7 +370,7 @@ def still_solids(meshes: list[tuple[Mesh, Colour]], scene: Scene, tall: Floats) 
 
 
 def merged_by_colour(meshes: list[tuple[Mesh, Colour]]) -> list[tuple[Mesh, Colour]]:
-    """Fewer meshes: up to 400 of one colour are joined, because PyBullet takes at most 131072 vertices per mesh."""
+    """The meshes, up to 400 of one colour joined to one: PyBullet takes at most 131072 vertices per mesh."""
     found = []
     for colour in dict.fromkeys(colour for _, colour in meshes):
         alike = [mesh for mesh, c in meshes if c == colour]
@@ -355,7 +381,7 @@ def merged_by_colour(meshes: list[tuple[Mesh, Colour]]) -> list[tuple[Mesh, Colo
 def part_pose(
     part: Part, x: float, y: float, yaw: float, wheels: tuple[float, float]
 ) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
-    """Position [m] and orientation (quaternion) of a part of the robot at a pose, its wheels turned by angles [rad]."""
+    """Position [m] and orientation (quaternion) of a part of the robot at a pose with its wheels turned [rad]."""
     cosine, sine = math.cos(yaw), math.sin(yaw)
     ax, ay, az = part.axle
     angle = 0.0 if part.wheel == 0 else wheels[0] if part.wheel > 0 else wheels[1]
@@ -365,7 +391,7 @@ def part_pose(
 
 
 def _sun(camera: Camera) -> tuple[tuple[float, float], tuple[float, float, float]]:
-    """How far a shadow reaches per metre of height, and the direction to the lamp: left of the camera and in front."""
+    """How far shadows reach per metre of height, and the direction to the lamp: left of the camera, in front."""
     right = camera.view[0, :3]
     ahead = np.array([-right[1], right[0], 0.0])
     reach = 0.55 * right + 0.28 * ahead

@@ -1,4 +1,4 @@
-"""Paint the ground of a film: floor and grid, inflated zones, soft shadows, the planned route, start and goal."""
+"""Paint the ground of a film: floor, grid, inflated zones, soft shadows, planned route, start and goal."""
 
 from __future__ import annotations
 

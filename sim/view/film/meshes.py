@@ -1,4 +1,4 @@
-"""Meshes of everything a film shows: cylinders, the kerb around the world, and a robot whose wheels visibly turn."""
+"""Meshes for films: cylinders, the kerb around the world, and a robot whose wheels visibly turn."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def cylinder(radius: float, low: float, high: float, *, sides: int = 48, x: floa
 
 
 def prism(outline: Floats, low: float, high: float, *, chamfer: float = 0.0) -> Mesh:
-    """A convex counter-clockwise outline (K, 2) extruded from `low` to `high`, its upper edge chamfered; no bottom."""
+    """A convex counter-clockwise outline (K, 2) extruded from `low` to `high`, with a chamfered upper edge."""
     count = len(outline)
     centre = outline.mean(axis=0)
     reach = np.hypot(*(outline - centre).T).max()
@@ -116,15 +116,15 @@ def _cuts(low: float, high: float) -> list[float]:
 
 
 def robot_height(body: Body) -> float:
-    """The height that the robot is drawn with [m]; a tall mast is left out, because it would hide the robot's path."""
+    """The height that the robot is drawn with [m]; a tall mast is left out, as it would hide the path."""
     return min(body.height, max(1.1 * body.footprint.radius, 2.4 * body.wheel_radius))
 
 
 def robot_parts(body: Body) -> tuple[Part, ...]:
-    """The robot's parts. The point on the ground below the axle's centre is the origin, and the robot heads along +x.
+    """The robot's parts. The origin is on the ground below the axle's centre, and the robot heads along +x.
 
-    The deck has the footprint's exact outline. On it are a turret, a white arrow and two lamps in front; the wheels turn
-    in wells.
+    The deck has the footprint's exact outline. On it are a turret, a white arrow and two lamps in front; the wheels
+    turn in wells.
     """
     foot, r = body.footprint, body.wheel_radius
     length, width = foot.half_length + foot.rounding, foot.half_width + foot.rounding
@@ -215,7 +215,7 @@ def _outline(half_length: float, half_width: float, rounding: float, *, steps: i
 
 
 def _cut(outline: Floats, axis: int, at: float, *, keep_low: bool = False) -> Floats:
-    """The part of a convex outline (K, 2) where the coordinate of an axis is above `at`, or below it with `keep_low`."""
+    """The part of a convex outline (K, 2) whose coordinate `axis` is above `at`, or below it with `keep_low`."""
     sign = -1.0 if keep_low else 1.0
     inside = sign * (outline[:, axis] - at) >= 0
     points = []

@@ -1,4 +1,4 @@
-"""Text over a film's picture: a band with names and numbers below it, the legend, and the outcome at the end."""
+"""Text over a film's picture: a band of names and numbers below it, the legend, and the outcome at the end."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ SLOWED = (f"SLOW ×1/{SLOW_MOTION:g}", BAD)
 
 #: The names of the band's four numbers during the drive and during planning.
 DRIVE_FIELDS = ("TIME", "SPEED", "CLEARANCE", "MINIMUM")
-PLAN_FIELDS = ("ITERATION", "BEST PATH", "MEAN", "ARRIVED")
+PLAN_FIELDS = ("ITERATION", "BEST PATH", "MEAN PATH", "ARRIVED")
 
 Values: TypeAlias = list[tuple[str, bool]]  # each number as text, and whether it is shown in red
 
@@ -134,7 +134,13 @@ class Band:
         subroom = room if wide else width - text_width(shown, small, True) - 3 * pad
         draw.text((pad, 0.6 * unit), fitted(title, room, big, True), font=font(big, True), fill=INK)
         draw.text((pad, 2.45 * unit), fitted(subtitle, subroom, unit), font=font(unit), fill=MUTED)
-        draw.text((width - pad, (3.75 if wide else 3.3) * unit), shown, font=font(small, True), fill=CALM, anchor="rm")
+        draw.text(
+            (width - pad, (3.75 if wide else 3.3) * unit),
+            shown,
+            font=font(small, True),
+            fill=CALM,
+            anchor="rm",
+        )
         for (x, y), name in zip(self._fields, names, strict=True):
             draw.text((x, y), name, font=font(round(0.82 * unit), True), fill=MUTED)
         if not layout.card:

@@ -1,4 +1,4 @@
-"""Render the frames of a moving camera in several processes. Such frames cost most, since nothing is kept between them."""
+"""Render the frames of a moving camera in several processes. They cost most: each needs a backdrop of its own."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def process_count() -> int:
 
 
 def render_frames(rollout: Rollout, setting: dict[str, Any], times: Floats, jobs: int) -> Iterator[Picture]:
-    """The frames (H, W, 3) in order, the same for any number of processes; at most `jobs` x `CHUNK` are held at once.
+    """The frames (H, W, 3) in order, the same for any number of processes; `jobs` x `CHUNK` are held at once.
 
     Args:
         rollout: the run

@@ -1,4 +1,4 @@
-"""The part of a film before the drive: how the path was planned, with the planner's field and its best path so far.
+"""The part of a film before the drive: how the path was planned, with the planner's field and best path so far.
 
 A log holds no field. The path is planned again from the log's seed, which gives the same iterations.
 """
@@ -81,7 +81,8 @@ def planning_frames(rollout: Rollout, setting: dict[str, Any], count: int) -> It
             levels = field_levels(grid, state.landscape)
             path = grid.xy(state.cells if state.waypoints is None else state.waypoints)
             yield shot.planning_frame(
-                _values(number, total, state), functools.partial(_draw_field, grid=grid, levels=levels, path=path)
+                _values(number, total, state),
+                functools.partial(_draw_field, grid=grid, levels=levels, path=path),
             )
     if not np.array_equal(state.cells, rollout.cells):
         raise InputError("prelude: planning again led to another path; the log is of another version or machine")

@@ -1,4 +1,4 @@
-"""Ray casting of cylinders and boxes: exact, and several times as fast as PyBullet's renderer, for cameras that move."""
+"""Ray casting of cylinders and boxes for moving cameras: exact, and several times as fast as TinyRenderer."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Solids:
         )
 
     def render(self, camera: Camera, fine: int, light: tuple[float, float, float]) -> tuple[Any, Any, Any]:
-        """Picture (h, w, 4), depth (h, w) and body numbers (h, w), -1 for none, as `tiny_renderer.render` gives them.
+        """Picture (h, w, 4), depth (h, w) and body numbers (h, w), -1 for none, like `tiny_renderer.render`.
 
         Args:
             camera: where the picture is taken from
@@ -67,7 +67,14 @@ class Solids:
             image, depth, seg, *common, self.cylinders, _spans(camera, around), self.cylinder_colours, 0
         )
         kernels.cast_boxes(
-            image, depth, seg, *common, self.boxes, _spans(camera, self.boxes), self.box_colours, len(self.cylinders)
+            image,
+            depth,
+            seg,
+            *common,
+            self.boxes,
+            _spans(camera, self.boxes),
+            self.box_colours,
+            len(self.cylinders),
         )
         return image, depth, seg
 
@@ -81,7 +88,7 @@ def _spans(camera: Camera, boxes: Floats) -> npt.NDArray[np.int64]:
     size = np.array(camera.size)
     at = (1 + at * [1, -1]) * size / 2
     low, high = np.floor(at.min(axis=1)) - 1, np.ceil(at.max(axis=1)) + 1
-    partly_behind = (clip[..., 3] <= 0).any(axis=1)  # the projection of these corners means nothing: take all pixels
+    partly_behind = (clip[..., 3] <= 0).any(axis=1)  # such corners have no projection: take all pixels
     low[partly_behind], high[partly_behind] = 0, size
     behind = (clip[..., 3] <= 0).all(axis=1)
     low[behind], high[behind] = 0, 0

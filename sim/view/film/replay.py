@@ -14,7 +14,7 @@ from antdrive.sim.view.scene import Scene, contact_point, jumps
 
 Floats = npt.NDArray[np.float64]
 
-CAMERA_LAG = 0.6  # a following camera looks at the robot's mean position from this long before to this long after [s]
+CAMERA_WINDOW = 0.6  # a following camera looks at the robot's mean position over this time before and after [s]
 
 SLOW_MOTION = 4.0  # a film is this many times slower around a contact
 SLOW_BEFORE, SLOW_AFTER = 0.3, 0.1  # slow motion starts and ends this long before and after a contact [s]
@@ -98,7 +98,7 @@ class Replay:
 
     def camera_target(self, at: float) -> tuple[float, float]:
         """Where a following camera looks [m]: the robot's mean position around a moment."""
-        moments = at + CAMERA_LAG * np.linspace(-1, 1, 25)
+        moments = at + CAMERA_WINDOW * np.linspace(-1, 1, 25)
         x, y = (float(np.interp(moments, self.t, self._pose[:, axis]).mean()) for axis in (0, 1))
         return x, y
 
@@ -108,7 +108,7 @@ class Replay:
         return left, right
 
     def movers(self, at: float) -> Floats:
-        """The movers' positions (M, 2) [m]; a mover that jumps stays where it is until the row after the jump."""
+        """The movers' positions (M, 2) [m]; a mover that jumps stays in place until the row after the jump."""
         row, share = self._between(at)
         here = self._movers[row]
         if share == 0.0:
@@ -125,7 +125,7 @@ class Replay:
         return np.asarray(step / (self.t[row + 1] - self.t[row]))
 
     def _between(self, at: float) -> tuple[int, float]:
-        """The last row at or before a moment, and the fraction of the time to the next row that has passed."""
+        """The last row at or before a moment, and the fraction of the time to the next row that is over."""
         row = self._row(at)
         if row + 1 >= len(self.t) or at <= self.t[row]:
             return row, 0.0

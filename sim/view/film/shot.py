@@ -1,4 +1,4 @@
-"""One run in front of one camera: the frames of a film, with trail, route, labels, legend and the band of numbers."""
+"""One run in front of one camera: the frames of a film with trail, route, labels, legend and band of numbers."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Shot:
         camera: `oblique`, `top` or `follow`
         size: width and height [px]
         note: a line for the band below the picture
-        speed: how many times as fast as the run the film is; captions and flashes stay as long in the film's time
+        speed: how many times as fast as the run the film is; captions stay as long at any speed
         planning: the frames show how the path was planned, not the drive
         bare: no band and no legend
     """

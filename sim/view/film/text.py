@@ -1,4 +1,4 @@
-"""Text on pictures, in the font that matplotlib brings along (no system font is needed), and other small pictures."""
+"""Text and other small pictures. The font is the one inside matplotlib, so no system font is needed."""
 
 from __future__ import annotations
 
@@ -47,7 +47,12 @@ def label(text: str, size: int, colour: Colour = INK, *, bold: bool = True) -> S
     image = Image.new("RGBA", (wide, high), (255, 255, 255, 0))
     draw = ImageDraw.Draw(image)
     draw.text(
-        (rim, rim), text, font=font(size, bold), fill=colour, stroke_width=rim - 1, stroke_fill=(255, 255, 255, 215)
+        (rim, rim),
+        text,
+        font=font(size, bold),
+        fill=colour,
+        stroke_width=rim - 1,
+        stroke_fill=(255, 255, 255, 215),
     )
     draw.text((rim, rim), text, font=font(size, bold), fill=colour)
     return np.asarray(image)

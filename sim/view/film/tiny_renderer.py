@@ -17,7 +17,7 @@ Box: TypeAlias = tuple[int, int, int, int]  # x0, y0, x1, y1 [px]; x1 and y1 are
 
 
 def add_mesh(number: int, mesh: Mesh, colour: Colour) -> int:
-    """Add a mesh that is visible but cannot collide to the PyBullet client `number`; returns its body number."""
+    """Add a mesh that is visible but cannot collide to PyBullet client `number`; returns its body number."""
     p = bullet()
     shape = p.createVisualShape(
         p.GEOM_MESH,
@@ -34,7 +34,7 @@ def add_mesh(number: int, mesh: Mesh, colour: Colour) -> int:
 def render(
     number: int, camera: Camera, box: Box | None, fine: int, light: tuple[float, float, float]
 ) -> tuple[Any, Any, Any]:
-    """Render the bodies of a PyBullet client: picture (h, w, 4), depth (h, w) and body numbers (h, w), -1 for none.
+    """Render a PyBullet client's bodies: picture (h, w, 4), depth (h, w) and body numbers (h, w), -1 for none.
 
     Args:
         number: the client

@@ -1,7 +1,7 @@
-"""Films and stills of a run, replayed from its log: physics never waits for pixels, and an old run can be filmed again.
+"""Films and stills of a run from its log: physics never waits for pixels, and an old run can be filmed again.
 
-Frames go straight to the encoder, one at a time, so a long film needs no more memory than a short one. A file appears when
-it is complete.
+Frames go straight to the encoder, one at a time, so a long film needs no more memory than a short one. A file appears
+when it is complete.
 """
 
 from __future__ import annotations
@@ -87,14 +87,14 @@ def film(
         fps: frames per second, at most 240
         speed: how many times as fast as the run the film is
         note: a line for the band below the picture, for example the certificate's verdict
-        prelude: the length of an introduction that shows how the path was planned [s]: the field of an iterative planner on
-            the ground, and its best path so far; they are planned again from the run's seed
-        jobs: how many processes render for a moving camera; one per core by default. The film does not depend on it
+        prelude: the length of an introduction that shows how the path was planned [s]: the field of an iterative
+            planner on the ground, and its best path so far; the path is planned again from the run's seed
+        jobs: how many processes render for a moving camera, by default one per core; the film is the same
         progress: called after each frame with the fraction that is done
 
     Raises:
-        InputError: an unknown camera or suffix, an odd or tiny size, a rate or speed that is not positive, or a prelude of a
-            planner that has no field.
+        InputError: an unknown camera or suffix, an odd or tiny size, a rate or speed that is not positive, or a
+            prelude for a planner without a field.
         OSError: the encoder could not write the film.
     """
     target = Path(path)
@@ -119,7 +119,7 @@ def film(
 def _frames(
     rollout: Rollout, setting: dict[str, Any], before: int, times: Floats, hold: int, jobs: int | None
 ) -> Iterator[Picture]:
-    """Every frame of a film in turn: `before` frames of planning, the drive at `times`, `hold` frames of its end."""
+    """Every frame in turn: `before` frames of planning, the drive at `times`, `hold` frames of its end."""
     if before:
         yield from planning_frames(rollout, setting, before)
     with Shot(rollout, **setting) as shot:
@@ -171,7 +171,7 @@ def still(
 
 
 def frame_times(duration: float, fps: float, speed: float, slow: tuple[float, float] | None = None) -> Floats:
-    """The moments of the run [s] that a film's frames show. The first is 0, the last less than a frame before the end.
+    """The moments of the run that frames show [s]; the first is 0, the last less than a frame before the end.
 
     Args:
         duration: the run's length [s]

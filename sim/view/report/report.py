@@ -1,7 +1,7 @@
-"""One page about many runs: a table to sort and filter, and for each run its film, figures, numbers and command.
+"""One page about many runs: a table to sort and filter; for each run its film, figures, numbers and command.
 
-The page works without a network. Figures are embedded up to a total size, the overview of every run first; the other figures
-and the films are linked.
+The page works without a network. Figures are embedded up to a total size, the overview of every run first; the other
+figures and the films are linked.
 """
 
 from __future__ import annotations
@@ -92,7 +92,10 @@ def _attach_files(run: ReportedRun, base: Path, embed_films: bool) -> None:
         kind = FILM_TYPES[path.suffix.lower()]
         source = _data_uri(kind, path.read_bytes()) if embed_films else _link(path, base)
         run.films.append(Attachment(path.name, source, is_video=kind.startswith("video/")))
-    for names, found in ((("rollout.npz", "result.json"), run.links), (("overview.png", "plan.png"), run.pictures)):
+    for names, found in (
+        (("rollout.npz", "result.json"), run.links),
+        (("overview.png", "plan.png"), run.pictures),
+    ):
         found += [Attachment(name, _link(run.folder / name, base)) for name in names if (run.folder / name).exists()]
 
 
@@ -142,10 +145,11 @@ def _summary(runs: list[ReportedRun]) -> list[tuple[str, str]]:
     certified = sum(run.succeeded for run in runs)
     bounds = [float(run.result["certificate"]["bound_m"]) for run in runs if run.succeeded]
     driven = sum(float(value) for run in runs if (value := run.cells[1][0]))
+    worlds, planners = len({run.world for run in runs}), len({run.planner for run in runs})
     return [
         (f"{certified} / {len(runs)}", "reached the goal, certified collision-free"),
         (f"{min(bounds):.3f} m" if bounds else "–", "smallest clearance proved"),
         (f"{driven:.1f} m", "driven in total"),
-        (str(len({run.world for run in runs})), "worlds"),
-        (str(len({run.planner for run in runs})), "planners"),
+        (str(worlds), "world" if worlds == 1 else "worlds"),
+        (str(planners), "planner" if planners == 1 else "planners"),
     ]

@@ -1,4 +1,4 @@
-"""The runs of a report: what `antdrive run --out` left in each folder, in the words and numbers that the page shows."""
+"""The runs of a report, read from folders that `antdrive run --out` wrote, as text and numbers for the page."""
 
 from __future__ import annotations
 
@@ -48,8 +48,8 @@ COLUMNS = (
 
 #: What the less obvious columns mean.
 COLUMN_NOTES = (
-    ("path", "length of the planned path"),
-    ("gap", "how much longer the path is than the shortest path in the plane"),
+    ("path", "length of the planned path, before smoothing"),
+    ("gap", "how much longer the smoothed route is than the shortest path among the inflated obstacles"),
     ("min clearance", "smallest distance to an obstacle at any logged pose"),
     ("proved", "distance that the certificate guarantees between logged poses, too"),
 )

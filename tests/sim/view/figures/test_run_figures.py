@@ -74,7 +74,8 @@ def test_movers_and_their_ways_are_drawn(made_up_drive, planned, tmp_path):
     task, grid, plan = planned
     mover = Keyframed(radius=0.2, keyframes=((0.0, 0.5, 3.0), (5.0, 2.5, 3.5)))
     moving = dataclasses.replace(
-        task, world=dataclasses.replace(task.world, movers=(mover, Wandering(radius=0.1, cell=0.5, period=1.0)))
+        task,
+        world=dataclasses.replace(task.world, movers=(mover, Wandering(radius=0.1, cell=0.5, period=1.0))),
     )
     picture = pixels(plan_figure(moving, grid, plan, ROBOT, tmp_path / "moving.png", dpi=80))
     plain = pixels(plan_figure(task, grid, plan, ROBOT, tmp_path / "plain.png", dpi=80))

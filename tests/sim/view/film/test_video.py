@@ -295,7 +295,10 @@ def test_a_small_robot_gets_a_glow_and_a_large_one_none(made_up_drive):
 def test_a_replan_is_shown_from_its_moment_on(drive):
     """The old line goes, the new one comes, a dot marks the place; the cause is told for a while."""
     ahead, new = np.array([(1.0, 0.4), (3.5, 0.4)]), {"t": 0.3, "cause": "obstructed", "solved": True}
-    entries = [{**new, "route": ahead.tolist()}, {**new, "t": 0.8, "cause": "waited", "solved": False, "route": []}]
+    entries = [
+        {**new, "route": ahead.tolist()},
+        {**new, "t": 0.8, "cause": "waited", "solved": False, "route": []},
+    ]
     replanned = replace(drive, meta={**drive.meta, "replans": entries})
 
     def views(rollout, news, *times):

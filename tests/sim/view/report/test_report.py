@@ -14,7 +14,8 @@ from antdrive.sim.view.report.report import EMBEDDED_BYTES, write_report
 from antdrive.worlds import InputError
 
 BROWSER = next(
-    (found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None
+    (found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))),
+    None,
 )
 needs_browser = pytest.mark.skipif(BROWSER is None, reason="no chromium on this machine")
 
