@@ -1,18 +1,15 @@
 import dataclasses
+import math
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from antdrive.planners import History, Query, load_planner
+from antdrive.planners import History, PlanResult, PlanStatus, Query, load_planner
 from antdrive.robots import load_robot
-from antdrive.sim.log.certificate import Certificate
 from antdrive.sim.view.figures import plan_figures as module
-from antdrive.sim.view.figures.paper_figures import ants_figure, history_figure, sweep_figure
-from antdrive.sim.view.figures.plan_figures import bars_figure, plan_figures
-from antdrive.sim.view.figures.run_figures import certificate_figure, comparison_figure
-from antdrive.sim.view.style import BAD, GOOD, planner_style
-from antdrive.worlds import Disc, InputError, Task, World, rasterise
+from antdrive.sim.view.figures.plan_figures import bars_figure, plan_figure, plan_figures
+from antdrive.worlds import Disc, Task, World, rasterise
 
 
 @pytest.fixture(scope="module")
@@ -24,6 +21,13 @@ def planned():
     return task, grid, plan
 
 
+@pytest.fixture(scope="module")
+def searched(planned):
+    """A plan without history and field."""
+    task, grid, _ = planned
+    return load_planner("astar").plan(Query.between(grid, task), np.random.default_rng(0))
+
+
 def pixels(path):
     with Image.open(path) as picture:
         return np.asarray(picture.convert("RGB")).astype(int)
@@ -33,12 +37,7 @@ def near(picture, colour, within=12):
     return int((np.abs(picture - np.array(colour)).max(axis=-1) < within).sum())
 
 
-def history(start, n=20):
-    best = start + np.exp(-np.arange(n) / 4)
-    return History(best=best, iteration_best=best, iteration_mean=best + 1, arrived=np.full(n, 5))
-
-
-def test_a_plan_has_the_papers_kinds_of_figures_in_pixels_and_vectors(planned, tmp_path):
+def test_a_plan_has_all_kinds_of_figures_in_pixels_and_vectors(planned, tmp_path):
     made = plan_figures(*planned, load_robot("turtlebot"), tmp_path, name="as", suffixes=(".png", ".pdf"))
     kinds = {"plan", "tour", "history", "bars", "contours"}
     assert set(made) == kinds | {f"{kind} pdf" for kind in kinds}
@@ -54,7 +53,7 @@ def test_a_search_has_neither_history_nor_field(planned, tmp_path):
     assert set(made) == {"plan"}
 
 
-def test_bars_rise_with_the_field_and_spare_blocked_cells(planned, tmp_path):
+def test_bars_rise_with_the_field(planned, tmp_path):
     _, grid, _ = planned
     field = np.zeros(grid.shape)
     flat = pixels(bars_figure(grid, field, tmp_path / "flat.png", dpi=60))
@@ -76,41 +75,28 @@ def test_a_large_field_is_drawn_with_fewer_bars_that_keep_its_peaks(tmp_path, mo
     assert heights[0].max() == pytest.approx(3.0)
 
 
-def test_each_planner_keeps_its_colour(tmp_path):
-    for name in ("ants", "mmas"):
-        picture = pixels(
-            history_figure({name: [history(4), history(5)]}, tmp_path / f"{name}.png", dpi=80, optimum=3.9)
-        )
-        other = "mmas" if name == "ants" else "ants"
-        assert near(picture, planner_style(name)[0]) > 100
-        assert near(picture, planner_style(other)[0]) == 0
+def test_a_plan_is_drawn_on_the_map(planned, searched, tmp_path):
+    task, grid, _ = planned
+    picture = pixels(plan_figure(task, grid, searched, load_robot("turtlebot"), tmp_path / "plan.png", dpi=80))
+    assert near(picture, (255, 122, 14), 24) > 300
 
 
-def test_ants_and_sweeps_are_drawn(tmp_path):
-    lengths = {10: [41.0, 44.0], 100: [38.0, 39.0], 500: [36.0, 36.5]}
-    picture = pixels(
-        ants_figure(lengths, tmp_path / "a.png", planner="aco-han", optimum=30.0, printed={10: 45.0}, dpi=80)
-    )
-    assert near(picture, planner_style("aco-han")[0]) > 100
-    table = {True: np.array([[30.0, 31.0], [32.0, np.nan]]), False: np.array([[33.0, 34.0], [35.0, 36.0]])}
-    assert sweep_figure([0.2, 0.4], [0.1, 0.3], table, tmp_path / "s.pdf").stat().st_size > 3000
+def test_an_iterative_planner_gets_its_history_and_field(planned, searched, tmp_path):
+    task, grid, _ = planned
+    best = searched.cost * (1 + np.exp(-np.arange(30) / 6))
+    mean = best + 1
+    mean[:4] = math.inf
+    history = History(best=best, iteration_best=best + 0.2, iteration_mean=mean, arrived=np.full(30, 9))
+    learnt = dataclasses.replace(searched, history=history, landscape=np.random.default_rng(0).random(grid.shape))
+    robot = load_robot("turtlebot")
+    picture = pixels(plan_figure(task, grid, learnt, robot, tmp_path / "learnt.png", dpi=80))
+    assert near(picture, (18, 63, 122), 40) > 500, "the field's dark end"
+    plain = pixels(plan_figure(task, grid, searched, robot, tmp_path / "plain.png", dpi=80))
+    assert picture.shape[1] > 1.3 * plain.shape[1]
 
 
-@pytest.mark.parametrize("certified", [True, False])
-def test_a_certificate_is_drawn_with_its_verdict(made_up_drive, tmp_path, certified):
-    found = Certificate(certified, 0 if certified else 3, 0.05, 0.04, () if certified else ("it touched",))
-    picture = pixels(certificate_figure(made_up_drive(), found, tmp_path / "c.png", dpi=80))
-    assert (near(picture, GOOD) > near(picture, BAD)) == certified
-
-
-def test_several_planners_on_one_map(made_up_drive, tmp_path):
-    one = made_up_drive()
-    other = dataclasses.replace(one, pose=one.pose + [0, 0.2, 0])
-    picture = pixels(comparison_figure({"astar": one, "mmas": other}, tmp_path / "c.png", dpi=80))
-    assert near(picture, planner_style("astar")[0]) > 50
-    assert near(picture, planner_style("mmas")[0]) > 100
-
-
-def test_an_unknown_suffix_is_refused(tmp_path):
-    with pytest.raises(InputError, match="choose one of"):
-        history_figure({"as": [history(3)]}, tmp_path / "a.bmp")
+def test_a_failed_plan_gives_the_reason(planned, tmp_path):
+    task, grid, _ = planned
+    failed = PlanResult(status=PlanStatus.NO_PATH, reason="walled in")
+    path = plan_figure(task, grid, failed, load_robot("turtlebot"), tmp_path / "failed.png", dpi=80)
+    assert near(pixels(path), (204, 32, 42), 24) > 100

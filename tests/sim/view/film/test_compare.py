@@ -7,7 +7,7 @@ from PIL import Image
 
 from antdrive.sim.log.rollout import Outcome
 from antdrive.sim.view.film.compare import SplitScreen, compare_film
-from antdrive.sim.view.style import PLANNER_STYLES, VERDICTS, planner_style
+from antdrive.sim.view.style import VERDICTS, planner_style
 from antdrive.worlds import InputError
 
 SIZE = (640, 360)
@@ -21,7 +21,7 @@ def drives(made_up_drive):
             for log, name in ((short, "astar"), (long, "mmas"))]  # fmt: skip
 
 
-def test_runs_are_side_by_side_at_the_same_moment_and_wait_for_the_last(drives):
+def test_tiles_show_the_same_moment_and_a_finished_run_keeps_its_last_picture(drives):
     with SplitScreen(drives, "top", SIZE) as screen:
         at = [screen.frame(t) for t in (0.3, 0.7, 0.8)]
         alone = screen._tiles[1].shot.replay.pose(0.8)
@@ -44,7 +44,7 @@ def test_each_run_has_its_planners_colour_and_its_outcome(drives):
 
 
 @pytest.mark.parametrize("count", [2, 3, 4, 5, 6])
-def test_up_to_six_fit(drives, count):
+def test_up_to_six_runs_fit_into_the_frame(drives, count):
     with SplitScreen((drives * 3)[:count], "oblique", SIZE) as screen:
         assert len(set(screen._corners)) == count
         for (x, y), tile in zip(screen._corners, screen._tiles, strict=True):
@@ -65,9 +65,3 @@ def test_the_film_has_the_frames_it_claims(drives, tmp_path):
 def test_one_or_seven_runs_are_refused(drives, tmp_path, count):
     with pytest.raises(InputError, match=re.escape(f"needs 2 to 6 runs, got {count}")):
         compare_film((drives * 4)[:count], tmp_path / "c.mp4")
-
-
-def test_planners_look_different_from_each_other():
-    styles = list(PLANNER_STYLES.values())
-    assert len(set(styles)) == len(styles)
-    assert planner_style("somebody-elses") == planner_style("somebody-elses")

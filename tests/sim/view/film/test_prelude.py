@@ -44,7 +44,7 @@ def test_a_film_is_longer_by_its_prelude(walked, tmp_path):
     assert lengths[1] == lengths[0] + 8
 
 
-def test_a_log_that_planning_does_not_lead_to_is_refused(walked):
+def test_a_log_whose_path_planning_again_does_not_give_is_refused(walked):
     other = replace(walked, cells=walked.cells[::-1])
     with pytest.raises(InputError, match="another path"):
         list(planning_frames(other, SETTING, 2))
@@ -64,7 +64,7 @@ def test_planners_without_a_field_are_refused_before_anything_is_drawn(walked, t
     assert not list(tmp_path.iterdir())
 
 
-def test_levels_run_from_nothing_to_much_and_leave_blocked_cells_out():
+def test_field_levels_run_from_0_to_1_and_leave_blocked_cells_out():
     grid = rasterise(World("one", (0, 0, 3, 3), (Disc(1.5, 1.5, 0.4),)), 0.3, 0.1)
     field = np.arange(np.prod(grid.shape), dtype=float).reshape(grid.shape)
     levels = field_levels(grid, field)

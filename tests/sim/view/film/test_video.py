@@ -89,7 +89,7 @@ def test_a_film_can_run_faster_than_the_drive(drive):
 
 
 @pytest.mark.parametrize("suffix", [".gif", ".webp"])
-def test_other_suffixes_give_moving_pictures(drive, tmp_path, suffix):
+def test_gif_and_webp_are_animated(drive, tmp_path, suffix):
     info = film(drive, tmp_path / f"drive{suffix}", size=(160, 160), fps=5, camera="top")
     with Image.open(info.path) as picture:
         assert picture.size == (160, 160)
@@ -108,7 +108,7 @@ def test_every_camera_shows_robot_and_goal(drive, tmp_path):
 
 
 @pytest.mark.parametrize("size", [(640, 480), (1280, 720), (320, 240), (480, 640)])
-def test_the_caption_fits_every_size(drive, size):
+def test_the_band_fits_every_size(drive, size):
     for card in (True, False):
         layout = Layout.of(size, card)
         assert layout.height % 2 == 0
@@ -213,7 +213,7 @@ def test_the_index_is_in_front_so_that_browsers_play_at_once(filmed):
     assert head.index(b"moov") < head.index(b"mdat")
 
 
-def test_ffmpeg_finds_no_fault_in_the_film(filmed):
+def test_ffmpeg_decodes_the_film_without_errors(filmed):
     checked = ffmpeg("-v", "error", "-i", filmed[0].path, "-f", "null", "-")
     assert checked.returncode == 0
     assert checked.stderr == b""
@@ -243,7 +243,7 @@ def test_a_still_is_a_png(drive, tmp_path):
 
 
 @pytest.mark.parametrize("size", [(320, 240), (640, 480), (1280, 720)])
-def test_the_last_sentence_leaves_the_legend_readable(drive, size):
+def test_the_outcomes_sentence_does_not_cover_the_legend(drive, size):
     with Shot(drive, camera="follow", size=size) as shot:
         before, after = shot.frame(shot.replay.duration), shot.last_frame()
         high, wide = (shot._layout.unit + side for side in shot._legend.shape[:2])
@@ -251,7 +251,7 @@ def test_the_last_sentence_leaves_the_legend_readable(drive, size):
     assert not np.array_equal(before, after)
 
 
-def test_a_film_is_slow_around_a_contact(crash):
+def test_a_film_goes_into_slow_motion_around_a_contact(crash):
     with Shot(crash, camera="oblique", size=SIZE) as shot:
         end, (first, last) = shot.replay.duration, shot.slow_motion
         times = frame_times(end, 30, 1.0, shot.slow_motion)
@@ -264,11 +264,11 @@ def test_a_film_is_slow_around_a_contact(crash):
     assert end - times[-1] < 1 / 30
     red = [((part[..., 0].astype(int) - part[..., 1]) > 120).sum() for part in word]
     assert red[0] == 0
-    assert red[1] > 100, "it says that it is slow"
+    assert red[1] > 100, "the band is labelled SLOW"
 
 
 @pytest.mark.parametrize("jobs", [2])
-def test_processes_share_the_frames_of_a_moving_camera_and_change_nothing(drive, jobs):
+def test_frames_rendered_in_several_processes_equal_those_of_one(drive, jobs):
     from antdrive.sim.view.film.parallel import render_frames
 
     setting = {"camera": "follow", "size": SIZE, "note": None, "speed": 1.0}
@@ -292,8 +292,8 @@ def test_a_small_robot_gets_a_glow_and_a_large_one_none(made_up_drive):
         assert (aside > 20) == found
 
 
-def test_a_replan_is_shown_from_its_moment_on(drive):
-    """The old line goes, the new one comes, a dot marks the place; the cause is told for a while."""
+def test_a_replan_shows_its_new_route_and_its_cause(drive):
+    """The new route replaces the old one, a dot marks the place, and the cause is shown for a while."""
     ahead, new = np.array([(1.0, 0.4), (3.5, 0.4)]), {"t": 0.3, "cause": "obstructed", "solved": True}
     entries = [
         {**new, "route": ahead.tolist()},
@@ -317,7 +317,7 @@ def test_a_replan_is_shown_from_its_moment_on(drive):
     def dark(view, line):
         return np.mean([view[round(py), round(px)].sum() < 300 for px, py in line])
 
-    assert np.abs(before - kept).max(axis=-1).mean() < 2, "drawn again in every frame, to about the same effect"
+    assert np.abs(before - kept).max(axis=-1).mean() < 2, "a route drawn in every frame looks about the same"
     assert dark(plain, new_line) == dark(before, new_line) == 0
     assert dark(after, new_line) > 0.3
     assert dark(failed, new_line) > 0.3
@@ -326,7 +326,7 @@ def test_a_replan_is_shown_from_its_moment_on(drive):
     assert (np.abs(told - after).max(axis=-1) > 60).sum() > 100
 
 
-def test_decisions_at_every_cell_are_not_told(drive):
+def test_replans_at_every_cell_have_no_caption(drive):
     entry = {"t": 0.0, "cause": "decision", "solved": True, "route": [[1.0, 1.0], [1.5, 1.0]]}
     decided = replace(drive, meta={**drive.meta, "replans": [entry]})
     with Shot(decided, camera="top", size=SIZE) as shot:

@@ -1,4 +1,4 @@
-"""The report, as text and in a real browser: it loads without errors, sorts, filters, plays films and fits a phone."""
+"""The report as text and in a real browser: it loads without errors, sorts, filters, plays films and fits a phone."""
 
 import html
 import json
@@ -82,7 +82,7 @@ def runs(made_up_drive, tmp_path_factory):
 
 
 def dumped(page: Path, *words: str) -> dict:
-    """What a page says about itself in a browser."""
+    """What the probe in a page finds in a browser."""
     common = ("--headless", "--no-sandbox", "--disable-gpu", "--autoplay-policy=no-user-gesture-required",
               "--allow-file-access-from-files", "--virtual-time-budget=20000", "--dump-dom", *words)  # fmt: skip
     done = subprocess.run([BROWSER, *common, page.as_uri()], capture_output=True, text=True, timeout=120, check=True)
@@ -126,7 +126,7 @@ def test_on_a_phone_the_page_is_as_wide_as_the_screen(runs, tmp_path):
     assert said["overflow"] == 0
 
 
-def test_the_page_holds_everything_and_calls_nobody(runs, tmp_path):
+def test_the_page_needs_no_network_and_escapes_its_content(runs, tmp_path):
     assert write_report(runs, tmp_path / "report.html", title="Ours & theirs") == 3
     text = (tmp_path / "report.html").read_text()
     assert "Ours &amp; theirs" in text
@@ -142,7 +142,7 @@ def test_films_can_be_embedded(runs, tmp_path):
     assert "data:video/mp4;base64," in (tmp_path / "with.html").read_text()
 
 
-def test_it_stays_small_by_linking_what_does_not_fit(runs, tmp_path, monkeypatch):
+def test_the_page_stays_small_by_linking_figures(runs, tmp_path, monkeypatch):
     from antdrive.sim.view.report import report as reporting
 
     write_report(runs, tmp_path / "all.html")
@@ -175,7 +175,7 @@ def test_the_markdown_is_a_table_with_pictures_and_commands(runs, tmp_path):
         ("other", "", "no runs"),
     ],
 )
-def test_wrong_folders_are_named(tmp_path, name, content, message):
+def test_folders_without_runs_and_broken_files_are_refused_by_name(tmp_path, name, content, message):
     (tmp_path / name).write_text(content)
     with pytest.raises(InputError, match=message):
         write_report(tmp_path, tmp_path / "report.html")
