@@ -54,7 +54,7 @@ def check_field(rollout: Rollout) -> None:
     Raises:
         InputError: it has none, or its planning cannot be repeated.
     """
-    if next(plan_again(rollout)[2]).landscape is None:
+    if next(plan_again(rollout)[2]).field is None:
         raise InputError(f"prelude: {rollout.meta['planner']['name']} keeps no field")
 
 
@@ -77,8 +77,8 @@ def planning_frames(rollout: Rollout, setting: dict[str, Any], count: int) -> It
             due = math.ceil((k + 1) * total / count)
             for later in itertools.islice(states, due - number):
                 number, state = number + 1, later
-            assert state.landscape is not None
-            levels = field_levels(grid, state.landscape)
+            assert state.field is not None
+            levels = field_levels(grid, state.field)
             path = grid.xy(state.cells if state.waypoints is None else state.waypoints)
             yield shot.planning_frame(
                 _values(number, total, state),

@@ -87,7 +87,7 @@ def test_an_iterative_planner_gets_its_history_and_field(planned, searched, tmp_
     mean = best + 1
     mean[:4] = math.inf
     history = History(best=best, iteration_best=best + 0.2, iteration_mean=mean, arrived=np.full(30, 9))
-    learnt = dataclasses.replace(searched, history=history, landscape=np.random.default_rng(0).random(grid.shape))
+    learnt = dataclasses.replace(searched, history=history, field=np.random.default_rng(0).random(grid.shape))
     robot = load_robot("turtlebot")
     picture = pixels(plan_figure(task, grid, learnt, robot, tmp_path / "learnt.png", dpi=80))
     assert near(picture, (18, 63, 122), 40) > 500, "the field's dark end"
