@@ -301,7 +301,7 @@ def verify(
                   "rollouts": {path: c.as_dict() for path, c in checked.items()}})  # fmt: skip
     else:
         for path, c in checked.items():
-            verdict = "certified collision-free" if c.certified else "NOT certified"
+            verdict = c.verdict
             say(
                 f"{path}: {verdict}: least clearance {in_metres(c.min_clearance)}, between steps at least {in_metres(c.bound)}"
             )
@@ -1014,7 +1014,7 @@ def _tell(result: Run, files: dict[str, str]) -> None:
                 f"  replanned {facts['replans']:.0f} times, gave way to moving obstacles for {facts['avoiding_s']:.1f} s"
             )
         c = result.certificate
-        verdict = "certified collision-free" if c.certified else "NOT certified"
+        verdict = c.verdict
         say(f"  {verdict}: least clearance {in_metres(c.min_clearance)}, between steps at least {in_metres(c.bound)}")
         for problem in c.problems:
             say(f"    {problem}")

@@ -45,7 +45,7 @@ class ComponentRecord:
     """A part of the scenario that has a name and settings.
 
     Attributes:
-        name: the planner's registered name, or the controller's class
+        name: the registered name of the planner, or the class of the controller
         settings: every setting by its name, as it was in force; null stands for "no limit"
     """
 
@@ -84,8 +84,9 @@ class SmoothingRecord:
 
     Attributes:
         asked: the smoothing that the scenario asked for: none, taut or clearance
-        made: the smoothing of the route that was driven; it differs from `asked` where that had to be given up
-        note: why it differs, in words; empty where it does not
+        made: the smoothing of the route that was driven; plans in space and time are not smoothed, and a smoothing
+            that fails is given up
+        note: why a smoothing was given up, in words; may be empty
     """
 
     asked: str
@@ -144,7 +145,7 @@ class TimesRecord:
 
     plan_s: float
     drive_wall_s: float
-    replans_s: tuple[float, ...] = ()
+    replans_s: tuple[float, ...]
 
 
 def _to_task(value: Any) -> Task:
@@ -163,9 +164,8 @@ class DriveRecord:
 
     Attributes:
         schema: the version of the format, 1
-        task: the world, start and goal that were planned with, in the form of a world file
-        unseen: cylinders {x, y, radius, height} [m] that stood in the world too, but that neither planner nor
-            controller knew of
+        task: the world, start and goal that planner and controller knew, in the form of a world file
+        unseen: cylinders {x, y, radius, height} [m] that also stood in the world, unknown to planner and controller
         seed: the seed that all of the run's random numbers follow from
         planner: the planner and its settings
         plan: the plan's size beside the shortest paths that are possible
