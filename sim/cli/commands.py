@@ -301,7 +301,7 @@ def verify(
                   "rollouts": {path: c.as_dict() for path, c in checked.items()}})  # fmt: skip
     else:
         for path, c in checked.items():
-            verdict = "certified collision-free" if c.certified else "NOT certified"
+            verdict = c.verdict
             say(
                 f"{path}: {verdict}: least clearance {in_metres(c.min_clearance)}, between steps at least {in_metres(c.bound)}"
             )
@@ -837,12 +837,12 @@ def _tell_budget(path: str, json: bool) -> int:
     where = f"({spent.x:.2f}, {spent.y:.2f}), t = {spent.t:.2f} s"
     say(f"{path}: margin {spent.margin:.3f} m, least room left around its disc {spent.left:.4f} m at {where}")
     table(
-        ("eaten by", "at most m", "at", "at the tightest place m"),
+        ("cause", "at most m", "at", "at the tightest place m"),
         ((s.cause, f"{s.metres:.4f}", f"({s.x:.2f}, {s.y:.2f}), {s.t:.2f} s" if s.metres else "-", f"{s.at_tightest:+.4f}")
-         for s in spent.shares),
+         for s in spent.contributions),
     )  # fmt: skip
     if spent.largest.metres:
-        say(f"the largest eater is {spent.largest.cause}")
+        say(f"the largest loss is due to {spent.largest.cause}")
     return SUCCEEDED
 
 
@@ -1009,12 +1009,12 @@ def _tell(result: Run, files: dict[str, str]) -> None:
             f"  drove {facts['driven_length_m']:.2f} m in {facts['duration_s']:.1f} s "
             f"(route {facts['route_length_m']:.2f} m); tracking error at most {facts['tracking_error_max_m']:.3f} m"
         )
-        if facts["replans"] or facts["yielding_s"]:
+        if facts["replans"] or facts["avoiding_s"]:
             say(
-                f"  replanned {facts['replans']:.0f} times, gave way to moving obstacles for {facts['yielding_s']:.1f} s"
+                f"  replanned {facts['replans']:.0f} times, gave way to moving obstacles for {facts['avoiding_s']:.1f} s"
             )
         c = result.certificate
-        verdict = "certified collision-free" if c.certified else "NOT certified"
+        verdict = c.verdict
         say(f"  {verdict}: least clearance {in_metres(c.min_clearance)}, between steps at least {in_metres(c.bound)}")
         for problem in c.problems:
             say(f"    {problem}")

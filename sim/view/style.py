@@ -10,7 +10,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.sim.log.rollout import Outcome
+from antdrive.sim.log.outcome import Outcome
 
 Colour: TypeAlias = tuple[int, int, int]  # red, green, blue, 0 to 255
 
@@ -47,8 +47,8 @@ VERDICTS: Mapping[Outcome, tuple[str, Colour]] = MappingProxyType(
     {
         Outcome.SUCCEEDED: ("✓ SUCCEEDED", GOOD),
         Outcome.COLLIDED: ("✕ COLLIDED", BAD),
-        Outcome.RUN_INTO: ("✕ HIT WHILE STANDING", DOUBT),
-        Outcome.JUMPED_ON: ("✕ HIT BY TELEPORT", DOUBT),
+        Outcome.HIT_WHILE_STANDING: ("✕ HIT WHILE STANDING", DOUBT),
+        Outcome.HIT_BY_TELEPORT: ("✕ HIT BY TELEPORT", DOUBT),
         Outcome.TIMED_OUT: ("TIMED OUT", DOUBT),
         Outcome.STUCK: ("STUCK", DOUBT),
         Outcome.NO_PATH: ("NO PATH", DOUBT),

@@ -56,7 +56,7 @@ def draw_speed(axes: Any, scene: Scene, rollout: Rollout) -> None:
 
 def draw_limiters(axes: Any, rollout: Rollout) -> None:
     """Draw a strip that shows which rule limited the speed over time."""
-    names = [str(name) for name in rollout.meta.get("limiters", [])]
+    names = rollout.record.limiters
     axes.set(xlabel="time [s]", yticks=[])
     axes.grid(False)
     axes.spines["left"].set_visible(False)

@@ -54,7 +54,7 @@ def overview(rollout: Rollout, path: str | Path, *, cells: Floats | None = None,
         draw_speed(figure.add_subplot(grid[1, 1], sharex=clearance), scene, rollout)
         draw_limiters(figure.add_subplot(grid[2, 1], sharex=clearance), rollout)
         name, colour = VERDICTS[rollout.outcome]
-        planner = rollout.meta.get("planner", {}).get("name", "?")
+        planner = rollout.record.planner.name
         title = f"{scene.name}   ·   {planner}   ·   {scene.robot.name}"
         figure.suptitle(title, x=0.012, ha="left", fontsize=12, weight="bold")
         figure.text(0.988, 0.993, name, ha="right", va="top", fontsize=11, weight="bold", color=hexed(colour))
@@ -113,9 +113,10 @@ def _draw_readings(axes: Any, certificate: Certificate, rollout: Rollout) -> Non
         (certificate.bound > 0, bound),
     )
     lines = [*readings, *((False, problem) for problem in certificate.problems[:3])]
-    verdict = "certified collision-free" if certificate.certified else "NOT certified collision-free"
     colour = hexed(GOOD if certificate.certified else BAD)
-    axes.text(0, 0.97, verdict, weight="bold", fontsize=12, color=colour, va="top", transform=axes.transAxes)
+    axes.text(
+        0, 0.97, certificate.verdict, weight="bold", fontsize=12, color=colour, va="top", transform=axes.transAxes
+    )
     for k, (fine, words) in enumerate(lines):
         place: dict[str, Any] = {"y": 0.78 - 0.13 * k, "va": "top", "transform": axes.transAxes}
         axes.text(x=0, s="✓" if fine else "✕", color=hexed(GOOD if fine else BAD), weight="bold", **place)

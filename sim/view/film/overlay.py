@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image, ImageDraw
 
-from antdrive.sim.log.rollout import Outcome
+from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.view.film import _kernels_paint as kernels
 from antdrive.sim.view.film.replay import SLOW_MOTION
 from antdrive.sim.view.film.text import Sprite, fitted, font, pill, plate, text_width

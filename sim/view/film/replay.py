@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.sim.driving.replanning import DECISION
+from antdrive.sim.log.record import DECISION
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.view.scene import Scene, contact_point, jumps
 
@@ -25,22 +25,22 @@ class ReplanEvent(NamedTuple):
 
     Attributes:
         t: when [s]
-        cause: why the robot replanned
+        trigger: why the robot replanned
         solved: whether it found a new route
         route: the polyline followed from then on (N, 2) [m]
     """
 
     t: float
-    cause: str
+    trigger: str
     solved: bool
     route: Floats
 
     @property
     def caption(self) -> str:
         """The replan in a few words; empty for the steps of a robot that plans anew at every cell."""
-        if self.cause == DECISION:
+        if self.trigger == DECISION:
             return ""
-        return f"{'new route' if self.solved else 'no new route'}: {self.cause}"
+        return f"{'new route' if self.solved else 'no new route'}: {self.trigger}"
 
 
 class Replay:
@@ -60,9 +60,9 @@ class Replay:
         self._jumps = jumps(self._movers)
         self.replans: list[ReplanEvent] = []
         route = rollout.route
-        for entry in rollout.meta.get("replans", ()):
-            route = np.array(entry["route"], dtype=np.float64) if entry["solved"] else route
-            self.replans.append(ReplanEvent(float(entry["t"]), str(entry["cause"]), bool(entry["solved"]), route))
+        for replan in rollout.record.replans:
+            route = np.array(replan.route, dtype=np.float64) if replan.solved else route
+            self.replans.append(ReplanEvent(replan.t, replan.trigger, replan.solved, route))
         rim = self._twist[:, 1] * robot.track / 2
         steps = np.diff(self.t)
         self._angles = []

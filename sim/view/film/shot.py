@@ -81,7 +81,7 @@ class Shot:
             self._legend = legend_card(entries, layout) if card and not bare else None
             if self._legend is not None and self._fits_beside_world(self._legend):
                 break
-        planner = str(rollout.meta.get("planner", {}).get("name", "?"))
+        planner = rollout.record.planner.name
         subtitle = f"planner {planner}  ·  robot {scene.robot.name}"
         fields = PLAN_FIELDS if planning else DRIVE_FIELDS
         self._band = Band(layout, scene.name, subtitle, None if planning else note, entries, fields)

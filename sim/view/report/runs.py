@@ -5,14 +5,13 @@ from __future__ import annotations
 import json
 import math
 import re
-import zipfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-
+from antdrive.sim.log.record import DriveRecord
+from antdrive.sim.log.rollout import read_record
 from antdrive.sim.view.style import hexed, planner_style
 from antdrive.worlds.errors import InputError
 
@@ -83,7 +82,7 @@ class ReportedRun:
     Attributes:
         folder: where the run's files are
         result: the content of result.json
-        meta: the metadata of the log; empty if the robot did not drive
+        record: the record of the log; None if the robot did not drive
         number: its place among the runs of the report
         figures: embedded figures
         films: films, embedded or linked
@@ -93,7 +92,7 @@ class ReportedRun:
 
     folder: Path
     result: Mapping[str, Any]
-    meta: Mapping[str, Any]
+    record: DriveRecord | None
     number: int
     figures: list[Attachment] = field(default_factory=list)
     films: list[Attachment] = field(default_factory=list)
@@ -206,20 +205,20 @@ class ReportedRun:
     @property
     def details(self) -> list[tuple[str, list[tuple[str, str]]]]:
         """Lists of names and values, each with its heading."""
-        meta = self.meta
+        record = self.record.as_dict() if self.record else {}
         settings = {
-            key: meta[key]
+            key: record[key]
             for key in ("margin", "inflate", "cell", "physics_hz", "control_hz", "time_limit")
-            if key in meta
+            if key in record
         }
         certificate = {k: v for k, v in (self.result.get("certificate") or {}).items() if k != "problems"}
         return [
             ("Metrics", _pairs(self.result.get("metrics"))),
             ("Certificate", _pairs(certificate)),
-            ("Planner", _pairs(_part(meta, "planner", "options"))),
-            ("Controller", _pairs(meta.get("controller"))),
+            ("Planner", _pairs(_part(record, "planner", "settings"))),
+            ("Controller", _pairs(_part(record, "controller", "settings"))),
             ("Run", _pairs({**settings, "digest": self.result.get("digest")})),
-            ("Versions", _pairs(meta.get("versions"))),
+            ("Versions", _pairs(record.get("versions"))),
         ]
 
 
@@ -240,19 +239,12 @@ def find_runs(folder: Path) -> Iterator[ReportedRun]:
         missing = [key for key in REQUIRED if key not in result]
         if missing:
             raise InputError(f"{path}: {missing[0]}: missing; `antdrive run` writes it")
-        yield ReportedRun(path.parent, result, _meta(path.parent / "rollout.npz"), number)
+        yield ReportedRun(path.parent, result, _record(path.parent / "rollout.npz"), number)
 
 
-def _meta(path: Path) -> Mapping[str, Any]:
-    """The metadata of a log, without loading its arrays; empty if there is no log."""
-    if not path.exists():
-        return {}
-    try:
-        with path.open("rb") as raw, np.load(raw, allow_pickle=False) as log:
-            found = json.loads(str(log["meta"][()]))
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-        raise InputError(f"{path}: not a rollout ({str(error).splitlines()[0]})") from None
-    return found if isinstance(found, dict) else {}
+def _record(path: Path) -> DriveRecord | None:
+    """The record of a log; None if there is no log, because the robot did not drive."""
+    return read_record(path) if path.exists() else None
 
 
 def _part(values: Mapping[str, Any], *keys: str) -> Any:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from antdrive.planners import PLANNERS
-from antdrive.sim.log.rollout import Outcome
+from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.view.style import PLANNER_COLOURS, PLANNER_STYLES, VERDICTS, planner_style
 
 

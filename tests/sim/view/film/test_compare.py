@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from antdrive.sim.log.rollout import Outcome
+from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.log.record import ComponentRecord
 from antdrive.sim.view.film.compare import SplitScreen, compare_film
 from antdrive.sim.view.style import VERDICTS, planner_style
 from antdrive.worlds import InputError
@@ -16,9 +17,10 @@ SIZE = (640, 360)
 @pytest.fixture(scope="module")
 def drives(made_up_drive):
     short, long = made_up_drive(seconds=0.6), made_up_drive(seconds=1.0)
-    plan = {"length_m": 3.2}
-    return [replace(log, meta={**log.meta, "plan": plan, "planner": {"name": name, "options": {}}})
-            for log, name in ((short, "astar"), (long, "mmas"))]  # fmt: skip
+    return [
+        replace(log, record=replace(log.record, planner=ComponentRecord(name=name, settings={})))
+        for log, name in ((short, "astar"), (long, "mmas"))
+    ]
 
 
 def test_tiles_show_the_same_moment_and_a_finished_run_keeps_its_last_picture(drives):
@@ -37,7 +39,7 @@ def test_each_run_has_its_planners_colour_and_its_outcome(drives):
     with SplitScreen(drives, "top", SIZE) as screen:
         end = screen.frame(np.inf)
     for k, log in enumerate(drives):
-        colour = np.array(planner_style(log.meta["planner"]["name"])[0])
+        colour = np.array(planner_style(log.record.planner.name)[0])
         assert np.abs(end[2, 320 * k + 2].astype(int) - colour).max() == 0
     green = np.array(VERDICTS[Outcome.SUCCEEDED][1])
     assert (np.abs(end.astype(int) - green).max(axis=-1) < 6).sum() > 500

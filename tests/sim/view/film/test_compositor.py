@@ -13,7 +13,6 @@ from antdrive.sim.view.film.meshes import cylinder, robot_parts
 from antdrive.sim.view.film.tiny_renderer import add_mesh, merged, render
 from antdrive.sim.view.scene import Scene
 from antdrive.sim.view.style import MOVER
-from antdrive.worlds import InputError
 
 SIZE = (320, 240)
 
@@ -169,13 +168,6 @@ def test_a_trail_painted_at_once_equals_one_painted_step_by_step(drive, scene):
         for k in range(len(points) - 1):
             compositor.extend_trail(points[k : k + 2], speeds[k : k + 2])
         assert (compositor.frame(middle(drive)) == at_once).all()
-
-
-@pytest.mark.parametrize("missing", ["task", "robot"])
-def test_metadata_without_a_world_or_a_robot_are_refused(drive, missing):
-    meta = {key: value for key, value in drive.meta.items() if key != missing}
-    with pytest.raises(InputError, match=missing):
-        Scene.of(replace(drive, meta=meta))
 
 
 def test_a_movers_motion_ahead_is_drawn_on_the_ground(drive, scene):
