@@ -165,7 +165,7 @@ def plan(
         grid, answer = make_plan(scenario)
     files = {}
     if out is not None:
-        from antdrive.sim.view.figures.figures import plan_figures
+        from antdrive.sim.view.figures.plan_figures import plan_figures
 
         made = plan_figures(scenario.task, grid, answer, scenario.robot, out, name=planner, suffixes=_suffixes(vector))
         files = {name: str(path) for name, path in made.items()}
@@ -265,7 +265,7 @@ def compare(
         files[name] = str(folder / name)
     logs = [result.rollout for result in results.values() if result.rollout is not None]
     if len(logs) > 1 and figures:
-        from antdrive.sim.view.figures.figures import comparison_figure
+        from antdrive.sim.view.figures.run_figures import comparison_figure
 
         named = {name: result.rollout for name, result in results.items() if result.rollout is not None}
         files["figure"] = str(comparison_figure(named, folder / "comparison.png"))
@@ -301,7 +301,7 @@ def verify(
                   "rollouts": {path: c.as_dict() for path, c in checked.items()}})  # fmt: skip
     else:
         for path, c in checked.items():
-            verdict = "certified collision-free" if c.certified else "NOT certified"
+            verdict = c.verdict
             say(
                 f"{path}: {verdict}: least clearance {in_metres(c.min_clearance)}, between steps at least {in_metres(c.bound)}"
             )
@@ -517,7 +517,7 @@ def show_world(
     if out is not None:
         import numpy as np
 
-        from antdrive.sim.view.figures.plots import plan_figure
+        from antdrive.sim.view.figures.plan_figures import plan_figure
 
         plan_figure(task, grid, load_planner("astar").plan(query, np.random.default_rng(0)), spec, out)
     if json:
@@ -837,12 +837,12 @@ def _tell_budget(path: str, json: bool) -> int:
     where = f"({spent.x:.2f}, {spent.y:.2f}), t = {spent.t:.2f} s"
     say(f"{path}: margin {spent.margin:.3f} m, least room left around its disc {spent.left:.4f} m at {where}")
     table(
-        ("eaten by", "at most m", "at", "at the tightest place m"),
+        ("cause", "at most m", "at", "at the tightest place m"),
         ((s.cause, f"{s.metres:.4f}", f"({s.x:.2f}, {s.y:.2f}), {s.t:.2f} s" if s.metres else "-", f"{s.at_tightest:+.4f}")
-         for s in spent.shares),
+         for s in spent.contributions),
     )  # fmt: skip
     if spent.largest.metres:
-        say(f"the largest eater is {spent.largest.cause}")
+        say(f"the largest loss is due to {spent.largest.cause}")
     return SUCCEEDED
 
 
@@ -890,8 +890,8 @@ OWN_FILES = ("result.json", "rollout.npz", *(name + suffix for name in FIGURES f
 
 
 def _write(result: Run, folder: Path, *, vector: bool = False, figures: bool = True) -> dict[str, str]:
-    from antdrive.sim.view.figures.figures import certificate_figure, plan_figures
-    from antdrive.sim.view.figures.plots import overview, plan_figure
+    from antdrive.sim.view.figures.plan_figures import plan_figure, plan_figures
+    from antdrive.sim.view.figures.run_figures import certificate_figure, overview
 
     s = result.scenario
     files = {"result": str(folder / "result.json")}
@@ -975,7 +975,7 @@ def _numbers_of(result: Run) -> tuple[str, ...]:
 
 
 def _check_film(path: Path) -> None:
-    from antdrive.sim.view.film.video import ENCODERS
+    from antdrive.sim.view.film.encoder import ENCODERS
 
     if path.suffix.lower() not in ENCODERS:
         raise InputError(f"--video {path}: films are written as {', '.join(ENCODERS)}")
@@ -1009,12 +1009,12 @@ def _tell(result: Run, files: dict[str, str]) -> None:
             f"  drove {facts['driven_length_m']:.2f} m in {facts['duration_s']:.1f} s "
             f"(route {facts['route_length_m']:.2f} m); tracking error at most {facts['tracking_error_max_m']:.3f} m"
         )
-        if facts["replans"] or facts["yielding_s"]:
+        if facts["replans"] or facts["avoiding_s"]:
             say(
-                f"  replanned {facts['replans']:.0f} times, gave way to moving obstacles for {facts['yielding_s']:.1f} s"
+                f"  replanned {facts['replans']:.0f} times, gave way to moving obstacles for {facts['avoiding_s']:.1f} s"
             )
         c = result.certificate
-        verdict = "certified collision-free" if c.certified else "NOT certified"
+        verdict = c.verdict
         say(f"  {verdict}: least clearance {in_metres(c.min_clearance)}, between steps at least {in_metres(c.bound)}")
         for problem in c.problems:
             say(f"    {problem}")

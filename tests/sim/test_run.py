@@ -28,7 +28,7 @@ def test_a_run_ends_at_the_goal_certified(small_run: Run) -> None:
     assert len(log.contacts) == 0
     assert log.clearance.min() > 0.3 * small_run.scenario.margin
     assert log.t[1] == pytest.approx(1 / 240)
-    assert log.meta["outcome"] == "succeeded"
+    assert log.outcome.key == "succeeded"
     assert json.dumps(small_run.as_dict())
 
 
@@ -73,7 +73,7 @@ def test_a_large_world_is_driven_in_the_fast_suite_too() -> None:
 def test_the_outcome_of_every_world_with_movers_is_certain(name: str, seed: int) -> None:
     """Not every drive succeeds, but all three readings agree on whether something was touched."""
     result = run(Scenario.of(name, seed=seed))
-    assert result.outcome in (Outcome.SUCCEEDED, Outcome.COLLIDED, Outcome.RUN_INTO)
+    assert result.outcome in (Outcome.SUCCEEDED, Outcome.COLLIDED, Outcome.HIT_WHILE_STANDING)
     assert result.certificate is not None
     assert result.succeeded == (result.outcome is Outcome.SUCCEEDED) == result.certificate.certified
     assert not any("disagree" in problem or "outcome" in problem for problem in result.certificate.problems)
@@ -105,7 +105,7 @@ def test_an_unseen_obstacle_on_the_route_is_hit(collided_run: Run) -> None:
     assert certificate is not None
     assert len(log.contacts) > 0
     step, obstacle, distance, force = log.contacts[0]
-    assert log.meta["unseen"] == [int(obstacle)]
+    assert len(log.record.task.world.obstacles) == int(obstacle)
     assert abs(log.clearance[int(step)]) < 0.01
     assert distance <= 1e-4 or force > 0
     assert not certificate.certified
@@ -284,7 +284,7 @@ def test_every_smoothing_is_driven_and_recorded(kind: str, small_scenario: Scena
     result = run(replace(small_scenario, smoothing=kind))
     assert result.succeeded
     assert result.rollout is not None
-    assert result.rollout.meta["route"] == {"asked": kind, "kind": kind, "note": ""}
+    assert result.rollout.record.smoothing == SmoothingRecord(asked=kind, made=kind, note="")
 
 
 def test_settings_out_of_range_are_refused(small_scenario: Scenario) -> None:

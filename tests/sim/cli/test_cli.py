@@ -199,12 +199,14 @@ def test_a_noisy_drive_tells_what_ate_its_margin(antdrive, small: Path) -> None:
     assert code == 0
     with np.load("r/rollout.npz") as log:
         assert log["estimate"].shape == log["pose"].shape
-        assert json.loads(str(log["meta"]))["route"] == {"asked": "taut", "kind": "taut", "note": ""}
+        assert json.loads(str(log["record"]))["smoothing"] == {"asked": "taut", "made": "taut", "note": ""}
     code, out, _ = antdrive("margin", facts["files"]["rollout"], "--json")
     spent = json.loads(out)
     assert code == 0
     assert spent["left"] >= facts["certificate"]["min_clearance_m"] - 1e-9  # of the disc around a disc robot
-    assert sum(share["at_tightest"] for share in spent["shares"]) == pytest.approx(spent["margin"] - spent["left"])
+    assert sum(share["at_tightest"] for share in spent["contributions"]) == pytest.approx(
+        spent["margin"] - spent["left"]
+    )
     code, out, _ = antdrive("margin", facts["files"]["rollout"])
     assert code == 0
     assert "localisation" in out
@@ -229,13 +231,13 @@ def test_a_run_tells_of_its_replans_and_yields_unless_told_not_to(antdrive, tmp_
     code, out, _ = antdrive(*words)
     measured = json.loads(out)["metrics"]
     assert code == 0
-    assert measured["replans"] + measured["yielding_s"] > 0
+    assert measured["replans"] + measured["avoiding_s"] > 0
     assert measured["tracking_error_max_m"] < 1.0, "from the route that it followed then"
     assert "gave way to moving obstacles for" in antdrive(*words[:-1])[1]
     code, out, _ = antdrive(*words, "--no-yield", "--no-replan")
     assert code == 1
     assert json.loads(out)["outcome"] == "collided"
-    assert json.loads(out)["metrics"]["replans"] == json.loads(out)["metrics"]["yielding_s"] == 0
+    assert json.loads(out)["metrics"]["replans"] == json.loads(out)["metrics"]["avoiding_s"] == 0
 
 
 def test_without_figures_a_run_leaves_its_log_and_result(antdrive, small: Path) -> None:  # type: ignore[no-untyped-def]

@@ -12,6 +12,7 @@ from antdrive.planners import load_planner
 from antdrive.robots import LIMITERS, Avoidance, RobotSpec
 from antdrive.sim import Outcome, Perception, Run, Scenario, certify, run
 from antdrive.sim.driving.perception import Predictor
+from antdrive.sim.log.record import PerceptionRecord
 from antdrive.worlds import Cruising, Disc, Keyframed, Mover, Task, Trajectories, World
 
 HALL = World("hall", (0.0, 0.0, 9.0, 6.0))
@@ -110,7 +111,7 @@ def test_where_contact_cannot_be_avoided_the_robot_stands_still(turtlebot: Robot
     """A piston as wide as the aisle, faster than the robot."""
     piston = keyframed((0.0, 8.0, 0.5), (4.0, 0.0, 0.5), radius=0.45)
     done = among(piston, robot=turtlebot, task=Task(AISLE, (1.0, 0.5, 0.0), (8.0, 0.5), cell=0.1))
-    assert done.outcome is Outcome.RUN_INTO, done.reason
+    assert done.outcome is Outcome.HIT_WHILE_STANDING, done.reason
 
 
 @pytest.mark.parametrize("gap", [0.02, 0.08])
@@ -132,7 +133,7 @@ def test_a_robot_that_cannot_escape_stands_still(turtlebot: RobotSpec) -> None:
     comes = keyframed((0.0, 2.2, 0.5), (4.0, 0.2, 0.5), radius=0.4)
     task = Task(AISLE, (0.4, 0.5, math.pi / 2), (8.0, 0.5), cell=0.1)
     done = among(comes, robot=turtlebot, task=task)
-    assert done.outcome is Outcome.RUN_INTO, done.reason
+    assert done.outcome is Outcome.HIT_WHILE_STANDING, done.reason
     assert done.rollout is not None
     end = int(done.rollout.contacts[0, 0])
     assert np.abs(done.rollout.twist[end - 24 : end]).max() < 1e-3
@@ -160,7 +161,7 @@ def test_a_robot_does_not_avoid_what_it_does_not_see(turtlebot: RobotSpec) -> No
     for told in ("positions", "motions"):
         known = among(CROSSING, robot=turtlebot, perception=Perception(kind=told))  # type: ignore[arg-type]
         assert known.rollout is not None
-        assert known.rollout.meta["knowledge"] == {"told": told, "reach_m": None}
+        assert known.rollout.record.perception == PerceptionRecord(kind=told, range_m=None)
 
 
 @given(st.integers(0, 2000), st.sampled_from(["positions", "velocities", "motions"]))

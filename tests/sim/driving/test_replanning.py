@@ -1,7 +1,6 @@
 """New routes while driving."""
 
 import dataclasses
-import json
 import math
 from typing import Any
 
@@ -53,7 +52,7 @@ def test_replans_are_repeatable_and_saved_with_the_log(turtlebot: RobotSpec, tmp
     assert again is not None
     assert first.digest == again.digest
     loaded = Rollout.load(first.save(f"{tmp_path}/run.npz"))
-    assert loaded.meta["replans"] == json.loads(json.dumps(first.meta["replans"]))
+    assert loaded.record.replans == first.record.replans
     assert certify(loaded).certified == certify(first).certified
 
 
@@ -66,7 +65,7 @@ def test_every_planner_replans(planner: str, turtlebot: RobotSpec) -> None:
     if done.rollout is None:  # a planner that is not complete found no path
         assert not getattr(load_planner(planner), "complete", False)
         return
-    assert done.rollout.meta["replans"]
+    assert done.rollout.record.replans
     assert not len(done.rollout.contacts)
 
 
@@ -75,7 +74,7 @@ def test_nothing_is_replanned_if_nothing_is_in_the_way(turtlebot: RobotSpec) -> 
     done = among(far, robot=turtlebot)
     assert done.succeeded
     assert done.rollout is not None
-    assert done.rollout.meta["replans"] == []
+    assert done.rollout.record.replans == ()
 
 
 GATEKEEPER = Keyframed(radius=0.45, keyframes=((0.0, 4.0, 3.0), (9.0, 4.0, 3.0001), (12.0, 1.5, 5.5)), loop="once")
@@ -96,10 +95,10 @@ def test_mmas_dstar_decides_cell_by_cell_and_waits_if_there_is_no_path(turtlebot
     done = among(GATEKEEPER, robot=turtlebot, planner="mmas-dstar")
     assert done.succeeded, (done.outcome, done.reason)
     assert done.rollout is not None
-    decisions = done.rollout.meta["replans"]
-    assert {d["cause"] for d in decisions} == {"decision"}
+    decisions = done.rollout.record.replans
+    assert {d.trigger for d in decisions} == {"decision"}
     assert len(decisions) > 20
-    steps = [math.dist(d["route"][-2], d["route"][-1]) for d in decisions[1:-1]]
+    steps = [math.dist(d.route[-2], d.route[-1]) for d in decisions[1:-1]]
     assert max(steps) < 0.25 * 2**0.5 + 0.25
     again = among(GATEKEEPER, robot=turtlebot, planner="mmas-dstar").rollout
     assert again is not None
@@ -117,10 +116,10 @@ def test_mmas_dstar_stays_at_the_start_while_there_is_no_path(turtlebot: RobotSp
     log = run(Scenario(task=task, planner=planner, robot=turtlebot, avoidance=None)).rollout
     assert log is not None
     assert np.ptp(log.pose[log.t < 4.0, 0]) < 0.01
-    decisions = log.meta["replans"]
-    assert {d["cause"] for d in decisions} == {"decision"}
-    assert decisions[0]["t"] > 4.0
-    assert max(math.dist(d["route"][0], d["route"][-1]) for d in decisions[:-1]) < 0.5
+    decisions = log.record.replans
+    assert {d.trigger for d in decisions} == {"decision"}
+    assert decisions[0].t > 4.0
+    assert max(math.dist(d.route[0], d.route[-1]) for d in decisions[:-1]) < 0.5
 
 
 @pytest.mark.parametrize(
@@ -136,8 +135,8 @@ def test_mmas_dstar_keeps_the_inflation_from_obstacles(
     done = run(Scenario(task=task, planner=load_planner("mmas-dstar"), robot=turtlebot))
     assert done.succeeded, (done.outcome, done.reason)
     assert done.rollout is not None
-    for decision in done.rollout.meta["replans"][:-1]:
-        assert polyline_clearance(task.world, np.array(decision["route"])) > 0.21 - 2e-4, decision
+    for decision in done.rollout.record.replans[:-1]:
+        assert polyline_clearance(task.world, np.array(decision.route)) > 0.21 - 2e-4, decision
 
 
 def test_a_robot_that_does_not_know_that_it_missed_the_goal_stays(turtlebot: RobotSpec) -> None:
@@ -159,7 +158,7 @@ def test_a_robot_that_does_not_know_that_it_missed_the_goal_stays(turtlebot: Rob
         believed = math.dist(alone.rollout.estimate[-1, :2], tight.task.goal)
         if believed <= 0.003:
             assert among_them.outcome is alone.outcome
-            assert among_them.rollout.meta["replans"] == []
+            assert among_them.rollout.record.replans == ()
             ends.append(alone.outcome)
     assert {Outcome.STUCK, Outcome.SUCCEEDED} <= set(ends), ends
 
