@@ -25,7 +25,6 @@ from antdrive.worlds import (
     task_schema,
     task_to_dict,
 )
-from antdrive.worlds.errors import input_error
 from antdrive.worlds.files.document import parse_document
 from tests.worlds.malformed import GOOD, MALFORMED
 
@@ -151,10 +150,6 @@ def test_a_dangling_link_is_a_missing_file(tmp_path):
 def test_the_first_unknown_key_is_told_before_what_it_left_missing():
     with pytest.raises(InputError, match=r"^task: strat: unknown key; did you mean start\?$"):
         task_from_dict({k if k != "start" else "strat": v for k, v in task_to_dict(TASK).items()})
-
-
-def test_an_error_is_one_line_whatever_it_quotes():
-    assert str(input_error("a\nb", "c\u2028d\x1b[31m")) == "a\\nb: c\\u2028d\\x1b[31m"
 
 
 # Accepted files
@@ -308,13 +303,6 @@ def test_the_schema_tells_every_key_and_what_is_needed():
     assert schema["additionalProperties"] is False
     assert schema["properties"]["start"]["minItems"] == schema["properties"]["start"]["maxItems"] == 3
     assert schema["$defs"]["DiscEntry"]["properties"]["radius"]["exclusiveMinimum"] == 0
-
-
-def test_the_limit_on_cells_is_that_of_grids():
-    from antdrive.worlds import grid
-    from antdrive.worlds.files import world_file as files
-
-    assert files.MAX_CELLS == grid.MAX_CELLS
 
 
 def test_the_catalogue_is_the_files_that_come_along():
