@@ -8,6 +8,7 @@ import numpy as np
 
 from antdrive.planners.plan import PlanResult
 from antdrive.worlds import Floats, Grid, Route, Task, point_clearance, segment_clearance
+from antdrive.worlds.errors import FieldError
 
 
 def route_along(plan: PlanResult, grid: Grid, task: Task) -> Route:
@@ -21,7 +22,7 @@ def route_along(plan: PlanResult, grid: Grid, task: Task) -> Route:
         ValueError: the plan has no path.
     """
     if not plan.solved:
-        raise ValueError("plan: has no path to follow")
+        raise FieldError("plan", "has no path to follow")
     xy = _join(grid.xy(plan.line), np.array(task.start[:2]), grid, task)
     if point_clearance(task.world, [task.goal])[0] >= grid.inflate - 1e-9:
         xy = _join(xy[::-1], np.array(task.goal), grid, task)[::-1]

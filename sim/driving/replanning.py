@@ -31,6 +31,7 @@ from antdrive.robots import PurePursuit, RobotSpec, TrackedPath
 from antdrive.sim.driving.perception import Predictor
 from antdrive.sim.driving.schedule import Schedule
 from antdrive.worlds import Disc, Floats, Grid, Pose, Route, Task, rasterise, segment_clearance
+from antdrive.worlds.errors import FieldError
 
 if TYPE_CHECKING:
     from antdrive.planners import Replanner
@@ -60,7 +61,7 @@ class ReplanPolicy:
     def __post_init__(self) -> None:
         for key in ("within", "patience", "strayed", "beside", "pause", "ahead"):
             if not 0 <= getattr(self, key) < math.inf:
-                raise ValueError(f"{key}: must be at least 0, got {getattr(self, key):g}")
+                raise FieldError(key, f"must be at least 0, got {getattr(self, key):g}")
 
 
 @dataclass(frozen=True)

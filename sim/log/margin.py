@@ -14,6 +14,7 @@ import numpy.typing as npt
 from antdrive.sim.log.metrics import nearest_on_route
 from antdrive.sim.log.rollout import Outcome, Rollout
 from antdrive.worlds import World, point_clearance, task_from_dict
+from antdrive.worlds.errors import FieldError
 
 if TYPE_CHECKING:
     from antdrive.sim.pipeline import Run
@@ -140,7 +141,7 @@ def find_margin(
         ValueError: a setting outside its range.
     """
     if not 0 < resolution < most:
-        raise ValueError(f"resolution: must be greater than 0 and less than {most:g}, got {resolution:g}")
+        raise FieldError("resolution", f"must be greater than 0 and less than {most:g}, got {resolution:g}")
     hardest_first = list(seeds)
 
     def tried(margin: float) -> Trial:
