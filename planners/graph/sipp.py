@@ -19,6 +19,7 @@ from antdrive.planners.iterative import require
 from antdrive.planners.plan import GridPlanner, PlanResult, PlanStatus, Query, path_cost
 from antdrive.worlds import Floats, MoverMotion
 from antdrive.worlds.errors import FieldError
+from antdrive.worlds.plane import segment_lengths
 
 STEP = 0.05  # s: how often a motion is looked at; turns in between are then looked for
 INSTANT = 1e-6  # s: a motion that is not straight over so short a time jumps
@@ -187,4 +188,4 @@ def _samples(mover: MoverMotion, start: float, end: float) -> tuple[Floats, Floa
         open_ = np.stack([halves - 1, halves], axis=1).ravel()
     if not np.isfinite(xy).all():
         raise FieldError("movers", "a mover's position is not finite")
-    return t, xy, (np.diff(t) <= INSTANT) & (np.hypot(*np.diff(xy, axis=0).T) > TOLERANCE)
+    return t, xy, (np.diff(t) <= INSTANT) & (segment_lengths(xy) > TOLERANCE)

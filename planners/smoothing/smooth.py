@@ -28,6 +28,7 @@ from antdrive.planners.plan import PlanResult
 from antdrive.planners.smoothing.cells import route_along
 from antdrive.worlds import Bounds, Floats, Route, Task, World, polyline_clearance, segment_clearance
 from antdrive.worlds.errors import FieldError
+from antdrive.worlds.plane import polyline_length
 
 if TYPE_CHECKING:  # brings the compiler with it
     from antdrive.worlds import Grid
@@ -244,7 +245,7 @@ def _fault(string: String, xy: Floats, line: Floats, world: World, inflate: floa
 
 
 def _length(xy: Floats) -> float:
-    return float(np.hypot(*np.diff(xy, axis=0).T).sum())
+    return polyline_length(xy)
 
 
 def _widened(

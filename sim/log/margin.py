@@ -15,6 +15,7 @@ from antdrive.sim.log.metrics import nearest_on_route
 from antdrive.sim.log.rollout import Outcome, Rollout
 from antdrive.worlds import World, point_clearance, task_from_dict
 from antdrive.worlds.errors import FieldError
+from antdrive.worlds.plane import wrap_angle
 
 if TYPE_CHECKING:
     from antdrive.sim.pipeline import Run
@@ -211,7 +212,7 @@ def _commanded(rollout: Rollout) -> Floats:
 def _near_corner(points: Floats, route: Floats) -> npt.NDArray[np.bool_]:
     steps = np.diff(route, axis=0)
     heading = np.arctan2(steps[:, 1], steps[:, 0])
-    turn = np.abs((np.diff(heading) + np.pi) % (2 * np.pi) - np.pi)
+    turn = np.abs(wrap_angle(np.diff(heading)))
     near = np.zeros(len(points), dtype=np.bool_)
     for corner in route[1:-1][turn >= CORNER]:
         near |= np.hypot(*(points - corner).T) <= NEAR_CORNER
