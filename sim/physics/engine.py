@@ -24,7 +24,8 @@ from antdrive.robots.footprint import footprint_clearance
 from antdrive.robots.spec import RobotSpec
 from antdrive.worlds.errors import FieldError
 from antdrive.worlds.trajectories import Trajectories
-from antdrive.worlds.world import Floats, Pose, World
+from antdrive.worlds.types import Floats, Pose
+from antdrive.worlds.world import World
 
 
 @functools.cache
