@@ -1,7 +1,7 @@
-"""Frames a second of a film, rendering and encoding: `python -m benchmarks.film`.
+"""Measure how many frames per second a film is rendered and encoded with: `python -m benchmarks.film`.
 
-Beside it the bare cost of drawing each frame in full with the same renderer, without anything painted and without a file. With
-`--memory`, the peak memory of films of ten seconds and of five minutes instead, each in a process of its own.
+For comparison, the table shows the rate at which the same renderer draws full frames, without painted ground and without a
+file. With `--memory`, measure the peak memory of films of ten seconds and of five minutes instead, each in its own process.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.physics.engine import client
 from antdrive.sim.pipeline import Scenario, run
 from antdrive.sim.view.film.camera import camera_for
-from antdrive.sim.view.film.model import robot_parts
-from antdrive.sim.view.film.parallel import processes
-from antdrive.sim.view.film.stage import drawn_height, grouped, still_pieces
-from antdrive.sim.view.film.tiny import add_mesh, render
+from antdrive.sim.view.film.compositor import drawn_height, merged_by_colour, still_meshes
+from antdrive.sim.view.film.meshes import robot_parts
+from antdrive.sim.view.film.parallel import process_count
+from antdrive.sim.view.film.tiny_renderer import add_mesh, render
 from antdrive.sim.view.film.video import film
 from antdrive.sim.view.scene import Scene
 
 ROUNDS = 3
 SIZES = ((640, 480), (1280, 720))
-SECONDS = 10.0  # of the run are filmed
+SECONDS = 10.0  # length of the filmed part of the run [s]
 
 
 def bare_fps(rollout: Rollout, camera: str, size: tuple[int, int], *, fine: int = 1) -> float:
-    """Full frames a second of PyBullet's renderer alone."""
+    """The rate at which PyBullet's renderer alone draws full frames [1/s]."""
     scene = Scene.of(rollout)
     tall = np.minimum(scene.obstacles[:, 3], drawn_height(scene))
     low, high = scene.region(np.vstack([rollout.pose[:, :2], rollout.route]))
@@ -44,7 +44,7 @@ def bare_fps(rollout: Rollout, camera: str, size: tuple[int, int], *, fine: int 
         at = rollout.pose[len(rollout.pose) // 2]
         view = camera_for(camera, (-reach, -0.6 * reach), (reach, 0.6 * reach), float(tall.max()), size).moved(*at[:2])
     with client() as number:
-        for mesh, colour in grouped(still_pieces(scene, tall)):
+        for mesh, colour in merged_by_colour(still_meshes(scene, tall)):
             add_mesh(number, mesh, colour)
         for part in robot_parts(scene.robot):
             add_mesh(number, part.mesh, part.colour)
@@ -57,7 +57,7 @@ def bare_fps(rollout: Rollout, camera: str, size: tuple[int, int], *, fine: int 
 
 
 def cut(rollout: Rollout, seconds: float) -> Rollout:
-    """The first part of a run, or, where it is too short, the run again and again."""
+    """The first `seconds` of a run; a run that is too short is repeated."""
     import dataclasses
 
     step = float(rollout.t[1] - rollout.t[0])
@@ -70,7 +70,7 @@ def cut(rollout: Rollout, seconds: float) -> Rollout:
 
 def speed(rollout: Rollout) -> None:
     count = len(rollout.record.world.obstacles)
-    print(f"{count} cylinders; best of {ROUNDS}; a moving camera renders in {processes()} processes")
+    print(f"{count} cylinders; best of {ROUNDS}; a moving camera renders in {process_count()} processes")
     print("camera    size        film fps   on one core   full frames, bare   2x2 finer, bare")
     with tempfile.TemporaryDirectory() as folder:
         for camera in ("top", "oblique", "follow"):
@@ -88,13 +88,13 @@ def speed(rollout: Rollout) -> None:
 
 
 def memory(path: Path) -> None:
-    """Peak memory of this process and its encoder, film by film in a process of its own."""
+    """Print the peak memory of rendering and encoding a short and a long film, each in its own process."""
     for camera in ("oblique", "follow"):
         peaks = []
         for seconds in (10, 300):
             code = f"from benchmarks.film import peak; peak({str(path)!r}, {camera!r}, {seconds})"
-            said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-            peaks.append(float(said.stdout))
+            done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+            peaks.append(float(done.stdout))
         print(
             f"{camera:8} 640x480   10 s: {peaks[0]:.0f} MB   5 min: {peaks[1]:.0f} MB   difference {peaks[1] - peaks[0]:.0f} MB"
         )
@@ -102,7 +102,7 @@ def memory(path: Path) -> None:
 
 def peak(path: str, camera: str, seconds: float) -> None:
     log = cut(Rollout.load(path), seconds)
-    fps = 30 if camera == "oblique" else 2  # a moving camera's frames are the same few at a time at any rate
+    fps = 30 if camera == "oblique" else 2  # a moving camera holds the same number of frames at any rate
     with tempfile.TemporaryDirectory() as folder:
         film(log, Path(folder) / "a.mp4", camera=camera, size=(640, 480), fps=fps, jobs=1)
     own, child = (resource.getrusage(who).ru_maxrss / 1024 for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
@@ -110,12 +110,12 @@ def peak(path: str, camera: str, seconds: float) -> None:
 
 
 def main() -> None:
-    reader = argparse.ArgumentParser(description=__doc__)
-    reader.add_argument("--memory", action="store_true")
-    wanted = reader.parse_args()
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--memory", action="store_true", help="measure peak memory instead of the rate")
+    options = parser.parse_args()
     log = run(Scenario.of("forest")).rollout
     assert log is not None
-    if not wanted.memory:
+    if not options.memory:
         speed(log)
         return
     with tempfile.TemporaryDirectory() as folder:

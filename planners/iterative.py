@@ -31,7 +31,7 @@ class Iteration(NamedTuple):
     arrived: int
     work: int  # spent in this iteration
     waypoints: Floats | None = None  # as in PlanResult
-    landscape: Floats | None = None  # as in PlanResult
+    field: Floats | None = None  # as in PlanResult
 
 
 class Progress(NamedTuple):
@@ -139,7 +139,7 @@ class IterativePlanner(GridPlanner):
             iteration_mean=np.array([state.iteration_mean for state in done], dtype=np.float64),
             arrived=np.array([state.arrived for state in done], dtype=np.int64),
         )
-        landscape = None if last is None else last.landscape
+        field = None if last is None else last.field
         if last is None or not len(last.cells):
             return PlanResult(
                 status=PlanStatus.STOPPED,
@@ -147,7 +147,7 @@ class IterativePlanner(GridPlanner):
                 work=work,
                 work_unit=self.work_unit,
                 history=history,
-                landscape=landscape,
+                field=field,
             )
         return PlanResult(
             status=PlanStatus.SOLVED,
@@ -158,7 +158,7 @@ class IterativePlanner(GridPlanner):
             work=work,
             work_unit=self.work_unit,
             history=history,
-            landscape=landscape,
+            field=field,
         )
 
 

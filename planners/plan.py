@@ -142,8 +142,8 @@ class PlanResult:
     work: int = 0  # cells expanded, ant steps taken, chromosomes rated
     work_unit: str = "cells expanded"
     history: History = field(default_factory=History)
-    landscape: Floats | None = None  # (R, C) pheromone or potential at the end, for plots
-    options: Mapping[str, Any] = field(default_factory=dict)  # the planner's parameters
+    field: Floats | None = None  # (R, C) pheromone or potential at the end, for plots
+    options: Mapping[str, Any] = dataclasses.field(default_factory=dict)  # the planner's parameters
     wall_s: float = 0.0  # planning time [s]
 
     @property

@@ -12,8 +12,8 @@ from .pipeline import Run as Run
 from .pipeline import Scenario as Scenario
 from .pipeline import plan as plan
 from .pipeline import run as run
-from .view.figures.plots import overview as overview
-from .view.figures.plots import plan_figure as plan_figure
+from .view.figures.plan_figures import plan_figure as plan_figure
+from .view.figures.run_figures import overview as overview
 from .view.film.video import FilmInfo as FilmInfo
 from .view.film.video import film as film
 from .view.film.video import still as still

@@ -60,7 +60,7 @@ class MaxMinDStar(GridPlanner):
             reason="; ".join(filter(None, (*notes, note))),
             work=work,
             work_unit=unit,
-            landscape=_shown(pheromone).reshape(ground.shape),
+            field=_shown(pheromone).reshape(ground.shape),
         )
 
     def spread(self, query: Query) -> tuple[ColonyGraph, Floats, int, list[str]]:

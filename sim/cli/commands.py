@@ -165,7 +165,7 @@ def plan(
         grid, answer = make_plan(scenario)
     files = {}
     if out is not None:
-        from antdrive.sim.view.figures.figures import plan_figures
+        from antdrive.sim.view.figures.plan_figures import plan_figures
 
         made = plan_figures(scenario.task, grid, answer, scenario.robot, out, name=planner, suffixes=_suffixes(vector))
         files = {name: str(path) for name, path in made.items()}
@@ -265,7 +265,7 @@ def compare(
         files[name] = str(folder / name)
     logs = [result.rollout for result in results.values() if result.rollout is not None]
     if len(logs) > 1 and figures:
-        from antdrive.sim.view.figures.figures import comparison_figure
+        from antdrive.sim.view.figures.run_figures import comparison_figure
 
         named = {name: result.rollout for name, result in results.items() if result.rollout is not None}
         files["figure"] = str(comparison_figure(named, folder / "comparison.png"))
@@ -517,7 +517,7 @@ def show_world(
     if out is not None:
         import numpy as np
 
-        from antdrive.sim.view.figures.plots import plan_figure
+        from antdrive.sim.view.figures.plan_figures import plan_figure
 
         plan_figure(task, grid, load_planner("astar").plan(query, np.random.default_rng(0)), spec, out)
     if json:
@@ -890,8 +890,8 @@ OWN_FILES = ("result.json", "rollout.npz", *(name + suffix for name in FIGURES f
 
 
 def _write(result: Run, folder: Path, *, vector: bool = False, figures: bool = True) -> dict[str, str]:
-    from antdrive.sim.view.figures.figures import certificate_figure, plan_figures
-    from antdrive.sim.view.figures.plots import overview, plan_figure
+    from antdrive.sim.view.figures.plan_figures import plan_figure, plan_figures
+    from antdrive.sim.view.figures.run_figures import certificate_figure, overview
 
     s = result.scenario
     files = {"result": str(folder / "result.json")}
@@ -975,7 +975,7 @@ def _numbers_of(result: Run) -> tuple[str, ...]:
 
 
 def _check_film(path: Path) -> None:
-    from antdrive.sim.view.film.video import ENCODERS
+    from antdrive.sim.view.film.encoder import ENCODERS
 
     if path.suffix.lower() not in ENCODERS:
         raise InputError(f"--video {path}: films are written as {', '.join(ENCODERS)}")

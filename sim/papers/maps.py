@@ -1,4 +1,4 @@
-"""The papers' maps. Those known as pictures only are recreated: random ones of the same size and kind, and said to be so."""
+"""The papers' maps. Where a paper only shows a picture, a random map of the same size and kind takes its place."""
 
 from __future__ import annotations
 
@@ -15,38 +15,41 @@ Picture = npt.NDArray[np.bool_]
 
 #: The fourteen obstacles of han2007's ACO listing, radius 1, on points (1, 1) to (20, 20).
 HAN_ANTS = (
-    (4, 6), (14, 12), (13, 11), (8, 10), (10, 10), (14, 10), (14, 4), (8, 14), (13, 14), (4, 10), (16, 14), (10, 16),
-    (17, 10), (19, 18),
-)  # fmt: skip
-#: The six of its GA listing, radius 1, on points (0, 0) to (20, 20).
+    *((4, 6), (14, 12), (13, 11), (8, 10), (10, 10), (14, 10), (14, 4)),
+    *((8, 14), (13, 14), (4, 10), (16, 14), (10, 16), (17, 10), (19, 18)),
+)
+#: The six obstacles of its GA listing, radius 1, on points (0, 0) to (20, 20).
 HAN_GENES = ((3, 3), (10, 10), (14, 10), (14, 4), (8, 14), (6, 18))
 
 
 def optimum(query: Query) -> float:
-    """The length of the shortest path on the same moves, inf where there is none."""
+    """The length of the shortest path with the same moves; inf if there is none."""
     return PLANNERS["astar"].plan(query, np.random.default_rng(0)).cost
 
 
 def han_ants() -> Query:
-    """The thesis' map for ants in its own units, for a point robot."""
+    """han2007's map for ants, in the thesis' units, for a point robot."""
     discs = tuple(Disc(float(x), float(y), 1.0) for x, y in HAN_ANTS)
     return Query(rasterise(World("han2007-aco", (0.5, 0.5, 20.5, 20.5), discs), 1.0), (0, 0), (19, 19))
 
 
 def han_genes(*discs: tuple[float, float, float]) -> Query:
-    """The thesis' map for the genetic algorithm, with the listing's six obstacles or others (x, y, radius)."""
+    """han2007's map for the genetic algorithm, with the listing's obstacles or with `discs` (x, y, radius)."""
     found = discs or tuple((float(x), float(y), 1.0) for x, y in HAN_GENES)
     world = World("han2007-ga", (-0.5, -0.5, 20.5, 20.5), tuple(Disc(*disc) for disc in found))
     return Query(rasterise(world, 1.0), (0, 0), (20, 20))
 
 
 def scattered(size: int, blocked: float, seed: int) -> Query:
-    """Recreated: each cell of size x size blocked with one probability, corner to corner."""
+    """A recreated map of size x size cells, each blocked with probability `blocked`, from corner to corner."""
     return _crossable(lambda rng: rng.random((size, size)) >= blocked, seed)
 
 
 def blocks(rows: int, cols: int, count: int, largest: int, seed: int) -> Query:
-    """Recreated: `count` upright rectangles of 1 to `largest` cells a side, two cells clear of both corners."""
+    """A recreated map with `count` upright rectangles, each side 1 to `largest` cells, from corner to corner.
+
+    The 3 x 3 cells at both corners are free.
+    """
 
     def draw(rng: np.random.Generator) -> Picture:
         free = np.ones((rows, cols), dtype=np.bool_)
@@ -61,7 +64,7 @@ def blocks(rows: int, cols: int, count: int, largest: int, seed: int) -> Query:
 
 
 def environments() -> dict[str, Query]:
-    """Recreated: hasan's six environments of 50 x 50 cells, as the text tells them, with its starts and goals."""
+    """hasan's six environments of 50 x 50 cells, recreated from the paper's text, with its starts and goals."""
     row, col = np.mgrid[:50, :50]
 
     def arc(r: float, c: float, radius: float, opening: float, wide: float) -> Picture:
@@ -99,7 +102,7 @@ def environments() -> dict[str, Query]:
 
 
 def _crossable(draw: Callable[[np.random.Generator], Picture], seed: int) -> Query:
-    """Corner to corner over the first picture drawn that can be crossed."""
+    """From corner to corner over the first map that `draw` gives on which there is a path."""
     rng = np.random.default_rng(seed)
     while True:
         free = draw(rng)

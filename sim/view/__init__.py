@@ -1,1 +1,1 @@
-"""Figures, films, reports and the live window."""
+"""What people see of a run: figures, films, reports, and a window that replays it."""

@@ -1,8 +1,9 @@
-"""What films and figures show of a run, taken from its log: the world, the marks and the robot's shape."""
+"""The scene that films and figures draw: world, start, goal and the robot's shape, read from a run's log."""
 
 from __future__ import annotations
 
 import dataclasses
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,48 +18,73 @@ from antdrive.worlds.world import Task
 
 Floats = npt.NDArray[np.float64]
 
-JUMP = 0.05  # a mover that moves less from row to row has not jumped [m]
-PLANNED_TRACK = 30.0  # how much of the movers' ways a plan's figure shows [s]
+MIN_JUMP = 0.05  # the least distance between two rows that counts as a mover's jump [m]
+PLANNED_TRACK = 30.0  # a plan's figure shows the movers' tracks for this long [s]
 
 
 @dataclass(frozen=True)
 class Body:
-    """The robot's shape, as far as it can be seen."""
+    """The robot's visible shape, and its top speed for the scale of colours.
+
+    Attributes:
+        name: the robot's name
+        footprint: its outline on the ground
+        height: [m]
+        wheel_radius: [m]
+        track: distance between the wheels [m]
+        max_speed: [m/s]
+    """
 
     name: str
     footprint: Footprint
-    height: float  # [m]
-    wheel_radius: float  # [m]
-    track: float  # [m]
-    max_speed: float  # [m/s]
+    height: float
+    wheel_radius: float
+    track: float
+    max_speed: float
 
     @classmethod
     def of(cls, robot: RobotSpec) -> Body:
-        """The body of a robot."""
+        """The shape of a robot that is not yet in a log."""
         return cls(robot.name, robot.footprint, robot.height, robot.wheel_radius, robot.track, robot.max_speed)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Scene:
-    """Everything that stands still, and the robot's shape."""
+    """Everything that stands still during a run, the robot's shape, and the movers' tracks.
+
+    Attributes:
+        name: the world's name
+        bounds: xmin, ymin, xmax, ymax [m]
+        obstacles: x, y, radius and height of each cylinder (N, 4) [m]
+        unseen: whether each obstacle was placed after planning (N,)
+        start: x, y [m] and heading [rad]
+        goal: x, y [m]
+        goal_tolerance: how far from the goal the robot may stop [m]
+        inflate: how far the planner kept its path from obstacles: the robot's radius plus the margin [m]
+        margin: the part of `inflate` beyond the robot's radius [m]
+        robot: the robot's shape
+        mover_radii: one per mover [m]
+        movers: one position per mover [m]: at the run's end, or at t = 0 for a plan that was not driven
+        tracks: polylines (N, 2) that movers follow [m]; a mover that jumps has several
+    """
 
     name: str
-    bounds: Bounds  # [m]
-    obstacles: Floats  # (N, 4) x, y, radius, height [m]
-    unseen: npt.NDArray[np.bool_]  # (N,) placed after planning
+    bounds: Bounds
+    obstacles: Floats
+    unseen: npt.NDArray[np.bool_]
     start: Pose
     goal: Point
-    goal_tolerance: float  # [m]
-    inflate: float  # robot radius + margin, as planned with [m]
-    margin: float  # [m]
+    goal_tolerance: float
+    inflate: float
+    margin: float
     robot: Body
-    mover_radii: tuple[float, ...] = ()  # [m]
-    movers: tuple[Point, ...] = ()  # where they are when the run ends, or at first before it began [m]
-    tracks: tuple[Floats, ...] = ()  # where each mover goes, (N, 2) a piece [m]; jumps part pieces
+    mover_radii: tuple[float, ...] = ()
+    movers: tuple[Point, ...] = ()
+    tracks: tuple[Floats, ...] = ()
 
     @classmethod
     def of(cls, rollout: Rollout) -> Scene:
-        """The scene of a run."""
+        """The scene of a logged run."""
         record, task, world = rollout.record, rollout.record.task, rollout.record.world
         discs = [(disc.x, disc.y, disc.radius, disc.height) for disc in world.obstacles]
         return cls(
@@ -74,16 +100,21 @@ class Scene:
             robot=Body.of(record.robot),
             mover_radii=tuple(mover.radius for mover in world.movers),
             movers=tuple((float(x), float(y)) for x, y in rollout.movers[-1]) if len(rollout.movers) else (),
-            tracks=pieces(rollout.movers),
+            tracks=mover_tracks(rollout.movers),
         )
 
     @classmethod
     def planned(cls, task: Task, robot: RobotSpec, inflate: float) -> Scene:
-        """The scene of a plan that was not driven."""
+        """The scene of a plan that was not driven.
+
+        Args:
+            inflate: how far the planner kept its path from obstacles [m]
+        """
         discs = [(disc.x, disc.y, disc.radius, disc.height) for disc in task.world.obstacles]
-        shown = [mover for mover in task.world.movers if not isinstance(mover, Wandering)]  # their way hangs on a seed
-        traffic = Trajectories.of(dataclasses.replace(task.world, movers=tuple(shown)), task.start[:2])
-        ways = traffic.positions(np.arange(0.0, PLANNED_TRACK, 0.05))
+        # The motion of wandering movers depends on a run's seed.
+        shown = [mover for mover in task.world.movers if not isinstance(mover, Wandering)]
+        trajectories = Trajectories.of(dataclasses.replace(task.world, movers=tuple(shown)), task.start[:2])
+        positions = trajectories.positions(np.arange(0.0, PLANNED_TRACK, 0.05))
         return cls(
             name=task.world.name,
             bounds=task.world.bounds,
@@ -95,19 +126,19 @@ class Scene:
             inflate=inflate,
             margin=max(0.0, inflate - robot.radius),
             robot=Body.of(robot),
-            mover_radii=tuple(traffic.radii.tolist()),
-            movers=tuple((x, y) for x, y in ways[0].tolist()),
-            tracks=pieces(ways),
+            mover_radii=tuple(trajectories.radii.tolist()),
+            movers=tuple((x, y) for x, y in positions[0].tolist()),
+            tracks=mover_tracks(positions),
         )
 
-    def region(self, lines: Floats) -> tuple[Floats, Floats]:
-        """The corners (2,), (2,) of the part of the world that the task and lines of points (N, 2) take up.
+    def region(self, points: Floats) -> tuple[Floats, Floats]:
+        """The corners (2,), (2,) [m] of the part of the world to show: around start, goal and points (N, 2).
 
-        It is the whole world unless that would leave most of a picture unused.
+        If this part is more than half of the world, the whole world is shown.
         """
         room = max(0.8, 3 * self.robot.footprint.radius, 1.5 * self.inflate)
         ends = np.array([self.start[:2], self.goal])
-        points = np.vstack([ends, lines.reshape(-1, 2)])
+        points = np.vstack([ends, points.reshape(-1, 2)])
         world_low, world_high = np.array(self.bounds[:2]), np.array(self.bounds[2:])
         low = np.maximum(points.min(axis=0) - room, world_low)
         high = np.minimum(points.max(axis=0) + room, world_high)
@@ -116,19 +147,48 @@ class Scene:
         return low, high
 
 
-def jumping(movers: Floats) -> npt.NDArray[np.bool_]:
-    """Whether movers at places (T, M, 2) jump from one row to the next, (T - 1, M): far, and not as a part of motion."""
+def contact_point(scene: Scene, pose: npt.ArrayLike, index: int, movers: Floats) -> tuple[float, float]:
+    """The point [m] on the surface of an obstacle, a mover or a wall that is nearest to the robot.
+
+    Args:
+        pose: the robot's x, y [m] and heading [rad]
+        index: as in a log's contacts: obstacles first, then movers, then the walls left, right, bottom, top
+        movers: the movers' positions (M, 2) [m]
+    """
+    x, y, yaw = (float(value) for value in np.asarray(pose))
+    foot = scene.robot.footprint
+    discs = np.vstack([scene.obstacles[:, :3], np.column_stack([movers, scene.mover_radii])])
+    if index >= len(discs):
+        x0, y0, x1, y1 = scene.bounds
+        return ((x0, y), (x1, y), (x, y0), (x, y1))[(index - len(discs)) % 4]
+    ox, oy, radius = (float(value) for value in discs[index])
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    ahead = min(max((ox - x) * cosine + (oy - y) * sine, -foot.half_length), foot.half_length)
+    aside = min(max((oy - y) * cosine - (ox - x) * sine, -foot.half_width), foot.half_width)
+    nx, ny = x + ahead * cosine - aside * sine, y + ahead * sine + aside * cosine
+    gap = math.hypot(nx - ox, ny - oy)
+    if gap < 1e-9:
+        return ox, oy
+    return ox + radius * (nx - ox) / gap, oy + radius * (ny - oy) / gap
+
+
+def jumps(movers: Floats) -> npt.NDArray[np.bool_]:
+    """Whether movers at positions (T, M, 2) jump between consecutive rows, shape (T - 1, M).
+
+    A jump is a step longer than `MIN_JUMP` that is also more than three times the steps before and after it: a fast
+    mover makes long steps, too, but all alike.
+    """
     step = np.hypot(*np.moveaxis(np.diff(movers, axis=0), -1, 0))
     around = np.zeros_like(step)
     if len(step) > 1:
         around[1:] = step[:-1]
         around[:-1] = np.maximum(around[:-1], step[1:])
-    return np.asarray((step > JUMP) & (step > 3 * around))
+    return np.asarray((step > MIN_JUMP) & (step > 3 * around))
 
 
-def pieces(movers: Floats) -> tuple[Floats, ...]:
-    """The ways (N, 2) of movers at places (T, M, 2), cut where they jump."""
-    cuts = jumping(movers)
+def mover_tracks(movers: Floats) -> tuple[Floats, ...]:
+    """The polylines (N, 2) of movers at positions (T, M, 2), cut where they jump."""
+    cuts = jumps(movers)
     return tuple(
         piece
         for m in range(movers.shape[1])

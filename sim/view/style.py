@@ -1,4 +1,4 @@
-"""The colours that films and figures share: light ground, slate obstacles, one bright robot; safe for the colour-blind."""
+"""The colours of films, figures and reports, and each planner's style; chosen for readers of any colour vision."""
 
 from __future__ import annotations
 
@@ -10,34 +10,53 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-Colour: TypeAlias = tuple[int, int, int]  # red, green, blue, 0..255
+from antdrive.sim.log.outcome import Outcome
 
+Colour: TypeAlias = tuple[int, int, int]  # red, green, blue, 0 to 255
+
+# The map: light ground, slate obstacles, one bright robot.
 PAPER: Colour = (250, 250, 252)
 GROUND: Colour = (236, 239, 243)
 GRID: Colour = (203, 210, 220)
 KERB: Colour = (196, 203, 213)
 OBSTACLE: Colour = (121, 136, 160)
-UNSEEN: Colour = (196, 74, 138)  # obstacles that the planner did not know
+UNSEEN: Colour = (196, 74, 138)  # obstacles placed after planning
 MOVER: Colour = (224, 168, 40)
-ZONE: Colour = (96, 128, 186)  # the robot's inflation around an obstacle
+ZONE: Colour = (96, 128, 186)  # inflation around obstacles
 ROUTE: Colour = (24, 34, 66)
-SHELL: Colour = (255, 122, 14)  # of the robot
-TURRET: Colour = (226, 84, 0)
+SHELL: Colour = (255, 122, 14)  # the robot's deck
+TURRET: Colour = (226, 84, 0)  # the robot's upper part
 WHITE: Colour = (255, 255, 255)
 START: Colour = (52, 92, 190)
 GOAL: Colour = (0, 138, 92)
 CONTACT: Colour = (214, 34, 44)
 
+# Text and the band below a film's picture.
 INK: Colour = (28, 33, 44)
 MUTED: Colour = (104, 114, 130)
 BAND: Colour = (255, 255, 255)
 
+# What a label means.
 GOOD: Colour = (0, 128, 84)
 BAD: Colour = (204, 32, 42)
 DOUBT: Colour = (176, 106, 0)
 CALM: Colour = (70, 82, 104)
 
-#: Speed from 0 to the robot's top: viridis without its palest end, which a light ground would swallow.
+#: The label of each outcome on pictures, and its colour.
+VERDICTS: Mapping[Outcome, tuple[str, Colour]] = MappingProxyType(
+    {
+        Outcome.SUCCEEDED: ("✓ SUCCEEDED", GOOD),
+        Outcome.COLLIDED: ("✕ COLLIDED", BAD),
+        Outcome.HIT_WHILE_STANDING: ("✕ HIT WHILE STANDING", DOUBT),
+        Outcome.HIT_BY_TELEPORT: ("✕ HIT BY TELEPORT", DOUBT),
+        Outcome.TIMED_OUT: ("TIMED OUT", DOUBT),
+        Outcome.STUCK: ("STUCK", DOUBT),
+        Outcome.NO_PATH: ("NO PATH", DOUBT),
+        Outcome.STOPPED: ("STOPPED", DOUBT),
+    }
+)
+
+#: Colours from standing to the robot's top speed: viridis without the palest end, which a light ground would hide.
 SPEED_STOPS: tuple[Colour, ...] = (
     (72, 26, 108),
     (68, 58, 131),
@@ -51,42 +70,57 @@ SPEED_STOPS: tuple[Colour, ...] = (
 )
 
 
-#: A planner's field, such as pheromone, from none to much.
-FIELD_STOPS: tuple[Colour, ...] = ((244, 246, 249), (213, 228, 243), (143, 188, 224), (63, 131, 191), (18, 63, 122))
+#: Colours of a planner's field, such as pheromone, from its low to its high values.
+FIELD_STOPS: tuple[Colour, ...] = (
+    (244, 246, 249),
+    (213, 228, 243),
+    (143, 188, 224),
+    (63, 131, 191),
+    (18, 63, 122),
+)
 
-#: Okabe & Ito's colours, told apart by the colour-blind, without the yellow that a white page swallows.
-DISTINCT: tuple[Colour, ...] = (
-    (0, 114, 178), (213, 94, 0), (0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180, 233), (27, 35, 51),
-)  # fmt: skip
+#: One colour per planner. The first seven are Okabe and Ito's, without the yellow that white would hide; each other one
+#: is far (CIELAB) from those before it, for full colour vision and for deuteranopia.
+PLANNER_COLOURS: tuple[Colour, ...] = (
+    *(
+        (0, 114, 178),
+        (213, 94, 0),
+        (0, 158, 115),
+        (204, 121, 167),
+        (230, 159, 0),
+        (86, 180, 233),
+        (27, 35, 51),
+    ),
+    *((17, 68, 204), (85, 68, 0), (221, 187, 136), (119, 0, 51), (170, 0, 136), (221, 51, 68), (68, 34, 119)),
+    *((170, 204, 85), (153, 204, 170), (204, 51, 255), (119, 85, 102)),
+)
 
-#: The family decides: each planner has its colour and dash everywhere.
+_DASHES = ("solid", "dashed", "dotted")
+_PLANNERS = (
+    *("aco-han", "ants", "mmas", "pfaco", "iaco", "maco", "as"),
+    *("ga-han", "hybrid", "tangent", "aco-han-elite", "mmas-dstar", "astar", "dijkstra"),
+    *("dstar-lite", "dstar", "apf", "sipp"),
+)
+
+#: The colour and line style of each planner, the same in every picture. No two share a colour.
 PLANNER_STYLES: Mapping[str, tuple[Colour, str]] = MappingProxyType(
-    {
-        name: (DISTINCT[k % len(DISTINCT)], ("solid", "dashed", "dotted")[k // len(DISTINCT)])
-        for k, name in enumerate(
-            (
-                *("aco-han", "ants", "mmas", "pfaco", "iaco", "maco", "as"),
-                *("ga-han", "hybrid", "tangent", "aco-han-elite", "mmas-dstar", "astar", "dijkstra"),
-                *("dstar-lite", "dstar", "apf"),
-            )
-        )
-    }
+    {name: (PLANNER_COLOURS[k], _DASHES[k // 7]) for k, name in enumerate(_PLANNERS)}
 )
 
 
 def planner_style(name: str) -> tuple[Colour, str]:
-    """A planner's colour and line style, the same in every picture; others' planners get one by their name."""
-    k = zlib.crc32(name.encode())
-    return PLANNER_STYLES.get(name, (DISTINCT[k % len(DISTINCT)], "dashdot"))
+    """A planner's colour and line style; a plugin's planner gets one that depends on its name alone."""
+    k = zlib.crc32(name.encode()) % len(PLANNER_COLOURS)
+    return PLANNER_STYLES.get(name, (PLANNER_COLOURS[k], "dashdot"))
 
 
 def field_colours(level: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """Colours (N, 3), 0..255, of a field's levels (N,), 0 to 1."""
+    """Colours (N, 3), 0 to 255, for the levels (N,), 0 to 1, of a planner's field."""
     return _along(FIELD_STOPS, level)
 
 
 def speed_colours(fraction: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """Colours (N, 3), 0..255, of speeds given as fractions (N,) of the robot's top speed."""
+    """Colours (N, 3), 0 to 255, for speeds given as fractions (N,) of the robot's top speed."""
     return _along(SPEED_STOPS, fraction)
 
 

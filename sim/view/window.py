@@ -1,4 +1,4 @@
-"""A window on a run, for people with a screen: PyBullet's own viewer replays the log at the speed of life."""
+"""Replay a run in real time in PyBullet's own viewer, for machines with a screen."""
 
 from __future__ import annotations
 
@@ -10,26 +10,30 @@ import numpy as np
 
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.physics.engine import bullet
-from antdrive.sim.view.film.model import robot_parts
+from antdrive.sim.view.film.compositor import drawn_height, merged_by_colour, part_pose, still_meshes
+from antdrive.sim.view.film.meshes import robot_parts
 from antdrive.sim.view.film.replay import Replay
-from antdrive.sim.view.film.stage import drawn_height, grouped, part_pose, still_pieces
-from antdrive.sim.view.film.tiny import add_mesh
+from antdrive.sim.view.film.tiny_renderer import add_mesh
 from antdrive.sim.view.scene import Scene
 from antdrive.worlds.errors import InputError
 
 
 def check_display() -> None:
-    """See, before the work, whether a window can open.
+    """Check, before any work, that a window can open.
 
     Raises:
         InputError: there is no display.
     """
     if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
-        raise InputError("--gui: no display (DISPLAY is not set); films need none: --video FILE.mp4")
+        raise InputError("--gui: no display (DISPLAY is not set); --video FILE.mp4 works without one")
 
 
 def show(rollout: Rollout, *, hold: float = 3.0) -> None:
-    """Replay a run in a window, then hold the last picture for some seconds; closing the window ends it.
+    """Replay a run in a window until it ends or the window is closed.
+
+    Args:
+        rollout: the run's log
+        hold: how long the last picture stays [s]
 
     Raises:
         InputError: there is no display, or the viewer did not open.
@@ -42,7 +46,8 @@ def show(rollout: Rollout, *, hold: float = 3.0) -> None:
     try:
         p.configureDebugVisualizer(p.COV_ENABLE_GUI, 0, physicsClientId=number)
         scene, replay = Scene.of(rollout), Replay(rollout)
-        for mesh, colour in grouped(still_pieces(scene, np.minimum(scene.obstacles[:, 3], drawn_height(scene)))):
+        tall = np.minimum(scene.obstacles[:, 3], drawn_height(scene))
+        for mesh, colour in merged_by_colour(still_meshes(scene, tall)):
             add_mesh(number, mesh, colour)
         robot = [(part, add_mesh(number, part.mesh, part.colour)) for part in robot_parts(scene.robot)]
         for a, b in zip(rollout.route[:-1], rollout.route[1:], strict=True):

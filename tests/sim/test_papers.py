@@ -11,13 +11,13 @@ from antdrive.worlds import InputError
 
 
 @pytest.mark.parametrize("paper", PAPERS)
-def test_every_trial_can_be_solved_and_says_whether_its_map_is_the_papers(paper):
-    for trial in PAPERS[paper]():
-        query = trial.query(0)
-        assert trial.paper == paper
+def test_every_experiment_has_a_path_and_states_whether_its_map_is_recreated(paper):
+    for experiment in PAPERS[paper]():
+        query = experiment.query(0)
+        assert experiment.paper == paper
         assert math.isfinite(maps.optimum(query))
-        assert trial.printed > 0
-        assert trial.recreated == (paper != "han2007")
+        assert experiment.printed > 0
+        assert experiment.recreated == (paper != "han2007")
 
 
 def test_known_maps_are_those_of_the_thesis():
@@ -27,16 +27,16 @@ def test_known_maps_are_those_of_the_thesis():
     assert (free == (np.hypot(rows - 10, cols - 10) > 5 + 1e-9)).all()  # touching is not free
 
 
-def test_a_recreated_map_is_the_same_for_a_seed_and_another_for_another():
+def test_a_recreated_map_depends_on_the_seed_alone():
     one, same, other = (maps.scattered(12, 0.15, seed).grid.free for seed in (1, 1, 2))
     assert (one == same).all()
     assert (one != other).any()
 
 
-def test_a_paper_is_measured_and_written_down(tmp_path, monkeypatch):
+def test_a_papers_experiments_are_run_and_written_to_files(tmp_path, monkeypatch):
     monkeypatch.setattr(reproduce, "PC", (0.25,))
     monkeypatch.setattr(reproduce, "PM", (0.1, 0.2))
-    few = [trial for trial in PAPERS["han2007"]() if trial.options.get("ants", 0) < 500]
+    few = [experiment for experiment in PAPERS["han2007"]() if experiment.options.get("ants", 0) < 500]
     monkeypatch.setattr(reproduce, "PAPERS", {"han2007": lambda: few})
     seen = []
     rows, files = measure_again(["han2007"], tmp_path, seeds=2, suffixes=(".png",), progress=seen.append)

@@ -15,7 +15,7 @@ from antdrive.robots import PurePursuit, RobotSpec
 from antdrive.sim import Engine, Outcome, Run, Scenario, measure, run
 from antdrive.sim.driving.drive import drive
 from antdrive.sim.log.record import SmoothingRecord
-from antdrive.sim.view.figures.plots import plan_figure
+from antdrive.sim.view.figures.plan_figures import plan_figure
 from antdrive.worlds import Disc, InputError, Route, Task, World, list_worlds, load_task
 
 

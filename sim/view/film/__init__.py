@@ -1,1 +1,1 @@
-"""Films."""
+"""Films and stills of runs, rendered from their logs."""

@@ -1,7 +1,7 @@
-"""Compiled painting on the ground plane and blending of rendered crops: arrays in, arrays out, nothing validated.
+"""Compiled painting on the ground plane and blending of rendered crops: arrays in, arrays out, no validation.
 
-`inv` (3, 3) takes pixels to the ground, `fwd` (3, 3) the ground to pixels. Edges are anti-aliased by the exact distance to
-them, divided by what one pixel covers across the edge.
+`inv` (3, 3) takes pixels to the ground, `fwd` (3, 3) the ground to pixels. Edges are anti-aliased by the exact
+distance to them, divided by the extent of one pixel across the edge.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def pixel_box(
 ) -> tuple[int, int, int, int]:
     """The pixels x0, y0, x1, y1 that a ground rectangle may cover; empty when it lies behind the camera."""
     left, top, right, bottom = 1e30, 1e30, -1e30, -1e30
-    # What is less far ahead than any ground in the picture is cut off: near the camera's own plane, boxes would be huge.
+    # Edges are cut where they are nearer than any ground in the picture: close to the camera, boxes would be huge.
     left_edge = max(inv[2, 2], inv[2, 1] * height + inv[2, 2])
     near = 0.5 / max(left_edge, left_edge + inv[2, 0] * width)
     for i in range(4):
@@ -73,7 +73,7 @@ def _at(inv: Array, px: float, py: float) -> tuple[float, float, float]:
 
 @inline
 def _span(inv: Array, x: float, y: float, w: float, nx: float, ny: float) -> float:
-    """How far one pixel reaches on the ground along the unit vector n [m]."""
+    """The extent of one pixel on the ground along the unit vector n [m]."""
     across = nx * (inv[0, 0] - x * inv[2, 0]) + ny * (inv[1, 0] - y * inv[2, 0])
     down = nx * (inv[0, 1] - x * inv[2, 1]) + ny * (inv[1, 1] - y * inv[2, 1])
     return math.sqrt(across * across + down * down) / abs(w) + 1e-12
@@ -81,11 +81,18 @@ def _span(inv: Array, x: float, y: float, w: float, nx: float, ny: float) -> flo
 
 @kernel
 def lay_floor(
-    rgb: Array, ground: Array, inside: Array, inv: Array, bounds: Array, step: float, weight: float, colours: Array
+    rgb: Array,
+    ground: Array,
+    inside: Array,
+    inv: Array,
+    bounds: Array,
+    step: float,
+    weight: float,
+    colours: Array,
 ) -> None:
-    """Paint the floor (H, W, 3) where `ground`: colours are inside, outside and grid lines, `weight` pixels wide.
+    """Paint the floor (H, W, 3) where `ground` is true, and set `inside` to the ground within the bounds.
 
-    `inside` becomes the ground within the bounds.
+    `colours` (3, 3) are those inside, outside and of grid lines, which are `weight` pixels wide.
     """
     height, width = rgb.shape[0], rgb.shape[1]
     for row in range(height):
@@ -110,9 +117,9 @@ def lay_floor(
 
 @kernel
 def cast_shadows(shade: Array, fwd: Array, inv: Array, discs: Array, sun_x: float, sun_y: float, depth: float) -> None:
-    """Darken `shade` (H, W), 1 = lit, where cylinders (N, 4) x, y, radius, height keep the sun and the sky away.
+    """Darken `shade` (H, W), 1 = fully lit, where cylinders (N, 4) x, y, radius, height block the sun or the sky.
 
-    A cylinder's shadow is its disc swept along (sun_x, sun_y) times its height; the edge softens with that distance.
+    A cylinder's shadow is its disc swept along (sun_x, sun_y) times its height; the edge softens with the distance.
     """
     height, width = shade.shape
     for i in range(discs.shape[0]):
@@ -152,7 +159,14 @@ def cover_capsules(cover: Array, fwd: Array, inv: Array, rows: Array) -> None:
     for i in range(rows.shape[0]):
         ax, ay, bx, by, half = rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3], rows[i, 4]
         left, top, right, bottom = pixel_box(
-            fwd, inv, min(ax, bx) - half, min(ay, by) - half, max(ax, bx) + half, max(ay, by) + half, width, height
+            fwd,
+            inv,
+            min(ax, bx) - half,
+            min(ay, by) - half,
+            max(ax, bx) + half,
+            max(ay, by) + half,
+            width,
+            height,
         )
         for row in range(top, bottom):
             for col in range(left, right):
@@ -163,7 +177,7 @@ def cover_capsules(cover: Array, fwd: Array, inv: Array, rows: Array) -> None:
 
 @kernel
 def capsule_cover(inv: Array, row: int, col: int, ax: float, ay: float, bx: float, by: float, half: float) -> float:
-    """How much of a pixel a capsule covers."""
+    """The fraction of a pixel that a capsule covers."""
     x, y, w = _at(inv, col + 0.5, row + 0.5)
     dx, dy = bx - ax, by - ay
     length2 = dx * dx + dy * dy
@@ -199,7 +213,7 @@ def cover_rings(cover: Array, fwd: Array, inv: Array, rows: Array) -> None:
 
 @kernel
 def blend_cover(rgb: Array, cover: Array, ground: Array, colour: Array, strength: float) -> None:
-    """Blend a colour into `rgb` (H, W, 3) by coverage, on the ground alone; clear the coverage."""
+    """Blend a colour into `rgb` (H, W, 3) by coverage where `ground` is true; clear the coverage."""
     for row in range(rgb.shape[0]):
         for col in range(rgb.shape[1]):
             value = cover[row, col]
@@ -212,7 +226,7 @@ def blend_cover(rgb: Array, cover: Array, ground: Array, colour: Array, strength
 
 @kernel
 def multiply(rgb: Array, shade: Array) -> None:
-    """Darken `rgb` (H, W, 3) by `shade` (H, W); a shadow outdoors is a little blue."""
+    """Darken `rgb` (H, W, 3) by `shade` (H, W), blue less than red, as outdoor shadows are a little blue."""
     for row in range(rgb.shape[0]):
         for col in range(rgb.shape[1]):
             lit = shade[row, col]
@@ -224,7 +238,7 @@ def multiply(rgb: Array, shade: Array) -> None:
 
 @kernel
 def count_ground(seg: Array, factor: int, visible: Array, ground: Array) -> None:
-    """What part of each pixel, `factor` times as fine in `seg`, no body covers; `ground`: whether any."""
+    """Set `visible` to the fraction of each pixel (`factor` x `factor` of `seg`) without a body, `ground` to > 0."""
     for row in range(visible.shape[0]):
         for col in range(visible.shape[1]):
             seen = 0
@@ -238,14 +252,18 @@ def count_ground(seg: Array, factor: int, visible: Array, ground: Array) -> None
 
 @kernel
 def resolve(rgb: Array, image: Array, seg: Array, factor: int, visible: Array, out: Array) -> None:
-    """The painted ground (H, W, 3) and the bodies rendered `factor` times as fine, as one picture `out` uint8."""
+    """Join the painted ground (H, W, 3) and the bodies, rendered `factor` times as fine, to a picture `out`."""
     count = factor * factor
     for row in range(out.shape[0]):
         for col in range(out.shape[1]):
             share = visible[row, col]
             red, green, blue = 0.0, 0.0, 0.0
             if share > 0.0:
-                red, green, blue = rgb[row, col, 0] * share, rgb[row, col, 1] * share, rgb[row, col, 2] * share
+                red, green, blue = (
+                    rgb[row, col, 0] * share,
+                    rgb[row, col, 1] * share,
+                    rgb[row, col, 2] * share,
+                )
             if share < 1.0:
                 for i in range(factor):
                     for j in range(factor):
@@ -261,14 +279,28 @@ def resolve(rgb: Array, image: Array, seg: Array, factor: int, visible: Array, o
 
 @kernel
 def draw_trail(
-    canvas: Array, base: Array, visible: Array, trail: Array, fwd: Array, inv: Array, rows: Array, colours: Array
+    canvas: Array,
+    base: Array,
+    visible: Array,
+    trail: Array,
+    fwd: Array,
+    inv: Array,
+    rows: Array,
+    colours: Array,
 ) -> None:
-    """Paint capsules (N, 5) in colours (N, 3) into `canvas`; `trail` (H, W, 4) uint8 keeps colour and coverage so far."""
+    """Paint capsules (N, 5) in colours (N, 3) into `canvas`; `trail` (H, W, 4) holds colour and coverage so far."""
     height, width = canvas.shape[0], canvas.shape[1]
     for i in range(rows.shape[0]):
         ax, ay, bx, by, half = rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3], rows[i, 4]
         left, top, right, bottom = pixel_box(
-            fwd, inv, min(ax, bx) - half, min(ay, by) - half, max(ax, bx) + half, max(ay, by) + half, width, height
+            fwd,
+            inv,
+            min(ax, bx) - half,
+            min(ay, by) - half,
+            max(ax, bx) + half,
+            max(ay, by) + half,
+            width,
+            height,
         )
         for row in range(top, bottom):
             for col in range(left, right):
@@ -291,12 +323,19 @@ def draw_trail(
 def blend_capsules(
     frame: Array, visible: Array, fwd: Array, inv: Array, rows: Array, colour: Array, strength: float
 ) -> None:
-    """Blend capsules (N, 5) of one colour into `frame` (H, W, 3), on the ground alone."""
+    """Blend capsules (N, 5) of one colour into the ground of `frame` (H, W, 3)."""
     height, width = visible.shape
     for i in range(rows.shape[0]):
         ax, ay, bx, by, half = rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3], rows[i, 4]
         left, top, right, bottom = pixel_box(
-            fwd, inv, min(ax, bx) - half, min(ay, by) - half, max(ax, bx) + half, max(ay, by) + half, width, height
+            fwd,
+            inv,
+            min(ax, bx) - half,
+            min(ay, by) - half,
+            max(ax, bx) + half,
+            max(ay, by) + half,
+            width,
+            height,
         )
         for row in range(top, bottom):
             for col in range(left, right):
@@ -319,7 +358,7 @@ def shade_body(
     soft: float,
     strength: float,
 ) -> None:
-    """Darken the ground under a rounded rectangle (half length, half width, rounding) swept along `sun` [m]."""
+    """Darken the ground below a rounded rectangle (half length, half width, rounding) swept along `sun` [m]."""
     height, width = visible.shape
     cx, cy, yaw = pose[0], pose[1], pose[2]
     cosine, sine = math.cos(yaw), math.sin(yaw)
@@ -353,11 +392,19 @@ def shade_body(
 
 @kernel
 def put_bodies(
-    frame: Array, image: Array, z: Array, seg: Array, depth: Array, x0: int, y0: int, factor: int, ghost: float
+    frame: Array,
+    image: Array,
+    z: Array,
+    seg: Array,
+    depth: Array,
+    x0: int,
+    y0: int,
+    factor: int,
+    ghost: float,
 ) -> None:
-    """Blend a crop rendered `factor` times as fine into `frame` at x0, y0, where it is nearer than `depth`.
+    """Blend a crop, rendered `factor` times as fine, into `frame` at x0, y0, where its depth `z` is below `depth`.
 
-    What stands behind something shines through with the strength `ghost`.
+    Elsewhere the crop is hidden, and shines through with the strength `ghost`.
     """
     count = factor * factor
     rows, cols = z.shape[0] // factor, z.shape[1] // factor
@@ -386,7 +433,7 @@ def put_bodies(
 
 @kernel
 def put_sprite(frame: Array, sprite: Array, x0: int, y0: int, strength: float) -> None:
-    """Blend an RGBA picture (h, w, 4) into `frame` (H, W, 3) at x0, y0; what falls outside is cut off."""
+    """Blend an RGBA picture (h, w, 4) into `frame` (H, W, 3) at x0, y0; parts outside are cut off."""
     for row in range(max(0, -y0), min(sprite.shape[0], frame.shape[0] - y0)):
         for col in range(max(0, -x0), min(sprite.shape[1], frame.shape[1] - x0)):
             alpha = sprite[row, col, 3] * strength / 255.0
@@ -398,7 +445,7 @@ def put_sprite(frame: Array, sprite: Array, x0: int, y0: int, strength: float) -
 
 @kernel
 def flash(frame: Array, colour: Array, border: float, edge: float, tint: float) -> None:
-    """Colour the border of a picture with strength `edge`, and all of it with `tint`."""
+    """Blend a colour into the border of a picture with strength `edge`, and into the rest with `tint`."""
     height, width = frame.shape[0], frame.shape[1]
     for row in range(height):
         for col in range(width):
@@ -414,7 +461,10 @@ def flash(frame: Array, colour: Array, border: float, edge: float, tint: float) 
 def lay_field(
     frame: Array, visible: Array, inv: Array, levels: Array, x0: float, y0: float, cell: float, tints: Array
 ) -> None:
-    """Tint the ground by a field (R, C), 0 to 1 or NaN, whose cell (0, 0) is centred at x0, y0; `tints` (256, 3)."""
+    """Tint the ground by a field `levels` (R, C), 0 to 1 or NaN, with colours `tints` (256, 3).
+
+    The centre of cell (0, 0) is at x0, y0 [m].
+    """
     for row in range(frame.shape[0]):
         for col in range(frame.shape[1]):
             if visible[row, col] <= 0.0:

@@ -1,4 +1,4 @@
-"""Where a picture is taken from: framing, projection to pixels, and crops of a larger picture."""
+"""Cameras: framing a part of the world, projecting points to pixels, and cropping a picture."""
 
 from __future__ import annotations
 
@@ -13,16 +13,26 @@ Floats = npt.NDArray[np.float64]
 CAMERAS: tuple[str, ...] = ("oblique", "top", "follow")
 
 _TILT = {"oblique": 52.0, "top": 90.0, "follow": 46.0}  # above the horizon [degrees]
-_FOV = {"oblique": 30.0, "top": 6.0, "follow": 34.0}  # vertical [degrees]; TinyRenderer knows no orthographic view
+_FOV = {
+    "oblique": 30.0,
+    "top": 6.0,
+    "follow": 34.0,
+}  # vertical [degrees]; TinyRenderer has no orthographic view
 
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """A pinhole camera. Pixels count from the upper left corner, x right and y down."""
+    """A pinhole camera. Pixels count from the upper left corner, x to the right and y down.
 
-    view: Floats  # (4, 4) world to camera
-    projection: Floats  # (4, 4) camera to clip space
-    size: tuple[int, int]  # width, height [px]
+    Attributes:
+        view: world to camera (4, 4)
+        projection: camera to clip space (4, 4)
+        size: width and height of the picture [px]
+    """
+
+    view: Floats
+    projection: Floats
+    size: tuple[int, int]
 
     @classmethod
     def framing(
@@ -35,10 +45,15 @@ class Camera:
         turned: bool = False,
         pad: tuple[float, float, float, float] = (0.04, 0.04, 0.04, 0.04),
     ) -> Camera:
-        """The nearest camera of a given tilt that sees all points (N, 3).
+        """The nearest camera that sees all points (N, 3) [m].
 
-        `turned` looks along -x instead of +y, so that what runs along y runs across the picture. `pad` is the part of the
-        picture to leave free on the left, right, top and bottom.
+        Args:
+            points: what must be in the picture
+            size: width and height of the picture [px]
+            tilt: angle between the line of sight and the ground [degrees]
+            fov: vertical field of view [degrees]
+            turned: look along -x instead of +y, so that a world long in y fills a wide picture
+            pad: the fractions of the picture to leave free on the left, right, top and bottom
         """
         right, up, back = _axes(math.radians(tilt), turned)
         basis = np.array([right, up, back])
@@ -46,7 +61,8 @@ class Camera:
         x, y, depth = seen[:, 0], seen[:, 1], -seen[:, 2]
         tan_y = math.tan(math.radians(fov) / 2)
         tan_x = tan_y * size[0] / size[1]
-        # A point is inside the left edge when x - cx >= l (depth - cz): linear in the camera's place, for each edge.
+        # A point is right of the left edge if x - cx >= left (depth - cz): linear in the camera's position cx, cz.
+        # The same holds for the other edges, so the nearest position follows from the extreme points alone.
         left, right_edge = -tan_x * (1 - 2 * pad[0]), tan_x * (1 - 2 * pad[1])
         top, bottom = tan_y * (1 - 2 * pad[2]), -tan_y * (1 - 2 * pad[3])
         ax, bx = float((x - left * depth).min()), float((x - right_edge * depth).max())
@@ -67,7 +83,7 @@ class Camera:
 
     @property
     def ground(self) -> Floats:
-        """The map (3, 3) from points (x, y, 1) on the ground to pixels, homogeneous."""
+        """The homogeneous map (3, 3) from points (x, y, 1) on the ground to pixels."""
         clip = self.full[:, [0, 1, 3]]
         width, height = self.size
         return np.array(
@@ -80,14 +96,14 @@ class Camera:
 
     @property
     def pixel(self) -> float:
-        """What a pixel measures across, on the ground in the middle of the picture [m]."""
+        """The width of a pixel on the ground in the middle of the picture [m]."""
         width, height = self.size
         back = np.linalg.inv(self.ground)
         ends = np.array([(width / 2 + k, height / 2, 1.0) for k in (-0.5, 0.5)]) @ back.T
         return float(np.hypot(*(ends[1, :2] / ends[1, 2] - ends[0, :2] / ends[0, 2])))
 
     def pixels(self, points: npt.ArrayLike) -> Floats:
-        """Where points (N, 3) appear, (N, 2) [px]."""
+        """Where points (N, 3) [m] appear, (N, 2) [px]."""
         xyz = np.asarray(points, dtype=np.float64).reshape(-1, 3)
         clip = np.column_stack([xyz, np.ones(len(xyz))]) @ self.full.T
         width, height = self.size
@@ -95,7 +111,7 @@ class Camera:
         return np.column_stack([(1 + ndc[:, 0]) * width / 2, (1 - ndc[:, 1]) * height / 2])
 
     def sees(self, centres: Floats, radii: Floats) -> npt.NDArray[np.bool_]:
-        """Which balls (N, 3) with radii (N,) may show. What reaches behind the camera does not."""
+        """Which balls at centres (N, 3) with radii (N,) [m] may be in sight; none that reaches behind the camera."""
         x, y, z = (centres @ self.view[:3, :3].T + self.view[:3, 3]).T
         depth = -z
         inside: npt.NDArray[np.bool_] = depth > radii
@@ -110,7 +126,7 @@ class Camera:
         return Camera(self.view @ shift, self.projection, self.size)
 
     def matrices(self, box: tuple[int, int, int, int] | None = None) -> tuple[list[float], list[float]]:
-        """View and projection as OpenGL wants them; with `box` = x0, y0, x1, y1 of that part of the picture alone."""
+        """View and projection in OpenGL's column order, of the whole picture or of the pixels in `box`."""
         projection = self.projection
         if box is not None:
             width, height = self.size
@@ -123,7 +139,15 @@ class Camera:
 
 
 def camera_for(name: str, low: npt.ArrayLike, high: npt.ArrayLike, height: float, size: tuple[int, int]) -> Camera:
-    """A named camera that sees the ground rectangle from `low` to `high` with bodies up to `height` on it."""
+    """The camera of a name that sees a rectangle of the ground and the bodies on it.
+
+    Args:
+        name: one of `CAMERAS`
+        low: the rectangle's corner with the least x and y [m]
+        high: the opposite corner [m]
+        height: of the tallest body [m]
+        size: width and height of the picture [px]
+    """
     (x0, y0), (x1, y1) = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
     corners = np.array([(x, y, z) for x in (x0, x1) for y in (y0, y1) for z in (0.0, height)])
     tilt, fov = _TILT[name], _FOV[name]

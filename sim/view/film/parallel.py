@@ -1,37 +1,39 @@
-"""Frames of a moving camera, which must be rendered whole: several processes share them, a few frames each at a time."""
+"""Render the frames of a moving camera in several processes. They cost most: each needs a backdrop of its own."""
 
 from __future__ import annotations
 
 import uuid
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import joblib
 import numpy as np
 import numpy.typing as npt
 
 from antdrive.sim.log.rollout import Rollout
-
-if TYPE_CHECKING:
-    from antdrive.sim.view.film.video import Shot
+from antdrive.sim.view.film.shot import Shot
 
 Picture = npt.NDArray[np.uint8]  # (H, W, 3)
 Floats = npt.NDArray[np.float64]
 
-CHUNK = 16  # frames a process renders before it hands them over
-WORTH = 300  # frames; starting processes takes as long as rendering fewer
-MOST = 8  # processes; each takes some 150 MB
+CHUNK = 16  # frames that a process renders before it hands them over
+MIN_FRAMES = 300  # starting processes takes as long as rendering this many frames
+MAX_PROCESSES = 8  # each takes some 150 MB
 
 
-def processes() -> int:
-    """How many processes render at once, one for each core of this machine that may be used."""
-    return int(min(MOST, joblib.cpu_count()))
+def process_count() -> int:
+    """How many processes render at once by default: one per available core, at most `MAX_PROCESSES`."""
+    return int(min(MAX_PROCESSES, joblib.cpu_count()))
 
 
-def pictures(rollout: Rollout, setting: dict[str, Any], times: Floats, jobs: int) -> Iterator[Picture]:
-    """The frames (H, W, 3) at `times`, in order and the same for any number of `jobs`.
+def render_frames(rollout: Rollout, setting: dict[str, Any], times: Floats, jobs: int) -> Iterator[Picture]:
+    """The frames (H, W, 3) in order, the same for any number of processes; `jobs` x `CHUNK` are held at once.
 
-    `setting` are the arguments of `Shot`. At most `jobs` x `CHUNK` frames are held at once.
+    Args:
+        rollout: the run
+        setting: the keyword arguments of `Shot`
+        times: the moments to show [s]
+        jobs: the number of processes
     """
     chunks = [(first, min(first + CHUNK, len(times))) for first in range(0, len(times), CHUNK)]
     film = uuid.uuid4().hex
@@ -42,17 +44,16 @@ def pictures(rollout: Rollout, setting: dict[str, Any], times: Floats, jobs: int
                 yield from rendered
 
 
-_open: dict[str, Shot] = {}  # the shot that this process has open, by its film; the next film's first frame closes it
+#: The shot that a worker process has open, under the id of its film. It is closed when the next film begins.
+_open: dict[str, Shot] = {}
 
 
 def _render(film: str, rollout: Rollout, setting: dict[str, Any], times: Floats, first: int, end: int) -> list[Picture]:
-    from antdrive.sim.view.film.video import Shot
-
     shot = _open.get(film)
     if shot is None:
         while _open:
             _open.popitem()[1].__exit__(None, None, None)
         shot = _open[film] = Shot(rollout, **setting).__enter__()
     for at in times[:first][times[:first] > shot.shown]:
-        shot.drive(at)
-    return [shot.picture(at) for at in times[first:end]]
+        shot.extend_trail(at)
+    return [shot.frame(at) for at in times[first:end]]

@@ -1,10 +1,11 @@
-"""How a path was planned, before the robot sets off: the planner's field on the ground and its best path so far.
+"""The part of a film before the drive: how the path was planned, with the planner's field and best path so far.
 
-A log holds no field. It is planned again from the log's seed, which gives the same iterations.
+A log holds no field. The path is planned again from the log's seed, which gives the same iterations.
 """
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 import zlib
@@ -16,19 +17,20 @@ import numpy.typing as npt
 
 from antdrive.planners import Iteration, IterativePlanner, Query, load_planner
 from antdrive.sim.log.rollout import Rollout
-from antdrive.sim.view.film.caption import Values
-from antdrive.sim.view.film.video import Shot
+from antdrive.sim.view.film.compositor import Compositor
+from antdrive.sim.view.film.overlay import Values
+from antdrive.sim.view.film.shot import Shot
 from antdrive.worlds import Grid, InputError, rasterise
 
 Picture = npt.NDArray[np.uint8]  # (H, W, 3)
 Floats = npt.NDArray[np.float64]
 
 
-def search(rollout: Rollout) -> tuple[Grid, int, Iterator[Iteration]]:
-    """The grid of a run, how many iterations its planner was allowed, and these, planned again one at a time.
+def plan_again(rollout: Rollout) -> tuple[Grid, int, Iterator[Iteration]]:
+    """Repeat a run's planning: its grid, the number of iterations allowed, and the iterations one at a time.
 
     Raises:
-        InputError: the planner has no iterations, cannot be found, or its plan cannot be repeated.
+        InputError: the planner is unknown, does not plan in iterations, or planned under a time budget.
     """
     record = rollout.record
     name = record.planner.name
@@ -44,22 +46,27 @@ def search(rollout: Rollout) -> tuple[Grid, int, Iterator[Iteration]]:
 
 
 def check_field(rollout: Rollout) -> None:
-    """Look, before anything is drawn, whether there is a field to show.
+    """Check, before anything is drawn, that a run's planner has a field.
 
     Raises:
-        InputError: there is none.
+        InputError: it has none, or its planning cannot be repeated.
     """
-    if next(search(rollout)[2]).landscape is None:
+    if next(plan_again(rollout)[2]).field is None:
         raise InputError(f"prelude: {rollout.record.planner.name} keeps no field")
 
 
-def planning_pictures(rollout: Rollout, setting: dict[str, Any], count: int) -> Iterator[Picture]:
-    """`count` frames (H, W, 3) of a run's planning from first to last iteration.
+def planning_frames(rollout: Rollout, setting: dict[str, Any], count: int) -> Iterator[Picture]:
+    """Frames (H, W, 3) of a run's planning, from the first to the last iteration.
+
+    Args:
+        rollout: the run
+        setting: the keyword arguments of `Shot`; a following camera is replaced by the oblique one
+        count: how many frames
 
     Raises:
         InputError: planning again led to another path.
     """
-    grid, total, states = search(rollout)
+    grid, total, states = plan_again(rollout)
     still = {**setting, "camera": "oblique" if setting["camera"] == "follow" else setting["camera"]}
     with Shot(rollout, **still, planning=True) as shot:
         number, state = 1, next(states)
@@ -67,20 +74,27 @@ def planning_pictures(rollout: Rollout, setting: dict[str, Any], count: int) -> 
             due = math.ceil((k + 1) * total / count)
             for later in itertools.islice(states, due - number):
                 number, state = number + 1, later
-            assert state.landscape is not None
-            levels = field_levels(grid, state.landscape)
-            line = grid.xy(state.cells if state.waypoints is None else state.waypoints)
-            yield shot.planning(_told(number, total, state), lambda stage: stage.field(grid, levels, line))  # noqa: B023
+            assert state.field is not None
+            levels = field_levels(grid, state.field)
+            path = grid.xy(state.cells if state.waypoints is None else state.waypoints)
+            yield shot.planning_frame(
+                _values(number, total, state),
+                functools.partial(_draw_field, grid=grid, levels=levels, path=path),
+            )
     if not np.array_equal(state.cells, rollout.cells):
         raise InputError("prelude: planning again led to another path; the log is of another version or machine")
 
 
-def field_levels(grid: Grid, landscape: Floats) -> Floats:
-    """A field (R, C) as 0 to 1 between its low and its high values, NaN where no cell is free.
+def _draw_field(compositor: Compositor, grid: Grid, levels: Floats, path: Floats) -> Picture:
+    return compositor.field_frame(grid, levels, path)
 
-    The square root keeps weak trails in sight beside strong ones.
+
+def field_levels(grid: Grid, field: Floats) -> Floats:
+    """A planner's field (R, C) scaled to 0 to 1 from its low to its high values; NaN where a cell is blocked.
+
+    The scale is a square root, so that weak trails stay visible beside strong ones.
     """
-    values = np.where(grid.free, np.asarray(landscape, dtype=np.float64), np.nan)
+    values = np.where(grid.free, np.asarray(field, dtype=np.float64), np.nan)
     finite = values[np.isfinite(values)]
     if not len(finite):
         return values
@@ -88,7 +102,9 @@ def field_levels(grid: Grid, landscape: Floats) -> Floats:
     return np.asarray(np.sqrt(np.clip((values - low) / max(high - low, 1e-300), 0.0, 1.0)))
 
 
-def _told(number: int, total: int, state: Iteration) -> Values:
+def _values(number: int, total: int, state: Iteration) -> Values:
+    """The numbers of the band, named `PLAN_FIELDS`."""
+
     def metres(value: float) -> str:
         return f"{value:.2f} m" if math.isfinite(value) else "—"
 

@@ -1,6 +1,7 @@
-"""Pictures as they were looked at and found good, one set for each renderer; `python -m tests.sim.test_golden` paints them anew.
+"""Stored pictures that somebody looked at and approved, one per camera.
 
-Pictures of two renderers are never compared: the fixed cameras' bodies are TinyRenderer's, a moving camera's are cast by rays.
+`python -m tests.sim.view.film.test_golden` renders them anew. Fixed cameras use TinyRenderer and a moving camera uses ray
+casting, so a camera's picture is only ever compared with its own.
 """
 
 from pathlib import Path
@@ -10,7 +11,7 @@ import pytest
 from PIL import Image
 
 from antdrive.sim.view.film.camera import CAMERAS
-from antdrive.sim.view.film.video import Shot
+from antdrive.sim.view.film.shot import Shot
 from tests.sim.conftest import _made_up_drive
 
 GOLDEN = Path(__file__).with_name("golden")
@@ -24,7 +25,7 @@ def picture(camera, **changes):
 
 
 def differs(one, other):
-    """The share of pixels that differ clearly: rounding and another compiler's last digits do not count."""
+    """The fraction of pixels that differ clearly; rounding and another compiler's last digits do not count."""
     return float((np.abs(one - other).max(axis=-1) > 24).mean())
 
 
@@ -34,22 +35,22 @@ def golden(request):
         return request.param, np.asarray(stored.convert("RGB")).astype(int)
 
 
-def test_a_picture_is_as_it_was(golden):
+def test_a_picture_equals_the_stored_one(golden):
     camera, stored = golden
     assert differs(picture(camera), stored) < 0.002
 
 
-def test_the_comparison_would_see_what_is_missing(golden, monkeypatch):
-    from antdrive.sim.view.film import stage
+def test_the_comparison_detects_missing_bodies_and_trails(golden, monkeypatch):
+    from antdrive.sim.view.film import compositor
 
     camera, stored = golden
     assert differs(picture(camera, obstacles=12), stored) > 0.002, "obstacles"
     with monkeypatch.context() as without:
-        without.setattr(stage.Stage, "_put", lambda *_: None)
+        without.setattr(compositor.Compositor, "_put_bodies", lambda *_: None)
         assert differs(picture(camera), stored) > 0.002, "the robot"
     with monkeypatch.context() as without:
-        without.setattr(stage.Stage, "drive", lambda *_: None)
-        assert differs(picture(camera), stored) > 0.002, "the driven way"
+        without.setattr(compositor.Compositor, "extend_trail", lambda *_: None)
+        assert differs(picture(camera), stored) > 0.002, "the driven path"
 
 
 def main():

@@ -6,7 +6,7 @@ import pytest
 from antdrive.sim.log.record import ComponentRecord
 from antdrive.sim.pipeline import Scenario, run
 from antdrive.sim.view.film import prelude
-from antdrive.sim.view.film.prelude import field_levels, planning_pictures, search
+from antdrive.sim.view.film.prelude import field_levels, plan_again, planning_frames
 from antdrive.sim.view.film.video import film
 from antdrive.worlds import Disc, InputError, Task, World, rasterise
 
@@ -25,14 +25,14 @@ def walked(tmp_path_factory):
 
 
 def test_planning_again_gives_the_logged_path(walked):
-    _, total, states = search(walked)
+    _, total, states = plan_again(walked)
     assert total == 12
     *_, last = states
     assert np.array_equal(last.cells, walked.cells)
 
 
 def test_a_prelude_shows_the_field_and_goes_on_to_the_last_iteration(walked):
-    frames = list(planning_pictures(walked, SETTING, 5))
+    frames = list(planning_frames(walked, SETTING, 5))
     assert len(frames) == 5
     assert all(frame.shape == (240, 320, 3) for frame in frames)
     blue = [(frame[..., 2].astype(int) - frame[..., 0] > 60).sum() for frame in frames]
@@ -45,10 +45,10 @@ def test_a_film_is_longer_by_its_prelude(walked, tmp_path):
     assert lengths[1] == lengths[0] + 8
 
 
-def test_a_log_that_planning_does_not_lead_to_is_refused(walked):
+def test_a_log_whose_path_planning_again_does_not_give_is_refused(walked):
     other = replace(walked, cells=walked.cells[::-1])
     with pytest.raises(InputError, match="another path"):
-        list(planning_pictures(other, SETTING, 2))
+        list(planning_frames(other, SETTING, 2))
 
 
 @pytest.mark.parametrize(
@@ -69,7 +69,7 @@ def test_planners_without_a_field_are_refused_before_anything_is_drawn(walked, t
     assert not list(tmp_path.iterdir())
 
 
-def test_levels_run_from_nothing_to_much_and_leave_blocked_cells_out():
+def test_field_levels_run_from_0_to_1_and_leave_blocked_cells_out():
     grid = rasterise(World("one", (0, 0, 3, 3), (Disc(1.5, 1.5, 0.4),)), 0.3, 0.1)
     field = np.arange(np.prod(grid.shape), dtype=float).reshape(grid.shape)
     levels = field_levels(grid, field)

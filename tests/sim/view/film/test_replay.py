@@ -1,12 +1,12 @@
-"""A log read between its rows, where something jumps or touches."""
+"""Reading a log between its rows, at jumps and at contacts."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from antdrive.sim.view.film.replay import Replay, contact_point
-from antdrive.sim.view.scene import Scene, jumping, pieces
+from antdrive.sim.view.film.replay import Replay
+from antdrive.sim.view.scene import Scene, contact_point, jumps, mover_tracks
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +20,7 @@ def jumped(made_up_drive):
     return replace(drive, movers=movers)
 
 
-def test_a_mover_that_jumps_is_on_one_side_or_the_other(jumped):
+def test_a_jumping_mover_is_never_between_its_two_positions(jumped):
     replay = Replay(jumped)
     before, after = jumped.movers[119, 0, 0], jumped.movers[120, 0, 0]
     assert replay.movers(119.9 / 240)[0, 0] == before
@@ -36,16 +36,16 @@ def test_movers_have_the_velocity_of_their_rows(jumped):
 
 
 def test_tracks_are_cut_at_jumps_and_nowhere_else(jumped):
-    assert np.argwhere(jumping(jumped.movers)).tolist() == [[119, 0]]
-    one, two, stood = pieces(jumped.movers)
+    assert np.argwhere(jumps(jumped.movers)).tolist() == [[119, 0]]
+    one, two, stood = mover_tracks(jumped.movers)
     assert (len(one), len(two), len(stood)) == (120, len(jumped.t) - 120, len(jumped.t))
     fast = np.zeros((100, 1, 2))
     fast[:, 0, 0] = np.arange(100) * 20 / 240
-    assert not jumping(fast).any(), "20 m/s is fast, but no jump"
+    assert not jumps(fast).any(), "20 m/s is fast, but no jump"
     assert Scene.of(jumped).movers == ((float(jumped.movers[-1, 0, 0]), 0.0), (3.5, 0.5))
 
 
-def test_contacts_with_discs_movers_and_walls_have_their_points(jumped):
+def test_contact_points_lie_on_obstacles_movers_and_walls(jumped):
     scene = Scene.of(jumped)
     count, movers = len(scene.obstacles), jumped.movers[0]
     x, y = contact_point(scene, (3.0, 0.5, 0.0), count + 1, movers)

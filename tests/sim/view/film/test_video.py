@@ -11,10 +11,12 @@ from PIL import Image
 
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import ReplanRecord
-from antdrive.sim.view.film import encode, video
-from antdrive.sim.view.film.caption import VERDICTS, Layout
-from antdrive.sim.view.film.video import Shot, film, frame_times, still
+from antdrive.sim.view.film import encoder, video
+from antdrive.sim.view.film.overlay import Layout
+from antdrive.sim.view.film.shot import Shot
+from antdrive.sim.view.film.video import film, frame_times, still
 from antdrive.sim.view.scene import Scene
+from antdrive.sim.view.style import VERDICTS
 from antdrive.worlds import InputError
 
 SIZE = (320, 240)
@@ -69,7 +71,7 @@ def test_a_film_shows_what_was_drawn(filmed, drive):
     info, _ = filmed
     _, frames = decoded(info.path)
     with Shot(drive, camera="oblique", size=SIZE, note="certified") as shot:
-        drawn = shot.picture(0.0)
+        drawn = shot.frame(0.0)
     assert np.abs(frames[0].astype(int) - drawn.astype(int)).mean() < 4
     assert np.abs(frames[10].astype(int) - frames[0].astype(int)).max() > 100
 
@@ -88,7 +90,7 @@ def test_a_film_can_run_faster_than_the_drive(drive):
 
 
 @pytest.mark.parametrize("suffix", [".gif", ".webp"])
-def test_other_suffixes_give_moving_pictures(drive, tmp_path, suffix):
+def test_gif_and_webp_are_animated(drive, tmp_path, suffix):
     info = film(drive, tmp_path / f"drive{suffix}", size=(160, 160), fps=5, camera="top")
     with Image.open(info.path) as picture:
         assert picture.size == (160, 160)
@@ -107,20 +109,20 @@ def test_every_camera_shows_robot_and_goal(drive, tmp_path):
 
 
 @pytest.mark.parametrize("size", [(640, 480), (1280, 720), (320, 240), (480, 640)])
-def test_the_caption_fits_every_size(drive, size):
+def test_the_band_fits_every_size(drive, size):
     for card in (True, False):
         layout = Layout.of(size, card)
         assert layout.height % 2 == 0
         assert layout.height < 0.35 * size[1]
     with Shot(drive, camera="top", size=size, note="certified: min clearance 0.043 m") as shot:
-        assert shot.picture(0.5).shape == (size[1], size[0], 3)
+        assert shot.frame(0.5).shape == (size[1], size[0], 3)
 
 
 @pytest.mark.parametrize("outcome", list(Outcome))
 def test_every_outcome_ends_with_words_in_its_colour(drive, outcome):
     ended = replace(drive, record=replace(drive.record, outcome=outcome))
     with Shot(ended, camera="top", size=SIZE) as shot:
-        before, after = shot.picture(1.0), shot.ending()
+        before, after = shot.frame(1.0), shot.last_frame()
     colour = np.array(VERDICTS[outcome][1])
     count = [(np.abs(frame.astype(int) - colour).max(axis=-1) < 6).sum() for frame in (before, after)]
     assert count[1] > count[0] + 300
@@ -129,8 +131,8 @@ def test_every_outcome_ends_with_words_in_its_colour(drive, outcome):
 def test_a_contact_flashes_and_stays_marked(crash):
     with Shot(crash, camera="oblique", size=SIZE) as shot:
         end = shot.replay.duration
-        before, at, final = shot.picture(end - 0.2), shot.picture(end), shot.ending()
-        px, py = (round(value) for value in shot._stage.pixel(*shot.replay.touched(end)[:2], 0.1))
+        before, at, final = shot.frame(end - 0.2), shot.frame(end), shot.last_frame()
+        px, py = (round(value) for value in shot._compositor.pixel(*shot.replay.contact(end)[:2], 0.1))
 
     def redness(picture, where):
         red, green, _ = np.moveaxis(picture[where].astype(int), -1, 0)
@@ -148,7 +150,7 @@ def test_a_contact_flashes_and_stays_marked(crash):
 def test_the_smallest_clearance_so_far_never_grows(crash):
     with Shot(crash, camera="top", size=SIZE) as shot:
         replay = shot.replay
-    read = [replay.least_clearance(at) for at in np.linspace(0, replay.duration, 50)]
+    read = [replay.min_clearance(at) for at in np.linspace(0, replay.duration, 50)]
     assert all(a >= b for a, b in itertools.pairwise(read))
     assert read[-1] == crash.clearance.min()
 
@@ -179,7 +181,7 @@ def test_a_failure_in_the_middle_leaves_no_file(drive, tmp_path, monkeypatch):
             raise RuntimeError("no more paint")
         return np.zeros((*SIZE[::-1], 3), dtype=np.uint8)
 
-    monkeypatch.setattr(Shot, "picture", fails)
+    monkeypatch.setattr(Shot, "frame", fails)
     (tmp_path / "drive.mp4").write_bytes(b"an older film")
     with pytest.raises(RuntimeError, match="no more paint"):
         film(drive, tmp_path / "drive.mp4", size=SIZE)
@@ -188,7 +190,7 @@ def test_a_failure_in_the_middle_leaves_no_file(drive, tmp_path, monkeypatch):
 
 
 def test_an_encoder_that_dies_is_reported(drive, tmp_path, monkeypatch):
-    monkeypatch.setitem(encode.ENCODERS, ".mp4", ("-c:v", "no-such-codec"))
+    monkeypatch.setitem(encoder.ENCODERS, ".mp4", ("-c:v", "no-such-codec"))
     with pytest.raises(OSError, match="no-such-codec"):
         film(drive, tmp_path / "drive.mp4", size=SIZE)
     assert not list(tmp_path.iterdir())
@@ -212,7 +214,7 @@ def test_the_index_is_in_front_so_that_browsers_play_at_once(filmed):
     assert head.index(b"moov") < head.index(b"mdat")
 
 
-def test_ffmpeg_finds_no_fault_in_the_film(filmed):
+def test_ffmpeg_decodes_the_film_without_errors(filmed):
     checked = ffmpeg("-v", "error", "-i", filmed[0].path, "-f", "null", "-")
     assert checked.returncode == 0
     assert checked.stderr == b""
@@ -242,39 +244,39 @@ def test_a_still_is_a_png(drive, tmp_path):
 
 
 @pytest.mark.parametrize("size", [(320, 240), (640, 480), (1280, 720)])
-def test_the_last_sentence_leaves_the_legend_readable(drive, size):
+def test_the_outcomes_sentence_does_not_cover_the_legend(drive, size):
     with Shot(drive, camera="follow", size=size) as shot:
-        before, after = shot.picture(shot.replay.duration), shot.ending()
+        before, after = shot.frame(shot.replay.duration), shot.last_frame()
         high, wide = (shot._layout.unit + side for side in shot._legend.shape[:2])
     assert np.array_equal(before[:high, :wide], after[:high, :wide])
     assert not np.array_equal(before, after)
 
 
-def test_a_film_is_slow_around_a_contact(crash):
+def test_a_film_goes_into_slow_motion_around_a_contact(crash):
     with Shot(crash, camera="oblique", size=SIZE) as shot:
-        end, (first, last) = shot.replay.duration, shot.slow
-        times = frame_times(end, 30, 1.0, shot.slow)
-        word = [shot.picture(at)[-100:, -120:] for at in (first - 0.1, first + 0.1)]
+        end, (first, last) = shot.replay.duration, shot.slow_motion
+        times = frame_times(end, 30, 1.0, shot.slow_motion)
+        word = [shot.frame(at)[-100:, -120:] for at in (first - 0.1, first + 0.1)]
     steps = np.diff(times)
     slowly = (times[:-1] >= first) & (times[1:] <= last)
-    assert steps[slowly] == pytest.approx(1 / 30 / video.SLOW)
+    assert steps[slowly] == pytest.approx(1 / 30 / video.SLOW_MOTION)
     assert steps[: slowly.argmax() - 1] == pytest.approx(1 / 30)
     assert times[0] == 0
     assert end - times[-1] < 1 / 30
     red = [((part[..., 0].astype(int) - part[..., 1]) > 120).sum() for part in word]
     assert red[0] == 0
-    assert red[1] > 100, "it says that it is slow"
+    assert red[1] > 100, "the band is labelled SLOW"
 
 
 @pytest.mark.parametrize("jobs", [2])
-def test_processes_share_the_frames_of_a_moving_camera_and_change_nothing(drive, jobs):
-    from antdrive.sim.view.film.parallel import pictures
+def test_frames_rendered_in_several_processes_equal_those_of_one(drive, jobs):
+    from antdrive.sim.view.film.parallel import render_frames
 
     setting = {"camera": "follow", "size": SIZE, "note": None, "speed": 1.0}
     times = frame_times(0.6, 60, 1.0)
-    shared = list(pictures(drive, setting, times, jobs))
+    shared = list(render_frames(drive, setting, times, jobs))
     with Shot(drive, **setting) as shot:
-        alone = [shot.picture(at) for at in times]
+        alone = [shot.frame(at) for at in times]
     assert len(shared) == len(alone) == len(times)
     assert all((a == b).all() for a, b in zip(shared, alone, strict=True))
 
@@ -282,38 +284,38 @@ def test_processes_share_the_frames_of_a_moving_camera_and_change_nothing(drive,
 def test_a_small_robot_gets_a_glow_and_a_large_one_none(made_up_drive):
     for size, found in (((30.0, 22.0), True), ((4.0, 3.0), False)):
         with Shot(made_up_drive(size=size, obstacles=0), camera="top", size=SIZE) as shot:
-            stage, pose = shot._stage, shot.replay.pose(0.5)
-            px, py = (round(value) for value in stage.pixel(*pose[:2]))
-            tinted = stage.frame(pose).astype(int) - stage.backdrop.pixels
+            compositor, pose = shot._compositor, shot.replay.pose(0.5)
+            px, py = (round(value) for value in compositor.pixel(*pose[:2]))
+            tinted = compositor.frame(pose).astype(int) - compositor.backdrop.pixels
         ring = np.abs(tinted[py - 14 : py + 14, px - 14 : px + 14, 2]).max()
         aside = np.abs(tinted[py, px + 5 : px + 9]).max() if found else 0
         assert ring > 100
         assert (aside > 20) == found
 
 
-def test_a_replan_is_shown_from_its_moment_on(drive):
-    """The old line goes, the new one comes, a dot marks the place; the cause is told for a while."""
+def test_a_replan_shows_its_new_route_and_its_cause(drive):
+    """The new route replaces the old one, a dot marks the place, and the cause is shown for a while."""
     new = ReplanRecord(t=0.3, trigger="obstructed", solved=True, cost_m=2.5, work=1, route=((1.0, 0.4), (3.5, 0.4)))
-    failed_one = replace(new, t=0.8, trigger="waited", solved=False, cost_m=None, route=())
-    replanned = replace(drive, record=replace(drive.record, replans=(new, failed_one)))
+    unsolved = replace(new, t=0.8, trigger="waited", solved=False, cost_m=None, route=())
+    replanned = replace(drive, record=replace(drive.record, replans=(new, unsolved)))
 
     def views(rollout, news, *times):
         with Shot(rollout, camera="top", size=SIZE, bare=True) as shot:
-            shot._news = news
+            shot._replan_caption = news
             return [shot.view(at).astype(int) for at in times]
 
     kept, plain = views(drive, 0.0, 0.2, 0.5)
     before, after, failed = views(replanned, 0.0, 0.2, 0.5, 0.85)
     told = views(replanned, 1.0, 0.5)[0]
     with Shot(drive, camera="top", size=SIZE, bare=True) as shot:
-        new_line = [shot._stage.pixel(x, 0.4) for x in np.linspace(1.0, 3.5, 200)]
+        new_line = [shot._compositor.pixel(x, 0.4) for x in np.linspace(1.0, 3.5, 200)]
         x = np.linspace(2.4, 3.1, 100)
-        old_line = [shot._stage.pixel(*at) for at in zip(x, np.interp(x, *drive.route.T), strict=True)]
+        old_line = [shot._compositor.pixel(*at) for at in zip(x, np.interp(x, *drive.route.T), strict=True)]
 
     def dark(view, line):
         return np.mean([view[round(py), round(px)].sum() < 300 for px, py in line])
 
-    assert np.abs(before - kept).max(axis=-1).mean() < 2, "drawn again in every frame, to about the same effect"
+    assert np.abs(before - kept).max(axis=-1).mean() < 2, "a route drawn in every frame looks about the same"
     assert dark(plain, new_line) == dark(before, new_line) == 0
     assert dark(after, new_line) > 0.3
     assert dark(failed, new_line) > 0.3
@@ -322,9 +324,9 @@ def test_a_replan_is_shown_from_its_moment_on(drive):
     assert (np.abs(told - after).max(axis=-1) > 60).sum() > 100
 
 
-def test_decisions_at_every_cell_are_not_told(drive):
+def test_replans_at_every_cell_have_no_caption(drive):
     entry = ReplanRecord(t=0.0, trigger="decision", solved=True, cost_m=0.5, work=1, route=((1.0, 1.0), (1.5, 1.0)))
     decided = replace(drive, record=replace(drive.record, replans=(entry,)))
     with Shot(decided, camera="top", size=SIZE) as shot:
-        assert [renewal.told for renewal in shot.replay.renewals] == [""]
-        shot.picture(0.5)
+        assert [event.caption for event in shot.replay.replans] == [""]
+        shot.frame(0.5)

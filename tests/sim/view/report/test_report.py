@@ -1,4 +1,4 @@
-"""The report, as text and in a real browser: it loads without errors, sorts, filters, plays films and fits a phone."""
+"""The report as text and in a real browser: it loads without errors, sorts, filters, plays films and fits a phone."""
 
 import html
 import json
@@ -9,12 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from antdrive.sim.view.figures.plots import overview
-from antdrive.sim.view.report.report import ROOM, write_report
+from antdrive.sim.view.figures.run_figures import overview
+from antdrive.sim.view.report.report import EMBEDDED_BYTES, write_report
 from antdrive.worlds import InputError
 
 BROWSER = next(
-    (found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None
+    (found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))),
+    None,
 )
 needs_browser = pytest.mark.skipif(BROWSER is None, reason="no chromium on this machine")
 
@@ -30,7 +31,7 @@ window.onload = async () => {
   const named = (name) => heads.find((h) => h.textContent === name);
   named("planner").click(); said.up = column(1);
   named("planner").click(); said.down = column(1);
-  named("driven m").click(); said.driven = column(6);
+  named("driven [m]").click(); said.driven = column(6);
   const filter = document.querySelector("#filter");
   filter.value = "astar COLLIDED"; filter.dispatchEvent(new Event("input"));
   said.filtered = column(0); said.sections = [...document.querySelectorAll("section")].filter((s) => !s.hidden).length;
@@ -81,7 +82,7 @@ def runs(made_up_drive, tmp_path_factory):
 
 
 def dumped(page: Path, *words: str) -> dict:
-    """What a page says about itself in a browser."""
+    """What the probe in a page finds in a browser."""
     common = ("--headless", "--no-sandbox", "--disable-gpu", "--autoplay-policy=no-user-gesture-required",
               "--allow-file-access-from-files", "--virtual-time-budget=20000", "--dump-dom", *words)  # fmt: skip
     done = subprocess.run([BROWSER, *common, page.as_uri()], capture_output=True, text=True, timeout=120, check=True)
@@ -125,7 +126,7 @@ def test_on_a_phone_the_page_is_as_wide_as_the_screen(runs, tmp_path):
     assert said["overflow"] == 0
 
 
-def test_the_page_holds_everything_and_calls_nobody(runs, tmp_path):
+def test_the_page_needs_no_network_and_escapes_its_content(runs, tmp_path):
     assert write_report(runs, tmp_path / "report.html", title="Ours & theirs") == 3
     text = (tmp_path / "report.html").read_text()
     assert "Ours &amp; theirs" in text
@@ -141,13 +142,14 @@ def test_films_can_be_embedded(runs, tmp_path):
     assert "data:video/mp4;base64," in (tmp_path / "with.html").read_text()
 
 
-def test_it_stays_small_by_linking_what_does_not_fit(runs, tmp_path, monkeypatch):
+def test_the_page_stays_small_by_linking_figures(runs, tmp_path, monkeypatch):
     from antdrive.sim.view.report import report as reporting
 
     write_report(runs, tmp_path / "all.html")
     assert (tmp_path / "all.html").stat().st_size < 5_000_000
-    assert ROOM < 5_000_000
-    monkeypatch.setattr(reporting, "ROOM", 1.5 * len(reporting._shrunk(runs / "run 0" / "overview.png", "").source))
+    assert EMBEDDED_BYTES < 5_000_000
+    one = len(reporting._embedded(runs / "run 0" / "overview.png", "").source)
+    monkeypatch.setattr(reporting, "EMBEDDED_BYTES", 1.5 * one)
     write_report(runs, tmp_path / "few.html")
     text = (tmp_path / "few.html").read_text()
     assert text.count("data:image/webp") == 1
@@ -173,7 +175,7 @@ def test_the_markdown_is_a_table_with_pictures_and_commands(runs, tmp_path):
         ("other", "", "no runs"),
     ],
 )
-def test_wrong_folders_are_named(tmp_path, name, content, message):
+def test_folders_without_runs_and_broken_files_are_refused_by_name(tmp_path, name, content, message):
     (tmp_path / name).write_text(content)
     with pytest.raises(InputError, match=message):
         write_report(tmp_path, tmp_path / "report.html")

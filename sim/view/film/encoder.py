@@ -1,4 +1,4 @@
-"""Frames to a film file: ffmpeg in a process of its own, fed through a pipe."""
+"""Encode frames to a film file: ffmpeg runs in its own process and is fed through a pipe."""
 
 from __future__ import annotations
 
@@ -17,27 +17,49 @@ from antdrive.worlds.errors import InputError
 
 Picture = npt.NDArray[np.uint8]  # (H, W, 3)
 
-#: What ffmpeg is told, by the suffix of the file.
+#: The file suffixes of films, each with ffmpeg's options for its format.
 ENCODERS: dict[str, tuple[str, ...]] = {
     ".mp4": (
-        *("-c:v", "libx264", "-preset", "veryfast", "-crf", "20", "-pix_fmt", "yuv420p", "-movflags", "+faststart"),
+        *(
+            "-c:v",
+            "libx264",
+            "-preset",
+            "veryfast",
+            "-crf",
+            "20",
+            "-pix_fmt",
+            "yuv420p",
+            "-movflags",
+            "+faststart",
+        ),
         *("-vf", "scale=out_color_matrix=bt709", "-colorspace", "bt709"),
         *("-color_primaries", "bt709", "-color_trc", "bt709"),
     ),
     ".gif": (
-        # A palette per frame: one for all frames would have to hold the whole film.
+        # A palette per frame: for one palette, ffmpeg would have to hold the whole film in memory.
         *("-vf", "split[a][b];[a]palettegen=stats_mode=single[p];[b][p]paletteuse=new=1:dither=none"),
         *("-c:v", "gif", "-loop", "0"),
     ),
-    ".webp": ("-c:v", "libwebp_anim", "-pix_fmt", "yuv420p", "-quality", "70", "-compression_level", "2", "-loop", "0"),
+    ".webp": (
+        "-c:v",
+        "libwebp_anim",
+        "-pix_fmt",
+        "yuv420p",
+        "-quality",
+        "70",
+        "-compression_level",
+        "2",
+        "-loop",
+        "0",
+    ),
 }
 
 
 def known_suffix(path: Path) -> str:
-    """The suffix that chooses a film's format.
+    """The suffix of a film's path, in lower case.
 
     Raises:
-        InputError: no format has it.
+        InputError: films cannot be written in this format.
     """
     suffix = path.suffix.lower()
     if suffix not in ENCODERS:
@@ -47,23 +69,41 @@ def known_suffix(path: Path) -> str:
 
 @contextmanager
 def encoding(path: Path, size: tuple[int, int], fps: float) -> Iterator[Callable[[Picture], None]]:
-    """A function that appends frames (H, W, 3) to a file, which is complete when the block ends.
+    """A function that appends a frame (H, W, 3) to a film, which is complete when the `with` block ends.
+
+    Args:
+        path: the file; its suffix is one of `ENCODERS`
+        size: width and height of the frames [px]
+        fps: frames per second
 
     Raises:
-        OSError: ffmpeg failed; the message has its own words.
+        OSError: ffmpeg failed; the message quotes ffmpeg.
     """
     import imageio_ffmpeg
 
     command = [
         *(imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-v", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"),
-        *("-s", f"{size[0]}x{size[1]}", "-r", str(Fraction(fps).limit_denominator(100_000)), "-i", "-", "-an"),
+        *(
+            "-s",
+            f"{size[0]}x{size[1]}",
+            "-r",
+            str(Fraction(fps).limit_denominator(100_000)),
+            "-i",
+            "-",
+            "-an",
+        ),
         *ENCODERS[known_suffix(path)],
         str(path),
     ]
-    with tempfile.TemporaryFile() as words:
-        # In a session of its own, so that Ctrl-C reaches this process alone, which then tidies up.
+    with tempfile.TemporaryFile() as messages:
+        # In its own session: Ctrl-C then reaches only this process, which stops ffmpeg and removes the file.
         process = subprocess.Popen(  # noqa: S603
-            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=words, start_new_session=True, bufsize=0
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=messages,
+            start_new_session=True,
+            bufsize=0,
         )
         pipe = process.stdin
         assert pipe is not None
@@ -79,9 +119,9 @@ def encoding(path: Path, size: tuple[int, int], fps: float) -> Iterator[Callable
                 process.wait()
             pipe.close()
         if process.returncode != 0:
-            words.seek(0)
-            said = words.read().decode(errors="replace").strip().splitlines()
-            raise OSError(f"ffmpeg failed to write the film ({said[0] if said else process.returncode})")
+            messages.seek(0)
+            lines = messages.read().decode(errors="replace").strip().splitlines()
+            raise OSError(f"ffmpeg failed to write the film ({lines[0] if lines else process.returncode})")
 
 
 def _write_all(pipe: IO[bytes], picture: Picture) -> None:

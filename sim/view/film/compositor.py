@@ -1,8 +1,9 @@
-"""A stage for films: everything that stands still is rendered once, each frame adds what moves.
+"""Compose the pictures of a film: everything that stands still is rendered once; each frame adds robot and movers.
 
-PyBullet's TinyRenderer draws the bodies; for a camera that moves, those that stand still are cast by rays. The still picture
-keeps its depth, so that a frame costs only the pixels around the robot: they are rendered through a crop of the same camera and
-blended in where they are nearer than what stood there.
+PyBullet's TinyRenderer draws the bodies. The backdrop of standing bodies keeps its depth, so a frame costs only the
+pixels around the robot and the movers: these are rendered through a crop of the same camera and blended in where they
+are nearer than the backdrop. A camera that moves needs a new backdrop in every frame; ray casting draws it faster
+than TinyRenderer.
 """
 
 from __future__ import annotations
@@ -18,13 +19,23 @@ import numpy.typing as npt
 from antdrive.sim.physics.engine import bullet, client
 from antdrive.sim.view.film import _kernels_paint as kernels
 from antdrive.sim.view.film.camera import Camera
-from antdrive.sim.view.film.cast import Solids
-from antdrive.sim.view.film.lettering import glow
-from antdrive.sim.view.film.model import Mesh, Part, cylinder, join, kerb, robot_height, robot_parts
-from antdrive.sim.view.film.paint import dashes, kerb_width, paint_ground
-from antdrive.sim.view.film.tiny import Box, add_mesh, merged, render
+from antdrive.sim.view.film.ground import dashes, kerb_width, paint_ground
+from antdrive.sim.view.film.meshes import Mesh, Part, cylinder, join, kerb, robot_height, robot_parts
+from antdrive.sim.view.film.raycast import Solids
+from antdrive.sim.view.film.text import glow
+from antdrive.sim.view.film.tiny_renderer import Box, add_mesh, merged, render
 from antdrive.sim.view.scene import Scene
-from antdrive.sim.view.style import KERB, MOVER, OBSTACLE, ROUTE, SHELL, UNSEEN, Colour, field_colours, speed_colours
+from antdrive.sim.view.style import (
+    KERB,
+    MOVER,
+    OBSTACLE,
+    ROUTE,
+    SHELL,
+    UNSEEN,
+    Colour,
+    field_colours,
+    speed_colours,
+)
 
 if TYPE_CHECKING:
     from antdrive.worlds import Grid
@@ -32,49 +43,65 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 Picture = npt.NDArray[np.uint8]  # (H, W, 3)
 
-GHOST = 0.16  # how much of the robot shines through a cylinder in front of it
-SOFT = 0.05  # [m]
-FORETOLD = 1.5  # how far ahead movers' ways are drawn [s]
+HIDDEN_OPACITY = 0.16  # of a robot behind a cylinder, so that it is never lost
+SHADOW_BLUR = 0.05  # softness of the shadow of a flat body [m]
+FORECAST = 1.5  # how far ahead the motion of movers is drawn [s]
 
 
 @dataclass(frozen=True, eq=False)
 class Backdrop:
-    """What a camera sees of everything that stands still."""
+    """What a camera sees of everything that stands still.
+
+    Attributes:
+        camera: the camera
+        pixels: the picture (H, W, 3)
+        visible: the fraction of each pixel that shows ground (H, W)
+        depth: depth of the bodies in clip space, 1 where there is none, at the resolution they were rendered in
+    """
 
     camera: Camera
     pixels: Picture
-    visible: npt.NDArray[np.float32]  # (H, W) the part of each pixel that is ground
-    depth: npt.NDArray[np.float32]  # (fine H, fine W) of bodies; 1 where there are none
+    visible: npt.NDArray[np.float32]
+    depth: npt.NDArray[np.float32]
 
 
-class Stage:
-    """A scene before one camera. Use it in a `with` block.
+class Compositor:
+    """Draws frames of one scene for one camera. Use it in a `with` block.
 
-    >>> with Stage(scene, camera, route=rollout.route) as stage:
-    ...     stage.drive(points, speeds)
-    ...     picture = stage.frame(pose, wheels)
+    >>> with Compositor(scene, camera, route=rollout.route) as compositor:
+    ...     compositor.extend_trail(points, speeds)
+    ...     picture = compositor.frame(pose, wheels)
+
+    Args:
+        scene: what stands still
+        camera: where the pictures are taken from
+        route: a polyline (N, 2) [m] that stays on the ground; for a route that changes, use `show_route`
+        fine: each pixel is the mean of fine x fine rendered ones
+        moving_camera: the camera will move, so the backdrop is cast by rays
     """
 
-    def __init__(self, scene: Scene, camera: Camera, *, route: Floats, fine: int = 2, moves: bool = False) -> None:
+    def __init__(
+        self, scene: Scene, camera: Camera, *, route: Floats, fine: int = 2, moving_camera: bool = False
+    ) -> None:
         self.scene = scene
         self.camera = camera
-        self.fine = fine  # each pixel is the mean of fine x fine
-        self._moves = moves  # the camera does, so that nothing can be kept from frame to frame
+        self.fine = fine
+        self._moving_camera = moving_camera
         self.tall = np.minimum(scene.obstacles[:, 3], drawn_height(scene))
         self._route = np.ascontiguousarray(route, dtype=np.float64).reshape(-1, 2)
         self._sun, self._light = _sun(camera)
         self._trail_width = trail_width(scene, camera)
         self._trail: list[tuple[Floats, Floats]] = []
-        self._written: list[tuple[Picture, float, float, float]] = []
-        self._renewed = (np.empty((0, 5)), np.empty((0, 5)))
+        self._labels: list[tuple[Picture, float, float, float]] = []
+        self._changing_route = (np.empty((0, 5)), np.empty((0, 5)))  # dashes and dots, as capsules
         self._open = contextlib.ExitStack()
 
-    def __enter__(self) -> Stage:
+    def __enter__(self) -> Compositor:
         self._still = self._open.enter_context(client())
         self._moving = self._open.enter_context(client())
-        self._pieces = still_pieces(self.scene, self.tall)
-        self._solids = solids(self._pieces, self.scene, self.tall)
-        balls = [mesh.ball for mesh, _ in self._pieces]
+        self._meshes = still_meshes(self.scene, self.tall)
+        self._solids = still_solids(self._meshes, self.scene, self.tall)
+        balls = [mesh.ball for mesh, _ in self._meshes]
         self._centres = np.array([centre for centre, _ in balls])
         self._radii = np.array([radius for _, radius in balls])
         self._loaded = np.zeros(len(balls), dtype=np.bool_)
@@ -82,14 +109,14 @@ class Stage:
         self._bodies = [add_mesh(self._moving, part.mesh, part.colour) for part in self._parts]
         tall = drawn_height(self.scene)
         self._movers = [add_mesh(self._moving, cylinder(radius, 0.0, tall), MOVER) for radius in self.scene.mover_radii]
-        self.look(self.camera)
+        self.set_camera(self.camera)
         return self
 
     def __exit__(self, *_: object) -> None:
         self._open.close()
 
-    def look(self, camera: Camera) -> None:
-        """Render everything that stands still through a camera."""
+    def set_camera(self, camera: Camera) -> None:
+        """Render the backdrop through a camera, with the labels and the trail so far."""
         self.camera = camera
         self.backdrop = self._render_still(camera)
         self._forward = camera.ground
@@ -97,8 +124,8 @@ class Stage:
         height, width = self.backdrop.visible.shape
         self._canvas = self.backdrop.pixels.copy()
         self._painted = np.zeros((height, width, 4), dtype=np.uint8)
-        for sprite in self._written:
-            self._lay(*sprite)
+        for label in self._labels:
+            self._put_on_ground(*label)
         if self._trail:
             rows, colours = (np.concatenate(part) for part in zip(*self._trail, strict=True))
             ends = rows[:, :4].reshape(-1, 2, 2)
@@ -106,8 +133,8 @@ class Stage:
             seen = camera.sees(middles, np.hypot(*(ends[:, 1] - ends[:, 0]).T) / 2 + self._trail_width)
             self._paint_trail(rows[seen], colours[seen])
 
-    def drive(self, points: Floats, speeds: npt.ArrayLike) -> None:
-        """Continue the driven trail along points (N, 2), N >= 2, at speeds (N,) [m/s]."""
+    def extend_trail(self, points: Floats, speeds: npt.ArrayLike) -> None:
+        """Continue the driven path along points (N, 2) [m], N >= 2, coloured by the speeds (N,) there [m/s]."""
         share = np.abs(np.asarray(speeds, dtype=np.float64)) / self.scene.robot.max_speed
         half = np.full(len(points) - 1, self._trail_width / 2)
         rows = np.ascontiguousarray(np.column_stack([points[:-1], points[1:], half]))
@@ -115,11 +142,16 @@ class Stage:
         self._trail.append((rows, colours))
         self._paint_trail(rows, colours)
 
-    def reroute(self, line: Floats, places: Floats) -> None:
-        """Draw a line (N, 2), from now on, in place of the last, and marks at places (M, 2) where new lines were found."""
+    def show_route(self, route: Floats, replanned_at: Floats) -> None:
+        """Replace the route that later frames show.
+
+        Args:
+            route: the polyline (N, 2) [m]
+            replanned_at: where the robot was at each replan so far (M, 2) [m]; a dot marks each place
+        """
         half = 1.5 * self.camera.pixel
-        dots = np.column_stack([places, places, np.full(len(places), 2.4 * half)])
-        self._renewed = (dashes(line, 7 * half, 5 * half, 0.9 * half), np.ascontiguousarray(dots))
+        dots = np.column_stack([replanned_at, replanned_at, np.full(len(replanned_at), 2.4 * half)])
+        self._changing_route = (dashes(route, 7 * half, 5 * half, 0.9 * half), np.ascontiguousarray(dots))
 
     def frame(
         self,
@@ -128,44 +160,54 @@ class Stage:
         movers: npt.ArrayLike = (),
         velocities: npt.ArrayLike | None = None,
     ) -> Picture:
-        """The picture with the robot at a pose, its wheels turned by angles (left, right) and movers at (M, 2).
+        """The picture (H, W, 3) with robot and movers.
 
-        Movers' `velocities` (M, 2) [m/s] are drawn as lines to where they will be if they keep them.
+        Args:
+            pose: the robot's x, y [m] and heading [rad]
+            wheels: how far the left and the right wheel have turned [rad]
+            movers: the movers' positions (M, 2) [m]
+            velocities: the movers' velocities (M, 2) [m/s], to draw where they will be at constant velocity
         """
         x, y, yaw = (float(value) for value in np.asarray(pose))
         places = np.asarray(movers, dtype=np.float64).reshape(-1, 2)
         frame = self._canvas.copy()
-        for rows in self._renewed:
+        for rows in self._changing_route:
             self._blend(frame, rows, ROUTE, 0.85)
         if velocities is not None:
-            self._foretell(frame, places, np.asarray(velocities, dtype=np.float64).reshape(-1, 2))
-        self._shade(frame, np.array([x, y, yaw]), places)
-        self._place(x, y, yaw, wheels, places)
+            self._draw_forecast(frame, places, np.asarray(velocities, dtype=np.float64).reshape(-1, 2))
+        self._draw_shadows(frame, np.array([x, y, yaw]), places)
+        self._place_bodies(x, y, yaw, wheels, places)
         for box in merged(self._boxes(x, y, places)):
-            self._put(frame, box)
+            self._put_bodies(frame, box)
         return frame
 
-    def field(self, grid: Grid, levels: Floats, line: Floats) -> Picture:
-        """The picture without a robot: a field (R, C) of a grid, 0 to 1, on the ground, and a line (N, 2) over it."""
+    def field_frame(self, grid: Grid, levels: Floats, path: Floats) -> Picture:
+        """The picture (H, W, 3) without a robot, with a planner's field on the ground and a path over it.
+
+        Args:
+            grid: the grid of the field
+            levels: the field (R, C), 0 to 1; NaN leaves a cell unpainted
+            path: a polyline (N, 2) [m]
+        """
         frame = self.backdrop.pixels.copy()
         tints = field_colours(np.linspace(0, 1, 256))
         visible, (x, y) = self.backdrop.visible, grid.origin
         kernels.lay_field(frame, visible, self._inverse, np.ascontiguousarray(levels), x, y, grid.cell, tints)
-        half = np.full(max(0, len(line) - 1), 1.6 * self.camera.pixel)
-        rows = np.ascontiguousarray(np.column_stack([line[:-1], line[1:], half]))
+        half = np.full(max(0, len(path) - 1), 1.6 * self.camera.pixel)
+        rows = np.ascontiguousarray(np.column_stack([path[:-1], path[1:], half]))
         painted = np.zeros((*visible.shape, 4), dtype=np.uint8)
         colours = np.tile(np.array(SHELL, dtype=np.float64), (len(rows), 1))
         kernels.draw_trail(frame, frame.copy(), visible, painted, self._forward, self._inverse, rows, colours)
-        for sprite, x, y, reach in self._written:
+        for sprite, x, y, reach in self._labels:
             self._put_label(frame, sprite, x, y, reach)
         return frame
 
-    def write(self, sprite: Picture, x: float, y: float, reach: float) -> None:
-        """Lay an RGBA picture on the ground's picture, centred below (or above) a disc of radius `reach` at x, y."""
-        self._written.append((sprite, x, y, reach))
-        self._lay(sprite, x, y, reach)
+    def add_label(self, sprite: Picture, x: float, y: float, reach: float) -> None:
+        """Put an RGBA picture on the ground for good, below (or above) the disc of radius `reach` at x, y [m]."""
+        self._labels.append((sprite, x, y, reach))
+        self._put_on_ground(sprite, x, y, reach)
 
-    def _lay(self, sprite: Picture, x: float, y: float, reach: float) -> None:
+    def _put_on_ground(self, sprite: Picture, x: float, y: float, reach: float) -> None:
         for picture in (self.backdrop.pixels, self._canvas):
             self._put_label(picture, sprite, x, y, reach)
 
@@ -180,22 +222,22 @@ class Stage:
         kernels.put_sprite(frame, sprite, round(left), round(top), 1.0)
 
     def pixel(self, x: float, y: float, z: float = 0.0) -> tuple[float, float]:
-        """Where a point appears [px]."""
+        """Where a point of the world [m] appears: column and row [px]."""
         at = self.camera.pixels([(x, y, z)])[0]
         return float(at[0]), float(at[1])
 
     def _load(self, chosen: npt.NDArray[np.bool_]) -> None:
-        """Have just these pieces in the client: what cannot be seen need not be drawn."""
+        """Have exactly these meshes in the client; the renderer spends time on meshes out of sight, too."""
         if (chosen == self._loaded).all():
             return
         bullet().resetSimulation(physicsClientId=self._still)
-        for mesh, colour in grouped([self._pieces[k] for k in np.flatnonzero(chosen)]):
+        for mesh, colour in merged_by_colour([self._meshes[k] for k in np.flatnonzero(chosen)]):
             add_mesh(self._still, mesh, colour)
         self._loaded = chosen
 
     def _render_still(self, camera: Camera) -> Backdrop:
-        if self._moves:
-            image, depth, seg = self._solids.seen(camera, self.fine, self._light)
+        if self._moving_camera:
+            image, depth, seg = self._solids.render(camera, self.fine, self._light)
         else:
             self._load(camera.sees(self._centres, self._radii))
             image, depth, seg = render(self._still, camera, None, self.fine, self._light)
@@ -210,15 +252,22 @@ class Stage:
         return Backdrop(camera, pixels, visible, depth)
 
     def _paint_trail(self, rows: Floats, colours: Floats) -> None:
+        visible = self.backdrop.visible
         kernels.draw_trail(
-            self._canvas, self.backdrop.pixels, self.backdrop.visible, self._painted, self._forward, self._inverse, rows,
+            self._canvas,
+            self.backdrop.pixels,
+            visible,
+            self._painted,
+            self._forward,
+            self._inverse,
+            rows,
             colours,
-        )  # fmt: skip
+        )
 
-    def _foretell(self, frame: Picture, places: Floats, velocities: Floats) -> None:
-        """A line from each mover to where it will be, with a dot at each half second."""
+    def _draw_forecast(self, frame: Picture, places: Floats, velocities: Floats) -> None:
+        """Draw a line from each mover to where it will be at constant velocity, with a dot at each half second."""
         half = 1.1 * self.camera.pixel
-        ahead = places + FORETOLD * velocities
+        ahead = places + FORECAST * velocities
         lines = np.column_stack([places, ahead, np.full(len(places), half)])
         stops = [places + share * (ahead - places) for share in (1 / 3, 2 / 3, 1.0)]
         moving = np.hypot(*velocities.T) > 0.01
@@ -227,15 +276,15 @@ class Stage:
             self._blend(frame, np.ascontiguousarray(rows), MOVER, strength)
 
     def _blend(self, frame: Picture, rows: Floats, colour: Colour, strength: float) -> None:
-        """Draw thick segments (N, 5) on the ground."""
+        """Blend capsules (N, 5) of one colour into the ground."""
         tint = np.array(colour, dtype=np.float64)
         kernels.blend_capsules(frame, self.backdrop.visible, self._forward, self._inverse, rows, tint, strength)
 
-    def _shade(self, frame: Picture, pose: Floats, movers: Floats) -> None:
-        """The soft shadows of what moves, and a glow under a robot too small to be found at a glance."""
+    def _draw_shadows(self, frame: Picture, pose: Floats, movers: Floats) -> None:
+        """Draw the soft shadows of robot and movers, and a glow under a robot that is small in the picture."""
         tall, foot = robot_height(self.scene.robot), self.scene.robot.footprint
         shape = np.array([foot.half_length, foot.half_width, foot.rounding])
-        self._shadow(frame, pose, shape, tall, SOFT + 0.3 * tall)
+        self._draw_shadow(frame, pose, shape, tall, SHADOW_BLUR + 0.3 * tall)
         wide = round(2 * foot.radius / self.camera.pixel)
         if wide < 0.05 * frame.shape[1]:
             px, py = self.pixel(pose[0], pose[1], tall / 2)
@@ -243,16 +292,26 @@ class Stage:
             kernels.put_sprite(frame, halo, round(px - len(halo) / 2), round(py - len(halo) / 2), 1.0)
         for (x, y), radius in zip(movers, self.scene.mover_radii, strict=True):
             tall = drawn_height(self.scene)
-            self._shadow(frame, np.array([x, y, 0.0]), np.array([0.0, 0.0, radius]), tall, SOFT + 0.3 * tall)
+            disc = np.array([0.0, 0.0, radius])
+            self._draw_shadow(frame, np.array([x, y, 0.0]), disc, tall, SHADOW_BLUR + 0.3 * tall)
 
-    def _shadow(self, frame: Picture, pose: Floats, shape: Floats, tall: float, soft: float) -> None:
+    def _draw_shadow(self, frame: Picture, pose: Floats, shape: Floats, tall: float, soft: float) -> None:
+        """Darken the ground beside a body, where it keeps off the sun, and below it, where it keeps off the sky."""
         sun = np.array(self._sun) * tall
         for reach, blur, strength in ((sun, soft, 0.30), (np.zeros(2), 0.5 * shape.sum(), 0.22)):
             kernels.shade_body(
-                frame, self.backdrop.visible, self._forward, self._inverse, pose, shape, reach, float(blur), strength
+                frame,
+                self.backdrop.visible,
+                self._forward,
+                self._inverse,
+                pose,
+                shape,
+                reach,
+                float(blur),
+                strength,
             )
 
-    def _place(self, x: float, y: float, yaw: float, wheels: tuple[float, float], movers: Floats) -> None:
+    def _place_bodies(self, x: float, y: float, yaw: float, wheels: tuple[float, float], movers: Floats) -> None:
         p = bullet()
         for part, body in zip(self._parts, self._bodies, strict=True):
             at, quaternion = part_pose(part, x, y, yaw, wheels)
@@ -261,7 +320,7 @@ class Stage:
             p.resetBasePositionAndOrientation(body, (mx, my, 0.0), (0, 0, 0, 1), physicsClientId=self._moving)
 
     def _boxes(self, x: float, y: float, movers: Floats) -> list[Box]:
-        """The pixels that each moving body may cover."""
+        """The pixels that robot and movers may cover, a box for each that is in sight."""
         tall = drawn_height(self.scene)
         robot = self.scene.robot
         bodies = [(x, y, 1.05 * robot.footprint.radius, 1.2 * max(robot_height(robot), 2.2 * robot.wheel_radius))]
@@ -277,23 +336,24 @@ class Stage:
                 boxes.append((int(x0), int(y0), int(x1), int(y1)))
         return boxes
 
-    def _put(self, frame: Picture, box: Box) -> None:
+    def _put_bodies(self, frame: Picture, box: Box) -> None:
+        """Render robot and movers within a box and blend them into the frame."""
         image, depth, seg = render(self._moving, self.camera, box, self.fine, self._light)
-        kernels.put_bodies(frame, image, depth, seg, self.backdrop.depth, box[0], box[1], self.fine, GHOST)
+        kernels.put_bodies(frame, image, depth, seg, self.backdrop.depth, box[0], box[1], self.fine, HIDDEN_OPACITY)
 
 
 def drawn_height(scene: Scene) -> float:
-    """Cylinders are drawn no taller than this [m], so that they hide little of the robot."""
+    """The tallest that cylinders are drawn [m]: taller ones would hide the robot."""
     return max(0.3, 2.0 * robot_height(scene.robot))
 
 
 def trail_width(scene: Scene, camera: Camera) -> float:
-    """The width of the driven trail [m]: a part of the robot's, but never a hair line."""
+    """The width of the driven path [m]: a fraction of the robot's, and at least four pixels."""
     return max(0.32 * scene.robot.footprint.radius, 4.0 * camera.pixel)
 
 
-def still_pieces(scene: Scene, tall: Floats) -> list[tuple[Mesh, Colour]]:
-    """What stands still: the kerb in pieces, and the cylinders, `tall` (N,) high."""
+def still_meshes(scene: Scene, tall: Floats) -> list[tuple[Mesh, Colour]]:
+    """Everything that stands still as coloured meshes: the kerb in pieces, and cylinders of heights `tall` (N,) [m]."""
     width = kerb_width(scene)
     found = [(mesh, KERB) for mesh in kerb(scene.bounds, width, 0.8 * width)]
     for (x, y, radius, _), z, unseen in zip(scene.obstacles, tall, scene.unseen, strict=True):
@@ -301,28 +361,27 @@ def still_pieces(scene: Scene, tall: Floats) -> list[tuple[Mesh, Colour]]:
     return found
 
 
-def solids(pieces: list[tuple[Mesh, Colour]], scene: Scene, tall: Floats) -> Solids:
-    """The same, for casting rays."""
-    kerbs = [mesh.vertices for mesh, colour in pieces if colour == KERB]
+def still_solids(meshes: list[tuple[Mesh, Colour]], scene: Scene, tall: Floats) -> Solids:
+    """Everything that stands still as boxes and cylinders, for ray casting."""
+    kerbs = [mesh.vertices for mesh, colour in meshes if colour == KERB]
     boxes = np.array([np.concatenate([corners.min(axis=0), corners.max(axis=0)]) for corners in kerbs])
     cylinders = np.column_stack([scene.obstacles[:, :3], tall])
     return Solids.of(cylinders, [UNSEEN if unseen else OBSTACLE for unseen in scene.unseen], boxes, KERB)
 
 
-def grouped(pieces: list[tuple[Mesh, Colour]]) -> list[tuple[Mesh, Colour]]:
-    """The pieces, those of one colour joined."""
+def merged_by_colour(meshes: list[tuple[Mesh, Colour]]) -> list[tuple[Mesh, Colour]]:
+    """The meshes, up to 400 of one colour joined to one: PyBullet takes at most 131072 vertices per mesh."""
     found = []
-    for colour in dict.fromkeys(colour for _, colour in pieces):
-        meshes = [mesh for mesh, c in pieces if c == colour]
-        # PyBullet takes at most 131072 vertices a mesh.
-        found += [(join(*meshes[i : i + 400]), colour) for i in range(0, len(meshes), 400)]
+    for colour in dict.fromkeys(colour for _, colour in meshes):
+        alike = [mesh for mesh, c in meshes if c == colour]
+        found += [(join(*alike[i : i + 400]), colour) for i in range(0, len(alike), 400)]
     return found
 
 
 def part_pose(
     part: Part, x: float, y: float, yaw: float, wheels: tuple[float, float]
 ) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
-    """Where a part of the robot is, and its orientation."""
+    """Position [m] and orientation (quaternion) of a part of the robot at a pose with its wheels turned [rad]."""
     cosine, sine = math.cos(yaw), math.sin(yaw)
     ax, ay, az = part.axle
     angle = 0.0 if part.wheel == 0 else wheels[0] if part.wheel > 0 else wheels[1]
@@ -332,7 +391,7 @@ def part_pose(
 
 
 def _sun(camera: Camera) -> tuple[tuple[float, float], tuple[float, float, float]]:
-    """How far a shadow reaches per metre of height, and the direction to the lamp: from the left, in front."""
+    """How far shadows reach per metre of height, and the direction to the lamp: left of the camera, in front."""
     right = camera.view[0, :3]
     ahead = np.array([-right[1], right[0], 0.0])
     reach = 0.55 * right + 0.28 * ahead

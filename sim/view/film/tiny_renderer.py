@@ -1,4 +1,4 @@
-"""PyBullet's software renderer: meshes in, pictures with depth out."""
+"""PyBullet's software renderer, TinyRenderer: meshes in, pictures with depth out."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ import numpy as np
 
 from antdrive.sim.physics.engine import bullet
 from antdrive.sim.view.film.camera import Camera
-from antdrive.sim.view.film.model import Mesh
+from antdrive.sim.view.film.meshes import Mesh
 from antdrive.sim.view.style import Colour
 
-AMBIENT, DIFFUSE = 0.62, 0.46  # light from everywhere and from the lamp
+AMBIENT, DIFFUSE = 0.62, 0.46  # strength of the light from all sides and from the lamp
 
-Box: TypeAlias = tuple[int, int, int, int]  # x0, y0, x1, y1 [px], the last ones excluded
+Box: TypeAlias = tuple[int, int, int, int]  # x0, y0, x1, y1 [px]; x1 and y1 are excluded
 
 
 def add_mesh(number: int, mesh: Mesh, colour: Colour) -> int:
-    """Put a mesh into a PyBullet client, for the eye only; returns the body."""
+    """Add a mesh that is visible but cannot collide to PyBullet client `number`; returns its body number."""
     p = bullet()
     shape = p.createVisualShape(
         p.GEOM_MESH,
@@ -34,7 +34,15 @@ def add_mesh(number: int, mesh: Mesh, colour: Colour) -> int:
 def render(
     number: int, camera: Camera, box: Box | None, fine: int, light: tuple[float, float, float]
 ) -> tuple[Any, Any, Any]:
-    """TinyRenderer's picture (h, w, 4), depth and body numbers (h, w), `fine` times the pixels of (a box of) a camera's."""
+    """Render a PyBullet client's bodies: picture (h, w, 4), depth (h, w) and body numbers (h, w), -1 for none.
+
+    Args:
+        number: the client
+        camera: where the picture is taken from
+        box: the part of the camera's picture to render; None for all of it
+        fine: how many times as many rows and columns as the box's the picture has
+        light: direction to the lamp
+    """
     p = bullet()
     x0, y0, x1, y1 = box or (0, 0, *camera.size)
     view, projection = camera.matrices(box)
@@ -61,7 +69,7 @@ def render(
 
 
 def merged(boxes: list[Box]) -> list[Box]:
-    """The boxes, with those that overlap made one: a crop shows all that moves, so each pixel must be blended once."""
+    """The boxes, overlapping ones joined: each crop shows all moving bodies, so no pixel may be in two crops."""
     done: list[Box] = []
     for box in boxes:
         while True:

@@ -1,4 +1,4 @@
-"""Rays instead of triangles: what a moving camera sees of cylinders and kerb, exact and several times as fast."""
+"""Ray casting of cylinders and boxes for moving cameras: exact, and several times as fast as TinyRenderer."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.sim.view.film import _kernels_cast as kernels
+from antdrive.sim.view.film import _kernels_raycast as kernels
 from antdrive.sim.view.film.camera import Camera
-from antdrive.sim.view.film.tiny import AMBIENT, DIFFUSE
+from antdrive.sim.view.film.tiny_renderer import AMBIENT, DIFFUSE
 from antdrive.sim.view.style import Colour
 
 Floats = npt.NDArray[np.float64]
@@ -18,16 +18,23 @@ Floats = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Solids:
-    """Cylinders on the ground and boxes along the axes, each with its colour (N, 3), 0 to 255."""
+    """Cylinders that stand on the ground, and boxes along the axes.
 
-    cylinders: Floats  # (N, 4) x, y, radius, height [m]
+    Attributes:
+        cylinders: x, y, radius and height of each (N, 4) [m]
+        cylinder_colours: red, green, blue of each (N, 3), 0 to 255
+        boxes: x0, y0, z0, x1, y1, z1 of each (M, 6) [m]
+        box_colours: red, green, blue of each (M, 3), 0 to 255
+    """
+
+    cylinders: Floats
     cylinder_colours: Floats
-    boxes: Floats  # (M, 6) x0, y0, z0, x1, y1, z1 [m]
+    boxes: Floats
     box_colours: Floats
 
     @classmethod
     def of(cls, cylinders: Floats, colours: list[Colour], boxes: Floats, box_colour: Colour) -> Solids:
-        """Cylinders of several colours, boxes of one."""
+        """Cylinders (N, 4) with a colour each, and boxes (M, 6) of one colour."""
         tints = np.array(colours, dtype=np.float64).reshape(-1, 3)
         return cls(
             np.ascontiguousarray(cylinders),
@@ -36,8 +43,14 @@ class Solids:
             np.tile(np.array(box_colour, dtype=np.float64), (len(boxes), 1)),
         )
 
-    def seen(self, camera: Camera, fine: int, light: tuple[float, float, float]) -> tuple[Any, Any, Any]:
-        """Picture (h, w, 4), depth and body numbers (h, w), -1 for none, `fine` times the camera's pixels."""
+    def render(self, camera: Camera, fine: int, light: tuple[float, float, float]) -> tuple[Any, Any, Any]:
+        """Picture (h, w, 4), depth (h, w) and body numbers (h, w), -1 for none, like `tiny_renderer.render`.
+
+        Args:
+            camera: where the picture is taken from
+            fine: how many times as many rows and columns as the camera's the picture has
+            light: direction to the lamp
+        """
         width, height = camera.size
         image = np.empty((height * fine, width * fine, 4), dtype=np.uint8)
         depth = np.ones(image.shape[:2], dtype=np.float32)
@@ -54,13 +67,20 @@ class Solids:
             image, depth, seg, *common, self.cylinders, _spans(camera, around), self.cylinder_colours, 0
         )
         kernels.cast_boxes(
-            image, depth, seg, *common, self.boxes, _spans(camera, self.boxes), self.box_colours, len(self.cylinders)
+            image,
+            depth,
+            seg,
+            *common,
+            self.boxes,
+            _spans(camera, self.boxes),
+            self.box_colours,
+            len(self.cylinders),
         )
         return image, depth, seg
 
 
 def _spans(camera: Camera, boxes: Floats) -> npt.NDArray[np.int64]:
-    """The pixels x0, y0, x1, y1 (N, 4) that boxes may cover; empty ones where a box is out of sight."""
+    """The pixels x0, y0, x1, y1 (N, 4) that each box may cover; empty where the box is out of sight."""
     points = boxes[:, [(i, 1 + j, 2 + k) for i in (0, 3) for j in (0, 3) for k in (0, 3)]]  # (N, 8, 3)
     clip = np.concatenate([points, np.ones((*points.shape[:2], 1))], axis=2) @ camera.full.T
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -68,9 +88,9 @@ def _spans(camera: Camera, boxes: Floats) -> npt.NDArray[np.int64]:
     size = np.array(camera.size)
     at = (1 + at * [1, -1]) * size / 2
     low, high = np.floor(at.min(axis=1)) - 1, np.ceil(at.max(axis=1)) + 1
-    around = (clip[..., 3] <= 0).any(axis=1)  # part of it is behind the camera: anywhere
-    low[around], high[around] = 0, size
-    gone = (clip[..., 3] <= 0).all(axis=1)
-    low[gone], high[gone] = 0, 0
+    partly_behind = (clip[..., 3] <= 0).any(axis=1)  # such corners have no projection: take all pixels
+    low[partly_behind], high[partly_behind] = 0, size
+    behind = (clip[..., 3] <= 0).all(axis=1)
+    low[behind], high[behind] = 0, 0
     spans = np.hstack([np.clip(low, 0, size), np.clip(high, 0, size)])
     return spans.astype(np.int64)

@@ -1,4 +1,4 @@
-"""The painted ground of a film: floor and grid, inflated zones, soft shadows, the planned route, start and goal."""
+"""Paint the ground of a film: floor, grid, inflated zones, soft shadows, planned route, start and goal."""
 
 from __future__ import annotations
 
@@ -16,32 +16,44 @@ from antdrive.worlds.plane import segment_lengths
 Floats = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
-SHADOW = 0.30  # how dark the deepest shadow is
+SHADOW_DEPTH = 0.30  # how much light the deepest shadow takes away
 
 
 def paint_ground(
     camera: Camera, scene: Scene, route: Floats, ground: Mask, tall: Floats, sun: tuple[float, float]
 ) -> npt.NDArray[np.float32]:
-    """The ground (H, W, 3) as a camera sees it where `ground` (H, W) is true.
+    """The ground (H, W, 3) as a camera sees it.
 
-    `tall` (N,) are the heights that cast shadows along `sun` per metre.
+    Args:
+        camera: where the picture is taken from
+        scene: what to paint
+        route: the planned polyline (N, 2) [m]
+        ground: which pixels show ground (H, W); the others stay unpainted
+        tall: the obstacles' heights (N,) [m], for their shadows
+        sun: how far the shadow of a body reaches in x and y per metre of its height
     """
     width, height = camera.size
     brush = _Brush(camera, ground)
-    under = kerb_width(scene) / 2  # the floor goes on under the kerb, so that no edge of it can be seen
+    under = kerb_width(scene) / 2  # the floor continues under the kerb, so that its edge is hidden
     bounds = np.array(scene.bounds) + np.array([-under, -under, under, under])
     step = grid_step(camera)
     kernels.lay_floor(
-        brush.rgb, ground, brush.inside, brush.inverse, bounds, step, 1.0,
+        brush.rgb,
+        ground,
+        brush.inside,
+        brush.inverse,
+        bounds,
+        step,
+        1.0,
         np.array([GROUND, PAPER, GRID], dtype=np.float64),
-    )  # fmt: skip
+    )
     line = 1.5 * camera.pixel
     if scene.inflate > 0:
         brush.zones(scene, line)
     shade = np.ones((height, width), dtype=np.float32)
     cylinders = scene.obstacles.copy()
     cylinders[:, 3] = tall
-    kernels.cast_shadows(shade, brush.forward, brush.inverse, cylinders, *sun, SHADOW)
+    kernels.cast_shadows(shade, brush.forward, brush.inverse, cylinders, *sun, SHADOW_DEPTH)
     kernels.multiply(brush.rgb, shade)
     if len(route) > 1:
         brush.capsules(dashes(route, 7 * line, 5 * line, 0.9 * line), ROUTE, 0.85)
@@ -57,8 +69,8 @@ def kerb_width(scene: Scene) -> float:
 
 
 def grid_step(camera: Camera) -> float:
-    """The distance between grid lines [m]: the finest of 0.1, 0.25, 0.5, 1, 2, 5, ... that is not too fine to see."""
-    least = max(34.0, camera.size[0] / 24)
+    """The distance between grid lines [m]: the smallest of 0.1, 0.25, 0.5, 1, 2, 5, ... that is not too fine."""
+    least = max(34.0, camera.size[0] / 24)  # [px]
     for step in (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0):
         if step / camera.pixel >= least:
             return step
@@ -66,7 +78,14 @@ def grid_step(camera: Camera) -> float:
 
 
 def dashes(line: Floats, on: float, off: float, half: float) -> Floats:
-    """Capsules (M, 5) that draw a polyline (N, 2) dashed, `on` metres and `off` metres in turn."""
+    """Capsules (M, 5) that draw a polyline (N, 2) dashed.
+
+    Args:
+        line: the polyline [m]
+        on: length of a dash [m]
+        off: length of a gap [m]
+        half: half the width of the line [m]
+    """
     steps = segment_lengths(line)
     arc = np.concatenate([[0.0], np.cumsum(steps)])
     starts = np.arange(0.0, arc[-1], on + off)
@@ -77,7 +96,7 @@ def dashes(line: Floats, on: float, off: float, half: float) -> Floats:
 
 
 class _Brush:
-    """Ground colours and a coverage mask to paint them through."""
+    """The colours of the ground, and a coverage mask through which shapes are painted."""
 
     def __init__(self, camera: Camera, ground: Mask) -> None:
         width, height = camera.size
@@ -88,21 +107,21 @@ class _Brush:
         self.cover = np.zeros((height, width), dtype=np.float32)
 
     def blend(self, colour: Colour, strength: float) -> None:
-        """Put a colour on what is covered, and start a new cover."""
+        """Blend a colour into the covered pixels and clear the mask."""
         kernels.blend_cover(self.rgb, self.cover, self.inside, np.array(colour, dtype=np.float64), strength)
 
     def capsules(self, rows: Floats, colour: Colour, strength: float) -> None:
-        """Paint thick segments (N, 5)."""
+        """Paint capsules (N, 5): ax, ay, bx, by, half width [m]."""
         kernels.cover_capsules(self.cover, self.forward, self.inverse, rows)
         self.blend(colour, strength)
 
     def rings(self, rows: list[tuple[float, float, float, float]], colour: Colour, strength: float) -> None:
-        """Paint circles: x, y, radius, half width."""
+        """Paint circles: x, y, radius, half width of the line [m]."""
         kernels.cover_rings(self.cover, self.forward, self.inverse, np.array(rows, dtype=np.float64))
         self.blend(colour, strength)
 
     def zones(self, scene: Scene, line: float) -> None:
-        """Where the robot's centre may not be planned: tinted, with an outline around all of it."""
+        """Tint the zones that planned paths avoid, and draw one outline around all of them."""
         kernels.cover_capsules(self.cover, self.forward, self.inverse, _zone_rows(scene, 0.0))
         outer = self.cover.copy()
         self.blend(ZONE, 0.20)
@@ -111,7 +130,7 @@ class _Brush:
         self.blend(ZONE, 0.38)
 
     def start(self, scene: Scene, line: float) -> None:
-        """A ring as wide as the robot, with a tick along its heading."""
+        """Mark the start by a ring as wide as the robot, with a tick along its heading."""
         x, y, yaw = scene.start
         radius = scene.robot.footprint.radius + line
         self.rings([(x, y, radius, 0.8 * line)], START, 0.9)
@@ -120,7 +139,7 @@ class _Brush:
         self.capsules(np.array(tick), START, 0.9)
 
     def goal(self, scene: Scene, line: float) -> None:
-        """The disc the robot must stop in, with its centre marked."""
+        """Mark the disc in which the robot must stop, and its centre."""
         (x, y), radius = scene.goal, scene.goal_tolerance
         self.capsules(np.array([(x, y, x, y, radius)]), GOAL, 0.22)
         self.rings([(x, y, radius, 0.9 * line)], GOAL, 0.95)
@@ -129,7 +148,7 @@ class _Brush:
 
 
 def _zone_rows(scene: Scene, shrink: float) -> Floats:
-    """Discs and walls, inflated, as capsules."""
+    """The inflated obstacles and walls as capsules (N, 5), `shrink` metres smaller."""
     x, y, radius, _ = scene.obstacles[~scene.unseen].T
     reach = scene.inflate - shrink
     discs = np.column_stack([x, y, x, y, radius + reach])

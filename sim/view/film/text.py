@@ -1,4 +1,4 @@
-"""Words on pictures: a font that comes with matplotlib, so that no system font is needed, and small pictures with text."""
+"""Text and other small pictures. The font is the one inside matplotlib, so no system font is needed."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ def font(size: int, bold: bool = False) -> ImageFont.FreeTypeFont:
 
 
 def text_width(text: str, size: int, bold: bool = False) -> int:
-    """How wide a text is [px]."""
+    """The width of a text [px]."""
     return int(np.ceil(font(size, bold).getlength(text)))
 
 
 def fitted(text: str, width: int, size: int, bold: bool = False) -> str:
-    """The text, shortened with an ellipsis where it is wider than `width` [px]."""
+    """The text, shortened with an ellipsis if it is wider than `width` [px]."""
     if text_width(text, size, bold) <= width:
         return text
     while text and text_width(text + "…", size, bold) > width:
@@ -41,20 +41,25 @@ def fitted(text: str, width: int, size: int, bold: bool = False) -> str:
 
 
 def label(text: str, size: int, colour: Colour = INK, *, bold: bool = True) -> Sprite:
-    """A text with a soft white rim, readable on anything."""
+    """A text with a soft white rim, readable on any background."""
     rim = max(2, size // 7)
     wide, high = text_width(text, size, bold) + 2 * rim, round(1.25 * size) + 2 * rim
     image = Image.new("RGBA", (wide, high), (255, 255, 255, 0))
     draw = ImageDraw.Draw(image)
     draw.text(
-        (rim, rim), text, font=font(size, bold), fill=colour, stroke_width=rim - 1, stroke_fill=(255, 255, 255, 215)
+        (rim, rim),
+        text,
+        font=font(size, bold),
+        fill=colour,
+        stroke_width=rim - 1,
+        stroke_fill=(255, 255, 255, 215),
     )
     draw.text((rim, rim), text, font=font(size, bold), fill=colour)
     return np.asarray(image)
 
 
 def pill(text: str, size: int, colour: Colour) -> Sprite:
-    """White words on a coloured plate with round ends."""
+    """White text on a coloured plate with round ends."""
     pad_x, pad_y = round(0.75 * size), round(0.36 * size)
     wide, high = text_width(text, size, True) + 2 * pad_x, round(1.2 * size) + 2 * pad_y
     image = plate(wide, high, colour, 255, radius=high // 2)
@@ -64,7 +69,7 @@ def pill(text: str, size: int, colour: Colour) -> Sprite:
 
 
 def plate(width: int, height: int, colour: Colour, alpha: int, *, radius: int) -> Image.Image:
-    """A rectangle with smooth round corners on nothing."""
+    """A rectangle with smooth round corners on a transparent background."""
     fine = 4
     mask = Image.new("L", (width * fine, height * fine), 0)
     box = (0, 0, width * fine - 1, height * fine - 1)
@@ -75,7 +80,7 @@ def plate(width: int, height: int, colour: Colour, alpha: int, *, radius: int) -
 
 
 def burst(size: int, colour: Colour) -> Sprite:
-    """A mark for a contact: a ring with rays."""
+    """The mark of a contact: a ring with rays."""
     fine = 4
     wide = size * fine
     image = Image.new("RGBA", (wide, wide), (*colour, 0))

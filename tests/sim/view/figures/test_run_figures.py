@@ -1,5 +1,4 @@
 import dataclasses
-import math
 import sys
 import threading
 
@@ -8,11 +7,14 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from antdrive.planners import History, PlanResult, PlanStatus, Query
+from antdrive.planners import Query
 from antdrive.planners.graph.search import AStar
 from antdrive.robots import Footprint, RobotSpec
-from antdrive.sim import Outcome
-from antdrive.sim.view.figures.plots import overview, plan_figure
+from antdrive.sim.log.certificate import Certificate
+from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.view.figures.plan_figures import plan_figure
+from antdrive.sim.view.figures.run_figures import certificate_figure, comparison_figure, overview
+from antdrive.sim.view.style import BAD, GOOD, planner_style
 from antdrive.worlds import Disc, InputError, Keyframed, Task, Wandering, World, rasterise
 
 ROBOT = RobotSpec(
@@ -73,14 +75,15 @@ def test_unseen_obstacles_have_their_own_colour(made_up_drive, tmp_path):
     assert near(pixels(overview(marked, tmp_path / "marked.png", dpi=80)), (196, 74, 138)) > 100
 
 
-def test_movers_and_their_ways_are_drawn(made_up_drive, planned, tmp_path):
+def test_movers_and_their_tracks_are_drawn(made_up_drive, planned, tmp_path):
     amber = (228, 177, 65)
     pictures = [pixels(overview(made_up_drive(movers=n), tmp_path / f"{n}.png", dpi=80)) for n in (0, 2)]
     assert near(pictures[1], amber) > near(pictures[0], amber) + 100
     task, grid, plan = planned
     mover = Keyframed(radius=0.2, keyframes=((0.0, 0.5, 3.0), (5.0, 2.5, 3.5)))
     moving = dataclasses.replace(
-        task, world=dataclasses.replace(task.world, movers=(mover, Wandering(radius=0.1, cell=0.5, period=1.0)))
+        task,
+        world=dataclasses.replace(task.world, movers=(mover, Wandering(radius=0.1, cell=0.5, period=1.0))),
     )
     picture = pixels(plan_figure(moving, grid, plan, ROBOT, tmp_path / "moving.png", dpi=80))
     plain = pixels(plan_figure(task, grid, plan, ROBOT, tmp_path / "plain.png", dpi=80))
@@ -101,31 +104,6 @@ def test_a_run_that_never_drove_has_an_overview(made_up_drive, tmp_path):
     assert overview(empty, tmp_path / "empty.png", dpi=60).stat().st_size > 5000
 
 
-def test_a_plan_is_drawn_on_the_map(planned, tmp_path):
-    task, grid, plan = planned
-    picture = pixels(plan_figure(task, grid, plan, ROBOT, tmp_path / "plan.png", dpi=80))
-    assert near(picture, (255, 122, 14)) > 300
-
-
-def test_an_iterative_planner_gets_its_history_and_landscape(planned, tmp_path):
-    task, grid, plan = planned
-    best = plan.cost * (1 + np.exp(-np.arange(30) / 6))
-    mean = best + 1
-    mean[:4] = math.inf
-    history = History(best=best, iteration_best=best + 0.2, iteration_mean=mean, arrived=np.full(30, 9))
-    learnt = dataclasses.replace(plan, history=history, landscape=np.random.default_rng(0).random(grid.shape))
-    picture = pixels(plan_figure(task, grid, learnt, ROBOT, tmp_path / "learnt.png", dpi=80))
-    assert near(picture, (18, 63, 122), 40) > 500, "the landscape's dark end"
-    plain = pixels(plan_figure(task, grid, plan, ROBOT, tmp_path / "plain.png", dpi=80))
-    assert picture.shape[1] > 1.3 * plain.shape[1]
-
-
-def test_a_plan_that_failed_says_why(planned, tmp_path):
-    task, grid, _ = planned
-    failed = PlanResult(status=PlanStatus.NO_PATH, reason="walled in")
-    assert near(pixels(plan_figure(task, grid, failed, ROBOT, tmp_path / "failed.png", dpi=80)), (204, 32, 42)) > 100
-
-
 def test_an_unknown_suffix_is_refused(made_up_drive, planned, tmp_path):
     with pytest.raises(InputError, match=r"choose one of .png, .pdf, .svg"):
         overview(made_up_drive(), tmp_path / "a.bmp")
@@ -142,3 +120,18 @@ def test_figures_work_in_a_thread_without_pyplot_and_leave_settings_alone(made_u
     thread.join()
     assert (tmp_path / "a.png").exists()
     assert matplotlib.rcParams.copy() == before
+
+
+@pytest.mark.parametrize("certified", [True, False])
+def test_a_certificate_is_drawn_with_its_verdict(made_up_drive, tmp_path, certified):
+    found = Certificate(certified, 0 if certified else 3, 0.05, 0.04, () if certified else ("it touched",))
+    picture = pixels(certificate_figure(made_up_drive(), found, tmp_path / "c.png", dpi=80))
+    assert (near(picture, GOOD, 12) > near(picture, BAD, 12)) == certified
+
+
+def test_several_planners_on_one_map(made_up_drive, tmp_path):
+    one = made_up_drive()
+    other = dataclasses.replace(one, pose=one.pose + [0, 0.2, 0])
+    picture = pixels(comparison_figure({"astar": one, "mmas": other}, tmp_path / "c.png", dpi=80))
+    assert near(picture, planner_style("astar")[0], 12) > 50
+    assert near(picture, planner_style("mmas")[0], 12) > 100

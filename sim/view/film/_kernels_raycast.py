@@ -1,7 +1,7 @@
-"""Compiled ray casting of what stands still, for moving cameras: arrays in, arrays out, nothing validated.
+"""Compiled ray casting of standing bodies, for moving cameras: arrays in, arrays out, nothing validated.
 
-`rays` (3, 3) takes a pixel (x, y, 1) to the direction seen there, one metre deep, so that a hit's distance along it is its depth.
-Light is reckoned as PyBullet's TinyRenderer does.
+`rays` (3, 3) takes a pixel (x, y, 1) to the direction seen there, one metre deep: the distance of a hit along that
+direction is its depth. Light is computed as PyBullet's TinyRenderer does it.
 """
 
 from __future__ import annotations
@@ -34,13 +34,24 @@ def _put(
 
 @kernel
 def cast_cylinders(
-    image: Array, depth: Array, seg: Array, fine: int, eye: Array, rays: Array, scale: Array, light: Array,
-    cylinders: Array, spans: Array, colours: Array, first: int,
-) -> None:  # fmt: skip
-    """Draw cylinders (N, 4) x, y, radius, height standing on the ground, each within its span x0, y0, x1, y1 of pixels.
+    image: Array,
+    depth: Array,
+    seg: Array,
+    fine: int,
+    eye: Array,
+    rays: Array,
+    scale: Array,
+    light: Array,
+    cylinders: Array,
+    spans: Array,
+    colours: Array,
+    first: int,
+) -> None:
+    """Draw cylinders (N, 4) x, y, radius, height that stand on the ground, each within its span of pixels.
 
-    `image` (h, w, 4), `depth` and `seg` (h, w) are `fine` times as fine as the pixels; `scale` is what turns depth into that of
-    the projection, then ambient and diffuse light. Bodies count from `first`.
+    `spans` (N, 4) are x0, y0, x1, y1. `image` (h, w, 4), `depth` and `seg` (h, w) have `fine` times as many rows and
+    columns as the spans' pixels. `scale` holds the offset and the factor from 1 / depth to the projection's depth, then
+    the ambient and the diffuse light. Bodies are numbered from `first`.
     """
     for n in range(cylinders.shape[0]):
         cx, cy, radius, tall = cylinders[n, 0], cylinders[n, 1], cylinders[n, 2], cylinders[n, 3]
@@ -73,9 +84,19 @@ def cast_cylinders(
 
 @kernel
 def cast_boxes(
-    image: Array, depth: Array, seg: Array, fine: int, eye: Array, rays: Array, scale: Array, light: Array,
-    boxes: Array, spans: Array, colours: Array, first: int,
-) -> None:  # fmt: skip
+    image: Array,
+    depth: Array,
+    seg: Array,
+    fine: int,
+    eye: Array,
+    rays: Array,
+    scale: Array,
+    light: Array,
+    boxes: Array,
+    spans: Array,
+    colours: Array,
+    first: int,
+) -> None:
     """Draw boxes (N, 6) x0, y0, z0, x1, y1, z1, as `cast_cylinders` draws cylinders."""
     for n in range(boxes.shape[0]):
         for row in range(spans[n, 1] * fine, spans[n, 3] * fine):
@@ -97,7 +118,11 @@ def cast_boxes(
                 near = scale[0] + scale[1] / enter
                 if near < depth[row, col]:
                     lit = _lit(
-                        side if face == 0 else 0.0, side if face == 1 else 0.0, side if face == 2 else 0.0,
-                        light, scale[2], scale[3],
-                    )  # fmt: skip
+                        side if face == 0 else 0.0,
+                        side if face == 1 else 0.0,
+                        side if face == 2 else 0.0,
+                        light,
+                        scale[2],
+                        scale[3],
+                    )
                     _put(image, depth, seg, row, col, near, first + n, colours[n], lit)

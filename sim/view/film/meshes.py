@@ -1,4 +1,4 @@
-"""Meshes of what a film shows: cylinders, the kerb around the world, and the robot with wheels that can be seen turning."""
+"""Meshes for films: cylinders, the kerb around the world, and a robot whose wheels visibly turn."""
 
 from __future__ import annotations
 
@@ -17,27 +17,40 @@ Floats = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangles with a normal per vertex; vertices on an edge are doubled, so that edges stay sharp."""
+    """Triangles with a normal per vertex.
 
-    vertices: Floats  # (V, 3) [m]
-    normals: Floats  # (V, 3)
-    triangles: npt.NDArray[np.int64]  # (T, 3), counter-clockwise from outside
+    Attributes:
+        vertices: points (V, 3) [m]; those on a sharp edge occur once for each face
+        normals: a unit vector per vertex (V, 3)
+        triangles: vertex numbers (T, 3), counter-clockwise as seen from outside
+    """
+
+    vertices: Floats
+    normals: Floats
+    triangles: npt.NDArray[np.int64]
 
     @property
     def ball(self) -> tuple[Floats, float]:
-        """A ball around it: centre (3,) and radius [m]."""
+        """Centre (3,) and radius [m] of a ball that contains the mesh."""
         centre = (self.vertices.min(axis=0) + self.vertices.max(axis=0)) / 2
         return centre, float(np.sqrt(((self.vertices - centre) ** 2).sum(axis=1).max()))
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A mesh of one colour that moves as a whole."""
+    """A part of the robot, of one colour, that moves as a whole.
+
+    Attributes:
+        mesh: its shape
+        colour: its colour
+        wheel: 0 if it is fixed to the chassis, 1 if it turns with the left wheel, -1 with the right wheel
+        axle: where its origin is on the chassis [m]
+    """
 
     mesh: Mesh
     colour: Colour
-    wheel: int = 0  # 0: fixed to the chassis; +1 turns with the left wheel, -1 with the right
-    axle: tuple[float, float, float] = (0.0, 0.0, 0.0)  # where a wheel sits on the chassis
+    wheel: int = 0
+    axle: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 def join(*meshes: Mesh) -> Mesh:
@@ -68,7 +81,7 @@ def cylinder(radius: float, low: float, high: float, *, sides: int = 48, x: floa
 
 
 def prism(outline: Floats, low: float, high: float, *, chamfer: float = 0.0) -> Mesh:
-    """A convex counter-clockwise outline (K, 2) raised from `low` to `high`, with a lid whose edge is chamfered."""
+    """A convex counter-clockwise outline (K, 2) extruded from `low` to `high`, with a chamfered upper edge."""
     count = len(outline)
     centre = outline.mean(axis=0)
     reach = np.hypot(*(outline - centre).T).max()
@@ -103,15 +116,15 @@ def _cuts(low: float, high: float) -> list[float]:
 
 
 def robot_height(body: Body) -> float:
-    """How tall the robot is drawn [m]: a high mast would hide what happens around it."""
+    """The height that the robot is drawn with [m]; a tall mast is left out, as it would hide the path."""
     return min(body.height, max(1.1 * body.footprint.radius, 2.4 * body.wheel_radius))
 
 
 def robot_parts(body: Body) -> tuple[Part, ...]:
-    """The robot, its axle's centre on the ground at the origin, looking along +x.
+    """The robot's parts. The origin is on the ground below the axle's centre, and the robot heads along +x.
 
-    A deck of the footprint's true outline with the wheels in wells, a turret, a white arrow and two
-    lamps in front.
+    The deck has the footprint's exact outline. On it are a turret, a white arrow and two lamps in front; the wheels
+    turn in wells.
     """
     foot, r = body.footprint, body.wheel_radius
     length, width = foot.half_length + foot.rounding, foot.half_width + foot.rounding
@@ -147,7 +160,7 @@ def robot_parts(body: Body) -> tuple[Part, ...]:
 
 
 def _wheel(radius: float, tread: float, side: int) -> tuple[Mesh, Mesh]:
-    """A tyre about the y axis, and the light lugs and spokes that show it turning."""
+    """A tyre about the y axis, and the light lugs and spokes that make its rotation visible."""
     tyre = _about_y(_drum(radius, tread))
     lugs = []
     for k in range(5):
@@ -163,20 +176,20 @@ def _wheel(radius: float, tread: float, side: int) -> tuple[Mesh, Mesh]:
 
 
 def _drum(radius: float, tread: float) -> Mesh:
-    """A closed cylinder about z, centred."""
+    """A closed cylinder about the z axis, centred at the origin."""
     upper = cylinder(radius, -tread / 2, tread / 2, sides=28)
     flip = np.array([1.0, -1.0, -1.0])
     return join(upper, Mesh(upper.vertices * flip, upper.normals * flip, upper.triangles))
 
 
 def _about_y(mesh: Mesh) -> Mesh:
-    """What stood along z, lying along y."""
+    """The mesh turned so that its z axis becomes the y axis."""
     turn = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
     return Mesh(mesh.vertices @ turn, mesh.normals @ turn, mesh.triangles)
 
 
 def _turned(mesh: Mesh, angle: float) -> Mesh:
-    """Turned about the y axis."""
+    """The mesh turned about the y axis by an angle [rad]."""
     c, s = math.cos(angle), math.sin(angle)
     turn = np.array([[c, 0, -s], [0, 1.0, 0], [s, 0, c]])
     return Mesh(mesh.vertices @ turn, mesh.normals @ turn, mesh.triangles)
@@ -202,7 +215,7 @@ def _outline(half_length: float, half_width: float, rounding: float, *, steps: i
 
 
 def _cut(outline: Floats, axis: int, at: float, *, keep_low: bool = False) -> Floats:
-    """The part of a convex outline above (or below) a value along an axis."""
+    """The part of a convex outline (K, 2) whose coordinate `axis` is above `at`, or below it with `keep_low`."""
     sign = -1.0 if keep_low else 1.0
     inside = sign * (outline[:, axis] - at) >= 0
     points = []
@@ -217,7 +230,7 @@ def _cut(outline: Floats, axis: int, at: float, *, keep_low: bool = False) -> Fl
 
 
 def _band(low: tuple[Floats, float], high: tuple[Floats, float]) -> Mesh:
-    """The flat faces between two outlines of equal count."""
+    """The flat faces between two outlines with the same number of points, each at its height."""
     (a, za), (b, zb) = low, high
     count = len(a)
     following = (np.arange(count) + 1) % count

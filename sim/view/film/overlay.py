@@ -1,4 +1,4 @@
-"""What a film says: a band below the picture with names and numbers, a legend in its corner, the outcome at its end."""
+"""Text over a film's picture: a band of names and numbers below it, the legend, and the outcome at the end."""
 
 from __future__ import annotations
 
@@ -11,21 +11,20 @@ from PIL import Image, ImageDraw
 
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.view.film import _kernels_paint as kernels
-from antdrive.sim.view.film.lettering import Sprite, fitted, font, pill, plate, text_width
-from antdrive.sim.view.film.replay import SLOW
+from antdrive.sim.view.film.replay import SLOW_MOTION
+from antdrive.sim.view.film.text import Sprite, fitted, font, pill, plate, text_width
 from antdrive.sim.view.scene import Scene
 from antdrive.sim.view.style import (
     BAD,
     BAND,
     CALM,
-    DOUBT,
-    GOOD,
     INK,
     MOVER,
     MUTED,
     ROUTE,
     SHELL,
     UNSEEN,
+    VERDICTS,
     ZONE,
     Colour,
     field_colours,
@@ -34,60 +33,65 @@ from antdrive.sim.view.style import (
 
 Picture = npt.NDArray[np.uint8]  # (H, W, 3)
 
-VERDICTS: dict[Outcome, tuple[str, Colour]] = {
-    Outcome.SUCCEEDED: ("✓ SUCCEEDED", GOOD),
-    Outcome.COLLIDED: ("✕ COLLIDED", BAD),
-    Outcome.HIT_WHILE_STANDING: ("✕ RUN INTO", DOUBT),
-    Outcome.HIT_BY_TELEPORT: ("✕ JUMPED ON", DOUBT),
-    Outcome.TIMED_OUT: ("TIMED OUT", DOUBT),
-    Outcome.STUCK: ("STUCK", DOUBT),
-    Outcome.NO_PATH: ("NO PATH", DOUBT),
-    Outcome.STOPPED: ("STOPPED", DOUBT),
-}
 DRIVING = ("DRIVING", CALM)
 PLANNING = ("PLANNING", CALM)
-SLOWED = (f"SLOW ×1/{SLOW:g}", BAD)
+SLOWED = (f"SLOW ×1/{SLOW_MOTION:g}", BAD)
 
-#: What the four numbers of the band are called: while it drives, and while it plans.
-DRIVEN = ("TIME", "SPEED", "CLEARANCE", "MINIMUM")
-SEARCHED = ("ITERATION", "BEST PATH", "MEAN", "ARRIVED")
+#: The names of the band's four numbers during the drive and during planning.
+DRIVE_FIELDS = ("TIME", "SPEED", "CLEARANCE", "MINIMUM")
+PLAN_FIELDS = ("ITERATION", "BEST PATH", "MEAN PATH", "ARRIVED")
 
-Values: TypeAlias = list[tuple[str, bool]]  # a text and whether it is alarming
+Values: TypeAlias = list[tuple[str, bool]]  # each number as text, and whether it is shown in red
 
 
 @dataclass(frozen=True)
 class Reading:
-    """The numbers of one frame."""
+    """The numbers of one frame of a drive.
 
-    time: float  # [s]
-    speed: float  # [m/s]
-    clearance: float  # [m]
-    least: float  # the smallest clearance so far [m]
+    Attributes:
+        time: [s]
+        speed: [m/s]
+        clearance: [m]
+        min_clearance: the smallest clearance so far [m]
+    """
+
+    time: float
+    speed: float
+    clearance: float
+    min_clearance: float
 
     @property
-    def told(self) -> Values:
-        """As the band shows them."""
+    def values(self) -> Values:
+        """The numbers as the band shows them."""
         return [
             (f"{self.time:.1f} s", False),
             (f"{max(self.speed, 0.0):.2f} m/s", False),
             (_metres(self.clearance), self.clearance <= 0),
-            (_metres(self.least), self.least <= 0),
+            (_metres(self.min_clearance), self.min_clearance <= 0),
         ]
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Sizes of lettering and band for a frame [px]."""
+    """The sizes of text and band in a frame.
+
+    Attributes:
+        width: of the frame [px]
+        unit: height of small text [px]
+        wide: names, numbers and outcome stand beside each other in the band
+        card: the legend is a card in the picture's corner; otherwise it is a row of the band
+        height: of the band [px]
+    """
 
     width: int
-    unit: int  # height of small text
-    wide: bool  # whether names, numbers and outcome fit beside each other
-    card: bool  # whether the legend is a card in the picture's corner; else it is a row of the band
-    height: int  # of the band
+    unit: int
+    wide: bool
+    card: bool
+    height: int
 
     @classmethod
     def of(cls, size: tuple[int, int], card: bool) -> Layout:
-        """The layout for a frame of a size."""
+        """The layout for a frame of a size (width, height) [px]."""
         width, height = size
         wide = width >= 1.5 * height and width >= 900
         unit = max(8, round(min(height / 46, width / (82 if wide else 56))))
@@ -96,7 +100,16 @@ class Layout:
 
 
 class Band:
-    """The band below the picture. What never changes is drawn once."""
+    """The band below the picture. Everything that stays the same is drawn once.
+
+    Args:
+        layout: its sizes
+        title: the first line
+        subtitle: the second line
+        note: a line below the numbers
+        entries: the legend's entries, for a layout without a card
+        names: of the four numbers
+    """
 
     def __init__(
         self,
@@ -104,8 +117,8 @@ class Band:
         title: str,
         subtitle: str,
         note: str | None,
-        entries: list[Entry],
-        names: tuple[str, ...] = DRIVEN,
+        entries: list[LegendEntry],
+        names: tuple[str, ...] = DRIVE_FIELDS,
     ) -> None:
         self.layout = layout
         unit, width, wide = layout.unit, layout.width, layout.wide
@@ -121,14 +134,20 @@ class Band:
         subroom = room if wide else width - text_width(shown, small, True) - 3 * pad
         draw.text((pad, 0.6 * unit), fitted(title, room, big, True), font=font(big, True), fill=INK)
         draw.text((pad, 2.45 * unit), fitted(subtitle, subroom, unit), font=font(unit), fill=MUTED)
-        draw.text((width - pad, (3.75 if wide else 3.3) * unit), shown, font=font(small, True), fill=CALM, anchor="rm")
+        draw.text(
+            (width - pad, (3.75 if wide else 3.3) * unit),
+            shown,
+            font=font(small, True),
+            fill=CALM,
+            anchor="rm",
+        )
         for (x, y), name in zip(self._fields, names, strict=True):
             draw.text((x, y), name, font=font(round(0.82 * unit), True), fill=MUTED)
         if not layout.card:
             _legend_row(draw, entries, layout)
 
     def draw(self, values: Values, verdict: tuple[str, Colour]) -> Picture:
-        """The band (h, W, 3) with the four numbers of one frame."""
+        """The band (h, W, 3) of one frame, with its four numbers and a label."""
         unit = self.layout.unit
         image = self._blank.copy()
         draw = ImageDraw.Draw(image)
@@ -152,63 +171,76 @@ def _metres(value: float) -> str:
     return f"{value + 0.0 if abs(value) >= 5e-4 else 0.0:.3f} m"
 
 
-WIDE = ("ramp", "field", "line", "dash", "zone")  # kinds of entries with a wide sample
+_WIDE_KINDS = ("ramp", "field", "line", "dash", "zone")
 
 
-class Entry(NamedTuple):
-    """A line of the legend."""
+class LegendEntry(NamedTuple):
+    """A line of the legend.
 
-    kind: str  # how its sample is drawn
+    Attributes:
+        kind: how its sample is drawn: `ramp`, `field`, `line`, `dash`, `zone`, `dot` or `scale`
+        colour: of the sample
+        text: its meaning
+        width: of a scale bar [px]
+    """
+
+    kind: str
     colour: Colour
     text: str
-    wide: float = 0.0  # of a scale bar [px]
+    width: float = 0.0
 
 
-def entries_for(
+def legend_entries(
     scene: Scene, step: float, pixel: float, *, planning: bool = False, replans: bool = False
-) -> list[Entry]:
-    """What the legend of a scene tells: grid lines every `step` metres, `pixel` metres a pixel in the middle."""
-    found = (
-        [Entry("field", INK, "planner's field"), Entry("line", SHELL, "best path so far")]
-        if planning
-        else [
-            Entry("ramp", INK, f"speed, 0 to {scene.robot.max_speed:.3g} m/s"),
-            Entry("dash", ROUTE, "planned route"),
-        ]
-    )
+) -> list[LegendEntry]:
+    """The legend's lines: one for each kind of thing in the picture.
+
+    Args:
+        scene: what is in the picture
+        step: the distance between grid lines [m]
+        pixel: the width of a pixel in the middle of the picture [m]
+        planning: the picture shows planning, not a drive
+        replans: the robot replanned during the run
+    """
+    if planning:
+        found = [LegendEntry("field", INK, "planner's field"), LegendEntry("line", SHELL, "best path so far")]
+    else:
+        speeds = f"speed, 0 to {scene.robot.max_speed:.3g} m/s"
+        found = [LegendEntry("ramp", INK, speeds), LegendEntry("dash", ROUTE, "planned route")]
     if replans:
-        found.append(Entry("dot", ROUTE, "new route"))
+        found.append(LegendEntry("dot", ROUTE, "new route"))
     if scene.inflate > 0:
-        found.append(Entry("zone", ZONE, f"inflated by {scene.inflate:.2f} m"))
+        found.append(LegendEntry("zone", ZONE, f"inflated by {scene.inflate:.2f} m"))
     if scene.unseen.any():
-        found.append(Entry("dot", UNSEEN, "placed after planning"))
+        found.append(LegendEntry("dot", UNSEEN, "placed after planning"))
     if scene.mover_radii:
-        found.append(Entry("dot", MOVER, "moving obstacle, 1.5 s ahead"))
-    return [*found, Entry("scale", INK, f"{step:g} m (grid)", step / pixel)]
+        found.append(LegendEntry("dot", MOVER, "moving obstacle, 1.5 s ahead"))
+    return [*found, LegendEntry("scale", INK, f"{step:g} m (grid)", step / pixel)]
 
 
-def legend_card(entries: list[Entry], layout: Layout) -> Sprite:
-    """The legend as a card."""
+def legend_card(entries: list[LegendEntry], layout: Layout) -> Sprite:
+    """The legend as a card for the picture's corner."""
     size = max(8, round(0.9 * layout.unit))
-    line, pad, key = round(1.55 * size), round(0.8 * size), round(max(2.6 * size, *(entry.wide for entry in entries)))
+    line, pad = round(1.55 * size), round(0.8 * size)
+    key = round(max(2.6 * size, *(entry.width for entry in entries)))
     wide = 2 * pad + key + size // 2 + max(text_width(entry.text, size) for entry in entries)
     image = plate(wide, 2 * pad + line * len(entries), (255, 255, 255), 222, radius=size // 2)
     draw = ImageDraw.Draw(image)
     for k, entry in enumerate(entries):
         middle = pad + line * k + line / 2
-        _key(draw, entry, pad, middle, key, size)
+        _draw_sample(draw, entry, pad, middle, key, size)
         draw.text((pad + key + size // 2, middle), entry.text, font=font(size), fill=INK, anchor="lm")
     return np.array(image)
 
 
-def _legend_row(draw: ImageDraw.ImageDraw, entries: list[Entry], layout: Layout) -> None:
-    """The legend as the last row of a band."""
+def _legend_row(draw: ImageDraw.ImageDraw, entries: list[LegendEntry], layout: Layout) -> None:
+    """Draw the legend as the last row of a band."""
     unit = layout.unit
     middle = layout.height - 1.15 * unit
     draw.line([(unit, middle - 1.05 * unit), (layout.width - unit, middle - 1.05 * unit)], fill=(226, 230, 237))
     size = max(7, round(0.9 * unit))
     while True:
-        keys = [round(entry.wide or (2.2 if entry.kind in WIDE else 1.0) * size) for entry in entries]
+        keys = [round(entry.width or (2.2 if entry.kind in _WIDE_KINDS else 1.0) * size) for entry in entries]
         widths = [key + 0.5 * size + text_width(entry.text, size) for key, entry in zip(keys, entries, strict=True)]
         gap = (layout.width - 2 * unit - sum(widths)) / max(1, len(entries) - 1)
         if gap >= size or size <= 7:
@@ -216,13 +248,13 @@ def _legend_row(draw: ImageDraw.ImageDraw, entries: list[Entry], layout: Layout)
         size -= 1
     x, gap = float(unit), min(gap, 2.5 * size)
     for entry, key, width in zip(entries, keys, widths, strict=True):
-        _key(draw, entry, round(x), middle, key, size)
+        _draw_sample(draw, entry, round(x), middle, key, size)
         draw.text((x + key + 0.5 * size, middle), entry.text, font=font(size), fill=INK, anchor="lm")
         x += width + gap
 
 
-def _key(draw: ImageDraw.ImageDraw, entry: Entry, x: int, y: float, wide: int, size: int) -> None:
-    """The sample beside a line of the legend."""
+def _draw_sample(draw: ImageDraw.ImageDraw, entry: LegendEntry, x: int, y: float, wide: int, size: int) -> None:
+    """Draw the sample of a line of the legend, `wide` pixels wide, beside text of height `size`."""
     kind, colour = entry.kind, entry.colour
     r = 0.42 * size
     if kind in ("ramp", "field"):
@@ -241,13 +273,13 @@ def _key(draw: ImageDraw.ImageDraw, entry: Entry, x: int, y: float, wide: int, s
         draw.ellipse((x + wide / 2 - r, y - r, x + wide / 2 + r, y + r), fill=colour)
     else:  # a scale bar
         line = max(1, size // 7)
-        draw.line([(x, y), (x + entry.wide, y)], fill=colour, width=line)
-        for end in (x, x + entry.wide):
+        draw.line([(x, y), (x + entry.width, y)], fill=colour, width=line)
+        for end in (x, x + entry.width):
             draw.line([(end, y - 0.35 * size), (end, y + 0.35 * size)], fill=colour, width=line)
 
 
 def banner(outcome: Outcome, layout: Layout, room: int) -> Sprite:
-    """The outcome as a sentence, for the end of a film, within `room` [px]."""
+    """The outcome as a sentence, for the end of a film, at most 0.86 of `room` wide [px]."""
     name, colour = VERDICTS[outcome]
     sentence = outcome.value[0].upper() + outcome.value[1:]
     size = round(1.5 * layout.unit)

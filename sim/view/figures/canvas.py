@@ -1,0 +1,96 @@
+"""The canvas of all figures: one look, no screen needed, and the same file, byte for byte, for the same data.
+
+A file's suffix chooses PNG, PDF or SVG. No dates or versions are written into files.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from antdrive.sim.view.scene import Scene
+from antdrive.sim.view.style import INK, MUTED, hexed
+from antdrive.worlds.errors import InputError
+from antdrive.worlds.files.atomic import written_whole
+
+SUFFIXES = (".png", ".pdf", ".svg")
+
+_STYLE: Any = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9.0,
+    "axes.edgecolor": "#aab2bf",
+    "axes.labelcolor": hexed(INK),
+    "axes.titlesize": 10.0,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#e6e9ee",
+    "grid.linewidth": 0.7,
+    "axes.axisbelow": True,
+    "xtick.color": hexed(MUTED),
+    "ytick.color": hexed(MUTED),
+    "text.color": hexed(INK),
+    "legend.frameon": False,
+    "legend.fontsize": 8.0,
+    "svg.hashsalt": "antdrive",
+    "pdf.compression": 6,
+}
+
+
+def styled() -> Any:
+    """A context in which figures have the common look; matplotlib's settings outside it stay as they are."""
+    return matplotlib.rc_context(_STYLE)
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure of a width and height [inches]; it needs no screen."""
+    figure = Figure(figsize=(width, height), layout="constrained", facecolor="white")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def map_size(scene: Scene) -> tuple[float, float]:
+    """The width and height of a scene's map in a figure [inches]."""
+    x0, y0, x1, y1 = scene.bounds
+    shape = (y1 - y0) / (x1 - x0)
+    high = float(np.clip(5.6 * shape, 3.9, 6.4))
+    return float(np.clip(high / shape, 3.2, 7.0)), high
+
+
+def checked(path: str | Path) -> Path:
+    """The path of a figure, checked before any work.
+
+    Raises:
+        InputError: a suffix that is none of .png, .pdf, .svg.
+    """
+    target = Path(path)
+    if target.suffix.lower() not in SUFFIXES:
+        raise InputError(f"{target}: unknown suffix {target.suffix!r}; choose one of {', '.join(SUFFIXES)}")
+    return target
+
+
+def write_figure(figure: Figure, target: Path, dpi: float) -> Path:
+    """Write a figure in the format of its suffix, whole or not at all; returns its path.
+
+    Args:
+        figure: what to write
+        target: the file
+        dpi: pixels per inch
+    """
+    kind = target.suffix.lower()[1:]
+    # Without these entries, matplotlib writes its version or the date.
+    empty: dict[str, Any] = {
+        "png": {"Software": None},
+        "pdf": {"CreationDate": None, "Producer": None, "Creator": None},
+        "svg": {"Date": None, "Creator": None},
+    }[kind]
+    with written_whole(target) as temporary:
+        figure.savefig(temporary, format=kind, dpi=dpi, metadata=empty)
+    return target

@@ -1,0 +1,202 @@
+"""Figures as papers print them: path length by iteration, by number of ants, and over a sweep of parameters."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.ticker import MaxNLocator
+
+from antdrive.sim.view.figures.canvas import checked, new_figure, styled, write_figure
+from antdrive.sim.view.style import INK, MUTED, hexed, planner_style
+
+if TYPE_CHECKING:
+    from antdrive.planners.plan import History
+
+Floats = npt.NDArray[np.float64]
+
+
+def history_figure(
+    histories: Mapping[str, Sequence[History]],
+    path: str | Path,
+    *,
+    optimum: float | None = None,
+    unit: str = "m",
+    dpi: float = 160,
+) -> Path:
+    """Draw the best path length so far by iteration for one or more planners.
+
+    Args:
+        histories: by planner, the history of each seed; of several seeds the median is drawn, and the range as
+            a band
+        path: the file to write; its suffix chooses PNG, PDF or SVG
+        optimum: the shortest length on the same moves, drawn as a line
+        unit: of the lengths
+        dpi: pixels per inch
+
+    Returns:
+        The file's path.
+
+    Raises:
+        InputError: a suffix that is none of .png, .pdf, .svg.
+    """
+    target = checked(path)
+    with styled():
+        figure = new_figure(6.4, 4.0)
+        axes: Any = figure.add_subplot()
+        for name, runs in histories.items():
+            colour, dash = planner_style(name)
+            longest = max(len(run) for run in runs)
+            best = np.array([np.pad(run.best, (0, longest - len(run)), mode="edge") for run in runs if len(run)])
+            best = np.where(np.isfinite(best), best, np.nan)
+            turns = np.arange(1, longest + 1)
+            known = np.isfinite(best).all(axis=0)
+            axes.plot(
+                turns[known],
+                np.median(best[:, known], axis=0),
+                color=hexed(colour),
+                ls=dash,
+                lw=2.0,
+                label=name,
+                drawstyle="steps-post",
+            )
+            if len(runs) > 1:
+                axes.fill_between(
+                    turns[known],
+                    best[:, known].min(axis=0),
+                    best[:, known].max(axis=0),
+                    step="post",
+                    color=hexed(colour),
+                    alpha=0.15,
+                    lw=0,
+                )
+        if optimum is not None:
+            axes.axhline(optimum, color=hexed(MUTED), ls="--", lw=1.0, label="shortest on these moves")
+        axes.set(xlabel="iteration", ylabel=f"best path so far [{unit}]")
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+        axes.legend(loc="upper right")
+        return write_figure(figure, target, dpi)
+
+
+def ants_figure(
+    lengths: Mapping[int, Sequence[float]],
+    path: str | Path,
+    *,
+    planner: str,
+    optimum: float,
+    printed: Mapping[int, float] | None = None,
+    unit: str = "m",
+    dpi: float = 160,
+) -> Path:
+    """Draw path length by number of ants: every seed, the mean, and the values that a paper prints.
+
+    Args:
+        lengths: by number of ants, the path length of each seed
+        path: the file to write; its suffix chooses PNG, PDF or SVG
+        planner: its name
+        optimum: the shortest length on the same moves
+        printed: by number of ants, the paper's value
+        unit: of the lengths
+        dpi: pixels per inch
+
+    Returns:
+        The file's path.
+
+    Raises:
+        InputError: a suffix that is none of .png, .pdf, .svg.
+    """
+    target = checked(path)
+    colour = hexed(planner_style(planner)[0])
+    with styled():
+        figure = new_figure(5.6, 4.0)
+        axes: Any = figure.add_subplot()
+        counts = sorted(lengths)
+        for count in counts:
+            axes.plot([count] * len(lengths[count]), lengths[count], "o", ms=4, color=colour, alpha=0.35, mew=0)
+        means = [float(np.mean(lengths[count])) for count in counts]
+        axes.plot(
+            counts,
+            means,
+            "-o",
+            ms=6,
+            color=colour,
+            lw=2.0,
+            label=f"{planner}, mean of {len(lengths[counts[0]])}",
+        )
+        if printed:
+            known = sorted(printed)
+            axes.plot(
+                known,
+                [printed[count] for count in known],
+                "s--",
+                color=hexed(INK),
+                mfc="white",
+                label="in the paper",
+            )
+        axes.axhline(optimum, color=hexed(MUTED), ls="--", lw=1.0, label="shortest on these moves")
+        axes.set(xscale="log", xlabel="number of ants", ylabel=f"path length [{unit}]")
+        axes.set_xticks(counts, [str(count) for count in counts])
+        axes.minorticks_off()
+        axes.legend(loc="upper right")
+        return write_figure(figure, target, dpi)
+
+
+def sweep_figure(
+    pc: Sequence[float],
+    pm: Sequence[float],
+    lengths: Mapping[bool, Floats],
+    path: str | Path,
+    *,
+    dpi: float = 160,
+) -> Path:
+    """Draw the mean path length by crossover and mutation probability, with and without elitism side by side.
+
+    Args:
+        pc: crossover probabilities (P,)
+        pm: mutation probabilities (M,)
+        lengths: with elitism (True) and without (False), the mean lengths (P, M); nan where no seed found a
+            path
+        path: the file to write; its suffix chooses PNG, PDF or SVG
+        dpi: pixels per inch
+
+    Returns:
+        The file's path.
+
+    Raises:
+        InputError: a suffix that is none of .png, .pdf, .svg.
+    """
+    target = checked(path)
+    both = np.concatenate([np.ravel(values) for values in lengths.values()])
+    finite = both[np.isfinite(both)]
+    with styled():
+        figure = new_figure(9.4, 3.9)
+        for k, elitism in enumerate((True, False)):
+            axes: Any = figure.add_subplot(1, 2, k + 1)
+            values = np.asarray(lengths[elitism])
+            drawn = axes.imshow(
+                values, origin="lower", cmap="cividis_r", vmin=finite.min(), vmax=finite.max(), aspect="auto"
+            )
+            axes.set_xticks(range(len(pm)), [f"{p:g}" for p in pm])
+            axes.set_yticks(range(len(pc)), [f"{p:g}" for p in pc])
+            title = "with elitism" if elitism else "without elitism"
+            axes.set(xlabel="mutation probability Pm", ylabel="crossover probability Pc", title=title)
+            axes.grid(False)
+            for (i, j), value in np.ndenumerate(values):
+                dark = value > (finite.min() + finite.max()) / 2
+                axes.text(
+                    j,
+                    i,
+                    f"{value:.2f}" if math.isfinite(value) else "–",
+                    ha="center",
+                    va="center",
+                    fontsize=7.5,
+                    color="white" if dark else hexed(INK),
+                )
+        bar = figure.colorbar(drawn, ax=figure.axes, shrink=0.85, aspect=26)
+        bar.set_label("mean path length [cells]")
+        bar.outline.set_visible(False)
+        return write_figure(figure, target, dpi)
