@@ -22,6 +22,7 @@ from antdrive.robots.control._kernels_pursuit import reachable_twist
 from antdrive.robots.control.pursuit import PursuitState, TrackedPath, Twist
 from antdrive.robots.spec import RobotSpec
 from antdrive.worlds import Floats, Pose
+from antdrive.worlds.errors import FieldError
 
 SPEED_WEIGHT = 0.3  # metres of the route that 1 m/s of final speed along the route is worth [s]
 PERSISTENCE = 0.05  # metres of the route that keeping to the last decision is worth
@@ -77,7 +78,7 @@ class Avoidance:
                 raise ValueError(f"{key}: must be greater than 0 and at most 60, got {getattr(self, key):g}")
         for key in _NOT_NEGATIVE:
             if not 0 <= getattr(self, key) < math.inf:
-                raise ValueError(f"{key}: must be at least 0, got {getattr(self, key):g}")
+                raise FieldError(key, f"must be at least 0, got {getattr(self, key):g}")
 
     @property
     def prediction_times(self) -> Floats:

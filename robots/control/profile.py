@@ -17,6 +17,7 @@ import numpy as np
 
 from antdrive.robots.spec import RobotSpec
 from antdrive.worlds import Floats, Route
+from antdrive.worlds.errors import FieldError
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +77,7 @@ def speed_profile(
     """
     for key, value in (("blend", blend), ("rotate_in_place_above", rotate_in_place_above), ("step", step)):
         if not (math.isfinite(value) and value > 0):
-            raise ValueError(f"{key}: must be greater than 0, got {value:g}")
+            raise FieldError(key, f"must be greater than 0, got {value:g}")
     if not 0 < braking <= 1:
         raise ValueError(f"braking: must be greater than 0 and at most 1, got {braking:g}")
 

@@ -143,12 +143,12 @@ class PurePursuit:
     def __post_init__(self) -> None:
         for key in _POSITIVE:
             if not 1e-3 <= getattr(self, key) <= 100:
-                raise ValueError(f"{key}: must be between 0.001 and 100, got {getattr(self, key):g}")
+                raise FieldError(key, f"must be between 0.001 and 100, got {getattr(self, key):g}")
         if self.lookahead_max < self.lookahead_min:
             raise ValueError(f"lookahead_max: must be at least lookahead_min ({self.lookahead_min:g})")
         for key in ("lookahead_margin", "stopping_margin"):
             if not 0 <= getattr(self, key) <= 1:
-                raise ValueError(f"{key}: must be between 0 and 1, got {getattr(self, key):g}")
+                raise FieldError(key, f"must be between 0 and 1, got {getattr(self, key):g}")
         if not 0 < self.braking <= 1:
             raise ValueError(f"braking: must be between 0 and 1, got {self.braking:g}")
         if not self.rotate_in_place_until < self.rotate_in_place_above < math.pi / 2:

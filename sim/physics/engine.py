@@ -21,7 +21,8 @@ from antdrive.sim.physics.bullet import CHASSIS, GROUND, OBSTACLE, WHEELS, bulle
 from antdrive.sim.physics.movers import MoverBodies
 from antdrive.sim.physics.urdf import CASTER_GAP, robot_urdf
 from antdrive.worlds.trajectories import Trajectories
-from antdrive.worlds.world import Floats, Pose, World
+from antdrive.worlds.types import Floats, Pose
+from antdrive.worlds.world import World
 
 Point3: TypeAlias = tuple[float, float, float]  # [m]
 
