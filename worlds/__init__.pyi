@@ -11,10 +11,10 @@ from .formats.cellmap import CellMap as CellMap
 from .formats.cellmap import Cover as Cover
 from .formats.cellmap import cell_map as cell_map
 from .formats.cellmap import map_task as map_task
-from .formats.door import IMPORTS as IMPORTS
-from .formats.door import import_file as import_file
-from .formats.door import import_format as import_format
 from .formats.dynabarn import import_dynabarn as import_dynabarn
+from .formats.importing import IMPORTS as IMPORTS
+from .formats.importing import import_file as import_file
+from .formats.importing import import_format as import_format
 from .formats.map_server import export_map_server as export_map_server
 from .formats.map_server import import_map_server as import_map_server
 from .formats.movingai import MapProblem as MapProblem

@@ -11,7 +11,7 @@ ORDER = [
     "movers", "motions", "world", "geometry", "grid", "route", "trajectories",
     "files.atomic", "files.reading", "files.document", "files.checks", "files.world_file",
     "formats._kernels_cover", "formats.checks", "formats.cellmap", "formats.xml", "formats.sdf_models", "formats.sdf",
-    "formats.barn", "formats.dynabarn", "formats.movingai", "formats.map_server", "formats.door",
+    "formats.barn", "formats.dynabarn", "formats.movingai", "formats.map_server", "formats.importing",
     "generators.automaton", "generators.generate",
 ]  # fmt: skip
 MODULES = {
