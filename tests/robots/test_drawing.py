@@ -61,7 +61,7 @@ def test_names_are_shown_and_not_run(jackal: RobotSpec) -> None:
     assert "<script>" not in dataclasses.replace(jackal, name="<script>")._repr_html_()
 
 
-def test_a_robot_without_noise_says_so(jackal: RobotSpec) -> None:
+def test_the_table_of_a_robot_without_noise_lists_none(jackal: RobotSpec) -> None:
     quiet = dataclasses.replace(jackal, noise=jackal.noise.scaled(0.0))
     assert '<td style="text-align:left">none</td>' in quiet._repr_html_()
 

@@ -16,15 +16,12 @@ def outline(foot: Footprint, pose: tuple[float, float, float]) -> np.ndarray:
     """Points on a footprint's outline, from its definition: a rectangle's outline moved outwards."""
     sides = np.linspace(-1, 1, 801)
     hx, hy = foot.half_length, foot.half_width
-    edge = np.concatenate(
-        [
-            np.stack([hx * sides, np.full_like(sides, s * hy)], 1) + [0, s * foot.rounding] for s in (-1, 1)
-        ] + [np.stack([np.full_like(sides, s * hx), hy * sides], 1) + [s * foot.rounding, 0] for s in (-1, 1)]
-    )  # fmt: skip
+    along = [np.stack([hx * sides, np.full_like(sides, s * hy)], 1) + [0, s * foot.rounding] for s in (-1, 1)]
+    across = [np.stack([np.full_like(sides, s * hx), hy * sides], 1) + [s * foot.rounding, 0] for s in (-1, 1)]
     angles = np.linspace(0, 2 * math.pi, 4001)
     round_corner = foot.rounding * np.stack([np.cos(angles), np.sin(angles)], 1)
     corners = np.concatenate([round_corner + [a * hx, b * hy] for a in (-1, 1) for b in (-1, 1)])
-    points = np.concatenate([edge, corners])
+    points = np.concatenate([*along, *across, corners])
     x, y, yaw = pose
     rotation = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
     return points @ rotation.T + [x, y]

@@ -102,9 +102,9 @@ def test_a_robot_file_may_give_its_noise(tmp_path) -> None:
     assert load_robot(path).noise.slip == 0.1
     path.write_text("\n".join(line for line in text.splitlines() if not line.startswith("noise")))
     assert not load_robot(path).noise.nonzero
-    for wrong, says in (("slip: 2", "slip"), ("slop: 0.1", "slop"), ("slip: often", "slip")):
+    for wrong, key in (("slip: 2", "slip"), ("slop: 0.1", "slop"), ("slip: often", "slip")):
         path.write_text(text.replace("slip: 0.02", wrong))
-        with pytest.raises(InputError, match=says) as error:
+        with pytest.raises(InputError, match=key) as error:
             load_robot(path)
         assert "mine.yaml" in str(error.value)
         assert "noise" in str(error.value)

@@ -86,14 +86,13 @@ def test_corners_are_cut_only_where_there_is_room(jackal: RobotSpec) -> None:
     post = World("post", OPEN.bounds, (Disc(3 - keep * math.tan(math.pi / 8), keep, 0.01),))
     free, _, _ = follow(jackal, route, (0, 0, 0), OPEN, margin)
     guarded, _, _ = follow(jackal, route, (0, 0, 0), post, margin)
-    assert (
-        point_clearance(post, free[:, :2]).min() < jackal.radius + 0.2 * margin
-    )  # without the post, the corner is cut
+    # Without the post, the corner is cut where the post would stand.
+    assert point_clearance(post, free[:, :2]).min() < jackal.radius + 0.2 * margin
     assert point_clearance(post, guarded[:, :2]).min() > jackal.radius + 0.35 * margin
 
 
 def bends(radius: float, bulge: float = 5e-4) -> Route:
-    """A straight line, a half circle to the left, one to the right and a straight line, as smoothed routes contain them."""
+    """A straight line, half a circle to the left, half to the right and a straight line, as in smoothed routes."""
     points, curvature = [(0.0, 0.0)], [0.0]
     for centre, begin, turn in (((3.0, radius), -math.pi / 2, 1), ((3.0, 3 * radius), -math.pi / 2, -1)):
         count = math.ceil(math.pi / (2 * math.acos(radius / (radius + bulge))))
@@ -116,15 +115,15 @@ def cross_track(poses: np.ndarray, route: Route) -> np.ndarray:
 
 @pytest.mark.parametrize(("radius", "speed"), [(0.5, 1.0), (2.0, 2.0)])
 def test_bends_of_known_curvature_are_followed_and_not_cut(radius: float, speed: float, jackal: RobotSpec) -> None:
-    """They are driven at the speed that the lateral acceleration allows. Steering for the carrot alone cuts them."""
+    """Their speed is what the lateral acceleration allows. Steering for the carrot alone cuts them."""
     route = bends(radius)
     poses, commands, _ = follow(jackal, route, (0, 0, 0))
     fast = commands[:, 0] > 0.7 * speed
     assert fast.sum() > 100
     error = float(np.percentile(cross_track(poses[fast], route), 95))
     assert error < 0.01
-    raw, commands, _ = follow(jackal, Route(route.xy), (0, 0, 0))
-    assert float(np.percentile(cross_track(raw[commands[:, 0] > 0.4], route), 95)) > 2 * error
+    cut, commands, _ = follow(jackal, Route(route.xy), (0, 0, 0))
+    assert float(np.percentile(cross_track(cut[commands[:, 0] > 0.4], route), 95)) > 2 * error
 
 
 def test_a_drive_takes_as_long_as_its_speed_profile_predicts(jackal: RobotSpec) -> None:
