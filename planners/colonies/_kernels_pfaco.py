@@ -3,22 +3,98 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from antdrive.planners.colonies._kernels_colony import cut_one_short, next_random, walk_length
 from antdrive.worlds._kernels import SQRT2, Array, inline, kernel
 
-# What an ant has behind it, by column of `ants`.
-SIZE, TAKEN = 0, 1  # cells of its walk; steps since it left, those back included
-# What the colony has behind it, by index of `counts`.
-LISTED, ENTRIES, STEPS, ARRIVED = 0, 1, 2, 3
+LISTED, ENTRIES = 0, 1  # indices of `Ranking.counts`
+WALKING, STEPPED_BACK, DEAD, ARRIVED = 0, 1, 2, 3  # what `advance` did with an ant
+
+
+class Graph(NamedTuple):
+    """The graph that ants walk on; cells are flat indices.
+
+    Attributes:
+        mask: the allowed moves of each cell, one bit per direction (cells,)
+        offset: what each of the eight moves adds to an index (8,)
+        start: the start cell
+        goal: the goal cell
+    """
+
+    mask: Array
+    offset: Array
+    start: int
+    goal: int
+
+
+class Rules(NamedTuple):
+    """The planner's parameters for one iteration.
+
+    Attributes:
+        alpha: the exponent of the pheromone
+        evaporation: the share of the pheromone that is lost per tick
+        min_pheromone: the pheromone does not decay below this
+        deposit: what a walk of the first rank leaves on each of its cells
+        limit: the steps after which a walk ends
+        backtrack: whether an ant in a dead end steps back
+        shortcut: whether walks that arrive are cut short
+        quota: the iteration ends when this many walks have ended
+    """
+
+    alpha: float
+    evaporation: float
+    min_pheromone: float
+    deposit: float
+    limit: int
+    backtrack: bool
+    shortcut: bool
+    quota: int
+
+
+class Ants(NamedTuple):
+    """The ants and their unfinished walks.
+
+    Attributes:
+        states: the state of each ant's random numbers (ants,)
+        walks: the cells of each walk (ants, room)
+        sizes: how many cells each walk has (ants,)
+        taken: the steps each ant has taken since it left the start, those back included (ants,)
+        lengths: the length of each walk [cells] (ants,)
+        visited: the cells that each ant has visited, one bit per cell (ants, cells / 8 + 1)
+    """
+
+    states: Array
+    walks: Array
+    sizes: Array
+    taken: Array
+    lengths: Array
+    visited: Array
+
+
+class Ranking(NamedTuple):
+    """The list of the best walks so far.
+
+    Attributes:
+        walks: the cells of each walk in the list (ranks, room)
+        sizes: how many cells each walk has (ranks,)
+        costs: the cost of each walk, its length times its size (ranks,)
+        order: the row of each rank, the best first (ranks,)
+        counts: how many walks are in the list (LISTED), and how many were ever entered (ENTRIES)
+    """
+
+    walks: Array
+    sizes: Array
+    costs: Array
+    order: Array
+    counts: Array
 
 
 @kernel
 def obstacle_distance(free: Array, reach: int) -> Array:
-    """Distance from each cell to the nearest blocked one [cells], inf beyond `reach`."""
+    """The distance from each cell to the nearest blocked cell [cells], inf beyond `reach`."""
     rows, cols = free.shape
     out = np.full((rows, cols), np.inf)
     for r in range(rows):
@@ -27,13 +103,14 @@ def obstacle_distance(free: Array, reach: int) -> Array:
                 continue
             for near_row in range(max(0, r - reach), min(rows, r + reach + 1)):
                 for near_col in range(max(0, c - reach), min(cols, c + reach + 1)):
-                    out[near_row, near_col] = min(out[near_row, near_col], math.hypot(near_row - r, near_col - c))
+                    distance = math.hypot(near_row - r, near_col - c)
+                    out[near_row, near_col] = min(out[near_row, near_col], distance)
     return out
 
 
 @inline
 def _power(value: float, exponent: float) -> float:
-    """value^exponent, quick for 1, 2 and 3."""
+    """value^exponent, fast for the exponents 1, 2 and 3."""
     if exponent == 1.0:
         return value
     if exponent == 2.0:
@@ -42,24 +119,20 @@ def _power(value: float, exponent: float) -> float:
 
 
 @kernel
-def leave(ant: int, start: int, walks: Array, ants: Array, lengths: Array, been: Array) -> None:
-    """Put an ant at the start, with nothing behind it."""
-    for b in range(been.shape[1]):
-        been[ant, b] = 0
-    been[ant, start >> 3] |= 1 << (start & 7)
-    walks[ant, 0] = start
-    ants[ant, SIZE], ants[ant, TAKEN] = 1, 0
-    lengths[ant] = 0.0
+def leave(ant: int, start: int, ants: Ants) -> None:
+    """Put an ant at the start, with a walk of one cell."""
+    for b in range(ants.visited.shape[1]):
+        ants.visited[ant, b] = 0
+    ants.visited[ant, start >> 3] |= 1 << (start & 7)
+    ants.walks[ant, 0] = start
+    ants.sizes[ant], ants.taken[ant] = 1, 0
+    ants.lengths[ant] = 0.0
 
 
 @kernel
-def enter(
-    walk: Array, size: int, length: float, ranked: Array, sizes: Array, costs: Array, order: Array, counts: Array
-) -> int:
-    """Enter a walk into the ranking list by its cost (lee2008 eq. 15); its rank, or -1 if it is no better than the last.
-
-    order[r] is the row of `ranked` that holds rank r.
-    """
+def enter(walk: Array, size: int, length: float, ranking: Ranking) -> int:
+    """Enter a walk into the ranking by its cost (lee2008 eq. 15); its rank, or -1 if the list is full of better walks."""
+    order, costs, counts = ranking.order, ranking.costs, ranking.counts
     cost = length * size
     listed, room = counts[LISTED], len(order)
     if listed == room and cost >= costs[order[room - 1]]:
@@ -75,121 +148,126 @@ def enter(
         order[rank] = order[rank - 1]
         rank -= 1
     order[rank] = row
-    costs[row], sizes[row] = cost, size
+    costs[row], ranking.sizes[row] = cost, size
     for s in range(size):
-        ranked[row, s] = walk[s]
+        ranking.walks[row, s] = walk[s]
     counts[ENTRIES] += 1
     return rank
 
 
 @kernel
+def longest_listed(ranking: Ranking) -> float:
+    """The length of the longest walk of a full list."""
+    longest = 0.0
+    for row in range(len(ranking.order)):
+        longest = max(longest, ranking.costs[row] / ranking.sizes[row])
+    return longest
+
+
+@kernel
+def advance(ant: int, trail: Array, heuristic: Array, graph: Graph, rules: Rules, ants: Ants, cumulated: Array) -> int:
+    """Move one ant by a cell: whether it walks on, stepped back, is dead or arrived. `cumulated` (8,) is scratch."""
+    mask, offset = graph.mask, graph.offset
+    size = ants.sizes[ant]
+    i: Any = np.int64(ants.walks[ant, size - 1])
+    total = 0.0
+    for k in range(8):
+        if mask[i] & (1 << k):
+            j = i + offset[k]
+            if not ants.visited[ant, j >> 3] & (1 << (j & 7)):
+                total += _power(trail[j], rules.alpha) * heuristic[j]  # eq. 13
+        cumulated[k] = total
+    ants.taken[ant] += 1
+    if total <= 0.0:
+        if not rules.backtrack or size == 1 or ants.taken[ant] >= rules.limit:
+            return DEAD
+        ants.sizes[ant] = size - 1
+        back = np.int64(ants.walks[ant, size - 2])
+        ants.lengths[ant] -= 1.0 if abs(i - back) == 1 or abs(i - back) == offset[2] else SQRT2
+        return STEPPED_BACK
+    state = next_random(ants.states[ant])
+    ants.states[ant] = state
+    spin = (state >> np.uint64(11)) * (1.0 / 9007199254740992.0) * total
+    k = 0
+    while cumulated[k] <= spin and k < 7:
+        k += 1
+    i += offset[k]
+    ants.visited[ant, i >> 3] |= 1 << (i & 7)
+    ants.walks[ant, size] = i
+    ants.sizes[ant] = size + 1
+    ants.lengths[ant] += SQRT2 if k & 1 else 1.0
+    return ARRIVED if i == graph.goal else WALKING
+
+
+@kernel
+def decay(trail: Array, graph: Graph, rules: Rules) -> None:
+    """Evaporate the pheromone of a tick."""
+    for i in range(len(trail)):
+        if graph.mask[i]:
+            trail[i] = max(rules.min_pheromone, trail[i] * (1.0 - rules.evaporation))
+
+
+@kernel
 def run_colony(
     trail: Array,
-    appeal: Array,
-    mask: Array,
-    offset: Array,
-    start: int,
-    goal: int,
-    alpha: float,
-    evaporation: float,
-    least: float,
-    deposit: float,
-    limit: int,
-    retreat: bool,
-    shortcut: bool,
-    quota: int,
-    states: Array,
-    walks: Array,
-    ants: Array,
-    lengths: Array,
-    been: Array,
-    ranked: Array,
-    sizes: Array,
-    costs: Array,
-    order: Array,
-    counts: Array,
+    heuristic: Array,
+    graph: Graph,
+    rules: Rules,
+    ants: Ants,
+    ranking: Ranking,
     shortest: float,
     best: Array,
     arrivals: Array,
-) -> tuple[int, float]:
-    """Move every ant a cell a tick until `quota` walks have ended; the number of cells of the best walk and its length.
+) -> tuple[int, float, int, int]:
+    """Move every ant by a cell per tick until `rules.quota` walks have ended.
 
-    `best` receives it if it is shorter than `shortest`; else the number is 0.
+    A walk ends at the goal, in a dead end, after `rules.limit` steps, or when it is longer than every walk of the full
+    ranking; the ant then starts again. `best` receives the cells of the best walk if it is shorter than `shortest`,
+    `arrivals` the lengths of the walks that arrived.
 
-    A walk ends at the goal, in a dead end, after `limit` steps, or when it is longer than all of the full list.
-    `arrivals` receives the lengths of those that arrived.
+    Returns the size of the new best walk (0: none), the length of the best walk, the steps taken, and how many arrived.
     """
-    share = np.empty(8, dtype=np.float64)
-    place = np.full(len(mask), -1, dtype=np.int64)
-    first: Any = np.int64(0)  # a plain 0 would be compiled for as a type of its own
+    cumulated = np.empty(8, dtype=np.float64)
+    place = np.full(len(graph.mask), -1, dtype=np.int64)
+    first: Any = np.int64(0)  # a literal 0 would make numba compile `cut_one_short` a second time
     tour = np.empty_like(best)
-    ended, new = 0, 0
-    counts[ARRIVED] = 0
-    worst = np.inf  # longest of the list
-    stale = True
-    while ended < quota:
-        for ant in range(len(states)):
-            size = ants[ant, SIZE]
-            i: Any = np.int64(walks[ant, size - 1])
-            total = 0.0
-            for k in range(8):
-                if mask[i] & (1 << k):
-                    j = i + offset[k]
-                    if not been[ant, j >> 3] & (1 << (j & 7)):
-                        total += _power(trail[j], alpha) * appeal[j]  # eq. 13
-                share[k] = total
-            ants[ant, TAKEN] += 1
-            counts[STEPS] += 1
-            if total <= 0.0:
-                if retreat and size > 1 and ants[ant, TAKEN] < limit:
-                    ants[ant, SIZE] = size - 1
-                    h = np.int64(walks[ant, size - 2])
-                    lengths[ant] -= 1.0 if abs(i - h) == 1 or abs(i - h) == offset[2] else SQRT2
-                    continue
-                leave(ant, start, walks, ants, lengths, been)
-                ended += 1
+    ended, steps, arrived, new = 0, 0, 0, 0
+    worst = np.inf  # the longest walk of the ranking once it is full
+    stale = True  # whether the ranking has changed since `worst` was found
+    while ended < rules.quota:
+        for ant in range(len(ants.states)):
+            event = advance(ant, trail, heuristic, graph, rules, ants, cumulated)
+            steps += 1
+            if event == STEPPED_BACK:
                 continue
-            state = next_random(states[ant])
-            states[ant] = state
-            spin = (state >> np.uint64(11)) * (1.0 / 9007199254740992.0) * total
-            k = 0
-            while share[k] <= spin and k < 7:
-                k += 1
-            i += offset[k]
-            been[ant, i >> 3] |= 1 << (i & 7)
-            walks[ant, size] = i
-            ants[ant, SIZE] = size + 1
-            lengths[ant] += SQRT2 if k & 1 else 1.0
-            if i == goal:
-                if shortcut:
-                    size = cut_one_short(walks[ant], size + 1, mask, offset, first, place, tour) - 1
-                    first += len(mask)
-                    for s in range(size + 1):
-                        walks[ant, s] = tour[s]
-                    lengths[ant] = walk_length(tour, size + 1, offset[2])
-                arrivals[counts[ARRIVED]] = lengths[ant]
-                counts[ARRIVED] += 1
-                if lengths[ant] < shortest - 1e-9:
-                    shortest = lengths[ant]
-                    new = size + 1
-                    for s in range(size + 1):
-                        best[s] = walks[ant, s]
-                rank = enter(walks[ant], size + 1, lengths[ant], ranked, sizes, costs, order, counts)
+            if event == WALKING and ants.taken[ant] < rules.limit and ants.lengths[ant] <= worst:
+                continue
+            if event == ARRIVED:
+                walk, size = ants.walks[ant], ants.sizes[ant]
+                if rules.shortcut:
+                    size = cut_one_short(walk, size, graph.mask, graph.offset, first, place, tour)
+                    first += len(graph.mask)
+                    for s in range(size):
+                        walk[s] = tour[s]
+                    ants.lengths[ant] = walk_length(tour, size, graph.offset[2])
+                length = ants.lengths[ant]
+                arrivals[arrived] = length
+                arrived += 1
+                if length < shortest - 1e-9:
+                    shortest = length
+                    new = size
+                    for s in range(size):
+                        best[s] = walk[s]
+                rank = enter(walk, size, length, ranking)
                 if rank >= 0:  # the better the rank, the more on each cell
-                    amount = deposit * (1.0 - rank / len(order))
-                    for s in range(size + 1):
-                        trail[walks[ant, s]] += amount
+                    amount = rules.deposit * (1.0 - rank / len(ranking.order))
+                    for s in range(size):
+                        trail[walk[s]] += amount
                     stale = True
-            elif ants[ant, TAKEN] < limit and lengths[ant] <= worst:
-                continue
+            leave(ant, graph.start, ants)
             ended += 1
-            leave(ant, start, walks, ants, lengths, been)
-        for i in range(len(trail)):
-            if mask[i]:
-                trail[i] = max(least, trail[i] * (1.0 - evaporation))
-        if stale and counts[LISTED] == len(order):
+        decay(trail, graph, rules)
+        if stale and ranking.counts[LISTED] == len(ranking.order):
             stale = False
-            worst = 0.0
-            for row in range(len(order)):
-                worst = max(worst, costs[row] / sizes[row])
-    return new, shortest
+            worst = longest_listed(ranking)
+    return new, shortest, steps, arrived
