@@ -168,7 +168,7 @@ def paper_maps(quick: bool) -> Iterator[tuple[str, str, str, dict[str, Any], lis
         queries = [random_grid(size, seed, 0.15) for seed in seeds]
         for name, options, figure in (
             ("as", {"ants": 50, **common}, figures[0]),
-            ("pfaco", {"ants": 50, "iterations": 100, "ranking_size": 15}, figures[1]),
+            ("pfaco", {"ants": 50, "iterations": 100, "ranks": 15}, figures[1]),
             ("iaco", {"ants": 25, "explorers": 75, **common}, figures[2]),
         ):
             yield "suganthi2019", f"{size}×{size}, 15 % blocked", name, options, queries, f"{figure:g}"
@@ -352,7 +352,9 @@ def speed(quick: bool) -> Iterator[str]:
             colony: Any = load_planner("as", ants=2000, **options)
             ground, rng = ColonyGraph.of(query), np.random.default_rng(0)
             walk = TourConstruction.of(colony, ground)
-            colony.choice_weights(ground, colony.initial_trail(ground, rng), colony.heuristic_values(ground), walk.weights[0])
+            colony.choice_weights(
+                ground, colony.initial_trail(ground, rng), colony.heuristic_values(ground), walk.weights[0]
+            )
             rates = []
             for _ in range(5):
                 started = time.process_time()

@@ -11,7 +11,6 @@ from antdrive.planners.colonies._kernels_colony import cut_one_short, next_rando
 from antdrive.worlds._kernels import SQRT2, Array, inline, kernel
 
 LISTED, ENTRIES = 0, 1  # indices of `Ranking.counts`
-WALKING, STEPPED_BACK, DEAD, ARRIVED = 0, 1, 2, 3  # what `advance` did with an ant
 
 
 class Graph(NamedTuple):
@@ -118,7 +117,7 @@ def _power(value: float, exponent: float) -> float:
     return value * value * value if exponent == 3.0 else value**exponent
 
 
-@kernel
+@inline
 def leave(ant: int, start: int, ants: Ants) -> None:
     """Put an ant at the start, with a walk of one cell."""
     for b in range(ants.visited.shape[1]):
@@ -164,47 +163,68 @@ def longest_listed(ranking: Ranking) -> float:
     return longest
 
 
-@kernel
-def advance(ant: int, trail: Array, heuristic: Array, graph: Graph, rules: Rules, ants: Ants, cumulated: Array) -> int:
-    """Move one ant by a cell: whether it walks on, stepped back, is dead or arrived. `cumulated` (8,) is scratch."""
-    mask, offset = graph.mask, graph.offset
-    size = ants.sizes[ant]
-    i: Any = np.int64(ants.walks[ant, size - 1])
+@inline
+def cumulate(
+    i: Any,
+    ant: int,
+    trail: Array,
+    heuristic: Array,
+    mask: Array,
+    offset: Array,
+    visited: Array,
+    alpha: float,
+    out: Array,
+) -> float:
+    """out[k] = the attraction of the moves 0 to k from cell i to cells that the ant has not visited; that of all."""
     total = 0.0
     for k in range(8):
         if mask[i] & (1 << k):
             j = i + offset[k]
-            if not ants.visited[ant, j >> 3] & (1 << (j & 7)):
-                total += _power(trail[j], rules.alpha) * heuristic[j]  # eq. 13
-        cumulated[k] = total
-    ants.taken[ant] += 1
-    if total <= 0.0:
-        if not rules.backtrack or size == 1 or ants.taken[ant] >= rules.limit:
-            return DEAD
-        ants.sizes[ant] = size - 1
-        back = np.int64(ants.walks[ant, size - 2])
-        ants.lengths[ant] -= 1.0 if abs(i - back) == 1 or abs(i - back) == offset[2] else SQRT2
-        return STEPPED_BACK
-    state = next_random(ants.states[ant])
-    ants.states[ant] = state
+            if not visited[ant, j >> 3] & (1 << (j & 7)):
+                total += _power(trail[j], alpha) * heuristic[j]  # eq. 13
+        out[k] = total
+    return total
+
+
+@inline
+def draw(cumulated: Array, state: Any, total: float) -> int:
+    """The move that a random number points to."""
     spin = (state >> np.uint64(11)) * (1.0 / 9007199254740992.0) * total
     k = 0
     while cumulated[k] <= spin and k < 7:
         k += 1
-    i += offset[k]
-    ants.visited[ant, i >> 3] |= 1 << (i & 7)
-    ants.walks[ant, size] = i
-    ants.sizes[ant] = size + 1
-    ants.lengths[ant] += SQRT2 if k & 1 else 1.0
-    return ARRIVED if i == graph.goal else WALKING
+    return k
 
 
 @kernel
-def decay(trail: Array, graph: Graph, rules: Rules) -> None:
-    """Evaporate the pheromone of a tick."""
+def cut_walk_short(ant: int, ants: Ants, graph: Graph, first: int, place: Array, tour: Array) -> None:
+    """Cut the walk of an ant short; `first`, `place` and `tour` are those of `cut_one_short`."""
+    walk = ants.walks[ant]
+    size = cut_one_short(walk, ants.sizes[ant], graph.mask, graph.offset, first, place, tour)
+    for s in range(size):
+        walk[s] = tour[s]
+    ants.sizes[ant] = size
+    ants.lengths[ant] = walk_length(tour, size, graph.offset[2])
+
+
+@kernel
+def reward(walk: Array, size: int, length: float, trail: Array, ranking: Ranking, deposit: float) -> bool:
+    """Enter a walk into the ranking and deposit by its rank on each of its cells; whether it has a rank."""
+    rank = enter(walk, size, length, ranking)
+    if rank < 0:
+        return False
+    amount = deposit * (1.0 - rank / len(ranking.order))
+    for s in range(size):
+        trail[walk[s]] += amount
+    return True
+
+
+@kernel
+def decay(trail: Array, mask: Array, min_pheromone: float, evaporation: float) -> None:
+    """Evaporate the pheromone of one tick."""
     for i in range(len(trail)):
-        if graph.mask[i]:
-            trail[i] = max(rules.min_pheromone, trail[i] * (1.0 - rules.evaporation))
+        if mask[i]:
+            trail[i] = max(min_pheromone, trail[i] * (1.0 - evaporation))
 
 
 @kernel
@@ -227,46 +247,55 @@ def run_colony(
 
     Returns the size of the new best walk (0: none), the length of the best walk, the steps taken, and how many arrived.
     """
+    # Arrays are taken out of their tuples here: the loop below runs once per step of every ant.
+    mask, offset, goal = graph.mask, graph.offset, graph.goal
+    states, walks, sizes, taken = ants.states, ants.walks, ants.sizes, ants.taken
+    lengths, visited = ants.lengths, ants.visited
+    alpha, limit = rules.alpha, rules.limit
     cumulated = np.empty(8, dtype=np.float64)
-    place = np.full(len(graph.mask), -1, dtype=np.int64)
+    place, tour = np.full(len(mask), -1, dtype=np.int64), np.empty_like(best)
     first: Any = np.int64(0)  # a literal 0 would make numba compile `cut_one_short` a second time
-    tour = np.empty_like(best)
     ended, steps, arrived, new = 0, 0, 0, 0
     worst = np.inf  # the longest walk of the ranking once it is full
     stale = True  # whether the ranking has changed since `worst` was found
     while ended < rules.quota:
-        for ant in range(len(ants.states)):
-            event = advance(ant, trail, heuristic, graph, rules, ants, cumulated)
+        for ant in range(len(states)):
+            size = sizes[ant]
+            i: Any = np.int64(walks[ant, size - 1])
+            total = cumulate(i, ant, trail, heuristic, mask, offset, visited, alpha, cumulated)
+            taken[ant] += 1
             steps += 1
-            if event == STEPPED_BACK:
+            if total > 0.0:
+                state = next_random(states[ant])
+                states[ant] = state
+                k = draw(cumulated, state, total)
+                i += offset[k]
+                visited[ant, i >> 3] |= 1 << (i & 7)
+                walks[ant, size] = i
+                sizes[ant] = size + 1
+                lengths[ant] += SQRT2 if k & 1 else 1.0
+                if i == goal:
+                    if rules.shortcut:
+                        cut_walk_short(ant, ants, graph, first, place, tour)
+                        first += len(mask)
+                    size = sizes[ant]
+                    arrivals[arrived] = lengths[ant]
+                    arrived += 1
+                    if lengths[ant] < shortest - 1e-9:
+                        shortest, new = lengths[ant], size
+                        for s in range(size):
+                            best[s] = walks[ant, s]
+                    stale |= reward(walks[ant], size, lengths[ant], trail, ranking, rules.deposit)
+                elif taken[ant] < limit and lengths[ant] <= worst:
+                    continue
+            elif rules.backtrack and size > 1 and taken[ant] < limit:
+                sizes[ant] = size - 1
+                back = np.int64(walks[ant, size - 2])
+                lengths[ant] -= 1.0 if abs(i - back) == 1 or abs(i - back) == offset[2] else SQRT2
                 continue
-            if event == WALKING and ants.taken[ant] < rules.limit and ants.lengths[ant] <= worst:
-                continue
-            if event == ARRIVED:
-                walk, size = ants.walks[ant], ants.sizes[ant]
-                if rules.shortcut:
-                    size = cut_one_short(walk, size, graph.mask, graph.offset, first, place, tour)
-                    first += len(graph.mask)
-                    for s in range(size):
-                        walk[s] = tour[s]
-                    ants.lengths[ant] = walk_length(tour, size, graph.offset[2])
-                length = ants.lengths[ant]
-                arrivals[arrived] = length
-                arrived += 1
-                if length < shortest - 1e-9:
-                    shortest = length
-                    new = size
-                    for s in range(size):
-                        best[s] = walk[s]
-                rank = enter(walk, size, length, ranking)
-                if rank >= 0:  # the better the rank, the more on each cell
-                    amount = rules.deposit * (1.0 - rank / len(ranking.order))
-                    for s in range(size):
-                        trail[walk[s]] += amount
-                    stale = True
             leave(ant, graph.start, ants)
             ended += 1
-        decay(trail, graph, rules)
+        decay(trail, mask, rules.min_pheromone, rules.evaporation)
         if stale and ranking.counts[LISTED] == len(ranking.order):
             stale = False
             worst = longest_listed(ranking)

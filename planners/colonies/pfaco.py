@@ -39,7 +39,7 @@ class PotentialFieldAnts(IterativePlanner):
 
     Attributes:
         ants: ants, and walks per iteration
-        ranking_size: paths in the ranking list
+        ranks: paths in the ranking list
         evaporation: the share of the pheromone lost per tick; rho of lee2008, 0.99, is the share retained
         mix: k_mix of eq. 14, the share of chance in the first pheromone
         alpha_1: the exponent of the pheromone in stage 1, until the list has been filled twice
@@ -60,7 +60,7 @@ class PotentialFieldAnts(IterativePlanner):
     """
 
     ants: int = 500
-    ranking_size: int = 100
+    ranks: int = 100
     evaporation: float = 0.01
     mix: float = 0.3
     alpha_1: float = 1.0
@@ -82,7 +82,7 @@ class PotentialFieldAnts(IterativePlanner):
     def __post_init__(self) -> None:
         super().__post_init__()
         require("ants", self.ants, at_least=1, at_most=1_000_000)
-        require("ranking_size", self.ranking_size, at_least=1, at_most=1_000_000)
+        require("ranks", self.ranks, at_least=1, at_most=1_000_000)
         require("evaporation", self.evaporation, at_least=0, at_most=1)
         require("mix", self.mix, at_least=0, at_most=1)
         for key in ("alpha_1", "beta_1", "alpha_2", "beta_2", "alpha_3", "beta_3", "repulsion"):
@@ -136,7 +136,7 @@ class PotentialFieldAnts(IterativePlanner):
 
     def stage(self, entries: int) -> int:
         """The stage, 1 to 3, after so many `entries` into the ranking list (section IV-B)."""
-        twice = 2 * self.ranking_size
+        twice = 2 * self.ranks
         return 1 if entries < twice else 2 if entries < twice + self.ants else 3
 
     def rebuild(
@@ -158,7 +158,7 @@ class PotentialFieldAnts(IterativePlanner):
         ranking, listed = pool.ranking, pool.listed
         for rank in range(math.ceil(listed / 10) if stage == 2 else listed):
             row = ranking.order[rank]
-            trail[ranking.walks[row, : ranking.sizes[row]]] += self.deposit * (1 - rank / self.ranking_size)
+            trail[ranking.walks[row, : ranking.sizes[row]]] += self.deposit * (1 - rank / self.ranks)
 
 
 @dataclass(eq=False)
@@ -192,7 +192,7 @@ class AntPool:
         """All ants at the start, and an empty list."""
         from antdrive.planners.colonies import _kernels_pfaco
 
-        cells, count, ranks = len(graph.mask), planner.ants, planner.ranking_size
+        cells, count, ranks = len(graph.mask), planner.ants, planner.ranks
         limit = planner.max_steps or (2 * cells if planner.backtrack else min(max(100, cells), 20_000))
         room = 1 + min(limit, cells)
         ants = _kernels_pfaco.Ants(

@@ -50,7 +50,7 @@ def han2007() -> list[Trial]:
 def suganthi2019() -> list[Trial]:
     """Table 2: four sizes, three planners."""
     common = {"alpha": 1.0, "beta": 1.0, "evaporation": 0.3, "deposit": 1.0, "heuristic": "step", "iterations": 100}
-    options: dict[str, dict[str, Any]] = {"as": {"ants": 50, **common}, "pfaco": {"ants": 50, "iterations": 100, "ranking_size": 15},
+    options: dict[str, dict[str, Any]] = {"as": {"ants": 50, **common}, "pfaco": {"ants": 50, "iterations": 100, "ranks": 15},
                "iaco": {"ants": 25, "explorers": 75, **common}}  # fmt: skip
     printed = {10: (13.899, 13.899, 13.899), 20: (28.627, 38.627, 28.627), 30: (46.527, 59.355, 42.184),
                50: (96.125, 109.761, 94.326)}  # fmt: skip

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from antdrive.planners import AcoHan, Iteration, PlanStatus, Progress, Query, keep_best, watch
-from antdrive.planners.colonies.colony import ColonyGraph, IterationState, Walks, TourConstruction, without_loops
+from antdrive.planners.colonies.colony import ColonyGraph, IterationState, TourConstruction, Walks, without_loops
 from antdrive.worlds import Floats, Grid
 from tests.planners.worlds_to_solve import catalogue
 

@@ -30,8 +30,8 @@ from antdrive.planners.colonies.colony import (
     ChoiceContext,
     ColonyGraph,
     IterationState,
-    Walks,
     TourConstruction,
+    Walks,
     cut_short,
 )
 from antdrive.planners.colonies.mmas import best_so_far_every

@@ -61,12 +61,12 @@ def test_the_ranking_list_is_kept_by_length_times_cells() -> None:
 
 
 def test_the_stage_follows_from_the_number_of_entries() -> None:
-    planner = PotentialFieldAnts(ants=30, ranking_size=10)
+    planner = PotentialFieldAnts(ants=30, ranks=10)
     assert [planner.stage(n) for n in (0, 19, 20, 49, 50, 1000)] == [1, 1, 2, 2, 3, 3]
 
 
 def test_converged_pheromone_is_rebuilt_from_the_list() -> None:
-    planner = PotentialFieldAnts(ants=4, ranking_size=20, deposit=2.0, min_pheromone=0.5)
+    planner = PotentialFieldAnts(ants=4, ranks=20, deposit=2.0, min_pheromone=0.5)
     graph, rng = ColonyGraph.of(OPEN), np.random.default_rng(0)
     pool = AntPool.of(planner, graph, rng)
     for rank in range(20):
@@ -136,7 +136,7 @@ def test_backtracking_ants_leave_dead_ends() -> None:
 @pytest.mark.parametrize(
     ("key", "value"),
     [
-        ("ants", 0), ("ranking_size", 0), ("evaporation", 1.5), ("mix", -0.1), ("beta_2", -1.0), ("influence", 0.0),
+        ("ants", 0), ("ranks", 0), ("evaporation", 1.5), ("mix", -0.1), ("beta_2", -1.0), ("influence", 0.0),
         ("min_pheromone", 0.0),
     ],
 )  # fmt: skip
