@@ -8,7 +8,7 @@ seen from the disc's centre. Angles lie in [0, 2 pi).
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
