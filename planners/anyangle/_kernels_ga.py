@@ -36,7 +36,7 @@ def length_of(via: Array, ends: Array) -> float:
 
 @kernel
 def feasible(via: Array, ends: Array, land: Terrain) -> bool:
-    """Whether no segment of the line from ends[0] over the via points to ends[1] touches anything."""
+    """Whether every segment of the line from ends[0] over the via points to ends[1] is clear."""
     x, y = ends[0, 0], ends[0, 1]
     for k in range(via.shape[0]):
         if not clear_line(land, x, y, via[k, 0], via[k, 1]):
@@ -194,11 +194,11 @@ def tighten_all(via: Array, ends: Array, land: Terrain, rounds: int) -> float:
 
 
 @kernel
-def shift(via: Array, k: int, ends: Array, land: Terrain, reach: float, state: Any) -> Any:
-    """Move one via point at random, by `reach` down to a ten-thousandth of it, if its segments stay clear; state."""
+def shift(via: Array, k: int, ends: Array, land: Terrain, max_shift: float, state: Any) -> Any:
+    """Move one via point at random, by `max_shift` down to a ten-thousandth of it, if its segments stay clear; state."""
     ax, ay, bx, by = neighbours(via, k, ends)
     state = next_random(state)
-    step = reach * 10.0 ** (-4.0 * uniform(state))
+    step = max_shift * 10.0 ** (-4.0 * uniform(state))
     state = next_random(state)
     heading = 2.0 * math.pi * uniform(state)
     nx, ny = via[k, 0] + step * math.cos(heading), via[k, 1] + step * math.sin(heading)
@@ -208,14 +208,14 @@ def shift(via: Array, k: int, ends: Array, land: Terrain, reach: float, state: A
 
 
 @kernel
-def refine_generation(
+def breed_feasible(
     population: Array,
     lengths: Array,
     ends: Array,
     land: Terrain,
     crossover: float,
     mutation: float,
-    reach: float,
+    max_shift: float,
     state: Any,
 ) -> Any:
     """Breed feasible chromosomes from feasible ones in place, the best one kept in front; state.
@@ -250,7 +250,7 @@ def refine_generation(
                 if uniform(state) < 0.5:
                     tighten(bred[i], k, ends, land)
                 else:
-                    state = shift(bred[i], k, ends, land, reach, state)
+                    state = shift(bred[i], k, ends, land, max_shift, state)
     for i in range(room):
         copy_points(bred[i], 0, population[i])
         lengths[i] = length_of(bred[i], ends)

@@ -51,8 +51,8 @@ class Bins(NamedTuple):
     side: float
 
 
-class Scene(NamedTuple):
-    """What lines are drawn among.
+class Obstacles(NamedTuple):
+    """What tangents must not cross.
 
     Attributes:
         discs: x, y and radius of each inflated disc [m] (N, 3)
@@ -454,14 +454,14 @@ def doubled_lines(lines: Lines) -> Lines:
 
 
 @kernel
-def add_tangents(scene: Scene, ends: Array, line: int, lines: Lines, count: int) -> tuple[int, int]:
+def add_tangents(obstacles: Obstacles, ends: Array, line: int, lines: Lines, count: int) -> tuple[int, int]:
     """Add the tangents that leave the disc and turn which `line` reaches; for -1, those from the start.
 
     There are 2 N + 1 at most, one to the goal and two to each disc; `lines` has room for them. Returns the number of
     lines in the table, and the number of lines that were checked against the other discs.
     """
-    discs, bounds, grid, gates, checked = scene.discs, scene.bounds, scene.bins, scene.gates, 0
-    first, begin, width = scene.rims.first, scene.rims.begin, scene.rims.width
+    discs, bounds, grid, gates, checked = obstacles.discs, obstacles.bounds, obstacles.bins, obstacles.gates, 0
+    first, begin, width = obstacles.rims.first, obstacles.rims.begin, obstacles.rims.width
     i, s, x, y, r = -1, 1, ends[0, 0], ends[0, 1], 0.0
     if line >= 0:
         i, s = lines.disc[line], lines.turn[line]
@@ -511,11 +511,13 @@ def add_tangents(scene: Scene, ends: Array, line: int, lines: Lines, count: int)
 
 
 @kernel
-def relax(scene: Scene, ends: Array, line: int, lines: Lines, first: int, last: int, heap: Heap, waiting: int) -> int:
+def relax(
+    obstacles: Obstacles, ends: Array, line: int, lines: Lines, first: int, last: int, heap: Heap, waiting: int
+) -> int:
     """Extend the way that ends with `line` by the lines `first` to `last`, which leave its disc; the heap's new size."""
     g, r = 0.0, 0.0
     if line >= 0:
-        g, r = lines.best[line], scene.discs[lines.disc[line], 2]
+        g, r = lines.best[line], obstacles.discs[lines.disc[line], 2]
     for e in range(first, last):
         if lines.done[e]:
             continue
@@ -524,7 +526,7 @@ def relax(scene: Scene, ends: Array, line: int, lines: Lines, first: int, last: 
             arc = lines.arc[line]
             if lines.from_arc[e] != arc:
                 continue
-            ahead = along_rim(scene.rims, arc, lines.turn[line], lines.reach[line], lines.leave[e])
+            ahead = along_rim(obstacles.rims, arc, lines.turn[line], lines.reach[line], lines.leave[e])
             if ahead == np.inf:
                 continue
         length = g + r * ahead + lines.length[e]
@@ -537,7 +539,7 @@ def relax(scene: Scene, ends: Array, line: int, lines: Lines, first: int, last: 
 
 
 @kernel
-def next_line(scene: Scene, lines: Lines, latest: Array, heap: Heap, waiting: int) -> tuple[int, int]:
+def next_line(obstacles: Obstacles, lines: Lines, latest: Array, heap: Heap, waiting: int) -> tuple[int, int]:
     """The most promising line to follow, -1 if there is none, and the heap's new size.
 
     A line is passed over if one that was followed earlier reaches the same point of the rim by a way as short. Lines
@@ -551,12 +553,12 @@ def next_line(scene: Scene, lines: Lines, latest: Array, heap: Heap, waiting: in
         lines.done[e] = True
         if lines.disc[e] < 0:
             return e, waiting
-        arc, turn, r = lines.arc[e], lines.turn[e], scene.discs[lines.disc[e], 2]
+        arc, turn, r = lines.arc[e], lines.turn[e], obstacles.discs[lines.disc[e], 2]
         slot = 2 * arc + (1 if turn > 0 else 0)
         other = latest[slot]
         beaten = False
         while other >= 0 and not beaten:
-            ahead = along_rim(scene.rims, arc, turn, lines.reach[other], lines.reach[e])
+            ahead = along_rim(obstacles.rims, arc, turn, lines.reach[other], lines.reach[e])
             beaten = ahead < np.inf and lines.best[other] + r * ahead <= lines.best[e] + SAME
             other = lines.earlier[other]
         if beaten:
@@ -596,10 +598,10 @@ def shortest_path(discs: Array, bounds: Array, ends: Array) -> tuple[Array, floa
     turn; every line that arrives there tries all that leave the same free arc ahead of it.
     """
     n = discs.shape[0]
-    scene = Scene(discs, bounds, free_arcs(discs, bounds), bins(discs, bounds), gates(discs, bounds))
+    obstacles = Obstacles(discs, bounds, free_arcs(discs, bounds), bins(discs, bounds), gates(discs, bounds))
     lines = empty_lines(max(256, 2 * n + 1))
     span = np.full((2 * n + 1, 2), -1, dtype=np.int64)  # the lines that leave each disc by turn, the start last
-    latest = np.full(2 * len(scene.rims.begin), -1, dtype=np.int64)
+    latest = np.full(2 * len(obstacles.rims.begin), -1, dtype=np.int64)
     heap = Heap(np.empty(256, dtype=np.float64), np.empty(256, dtype=np.int64))
     count, waiting, checked, line = 0, 0, 0, -1
     while True:
@@ -608,14 +610,14 @@ def shortest_path(discs: Array, bounds: Array, ends: Array) -> tuple[Array, floa
             if count + 2 * n + 1 > len(lines.leave):
                 lines = doubled_lines(lines)
             span[source, 0] = count
-            count, more = add_tangents(scene, ends, line, lines, count)
+            count, more = add_tangents(obstacles, ends, line, lines, count)
             span[source, 1] = count
             checked += more
         first, last = span[source, 0], span[source, 1]
         while waiting + last - first > len(heap.key):
             heap = Heap(doubled(heap.key), doubled(heap.line))
-        waiting = relax(scene, ends, line, lines, first, last, heap, waiting)
-        line, waiting = next_line(scene, lines, latest, heap, waiting)
+        waiting = relax(obstacles, ends, line, lines, first, last, heap, waiting)
+        line, waiting = next_line(obstacles, lines, latest, heap, waiting)
         if line < 0:
             return np.empty((0, 6), dtype=np.float64), np.inf, checked
         if lines.disc[line] < 0:

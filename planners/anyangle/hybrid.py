@@ -123,7 +123,7 @@ class Hybrid(ViaPointPlanner):
         lengths = np.full(self.population, polyline_length(np.vstack([fixed[:1], via, fixed[1:]])))
         max_shift = self.max_shift * query.grid.cell
         while True:
-            state = _kernels_ga.refine_generation(
+            state = _kernels_ga.breed_feasible(
                 population, lengths, fixed, land, self.crossover, self.mutation, max_shift, np.uint64(state)
             )
             yield incumbent.report(population, lengths, arrived=self.population, work=self.population)
