@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from antdrive.planners import PLANNERS, Planner, PlanResult, Query, load_planner
-from antdrive.planners.colonies.colony import ColonyGraph, _Walk
+from antdrive.planners.colonies.colony import ColonyGraph, TourConstruction
 from antdrive.sim.papers.maps import blocks, environments, han_ants, optimum, scattered
 from antdrive.worlds import DIRECTIONS, Disc, Grid, Task, World, forest, rasterise
 
@@ -168,7 +168,7 @@ def paper_maps(quick: bool) -> Iterator[tuple[str, str, str, dict[str, Any], lis
         queries = [random_grid(size, seed, 0.15) for seed in seeds]
         for name, options, figure in (
             ("as", {"ants": 50, **common}, figures[0]),
-            ("pfaco", {"ants": 50, "iterations": 100, "listed": 15}, figures[1]),
+            ("pfaco", {"ants": 50, "iterations": 100, "ranks": 15}, figures[1]),
             ("iaco", {"ants": 25, "explorers": 75, **common}, figures[2]),
         ):
             yield "suganthi2019", f"{size}×{size}, 15 % blocked", name, options, queries, f"{figure:g}"
@@ -201,7 +201,7 @@ def papers(quick: bool) -> Iterator[str]:
     rows = []
     for paper, place, name, options, queries, printed in paper_maps(quick):
         row = [paper, place, f"`{name}`", printed]
-        helped = load_planner(name, **{**options, "iterations": 100, "retreat": True, "shortcut": True})
+        helped = load_planner(name, **{**options, "iterations": 100, "backtrack": True, "shortcut": True})
         for planner in (load_planner(name, **options), helped, load_planner("ants")):
             solve(planner, queries[0], 0)
             arrived, gaps, wall = summary(planner, queries)
@@ -219,7 +219,7 @@ def papers(quick: bool) -> Iterator[str]:
             "printed",
             "shortest here",
             "by the paper",
-            "retreat, shortcut, 100 iterations",
+            "backtrack, shortcut, 100 iterations",
             "`ants`",
         ],
         rows,
@@ -348,15 +348,17 @@ def speed(quick: bool) -> Iterator[str]:
     rows = []
     for size in (20, 40, 100):
         query = random_grid(size, 0, 0.2)
-        for label, options in (("die in dead ends", {}), ("retreat", {"retreat": True})):
+        for label, options in (("die in dead ends", {}), ("backtrack", {"backtrack": True})):
             colony: Any = load_planner("as", ants=2000, **options)
             ground, rng = ColonyGraph.of(query), np.random.default_rng(0)
-            walk = _Walk.of(colony, ground)
-            colony.weigh(ground, colony.lay(ground, rng), colony.desire(ground), walk.weights[0])
+            walk = TourConstruction.of(colony, ground)
+            colony.choice_weights(
+                ground, colony.initial_trail(ground, rng), colony.heuristic_values(ground), walk.weights[0]
+            )
             rates = []
             for _ in range(5):
                 started = time.process_time()
-                _, steps = walk.go(rng)
+                _, steps = walk.construct(rng)
                 rates.append(steps / (time.process_time() - started))
             rows.append([f"{size}×{size}", label, f"{statistics.median(rates) / 1e6:.1f} M"])
     yield "Walking alone, one core, 20 % blocked"
@@ -424,7 +426,7 @@ def peer(quick: bool, python: str) -> Iterator[str]:
         rows.append([kind, label, f"{arrived}/{len(seeds)}", middle, seconds(theirs), "1", "–"])
         for name, options in (
             ("as", {"beta": 5.0, "evaporation": 0.1}),
-            ("as", {"beta": 5.0, "evaporation": 0.1, "retreat": True, "shortcut": True}),
+            ("as", {"beta": 5.0, "evaporation": 0.1, "backtrack": True, "shortcut": True}),
             ("mmas", {}),
             ("ants", {}),
         ):
@@ -442,7 +444,7 @@ def peer(quick: bool, python: str) -> Iterator[str]:
             label = (
                 f"`{name}`"
                 + (", its settings" if options else "")
-                + (", retreat, shortcut" if "retreat" in options else "")
+                + (", backtrack, shortcut" if "backtrack" in options else "")
             )
             rows.append([kind, label, f"{len(gap)}/{len(seeds)}", percent(statistics.median(gap)), seconds(wall), f"{ratio:,.0f}",
                          str(longer)])  # fmt: skip

@@ -17,12 +17,7 @@ from typing import Any, Literal, Union
 from antdrive.planners.anyangle.ga_han import GaHan
 from antdrive.planners.anyangle.hybrid import Hybrid
 from antdrive.planners.anyangle.tangent import Tangent
-from antdrive.planners.colonies.aco_han import AcoHan
-from antdrive.planners.colonies.ant_system import AgeingAnts, AntSystem, ExploringAnts
-from antdrive.planners.colonies.merging_ants import MergingAnts
-from antdrive.planners.colonies.mmas import MaxMinAnts
-from antdrive.planners.colonies.mmas_dstar import MaxMinDStar
-from antdrive.planners.colonies.pfaco import PotentialFieldAnts
+from antdrive.planners.colonies.catalog import ANT_PLANNERS
 from antdrive.planners.graph.apf import PotentialField
 from antdrive.planners.graph.dstar import DStar
 from antdrive.planners.graph.dstar_lite import DStarLite
@@ -40,15 +35,7 @@ PLANNERS: Mapping[str, Planner] = MappingProxyType(
         "dstar-lite": DStarLite(),
         "sipp": SafeIntervals(),
         "apf": PotentialField(),
-        "aco-han": AcoHan(),
-        "aco-han-elite": AcoHan(elitism=100),
-        "as": AntSystem(),
-        "maco": AgeingAnts(),
-        "iaco": ExploringAnts(),
-        "pfaco": PotentialFieldAnts(),
-        "mmas": MaxMinAnts(),
-        "mmas-dstar": MaxMinDStar(),
-        "ants": MergingAnts(),
+        **ANT_PLANNERS,
         "ga-han": GaHan(),
         "hybrid": Hybrid(),
         "tangent": Tangent(),

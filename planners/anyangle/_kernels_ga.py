@@ -1,7 +1,7 @@
 """Compiled evolution of via points: arrays in, arrays out, nothing validated.
 
-A chromosome is a row of via points between the two fixed ends. Random numbers come from one xorshift64 state, which
-every function hands back.
+A chromosome is a row of via points between the two fixed ends. Random numbers come from one xorshift64 state; every
+function that draws some returns the new state.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ PER_BIT = 1.0 / 9007199254740992.0
 
 @inline
 def uniform(state: Any) -> Any:
-    """The number within [0, 1) that a state stands for."""
+    """The random number in [0, 1) that a state stands for."""
     return (state >> np.uint64(11)) * PER_BIT
 
 
@@ -36,7 +36,7 @@ def length_of(via: Array, ends: Array) -> float:
 
 @kernel
 def feasible(via: Array, ends: Array, land: Terrain) -> bool:
-    """Whether no segment of the line from ends[0] over the via points to ends[1] touches anything."""
+    """Whether every segment of the line from ends[0] over the via points to ends[1] is clear."""
     x, y = ends[0, 0], ends[0, 1]
     for k in range(via.shape[0]):
         if not clear_line(land, x, y, via[k, 0], via[k, 1]):
@@ -54,7 +54,7 @@ def refill(
     drawn = 0
     while size < population.shape[0] and drawn < tries:
         drawn += 1
-        # A via point is drawn when the line has got to the one before it: most draws fail at the first segment.
+        # A via point is drawn only when the line to the one before it is clear: most draws fail at the first segment.
         x, y = ends[0, 0], ends[0, 1]
         clear = True
         for k in range(n):
@@ -80,7 +80,7 @@ def copy_points(points: Array, first: int, into: Array) -> None:
 
 @inline
 def shortest_of(lengths: Array, size: int) -> int:
-    """Index of the least of the first `size` lengths."""
+    """The index of the shortest of the first `size` lengths."""
     first = 0
     for i in range(1, size):
         first = i if lengths[i] < lengths[first] else first
@@ -102,7 +102,7 @@ def next_generation(
 ) -> tuple[int, Any]:
     """Clone, cross, mutate and eliminate in place (Han 2007, section 4.1); how many survive, state.
 
-    The survivors come first in `population`; the elite, if it is kept, at the very front.
+    The survivors fill the front of `population`; with elitism the best of the last generation comes first.
     """
     room, n = population.shape[0], population.shape[1]
     # Natural selection: as many clones as there is room, drawn by fitness 1 / length.
@@ -118,7 +118,7 @@ def next_generation(
         state = next_random(state)
         parent = np.searchsorted(share, uniform(state) * share[size - 1], side="right")
         copy_points(population[min(parent, size - 1)], 0, bred[i])
-    # Crossover behind the same via point for all parents; the tails change hands in reversed order.
+    # Crossover after the same via point for all parents, who receive the tails in reverse order.
     if n > 1:
         state = next_random(state)
         head = 1 + int(uniform(state) * (n - 1))
@@ -134,7 +134,7 @@ def next_generation(
             copy_points(bred[parents[count - 1 - k]], head, tails[k])
         for k in range(count):
             copy_points(tails[k], head, bred[parents[k]])
-    # Mutation of single genes to any free grid point.
+    # A gene mutates to any free grid point.
     for i in range(keep, room):
         for k in range(n):
             state = next_random(state)
@@ -142,7 +142,7 @@ def next_generation(
                 state = next_random(state)
                 p = int(uniform(state) * points.shape[0])
                 bred[i, k, 0], bred[i, k, 1] = points[p, 0], points[p, 1]
-    # Elimination.
+    # Elimination of infeasible chromosomes.
     size = 0
     for i in range(room):
         if i < keep or feasible(bred[i], ends, land):
@@ -166,7 +166,7 @@ def neighbours(via: Array, k: int, ends: Array) -> tuple[float, float, float, fl
 
 @kernel
 def tighten(via: Array, k: int, ends: Array, land: Terrain) -> None:
-    """Move one via point towards the line between its neighbours as far as both its segments stay clear."""
+    """Move one via point towards the line between its neighbours, as far as both its segments stay clear."""
     ax, ay, bx, by = neighbours(via, k, ends)
     x, y = via[k, 0], via[k, 1]
     dx, dy = bx - ax, by - ay
@@ -175,7 +175,7 @@ def tighten(via: Array, k: int, ends: Array, land: Terrain) -> None:
     t = min(1.0, max(0.0, t))
     dx, dy = ax + t * dx - x, ay + t * dy - y
     part, step = 0.0, 1.0
-    for _ in range(10):  # a thousandth of the way is near enough
+    for _ in range(10):  # to a thousandth of the distance
         if part + step <= 1.0:
             nx, ny = x + (part + step) * dx, y + (part + step) * dy
             if clear_line(land, ax, ay, nx, ny) and clear_line(land, nx, ny, bx, by):
@@ -186,7 +186,7 @@ def tighten(via: Array, k: int, ends: Array, land: Terrain) -> None:
 
 @kernel
 def tighten_all(via: Array, ends: Array, land: Terrain, rounds: int) -> float:
-    """Move all via points so, one after the other and again; the line's length."""
+    """Tighten all via points one after the other, `rounds` times; the length of the line."""
     for _ in range(rounds):
         for k in range(via.shape[0]):
             tighten(via, k, ends, land)
@@ -194,11 +194,11 @@ def tighten_all(via: Array, ends: Array, land: Terrain, rounds: int) -> float:
 
 
 @kernel
-def shift(via: Array, k: int, ends: Array, land: Terrain, reach: float, state: Any) -> Any:
-    """Move one via point anywhere, by `reach` down to a ten-thousandth of it, if its segments stay clear; state."""
+def shift(via: Array, k: int, ends: Array, land: Terrain, max_shift: float, state: Any) -> Any:
+    """Move one via point at random, by `max_shift` down to a ten-thousandth of it, if its segments stay clear; state."""
     ax, ay, bx, by = neighbours(via, k, ends)
     state = next_random(state)
-    step = reach * 10.0 ** (-4.0 * uniform(state))
+    step = max_shift * 10.0 ** (-4.0 * uniform(state))
     state = next_random(state)
     heading = 2.0 * math.pi * uniform(state)
     nx, ny = via[k, 0] + step * math.cos(heading), via[k, 1] + step * math.sin(heading)
@@ -208,21 +208,21 @@ def shift(via: Array, k: int, ends: Array, land: Terrain, reach: float, state: A
 
 
 @kernel
-def refine_generation(
+def breed_feasible(
     population: Array,
     lengths: Array,
     ends: Array,
     land: Terrain,
     crossover: float,
     mutation: float,
-    reach: float,
+    max_shift: float,
     state: Any,
 ) -> Any:
-    """Breed feasible chromosomes from feasible ones, in place, the best one kept in front; state.
+    """Breed feasible chromosomes from feasible ones in place, the best one kept in front; state.
 
-    Parents are the shorter of two drawn at random. Tails are exchanged where the new segment is clear; a gene that
-    mutates is pulled taut or shifted at random, and only as far as its segments stay clear. So nothing needs to be
-    eliminated.
+    A parent is the shorter of two chromosomes drawn at random. A tail is taken over where the new segment is clear. A
+    gene mutates by tightening or by a random shift, and only as far as its segments stay clear, so no chromosome needs
+    to be eliminated.
     """
     room, n = population.shape[0], population.shape[1]
     bred = np.empty_like(population)
@@ -250,7 +250,7 @@ def refine_generation(
                 if uniform(state) < 0.5:
                     tighten(bred[i], k, ends, land)
                 else:
-                    state = shift(bred[i], k, ends, land, reach, state)
+                    state = shift(bred[i], k, ends, land, max_shift, state)
     for i in range(room):
         copy_points(bred[i], 0, population[i])
         lengths[i] = length_of(bred[i], ends)

@@ -13,21 +13,32 @@ EDGE = 1e-9  # cells: a line this close to a cell's border touches the cell behi
 
 
 class Terrain(NamedTuple):
-    """Where a straight line may run, as compiled code wants it."""
+    """Where a straight line may run, in the form that compiled code takes.
 
-    discs: Array  # (N, 3): x, y, radius + inflation [m]
-    bounds: Array  # (4,) the walls [m]
-    inflate: float  # what the line keeps off the walls [m]
-    free: Array  # (R, C) the grid, which alone counts where `bare`
-    x0: float  # centre of cell (0, 0) [m]
+    Attributes:
+        discs: x, y and radius + inflation of each disc [m] (N, 3)
+        bounds: the walls [m] (4,)
+        inflate: the distance that a line keeps from the walls [m]
+        free: the grid (R, C)
+        x0: x of the centre of cell (0, 0) [m]
+        y0: y of the centre of cell (0, 0) [m]
+        cell: the side of a cell [m]
+        bare: whether there is no world, so that `free` decides instead of discs and walls
+    """
+
+    discs: Array
+    bounds: Array
+    inflate: float
+    free: Array
+    x0: float
     y0: float
-    cell: float  # [m]
-    bare: bool  # whether there is nothing but the grid
+    cell: float
+    bare: bool
 
 
 @kernel
 def clear_line(land: Terrain, ax: float, ay: float, bx: float, by: float) -> bool:
-    """Whether a robot that follows the segment ab touches nothing; contact alone is a touch."""
+    """Whether a robot that follows the segment ab touches nothing; contact counts as touching."""
     if land.bare:
         return clear_cells(
             land.free,
@@ -51,7 +62,7 @@ def clear_line(land: Terrain, ax: float, ay: float, bx: float, by: float) -> boo
 
 @kernel
 def clear_cells(free: Array, r0: float, c0: float, r1: float, c1: float) -> bool:
-    """Whether every cell that the segment touches, be it by a corner, is free."""
+    """Whether every cell that the segment touches, if only at a corner, is free."""
     rows, cols = free.shape
     first = math.ceil(min(r0, r1) - 0.5 - EDGE)
     last = math.floor(max(r0, r1) + 0.5 + EDGE)
@@ -76,9 +87,9 @@ def clear_cells(free: Array, r0: float, c0: float, r1: float, c1: float) -> bool
 
 @kernel
 def pull(land: Terrain, xy: Array) -> Array:
-    """The points of a polyline (M, 2) that remain when it is pulled straight, first and last included.
+    """The indices of the points that remain when a polyline (M, 2) is pulled straight, first and last included.
 
-    From each point kept, on to the last one that a clear line reaches; a piece that is not clear itself stays.
+    Each point kept is joined to the last point that a clear line from it reaches, or to the next if there is none.
     """
     n = xy.shape[0]
     kept = np.empty(n, dtype=np.int64)
@@ -104,7 +115,7 @@ def corridor_moves(moves: Array, line: Array, width: float) -> Array:
             max(0, math.ceil(min(r0, r1) - width)),
             min(rows - 1, math.floor(max(r0, r1) + width)) + 1,
         ):
-            # Within a row the cells near a segment lie between the parts of it that pass this row.
+            # In a row, the cells near a segment lie beside the part of it that is within `width` of the row.
             t0, t1 = 0.0, 1.0
             if r1 != r0:
                 ta, tb = (r - width - r0) / (r1 - r0), (r + width - r0) / (r1 - r0)

@@ -1,24 +1,116 @@
 """Compiled search for the shortest path among discs: arrays in, arrays out, nothing validated.
 
-A shortest path consists of straight lines and of arcs of the discs that it bends around. A turn to the left
-around a disc is `1`, to the right `-1`; a line that leaves a disc in direction `a` leaves it at the angle
-`a - turn * pi / 2`. Angles lie in [0, 2 pi).
+A shortest path consists of straight lines and of arcs along the rims of the discs that it bends around. A turn to the
+left around a disc is `1`, to the right `-1`. A line in direction `a` touches a disc at the angle `a - turn * pi / 2`,
+seen from the disc's centre. Angles lie in [0, 2 pi).
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
 from antdrive.worlds._kernels import Array, doubled, doubled_rows, inline, kernel, segment_distance2
 
-EPS = 5e-10  # m: a gap no wider than this is closed; a line may lie this much deeper than the clearance
+EPS = 5e-10  # m: a gap no wider than this is closed; a line may enter a disc by this much
 TURN = 2.0 * math.pi
-ANGLE = 1e-9  # rad: how close to the end of a free arc counts as beyond it
-BACK = 1e-7  # rad: an arc that would go backwards by less than this is rounding and has no length
+ANGLE = 1e-9  # rad: an angle this close to the end of a free arc does not lie on the arc
+BACK = 1e-7  # rad: going backwards along a rim by less than this is rounding and counts as no length
 SAME = 1e-12  # m: lengths that differ by less are equal
+
+
+class Rims(NamedTuple):
+    """The free arcs of all rims, the parts that no other disc and no wall covers.
+
+    Attributes:
+        first: disc i has the arcs first[i] to first[i + 1] (N + 1,)
+        begin: the angle at which each arc begins (A,)
+        width: the angle that each arc covers, 2 pi where the whole rim is free (A,)
+    """
+
+    first: Array
+    begin: Array
+    width: Array
+
+
+class Bins(NamedTuple):
+    """Square bins over the bounds, row by row, each with a list of the discs in it.
+
+    Attributes:
+        start: where each bin's discs begin in `items` (rows * columns + 1,)
+        items: the discs of all bins
+        shape: rows and columns (2,)
+        side: the side of a bin [m]
+    """
+
+    start: Array
+    items: Array
+    shape: Array
+    side: float
+
+
+class Obstacles(NamedTuple):
+    """What tangents must not cross.
+
+    Attributes:
+        discs: x, y and radius of each inflated disc [m] (N, 3)
+        bounds: the walls [m] (4,)
+        rims: the free arcs of the discs
+        bins: the discs by place
+        gates: segments between discs or walls that just touch, which no path crosses [m] (G, 4)
+    """
+
+    discs: Array
+    bounds: Array
+    rims: Rims
+    bins: Bins
+    gates: Array
+
+
+class Lines(NamedTuple):
+    """The tangents found so far, a row each, and what the search knows of them. There may be unused rows at the end.
+
+    Attributes:
+        leave: the angle at which the line leaves its disc
+        reach: the angle at which it reaches the next disc
+        length: its length [m]
+        segment: x, y of its two ends [m] (rows, 4)
+        from_arc: the free arc that it leaves, -1 at the start
+        disc: the disc that it reaches, -1 at the goal
+        turn: the turn around that disc
+        arc: the free arc that it reaches, -1 at the goal
+        before: the line before it on the shortest way found, -1 at the start
+        best: the length of that way, this line included [m]
+        done: whether that way is final
+        earlier: the line that was followed before this one to the same arc and turn, -1 if none
+    """
+
+    leave: Array
+    reach: Array
+    length: Array
+    segment: Array
+    from_arc: Array
+    disc: Array
+    turn: Array
+    arc: Array
+    before: Array
+    best: Array
+    done: Array
+    earlier: Array
+
+
+class Heap(NamedTuple):
+    """A binary heap of lines by length; entries beyond its size are unused.
+
+    Attributes:
+        key: the least length of a path by way of each line [m]
+        line: the lines
+    """
+
+    key: Array
+    line: Array
 
 
 @inline
@@ -30,7 +122,7 @@ def wrapped(angle: float) -> float:
 
 @kernel
 def keep_outer(discs: Array, bounds: Array) -> Array:
-    """Which discs (N, 3) have a rim that is not wholly within another disc or outside the bounds."""
+    """Which discs (N, 3) have a rim that is at least partly outside all other discs and inside the bounds."""
     n = discs.shape[0]
     keep = np.ones(n, dtype=np.bool_)
     for i in range(n):
@@ -45,7 +137,7 @@ def keep_outer(discs: Array, bounds: Array) -> Array:
             if room < -EPS:
                 continue
             if math.hypot(x - discs[j, 0], y - discs[j, 1]) <= room + EPS:
-                # Of two that hold each other the first stays; one outside the bounds is dropped for that alone.
+                # Of two equal discs the first stays.
                 if room <= EPS and j > i:
                     continue
                 keep[i] = False
@@ -54,12 +146,8 @@ def keep_outer(discs: Array, bounds: Array) -> Array:
 
 
 @kernel
-def free_arcs(discs: Array, bounds: Array) -> tuple[Array, Array, Array]:
-    """The parts of each rim that no other disc and no wall covers.
-
-    Disc i has the arcs first[i] to first[i + 1]; each begins at an angle and has a width, 2 pi where the whole
-    rim is free. Contact ends an arc.
-    """
+def free_arcs(discs: Array, bounds: Array) -> Rims:
+    """The parts of each rim that no other disc and no wall covers; contact ends an arc."""
     n = discs.shape[0]
     first = np.zeros(n + 1, dtype=np.int64)
     begin = np.empty(4 * n + 16, dtype=np.float64)
@@ -117,13 +205,13 @@ def free_arcs(discs: Array, bounds: Array) -> tuple[Array, Array, Array]:
             begin[size], width[size] = 0.0, TURN
             size += 1
             continue
-        for q in range(m):  # in order, by insertion: there are few
+        for q in range(m):  # sort by insertion: there are few
             at = q
             while at > 0 and low[order[at - 1]] > low[q]:
                 order[at] = order[at - 1]
                 at -= 1
             order[at] = q
-        # The gap that runs through the angle 0 comes last.
+        # The gap that contains the angle 0 comes last.
         reach = high[order[0]]
         for q in range(1, m):
             p = order[q]
@@ -131,12 +219,12 @@ def free_arcs(discs: Array, bounds: Array) -> tuple[Array, Array, Array]:
                 begin[size], width[size] = reach, low[p] - reach
                 size += 1
             reach = max(reach, high[p])
-        rest = min(low[order[0]] + TURN - reach, TURN - ANGLE)  # less than a full rim: one contact cuts it
+        rest = min(low[order[0]] + TURN - reach, TURN - ANGLE)  # less than a full rim, as one contact cuts it
         if rest > 2.0 * ANGLE:
             begin[size], width[size] = wrapped(reach), rest
             size += 1
     first[n] = size
-    return first, begin[:size], width[:size]
+    return Rims(first, begin[:size], width[:size])
 
 
 @inline
@@ -153,9 +241,22 @@ def arc_at(first: Array, begin: Array, width: Array, i: int, angle: float) -> in
     return found
 
 
+@inline
+def along_rim(rims: Rims, arc: int, turn: int, here: float, there: float) -> float:
+    """The angle from `here` to `there` on a free arc in the direction of `turn`; inf if the arc ends in between."""
+    ahead = (turn * (there - here)) % TURN
+    if ahead > TURN - BACK:
+        ahead = 0.0
+    if rims.width[arc] < TURN:
+        past = (here - rims.begin[arc]) % TURN
+        if ahead > (rims.width[arc] - past if turn > 0 else past):
+            ahead = np.inf
+    return ahead
+
+
 @kernel
 def gates(discs: Array, bounds: Array) -> Array:
-    """Where two discs, or a disc and a wall, just touch: segments (G, 4) that no path crosses."""
+    """The segments (G, 4) between discs, or between a disc and a wall, that just touch: no path crosses them."""
     n = discs.shape[0]
     out = np.empty((16, 4), dtype=np.float64)
     size = 0
@@ -194,13 +295,13 @@ def gates(discs: Array, bounds: Array) -> Array:
 
 @inline
 def side(ax: float, ay: float, bx: float, by: float, px: float, py: float) -> float:
-    """Positive where p lies to the left of the line from a to b."""
+    """Positive if p lies to the left of the line from a to b."""
     return (bx - ax) * (py - ay) - (by - ay) * (px - ax)
 
 
 @kernel
-def bins(discs: Array, bounds: Array) -> tuple[Array, Array, Array, float]:
-    """Square bins over the bounds: where each one's discs begin in a list, that list, (rows, columns), the side."""
+def bins(discs: Array, bounds: Array) -> Bins:
+    """Discs by place: every bin that a disc touches has it in its list."""
     n = discs.shape[0]
     wide, tall = bounds[2] - bounds[0], bounds[3] - bounds[1]
     cell = max(math.sqrt(wide * tall / max(n, 1)), max(wide, tall) / 200.0, 1e-9)
@@ -230,36 +331,25 @@ def bins(discs: Array, bounds: Array) -> tuple[Array, Array, Array, float]:
                         at[row * cols + col] += 1
                     else:
                         start[row * cols + col + 1] += 1
-    return start, items, shape, cell
+    return Bins(start, items, shape, cell)
 
 
 @kernel
 def visible(
-    ax: float,
-    ay: float,
-    bx: float,
-    by: float,
-    i: int,
-    j: int,
-    discs: Array,
-    bounds: Array,
-    start: Array,
-    items: Array,
-    shape: Array,
-    cell: float,
-    gate: Array,
+    ax: float, ay: float, bx: float, by: float, i: int, j: int, discs: Array, bounds: Array, grid: Bins, gates: Array
 ) -> bool:
-    """Whether the segment ab enters no disc but i and j, to which it is tangent, and passes no gate."""
-    rows, cols = shape[0], shape[1]
-    px, py = (ax - bounds[0]) / cell, (ay - bounds[1]) / cell
-    qx, qy = (bx - bounds[0]) / cell, (by - bounds[1]) / cell
+    """Whether the segment ab enters no disc but i and j, to which it is tangent, and crosses no gate."""
+    start, items, bin_side = grid.start, grid.items, grid.side
+    rows, cols = grid.shape[0], grid.shape[1]
+    px, py = (ax - bounds[0]) / bin_side, (ay - bounds[1]) / bin_side
+    qx, qy = (bx - bounds[0]) / bin_side, (by - bounds[1]) / bin_side
     col = min(max(math.floor(px), 0), cols - 1)
     row = min(max(math.floor(py), 0), rows - 1)
     last_col = min(max(math.floor(qx), 0), cols - 1)
     last_row = min(max(math.floor(qy), 0), rows - 1)
     dx, dy = qx - px, qy - py
     step_col, step_row = 1 if dx > 0.0 else -1, 1 if dy > 0.0 else -1
-    # Along the segment, from 0 to 1: where the next column and the next row begin, and how far they lie apart.
+    # As fractions of the segment: where the next column and the next row begin, and how far apart columns and rows are.
     next_x = ((col + (1 if dx > 0.0 else 0)) - px) / dx if dx != 0.0 else np.inf
     next_y = ((row + (1 if dy > 0.0 else 0)) - py) / dy if dy != 0.0 else np.inf
     per_x = abs(1.0 / dx) if dx != 0.0 else np.inf
@@ -283,8 +373,8 @@ def visible(
         else:
             row += step_row
             next_y += per_y
-    for g in range(gate.shape[0]):
-        gx, gy, hx, hy = gate[g, 0], gate[g, 1], gate[g, 2], gate[g, 3]
+    for g in range(gates.shape[0]):
+        gx, gy, hx, hy = gates[g, 0], gates[g, 1], gates[g, 2], gates[g, 3]
         apart = side(gx, gy, hx, hy, ax, ay) * side(gx, gy, hx, hy, bx, by) < 0.0
         if apart and side(ax, ay, bx, by, gx, gy) * side(ax, ay, bx, by, hx, hy) <= 0.0:
             return False
@@ -292,201 +382,243 @@ def visible(
 
 
 @kernel
-def push(heap_f: Array, heap_e: Array, size: int, f: float, e: int) -> tuple[Array, Array, int]:
-    """Add an entry to a binary heap."""
-    if size == len(heap_f):
-        heap_f = doubled(heap_f)
-        heap_e = doubled(heap_e)
+def push(heap: Heap, size: int, key: float, line: int) -> int:
+    """Add a line to a heap that has room for it; its new size."""
     at = size
     while at > 0:
         up = (at - 1) >> 1
-        if heap_f[up] <= f:
+        if heap.key[up] <= key:
             break
-        heap_f[at], heap_e[at] = heap_f[up], heap_e[up]
+        heap.key[at], heap.line[at] = heap.key[up], heap.line[up]
         at = up
-    heap_f[at], heap_e[at] = f, e
-    return heap_f, heap_e, size + 1
+    heap.key[at], heap.line[at] = key, line
+    return size + 1
 
 
 @kernel
-def drop_first(heap_f: Array, heap_e: Array, size: int) -> int:
-    """Take the first entry off a binary heap; its new size."""
+def drop_first(heap: Heap, size: int) -> int:
+    """Remove the first line from a heap; its new size."""
     size -= 1
-    f, e = heap_f[size], heap_e[size]
+    key, line = heap.key[size], heap.line[size]
     at = 0
     while True:
         down = 2 * at + 1
         if down >= size:
             break
-        if down + 1 < size and heap_f[down + 1] < heap_f[down]:
+        if down + 1 < size and heap.key[down + 1] < heap.key[down]:
             down += 1
-        if heap_f[down] >= f:
+        if heap.key[down] >= key:
             break
-        heap_f[at], heap_e[at] = heap_f[down], heap_e[down]
+        heap.key[at], heap.line[at] = heap.key[down], heap.line[down]
         at = down
-    heap_f[at], heap_e[at] = f, e
+    heap.key[at], heap.line[at] = key, line
     return size
 
 
 @kernel
-def shortest_path(discs: Array, bounds: Array, ends: Array) -> tuple[Array, float, int]:
-    """The shortest way from point ends[0] to ends[1]: its lines (L, 6), its length, the lines looked at.
+def empty_lines(room: int) -> Lines:
+    """A table with `room` unused rows."""
+    return Lines(
+        np.empty(room, dtype=np.float64),
+        np.empty(room, dtype=np.float64),
+        np.empty(room, dtype=np.float64),
+        np.empty((room, 4), dtype=np.float64),
+        np.empty(room, dtype=np.int64),
+        np.empty(room, dtype=np.int64),
+        np.empty(room, dtype=np.int64),
+        np.empty(room, dtype=np.int64),
+        np.empty(room, dtype=np.int64),
+        np.empty(room, dtype=np.float64),
+        np.empty(room, dtype=np.bool_),
+        np.empty(room, dtype=np.int64),
+    )
 
-    `discs` are inflated, `bounds` shrunken; none of the discs lies within another (`keep_outer`). A line is
-    x, y where it starts, x, y where it stops, and the disc and the turn (1 left, -1 right) that it stops at;
-    the disc is -1 at the goal. No lines: there is no way.
 
-    A* over the tangents between discs. A disc's tangents are found when the search first comes to it, sorted
-    by nothing: each arrival looks at all that leave the same free arc ahead of it. An arrival is passed over
-    when an earlier one reaches the same spot along the rim as cheaply.
+@kernel
+def doubled_lines(lines: Lines) -> Lines:
+    """The same table with twice the rows."""
+    return Lines(
+        doubled(lines.leave),
+        doubled(lines.reach),
+        doubled(lines.length),
+        doubled_rows(lines.segment),
+        doubled(lines.from_arc),
+        doubled(lines.disc),
+        doubled(lines.turn),
+        doubled(lines.arc),
+        doubled(lines.before),
+        doubled(lines.best),
+        doubled(lines.done),
+        doubled(lines.earlier),
+    )
+
+
+@kernel
+def add_tangents(obstacles: Obstacles, ends: Array, line: int, lines: Lines, count: int) -> tuple[int, int]:
+    """Add the tangents that leave the disc and turn which `line` reaches; for -1, those from the start.
+
+    There are 2 N + 1 at most, one to the goal and two to each disc; `lines` has room for them. Returns the number of
+    lines in the table, and the number of lines that were checked against the other discs.
     """
-    n = discs.shape[0]
-    first, begin, width = free_arcs(discs, bounds)
-    gate = gates(discs, bounds)
-    start, items, shape, cell = bins(discs, bounds)
-    gx, gy = ends[1, 0], ends[1, 1]
-
-    # Lines: leaving angle and arc on the disc they come from, arriving angle and arc on the one they reach.
-    room = 256
-    num = np.empty((room, 7), dtype=np.float64)  # leaving angle, arriving angle, length, x, y, x, y
-    ref = np.empty((room, 5), dtype=np.int64)  # leaving arc, disc reached, turn there, arc there, line before
-    best = np.empty(room, dtype=np.float64)
-    lines = 0
-    span = np.full((2 * n + 1, 2), -1, dtype=np.int64)  # by disc and turn, the start last: lines that leave
-    heap_f, heap_e = np.empty(256, dtype=np.float64), np.empty(256, dtype=np.int64)
-    waiting: Any = np.int64(0)  # a plain 0 would be compiled for as a type of its own
-    # Arrivals that were followed, as linked lists by arc and turn.
-    arrived = np.full(2 * len(begin), -1, dtype=np.int64)
-    earlier = np.full(room, -1, dtype=np.int64)
-    done = np.zeros(room, dtype=np.bool_)
-
-    line, g = -1, 0.0
-    looked = 0
-    while True:
-        # Where the search stands: at the start, or on disc i after line `line`, turning by s.
-        if line < 0:
-            i, s, x, y, r, source = -1, 1, ends[0, 0], ends[0, 1], 0.0, 2 * n
-        else:
-            i, s = ref[line, 1], ref[line, 2]
-            x, y, r = discs[i, 0], discs[i, 1], discs[i, 2]
-            source = 2 * i + (1 if s > 0 else 0)
-        if span[source, 0] < 0:
-            span[source, 0] = lines
-            for j in range(-1, n):
-                if j == i and j >= 0:
+    discs, bounds, grid, gates, checked = obstacles.discs, obstacles.bounds, obstacles.bins, obstacles.gates, 0
+    first, begin, width = obstacles.rims.first, obstacles.rims.begin, obstacles.rims.width
+    i, s, x, y, r = -1, 1, ends[0, 0], ends[0, 1], 0.0
+    if line >= 0:
+        i, s = lines.disc[line], lines.turn[line]
+        x, y, r = discs[i, 0], discs[i, 1], discs[i, 2]
+    for j in range(-1, discs.shape[0]):
+        if j == i and j >= 0:
+            continue
+        for side_of_disc in range(2 if j >= 0 else 1):
+            t = 2 * side_of_disc - 1
+            if j < 0:
+                dx, dy, q = ends[1, 0] - x, ends[1, 1] - y, 0.0
+            else:
+                dx, dy, q = discs[j, 0] - x, discs[j, 1] - y, discs[j, 2]
+            d = math.hypot(dx, dy)
+            across = t * q - s * r
+            if abs(across) > d + 4.0 * EPS:
+                continue
+            sine = min(1.0, max(-1.0, across / d)) if d > 0.0 else 0.0
+            heading = math.atan2(dy, dx) - math.asin(sine)
+            leave = wrapped(heading - s * 0.5 * math.pi)
+            reach = wrapped(heading - t * 0.5 * math.pi)
+            from_arc, arc = -1, -1
+            ax, ay, bx, by = x, y, ends[1, 0], ends[1, 1]
+            if i >= 0:
+                from_arc = arc_at(first, begin, width, i, leave)
+                if from_arc < 0:
                     continue
-                for turn in range(2 if j >= 0 else 1):
-                    t = 2 * turn - 1
-                    if j < 0:
-                        dx, dy, q = gx - x, gy - y, 0.0
-                    else:
-                        dx, dy, q = discs[j, 0] - x, discs[j, 1] - y, discs[j, 2]
-                    d = math.hypot(dx, dy)
-                    across = t * q - s * r
-                    if abs(across) > d + 4.0 * EPS:
-                        continue
-                    sine = min(1.0, max(-1.0, across / d)) if d > 0.0 else 0.0
-                    heading = math.atan2(dy, dx) - math.asin(sine)
-                    leave = wrapped(heading - s * 0.5 * math.pi)
-                    reach = wrapped(heading - t * 0.5 * math.pi)
-                    arc0, arc1 = -1, -1
-                    ax, ay, bx, by = x, y, gx, gy
-                    if i >= 0:
-                        arc0 = arc_at(first, begin, width, i, leave)
-                        if arc0 < 0:
-                            continue
-                        ax, ay = x + r * math.cos(leave), y + r * math.sin(leave)
-                    if j >= 0:
-                        arc1 = arc_at(first, begin, width, j, reach)
-                        if arc1 < 0:
-                            continue
-                        bx, by = discs[j, 0] + q * math.cos(reach), discs[j, 1] + q * math.sin(reach)
-                    looked += 1
-                    if not visible(ax, ay, bx, by, i, j, discs, bounds, start, items, shape, cell, gate):
-                        continue
-                    if lines == room:
-                        num = doubled_rows(num)
-                        ref = doubled_rows(ref)
-                        best = doubled(best)
-                        earlier = doubled(earlier)
-                        done = doubled(done)
-                        done[room:] = False
-                        room *= 2
-                    num[lines, 0], num[lines, 1] = leave, reach
-                    num[lines, 2] = math.sqrt(max(0.0, d * d - across * across))
-                    num[lines, 3], num[lines, 4], num[lines, 5], num[lines, 6] = ax, ay, bx, by
-                    ref[lines, 0], ref[lines, 1], ref[lines, 2] = arc0, j, t
-                    ref[lines, 3], ref[lines, 4] = arc1, -1
-                    best[lines] = np.inf
-                    lines += 1
-            span[source, 1] = lines
-        for e in range(span[source, 0], span[source, 1]):
-            if done[e]:
-                continue
-            ahead = 0.0
-            if line >= 0:
-                arc = ref[line, 3]
-                if ref[e, 0] != arc:
+                ax, ay = x + r * math.cos(leave), y + r * math.sin(leave)
+            if j >= 0:
+                arc = arc_at(first, begin, width, j, reach)
+                if arc < 0:
                     continue
-                ahead = (s * (num[e, 0] - num[line, 1])) % TURN
-                if ahead > TURN - BACK:
-                    ahead = 0.0
-                if width[arc] < TURN:  # the way round must not leave the arc
-                    past = (num[line, 1] - begin[arc]) % TURN
-                    if ahead > (width[arc] - past if s > 0 else past):
-                        continue
-            g_new = g + r * ahead + num[e, 2]
-            if g_new < best[e] - SAME:
-                best[e] = g_new
-                ref[e, 4] = line
-                f = g_new + math.hypot(gx - num[e, 5], gy - num[e, 6])
-                heap_f, heap_e, waiting = push(heap_f, heap_e, waiting, f, e)
-        # On to the most promising arrival.
-        line = -1
-        while waiting > 0:
-            e = heap_e[0]
-            waiting = drop_first(heap_f, heap_e, waiting)
-            if done[e]:
+                bx, by = discs[j, 0] + q * math.cos(reach), discs[j, 1] + q * math.sin(reach)
+            checked += 1
+            if not visible(ax, ay, bx, by, i, j, discs, bounds, grid, gates):
                 continue
-            done[e] = True
-            g = best[e]
-            if ref[e, 1] < 0:
-                line = e
-                break
-            arc, j = ref[e, 3], ref[e, 1]
-            slot = 2 * arc + (1 if ref[e, 2] > 0 else 0)
-            other = arrived[slot]
-            beaten = False
-            while other >= 0 and not beaten:
-                ahead = (ref[e, 2] * (num[e, 1] - num[other, 1])) % TURN
-                if ahead > TURN - BACK:
-                    ahead = 0.0
-                within = True
-                if width[arc] < TURN:
-                    past = (num[other, 1] - begin[arc]) % TURN
-                    within = ahead <= (width[arc] - past if ref[e, 2] > 0 else past)
-                beaten = within and best[other] + discs[j, 2] * ahead <= g + SAME
-                other = earlier[other]
-            if beaten:
+            lines.leave[count], lines.reach[count] = leave, reach
+            lines.length[count] = math.sqrt(max(0.0, d * d - across * across))
+            lines.segment[count, 0], lines.segment[count, 1] = ax, ay
+            lines.segment[count, 2], lines.segment[count, 3] = bx, by
+            lines.from_arc[count], lines.arc[count] = from_arc, arc
+            lines.disc[count], lines.turn[count] = j, t
+            lines.before[count], lines.earlier[count] = -1, -1
+            lines.best[count], lines.done[count] = np.inf, False
+            count += 1
+    return count, checked
+
+
+@kernel
+def relax(
+    obstacles: Obstacles, ends: Array, line: int, lines: Lines, first: int, last: int, heap: Heap, waiting: int
+) -> int:
+    """Extend the way that ends with `line` by the lines `first` to `last`, which leave its disc; the heap's new size."""
+    g, r = 0.0, 0.0
+    if line >= 0:
+        g, r = lines.best[line], obstacles.discs[lines.disc[line], 2]
+    for e in range(first, last):
+        if lines.done[e]:
+            continue
+        ahead = 0.0
+        if line >= 0:
+            arc = lines.arc[line]
+            if lines.from_arc[e] != arc:
                 continue
-            earlier[e] = arrived[slot]
-            arrived[slot] = e
-            line = e
-            break
-        if line < 0:
-            return np.empty((0, 6), dtype=np.float64), np.inf, looked
-        if ref[line, 1] < 0:
-            break
-    count = 0
-    e = line
+            ahead = along_rim(obstacles.rims, arc, lines.turn[line], lines.reach[line], lines.leave[e])
+            if ahead == np.inf:
+                continue
+        length = g + r * ahead + lines.length[e]
+        if length < lines.best[e] - SAME:
+            lines.best[e] = length
+            lines.before[e] = line
+            to_goal = math.hypot(ends[1, 0] - lines.segment[e, 2], ends[1, 1] - lines.segment[e, 3])
+            waiting = push(heap, waiting, length + to_goal, e)
+    return waiting
+
+
+@kernel
+def next_line(obstacles: Obstacles, lines: Lines, latest: Array, heap: Heap, waiting: int) -> tuple[int, int]:
+    """The most promising line to follow, -1 if there is none, and the heap's new size.
+
+    A line is passed over if one that was followed earlier reaches the same point of the rim by a way as short. Lines
+    that were followed form a linked list per arc and turn, from `latest` (2 A,) on by `Lines.earlier`.
+    """
+    while waiting > 0:
+        e = heap.line[0]
+        waiting = drop_first(heap, waiting)
+        if lines.done[e]:
+            continue
+        lines.done[e] = True
+        if lines.disc[e] < 0:
+            return e, waiting
+        arc, turn, r = lines.arc[e], lines.turn[e], obstacles.discs[lines.disc[e], 2]
+        slot = 2 * arc + (1 if turn > 0 else 0)
+        other = latest[slot]
+        beaten = False
+        while other >= 0 and not beaten:
+            ahead = along_rim(obstacles.rims, arc, turn, lines.reach[other], lines.reach[e])
+            beaten = ahead < np.inf and lines.best[other] + r * ahead <= lines.best[e] + SAME
+            other = lines.earlier[other]
+        if beaten:
+            continue
+        lines.earlier[e] = latest[slot]
+        latest[slot] = e
+        return e, waiting
+    return -1, waiting
+
+
+@kernel
+def way_to(line: int, lines: Lines) -> Array:
+    """The lines of the way that ends with `line`, as `shortest_path` returns them."""
+    count, e = 0, line
     while e >= 0:
         count += 1
-        e = ref[e, 4]
+        e = lines.before[e]
     way = np.empty((count, 6), dtype=np.float64)
     e = line
     for k in range(count - 1, -1, -1):
         for q in range(4):
-            way[k, q] = num[e, 3 + q]
-        way[k, 4], way[k, 5] = ref[e, 1], ref[e, 2]
-        e = ref[e, 4]
-    return way, g, looked
+            way[k, q] = lines.segment[e, q]
+        way[k, 4], way[k, 5] = lines.disc[e], lines.turn[e]
+        e = lines.before[e]
+    return way
+
+
+@kernel
+def shortest_path(discs: Array, bounds: Array, ends: Array) -> tuple[Array, float, int]:
+    """The shortest path from point ends[0] to ends[1]: its lines (L, 6), its length, how many lines were checked.
+
+    `discs` are inflated, `bounds` shrunk; none of the discs lies within another (`keep_outer`). A line is x, y where
+    it begins, x, y where it ends, and the disc that it reaches with the turn (1 left, -1 right) around it; the disc is
+    -1 at the goal. There is no path if there are no lines.
+
+    A* over the tangents between discs. The tangents from a disc are found when the search first reaches that disc and
+    turn; every line that arrives there tries all that leave the same free arc ahead of it.
+    """
+    n = discs.shape[0]
+    obstacles = Obstacles(discs, bounds, free_arcs(discs, bounds), bins(discs, bounds), gates(discs, bounds))
+    lines = empty_lines(max(256, 2 * n + 1))
+    span = np.full((2 * n + 1, 2), -1, dtype=np.int64)  # the lines that leave each disc by turn, the start last
+    latest = np.full(2 * len(obstacles.rims.begin), -1, dtype=np.int64)
+    heap = Heap(np.empty(256, dtype=np.float64), np.empty(256, dtype=np.int64))
+    count, waiting, checked, line = 0, 0, 0, -1
+    while True:
+        source = 2 * n if line < 0 else 2 * lines.disc[line] + (1 if lines.turn[line] > 0 else 0)
+        if span[source, 0] < 0:
+            if count + 2 * n + 1 > len(lines.leave):
+                lines = doubled_lines(lines)
+            span[source, 0] = count
+            count, more = add_tangents(obstacles, ends, line, lines, count)
+            span[source, 1] = count
+            checked += more
+        first, last = span[source, 0], span[source, 1]
+        while waiting + last - first > len(heap.key):
+            heap = Heap(doubled(heap.key), doubled(heap.line))
+        waiting = relax(obstacles, ends, line, lines, first, last, heap, waiting)
+        line, waiting = next_line(obstacles, lines, latest, heap, waiting)
+        if line < 0:
+            return np.empty((0, 6), dtype=np.float64), np.inf, checked
+        if lines.disc[line] < 0:
+            return way_to(line, lines), lines.best[line], checked

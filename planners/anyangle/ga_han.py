@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from antdrive.planners.anyangle.lines import Ends, cells_along, ends, terrain
+from antdrive.planners.anyangle.lines import RouteEnds, cells_along, polyline_length, route_ends, terrain
 from antdrive.planners.iterative import Iteration, IterativePlanner, require
 from antdrive.planners.plan import Cells, PlanResult, Query
 from antdrive.worlds import Floats
@@ -18,8 +18,8 @@ from antdrive.worlds.plane import polyline_length
 
 
 @dataclass(frozen=True, kw_only=True)
-class ViaPlanner(IterativePlanner):
-    """A planner whose answer is a line over via points, which need not run along the grid's moves."""
+class ViaPointPlanner(IterativePlanner):
+    """A planner whose answer is a polyline over via points that need not lie on the grid's moves."""
 
     @property
     def work_unit(self) -> str:
@@ -33,35 +33,52 @@ class ViaPlanner(IterativePlanner):
         return dataclasses.replace(result, length=polyline_length(query.grid.xy(result.waypoints)))
 
 
-class Leader:
-    """The best line so far; the cells beside it are looked for only when it changes."""
+class Incumbent:
+    """The best line so far, with its leads; the cells beside it are searched only when it changes.
 
-    def __init__(self, query: Query, way: Ends) -> None:
-        self.query, self.way = query, way
-        self.best = math.inf  # [m], what lies outside the ends that chromosomes know of included
-        self.extra = polyline_length([*way.before, way.first]) + polyline_length([way.last, *way.after])
+    Attributes:
+        query: the query
+        ends: the ends of the line, and its leads
+        best: the length of the best line, leads included [m], inf while there is none
+        cells: a path of cells beside the line (N, 2)
+        waypoints: the line in fractional cells (M, 2), None while there is none
+    """
+
+    def __init__(self, query: Query, ends: RouteEnds) -> None:
+        self.query, self.ends = query, ends
+        self.best = math.inf
         self.cells: Cells = np.empty((0, 2), dtype=np.int32)
         self.waypoints: Floats | None = None
 
-    def offer(self, via: Floats, length: float) -> None:
-        """Take a line over via points (n, 2) [m] for the best if it is."""
-        if length + self.extra >= self.best:
-            return
-        self.best = length + self.extra
-        line = self.way.joined(np.vstack([self.way.first, via, self.way.last]))
+    def offer(self, via: Floats, length: float) -> bool:
+        """Keep the line over via points (n, 2) [m], of this length without leads, if it is the best; whether it is."""
+        length += self.ends.lead_length
+        if length >= self.best:
+            return False
+        self.best = length
+        line = self.ends.with_leads(np.vstack([self.ends.start, via, self.ends.goal]))
         self.waypoints = self.query.grid.fractional(line)
         self.cells = cells_along(self.query, self.waypoints)
+        return True
 
     def report(self, population: Floats, lengths: Floats, *, arrived: int, work: int) -> Iteration:
-        """An iteration's account of a population (P, n, 2) of feasible chromosomes; P may be 0."""
+        """The state after a generation, whose shortest line is offered first.
+
+        Args:
+            population: the via points of feasible chromosomes [m] (P, n, 2); P may be 0
+            lengths: the lengths of their lines [m] (P,)
+            arrived: how many chromosomes count as arrived
+            work: how many chromosomes were rated
+        """
+        leads = self.ends.lead_length
         if len(lengths):
             first = int(lengths.argmin())
             self.offer(population[first], float(lengths[first]))
         return Iteration(
             cells=self.cells,
             best=self.best,
-            iteration_best=float(lengths.min()) + self.extra if len(lengths) else math.inf,
-            iteration_mean=float(lengths.mean()) + self.extra if len(lengths) else math.inf,
+            iteration_best=float(lengths.min()) + leads if len(lengths) else math.inf,
+            iteration_mean=float(lengths.mean()) + leads if len(lengths) else math.inf,
             arrived=arrived,
             work=work,
             waypoints=self.waypoints,
@@ -69,37 +86,51 @@ class Leader:
         )
 
     def _visits(self, population: Floats) -> Floats:
-        from antdrive.planners.anyangle import _kernels_lines as _kernels_anyangle
+        from antdrive.planners.anyangle import _kernels_lines
 
         grid = self.query.grid
         lines = np.empty((len(population), population.shape[1] + 2, 2))
-        lines[:, 0], lines[:, 1:-1], lines[:, -1] = self.way.first, population, self.way.last
+        lines[:, 0], lines[:, 1:-1], lines[:, -1] = self.ends.start, population, self.ends.goal
         cells = np.ascontiguousarray(grid.fractional(lines)).reshape(lines.shape)
-        return np.asarray(_kernels_anyangle.visits(cells, grid.shape))
+        return np.asarray(_kernels_lines.visits(cells, grid.shape))
 
 
 def seeded(rng: np.random.Generator) -> Any:
-    """A state for compiled code's own random numbers."""
+    """A seed for the random numbers of compiled code."""
     return np.uint64(rng.bit_generator.random_raw()) | np.uint64(1)
 
 
 @dataclass(frozen=True, kw_only=True)
-class GaHan(ViaPlanner):
+class GaHan(ViaPointPlanner):
     """A genetic algorithm on a few via points, refilled with random chromosomes (Han 2007).
 
-    `iterations` are generations. `field` counts the chromosomes of the last population that pass each cell. A hard
-    world may have no chromosome of so few via points, or none that chance finds: then the answer is `STOPPED`.
+    Section 4.1 of the thesis: a chromosome is a row of via points on free cells. Each generation selects by 1 / length,
+    crosses, mutates, eliminates what touches an obstacle and refills the population at random. The defaults are those
+    of the thesis. `landscape` counts the chromosomes of the last population that pass each cell.
+
+    The algorithm depends on chance finding a first feasible line. In worlds with many obstacles there may be no line
+    over so few via points, or none that chance finds: then the answer is `STOPPED`.
+
+    Attributes:
+        population: chromosomes
+        iterations: generations
+        crossover: Pc, the probability that a chromosome takes part in crossover
+        mutation: Pm, the probability that a gene mutates; the thesis uses 0.4 with nine obstacles
+        via_points: via points of a chromosome, 1 to 6 in the thesis
+        elitism: whether the best chromosome always survives
+        tries: random chromosomes drawn at most in the whole run
+        complete: False, as the planner may miss a path that exists
     """
 
     population: int = 100
     iterations: int = 100
-    crossover: float = 0.25  # Pc
-    mutation: float = 0.2  # Pm, of each gene; the thesis takes 0.4 with nine obstacles
-    via_points: int = 3  # 1 to 6 in the thesis
+    crossover: float = 0.25
+    mutation: float = 0.2
+    via_points: int = 3
     elitism: bool = True
-    tries: int = 1_000_000  # random chromosomes drawn at most in the whole run
+    tries: int = 1_000_000
 
-    complete: ClassVar[bool] = False  # may miss a path that exists
+    complete: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -110,22 +141,30 @@ class GaHan(ViaPlanner):
         require("tries", self.tries, at_least=1)
 
     def iterate(self, query: Query, rng: np.random.Generator) -> Iterator[Iteration]:
-        """The program sequence of section 4.1 viii; ends where no feasible chromosome is found at all."""
+        """Breed generations as in section 4.1 viii, without end unless no feasible chromosome is ever found."""
         from antdrive.planners.anyangle import _kernels_ga
 
-        way, land, state = ends(query), terrain(query), seeded(rng)
-        fixed = np.array([way.first, way.last])
+        ends, land, state = route_ends(query), terrain(query), seeded(rng)
+        fixed = np.array([ends.start, ends.goal])
         points = query.grid.xy(_genes(query))
         population = np.empty((self.population, self.via_points, 2))
         lengths = np.empty(self.population)
-        leader, tries = Leader(query, way), self.tries
+        incumbent, tries = Incumbent(query, ends), self.tries
         size = survivors = 0
         while True:
             if size:
                 survivors, state = _kernels_ga.next_generation(
-                    population, lengths, size, points, fixed, land,
-                    self.crossover, self.mutation, self.elitism, np.uint64(state),
-                )  # fmt: skip
+                    population,
+                    lengths,
+                    size,
+                    points,
+                    fixed,
+                    land,
+                    self.crossover,
+                    self.mutation,
+                    self.elitism,
+                    np.uint64(state),
+                )
                 rated = self.population
             else:
                 survivors, rated = 0, 0
@@ -133,7 +172,7 @@ class GaHan(ViaPlanner):
                 population, lengths, survivors, points, fixed, land, tries, np.uint64(state)
             )
             tries -= drawn
-            yield leader.report(
+            yield incumbent.report(
                 population[:size], lengths[:size], arrived=survivors if rated else size, work=rated + drawn
             )
             if not size and not tries:

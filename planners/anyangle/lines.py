@@ -1,4 +1,4 @@
-"""What planners share that are not bound to the grid's eight directions: straight lines, ends, cells beside a line."""
+"""Straight lines, their ends and the cells beside them, for planners that are not bound to the grid's directions."""
 
 from __future__ import annotations
 
@@ -12,52 +12,68 @@ import numpy.typing as npt
 from antdrive.planners.plan import Cells, Query
 from antdrive.worlds import Floats, Point
 
-if TYPE_CHECKING:  # brings the compiler with it
+if TYPE_CHECKING:  # importing kernels loads the compiler
     from antdrive.planners.anyangle._kernels_lines import Terrain
 
-ROOM = 5e-10  # m: an end that falls short of the clearance by no more than this just has it
+CONTACT = 5e-10  # m: an end whose room falls short of the clearance by no more than this has just the clearance
 
 
-class Ends(NamedTuple):
-    """Where a line that keeps its clearance starts and stops [m], and what the driven line has beyond that."""
+class RouteEnds(NamedTuple):
+    """The ends of the part of a route that keeps the clearance, and the exact ends where these have too little room.
 
-    first: Point
-    last: Point
-    before: tuple[Point, ...] = ()  # the exact start, where it has too little room itself
-    after: tuple[Point, ...] = ()  # the exact goal, where it is driven to but not within the clearance
+    Attributes:
+        start: where the part that keeps the clearance starts [m]
+        goal: where it stops [m]
+        lead_in: the exact start, where it has too little room itself and is left on a straight line to `start`
+        lead_out: the exact goal, where it has just the clearance and is reached on a straight line from `goal`
+    """
 
-    def joined(self, xy: npt.ArrayLike) -> Floats:
-        """The driven line (M, 2) [m] around a polyline from `first` to `last`."""
-        parts = [np.reshape(part, (-1, 2)) for part in (self.before, xy, self.after)]
+    start: Point
+    goal: Point
+    lead_in: tuple[Point, ...] = ()
+    lead_out: tuple[Point, ...] = ()
+
+    @property
+    def lead_length(self) -> float:
+        """The length of both leads together [m]."""
+        return polyline_length([*self.lead_in, self.start]) + polyline_length([self.goal, *self.lead_out])
+
+    def with_leads(self, xy: npt.ArrayLike) -> Floats:
+        """The route (M, 2) [m]: a polyline from `start` to `goal` with both leads."""
+        parts = [np.reshape(part, (-1, 2)) for part in (self.lead_in, xy, self.lead_out)]
         return np.vstack(parts).astype(np.float64)
 
 
-def ends(query: Query, *, touching: bool = False) -> Ends:
-    """The exact start and goal of the query's task, else the centres of its end cells.
+def route_ends(query: Query, *, touching: bool = False) -> RouteEnds:
+    """The exact start and goal of the query's task; without a task, the centres of its end cells.
 
-    An end with too little room is left, or reached, on the straight line to the centre of its cell, which
-    `Query.between` has found clear; a goal that lies closer to something than the clearance asks is reached at
-    that centre. `touching` also accepts ends whose room is just the clearance.
+    A start with too little room is left on the straight line to the centre of its cell, which `Query.between` has
+    found clear. A goal with too little room is not reached: the route ends at the centre of its cell. A goal with just
+    the clearance is reached from that centre.
+
+    Args:
+        query: the query
+        touching: whether ends with just the clearance count as having room
     """
     (start, goal) = (_point(xy) for xy in query.grid.xy([query.start, query.goal]))
     if query.task is None:
-        return Ends(start, goal)
+        return RouteEnds(start, goal)
     from antdrive.worlds.geometry import point_clearance
 
     inflate = query.grid.inflate
     exact_start, exact_goal = _point(query.task.start[:2]), _point(query.task.goal)
     room = [float(r) for r in point_clearance(query.task.world, [exact_start, exact_goal])]
-    fits = [r >= inflate - ROOM if touching else r > inflate for r in room]
-    return Ends(
+    fits = [r >= inflate - CONTACT if touching else r > inflate for r in room]
+    return RouteEnds(
         exact_start if fits[0] else start,
         exact_goal if fits[1] else goal,
         () if fits[0] else (exact_start,),
-        (exact_goal,) if not fits[1] and room[1] >= inflate - ROOM else (),
+        (exact_goal,) if not fits[1] and room[1] >= inflate - CONTACT else (),
     )
 
 
 def terrain(query: Query) -> Terrain:
-    """Where straight lines may run: among the discs of the query's world, or over the free cells of a bare grid."""
+    """Where straight lines may run: among the discs of the query's world or, without a task, over free cells."""
     from antdrive.planners.anyangle._kernels_lines import Terrain
 
     grid, task = query.grid, query.task
@@ -69,22 +85,22 @@ def terrain(query: Query) -> Terrain:
 
 
 def clear_line(query: Query, start: Point, goal: Point) -> bool:
-    """Whether the straight line between two points [m] keeps the clearance; contact alone is too close.
+    """Whether the straight line between two points [m] keeps the clearance; contact counts as too close.
 
-    With a world this is the exact distance to discs and walls. On a bare grid the line must keep to free cells:
-    none that it touches, be it by a corner, is blocked.
+    With a world, the exact distance to discs and walls decides. On a bare grid, every cell that the line touches, if
+    only at a corner, must be free.
     """
-    from antdrive.planners.anyangle import _kernels_lines as _kernels_anyangle
+    from antdrive.planners.anyangle import _kernels_lines
 
-    return bool(_kernels_anyangle.clear_line(terrain(query), *map(float, (*start, *goal))))
+    return bool(_kernels_lines.clear_line(terrain(query), *map(float, (*start, *goal))))
 
 
 def cells_along(query: Query, waypoints: npt.ArrayLike) -> Cells:
     """A path of allowed moves from start to goal beside a polyline in fractional cells; empty if there is none.
 
-    It is the shortest one within a corridor about the polyline, which widens until it holds a path.
+    It is the shortest path within a corridor around the polyline; the corridor widens until it contains a path.
     """
-    from antdrive.planners.anyangle import _kernels_lines as _kernels_anyangle
+    from antdrive.planners.anyangle import _kernels_lines
     from antdrive.planners.graph import _kernels_search
 
     line = np.ascontiguousarray(waypoints, dtype=np.float64).reshape(-1, 2)
@@ -92,8 +108,8 @@ def cells_along(query: Query, waypoints: npt.ArrayLike) -> Cells:
     moves, width = query.grid.moves, 1.0
     while True:
         within = width < max(query.grid.shape)
-        near = _kernels_anyangle.corridor_moves(moves, line, width) if within else moves
-        near.setflags(write=False)  # as a grid's own are, for which the search is compiled
+        near = _kernels_lines.corridor_moves(moves, line, width) if within else moves
+        near.setflags(write=False)  # the search is compiled for read-only moves, as those of a grid are
         cells, _, _, _ = _kernels_search.shortest_path(near, *query.start, *query.goal, True)
         if len(cells) or not within:
             return np.asarray(cells, dtype=np.int32)
@@ -101,7 +117,7 @@ def cells_along(query: Query, waypoints: npt.ArrayLike) -> Cells:
 
 
 def cells_under(query: Query, waypoints: npt.ArrayLike) -> Cells:
-    """The cells beneath a polyline in fractional cells, each a neighbour of the one before; they need not be free."""
+    """The cells that a polyline in fractional cells passes over, each a neighbour of the last; they need not be free."""
     line = np.asarray(waypoints, dtype=np.float64).reshape(-1, 2)
     line = np.vstack([query.start, line, query.goal])
     parts = [line[:1]]

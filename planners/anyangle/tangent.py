@@ -1,6 +1,6 @@
-"""The floor under every planner's length: the shortest path of the plane among inflated discs.
+"""The lower bound on every planner's length: the shortest path in the plane among inflated discs.
 
-A shortest path among discs consists of lines tangent to two of them and of arcs along their rims, as told for
+A shortest path among discs consists of lines tangent to two of them and of arcs along their rims, as described for
 polygons by Lozano-Pérez & Wesley (*An algorithm for planning collision-free paths among polyhedral obstacles*, CACM
 22, 1979) and for curved obstacles by Liu & Arimoto (*Path planning using a tangent graph for mobile robots among
 polygonal and curved obstacles*, IJRR 11, 1992).
@@ -17,7 +17,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.planners.anyangle.lines import Ends, cells_along, cells_under, ends
+from antdrive.planners.anyangle.lines import RouteEnds, cells_along, cells_under, route_ends
 from antdrive.planners.iterative import require
 from antdrive.planners.plan import GridPlanner, PlanResult, PlanStatus, Query, path_cost
 from antdrive.worlds import Bounds, Floats, InputError, Point, Task
@@ -28,64 +28,85 @@ NO_GAP = "discs and walls leave no way from the start to the goal for this clear
 
 @dataclass(frozen=True)
 class Line:
-    """A straight piece of a path."""
+    """A straight piece of a path.
 
-    start: Point  # [m]
-    end: Point  # [m]
+    Attributes:
+        start: its first point [m]
+        end: its last point [m]
+    """
+
+    start: Point
+    end: Point
 
     @property
     def length(self) -> float:
-        """[m]."""
+        """Its length [m]."""
         return math.dist(self.start, self.end)
 
 
 @dataclass(frozen=True)
 class Arc:
-    """A piece of a path along the rim of a disc."""
+    """A piece of a path along the rim of a disc.
 
-    centre: Point  # [m]
-    radius: float  # [m]
-    begin: float  # the angle of its first point, seen from the centre [rad]
-    sweep: float  # [rad], positive counter-clockwise
+    Attributes:
+        centre: the centre of the disc [m]
+        radius: the radius of the inflated disc [m]
+        begin: the angle of its first point, seen from the centre [rad]
+        sweep: the angle from its first point to its last, positive counter-clockwise [rad]
+    """
+
+    centre: Point
+    radius: float
+    begin: float
+    sweep: float
 
     @property
     def length(self) -> float:
-        """[m]."""
+        """Its length [m]."""
         return self.radius * abs(self.sweep)
 
     def at(self, angle: float, stretch: float = 1.0) -> Point:
-        """The point `angle` rad past the beginning, `stretch` radii away from the centre."""
+        """The point `angle` [rad] after the first, at `stretch` radii from the centre [m]."""
         direction = self.begin + math.copysign(angle, self.sweep)
         reach = self.radius * stretch
         return self.centre[0] + reach * math.cos(direction), self.centre[1] + reach * math.sin(direction)
 
     @property
     def start(self) -> Point:
-        """[m]."""
+        """Its first point [m]."""
         return self.at(0.0)
 
     @property
     def end(self) -> Point:
-        """[m]."""
+        """Its last point [m]."""
         return self.at(abs(self.sweep))
 
 
 @dataclass(frozen=True)
 class TangentPath:
-    """Lines and arcs, each beginning where the one before ends and in its direction."""
+    """A smooth path of lines and arcs: each piece begins where the last one ends, in the same direction.
+
+    Attributes:
+        pieces: the lines and arcs in order
+        work: how many tangents were checked to find it
+    """
 
     pieces: tuple[Line | Arc, ...]
-    work: int = 0  # lines looked at to find it
+    work: int = 0
 
     @property
     def length(self) -> float:
-        """[m]."""
+        """Its length [m]."""
         return math.fsum(piece.length for piece in self.pieces)
 
     def polyline(self, bulge: float, discs: npt.ArrayLike, bounds: Bounds, inflate: float) -> Floats:
-        """The path as a polyline (M, 2) [m] whose corners stand off the arcs, outside, by at most `bulge`.
+        """The path as a polyline (M, 2) [m]; its corners lie outside the arcs, so it never cuts into a disc.
 
-        So it never cuts into the disc it goes round. In a gap narrower than that, corners stand off less.
+        Args:
+            bulge: how far corners may stand off the arcs [m]; in narrow gaps they stand off less
+            discs: the discs that the path must clear: x, y, radius [m] (N, 3)
+            bounds: the walls that it must clear [m]
+            inflate: the clearance that it must keep [m]
         """
         points = [self.pieces[0].start]
         for piece in self.pieces:
@@ -98,8 +119,8 @@ class TangentPath:
 def shortest(discs: npt.ArrayLike, bounds: Bounds, inflate: float, start: Point, goal: Point) -> TangentPath | None:
     """The shortest path that stays `inflate` [m] from all discs (N, 3: x, y, radius) and inside the bounds.
 
-    None where there is none: contact closes a gap, so two discs exactly 2 `inflate` apart, or a disc that far from a
-    wall, let nothing pass. The ends must have the clearance; they may just have it.
+    None if there is no such path. Contact closes a gap: nothing passes between two discs exactly 2 `inflate` apart, or
+    between such a disc and a wall. Both ends must have the clearance; having just the clearance suffices.
     """
     from antdrive.planners.anyangle import _kernels_tangent
 
@@ -114,26 +135,32 @@ def shortest(discs: npt.ArrayLike, bounds: Bounds, inflate: float, start: Point,
         if min(x - box[0], y - box[1], box[2] - x, box[3] - y, *rim) < -_kernels_tangent.EPS:
             return None
     inflated = np.ascontiguousarray(inflated[_kernels_tangent.keep_outer(inflated, box)])
-    way, _, looked = _kernels_tangent.shortest_path(inflated, box, both)
+    way, _, checked = _kernels_tangent.shortest_path(inflated, box, both)
     if not len(way):
         return None
     pieces = _pieces(way, inflated) or [Line(start, goal)]  # the ends may be one point
-    return TangentPath(tuple(pieces), int(looked))
+    return TangentPath(tuple(pieces), int(checked))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Tangent(GridPlanner):
-    """The shortest path of the plane, over the tangents between inflated discs: no grid, the floor for every length.
+    """The shortest path in the plane, over the tangents between inflated discs: a lower bound for every planner.
 
-    It plans in the world behind the query, so it may find a way where the grid's cells are too coarse for one, and
-    then `cells` are those that the way passes over, with an infinite `cost`. Ends with too little room are left and
-    reached through the centres of their cells, as for all planners.
+    A* on the tangent graph of Liu & Arimoto (1992); the result is exact. It plans among the discs of the query's world,
+    not on the grid, so it may find a path where the grid is too coarse for one. `cells` are then the cells that the
+    path passes over, and `cost` is infinite. Ends with too little room are left and reached through the centres of
+    their cells, as for all planners. The path grazes discs at exactly the clearance, which leaves a driving robot no
+    margin.
+
+    Attributes:
+        bulge: how far corners of the driven polyline may stand off an arc [m]
+        needs_world: True, as the planner needs the discs themselves
 
     Raises:
         InputError: the query has no task, so there is no world to plan in.
     """
 
-    bulge: float = 1e-3  # how far the corners of the driven polyline may stand off an arc [m]
+    bulge: float = 1e-3
 
     needs_world: ClassVar[bool] = True
 
@@ -143,32 +170,31 @@ class Tangent(GridPlanner):
     def plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
         """Find the shortest path from the exact start to the exact goal."""
         started = time.perf_counter()
-        result = self._plan(query, rng)  # whether the ends' cells are free does not matter here
+        result = self._plan(query, rng)  # the cells of the ends need not be free
         options = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
         return dataclasses.replace(result, options=options, wall_s=time.perf_counter() - started)
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
         if query.task is None:
-            raise InputError("query: has no task; the tangent planner needs the discs themselves, not a grid alone")
+            raise InputError("query: has no task; the tangent planner needs the discs of a world, a grid is not enough")
         grid, world = query.grid, query.task.world
-        way = ends(query, touching=True)
-        reason = _shut(query, query.task, way)
-        found = None if reason else shortest(world.discs, world.bounds, grid.inflate, way.first, way.last)
+        ends = route_ends(query, touching=True)
+        reason = _unusable_ends(query, query.task, ends)
+        found = None if reason else shortest(world.discs, world.bounds, grid.inflate, ends.start, ends.goal)
         if found is None:
             return PlanResult(status=PlanStatus.NO_PATH, reason=reason or NO_GAP, work_unit=WORK_UNIT)
-        xy = way.joined(found.polyline(self.bulge, world.discs, world.bounds, grid.inflate))
+        xy = ends.with_leads(found.polyline(self.bulge, world.discs, world.bounds, grid.inflate))
         waypoints = grid.fractional(xy)
         cells = cells_along(query, waypoints) if query.blocked_end is None else np.empty((0, 2), dtype=np.int32)
         cost = path_cost(cells, grid.cell) if len(cells) else math.inf
         if not len(cells):
             cells = cells_under(query, waypoints)
-        extra = polyline_length([*way.before, way.first]) + polyline_length([way.last, *way.after])
         return PlanResult(
             status=PlanStatus.SOLVED,
             cells=cells,
             cost=cost,
             waypoints=waypoints,
-            length=found.length + extra,
+            length=found.length + ends.lead_length,
             work=found.work,
             work_unit=WORK_UNIT,
         )
@@ -177,25 +203,27 @@ class Tangent(GridPlanner):
 WORK_UNIT = "tangents checked"
 
 
-def _shut(query: Query, task: Task, way: Ends) -> str:
-    """Which end has neither room itself nor a free cell whose centre it can be passed through; empty: none."""
+def _unusable_ends(query: Query, task: Task, ends: RouteEnds) -> str:
+    """A sentence for each end that has neither room itself nor a free cell to leave or reach it through; or empty."""
     from antdrive.worlds.geometry import point_clearance, segment_clearance
 
-    shut = []
-    legs = (("start", task.start[:2], way.first, query.start, math.inf),
-            ("goal", task.goal, way.last, query.goal, task.goal_tolerance))  # fmt: skip
+    unusable = []
+    legs = (
+        ("start", task.start[:2], ends.start, query.start, math.inf),
+        ("goal", task.goal, ends.goal, query.goal, task.goal_tolerance),
+    )
     for key, exact, used, cell, within in legs:
         if math.dist(exact, used) < 1e-9:
             continue
         own = float(point_clearance(task.world, [exact])[0])
         clear = segment_clearance(task.world, [exact], [used])[0] >= min(query.grid.inflate, own) - 1e-9
         if not (query.grid.free[cell] and clear and math.dist(exact, used) <= within):
-            shut.append(f"the {key} has too little room and no free cell near it can be reached")
-    return "; ".join(shut)
+            unusable.append(f"the {key} has too little room and no free cell near it can be reached")
+    return "; ".join(unusable)
 
 
 def _pieces(way: Floats, discs: Floats) -> list[Line | Arc]:
-    """The kernel's lines with the arcs between them; what has no length is left out."""
+    """The lines of the kernel and the arcs between them, without pieces of no length."""
     pieces: list[Line | Arc] = []
     for k, (ax, ay, bx, by, disc, turn) in enumerate(way):
         if math.dist((ax, ay), (bx, by)) > 0.0:
@@ -212,7 +240,10 @@ def _pieces(way: Floats, discs: Floats) -> list[Line | Arc]:
 
 
 def _around(arc: Arc, bulge: float, discs: Floats, bounds: Bounds, inflate: float) -> list[Point]:
-    """Corners between the two ends of an arc: where its tangents meet, at evenly spaced points or closer ones."""
+    """Corners around an arc: where its tangents at successive points meet.
+
+    The points are evenly spaced, and closer together where a corner would lose the clearance.
+    """
     from antdrive.worlds._kernels import segment_clearances
 
     half = math.acos(arc.radius / (arc.radius + bulge))

@@ -1,7 +1,8 @@
 """Compiled ants: arrays in, arrays out, nothing validated.
 
-Cells are flat indices. A colony's rules reach its ants as one table `weights` (cells, 8) of float32: how much
-each move attracts, 0 where it is not allowed. It is filled once an iteration, so one walk serves every rule.
+Cells are flat indices. The rules of a colony reach its ants as one table `weights` (cells, 8) of float32: how much
+each move attracts, 0 where the move is not allowed. The table is filled once per iteration, so `walk_ants` serves
+every rule.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 
 from antdrive.worlds._kernels import DCOL, DROW, SQRT2, Array, inline, kernel
 
-LEAST = 1e-30  # the least weight of an allowed move beside the largest of its cell: not lost in float32
+MIN_WEIGHT = 1e-30  # relative to the largest weight of a cell; float32 still holds it, so no allowed move is lost
 UNIT = np.float32(1.0 / 16777216.0)
 ZERO = np.float32(0.0)
 
@@ -29,7 +30,7 @@ def next_random(state: Any) -> Any:
 
 @kernel
 def offsets(cols: int) -> Array:
-    """What each move adds to a flat index."""
+    """What each of the eight moves adds to a flat index."""
     out = np.empty(8, dtype=np.int64)
     for k in range(8):
         out[k] = DROW[k] * cols + DCOL[k]
@@ -38,7 +39,7 @@ def offsets(cols: int) -> Array:
 
 @kernel
 def walk_length(walk: Array, size: int, cols: int) -> float:
-    """Length of a walk [cells]."""
+    """The length of a walk [cells]."""
     straight, diagonal = 0, 0
     for s in range(size - 1):
         step = abs(walk[s + 1] - walk[s])
@@ -58,21 +59,24 @@ def walk_ants(
     goal: int,
     limit: int,
     revisit: float,
-    retreat: bool,
+    backtrack: bool,
     seeds: Array,
     walks: Array,
     sizes: Array,
     lengths: Array,
 ) -> int:
-    """Send one ant per seed from start to goal; the steps taken by all.
+    """Send one ant per seed from start to goal; the steps that all of them took.
 
-    Row a of `walks` receives the cells of ant a, sizes[a] their number and lengths[a] its length [cells]; they are
-    0 and inf if it did not arrive: it died where no move has any weight, or it took `limit` steps. A cell the ant
-    has been to weighs `revisit`; at 0 it never goes there again. An ant that may `retreat` steps back where it
-    would die, and forgets the dead cell as part of its walk, but not that it has been there.
+    Row a of `walks` receives the cells of ant a, sizes[a] their number and lengths[a] the length [cells]. An ant that
+    does not arrive, because it dies where no move has any weight or has taken `limit` steps, has size 0 and length
+    inf. A cell that the ant has visited weighs `revisit`; at 0 it is never visited again. With `backtrack` an ant
+    steps back where it would die: the dead cell is no longer part of the walk, but counts as visited.
+
+    The eight moves are written out and summed in pairs. A loop over them was measured 1 to 2 % slower and, as it adds
+    in another order, would round differently and so change plans.
     """
-    pad = offset[1]  # no move leads further, so what surrounds the grid can be read without a check
-    visited = np.zeros(len(mask) + 2 * pad, dtype=np.int32)  # the last ant that was there, from 1
+    pad = offset[1]  # no move leads farther, so the cells around the grid can be read without a check
+    visited = np.zeros(len(mask) + 2 * pad, dtype=np.int32)  # the number of the last ant at each cell, from 1
     again = np.float32(revisit)
     taken = 0
     for a in range(len(seeds)):
@@ -107,14 +111,14 @@ def walk_ants(
             total = q0 + q1
             left -= 1
             if total <= ZERO:
-                if not retreat or n == 1:
+                if not backtrack or n == 1:
                     left += 1
                     break
                 n -= 1
                 i = np.int64(walk[n - 1])
                 continue
             state = next_random(state)
-            # The roulette wheel as three halvings, without a branch to mispredict.
+            # The roulette wheel as three halvings: there is no branch for the processor to mispredict.
             spin = np.float32(state >> np.uint64(40)) * UNIT * total
             upper = spin >= q0
             spin = spin - q0 if upper else spin
@@ -128,7 +132,7 @@ def walk_ants(
             wa = wc if second else wa
             wb = wd if second else wb
             last = spin >= wa
-            if (wb if last else wa) <= ZERO:  # rounding pointed just beside a move: spin again
+            if (wb if last else wa) <= ZERO:  # rounding chose a move that is not allowed: spin again
                 continue
             i += offset[4 * upper + 2 * second + last]
             visited[i + pad] = ant
@@ -141,8 +145,8 @@ def walk_ants(
 
 
 @kernel
-def tally(lengths: Array) -> tuple[int, float, int]:
-    """How many walks arrived, their mean length, and the shortest; lengths are inf of those that did not."""
+def summarise(lengths: Array) -> tuple[int, float, int]:
+    """How many walks arrived, their mean length, and the row of the shortest; a walk that did not arrive has length inf."""
     count, total, first = 0, 0.0, 0
     for a in range(len(lengths)):
         if lengths[a] < np.inf:
@@ -157,7 +161,7 @@ def tally(lengths: Array) -> tuple[int, float, int]:
 def cut_loops(
     walks: Array, sizes: Array, mask: Array, offset: Array, tours: Array, tour_sizes: Array, lengths: Array
 ) -> None:
-    """Row a of `tours` receives walk a without loops: back at a cell, everything since is dropped."""
+    """Row a of `tours` receives walk a without loops: where it returns to a cell, everything in between is dropped."""
     place = np.full(len(mask), -1, dtype=np.int32)
     for a in range(len(sizes)):
         n = 0
@@ -179,10 +183,11 @@ def cut_loops(
 
 @kernel
 def cut_one_short(walk: Array, size: int, mask: Array, offset: Array, first: int, place: Array, tour: Array) -> int:
-    """`tour` receives the walk cut short: from each cell on to its neighbour that comes last in it. Its size.
+    """`tour` receives the walk cut short: from each cell it goes straight to the neighbour that comes last in the walk.
 
-    No longer than the walk: what is left out has two steps or more, and the step in its place is sqrt(2) at most.
-    `place` tells each cell's place in a walk, counted on from `first`; what earlier walks left there is less.
+    Returns the size of the tour. A tour is never longer than its walk: what is left out has at least two steps, and
+    the move that replaces it measures sqrt(2) at most. `place` holds the position of each cell in the walk, counted
+    from `first`; entries that earlier walks left there are below `first`.
     """
     for s in range(size):
         place[walk[s]] = first + s
@@ -205,7 +210,7 @@ def cut_short(
 ) -> None:
     """Row a of `tours` receives walk a cut short."""
     place = np.full(len(mask), -1, dtype=np.int64)
-    first: Any = np.int64(0)  # a plain 0 would be compiled for as a type of its own
+    first: Any = np.int64(0)  # a literal 0 would make numba compile `cut_one_short` a second time
     for a in range(len(sizes)):
         n = cut_one_short(walks[a], sizes[a], mask, offset, first, place, tours[a])
         first += sizes[a]
@@ -215,21 +220,21 @@ def cut_short(
 
 @kernel
 def evaporate(trail: Array, evaporation: float) -> None:
-    """trail *= 1 - evaporation, for a flat `trail`."""
+    """Multiply a flat `trail` by 1 - evaporation."""
     for i in range(len(trail)):
         trail[i] *= 1.0 - evaporation
 
 
 @kernel
 def clamp(trail: Array, least: float, most: float) -> None:
-    """Bring every trail between two bounds; `trail` is flat."""
+    """Clamp a flat `trail` to [least, most]."""
     for i in range(len(trail)):
         trail[i] = min(max(trail[i], least), most)
 
 
 @kernel
 def deposit_on_cells(trail: Array, walks: Array, sizes: Array, amounts: Array) -> None:
-    """Add amounts[a] to each cell that walk a visits, once however often it does."""
+    """Add amounts[a] to each cell that walk a visits, once per cell however often the walk visits it."""
     last = np.full(len(trail), -1, dtype=np.int32)
     for a in range(len(sizes)):
         for s in range(sizes[a]):
@@ -241,7 +246,7 @@ def deposit_on_cells(trail: Array, walks: Array, sizes: Array, amounts: Array) -
 
 @inline
 def row_and_move(i: Any, j: Any, row: Any, cols: int) -> tuple[Any, Any]:
-    """Row of cell j, and the move that leads there from its neighbour i in row `row`."""
+    """The row of cell j, and the move that leads to j from its neighbour i in row `row`."""
     next_row = j // cols
     up = next_row - row
     right = j - i - up * cols
@@ -251,7 +256,7 @@ def row_and_move(i: Any, j: Any, row: Any, cols: int) -> tuple[Any, Any]:
 
 @kernel
 def deposit_on_arcs(trail: Array, cols: int, walks: Array, sizes: Array, amounts: Array) -> None:
-    """Add amounts[a] to each move, from its cell, that walk a makes; `trail` is (cells, 8)."""
+    """Add amounts[a] to each arc that walk a uses; `trail` is (cells, 8)."""
     for a in range(len(sizes)):
         if sizes[a] == 0:
             continue
@@ -266,7 +271,7 @@ def deposit_on_arcs(trail: Array, cols: int, walks: Array, sizes: Array, amounts
 
 @kernel
 def deposit_in_passing(trail: Array, walks: Array, sizes: Array, amounts: Array, evaporation: float) -> None:
-    """As han2007's listing: a cell evaporates each time an ant's deposit reaches it, and only then."""
+    """Add amounts[a] to each cell of walk a as the program of han2007 does: a cell evaporates only when it is added to."""
     for a in range(len(sizes)):
         for s in range(sizes[a]):
             i = walks[a, s]
@@ -284,30 +289,30 @@ def strongest(trail: Array, out: Array) -> None:
 
 
 @kernel
-def arc_weights(trail: Array, desire: Array, alpha: float, weights: Array) -> None:
-    """weights[i, k] = trail^alpha * desire, scaled so that the largest of each cell is 1."""
+def arc_weights(trail: Array, heuristic: Array, alpha: float, weights: Array) -> None:
+    """weights[i, k] = trail^alpha * heuristic, scaled so that the largest weight of each cell is 1."""
     for i in range(len(weights)):
         most = 0.0
         for k in range(8):
-            if desire[i, k] > 0.0:
-                most = max(most, _power(trail[i, k], alpha) * desire[i, k])
+            if heuristic[i, k] > 0.0:
+                most = max(most, _power(trail[i, k], alpha) * heuristic[i, k])
         scale = 1.0 / most if most > 0.0 else 0.0
         for k in range(8):
             weights[i, k] = 0.0
-            if desire[i, k] > 0.0:
-                weights[i, k] = max(LEAST, scale * _power(trail[i, k], alpha) * desire[i, k])
+            if heuristic[i, k] > 0.0:
+                weights[i, k] = max(MIN_WEIGHT, scale * _power(trail[i, k], alpha) * heuristic[i, k])
 
 
 @inline
 def _power(trail: float, alpha: float) -> float:
-    """trail^alpha, quick for 1 and -1; a trail that has all but gone is as good as gone."""
+    """trail^alpha, fast for alpha 1 and -1; the bound keeps negative powers of evaporated trails finite."""
     trail = max(trail, 1e-100)
     return trail if alpha == 1.0 else (1.0 / trail if alpha == -1.0 else trail**alpha)
 
 
 @kernel
 def union_moves(walks: Array, sizes: Array, cols: int, moves: Array) -> None:
-    """Add to moves[i], bit by bit, those that the walks make from cell i; the cells are flat indices."""
+    """Set in moves[i] the bit of every move that a walk makes from cell i."""
     for a in range(len(sizes)):
         if sizes[a] == 0:
             continue
@@ -322,7 +327,7 @@ def union_moves(walks: Array, sizes: Array, cols: int, moves: Array) -> None:
 
 @inline
 def _octile(rows: int, cols: int) -> float:
-    """Length of the shortest way over open ground [cells]."""
+    """The length of the shortest path over open ground [cells]."""
     rows, cols = abs(rows), abs(cols)
     return max(rows, cols) + (SQRT2 - 1.0) * min(rows, cols)
 
@@ -335,51 +340,50 @@ def detour_weights(
     start: int,
     goal: int,
     greed: float,
-    pull: float,
+    lane_pull: float,
     lane: float,
-    height: Array,
+    to_goal: Array,
     weights: Array,
 ) -> None:
-    """weights[i, k] = exp(-greed * how much longer move k makes the way to the goal than it need be) [cells].
+    """weights[i, k] = exp(-greed * detour), the detour being how much longer than necessary move k makes the path.
 
-    The way from a cell to the goal is as over open ground plus, with `pull` above 0, pull * the distance to a
-    lane: the line parallel to that from start to goal, `lane` cells to its side. `height` is room for a number
-    per cell.
+    The path from a cell to the goal counts as long as over open ground plus `lane_pull` times the distance to a lane:
+    the line parallel to that from start to goal, `lane` cells to its side. `to_goal` (cells,) is working memory.
     """
     r0, c0, r1, c1 = start // cols, start % cols, goal // cols, goal % cols
-    far = max(math.hypot(r1 - r0, c1 - c0), 1.0)
-    across_row, across_col = (c0 - c1) / far, (r1 - r0) / far
+    distance = max(math.hypot(r1 - r0, c1 - c0), 1.0)
+    across_row, across_col = (c0 - c1) / distance, (r1 - r0) / distance
     for i in range(len(mask)):
         row, col = i // cols, i % cols
         aside = (row - r0) * across_row + (col - c0) * across_col
-        height[i] = _octile(r1 - row, c1 - col) + pull * abs(aside - lane)
+        to_goal[i] = _octile(r1 - row, c1 - col) + lane_pull * abs(aside - lane)
     for i in range(len(mask)):
         for k in range(8):
             weights[i, k] = 0.0
             if mask[i] & (1 << k):
-                detour = (SQRT2 if k & 1 else 1.0) + height[i + offset[k]] - height[i]
+                detour = (SQRT2 if k & 1 else 1.0) + to_goal[i + offset[k]] - to_goal[i]
                 weights[i, k] = math.exp(-greed * detour)
 
 
 @kernel
-def goal_pull(mask: Array, cols: int, r1: int, c1: int, pull: Array) -> None:
-    """pull[i, k] = cosine between move k and the direction from cell i to the goal, at least 0."""
+def goal_pull(mask: Array, cols: int, r1: int, c1: int, out: Array) -> None:
+    """out[i, k] = the cosine between move k and the direction from cell i to the goal, at least 0."""
     for i in range(len(mask)):
         dr, dc = r1 - i // cols, c1 - i % cols
-        far = math.hypot(dr, dc)
+        distance = math.hypot(dr, dc)
         for k in range(8):
-            pull[i, k] = 0.0
-            if far > 0.0 and mask[i] & (1 << k):
-                along = (DROW[k] * dr + DCOL[k] * dc) / far
-                pull[i, k] = max(0.0, along / SQRT2 if k & 1 else along)
+            out[i, k] = 0.0
+            if distance > 0.0 and mask[i] & (1 << k):
+                along = (DROW[k] * dr + DCOL[k] * dc) / distance
+                out[i, k] = max(0.0, along / SQRT2 if k & 1 else along)
 
 
 @kernel
-def fixed_pull(mask: Array, dr: float, dc: float, pull: Array) -> None:
-    """pull[i, k] = dot product of step k (not normalised) and one direction for all cells, at least 0."""
+def fixed_pull(mask: Array, dr: float, dc: float, out: Array) -> None:
+    """out[i, k] = the dot product of move k (not normalised) and the same direction for all cells, at least 0."""
     for i in range(len(mask)):
         for k in range(8):
-            pull[i, k] = max(0.0, DROW[k] * dr + DCOL[k] * dc) if mask[i] & (1 << k) else 0.0
+            out[i, k] = max(0.0, DROW[k] * dr + DCOL[k] * dc) if mask[i] & (1 << k) else 0.0
 
 
 @kernel
@@ -387,13 +391,13 @@ def attracted_weights(
     trail: Array,
     mask: Array,
     offset: Array,
-    pull: Array,
+    omega: Array,
     attraction: float,
     shares: bool,
-    least: float,
+    min_weight: float,
     weights: Array,
 ) -> None:
-    """weights[i, k] = the neighbour's trail (or its share among the neighbours) + attraction * pull."""
+    """weights[i, k] = the neighbour's trail + attraction * omega; with `shares`, the trail's share of all neighbours'."""
     for i in range(len(mask)):
         scale = 1.0
         if shares:
@@ -405,4 +409,4 @@ def attracted_weights(
         for k in range(8):
             weights[i, k] = 0.0
             if mask[i] & (1 << k):
-                weights[i, k] = max(least, trail[i + offset[k]] * scale + attraction * pull[i, k])
+                weights[i, k] = max(min_weight, trail[i + offset[k]] * scale + attraction * omega[i, k])

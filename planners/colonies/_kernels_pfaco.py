@@ -3,22 +3,97 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from antdrive.planners.colonies._kernels_colony import cut_one_short, next_random, walk_length
 from antdrive.worlds._kernels import SQRT2, Array, inline, kernel
 
-# What an ant has behind it, by column of `ants`.
-SIZE, TAKEN = 0, 1  # cells of its walk; steps since it left, those back included
-# What the colony has behind it, by index of `counts`.
-LISTED, ENTRIES, STEPS, ARRIVED = 0, 1, 2, 3
+LISTED, ENTRIES = 0, 1  # indices of `Ranking.counts`
+
+
+class Graph(NamedTuple):
+    """The graph that ants walk on; cells are flat indices.
+
+    Attributes:
+        mask: the allowed moves of each cell, one bit per direction (cells,)
+        offset: what each of the eight moves adds to an index (8,)
+        start: the start cell
+        goal: the goal cell
+    """
+
+    mask: Array
+    offset: Array
+    start: int
+    goal: int
+
+
+class Rules(NamedTuple):
+    """The planner's parameters for one iteration.
+
+    Attributes:
+        alpha: the exponent of the pheromone
+        evaporation: the share of the pheromone that is lost per tick
+        min_pheromone: the pheromone does not decay below this
+        deposit: what a walk of the first rank leaves on each of its cells
+        limit: the steps after which a walk ends
+        backtrack: whether an ant in a dead end steps back
+        shortcut: whether walks that arrive are cut short
+        quota: the iteration ends when this many walks have ended
+    """
+
+    alpha: float
+    evaporation: float
+    min_pheromone: float
+    deposit: float
+    limit: int
+    backtrack: bool
+    shortcut: bool
+    quota: int
+
+
+class Ants(NamedTuple):
+    """The ants and their unfinished walks.
+
+    Attributes:
+        states: the state of each ant's random numbers (ants,)
+        walks: the cells of each walk (ants, room)
+        sizes: how many cells each walk has (ants,)
+        taken: the steps each ant has taken since it left the start, those back included (ants,)
+        lengths: the length of each walk [cells] (ants,)
+        visited: the cells that each ant has visited, one bit per cell (ants, cells / 8 + 1)
+    """
+
+    states: Array
+    walks: Array
+    sizes: Array
+    taken: Array
+    lengths: Array
+    visited: Array
+
+
+class Ranking(NamedTuple):
+    """The list of the best walks so far.
+
+    Attributes:
+        walks: the cells of each walk in the list (ranks, room)
+        sizes: how many cells each walk has (ranks,)
+        costs: the cost of each walk, its length times its size (ranks,)
+        order: the row of each rank, the best first (ranks,)
+        counts: how many walks are in the list (LISTED), and how many were ever entered (ENTRIES)
+    """
+
+    walks: Array
+    sizes: Array
+    costs: Array
+    order: Array
+    counts: Array
 
 
 @kernel
 def obstacle_distance(free: Array, reach: int) -> Array:
-    """Distance from each cell to the nearest blocked one [cells], inf beyond `reach`."""
+    """The distance from each cell to the nearest blocked cell [cells], inf beyond `reach`."""
     rows, cols = free.shape
     out = np.full((rows, cols), np.inf)
     for r in range(rows):
@@ -27,13 +102,14 @@ def obstacle_distance(free: Array, reach: int) -> Array:
                 continue
             for near_row in range(max(0, r - reach), min(rows, r + reach + 1)):
                 for near_col in range(max(0, c - reach), min(cols, c + reach + 1)):
-                    out[near_row, near_col] = min(out[near_row, near_col], math.hypot(near_row - r, near_col - c))
+                    distance = math.hypot(near_row - r, near_col - c)
+                    out[near_row, near_col] = min(out[near_row, near_col], distance)
     return out
 
 
 @inline
 def _power(value: float, exponent: float) -> float:
-    """value^exponent, quick for 1, 2 and 3."""
+    """value^exponent, fast for the exponents 1, 2 and 3."""
     if exponent == 1.0:
         return value
     if exponent == 2.0:
@@ -41,25 +117,21 @@ def _power(value: float, exponent: float) -> float:
     return value * value * value if exponent == 3.0 else value**exponent
 
 
-@kernel
-def leave(ant: int, start: int, walks: Array, ants: Array, lengths: Array, been: Array) -> None:
-    """Put an ant at the start, with nothing behind it."""
-    for b in range(been.shape[1]):
-        been[ant, b] = 0
-    been[ant, start >> 3] |= 1 << (start & 7)
-    walks[ant, 0] = start
-    ants[ant, SIZE], ants[ant, TAKEN] = 1, 0
-    lengths[ant] = 0.0
+@inline
+def leave(ant: int, start: int, ants: Ants) -> None:
+    """Put an ant at the start, with a walk of one cell."""
+    for b in range(ants.visited.shape[1]):
+        ants.visited[ant, b] = 0
+    ants.visited[ant, start >> 3] |= 1 << (start & 7)
+    ants.walks[ant, 0] = start
+    ants.sizes[ant], ants.taken[ant] = 1, 0
+    ants.lengths[ant] = 0.0
 
 
 @kernel
-def enter(
-    walk: Array, size: int, length: float, ranked: Array, sizes: Array, costs: Array, order: Array, counts: Array
-) -> int:
-    """Enter a walk into the ranking list by its cost (lee2008 eq. 15); its rank, or -1 if it is no better than the last.
-
-    order[r] is the row of `ranked` that holds rank r.
-    """
+def enter(walk: Array, size: int, length: float, ranking: Ranking) -> int:
+    """Enter a walk into the ranking by its cost (lee2008 eq. 15); its rank, or -1 if the list is full of better walks."""
+    order, costs, counts = ranking.order, ranking.costs, ranking.counts
     cost = length * size
     listed, room = counts[LISTED], len(order)
     if listed == room and cost >= costs[order[room - 1]]:
@@ -75,121 +147,156 @@ def enter(
         order[rank] = order[rank - 1]
         rank -= 1
     order[rank] = row
-    costs[row], sizes[row] = cost, size
+    costs[row], ranking.sizes[row] = cost, size
     for s in range(size):
-        ranked[row, s] = walk[s]
+        ranking.walks[row, s] = walk[s]
     counts[ENTRIES] += 1
     return rank
 
 
 @kernel
-def run_colony(
+def longest_listed(ranking: Ranking) -> float:
+    """The length of the longest walk of a full list."""
+    longest = 0.0
+    for row in range(len(ranking.order)):
+        longest = max(longest, ranking.costs[row] / ranking.sizes[row])
+    return longest
+
+
+@inline
+def cumulate(
+    i: Any,
+    ant: int,
     trail: Array,
-    appeal: Array,
+    heuristic: Array,
     mask: Array,
     offset: Array,
-    start: int,
-    goal: int,
+    visited: Array,
     alpha: float,
-    evaporation: float,
-    least: float,
-    deposit: float,
-    limit: int,
-    retreat: bool,
-    shortcut: bool,
-    quota: int,
-    states: Array,
-    walks: Array,
-    ants: Array,
-    lengths: Array,
-    been: Array,
-    ranked: Array,
-    sizes: Array,
-    costs: Array,
-    order: Array,
-    counts: Array,
+    out: Array,
+) -> float:
+    """out[k] = the attraction of the moves 0 to k from cell i to cells that the ant has not visited; that of all."""
+    total = 0.0
+    for k in range(8):
+        if mask[i] & (1 << k):
+            j = i + offset[k]
+            if not visited[ant, j >> 3] & (1 << (j & 7)):
+                total += _power(trail[j], alpha) * heuristic[j]  # eq. 13
+        out[k] = total
+    return total
+
+
+@inline
+def draw(cumulated: Array, state: Any, total: float) -> int:
+    """The move that a random number points to."""
+    spin = (state >> np.uint64(11)) * (1.0 / 9007199254740992.0) * total
+    k = 0
+    while cumulated[k] <= spin and k < 7:
+        k += 1
+    return k
+
+
+@kernel
+def cut_walk_short(ant: int, ants: Ants, graph: Graph, first: int, place: Array, tour: Array) -> None:
+    """Cut the walk of an ant short; `first`, `place` and `tour` are those of `cut_one_short`."""
+    walk = ants.walks[ant]
+    size = cut_one_short(walk, ants.sizes[ant], graph.mask, graph.offset, first, place, tour)
+    for s in range(size):
+        walk[s] = tour[s]
+    ants.sizes[ant] = size
+    ants.lengths[ant] = walk_length(tour, size, graph.offset[2])
+
+
+@kernel
+def reward(walk: Array, size: int, length: float, trail: Array, ranking: Ranking, deposit: float) -> bool:
+    """Enter a walk into the ranking and deposit by its rank on each of its cells; whether it has a rank."""
+    rank = enter(walk, size, length, ranking)
+    if rank < 0:
+        return False
+    amount = deposit * (1.0 - rank / len(ranking.order))
+    for s in range(size):
+        trail[walk[s]] += amount
+    return True
+
+
+@kernel
+def decay(trail: Array, mask: Array, min_pheromone: float, evaporation: float) -> None:
+    """Evaporate the pheromone of one tick."""
+    for i in range(len(trail)):
+        if mask[i]:
+            trail[i] = max(min_pheromone, trail[i] * (1.0 - evaporation))
+
+
+@kernel
+def run_colony(
+    trail: Array,
+    heuristic: Array,
+    graph: Graph,
+    rules: Rules,
+    ants: Ants,
+    ranking: Ranking,
     shortest: float,
     best: Array,
     arrivals: Array,
-) -> tuple[int, float]:
-    """Move every ant a cell a tick until `quota` walks have ended; the number of cells of the best walk and its length.
+) -> tuple[int, float, int, int]:
+    """Move every ant by a cell per tick until `rules.quota` walks have ended.
 
-    `best` receives it if it is shorter than `shortest`; else the number is 0.
+    A walk ends at the goal, in a dead end, after `rules.limit` steps, or when it is longer than every walk of the full
+    ranking; the ant then starts again. `best` receives the cells of the best walk if it is shorter than `shortest`,
+    `arrivals` the lengths of the walks that arrived.
 
-    A walk ends at the goal, in a dead end, after `limit` steps, or when it is longer than all of the full list.
-    `arrivals` receives the lengths of those that arrived.
+    Returns the size of the new best walk (0: none), the length of the best walk, the steps taken, and how many arrived.
     """
-    share = np.empty(8, dtype=np.float64)
-    place = np.full(len(mask), -1, dtype=np.int64)
-    first: Any = np.int64(0)  # a plain 0 would be compiled for as a type of its own
-    tour = np.empty_like(best)
-    ended, new = 0, 0
-    counts[ARRIVED] = 0
-    worst = np.inf  # longest of the list
-    stale = True
-    while ended < quota:
+    # Arrays are taken out of their tuples here: the loop below runs once per step of every ant.
+    mask, offset, goal = graph.mask, graph.offset, graph.goal
+    states, walks, sizes, taken = ants.states, ants.walks, ants.sizes, ants.taken
+    lengths, visited = ants.lengths, ants.visited
+    alpha, limit = rules.alpha, rules.limit
+    cumulated = np.empty(8, dtype=np.float64)
+    place, tour = np.full(len(mask), -1, dtype=np.int64), np.empty_like(best)
+    first: Any = np.int64(0)  # a literal 0 would make numba compile `cut_one_short` a second time
+    ended, steps, arrived, new = 0, 0, 0, 0
+    worst = np.inf  # the longest walk of the ranking once it is full
+    stale = True  # whether the ranking has changed since `worst` was found
+    while ended < rules.quota:
         for ant in range(len(states)):
-            size = ants[ant, SIZE]
+            size = sizes[ant]
             i: Any = np.int64(walks[ant, size - 1])
-            total = 0.0
-            for k in range(8):
-                if mask[i] & (1 << k):
-                    j = i + offset[k]
-                    if not been[ant, j >> 3] & (1 << (j & 7)):
-                        total += _power(trail[j], alpha) * appeal[j]  # eq. 13
-                share[k] = total
-            ants[ant, TAKEN] += 1
-            counts[STEPS] += 1
-            if total <= 0.0:
-                if retreat and size > 1 and ants[ant, TAKEN] < limit:
-                    ants[ant, SIZE] = size - 1
-                    h = np.int64(walks[ant, size - 2])
-                    lengths[ant] -= 1.0 if abs(i - h) == 1 or abs(i - h) == offset[2] else SQRT2
+            total = cumulate(i, ant, trail, heuristic, mask, offset, visited, alpha, cumulated)
+            taken[ant] += 1
+            steps += 1
+            if total > 0.0:
+                state = next_random(states[ant])
+                states[ant] = state
+                k = draw(cumulated, state, total)
+                i += offset[k]
+                visited[ant, i >> 3] |= 1 << (i & 7)
+                walks[ant, size] = i
+                sizes[ant] = size + 1
+                lengths[ant] += SQRT2 if k & 1 else 1.0
+                if i == goal:
+                    if rules.shortcut:
+                        cut_walk_short(ant, ants, graph, first, place, tour)
+                        first += len(mask)
+                    size = sizes[ant]
+                    arrivals[arrived] = lengths[ant]
+                    arrived += 1
+                    if lengths[ant] < shortest - 1e-9:
+                        shortest, new = lengths[ant], size
+                        for s in range(size):
+                            best[s] = walks[ant, s]
+                    stale |= reward(walks[ant], size, lengths[ant], trail, ranking, rules.deposit)
+                elif taken[ant] < limit and lengths[ant] <= worst:
                     continue
-                leave(ant, start, walks, ants, lengths, been)
-                ended += 1
+            elif rules.backtrack and size > 1 and taken[ant] < limit:
+                sizes[ant] = size - 1
+                back = np.int64(walks[ant, size - 2])
+                lengths[ant] -= 1.0 if abs(i - back) == 1 or abs(i - back) == offset[2] else SQRT2
                 continue
-            state = next_random(states[ant])
-            states[ant] = state
-            spin = (state >> np.uint64(11)) * (1.0 / 9007199254740992.0) * total
-            k = 0
-            while share[k] <= spin and k < 7:
-                k += 1
-            i += offset[k]
-            been[ant, i >> 3] |= 1 << (i & 7)
-            walks[ant, size] = i
-            ants[ant, SIZE] = size + 1
-            lengths[ant] += SQRT2 if k & 1 else 1.0
-            if i == goal:
-                if shortcut:
-                    size = cut_one_short(walks[ant], size + 1, mask, offset, first, place, tour) - 1
-                    first += len(mask)
-                    for s in range(size + 1):
-                        walks[ant, s] = tour[s]
-                    lengths[ant] = walk_length(tour, size + 1, offset[2])
-                arrivals[counts[ARRIVED]] = lengths[ant]
-                counts[ARRIVED] += 1
-                if lengths[ant] < shortest - 1e-9:
-                    shortest = lengths[ant]
-                    new = size + 1
-                    for s in range(size + 1):
-                        best[s] = walks[ant, s]
-                rank = enter(walks[ant], size + 1, lengths[ant], ranked, sizes, costs, order, counts)
-                if rank >= 0:  # the better the rank, the more on each cell
-                    amount = deposit * (1.0 - rank / len(order))
-                    for s in range(size + 1):
-                        trail[walks[ant, s]] += amount
-                    stale = True
-            elif ants[ant, TAKEN] < limit and lengths[ant] <= worst:
-                continue
+            leave(ant, graph.start, ants)
             ended += 1
-            leave(ant, start, walks, ants, lengths, been)
-        for i in range(len(trail)):
-            if mask[i]:
-                trail[i] = max(least, trail[i] * (1.0 - evaporation))
-        if stale and counts[LISTED] == len(order):
+        decay(trail, mask, rules.min_pheromone, rules.evaporation)
+        if stale and ranking.counts[LISTED] == len(ranking.order):
             stale = False
-            worst = 0.0
-            for row in range(len(order)):
-                worst = max(worst, costs[row] / sizes[row])
-    return new, shortest
+            worst = longest_listed(ranking)
+    return new, shortest, steps, arrived

@@ -1,4 +1,4 @@
-"""Ant system and its two variants for robots: ageing ants, and common beside exploratory ants.
+"""The ant system and its two variants for robots: ants that deposit less with age, and exploratory ants.
 
 ibraheem2016: I. K. Ibraheem, F. H. Ajeil, *Path planning of an autonomous mobile robot using swarm based
 optimization techniques*, Al-Khwarizmi Engineering Journal, 2016. suganthi2019: P. H. Suganthi, K. Subha, *Path
@@ -13,29 +13,49 @@ from typing import Literal
 
 import numpy as np
 
-from antdrive.planners.colonies.colony import FIRST, ChoiceContext, Colony, ColonyGraph, Desire, IterationState, Weights
+from antdrive.planners.colonies.colony import (
+    FIRST_KIND,
+    ChoiceContext,
+    Colony,
+    ColonyGraph,
+    Heuristic,
+    IterationState,
+    Weights,
+)
 from antdrive.planners.iterative import require
 from antdrive.worlds import Floats
 from antdrive.worlds.errors import FieldError
 
-#: Length of each move [cells].
+#: The length of each move [cells].
 STEP = np.sqrt([1.0, 2.0, 1.0, 2.0, 1.0, 2.0, 1.0, 2.0])
 
 
 @dataclass(frozen=True, kw_only=True)
 class AntSystem(Colony):
-    """Ants drawn by pheromone on arcs and by a heuristic: the ant system, as ibraheem2016 sets it up.
+    """Ants guided by pheromone on arcs and by a heuristic: the ant system, as ibraheem2016 sets it up.
 
-    suganthi2019 has beta 1 and heuristic "step"; lee2008 ants 500, beta 2, evaporation 0.01.
+    Section 3.1 of ibraheem2016: p ~ tau^alpha eta^beta (eq. 1), and every ant that arrives deposits Q / length on the
+    arcs it used. The defaults are the values of ibraheem2016. suganthi2019 uses beta 1 and heuristic "step"; lee2008
+    uses 500 ants, beta 2 and evaporation 0.01.
+
+    Ants die in dead ends, as in the papers, so on large grids with scattered obstacles few arrive or none, and paths
+    are far from the shortest. With `backtrack` and `shortcut` the same colony arrives.
+
+    Attributes:
+        alpha: the exponent of the pheromone
+        beta: the exponent of the heuristic; None: 0.22 N on a map of N x N cells, the rule of ibraheem2016, Table 1
+        evaporation: rho, the share of the pheromone that is lost per iteration; rho of lee2008 is the share retained
+        deposit: Q; an ant deposits Q / length on each of its arcs
+        initial: the pheromone on every arc at the start
+        heuristic: "goal": eta = 1 / distance from the next cell to the goal (ibraheem2016 eq. 6, lee2008);
+            "step": eta = 1 / length of the move (suganthi2019 eq. 6)
     """
 
-    alpha: float = 1.0  # exponent of the pheromone
-    beta: float | None = None  # exponent of the heuristic; None: ibraheem2016's rule, 0.22 N for N x N cells
-    evaporation: float = 0.3  # rho; lee2008's rho is what is retained
-    deposit: float = 1.0  # Q: an ant leaves Q / length on its arcs
-    initial: float = 1.0  # C: pheromone on every arc at the start
-    # eta: 1 / distance from the next cell to the goal (ibraheem2016 eq. 6; lee2008), or 1 / length of the step
-    # (suganthi2019 eq. 6).
+    alpha: float = 1.0
+    beta: float | None = None
+    evaporation: float = 0.3
+    deposit: float = 1.0
+    initial: float = 1.0
     heuristic: Literal["goal", "step"] = "goal"
 
     def __post_init__(self) -> None:
@@ -49,74 +69,105 @@ class AntSystem(Colony):
         if self.heuristic not in ("goal", "step"):
             raise FieldError("heuristic", f"must be 'goal' or 'step', got {self.heuristic!r}")
 
-    def lay(self, ground: ColonyGraph, rng: np.random.Generator) -> Floats:
-        """tau(0) = C on every arc."""
-        return np.full((len(ground.mask), 8), self.initial)
+    def initial_trail(self, graph: ColonyGraph, rng: np.random.Generator) -> Floats:
+        """tau(0) = `initial` on every arc of `graph`."""
+        return np.full((len(graph.mask), 8), self.initial)
 
-    def desire(self, ground: ColonyGraph) -> Desire:
-        """eta^beta, as a share of the largest that a cell has to offer."""
+    def heuristic_values(self, graph: ColonyGraph) -> Heuristic:
+        """eta^beta for each move of `graph`, as a share of the largest value in its cell."""
         if self.heuristic == "goal":
-            # The goal itself is at distance 0: any ant beside it shall go there.
-            eta = ground.over_moves(1.0 / np.maximum(ground.far(ground.goal), 0.01))
+            # The goal is at distance 0 from itself; the bound makes every ant beside the goal step onto it.
+            eta = graph.at_neighbours(1.0 / np.maximum(graph.distance_to(graph.goal), 0.01))
         else:
-            eta = np.where(np.isfinite(ground.over_moves(np.ones(len(ground.mask)))), 1.0 / STEP, -np.inf)
-        beta = ibraheem_beta(max(ground.shape)) if self.beta is None else self.beta
+            eta = np.where(np.isfinite(graph.at_neighbours(np.ones(len(graph.mask)))), 1.0 / STEP, -np.inf)
+        beta = ibraheem_beta(max(graph.shape)) if self.beta is None else self.beta
         return shares(eta, beta)
 
-    def weigh(
-        self, ground: ColonyGraph, trail: Floats, desire: Desire, weights: Weights, turn: ChoiceContext = FIRST
+    def choice_weights(
+        self,
+        graph: ColonyGraph,
+        trail: Floats,
+        heuristic: Heuristic,
+        weights: Weights,
+        context: ChoiceContext = FIRST_KIND,
     ) -> None:
-        """p ~ tau^alpha eta^beta (eq. 1 of all three papers)."""
-        from antdrive.planners.colonies import _kernels_colony as _kernels_ants
+        """p ~ tau^alpha eta^beta (eq. 1 of all three papers).
 
-        _kernels_ants.arc_weights(trail, desire, self.alpha, weights)
+        `weights` depends on `trail` and `heuristic` alone, neither on `graph` nor on `context`.
+        """
+        from antdrive.planners.colonies import _kernels_colony
 
-    def update(self, trail: Floats, season: IterationState) -> None:
-        """Evaporate; every ant that arrived deposits on the arcs it used (suganthi2019 eq. 2-4)."""
-        from antdrive.planners.colonies import _kernels_colony as _kernels_ants
+        _kernels_colony.arc_weights(trail, heuristic, self.alpha, weights)
 
-        _kernels_ants.evaporate(trail.ravel(), self.evaporation)
-        tours = season.tours
-        _kernels_ants.deposit_on_arcs(trail, season.ground.shape[1], tours.cells, tours.sizes, self.amounts(season))
+    def update(self, trail: Floats, state: IterationState) -> None:
+        """Evaporate `trail`; every ant of `state` that arrived deposits on its arcs (suganthi2019 eq. 2-4)."""
+        from antdrive.planners.colonies import _kernels_colony
 
-    def amounts(self, season: IterationState) -> Floats:
-        """What each ant leaves on an arc: Q / L_k, 0 if it did not arrive."""
-        return self.deposit / season.tours.lengths
+        _kernels_colony.evaporate(trail.ravel(), self.evaporation)
+        tours = state.tours
+        _kernels_colony.deposit_on_arcs(trail, state.graph.shape[1], tours.cells, tours.sizes, self.amounts(state))
+
+    def amounts(self, state: IterationState) -> Floats:
+        """What each ant of `state` deposits on an arc (ants,): Q / L_k, 0 if the ant did not arrive."""
+        return self.deposit / state.tours.lengths
 
 
 @dataclass(frozen=True, kw_only=True)
 class AgeingAnts(AntSystem):
-    """An ant system in which older ants leave less pheromone: the modified ACO of ibraheem2016, section 3.2."""
+    """An ant system in which older ants deposit less pheromone: the modified ACO of ibraheem2016, section 3.2.
 
-    # Q_max and Q_min; the paper names no values.
-    most: float = 1.0
-    least: float = 0.1
+    Ant m of M deposits Q_m / length, and Q_m falls from Q_max to Q_min with m (eq. 5). The paper gives no values for
+    the two bounds. On large grids with scattered obstacles these ants die as those of `AntSystem` do.
+
+    Attributes:
+        q_max: Q_max, the deposit of a young ant
+        q_min: Q_min, the deposit of an old ant
+    """
+
+    q_max: float = 1.0
+    q_min: float = 0.1
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require("least", self.least, above=0)
-        require("most", self.most, at_least=self.least)
+        require("q_min", self.q_min, above=0)
+        require("q_max", self.q_max, at_least=self.q_min)
 
-    def amounts(self, season: IterationState) -> Floats:
-        """Q_m / L_m with Q_m by eq. 5, kept within its bounds, which as printed it may leave."""
-        count = len(season.tours)
-        return self.aged(season.rng.random(count)) / season.tours.lengths
+    def amounts(self, state: IterationState) -> Floats:
+        """Q_m / L_m for each ant m of `state`, with Q_m by eq. 5."""
+        count = len(state.tours)
+        return self.aged(state.rng.random(count)) / state.tours.lengths
 
     def aged(self, rand: Floats) -> Floats:
-        """Q_m of ants m = 1 to M (eq. 5), for a random number of each."""
-        span, m = self.most - self.least, np.arange(1, len(rand) + 1)
-        amounts = self.most - span / 2 * rand - span / len(rand) * m
-        return np.clip(amounts, self.least, self.most)
+        """Q_m of ants m = 1 to M (eq. 5), clipped to its bounds, which eq. 5 as printed may leave.
+
+        Args:
+            rand: a random number in [0, 1) for each ant (M,)
+        """
+        span, m = self.q_max - self.q_min, np.arange(1, len(rand) + 1)
+        amounts = self.q_max - span / 2 * rand - span / len(rand) * m
+        return np.clip(amounts, self.q_min, self.q_max)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ExploringAnts(AntSystem):
-    """Common ants, exploratory ants that shun pheromone, and an elite: the improved ACO of suganthi2019."""
+    """Common ants, exploratory ants that avoid pheromone, and an elite: the improved ACO of suganthi2019.
 
-    ants: int = 25  # common ants
-    explorers: int = 75  # exploratory ants
+    Section IV of suganthi2019: common ants choose by tau^alpha eta^beta (eq. 1), exploratory ants by eta^beta /
+    tau^alpha (eq. 5), and the best ants of an iteration deposit more (eq. 7-8). Exploratory ants keep paths long: with
+    the paper's settings this colony is the weakest of the ant systems, and no ant crosses a grid of 100 x 100 cells.
+
+    Attributes:
+        ants: the number of common ants
+        explorers: the number of exploratory ants
+        beta: the exponent of the heuristic
+        elite: a of eq. 7, the additional deposit of the iteration's best ants in units of Q / length
+        heuristic: as in `AntSystem`
+    """
+
+    ants: int = 25
+    explorers: int = 75
     beta: float | None = 1.0
-    elite: float = 1.0  # a of eq. 7: how often more the iteration's best ant deposits
+    elite: float = 1.0
     heuristic: Literal["goal", "step"] = "step"
 
     def __post_init__(self) -> None:
@@ -125,21 +176,29 @@ class ExploringAnts(AntSystem):
         require("elite", self.elite, at_least=0)
 
     @property
-    def castes(self) -> tuple[int, ...]:
-        """Common ants first, then exploratory ones."""
+    def kinds(self) -> tuple[int, ...]:
+        """Common ants, then exploratory ants."""
         return (self.ants, self.explorers)
 
-    def weigh(
-        self, ground: ColonyGraph, trail: Floats, desire: Desire, weights: Weights, turn: ChoiceContext = FIRST
+    def choice_weights(
+        self,
+        graph: ColonyGraph,
+        trail: Floats,
+        heuristic: Heuristic,
+        weights: Weights,
+        context: ChoiceContext = FIRST_KIND,
     ) -> None:
-        """p ~ eta^beta tau^alpha for common ants (eq. 1), eta^beta / tau^alpha for exploratory ones (eq. 5)."""
-        from antdrive.planners.colonies import _kernels_colony as _kernels_ants
+        """p ~ eta^beta tau^alpha for common ants (eq. 1), eta^beta / tau^alpha for exploratory ants (eq. 5).
 
-        _kernels_ants.arc_weights(trail, desire, self.alpha if turn.caste == 0 else -self.alpha, weights)
+        `context` says which kind the `weights` are for; they depend on `trail` and `heuristic`, not on `graph`.
+        """
+        from antdrive.planners.colonies import _kernels_colony
 
-    def amounts(self, season: IterationState) -> Floats:
-        """Q / L_k and, for the best ants of the iteration, a Q / L_best more (eq. 7-8)."""
-        lengths = season.tours.lengths
+        _kernels_colony.arc_weights(trail, heuristic, self.alpha if context.kind == 0 else -self.alpha, weights)
+
+    def amounts(self, state: IterationState) -> Floats:
+        """Q / L_k and, for the best ants of `state`, a Q / L_best more, shared among them (eq. 7-8)."""
+        lengths = state.tours.lengths
         best = lengths <= lengths.min() + 1e-9
         return np.where(best, 1.0 + self.elite / best.sum(), 1.0) * self.deposit / lengths
 
@@ -150,11 +209,11 @@ def ibraheem_beta(side: int) -> float:
 
 
 def shares(eta: Floats, beta: float) -> Weights:
-    """eta^beta (cells, 8) as a share of each cell's largest: choices stay the same, and no power runs out of range.
+    """eta^beta (cells, 8) as a share of each cell's largest value; 0 for moves that are not allowed (eta = -inf).
 
-    A move that is not allowed has -inf and gets 0.
+    Ants choose by ratios within a cell, so the scale does not matter to them, and no power leaves the range of float32.
     """
-    most = eta.max(axis=1, keepdims=True)
+    largest = eta.max(axis=1, keepdims=True)
     with np.errstate(invalid="ignore"):
-        ratio = np.where(np.isfinite(eta), eta / np.where(np.isfinite(most), most, 1.0), 0.0)
+        ratio = np.where(np.isfinite(eta), eta / np.where(np.isfinite(largest), largest, 1.0), 0.0)
     return np.where(ratio > 0, np.maximum(ratio**beta, 1e-30), 0.0).astype(np.float32)

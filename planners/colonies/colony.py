@@ -1,4 +1,4 @@
-"""The colony: one loop for every ant planner, which differ in how ants choose and how trails change."""
+"""The loop of an ant colony; the ant planners differ in how ants choose moves and how trails change."""
 
 from __future__ import annotations
 
@@ -20,47 +20,55 @@ from antdrive.worlds import Floats
 
 Flat = npt.NDArray[np.int32]  # flat cell indices
 Weights = npt.NDArray[np.float32]  # (cells, 8)
-Desire = npt.NDArray[np.floating[Any]]  # (cells, 8)
+Heuristic = npt.NDArray[np.floating[Any]]  # (cells, 8)
 
 
 @dataclass(frozen=True, eq=False)
 class ColonyGraph:
-    """What a colony walks on, as compiled code wants it: cells are flat indices."""
+    """The graph that ants walk on, in the form that compiled code takes: cells are flat indices.
 
-    mask: npt.NDArray[np.uint8]  # (cells,) allowed moves
-    offset: npt.NDArray[np.int64]  # (8,) what each move adds to an index
+    Attributes:
+        mask: the allowed moves of each cell, one bit per direction (cells,)
+        offset: what each of the eight moves adds to a flat index (8,)
+        shape: rows and columns of the grid
+        start: the start cell
+        goal: the goal cell
+    """
+
+    mask: npt.NDArray[np.uint8]
+    offset: npt.NDArray[np.int64]
     shape: tuple[int, int]
     start: int
     goal: int
 
     @classmethod
     def of(cls, query: Query) -> ColonyGraph:
-        """The ground of a query."""
-        from antdrive.planners.colonies import _kernels_colony as _kernels_ants
+        """The graph of a query's grid."""
+        from antdrive.planners.colonies import _kernels_colony
 
         cols = query.grid.shape[1]
         return cls(
             mask=query.grid.moves.ravel(),
-            offset=_kernels_ants.offsets(cols),
+            offset=_kernels_colony.offsets(cols),
             shape=query.grid.shape,
             start=query.start[0] * cols + query.start[1],
             goal=query.goal[0] * cols + query.goal[1],
         )
 
     def cells(self, walk: Flat) -> npt.NDArray[np.int32]:
-        """(row, col) of each cell of a walk, (N, 2)."""
+        """The cells of a walk as (row, col), (N, 2)."""
         return np.stack(np.divmod(walk, self.shape[1]), axis=1).astype(np.int32)
 
-    def over_moves(self, value: Floats) -> Floats:
-        """Of a value per cell, that of the cell which each allowed move leads to, (cells, 8); -inf where none is."""
+    def at_neighbours(self, values: Floats) -> Floats:
+        """`values` (cells,) at the cell that each move leads to, (cells, 8); -inf where the move is not allowed."""
         out = np.full((len(self.mask), 8), -np.inf)
         for k in range(8):
             (here,) = np.nonzero(self.mask >> k & 1)
-            out[here, k] = value[here + self.offset[k]]
+            out[here, k] = values[here + self.offset[k]]
         return out
 
-    def far(self, cell: int) -> Floats:
-        """Straight distance from each cell to one of them [cells], (cells,)."""
+    def distance_to(self, cell: int) -> Floats:
+        """The straight-line distance from every cell to one cell [cells], (cells,)."""
         rows, cols = np.indices(self.shape)
         row, col = divmod(cell, self.shape[1])
         return np.asarray(np.hypot(rows - row, cols - col).ravel())
@@ -68,93 +76,140 @@ class ColonyGraph:
 
 @dataclass(frozen=True, eq=False)
 class Walks:
-    """Where the ants of one iteration went. Rows of those that did not arrive are meaningless."""
+    """The walks of one iteration's ants, a row each. A row of an ant that did not arrive has no meaning.
 
-    cells: Flat  # (ants, room)
-    sizes: npt.NDArray[np.int64]  # (ants,) cells used of each row, 0 where the ant did not arrive
-    lengths: Floats  # (ants,) [cells], inf where the ant did not arrive
+    Attributes:
+        cells: the cells of each walk in order, as flat indices (ants, room)
+        sizes: how many cells of each row are used (ants,), 0 where the ant did not arrive
+        lengths: the length of each walk [cells] (ants,), inf where the ant did not arrive
+    """
+
+    cells: Flat
+    sizes: npt.NDArray[np.int64]
+    lengths: Floats
 
     def __len__(self) -> int:
         return len(self.sizes)
 
     def only(self, ant: int) -> Walks:
-        """One ant's walk, copied."""
+        """A copy of the walk of one ant."""
         size = int(self.sizes[ant])
         return Walks(self.cells[ant : ant + 1, :size].copy(), self.sizes[[ant]], self.lengths[[ant]])
 
     def shortest(self) -> Walks | None:
-        """The shortest walk, alone; None if nobody arrived."""
-        tally = self.tally()
-        return self.only(tally.first) if tally.arrived else None
+        """A copy of the shortest walk; None if no ant arrived."""
+        summary = self.summary()
+        return self.only(summary.shortest) if summary.arrived else None
 
-    def tally(self) -> Tally:
-        """How the ants fared."""
-        from antdrive.planners.colonies import _kernels_colony as _kernels_ants
+    def summary(self) -> WalkSummary:
+        """How many ants arrived, and how long their walks are."""
+        from antdrive.planners.colonies import _kernels_colony
 
-        return Tally(*_kernels_ants.tally(self.lengths))
+        return WalkSummary(*_kernels_colony.summarise(self.lengths))
 
     @classmethod
     def room(cls, ants: int, room: int) -> Walks:
-        """Empty rows to be filled."""
+        """Rows to be filled, one per ant, each for up to `room` cells."""
         return cls(np.empty((ants, room), dtype=np.int32), np.zeros(ants, dtype=np.int64), np.empty(ants))
 
 
-class Tally(NamedTuple):
-    """How the ants of an iteration fared."""
+class WalkSummary(NamedTuple):
+    """How the ants of an iteration fared.
+
+    Attributes:
+        arrived: how many ants reached the goal
+        mean: the mean length of their walks [cells], inf if no ant arrived
+        shortest: the row of the shortest walk
+    """
 
     arrived: int
-    mean: float  # length of those that arrived [cells], inf if nobody did
-    first: int  # who came the shortest way
+    mean: float
+    shortest: int
 
 
 class ChoiceContext(NamedTuple):
-    """For whom weights are asked."""
+    """What choice weights depend on besides trails and heuristic.
 
-    caste: int = 0
-    chance: float = 0.5  # a random number of this iteration's own, in [0, 1)
+    Attributes:
+        kind: the kind of ant that the weights are for, an index of `Colony.kinds`
+        uniform: a random number in [0, 1), drawn once per iteration and kind
+    """
+
+    kind: int = 0
+    uniform: float = 0.5
 
 
 @dataclass(eq=False)
 class Memory:
-    """What a colony leaves to one that walks the same cells after it. Filled in as it walks."""
+    """What a colony hands on to a later colony on the same cells; the colony keeps it up to date.
 
-    trail: Floats | None = None  # as `Colony.lay`
-    tour: Walks | None = None  # the best one, alone
+    Attributes:
+        trail: the trails, as `Colony.initial_trail` returns them
+        tour: the best tour, a single row
+    """
+
+    trail: Floats | None = None
+    tour: Walks | None = None
 
 
 class IterationState(NamedTuple):
-    """One iteration of a colony, as its trails see it."""
+    """One iteration of a colony, as the rules that change trails see it.
 
-    number: int  # from 0
-    ground: ColonyGraph
-    walks: Walks  # as walked
-    tours: Walks  # without loops, and cut short where the planner's ants do that
-    joint: Walks | None  # the tour made of all of them, alone, where the planner makes one
-    best: Walks | None  # the best tour so far, alone
-    since: int  # iterations since it was found
+    Attributes:
+        number: the iteration's number, from 0
+        graph: the graph that ants walk on
+        walks: the ants' walks, loops included
+        tours: the same walks without loops and, with `Colony.shortcut`, cut short
+        daemon_tour: the tour that `Colony.daemon_action` made, a single row
+        best: the best tour so far, a single row
+        since: how many iterations ago the best tour was found
+        rng: the colony's source of random numbers
+    """
+
+    number: int
+    graph: ColonyGraph
+    walks: Walks
+    tours: Walks
+    daemon_tour: Walks | None
+    best: Walks | None
+    since: int
     rng: np.random.Generator
 
 
-#: The only caste of most planners.
-FIRST = ChoiceContext()
+#: The context of colonies that have one kind of ant.
+FIRST_KIND = ChoiceContext()
 
 
 @dataclass(frozen=True, kw_only=True)
 class Colony(IterativePlanner):
-    """Ants that walk from the start towards the goal, drawn by trails that the successful ones leave.
+    """Ants that walk from the start to the goal, guided by the pheromone trails of ants that arrived before.
 
-    A planner of this family says where trails begin (`lay`), how much each move attracts (`desire`, `weigh`)
-    and how the trails change after an iteration (`update`). It may have ants of several kinds (`castes`), make one
-    more tour of those of an iteration (`join`), and know when to end (`finished`). Walking, cutting loops out,
-    keeping the best and counting happen here.
+    This class holds the loop: ants walk, loops are cut out of their walks, the best tour is kept, work is counted.
+    A planner of the family adds its rules, named as in ACOTSP (Stützle) and in Dorigo & Stützle, *Ant Colony
+    Optimization*, 2004:
+
+    - `initial_trail`: tau before the first iteration
+    - `heuristic_values`: eta, what attracts ants whatever the trails are
+    - `choice_weights`: how trails and heuristic combine into the attraction of each move
+    - `update`: how trails evaporate and which ants deposit
+    - `kinds`, `daemon_action` and `finished`, where a planner has several kinds of ants, improves on the tours of an
+      iteration in one central step, or can stop early
+
+    Attributes:
+        ants: ants per iteration
+        max_steps: an ant gives up after this many steps; None: see `default_steps`
+        revisit: the weight of a cell that the ant has already visited; at 0 ants never visit a cell twice
+        backtrack: whether an ant in a dead end steps back until it finds another way; otherwise it dies there
+        shortcut: whether tours are cut short where they pass next to an earlier part of themselves
+        threads: how many threads the ants walk on; the plan does not depend on it
     """
 
     ants: int = 50
-    max_steps: int | None = None  # an ant that takes more gives up; None: see `default_steps`
-    revisit: float = 0.0  # weight of a cell the ant has already been to; 0: it never goes back
-    retreat: bool = False  # an ant in a dead end steps back out of it; else it dies there
-    shortcut: bool = False  # tours are cut short wherever they pass next to themselves
-    threads: int = 1  # ants walk on that many; the plan is the same
+    max_steps: int | None = None
+    revisit: float = 0.0
+    backtrack: bool = False
+    shortcut: bool = False
+    threads: int = 1
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -170,140 +225,172 @@ class Colony(IterativePlanner):
 
     @property
     def complete(self) -> bool:
-        """Whether ants find a way wherever there is one; those that die in dead ends may not."""
-        return self.retreat or self.revisit > 0
+        """Whether ants find a path wherever there is one; ants that die in dead ends may miss it."""
+        return self.backtrack or self.revisit > 0
 
     def default_steps(self, rows: int, cols: int) -> int:
-        """How long an ant may walk without `max_steps`: a step per cell, within 100 to 20 000.
+        """How many steps an ant may take on a grid of `rows` x `cols` where `max_steps` is None.
 
-        Ants that retreat get two steps per cell, in and back out, which takes each of them to the goal.
+        One step per cell, but at least 100 and at most 20 000. Ants that backtrack get two steps per cell, one in and
+        one out, which suffices for every ant to reach the goal.
         """
-        return 2 * rows * cols if self.retreat else min(max(100, rows * cols), 20_000)
+        return 2 * rows * cols if self.backtrack else min(max(100, rows * cols), 20_000)
 
     @property
-    def castes(self) -> tuple[int, ...]:
-        """How many ants there are of each kind."""
+    def kinds(self) -> tuple[int, ...]:
+        """The number of ants of each kind."""
         return (self.ants,)
 
     @abc.abstractmethod
-    def lay(self, ground: ColonyGraph, rng: np.random.Generator) -> Floats:
-        """The trails before the first iteration: (cells,) or, on arcs, (cells, 8)."""
+    def initial_trail(self, graph: ColonyGraph, rng: np.random.Generator) -> Floats:
+        """The trails on `graph` before the first iteration: on cells (cells,) or on arcs (cells, 8)."""
 
     @abc.abstractmethod
-    def desire(self, ground: ColonyGraph) -> Desire:
-        """What draws ants along each allowed move whatever the trails are, (cells, 8)."""
+    def heuristic_values(self, graph: ColonyGraph) -> Heuristic:
+        """What each move of `graph` attracts by whatever the trails are (cells, 8); `choice_weights` receives it."""
 
     @abc.abstractmethod
-    def weigh(
-        self, ground: ColonyGraph, trail: Floats, desire: Desire, weights: Weights, turn: ChoiceContext = FIRST
+    def choice_weights(
+        self,
+        graph: ColonyGraph,
+        trail: Floats,
+        heuristic: Heuristic,
+        weights: Weights,
+        context: ChoiceContext = FIRST_KIND,
     ) -> None:
-        """Fill `weights` (cells, 8): how much each allowed move attracts ants of a caste in the coming iteration."""
+        """Fill in how much each move attracts one kind of ant in the coming iteration.
+
+        Args:
+            graph: the graph that ants walk on
+            trail: the trails as they are now
+            heuristic: the result of `heuristic_values`
+            weights: the table to fill (cells, 8); 0 for moves that are not allowed
+            context: the kind of ant, and a random number for rules that draw one per iteration
+        """
 
     @abc.abstractmethod
-    def update(self, trail: Floats, season: IterationState) -> None:
-        """Change the trails in place after an iteration."""
+    def update(self, trail: Floats, state: IterationState) -> None:
+        """Evaporate and deposit: change `trail` in place after the iteration that `state` describes."""
 
-    def join(self, ground: ColonyGraph, tours: Walks, best: Walks | None) -> Walks | None:
-        """One more tour, made of those of the iteration and the best one before."""
+    def daemon_action(self, graph: ColonyGraph, tours: Walks, best: Walks | None) -> Walks | None:
+        """One more tour, made centrally after the ants have walked; None if there is none.
+
+        Args:
+            graph: the graph that ants walk on
+            tours: the tours of this iteration
+            best: the best tour before it
+        """
         return None
 
-    def finished(self, season: IterationState) -> bool:
-        """Whether nothing more is to be gained."""
+    def finished(self, state: IterationState) -> bool:
+        """Whether the colony can stop after the iteration that `state` describes."""
         return False
 
     def iterate(self, query: Query, rng: np.random.Generator) -> Iterator[Iteration]:
-        """Walk, rate, update, until nothing more is to be gained."""
+        """Walk, rate and update the trails until `finished`."""
         return self.resume(query, rng, Memory())
 
     def resume(self, query: Query, rng: np.random.Generator, memory: Memory) -> Iterator[Iteration]:
-        """Iterate on the trails of an earlier colony, whose best tour, as far as it can still be walked, is known."""
-        ground = ColonyGraph.of(query)
-        trail = self.lay(ground, rng) if memory.trail is None else memory.trail
-        memory.trail, desire = trail, self.desire(ground)
-        walk = _Walk.of(self, ground)
-        cell, scene = query.grid.cell, np.empty(ground.shape)  # one picture, always of the latest trails
+        """Iterate with the trails and the best tour in `memory`, and keep both up to date there.
+
+        The grid may have changed since: of the remembered tour only the arcs that are still allowed are used.
+        """
+        graph = ColonyGraph.of(query)
+        if memory.trail is None:
+            memory.trail = self.initial_trail(graph, rng)
+        trail, heuristic = memory.trail, self.heuristic_values(graph)
+        construction = TourConstruction.of(self, graph)
+        cell = query.grid.cell
+        picture = np.empty(graph.shape)  # one array for all iterations: it always shows the latest trails
         best: Walks | None = None
-        path, found = ground.cells(np.empty(0, dtype=np.int32)), 0
+        best_cells, best_number = graph.cells(np.empty(0, dtype=np.int32)), 0
         with ExitStack() as stack:
             pool = stack.enter_context(ThreadPoolExecutor(self.threads)) if self.threads > 1 else None
             for number in itertools.count():
-                for caste, weights in enumerate(walk.weights):
-                    self.weigh(ground, trail, desire, weights, ChoiceContext(caste, rng.random()))
-                walks, steps = walk.go(rng, pool)
-                tours = walk.cut(walks)
-                joint = self.join(ground, tours, best or memory.tour)
-                tally = tours.tally()
-                shortest = float(tours.lengths[tally.first])
-                if joint is not None and joint.lengths[0] <= shortest:
-                    shortest, first = float(joint.lengths[0]), joint
-                else:
-                    first = None
-                if shortest < (float(best.lengths[0]) - 1e-9 if best else math.inf):
-                    best = first or tours.only(tally.first)
-                    path, found = ground.cells(best.cells[0]), number
-                if best is not None:
-                    memory.tour = best
-                season = IterationState(number, ground, walks, tours, joint, best, number - found, rng)
-                self.update(trail, season)
-                _draw(trail, scene)
+                for kind, weights in enumerate(construction.weights):
+                    self.choice_weights(graph, trail, heuristic, weights, ChoiceContext(kind, rng.random()))
+                walks, steps = construction.construct(rng, pool)
+                tours = construction.shorten(walks)
+                daemon_tour = self.daemon_action(graph, tours, memory.tour if best is None else best)
+                summary = tours.summary()
+                leader, row = tours, summary.shortest
+                if daemon_tour is not None and daemon_tour.lengths[0] <= tours.lengths[row]:
+                    leader, row = daemon_tour, 0
+                iteration_best = float(leader.lengths[row])
+                if iteration_best < (math.inf if best is None else float(best.lengths[0]) - 1e-9):
+                    memory.tour = best = leader.only(row)
+                    best_cells, best_number = graph.cells(best.cells[0]), number
+                state = IterationState(number, graph, walks, tours, daemon_tour, best, number - best_number, rng)
+                self.update(trail, state)
+                _picture(trail, picture)
                 yield Iteration(
-                    cells=path,
-                    best=cell * float(best.lengths[0]) if best else math.inf,
-                    iteration_best=cell * shortest,
-                    iteration_mean=cell * tally.mean,
-                    arrived=tally.arrived,
+                    cells=best_cells,
+                    best=math.inf if best is None else cell * float(best.lengths[0]),
+                    iteration_best=cell * iteration_best,
+                    iteration_mean=cell * summary.mean,
+                    arrived=summary.arrived,
                     work=steps,
-                    field=scene,
+                    landscape=picture,
                 )
-                if self.finished(season):
+                if self.finished(state):
                     return
 
 
 @dataclass(frozen=True, eq=False)
-class _Walk:
-    """The walking of one plan, with the memory that its iterations share."""
+class TourConstruction:
+    """Sends the ants of one plan; the arrays are allocated once and reused in every iteration.
+
+    Attributes:
+        planner: the colony, for its numbers of ants and rules of walking
+        graph: the graph that ants walk on
+        limit: the steps after which an ant gives up
+        weights: the choice weights of each kind of ant, to be filled before `construct`
+        walks: where `construct` puts the walks
+        tours: where `shorten` puts the tours
+    """
 
     planner: Colony
-    ground: ColonyGraph
-    limit: int  # steps
-    weights: tuple[Weights, ...]  # per caste
+    graph: ColonyGraph
+    limit: int
+    weights: tuple[Weights, ...]
     walks: Walks
     tours: Walks
 
     @classmethod
-    def of(cls, planner: Colony, ground: ColonyGraph) -> _Walk:
-        limit = planner.max_steps or planner.default_steps(*ground.shape)
-        # Ants that never go back visit every cell once at most.
-        room = 1 + (limit if planner.revisit else min(limit, len(ground.mask)))
-        weights = tuple(np.zeros((len(ground.mask), 8), dtype=np.float32) for _ in planner.castes)
-        ants = sum(planner.castes)
-        return cls(planner, ground, limit, weights, Walks.room(ants, room), Walks.room(ants, room))
+    def of(cls, planner: Colony, graph: ColonyGraph) -> TourConstruction:
+        """The arrays that a colony needs on a graph."""
+        limit = planner.max_steps or planner.default_steps(*graph.shape)
+        # Ants that never revisit a cell visit each cell once at most.
+        room = 1 + (limit if planner.revisit else min(limit, len(graph.mask)))
+        weights = tuple(np.zeros((len(graph.mask), 8), dtype=np.float32) for _ in planner.kinds)
+        ants = sum(planner.kinds)
+        return cls(planner, graph, limit, weights, Walks.room(ants, room), Walks.room(ants, room))
 
-    def go(self, rng: np.random.Generator, pool: Executor | None = None) -> tuple[Walks, int]:
-        """Send every ant; where they went, and the steps they took."""
-        # Each ant draws from a stream of its own, so the order in which ants walk cannot matter.
+    def construct(self, rng: np.random.Generator, pool: Executor | None = None) -> tuple[Walks, int]:
+        """Send every ant, on the threads of `pool` if there is one: their walks, and the steps of all together."""
+        # Each ant has a random stream of its own, so the order in which ants walk does not matter.
         seeds = rng.bit_generator.random_raw(len(self.walks)).astype(np.uint64) | np.uint64(1)
         jobs, first = [], 0
-        for caste, count in enumerate(self.planner.castes):
+        for kind, count in enumerate(self.planner.kinds):
             each = max(1, -(-count // (self.planner.threads if pool else 1)))
-            jobs += [(caste, first + i, first + min(i + each, count)) for i in range(0, count, each)]
+            jobs += [(kind, first + i, first + min(i + each, count)) for i in range(0, count, each)]
             first += count
         steps = sum((pool.map if pool else map)(lambda job: self._send(seeds, *job), jobs))
         return self.walks, steps
 
-    def _send(self, seeds: npt.NDArray[np.uint64], caste: int, first: int, end: int) -> int:
-        from antdrive.planners.colonies import _kernels_colony as _kernels_ants
+    def _send(self, seeds: npt.NDArray[np.uint64], kind: int, first: int, end: int) -> int:
+        from antdrive.planners.colonies import _kernels_colony
 
         return int(
-            _kernels_ants.walk_ants(
-                self.weights[caste],
-                self.ground.mask,
-                self.ground.offset,
-                self.ground.start,
-                self.ground.goal,
+            _kernels_colony.walk_ants(
+                self.weights[kind],
+                self.graph.mask,
+                self.graph.offset,
+                self.graph.start,
+                self.graph.goal,
                 self.limit,
                 float(self.planner.revisit),
-                self.planner.retreat,
+                self.planner.backtrack,
                 seeds[first:end],
                 self.walks.cells[first:end],
                 self.walks.sizes[first:end],
@@ -311,38 +398,38 @@ class _Walk:
             )
         )
 
-    def cut(self, walks: Walks) -> Walks:
-        """The tours of walks: without loops, and cut short if the planner's ants do that."""
+    def shorten(self, walks: Walks) -> Walks:
+        """The tours of these walks: without loops and, if the planner says so, cut short."""
         if self.planner.shortcut:
-            return cut_short(walks, self.ground, self.tours)
-        return without_loops(walks, self.ground, self.tours) if self.planner.revisit else walks
+            return cut_short(walks, self.graph, self.tours)
+        return without_loops(walks, self.graph, self.tours) if self.planner.revisit else walks
 
 
-def without_loops(walks: Walks, ground: ColonyGraph, into: Walks | None = None) -> Walks:
+def without_loops(walks: Walks, graph: ColonyGraph, out: Walks | None = None) -> Walks:
     """The same walks with their loops cut out."""
-    from antdrive.planners.colonies import _kernels_colony as _kernels_ants
+    from antdrive.planners.colonies import _kernels_colony
 
-    return _cut(_kernels_ants.cut_loops, walks, ground, into)
-
-
-def cut_short(walks: Walks, ground: ColonyGraph, into: Walks | None = None) -> Walks:
-    """The same walks, each going on from every cell to the last of its cells that is one allowed move away."""
-    from antdrive.planners.colonies import _kernels_colony as _kernels_ants
-
-    return _cut(_kernels_ants.cut_short, walks, ground, into)
+    return _cut(_kernels_colony.cut_loops, walks, graph, out)
 
 
-def _cut(kernel: Callable[..., None], walks: Walks, ground: ColonyGraph, into: Walks | None) -> Walks:
-    tours = into or Walks.room(*walks.cells.shape)
-    kernel(walks.cells, walks.sizes, ground.mask, ground.offset, tours.cells, tours.sizes, tours.lengths)
+def cut_short(walks: Walks, graph: ColonyGraph, out: Walks | None = None) -> Walks:
+    """The same walks, each going straight from every cell to the last of its cells that is one allowed move away."""
+    from antdrive.planners.colonies import _kernels_colony
+
+    return _cut(_kernels_colony.cut_short, walks, graph, out)
+
+
+def _cut(kernel: Callable[..., None], walks: Walks, graph: ColonyGraph, out: Walks | None) -> Walks:
+    tours = Walks.room(*walks.cells.shape) if out is None else out
+    kernel(walks.cells, walks.sizes, graph.mask, graph.offset, tours.cells, tours.sizes, tours.lengths)
     return tours
 
 
-def _draw(trail: Floats, scene: Floats) -> None:
-    """Trails as a picture: of arcs, the strongest that leaves each cell."""
+def _picture(trail: Floats, out: Floats) -> None:
+    """Fill `out` (R, C) with the trail of each cell; for trails on arcs, the strongest arc that leaves the cell."""
     if trail.ndim == 1:
-        scene.ravel()[:] = trail
+        out.ravel()[:] = trail
     else:
-        from antdrive.planners.colonies import _kernels_colony as _kernels_ants
+        from antdrive.planners.colonies import _kernels_colony
 
-        _kernels_ants.strongest(trail, scene.ravel())
+        _kernels_colony.strongest(trail, out.ravel())

@@ -1,4 +1,4 @@
-"""The colony that serves best here: MAX-MIN ants and scouts, whose tours of an iteration are put together."""
+"""The strongest colony here: MAX-MIN ants and scouts, whose tours of an iteration are merged into one."""
 
 from __future__ import annotations
 
@@ -7,7 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from antdrive.planners.colonies.colony import FIRST, ChoiceContext, ColonyGraph, Desire, IterationState, Walks, Weights
+from antdrive.planners.colonies.colony import (
+    FIRST_KIND,
+    ChoiceContext,
+    ColonyGraph,
+    Heuristic,
+    IterationState,
+    Walks,
+    Weights,
+)
 from antdrive.planners.colonies.mmas import MaxMinAnts
 from antdrive.planners.iterative import require
 from antdrive.worlds import Floats
@@ -16,29 +24,44 @@ from antdrive.worlds.errors import FieldError
 
 @dataclass(frozen=True, kw_only=True)
 class MergingAnts(MaxMinAnts):
-    """MAX-MIN ants that weigh detours, scouts beside them, and the shortest way over all arcs they used.
+    """MAX-MIN ants that avoid detours, scouts beside them, and the shortest path over all arcs they used.
 
-    What sets it apart from `MaxMinAnts`, whose bounds, retreats, cut tours and fresh starts it keeps:
+    Bounds, backtracking, cutting tours short and resets are those of `MaxMinAnts`. New are:
 
-    - A move attracts by `exp(-greed * detour)`, the detour being how much longer it makes the way to the goal, as
-      over open ground, than it need be. Unlike a power of the distance it is as strong far from the goal.
-    - Scouts ignore the trails and keep to a lane beside the straight line, drawn anew each iteration, so that ways
-      around the other side of things stay known.
-    - After an iteration the shortest way is sought over the arcs that its tours used, and the best tour's: ants
-      find the pieces, and what deposits is the best that can be put together of them. Nothing beyond those arcs,
-      about a tenth of a grid's, is searched.
-    - It ends when so many iterations brought nothing better (`settled`), or the tour cannot be shorter on any grid.
+    - The heuristic is exp(-greed * detour). The detour of a move is how much longer than necessary it makes the path
+      over open ground to the goal. Unlike a power of the distance, it is as strong far from the goal as near it.
+    - Scouts ignore the trails. They follow a lane parallel to the line from start to goal, drawn anew in each
+      iteration, so that ways around the other side of obstacles are not forgotten.
+    - As daemon action, the shortest path over the arcs of this iteration's tours and of the best tour is found, and
+      that path deposits. Ants find the pieces; the search puts the best of them together. It looks at no other arc,
+      which leaves about nine tenths of a grid out.
+    - The colony stops after `settled` iterations without a better tour, or when no tour on any grid could be shorter.
+
+    These rules are antdrive's own; no paper describes them. A path of many turns is only as good as the pieces that
+    ants have found: on very large grids it may stay a little longer than the shortest.
+
+    Attributes:
+        ants: ants that follow trails
+        scouts: ants that follow lanes
+        greed: how strongly detours repel [1 / cell]
+        lane_pull: how many cells of detour a scout accepts to come one cell nearer to its lane
+        lane_spread: how far to either side lanes lie at most, in units of the distance from start to goal
+        evaporation: rho
+        patience: iterations without a better tour after which all trails return to the upper bound
+        iterations: iterations at most
+        settled: the colony stops after this many iterations without a better tour; where tours are short, after
+            0.6 times their length in cells, but not before 20
     """
 
     ants: int = 25
     scouts: int = 75
-    greed: float = 2.0  # [1 / cell]
-    lane_pull: float = 0.6  # cells of detour that a scout accepts to come a cell nearer to its lane
-    lane_spread: float = 0.4  # lanes lie up to this many times the straight distance to either side
+    greed: float = 2.0
+    lane_pull: float = 0.6
+    lane_spread: float = 0.4
     evaporation: float = 0.1
     patience: int = 10
     iterations: int = 300
-    settled: int = 60  # at most; where tours are short 0.6 times their length in cells, but 20
+    settled: int = 60
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -49,61 +72,69 @@ class MergingAnts(MaxMinAnts):
         require("settled", self.settled, at_least=1)
         for key, unset in (("beta", None), ("heuristic", "goal")):
             if getattr(self, key) != unset:
-                raise FieldError(
-                    key, f"must be {unset!r}, as these ants are drawn by `greed`; got {getattr(self, key)!r}"
+                raise ValueError(
+                    f"{key}: must be {unset!r}, as `greed` is the heuristic of these ants; got {getattr(self, key)!r}"
                 )
 
     @property
-    def castes(self) -> tuple[int, ...]:
-        """Ants that follow trails first, then scouts."""
+    def kinds(self) -> tuple[int, ...]:
+        """Ants that follow trails, then scouts."""
         return (self.ants, self.scouts)
 
-    def desire(self, ground: ColonyGraph) -> Desire:
-        """exp(-greed * detour)."""
-        return self._detours(ground, np.empty((len(ground.mask), 8), dtype=np.float32))
+    def heuristic_values(self, graph: ColonyGraph) -> Heuristic:
+        """exp(-greed * detour) for each move of `graph`."""
+        return self._detour_weights(graph, np.empty((len(graph.mask), 8), dtype=np.float32))
 
-    def weigh(
-        self, ground: ColonyGraph, trail: Floats, desire: Desire, weights: Weights, turn: ChoiceContext = FIRST
+    def choice_weights(
+        self,
+        graph: ColonyGraph,
+        trail: Floats,
+        heuristic: Heuristic,
+        weights: Weights,
+        context: ChoiceContext = FIRST_KIND,
     ) -> None:
-        """Trail and desire for ants; desire alone, towards this iteration's lane, for scouts."""
-        if turn.caste == 0:
-            super().weigh(ground, trail, desire, weights)
+        """Fill `weights`: `trail` times `heuristic` for ants; for scouts, detours on `graph` from this iteration's lane.
+
+        `context` names the kind and holds the random number that places the lane.
+        """
+        if context.kind == 0:
+            super().choice_weights(graph, trail, heuristic, weights)
         else:
-            far = math.dist(*(divmod(cell, ground.shape[1]) for cell in (ground.start, ground.goal)))
-            self._detours(ground, weights, self.lane_pull, self.lane_spread * far * (2.0 * turn.chance - 1.0))
+            distance = math.dist(*(divmod(cell, graph.shape[1]) for cell in (graph.start, graph.goal)))
+            lane = self.lane_spread * distance * (2.0 * context.uniform - 1.0)
+            self._detour_weights(graph, weights, self.lane_pull, lane)
 
-    def _detours(self, ground: ColonyGraph, out: Weights, pull: float = 0.0, lane: float = 0.0) -> Weights:
-        from antdrive.planners.colonies import _kernels_colony as _kernels_ants
+    def _detour_weights(self, graph: ColonyGraph, out: Weights, lane_pull: float = 0.0, lane: float = 0.0) -> Weights:
+        from antdrive.planners.colonies import _kernels_colony
 
-        height = np.empty(len(ground.mask))
-        _kernels_ants.detour_weights(
-            ground.mask,
-            ground.offset,
-            ground.shape[1],
-            ground.start,
-            ground.goal,
+        _kernels_colony.detour_weights(
+            graph.mask,
+            graph.offset,
+            graph.shape[1],
+            graph.start,
+            graph.goal,
             self.greed,
-            pull,
+            lane_pull,
             lane,
-            height,
+            np.empty(len(graph.mask)),
             out,
         )
         return out
 
-    def join(self, ground: ColonyGraph, tours: Walks, best: Walks | None) -> Walks | None:
-        """The shortest way over the arcs of these tours."""
-        from antdrive.planners.colonies import _kernels_colony as _kernels_ants
+    def daemon_action(self, graph: ColonyGraph, tours: Walks, best: Walks | None) -> Walks | None:
+        """The shortest path on `graph` over the arcs of these `tours` and of the `best` one."""
+        from antdrive.planners.colonies import _kernels_colony
         from antdrive.planners.graph import _kernels_search
 
-        moves = np.zeros_like(ground.mask)
+        moves = np.zeros_like(graph.mask)
         for walks in (tours, best):
             if walks is not None:
-                _kernels_ants.union_moves(walks.cells, walks.sizes, ground.shape[1], moves)
-        moves &= ground.mask  # the best may be of before a change
-        moves.setflags(write=False)  # as a grid's own are, for which the search is compiled
-        cols = ground.shape[1]
+                _kernels_colony.union_moves(walks.cells, walks.sizes, graph.shape[1], moves)
+        moves &= graph.mask  # the best tour may be older than the last change of the grid
+        moves.setflags(write=False)  # the search is compiled for read-only moves, as those of a grid are
+        cols = graph.shape[1]
         cells, straight, diagonal, _ = _kernels_search.shortest_path(
-            moves.reshape(ground.shape), *divmod(ground.start, cols), *divmod(ground.goal, cols), True
+            moves.reshape(graph.shape), *divmod(graph.start, cols), *divmod(graph.goal, cols), True
         )
         if not len(cells):
             return None
@@ -111,17 +142,17 @@ class MergingAnts(MaxMinAnts):
         length = straight + math.sqrt(2.0) * diagonal
         return Walks(walk[np.newaxis], np.array([len(walk)]), np.array([length]))
 
-    def depositor(self, season: IterationState) -> Walks | None:
-        """The tour put together in this iteration, which the best one before may be part of."""
-        return season.joint
+    def depositor(self, state: IterationState) -> Walks | None:
+        """The merged tour of the iteration in `state`; parts of it may be of the best tour so far."""
+        return state.daemon_tour
 
-    def finished(self, season: IterationState) -> bool:
-        """Whether nothing better came up for long, or cannot."""
-        if season.best is None:
+    def finished(self, state: IterationState) -> bool:
+        """Whether, after the iteration in `state`, the best tour is old or as short as open ground allows."""
+        if state.best is None:
             return False
-        cols = season.ground.shape[1]
-        (r0, c0), (r1, c1) = divmod(season.ground.start, cols), divmod(season.ground.goal, cols)
+        cols = state.graph.shape[1]
+        (r0, c0), (r1, c1) = divmod(state.graph.start, cols), divmod(state.graph.goal, cols)
         low, high = sorted((abs(r1 - r0), abs(c1 - c0)))
-        shortest = high - low + math.sqrt(2.0) * low
-        enough = min(self.settled, max(20, round(0.6 * float(season.best.lengths[0]))))
-        return season.since >= enough or bool(season.best.lengths[0] <= shortest + 1e-9)
+        over_open_ground = high - low + math.sqrt(2.0) * low
+        enough = min(self.settled, max(20, round(0.6 * float(state.best.lengths[0]))))
+        return state.since >= enough or bool(state.best.lengths[0] <= over_open_ground + 1e-9)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -19,46 +19,75 @@ from antdrive.planners.iterative import Iteration, IterativePlanner, require
 from antdrive.planners.plan import Query
 from antdrive.worlds import Floats
 
+if TYPE_CHECKING:  # importing kernels loads the compiler
+    from antdrive.planners.colonies._kernels_pfaco import Ants, Ranking
+
 
 @dataclass(frozen=True, kw_only=True)
 class PotentialFieldAnts(IterativePlanner):
-    """Ants drawn by a potential field, which rank their paths and start again one by one: lee2008's improved ACO.
+    """Ants guided by a potential field, which rank their paths and start again one by one: lee2008's improved ACO.
 
-    All ants move a cell per tick; an iteration is as many ticks as it takes for as many walks to end as there are
-    ants. Pheromone lies on cells.
+    Section IV of lee2008: an ant chooses the next cell by pheromone^alpha potential^beta (eq. 13). The potential rises
+    away from the start (eq. 9) and falls near obstacles (eq. 11); the first pheromone is a mix of potential and chance
+    (eq. 14). All ants move by one cell per tick. An ant that arrives enters its path into a ranking list by length
+    times number of cells (eq. 15), deposits by rank and starts again. Where the pheromone has converged it is rebuilt
+    from the list (section IV-B). An iteration here is as many ticks as it takes for `ants` walks to end.
+
+    The paper gives no values for the constants from `attraction` on; these are ours. Ants that start again in dead ends
+    rarely cross large grids with scattered obstacles, and then by paths several times too long; with `backtrack` and
+    `shortcut` they arrive.
+
+    Attributes:
+        ants: ants, and walks per iteration
+        ranks: paths in the ranking list
+        evaporation: the share of the pheromone lost per tick; rho of lee2008, 0.99, is the share retained
+        mix: k_mix of eq. 14, the share of chance in the first pheromone
+        alpha_1: the exponent of the pheromone in stage 1, until the list has been filled twice
+        beta_1: the exponent of the potential in stage 1
+        alpha_2: the exponent of the pheromone in stage 2, until as many more paths as ants have entered the list
+        beta_2: the exponent of the potential in stage 2
+        alpha_3: the exponent of the pheromone in stage 3
+        beta_3: the exponent of the potential in stage 3
+        attraction: k_att of eq. 9
+        repulsion: k_rep of eq. 11
+        influence: d0 of eq. 11, how far obstacles repel [cells]
+        deposit: the deposit on each cell of a path of the first rank; it falls linearly with the rank
+        min_pheromone: the pheromone of a free cell does not decay below this
+        convergence: the pheromone has converged when its sum changes by less than this share in an iteration
+        max_steps: a walk ends after this many steps; None: one step per cell, but at least 100 and at most 20 000
+        backtrack: whether an ant in a dead end steps back until it finds another way; otherwise it starts again
+        shortcut: whether paths are cut short where they pass next to an earlier part of themselves
     """
 
     ants: int = 500
-    listed: int = 100  # paths in the ranking list
-    evaporation: float = 0.01  # per tick; the paper's rho, 0.99, is what is retained
-    mix: float = 0.3  # k_mix of eq. 14: share of chance in the first pheromone
-    # Exponents of pheromone and potential in the three stages.
+    ranks: int = 100
+    evaporation: float = 0.01
+    mix: float = 0.3
     alpha_1: float = 1.0
     beta_1: float = 2.0
     alpha_2: float = 2.0
     beta_2: float = 1.0
     alpha_3: float = 3.0
     beta_3: float = 1.0
-    # The paper gives no values for the rest.
-    attraction: float = 1.0  # k_att of eq. 9
-    repulsion: float = 10.0  # k_rep of eq. 11
-    influence: float = 2.0  # d0 of eq. 11 [cells]
-    deposit: float = 2.0  # on each cell of a path of the first rank; the last gets next to nothing
-    least: float = 0.001  # pheromone does not decay below this
-    converged: float = 0.02  # the field has converged when an iteration changes its sum by less than this share
-    max_steps: int | None = None  # a walk that takes more ends; None: a step per cell, within 100 to 20 000
-    retreat: bool = False  # an ant in a dead end steps back out of it; else it starts again
-    shortcut: bool = False  # paths are cut short wherever they pass next to themselves
+    attraction: float = 1.0
+    repulsion: float = 10.0
+    influence: float = 2.0
+    deposit: float = 2.0
+    min_pheromone: float = 0.001
+    convergence: float = 0.02
+    max_steps: int | None = None
+    backtrack: bool = False
+    shortcut: bool = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
         require("ants", self.ants, at_least=1, at_most=1_000_000)
-        require("listed", self.listed, at_least=1, at_most=1_000_000)
+        require("ranks", self.ranks, at_least=1, at_most=1_000_000)
         require("evaporation", self.evaporation, at_least=0, at_most=1)
         require("mix", self.mix, at_least=0, at_most=1)
         for key in ("alpha_1", "beta_1", "alpha_2", "beta_2", "alpha_3", "beta_3", "repulsion"):
             require(key, getattr(self, key), at_least=0)
-        for key in ("attraction", "influence", "deposit", "least", "converged"):
+        for key in ("attraction", "influence", "deposit", "min_pheromone", "convergence"):
             require(key, getattr(self, key), above=0)
         if self.max_steps is not None:
             require("max_steps", self.max_steps, at_least=1)
@@ -70,160 +99,181 @@ class PotentialFieldAnts(IterativePlanner):
 
     @property
     def complete(self) -> bool:
-        """Whether ants find a way wherever there is one; those that give up in dead ends may not."""
-        return self.retreat
+        """Whether ants find a path wherever there is one; ants that start again in dead ends may miss it."""
+        return self.backtrack
 
     def potential(self, query: Query) -> Floats:
-        """The field that ants climb, (cells,), above 0 where free: eq. 9 from the start, lowered by eq. 11."""
+        """The field that ants climb (cells,), above 0 where free: eq. 9 from the start, lowered by eq. 11."""
         from antdrive.planners.colonies import _kernels_pfaco
 
-        ground = ColonyGraph.of(query)
+        graph = ColonyGraph.of(query)
         near = _kernels_pfaco.obstacle_distance(query.grid.free, math.floor(self.influence)).ravel()
         near = np.clip(near, 1.0, self.influence)
-        climb = 0.5 * self.attraction * ground.far(ground.start) ** 2
+        climb = 0.5 * self.attraction * graph.distance_to(graph.start) ** 2
         climb -= 0.5 * self.repulsion * (1.0 / near - 1.0 / self.influence) ** 2
         free = query.grid.free.ravel()
-        # The lowest free cell still attracts a little.
+        # The lowest free cell must still attract a little.
         return np.where(free, climb - climb[free].min() + 0.5 * self.attraction, 0.0)
 
     def iterate(self, query: Query, rng: np.random.Generator) -> Iterator[Iteration]:
-        """Run, and rebuild the pheromone wherever it has converged."""
-        ground, field = ColonyGraph.of(query), self.potential(query)
+        """Run the ants without end, and rebuild the pheromone whenever it has converged."""
+        field = self.potential(query)
         free = query.grid.free.ravel()
         trail = self.mix * rng.random(len(field)) + (1 - self.mix) * field / field.max()  # eq. 14
-        trail = np.where(free, np.maximum(trail, self.least), 0.0)
-        colony = _Colony.of(self, ground, rng)
+        trail = np.where(free, np.maximum(trail, self.min_pheromone), 0.0)
+        pool = AntPool.of(self, ColonyGraph.of(query), rng)
         total = math.inf
         while True:
-            stage = self.stage(int(colony.counts[1]))
+            stage = self.stage(pool.entries)
             alpha = (self.alpha_1, self.alpha_2, self.alpha_3)[stage - 1]
             beta = (self.beta_1, self.beta_2, self.beta_3)[stage - 1]
-            arrivals, steps = colony.run(trail, field**beta, alpha)
+            arrivals, steps = pool.run(trail, field**beta, alpha)
             before, total = total, float(trail.sum())
-            if abs(total - before) < self.converged * before:
-                self.rebuild(trail, free, stage, colony, rng)
+            if abs(total - before) < self.convergence * before:
+                self.rebuild(trail, free, stage, pool, rng)
                 total = math.inf
-            yield _report(query, ground, trail, colony, arrivals, steps)
+            yield pool.report(query.grid.cell, trail, arrivals, steps)
 
     def stage(self, entries: int) -> int:
-        """1 until the ranking list has been filled anew, 2 until as many entries more as ants, 3 (section IV-B)."""
-        anew = 2 * self.listed
-        return 1 if entries < anew else 2 if entries < anew + self.ants else 3
+        """The stage, 1 to 3, after so many `entries` into the ranking list (section IV-B)."""
+        twice = 2 * self.ranks
+        return 1 if entries < twice else 2 if entries < twice + self.ants else 3
 
     def rebuild(
-        self, trail: Floats, free: npt.NDArray[np.bool_], stage: int, colony: _Colony, rng: np.random.Generator
+        self, trail: Floats, free: npt.NDArray[np.bool_], stage: int, pool: AntPool, rng: np.random.Generator
     ) -> None:
-        """Reset a converged field: at random, by the best tenth of the list, by all of it (section IV-B)."""
+        """Reset converged pheromone: at random, from the best tenth of the list, from all of it (section IV-B).
+
+        Args:
+            trail: the pheromone, changed in place (cells,)
+            free: whether each cell is free (cells,)
+            stage: which of the three ways
+            pool: the ants, for their ranking list
+            rng: the source of random numbers, for stage 1
+        """
         if stage == 1:
-            trail[:] = np.where(free, np.maximum(rng.random(len(trail)), self.least), 0.0)
+            trail[:] = np.where(free, np.maximum(rng.random(len(trail)), self.min_pheromone), 0.0)
             return
-        trail[:] = np.where(free, self.least, 0.0)
-        listed = int(colony.counts[0])
+        trail[:] = np.where(free, self.min_pheromone, 0.0)
+        ranking, listed = pool.ranking, pool.listed
         for rank in range(math.ceil(listed / 10) if stage == 2 else listed):
-            row = colony.order[rank]
-            trail[colony.ranked[row, : colony.sizes[row]]] += self.deposit * (1 - rank / self.listed)
+            row = ranking.order[rank]
+            trail[ranking.walks[row, : ranking.sizes[row]]] += self.deposit * (1 - rank / self.ranks)
 
 
 @dataclass(eq=False)
-class _Colony:
-    """The ants and their ranking list, as compiled code keeps them."""
+class AntPool:
+    """The ants of one plan and their ranking list, in the form that compiled code takes.
+
+    Attributes:
+        planner: the parameters
+        graph: the graph that ants walk on
+        limit: the steps after which a walk ends
+        ants: the ants and their unfinished walks
+        ranking: the ranking list
+        buffer: where compiled code puts a new best walk (room,)
+        arrivals: where compiled code puts the lengths of the walks that arrived
+        shortest: the length of the best walk [cells], inf while there is none
+        best: the cells of the best walk, as flat indices
+    """
 
     planner: PotentialFieldAnts
-    ground: ColonyGraph
+    graph: ColonyGraph
     limit: int
-    states: npt.NDArray[np.uint64]
-    walks: npt.NDArray[np.int32]
-    ants: npt.NDArray[np.int64]
-    lengths: Floats
-    been: npt.NDArray[np.uint8]
-    ranked: npt.NDArray[np.int32]
-    sizes: npt.NDArray[np.int64]
-    costs: Floats
-    order: npt.NDArray[np.int64]
-    counts: npt.NDArray[np.int64]
+    ants: Ants
+    ranking: Ranking
     buffer: npt.NDArray[np.int32]
     arrivals: Floats
     shortest: float = math.inf
     best: npt.NDArray[np.int32] | None = None
 
     @classmethod
-    def of(cls, planner: PotentialFieldAnts, ground: ColonyGraph, rng: np.random.Generator) -> _Colony:
+    def of(cls, planner: PotentialFieldAnts, graph: ColonyGraph, rng: np.random.Generator) -> AntPool:
+        """All ants at the start, and an empty list."""
         from antdrive.planners.colonies import _kernels_pfaco
 
-        cells, ants, listed = len(ground.mask), planner.ants, planner.listed
-        limit = planner.max_steps or (2 * cells if planner.retreat else min(max(100, cells), 20_000))
+        cells, count, ranks = len(graph.mask), planner.ants, planner.ranks
+        limit = planner.max_steps or (2 * cells if planner.backtrack else min(max(100, cells), 20_000))
         room = 1 + min(limit, cells)
-        colony = cls(
-            planner=planner,
-            ground=ground,
-            limit=limit,
-            states=rng.bit_generator.random_raw(ants).astype(np.uint64) | np.uint64(1),
-            walks=np.empty((ants, room), dtype=np.int32),
-            ants=np.empty((ants, 2), dtype=np.int64),
-            lengths=np.empty(ants),
-            been=np.empty((ants, cells // 8 + 1), dtype=np.uint8),
-            ranked=np.empty((listed, room), dtype=np.int32),
-            sizes=np.empty(listed, dtype=np.int64),
-            costs=np.empty(listed),
-            order=np.empty(listed, dtype=np.int64),
-            counts=np.zeros(4, dtype=np.int64),
-            buffer=np.empty(room, dtype=np.int32),
-            arrivals=np.empty(2 * ants),
+        ants = _kernels_pfaco.Ants(
+            states=rng.bit_generator.random_raw(count).astype(np.uint64) | np.uint64(1),
+            walks=np.empty((count, room), dtype=np.int32),
+            sizes=np.empty(count, dtype=np.int64),
+            taken=np.empty(count, dtype=np.int64),
+            lengths=np.empty(count),
+            visited=np.empty((count, cells // 8 + 1), dtype=np.uint8),
         )
-        for ant in range(ants):
-            _kernels_pfaco.leave(ant, ground.start, colony.walks, colony.ants, colony.lengths, colony.been)
-        return colony
+        ranking = _kernels_pfaco.Ranking(
+            walks=np.empty((ranks, room), dtype=np.int32),
+            sizes=np.empty(ranks, dtype=np.int64),
+            costs=np.empty(ranks),
+            order=np.empty(ranks, dtype=np.int64),
+            counts=np.zeros(2, dtype=np.int64),
+        )
+        for ant in range(count):
+            _kernels_pfaco.leave(ant, graph.start, ants)
+        buffer, arrivals = np.empty(room, dtype=np.int32), np.empty(2 * count)
+        return cls(planner, graph, limit, ants, ranking, buffer, arrivals)
 
-    def run(self, trail: Floats, appeal: Floats, alpha: float) -> tuple[Floats, int]:
-        """One iteration: the lengths of those that arrived, and the steps of all."""
+    @property
+    def listed(self) -> int:
+        """How many walks are in the ranking list."""
+        from antdrive.planners.colonies._kernels_pfaco import LISTED
+
+        return int(self.ranking.counts[LISTED])
+
+    @property
+    def entries(self) -> int:
+        """How many walks were ever entered into the ranking list."""
+        from antdrive.planners.colonies._kernels_pfaco import ENTRIES
+
+        return int(self.ranking.counts[ENTRIES])
+
+    def run(self, trail: Floats, heuristic: Floats, alpha: float) -> tuple[Floats, int]:
+        """Run one iteration: the lengths of the walks that arrived [cells], and the steps of all ants together.
+
+        Args:
+            trail: the pheromone, changed in place (cells,)
+            heuristic: potential^beta (cells,)
+            alpha: the exponent of the pheromone
+        """
         from antdrive.planners.colonies import _kernels_pfaco
 
-        planner, before = self.planner, int(self.counts[2])
-        size, self.shortest = _kernels_pfaco.run_colony(
+        planner, graph = self.planner, self.graph
+        rules = _kernels_pfaco.Rules(
+            alpha=float(alpha),
+            evaporation=float(planner.evaporation),
+            min_pheromone=float(planner.min_pheromone),
+            deposit=float(planner.deposit),
+            limit=self.limit,
+            backtrack=planner.backtrack,
+            shortcut=planner.shortcut,
+            quota=planner.ants,
+        )
+        size, self.shortest, steps, arrived = _kernels_pfaco.run_colony(
             trail,
-            appeal,
-            self.ground.mask,
-            self.ground.offset,
-            self.ground.start,
-            self.ground.goal,
-            alpha,
-            planner.evaporation,
-            planner.least,
-            planner.deposit,
-            self.limit,
-            planner.retreat,
-            planner.shortcut,
-            planner.ants,
-            self.states,
-            self.walks,
+            heuristic,
+            _kernels_pfaco.Graph(graph.mask, graph.offset, graph.start, graph.goal),
+            rules,
             self.ants,
-            self.lengths,
-            self.been,
-            self.ranked,
-            self.sizes,
-            self.costs,
-            self.order,
-            self.counts,
+            self.ranking,
             self.shortest,
             self.buffer,
             self.arrivals,
         )
         if size:
             self.best = self.buffer[:size].copy()
-        return self.arrivals[: self.counts[3]].copy(), int(self.counts[2]) - before
+        return self.arrivals[:arrived].copy(), int(steps)
 
-
-def _report(
-    query: Query, ground: ColonyGraph, trail: Floats, colony: _Colony, arrivals: Floats, steps: int
-) -> Iteration:
-    cell = query.grid.cell
-    nothing: Any = np.empty(0, dtype=np.int32)
-    return Iteration(
-        cells=ground.cells(nothing if colony.best is None else colony.best),
-        best=cell * colony.shortest,
-        iteration_best=cell * float(arrivals.min(initial=math.inf)),
-        iteration_mean=cell * float(arrivals.mean()) if len(arrivals) else math.inf,
-        arrived=len(arrivals),
-        work=steps,
-        field=trail.reshape(ground.shape),
-    )
+    def report(self, cell: float, trail: Floats, arrivals: Floats, steps: int) -> Iteration:
+        """The state after an iteration: the results of `run` and the pheromone, for cells of side `cell` [m]."""
+        best: Any = np.empty(0, dtype=np.int32) if self.best is None else self.best
+        return Iteration(
+            cells=self.graph.cells(best),
+            best=cell * self.shortest,
+            iteration_best=cell * float(arrivals.min(initial=math.inf)),
+            iteration_mean=cell * float(arrivals.mean()) if len(arrivals) else math.inf,
+            arrived=len(arrivals),
+            work=steps,
+            landscape=trail.reshape(self.graph.shape),
+        )

@@ -19,7 +19,7 @@ free[1:5, 3] = 0
 bare = Query(Grid.from_free(free), (2, 1), (3, 5))
 task = Task(World("w", (0, 0, 4, 3), (Disc(2, 1.5, 0.5), Disc(2.4, 1.9, 0.3))), (0.75, 1.25, 0), (3.25, 1.75))
 query = Query.between(rasterise(task.world, 0.5, 0.1), task)
-few = {"ants": 4, "iterations": 3, "population": 6, "foraging": 2, "parties": 1, "retreat": True, "shortcut": True}
+few = {"ants": 4, "iterations": 3, "population": 6, "ant_iterations": 2, "ant_runs": 1, "backtrack": True, "shortcut": True}
 for name, planner in PLANNERS.items():
     known = {f.name for f in dataclasses.fields(planner)}
     planner = dataclasses.replace(planner, **{key: value for key, value in few.items() if key in known})

@@ -12,7 +12,7 @@ from antdrive.worlds import Disc, Grid, Task, World, load_task, polyline_clearan
 from antdrive.worlds.plane import polyline_length
 from tests.planners.worlds_to_solve import catalogue, random_query, sealed
 
-THESIS = 33.1798  # the thesis' own length with 3 via points, the best of 1, 2 and 3
+THESIS = 33.1798  # the length that the thesis prints for 3 via points, the best of 1, 2 and 3
 FLOOR = 30.0711
 
 
@@ -76,7 +76,7 @@ def test_without_variation_the_best_of_the_first_population_takes_over() -> None
     assert result.history.best[-1] == result.history.best[0]
 
 
-def test_elimination_is_refilled_at_random() -> None:
+def test_eliminated_chromosomes_are_replaced_by_random_ones() -> None:
     result = solve(single(), mutation=1.0)
     assert (result.history.arrived[1:] < 100).all()
     assert result.work > 100 * 100
@@ -89,7 +89,7 @@ def query_shape() -> tuple[int, int]:
 
 
 @pytest.mark.parametrize("name", ["han2007-single", "han2007-ga", "u-trap", "gate"])
-def test_the_worlds_of_the_catalogue_are_feasible(name: str) -> None:
+def test_the_lines_through_the_catalogue_are_feasible(name: str) -> None:
     task = load_task(name)
     query = Query.between(rasterise(task.world, task.cell, 0.363), task)
     result = solve(query)
@@ -97,7 +97,7 @@ def test_the_worlds_of_the_catalogue_are_feasible(name: str) -> None:
     assert_feasible(result, query)
 
 
-def test_what_chance_does_not_find_ends_with_a_sentence() -> None:
+def test_a_line_that_chance_does_not_find_ends_the_plan_with_a_reason() -> None:
     result = solve(catalogue()["slalom"], via_points=1, tries=5000)
     assert result.status is PlanStatus.STOPPED
     assert result.reason == "no feasible chromosome found within 5000 tries"
@@ -105,7 +105,7 @@ def test_what_chance_does_not_find_ends_with_a_sentence() -> None:
     assert solve(sealed()).status is PlanStatus.NO_PATH
 
 
-def test_once_the_tries_are_used_up_survivors_go_on_alone() -> None:
+def test_once_the_tries_are_used_up_only_survivors_breed() -> None:
     result = solve(single(), tries=200)
     assert result.solved
     assert len(result.history) == 100

@@ -32,7 +32,7 @@ def solve(query: Query, seed: int = 0, **options: object) -> PlanResult:
     return dataclasses.replace(Hybrid(), **options).plan(query, np.random.default_rng(seed))  # type: ignore[arg-type]
 
 
-def test_it_comes_within_two_percent_of_the_floor() -> None:
+def test_the_line_comes_within_two_percent_of_the_shortest() -> None:
     query = single()
     for seed in range(10):
         assert FLOOR < solve(query, seed).length < 1.02 * FLOOR  # type: ignore[operator]
@@ -44,7 +44,7 @@ def test_the_line_keeps_the_clearance_and_is_near_the_shortest(name: str) -> Non
     assert query.task is not None
     floor = Tangent().plan(query, np.random.default_rng(0)).length
     assert floor is not None
-    # Where the grid has no cells within the best corridor, ants cannot find it.
+    # Where the grid has no free cells in the best corridor, ants cannot find it.
     corridor = {"forest": 1.06, "han2007-aco": 1.10}.get(name, 1.03)
     for seed in range(3):
         result = solve(query, seed)
@@ -64,20 +64,20 @@ def test_the_genetic_algorithm_improves_on_the_pulled_path() -> None:
     assert history.best[29] < optimum(query) - 0.05
 
 
-def test_chromosomes_are_feasible_in_every_generation() -> None:
+def test_all_chromosomes_are_feasible_in_every_generation() -> None:
     result = solve(of_catalogue("forest"), iterations=40)
     assert (result.history.arrived[30:] == Hybrid().population).all()
     assert result.field is not None
     assert result.field.max() == Hybrid().population
 
 
-def test_a_straight_way_stays_straight() -> None:
+def test_a_straight_line_stays_straight() -> None:
     query = of_catalogue("empty")
     assert query.task is not None
     assert solve(query).length == pytest.approx(np.hypot(*np.subtract(query.task.goal, query.task.start[:2])))
 
 
-def test_stopped_while_ants_forage_it_answers_with_their_pulled_path() -> None:
+def test_interrupted_during_the_ants_it_returns_their_pulled_path() -> None:
     query = of_catalogue("u-trap")
 
     def stop(progress: Progress) -> None:
@@ -91,7 +91,7 @@ def test_stopped_while_ants_forage_it_answers_with_their_pulled_path() -> None:
     assert result.length == pytest.approx(result.history.best[-1])
 
 
-def test_ants_that_never_arrive_end_the_plan() -> None:
+def test_the_plan_stops_if_no_ant_arrives() -> None:
     query = catalogue()["slalom"]
     lost = dataclasses.replace(AcoHan(), max_steps=2)
     hybrid = Hybrid(iterations=5)
@@ -109,9 +109,9 @@ def test_a_bare_grid_is_planned_on_its_free_cells() -> None:
     assert by_hand <= result.length <= 1.02 * by_hand  # type: ignore[operator]
 
 
-def test_the_colony_must_be_one() -> None:
-    with pytest.raises(InputError, match="colony: must be an ant planner, one of aco-han"):
-        solve(single(), colony="astar")
-    with pytest.raises(InputError, match="aco-han"):
-        solve(single(), colony="aco-ham")
+def test_the_colony_is_an_ant_planner_by_name() -> None:
+    with pytest.raises(InputError, match=r"planner\.colony: must be an ant planner, one of aco-han, .*; got 'astar'"):
+        load_planner("hybrid", colony="astar")
+    with pytest.raises(ValueError, match=r"^colony: must be an ant planner, one of aco-han, .*; got 'aco-ham'"):
+        Hybrid(colony="aco-ham")
     assert load_planner("hybrid", colony="aco-han-elite").plan(single(), np.random.default_rng(0)).solved

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from antdrive.planners import AStar, Query, path_cost
-from antdrive.planners.anyangle.lines import cells_along, cells_under, clear_line, ends
+from antdrive.planners.anyangle.lines import cells_along, cells_under, clear_line, polyline_length, route_ends
 from antdrive.worlds import DIRECTIONS, Disc, Grid, Task, World, rasterise, segment_clearance
 from antdrive.worlds.plane import polyline_length
 from tests.planners.worlds_to_solve import catalogue, optimum, random_query, sealed
@@ -33,7 +33,7 @@ def picture(*rows: str) -> Query:
 
 
 @given(st.lists(st.tuples(coordinate, coordinate), min_size=1, max_size=5))
-def test_fractional_cells_are_the_way_back_from_metres(points: list[tuple[float, float]]) -> None:
+def test_fractional_is_the_inverse_of_xy(points: list[tuple[float, float]]) -> None:
     grid = Grid.from_free(np.ones((4, 5)), cell=0.3, origin=(-1.0, 2.0))
     np.testing.assert_allclose(grid.xy(grid.fractional(points)), points, atol=1e-12)
     np.testing.assert_allclose(grid.fractional(grid.xy([(2, 3)])), [(2, 3)], atol=1e-12)
@@ -51,7 +51,7 @@ def test_contact_with_a_disc_or_a_wall_is_too_close() -> None:
     assert clear_line(query, (0.5001, 1), (0.5001, 9))
 
 
-def test_a_clear_line_is_one_with_more_clearance_than_the_inflation() -> None:
+def test_a_line_is_clear_if_its_clearance_exceeds_the_inflation() -> None:
     rng = np.random.default_rng(3)
     query = catalogue()["forest"]
     assert query.task is not None
@@ -62,7 +62,7 @@ def test_a_clear_line_is_one_with_more_clearance_than_the_inflation() -> None:
     assert found == list(room > query.grid.inflate)
 
 
-def test_on_a_bare_grid_a_line_touches_no_blocked_cell_be_it_by_a_corner() -> None:
+def test_on_a_bare_grid_a_clear_line_touches_no_blocked_cell_not_even_at_a_corner() -> None:
     query = picture(".....", "..#..", ".....")
     assert clear_line(query, (0, 0), (4, 0))
     assert clear_line(query, (0, 0), (1.4, 2))
@@ -94,28 +94,28 @@ def task_query(start: tuple[float, float], goal: tuple[float, float], tolerance:
     return Query.between(rasterise(world, 0.5, 0.4), task)
 
 
-def test_ends_are_the_exact_ones_or_centres_of_cells() -> None:
-    assert ends(task_query((1.1, 5.0), (9.0, 5.1)))[:2] == ((1.1, 5.0), (9.0, 5.1))
+def test_ends_are_those_of_the_task_or_the_centres_of_cells() -> None:
+    assert route_ends(task_query((1.1, 5.0), (9.0, 5.1)))[:2] == ((1.1, 5.0), (9.0, 5.1))
     bare = picture("...", "...")
-    assert ends(bare) == ((0.0, 0.0), (2.0, 1.0), (), ())
+    assert route_ends(bare) == ((0.0, 0.0), (2.0, 1.0), (), ())
 
 
-def test_ends_without_room_are_passed_through_the_centres_of_their_cells() -> None:
+def test_ends_without_room_are_replaced_by_the_centres_of_their_cells() -> None:
     query = task_query((2.6, 2.0), (7.4, 7.8), tolerance=0.8)
-    way = ends(query)
-    np.testing.assert_allclose([way.first, way.last], query.grid.xy([query.start, query.goal]))
-    assert way.before == ((2.6, 2.0),)
-    assert way.after == ()
-    assert len(way.joined([way.first, way.last])) == 3
+    ends = route_ends(query)
+    np.testing.assert_allclose([ends.start, ends.goal], query.grid.xy([query.start, query.goal]))
+    assert ends.lead_in == ((2.6, 2.0),)
+    assert ends.lead_out == ()
+    assert len(ends.with_leads([ends.start, ends.goal])) == 3
 
 
-def test_a_goal_that_just_touches_is_still_driven_to() -> None:
+def test_a_goal_with_just_the_clearance_is_reached() -> None:
     goal = (7.1 + 2e-10, 8.0)
     query = task_query((1.0, 5.0), goal)
     assert query.task is not None
-    way = ends(query)
-    assert way.after == (goal,)
-    assert ends(query, touching=True).last == goal
+    ends = route_ends(query)
+    assert ends.lead_out == (goal,)
+    assert route_ends(query, touching=True).goal == goal
 
 
 # -- cells beside a line
@@ -130,7 +130,7 @@ def test_cells_along_a_path_are_allowed_moves_close_to_it(world: str) -> None:
     assert path_cost(along, query.grid.cell) == pytest.approx(optimum(query))
 
 
-def test_cells_stay_on_the_side_that_the_line_takes() -> None:
+def test_cells_pass_obstacles_on_the_same_side_as_the_line() -> None:
     query = picture(*["." * 21] * 8, "." * 3 + "#" * 15 + "." * 3, *["." * 21] * 8)
     for row in (2.0, 14.0):
         along = cells_along(query, [(0, 0), (row, 1), (row, 19), (16, 20)])
@@ -138,13 +138,13 @@ def test_cells_stay_on_the_side_that_the_line_takes() -> None:
         assert {int(r) for r, c in along if c == 10} <= set(range(int(row) - 1, int(row) + 2))
 
 
-def test_a_corridor_widens_until_it_holds_a_path() -> None:
+def test_the_corridor_widens_until_it_contains_a_path() -> None:
     query = picture("....#....", "....#....", "....#....", ".........")
     assert is_a_path(query, cells_along(query, [(0, 0), (0, 8), (3, 8)]))
     assert len(cells_along(sealed(), [(1, 1), (6, 6)])) == 0
 
 
-def test_cells_under_a_line_are_neighbours_and_need_not_be_free() -> None:
+def test_cells_under_a_line_are_consecutive_neighbours_and_need_not_be_free() -> None:
     query = sealed()
     under = cells_under(query, [(1.2, 0.8), (6.0, 3.0), (6.0, 6.0)])
     assert tuple(under[0]) == query.start

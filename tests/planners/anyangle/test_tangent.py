@@ -1,4 +1,4 @@
-"""The exact shortest path among discs, against closed forms and against polygons that share no code with it."""
+"""The exact shortest path among discs, compared with closed forms and with an oracle of polygons."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def random_discs(rng: np.random.Generator, count: int) -> list[tuple[float, floa
     return [d for d in discs if min(math.dist(d[:2], end) for end in ((0.5, 0.5), (9.5, 9.5))) > d[2] + 0.05]
 
 
-def test_length_lies_between_the_bounds_of_polygons() -> None:
+def test_the_length_lies_between_those_among_inner_and_outer_polygons() -> None:
     rng = np.random.default_rng(7)
     solved = sealed = 0
     for count in (1, 2, 3, 4, 5, 6, 8, 10, 12, 14) * 3:
@@ -83,10 +83,10 @@ def test_length_lies_between_the_bounds_of_polygons() -> None:
     assert sealed >= 2
 
 
-# -- worlds worked by hand
+# -- worlds worked out by hand
 
 
-def test_one_disc_has_its_closed_form() -> None:
+def test_the_path_around_one_disc_has_the_closed_form() -> None:
     """The radius-5 world of Han's thesis (2007): 30.071, where his genetic algorithm reached 33.1798."""
     found = shortest([(10, 10, 5)], BOX, 0.0, (0, 0), (20, 20))
     to_centre = math.hypot(10, 10)
@@ -97,7 +97,7 @@ def test_one_disc_has_its_closed_form() -> None:
     assert [type(piece) for piece in found.pieces] == [Line, Arc, Line]
 
 
-def test_two_overlapping_discs_are_passed_over_their_outer_tangent() -> None:
+def test_two_overlapping_discs_are_passed_along_their_outer_tangent() -> None:
     found = shortest([(-1, 0, 1.5), (1, 0, 1.5)], WIDE, 0.0, (-5, 0), (5, 0))
     tilt = math.acos(1.5 / 4)
     by_hand = 2 * math.sqrt(16 - 2.25) + 2 * 1.5 * (math.pi / 2 - tilt) + 2
@@ -105,7 +105,7 @@ def test_two_overlapping_discs_are_passed_over_their_outer_tangent() -> None:
     assert found.length == pytest.approx(by_hand, abs=1e-12)
 
 
-def test_two_discs_are_passed_between_them_by_an_inner_tangent() -> None:
+def test_the_path_between_two_discs_follows_their_inner_tangent() -> None:
     start, goal = (-1.0, 0.0), (5.0, 0.0)  # each on the rim of a disc, on opposite sides of the gap
     found = shortest([(0, 0, 1), (4, 0, 1)], WIDE, 0.0, start, goal)
     across = shortest([(0, 0, 1), (4, 0, 1)], WIDE, 0.0, (0, 1), (4, -1))
@@ -134,7 +134,7 @@ def test_a_straight_line_that_only_grazes_discs_is_the_path() -> None:
     assert found.length == pytest.approx(10, abs=1e-9)
 
 
-def test_a_disc_in_the_wall_is_passed_on_the_open_side_alone() -> None:
+def test_a_disc_that_overlaps_a_wall_is_passed_on_its_open_side() -> None:
     box = (0.0, 0.0, 10.0, 4.0)
     found = shortest([(5, 0.5, 1.5)], box, 0.0, (1, 0.2), (9, 0.2))
     assert found is not None
@@ -149,16 +149,21 @@ def test_an_end_without_the_clearance_has_no_path() -> None:
     assert shortest([], (0, 0, 1, 10), 0.6, (0.5, 5), (0.5, 6)) is None
 
 
-def test_ends_that_are_one_point_have_a_path_of_no_length() -> None:
+def test_the_path_from_a_point_to_itself_has_length_zero() -> None:
     found = shortest([(5, 5, 1)], WIDE, 0.1, (1, 1), (1, 1))
     assert found is not None
     assert found.length == 0.0
     assert len(found.polyline(1e-3, [(5, 5, 1)], WIDE, 0.1)) == 2
 
 
-def test_discs_within_others_and_copies_change_nothing() -> None:
+def test_duplicate_and_nested_discs_do_not_change_the_path() -> None:
     discs = [(3.0, 3.0, 1.5), (6.0, 7.0, 2.0)]
-    more = [*discs, discs[0], (3.2, 3.1, 0.4), (6.0, 8.0, 1.0)]  # a copy, one within, one touching from within
+    more = [
+        *discs,
+        discs[0],
+        (3.2, 3.1, 0.4),
+        (6.0, 8.0, 1.0),
+    ]  # a copy, one inside another, one touching another from inside
     lengths = {
         round(shortest(order, BOX, 0.1, (0, 0), (9, 9)).length, 9)  # type: ignore[union-attr]
         for order in (discs, more, more[::-1])
@@ -182,7 +187,7 @@ def length(discs: Discs, start: tuple[float, float] = START, goal: tuple[float, 
 
 @settings(max_examples=150)
 @given(some_discs)
-def test_length_ignores_which_end_is_the_start_and_how_the_world_is_turned(discs: Discs) -> None:
+def test_the_length_does_not_change_when_ends_are_swapped_or_the_world_is_turned(discs: Discs) -> None:
     expected = pytest.approx(length(discs), abs=1e-7)
     assert length(discs, GOAL, START) == expected
     for turn in (
@@ -196,7 +201,9 @@ def test_length_ignores_which_end_is_the_start_and_how_the_world_is_turned(discs
 
 @settings(max_examples=100)
 @given(some_discs, st.floats(0, math.tau), st.floats(-50, 50), st.floats(-50, 50))
-def test_length_ignores_a_rigid_motion_far_from_walls(discs: Discs, angle: float, dx: float, dy: float) -> None:
+def test_the_length_does_not_change_under_a_rigid_motion_far_from_walls(
+    discs: Discs, angle: float, dx: float, dy: float
+) -> None:
     assume(not nearly_touching(discs, 0.1))
 
     def moved(x: float, y: float) -> tuple[float, float]:
@@ -255,7 +262,7 @@ def test_no_clear_polyline_is_shorter(discs: Discs, via: list[tuple[float, float
 
 
 @pytest.mark.parametrize("world", catalogue())
-def test_the_planner_is_below_the_grid_and_keeps_the_clearance(world: str) -> None:
+def test_the_path_is_no_longer_than_that_on_the_grid_and_keeps_the_clearance(world: str) -> None:
     query = catalogue()[world]
     assert query.task is not None
     result = Tangent().plan(query, RNG)
@@ -339,8 +346,8 @@ def test_a_forest_of_400_discs_is_quick() -> None:
     assert seconds < 0.25
 
 
-def test_discs_on_a_lattice_that_all_touch_are_no_trouble() -> None:
-    """As the worlds of the BARN set: a lattice whose discs touch, so that rims meet in threes and fours."""
+def test_a_lattice_of_discs_that_all_touch_is_solved() -> None:
+    """As in the worlds of the BARN set, three or four rims meet in one point."""
     rng: npt.NDArray[np.bool_] = np.random.default_rng(5).random((30, 30)) < 0.25
     rng[:4, :4] = rng[-4:, -4:] = False
     discs = [(0.15 * c, 0.15 * r, 0.075) for r, c in np.argwhere(rng)]

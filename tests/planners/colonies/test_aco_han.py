@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 
 from antdrive.planners import AcoHan, Iteration, PlanStatus, Progress, Query, keep_best, watch
-from antdrive.planners.colonies.colony import ColonyGraph, IterationState, Walks, _Walk, without_loops
+from antdrive.planners.colonies.colony import ColonyGraph, IterationState, TourConstruction, Walks, without_loops
 from antdrive.worlds import Floats, Grid
 from tests.planners.worlds_to_solve import catalogue
 
 OPEN = Query(Grid.from_free(np.ones((3, 4))), (0, 0), (2, 3))
 
 
-def walks(ground: ColonyGraph, *paths: list[tuple[int, int]]) -> Walks:
-    """Walks that all arrived, with lengths by plain Python."""
-    cols = ground.shape[1]
+def walks(graph: ColonyGraph, *paths: list[tuple[int, int]]) -> Walks:
+    """Walks that all arrived; their lengths are summed in plain Python."""
+    cols = graph.shape[1]
     cells = np.zeros((len(paths), max(map(len, paths))), dtype=np.int32)
     for a, path in enumerate(paths):
         cells[a, : len(path)] = [r * cols + c for r, c in path]
@@ -24,10 +24,10 @@ def walks(ground: ColonyGraph, *paths: list[tuple[int, int]]) -> Walks:
     return Walks(cells, np.array([len(p) for p in paths]), np.array(lengths))
 
 
-def season(ground: ColonyGraph, walked: Walks, best: Walks) -> IterationState:
-    """The first iteration, with these walks."""
-    tours = without_loops(walked, ground)
-    return IterationState(0, ground, walked, tours, None, best, 0, np.random.default_rng(0))
+def state(graph: ColonyGraph, walked: Walks, best: Walks) -> IterationState:
+    """The first iteration of a colony, with these walks."""
+    tours = without_loops(walked, graph)
+    return IterationState(0, graph, walked, tours, None, best, 0, np.random.default_rng(0))
 
 
 DIRECT = [(0, 0), (1, 1), (2, 2), (2, 3)]
@@ -36,11 +36,11 @@ ROUND = [(0, 0), (0, 1), (0, 2), (0, 1), (1, 2), (2, 3)]  # with a loop
 
 @pytest.mark.parametrize("elitism", [0, 7])
 def test_trails_follow_equations_4_2_2_to_4_2_4(elitism: int) -> None:
-    ground, planner = ColonyGraph.of(OPEN), AcoHan(evaporation=0.25, deposit=2.0, elitism=elitism)
-    both = walks(ground, DIRECT, ROUND)
+    graph, planner = ColonyGraph.of(OPEN), AcoHan(evaporation=0.25, deposit=2.0, elitism=elitism)
+    both = walks(graph, DIRECT, ROUND)
     before = np.linspace(0.1, 1.2, 12)
     trail = before.copy()
-    planner.update(trail, season(ground, both, both.only(0)))
+    planner.update(trail, state(graph, both, both.only(0)))
 
     expected = 0.75 * before.reshape(3, 4)
     direct, wander = 2 * math.sqrt(2) + 1, 3 + 2 * math.sqrt(2)
@@ -52,10 +52,10 @@ def test_trails_follow_equations_4_2_2_to_4_2_4(elitism: int) -> None:
 
 
 def test_the_listing_evaporates_only_where_ants_deposit() -> None:
-    ground, planner = ColonyGraph.of(OPEN), AcoHan(evaporation=0.25, deposit=5.0, form="listing")
-    one = walks(ground, DIRECT)
+    graph, planner = ColonyGraph.of(OPEN), AcoHan(evaporation=0.25, deposit=5.0, form="listing")
+    one = walks(graph, DIRECT)
     trail = np.ones(12)
-    planner.update(trail, season(ground, one, one))
+    planner.update(trail, state(graph, one, one))
     expected = np.ones((3, 4))
     for cell in DIRECT:
         expected[cell] = 0.75 + 5.0 / (2 * math.sqrt(2) + 1)
@@ -63,10 +63,10 @@ def test_the_listing_evaporates_only_where_ants_deposit() -> None:
 
 
 def test_weights_follow_equation_4_2_1() -> None:
-    ground, planner = ColonyGraph.of(OPEN), AcoHan(attraction=0.5, least=0.0)
+    graph, planner = ColonyGraph.of(OPEN), AcoHan(attraction=0.5, min_weight=0.0)
     trail = np.arange(12.0)
     weights = np.zeros((12, 8))
-    planner.weigh(ground, trail, planner.desire(ground), weights)
+    planner.choice_weights(graph, trail, planner.heuristic_values(graph), weights)
     # From cell (1, 1) = 5 to the goal (2, 3): all eight neighbours are allowed.
     steps = [(0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1)]
     tau = np.array([trail[(1 + r) * 4 + 1 + c] for r, c in steps])
@@ -77,19 +77,19 @@ def test_weights_follow_equation_4_2_1() -> None:
 
 
 def test_the_listing_adds_raw_pheromone_to_one_fixed_direction() -> None:
-    ground, planner = ColonyGraph.of(OPEN), AcoHan(form="listing", least=0.0)
+    graph, planner = ColonyGraph.of(OPEN), AcoHan(form="listing", min_weight=0.0)
     weights = np.zeros((12, 8))
-    planner.weigh(ground, np.full(12, 3.0), planner.desire(ground), weights)
+    planner.choice_weights(graph, np.full(12, 3.0), planner.heuristic_values(graph), weights)
     north_east = (1 * 2 + 1 * 3) / math.hypot(2, 3)
     assert weights[0, 1] == pytest.approx(3.0 + north_east)
     assert weights[5, 1] == pytest.approx(3.0 + north_east)
-    assert weights[5, 5] == pytest.approx(3.0)  # backwards: no pull, but the trail
+    assert weights[5, 5] == pytest.approx(3.0)  # away from the goal: the trail alone
 
 
-def test_loops_are_cut_out_of_a_walk() -> None:
-    ground = ColonyGraph.of(OPEN)
-    tours = without_loops(walks(ground, DIRECT, ROUND), ground)
-    assert ground.cells(tours.cells[1, : tours.sizes[1]]).tolist() == [[0, 0], [0, 1], [1, 2], [2, 3]]
+def test_without_loops_cuts_loops_out_of_a_walk() -> None:
+    graph = ColonyGraph.of(OPEN)
+    tours = without_loops(walks(graph, DIRECT, ROUND), graph)
+    assert graph.cells(tours.cells[1, : tours.sizes[1]]).tolist() == [[0, 0], [0, 1], [1, 2], [2, 3]]
     assert tours.lengths[1] == pytest.approx(1 + 2 * math.sqrt(2))
     assert tours.sizes[0] == len(DIRECT)
 
@@ -100,7 +100,7 @@ def test_a_returned_path_visits_no_cell_twice(world: str) -> None:
     assert len({tuple(c) for c in result.cells}) == len(result.cells)
 
 
-def test_history_tells_each_iteration() -> None:
+def test_the_history_records_every_iteration() -> None:
     query = catalogue()["forest"]
     result = AcoHan(ants=50, iterations=8).plan(query, np.random.default_rng(0))
     history = result.history
@@ -116,8 +116,8 @@ def test_history_tells_each_iteration() -> None:
     assert (result.field[~query.grid.free] == 0).all()
 
 
-def test_elitism_gathers_the_trail_on_the_best_path() -> None:
-    """The thesis' discussion of its experiments 1 to 4: a narrow region is reinforced."""
+def test_elitism_concentrates_pheromone_on_the_best_path() -> None:
+    """As the thesis observes in its experiments 1 to 4: pheromone gathers in a narrow region."""
     query = catalogue()["forest"]
 
     def share_on_path(elitism: int) -> float:
@@ -131,15 +131,15 @@ def test_elitism_gathers_the_trail_on_the_best_path() -> None:
     assert share_on_path(100) > 1.3 * share_on_path(0)
 
 
-def test_the_equation_alone_leaves_no_dead_end_and_a_least_weight_does() -> None:
+def test_by_the_equation_alone_no_ant_leaves_a_dead_end_but_a_least_weight_lets_them() -> None:
     query = catalogue()["trap"]
-    literal = AcoHan(ants=50, iterations=3, least=0.0).plan(query, np.random.default_rng(0))
+    literal = AcoHan(ants=50, iterations=3, min_weight=0.0).plan(query, np.random.default_rng(0))
     assert literal.status is PlanStatus.STOPPED
     assert "nothing arrived within 3 iterations" in literal.reason
     assert AcoHan(ants=50, iterations=3).plan(query, np.random.default_rng(0)).solved
 
 
-def test_ants_give_up_after_max_steps() -> None:
+def test_ants_give_up_after_max_steps_and_leave_no_path() -> None:
     query = catalogue()["empty"]
     result = AcoHan(ants=10, iterations=2, max_steps=3).plan(query, np.random.default_rng(0))
     assert result.status is PlanStatus.STOPPED
@@ -147,20 +147,22 @@ def test_ants_give_up_after_max_steps() -> None:
     assert np.isinf(result.history.best).all()
 
 
-def test_an_ant_draws_the_same_numbers_whoever_walks_with_it() -> None:
+def test_an_ant_draws_the_same_random_numbers_in_a_colony_of_any_size() -> None:
     query = catalogue()["forest"]
-    ground = ColonyGraph.of(query)
+    graph = ColonyGraph.of(query)
 
     def lengths(ants: int) -> Floats:
         planner = AcoHan(ants=ants)
-        walk = _Walk.of(planner, ground)
-        planner.weigh(ground, np.zeros(len(ground.mask)), planner.desire(ground), walk.weights[0])
-        return walk.go(np.random.default_rng(4))[0].lengths
+        construction = TourConstruction.of(planner, graph)
+        planner.choice_weights(
+            graph, np.zeros(len(graph.mask)), planner.heuristic_values(graph), construction.weights[0]
+        )
+        return construction.construct(np.random.default_rng(4))[0].lengths
 
     np.testing.assert_array_equal(lengths(5), lengths(9)[:5])
 
 
-def test_a_time_budget_ends_early_and_says_so() -> None:
+def test_a_time_budget_ends_the_plan_early_with_a_reason() -> None:
     planner = AcoHan(ants=20, iterations=10_000, time_budget=0.05)
     result = planner.plan(catalogue()["empty"], np.random.default_rng(0))
     assert result.solved
@@ -168,33 +170,33 @@ def test_a_time_budget_ends_early_and_says_so() -> None:
     assert "time budget of 0.05 s" in result.reason
 
 
-def test_watchers_see_every_iteration() -> None:
+def test_a_watcher_is_called_after_every_iteration() -> None:
     seen: list[Progress] = []
     planner = AcoHan(ants=20, iterations=4)
     with watch(seen.append):
         result = planner.plan(catalogue()["empty"], np.random.default_rng(0))
-    planner.plan(catalogue()["empty"], np.random.default_rng(0))  # not watched
+    planner.plan(catalogue()["empty"], np.random.default_rng(0))  # outside the block, so not watched
     assert [p.done for p in seen] == [1, 2, 3, 4]
     assert seen[-1].total == 4
     assert seen[-1].best == pytest.approx(result.cost)
 
 
 def interrupt_after(count: int) -> list[Progress]:
-    class Impatient(list[Progress]):
+    class Interrupting(list[Progress]):
         def append(self, state: Progress) -> None:
             super().append(state)
             if state.done == count:
                 raise KeyboardInterrupt
 
-    return Impatient()
+    return Interrupting()
 
 
-def test_ctrl_c_is_raised_where_nobody_asked_to_keep_the_best() -> None:
+def test_ctrl_c_is_raised_outside_keep_best() -> None:
     with watch(interrupt_after(3).append), pytest.raises(KeyboardInterrupt):
         AcoHan(ants=20, iterations=50).plan(catalogue()["empty"], np.random.default_rng(0))
 
 
-def test_ctrl_c_returns_the_best_so_far() -> None:
+def test_ctrl_c_within_keep_best_returns_the_best_path_so_far() -> None:
     with watch(interrupt_after(3).append), keep_best():
         result = AcoHan(ants=20, iterations=50).plan(catalogue()["empty"], np.random.default_rng(0))
     assert result.status is PlanStatus.STOPPED
@@ -205,14 +207,14 @@ def test_ctrl_c_returns_the_best_so_far() -> None:
     assert len(result.history) == 3
 
 
-def test_ctrl_c_before_any_path_is_stopped() -> None:
+def test_ctrl_c_before_any_ant_arrives_is_stopped_without_a_path() -> None:
     with watch(interrupt_after(1).append), keep_best():
         result = AcoHan(ants=5, max_steps=2).plan(catalogue()["empty"], np.random.default_rng(0))
     assert result.status is PlanStatus.STOPPED
     assert "interrupted" in result.reason
 
 
-def test_iterations_can_be_followed_one_by_one() -> None:
+def test_iterate_yields_one_iteration_at_a_time() -> None:
     states = AcoHan(ants=20).iterate(catalogue()["empty"], np.random.default_rng(0))
     first = next(states)
     assert isinstance(first, Iteration)
@@ -223,7 +225,7 @@ def test_iterations_can_be_followed_one_by_one() -> None:
     ("key", "value"),
     [
         ("ants", 0), ("iterations", 0), ("max_steps", 0), ("evaporation", 1.5), ("deposit", 0.0),
-        ("attraction", -1.0), ("elitism", -1), ("form", "song"), ("time_budget", 0.0), ("least", math.nan),
+        ("attraction", -1.0), ("elitism", -1), ("form", "song"), ("time_budget", 0.0), ("min_weight", math.nan),
     ],
 )  # fmt: skip
 def test_options_out_of_range_are_refused_by_name(key: str, value: object) -> None:

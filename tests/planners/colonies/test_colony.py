@@ -1,4 +1,4 @@
-"""Walking, cutting tours short, trails on arcs: what the ant planners share, and the rules of each."""
+"""What the ant planners share (walking, cutting tours short, trails on arcs), and the rules of each of them."""
 
 from __future__ import annotations
 
@@ -24,39 +24,46 @@ from antdrive.planners import (
     Query,
     load_planner,
 )
-from antdrive.planners.colonies import _kernels_colony as _kernels_ants
+from antdrive.planners.colonies import _kernels_colony
 from antdrive.planners.colonies.ant_system import ibraheem_beta
-from antdrive.planners.colonies.colony import ChoiceContext, ColonyGraph, IterationState, Walks, _Walk, cut_short
-from antdrive.planners.colonies.mmas import best_every
+from antdrive.planners.colonies.colony import (
+    ChoiceContext,
+    ColonyGraph,
+    IterationState,
+    TourConstruction,
+    Walks,
+    cut_short,
+)
+from antdrive.planners.colonies.mmas import best_so_far_every
 from antdrive.worlds import DIRECTIONS, Floats, Grid
 from tests.planners.worlds_to_solve import catalogue, optimum, random_query
 
 OPEN = Query(Grid.from_free(np.ones((3, 4))), (0, 0), (2, 3))
-GROUND = ColonyGraph.of(OPEN)
+GRAPH = ColonyGraph.of(OPEN)
 DIRECT = [(0, 0), (1, 1), (2, 2), (2, 3)]
 BEND = [(0, 0), (0, 1), (1, 2), (1, 3), (2, 3)]
 
 
-def walks(*paths: list[tuple[int, int]], ground: ColonyGraph = GROUND) -> Walks:
-    """Walks with lengths by plain Python; an empty one did not arrive."""
+def walks(*paths: list[tuple[int, int]], graph: ColonyGraph = GRAPH) -> Walks:
+    """Walks whose lengths are summed in plain Python; an empty path is an ant that did not arrive."""
     cells = np.zeros((len(paths), max(map(len, paths))), dtype=np.int32)
     for a, path in enumerate(paths):
-        cells[a, : len(path)] = [r * ground.shape[1] + c for r, c in path]
+        cells[a, : len(path)] = [r * graph.shape[1] + c for r, c in path]
     lengths = [sum(math.dist(p, q) for p, q in itertools.pairwise(path)) if path else math.inf for path in paths]
     return Walks(cells, np.array([len(p) for p in paths]), np.array(lengths))
 
 
-def season(tours: Walks, best: Walks | None = None, number: int = 1, since: int = 0) -> IterationState:
-    return IterationState(number, GROUND, tours, tours, None, best, since, np.random.default_rng(0))
+def state(tours: Walks, best: Walks | None = None, number: int = 1, since: int = 0) -> IterationState:
+    return IterationState(number, GRAPH, tours, tours, None, best, since, np.random.default_rng(0))
 
 
 def arcs(path: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    """(cell, move) of each step."""
+    """The arcs of a path, as (cell, move)."""
     return [(r * 4 + c, DIRECTIONS.index((q - r, d - c))) for (r, c), (q, d) in itertools.pairwise(path)]
 
 
 def grid_query(size: int, blocked: float, seed: int) -> Query:
-    """Corner to corner over a random picture that can be crossed."""
+    """A query from corner to corner of a random grid that has a path."""
     rng = np.random.default_rng(seed)
     while True:
         free = rng.random((size, size)) >= blocked
@@ -73,39 +80,44 @@ def solve(planner: Colony, query: Query, seed: int = 0) -> PlanResult:
 # Walking
 
 
-def test_the_wheel_gives_each_move_its_share() -> None:
-    ground = ColonyGraph.of(Query(Grid.from_free(np.ones((3, 3))), (1, 1), (0, 0)))
+def test_moves_are_chosen_in_proportion_to_their_weights() -> None:
+    graph = ColonyGraph.of(Query(Grid.from_free(np.ones((3, 3))), (1, 1), (0, 0)))
     weights = np.zeros((9, 8), dtype=np.float32)
-    weights[4] = [1, 2, 0, 4, 3, 0, 6, 5]  # from the middle cell; moves 2 and 5 attract nobody
+    weights[4] = [1, 2, 0, 4, 3, 0, 6, 5]  # in the middle cell; moves 2 and 5 are not allowed
     count = 40_000
     seeds = np.random.default_rng(1).bit_generator.random_raw(count).astype(np.uint64)
     cells, sizes = np.zeros((count, 2), dtype=np.int32), np.zeros(count, dtype=np.int64)
-    _kernels_ants.walk_ants(
-        weights, ground.mask, ground.offset, 4, 0, 1, 0.0, False, seeds, cells, sizes, np.zeros(count)
+    _kernels_colony.walk_ants(
+        weights, graph.mask, graph.offset, 4, 0, 1, 0.0, False, seeds, cells, sizes, np.zeros(count)
     )
-    went = np.array([(cells[:, 1] == 4 + step).mean() for step in ground.offset])
+    went = np.array([(cells[:, 1] == 4 + step).mean() for step in graph.offset])
     np.testing.assert_allclose(went, weights[4] / weights[4].sum(), atol=0.01)
     assert went[[2, 5]].max() == 0
 
 
-@pytest.mark.parametrize("retreat", [False, True])
-def test_ants_walk_allowed_moves_and_never_come_back(retreat: bool) -> None:
+@pytest.mark.parametrize("backtrack", [False, True])
+def test_ants_walk_along_allowed_moves_and_visit_no_cell_twice(backtrack: bool) -> None:
     query = catalogue()["forest"]
-    ground, planner = ColonyGraph.of(query), AntSystem(ants=200, retreat=retreat)
-    walk = _Walk.of(planner, ground)
-    planner.weigh(ground, planner.lay(ground, np.random.default_rng(0)), planner.desire(ground), walk.weights[0])
-    done, steps = walk.go(np.random.default_rng(0))
+    graph, planner = ColonyGraph.of(query), AntSystem(ants=200, backtrack=backtrack)
+    construction = TourConstruction.of(planner, graph)
+    planner.choice_weights(
+        graph,
+        planner.initial_trail(graph, np.random.default_rng(0)),
+        planner.heuristic_values(graph),
+        construction.weights[0],
+    )
+    done, steps = construction.construct(np.random.default_rng(0))
     for cells, size in zip(done.cells, done.sizes, strict=True):
-        path = ground.cells(cells[:size])
+        path = graph.cells(cells[:size])
         assert len(set(cells[:size].tolist())) == size
         for here, step in zip(path, np.diff(path, axis=0), strict=False):
             assert int(query.grid.moves[tuple(here)]) >> DIRECTIONS.index(tuple(step)) & 1
     assert steps >= done.sizes.sum() - 200
-    assert done.sizes.min() > 0 if retreat else done.sizes.min() == 0
+    assert done.sizes.min() > 0 if backtrack else done.sizes.min() == 0
 
 
 @pytest.mark.parametrize("planner", [AntSystem(beta=20.0), ExploringAnts(beta=0.0, explorers=3)])
-def test_retreat_leaves_a_trap_in_which_ants_die(planner: Colony) -> None:
+def test_backtracking_ants_leave_a_trap_in_which_others_die(planner: Colony) -> None:
     size = 24
     free = np.ones((size, size), dtype=np.bool_)
     free[::2, 4:20] = False
@@ -117,12 +129,12 @@ def test_retreat_leaves_a_trap_in_which_ants_die(planner: Colony) -> None:
     assert lost.status is PlanStatus.STOPPED
     assert "nothing arrived within 2 iterations" in lost.reason
     assert not planner.complete
-    found = replace(planner, ants=5, iterations=2, retreat=True)
+    found = replace(planner, ants=5, iterations=2, backtrack=True)
     assert found.complete
     assert solve(found, query).solved
 
 
-def test_ants_that_take_too_long_leave_nothing() -> None:
+def test_ants_that_give_up_deposit_nothing() -> None:
     planner = AntSystem(ants=10, iterations=2, max_steps=3, evaporation=0.5, initial=4.0)
     result = solve(planner, catalogue()["empty"])
     assert result.status is PlanStatus.STOPPED
@@ -144,32 +156,34 @@ def test_threads_do_not_change_the_plan(planner: Colony, threads: int) -> None:
 
 
 @pytest.mark.parametrize("world", ["trap", "forest"])
-@pytest.mark.parametrize("name", [name for name, planner in PLANNERS.items() if hasattr(planner, "retreat")])
-def test_every_ant_planner_arrives_that_retreats_and_cuts_short(name: str, world: str) -> None:
-    options = {"ants": 5, "iterations": 3, "retreat": True, "shortcut": True}
+@pytest.mark.parametrize("name", [name for name, planner in PLANNERS.items() if hasattr(planner, "backtrack")])
+def test_every_ant_planner_arrives_with_backtrack_and_shortcut(name: str, world: str) -> None:
+    options = {"ants": 5, "iterations": 3, "backtrack": True, "shortcut": True}
     query = catalogue()[world]
     result = load_planner(name, **options).plan(query, np.random.default_rng(0))
     assert result.solved
-    ground = ColonyGraph.of(query)
-    flat = (result.cells @ [ground.shape[1], 1]).astype(np.int32)[np.newaxis]
-    again = cut_short(Walks(flat, np.array([flat.size]), np.array([result.cost])), ground)
-    assert again.sizes[0] == flat.size  # nothing is left to be cut
+    graph = ColonyGraph.of(query)
+    flat = (result.cells @ [graph.shape[1], 1]).astype(np.int32)[np.newaxis]
+    again = cut_short(Walks(flat, np.array([flat.size]), np.array([result.cost])), graph)
+    assert again.sizes[0] == flat.size  # the path cannot be cut any shorter
 
 
 # Cutting short
 
 
 @given(st.integers(0, 10_000))
-def test_a_tour_cut_short_is_legal_and_never_longer(seed: int) -> None:
+def test_a_tour_cut_short_has_allowed_moves_and_is_never_longer(seed: int) -> None:
     rng = np.random.default_rng(seed)
     query = random_query(rng)
-    ground, planner = ColonyGraph.of(query), AntSystem(ants=4, beta=0.0, retreat=True)
+    graph, planner = ColonyGraph.of(query), AntSystem(ants=4, beta=0.0, backtrack=True)
     if query.start == query.goal:
         return
-    walk = _Walk.of(planner, ground)
-    planner.weigh(ground, planner.lay(ground, rng), planner.desire(ground), walk.weights[0])
-    before, _ = walk.go(rng)
-    after = cut_short(before, ground)
+    construction = TourConstruction.of(planner, graph)
+    planner.choice_weights(
+        graph, planner.initial_trail(graph, rng), planner.heuristic_values(graph), construction.weights[0]
+    )
+    before, _ = construction.construct(rng)
+    after = cut_short(before, graph)
     for a in range(len(before)):
         old, new = (w.cells[a, : w.sizes[a]].tolist() for w in (before, after))
         if not old:
@@ -179,16 +193,16 @@ def test_a_tour_cut_short_is_legal_and_never_longer(seed: int) -> None:
         assert after.lengths[a] <= before.lengths[a] + 1e-9
         places = [old.index(cell) for cell in new]
         assert places == sorted(places)
-        near = [{i + int(ground.offset[k]) for k in range(8) if int(ground.mask[i]) >> k & 1} for i in new]
+        near = [{i + int(graph.offset[k]) for k in range(8) if int(graph.mask[i]) >> k & 1} for i in new]
         for here, there, reach in zip(places, places[1:], near, strict=False):
             assert there == max(p for p in range(here + 1, len(old)) if old[p] in reach)
 
 
-def test_a_walk_around_a_corner_is_cut_by_hand() -> None:
+def test_a_walk_around_a_corner_is_cut_as_worked_out_by_hand() -> None:
     detour = [(0, 0), (0, 1), (0, 2), (1, 2), (1, 1), (2, 1), (2, 2), (2, 3)]
-    tours = cut_short(walks(detour), GROUND)
-    # From (0, 0) the walk comes by at (1, 1) last; from there at (2, 2).
-    assert GROUND.cells(tours.cells[0, : tours.sizes[0]]).tolist() == [[0, 0], [1, 1], [2, 2], [2, 3]]
+    tours = cut_short(walks(detour), GRAPH)
+    # The last cell of the walk beside (0, 0) is (1, 1); the last one beside (1, 1) is (2, 2).
+    assert GRAPH.cells(tours.cells[0, : tours.sizes[0]]).tolist() == [[0, 0], [1, 1], [2, 2], [2, 3]]
     assert tours.lengths[0] == pytest.approx(1 + 2 * math.sqrt(2))
 
 
@@ -199,7 +213,7 @@ def test_arcs_evaporate_and_receive_q_over_length() -> None:
     planner = AntSystem(evaporation=0.25, deposit=3.0)
     before = np.linspace(0.1, 2.0, 96).reshape(12, 8)
     trail = before.copy()
-    planner.update(trail, season(walks(DIRECT, BEND, [])))
+    planner.update(trail, state(walks(DIRECT, BEND, [])))
     expected = 0.75 * before
     for path, length in ((DIRECT, 1 + 2 * math.sqrt(2)), (BEND, 3 + math.sqrt(2))):
         for arc in arcs(path):
@@ -212,22 +226,24 @@ def test_weights_are_pheromone_and_heuristic_to_their_powers(heuristic: str) -> 
     planner = AntSystem(alpha=2.0, beta=1.5, heuristic=heuristic)  # type: ignore[arg-type]
     trail = np.random.default_rng(0).uniform(0.1, 2.0, (12, 8))
     weights = np.zeros((12, 8), dtype=np.float32)
-    planner.weigh(GROUND, trail, planner.desire(GROUND), weights)
+    planner.choice_weights(GRAPH, trail, planner.heuristic_values(GRAPH), weights)
     expected = [
         trail[5, k] ** 2
         * (1 / math.hypot(dr, dc) if heuristic == "step" else 1 / math.dist((1 + dr, 1 + dc), (2, 3))) ** 1.5
         for k, (dr, dc) in enumerate(DIRECTIONS)
     ]
     np.testing.assert_allclose(weights[5] / weights[5].sum(), np.array(expected) / sum(expected), rtol=1e-5)
-    assert ((weights > 0) == (GROUND.mask[:, None] >> np.arange(8) & 1)).all()
+    assert ((weights > 0) == (GRAPH.mask[:, None] >> np.arange(8) & 1)).all()
 
 
-def test_a_great_beta_on_a_great_grid_closes_no_move() -> None:
+def test_a_large_beta_on_a_large_grid_underflows_no_weight_to_zero() -> None:
     query = Query(Grid.from_free(np.ones((120, 120))), (0, 0), (119, 119))
-    ground, planner = ColonyGraph.of(query), AntSystem(beta=60.0)
-    weights = np.zeros((len(ground.mask), 8), dtype=np.float32)
-    planner.weigh(ground, planner.lay(ground, np.random.default_rng(0)), planner.desire(ground), weights)
-    assert ((weights > 0) == (ground.mask[:, None] >> np.arange(8) & 1)).all()
+    graph, planner = ColonyGraph.of(query), AntSystem(beta=60.0)
+    weights = np.zeros((len(graph.mask), 8), dtype=np.float32)
+    planner.choice_weights(
+        graph, planner.initial_trail(graph, np.random.default_rng(0)), planner.heuristic_values(graph), weights
+    )
+    assert ((weights > 0) == (graph.mask[:, None] >> np.arange(8) & 1)).all()
     np.testing.assert_allclose(weights.max(axis=1), 1.0, rtol=1e-6)
 
 
@@ -236,128 +252,128 @@ def test_beta_follows_the_rule_of_ibraheem2016() -> None:
     assert ibraheem_beta(40) == pytest.approx(8.8)
 
 
-def test_older_ants_leave_less_by_equation_5() -> None:
-    planner = AgeingAnts(most=2.0, least=1.0)
+def test_older_ants_deposit_less_by_equation_5() -> None:
+    planner = AgeingAnts(q_max=2.0, q_min=1.0)
     rand = np.array([0.0, 0.5, 1.0, 0.2])
     # Q_max - (Q_max - Q_min) / 2 * rand - (Q_max - Q_min) / M * m, not below Q_min
     np.testing.assert_allclose(planner.aged(rand), [1.75, 1.25, 1.0, 1.0])
-    amounts = planner.amounts(season(walks(DIRECT, [], BEND)))
+    amounts = planner.amounts(state(walks(DIRECT, [], BEND)))
     assert amounts[1] == 0
     assert (1.0 / walks(DIRECT, BEND).lengths <= amounts[[0, 2]]).all()
     assert (amounts[[0, 2]] <= 2.0 / walks(DIRECT, BEND).lengths).all()
 
 
-def test_exploratory_ants_shun_what_common_ants_follow() -> None:
+def test_exploratory_ants_avoid_what_common_ants_follow() -> None:
     planner = ExploringAnts()
     trail = np.ones((12, 8))
     trail[5, 1] = 4.0
-    tables = [np.zeros((12, 8), dtype=np.float32) for _ in planner.castes]
-    for caste, table in enumerate(tables):
-        planner.weigh(GROUND, trail, planner.desire(GROUND), table, ChoiceContext(caste))
-    assert planner.castes == (25, 75)
+    tables = [np.zeros((12, 8), dtype=np.float32) for _ in planner.kinds]
+    for kind, table in enumerate(tables):
+        planner.choice_weights(GRAPH, trail, planner.heuristic_values(GRAPH), table, ChoiceContext(kind))
+    assert planner.kinds == (25, 75)
     eta = 1 / math.sqrt(2)
     assert tables[0][5, 1] / tables[0][5, 0] == pytest.approx(4 * eta)  # eq. 1
     assert tables[1][5, 1] / tables[1][5, 0] == pytest.approx(eta / 4)  # eq. 5
 
 
-def test_the_elite_of_an_iteration_leaves_more() -> None:
+def test_the_elite_of_an_iteration_deposits_more() -> None:
     tours = walks(BEND, DIRECT, [])
-    amounts = ExploringAnts(elite=2.0, deposit=5.0).amounts(season(tours))
+    amounts = ExploringAnts(elite=2.0, deposit=5.0).amounts(state(tours))
     np.testing.assert_allclose(amounts, [5 / tours.lengths[0], 3 * 5 / tours.lengths[1], 0])  # eq. 7-8
 
 
 # MAX-MIN ant system (Stützle & Hoos 2000)
 
 
-def test_bounds_by_hand() -> None:
+def test_the_bounds_are_those_worked_out_by_hand() -> None:
     best = walks(DIRECT)
-    least, most = MaxMinAnts(evaporation=0.2, p_best=0.05).bounds(GROUND, best)
-    assert most == pytest.approx(1 / (0.2 * (1 + 2 * math.sqrt(2))))
+    tau_min, tau_max = MaxMinAnts(evaporation=0.2, p_best=0.05).bounds(GRAPH, best)
+    assert tau_max == pytest.approx(1 / (0.2 * (1 + 2 * math.sqrt(2))))
     right = 0.05 ** (1 / 3)
-    options = (4 * 3 + 6 * 5 + 2 * 8) / 12 - 1  # moves per cell, but the one back
-    assert least == pytest.approx(most * (1 - right) / ((options - 1) * right))
+    options = (4 * 3 + 6 * 5 + 2 * 8) / 12 - 1  # moves per cell, without the one back
+    assert tau_min == pytest.approx(tau_max * (1 - right) / ((options - 1) * right))
 
 
 def test_trails_stay_within_their_bounds() -> None:
     @dataclass(frozen=True, kw_only=True)
     class Watched(MaxMinAnts):
-        def update(self, trail: Floats, season: IterationState) -> None:
-            super().update(trail, season)
-            assert season.best is not None
-            least, most = self.bounds(season.ground, season.best)
-            assert least - 1e-12 <= trail.min()
-            assert trail.max() <= most + 1e-12
-            ranges.append((trail.min() / least, trail.max() / most))
+        def update(self, trail: Floats, state: IterationState) -> None:
+            super().update(trail, state)
+            assert state.best is not None
+            tau_min, tau_max = self.bounds(state.graph, state.best)
+            assert tau_min - 1e-12 <= trail.min()
+            assert trail.max() <= tau_max + 1e-12
+            ranges.append((trail.min() / tau_min, trail.max() / tau_max))
 
     ranges: list[tuple[float, float]] = []
     solve(Watched(ants=10, iterations=40, patience=15), catalogue()["forest"])
-    assert ranges[0][0] > 1  # all trails begin high,
+    assert ranges[0][0] > 1  # all trails begin at the upper bound,
     assert ranges[0][1] == pytest.approx(1)
-    assert min(low for low, _ in ranges) == pytest.approx(1)  # and those that nobody uses end at the bottom
+    assert min(low for low, _ in ranges) == pytest.approx(1)  # and those that no ant uses end at the lower bound
 
 
-def test_one_ant_deposits() -> None:
+def test_only_the_best_ant_deposits() -> None:
     planner = MaxMinAnts(evaporation=0.2)
-    least, most = planner.bounds(GROUND, walks(DIRECT))
-    trail = np.full((12, 8), 0.5 * (least + most))
+    tau_min, tau_max = planner.bounds(GRAPH, walks(DIRECT))
+    trail = np.full((12, 8), 0.5 * (tau_min + tau_max))
     expected = 0.8 * trail
     for arc in arcs(DIRECT):
         expected[arc] += 1 / (1 + 2 * math.sqrt(2))
-    planner.update(trail, season(walks(BEND, DIRECT), best=walks(DIRECT)))
-    np.testing.assert_allclose(trail, np.clip(expected, least, most), rtol=1e-12)
+    planner.update(trail, state(walks(BEND, DIRECT), best=walks(DIRECT)))
+    np.testing.assert_allclose(trail, np.clip(expected, tau_min, tau_max), rtol=1e-12)
 
 
-def test_stagnation_lays_the_trails_anew() -> None:
+def test_stagnation_resets_all_trails_to_the_upper_bound() -> None:
     planner = MaxMinAnts(patience=7)
-    most = planner.bounds(GROUND, walks(DIRECT))[1]
-    trail = np.full((12, 8), 0.4 * most)
-    planner.update(trail, season(walks(BEND), best=walks(DIRECT), since=6))
-    assert trail.max() < most
-    planner.update(trail, season(walks(BEND), best=walks(DIRECT), since=7))
-    np.testing.assert_array_equal(trail, most)
+    tau_max = planner.bounds(GRAPH, walks(DIRECT))[1]
+    trail = np.full((12, 8), 0.4 * tau_max)
+    planner.update(trail, state(walks(BEND), best=walks(DIRECT), since=6))
+    assert trail.max() < tau_max
+    planner.update(trail, state(walks(BEND), best=walks(DIRECT), since=7))
+    np.testing.assert_array_equal(trail, tau_max)
 
 
-def test_the_best_of_all_deposits_ever_more_often() -> None:
-    assert [best_every(number) for number in (0, 24, 25, 75, 125, 250, 1000)] == [25, 25, 5, 3, 2, 1, 1]
+def test_the_best_tour_so_far_deposits_ever_more_often() -> None:
+    assert [best_so_far_every(number) for number in (0, 24, 25, 75, 125, 250, 1000)] == [25, 25, 5, 3, 2, 1, 1]
     now, ever = walks(BEND), walks(DIRECT)
-    assert MaxMinAnts().depositor(season(now, best=ever, number=26)).lengths[0] == now.lengths[0]  # type: ignore[union-attr]
-    assert MaxMinAnts().depositor(season(now, best=ever, number=30)) is ever
+    assert MaxMinAnts().depositor(state(now, best=ever, number=26)).lengths[0] == now.lengths[0]  # type: ignore[union-attr]
+    assert MaxMinAnts().depositor(state(now, best=ever, number=30)) is ever
 
 
 # Merging ants
 
 
-def test_the_joint_tour_takes_only_arcs_that_ants_took() -> None:
+def test_the_merged_tour_uses_only_arcs_that_ants_used() -> None:
     across = [(0, 0), (0, 1), (0, 2), (1, 2), (2, 2), (2, 3)]
     other = [(0, 0), (1, 0), (1, 1), (1, 2), (1, 3), (2, 3)]
-    joint = MergingAnts().join(GROUND, walks(across, other), None)
-    assert joint is not None
-    assert joint.lengths[0] == pytest.approx(5)  # no diagonal was walked
-    joint = MergingAnts().join(GROUND, walks(across, other), walks(DIRECT))
-    assert joint is not None
-    assert joint.lengths[0] == pytest.approx(1 + 2 * math.sqrt(2))
+    merged = MergingAnts().daemon_action(GRAPH, walks(across, other), None)
+    assert merged is not None
+    assert merged.lengths[0] == pytest.approx(5)  # no diagonal was walked
+    merged = MergingAnts().daemon_action(GRAPH, walks(across, other), walks(DIRECT))
+    assert merged is not None
+    assert merged.lengths[0] == pytest.approx(1 + 2 * math.sqrt(2))
     crossing = [(0, 0), (1, 1), (1, 2), (2, 2), (2, 3)], [(0, 0), (0, 1), (1, 2), (2, 3)]
-    joint = MergingAnts().join(GROUND, walks(*crossing), None)
-    assert joint is not None
-    assert joint.lengths[0] == pytest.approx(1 + 2 * math.sqrt(2))  # begins as one, ends as the other
-    assert MergingAnts().join(GROUND, walks([]), None) is None
+    merged = MergingAnts().daemon_action(GRAPH, walks(*crossing), None)
+    assert merged is not None
+    assert merged.lengths[0] == pytest.approx(1 + 2 * math.sqrt(2))  # begins as one, ends as the other
+    assert MergingAnts().daemon_action(GRAPH, walks([]), None) is None
 
 
-def test_a_move_attracts_by_the_detour_it_makes() -> None:
-    desire = MergingAnts(greed=1.5).desire(GROUND)
-    # From (1, 1) to the goal (2, 3) it is 1 + sqrt(2) over open ground.
-    assert desire[5, 1] == pytest.approx(1.0)  # (2, 2): on the way
-    assert desire[5, 0] == pytest.approx(1.0)  # (1, 2): too
-    assert desire[5, 4] == pytest.approx(math.exp(-1.5 * 2), rel=1e-5)  # (1, 0): there and back
+def test_the_heuristic_of_merging_ants_falls_with_the_detour() -> None:
+    heuristic = MergingAnts(greed=1.5).heuristic_values(GRAPH)
+    # From (1, 1) to the goal (2, 3) it is 1 + sqrt(2) over open graph.
+    assert heuristic[5, 1] == pytest.approx(1.0)  # (2, 2): no detour
+    assert heuristic[5, 0] == pytest.approx(1.0)  # (1, 2): no detour either
+    assert heuristic[5, 4] == pytest.approx(math.exp(-1.5 * 2), rel=1e-5)  # (1, 0): one cell there and one back
 
 
-def test_it_ends_at_once_where_nothing_can_be_shorter() -> None:
+def test_merging_ants_stop_at_once_at_the_shortest_tour_possible() -> None:
     result = solve(MergingAnts(), catalogue()["empty"])
     assert len(result.history) < 10
     assert result.cost == pytest.approx(optimum(catalogue()["empty"]))
 
 
-def test_it_ends_when_it_has_settled() -> None:
+def test_merging_ants_stop_after_settled_iterations_without_a_better_tour() -> None:
     query = catalogue()["slalom"]
     history = solve(MergingAnts(settled=9), query).history
     assert (np.flatnonzero(history.best > history.best[-1] + 1e-9).max(initial=-1)) == len(history) - 11
@@ -396,7 +412,7 @@ def test_merging_ants_get_through_a_maze() -> None:
     ("kind", "key", "value"),
     [
         (AntSystem, "alpha", -1.0), (AntSystem, "beta", -1.0), (AntSystem, "initial", 0.0), (AntSystem, "threads", 0),
-        (AntSystem, "heuristic", "smell"), (AgeingAnts, "least", 0.0), (AgeingAnts, "most", 0.01),
+        (AntSystem, "heuristic", "smell"), (AgeingAnts, "q_min", 0.0), (AgeingAnts, "q_max", 0.01),
         (ExploringAnts, "explorers", -1), (ExploringAnts, "elite", -1.0), (MaxMinAnts, "p_best", 1.0),
         (MaxMinAnts, "patience", 0), (MergingAnts, "scouts", -1), (MergingAnts, "settled", 0),
         (MergingAnts, "beta", 2.0), (MergingAnts, "heuristic", "step"),

@@ -8,7 +8,7 @@ import pytest
 from antdrive.planners import PlanResult, PlanStatus, PotentialFieldAnts, Query
 from antdrive.planners.colonies import _kernels_pfaco
 from antdrive.planners.colonies.colony import ColonyGraph
-from antdrive.planners.colonies.pfaco import _Colony
+from antdrive.planners.colonies.pfaco import AntPool
 from antdrive.worlds import Grid
 from tests.planners.worlds_to_solve import catalogue, optimum
 
@@ -19,7 +19,7 @@ def solve(planner: PotentialFieldAnts, query: Query, seed: int = 0) -> PlanResul
     return planner.plan(query, np.random.default_rng(seed))
 
 
-def test_the_potential_by_hand() -> None:
+def test_the_potential_is_that_worked_out_by_hand() -> None:
     free = np.ones((4, 5))
     free[0, 4] = 0
     planner = PotentialFieldAnts(attraction=2.0, repulsion=8.0, influence=2.0)
@@ -35,68 +35,70 @@ def test_the_potential_by_hand() -> None:
 
 def test_the_ranking_list_is_kept_by_length_times_cells() -> None:
     room, count = 12, 5
-    ranked = np.zeros((count, room), dtype=np.int32)
-    sizes, order = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=np.int64)
-    costs, counts = np.zeros(count), np.zeros(4, dtype=np.int64)
+    ranking = _kernels_pfaco.Ranking(
+        walks=np.zeros((count, room), dtype=np.int32),
+        sizes=np.zeros(count, dtype=np.int64),
+        costs=np.zeros(count),
+        order=np.zeros(count, dtype=np.int64),
+        counts=np.zeros(2, dtype=np.int64),
+    )
     rng, seen = np.random.default_rng(2), []
     for number in range(60):
         size, length = int(rng.integers(2, room)), float(rng.uniform(1, 9))
         walk = np.full(room, number, dtype=np.int32)
         listed = sorted(seen)[:count]
-        rank = _kernels_pfaco.enter(walk, size, length, ranked, sizes, costs, order, counts)
+        rank = _kernels_pfaco.enter(walk, size, length, ranking)
         seen.append(size * length)  # eq. 15
-        assert rank == (sum(c <= size * length for c in listed) if size * length < max(listed, default=math.inf)
-                        or len(listed) < count else -1)  # fmt: skip
+        better = sum(cost <= size * length for cost in listed)
+        assert rank == (-1 if better == count else better)
         best = sorted(seen)[:count]
-        np.testing.assert_allclose(costs[order[: len(best)]], best)
+        np.testing.assert_allclose(ranking.costs[ranking.order[: len(best)]], best)
         if rank >= 0:
-            row = order[rank]
-            assert sizes[row] == size
-            assert (ranked[row, :size] == number).all()
-    assert counts[0] == count
+            row = ranking.order[rank]
+            assert ranking.sizes[row] == size
+            assert (ranking.walks[row, :size] == number).all()
+    assert ranking.counts[_kernels_pfaco.LISTED] == count
 
 
-def test_stages_follow_the_entries_of_the_list() -> None:
-    planner = PotentialFieldAnts(ants=30, listed=10)
+def test_the_stage_follows_from_the_number_of_entries() -> None:
+    planner = PotentialFieldAnts(ants=30, ranks=10)
     assert [planner.stage(n) for n in (0, 19, 20, 49, 50, 1000)] == [1, 1, 2, 2, 3, 3]
 
 
-def test_a_converged_field_is_rebuilt_from_the_list() -> None:
-    planner = PotentialFieldAnts(ants=4, listed=20, deposit=2.0, least=0.5)
-    ground, rng = ColonyGraph.of(OPEN), np.random.default_rng(0)
-    colony = _Colony.of(planner, ground, rng)
+def test_converged_pheromone_is_rebuilt_from_the_list() -> None:
+    planner = PotentialFieldAnts(ants=4, ranks=20, deposit=2.0, min_pheromone=0.5)
+    graph, rng = ColonyGraph.of(OPEN), np.random.default_rng(0)
+    pool = AntPool.of(planner, graph, rng)
     for rank in range(20):
         walk = np.array([0, 6 if rank < 2 else 5, 12, 19], dtype=np.int32)
-        _kernels_pfaco.enter(
-            walk, 4, 1.0 + rank, colony.ranked, colony.sizes, colony.costs, colony.order, colony.counts
-        )
+        _kernels_pfaco.enter(walk, 4, 1.0 + rank, pool.ranking)
     free, trail = np.ones(20, dtype=np.bool_), np.full(20, 9.0)
-    planner.rebuild(trail, free, 2, colony, rng)  # the best tenth: two paths
+    planner.rebuild(trail, free, 2, pool, rng)  # the best tenth: two paths
     amounts = 2.0 * (1 - np.arange(20) / 20)
     assert trail[6] == pytest.approx(0.5 + amounts[:2].sum())
     assert trail[5] == 0.5
-    planner.rebuild(trail, free, 3, colony, rng)
+    planner.rebuild(trail, free, 3, pool, rng)
     assert trail[5] == pytest.approx(0.5 + amounts[2:].sum())
     assert trail[12] == pytest.approx(0.5 + amounts.sum())
     assert trail[1] == 0.5
-    planner.rebuild(trail, free, 1, colony, rng)
+    planner.rebuild(trail, free, 1, pool, rng)
     assert 0.5 <= trail.min() < trail.max() < 1
 
 
-def test_pheromone_decays_by_the_tick_and_no_further_than_its_least() -> None:
+def test_pheromone_decays_every_tick_but_not_below_its_minimum() -> None:
     # A start that cannot be left: walks end at once, so an iteration of four ants is one tick.
     free = np.ones((3, 3))
     free[0, 1] = free[1, 0] = free[1, 1] = 0
     query = Query(Grid.from_free(free), (0, 0), (2, 2))
-    planner = PotentialFieldAnts(ants=4, evaporation=0.5, least=0.3, converged=1e-9)
-    colony = _Colony.of(planner, ColonyGraph.of(query), np.random.default_rng(0))
+    planner = PotentialFieldAnts(ants=4, evaporation=0.5, min_pheromone=0.3, convergence=1e-9)
+    pool = AntPool.of(planner, ColonyGraph.of(query), np.random.default_rng(0))
     trail = np.array([1, 0, 1, 0, 0, 0.4, 2, 1, 1])
-    arrivals, steps = colony.run(trail, np.ones(9), 1.0)
+    arrivals, steps = pool.run(trail, np.ones(9), 1.0)
     np.testing.assert_allclose(trail, [1, 0, 0.5, 0, 0, 0.3, 1, 0.5, 0.5])
     assert (len(arrivals), steps) == (0, 4)
 
 
-def test_history_tells_each_iteration() -> None:
+def test_the_history_records_every_iteration() -> None:
     query = catalogue()["forest"]
     result = solve(PotentialFieldAnts(ants=50, iterations=20), query)
     history = result.history
@@ -111,7 +113,7 @@ def test_history_tells_each_iteration() -> None:
     assert (result.field[~query.grid.free] == 0).all()
 
 
-def test_paths_get_near_the_shortest() -> None:
+def test_paths_come_close_to_the_shortest() -> None:
     query = catalogue()["forest"]
     result = solve(PotentialFieldAnts(), query)
     assert result.cost <= 1.1 * optimum(query)
@@ -119,21 +121,24 @@ def test_paths_get_near_the_shortest() -> None:
     assert optimum(query) - 1e-9 <= short.cost <= 1.05 * optimum(query)
 
 
-def test_retreat_leaves_dead_ends() -> None:
+def test_backtracking_ants_leave_dead_ends() -> None:
     free = np.zeros((5, 30), dtype=np.bool_)
     free[2] = True
     free[1, ::2] = free[3, 1::2] = True  # teeth of a double comb, each a dead end
     query = Query(Grid.from_free(free), (2, 0), (2, 29))
     assert not PotentialFieldAnts().complete
-    assert PotentialFieldAnts(retreat=True).complete
+    assert PotentialFieldAnts(backtrack=True).complete
     lost = solve(PotentialFieldAnts(ants=3, iterations=2, beta_1=0.0, max_steps=29), query)
     assert lost.status is PlanStatus.STOPPED
-    assert solve(PotentialFieldAnts(ants=3, iterations=2, beta_1=0.0, retreat=True), query).cost == pytest.approx(29)
+    assert solve(PotentialFieldAnts(ants=3, iterations=2, beta_1=0.0, backtrack=True), query).cost == pytest.approx(29)
 
 
 @pytest.mark.parametrize(
     ("key", "value"),
-    [("ants", 0), ("listed", 0), ("evaporation", 1.5), ("mix", -0.1), ("beta_2", -1.0), ("influence", 0.0), ("least", 0.0)],
+    [
+        ("ants", 0), ("ranks", 0), ("evaporation", 1.5), ("mix", -0.1), ("beta_2", -1.0), ("influence", 0.0),
+        ("min_pheromone", 0.0),
+    ],
 )  # fmt: skip
 def test_options_out_of_range_are_refused_by_name(key: str, value: object) -> None:
     with pytest.raises(ValueError, match=f"^{key}: must be"):
