@@ -17,11 +17,11 @@ import numpy as np
 from antdrive.planners import (
     PLANNERS,
     SMOOTHINGS,
-    MaxMinDStar,
     Planner,
     PlanResult,
     PlanStatus,
     Query,
+    capabilities_of,
     load_planner,
     smooth,
 )
@@ -80,7 +80,7 @@ class Scenario:
     @property
     def timed(self) -> bool:
         """Whether the planner plans in space and time, among movers."""
-        return bool(self.built.movers) and getattr(self.planner, "needs_motions", False)
+        return bool(self.built.movers) and capabilities_of(self.planner).needs_motions
 
     @property
     def sees(self) -> Perception:
@@ -199,7 +199,7 @@ def run(
     watch = Predictor(traffic, s.sees, s.control_hz) if traffic else None
     rerouter = None
     if watch and s.replanning:
-        rerouter = (CellwiseMonitor if isinstance(s.planner, MaxMinDStar) and s.replanning.around else ReplanMonitor)(
+        rerouter = (CellwiseMonitor if capabilities_of(s.planner).cell_by_cell and s.replanning.around else ReplanMonitor)(
             s.replanning, s.planner, grid, s.task, s.rng("replanner"),
             watch=watch, robot=s.robot, controller=s.controller, margin=s.margin, kind=s.smoothing, hz=s.control_hz,
         )  # fmt: skip

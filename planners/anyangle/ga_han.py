@@ -6,13 +6,13 @@ import dataclasses
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
 from antdrive.planners.anyangle.lines import Ends, cells_along, ends, polyline_length, terrain
 from antdrive.planners.iterative import Iteration, IterativePlanner, require
-from antdrive.planners.plan import Cells, PlanResult, Query
+from antdrive.planners.plan import Capabilities, Cells, PlanResult, Query
 from antdrive.worlds import Floats
 
 
@@ -98,7 +98,10 @@ class GaHan(ViaPlanner):
     elitism: bool = True
     tries: int = 1_000_000  # random chromosomes drawn at most in the whole run
 
-    complete: ClassVar[bool] = False  # may miss a path that exists
+    @property
+    def capabilities(self) -> Capabilities:
+        """What this planner can do and what it needs. It may miss a path that exists."""
+        return Capabilities(iterative=True, complete=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.planners.iterative import Iteration, IterativePlanner, require
-from antdrive.planners.plan import Query
+from antdrive.planners.plan import Capabilities, Query
 from antdrive.worlds import Floats
 
 Flat = npt.NDArray[np.int32]  # flat cell indices
@@ -169,9 +169,9 @@ class Colony(IterativePlanner):
         return "ant steps"
 
     @property
-    def complete(self) -> bool:
-        """Whether ants find a way wherever there is one; those that die in dead ends may not."""
-        return self.retreat or self.revisit > 0
+    def capabilities(self) -> Capabilities:
+        """What this planner can do and what it needs. Ants that die in dead ends may miss a path that exists."""
+        return Capabilities(iterative=True, complete=self.retreat or self.revisit > 0)
 
     def default_steps(self, rows: int, cols: int) -> int:
         """How long an ant may walk without `max_steps`: a step per cell, within 100 to 20 000.

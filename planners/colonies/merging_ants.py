@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from antdrive.planners.colonies.colony import FIRST, ChoiceContext, ColonyGraph, Desire, IterationState, Walks, Weights
 from antdrive.planners.colonies.mmas import MaxMinAnts
+from antdrive.planners.colonies.warm_start import WarmStartedColony
 from antdrive.planners.iterative import require
+from antdrive.planners.plan import Capabilities, Query
 from antdrive.worlds import Floats
 
 
@@ -56,6 +58,15 @@ class MergingAnts(MaxMinAnts):
     def castes(self) -> tuple[int, ...]:
         """Ants that follow trails first, then scouts."""
         return (self.ants, self.scouts)
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """What this planner can do and what it needs."""
+        return replace(super().capabilities, own_replanner=True)
+
+    def replanner(self, query: Query, rng: np.random.Generator) -> WarmStartedColony:
+        """A colony that continues on its trails after every change; `rng` serves all its answers."""
+        return WarmStartedColony(self, query, rng)
 
     def desire(self, ground: ColonyGraph) -> Desire:
         """exp(-greed * detour)."""

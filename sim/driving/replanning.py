@@ -20,10 +20,9 @@ from antdrive.planners import (
     Planner,
     PlanResult,
     Query,
-    SafeIntervals,
     TimedPlan,
-    online_for,
-    plan_in_time,
+    agent_for,
+    capabilities_of,
     replanner_for,
     smooth,
 )
@@ -97,7 +96,7 @@ class ReplanMonitor:
         self._blocked = np.zeros(grid.shape, dtype=np.bool_)
         self._rest = -math.inf  # when the last replan was
         self._wait_began = math.nan
-        self._timed = planner if isinstance(planner, SafeIntervals) else None
+        self._timed = capabilities_of(planner).needs_motions
         self.schedule: Schedule | None = None  # where the route says when
 
     @property
@@ -160,15 +159,12 @@ class ReplanMonitor:
         return self._controller.guide(route, task.world, self._robot, self._margin, 1 / self._hz, task.goal_tolerance)
 
     def _in_time(self, task: Task, now: float) -> PlanResult:
-        assert self._timed is not None
         motions = self._watch.traffic.motions
-        query = Query.between(self._grid, task)
-        return plan_in_time(
-            query, motions, speed=self._timed.speed, start_time=now, horizon=self._timed.horizon, stay=self._timed.stay
-        )
+        query = dataclasses.replace(Query.between(self._grid, task), motions=motions, start_time=now)
+        return self._planner.plan(query, self._rng)
 
     def _answer(self, task: Task, discs: list[Disc]) -> PlanResult:
-        if getattr(self._planner, "needs_world", False):
+        if capabilities_of(self._planner).needs_world:
             around = _with(task, discs)
             grid = rasterise(around.world, self._grid.cell, self._grid.inflate)
             return self._planner.plan(Query.between(grid, around), self._rng)
@@ -238,7 +234,7 @@ class CellwiseMonitor(ReplanMonitor):
     def __init__(self, *given: Any, **named: Any) -> None:
         super().__init__(*given, **named)
         query = Query.between(self._grid, self._task)
-        self._online = online_for(self._planner, query, self._rng)
+        self._online = agent_for(self._planner, query, self._rng)
         self._goal = query.goal
 
     @property
@@ -259,7 +255,7 @@ class CellwiseMonitor(ReplanMonitor):
         if cause == MISSED:  # or else it waits, and the next decision is due in a while
             return super().again(tick, pose, cause) if self._online.arrived else None
         self._rest, started = tick / self._hz, time.perf_counter()
-        here, propagated = self._online.cell, self._online.tally.propagated
+        here, propagated = self._online.cell, self._online.stats.propagated
         blocked = self._cells(self._covered(tick, np.array([pose[:2]]), 0.0))
         to = self._online.step(np.argwhere(blocked))
         ends = self._grid.xy(np.array([here, to or here]))
@@ -269,7 +265,7 @@ class CellwiseMonitor(ReplanMonitor):
         xy = np.vstack([pose[:2], ends[1 if near and self._clear(pose[:2], ends[1]) else 0 :]])
         moved = to is not None and bool(np.ptp(xy, axis=0).any())
         cost = float(np.hypot(*np.diff(xy, axis=0).T).sum())
-        work = self._online.tally.propagated - propagated
+        work = self._online.stats.propagated - propagated
         if moved:
             self.log.append(Replan(tick / self._hz, cause, True, cost, work, xy, time.perf_counter() - started))
         if not moved and tick == 0:  # it waits where it is, and does not set out by the plan of all the way

@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from antdrive.planners import PLANNERS, Planner, PlanResult, PlanStatus, Query, load_planner, path_cost
+from antdrive.planners import PLANNERS, Planner, PlanResult, PlanStatus, Query, capabilities_of, load_planner, path_cost
 from antdrive.worlds import DIRECTIONS, Grid, InputError, polyline_clearance
 from tests.planners.worlds_to_solve import catalogue, optimum, random_query, sealed
 
 CATALOGUE = catalogue()
 # What planners may declare: that they plan in the world itself, or that they may miss a path that exists.
-NEEDS_WORLD = [name for name, planner in PLANNERS.items() if getattr(planner, "needs_world", False)]
+NEEDS_WORLD = [name for name, planner in PLANNERS.items() if capabilities_of(planner).needs_world]
 ON_GRIDS = [name for name in PLANNERS if name not in NEEDS_WORLD]
-INCOMPLETE = [name for name, planner in PLANNERS.items() if not getattr(planner, "complete", True)]
+INCOMPLETE = [name for name, planner in PLANNERS.items() if not capabilities_of(planner).complete]
 
 
 def quick(name: str) -> Planner:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.planners import Iteration, IterativePlanner, Query, load_planner
+from antdrive.planners import Iteration, Query, as_iterative, load_planner
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.view.film.caption import Values
 from antdrive.sim.view.film.video import Shot
@@ -32,8 +32,8 @@ def search(rollout: Rollout) -> tuple[Grid, int, Iterator[Iteration]]:
     """
     meta = rollout.meta
     name, options = str(meta["planner"]["name"]), dict(meta["planner"].get("options") or {})
-    planner = load_planner(name, **options)
-    if not isinstance(planner, IterativePlanner):
+    planner = as_iterative(load_planner(name, **options))
+    if planner is None:
         raise InputError(f"prelude: {name} does not plan in iterations; there is no field to show")
     if planner.time_budget is not None:
         raise InputError("prelude: the plan was made under a time budget and cannot be repeated")

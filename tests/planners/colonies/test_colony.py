@@ -116,9 +116,9 @@ def test_retreat_leaves_a_trap_in_which_ants_die(planner: Colony) -> None:
     lost = solve(replace(planner, ants=5, iterations=2), query)
     assert lost.status is PlanStatus.STOPPED
     assert "nothing arrived within 2 iterations" in lost.reason
-    assert not planner.complete
+    assert not planner.capabilities.complete
     found = replace(planner, ants=5, iterations=2, retreat=True)
-    assert found.complete
+    assert found.capabilities.complete
     assert solve(found, query).solved
 
 

@@ -124,8 +124,8 @@ def test_retreat_leaves_dead_ends() -> None:
     free[2] = True
     free[1, ::2] = free[3, 1::2] = True  # teeth of a double comb, each a dead end
     query = Query(Grid.from_free(free), (2, 0), (2, 29))
-    assert not PotentialFieldAnts().complete
-    assert PotentialFieldAnts(retreat=True).complete
+    assert not PotentialFieldAnts().capabilities.complete
+    assert PotentialFieldAnts(retreat=True).capabilities.complete
     lost = solve(PotentialFieldAnts(ants=3, iterations=2, beta_1=0.0, max_steps=29), query)
     assert lost.status is PlanStatus.STOPPED
     assert solve(PotentialFieldAnts(ants=3, iterations=2, beta_1=0.0, retreat=True), query).cost == pytest.approx(29)
