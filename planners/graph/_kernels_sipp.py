@@ -308,7 +308,7 @@ def drop_first(heap: Array, size: int) -> int:
     return size
 
 
-@kernel
+@inline
 def conflicts(
     near: NearLegs, i: int, x: float, y: float, ux: float, uy: float, move: Move, lows: Array, highs: Array
 ) -> int:
@@ -324,7 +324,7 @@ def conflicts(
     return count
 
 
-@kernel
+@inline
 def relax(
     tree: Tree, intervals: Intervals, state: int, to: int, move: Move, lows: Array, highs: Array, count: int,
     heap: Array, size: int,
