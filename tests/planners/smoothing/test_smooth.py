@@ -411,7 +411,7 @@ def test_grid_is_the_plans_own_line_and_misuse_is_refused() -> None:
     route = smooth(plan, grid, task, kind="none")
     assert (route.xy == route_along(plan, grid, task).xy).all()
     assert (route.kind, route.curvature) == ("none", None)
-    with pytest.raises(ValueError, match="kind: unknown route 'tight'; choose from none, taut, clearance"):
+    with pytest.raises(ValueError, match="kind: unknown smoothing 'tight'; choose from none, taut, clearance"):
         smooth(plan, grid, task, kind="tight")
     for wrong in ({"clearance": -0.1}, {"stretch": math.nan}, {"bulge": 0.0}):
         with pytest.raises(ValueError, match=next(iter(wrong))):
