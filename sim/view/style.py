@@ -67,7 +67,7 @@ PLANNER_STYLES: Mapping[str, tuple[Colour, str]] = MappingProxyType(
             (
                 *("aco-han", "ants", "mmas", "pfaco", "iaco", "maco", "as"),
                 *("ga-han", "hybrid", "tangent", "aco-han-elite", "mmas-dstar", "astar", "dijkstra"),
-                *("dstar-lite", "dstar", "apf"),
+                *("dstar-lite", "dstar", "apf", "sipp"),
             )
         )
     }
