@@ -41,7 +41,7 @@ class Moving(Protocol):
         ...
 
     def at(self, t: Floats) -> Floats:
-        """The disc's centre (T, 2) [m] at times (T,) [s]."""
+        """The disc's centre (T, 2) [m] at times `t` (T,) [s]."""
         ...
 
 

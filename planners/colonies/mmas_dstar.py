@@ -105,7 +105,12 @@ class MaxMinDStar(GridPlanner):
         return graph, pheromone, work, notes
 
     def walk(self, graph: ColonyGraph, pheromone: Floats) -> tuple[Flat, str]:
-        """The flat cells of the path to the goal, and a remark on how the exponents had to change for it."""
+        """The flat cells of the path to the goal, and a remark on how the exponents had to change for it.
+
+        Args:
+            graph: the graph to walk on
+            pheromone: the pheromone of each cell (cells,), as `spread` returns it
+        """
         from antdrive.planners.colonies import _kernels_mmas_dstar as kernels
 
         walk = np.empty(len(graph.mask), dtype=np.int32)
@@ -138,7 +143,7 @@ class MaxMinDStar(GridPlanner):
         yield 1.0, 0.0
 
     def describe_exponents(self, alpha: float, beta: float) -> str:
-        """A sentence on how these exponents differ from the ones to begin with; empty if they do not."""
+        """A sentence on how `alpha` and `beta` differ from the exponents to begin with; empty if they do not."""
         if beta != self.beta:
             return f"alpha up to {self.alpha_max:g} did not help, and beta was set to 0"
         return f"alpha was raised from {self.alpha:g} to {alpha:g}" if alpha != self.alpha else ""

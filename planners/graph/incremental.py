@@ -29,7 +29,7 @@ class Replanner(Protocol):
         ...
 
     def move(self, start: Cell) -> None:
-        """Report that the robot is at another cell, which need not be on the path.
+        """Report that the robot is at another cell, `start`, which need not be on the path.
 
         Raises:
             ValueError: the cell lies outside the grid.
@@ -81,7 +81,7 @@ class EditableQuery(abc.ABC):
         return self._query
 
     def move(self, start: Cell) -> None:
-        """Report that the robot is at another cell, which need not be on the path.
+        """Report that the robot is at another cell, `start`, which need not be on the path.
 
         Raises:
             ValueError: the cell lies outside the grid.

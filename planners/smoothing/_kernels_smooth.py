@@ -149,7 +149,7 @@ def pull(line: Array, discs: Array) -> tuple[bool, Array, Array, Array]:
             if way == 0.0:
                 way = 1.0 if rest > 0.0 else -1.0
             rest *= way
-            met: Any = np.int64(-1)  # a plain -1 would be compiled for as a type of its own
+            met: Any = np.int64(-1)  # the compiler would treat a plain -1 as a type of its own
             event, turned, met_heading = NONE, rest, 0.0
             # At the very start the end may be carried past the pin itself: then the link has no length and sweeps nothing.
             if rest > 0.0 and not (count == 0 and rest > math.pi - GRAZE):
