@@ -106,8 +106,9 @@ def keep_best() -> Iterator[None]:
 class IterativePlanner(GridPlanner):
     """A planner that improves its answer in iterations.
 
-    It ends after `iterations` or at the `time_budget`, whichever comes first. A plan with a time budget cannot be
-    repeated: a faster machine gets further. Ctrl-C within `keep_best` returns the best path so far as `STOPPED`.
+    It ends after `iterations` or at the `time_budget`, whichever comes first. A plan with a time budget
+    cannot be repeated: a faster machine gets further. Ctrl-C within `keep_best` returns the best path so far
+    as `STOPPED`.
 
     Attributes:
         iterations: how many iterations are made at most

@@ -59,7 +59,8 @@ class Query:
         start_time: when the robot sets out, on the clock of the motions [s]
 
     Raises:
-        ValueError: a cell lies outside the grid. A blocked cell is not an error: planners answer it with `NO_PATH`.
+        ValueError: a cell lies outside the grid. A blocked cell is not an error: planners answer it with
+            `NO_PATH`.
     """
 
     grid: Grid
@@ -86,8 +87,8 @@ class Query:
 
         room = float(point_clearance(task.world, [task.goal])[0])
         start, can_leave = _entrance(grid, task, task.start[:2], math.inf)
-        # If the goal has less room than the inflation, the robot stops at a free cell within the goal tolerance.
-        # It does so a little short of the goal, or beside it, hence the allowance.
+        # If the goal has less room than the inflation, the robot stops at a free cell within the goal
+        # tolerance. It does so a little short of the goal, or beside it, hence the allowance.
         within = task.goal_tolerance - min(0.02, task.goal_tolerance / 2)
         goal, can_arrive = _entrance(grid, task, task.goal, math.inf if room >= grid.inflate else within)
         ends = {"the start": can_leave, "the goal": can_arrive}
@@ -129,7 +130,8 @@ def _entrance(grid: Grid, task: Task, point: Point, within: float) -> tuple[Cell
     centres = grid.xy(near)
     distance = np.hypot(*(centres - point).T)
     ends = np.broadcast_to(np.asarray(point, dtype=np.float64), centres.shape)
-    # A point may itself lie closer to a disc than the inflation; then the line must not come closer than the point.
+    # A point may itself lie closer to a disc than the inflation; then the line must not come closer than the
+    # point.
     own = float(point_clearance(task.world, [point])[0])
     clear = segment_clearance(task.world, centres, ends) >= min(grid.inflate, own) - 1e-9
     fit = clear & (distance <= within)
@@ -162,21 +164,23 @@ class History:
 class PlanResult:
     """A planner's answer, in cells.
 
-    `cells` runs along allowed moves of the grid from start to goal. A planner that was interrupted returns its best
-    path so far, if it has one, with the status `STOPPED`: to be looked at, not to be driven. A planner that is not
-    bound to the grid's eight directions also returns `waypoints`.
+    `cells` runs along allowed moves of the grid from start to goal. A planner that was interrupted returns
+    its best path so far, if it has one, with the status `STOPPED`: to be looked at, not to be driven. A
+    planner that is not bound to the grid's eight directions also returns `waypoints`.
 
     Attributes:
         status: how planning ended
         cells: the path as (row, col) of each cell (N, 2), empty without a path
         cost: length of `cells` [m], infinite without a path
         waypoints: the polyline to drive as fractional (row, col) (M, 2); None if that is `cells`
-        length: exact length of the curve that `waypoints` approximates, arcs included [m]; None if that is `cost`
+        length: exact length of the curve that `waypoints` approximates, arcs included [m]; None if that is
+            `cost`
         reason: why there is no path, or a remark on the plan; may be empty
         work: how many cells were expanded, ant steps taken or chromosomes rated
         work_unit: what `work` counts
         history: what each iteration achieved
-        landscape: the planner's field, such as pheromone or potential, at the end (R, C), for plots; None without one
+        landscape: the planner's field, such as pheromone or potential, at the end (R, C), for plots; None
+            without one
         options: the planner's options by name
         wall_s: planning time [s]
     """
@@ -230,8 +234,10 @@ class Capabilities:
         iterative: it improves its answer in iterations, as an `IterativePlanner` does
         needs_world: it plans among the world's discs, so the query must have a task
         needs_motions: it plans in space and time among the query's motions, and solves it with a `TimedPlan`
-        own_replanner: it has a method `replanner(query, rng)`; planners without one plan anew after every change
-        cell_by_cell: it has a method `agent(query, rng)` for driving; planners without one have their route followed
+        own_replanner: it has a method `replanner(query, rng)`; planners without one plan anew after every
+            change
+        cell_by_cell: it has a method `agent(query, rng)` for driving; planners without one have their route
+            followed
     """
 
     complete: bool = True

@@ -67,7 +67,8 @@ def load_planner(name: str, /, **options: Any) -> Planner:
         options: the planner's options by name; values may be text, as from a command line
 
     Raises:
-        InputError: there is no such planner or option, or the option does not take the value; lists what is valid.
+        InputError: there is no such planner or option, or the option does not take the value; lists what is
+            valid.
     """
     planner = PLANNERS.get(name)
     if planner is None:

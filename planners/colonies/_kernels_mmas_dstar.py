@@ -38,8 +38,9 @@ def close_gates(free: Array, moves: Array, start_row: int, start_col: int, goal_
 def propagate(mask: Array, offset: Array, start: int, goal: int, retained: float, pheromone: Array) -> int:
     """Spread pheromone, `retained` times the cost of the path to the goal, until the start's is final.
 
-    Returns how many cells got some; the others have inf, where the paper writes 10000. Cells are taken from the open
-    list by cost, as D* does. Costs are multiples of 1/5, so the list is a ring of eight buckets, each a linked list.
+    Returns how many cells got some; the others have inf, where the paper writes 10000. Cells are taken from
+    the open list by cost, as D* does. Costs are multiples of 1/5, so the list is a ring of eight buckets,
+    each a linked list.
     """
     cost = np.full(len(mask), -1, dtype=np.int64)
     closed = np.zeros(len(mask), dtype=np.bool_)
@@ -112,8 +113,8 @@ def descend(
 ) -> int:
     """Fill `walk` with cells, each the neighbour of the one before with the smallest pheromone^alpha * distance^beta.
 
-    Returns how many there are. If the walk is about to return to one of its cells, it is a circle, and the number is
-    negative.
+    Returns how many there are. If the walk is about to return to one of its cells, it is a circle, and the
+    number is negative.
     """
     been = np.zeros(len(mask), dtype=np.bool_)
     walk[0], n = start, 1

@@ -30,17 +30,18 @@ ONLINE_FACTOR = 2.0  # what an agent multiplies alpha by, as each circle costs i
 class MaxMinDStar(GridPlanner):
     """One ant that follows pheromone spread from the goal as D* spreads costs: hasan's improved max-min algorithm.
 
-    The ant always takes the neighbour of the smallest `pheromone^alpha * distance^beta`. As the straight distance to
-    the goal counts, the ant may walk in circles in front of a wall. The author chose other exponents for such maps;
-    here `exponents` is the rule for all of them, and it always arrives. The result's `reason` reports what it did.
+    The ant always takes the neighbour of the smallest `pheromone^alpha * distance^beta`. As the straight
+    distance to the goal counts, the ant may walk in circles in front of a wall. The author chose other
+    exponents for such maps; here `exponents` is the rule for all of them, and it always arrives. The result's
+    `reason` reports what it did.
 
     Attributes:
         alpha: exponent of the pheromone to begin with; in the paper 1 to 26, depending on the environment
         beta: exponent of the distance to begin with; in the paper 0 to 3
         alpha_max: highest alpha that is tried before beta becomes 0
         evaporation: share of the pheromone that is lost; the paper's rho, 0.98, is the share that is kept
-        gates: whether cells between two diagonally opposite blocked cells are closed, the paper's gate raise state;
-            if that leaves no path, they are opened again
+        gates: whether cells between two diagonally opposite blocked cells are closed, the paper's gate raise
+            state; if that leaves no path, they are opened again
     """
 
     alpha: float = 1.0
@@ -128,13 +129,13 @@ class MaxMinDStar(GridPlanner):
     def exponents(self, *, factor: float = 1.0, increment: float = 1.0) -> Iterator[tuple[float, float]]:
         """alpha and beta in the order in which they are tried; the next ones are due when the ant walks in a circle.
 
-        alpha rises up to `alpha_max`, which makes the straight distance count less and less; at last beta is 0. That
-        always arrives, as pheromone alone decreases at every step.
+        alpha rises up to `alpha_max`, which makes the straight distance count less and less; at last beta is
+        0. That always arrives, as pheromone alone decreases at every step.
 
         Args:
             factor: what alpha is multiplied by at each circle
-            increment: what is then added. A plan raises alpha by 1, as trying again costs next to nothing; an agent
-                doubles it (`ONLINE_FACTOR`), as its robot drives the circle.
+            increment: what is then added. A plan raises alpha by 1, as trying again costs next to nothing; an
+                agent doubles it (`ONLINE_FACTOR`), as its robot drives the circle.
         """
         alpha, beta = float(self.alpha), float(self.beta)
         while alpha <= self.alpha_max:
@@ -152,9 +153,10 @@ class MaxMinDStar(GridPlanner):
 class PheromoneAgent(SteppingAgent):
     """hasan's robot: one decision per cell, on pheromone spread once from the goal, and never into an occupied cell.
 
-    The robot goes to the allowed neighbour of the smallest `pheromone^alpha * distance^beta`. When it is about to
-    return to a cell that it visited with the current exponents, it is going in a circle and takes the next ones of
-    `MaxMinDStar.exponents`. If cells that stay blocked hold it up even then, it spreads pheromone anew around them.
+    The robot goes to the allowed neighbour of the smallest `pheromone^alpha * distance^beta`. When it is
+    about to return to a cell that it visited with the current exponents, it is going in a circle and takes
+    the next ones of `MaxMinDStar.exponents`. If cells that stay blocked hold it up even then, it spreads
+    pheromone anew around them.
     """
 
     def __init__(self, planner: MaxMinDStar, query: Query) -> None:

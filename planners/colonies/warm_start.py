@@ -22,10 +22,11 @@ if TYPE_CHECKING:  # the planner imports this module for its replanner
 class WarmStartedColony(CachedReplanner):
     """Ants that continue on their old trails, which are evened out near the cells that changed.
 
-    After a change, the trails of arcs within `reach` cells of it move towards the strongest trail, more so the nearer
-    they are (M. Guntsch and M. Middendorf, *Pheromone modification strategies for ant algorithms applied to dynamic
-    TSP*, 2001: the strategy by distance). The part of the best tour that can still be walked joins the tours of the
-    first iteration. The colony stops after `settled` iterations without improvement.
+    After a change, the trails of arcs within `reach` cells of it move towards the strongest trail, more so
+    the nearer they are (M. Guntsch and M. Middendorf, *Pheromone modification strategies for ant algorithms
+    applied to dynamic TSP*, 2001: the strategy by distance). The part of the best tour that can still be
+    walked joins the tours of the first iteration. The colony stops after `settled` iterations without
+    improvement.
 
     Args:
         planner: the colony

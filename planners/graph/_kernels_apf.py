@@ -20,8 +20,8 @@ def parabola(x: int, site: int, height: Array) -> int:
 def squared_distances(free: Array, out: Array) -> bool:
     """Fill `out` with squared distances in cells to the nearest blocked cell; returns whether there is one.
 
-    Exact, in integers and linear time: A. Meijster, J. Roerdink and W. Hesselink, *A general algorithm for computing
-    distance transforms in linear time*, 2000. Cells outside the grid do not count as blocked.
+    Exact, in integers and linear time: A. Meijster, J. Roerdink and W. Hesselink, *A general algorithm for
+    computing distance transforms in linear time*, 2000. Cells outside the grid do not count as blocked.
     """
     rows, cols = free.shape
     far = rows + cols  # farther than any cell

@@ -1,8 +1,9 @@
 """Compiled D*: arrays in, arrays out, nothing validated.
 
-A. Stentz, *Optimal and efficient path planning for partially-known environments*, ICRA 1994; names and line numbers as
-there. Moves go both ways. `h` is the cost to the goal and `back` the backpointer b as a direction, 8 for none; `heap` and
-`place` are the OPEN list by k, `size` its length. A state that is NEW has h = NEVER and is not on the list.
+A. Stentz, *Optimal and efficient path planning for partially-known environments*, ICRA 1994; names and line
+numbers as there. Moves go both ways. `h` is the cost to the goal and `back` the backpointer b as a direction,
+8 for none; `heap` and `place` are the OPEN list by k, `size` its length. A state that is NEW has h = NEVER
+and is not on the list.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Compiled D* Lite: arrays in, arrays out, nothing validated.
 
-S. Koenig and M. Likhachev, *D\\* Lite*, AAAI 2002, the optimised version (Figure 4); names as there. Moves go both ways.
-`g` and `rhs` are costs to the goal; `heap` and `place` are the queue U, `size` its length.
+S. Koenig and M. Likhachev, *D\\* Lite*, AAAI 2002, the optimised version (Figure 4); names as there. Moves go
+both ways. `g` and `rhs` are costs to the goal; `heap` and `place` are the queue U, `size` its length.
 """
 
 from __future__ import annotations

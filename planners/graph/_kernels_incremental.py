@@ -36,8 +36,9 @@ def offsets(cols: int) -> Array:
     return offset
 
 
-# The heap holds rows of (first key, second key, cell), the smallest first. `place` holds the row of each cell, -1 if the
-# cell is not in the heap. The open list of `_kernels_sipp` differs: its entries are never moved, so it needs no `place`.
+# The heap holds rows of (first key, second key, cell), the smallest first. `place` holds the row of each
+# cell, -1 if the cell is not in the heap. The open list of `_kernels_sipp` differs: its entries never
+# get a new key, so it needs no `place`.
 
 
 @inline
@@ -136,8 +137,8 @@ def closed_moves(free: Array, moves: Array, closed: Array) -> None:
 def mark(free: Array, closed: Array, moves: Array, cells: Array, value: bool, changed: Array) -> tuple[int, int]:
     """Make cells (N, 2) free or blocked, and list in `changed` the cells that now have other moves.
 
-    Returns how many these are, and the index of the first cell outside the grid. If there is none, it is -1; if there
-    is one, nothing is changed.
+    Returns how many these are, and the index of the first cell outside the grid. If there is none, it is -1;
+    if there is one, nothing is changed.
     """
     rows, cols = free.shape
     count = 0

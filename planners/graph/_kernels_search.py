@@ -6,8 +6,8 @@ import numpy as np
 
 from antdrive.worlds._kernels import DCOL, DROW, SQRT2, Array, doubled, inline, kernel
 
-# Path costs are a + b sqrt(2) with whole a and b. Two different costs that could meet in one search differ by far
-# more than this, and rounding errors are far smaller.
+# Path costs are a + b sqrt(2) with whole a and b. Two different costs that could meet in one search differ by
+# far more than this, and rounding errors are far smaller.
 TIE = 1e-6
 
 # The open list is a ring of buckets, each a stack. One bucket spans 1/16 of a cell side; a move raises g + h
@@ -72,8 +72,9 @@ def traced(mark: Array, offset: Array, cols: int, start: int, goal: int) -> tupl
 def shortest_path(moves: Array, r0: int, c0: int, r1: int, c1: int, informed: bool) -> tuple[Array, int, int, int]:
     """The shortest path (N, 2), empty if there is none; its straight and diagonal steps; the number of cells expanded.
 
-    A* with the octile heuristic if `informed`, else Dijkstra's algorithm. Cells may leave a bucket out of order, so a
-    cell whose cost drops after it was closed is opened again, and the search ends only when nothing cheaper is open.
+    A* with the octile heuristic if `informed`, else Dijkstra's algorithm. Cells may leave a bucket out of
+    order, so a cell whose cost drops after it was closed is opened again, and the search ends only when
+    nothing cheaper is open.
 
     The open list is written out in the loop, which the speed of most planners depends on.
     """

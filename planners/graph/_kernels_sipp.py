@@ -1,8 +1,8 @@
 """Compiled safe-interval path planning: arrays in, arrays out, nothing validated.
 
-A mover's motion is given as legs, on each of which it moves in a straight line at constant speed. The robot also does,
-while it waits or makes one move. So the instants at which the two come too close form an interval whose ends have a
-closed form, and nothing here is sampled. Times are in seconds, positions in metres.
+A mover's motion is given as legs, on each of which it moves in a straight line at constant speed. The robot
+also does, while it waits or makes one move. So the instants at which the two come too close form an interval
+whose ends have a closed form, and nothing here is sampled. Times are in seconds, positions in metres.
 """
 
 from __future__ import annotations
@@ -17,10 +17,12 @@ from antdrive.worlds._kernels import DCOL, DROW, SQRT2, Array, doubled_rows, inl
 
 INSTANT = 1e-9  # s: shorter gaps count as closed
 
-# Columns of a leg: when it begins and ends, position at its beginning, velocity, distance that the robot's centre keeps.
+# Columns of a leg: when it begins and ends, position at its beginning, velocity, distance that the robot's
+# centre keeps.
 BEGIN, END, X, Y, VX, VY, KEEP = range(7)
 
-# Columns of an entry of the open list: the earliest possible arrival at the goal, the arrival here, the safe interval.
+# Columns of an entry of the open list: the earliest possible arrival at the goal, the arrival here, the safe
+# interval.
 F, G, INTERVAL = range(3)
 
 
@@ -80,8 +82,8 @@ class Move(NamedTuple):
 def legs_within(t: Array, xy: Array, jump: Array, tolerance: float) -> tuple[Array, Array, int]:
     """First and last sample of each leg when samples are joined to legs that are as long as possible, and their number.
 
-    Samples `xy` (T, 2) at `t` (T,) lie no farther than `tolerance` from the leg over them. No leg spans a jump, which
-    is between samples i and i + 1 where jump[i].
+    Samples `xy` (T, 2) at `t` (T,) lie no farther than `tolerance` from the leg over them. No leg spans a
+    jump, which is between samples i and i + 1 where jump[i].
     """
     first, last = np.empty(len(t), dtype=np.int64), np.empty(len(t), dtype=np.int64)
     count, a = 0, 0
@@ -178,9 +180,9 @@ def conflict(leg: Array, x: float, y: float, ux: float, uy: float, lasts: float)
     """The departures between lo and hi for which a move from (x, y) at velocity u over `lasts` comes too close to a leg.
 
     With w the time since the leg began and s the time since the departure, the robot is too close where
-    |q + v w - u s| < reach: a convex region, cut by the rectangle 0 <= w <= span, 0 <= s <= lasts. The departure w - s
-    takes its extremes on the sides of the rectangle or where the rim of the region is parallel to w - s = const.
-    If there is no such departure, lo > hi.
+    |q + v w - u s| < reach: a convex region, cut by the rectangle 0 <= w <= span, 0 <= s <= lasts.
+    The departure w - s takes its extremes on the sides of the rectangle or where the rim of the region is
+    parallel to the line w - s = 0. If there is no such departure, lo > hi.
     """
     span, reach = leg[END] - leg[BEGIN], leg[KEEP]
     qx, qy, vx, vy = leg[X] - x, leg[Y] - y, leg[VX], leg[VY]
@@ -331,7 +333,8 @@ def relax(
 ) -> tuple[Array, int]:  # fmt: skip
     """Reach the safe intervals of cell `to` from interval `state` between conflicts; the open list and its size.
 
-    Between two conflicts the robot can leave at any instant, and all of these reach one interval of the next cell.
+    Between two conflicts the robot can leave at any instant, and all of these reach one interval of the next
+    cell.
     """
     leave, n = move.now, 0
     interval, last = intervals.first[to], intervals.first[to + 1]
@@ -380,8 +383,8 @@ def earliest(
 ) -> tuple[Array, Array, Array, int]:
     """The path that arrives first: its cells, when each is reached and left, and how many intervals were expanded.
 
-    Phillips and Likhachev's A* over the safe intervals of cells; of all ways into an interval only the first to arrive
-    matters, since the robot can wait there. The path is empty if none arrives by `trip.end`.
+    Phillips and Likhachev's A* over the safe intervals of cells; of all ways into an interval only the first
+    to arrive matters, since the robot can wait there. The path is empty if none arrives by `trip.end`.
     """
     rows, cols = moves.shape
     mask = moves.ravel()

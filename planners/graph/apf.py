@@ -17,13 +17,14 @@ from antdrive.worlds import Floats
 class PotentialField(GridPlanner):
     """Rolls downhill between an attracting goal and repelling obstacles (Lee et al. 2008, III); may get stuck.
 
-    The potential U = 1/2 k_att d_goal^2 (eq. 9) + 1/2 k_rep (1/d - 1/d0)^2 for d <= d0 (eq. 11) is followed along the
-    allowed move of steepest descent. U has local minima besides the goal. There the planner stops and reports the cell;
-    it cannot go in circles, as every step leads down. The paper gives no values for the gains and d0; of those tried,
-    these defaults arrive most often among random cylinders: in half of the worlds.
+    The potential U = 1/2 k_att d_goal^2 (eq. 9) + 1/2 k_rep (1/d - 1/d0)^2 for d <= d0 (eq. 11) is followed
+    along the allowed move of steepest descent. U has local minima besides the goal. There the planner stops
+    and reports the cell; it cannot go in circles, as every step leads down. The paper gives no values for the
+    gains and d0; of those tried, these defaults arrive most often among random cylinders: in half of the
+    worlds.
 
-    `d` is measured from the cell's centre to the nearest cylinder, less the grid's inflation; on a grid without a world
-    behind it, to the centre of the nearest blocked cell. Walls do not repel.
+    `d` is measured from the cell's centre to the nearest cylinder, less the grid's inflation; on a grid
+    without a world behind it, to the centre of the nearest blocked cell. Walls do not repel.
 
     Attributes:
         k_att: gain of the attraction

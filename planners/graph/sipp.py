@@ -122,10 +122,11 @@ def plan_in_time(
 ) -> TimedPlan:
     """The path over the grid's moves that arrives first, or `NO_PATH` if none arrives within `horizon` seconds.
 
-    The robot makes each move at `speed` and may wait in any cell for any time. Its centre always keeps the grid's
-    `inflate` from every mover's surface, and up to `2 * TOLERANCE` more from motions that do not consist of straight
-    legs. Over those legs the answer is exact: no path on this grid, at this speed, arrives sooner. Motions are sampled
-    `STEP` apart, closer near turns and jumps; a motion that turns twice within half a `STEP` may be missed.
+    The robot makes each move at `speed` and may wait in any cell for any time. Its centre always keeps the
+    grid's `inflate` from every mover's surface, and up to `2 * TOLERANCE` more from motions that do not
+    consist of straight legs. Over those legs the answer is exact: no path on this grid, at this speed,
+    arrives sooner. Motions are sampled `STEP` apart, closer near turns and jumps; a motion that turns twice
+    within half a `STEP` may be missed.
 
     Args:
         query: the grid and its ends; its own motions are not used
@@ -210,7 +211,8 @@ def _samples(mover: Moving, start: float, end: float) -> tuple[Floats, Floats, n
     while len(unchecked):
         middle = (t[unchecked] + t[unchecked + 1]) / 2
         there = np.asarray(mover.at(middle), dtype=np.float64)
-        # If two straight legs meet within a stretch, they stray from it at most twice as far as its middle does.
+        # If two straight legs meet within a stretch, they stray from it at most twice as far as its middle
+        # does.
         stray = 2 * np.hypot(*(there - (xy[unchecked] + xy[unchecked + 1]) / 2).T)
         bent = (stray > TOLERANCE) & (t[unchecked + 1] - t[unchecked] > INSTANT)
         if not bent.any():

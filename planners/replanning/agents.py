@@ -27,8 +27,8 @@ class AgentStats:
         propagated: cells that were given pheromone, or that a search expanded
         cycles: circles noticed and left
         length: length of the path so far [m]
-        cost: the "total cost" of hasan's table: the cost of the remaining path in cells, summed over all cells visited,
-            the first one included. 65 steps straight ahead give 65 + 64 + ... + 1.
+        cost: the "total cost" of hasan's table: the cost of the remaining path in cells, summed over all
+            cells visited, the first one included. 65 steps straight ahead give 65 + 64 + ... + 1.
     """
 
     steps: int = 0
@@ -73,8 +73,8 @@ class OnlineAgent(Protocol):
         """The cell to go to, an allowed move away, or None to wait.
 
         Args:
-            blocked: cells (N, 2) that are blocked now, besides those of the grid. Cells that the grid blocks and cells
-                outside it may be among them; the robot's own cell has no effect.
+            blocked: cells (N, 2) that are blocked now, besides those of the grid. Cells that the grid blocks
+                and cells outside it may be among them; the robot's own cell has no effect.
         """
         ...
 
@@ -134,8 +134,8 @@ class SteppingAgent(abc.ABC):
         """The cell to go to, an allowed move away, or None to wait.
 
         Args:
-            blocked: cells (N, 2) that are blocked now, besides those of the grid. Cells that the grid blocks and cells
-                outside it may be among them; the robot's own cell has no effect.
+            blocked: cells (N, 2) that are blocked now, besides those of the grid. Cells that the grid blocks
+                and cells outside it may be among them; the robot's own cell has no effect.
         """
         if self.arrived:
             return None

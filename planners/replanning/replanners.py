@@ -17,8 +17,8 @@ from antdrive.planners.plan import Planner, PlanResult, PlanStatus, Query, capab
 def replanner_for(planner: Planner, query: Query, rng: np.random.Generator) -> Replanner:
     """The replanner of a planner; `rng` serves all its answers.
 
-    Replanners know which cells are blocked but not by what. So they answer in cells, along allowed moves, even for
-    planners that draw lines of their own, and there is none for planners that need discs or motions.
+    Replanners know which cells are blocked but not by what. So they answer in cells, along allowed moves,
+    even for planners that draw lines of their own, and there is none for planners that need discs or motions.
 
     Raises:
         ValueError: the planner does not plan on cells alone.

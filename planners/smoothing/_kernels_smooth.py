@@ -1,9 +1,9 @@
 """Compiled string pulling among discs: arrays in, arrays out, nothing validated.
 
-A taut string consists of straight links and of contacts, at each of which it bends around a disc by a sweep: to the left,
-turn 1, or to the right, turn -1. Link i leads from contact i - 1 to contact i; the first leaves the start and the last
-reaches the goal, so there is one more link than contacts. A link that leaves a disc in direction `a` leaves its rim at
-the angle `a - turn * pi / 2`. Angles are in radians, lengths in metres.
+A taut string consists of straight links and of contacts, at each of which it bends around a disc by a sweep:
+to the left, turn 1, or to the right, turn -1. Link i leads from contact i - 1 to contact i; the first leaves
+the start and the last reaches the goal, so there is one more link than contacts. A link that leaves a disc in
+direction `a` leaves its rim at the angle `a - turn * pi / 2`. Angles are in radians, lengths in metres.
 """
 
 from __future__ import annotations
@@ -68,8 +68,8 @@ def signed(angle: float) -> float:
 def tangent(x: float, y: float, r: float, s: float, px: float, py: float, q: float, t: float) -> tuple[float, float]:
     """Direction and length of the line that leaves one disc (x, y, r) and reaches another (px, py, q).
 
-    It passes the first on the side given by the turn s, the second by the turn t. A disc of radius 0 is a point. The
-    length is negative if there is no such line.
+    It passes the first on the side given by the turn s, the second by the turn t. A disc of radius 0 is a
+    point. The length is negative if there is no such line.
     """
     dx, dy = px - x, py - y
     d = math.hypot(dx, dy)
@@ -121,10 +121,11 @@ def first_event(
 def pull(line: Array, discs: Array) -> tuple[bool, Array, Array, Array]:
     """Whether the shortest line homotopic to a clear polyline (M, 2) was found, and its contacts.
 
-    One end of the string stays at the first point, the other is carried along the polyline. Only the last link moves:
-    on each straight leg of the polyline it turns about the last contact in one sense, until it meets a disc, which
-    becomes a contact, or is in line with the link before it, which removes the contact between them. The discs (N, 3)
-    must lie off the polyline; they may overlap, but none may lie within another.
+    One end of the string stays at the first point, the other is carried along the polyline. Only the last
+    link moves: on each straight leg of the polyline it turns about the last contact in one sense, until it
+    meets a disc, which becomes a contact, or is in line with the link before it, which removes the contact
+    between them. The discs (N, 3) must lie off the polyline; they may overlap, but none may lie within
+    another.
     """
     events = 10_000 + 100 * (
         discs.shape[0] + line.shape[0]
@@ -151,7 +152,8 @@ def pull(line: Array, discs: Array) -> tuple[bool, Array, Array, Array]:
             rest *= way
             met: Any = np.int64(-1)  # the compiler would treat a plain -1 as a type of its own
             event, turned, met_heading = NONE, rest, 0.0
-            # At the very start the end may be carried past the pin itself: then the link has no length and sweeps nothing.
+            # At the very start the end may be carried past the pin itself: then the link has no length and
+            # sweeps nothing.
             if rest > 0.0 and not (count == 0 and rest > math.pi - GRAZE):
                 bend = sweep[count - 1] if count > 0 else 0.0
                 event, turned, met, met_heading = first_event(link, rest, way, bend, ax, ay, bx, by, discs)
@@ -311,8 +313,8 @@ def add_contact(count: int, contacts: Contacts, links: Array, discs: Array, ente
 def settle(first: Contacts, discs: Array, ends: Array) -> tuple[bool, Array, Array, Array, Array]:
     """The taut string near given contacts when the discs (N, 3) are not quite those that it was pulled among.
 
-    Returns whether it was found, its contacts, and its links (K + 1, 4). Until nothing changes, the loosest contact is
-    removed, or else the disc that the string enters most becomes a contact.
+    Returns whether it was found, its contacts, and its links (K + 1, 4). Until nothing changes, the loosest
+    contact is removed, or else the disc that the string enters most becomes a contact.
     """
     count = len(first.disc)
     room = 2 * count + 64
@@ -389,8 +391,8 @@ def with_point(xy: Array, curvature: Array, size: int, x: float, y: float, bend:
 def string_points(string: String, built: Array, bounds: Array, clearance: float, bulge: float) -> tuple[Array, Array]:
     """A string as a polyline (M, 2) and the curvature from each of its points on (M,).
 
-    An arc becomes the corners where its tangents meet. They stand off the arc by at most `bulge`, and by less where the
-    polyline would come closer than `clearance` to a wall or a disc as built.
+    An arc becomes the corners where its tangents meet. They stand off the arc by at most `bulge`, and by less
+    where the polyline would come closer than `clearance` to a wall or a disc as built.
     """
     (disc, turn, sweep), links, discs = string
     xy = np.empty((256, 2), dtype=np.float64)
@@ -459,7 +461,8 @@ def crosses(xy: Array, ax: float, ay: float, bx: float, by: float) -> bool:
 def room_to_grow(xy: Array, discs: Array, box: Array, ends: Array, most: float, out: Array) -> None:
     """out[i] = how much disc i may grow, up to `most`, if each gap that the polyline passes is shared fairly.
 
-    `discs` (N, 3) are inflated and `box` is shrunk. Both ends of the polyline must stay outside of the grown discs.
+    `discs` (N, 3) are inflated and `box` is shrunk. Both ends of the polyline must stay outside of the grown
+    discs.
     """
     n = discs.shape[0]
     share = 0.49  # of a gap for each side, so that some of it is left to pass through

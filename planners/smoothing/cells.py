@@ -13,9 +13,9 @@ from antdrive.worlds import Floats, Grid, Route, Task, point_clearance, segment_
 def route_along(plan: PlanResult, grid: Grid, task: Task) -> Route:
     """The plan's own line in metres, from the exact start to the goal, without points that lie on a straight line.
 
-    The first or last point of the plan is left out if the straight line past it keeps the grid's clearance, so that no
-    kink remains between the start and the centre of its cell. If the goal itself has less room than the grid's clearance,
-    the route ends at the plan's last point.
+    The first or last point of the plan is left out if the straight line past it keeps the grid's clearance,
+    so that no kink remains between the start and the centre of its cell. If the goal itself has less room
+    than the grid's clearance, the route ends at the plan's last point.
 
     Args:
         plan: a plan with a path

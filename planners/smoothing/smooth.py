@@ -1,15 +1,15 @@
 """From a plan to a line worth driving: pulled taut in the plan's own corridor, and moved away from discs where it is cheap.
 
-The shortest line among discs that is homotopic to a given one consists of tangents and of arcs along the discs. It is
-found by carrying the end of a string along the given line, as the funnel algorithm does in a sleeve of triangles (Lee &
-Preparata, *Euclidean shortest paths in the presence of rectilinear barriers*, Networks 14, 1984; for homotopy among
-obstacles Hershberger & Snoeyink, *Computing minimum length paths of a given homotopy class*, Comput. Geom. 4, 1994).
-Here the bends are the discs themselves, so no triangles are needed: between two events the string's last link turns about
-one disc, and the next event is the first of its tangents to come. Walls are left out, as leaving a convex room never
-makes a line shorter.
+The shortest line among discs that is homotopic to a given one consists of tangents and of arcs along the
+discs. It is found by carrying the end of a string along the given line, as the funnel algorithm does in a
+sleeve of triangles (Lee & Preparata, *Euclidean shortest paths in the presence of rectilinear barriers*,
+Networks 14, 1984; for homotopy among obstacles Hershberger & Snoeyink, *Computing minimum length paths of a
+given homotopy class*, Comput. Geom. 4, 1994). Here the bends are the discs themselves, so no triangles are
+needed: between two events the string's last link turns about one disc, and the next event is the first of its
+tangents to come. Walls are left out, as leaving a convex room never makes a line shorter.
 
-A line with more clearance is the taut line among discs that have grown: each by up to a preferred clearance, and in a gap
-by no more than its share of the gap.
+A line with more clearance is the taut line among discs that have grown: each by up to a preferred clearance,
+and in a gap by no more than its share of the gap.
 """
 
 from __future__ import annotations
@@ -50,17 +50,17 @@ def smooth(
 ) -> Route:
     """The route for a plan.
 
-    A smoothed route keeps the grid's clearance exactly, passes every disc on the same side as the plan's line, and is
-    never longer than that line or than the plan's cells. Parts that cannot be smoothed so stay as planned, and the
-    route's note says why. Where the plan's line itself comes closer than the grid's clearance, as a start with too little
-    room does, the line is kept.
+    A smoothed route keeps the grid's clearance exactly, passes every disc on the same side as the plan's
+    line, and is never longer than that line or than the plan's cells. Parts that cannot be smoothed so stay
+    as planned, and the route's note says why. Where the plan's line itself comes closer than the grid's
+    clearance, as a start with too little room does, the line is kept.
 
     Args:
         plan: a plan with a path
         grid: the grid that it was made on
         task: the task that the grid was made from
-        kind: `none` for the plan's own line, `taut` for that line pulled taut, `clearance` for a taut line that keeps
-            more distance from discs where there is room
+        kind: `none` for the plan's own line, `taut` for that line pulled taut, `clearance` for a taut line
+            that keeps more distance from discs where there is room
         clearance: how much more than the grid's clearance the kind `clearance` keeps at most [m]
         stretch: how much longer than the taut line that may make it, as a fraction
         bulge: how far the corners of the route's polyline may stand off an arc [m]
