@@ -42,7 +42,7 @@ class Iteration(NamedTuple):
         arrived: how many ants or chromosomes of this iteration arrived
         work: the work of this iteration, in the planner's `work_unit`
         waypoints: the best path so far as a polyline of fractional (row, col) (M, 2), as in `PlanResult`
-        landscape: the planner's field (R, C), as in `PlanResult`
+        field: the planner's field (R, C), as in `PlanResult`
     """
 
     cells: Cells
@@ -52,7 +52,7 @@ class Iteration(NamedTuple):
     arrived: int
     work: int
     waypoints: Floats | None = None
-    landscape: Floats | None = None
+    field: Floats | None = None
 
 
 class Progress(NamedTuple):
@@ -187,7 +187,7 @@ class IterativePlanner(GridPlanner):
             iteration_mean=np.array([state.iteration_mean for state in done], dtype=np.float64),
             arrived=np.array([state.arrived for state in done], dtype=np.int64),
         )
-        landscape = None if last is None else last.landscape
+        field = None if last is None else last.field
         if last is None or not len(last.cells):
             return PlanResult(
                 status=PlanStatus.STOPPED,
@@ -195,7 +195,7 @@ class IterativePlanner(GridPlanner):
                 work=work,
                 work_unit=self.work_unit,
                 history=history,
-                landscape=landscape,
+                field=field,
             )
         return PlanResult(
             status=PlanStatus.SOLVED,
@@ -206,7 +206,7 @@ class IterativePlanner(GridPlanner):
             work=work,
             work_unit=self.work_unit,
             history=history,
-            landscape=landscape,
+            field=field,
         )
 
 

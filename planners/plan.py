@@ -8,7 +8,7 @@ import enum
 import math
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
@@ -151,10 +151,10 @@ class History:
         arrived: how many ants or chromosomes arrived in the iteration (I,)
     """
 
-    best: Floats = field(default_factory=lambda: np.empty(0))
-    iteration_best: Floats = field(default_factory=lambda: np.empty(0))
-    iteration_mean: Floats = field(default_factory=lambda: np.empty(0))
-    arrived: npt.NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    best: Floats = dataclasses.field(default_factory=lambda: np.empty(0))
+    iteration_best: Floats = dataclasses.field(default_factory=lambda: np.empty(0))
+    iteration_mean: Floats = dataclasses.field(default_factory=lambda: np.empty(0))
+    arrived: npt.NDArray[np.int64] = dataclasses.field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
     def __len__(self) -> int:
         return len(self.best)
@@ -179,23 +179,23 @@ class PlanResult:
         work: how many cells were expanded, ant steps taken or chromosomes rated
         work_unit: what `work` counts
         history: what each iteration achieved
-        landscape: the planner's field, such as pheromone or potential, at the end (R, C), for plots; None
+        field: the planner's field, such as pheromone or potential, at the end (R, C), for plots; None
             without one
         options: the planner's options by name
         wall_s: planning time [s]
     """
 
     status: PlanStatus
-    cells: Cells = field(default_factory=lambda: np.empty((0, 2), dtype=np.int32))
+    cells: Cells = dataclasses.field(default_factory=lambda: np.empty((0, 2), dtype=np.int32))
     cost: float = math.inf
     waypoints: Floats | None = None
     length: float | None = None
     reason: str = ""
     work: int = 0
     work_unit: str = "cells expanded"
-    history: History = field(default_factory=History)
-    landscape: Floats | None = None
-    options: Mapping[str, Any] = field(default_factory=dict)
+    history: History = dataclasses.field(default_factory=History)
+    field: Floats | None = None
+    options: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     wall_s: float = 0.0
 
     @property

@@ -64,7 +64,7 @@ class Leader:
             arrived=arrived,
             work=work,
             waypoints=self.waypoints,
-            landscape=self._visits(population),
+            field=self._visits(population),
         )
 
     def _visits(self, population: Floats) -> Floats:
@@ -86,7 +86,7 @@ def seeded(rng: np.random.Generator) -> Any:
 class GaHan(ViaPlanner):
     """A genetic algorithm on a few via points, refilled with random chromosomes (Han 2007).
 
-    `iterations` are generations. `landscape` counts the chromosomes of the last population that pass each cell. A hard
+    `iterations` are generations. `field` counts the chromosomes of the last population that pass each cell. A hard
     world may have no chromosome of so few via points, or none that chance finds: then the answer is `STOPPED`.
     """
 

@@ -29,7 +29,7 @@ class Hybrid(ViaPlanner):
     """Ants find the corridor, then a genetic algorithm moves via points freely within it (after Han 2007).
 
     Of the `iterations` the first `parties` times `foraging` are the ants', or more while none of a party has arrived. For
-    these the history's means and counts and `landscape` are the ants' own; afterwards they are those of the chromosomes. The
+    these the history's means and counts and `field` are the ants' own; afterwards they are those of the chromosomes. The
     best is always that of the line to be driven: the ants' path is pulled straight at once.
     """
 

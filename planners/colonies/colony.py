@@ -253,7 +253,7 @@ class Colony(IterativePlanner):
                     iteration_mean=cell * tally.mean,
                     arrived=tally.arrived,
                     work=steps,
-                    landscape=scene,
+                    field=scene,
                 )
                 if self.finished(season):
                     return

@@ -82,7 +82,7 @@ class MaxMinDStar(GridPlanner):
             reason="; ".join(filter(None, (*notes, note))),
             work=work,
             work_unit=unit,
-            landscape=_finite(pheromone).reshape(graph.shape),
+            field=_finite(pheromone).reshape(graph.shape),
         )
 
     def spread(self, query: Query) -> tuple[ColonyGraph, Floats, int, list[str]]:

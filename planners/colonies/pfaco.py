@@ -225,5 +225,5 @@ def _report(
         iteration_mean=cell * float(arrivals.mean()) if len(arrivals) else math.inf,
         arrived=len(arrivals),
         work=steps,
-        landscape=trail.reshape(ground.shape),
+        field=trail.reshape(ground.shape),
     )

@@ -57,11 +57,9 @@ class PotentialField(GridPlanner):
         if last != query.goal:
             left = query.grid.cell * math.dist(last, query.goal)
             reason = f"stuck in a local minimum of the potential at cell {last}, {left:.2f} m from the goal"
-            return PlanResult(status=PlanStatus.STOPPED, reason=reason, work=work, work_unit="steps", landscape=field)
+            return PlanResult(status=PlanStatus.STOPPED, reason=reason, work=work, work_unit="steps", field=field)
         cost = path_cost(cells, query.grid.cell)
-        return PlanResult(
-            status=PlanStatus.SOLVED, cells=cells, cost=cost, work=work, work_unit="steps", landscape=field
-        )
+        return PlanResult(status=PlanStatus.SOLVED, cells=cells, cost=cost, work=work, work_unit="steps", field=field)
 
     def potential(self, query: Query) -> Floats:
         """The potential U of every cell (R, C), inf where blocked."""

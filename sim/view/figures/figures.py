@@ -44,13 +44,13 @@ def plan_figures(
     found: dict[str, Path] = {}
     for suffix in suffixes:
         end = "" if suffix == suffixes[0] else f" {suffix[1:]}"
-        bare = dataclasses.replace(plan, landscape=None, history=type(plan.history)())
+        bare = dataclasses.replace(plan, field=None, history=type(plan.history)())
         found["plan" + end] = plan_figure(task, grid, plan, robot, folder / f"plan{suffix}")
         if len(plan.history):
             found["tour" + end] = plan_figure(task, grid, bare, robot, folder / f"tour{suffix}")
             found["history" + end] = history_figure({name: [plan.history]}, folder / f"history{suffix}")
-        if plan.landscape is not None:
-            found["bars" + end] = bars_figure(grid, plan.landscape, folder / f"field-bars{suffix}")
+        if plan.field is not None:
+            found["bars" + end] = bars_figure(grid, plan.field, folder / f"field-bars{suffix}")
             found["contours" + end] = contours_figure(task, grid, plan, robot, folder / f"field-contours{suffix}")
     return found
 
@@ -90,8 +90,8 @@ def contours_figure(
     """A planner's field as contours on the map, with the planned path."""
     target = checked(path)
     scene = Scene.planned(task, robot, grid.inflate)
-    assert plan.landscape is not None
-    values = np.where(grid.free, np.asarray(plan.landscape, dtype=np.float64), np.nan)
+    assert plan.field is not None
+    values = np.where(grid.free, np.asarray(plan.field, dtype=np.float64), np.nan)
     x = grid.origin[0] + grid.cell * np.arange(grid.shape[1])
     y = grid.origin[1] + grid.cell * np.arange(grid.shape[0])
     finite = values[np.isfinite(values)]

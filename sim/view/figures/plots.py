@@ -118,13 +118,13 @@ def plan_figure(
     with styled():
         shape = _shape(scene)
         high = float(np.clip(5.6 * shape, 3.9, 6.4))
-        wide = float(np.clip(high / shape, 3.2, 7.0)) + (0.9 if plan.landscape is not None else 0.0)
+        wide = float(np.clip(high / shape, 3.2, 7.0)) + (0.9 if plan.field is not None else 0.0)
         figure = new_figure(wide + (4.6 if iterations else 0.6), high + 0.9)
         areas = figure.add_gridspec(1, 2 if iterations else 1, width_ratios=[wide, 4.2] if iterations else [1])
         chart = figure.add_subplot(areas[0, 0])
-        if plan.landscape is not None:
-            draw_landscape(figure, chart, grid, plan.landscape)
-        draw_map(chart, scene, floor=plan.landscape is None)
+        if plan.field is not None:
+            draw_landscape(figure, chart, grid, plan.field)
+        draw_map(chart, scene, floor=plan.field is None)
         handles: list[Any] = []
         if len(plan.cells):
             cells, line = grid.xy(plan.cells), grid.xy(plan.line)

@@ -52,7 +52,7 @@ def check_field(rollout: Rollout) -> None:
     Raises:
         InputError: there is none.
     """
-    if next(search(rollout)[2]).landscape is None:
+    if next(search(rollout)[2]).field is None:
         raise InputError(f"prelude: {rollout.meta['planner']['name']} keeps no field")
 
 
@@ -70,8 +70,8 @@ def planning_pictures(rollout: Rollout, setting: dict[str, Any], count: int) -> 
             due = math.ceil((k + 1) * total / count)
             for later in itertools.islice(states, due - number):
                 number, state = number + 1, later
-            assert state.landscape is not None
-            levels = field_levels(grid, state.landscape)
+            assert state.field is not None
+            levels = field_levels(grid, state.field)
             line = grid.xy(state.cells if state.waypoints is None else state.waypoints)
             yield shot.planning(_told(number, total, state), lambda stage: stage.field(grid, levels, line))  # noqa: B023
     if not np.array_equal(state.cells, rollout.cells):

@@ -80,8 +80,8 @@ def test_elimination_is_refilled_at_random() -> None:
     result = solve(single(), mutation=1.0)
     assert (result.history.arrived[1:] < 100).all()
     assert result.work > 100 * 100
-    assert result.landscape.shape == query_shape()
-    assert result.landscape.max() == 100  # all 100 chromosomes start in the same cell
+    assert result.field.shape == query_shape()
+    assert result.field.max() == 100  # all 100 chromosomes start in the same cell
 
 
 def query_shape() -> tuple[int, int]:

@@ -67,8 +67,8 @@ def test_the_genetic_algorithm_improves_on_the_pulled_path() -> None:
 def test_chromosomes_are_feasible_in_every_generation() -> None:
     result = solve(of_catalogue("forest"), iterations=40)
     assert (result.history.arrived[30:] == Hybrid().population).all()
-    assert result.landscape is not None
-    assert result.landscape.max() == Hybrid().population
+    assert result.field is not None
+    assert result.field.max() == Hybrid().population
 
 
 def test_a_straight_way_stays_straight() -> None:

@@ -111,9 +111,9 @@ def test_history_tells_each_iteration() -> None:
     assert (history.best <= history.iteration_best + 1e-9).all()
     assert ((history.arrived > 0) & (history.arrived <= 50)).all()
     assert result.work_unit == "ant steps"
-    assert result.landscape is not None
-    assert result.landscape.shape == query.grid.shape
-    assert (result.landscape[~query.grid.free] == 0).all()
+    assert result.field is not None
+    assert result.field.shape == query.grid.shape
+    assert (result.field[~query.grid.free] == 0).all()
 
 
 def test_elitism_gathers_the_trail_on_the_best_path() -> None:
@@ -124,8 +124,8 @@ def test_elitism_gathers_the_trail_on_the_best_path() -> None:
         shares = []
         for seed in range(3):
             result = AcoHan(ants=100, iterations=20, elitism=elitism).plan(query, np.random.default_rng(seed))
-            assert result.landscape is not None
-            shares.append(result.landscape[tuple(result.cells.T)].sum() / result.landscape.sum())
+            assert result.field is not None
+            shares.append(result.field[tuple(result.cells.T)].sum() / result.field.sum())
         return float(np.mean(shares))
 
     assert share_on_path(100) > 1.3 * share_on_path(0)

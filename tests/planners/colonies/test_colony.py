@@ -127,8 +127,8 @@ def test_ants_that_take_too_long_leave_nothing() -> None:
     result = solve(planner, catalogue()["empty"])
     assert result.status is PlanStatus.STOPPED
     assert result.work == 10 * 2 * 3
-    assert result.landscape is not None
-    np.testing.assert_array_equal(np.unique(result.landscape), [1.0])
+    assert result.field is not None
+    np.testing.assert_array_equal(np.unique(result.field), [1.0])
 
 
 @pytest.mark.parametrize("planner", [AntSystem(ants=7), ExploringAnts(ants=3, explorers=4), MergingAnts(ants=5)])
@@ -139,7 +139,7 @@ def test_threads_do_not_change_the_plan(planner: Colony, threads: int) -> None:
     shared = solve(replace(planner, iterations=6, threads=threads), query, seed=3)
     np.testing.assert_array_equal(alone.cells, shared.cells)
     np.testing.assert_array_equal(alone.history.iteration_mean, shared.history.iteration_mean)
-    np.testing.assert_array_equal(alone.landscape, shared.landscape)  # type: ignore[arg-type]
+    np.testing.assert_array_equal(alone.field, shared.field)  # type: ignore[arg-type]
     assert alone.work == shared.work
 
 

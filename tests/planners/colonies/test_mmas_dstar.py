@@ -70,8 +70,8 @@ def test_on_open_ground_nothing_needs_to_be_raised() -> None:
     result = solve(MaxMinDStar(), catalogue()["empty"])
     assert result.reason == ""
     assert result.cost == pytest.approx(optimum(catalogue()["empty"]))
-    assert result.landscape is not None
-    assert np.isfinite(result.landscape).all()
+    assert result.field is not None
+    assert np.isfinite(result.field).all()
 
 
 def test_gate_cells_are_closed_unless_there_is_no_other_way() -> None:

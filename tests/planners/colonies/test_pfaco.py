@@ -107,8 +107,8 @@ def test_history_tells_each_iteration() -> None:
     arrived = history.arrived > 0
     assert (history.iteration_best[arrived] <= history.iteration_mean[arrived] + 1e-9).all()
     assert np.isinf(history.iteration_best[~arrived]).all()
-    assert result.landscape is not None
-    assert (result.landscape[~query.grid.free] == 0).all()
+    assert result.field is not None
+    assert (result.field[~query.grid.free] == 0).all()
 
 
 def test_paths_get_near_the_shortest() -> None:

@@ -87,7 +87,7 @@ def test_every_step_leads_down_by_the_steepest_fall(planner: PotentialField) -> 
         result = planner.plan(query, RNG)
         if not result.solved:
             continue
-        field, cells = result.landscape, result.cells
+        field, cells = result.field, result.cells
         assert field is not None
         assert (np.diff(field[tuple(cells.T)]) < 0).all()
         for (r, c), step in zip(cells, np.diff(cells, axis=0), strict=False):
@@ -105,8 +105,8 @@ def test_a_trap_stops_it_in_a_local_minimum_that_it_names() -> None:
     assert result.status is PlanStatus.STOPPED
     assert len(result.cells) == 0
     assert math.isinf(result.cost)
-    assert result.landscape is not None
-    field = result.landscape
+    assert result.field is not None
+    field = result.field
     stuck = [
         (r, c)
         for r, c in np.argwhere(query.grid.free)

@@ -106,7 +106,7 @@ def test_an_iterative_planner_gets_its_history_and_landscape(planned, tmp_path):
     mean = best + 1
     mean[:4] = math.inf
     history = History(best=best, iteration_best=best + 0.2, iteration_mean=mean, arrived=np.full(30, 9))
-    learnt = dataclasses.replace(plan, history=history, landscape=np.random.default_rng(0).random(grid.shape))
+    learnt = dataclasses.replace(plan, history=history, field=np.random.default_rng(0).random(grid.shape))
     picture = pixels(plan_figure(task, grid, learnt, ROBOT, tmp_path / "learnt.png", dpi=80))
     assert near(picture, (18, 63, 122), 40) > 500, "the landscape's dark end"
     plain = pixels(plan_figure(task, grid, plan, ROBOT, tmp_path / "plain.png", dpi=80))
