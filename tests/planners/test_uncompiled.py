@@ -1,4 +1,4 @@
-"""The kernels are plain Python too."""
+"""Kernels give the same results as plain Python."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every replanner promises."""
+"""Properties of every incremental search."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def open_ground(rows: int = 12, cols: int = 12) -> Query:
 
 
 @BOTH
-def test_a_replanner_is_one(planner: ReplanningPlanner) -> None:
+def test_a_search_is_a_replanner(planner: ReplanningPlanner) -> None:
     assert isinstance(planner.replanner(open_ground(), RNG), Replanner)
 
 
@@ -74,7 +74,7 @@ changes = st.lists(
 @BOTH
 @settings(max_examples=150, deadline=None)
 @given(bits=st.lists(st.booleans(), min_size=42, max_size=42), told=changes)
-def test_any_sequence_of_changes(
+def test_repairs_equal_the_oracle_after_any_sequence_of_changes(
     planner: ReplanningPlanner, bits: list[bool], told: list[tuple[str, list[tuple[int, int]]]]
 ) -> None:
     free = np.array(bits).reshape(6, 7)
@@ -93,8 +93,8 @@ def test_any_sequence_of_changes(
 
 @BOTH
 @pytest.mark.parametrize("seed", range(3))
-def test_driving_through_unknown_ground(planner: ReplanningPlanner, seed: int) -> None:
-    """The robot sees three cells far, believes the rest to be free, and replans at every step."""
+def test_a_drive_through_an_unknown_map(planner: ReplanningPlanner, seed: int) -> None:
+    """The robot sees three cells far, takes all other cells for free, and replans at every step."""
     rng = np.random.default_rng(seed)
     truth = rng.random((40, 40)) >= 0.25
     truth[1, 1] = truth[38, 38] = True
@@ -114,7 +114,7 @@ def test_driving_through_unknown_ground(planner: ReplanningPlanner, seed: int) -
 
 
 @BOTH
-def test_walking_along_the_path_costs_nothing(planner: ReplanningPlanner) -> None:
+def test_following_the_path_takes_no_work(planner: ReplanningPlanner) -> None:
     replanner = planner.replanner(catalogue()["slalom"], RNG)
     first = replanner.result()
     assert first.work > 0
@@ -126,7 +126,7 @@ def test_walking_along_the_path_costs_nothing(planner: ReplanningPlanner) -> Non
 
 
 @BOTH
-def test_a_wall_closes_and_opens_the_way(planner: ReplanningPlanner) -> None:
+def test_a_path_is_closed_and_opened_again_by_a_wall(planner: ReplanningPlanner) -> None:
     replanner = planner.replanner(open_ground(), RNG)
     before = replanner.result()
     wall = [(6, c) for c in range(12)]
@@ -141,7 +141,7 @@ def test_a_wall_closes_and_opens_the_way(planner: ReplanningPlanner) -> None:
 
 
 @BOTH
-def test_a_sealed_goal_has_no_path_until_a_door_opens(planner: ReplanningPlanner) -> None:
+def test_an_enclosed_goal_has_no_path_until_a_cell_is_cleared(planner: ReplanningPlanner) -> None:
     replanner = planner.replanner(sealed(), RNG)
     assert replanner.result().status is PlanStatus.NO_PATH
     replanner.clear([(4, 4)])
@@ -195,7 +195,7 @@ def test_moves_that_discs_close_stay_closed(planner: ReplanningPlanner) -> None:
 
 
 @BOTH
-def test_the_first_query_is_left_as_it_was_and_the_present_one_cannot_be_written(planner: ReplanningPlanner) -> None:
+def test_the_first_query_is_unchanged_and_the_present_one_is_read_only(planner: ReplanningPlanner) -> None:
     query = open_ground()
     replanner = planner.replanner(query, RNG)
     replanner.block([(5, 5)])
