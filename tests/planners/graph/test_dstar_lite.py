@@ -34,11 +34,11 @@ def test_integer_costs_compare_as_the_lengths_do(a: int, b: int, c: int, d: int)
 
 
 @given(st.lists(st.tuples(st.integers(0, 19), st.integers(0, 5), st.integers(0, 5)), max_size=80))
-def test_the_heap_keeps_its_order_after_any_insertions_and_removals(told: list[tuple[int, int, int]]) -> None:
+def test_the_heap_keeps_its_order_after_any_insertions_and_removals(operations: list[tuple[int, int, int]]) -> None:
     heap, place = np.empty((20, 3), dtype=np.int64), np.full(20, -1, dtype=np.int32)
     keys: dict[int, tuple[int, int]] = {}
     size = 0
-    for cell, first, second in told:
+    for cell, first, second in operations:
         if first == 5 and cell in keys:
             size = _kernels_replan.take(heap, place, size, cell)
             del keys[cell]
@@ -72,8 +72,8 @@ def test_keys_stay_right_through_a_long_drive_with_changes_behind_and_ahead() ->
         for r, c in rng.choice(free, size=5):
             replanner.move((int(r), int(c)))
         cells = rng.integers(0, 30, (3, 2))
-        told = replanner.block if turn % 2 else replanner.clear
-        told(cells)
+        edit = replanner.block if turn % 2 else replanner.clear
+        edit(cells)
         world.free[tuple(cells.T)] = turn % 2 == 0
         agree(replanner, world)
 

@@ -73,14 +73,14 @@ changes = st.lists(
 
 @BOTH
 @settings(max_examples=150, deadline=None)
-@given(bits=st.lists(st.booleans(), min_size=42, max_size=42), told=changes)
+@given(bits=st.lists(st.booleans(), min_size=42, max_size=42), edits=changes)
 def test_repairs_equal_the_oracle_after_any_sequence_of_changes(
-    planner: ReplanningPlanner, bits: list[bool], told: list[tuple[str, list[tuple[int, int]]]]
+    planner: ReplanningPlanner, bits: list[bool], edits: list[tuple[str, list[tuple[int, int]]]]
 ) -> None:
     free = np.array(bits).reshape(6, 7)
     query = Query(Grid.from_free(free), (0, 0), (5, 6))
     world, replanner = World(query.grid), planner.replanner(query, RNG)
-    for what, cells in told:
+    for what, cells in edits:
         if what == "ask":
             agree(replanner, world)
         elif what == "move":

@@ -325,8 +325,8 @@ def test_legs_stay_within_the_tolerance_of_the_motion(seed: int) -> None:
     n = np.minimum(n, len(legs) - 1)
     inside = (legs[n, 0] <= t) & (t <= legs[n, 1])
     assert inside.mean() > 0.999  # all but jumps
-    told = legs[n, 2:4] + (t - legs[n, 0])[:, np.newaxis] * legs[n, 4:6]
-    off = np.hypot(*(told - mover.at(t)).T)[inside]
+    expected = legs[n, 2:4] + (t - legs[n, 0])[:, np.newaxis] * legs[n, 4:6]
+    off = np.hypot(*(expected - mover.at(t)).T)[inside]
     assert off.max() <= 2 * TOLERANCE
     assert (legs[:, 6] >= mover.radius + INFLATE + 2 * TOLERANCE - 1e-12).all()
 

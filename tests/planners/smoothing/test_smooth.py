@@ -231,14 +231,14 @@ def test_a_turned_or_mirrored_world_has_a_turned_or_mirrored_route(
     flip = -1.0 if mirror else 1.0
     turn = np.array([[math.cos(angle), -flip * math.sin(angle)], [math.sin(angle), flip * math.cos(angle)]])
 
-    def told(matrix: Floats) -> Route:
+    def smoothed(matrix: Floats) -> Route:
         discs = tuple(Disc(*map(float, matrix @ (d.x, d.y)), d.radius) for d in task.world.obstacles)
         ends = [matrix @ np.array(end) for end in (task.start[:2], task.goal)]
         far = Task(World("far", (-99, -99, 99, 99), discs), (*ends[0], 0.0), tuple(ends[1]))  # walls do not turn
         moved = dataclasses.replace(plan, waypoints=grid.fractional(grid.xy(plan.cells) @ matrix.T))
         return smooth(moved, grid, far, kind=kind)
 
-    here, there = told(np.eye(2)), told(turn)
+    here, there = smoothed(np.eye(2)), smoothed(turn)
     assert there.length == pytest.approx(here.length, abs=1e-6)
     s = np.linspace(0, 1, 50)
     ours, theirs = (np.stack([np.interp(s * r.length, r.arc, axis) for axis in r.xy.T], axis=1) for r in (here, there))
