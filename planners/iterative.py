@@ -141,9 +141,9 @@ class IterativePlanner(GridPlanner):
         """What `work` counts."""
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
-        return self.take(query, self.iterate(query, rng))
+        return self.answer(query, self.iterate(query, rng))
 
-    def take(self, query: Query, states: Iterator[Iteration]) -> PlanResult:
+    def answer(self, query: Query, states: Iterator[Iteration]) -> PlanResult:
         """The answer after as many iterations as the planner's options allow.
 
         Args:

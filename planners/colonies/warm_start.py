@@ -54,7 +54,7 @@ class WarmStartedColony(CachedReplanner):
         planner = self._brief if warm else self._planner
         if warm and self._memory.trail is not None and len(changed):
             even_out(self._memory.trail, query.grid.shape, changed, self._reach)
-        answer = planner.take(query, planner.resume(query, self._rng, self._memory))
+        answer = planner.answer(query, planner.resume(query, self._rng, self._memory))
         return dataclasses.replace(answer, options=dataclasses.asdict(planner))
 
 

@@ -328,9 +328,17 @@ def conflicts(
 
 @inline
 def relax(
-    tree: Tree, intervals: Intervals, state: int, to: int, move: Move, lows: Array, highs: Array, count: int,
-    heap: Array, size: int,
-) -> tuple[Array, int]:  # fmt: skip
+    tree: Tree,
+    intervals: Intervals,
+    state: int,
+    to: int,
+    move: Move,
+    lows: Array,
+    highs: Array,
+    count: int,
+    heap: Array,
+    size: int,
+) -> tuple[Array, int]:
     """Reach the safe intervals of cell `to` from interval `state` between conflicts; the open list and its size.
 
     Between two conflicts the robot can leave at any instant, and all of these reach one interval of the next

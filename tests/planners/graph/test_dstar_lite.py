@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from antdrive.planners import DStar, DStarLite, Query
-from antdrive.planners.graph import _kernels_incremental as _kernels_replan
+from antdrive.planners.graph import _kernels_incremental as kernels
 from antdrive.planners.graph._kernels_incremental import DIAGONAL, STRAIGHT
 from antdrive.worlds import Grid
 from tests.planners.replanning.agreement import World, agree
@@ -40,10 +40,10 @@ def test_the_heap_keeps_its_order_after_any_insertions_and_removals(operations: 
     size = 0
     for cell, first, second in operations:
         if first == 5 and cell in keys:
-            size = _kernels_replan.take(heap, place, size, cell)
+            size = kernels.take(heap, place, size, cell)
             del keys[cell]
         else:
-            size = _kernels_replan.put(heap, place, size, cell, first, second)
+            size = kernels.put(heap, place, size, cell, first, second)
             keys[cell] = first, second
         assert size == len(keys)
         if keys:
@@ -51,7 +51,7 @@ def test_the_heap_keeps_its_order_after_any_insertions_and_removals(operations: 
     drained = []
     while size:
         drained.append(tuple(map(int, heap[0, :2])))
-        size = _kernels_replan.take(heap, place, size, int(heap[0, 2]))
+        size = kernels.take(heap, place, size, int(heap[0, 2]))
     assert drained == heapq.nsmallest(len(keys), keys.values())
     assert (place == -1).all()
 
