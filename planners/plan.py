@@ -210,7 +210,7 @@ class PlanResult:
 
     @property
     def line(self) -> Floats:
-        """The polyline to drive as fractional (row, col) (M, 2): `waypoints` if the planner set them, else `cells`."""
+        """The polyline to drive as fractional (row, col) (M, 2): `waypoints` if there are any, else `cells`."""
         return self.cells.astype(np.float64) if self.waypoints is None else self.waypoints
 
     def _repr_html_(self) -> str:
@@ -268,7 +268,10 @@ def capabilities_of(planner: Planner) -> Capabilities:
 
 @dataclass(frozen=True, kw_only=True)
 class GridPlanner(abc.ABC):
-    """A planner whose fields are its options. It checks both ends and records the planning time and the options."""
+    """A planner whose fields are its options.
+
+    It checks both ends and records the planning time and the options.
+    """
 
     @property
     def capabilities(self) -> Capabilities:

@@ -80,7 +80,10 @@ def load_planner(name: str, /, **options: Any) -> Planner:
 
 
 def list_planners() -> Mapping[str, Planner]:
-    """All planners by name, those of other packages last. A planner that cannot be loaded is left out with a warning."""
+    """All planners by name, those of other packages last.
+
+    A planner that cannot be loaded is left out with a warning.
+    """
     found = dict(PLANNERS)
     for name, entry in _plugins().items():
         try:

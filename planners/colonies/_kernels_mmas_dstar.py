@@ -1,4 +1,4 @@
-"""Compiled spreading of pheromone from the goal, and walking on it: arrays in, arrays out, nothing validated."""
+"""Compiled spreading of pheromone from the goal: arrays in, arrays out, nothing validated."""
 
 from __future__ import annotations
 

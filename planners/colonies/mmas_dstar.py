@@ -86,7 +86,7 @@ class MaxMinDStar(GridPlanner):
         )
 
     def spread(self, query: Query) -> tuple[ColonyGraph, Floats, int, list[str]]:
-        """The graph that the ant walks on, the pheromone (cells,), how many cells got some, and remarks on the plan."""
+        """The graph to walk on, the pheromone (cells,), how many cells got some, and remarks on the plan."""
         from antdrive.planners.colonies import _kernels_mmas_dstar as kernels
 
         graph, work = ColonyGraph.of(query), 0
@@ -144,7 +144,10 @@ class MaxMinDStar(GridPlanner):
         yield 1.0, 0.0
 
     def describe_exponents(self, alpha: float, beta: float) -> str:
-        """A sentence on how `alpha` and `beta` differ from the exponents to begin with; empty if they do not."""
+        """A sentence on how `alpha` and `beta` differ from the exponents to begin with.
+
+        It is empty if they do not.
+        """
         if beta != self.beta:
             return f"alpha up to {self.alpha_max:g} did not help, and beta was set to 0"
         return f"alpha was raised from {self.alpha:g} to {alpha:g}" if alpha != self.alpha else ""

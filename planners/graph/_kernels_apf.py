@@ -1,4 +1,7 @@
-"""Compiled potential field: arrays in, arrays out, nothing validated. Equation numbers as in Lee et al. 2008."""
+"""Compiled potential field: arrays in, arrays out, nothing validated.
+
+Equation numbers as in Lee et al. 2008.
+"""
 
 from __future__ import annotations
 
@@ -66,7 +69,7 @@ def squared_distances(free: Array, out: Array) -> bool:
 
 @kernel
 def disc_distances(discs: Array, x0: float, y0: float, cell: float, inflate: float, reach: float, out: Array) -> None:
-    """Lower `out` to the distance from each cell's centre to the nearest inflated disc, if that is within `reach`."""
+    """Lower `out` to the distance from each cell's centre to the nearest inflated disc, up to `reach`."""
     rows, cols = out.shape
     for j in range(discs.shape[0]):
         x, y, radius = discs[j, 0], discs[j, 1], discs[j, 2] + inflate
@@ -90,7 +93,10 @@ def potential(
     influence: float,
     out: Array,
 ) -> None:
-    """The potential U (eq. 7): attraction to the goal (eq. 9) and repulsion from obstacles (eq. 11); inf where blocked."""
+    """The potential U (eq. 7): attraction to the goal (eq. 9) and repulsion from obstacles (eq. 11).
+
+    It is infinite where blocked.
+    """
     rows, cols = free.shape
     for r in range(rows):
         for c in range(cols):

@@ -26,7 +26,10 @@ def insert(x: int, cost: int, h: Array, heap: Array, place: Array, size: int) ->
 
 @kernel
 def settle(moves: Array, start: int, h: Array, back: Array, heap: Array, place: Array, size: int) -> tuple[int, int]:
-    """PROCESS-STATE until k_min reaches h(start); returns the list's length and how many states were processed."""
+    """PROCESS-STATE until k_min reaches h(start).
+
+    Returns the list's length and how many states were processed.
+    """
     rows, cols = moves.shape
     mask, offset = moves.ravel(), offsets(cols)
     processed = 0

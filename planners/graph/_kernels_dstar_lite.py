@@ -39,7 +39,10 @@ def lookahead(u: int, mask: Array, offset: Array, g: Array) -> int:
 def settle(
     moves: Array, r0: int, c0: int, goal: int, km: int, g: Array, rhs: Array, heap: Array, place: Array, size: int
 ) -> tuple[int, int]:
-    """ComputeShortestPath from the start cell (r0, c0); returns the queue's size and how many cells were expanded."""
+    """ComputeShortestPath from the start cell (r0, c0).
+
+    Returns the queue's size and how many cells were expanded.
+    """
     cols = moves.shape[1]
     mask, offset = moves.ravel(), offsets(cols)
     start = r0 * cols + c0

@@ -110,7 +110,10 @@ def take(heap: Array, place: Array, size: int, cell: int) -> int:
 
 @inline
 def moves_between_free(free: Array, r: int, c: int) -> int:
-    """The moves of a cell that the free cells alone allow; a diagonal also needs both of its orthogonal neighbours."""
+    """The moves of a cell that the free cells alone allow.
+
+    A diagonal also needs both of its orthogonal neighbours.
+    """
     rows, cols = free.shape
     mask = 0
     if free[r, c]:

@@ -43,7 +43,7 @@ class NearLegs(NamedTuple):
 
 
 class Intervals(NamedTuple):
-    """By cell, when a robot can stand in it: of cell i from since[k] to until[k] for first[i] <= k < first[i + 1]."""
+    """When a robot can stand in cell i: from since[k] to until[k] for first[i] <= k < first[i + 1]."""
 
     first: Array  # (cells + 1,)
     since: Array  # (K,) [s]
@@ -51,7 +51,7 @@ class Intervals(NamedTuple):
 
 
 class Trip(NamedTuple):
-    """What is asked: flat start and goal cells, speed, departure, deadline, and whether the goal must stay safe."""
+    """Flat start and goal cells, speed, departure, deadline, and whether the goal must stay safe."""
 
     start: int
     goal: int
@@ -70,7 +70,7 @@ class Tree(NamedTuple):
 
 
 class Move(NamedTuple):
-    """One move from a safe interval: first and last possible departure, duration, least time from its end to the goal."""
+    """A move: first and last possible departure, duration, and the least time from its end to the goal."""
 
     now: float
     latest: float
@@ -266,7 +266,7 @@ def safe_intervals(near: NearLegs, free: Array, frame: Frame, start: float, end:
 
 @inline
 def sooner(heap: Array, a: int, b: int) -> bool:
-    """Whether entry a of the open list comes before entry b: by f, then by the later arrival, which is nearer the goal."""
+    """Whether entry a of the open list comes before entry b: by lower f, then by later arrival."""
     return bool(heap[a, F] < heap[b, F] or (heap[a, F] == heap[b, F] and heap[a, G] > heap[b, G]))
 
 
@@ -279,7 +279,10 @@ def swap(heap: Array, a: int, b: int) -> None:
 
 @kernel
 def push(heap: Array, size: int, f: float, g: float, interval: int) -> Array:
-    """Add an entry to the `size` entries of the open list; returns the list, which has grown if it was full."""
+    """Add an entry to the `size` entries of the open list.
+
+    Returns the list, which has grown if it was full.
+    """
     if size == len(heap):
         heap = doubled_rows(heap)
     heap[size, F], heap[size, G], heap[size, INTERVAL] = f, g, interval
@@ -314,7 +317,10 @@ def drop_first(heap: Array, size: int) -> int:
 def conflicts(
     near: NearLegs, i: int, x: float, y: float, ux: float, uy: float, move: Move, lows: Array, highs: Array
 ) -> int:
-    """Fill `lows` and `highs` with the departures that conflict with a leg, sorted; returns how many intervals."""
+    """Fill `lows` and `highs` with the departures that conflict with a leg, sorted.
+
+    Returns how many intervals they form.
+    """
     count = 0
     for e in range(near.first[i], near.first[i + 1]):
         leg = near.legs[near.number[e]]
@@ -368,7 +374,10 @@ def relax(
 
 @kernel
 def traced(tree: Tree, cell_of: Array, cols: int, found: int) -> tuple[Array, Array, Array]:
-    """The cells (N, 2) from the root to interval `found`, and when each is reached and left; empty if that is -1."""
+    """The cells (N, 2) from the root to interval `found`, and when each is reached and left.
+
+    All are empty if `found` is -1.
+    """
     length = 0
     state = found
     while state >= 0:

@@ -13,7 +13,7 @@ from antdrive.planners.plan import Cells, Query
 
 @dataclass(frozen=True, kw_only=True)
 class DStar(IncrementalPlanner):
-    """The shortest path over the grid's moves, by basic D* (Stentz 1994); replans while driving."""
+    """The shortest path over the grid's moves by basic D* (Stentz 1994), repaired when the map changes."""
 
     def replanner(self, query: Query, rng: np.random.Generator) -> DStarSearch:
         """A search that can be repaired after its first answer; it draws nothing from `rng`."""
@@ -21,7 +21,7 @@ class DStar(IncrementalPlanner):
 
 
 class DStarSearch(IncrementalSearch):
-    """The search of D*: Dijkstra's algorithm from the goal, whose RAISE and LOWER states propagate changes."""
+    """D*: Dijkstra's algorithm from the goal, whose RAISE and LOWER states propagate changes."""
 
     def __init__(self, query: Query) -> None:
         super().__init__(query)

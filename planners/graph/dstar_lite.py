@@ -13,7 +13,7 @@ from antdrive.planners.plan import Cells, Query
 
 @dataclass(frozen=True, kw_only=True)
 class DStarLite(IncrementalPlanner):
-    """The shortest path over the grid's moves, by D* Lite (Koenig & Likhachev 2002); replans while driving."""
+    """The shortest path over the grid's moves by D* Lite (Koenig & Likhachev 2002), repaired when the map changes."""
 
     def replanner(self, query: Query, rng: np.random.Generator) -> DStarLiteSearch:
         """A search that can be repaired after its first answer; it draws nothing from `rng`."""
@@ -21,7 +21,7 @@ class DStarLite(IncrementalPlanner):
 
 
 class DStarLiteSearch(IncrementalSearch):
-    """The search of D* Lite: the optimised version, Figure 4 of the paper, in exact integer costs."""
+    """D* Lite: the optimised version, Figure 4 of the paper, in exact integer costs."""
 
     def __init__(self, query: Query) -> None:
         super().__init__(query)

@@ -1,4 +1,4 @@
-"""Replanning on a grid: a query that can be edited while the robot moves, and searches that are repaired after an edit."""
+"""Replanning on a grid: queries that can be edited while the robot moves, and searches that are repaired."""
 
 from __future__ import annotations
 
@@ -21,7 +21,10 @@ if TYPE_CHECKING:  # importing a grid loads the compiler
 
 @runtime_checkable
 class Replanner(Protocol):
-    """A query that can be edited: report where the robot is and which cells changed, then ask for the path from there."""
+    """A query that can be edited, and its answer.
+
+    Report where the robot is and which cells changed, then ask for the path from there.
+    """
 
     @property
     def query(self) -> Query:
@@ -37,15 +40,24 @@ class Replanner(Protocol):
         ...
 
     def block(self, cells: npt.ArrayLike) -> int:
-        """Report that cells (N, 2) are blocked from now on; returns how many cells have other moves than before."""
+        """Report that cells (N, 2) are blocked from now on.
+
+        Returns how many cells have other moves than before.
+        """
         ...
 
     def clear(self, cells: npt.ArrayLike) -> int:
-        """Report that cells (N, 2) are free from now on; returns how many cells have other moves than before."""
+        """Report that cells (N, 2) are free from now on.
+
+        Returns how many cells have other moves than before.
+        """
         ...
 
     def change(self, grid: Grid) -> int:
-        """Replace the grid by another one of the same shape; returns how many cells have other moves than before."""
+        """Replace the grid by another one of the same shape.
+
+        Returns how many cells have other moves than before.
+        """
         ...
 
     def result(self) -> PlanResult:
@@ -62,7 +74,7 @@ class ReplanningPlanner(Planner, Protocol):
 
 
 class EditableQuery(abc.ABC):
-    """The part that all replanners share: the query as it is now, and which cells changed since the last answer."""
+    """The part that all replanners share: the present query, and the cells changed since the last answer."""
 
     def __init__(self, query: Query) -> None:
         from antdrive.planners.graph import _kernels_incremental  # imported here because it loads the compiler

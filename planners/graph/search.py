@@ -29,7 +29,10 @@ class AStar(GridPlanner):
 
 
 def shortest(query: Query, *, informed: bool = True) -> PlanResult:
-    """The shortest path between two free cells, or `NO_PATH`; by A* if `informed`, else by Dijkstra's algorithm."""
+    """The shortest path between two free cells, or `NO_PATH`.
+
+    By A* if `informed`, else by Dijkstra's algorithm.
+    """
     from antdrive.planners.graph import _kernels_search  # imported here because it loads the compiler
 
     cells, straight, diagonal, expanded = _kernels_search.shortest_path(

@@ -97,7 +97,7 @@ class SafeIntervals(GridPlanner):
 
     @property
     def capabilities(self) -> Capabilities:
-        """What this planner can do and what it needs: the cells that are blocked now are not enough for it."""
+        """What this planner can do and what it needs: knowing the cells blocked now is not enough."""
         return Capabilities(needs_motions=True)
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:

@@ -157,7 +157,7 @@ class SteppingAgent(abc.ABC):
 
 
 class ReplanningAgent(SteppingAgent):
-    """An agent that reports the blocked cells to a replanner and takes the first step of the path that it gets."""
+    """An agent that reports blocked cells to a replanner and takes the first step of its path."""
 
     def __init__(self, replanner: Replanner) -> None:
         super().__init__(replanner.query)

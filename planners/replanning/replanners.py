@@ -33,7 +33,7 @@ def replanner_for(planner: Planner, query: Query, rng: np.random.Generator) -> R
 
 
 class CachedReplanner(EditableQuery):
-    """A replanner in cells that keeps its answer as long as nothing has changed and the robot is on the path."""
+    """A replanner that keeps its answer as long as nothing has changed and the robot is on the path."""
 
     def __init__(self, query: Query) -> None:
         super().__init__(dataclasses.replace(query, task=None))

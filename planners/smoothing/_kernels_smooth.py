@@ -40,7 +40,7 @@ class Contacts(NamedTuple):
 
 
 class String(NamedTuple):
-    """A taut string: its contacts, its links (K + 1, 4) as x, y from and x, y to, and the discs (N, 3) it bends around."""
+    """A string: its contacts, links (K + 1, 4) as x, y from and x, y to, and discs (N, 3)."""
 
     contacts: Contacts
     links: Array
@@ -216,7 +216,7 @@ def insert(count: int, i: int, contacts: Contacts, k: int, t: float, a: float) -
 
 @inline
 def past(x: float, y: float, cx: float, cy: float, bx: float, by: float, turn: float) -> float:
-    """The angle from the direction of (bx, by) to that of (x, y) about a centre (cx, cy), in the sense of `turn` [rad]."""
+    """The angle from (bx, by) to (x, y) about a centre (cx, cy), in the sense of `turn` [rad]."""
     return (turn * (math.atan2(y - cy, x - cx) - math.atan2(by - cy, bx - cx))) % TURN
 
 
@@ -233,7 +233,10 @@ def merge_repeats(count: int, contacts: Contacts) -> int:
 
 @kernel
 def place_links(count: int, contacts: Contacts, discs: Array, ends: Array, links: Array, heading: Array) -> bool:
-    """Fill `links` and their directions with the tangents between consecutive contacts; False if there is none."""
+    """Fill `links` and their directions with the tangents between consecutive contacts.
+
+    Returns False if there is none.
+    """
     disc, turn, _ = contacts
     for i in range(count + 1):
         x, y, r, s = ends[0, 0], ends[0, 1], 0.0, 0.0
@@ -254,7 +257,10 @@ def place_links(count: int, contacts: Contacts, discs: Array, ends: Array, links
 
 @kernel
 def loosest(count: int, contacts: Contacts, heading: Array) -> int:
-    """Measure the sweeps between links; returns the contact that bends the string least if it is loose, else -1."""
+    """Measure the sweeps between links.
+
+    Returns the contact that bends the string least if it is loose, else -1.
+    """
     _, turn, sweep = contacts
     least, loose = LOOSE, -1
     for i in range(count):
@@ -267,7 +273,10 @@ def loosest(count: int, contacts: Contacts, heading: Array) -> int:
 
 @kernel
 def deepest_entry(count: int, contacts: Contacts, links: Array, discs: Array) -> tuple[int, int, bool]:
-    """The disc that the string enters most, -1 if none; the link or contact that enters it; whether it is a contact."""
+    """The disc that the string enters most, -1 if none; the link or contact that enters it.
+
+    The third value is whether a contact enters it, not a link.
+    """
     disc, turn, sweep = contacts
     most, at, entered, on_arc = DEEP, -1, -1, False
     for i in range(count + 1):
@@ -294,7 +303,10 @@ def deepest_entry(count: int, contacts: Contacts, links: Array, discs: Array) ->
 
 @kernel
 def add_contact(count: int, contacts: Contacts, links: Array, discs: Array, entered: int, at: int, on_arc: bool) -> int:
-    """Make a disc that the string enters a contact, on the side where its centre lies; returns how many there are now."""
+    """Make a disc that the string enters a contact, on the side where its centre lies.
+
+    Returns how many there are now.
+    """
     disc, turn, sweep = contacts
     kx, ky = discs[entered, 0], discs[entered, 1]
     if on_arc:  # the contact is split in two, before and after the disc
@@ -380,7 +392,10 @@ def string_clearance(string: String, built: Array, bounds: Array) -> float:
 
 @kernel
 def with_point(xy: Array, curvature: Array, size: int, x: float, y: float, bend: float) -> tuple[Array, Array, int]:
-    """A polyline of `size` points with one more, and the curvature from that point on; the arrays grow when full."""
+    """A polyline of `size` points with one more, and the curvature from that point on.
+
+    The arrays grow when full.
+    """
     if size == len(xy):
         xy, curvature = doubled_rows(xy), doubled(curvature)
     xy[size, 0], xy[size, 1], curvature[size] = x, y, bend

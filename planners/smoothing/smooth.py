@@ -182,7 +182,7 @@ class TautString:
         return float(kernels.string_clearance(self._compiled, world.discs, box))
 
     def drawn(self, world: World, inflate: float, bulge: float) -> tuple[Floats, Floats]:
-        """As a polyline (M, 2) [m] whose corners stand off its arcs by at most `bulge`, and the curvature (M,)."""
+        """A polyline (M, 2) [m] whose corners stand off the arcs by at most `bulge`, and its curvature (M,)."""
         from antdrive.planners.smoothing import _kernels_smooth as kernels
 
         box = np.asarray(world.bounds, dtype=np.float64)
