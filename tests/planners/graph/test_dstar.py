@@ -17,7 +17,7 @@ def corridor() -> DStarSearch:
     free = np.zeros((7, 12), dtype=np.bool_)
     free[1, 1:11] = free[5, 1:11] = True
     free[1:6, [1, 10]] = True
-    return DStar().replanner(Query(Grid.from_free(free), (1, 1), (1, 10)))
+    return DStar().replanner(Query(Grid.from_free(free), (1, 1), (1, 10)), RNG)
 
 
 def test_a_blocked_corridor_raises_the_costs_of_paths_through_it() -> None:
@@ -52,7 +52,7 @@ def test_a_change_away_from_the_path_is_not_processed() -> None:
 def test_backpointers_of_processed_states_lead_to_the_goal() -> None:
     rng = np.random.default_rng(5)
     query = Query(Grid.from_free(rng.random((30, 30)) >= 0.2), (0, 0), (29, 29))
-    repair, world = DStar().replanner(query), World(query.grid)
+    repair, world = DStar().replanner(query, RNG), World(query.grid)
     for _ in range(20):
         for tell, value in ((repair.block, False), (repair.clear, True)):
             cells = rng.integers(1, 29, (4, 2))

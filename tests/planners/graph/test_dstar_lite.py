@@ -66,7 +66,7 @@ def test_keys_stay_right_through_a_long_drive_with_changes_behind_and_ahead() ->
     """Thousands of moves between few repairs, which is the case that k_m exists for."""
     rng = np.random.default_rng(4)
     query = Query(Grid.from_free(rng.random((30, 30)) >= 0.15), (0, 0), (29, 29))
-    replanner, world = DStarLite().replanner(query), World(query.grid)
+    replanner, world = DStarLite().replanner(query, np.random.default_rng(0)), World(query.grid)
     free = np.argwhere(query.grid.free)
     for turn in range(300):
         for r, c in rng.choice(free, size=5):
@@ -81,7 +81,7 @@ def test_keys_stay_right_through_a_long_drive_with_changes_behind_and_ahead() ->
 def test_equally_long_paths_do_not_lead_in_circles() -> None:
     """An empty grid has many shortest paths, and every repair leaves cells with outdated costs behind."""
     query = Query(Grid.from_free(np.ones((25, 25))), (12, 0), (12, 24))
-    replanner, world = DStarLite().replanner(query), World(query.grid)
+    replanner, world = DStarLite().replanner(query, np.random.default_rng(0)), World(query.grid)
     for row, column in itertools.product((12, 11, 13, 10), (12, 8, 16)):
         for tell, value in ((replanner.block, False), (replanner.clear, True)):
             tell([(row, column)])
