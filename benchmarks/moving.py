@@ -18,7 +18,7 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.planners import Cell, OnlinePlanner, Query, load_planner, online_for
+from antdrive.planners import Cell, OnlineAgent, Query, agent_for, load_planner
 from antdrive.sim.papers.maps import environments
 from antdrive.worlds import DIRECTIONS, Grid
 from benchmarks.planners import seconds, table
@@ -72,11 +72,11 @@ def drive(robot: OnlinePlanner, query: Query, movers: Strollers, limit: int = 50
     return robot.arrived
 
 
-def runs(name: str, query: Query, count: int, seeds: range) -> Iterator[tuple[bool, OnlinePlanner, float]]:
+def runs(name: str, query: Query, count: int, seeds: range) -> Iterator[tuple[bool, OnlineAgent, float]]:
     for seed in seeds:
         movers = Strollers(query.grid, count, np.random.default_rng([seed, count]), (query.start, query.goal))
         started = time.perf_counter()
-        robot = online_for(load_planner(name), query, np.random.default_rng(seed))
+        robot = agent_for(load_planner(name), query, np.random.default_rng(seed))
         yield drive(robot, query, movers), robot, time.perf_counter() - started
 
 
@@ -94,7 +94,7 @@ def main() -> None:
                 for _ in runs(name, query, count, range(1)):
                     pass  # compile before timing
                 done = list(runs(name, query, count, seeds))
-                tallies = [robot.tally for _, robot, _ in done]
+                tallies = [robot.stats for _, robot, _ in done]
                 spread = {
                     key: f"{statistics.median(values):.0f} ({min(values):.0f}–{max(values):.0f})"
                     for key in ("steps", "cost", "propagated")

@@ -121,7 +121,7 @@ def quality(quick: bool) -> Iterator[str]:
         queries = {size: [make(size, seed) for seed in seeds] for size in sizes}
         rows = []
         for name, planner in PLANNERS.items():
-            if getattr(planner, "needs_world", False) and make is random_grid:
+            if capabilities_of(planner).needs_world and make is random_grid:
                 continue
             solve(planner, queries[20][0], 0)  # compiled before it is timed
             row = [f"`{name}`"]
@@ -310,7 +310,7 @@ def han2007(quick: bool) -> Iterator[str]:
     yield from table(["", "10 ants", "100 ants", "500 ants"], rows)
     rows = []
     for name in ("ants", "mmas", "ga-han", "hybrid"):
-        if name in PLANNERS and not getattr(PLANNERS[name], "needs_world", False):
+        if name in PLANNERS and not capabilities_of(PLANNERS[name]).needs_world:
             results = [solve(load_planner(name), query, seed) for seed in range(3 if quick else 10)]
             solved = [r for r in results if r.solved]
             line = f"{statistics.mean(r.length or r.cost for r in solved):.3f}" if solved else "–"

@@ -1,9 +1,9 @@
-"""What repairing a plan costs beside planning anew: `python -m benchmarks.replan`.
+"""The time to repair a plan compared with planning anew: `python -m benchmarks.replan`.
 
-A robot crosses 200 x 200 cells. Again and again it takes a few steps along its path, and a patch of up to 3 x 3 cells a few
-steps ahead of it is blocked, or one blocked before is cleared. Telling the replanner and getting the repaired path is timed
-against planning the same query anew, with the same planner and with `astar`; lengths must agree. For `ants`, which go on with
-their trails, fewer worlds are used, and what lengths lack to the optimum is told. Prints Markdown.
+A robot crosses 200 x 200 cells. Again and again it takes a few steps along its path, and a patch of up to 3 x 3 cells
+ahead of it is blocked, or one blocked before is cleared. The time to report the change to the replanner and get the
+repaired path is compared with planning the same query anew, by the same planner and by `astar`; lengths must agree. For
+`ants`, which continue on their trails, there are fewer worlds, and the gap to the optimum is reported. Prints Markdown.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ def timed(call: Callable[[], Any]) -> tuple[float, Any]:
 
 
 def drive(planner: Planner, query: Query, rng: np.random.Generator) -> list[tuple[float, ...]]:
-    """By change: seconds of repair, of planning anew, and of `astar`; what both lengths lack to the optimum."""
+    """For each change the seconds for the repair, for planning anew and for `astar`, and the gaps of repair and new plan."""
     replanner, astar = replanner_for(planner, query, rng), load_planner("astar")
-    replanner.block([])  # what a replanner looks up once for a grid
+    replanner.block([])  # the first edit prepares the grid once
     blocked: list[Any] = []
     rows = []
     for turn in range(CHANGES):
@@ -55,16 +55,16 @@ def drive(planner: Planner, query: Query, rng: np.random.Generator) -> list[tupl
             break
         replanner.move(tuple(map(int, path[int(rng.integers(1, 8))])))
         if turn % 3 == 2:
-            patch, tell = blocked.pop(0), replanner.clear
+            patch, edit = blocked.pop(0), replanner.clear
         else:
             ahead = path[int(rng.integers(12, 20))]
             patch = np.clip(ahead + rng.integers(-1, 2, (5, 2)), 0, SIDE - 1)
             patch = patch[replanner.query.grid.free[tuple(patch.T)]]
             blocked.append(patch)
-            tell = replanner.block
+            edit = replanner.block
 
-        def repair(tell: Callable[[Any], int] = tell, patch: Any = patch) -> Any:
-            tell(patch)
+        def repair(edit: Callable[[Any], int] = edit, patch: Any = patch) -> Any:
+            edit(patch)
             return replanner.result()
 
         took, repaired = timed(repair)
@@ -79,7 +79,7 @@ def drive(planner: Planner, query: Query, rng: np.random.Generator) -> list[tupl
 
 
 def measured(planner: Planner, kind: Callable[[np.random.Generator], Grid], worlds: int) -> Any:
-    """The columns of `drive` over so many worlds."""
+    """The columns of `drive` over a number of worlds."""
     rng = np.random.default_rng(0)
     drive(planner, corner_to_corner(kind(rng)), rng)  # warms up
     return np.array([row for _ in range(worlds) for row in drive(planner, corner_to_corner(kind(rng)), rng)]).T

@@ -1,6 +1,6 @@
-"""How to get there: queries, plans, and the registry of planners."""
+"""Planners: queries, plans, replanning, smoothing, and the registry."""
 
 import lazy_loader
 
-# What this package offers is listed, with its types, in __init__.pyi; each name is imported when first used.
+# __init__.pyi lists what this package offers, with types; each name is imported when it is first used.
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

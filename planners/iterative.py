@@ -1,4 +1,4 @@
-"""The loop that every planner with iterations shares: budget, history, interruption, progress."""
+"""The loop that all iterative planners share: budget, history, interruption, progress."""
 
 from __future__ import annotations
 
@@ -11,35 +11,63 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
 from antdrive.planners.graph.search import NO_WAY, reachable
-from antdrive.planners.plan import Cells, GridPlanner, History, PlanResult, PlanStatus, Query, path_cost
+from antdrive.planners.plan import (
+    Capabilities,
+    Cells,
+    GridPlanner,
+    History,
+    Planner,
+    PlanResult,
+    PlanStatus,
+    Query,
+    capabilities_of,
+    path_cost,
+)
 from antdrive.worlds import Floats
 from antdrive.worlds.errors import FieldError
 
 
 class Iteration(NamedTuple):
-    """Where a planner stands after an iteration. Lengths in metres, inf = none."""
+    """The state of a planner after an iteration. Lengths are in metres; infinite means no path.
 
-    cells: Cells  # the best path so far (N, 2), empty while there is none
-    best: float  # its length
+    Attributes:
+        cells: the best path so far as (row, col) of each cell (N, 2), empty while there is none
+        best: length of the best path so far [m]
+        iteration_best: length of this iteration's best path [m]
+        iteration_mean: mean length over those of this iteration that arrived [m]
+        arrived: how many ants or chromosomes of this iteration arrived
+        work: the work of this iteration, in the planner's `work_unit`
+        waypoints: the best path so far as a polyline of fractional (row, col) (M, 2), as in `PlanResult`
+        field: the planner's field (R, C), as in `PlanResult`
+    """
+
+    cells: Cells
+    best: float
     iteration_best: float
-    iteration_mean: float  # over those that arrived
+    iteration_mean: float
     arrived: int
-    work: int  # spent in this iteration
-    waypoints: Floats | None = None  # as in PlanResult
-    field: Floats | None = None  # as in PlanResult
+    work: int
+    waypoints: Floats | None = None
+    field: Floats | None = None
 
 
 class Progress(NamedTuple):
-    """How far a planner has come."""
+    """How far a planner has come.
 
-    done: int  # iterations
+    Attributes:
+        done: iterations done
+        total: iterations to do
+        best: length of the best path so far [m], infinite while there is none
+    """
+
+    done: int
     total: int
-    best: float  # length of the best path so far [m], inf while there is none
+    best: float
 
 
 _watcher: ContextVar[Callable[[Progress], None] | None] = ContextVar("_watcher", default=None)
@@ -47,7 +75,11 @@ _watcher: ContextVar[Callable[[Progress], None] | None] = ContextVar("_watcher",
 
 @contextmanager
 def watch(see: Callable[[Progress], None]) -> Iterator[None]:
-    """Within this block, planners call `see` after every iteration."""
+    """Within this block, planners call `see` after every iteration.
+
+    Args:
+        see: called with the progress; what it raises ends the planning
+    """
     token = _watcher.set(see)
     try:
         yield
@@ -60,9 +92,9 @@ _keeping: ContextVar[bool] = ContextVar("_keeping", default=False)
 
 @contextmanager
 def keep_best() -> Iterator[None]:
-    """Within this block, Ctrl-C makes a planner hand over its best path so far, as `STOPPED`.
+    """Within this block, Ctrl-C makes a planner return its best path so far, with the status `STOPPED`.
 
-    Elsewhere it is raised, so that it ends what plans many times instead of passing for one more result.
+    Outside such a block `KeyboardInterrupt` is raised as usual, so that it ends a series of plans.
     """
     token = _keeping.set(True)
     try:
@@ -75,22 +107,34 @@ def keep_best() -> Iterator[None]:
 class IterativePlanner(GridPlanner):
     """A planner that improves its answer in iterations.
 
-    It ends after `iterations`, or with the best path so far at the `time_budget`, with a note in `reason`. A time
-    budget gives up repeatability: a faster machine gets further. At Ctrl-C within `keep_best` it hands over the best so
-    far as `STOPPED`.
+    It ends after `iterations` or at the `time_budget`, whichever comes first. A plan with a time budget
+    cannot be repeated: a faster machine gets further. Ctrl-C within `keep_best` returns the best path so far
+    as `STOPPED`.
+
+    Attributes:
+        iterations: how many iterations are made at most
+        time_budget: planning time after which no further iteration begins [s]; None for no limit
     """
 
     iterations: int = 100
-    time_budget: float | None = None  # [s], looked at after each iteration
+    time_budget: float | None = None
 
     def __post_init__(self) -> None:
         require("iterations", self.iterations, at_least=1)
         if self.time_budget is not None:
             require("time_budget", self.time_budget, above=0)
 
+    @property
+    def capabilities(self) -> Capabilities:
+        """What this planner can do and what it needs."""
+        return Capabilities(iterative=True)
+
     @abc.abstractmethod
     def iterate(self, query: Query, rng: np.random.Generator) -> Iterator[Iteration]:
-        """Improve the answer until nothing more is to be gained, or without end; the goal can be reached."""
+        """Improve the answer until there is nothing more to gain, or without end.
+
+        It is only called for queries whose goal can be reached from the start.
+        """
 
     @property
     @abc.abstractmethod
@@ -98,10 +142,15 @@ class IterativePlanner(GridPlanner):
         """What `work` counts."""
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
-        return self.take(query, self.iterate(query, rng))
+        return self.answer(query, self.iterate(query, rng))
 
-    def take(self, query: Query, states: Iterator[Iteration]) -> PlanResult:
-        """The answer that iterations lead to, as many of them as there are to be; both ends are free."""
+    def answer(self, query: Query, states: Iterator[Iteration]) -> PlanResult:
+        """The answer after as many iterations as the planner's options allow.
+
+        Args:
+            query: the query, with both ends free
+            states: the iterations, as `iterate` yields them
+        """
         if not reachable(query):
             return PlanResult(status=PlanStatus.NO_PATH, reason=NO_WAY, work_unit=self.work_unit)
         if query.start == query.goal:
@@ -162,6 +211,11 @@ class IterativePlanner(GridPlanner):
         )
 
 
+def as_iterative(planner: Planner) -> IterativePlanner | None:
+    """The planner itself if it declares that it plans in iterations, else None."""
+    return cast(IterativePlanner, planner) if capabilities_of(planner).iterative else None
+
+
 def require(
     key: str,
     value: float,
@@ -173,8 +227,16 @@ def require(
 ) -> None:
     """Refuse an option outside its range.
 
+    Args:
+        key: name of the option
+        value: its value
+        at_least: smallest value allowed
+        above: the value must be greater than this
+        at_most: largest value allowed
+        below: the value must be less than this
+
     Raises:
-        ValueError: names the key and the range.
+        ValueError: the value is out of range; the message names the key and the range.
     """
     bounds = [
         f"{word} {bound:.12g}"

@@ -1,4 +1,4 @@
-"""What every planner is asked and what it answers."""
+"""What every planner is asked, what it answers, and what it declares about itself."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import enum
 import math
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
@@ -17,7 +17,7 @@ import numpy.typing as npt
 from antdrive.worlds import Floats, MoverMotion, Point, Task
 from antdrive.worlds.errors import FieldError
 
-if TYPE_CHECKING:  # a grid brings the compiler with it; naming a planner should not
+if TYPE_CHECKING:  # importing a grid loads the compiler, which naming a planner should not
     from antdrive.worlds import Grid
 
 Cell: TypeAlias = tuple[int, int]  # (row, col)
@@ -32,20 +32,45 @@ class PlanStatus(enum.Enum):
     STOPPED = "stopped early"
 
 
+@runtime_checkable
+class Moving(Protocol):
+    """A disc whose motion is known."""
+
+    @property
+    def radius(self) -> float:
+        """The disc's radius [m]."""
+        ...
+
+    def at(self, t: Floats) -> Floats:
+        """The disc's centre (T, 2) [m] at times `t` (T,) [s]."""
+        ...
+
+
 @dataclass(frozen=True)
 class Query:
-    """A grid with a start and a goal cell.
+    """What a planner is asked: a grid with a start cell and a goal cell.
+
+    Attributes:
+        grid: the grid to plan on
+        start: the start cell (row, col)
+        goal: the goal cell (row, col)
+        task: the task whose world the grid was made from, for planners that are not bound to cells
+        unreachable: why an end cannot be used although its cell may be free; empty if both can be used
+        motions: the discs that move, for planners of space and time
+        start_time: when the robot sets out, on the clock of the motions [s]
 
     Raises:
-        ValueError: a cell lies outside the grid. A blocked cell is no misuse: planners answer it with `NO_PATH`.
+        ValueError: a cell lies outside the grid. A blocked cell is not an error: planners answer it with
+            `NO_PATH`.
     """
 
     grid: Grid
     start: Cell
     goal: Cell
-    task: Task | None = None  # the world behind the grid, for planners that are not bound to cells
-    unreachable: str = ""  # why an end cannot be used although its cell may be free
-    motions: tuple[MoverMotion, ...] = ()  # for planners of space and time; t = 0 is when the robot sets out
+    task: Task | None = None
+    unreachable: str = ""
+    motions: tuple[Moving, ...] = ()
+    start_time: float = 0.0
 
     def __post_init__(self) -> None:
         rows, cols = self.grid.shape
@@ -57,24 +82,25 @@ class Query:
     def between(cls, grid: Grid, task: Task) -> Query:
         """The query for a task: each end becomes the nearest free cell that the robot reaches on a straight line.
 
-        Where an end has no such cell, `unreachable` says so and planners answer `NO_PATH`.
+        If an end has no such cell, `unreachable` says so and planners answer `NO_PATH`.
         """
-        from antdrive.worlds.geometry import point_clearance  # brings the compiler with it
+        from antdrive.worlds.geometry import point_clearance  # imports the compiler
 
         room = float(point_clearance(task.world, [task.goal])[0])
-        start, out = _enter(grid, task, task.start[:2], math.inf)
-        # A goal with too little room around it is reached where there is room, if that is within the tolerance.
-        within = task.goal_tolerance - min(0.02, task.goal_tolerance / 2)  # the robot stops a little short, or aside
-        goal, into = _enter(grid, task, task.goal, math.inf if room >= grid.inflate else within)
-        reasons = {"the start": out, "the goal": into}
+        start, can_leave = _entrance(grid, task, task.start[:2], math.inf)
+        # If the goal has less room than the inflation, the robot stops at a free cell within the goal
+        # tolerance. It does so a little short of the goal, or beside it, hence the allowance.
+        within = task.goal_tolerance - min(0.02, task.goal_tolerance / 2)
+        goal, can_arrive = _entrance(grid, task, task.goal, math.inf if room >= grid.inflate else within)
+        ends = {"the start": can_leave, "the goal": can_arrive}
         unreachable = "; ".join(
-            f"no free cell near {end} can be reached from it" for end, ok in reasons.items() if not ok
+            f"no free cell near {end} can be reached from it" for end, usable in ends.items() if not usable
         )
         return cls(grid, start, goal, task, unreachable)
 
     @property
     def blocked_end(self) -> str | None:
-        """A sentence naming the end that cannot be used, if one is."""
+        """A sentence naming the end that cannot be used, or None if both can."""
         if self.unreachable:
             return self.unreachable
         for key, cell in (("start", self.start), ("goal", self.goal)):
@@ -83,13 +109,16 @@ class Query:
         return None
 
 
-def _enter(grid: Grid, task: Task, point: Point, within: float) -> tuple[Cell, bool]:
-    """The free cell nearest to a point whose centre a straight line reaches; without one, the point's own and False."""
+def _entrance(grid: Grid, task: Task, point: Point, within: float) -> tuple[Cell, bool]:
+    """The nearest free cell, at most `within` [m] away, whose centre a clear straight line joins to a point; and True.
+
+    If there is none, the cell that holds the point and False.
+    """
     from antdrive.worlds.geometry import point_clearance, segment_clearance
 
     row, col = grid.cell_at(*point)
     rows, cols = grid.shape
-    # Cells farther off than this are no entrance: the way to them would be a plan of its own.
+    # Only cells close by are considered: getting to farther ones would take a plan of its own.
     reach = max(3, math.ceil(grid.inflate / grid.cell) + 1)
     near = [
         (r, c)
@@ -102,7 +131,8 @@ def _enter(grid: Grid, task: Task, point: Point, within: float) -> tuple[Cell, b
     centres = grid.xy(near)
     distance = np.hypot(*(centres - point).T)
     ends = np.broadcast_to(np.asarray(point, dtype=np.float64), centres.shape)
-    # An end may itself lie closer to a disc than the inflation asks; then the way in must not come closer still.
+    # A point may itself lie closer to a disc than the inflation; then the line must not come closer than the
+    # point.
     own = float(point_clearance(task.world, [point])[0])
     clear = segment_clearance(task.world, centres, ends) >= min(grid.inflate, own) - 1e-9
     fit = clear & (distance <= within)
@@ -113,12 +143,19 @@ def _enter(grid: Grid, task: Task, point: Point, within: float) -> tuple[Cell, b
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """What an iterative planner achieved in each iteration; empty for a search. Lengths in metres, inf = none."""
+    """What an iterative planner achieved in each of its I iterations; empty for a search. Infinite means no path.
 
-    best: Floats = field(default_factory=lambda: np.empty(0))  # (I,) best length so far
-    iteration_best: Floats = field(default_factory=lambda: np.empty(0))  # (I,)
-    iteration_mean: Floats = field(default_factory=lambda: np.empty(0))  # (I,) over those that arrived
-    arrived: npt.NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))  # (I,)
+    Attributes:
+        best: length of the best path so far (I,) [m]
+        iteration_best: length of the iteration's best path (I,) [m]
+        iteration_mean: mean length over those of the iteration that arrived (I,) [m]
+        arrived: how many ants or chromosomes arrived in the iteration (I,)
+    """
+
+    best: Floats = dataclasses.field(default_factory=lambda: np.empty(0))
+    iteration_best: Floats = dataclasses.field(default_factory=lambda: np.empty(0))
+    iteration_mean: Floats = dataclasses.field(default_factory=lambda: np.empty(0))
+    arrived: npt.NDArray[np.int64] = dataclasses.field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
     def __len__(self) -> int:
         return len(self.best)
@@ -128,23 +165,39 @@ class History:
 class PlanResult:
     """A planner's answer, in cells.
 
-    `cells` runs along allowed moves of the grid from start to goal and `cost` is its length. One that was interrupted
-    hands over the best path so far, if it has one, as `STOPPED`: to be looked at, not to be driven. A planner that is not bound
-    to the grid's eight directions also gives `waypoints`, the polyline to be driven, in fractional cells.
+    `cells` runs along allowed moves of the grid from start to goal. A planner that was interrupted returns
+    its best path so far, if it has one, with the status `STOPPED`: to be looked at, not to be driven. A
+    planner that is not bound to the grid's eight directions also returns `waypoints`.
+
+    Attributes:
+        status: how planning ended
+        cells: the path as (row, col) of each cell (N, 2), empty without a path
+        cost: length of `cells` [m], infinite without a path
+        waypoints: the polyline to drive as fractional (row, col) (M, 2); None if that is `cells`
+        length: exact length of the curve that `waypoints` approximates, arcs included [m]; None if that is
+            `cost`
+        reason: why there is no path, or a remark on the plan; may be empty
+        work: how many cells were expanded, ant steps taken or chromosomes rated
+        work_unit: what `work` counts
+        history: what each iteration achieved
+        field: the planner's field, such as pheromone or potential, at the end (R, C), for plots; None
+            without one
+        options: the planner's options by name
+        wall_s: planning time [s]
     """
 
     status: PlanStatus
-    cells: Cells = field(default_factory=lambda: np.empty((0, 2), dtype=np.int32))  # (N, 2), empty if there is none
-    cost: float = math.inf  # length of `cells` [m]
-    waypoints: Floats | None = None  # (M, 2) any-angle polyline in (row, col); None: the cells themselves
-    length: float | None = None  # exact length of what `waypoints` stand for, arcs included [m]; None: `cost`
-    reason: str = ""  # why there is no path, where the planner can tell
-    work: int = 0  # cells expanded, ant steps taken, chromosomes rated
+    cells: Cells = dataclasses.field(default_factory=lambda: np.empty((0, 2), dtype=np.int32))
+    cost: float = math.inf
+    waypoints: Floats | None = None
+    length: float | None = None
+    reason: str = ""
+    work: int = 0
     work_unit: str = "cells expanded"
-    history: History = field(default_factory=History)
-    field: Floats | None = None  # (R, C) pheromone or potential at the end, for plots
-    options: Mapping[str, Any] = dataclasses.field(default_factory=dict)  # the planner's parameters
-    wall_s: float = 0.0  # planning time [s]
+    history: History = dataclasses.field(default_factory=History)
+    field: Floats | None = None
+    options: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    wall_s: float = 0.0
 
     @property
     def solved(self) -> bool:
@@ -153,35 +206,78 @@ class PlanResult:
 
     @property
     def line_length(self) -> float:
-        """The length of the line to drive [m]: the planner's own where it has one, else `cost`."""
+        """Length of the line to drive [m]: `length` if the planner set it, else `cost`."""
         return self.cost if self.length is None else self.length
 
     @property
     def line(self) -> Floats:
-        """The polyline to drive, (M, 2) fractional cells: the planner's own, else its cells."""
+        """The polyline to drive as fractional (row, col) (M, 2): `waypoints` if there are any, else `cells`."""
         return self.cells.astype(np.float64) if self.waypoints is None else self.waypoints
 
     def _repr_html_(self) -> str:
         from antdrive.worlds.drawing import card, curve_svg, path_svg
 
         picture = (path_svg(self.line[:, ::-1]) if self.solved else "") + curve_svg(self.history.best)
-        facts = {"length": f"{self.line_length:.3f} m", "work": f"{self.work:,} {self.work_unit}",
-                 "time": f"{1000 * self.wall_s:.1f} ms"}  # fmt: skip
+        facts = {
+            "length": f"{self.line_length:.3f} m",
+            "work": f"{self.work:,} {self.work_unit}",
+            "time": f"{1000 * self.wall_s:.1f} ms",
+        }
         return card(picture, self.status.value + (f": {self.reason}" if self.reason else ""), facts)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Capabilities:
+    """What a planner can do and what it needs.
+
+    Attributes:
+        complete: it finds a path whenever there is one
+        iterative: it improves its answer in iterations, as an `IterativePlanner` does
+        needs_world: it plans among the world's discs, so the query must have a task
+        needs_motions: it plans in space and time among the query's motions, and solves it with a `TimedPlan`
+        own_replanner: it has a method `replanner(query, rng)`; planners without one plan anew after every
+            change
+        cell_by_cell: it has a method `agent(query, rng)` for driving; planners without one have their route
+            followed
+    """
+
+    complete: bool = True
+    iterative: bool = False
+    needs_world: bool = False
+    needs_motions: bool = False
+    own_replanner: bool = False
+    cell_by_cell: bool = False
 
 
 @runtime_checkable
 class Planner(Protocol):
-    """Anything that answers a query. All chance comes from `rng`: the same seed gives the same plan."""
+    """Anything that answers a query. All randomness comes from `rng`: the same seed gives the same plan.
+
+    A planner that departs from the defaults of `Capabilities` declares so in an attribute `capabilities`.
+    """
 
     def plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
         """Find a path from the start cell to the goal cell."""
         ...
 
 
+def capabilities_of(planner: Planner) -> Capabilities:
+    """What a planner declares; the defaults if it declares nothing, as other people's planners may."""
+    declared: Capabilities = getattr(planner, "capabilities", Capabilities())
+    return declared
+
+
 @dataclass(frozen=True, kw_only=True)
 class GridPlanner(abc.ABC):
-    """A planner whose fields are its options: ends are checked, and the time and the options recorded, in one place."""
+    """A planner whose fields are its options.
+
+    It checks both ends and records the planning time and the options.
+    """
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """What this planner can do and what it needs."""
+        return Capabilities()
 
     def plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
         """Find a path from the start cell to the goal cell."""
@@ -197,7 +293,12 @@ class GridPlanner(abc.ABC):
 
 
 def path_cost(cells: npt.ArrayLike, cell: float) -> float:
-    """The length [m] of a path of cells (N, 2): 1 or sqrt(2) cell sides a step."""
+    """The length [m] of a path of cells (N, 2): a step costs 1 or sqrt(2) cell sides.
+
+    Args:
+        cells: (row, col) of each cell of the path
+        cell: side of a cell [m]
+    """
     steps = np.abs(np.diff(np.asarray(cells), axis=0)).sum(axis=1)
     diagonal = int((steps == 2).sum())
     return cell * (len(steps) - diagonal + math.sqrt(2.0) * diagonal)

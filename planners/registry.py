@@ -1,4 +1,4 @@
-"""Every planner by name, with its options checked; planners of other packages join through entry points."""
+"""All planners by name, with their options checked. Planners of other packages join through entry points."""
 
 from __future__ import annotations
 
@@ -42,15 +42,20 @@ PLANNERS: Mapping[str, Planner] = MappingProxyType(
     }
 )
 
-#: The entry-point group through which other packages add a planner: an object with `plan` or a class of it.
+#: The entry-point group through which other packages add a planner: an object with `plan`, or a class of such objects.
 GROUP = "antdrive.planners"
 
 
 def load_planner(name: str, /, **options: Any) -> Planner:
-    """The planner of that name, with options set. Option values may be text, as from a command line.
+    """The planner of that name, with options set.
+
+    Args:
+        name: one of `list_planners()`
+        options: the planner's options by name; values may be text, as from a command line
 
     Raises:
-        InputError: no such planner or option, or a value that it does not take; says what would be right.
+        InputError: there is no such planner or option, or the option does not take the value; lists what is
+            valid.
     """
     planner = PLANNERS.get(name)
     if planner is None:
@@ -62,7 +67,10 @@ def load_planner(name: str, /, **options: Any) -> Planner:
 
 
 def list_planners() -> Mapping[str, Planner]:
-    """Every planner by name, other packages' last. One that cannot be loaded is left out with a warning."""
+    """All planners by name, those of other packages last.
+
+    A planner that cannot be loaded is left out with a warning.
+    """
     found = dict(PLANNERS)
     for name, entry in _plugins().items():
         try:
@@ -73,7 +81,7 @@ def list_planners() -> Mapping[str, Planner]:
 
 
 def describe(planner: Planner) -> str:
-    """One line on what a planner does, with the options in which it departs from its class's defaults."""
+    """One line on what a planner does, and which of its options differ from the defaults of its class."""
     summary = (type(planner).__doc__ or "No description.").strip().splitlines()[0]
     changed = [
         f"{f.name} {getattr(planner, f.name)}"
@@ -84,17 +92,22 @@ def describe(planner: Planner) -> str:
 
 
 def parse(key: str, kind: Any, value: Any) -> Any:
-    """A value for an option of type `kind`: int, float, bool, str, a Literal, or one of these or None.
+    """The value of an option of a given type.
+
+    Args:
+        key: name of the option, for messages
+        kind: the type: int, float, bool, str, a Literal, or a union of one of these and None
+        value: the value, or text for it
 
     Raises:
-        InputError: the value, or the text given for it, is not of that type.
+        InputError: the value, or the text for it, is not of that type.
     """
     origin, members = typing.get_origin(kind), typing.get_args(kind)
     if origin in (Union, types.UnionType) and type(None) in members:
         if value is None or (isinstance(value, str) and value.strip().lower() in ("none", "null", "")):
             return None
         inner = tuple(m for m in members if m is not type(None))
-        return parse(key, Union[inner], value)  # noqa: UP007 - a union made at run time
+        return parse(key, Union[inner], value)  # noqa: UP007 - the members are known only at run time
     if origin is Literal:
         for member in members:
             if value == member or (isinstance(value, str) and value == str(member)):
@@ -208,7 +221,7 @@ def _load(entry: importlib.metadata.EntryPoint) -> Planner:
     try:
         made = entry.load()
         planner = made() if isinstance(made, type) else made
-    except Exception as error:  # whatever another package's import or constructor raises
+    except Exception as error:  # another package's import or constructor may raise anything
         raise InputError(f"{who} cannot be loaded ({entry.value}): {type(error).__name__}: {error}") from error
     if not isinstance(planner, Planner):
         raise InputError(f"{who} is not a planner ({entry.value}): it has no method `plan(query, rng)`")

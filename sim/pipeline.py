@@ -179,7 +179,7 @@ class Scenario:
     @property
     def timed(self) -> bool:
         """Whether the planner plans in space and time, among movers."""
-        return bool(self.driven_world.movers) and getattr(self.planner, "needs_motions", False)
+        return bool(self.driven_world.movers) and capabilities_of(self.planner).needs_motions
 
     @property
     def effective_perception(self) -> Perception:

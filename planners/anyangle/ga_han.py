@@ -6,13 +6,13 @@ import dataclasses
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
 from antdrive.planners.anyangle.lines import RouteEnds, cells_along, polyline_length, route_ends, terrain
 from antdrive.planners.iterative import Iteration, IterativePlanner, require
-from antdrive.planners.plan import Cells, PlanResult, Query
+from antdrive.planners.plan import Capabilities, Cells, PlanResult, Query
 from antdrive.worlds import Floats
 from antdrive.worlds.plane import polyline_length
 

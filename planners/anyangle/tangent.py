@@ -12,14 +12,13 @@ import dataclasses
 import math
 import time
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from antdrive.planners.anyangle.lines import RouteEnds, cells_along, cells_under, route_ends
 from antdrive.planners.iterative import require
-from antdrive.planners.plan import GridPlanner, PlanResult, PlanStatus, Query, path_cost
+from antdrive.planners.plan import Capabilities, GridPlanner, PlanResult, PlanStatus, Query, path_cost
 from antdrive.worlds import Bounds, Floats, InputError, Point, Task
 from antdrive.worlds.plane import polyline_length
 
@@ -162,7 +161,10 @@ class Tangent(GridPlanner):
 
     bulge: float = 1e-3
 
-    needs_world: ClassVar[bool] = True
+    @property
+    def capabilities(self) -> Capabilities:
+        """What this planner can do and what it needs."""
+        return Capabilities(needs_world=True)
 
     def __post_init__(self) -> None:
         require("bulge", self.bulge, above=0)

@@ -1,4 +1,4 @@
-"""Compiled pheromone that spreads from the goal: arrays in, arrays out, nothing validated."""
+"""Compiled spreading of pheromone from the goal: arrays in, arrays out, nothing validated."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ import numpy as np
 
 from antdrive.worlds._kernels import DCOL, DROW, Array, kernel
 
-FIFTHS = np.array([5, 7, 5, 7, 5, 7, 5, 7], dtype=np.int64)  # cost of a move, 1 or 1.4, in fifths
+FIFTHS = np.array([5, 7, 5, 7, 5, 7, 5, 7], dtype=np.int64)  # cost of each move, 1 or 1.4, in fifths
 
 
 @kernel
 def close_gates(free: Array, moves: Array, start_row: int, start_col: int, goal_row: int, goal_col: int) -> int:
-    """Take the moves to gate cells out of `moves`: those between two blocked cells that lie diagonally opposite.
+    """Remove the moves to and from gate cells, which lie between two diagonally opposite blocked cells.
 
-    The number of cells closed; start and goal stay open.
+    Returns the number of cells closed; start and goal stay open.
     """
     rows, cols = free.shape
     closed = 0
@@ -36,12 +36,11 @@ def close_gates(free: Array, moves: Array, start_row: int, start_col: int, goal_
 
 @kernel
 def propagate(mask: Array, offset: Array, start: int, goal: int, retained: float, pheromone: Array) -> int:
-    """Spread pheromone, retained * cost of the way to the goal, until the start has its own; the cells that got some.
+    """Spread pheromone, `retained` times the cost of the path to the goal, until the start's is final.
 
-    The others have inf; the paper writes 10000.
-
-    Cells are taken from the open list by cost, as D* does. Costs are whole fifths, so the list is a ring of eight
-    buckets; a bucket is a chain of entries.
+    Returns how many cells got some; the others have inf, where the paper writes 10000. Cells are taken from
+    the open list by cost, as D* does. Costs are multiples of 1/5, so the list is a ring of eight buckets,
+    each a linked list.
     """
     cost = np.full(len(mask), -1, dtype=np.int64)
     closed = np.zeros(len(mask), dtype=np.bool_)
@@ -84,7 +83,7 @@ def propagate(mask: Array, offset: Array, start: int, goal: int, retained: float
 def decide(
     mask: Array, offset: Array, cols: int, here: int, goal: int, alpha: float, beta: float, pheromone: Array
 ) -> int:
-    """The allowed neighbour of the smallest pheromone^alpha * distance^beta; -1 where none has any pheromone."""
+    """The allowed neighbour of the smallest pheromone^alpha * distance^beta; -1 if none has any pheromone."""
     r1, c1 = goal // cols, goal % cols
     least, to = np.inf, -1
     for k in range(8):
@@ -112,9 +111,10 @@ def descend(
     pheromone: Array,
     walk: Array,
 ) -> int:
-    """Walk on to the allowed neighbour of the smallest pheromone^alpha * distance^beta; the cells in `walk`.
+    """Fill `walk` with cells, each the neighbour of the one before with the smallest pheromone^alpha * distance^beta.
 
-    It ends at the goal, or negative where the walk would come back to one of its cells: it goes in circles.
+    Returns how many there are. If the walk is about to return to one of its cells, it is a circle, and the
+    number is negative.
     """
     been = np.zeros(len(mask), dtype=np.bool_)
     walk[0], n = start, 1
@@ -133,7 +133,7 @@ def descend(
 
 @kernel
 def close_cells(moves: Array, cells: Array) -> None:
-    """Take every move into, out of or diagonally past these cells (N, 2) out of `moves` (rows, cols)."""
+    """Remove every move into, out of or diagonally past these cells (N, 2) from `moves` (rows, cols)."""
     rows, cols = moves.shape
     for n in range(len(cells)):
         r, c = cells[n, 0], cells[n, 1]
@@ -143,6 +143,6 @@ def close_cells(moves: Array, cells: Array) -> None:
             if rn < 0 or rn >= rows or cn < 0 or cn >= cols:
                 continue
             gone = 1 << ((k + 4) & 7)
-            if not k & 1:  # beside the cell: also the diagonals that pass it
+            if not k & 1:  # an orthogonal neighbour: also the diagonals past the cell
                 gone |= 1 << ((k + 3) & 7) | 1 << ((k + 5) & 7)
             moves[rn, cn] &= 255 - gone

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,7 +17,9 @@ from antdrive.planners.colonies.colony import (
     Weights,
 )
 from antdrive.planners.colonies.mmas import MaxMinAnts
+from antdrive.planners.colonies.warm_start import WarmStartedColony
 from antdrive.planners.iterative import require
+from antdrive.planners.plan import Capabilities, Query
 from antdrive.worlds import Floats
 from antdrive.worlds.errors import FieldError
 

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from antdrive.planners.colonies.colony import ColonyGraph
 from antdrive.planners.iterative import Iteration, IterativePlanner, require
-from antdrive.planners.plan import Query
+from antdrive.planners.plan import Capabilities, Query
 from antdrive.worlds import Floats
 
 if TYPE_CHECKING:  # importing kernels loads the compiler

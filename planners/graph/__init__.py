@@ -1,1 +1,1 @@
-"""Graph search on the grid, and its incremental and space-time forms."""
+"""Graph search on the grid, incremental search, safe-interval planning, and the potential field."""

@@ -1,4 +1,7 @@
-"""Compiled potential field: arrays in, arrays out, nothing validated. Equation numbers as in Lee et al. 2008."""
+"""Compiled potential field: arrays in, arrays out, nothing validated.
+
+Equation numbers as in Lee et al. 2008.
+"""
 
 from __future__ import annotations
 
@@ -11,17 +14,17 @@ from antdrive.worlds._kernels import DCOL, DROW, SQRT2, Array, inline, kernel
 
 @inline
 def parabola(x: int, site: int, height: Array) -> int:
-    """Squared distance from column x of a row to what is nearest along column `site`."""
+    """Squared distance from column x of a row to the nearest blocked cell in column `site`."""
     distance2: int = (x - site) * (x - site) + height[site]
     return distance2
 
 
 @kernel
 def squared_distances(free: Array, out: Array) -> bool:
-    """Fill `out` with squared distances in cells to the nearest blocked cell; whether there is one.
+    """Fill `out` with squared distances in cells to the nearest blocked cell; returns whether there is one.
 
-    Exact, in whole numbers and linear time: A. Meijster, J. Roerdink and W. Hesselink, *A general algorithm for computing
-    distance transforms in linear time*, 2000. Cells outside the grid do not count as blocked.
+    Exact, in integers and linear time: A. Meijster, J. Roerdink and W. Hesselink, *A general algorithm for
+    computing distance transforms in linear time*, 2000. Cells outside the grid do not count as blocked.
     """
     rows, cols = free.shape
     far = rows + cols  # farther than any cell
@@ -66,7 +69,7 @@ def squared_distances(free: Array, out: Array) -> bool:
 
 @kernel
 def disc_distances(discs: Array, x0: float, y0: float, cell: float, inflate: float, reach: float, out: Array) -> None:
-    """Lower `out` to the distance from each cell's centre to the nearest inflated disc, where that is within `reach`."""
+    """Lower `out` to the distance from each cell's centre to the nearest inflated disc, up to `reach`."""
     rows, cols = out.shape
     for j in range(discs.shape[0]):
         x, y, radius = discs[j, 0], discs[j, 1], discs[j, 2] + inflate
@@ -90,7 +93,10 @@ def potential(
     influence: float,
     out: Array,
 ) -> None:
-    """The potential U (eq. 7): attraction to the goal (eq. 9) and repulsion from obstacles (eq. 11); inf where blocked."""
+    """The potential U (eq. 7): attraction to the goal (eq. 9) and repulsion from obstacles (eq. 11).
+
+    It is infinite where blocked.
+    """
     rows, cols = free.shape
     for r in range(rows):
         for c in range(cols):
@@ -106,7 +112,7 @@ def potential(
 
 @kernel
 def roll_down(moves: Array, field: Array, r0: int, c0: int, r1: int, c1: int) -> Array:
-    """Cells (N, 2) along the steepest fall of the potential (eq. 5), to the goal or to where no move leads down."""
+    """Cells (N, 2) along the steepest descent of the potential (eq. 5), to the goal or a local minimum."""
     cells = np.empty((64, 2), dtype=np.int32)
     r, c, n = r0, c0, 1
     cells[0, 0], cells[0, 1] = r, c

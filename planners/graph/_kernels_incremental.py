@@ -1,4 +1,4 @@
-"""Compiled parts that the replanning searches share: exact costs, an indexed heap, masks after a change, paths."""
+"""Compiled parts that the incremental searches share: exact costs, an indexed heap, moves after an edit."""
 
 from __future__ import annotations
 
@@ -8,18 +8,21 @@ import numpy as np
 
 from antdrive.worlds._kernels import DCOL, DROW, Array, inline, kernel
 
-# Costs are whole numbers, so that no key is ever rounded. STRAIGHT is a Pell number: DIAGONAL / STRAIGHT differs
+# Costs are integers, so that no key is ever rounded. STRAIGHT is a Pell number: DIAGONAL / STRAIGHT differs
 # from sqrt(2) by 2e-19, and two sums of fewer than a billion steps compare as a + b sqrt(2) does.
 STRAIGHT = 1_311_738_121
 DIAGONAL = 1_855_077_841
-NEVER = 1 << 62  # more than any path; NEVER plus a path still fits 64 bits
+NEVER = 1 << 62  # more than the cost of any path; the sum of both still fits 64 bits
 
 COST = np.array([STRAIGHT, DIAGONAL] * 4, dtype=np.int64)  # by direction
 
 
 @inline
 def octile(rows: int, cols: int) -> int:
-    """Cost of the shortest way over open ground."""
+    """Cost of the shortest path on an empty grid, in the same integers.
+
+    `_kernels_search.octile` is the same distance in cells, which is rounded.
+    """
     rows, cols = abs(rows), abs(cols)
     return STRAIGHT * max(rows, cols) + (DIAGONAL - STRAIGHT) * min(rows, cols)
 
@@ -33,7 +36,9 @@ def offsets(cols: int) -> Array:
     return offset
 
 
-# The heap: rows of (first key, second key, cell), smallest first; `place` holds where a cell stands, -1 if nowhere.
+# The heap holds rows of (first key, second key, cell), the smallest first. `place` holds the row of each
+# cell, -1 if the cell is not in the heap. The open list of `_kernels_sipp` differs: its entries never
+# get a new key, so it needs no `place`.
 
 
 @inline
@@ -44,7 +49,7 @@ def before(heap: Array, i: int, first: int, second: int) -> bool:
 
 @kernel
 def rise(heap: Array, place: Array, i: int, first: int, second: int, cell: int) -> None:
-    """Put an entry at hole i or above it."""
+    """Put an entry at the empty row i or above it."""
     while i > 0:
         parent = (i - 1) >> 1
         if not (first < heap[parent, 0] or (first == heap[parent, 0] and second < heap[parent, 1])):
@@ -58,7 +63,7 @@ def rise(heap: Array, place: Array, i: int, first: int, second: int, cell: int) 
 
 @kernel
 def sink(heap: Array, place: Array, size: int, i: int, first: int, second: int, cell: int) -> None:
-    """Put an entry at hole i or below it."""
+    """Put an entry at the empty row i or below it."""
     while True:
         child = 2 * i + 1
         if child >= size:
@@ -76,7 +81,7 @@ def sink(heap: Array, place: Array, size: int, i: int, first: int, second: int, 
 
 @kernel
 def put(heap: Array, place: Array, size: int, cell: int, first: int, second: int) -> int:
-    """Insert a cell or give it a new key; the size then."""
+    """Insert a cell or give it a new key; returns the new size."""
     i: Any = np.int64(place[cell])
     if i < 0:
         rise(heap, place, size, first, second, cell)
@@ -90,7 +95,7 @@ def put(heap: Array, place: Array, size: int, cell: int, first: int, second: int
 
 @kernel
 def take(heap: Array, place: Array, size: int, cell: int) -> int:
-    """Remove a cell that stands in the heap; the size then."""
+    """Remove a cell that is in the heap; returns the new size."""
     i: Any = np.int64(place[cell])
     place[cell] = -1
     size -= 1
@@ -104,8 +109,11 @@ def take(heap: Array, place: Array, size: int, cell: int) -> int:
 
 
 @inline
-def pictured(free: Array, r: int, c: int) -> int:
-    """The moves of a cell that the free cells alone allow; a diagonal needs both orthogonal neighbours."""
+def moves_between_free(free: Array, r: int, c: int) -> int:
+    """The moves of a cell that the free cells alone allow.
+
+    A diagonal also needs both of its orthogonal neighbours.
+    """
     rows, cols = free.shape
     mask = 0
     if free[r, c]:
@@ -121,18 +129,19 @@ def pictured(free: Array, r: int, c: int) -> int:
 
 @kernel
 def closed_moves(free: Array, moves: Array, closed: Array) -> None:
-    """Fill `closed` with the moves that something else than blocked cells forbids."""
+    """Fill `closed` with the moves that are forbidden although the cells are free."""
     rows, cols = free.shape
     for r in range(rows):
         for c in range(cols):
-            closed[r, c] = pictured(free, r, c) & ~moves[r, c]
+            closed[r, c] = moves_between_free(free, r, c) & ~moves[r, c]
 
 
 @kernel
 def mark(free: Array, closed: Array, moves: Array, cells: Array, value: bool, changed: Array) -> tuple[int, int]:
-    """Make cells (N, 2) free or not and list in `changed` those whose moves are not what they were.
+    """Make cells (N, 2) free or blocked, and list in `changed` the cells that now have other moves.
 
-    Returns how many, and the number of the first cell outside the grid, -1 if all are inside; else nothing is done.
+    Returns how many these are, and the index of the first cell outside the grid. If there is none, it is -1;
+    if there is one, nothing is changed.
     """
     rows, cols = free.shape
     count = 0
@@ -144,7 +153,7 @@ def mark(free: Array, closed: Array, moves: Array, cells: Array, value: bool, ch
     for n in range(len(cells)):
         for r in range(max(0, cells[n, 0] - 1), min(rows, cells[n, 0] + 2)):
             for c in range(max(0, cells[n, 1] - 1), min(cols, cells[n, 1] + 2)):
-                mask = pictured(free, r, c) & ~closed[r, c]
+                mask = moves_between_free(free, r, c) & ~closed[r, c]
                 if mask != moves[r, c]:
                     moves[r, c] = mask
                     changed[count] = r * cols + c
@@ -154,7 +163,7 @@ def mark(free: Array, closed: Array, moves: Array, cells: Array, value: bool, ch
 
 @kernel
 def adopt(moves: Array, new: Array, changed: Array) -> int:
-    """Take over new moves; list in `changed` the cells where they differ; how many."""
+    """Replace the moves by new ones and list in `changed` the cells where they differ; returns how many."""
     rows, cols = moves.shape
     count = 0
     for r in range(rows):

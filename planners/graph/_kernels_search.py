@@ -6,8 +6,8 @@ import numpy as np
 
 from antdrive.worlds._kernels import DCOL, DROW, SQRT2, Array, doubled, inline, kernel
 
-# Path costs are a + b sqrt(2) with whole a and b. Two different ones that could meet in one search differ by
-# far more than this, and rounding by far less.
+# Path costs are a + b sqrt(2) with whole a and b. Two different costs that could meet in one search differ by
+# far more than this, and rounding errors are far smaller.
 TIE = 1e-6
 
 # The open list is a ring of buckets, each a stack. One bucket spans 1/16 of a cell side; a move raises g + h
@@ -15,12 +15,16 @@ TIE = 1e-6
 BUCKETS = 64
 PER_CELL = 16.0
 
-SEEN = 8  # bits of `mark`: 0-2 the move a cell was entered by, then seen, then closed
+# Bits of `mark`: 0 to 2 hold the move by which a cell was entered.
+SEEN = 8
 CLOSED = 16
 
 
 def _shunned() -> Array:
-    """By entering move and mask of the cell before: the moves that the cell before makes as cheaply."""
+    """The moves out of a cell that need not be tried, by the move into it and the allowed moves of the cell before.
+
+    They lead back, or to a cell that the cell before reaches by one move of its own, at no higher cost.
+    """
     step = {(int(r), int(c)): k for k, (r, c) in enumerate(zip(DROW, DCOL, strict=True))}
     table = np.zeros((8, 256), dtype=np.uint8)
     for entered in range(8):
@@ -39,18 +43,40 @@ SHUNNED = _shunned()
 
 @inline
 def octile(rows: int, cols: int) -> float:
-    """Length of the shortest way over open ground [cells]."""
+    """Length of the shortest path on an empty grid between cells this many rows and columns apart [cells]."""
     rows, cols = abs(rows), abs(cols)
     return max(rows, cols) + (SQRT2 - 1.0) * min(rows, cols)
 
 
 @kernel
-def shortest_path(moves: Array, r0: int, c0: int, r1: int, c1: int, informed: bool) -> tuple[Array, int, int, int]:
-    """The cheapest path (N, 2), empty if there is none; its straight and diagonal steps; the cells expanded.
+def traced(mark: Array, offset: Array, cols: int, start: int, goal: int) -> tuple[Array, int]:
+    """The path (N, 2) along the moves by which cells were entered, and its diagonal steps."""
+    n = 1
+    i = goal
+    while i != start:
+        i -= offset[mark[i] & 7]
+        n += 1
+    cells = np.empty((n, 2), dtype=np.int32)
+    diagonal = 0
+    i = goal
+    for step in range(n - 1, -1, -1):
+        cells[step, 0] = i // cols
+        cells[step, 1] = i % cols
+        if step > 0:
+            diagonal += mark[i] & 1
+            i -= offset[mark[i] & 7]
+    return cells, diagonal
 
-    A* with the octile heuristic when `informed`, else Dijkstra. Within a bucket cells may come out of order,
-    so a cell whose cost drops after it was closed is opened again, and the search ends only when nothing
-    cheaper is open.
+
+@kernel
+def shortest_path(moves: Array, r0: int, c0: int, r1: int, c1: int, informed: bool) -> tuple[Array, int, int, int]:
+    """The shortest path (N, 2), empty if there is none; its straight and diagonal steps; the number of cells expanded.
+
+    A* with the octile heuristic if `informed`, else Dijkstra's algorithm. Cells may leave a bucket out of
+    order, so a cell whose cost drops after it was closed is opened again, and the search ends only when
+    nothing cheaper is open.
+
+    The open list is written out in the loop, which the speed of most planners depends on.
     """
     rows, cols = moves.shape
     mask = moves.ravel()
@@ -64,7 +90,7 @@ def shortest_path(moves: Array, r0: int, c0: int, r1: int, c1: int, informed: bo
     head = np.full(BUCKETS, -1, dtype=np.int32)
     entry_cell = np.empty(1024, dtype=np.int32)
     entry_next = np.empty(1024, dtype=np.int32)
-    entries, spare = 0, -1  # entries ever made; a list of those that can be used again
+    entries, spare = 0, -1  # how many entries there are, and the first of those that can be used again
 
     origin = octile(r1 - r0, c1 - c0) if informed else 0.0
     mark[start] = SEEN
@@ -96,7 +122,7 @@ def shortest_path(moves: Array, r0: int, c0: int, r1: int, c1: int, informed: bo
             continue
         row = i // cols
         col = i - row * cols
-        if limit < np.inf:  # finishing the goal's own bucket
+        if limit < np.inf:  # the goal is closed; its own bucket is finished
             h = octile(r1 - row, c1 - col) if informed else 0.0
             if g + h >= limit:
                 continue
@@ -132,26 +158,13 @@ def shortest_path(moves: Array, r0: int, c0: int, r1: int, c1: int, informed: bo
 
     if not mark[goal] & SEEN:
         return np.empty((0, 2), dtype=np.int32), 0, 0, expanded
-    n = 1
-    i = goal
-    while i != start:
-        i -= offset[mark[i] & 7]
-        n += 1
-    cells = np.empty((n, 2), dtype=np.int32)
-    diagonal = 0
-    i = goal
-    for step in range(n - 1, -1, -1):
-        cells[step, 0] = i // cols
-        cells[step, 1] = i % cols
-        if step > 0:
-            diagonal += mark[i] & 1
-            i -= offset[mark[i] & 7]
-    return cells, n - 1 - diagonal, diagonal, expanded
+    cells, diagonal = traced(mark, offset, cols, start, goal)
+    return cells, len(cells) - 1 - diagonal, diagonal, expanded
 
 
 @kernel
 def connected(moves: Array, r0: int, c0: int, r1: int, c1: int) -> bool:
-    """Whether moves lead from one cell to another: a flood fill."""
+    """Whether allowed moves lead from one cell to another, by a flood fill."""
     rows, cols = moves.shape
     mask = moves.ravel()
     start, goal = r0 * cols + c0, r1 * cols + c1

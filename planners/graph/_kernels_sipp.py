@@ -1,28 +1,89 @@
 """Compiled safe-interval path planning: arrays in, arrays out, nothing validated.
 
-A mover comes as legs: rows of `legs` (L, 7) hold t0, t1, x and y at t0, vx, vy, and the distance that the robot's centre has
-to keep from it. Times are in seconds, places in metres. While a robot waits or makes one move and a mover is on one leg, both
-move in straight lines at constant speed; then the instants of conflict are an interval with ends in closed form, so nothing
-here is sampled.
+A mover's motion is given as legs, on each of which it moves in a straight line at constant speed. The robot
+also does, while it waits or makes one move. So the instants at which the two come too close form an interval
+whose ends have a closed form, and nothing here is sampled. Times are in seconds, positions in metres.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from antdrive.worlds._kernels import DCOL, DROW, SQRT2, Array, inline, kernel, segment_distance2
+from antdrive.planners.graph._kernels_search import octile
+from antdrive.worlds._kernels import DCOL, DROW, SQRT2, Array, doubled_rows, inline, kernel, segment_distance2
 
-INSTANT = 1e-9  # s: shorter gaps are none
+INSTANT = 1e-9  # s: shorter gaps count as closed
+
+# Columns of a leg: when it begins and ends, position at its beginning, velocity, distance that the robot's
+# centre keeps.
+BEGIN, END, X, Y, VX, VY, KEEP = range(7)
+
+# Columns of an entry of the open list: the earliest possible arrival at the goal, the arrival here, the safe
+# interval.
+F, G, INTERVAL = range(3)
+
+
+class Frame(NamedTuple):
+    """Where the grid's cells lie: the centre of cell (0, 0) and the side of a cell [m]."""
+
+    x0: float
+    y0: float
+    cell: float
+
+
+class NearLegs(NamedTuple):
+    """By cell, the legs that may come too close: of cell i those numbered number[first[i] : first[i + 1]]."""
+
+    legs: Array  # (L, 7)
+    first: Array  # (cells + 1,)
+    number: Array  # (M,)
+
+
+class Intervals(NamedTuple):
+    """When a robot can stand in cell i: from since[k] to until[k] for first[i] <= k < first[i + 1]."""
+
+    first: Array  # (cells + 1,)
+    since: Array  # (K,) [s]
+    until: Array  # (K,) [s]
+
+
+class Trip(NamedTuple):
+    """Flat start and goal cells, speed, departure, deadline, and whether the goal must stay safe."""
+
+    start: int
+    goal: int
+    speed: float
+    departure: float
+    end: float
+    stay: bool
+
+
+class Tree(NamedTuple):
+    """By safe interval, the best way into it that is known."""
+
+    reached: Array  # (K,) when it is reached, inf while it is not [s]
+    parent: Array  # (K,) the interval before, -1 at the root
+    left: Array  # (K,) when the parent's cell is left [s]
+
+
+class Move(NamedTuple):
+    """A move: first and last possible departure, duration, and the least time from its end to the goal."""
+
+    now: float
+    latest: float
+    lasts: float
+    rest: float
 
 
 @kernel
 def legs_within(t: Array, xy: Array, jump: Array, tolerance: float) -> tuple[Array, Array, int]:
-    """First and last sample of each straight leg at constant speed that samples can be told by, and how many.
+    """First and last sample of each leg when samples are joined to legs that are as long as possible, and their number.
 
-    Samples `xy` (T, 2) at `t` (T,) lie no farther than `tolerance` from the leg over them. No leg spans the jump between two
-    samples, from i to i + 1 where jump[i].
+    Samples `xy` (T, 2) at `t` (T,) lie no farther than `tolerance` from the leg over them. No leg spans a
+    jump, which is between samples i and i + 1 where jump[i].
     """
     first, last = np.empty(len(t), dtype=np.int64), np.empty(len(t), dtype=np.int64)
     count, a = 0, 0
@@ -30,7 +91,7 @@ def legs_within(t: Array, xy: Array, jump: Array, tolerance: float) -> tuple[Arr
         if jump[a]:
             a += 1
             continue
-        # The velocities that keep every sample so far within the tolerance, as a box about each coordinate.
+        # The velocities for which the leg passes every sample so far within the tolerance, as a box.
         low_x, high_x, low_y, high_y = -np.inf, np.inf, -np.inf, np.inf
         b = a
         while b < len(t) - 1 and not jump[b]:
@@ -49,26 +110,27 @@ def legs_within(t: Array, xy: Array, jump: Array, tolerance: float) -> tuple[Arr
 
 
 @kernel
-def near_legs(legs: Array, free: Array, x0: float, y0: float, cell: float) -> tuple[Array, Array]:
-    """By free cell, the legs that may come too close to a robot that stands there or makes a move from there.
+def near_legs(legs: Array, free: Array, frame: Frame) -> tuple[Array, Array]:
+    """`first` and `number` of `NearLegs`: by free cell, the legs that may come too close to a robot there.
 
-    Those of cell i are listed[begin[i] : begin[i + 1]], in the order of `legs`.
+    They include those that may come too close during a move from there. Legs keep their order.
     """
     rows, cols = free.shape
-    begin = np.zeros(rows * cols + 1, dtype=np.int64)
-    listed = np.empty(0, dtype=np.int32)
+    first = np.zeros(rows * cols + 1, dtype=np.int64)
+    number = np.empty(0, dtype=np.int32)
     fill = np.empty(0, dtype=np.int64)
-    for filling in range(2):  # first counted, then listed
+    x0, y0, cell = frame.x0, frame.y0, frame.cell
+    for filling in range(2):  # the first pass counts, the second lists
         for n in range(len(legs)):
-            span = legs[n, 1] - legs[n, 0]
-            ax, ay = legs[n, 2], legs[n, 3]
-            dx, dy = legs[n, 4] * span, legs[n, 5] * span
-            reach = legs[n, 6] + SQRT2 * cell
+            span = legs[n, END] - legs[n, BEGIN]
+            ax, ay = legs[n, X], legs[n, Y]
+            dx, dy = legs[n, VX] * span, legs[n, VY] * span
+            reach = legs[n, KEEP] + SQRT2 * cell
             r_lo = max(0, int(math.ceil((min(ay, ay + dy) - reach - y0) / cell)))
             r_hi = min(rows - 1, int(math.floor((max(ay, ay + dy) + reach - y0) / cell)))
             for r in range(r_lo, r_hi + 1):
                 y = y0 + r * cell
-                lo, hi = 0.0, 1.0  # the part of the leg no farther from this row than the reach
+                lo, hi = 0.0, 1.0  # the part of the leg that is no farther from this row than the reach
                 if abs(dy) > 1e-12:
                     one, two = (y - reach - ay) / dy, (y + reach - ay) / dy
                     lo, hi = max(0.0, min(one, two)), min(1.0, max(one, two))
@@ -82,20 +144,20 @@ def near_legs(legs: Array, free: Array, x0: float, y0: float, cell: float) -> tu
                         continue
                     i = r * cols + c
                     if filling:
-                        listed[fill[i]] = n
+                        number[fill[i]] = n
                         fill[i] += 1
                     else:
-                        begin[i + 1] += 1
+                        first[i + 1] += 1
         if not filling:
-            begin = np.cumsum(begin)
-            listed = np.empty(begin[-1], dtype=np.int32)
-            fill = begin.copy()
-    return begin, listed
+            first = np.cumsum(first)
+            number = np.empty(first[-1], dtype=np.int32)
+            fill = first.copy()
+    return first, number
 
 
 @inline
 def within(qx: float, qy: float, vx: float, vy: float, reach: float, span: float) -> tuple[float, float]:
-    """The part of [0, span] in which |q + v s| < reach, as (lo, hi); lo > hi where there is none."""
+    """The part of [0, span] in which |q + v s| < reach, as (lo, hi); lo > hi if there is none."""
     a = vx * vx + vy * vy
     b = qx * vx + qy * vy
     c = qx * qx + qy * qy - reach * reach
@@ -115,21 +177,22 @@ def within(qx: float, qy: float, vx: float, vy: float, reach: float, span: float
 
 @kernel
 def conflict(leg: Array, x: float, y: float, ux: float, uy: float, lasts: float) -> tuple[float, float]:
-    """The departures, as (lo, hi), of which a move from (x, y) at velocity u over `lasts` comes too close to a leg.
+    """The departures between lo and hi for which a move from (x, y) at velocity u over `lasts` comes too close to a leg.
 
-    With w the time since the leg began and s the time since the departure, it is too close where
-    |q + v w - u s| < reach: a convex region, cut by the rectangle 0 <= w <= span, 0 <= s <= lasts. Departures w - s
-    take their extremes on the rectangle's sides or where the region's rim runs along them. lo > hi where there are none.
+    With w the time since the leg began and s the time since the departure, the robot is too close where
+    |q + v w - u s| < reach: a convex region, cut by the rectangle 0 <= w <= span, 0 <= s <= lasts.
+    The departure w - s takes its extremes on the sides of the rectangle or where the rim of the region is
+    parallel to the line w - s = 0. If there is no such departure, lo > hi.
     """
-    span, reach = leg[1] - leg[0], leg[6]
-    qx, qy, vx, vy = leg[2] - x, leg[3] - y, leg[4], leg[5]
+    span, reach = leg[END] - leg[BEGIN], leg[KEEP]
+    qx, qy, vx, vy = leg[X] - x, leg[Y] - y, leg[VX], leg[VY]
     lo, hi = np.inf, -np.inf
-    for side in range(2):  # the robot where its move begins, or ends
+    for side in range(2):  # the robot at the beginning or end of its move
         s = side * lasts
         one, two = within(qx - ux * s, qy - uy * s, vx, vy, reach, span)
         if one <= two:
             lo, hi = min(lo, one - s), max(hi, two - s)
-    for side in range(2):  # the mover where its leg begins, or ends
+    for side in range(2):  # the mover at the beginning or end of its leg
         w = side * span
         one, two = within(qx + vx * w, qy + vy * w, -ux, -uy, reach, lasts)
         if one <= two:
@@ -143,12 +206,12 @@ def conflict(leg: Array, x: float, y: float, ux: float, uy: float, lasts: float)
             w, s = (zy * ux - zx * uy) / det, (vx * zy - vy * zx) / det
             if 0.0 <= w <= span and 0.0 <= s <= lasts:
                 lo, hi = min(lo, w - s), max(hi, w - s)
-    return leg[0] + lo, leg[0] + hi
+    return leg[BEGIN] + lo, leg[BEGIN] + hi
 
 
 @inline
 def insert(lows: Array, highs: Array, count: int, lo: float, hi: float) -> int:
-    """Put an interval among others sorted by their lower ends; how many then."""
+    """Insert an interval into a list sorted by lower ends; returns the new count."""
     n = count
     while n > 0 and lows[n - 1] > lo:
         lows[n], highs[n] = lows[n - 1], highs[n - 1]
@@ -158,30 +221,36 @@ def insert(lows: Array, highs: Array, count: int, lo: float, hi: float) -> int:
 
 
 @kernel
-def safe_intervals(
-    legs: Array, begin: Array, listed: Array, free: Array, x0: float, y0: float, cell: float, start: float, end: float
-) -> tuple[Array, Array, Array]:
-    """When a robot can stand in each free cell: from since[k] to until[k], for k of cell i from own[i] to own[i + 1]."""
-    rows, cols = free.shape
+def most_legs(near: NearLegs) -> int:
+    """The largest number of legs near one cell."""
     most = 0
-    for i in range(rows * cols):
-        most = max(most, begin[i + 1] - begin[i])
-    room = rows * cols + len(listed)
-    own = np.empty(rows * cols + 1, dtype=np.int64)
+    for i in range(len(near.first) - 1):
+        most = max(most, near.first[i + 1] - near.first[i])
+    return most
+
+
+@kernel
+def safe_intervals(near: NearLegs, free: Array, frame: Frame, start: float, end: float) -> tuple[Array, Array, Array]:
+    """The fields of `Intervals`: when a robot can stand in each free cell between two times."""
+    rows, cols = free.shape
+    room = rows * cols + len(near.number)
+    first = np.empty(rows * cols + 1, dtype=np.int64)
     since, until = np.empty(room), np.empty(room)
+    most = most_legs(near)
     lows, highs = np.empty(most), np.empty(most)
     size = 0
     for i in range(rows * cols):
-        own[i] = size
+        first[i] = size
         r, c = i // cols, i % cols
         if not free[r, c]:
             continue
         count = 0
-        for e in range(begin[i], begin[i + 1]):
-            leg = legs[listed[e]]
-            lo, hi = within(leg[2] - x0 - c * cell, leg[3] - y0 - r * cell, leg[4], leg[5], leg[6], leg[1] - leg[0])
+        for e in range(near.first[i], near.first[i + 1]):
+            leg = near.legs[near.number[e]]
+            qx, qy = leg[X] - frame.x0 - c * frame.cell, leg[Y] - frame.y0 - r * frame.cell
+            lo, hi = within(qx, qy, leg[VX], leg[VY], leg[KEEP], leg[END] - leg[BEGIN])
             if lo <= hi:
-                count = insert(lows, highs, count, leg[0] + lo, leg[0] + hi)
+                count = insert(lows, highs, count, leg[BEGIN] + lo, leg[BEGIN] + hi)
         t = start
         for n in range(count):
             if lows[n] > t + INSTANT:
@@ -191,154 +260,194 @@ def safe_intervals(
         if t < end:
             since[size], until[size] = t, end
             size += 1
-    own[rows * cols] = size
-    return own, since[:size].copy(), until[:size].copy()
+    first[rows * cols] = size
+    return first, since[:size].copy(), until[:size].copy()
 
 
 @inline
-def sooner(f: Array, g: Array, a: int, b: int) -> bool:
-    """Whether heap entry a comes before b: by f, then the farther along."""
-    return bool(f[a] < f[b] or (f[a] == f[b] and g[a] > g[b]))
+def sooner(heap: Array, a: int, b: int) -> bool:
+    """Whether entry a of the open list comes before entry b: by lower f, then by later arrival."""
+    return bool(heap[a, F] < heap[b, F] or (heap[a, F] == heap[b, F] and heap[a, G] > heap[b, G]))
 
 
 @inline
-def swap(f: Array, g: Array, state: Array, a: int, b: int) -> None:
-    """Exchange two heap entries."""
-    f[a], f[b] = f[b], f[a]
-    g[a], g[b] = g[b], g[a]
-    state[a], state[b] = state[b], state[a]
+def swap(heap: Array, a: int, b: int) -> None:
+    """Exchange two entries of the open list."""
+    for column in range(3):
+        heap[a, column], heap[b, column] = heap[b, column], heap[a, column]
 
 
 @kernel
-def earliest(
-    moves: Array,
-    start: int,
-    goal: int,
-    x0: float,
-    y0: float,
-    cell: float,
-    speed: float,
-    end: float,
-    stay: bool,
-    legs: Array,
-    begin: Array,
-    listed: Array,
-    own: Array,
-    since: Array,
-    until: Array,
-    departed: float,
-) -> tuple[Array, Array, Array, int]:
-    """The way that arrives first: its cells, when each is reached and left, and the states expanded.
+def push(heap: Array, size: int, f: float, g: float, interval: int) -> Array:
+    """Add an entry to the `size` entries of the open list.
 
-    Phillips and Likhachev's A* over pairs of a cell and one of its safe intervals; of all ways into a pair the first to
-    arrive is as good as any, since it can wait. Empty where no way arrives by `end`. With `stay` the goal must be safe
-    from the arrival to `end`.
+    Returns the list, which has grown if it was full.
     """
-    rows, cols = moves.shape
-    mask = moves.ravel()
-    r1, c1 = goal // cols, goal % cols
-    pace = cell / speed
-    reached = np.full(len(since), np.inf)
-    closed = np.zeros(len(since), dtype=np.bool_)
-    parent = np.full(len(since), -1, dtype=np.int64)
-    left = np.empty(len(since))  # when the parent's cell was left
-    place = np.empty(len(since), dtype=np.int64)
-    f, g, heap = np.empty(1024), np.empty(1024), np.empty(1024, dtype=np.int64)
-    most = 0
-    for i in range(rows * cols):
-        for k in range(own[i], own[i + 1]):
-            place[k] = i
-        most = max(most, begin[i + 1] - begin[i])
-    lows, highs = np.empty(most), np.empty(most)
-    size, expanded, found = 0, 0, -1
-    for k in range(own[start], own[start + 1]):
-        if since[k] <= departed <= until[k]:
-            reached[k] = departed
-            f[0], g[0], heap[0] = departed, departed, k
-            size = 1
+    if size == len(heap):
+        heap = doubled_rows(heap)
+    heap[size, F], heap[size, G], heap[size, INTERVAL] = f, g, interval
+    n = size
+    while n > 0 and sooner(heap, n, (n - 1) >> 1):
+        swap(heap, n, (n - 1) >> 1)
+        n = (n - 1) >> 1
+    return heap
+
+
+@kernel
+def drop_first(heap: Array, size: int) -> int:
+    """Remove the first of the `size` entries of the open list; returns how many are left."""
+    size -= 1
+    for column in range(3):
+        heap[0, column] = heap[size, column]
+    n = 0
+    while True:
+        child = 2 * n + 1
+        if child >= size:
             break
-    while size > 0:
-        state, now = heap[0], g[0]
-        size -= 1
-        f[0], g[0], heap[0] = f[size], g[size], heap[size]
-        n = 0
-        while True:
-            child = 2 * n + 1
-            if child >= size:
-                break
-            if child + 1 < size and sooner(f, g, child + 1, child):
-                child += 1
-            if not sooner(f, g, child, n):
-                break
-            swap(f, g, heap, child, n)
-            n = child
-        if closed[state]:
+        if child + 1 < size and sooner(heap, child + 1, child):
+            child += 1
+        if not sooner(heap, child, n):
+            break
+        swap(heap, child, n)
+        n = child
+    return size
+
+
+@inline
+def conflicts(
+    near: NearLegs, i: int, x: float, y: float, ux: float, uy: float, move: Move, lows: Array, highs: Array
+) -> int:
+    """Fill `lows` and `highs` with the departures that conflict with a leg, sorted.
+
+    Returns how many intervals they form.
+    """
+    count = 0
+    for e in range(near.first[i], near.first[i + 1]):
+        leg = near.legs[near.number[e]]
+        if leg[END] < move.now or leg[BEGIN] > move.latest + move.lasts:
             continue
-        closed[state] = True
-        i = place[state]
-        if i == goal and (not stay or until[state] >= end):
-            found = state
+        lo, hi = conflict(leg, x, y, ux, uy, move.lasts)
+        if lo <= hi and hi > move.now and lo < move.latest:
+            count = insert(lows, highs, count, lo, hi)
+    return count
+
+
+@inline
+def relax(
+    tree: Tree,
+    intervals: Intervals,
+    state: int,
+    to: int,
+    move: Move,
+    lows: Array,
+    highs: Array,
+    count: int,
+    heap: Array,
+    size: int,
+) -> tuple[Array, int]:
+    """Reach the safe intervals of cell `to` from interval `state` between conflicts; the open list and its size.
+
+    Between two conflicts the robot can leave at any instant, and all of these reach one interval of the next
+    cell.
+    """
+    leave, n = move.now, 0
+    interval, last = intervals.first[to], intervals.first[to + 1]
+    while leave <= move.latest:
+        while n < count and lows[n] <= leave + INSTANT:
+            leave = max(leave, highs[n])
+            n += 1
+        if leave > move.latest:
             break
-        expanded += 1
-        r, c = i // cols, i % cols
-        x, y = x0 + c * cell, y0 + r * cell
-        for k in range(8):
-            if not mask[i] & (1 << k):
-                continue
-            rn, cn = r + DROW[k], c + DCOL[k]
-            j = rn * cols + cn
-            lasts = pace * (SQRT2 if k & 1 else 1.0)
-            latest = min(until[state], end - lasts)
-            if now > latest:
-                continue
-            along = speed / SQRT2 if k & 1 else speed
-            count = 0
-            for e in range(begin[i], begin[i + 1]):
-                leg = legs[listed[e]]
-                if leg[1] < now or leg[0] > latest + lasts:
-                    continue
-                lo, hi = conflict(leg, x, y, DCOL[k] * along, DROW[k] * along, lasts)
-                if lo <= hi and hi > now and lo < latest:
-                    count = insert(lows, highs, count, lo, hi)
-            # Between conflicts the robot can leave at any instant, and all of these reach one interval of the next cell.
-            leave, n = now, 0
-            interval = own[j]
-            ahead = max(abs(r1 - rn), abs(c1 - cn)) + (SQRT2 - 1.0) * min(abs(r1 - rn), abs(c1 - cn))
-            while leave <= latest:
-                while n < count and lows[n] <= leave + INSTANT:
-                    leave = max(leave, highs[n])
-                    n += 1
-                if leave > latest:
-                    break
-                arrive = leave + lasts
-                while interval < own[j + 1] and until[interval] < arrive - INSTANT:
-                    interval += 1
-                if interval < own[j + 1] and since[interval] <= arrive + INSTANT and arrive < reached[interval]:
-                    reached[interval], parent[interval], left[interval] = arrive, state, leave
-                    if size == len(heap):
-                        f, g = np.concatenate((f, np.empty_like(f))), np.concatenate((g, np.empty_like(g)))
-                        heap = np.concatenate((heap, np.empty_like(heap)))
-                    f[size], g[size], heap[size] = arrive + pace * ahead, arrive, interval
-                    m = size
-                    size += 1
-                    while m > 0 and sooner(f, g, m, (m - 1) >> 1):
-                        swap(f, g, heap, m, (m - 1) >> 1)
-                        m = (m - 1) >> 1
-                if n == count:
-                    break
-                leave = highs[n]
-                n += 1
+        arrive = leave + move.lasts
+        while interval < last and intervals.until[interval] < arrive - INSTANT:
+            interval += 1
+        if interval < last and intervals.since[interval] <= arrive + INSTANT and arrive < tree.reached[interval]:
+            tree.reached[interval], tree.parent[interval], tree.left[interval] = arrive, state, leave
+            heap = push(heap, size, arrive + move.rest, arrive, interval)
+            size += 1
+        if n == count:
+            break
+        leave = highs[n]
+        n += 1
+    return heap, size
+
+
+@kernel
+def traced(tree: Tree, cell_of: Array, cols: int, found: int) -> tuple[Array, Array, Array]:
+    """The cells (N, 2) from the root to interval `found`, and when each is reached and left.
+
+    All are empty if `found` is -1.
+    """
     length = 0
     state = found
     while state >= 0:
         length += 1
-        state = parent[state]
-    cells, arrive_at, leave_at = np.empty((length, 2), dtype=np.int32), np.empty(length), np.empty(length)
+        state = tree.parent[state]
+    cells, arrive, leave = np.empty((length, 2), dtype=np.int32), np.empty(length), np.empty(length)
     state = found
-    leave = reached[found] if found >= 0 else 0.0
+    left = tree.reached[found] if found >= 0 else 0.0
     for n in range(length - 1, -1, -1):
-        cells[n, 0], cells[n, 1] = place[state] // cols, place[state] % cols
-        arrive_at[n], leave_at[n] = reached[state], leave
-        leave = left[state]
-        state = parent[state]
-    return cells, arrive_at, leave_at, expanded
+        cells[n, 0], cells[n, 1] = cell_of[state] // cols, cell_of[state] % cols
+        arrive[n], leave[n] = tree.reached[state], left
+        left = tree.left[state]
+        state = tree.parent[state]
+    return cells, arrive, leave
+
+
+@kernel
+def earliest(
+    moves: Array, frame: Frame, near: NearLegs, intervals: Intervals, trip: Trip
+) -> tuple[Array, Array, Array, int]:
+    """The path that arrives first: its cells, when each is reached and left, and how many intervals were expanded.
+
+    Phillips and Likhachev's A* over the safe intervals of cells; of all ways into an interval only the first
+    to arrive matters, since the robot can wait there. The path is empty if none arrives by `trip.end`.
+    """
+    rows, cols = moves.shape
+    mask = moves.ravel()
+    goal_row, goal_col = trip.goal // cols, trip.goal % cols
+    pace = frame.cell / trip.speed
+    states = len(intervals.since)
+    tree = Tree(np.full(states, np.inf), np.full(states, -1, dtype=np.int64), np.empty(states))
+    closed = np.zeros(states, dtype=np.bool_)
+    cell_of = np.empty(states, dtype=np.int64)
+    for i in range(rows * cols):
+        for k in range(intervals.first[i], intervals.first[i + 1]):
+            cell_of[k] = i
+    most = most_legs(near)
+    lows, highs = np.empty(most), np.empty(most)
+    heap = np.empty((1024, 3))
+    size, expanded, found = 0, 0, -1
+    for k in range(intervals.first[trip.start], intervals.first[trip.start + 1]):
+        if intervals.since[k] <= trip.departure <= intervals.until[k]:
+            tree.reached[k] = trip.departure
+            heap = push(heap, size, trip.departure, trip.departure, k)
+            size = 1
+            break
+    while size > 0:
+        state, now = int(heap[0, INTERVAL]), heap[0, G]
+        size = drop_first(heap, size)
+        if closed[state]:
+            continue
+        closed[state] = True
+        i = cell_of[state]
+        if i == trip.goal and (not trip.stay or intervals.until[state] >= trip.end):
+            found = state
+            break
+        expanded += 1
+        r, c = i // cols, i % cols
+        x, y = frame.x0 + c * frame.cell, frame.y0 + r * frame.cell
+        for k in range(8):
+            if not mask[i] & (1 << k):
+                continue
+            rn, cn = r + DROW[k], c + DCOL[k]
+            lasts = pace * (SQRT2 if k & 1 else 1.0)
+            latest = min(intervals.until[state], trip.end - lasts)
+            if now > latest:
+                continue
+            move = Move(now, latest, lasts, pace * octile(goal_row - rn, goal_col - cn))
+            along = trip.speed / SQRT2 if k & 1 else trip.speed
+            count = conflicts(near, i, x, y, DCOL[k] * along, DROW[k] * along, move, lows, highs)
+            heap, size = relax(tree, intervals, state, rn * cols + cn, move, lows, highs, count, heap, size)
+    cells, arrive, leave = traced(tree, cell_of, cols, found)
+    return cells, arrive, leave, expanded

@@ -1,16 +1,15 @@
-"""The artificial potential field as told by Lee et al. 2008, section III (eq. 5 to 12)."""
+"""The artificial potential field of Lee et al. 2008, section III (eq. 5 to 12)."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
 from antdrive.planners.graph.search import NO_WAY, reachable
 from antdrive.planners.iterative import require
-from antdrive.planners.plan import GridPlanner, PlanResult, PlanStatus, Query, path_cost
+from antdrive.planners.plan import Capabilities, GridPlanner, PlanResult, PlanStatus, Query, path_cost
 from antdrive.worlds import Floats
 
 
@@ -18,28 +17,37 @@ from antdrive.worlds import Floats
 class PotentialField(GridPlanner):
     """Rolls downhill between an attracting goal and repelling obstacles (Lee et al. 2008, III); may get stuck.
 
-    The potential U = 1/2 k_att d_goal^2 (eq. 9) + 1/2 k_rep (1/d - 1/d0)^2 for d <= d0 (eq. 11) is followed along the allowed
-    move of steepest fall. It has local minima besides the goal, and there the planner stops and says where; as every
-    step leads down, it cannot go in circles. The paper gives no values for the gains and d0; of those tried, these defaults
-    arrive most often among random cylinders: in half of the worlds.
+    The potential U = 1/2 k_att d_goal^2 (eq. 9) + 1/2 k_rep (1/d - 1/d0)^2 for d <= d0 (eq. 11) is followed
+    along the allowed move of steepest descent. U has local minima besides the goal. There the planner stops
+    and reports the cell; it cannot go in circles, as every step leads down. The paper gives no values for the
+    gains and d0; of those tried, these defaults arrive most often among random cylinders: in half of the
+    worlds.
 
-    Distances are in metres. `d` is measured from the cell's centre to the nearest cylinder, less the grid's inflation; on a grid
-    without a world behind it, to the centre of the nearest blocked cell. Walls confine and do not repel.
+    `d` is measured from the cell's centre to the nearest cylinder, less the grid's inflation; on a grid
+    without a world behind it, to the centre of the nearest blocked cell. Walls do not repel.
+
+    Attributes:
+        k_att: gain of the attraction
+        k_rep: gain of the repulsion
+        influence: d0, the distance beyond which obstacles do not repel [m]
     """
 
-    complete: ClassVar[bool] = False  # may miss a path that exists
-
-    k_att: float = 1.0  # gain of the attraction
-    k_rep: float = 0.01  # gain of the repulsion
-    influence: float = 0.5  # d0: obstacles farther away do not repel [m]
+    k_att: float = 1.0
+    k_rep: float = 0.01
+    influence: float = 0.5
 
     def __post_init__(self) -> None:
         require("k_att", self.k_att, above=0)
         require("k_rep", self.k_rep, at_least=0)
         require("influence", self.influence, above=0)
 
+    @property
+    def capabilities(self) -> Capabilities:
+        """What this planner can do and what it needs. It may miss a path that exists."""
+        return Capabilities(complete=False)
+
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
-        from antdrive.planners.graph import _kernels_apf  # here, so that naming a planner does not load the compiler
+        from antdrive.planners.graph import _kernels_apf  # imported here because it loads the compiler
 
         if not reachable(query):
             return PlanResult(status=PlanStatus.NO_PATH, reason=NO_WAY, work_unit="steps")
@@ -67,7 +75,12 @@ class PotentialField(GridPlanner):
 
 
 def obstacle_distance(query: Query, reach: float = math.inf) -> Floats:
-    """Distance from each cell's centre to the nearest obstacle (R, C) [m]; inf beyond `reach` or without obstacles."""
+    """Distance from each cell's centre to the nearest obstacle (R, C) [m].
+
+    Args:
+        query: the query; if it has no task, blocked cells count as obstacles
+        reach: distances beyond this may be infinite [m]
+    """
     from antdrive.planners.graph import _kernels_apf
 
     grid = query.grid

@@ -7,21 +7,21 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.planners.graph.incremental import IncrementalSearch, ReplanningPlanner
+from antdrive.planners.graph.incremental import IncrementalPlanner, IncrementalSearch
 from antdrive.planners.plan import Cells, Query
 
 
 @dataclass(frozen=True, kw_only=True)
-class DStar(ReplanningPlanner):
-    """The shortest path over the grid's moves, by basic D* (Stentz 1994); replans while driving."""
+class DStar(IncrementalPlanner):
+    """The shortest path over the grid's moves by basic D* (Stentz 1994), repaired when the map changes."""
 
-    def replanner(self, query: Query) -> DStarSearch:
-        """A search that goes on after its first answer."""
+    def replanner(self, query: Query, rng: np.random.Generator) -> DStarSearch:
+        """A search that can be repaired after its first answer; it draws nothing from `rng`."""
         return DStarSearch(query)
 
 
 class DStarSearch(IncrementalSearch):
-    """D* at work: Dijkstra's algorithm from the goal, whose RAISE and LOWER states carry changes onward."""
+    """D*: Dijkstra's algorithm from the goal, whose RAISE and LOWER states propagate changes."""
 
     def __init__(self, query: Query) -> None:
         super().__init__(query)
@@ -39,7 +39,14 @@ class DStarSearch(IncrementalSearch):
 
     def _repair(self, changed: npt.NDArray[np.int64], start: int) -> tuple[Cells, int, int]:
         found: tuple[Cells, int, int] = self._kernels.repair(
-            changed, self._moves, start, self._goal,
-            self._state, self._h, self._back, self._heap, self._place,
-        )  # fmt: skip
+            changed,
+            self._moves,
+            start,
+            self._goal,
+            self._state,
+            self._h,
+            self._back,
+            self._heap,
+            self._place,
+        )
         return found

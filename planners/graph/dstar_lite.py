@@ -1,4 +1,4 @@
-"""D* Lite (S. Koenig and M. Likhachev, *D\\* Lite*, AAAI 2002): A* from the goal that is repaired, not repeated."""
+"""D* Lite (S. Koenig and M. Likhachev, *D\\* Lite*, AAAI 2002): A* from the goal, repaired after a change."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.planners.graph.incremental import IncrementalSearch, ReplanningPlanner
+from antdrive.planners.graph.incremental import IncrementalPlanner, IncrementalSearch
 from antdrive.planners.plan import Cells, Query
 
 
 @dataclass(frozen=True, kw_only=True)
-class DStarLite(ReplanningPlanner):
-    """The shortest path over the grid's moves, by D* Lite (Koenig & Likhachev 2002); replans while driving."""
+class DStarLite(IncrementalPlanner):
+    """The shortest path over the grid's moves by D* Lite (Koenig & Likhachev 2002), repaired when the map changes."""
 
-    def replanner(self, query: Query) -> DStarLiteSearch:
-        """A search that goes on after its first answer."""
+    def replanner(self, query: Query, rng: np.random.Generator) -> DStarLiteSearch:
+        """A search that can be repaired after its first answer; it draws nothing from `rng`."""
         return DStarLiteSearch(query)
 
 
 class DStarLiteSearch(IncrementalSearch):
-    """D* Lite at work: the optimised version, Figure 4 of the paper, in exact whole-number costs."""
+    """D* Lite: the optimised version, Figure 4 of the paper, in exact integer costs."""
 
     def __init__(self, query: Query) -> None:
         super().__init__(query)
@@ -36,13 +36,26 @@ class DStarLiteSearch(IncrementalSearch):
         self._heap = np.empty((cells, 3), dtype=np.int64)
         self._place = np.empty(cells, dtype=np.int32)
         self._kernels.begin(
-            self._moves, self._index(query.start), self._goal,
-            self._state, self._g, self._rhs, self._heap, self._place,
-        )  # fmt: skip
+            self._moves,
+            self._index(query.start),
+            self._goal,
+            self._state,
+            self._g,
+            self._rhs,
+            self._heap,
+            self._place,
+        )
 
     def _repair(self, changed: npt.NDArray[np.int64], start: int) -> tuple[Cells, int, int]:
         found: tuple[Cells, int, int] = self._kernels.repair(
-            changed, self._moves, start, self._goal,
-            self._state, self._g, self._rhs, self._heap, self._place,
-        )  # fmt: skip
+            changed,
+            self._moves,
+            start,
+            self._goal,
+            self._state,
+            self._g,
+            self._rhs,
+            self._heap,
+            self._place,
+        )
         return found

@@ -1,4 +1,4 @@
-"""The grid optimum: Dijkstra's algorithm and A* (Hart, Nilsson & Raphael 1968)."""
+"""The shortest path on the grid: Dijkstra's algorithm and A* (Hart, Nilsson & Raphael 1968)."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from antdrive.planners.plan import GridPlanner, PlanResult, PlanStatus, Query
+
+NO_WAY = "no sequence of allowed moves leads from the start to the goal"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,8 +29,11 @@ class AStar(GridPlanner):
 
 
 def shortest(query: Query, *, informed: bool = True) -> PlanResult:
-    """The shortest path between two free cells, or `NO_PATH`."""
-    from antdrive.planners.graph import _kernels_search  # here, so that naming a planner does not load the compiler
+    """The shortest path between two free cells, or `NO_PATH`.
+
+    By A* if `informed`, else by Dijkstra's algorithm.
+    """
+    from antdrive.planners.graph import _kernels_search  # imported here because it loads the compiler
 
     cells, straight, diagonal, expanded = _kernels_search.shortest_path(
         query.grid.moves, *query.start, *query.goal, informed
@@ -37,9 +42,6 @@ def shortest(query: Query, *, informed: bool = True) -> PlanResult:
         return PlanResult(status=PlanStatus.NO_PATH, reason=NO_WAY, work=expanded)
     cost = query.grid.cell * (straight + math.sqrt(2.0) * diagonal)
     return PlanResult(status=PlanStatus.SOLVED, cells=cells, cost=cost, work=expanded)
-
-
-NO_WAY = "no sequence of allowed moves leads from the start to the goal"
 
 
 def reachable(query: Query) -> bool:

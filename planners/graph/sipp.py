@@ -1,4 +1,4 @@
-"""Plans in space and time, among movers whose motions are known: safe-interval path planning.
+"""Planning in space and time, among movers whose motions are known: safe-interval path planning.
 
 M. Phillips and M. Likhachev, *SIPP: Safe interval path planning for dynamic environments*, ICRA 2011.
 """
@@ -8,50 +8,53 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterable
-from dataclasses import dataclass, field
-from typing import ClassVar
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from antdrive.planners.graph.search import NO_WAY, reachable
 from antdrive.planners.iterative import require
-from antdrive.planners.plan import GridPlanner, PlanResult, PlanStatus, Query, path_cost
-from antdrive.worlds import Floats, MoverMotion
-from antdrive.worlds.errors import FieldError
-from antdrive.worlds.plane import segment_lengths
+from antdrive.planners.plan import Capabilities, GridPlanner, Moving, PlanResult, PlanStatus, Query, path_cost
+from antdrive.worlds import Floats
 
-STEP = 0.05  # s: how often a motion is looked at; turns in between are then looked for
-INSTANT = 1e-6  # s: a motion that is not straight over so short a time jumps
-TOLERANCE = 1e-3  # m: how far a motion may stray from the straight legs it is told by; kept in addition
+STEP = 0.05  # s: how often a motion is sampled at first; samples are added where it turns in between
+INSTANT = 1e-6  # s: a motion that is not straight over so short a time is a jump
+TOLERANCE = 1e-3  # m: how far a motion may stray from the straight legs that stand for it; kept in addition
+UNIT = "safe intervals expanded"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TimedPlan(PlanResult):
-    """A plan that says when: each cell is reached at `arrive`, left at `leave`, and the robot waits in between.
+    """A plan with times: each cell is reached at `arrive` and left at `leave`; the robot waits in between.
 
     From one cell to the next it drives straight at the plan's speed.
+
+    Attributes:
+        arrive: when each cell is reached (N,) [s]
+        leave: when each cell is left (N,) [s]
+        xy: centres of the cells (N, 2) [m]
     """
 
-    arrive: Floats = field(default_factory=lambda: np.empty(0))  # (N,) [s]
-    leave: Floats = field(default_factory=lambda: np.empty(0))  # (N,) [s]
-    xy: Floats = field(default_factory=lambda: np.empty((0, 2)))  # (N, 2) centres of the cells [m]
+    arrive: Floats = field(default_factory=lambda: np.empty(0))
+    leave: Floats = field(default_factory=lambda: np.empty(0))
+    xy: Floats = field(default_factory=lambda: np.empty((0, 2)))
 
     @property
     def duration(self) -> float:
-        """From the first instant to the arrival [s]; inf without a way."""
+        """Time from the departure to the arrival [s]; infinite without a path."""
         return float(self.arrive[-1] - self.arrive[0]) if len(self.arrive) else math.inf
 
     @property
     def waited(self) -> float:
-        """How long the robot stands on its way [s]."""
+        """How long the robot waits on its way in all [s]."""
         return float((self.leave - self.arrive).sum())
 
     def at(self, t: npt.ArrayLike) -> Floats:
-        """Where the robot is (T, 2) [m] at times (T,) [s]; before the plan begins and after it ends, at its ends.
+        """Where the robot is (T, 2) [m] at times `t` (T,) [s]; before the plan begins and after it ends, at its ends.
 
         Raises:
-            ValueError: there is no way.
+            ValueError: the plan has no path.
         """
         if not self.solved:
             raise FieldError("plan", "has no path to follow")
@@ -59,8 +62,13 @@ class TimedPlan(PlanResult):
         when = np.asarray(t, dtype=np.float64)
         return np.stack([np.interp(when, knots, np.repeat(self.xy[:, k], 2)) for k in (0, 1)], axis=-1)
 
-    def clearance(self, movers: Iterable[MoverMotion], step: float = 0.01) -> float:
-        """The least distance between the robot's centre and a mover's surface [m], looked at every `step` seconds."""
+    def clearance(self, movers: Iterable[Moving], step: float = 0.01) -> float:
+        """The least distance between the robot's centre and a mover's surface [m], sampled every `step` seconds.
+
+        Args:
+            movers: the discs that move
+            step: time between two samples [s]
+        """
         ticks = max(1, math.ceil(self.duration / step))
         t = np.linspace(self.arrive[0], self.arrive[-1], ticks + 1)
         robot = self.at(t)
@@ -69,23 +77,38 @@ class TimedPlan(PlanResult):
 
 @dataclass(frozen=True, kw_only=True)
 class SafeIntervals(GridPlanner):
-    """The way that arrives first among movers whose motions are known, waiting where that helps: SIPP.
+    """The path that arrives first among movers whose motions are known, with waits where they help: SIPP.
 
     The motions are the query's. Without any it is the shortest path. The answer is a `TimedPlan`.
+
+    Attributes:
+        speed: the robot's speed on every move [m/s]
+        horizon: how long from the departure on the motions are known, and the goal must be reached [s]
+        stay: whether the goal must also be safe from the arrival to the horizon
     """
 
-    speed: float = 0.5  # [m/s] on every move
-    horizon: float = 120.0  # the motions are known, and the goal must be reached, so long [s]
-    stay: bool = False  # the goal must also be safe from the arrival to the horizon
-
-    needs_motions: ClassVar[bool] = True  # cells that are blocked now are not enough
+    speed: float = 0.5
+    horizon: float = 120.0
+    stay: bool = False
 
     def __post_init__(self) -> None:
         require("speed", self.speed, above=0)
         require("horizon", self.horizon, above=0)
 
+    @property
+    def capabilities(self) -> Capabilities:
+        """What this planner can do and what it needs: knowing the cells blocked now is not enough."""
+        return Capabilities(needs_motions=True)
+
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
-        return plan_in_time(query, query.motions, speed=self.speed, horizon=self.horizon, stay=self.stay)
+        return plan_in_time(
+            query,
+            query.motions,
+            speed=self.speed,
+            start_time=query.start_time,
+            horizon=self.horizon,
+            stay=self.stay,
+        )
 
 
 def plan_in_time(
@@ -97,67 +120,75 @@ def plan_in_time(
     horizon: float = 120.0,
     stay: bool = False,
 ) -> TimedPlan:
-    """The way over the grid's moves that arrives first, or `NO_PATH` when none does within `horizon` seconds.
+    """The path over the grid's moves that arrives first, or `NO_PATH` if none arrives within `horizon` seconds.
 
-    The robot makes each move at `speed` [m/s] and may wait in any cell for any time. All along, its centre keeps the
-    grid's `inflate` from every mover's surface, and a little more, up to `2 * TOLERANCE`, for motions that are not
-    made of straight legs. Over those legs the answer is exact: no way on this grid, at this speed, arrives sooner.
-    Motions are told by samples `STEP` apart, closer about turns and jumps; one that turns twice within half a
-    `STEP` may be missed. With `stay` the goal must be safe from the arrival to the horizon.
+    The robot makes each move at `speed` and may wait in any cell for any time. Its centre always keeps the
+    grid's `inflate` from every mover's surface, and up to `2 * TOLERANCE` more from motions that do not
+    consist of straight legs. Over those legs the answer is exact: no path on this grid, at this speed,
+    arrives sooner. Motions are sampled `STEP` apart, closer near turns and jumps; a motion that turns twice
+    within half a `STEP` may be missed.
+
+    Args:
+        query: the grid and its ends; its own motions are not used
+        movers: the discs that move
+        speed: the robot's speed on every move [m/s]
+        start_time: when the robot sets out, on the clock of the motions [s]
+        horizon: how long after `start_time` the robot may arrive [s]
+        stay: whether the goal must also be safe from the arrival to the horizon
 
     Raises:
         ValueError: the speed or the horizon is not positive, or a mover's position is not finite.
     """
-    from antdrive.planners.graph import _kernels_sipp as kernels
-
     require("speed", speed, above=0, below=math.inf)
     require("horizon", horizon, above=0)
     started = time.perf_counter()
+    reason = query.blocked_end or ("" if reachable(query) else NO_WAY)
+    plan = (
+        TimedPlan(status=PlanStatus.NO_PATH, reason=reason)
+        if reason
+        else _earliest(query, movers, speed=speed, start_time=start_time, horizon=horizon, stay=stay)
+    )
+    return replace(plan, work_unit=UNIT, wall_s=time.perf_counter() - started)
 
-    def without(reason: str, work: int = 0) -> TimedPlan:
-        wall = time.perf_counter() - started
-        return TimedPlan(status=PlanStatus.NO_PATH, reason=reason, work=work, work_unit=UNIT, wall_s=wall)
 
-    if query.blocked_end:
-        return without(query.blocked_end)
-    if not reachable(query):
-        return without(NO_WAY)
-    grid = query.grid
+def _earliest(
+    query: Query, movers: Iterable[Moving], *, speed: float, start_time: float, horizon: float, stay: bool
+) -> TimedPlan:
+    """The plan that arrives first, on a grid that can be crossed."""
+    from antdrive.planners.graph import _kernels_sipp as kernels
+
+    grid, cols = query.grid, query.grid.shape[1]
     known = [_legs(mover, start_time, start_time + horizon, grid.inflate) for mover in movers]
     legs = np.concatenate([np.empty((0, 7)), *known])
-    legs = legs[np.argsort(legs[:, 0], kind="stable")]
+    legs = legs[np.argsort(legs[:, kernels.BEGIN], kind="stable")]
     end = start_time + horizon if known else math.inf
-    (x0, y0), cols = grid.origin, grid.shape[1]
-    begin, listed = kernels.near_legs(legs, grid.free, x0, y0, grid.cell)
-    own, since, until = kernels.safe_intervals(legs, begin, listed, grid.free, x0, y0, grid.cell, start_time, end)
     start, goal = (cell[0] * cols + cell[1] for cell in (query.start, query.goal))
-    if own[start] == own[start + 1] or since[own[start]] > start_time:
-        return without("a mover is too close to the start when the robot sets out")
-    cells, arrive, leave, work = kernels.earliest(
-        grid.moves, start, goal, x0, y0, grid.cell, float(speed), end, stay,
-        legs, begin, listed, own, since, until, start_time,
-    )  # fmt: skip
+    frame = kernels.Frame(*grid.origin, grid.cell)
+    near = kernels.NearLegs(legs, *kernels.near_legs(legs, grid.free, frame))
+    intervals = kernels.Intervals(*kernels.safe_intervals(near, grid.free, frame, start_time, end))
+    first = intervals.first[start]
+    if first == intervals.first[start + 1] or intervals.since[first] > start_time:
+        reason = "a mover is too close to the start when the robot sets out"
+        return TimedPlan(status=PlanStatus.NO_PATH, reason=reason)
+    trip = kernels.Trip(start, goal, float(speed), float(start_time), end, stay)
+    cells, arrive, leave, work = kernels.earliest(grid.moves, frame, near, intervals, trip)
     if not len(cells):
         stays = " and can stay there" if stay else ""
-        return without(f"no way past the movers reaches the goal within {horizon:g} s{stays}", work)
+        reason = f"no way past the movers reaches the goal within {horizon:g} s{stays}"
+        return TimedPlan(status=PlanStatus.NO_PATH, reason=reason, work=work)
     return TimedPlan(
         status=PlanStatus.SOLVED,
         cells=cells,
         cost=path_cost(cells, grid.cell),
         work=work,
-        work_unit=UNIT,
-        wall_s=time.perf_counter() - started,
         arrive=arrive,
         leave=leave,
         xy=grid.xy(cells),
     )
 
 
-UNIT = "safe intervals expanded"
-
-
-def _legs(mover: MoverMotion, start: float, end: float, inflate: float) -> Floats:
-    """A motion as straight legs (L, 7) at constant speed: t0, t1, x, y, vx, vy, the distance to be kept."""
+def _legs(mover: Moving, start: float, end: float, inflate: float) -> Floats:
+    """A motion as straight legs (L, 7) at constant speed, with the columns of `_kernels_sipp`."""
     from antdrive.planners.graph import _kernels_sipp as kernels
 
     t, xy, jump = _samples(mover, start, end)
@@ -165,27 +196,31 @@ def _legs(mover: MoverMotion, start: float, end: float, inflate: float) -> Float
     first, last = first[:count], last[:count]
     span = t[last] - t[first]
     velocity = (xy[last] - xy[first]) / span[:, np.newaxis]
-    reach = np.full(count, mover.radius + inflate + 2 * TOLERANCE)
-    return np.column_stack([t[first], t[last], xy[first], velocity, reach])
+    keep = np.full(count, mover.radius + inflate + 2 * TOLERANCE)
+    return np.column_stack([t[first], t[last], xy[first], velocity, keep])
 
 
-def _samples(mover: MoverMotion, start: float, end: float) -> tuple[Floats, Floats, npt.NDArray[np.bool_]]:
-    """Times (T,), places (T, 2) that straight lines join to within `TOLERANCE`, and, (T - 1,), where it jumps instead."""
+def _samples(mover: Moving, start: float, end: float) -> tuple[Floats, Floats, npt.NDArray[np.bool_]]:
+    """A motion as times (T,), positions (T, 2), and whether it jumps after each sample (T - 1,).
+
+    Between samples without a jump, the motion is within `TOLERANCE` of the straight line that joins them.
+    """
     t = np.linspace(start, end, max(2, math.ceil((end - start) / STEP) + 1))
     xy = np.asarray(mover.at(t), dtype=np.float64)
-    open_ = np.arange(len(t) - 1)  # stretches not yet known to be straight
-    while len(open_):
-        middle = (t[open_] + t[open_ + 1]) / 2
+    unchecked = np.arange(len(t) - 1)  # stretches not yet known to be straight
+    while len(unchecked):
+        middle = (t[unchecked] + t[unchecked + 1]) / 2
         there = np.asarray(mover.at(middle), dtype=np.float64)
-        # Where two straight legs meet within a stretch, they stray at most twice as far from it as its middle does.
-        stray = 2 * np.hypot(*(there - (xy[open_] + xy[open_ + 1]) / 2).T)
-        bent = (stray > TOLERANCE) & (t[open_ + 1] - t[open_] > INSTANT)
+        # If two straight legs meet within a stretch, they stray from it at most twice as far as its middle
+        # does.
+        stray = 2 * np.hypot(*(there - (xy[unchecked] + xy[unchecked + 1]) / 2).T)
+        bent = (stray > TOLERANCE) & (t[unchecked + 1] - t[unchecked] > INSTANT)
         if not bent.any():
             break
-        at = open_[bent] + 1
+        at = unchecked[bent] + 1
         t, xy = np.insert(t, at, middle[bent]), np.insert(xy, at, there[bent], axis=0)
-        halves = at + np.arange(len(at))  # where the middles have come to be
-        open_ = np.stack([halves - 1, halves], axis=1).ravel()
+        halves = at + np.arange(len(at))  # the indices of the middles
+        unchecked = np.stack([halves - 1, halves], axis=1).ravel()
     if not np.isfinite(xy).all():
         raise FieldError("movers", "a mover's position is not finite")
     return t, xy, (np.diff(t) <= INSTANT) & (segment_lengths(xy) > TOLERANCE)

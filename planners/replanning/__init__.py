@@ -1,1 +1,1 @@
-"""Planners that answer again while the world changes."""
+"""Planning while the world changes: replanners answer again after an edit, and agents decide cell by cell."""

@@ -1,23 +1,61 @@
 """Compiled string pulling among discs: arrays in, arrays out, nothing validated.
 
-A taut string consists of links, which are straight, and of contacts, where it bends around a disc: to the left, `1`,
-or to the right, `-1`, by a sweep. Link i leads from contact i - 1 to contact i; the first leaves the start and the
-last reaches the goal, so there is one more of them. A link that leaves a disc in direction `a` leaves it at the
-angle `a - turn * pi / 2`.
+A taut string consists of straight links and of contacts, at each of which it bends around a disc by a sweep:
+to the left, turn 1, or to the right, turn -1. Link i leads from contact i - 1 to contact i; the first leaves
+the start and the last reaches the goal, so there is one more link than contacts. A link that leaves a disc in
+direction `a` leaves its rim at the angle `a - turn * pi / 2`. Angles are in radians, lengths in metres.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from antdrive.worlds._kernels import Array, inline, kernel, segment_clearance, segment_distance2, wall_distance
+from antdrive.worlds._kernels import (
+    Array,
+    doubled,
+    doubled_rows,
+    inline,
+    kernel,
+    segment_clearance,
+    segment_distance2,
+    wall_distance,
+)
 
 TURN = 2.0 * math.pi
 GRAZE = 1e-9  # rad: a link that has turned past a disc by less than this touches it
-DEEP = 2e-10  # m: what enters a disc by less only touches it
-NONE, OFF, HIT = range(3)
+DEEP = 2e-10  # m: what enters a disc by less than this only touches it
+LOOSE = -1e-11  # rad: a contact whose sweep is less than this does not bend the string
+NONE, OFF, HIT = range(3)  # events while a link turns: it reaches its target, leaves its disc, or meets another disc
+
+
+class Contacts(NamedTuple):
+    """The bends of a string with K contacts."""
+
+    disc: Array  # (K,) index of the disc that it bends around
+    turn: Array  # (K,) 1 left, -1 right
+    sweep: Array  # (K,) [rad]
+
+
+class String(NamedTuple):
+    """A string: its contacts, links (K + 1, 4) as x, y from and x, y to, and discs (N, 3)."""
+
+    contacts: Contacts
+    links: Array
+    discs: Array
+
+
+class Link(NamedTuple):
+    """The last link while it turns: the disc it leaves, -1 at the start of the string, and its direction."""
+
+    base: Any
+    x: float
+    y: float
+    r: float
+    turn: float
+    heading: float
 
 
 @inline
@@ -28,9 +66,10 @@ def signed(angle: float) -> float:
 
 @inline
 def tangent(x: float, y: float, r: float, s: float, px: float, py: float, q: float, t: float) -> tuple[float, float]:
-    """Direction and length of the line that leaves a disc turning by s and reaches another turning by t.
+    """Direction and length of the line that leaves one disc (x, y, r) and reaches another (px, py, q).
 
-    The length is negative where there is no such line. A radius of 0 makes a point.
+    It passes the first on the side given by the turn s, the second by the turn t. A disc of radius 0 is a
+    point. The length is negative if there is no such line.
     """
     dx, dy = px - x, py - y
     d = math.hypot(dx, dy)
@@ -45,68 +84,82 @@ def tangent(x: float, y: float, r: float, s: float, px: float, py: float, q: flo
 
 
 @kernel
-def pull(line: Array, discs: Array) -> tuple[bool, Array, Array, Array]:
-    """The contacts of the shortest line homotopic to a clear polyline (M, 2): whether found, discs, turns, sweeps.
+def first_event(
+    link: Link, rest: float, way: float, sweep: float, ax: float, ay: float, bx: float, by: float, discs: Array
+) -> tuple[int, float, int, float]:
+    """What happens first while a link turns by at most `rest` in the sense `way`, as its end goes along the leg ab.
 
-    One end of the string stays at the first point, the other is carried along the polyline. Only the last link moves:
-    it turns about the last contact, in one direction on each straight leg of the polyline, until it meets a disc,
-    which becomes a contact, or lies in line with the link before, which frees the contact between them. The discs
-    (N, 3) must lie off the polyline; they may overlap, but none may lie within another.
+    Returns the event, the angle turned until then, and for HIT the disc and the link's direction.
     """
-    n = discs.shape[0]
-    room = 32
-    events = 10_000 + 100 * (n + line.shape[0])  # far more than any string has; rounding could make it circle
-    disc = np.empty(room, dtype=np.int64)
-    turn = np.empty(room, dtype=np.float64)
-    sweep = np.empty(room, dtype=np.float64)
-    into = np.empty(room, dtype=np.float64)  # direction of the link that reaches the contact
+    base, x, y, r, s, heading = link
+    event, first, closest, met, met_heading = NONE, rest, np.inf, -1, 0.0
+    if base >= 0 and s == -way and sweep <= rest:
+        event, first = OFF, max(0.0, sweep)
+    vx, vy = bx - ax, by - ay
+    x_lo, x_hi = min(x - r, min(ax, bx)), max(x + r, max(ax, bx))
+    y_lo, y_hi = min(y - r, min(ay, by)), max(y + r, max(ay, by))
+    for k in range(discs.shape[0]):
+        kx, ky, q = discs[k, 0], discs[k, 1], discs[k, 2]
+        if k == base or kx + q < x_lo or kx - q > x_hi or ky + q < y_lo or ky - q > y_hi:
+            continue
+        direction, length = tangent(x, y, r, s, kx, ky, q, way)
+        if length < 0.0:
+            continue
+        ahead = (way * (direction - heading)) % TURN
+        if ahead > TURN - GRAZE:
+            ahead = 0.0
+        if ahead > first or (ahead == first and length >= closest):
+            continue
+        leave = direction - 0.5 * math.pi * way
+        if way * (vx * (ky + q * math.sin(leave) - ay) - vy * (kx + q * math.cos(leave) - ax)) <= 0.0:
+            continue  # the disc lies beyond the leg, so the link does not reach it
+        event, first, closest, met, met_heading = HIT, ahead, length, k, direction
+    return event, first, met, met_heading
+
+
+@kernel
+def pull(line: Array, discs: Array) -> tuple[bool, Array, Array, Array]:
+    """Whether the shortest line homotopic to a clear polyline (M, 2) was found, and its contacts.
+
+    One end of the string stays at the first point, the other is carried along the polyline. Only the last
+    link moves: on each straight leg of the polyline it turns about the last contact in one sense, until it
+    meets a disc, which becomes a contact, or is in line with the link before it, which removes the contact
+    between them. The discs (N, 3) must lie off the polyline; they may overlap, but none may lie within
+    another.
+    """
+    events = 10_000 + 100 * (
+        discs.shape[0] + line.shape[0]
+    )  # far more than any string has; rounding could make it circle
+    disc = np.empty(32, dtype=np.int64)
+    turn = np.empty(32, dtype=np.float64)
+    sweep = np.empty(32, dtype=np.float64)
+    into = np.empty(32, dtype=np.float64)  # direction of the link that reaches the contact
     count = 0
     heading = math.atan2(line[1, 1] - line[0, 1], line[1, 0] - line[0, 0])
     for leg in range(1, line.shape[0] - 1):
         ax, ay, bx, by = line[leg, 0], line[leg, 1], line[leg + 1, 0], line[leg + 1, 1]
-        vx, vy = bx - ax, by - ay
         way = 0.0  # the sense in which the link turns on this leg
         while True:
             if count > 0:
                 base = disc[count - 1]
-                x, y, r, s = discs[base, 0], discs[base, 1], discs[base, 2], turn[count - 1]
+                link = Link(base, discs[base, 0], discs[base, 1], discs[base, 2], turn[count - 1], heading)
             else:
-                base, x, y, r, s = -1, line[0, 0], line[0, 1], 0.0, 0.0
-            target, _ = tangent(x, y, r, s, bx, by, 0.0, 0.0)
+                link = Link(np.int64(-1), line[0, 0], line[0, 1], 0.0, 0.0, heading)
+            target, _ = tangent(link.x, link.y, link.r, link.turn, bx, by, 0.0, 0.0)
             rest = signed(target - heading)
             if way == 0.0:
                 way = 1.0 if rest > 0.0 else -1.0
             rest *= way
-            # At the very start the end may be carried past the pin itself: the link has no length and sweeps nothing.
-            if rest <= 0.0 or (base < 0 and rest > math.pi - GRAZE):
-                if count > 0:
-                    sweep[count - 1] += s * way * rest
-                heading = target
-                break
-            event, first, closest, met, met_heading = NONE, rest, np.inf, -1, 0.0
-            if base >= 0 and s == -way and sweep[count - 1] <= rest:
-                event, first = OFF, max(0.0, sweep[count - 1])
-            x_lo, x_hi = min(x - r, min(ax, bx)), max(x + r, max(ax, bx))
-            y_lo, y_hi = min(y - r, min(ay, by)), max(y + r, max(ay, by))
-            for k in range(n):
-                kx, ky, q = discs[k, 0], discs[k, 1], discs[k, 2]
-                if k == base or kx + q < x_lo or kx - q > x_hi or ky + q < y_lo or ky - q > y_hi:
-                    continue
-                direction, length = tangent(x, y, r, s, kx, ky, q, way)
-                if length < 0.0:
-                    continue
-                ahead = (way * (direction - heading)) % TURN
-                if ahead > TURN - GRAZE:
-                    ahead = 0.0
-                if ahead > first or (ahead == first and length >= closest):
-                    continue
-                leave = direction - 0.5 * math.pi * way
-                if way * (vx * (ky + q * math.sin(leave) - ay) - vy * (kx + q * math.cos(leave) - ax)) <= 0.0:
-                    continue  # it lies beyond the leg, so the link does not reach it
-                event, first, closest, met, met_heading = HIT, ahead, length, k, direction
+            met: Any = np.int64(-1)  # the compiler would treat a plain -1 as a type of its own
+            event, turned, met_heading = NONE, rest, 0.0
+            # At the very start the end may be carried past the pin itself: then the link has no length and
+            # sweeps nothing.
+            if rest > 0.0 and not (count == 0 and rest > math.pi - GRAZE):
+                bend = sweep[count - 1] if count > 0 else 0.0
+                event, turned, met, met_heading = first_event(link, rest, way, bend, ax, ay, bx, by, discs)
             if event == NONE:
                 if count > 0:
-                    sweep[count - 1] += s * way * rest
+                    sweep[count - 1] += link.turn * way * rest
                 heading = target
                 break
             events -= 1
@@ -117,13 +170,9 @@ def pull(line: Array, discs: Array) -> tuple[bool, Array, Array, Array]:
                 heading = into[count]
                 continue
             if count > 0:
-                sweep[count - 1] += s * way * first
-            if count == room:
-                disc = np.concatenate((disc, np.empty_like(disc)))
-                turn = np.concatenate((turn, np.empty_like(turn)))
-                sweep = np.concatenate((sweep, np.empty_like(sweep)))
-                into = np.concatenate((into, np.empty_like(into)))
-                room *= 2
+                sweep[count - 1] += link.turn * way * turned
+            if count == len(disc):
+                disc, turn, sweep, into = doubled(disc), doubled(turn), doubled(sweep), doubled(into)
             disc[count], turn[count], sweep[count], into[count] = met, way, 0.0, met_heading
             heading = met_heading
             count += 1
@@ -132,7 +181,7 @@ def pull(line: Array, discs: Array) -> tuple[bool, Array, Array, Array]:
 
 @kernel
 def outermost(discs: Array) -> Array:
-    """Which discs (N, 3) do not lie within another; of equal ones the first counts."""
+    """Which discs (N, 3) do not lie within another; of equal discs only the first is kept."""
     n = discs.shape[0]
     keep = np.ones(n, dtype=np.bool_)
     for i in range(n):
@@ -147,16 +196,18 @@ def outermost(discs: Array) -> Array:
 
 
 @inline
-def drop(count: int, i: int, disc: Array, turn: Array, sweep: Array) -> int:
-    """Take contact i out; how many remain."""
+def drop(count: int, i: int, contacts: Contacts) -> int:
+    """Remove contact i; returns how many remain."""
+    disc, turn, sweep = contacts
     for j in range(i, count - 1):
         disc[j], turn[j], sweep[j] = disc[j + 1], turn[j + 1], sweep[j + 1]
     return count - 1
 
 
 @inline
-def insert(count: int, i: int, k: int, t: float, a: float, disc: Array, turn: Array, sweep: Array) -> int:
-    """Put a contact before contact i; how many there are now."""
+def insert(count: int, i: int, contacts: Contacts, k: int, t: float, a: float) -> int:
+    """Insert a contact with disc k, turn t and sweep a before contact i; returns how many there are now."""
+    disc, turn, sweep = contacts
     for j in range(count, i, -1):
         disc[j], turn[j], sweep[j] = disc[j - 1], turn[j - 1], sweep[j - 1]
     disc[i], turn[i], sweep[i] = k, t, a
@@ -165,101 +216,149 @@ def insert(count: int, i: int, k: int, t: float, a: float, disc: Array, turn: Ar
 
 @inline
 def past(x: float, y: float, cx: float, cy: float, bx: float, by: float, turn: float) -> float:
-    """How far past (bx, by) a disc's rim, followed by its turn, points from its centre to (x, y) [rad]."""
+    """The angle from (bx, by) to (x, y) about a centre (cx, cy), in the sense of `turn` [rad]."""
     return (turn * (math.atan2(y - cy, x - cx) - math.atan2(by - cy, bx - cx))) % TURN
 
 
 @kernel
-def settle(
-    first_disc: Array, first_turn: Array, first_sweep: Array, discs: Array, ends: Array
-) -> tuple[bool, Array, Array, Array, Array]:
+def merge_repeats(count: int, contacts: Contacts) -> int:
+    """Merge consecutive contacts with one disc; returns how many remain."""
+    disc, turn, sweep = contacts
+    for i in range(count - 1, 0, -1):
+        if disc[i] == disc[i - 1] and turn[i] == turn[i - 1]:
+            sweep[i - 1] += sweep[i]
+            count = drop(count, i, contacts)
+    return count
+
+
+@kernel
+def place_links(count: int, contacts: Contacts, discs: Array, ends: Array, links: Array, heading: Array) -> bool:
+    """Fill `links` and their directions with the tangents between consecutive contacts.
+
+    Returns False if there is none.
+    """
+    disc, turn, _ = contacts
+    for i in range(count + 1):
+        x, y, r, s = ends[0, 0], ends[0, 1], 0.0, 0.0
+        px, py, q, t = ends[1, 0], ends[1, 1], 0.0, 0.0
+        if i > 0:
+            x, y, r, s = discs[disc[i - 1], 0], discs[disc[i - 1], 1], discs[disc[i - 1], 2], turn[i - 1]
+        if i < count:
+            px, py, q, t = discs[disc[i], 0], discs[disc[i], 1], discs[disc[i], 2], turn[i]
+        a, length = tangent(x, y, r, s, px, py, q, t)
+        if length < 0.0:
+            return False
+        heading[i] = a
+        out, reach = a - 0.5 * math.pi * s, a - 0.5 * math.pi * t
+        links[i, 0], links[i, 1] = x + r * math.cos(out), y + r * math.sin(out)
+        links[i, 2], links[i, 3] = px + q * math.cos(reach), py + q * math.sin(reach)
+    return True
+
+
+@kernel
+def loosest(count: int, contacts: Contacts, heading: Array) -> int:
+    """Measure the sweeps between links.
+
+    Returns the contact that bends the string least if it is loose, else -1.
+    """
+    _, turn, sweep = contacts
+    least, loose = LOOSE, -1
+    for i in range(count):
+        bend = turn[i] * (heading[i + 1] - heading[i])
+        sweep[i] = bend + TURN * np.round((sweep[i] - bend) / TURN)
+        if sweep[i] < least:
+            least, loose = sweep[i], i
+    return loose
+
+
+@kernel
+def deepest_entry(count: int, contacts: Contacts, links: Array, discs: Array) -> tuple[int, int, bool]:
+    """The disc that the string enters most, -1 if none; the link or contact that enters it.
+
+    The third value is whether a contact enters it, not a link.
+    """
+    disc, turn, sweep = contacts
+    most, at, entered, on_arc = DEEP, -1, -1, False
+    for i in range(count + 1):
+        ax, ay, bx, by = links[i, 0], links[i, 1], links[i, 2], links[i, 3]
+        before, after = disc[i - 1] if i > 0 else -1, disc[i] if i < count else -1
+        for k in range(discs.shape[0]):
+            if k in (before, after):
+                continue
+            q = discs[k, 2] - most
+            if q > 0.0 and segment_distance2(discs[k, 0], discs[k, 1], ax, ay, bx, by) < q * q:
+                most = discs[k, 2] - math.sqrt(segment_distance2(discs[k, 0], discs[k, 1], ax, ay, bx, by))
+                at, entered, on_arc = i, k, False
+        if i == count or sweep[i] <= 0.0:
+            continue
+        x, y, r = discs[after, 0], discs[after, 1], discs[after, 2]
+        for k in range(discs.shape[0]):
+            if k == after:
+                continue
+            depth = discs[k, 2] - abs(math.hypot(discs[k, 0] - x, discs[k, 1] - y) - r)
+            if depth > most and past(discs[k, 0], discs[k, 1], x, y, bx, by, turn[i]) < sweep[i]:
+                most, at, entered, on_arc = depth, i, k, True
+    return entered, at, on_arc
+
+
+@kernel
+def add_contact(count: int, contacts: Contacts, links: Array, discs: Array, entered: int, at: int, on_arc: bool) -> int:
+    """Make a disc that the string enters a contact, on the side where its centre lies.
+
+    Returns how many there are now.
+    """
+    disc, turn, sweep = contacts
+    kx, ky = discs[entered, 0], discs[entered, 1]
+    if on_arc:  # the contact is split in two, before and after the disc
+        i = disc[at]
+        bend, t = sweep[at], turn[at]
+        ahead = past(kx, ky, discs[i, 0], discs[i, 1], links[at, 2], links[at, 3], t)
+        sweep[at] = ahead
+        count = insert(count, at + 1, contacts, entered, t, 0.0)
+        return insert(count, at + 2, contacts, i, t, bend - ahead)
+    ax, ay = links[at, 0], links[at, 1]
+    left = (links[at, 2] - ax) * (ky - ay) - (links[at, 3] - ay) * (kx - ax) > 0.0
+    return insert(count, at, contacts, entered, 1.0 if left else -1.0, 0.0)
+
+
+@kernel
+def settle(first: Contacts, discs: Array, ends: Array) -> tuple[bool, Array, Array, Array, Array]:
     """The taut string near given contacts when the discs (N, 3) are not quite those that it was pulled among.
 
-    Whether it was found, its discs, turns and sweeps, and its links (K + 1, 4). Contacts that no longer bend it are let
-    go, and the disc that it enters most is made a contact, on the side where its centre lies, until nothing changes.
+    Returns whether it was found, its contacts, and its links (K + 1, 4). Until nothing changes, the loosest
+    contact is removed, or else the disc that the string enters most becomes a contact.
     """
-    count = len(first_disc)
+    count = len(first.disc)
     room = 2 * count + 64
     disc = np.empty(room, dtype=np.int64)
     turn = np.empty(room, dtype=np.float64)
     sweep = np.empty(room, dtype=np.float64)
     for i in range(count):
-        disc[i], turn[i], sweep[i] = first_disc[i], first_turn[i], first_sweep[i]
+        disc[i], turn[i], sweep[i] = first.disc[i], first.turn[i], first.sweep[i]
+    contacts = Contacts(disc, turn, sweep)
     links = np.empty((room + 1, 4), dtype=np.float64)
     heading = np.empty(room + 1, dtype=np.float64)
     for _ in range(3 * room):
         if count > room - 2:
             break
-        done = True
-        for i in range(count - 1, 0, -1):
-            if disc[i] == disc[i - 1] and turn[i] == turn[i - 1]:
-                sweep[i - 1] += sweep[i]
-                count = drop(count, i, disc, turn, sweep)
-        for i in range(count + 1):
-            x, y, r, s = ends[0, 0], ends[0, 1], 0.0, 0.0
-            px, py, q, t = ends[1, 0], ends[1, 1], 0.0, 0.0
-            if i > 0:
-                x, y, r, s = discs[disc[i - 1], 0], discs[disc[i - 1], 1], discs[disc[i - 1], 2], turn[i - 1]
-            if i < count:
-                px, py, q, t = discs[disc[i], 0], discs[disc[i], 1], discs[disc[i], 2], turn[i]
-            a, length = tangent(x, y, r, s, px, py, q, t)
-            if length < 0.0:
-                return False, disc[:0], turn[:0], sweep[:0], links[:0]
-            heading[i] = a
-            out, reach = a - 0.5 * math.pi * s, a - 0.5 * math.pi * t
-            links[i, 0], links[i, 1] = x + r * math.cos(out), y + r * math.sin(out)
-            links[i, 2], links[i, 3] = px + q * math.cos(reach), py + q * math.sin(reach)
-        least, loose = -1e-11, -1
-        for i in range(count):
-            bend = turn[i] * (heading[i + 1] - heading[i])
-            sweep[i] = bend + TURN * np.round((sweep[i] - bend) / TURN)
-            if sweep[i] < least:
-                least, loose = sweep[i], i
+        count = merge_repeats(count, contacts)
+        if not place_links(count, contacts, discs, ends, links, heading):
+            break
+        loose = loosest(count, contacts, heading)
         if loose >= 0:
-            count = drop(count, loose, disc, turn, sweep)
+            count = drop(count, loose, contacts)
             continue
-        most, at, entered, split = DEEP, -1, -1, False
-        for i in range(count + 1):
-            ax, ay, bx, by = links[i, 0], links[i, 1], links[i, 2], links[i, 3]
-            before, after = disc[i - 1] if i > 0 else -1, disc[i] if i < count else -1
-            for k in range(discs.shape[0]):
-                if k in (before, after):
-                    continue
-                q = discs[k, 2] - most
-                if q > 0.0 and segment_distance2(discs[k, 0], discs[k, 1], ax, ay, bx, by) < q * q:
-                    most = discs[k, 2] - math.sqrt(segment_distance2(discs[k, 0], discs[k, 1], ax, ay, bx, by))
-                    at, entered, split = i, k, False
-            if i == count or sweep[i] <= 0.0:
-                continue
-            x, y, r = discs[after, 0], discs[after, 1], discs[after, 2]
-            for k in range(discs.shape[0]):
-                if k == after:
-                    continue
-                depth = discs[k, 2] - abs(math.hypot(discs[k, 0] - x, discs[k, 1] - y) - r)
-                if depth > most and past(discs[k, 0], discs[k, 1], x, y, bx, by, turn[i]) < sweep[i]:
-                    most, at, entered, split = depth, i, k, True
-        if entered >= 0:
-            done = False
-            kx, ky = discs[entered, 0], discs[entered, 1]
-            if split:
-                i = disc[at]
-                bend, t = sweep[at], turn[at]
-                ahead = past(kx, ky, discs[i, 0], discs[i, 1], links[at, 2], links[at, 3], t)
-                sweep[at] = ahead
-                count = insert(count, at + 1, entered, t, 0.0, disc, turn, sweep)
-                count = insert(count, at + 2, i, t, bend - ahead, disc, turn, sweep)
-            else:
-                ax, ay = links[at, 0], links[at, 1]
-                left = (links[at, 2] - ax) * (ky - ay) - (links[at, 3] - ay) * (kx - ax) > 0.0
-                count = insert(count, at, entered, 1.0 if left else -1.0, 0.0, disc, turn, sweep)
-        if done:
+        entered, at, on_arc = deepest_entry(count, contacts, links, discs)
+        if entered < 0:
             return True, disc[:count].copy(), turn[:count].copy(), sweep[:count].copy(), links[: count + 1].copy()
+        count = add_contact(count, contacts, links, discs, entered, at, on_arc)
     return False, disc[:0], turn[:0], sweep[:0], links[:0]
 
 
 @kernel
-def way_length(disc: Array, sweep: Array, links: Array, discs: Array) -> float:
+def string_length(string: String) -> float:
     """The length of a string."""
+    disc, sweep, links, discs = string.contacts.disc, string.contacts.sweep, string.links, string.discs
     total = 0.0
     for i in range(links.shape[0]):
         total += math.hypot(links[i, 2] - links[i, 0], links[i, 3] - links[i, 1])
@@ -269,13 +368,9 @@ def way_length(disc: Array, sweep: Array, links: Array, discs: Array) -> float:
 
 
 @kernel
-def way_clearance(
-    disc: Array, turn: Array, sweep: Array, links: Array, discs: Array, built: Array, bounds: Array
-) -> float:
-    """The exact distance from a string to the nearest surface of the discs as built, or wall.
-
-    `discs` are those that it goes round, with the radii of its arcs.
-    """
+def string_clearance(string: String, built: Array, bounds: Array) -> float:
+    """The exact distance from a string to the nearest wall or surface of the discs as built (N, 3)."""
+    (disc, turn, sweep), links, discs = string
     best = np.inf
     for i in range(links.shape[0]):
         best = min(best, segment_clearance(links[i, 0], links[i, 1], links[i, 2], links[i, 3], built, bounds))
@@ -284,7 +379,7 @@ def way_clearance(
             continue
         x, y, r = discs[disc[i], 0], discs[disc[i], 1], discs[disc[i], 2]
         bx, by = links[i, 2], links[i, 3]
-        for quarter in range(4):  # where the arc is nearest to a wall, other than at its ends
+        for quarter in range(4):  # where the arc may be nearest to a wall, apart from its ends
             px, py = x + r * math.cos(0.5 * math.pi * quarter), y + r * math.sin(0.5 * math.pi * quarter)
             if past(px, py, x, y, bx, by, turn[i]) < sweep[i]:
                 best = min(best, wall_distance(px, py, bounds))
@@ -296,35 +391,37 @@ def way_clearance(
 
 
 @kernel
-def way_points(
-    disc: Array, turn: Array, sweep: Array, links: Array, discs: Array, built: Array, bounds: Array,
-    clearance: float, bulge: float,
-) -> tuple[Array, Array]:  # fmt: skip
-    """A string as a polyline (M, 2) and the curvature from each of its points on.
+def with_point(xy: Array, curvature: Array, size: int, x: float, y: float, bend: float) -> tuple[Array, Array, int]:
+    """A polyline of `size` points with one more, and the curvature from that point on.
 
-    Arcs become the corners where their tangents meet, which stand off outside by at most `bulge`, and by less where
-    that would come closer than `clearance` to something else.
+    The arrays grow when full.
     """
-    room = 256
-    xy = np.empty((room, 2), dtype=np.float64)
-    curvature = np.zeros(room, dtype=np.float64)
+    if size == len(xy):
+        xy, curvature = doubled_rows(xy), doubled(curvature)
+    xy[size, 0], xy[size, 1], curvature[size] = x, y, bend
+    return xy, curvature, size + 1
+
+
+@kernel
+def string_points(string: String, built: Array, bounds: Array, clearance: float, bulge: float) -> tuple[Array, Array]:
+    """A string as a polyline (M, 2) and the curvature from each of its points on (M,).
+
+    An arc becomes the corners where its tangents meet. They stand off the arc by at most `bulge`, and by less
+    where the polyline would come closer than `clearance` to a wall or a disc as built.
+    """
+    (disc, turn, sweep), links, discs = string
+    xy = np.empty((256, 2), dtype=np.float64)
+    curvature = np.zeros(256, dtype=np.float64)
     size = 0
-    cuts = np.empty(64, dtype=np.float64)
+    cuts = np.empty(64, dtype=np.float64)  # where the next pieces of the arc end, the nearest last
     for i in range(links.shape[0]):
         for end in range(2):
-            if size + 2 > room:
-                xy = np.concatenate((xy, np.empty_like(xy)))
-                curvature = np.concatenate((curvature, np.zeros_like(curvature)))
-                room *= 2
             px, py = links[i, 2 * end], links[i, 2 * end + 1]
             if size > 0 and math.hypot(px - xy[size - 1, 0], py - xy[size - 1, 1]) <= 1e-9:
                 size -= 1
-            if end == 1 and i < len(disc) and sweep[i] > GRAZE:
-                bend = turn[i] / discs[disc[i], 2]
-            else:
-                bend = 0.0
-            xy[size, 0], xy[size, 1], curvature[size] = px, py, bend
-            size += 1
+            bends = end == 1 and i < len(disc) and sweep[i] > GRAZE
+            bend = turn[i] / discs[disc[i], 2] if bends else 0.0
+            xy, curvature, size = with_point(xy, curvature, size, px, py, bend)
         if i == len(disc) or sweep[i] <= GRAZE:
             continue
         x, y, r = discs[disc[i], 0], discs[disc[i], 1], discs[disc[i], 2]
@@ -332,12 +429,12 @@ def way_points(
         widest = 2.0 * math.acos(r / (r + bulge))
         even = sweep[i] / math.ceil(sweep[i] / widest)
         at = 0.0
-        waiting = 0  # ends of the next pieces of the arc, nearest last
-        nearest = 0
+        waiting = 0  # entries of `cuts`
+        pieces = 0  # of even size that have been begun
         while at < sweep[i] - 1e-12:
             if waiting == 0:
-                nearest += 1
-                cuts[0] = min(nearest * even, sweep[i])
+                pieces += 1
+                cuts[0] = min(pieces * even, sweep[i])
                 waiting = 1
             to = cuts[waiting - 1]
             half = 0.5 * (to - at)
@@ -351,12 +448,7 @@ def way_points(
                     cuts[waiting] = at + half
                     waiting += 1
                     continue
-            if size + 2 > room:
-                xy = np.concatenate((xy, np.empty_like(xy)))
-                curvature = np.concatenate((curvature, np.zeros_like(curvature)))
-                room *= 2
-            xy[size, 0], xy[size, 1], curvature[size] = cx, cy, turn[i] / r
-            size += 1
+            xy, curvature, size = with_point(xy, curvature, size, cx, cy, turn[i] / r)
             at = to
             waiting -= 1
     return xy[:size], curvature[:size]
@@ -381,13 +473,14 @@ def crosses(xy: Array, ax: float, ay: float, bx: float, by: float) -> bool:
 
 
 @kernel
-def spare(xy: Array, discs: Array, box: Array, ends: Array, most: float, out: Array) -> None:
+def room_to_grow(xy: Array, discs: Array, box: Array, ends: Array, most: float, out: Array) -> None:
     """out[i] = how much disc i may grow, up to `most`, if each gap that the polyline passes is shared fairly.
 
-    `discs` (N, 3) are inflated and `box` shrunken. An end of the polyline must stay outside.
+    `discs` (N, 3) are inflated and `box` is shrunk. Both ends of the polyline must stay outside of the grown
+    discs.
     """
     n = discs.shape[0]
-    share = 0.49  # of a gap, for each side: some is left to pass
+    share = 0.49  # of a gap for each side, so that some of it is left to pass through
     for i in range(n):
         x, y, r = discs[i, 0], discs[i, 1], discs[i, 2]
         grow = most
@@ -421,8 +514,8 @@ def spare(xy: Array, discs: Array, box: Array, ends: Array, most: float, out: Ar
 
 
 @kernel
-def within(xy: Array, discs: Array, reach: float) -> Array:
-    """Which discs (N, 3) come within `reach` of a polyline."""
+def near_polyline(xy: Array, discs: Array, reach: float) -> Array:
+    """Which discs (N, 3) come within `reach` of a polyline (M, 2)."""
     near = np.zeros(discs.shape[0], dtype=np.bool_)
     for k in range(discs.shape[0]):
         q = discs[k, 2] + reach

@@ -1,4 +1,4 @@
-"""From a plan in cells to the line that is driven in the world."""
+"""From a plan in cells to a route in the world, in metres."""
 
 from __future__ import annotations
 
@@ -15,9 +15,14 @@ from antdrive.worlds.plane import segment_lengths
 def route_along(plan: PlanResult, grid: Grid, task: Task) -> Route:
     """The plan's own line in metres, from the exact start to the goal, without points that lie on a straight line.
 
-    The first or last point of the plan is left out where the straight way past it is as clear as the grid asks, so that no
-    kink remains between the start and the centre of its cell. Where the goal itself has less room than the grid asks, the
-    route ends at the plan's last point.
+    The first or last point of the plan is left out if the straight line past it keeps the grid's clearance,
+    so that no kink remains between the start and the centre of its cell. If the goal itself has less room
+    than the grid's clearance, the route ends at the plan's last point.
+
+    Args:
+        plan: a plan with a path
+        grid: the grid that it was made on
+        task: the task that the grid was made from
 
     Raises:
         ValueError: the plan has no path.
@@ -29,7 +34,7 @@ def route_along(plan: PlanResult, grid: Grid, task: Task) -> Route:
         xy = _join(xy[::-1], np.array(task.goal), grid, task)[::-1]
     xy = _straightened(xy)
     if np.ptp(xy, axis=0).max() < 1e-6:
-        # The robot already stands where it should: a route of a tenth of a millimetre is over before it begins.
+        # The robot is at the goal already; a route needs two points, so it is a tenth of a millimetre long.
         yaw = task.start[2]
         xy = np.vstack([xy[0], xy[0] + 1e-4 * np.array([math.cos(yaw), math.sin(yaw)])])
     return Route(xy)
@@ -42,7 +47,7 @@ def _join(xy: Floats, end: Floats, grid: Grid, task: Task) -> Floats:
 
 
 def _straightened(xy: Floats) -> Floats:
-    far = segment_lengths(xy[:-1]) > 1e-6  # points that rounding alone tells apart have no direction
+    far = np.hypot(*np.diff(xy[:-1], axis=0).T) > 1e-6  # points that differ by rounding alone have no direction
     xy = np.vstack([xy[:1], xy[1:-1][far], xy[-1:]])
     if len(xy) > 2 and np.hypot(*(xy[-1] - xy[-2])) <= 1e-6:
         xy = np.vstack([xy[:-2], xy[-1:]])

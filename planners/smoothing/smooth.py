@@ -1,15 +1,15 @@
-"""From a plan to a line worth driving: pulled taut in the plan's own corridor, and eased off the discs where that is cheap.
+"""From a plan to a line worth driving: pulled taut in the plan's own corridor, and moved away from discs where it is cheap.
 
-The shortest line among discs that is homotopic to a given one consists of tangents and of arcs along the discs. It is
-found by carrying the end of a string along the given line, as the funnel algorithm does in a sleeve of triangles (Lee &
-Preparata, *Euclidean shortest paths in the presence of rectilinear barriers*, Networks 14, 1984; for homotopy among
-obstacles Hershberger & Snoeyink, *Computing minimum length paths of a given homotopy class*, Comput. Geom. 4, 1994).
-Here the bends are the discs themselves, so no triangles are needed: between two events the string's last link turns about
-one disc, and the next event is the first of its tangents to come. Walls take no part, as a line within a convex room is
-never shortened by leaving it.
+The shortest line among discs that is homotopic to a given one consists of tangents and of arcs along the
+discs. It is found by carrying the end of a string along the given line, as the funnel algorithm does in a
+sleeve of triangles (Lee & Preparata, *Euclidean shortest paths in the presence of rectilinear barriers*,
+Networks 14, 1984; for homotopy among obstacles Hershberger & Snoeyink, *Computing minimum length paths of a
+given homotopy class*, Comput. Geom. 4, 1994). Here the bends are the discs themselves, so no triangles are
+needed: between two events the string's last link turns about one disc, and the next event is the first of its
+tangents to come. Walls are left out, as leaving a convex room never makes a line shorter.
 
-A wide line is the taut one among discs that have grown: each by up to a preferred clearance, in a gap by no more than its
-share of it.
+A line with more clearance is the taut line among discs that have grown: each by up to a preferred clearance,
+and in a gap by no more than its share of the gap.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -30,14 +30,14 @@ from antdrive.worlds import Bounds, Floats, Route, Task, World, polyline_clearan
 from antdrive.worlds.errors import FieldError
 from antdrive.worlds.plane import polyline_length
 
-if TYPE_CHECKING:  # brings the compiler with it
+if TYPE_CHECKING:  # importing a grid loads the compiler
     from antdrive.worlds import Grid
 
-#: What a route can be: the plan's own line, that line pulled taut, or one that keeps to the middle of gaps.
+#: The kinds of smoothing: the plan's own line, that line pulled taut, or taut with more clearance where there is room.
 SMOOTHINGS: tuple[str, ...] = ("none", "taut", "clearance")
 
-SLACK = 1e-9  # m: what falls short of the clearance, or is longer than allowed, by no more than this is rounding
-SHRINK = 2e-9  # m: strings are first pulled among discs this much smaller, which the plan's line surely clears
+SLACK = 1e-9  # m: rounding, by which a line may be too close or too long
+SHRINK = 2e-9  # m: strings are first pulled among discs that are smaller by this, which the plan's line surely clears
 
 
 def smooth(
@@ -50,19 +50,28 @@ def smooth(
     stretch: float = 0.03,
     bulge: float = 5e-4,
 ) -> Route:
-    """The route for a plan: its own line (`grid`), that line pulled taut, or taut but in the middle of gaps (`wide`).
+    """The route for a plan.
 
-    A wide route keeps up to `clearance` [m] more from discs than the grid asks and is at most `stretch` longer than the
-    taut one. Corners stand off arcs by at most `bulge` [m]. A refined route keeps the grid's clearance exactly, passes
-    every disc on the same side as the plan's line and is never longer than it, or than the plan's cells. What cannot be
-    refined so stays as planned, and the route's note tells why. Where the plan's line itself comes closer than the grid
-    asks, as a start with too little room does, it is kept.
+    A smoothed route keeps the grid's clearance exactly, passes every disc on the same side as the plan's
+    line, and is never longer than that line or than the plan's cells. Parts that cannot be smoothed so stay
+    as planned, and the route's note says why. Where the plan's line itself comes closer than the grid's
+    clearance, as a start with too little room does, the line is kept.
+
+    Args:
+        plan: a plan with a path
+        grid: the grid that it was made on
+        task: the task that the grid was made from
+        kind: `none` for the plan's own line, `taut` for that line pulled taut, `clearance` for a taut line
+            that keeps more distance from discs where there is room
+        clearance: how much more than the grid's clearance the kind `clearance` keeps at most [m]
+        stretch: how much longer than the taut line that may make it, as a fraction
+        bulge: how far the corners of the route's polyline may stand off an arc [m]
 
     Raises:
-        ValueError: the plan has no path, an unknown kind, or a setting outside its range.
+        ValueError: the plan has no path, the kind is unknown, or a setting is out of range.
     """
     if kind not in SMOOTHINGS:
-        raise FieldError("kind", f"unknown route {kind!r}; choose from {', '.join(SMOOTHINGS)}")
+        raise ValueError(f"kind: unknown smoothing {kind!r}; choose from {', '.join(SMOOTHINGS)}")
     for key, value in (("clearance", clearance), ("stretch", stretch)):
         if not (math.isfinite(value) and value >= 0):
             raise FieldError(key, f"must be at least 0, got {value:g}")
@@ -78,7 +87,7 @@ def smooth(
     for run, clear in _runs(line.xy, world, inflate):
         piece = Piece(run, np.zeros(len(run)))
         if clear:
-            piece = _refined(run, world, inflate, extra, stretch, spare, bulge)
+            piece = _smoothed(run, world, inflate, extra, stretch, spare, bulge)
             spare -= max(0.0, _length(piece.xy) - _length(run))
             kinds.append(piece.kind)
         elif len(run) > 2 or not (run[0] == line.xy[0]).all():
@@ -93,9 +102,16 @@ def smooth(
 
 
 def pull_taut(xy: npt.ArrayLike, discs: npt.ArrayLike, bounds: Bounds, inflate: float) -> TangentPath | None:
-    """The shortest path that keeps `inflate` [m] from all discs (N, 3) and passes each as the polyline (M, 2) does.
+    """The shortest path that keeps a distance from all discs and passes each on the same side as a polyline does.
 
-    None where the polyline itself does not keep it.
+    Args:
+        xy: the polyline (M, 2) [m]
+        discs: the discs (N, 3) as x, y, radius [m]
+        bounds: the walls as xmin, ymin, xmax, ymax [m]
+        inflate: the distance to keep [m]
+
+    Returns:
+        The path, or None if the polyline itself does not keep the distance.
     """
     line = np.ascontiguousarray(xy, dtype=np.float64).reshape(-1, 2)
     built = np.ascontiguousarray(discs, dtype=np.float64).reshape(-1, 3)
@@ -107,30 +123,45 @@ def pull_taut(xy: npt.ArrayLike, discs: npt.ArrayLike, bounds: Bounds, inflate: 
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """A part of a route."""
+    """A part of a route.
 
-    xy: Floats  # (N, 2) [m]
-    curvature: Floats  # (N,) from each point on [1/m]
+    Attributes:
+        xy: its points (N, 2) [m]
+        curvature: curvature from each point on (N,) [1/m]
+        kind: its kind of smoothing
+        note: why it is not smoothed as asked; empty if it is
+    """
+
+    xy: Floats
+    curvature: Floats
     kind: str = "none"
     note: str = ""
 
 
 @dataclass(frozen=True, eq=False)
-class String:
-    """A taut string as the kernels tell it: K contacts and K + 1 links."""
+class TautString:
+    """A taut string with K contacts, where it bends around discs, and K + 1 straight links.
 
-    disc: npt.NDArray[np.int64]  # (K,) which disc it bends around
-    turn: Floats  # (K,) 1 left, -1 right
-    sweep: Floats  # (K,) [rad]
-    links: Floats  # (K + 1, 4) x, y from, x, y to [m]
-    discs: Floats  # (N, 3) the discs that it goes round, grown to the radii of its arcs [m]
+    Attributes:
+        disc: index of the disc that it bends around at each contact (K,)
+        turn: 1 where it bends to the left, -1 to the right (K,)
+        sweep: by how much it bends (K,) [rad]
+        links: ends of each link as x, y from and x, y to (K + 1, 4) [m]
+        discs: the discs that it bends around, with the radii of its arcs (N, 3) [m]
+    """
+
+    disc: npt.NDArray[np.int64]
+    turn: Floats
+    sweep: Floats
+    links: Floats
+    discs: Floats
 
     @property
     def length(self) -> float:
-        """[m]."""
-        from antdrive.planners.smoothing import _kernels_smooth as _kernels_refine
+        """Its length [m]."""
+        from antdrive.planners.smoothing import _kernels_smooth as kernels
 
-        return float(_kernels_refine.way_length(self.disc, self.sweep, self.links, self.discs))
+        return float(kernels.string_length(self._compiled))
 
     @property
     def path(self) -> TangentPath:
@@ -147,27 +178,30 @@ class String:
 
     def clearance(self, world: World) -> float:
         """The exact distance to the nearest disc surface or wall [m]."""
-        from antdrive.planners.smoothing import _kernels_smooth as _kernels_refine
+        from antdrive.planners.smoothing import _kernels_smooth as kernels
 
         box = np.asarray(world.bounds, dtype=np.float64)
-        return float(
-            _kernels_refine.way_clearance(self.disc, self.turn, self.sweep, self.links, self.discs, world.discs, box)
-        )
+        return float(kernels.string_clearance(self._compiled, world.discs, box))
 
     def drawn(self, world: World, inflate: float, bulge: float) -> tuple[Floats, Floats]:
-        """As a polyline (M, 2) [m] whose corners stand off its arcs by at most `bulge`, and the curvature (M,)."""
-        from antdrive.planners.smoothing import _kernels_smooth as _kernels_refine
+        """A polyline (M, 2) [m] whose corners stand off the arcs by at most `bulge`, and its curvature (M,)."""
+        from antdrive.planners.smoothing import _kernels_smooth as kernels
 
         box = np.asarray(world.bounds, dtype=np.float64)
-        xy, curvature = _kernels_refine.way_points(
-            self.disc, self.turn, self.sweep, self.links, self.discs, world.discs, box, inflate, bulge
-        )
+        xy, curvature = kernels.string_points(self._compiled, world.discs, box, inflate, bulge)
         return xy, curvature
+
+    @property
+    def _compiled(self) -> Any:
+        """The record that kernels take."""
+        from antdrive.planners.smoothing import _kernels_smooth as kernels
+
+        return kernels.String(kernels.Contacts(self.disc, self.turn, self.sweep), self.links, self.discs)
 
 
 def _runs(xy: Floats, world: World, inflate: float) -> Iterator[tuple[Floats, bool]]:
-    """The polyline cut where it starts or ceases to keep the clearance, each part with whether it does."""
-    clear = segment_clearance(world, xy[:-1], xy[1:]) >= inflate - 1.01 * SLACK  # as joined lines just have it
+    """The polyline cut where it begins or ceases to keep the clearance; with each part, whether it does."""
+    clear = segment_clearance(world, xy[:-1], xy[1:]) >= inflate - 1.01 * SLACK  # joined lines just have the clearance
     cuts = [0, *(np.flatnonzero(clear[1:] != clear[:-1]) + 1).tolist(), len(clear)]
     for first, last in itertools.pairwise(cuts):
         yield np.ascontiguousarray(xy[first : last + 1]), bool(clear[first])
@@ -182,16 +216,16 @@ def _clears(xy: Floats, discs: Floats, bounds: Bounds, inflate: float) -> bool:
     return bool((room >= inflate - SLACK).all())
 
 
-def _refined(
+def _smoothed(
     line: Floats, world: World, inflate: float, extra: float, stretch: float, spare: float, bulge: float
 ) -> Piece:
-    """A clear polyline refined as far as its checks allow."""
+    """A clear polyline, smoothed as far as the checks allow."""
     own = _length(line)
     taut = _pulled(line, world.discs, inflate)
     if taut is None:
         return Piece(line, np.zeros(len(line)), note="the line could not be pulled taut")
     note = ""
-    for fine in (bulge, bulge / 100.0):  # a plan whose arcs are drawn finer than ours is the shorter one
+    for fine in (bulge, bulge / 100.0):  # a plan whose arcs are drawn finer than ours may be shorter
         drawn = taut.drawn(world, inflate, fine)
         note = _fault(taut, drawn[0], line, world, inflate, own)
         if not note:
@@ -201,21 +235,23 @@ def _refined(
     piece = Piece(*drawn, "taut")
     if not extra:
         return piece
-    found = _widened(taut, piece.xy, world, inflate, extra, min(taut.length * (1.0 + stretch), own + spare), bulge)
-    return replace(piece, note="no room or length to spare for a wider line") if found is None else found
+    found = _with_clearance(
+        taut, piece.xy, world, inflate, extra, min(taut.length * (1.0 + stretch), own + spare), bulge
+    )
+    return replace(piece, note="no room or length to spare for more clearance") if found is None else found
 
 
-def _pulled(line: Floats, discs: Floats, inflate: float) -> String | None:
-    """The taut string in the class of a clear polyline."""
-    from antdrive.planners.smoothing import _kernels_smooth as _kernels_refine
+def _pulled(line: Floats, discs: Floats, inflate: float) -> TautString | None:
+    """The taut string that passes all discs as a clear polyline does; None if it was not found."""
+    from antdrive.planners.smoothing import _kernels_smooth as kernels
 
-    grown = discs[_kernels_refine.outermost(discs)]
+    grown = discs[kernels.outermost(discs)]
     grown[:, 2] += inflate - SHRINK
-    found, disc, turn, sweep = _kernels_refine.pull(line, grown)
+    found, disc, turn, sweep = kernels.pull(line, grown)
     if not found:
         return None
     ends = np.ascontiguousarray(line[[0, -1]])
-    for more in (SHRINK, SHRINK * 0.6):  # of the exact radius there may be none where a gap is closed by rounding
+    for more in (SHRINK, SHRINK * 0.6):  # if rounding closes a gap, there is no string among discs of exact radius
         exact = grown.copy()
         exact[:, 2] += more
         string = _settled(disc, turn, sweep, exact, ends)
@@ -224,23 +260,25 @@ def _pulled(line: Floats, discs: Floats, inflate: float) -> String | None:
     return None
 
 
-def _settled(disc: npt.NDArray[np.int64], turn: Floats, sweep: Floats, discs: Floats, ends: Floats) -> String | None:
-    from antdrive.planners.smoothing import _kernels_smooth as _kernels_refine
+def _settled(
+    disc: npt.NDArray[np.int64], turn: Floats, sweep: Floats, discs: Floats, ends: Floats
+) -> TautString | None:
+    from antdrive.planners.smoothing import _kernels_smooth as kernels
 
-    found, disc, turn, sweep, links = _kernels_refine.settle(disc, turn, sweep, discs, ends)
-    return String(disc, turn, sweep, links, discs) if found else None
+    found, disc, turn, sweep, links = kernels.settle(kernels.Contacts(disc, turn, sweep), discs, ends)
+    return TautString(disc, turn, sweep, links, discs) if found else None
 
 
-def _fault(string: String, xy: Floats, line: Floats, world: World, inflate: float, longest: float) -> str:
-    """What is wrong with a refined line, empty if nothing."""
-    from antdrive.planners.smoothing import _kernels_smooth as _kernels_refine
+def _fault(string: TautString, xy: Floats, line: Floats, world: World, inflate: float, longest: float) -> str:
+    """The reason why a smoothed line cannot be used; empty if it can."""
+    from antdrive.planners.smoothing import _kernels_smooth as kernels
 
     if _length(xy) > longest + SLACK:
-        return "the refined line would be longer than the plan's"
+        return "the smoothed line would be longer than the plan's"
     if min(string.clearance(world), polyline_clearance(world, xy)) < inflate - SLACK:
-        return "the refined line would come closer than the clearance"
-    if _kernels_refine.encloses(line, xy, world.discs):
-        return "the refined line would pass an obstacle on its other side"
+        return "the smoothed line would come closer than the clearance"
+    if kernels.encloses(line, xy, world.discs):
+        return "the smoothed line would pass an obstacle on its other side"
     return ""
 
 
@@ -248,20 +286,23 @@ def _length(xy: Floats) -> float:
     return polyline_length(xy)
 
 
-def _widened(
-    taut: String, xy: Floats, world: World, inflate: float, extra: float, longest: float, bulge: float
+def _with_clearance(
+    taut: TautString, xy: Floats, world: World, inflate: float, extra: float, longest: float, bulge: float
 ) -> Piece | None:
-    """The widest line of at most a length, by discs that grow together; None where not even a little is possible."""
-    from antdrive.planners.smoothing import _kernels_smooth as _kernels_refine
+    """The line with the most clearance among those no longer than `longest`; None if there is no room or length for any.
 
-    near = np.flatnonzero(_kernels_refine.within(xy, taut.discs, 2.0 * extra))
+    Its discs grow together, found by bisection.
+    """
+    from antdrive.planners.smoothing import _kernels_smooth as kernels
+
+    near = np.flatnonzero(kernels.near_polyline(xy, taut.discs, 2.0 * extra))
     discs = np.ascontiguousarray(taut.discs[near])
     disc = np.searchsorted(near, taut.disc)
     xmin, ymin, xmax, ymax = world.bounds
     box = np.array([xmin + inflate, ymin + inflate, xmax - inflate, ymax - inflate])
     ends = np.ascontiguousarray(xy[[0, -1]])
     room = np.empty(len(discs))
-    _kernels_refine.spare(xy, discs, box, ends, extra, room)
+    kernels.room_to_grow(xy, discs, box, ends, extra, room)
 
     def grown(part: float) -> Piece | None:
         wider = discs.copy()

@@ -113,11 +113,11 @@ def run(
 
         check_display()
     if prelude > 0:
-        from antdrive.planners import IterativePlanner
+        from antdrive.planners import capabilities_of
 
         if video is None:
             raise InputError("--prelude: belongs to a film; give --video, too")
-        if not isinstance(scenario.planner, IterativePlanner):
+        if not capabilities_of(scenario.planner).iterative:
             raise InputError(f"--prelude: {planner} does not plan in iterations; there is no field to show")
     if video is not None:
         _check_film(video)

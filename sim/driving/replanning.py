@@ -23,7 +23,6 @@ from antdrive.planners import (
     Planner,
     PlanResult,
     Query,
-    SafeIntervals,
     TimedPlan,
     plan_in_time,
     replanner_for,

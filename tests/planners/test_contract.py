@@ -1,4 +1,4 @@
-"""What every planner in the registry promises; a new line in `PLANNERS` is tested by being there."""
+"""Properties of every planner in the registry. A planner added to `PLANNERS` is tested without further work."""
 
 from __future__ import annotations
 
@@ -9,19 +9,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from antdrive.planners import PLANNERS, Planner, PlanResult, PlanStatus, Query, load_planner, path_cost
+from antdrive.planners import PLANNERS, Planner, PlanResult, PlanStatus, Query, capabilities_of, load_planner, path_cost
 from antdrive.worlds import DIRECTIONS, Grid, InputError, polyline_clearance
 from tests.planners.worlds_to_solve import catalogue, optimum, random_query, sealed
 
 CATALOGUE = catalogue()
-# What planners may declare: that they plan in the world itself, or that they may miss a path that exists.
-NEEDS_WORLD = [name for name, planner in PLANNERS.items() if getattr(planner, "needs_world", False)]
+NEEDS_WORLD = [name for name, planner in PLANNERS.items() if capabilities_of(planner).needs_world]
 ON_GRIDS = [name for name in PLANNERS if name not in NEEDS_WORLD]
-INCOMPLETE = [name for name, planner in PLANNERS.items() if not getattr(planner, "complete", True)]
+INCOMPLETE = [name for name, planner in PLANNERS.items() if not capabilities_of(planner).complete]
 
 
 def quick(name: str) -> Planner:
-    """A planner with a budget that suits a test."""
+    """A planner with a budget that is small enough for a test."""
     planner: Any = PLANNERS[name]
     small = {"ants": 60, "iterations": 12}
     known = {f.name for f in dataclasses.fields(planner)}
@@ -43,7 +42,7 @@ def assert_valid(result: PlanResult, query: Query) -> None:
 
 
 def assert_drivable(result: PlanResult, query: Query) -> None:
-    """A line of its own, where a planner has one, keeps the clearance and joins the exact ends."""
+    """If a planner draws a line of its own, the line keeps the clearance and joins the exact ends."""
     if result.waypoints is None:
         assert result.length is None
         return
@@ -51,14 +50,14 @@ def assert_drivable(result: PlanResult, query: Query) -> None:
     xy = query.grid.xy(result.line)
     np.testing.assert_allclose(xy[[0, -1]], [query.task.start[:2], query.task.goal], atol=1e-9)
     assert polyline_clearance(query.task.world, xy) >= query.grid.inflate - 1e-9
-    # The polyline stands for what is no longer than itself: it goes round arcs on the outside.
+    # The polyline passes arcs on their outside, so it is no shorter than the curve that it approximates.
     drawn = float(np.hypot(*np.diff(xy, axis=0).T).sum())
     assert drawn - 0.05 <= result.length <= drawn + 1e-9  # type: ignore[operator]
 
 
 @pytest.mark.parametrize("world", CATALOGUE)
 @pytest.mark.parametrize("name", PLANNERS)
-def test_solves_the_catalogue_along_allowed_moves(name: str, world: str) -> None:
+def test_every_world_of_the_catalogue_is_solved_along_allowed_moves(name: str, world: str) -> None:
     query = CATALOGUE[world]
     result = solve(name, query)
     if name in INCOMPLETE and not result.solved:
@@ -74,7 +73,7 @@ def test_solves_the_catalogue_along_allowed_moves(name: str, world: str) -> None
 
 
 @pytest.mark.parametrize("name", ON_GRIDS)
-def test_any_answer_on_a_random_grid_is_sound(name: str) -> None:
+def test_answers_on_random_grids_are_valid(name: str) -> None:
     rng = np.random.default_rng(11)
     for seed in range(40):
         query = random_query(rng, largest=12)
@@ -94,7 +93,7 @@ def test_the_same_seed_gives_the_same_plan(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ON_GRIDS)
-def test_a_sealed_goal_has_no_path(name: str) -> None:
+def test_an_enclosed_goal_has_no_path(name: str) -> None:
     result = solve(name, sealed())
     assert result.status is PlanStatus.NO_PATH
     assert len(result.cells) == 0
@@ -113,7 +112,7 @@ def test_a_blocked_end_has_no_path(name: str, end: str) -> None:
 
 
 @pytest.mark.parametrize("name", ON_GRIDS)
-def test_being_there_already_is_a_path_of_one_cell(name: str) -> None:
+def test_a_start_at_the_goal_is_a_path_of_one_cell(name: str) -> None:
     result = solve(name, Query(Grid.from_free(np.ones((3, 3))), (1, 1), (1, 1)))
     assert result.solved
     assert result.cells.tolist() == [[1, 1]]
@@ -127,7 +126,7 @@ def test_a_planner_that_needs_a_world_refuses_a_bare_grid(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", PLANNERS)
-def test_the_query_is_left_as_it_was(name: str) -> None:
+def test_the_query_is_not_changed(name: str) -> None:
     query = CATALOGUE["gate"]
     free, moves = query.grid.free.copy(), query.grid.moves.copy()
     solve(name, query)

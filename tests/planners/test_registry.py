@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 import re
 import subprocess
 import sys
@@ -10,7 +11,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from antdrive.planners import PLANNERS, AcoHan, describe, list_planners, load_planner
+import antdrive.planners
+from antdrive.planners import (
+    PLANNERS,
+    AcoHan,
+    Capabilities,
+    GridPlanner,
+    PlanResult,
+    Query,
+    capabilities_of,
+    describe,
+    list_planners,
+    load_planner,
+)
+from antdrive.sim.view.style import PLANNER_STYLES
+from antdrive.sim.warm import TOGETHER
 from antdrive.worlds import InputError
 from tests.planners.worlds_to_solve import catalogue, optimum
 
@@ -150,7 +165,65 @@ def test_every_planner_says_what_it_does_in_one_line() -> None:
 
 def test_naming_planners_does_not_load_the_compiler() -> None:
     code = (
-        "import sys; from planners import list_planners, load_planner, describe; list_planners();"
+        "import sys; from antdrive.planners import list_planners, load_planner, describe; list_planners();"
         "load_planner('aco-han', ants=3); assert 'numba' not in sys.modules, 'numba was imported'"
     )
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
+
+
+# What else has to know a new planner
+
+
+def kernel_modules(planner: object) -> set[str]:
+    """The kernel modules of a planner: those that the modules of its class and its bases import."""
+    sources = (inspect.getsource(sys.modules[kind.__module__]) for kind in type(planner).__mro__[:-1])
+    return {name for source in sources for name in re.findall(r"^ +from [\w.]+ import (_kernels_\w+)", source, re.M)}
+
+
+@pytest.mark.parametrize("name", PLANNERS)
+def test_a_planner_s_kernels_are_compiled_by_a_warm_up_group(name: str) -> None:
+    groups = [names for names in TOGETHER if name in names]
+    # The drive in the warm-up plans with `astar` and `as`, whose kernels other planners use, too.
+    known = {kernel for names in (*TOGETHER, ("astar", "as")) for n in names for kernel in kernel_modules(PLANNERS[n])}
+    assert groups or kernel_modules(PLANNERS[name]) <= known, f"add {name} to TOGETHER in sim/warm.py"
+
+
+@pytest.mark.parametrize("name", PLANNERS)
+def test_a_planner_has_a_line_style_of_its_own(name: str) -> None:
+    assert name in PLANNER_STYLES, f"add {name} to sim/view/style.py"
+    assert list(PLANNER_STYLES.values()).count(PLANNER_STYLES[name]) == 1
+
+
+@pytest.mark.parametrize("name", PLANNERS)
+def test_a_planner_has_a_row_in_the_readme(name: str) -> None:
+    table = (ROOT / "README.md").read_text().partition("\n## Planners\n")[2].partition("\n## ")[0]
+    rows = [line for line in table.splitlines() if line.startswith("| `")]
+    assert any(f"`{name}`" in row.split("|")[1] for row in rows), f"add {name} to the README's table of planners"
+
+
+@pytest.mark.parametrize("name", PLANNERS)
+def test_a_planner_s_class_is_offered_by_the_package(name: str) -> None:
+    assert type(PLANNERS[name]).__name__ in antdrive.planners.__all__, "add it to planners/__init__.pyi"
+
+
+@pytest.mark.parametrize("name", PLANNERS)
+def test_a_planner_has_the_methods_that_it_declares(name: str) -> None:
+    planner = PLANNERS[name]
+    can = capabilities_of(planner)
+    assert isinstance(can, Capabilities)
+    assert can.iterative == hasattr(planner, "iterate")
+    assert can.own_replanner == hasattr(planner, "replanner")
+    assert can.cell_by_cell == hasattr(planner, "agent")
+
+
+def test_an_unknown_planner_would_be_noticed() -> None:
+    class Newcomer(GridPlanner):
+        """As a planner whose module uses kernels that nothing warms up."""
+
+        def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+            raise NotImplementedError
+
+    assert capabilities_of(Newcomer()) == Capabilities()
+    assert "newcomer" not in PLANNER_STYLES
+    assert kernel_modules(PLANNERS["sipp"]) >= {"_kernels_sipp"}
+    assert kernel_modules(PLANNERS["ants"]) >= {"_kernels_colony", "_kernels_search"}

@@ -1,4 +1,4 @@
-"""The kernels are plain Python too."""
+"""Kernels give the same results as plain Python."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from antdrive.planners import PLANNERS
 CODE = """
 import dataclasses
 import numpy as np
-from antdrive.planners import PLANNERS, Query, plan_in_time
+from antdrive.planners import PLANNERS, Query, capabilities_of, plan_in_time
 from antdrive.worlds import Disc, Grid, Task, World, rasterise
 free = np.ones((6, 7))
 free[1:5, 3] = 0
@@ -23,7 +23,7 @@ few = {"ants": 4, "iterations": 3, "population": 6, "ant_iterations": 2, "ant_ru
 for name, planner in PLANNERS.items():
     known = {f.name for f in dataclasses.fields(planner)}
     planner = dataclasses.replace(planner, **{key: value for key, value in few.items() if key in known})
-    for q in [query] if getattr(planner, "needs_world", False) else [bare, query]:
+    for q in [query] if capabilities_of(planner).needs_world else [bare, query]:
         result = planner.plan(q, np.random.default_rng(0))
         print(name, result.status.name, round(result.line_length, 9), result.cells.tolist(), result.work)
 class Mover:

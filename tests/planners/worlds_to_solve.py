@@ -36,7 +36,7 @@ def optimum(query: Query) -> float:
 
 
 def optimum_by_scipy(query: Query) -> float:
-    """The same, by scipy: for grids too large for the plain one."""
+    """The length of the shortest path by scipy, for grids that are too large for `optimum`."""
     rows, cols = query.grid.shape
     moves = query.grid.moves
     links = []
@@ -50,7 +50,7 @@ def optimum_by_scipy(query: Query) -> float:
 
 
 def thinned(rng: np.random.Generator, side: int, cut: float) -> Query:
-    """Moves that no picture or discs would give: each two-way move is left out with probability `cut`."""
+    """A grid with moves that neither cells nor discs explain: each two-way move is left out with probability `cut`."""
     picture = Grid.from_free(rng.random((side, side)) >= 0.05)
     moves = picture.moves.copy()
     for k, (dr, dc) in enumerate(DIRECTIONS[:4]):
@@ -62,7 +62,7 @@ def thinned(rng: np.random.Generator, side: int, cut: float) -> Query:
 
 
 def random_query(rng: np.random.Generator, largest: int = 24) -> Query:
-    """A random picture between two random free cells; some cannot be solved."""
+    """Randomly blocked cells and two random free ends; some queries have no path."""
     shape = rng.integers(1, largest, size=2)
     free = rng.random(shape) >= rng.uniform(0.0, 0.5)
     free[tuple(shape // 2)] = True
@@ -104,7 +104,7 @@ def _forest() -> list[Disc]:
 
 
 def catalogue() -> dict[str, Query]:
-    """Small worlds, each hard in one way; all can be solved."""
+    """Small worlds, each difficult in one way; all have a path."""
     corner, far = (1.0, 1.0), (9.0, 9.0)
     slalom = _wall(2.5, 0, 2.5, 7) + _wall(5, 3, 5, 10) + _wall(7.5, 0, 7.5, 7)
     gate = _wall(5, 0, 5, 1) + _wall(5, 2.5, 5, 10)

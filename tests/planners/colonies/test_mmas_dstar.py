@@ -24,7 +24,7 @@ def environment_5f() -> Query:
 
 
 def pheromone_by_heap(query: Query) -> dict[tuple[int, int], float]:
-    """Cost of the way to the goal, at 1 or 1.4 a move, times 0.98."""
+    """Cost of the path to the goal, at 1 or 1.4 per move, times 0.98."""
     cost, queue = {query.goal: 0.0}, [(0.0, query.goal)]
     while queue:
         here, cell = heapq.heappop(queue)
@@ -37,7 +37,7 @@ def pheromone_by_heap(query: Query) -> dict[tuple[int, int], float]:
     return {cell: 0.98 * value for cell, value in cost.items()}
 
 
-def test_pheromone_is_cost_times_what_is_retained() -> None:
+def test_pheromone_is_cost_times_the_share_retained() -> None:
     rng = np.random.default_rng(4)
     for _ in range(20):
         query = random_query(rng, largest=15)
@@ -48,14 +48,14 @@ def test_pheromone_is_cost_times_what_is_retained() -> None:
         field = pheromone.reshape(query.grid.shape)
         assert not notes
         assert work == np.isfinite(field).sum()
-        # What is nearer to the goal than the start is final; spreading stops there.
+        # Cells nearer to the goal than the start have their final pheromone; spreading stops at the start.
         for cell, value in expected.items():
             if value < expected[query.start] - 1e-9:
                 assert field[cell] == pytest.approx(value)
 
 
 @pytest.mark.parametrize("alpha_max", [26.0, 1.0])
-def test_circles_before_a_wall_are_noticed_and_left(alpha_max: float) -> None:
+def test_circles_in_front_of_a_wall_are_noticed_and_left(alpha_max: float) -> None:
     query = environment_5f()
     result = solve(MaxMinDStar(alpha_max=alpha_max), query)
     assert result.solved
@@ -66,7 +66,7 @@ def test_circles_before_a_wall_are_noticed_and_left(alpha_max: float) -> None:
     assert result.work_unit == "cells propagated"
 
 
-def test_on_open_ground_nothing_needs_to_be_raised() -> None:
+def test_on_an_empty_grid_the_exponents_stay_the_same() -> None:
     result = solve(MaxMinDStar(), catalogue()["empty"])
     assert result.reason == ""
     assert result.cost == pytest.approx(optimum(catalogue()["empty"]))
@@ -96,7 +96,7 @@ def test_it_always_arrives() -> None:
         assert solve(MaxMinDStar(), query).solved == math.isfinite(optimum(query))
 
 
-def test_without_distance_the_way_is_the_cheapest_at_one_and_one_point_four() -> None:
+def test_without_distance_the_path_is_the_cheapest_at_one_and_one_point_four() -> None:
     rng = np.random.default_rng(9)
     for _ in range(20):
         query = random_query(rng)
@@ -113,7 +113,7 @@ def test_options_out_of_range_are_refused_by_name(key: str, value: float) -> Non
         MaxMinDStar(**{key: value})
 
 
-def test_closed_cells_leave_the_moves_that_a_picture_without_them_allows() -> None:
+def test_closing_cells_leaves_the_moves_of_a_grid_with_these_cells_blocked() -> None:
     from antdrive.planners.colonies._kernels_mmas_dstar import close_cells
 
     rng = np.random.default_rng(6)

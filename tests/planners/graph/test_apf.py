@@ -65,7 +65,7 @@ def test_obstacles_beyond_their_influence_do_not_count() -> None:
     np.testing.assert_array_equal(path, bare)
 
 
-def test_open_ground_is_crossed_on_a_shortest_path() -> None:
+def test_on_an_empty_grid_the_path_is_a_shortest_one() -> None:
     query = Query(Grid.from_free(np.ones((30, 40)), cell=0.25), (2, 3), (22, 37))
     assert PotentialField().plan(query, RNG).cost == pytest.approx(optimum(query), abs=1e-9)
 
@@ -80,7 +80,7 @@ def test_a_disc_off_the_line_is_passed_at_a_distance() -> None:
 
 
 @pytest.mark.parametrize("planner", [PotentialField(), BARE, PotentialField(k_rep=1.0, influence=2.0)])
-def test_every_step_leads_down_by_the_steepest_fall(planner: PotentialField) -> None:
+def test_every_step_is_the_steepest_descent(planner: PotentialField) -> None:
     rng = np.random.default_rng(3)
     for _ in range(60):
         query = random_query(rng)
@@ -99,7 +99,7 @@ def test_every_step_leads_down_by_the_steepest_fall(planner: PotentialField) -> 
             assert falls[tuple(step)] == pytest.approx(max(falls.values()), rel=1e-12)
 
 
-def test_a_trap_stops_it_in_a_local_minimum_that_it_names() -> None:
+def test_in_a_trap_the_local_minimum_is_reported() -> None:
     query = catalogue()["trap"]
     result = PotentialField().plan(query, RNG)
     assert result.status is PlanStatus.STOPPED
@@ -122,12 +122,12 @@ def test_a_trap_stops_it_in_a_local_minimum_that_it_names() -> None:
 
 
 def test_a_goal_too_near_an_obstacle_is_not_reached() -> None:
-    """The field's other known flaw: repulsion moves the minimum away from the goal."""
+    """The other known weakness of potential fields: repulsion moves the minimum away from the goal."""
     result = PotentialField(k_rep=5.0, influence=2.0).plan(among(Disc(4.4, 4.4, 0.2)), RNG)
     assert result.status is PlanStatus.STOPPED
 
 
-def test_no_path_is_told_from_a_local_minimum() -> None:
+def test_no_path_is_reported_differently_from_a_local_minimum() -> None:
     result = PotentialField().plan(sealed(), RNG)
     assert result.status is PlanStatus.NO_PATH
     assert "allowed moves" in result.reason

@@ -17,10 +17,10 @@ def corridor() -> DStarSearch:
     free = np.zeros((7, 12), dtype=np.bool_)
     free[1, 1:11] = free[5, 1:11] = True
     free[1:6, [1, 10]] = True
-    return DStar().replanner(Query(Grid.from_free(free), (1, 1), (1, 10)))
+    return DStar().replanner(Query(Grid.from_free(free), (1, 1), (1, 10)), RNG)
 
 
-def test_a_blocked_corridor_raises_what_led_through_it() -> None:
+def test_a_blocked_corridor_raises_the_costs_of_paths_through_it() -> None:
     repair = corridor()
     assert repair.result().cost == 9
     repair.block([(1, 6)])
@@ -33,7 +33,7 @@ def test_a_blocked_corridor_raises_what_led_through_it() -> None:
     assert repair.result().cost == 17 + 4
 
 
-def test_a_new_gap_lowers_what_it_serves() -> None:
+def test_a_new_gap_lowers_the_costs_of_cells_behind_it() -> None:
     repair = corridor()
     repair.block([(1, 6)])
     repair.result()
@@ -42,7 +42,7 @@ def test_a_new_gap_lowers_what_it_serves() -> None:
     assert repair._h.reshape(7, 12)[1, 5] == 5 * STRAIGHT
 
 
-def test_a_change_that_the_path_does_not_need_is_left_alone() -> None:
+def test_a_change_away_from_the_path_is_not_processed() -> None:
     repair = corridor()
     repair.result()
     repair.block([(3, 1)])  # farther from the goal than the robot
@@ -52,7 +52,7 @@ def test_a_change_that_the_path_does_not_need_is_left_alone() -> None:
 def test_backpointers_of_processed_states_lead_to_the_goal() -> None:
     rng = np.random.default_rng(5)
     query = Query(Grid.from_free(rng.random((30, 30)) >= 0.2), (0, 0), (29, 29))
-    repair, world = DStar().replanner(query), World(query.grid)
+    repair, world = DStar().replanner(query, RNG), World(query.grid)
     for _ in range(20):
         for tell, value in ((repair.block, False), (repair.clear, True)):
             cells = rng.integers(1, 29, (4, 2))
@@ -70,6 +70,6 @@ def test_backpointers_of_processed_states_lead_to_the_goal() -> None:
 
 
 @pytest.mark.parametrize("size", [1, 2])
-def test_tiny_grids(size: int) -> None:
+def test_grids_of_a_few_cells_are_solved(size: int) -> None:
     query = Query(Grid.from_free(np.ones((size, size))), (0, 0), (size - 1, size - 1))
     assert DStar().plan(query, RNG).cost == pytest.approx((size - 1) * 2**0.5)

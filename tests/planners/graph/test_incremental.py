@@ -1,4 +1,4 @@
-"""What every replanner promises."""
+"""Properties of every incremental search."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def open_ground(rows: int = 12, cols: int = 12) -> Query:
 
 
 @BOTH
-def test_a_replanner_is_one(planner: ReplanningPlanner) -> None:
-    assert isinstance(planner.replanner(open_ground()), Replanner)
+def test_a_search_is_a_replanner(planner: ReplanningPlanner) -> None:
+    assert isinstance(planner.replanner(open_ground(), RNG), Replanner)
 
 
 @BOTH
@@ -43,7 +43,7 @@ def test_plans_equal_the_oracle(planner: ReplanningPlanner) -> None:
 def test_repairs_equal_the_oracle(planner: ReplanningPlanner) -> None:
     rng = np.random.default_rng(2)
     solved = sum(
-        change_at_random(planner.replanner, make(rng), rng, 8)
+        change_at_random(lambda q: planner.replanner(q, RNG), make(rng), rng, 8)
         for _ in range(100)
         for make in (random_query, random_discs)
     )
@@ -56,8 +56,10 @@ def test_repairs_equal_the_oracle(planner: ReplanningPlanner) -> None:
 def test_repairs_equal_the_oracle_in_thousands_of_sequences(planner: ReplanningPlanner, seed: int) -> None:
     rng = np.random.default_rng([3, seed])
     for _ in range(500):
-        change_at_random(planner.replanner, random_query(rng, largest=40), rng, 15)
-        change_at_random(planner.replanner, random_discs(rng, count=int(rng.integers(1, 60))), rng, 15)
+        change_at_random(lambda q: planner.replanner(q, RNG), random_query(rng, largest=40), rng, 15)
+        change_at_random(
+            lambda q: planner.replanner(q, RNG), random_discs(rng, count=int(rng.integers(1, 60))), rng, 15
+        )
 
 
 changes = st.lists(
@@ -71,14 +73,14 @@ changes = st.lists(
 
 @BOTH
 @settings(max_examples=150, deadline=None)
-@given(bits=st.lists(st.booleans(), min_size=42, max_size=42), told=changes)
-def test_any_sequence_of_changes(
-    planner: ReplanningPlanner, bits: list[bool], told: list[tuple[str, list[tuple[int, int]]]]
+@given(bits=st.lists(st.booleans(), min_size=42, max_size=42), edits=changes)
+def test_repairs_equal_the_oracle_after_any_sequence_of_changes(
+    planner: ReplanningPlanner, bits: list[bool], edits: list[tuple[str, list[tuple[int, int]]]]
 ) -> None:
     free = np.array(bits).reshape(6, 7)
     query = Query(Grid.from_free(free), (0, 0), (5, 6))
-    world, replanner = World(query.grid), planner.replanner(query)
-    for what, cells in told:
+    world, replanner = World(query.grid), planner.replanner(query, RNG)
+    for what, cells in edits:
         if what == "ask":
             agree(replanner, world)
         elif what == "move":
@@ -91,12 +93,12 @@ def test_any_sequence_of_changes(
 
 @BOTH
 @pytest.mark.parametrize("seed", range(3))
-def test_driving_through_unknown_ground(planner: ReplanningPlanner, seed: int) -> None:
-    """The robot sees three cells far, believes the rest to be free, and replans at every step."""
+def test_a_drive_through_an_unknown_map(planner: ReplanningPlanner, seed: int) -> None:
+    """The robot sees three cells far, takes all other cells for free, and replans at every step."""
     rng = np.random.default_rng(seed)
     truth = rng.random((40, 40)) >= 0.25
     truth[1, 1] = truth[38, 38] = True
-    replanner = planner.replanner(open_ground(40, 40))
+    replanner = planner.replanner(open_ground(40, 40), RNG)
     world = World(replanner.query.grid)
     steps = 0
     while replanner.query.start != replanner.query.goal and steps < 2000:
@@ -112,8 +114,8 @@ def test_driving_through_unknown_ground(planner: ReplanningPlanner, seed: int) -
 
 
 @BOTH
-def test_walking_along_the_path_costs_nothing(planner: ReplanningPlanner) -> None:
-    replanner = planner.replanner(catalogue()["slalom"])
+def test_following_the_path_takes_no_work(planner: ReplanningPlanner) -> None:
+    replanner = planner.replanner(catalogue()["slalom"], RNG)
     first = replanner.result()
     assert first.work > 0
     replanner.move(tuple(map(int, first.cells[5])))
@@ -124,8 +126,8 @@ def test_walking_along_the_path_costs_nothing(planner: ReplanningPlanner) -> Non
 
 
 @BOTH
-def test_a_wall_closes_and_opens_the_way(planner: ReplanningPlanner) -> None:
-    replanner = planner.replanner(open_ground())
+def test_a_path_is_closed_and_opened_again_by_a_wall(planner: ReplanningPlanner) -> None:
+    replanner = planner.replanner(open_ground(), RNG)
     before = replanner.result()
     wall = [(6, c) for c in range(12)]
     assert replanner.block(wall) == 36  # the wall and the rows beside it
@@ -139,8 +141,8 @@ def test_a_wall_closes_and_opens_the_way(planner: ReplanningPlanner) -> None:
 
 
 @BOTH
-def test_a_sealed_goal_has_no_path_until_a_door_opens(planner: ReplanningPlanner) -> None:
-    replanner = planner.replanner(sealed())
+def test_an_enclosed_goal_has_no_path_until_a_cell_is_cleared(planner: ReplanningPlanner) -> None:
+    replanner = planner.replanner(sealed(), RNG)
     assert replanner.result().status is PlanStatus.NO_PATH
     replanner.clear([(4, 4)])
     result = replanner.result()
@@ -151,7 +153,7 @@ def test_a_sealed_goal_has_no_path_until_a_door_opens(planner: ReplanningPlanner
 @BOTH
 @pytest.mark.parametrize("end", ["start", "goal"])
 def test_a_blocked_end_is_named_and_can_be_cleared(planner: ReplanningPlanner, end: str) -> None:
-    replanner = planner.replanner(open_ground())
+    replanner = planner.replanner(open_ground(), RNG)
     cost = replanner.result().cost
     replanner.block([getattr(replanner.query, end)])
     blocked = replanner.result()
@@ -165,7 +167,7 @@ def test_a_blocked_end_is_named_and_can_be_cleared(planner: ReplanningPlanner, e
 def test_the_end_of_an_isolated_cell_can_be_blocked(planner: ReplanningPlanner) -> None:
     free = np.zeros((3, 3))
     free[1, 1] = 1
-    replanner = planner.replanner(Query(Grid.from_free(free), (1, 1), (1, 1)))
+    replanner = planner.replanner(Query(Grid.from_free(free), (1, 1), (1, 1)), RNG)
     assert replanner.result().cost == 0
     assert replanner.block([(1, 1)]) == 0  # it had no moves to lose
     assert replanner.result().status is PlanStatus.NO_PATH
@@ -173,7 +175,7 @@ def test_the_end_of_an_isolated_cell_can_be_blocked(planner: ReplanningPlanner) 
 
 @BOTH
 def test_a_blocked_cell_closes_the_diagonals_past_its_corners(planner: ReplanningPlanner) -> None:
-    replanner = planner.replanner(Query(Grid.from_free(np.ones((2, 2))), (0, 0), (1, 1)))
+    replanner = planner.replanner(Query(Grid.from_free(np.ones((2, 2))), (0, 0), (1, 1)), RNG)
     assert replanner.result().cost == pytest.approx(math.sqrt(2))
     replanner.block([(0, 1)])
     assert replanner.result().cost == pytest.approx(2.0)
@@ -184,7 +186,7 @@ def test_moves_that_discs_close_stay_closed(planner: ReplanningPlanner) -> None:
     rng = np.random.default_rng(7)
     for _ in range(30):
         query = random_discs(rng)
-        replanner = planner.replanner(query)
+        replanner = planner.replanner(query, RNG)
         cells = rng.choice(np.argwhere(query.grid.free), size=6)
         replanner.block(cells)
         replanner.clear(cells)
@@ -193,9 +195,9 @@ def test_moves_that_discs_close_stay_closed(planner: ReplanningPlanner) -> None:
 
 
 @BOTH
-def test_the_first_query_is_left_as_it_was_and_the_present_one_cannot_be_written(planner: ReplanningPlanner) -> None:
+def test_the_first_query_is_unchanged_and_the_present_one_is_read_only(planner: ReplanningPlanner) -> None:
     query = open_ground()
-    replanner = planner.replanner(query)
+    replanner = planner.replanner(query, RNG)
     replanner.block([(5, 5)])
     assert query.grid.free.all()
     now = replanner.query.grid
@@ -212,7 +214,7 @@ def test_a_local_change_takes_a_fraction_of_the_work(planner: ReplanningPlanner)
     for _ in range(10):
         free = rng.random((200, 200)) >= 0.2
         free[0, 0] = free[199, 199] = True
-        replanner = planner.replanner(Query(Grid.from_free(free), (0, 0), (199, 199)))
+        replanner = planner.replanner(Query(Grid.from_free(free), (0, 0), (199, 199)), RNG)
         path = replanner.result().cells
         if len(path):
             replanner.block([path[8]])
@@ -226,7 +228,7 @@ def test_a_local_change_takes_a_fraction_of_the_work(planner: ReplanningPlanner)
 
 @BOTH
 def test_misuse_is_refused_and_changes_nothing(planner: ReplanningPlanner) -> None:
-    replanner = planner.replanner(open_ground())
+    replanner = planner.replanner(open_ground(), RNG)
     with pytest.raises(ValueError, match=r"^cells: \(3, 12\) is outside the grid of 12 rows and 12 columns"):
         replanner.block([(2, 2), (3, 12)])
     assert replanner.query.grid.free.all()

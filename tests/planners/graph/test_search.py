@@ -27,7 +27,7 @@ def check(query: Query) -> None:
             assert result.cost == pytest.approx(path_cost(result.cells, query.grid.cell), abs=1e-9)
 
 
-def test_costs_equal_the_oracle_on_random_pictures() -> None:
+def test_costs_equal_the_oracle_on_random_grids() -> None:
     rng = np.random.default_rng(1)
     for _ in range(300):
         check(random_query(rng))
@@ -49,7 +49,7 @@ def test_costs_equal_the_oracle_on_thousands_of_grids() -> None:
 
 @pytest.mark.parametrize("side", [9, 40])
 def test_costs_equal_the_oracle_for_any_set_of_two_way_moves(side: int) -> None:
-    """Nothing may rely on how the moves of neighbouring cells hang together."""
+    """The search may not rely on how the moves of neighbouring cells are related."""
     rng = np.random.default_rng(4)
     for _ in range(200):
         query = thinned(rng, side, cut=0.3)
@@ -58,7 +58,7 @@ def test_costs_equal_the_oracle_for_any_set_of_two_way_moves(side: int) -> None:
             assert search.plan(query, RNG).cost == pytest.approx(floor, abs=1e-9)
 
 
-def test_the_first_way_to_close_the_goal_may_not_be_the_best() -> None:
+def test_the_first_path_that_closes_the_goal_may_not_be_the_shortest() -> None:
     """Two corridors of 24 straight (24) and 17 diagonal moves (24.04): both end in one bucket of the open list."""
     rows_of_diagonals = [20, 21, 22, 21, 20, 21, 22, 21, 20, 21, 20, 19, 20, 19, 18, 17, 16, 15]
     diagonals = [(row, 5 + i) for i, row in enumerate(rows_of_diagonals)]
@@ -99,22 +99,22 @@ def _corridor(turns: list[tuple[int, int]]) -> list[tuple[int, int]]:
     return cells
 
 
-def test_a_long_maze_fits_the_ring_of_buckets() -> None:
+def test_the_ring_of_buckets_suffices_for_a_long_maze() -> None:
     free = np.ones((61, 61), dtype=np.bool_)
     free[1::4, :-1] = False
     free[3::4, 1:] = False
     check(Query(Grid.from_free(free), (0, 0), (60, 60)))
 
 
-def test_an_open_list_larger_than_its_first_allotment() -> None:
-    """From the middle of open ground the front holds more than the 1024 entries there is room for at first."""
+def test_the_open_list_grows() -> None:
+    """From the middle of an empty grid, the open list needs more than the 1024 entries it begins with."""
     query = Query(Grid.from_free(np.ones((701, 701))), (350, 350), (700, 699))
     result = Dijkstra().plan(query, RNG)
     assert result.cost == pytest.approx(1 + 349 * math.sqrt(2), abs=1e-9)
     assert result.work > 480_000
 
 
-def test_astar_expands_no_more_than_dijkstra_on_open_ground() -> None:
+def test_astar_expands_no_more_cells_than_dijkstra_on_an_empty_grid() -> None:
     query = Query(Grid.from_free(np.ones((50, 50))), (25, 5), (30, 45))
     informed, blind = (s.plan(query, RNG).work for s in (AStar(), Dijkstra()))
     assert informed <= 41 < blind
@@ -135,7 +135,7 @@ def cost(free: np.ndarray, start: tuple[int, int], goal: tuple[int, int]) -> flo
 
 @settings(max_examples=150, deadline=None)
 @given(pictures, st.data())
-def test_cost_ignores_how_the_world_is_turned(free: np.ndarray, data: st.DataObject) -> None:
+def test_the_cost_is_the_same_in_a_turned_or_mirrored_world(free: np.ndarray, data: st.DataObject) -> None:
     cells = [tuple(map(int, c)) for c in np.argwhere(free)]
     start, goal = data.draw(st.sampled_from(cells)), data.draw(st.sampled_from(cells))
     rows, cols = free.shape

@@ -22,7 +22,7 @@ SPEED, CELL, INFLATE = 0.5, 0.5, 0.2
 
 @dataclasses.dataclass(frozen=True)
 class Keyframed:
-    """Straight between keyframes, there and back again, or from the last at once to the first."""
+    """A mover that goes straight between keyframes, back and forth, or jumps from the last to the first."""
 
     radius: float
     frames: np.ndarray  # (K, 3) t, x, y
@@ -49,7 +49,7 @@ class Circling:
 
 @dataclasses.dataclass(frozen=True)
 class Passing:
-    """At constant velocity for ever."""
+    """A mover at constant velocity."""
 
     radius: float
     place: tuple[float, float]
@@ -73,7 +73,7 @@ def some_mover(rng: np.random.Generator, side: float) -> MoverMotion:
     return Keyframed(radius, np.column_stack([t, rng.uniform(0, side, (count, 2))]), bool(rng.random() < 0.8))
 
 
-# The oracle: a table of which cells can be reached at which tick.
+# The oracle is a table of which cells can be reached at which tick.
 
 TICK = 0.05
 MOVES = [(dr, dc) for dr, dc in itertools.product((-1, 0, 1), repeat=2) if (dr, dc) != (0, 0)]
@@ -149,7 +149,7 @@ def small_plans() -> list[tuple[Query, list[MoverMotion], TimedPlan]]:
 
 @pytest.mark.parametrize("stay", [False, True], ids=["arrive", "stay"])
 @pytest.mark.parametrize("seeds", [FEW, MANY], ids=["few", "many"])
-def test_no_way_arrives_sooner_and_none_is_missed(seeds: range, stay: bool) -> None:
+def test_no_path_arrives_sooner_and_none_is_missed(seeds: range, stay: bool) -> None:
     gaps, without = [], 0
     for query, movers in map(small_world, seeds):
         plan = plan_in_time(query, movers, speed=SPEED, horizon=HORIZON, stay=stay)
@@ -167,7 +167,9 @@ def test_no_way_arrives_sooner_and_none_is_missed(seeds: range, stay: bool) -> N
     assert without > 0
 
 
-def test_a_goal_to_stay_at_may_take_longer(small_plans: list[tuple[Query, list[MoverMotion], TimedPlan]]) -> None:
+def test_reaching_a_goal_that_must_stay_safe_may_take_longer(
+    small_plans: list[tuple[Query, list[Moving], TimedPlan]],
+) -> None:
     later = 0
     for query, movers, plan in small_plans:
         stays = plan_in_time(query, movers, speed=SPEED, horizon=HORIZON, stay=True)
@@ -221,8 +223,8 @@ def corridor(length: int) -> Query:
     return Query(ground(np.ones((1, length))), (0, 0), (0, length - 1))
 
 
-def test_a_crossing_is_waited_for_exactly() -> None:
-    """A mover crosses the middle of a corridor; the robot arrives as its disc lets go of the line."""
+def test_the_robot_waits_exactly_until_a_mover_has_crossed() -> None:
+    """A mover crosses the middle of a corridor; the robot gets there when its disc leaves the line."""
     query = corridor(3)  # x from 0 to 1 m
     mover = Passing(0.25, (0.5, -0.4), (0.0, 0.1))
     reach = 0.25 + INFLATE + 2 * TOLERANCE
@@ -254,7 +256,7 @@ def test_a_robot_backs_into_a_bay_to_let_a_mover_pass() -> None:
 
 
 def test_two_robots_do_not_change_places_through_each_other() -> None:
-    """In a corridor with a mover that comes towards it there is no instant at which both fit."""
+    """In a corridor with an oncoming mover there is never room for both."""
     swap = Passing(0.05, (1.0, 0.0), (-0.5, 0.0))
     plan = plan_in_time(corridor(3), [swap], speed=SPEED, horizon=10)
     assert plan.status is PlanStatus.NO_PATH
@@ -280,7 +282,7 @@ def test_the_planner_of_the_registry_plans_among_the_motions_of_the_query() -> N
     assert plan.options["horizon"] == 120.0
 
 
-def test_plans_begin_when_they_are_asked_to() -> None:
+def test_plans_begin_at_their_start_time() -> None:
     mover = Keyframed(0.2, np.array([[0, 0.0, 1.0], [4, 2.0, 1.0]]))
     query = Query(ground(np.ones((5, 5))), (0, 2), (4, 2))
     for start in (0.0, 3.3, 8.0, 11.3):
@@ -299,8 +301,8 @@ def test_a_mover_on_the_start_is_named() -> None:
         plan.at([0.0])
 
 
-def test_a_jump_is_not_a_sweep() -> None:
-    """A mover that begins anew at the other end is never in between."""
+def test_a_mover_that_jumps_blocks_nothing_in_between() -> None:
+    """A mover that starts again at the other end is never in between."""
     loop = Keyframed(0.1, np.array([[0, 0.0, 0.0], [3.7, 0.0, 9.0]]), again=False)
     t, xy, jump = _samples(loop, 0.0, 10.0)
     assert jump.sum() == 2
@@ -313,7 +315,7 @@ def test_a_jump_is_not_a_sweep() -> None:
 
 @settings(max_examples=60, deadline=None)
 @given(seed=st.integers(0, 2**32))
-def test_legs_stay_with_the_motion_they_tell(seed: int) -> None:
+def test_legs_stay_within_the_tolerance_of_the_motion(seed: int) -> None:
     rng = np.random.default_rng(seed)
     mover = some_mover(rng, 5.0)
     legs = _legs(mover, 0.0, 20.0, INFLATE)
@@ -323,15 +325,15 @@ def test_legs_stay_with_the_motion_they_tell(seed: int) -> None:
     n = np.minimum(n, len(legs) - 1)
     inside = (legs[n, 0] <= t) & (t <= legs[n, 1])
     assert inside.mean() > 0.999  # all but jumps
-    told = legs[n, 2:4] + (t - legs[n, 0])[:, np.newaxis] * legs[n, 4:6]
-    off = np.hypot(*(told - mover.at(t)).T)[inside]
+    expected = legs[n, 2:4] + (t - legs[n, 0])[:, np.newaxis] * legs[n, 4:6]
+    off = np.hypot(*(expected - mover.at(t)).T)[inside]
     assert off.max() <= 2 * TOLERANCE
     assert (legs[:, 6] >= mover.radius + INFLATE + 2 * TOLERANCE - 1e-12).all()
 
 
 @settings(max_examples=150, deadline=None)
 @given(seed=st.integers(0, 2**32))
-def test_conflicts_are_those_a_close_look_finds(seed: int) -> None:
+def test_conflicts_are_those_found_by_sampling(seed: int) -> None:
     from antdrive.planners.graph._kernels_sipp import conflict
 
     rng = np.random.default_rng(seed)
@@ -362,6 +364,6 @@ def test_misuse_is_refused_by_name(key: str, value: float) -> None:
         plan_in_time(corridor(3), [], **{"speed": 1.0, key: value})
 
 
-def test_a_motion_without_a_place_is_refused() -> None:
+def test_a_motion_with_positions_that_are_not_finite_is_refused() -> None:
     with pytest.raises(ValueError, match="not finite"):
         plan_in_time(corridor(3), [Passing(0.1, (math.nan, 0.0), (0.0, 0.0))], speed=SPEED)

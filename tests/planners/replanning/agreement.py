@@ -25,7 +25,7 @@ def ends(shape: tuple[int, int], dr: int, dc: int) -> tuple[tuple[slice, slice],
 
 
 def pictured(free: np.ndarray) -> dict[int, np.ndarray]:
-    """By direction, the moves that free cells allow."""
+    """The moves that free cells allow, by direction."""
     able = {}
     for k, (dr, dc) in HALF.items():
         here, there = ends(free.shape, dr, dc)
@@ -62,7 +62,7 @@ class World:
 
 
 def agree(replanner: Replanner, world: World) -> bool:
-    """Assert that the result is a path of the oracle's length; whether there is one."""
+    """Assert that the result is a path of the oracle's length; returns whether there is one."""
     query, result = replanner.query, replanner.result()
     floor = world.optimum(query.start, query.goal)
     assert result.solved == math.isfinite(floor)
@@ -81,7 +81,7 @@ def agree(replanner: Replanner, world: World) -> bool:
 
 
 def change_at_random(make: Callable[[Query], Replanner], query: Query, rng: np.random.Generator, turns: int) -> int:
-    """Tell a replanner of random changes and compare it with the oracle after each; how often there was a path."""
+    """Report random changes to a replanner and compare it with the oracle after each; how often there was a path."""
     world, replanner = World(query.grid), make(query)
     shape = query.grid.shape
     solved = 0

@@ -1,4 +1,4 @@
-"""What a replanner promises, whichever planner it is made for."""
+"""Properties of every replanner, whichever planner it is made for."""
 
 from __future__ import annotations
 
@@ -11,18 +11,22 @@ import pytest
 
 from antdrive.planners import (
     PLANNERS,
+    Capabilities,
     MergingAnts,
     Planner,
+    PlanResult,
     PlanStatus,
     Query,
     ReplanFromScratch,
     Replanner,
     WarmStartedColony,
+    agent_for,
+    capabilities_of,
     load_planner,
     path_cost,
     replanner_for,
 )
-from antdrive.planners.replanning.replanners import even
+from antdrive.planners.colonies.warm_start import even_out
 from antdrive.worlds import DIRECTIONS, Grid
 from tests.planners.replanning.agreement import World
 from tests.planners.worlds_to_solve import catalogue, optimum, random_discs, random_query, sealed
@@ -30,10 +34,10 @@ from tests.planners.worlds_to_solve import catalogue, optimum, random_discs, ran
 ON_CELLS = [
     name
     for name, planner in PLANNERS.items()
-    if not (getattr(planner, "needs_world", False) or getattr(planner, "needs_motions", False))
+    if not (capabilities_of(planner).needs_world or capabilities_of(planner).needs_motions)
 ]
 OPTIMAL = {"dijkstra", "astar", "dstar", "dstar-lite"}
-MAY_MISS = {name for name in ON_CELLS if not getattr(PLANNERS[name], "complete", True)}
+MAY_MISS = {name for name in ON_CELLS if not capabilities_of(PLANNERS[name]).complete}
 
 
 def quick(name: str) -> Planner:
@@ -47,7 +51,7 @@ def made(name: str, query: Query, seed: int = 0) -> Replanner:
 
 
 @pytest.mark.parametrize("name", ON_CELLS)
-def test_after_any_change_the_answer_is_one_for_the_cells_as_they_are(name: str) -> None:
+def test_after_any_change_the_answer_fits_the_grid_as_it_is(name: str) -> None:
     rng = np.random.default_rng(4)
     solved = 0
     for turn in range(14):
@@ -84,7 +88,7 @@ def test_after_any_change_the_answer_is_one_for_the_cells_as_they_are(name: str)
 
 
 @pytest.mark.parametrize("name", ON_CELLS)
-def test_walking_along_an_answer_costs_nothing(name: str) -> None:
+def test_following_a_path_takes_no_work(name: str) -> None:
     replanner = made(name, catalogue()["empty"])
     first = replanner.result()
     if not first.solved:
@@ -98,7 +102,7 @@ def test_walking_along_an_answer_costs_nothing(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ON_CELLS)
-def test_a_door_opens(name: str) -> None:
+def test_a_cleared_cell_opens_a_path(name: str) -> None:
     replanner = made(name, sealed())
     assert replanner.result().status is PlanStatus.NO_PATH
     replanner.clear([(4, 4)])
@@ -110,25 +114,41 @@ def test_a_door_opens(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["ants", "mmas", "ga-han"])
 def test_the_same_seed_gives_the_same_answers(name: str) -> None:
-    def told() -> list[list[list[int]]]:
+    def answered() -> list[list[list[int]]]:
         replanner, answers = made(name, catalogue()["forest"], seed=3), []
         for r in range(5, 14, 4):
             answers.append(replanner.result().cells.tolist())
             replanner.block([(r, r), (r, r + 1)])
         return answers
 
-    assert told() == told()
+    assert answered() == answered()
 
 
-def test_each_planner_gets_its_own_kind() -> None:
+def test_a_planner_s_own_replanner_is_used_if_it_has_one() -> None:
     query, rng = catalogue()["empty"], np.random.default_rng(0)
     kinds = {name: type(replanner_for(PLANNERS[name], query, rng)).__name__ for name in ("dstar", "dstar-lite", "ants")}
     assert kinds == {"dstar": "DStarSearch", "dstar-lite": "DStarLiteSearch", "ants": "WarmStartedColony"}
     assert isinstance(replanner_for(PLANNERS["mmas"], query, rng), ReplanFromScratch)
 
 
+def test_a_planner_that_declares_nothing_plans_anew_after_every_change() -> None:
+    """As other people's planners may: only `plan` is needed."""
+
+    class Bare:
+        def plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+            return PLANNERS["astar"].plan(query, rng)
+
+    query, rng = catalogue()["empty"], np.random.default_rng(0)
+    assert capabilities_of(Bare()) == Capabilities()
+    replanner = replanner_for(Bare(), query, rng)
+    before = replanner.result()
+    replanner.block([before.cells[len(before.cells) // 2]])
+    assert replanner.result().solved
+    assert agent_for(Bare(), query, rng).step([]) == tuple(before.cells[1])
+
+
 @pytest.mark.parametrize(("name", "instead"), [("tangent", "discs"), ("sipp", "motions")])
-def test_who_does_not_plan_on_cells_alone_is_refused(name: str, instead: str) -> None:
+def test_a_planner_that_does_not_plan_on_cells_alone_is_refused(name: str, instead: str) -> None:
     with pytest.raises(ValueError, match=instead):
         replanner_for(PLANNERS[name], catalogue()["empty"], np.random.default_rng(0))
 
@@ -141,7 +161,7 @@ def cylinders(seed: int) -> Query:
     return query if math.isfinite(optimum(query)) else cylinders(seed + 100)
 
 
-def test_warm_ants_take_a_fraction_of_the_work_and_stay_near_the_optimum() -> None:
+def test_a_warm_started_colony_takes_a_fraction_of_the_work_and_stays_near_the_optimum() -> None:
     shares, gaps = [], []
     for seed in range(6):
         query, rng = cylinders(seed), np.random.default_rng(seed)
@@ -164,10 +184,10 @@ def test_warm_ants_take_a_fraction_of_the_work_and_stay_near_the_optimum() -> No
     assert max(gaps) < 0.1
 
 
-def test_trails_are_made_even_by_distance() -> None:
+def test_trails_are_evened_out_by_distance() -> None:
     trail = np.full((49, 8), 2.0)
     trail[0] = 10.0
-    even(trail, (7, 7), np.array([24]), 2)  # the middle of 7 x 7
+    even_out(trail, (7, 7), np.array([24]), 2)  # the middle of 7 x 7
     shown = trail[:, 0].reshape(7, 7)
     expected = np.full((7, 7), 2.0)
     expected[1:6, 1:6] = 2 + 8 / 3

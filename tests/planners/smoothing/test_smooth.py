@@ -1,4 +1,4 @@
-"""Refined routes: exact clearance, the plan's own corridor, never longer, and the optimum where the corridor is its own."""
+"""Smoothed routes keep the exact clearance and the plan's corridor, are never longer, and are optimal in the best corridor."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ from tests.planners.worlds_to_solve import catalogue as small_worlds
 
 RNG = np.random.default_rng(0)  # nothing that counts is drawn from it
 BARN = Path(__file__).parents[4] / "shared" / "data" / "barn" / "barn50.tar.xz"
-REFINED = ("taut", "clearance")
+SMOOTHED = ("taut", "clearance")
 
 
-# -- oracles that share no code with the refinement
+# -- oracles that share no code with the smoothing
 
 
 def word(xy: Floats, centres: Floats) -> list[tuple[int, bool]]:
-    """The homotopy class of a line among points: which of their parallel rays it crosses and in which sense, reduced."""
+    """The homotopy class of a line among points, as the rays from the points that it crosses, in order and reduced."""
     angle = 0.7390851  # no ray may pass through another point
     turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
     line, points = xy @ turn.T, np.unique(centres @ turn.T, axis=0)
@@ -144,7 +144,7 @@ def test_one_disc_has_its_closed_form(side: int) -> None:
     assert off.max() <= 5e-4 + 1e-9
 
 
-def test_wide_keeps_the_preferred_clearance_where_there_is_room() -> None:
+def test_clearance_keeps_the_preferred_clearance_where_there_is_room() -> None:
     task, grid, plan = one_disc(1)
     route = smooth(plan, grid, task, kind="clearance", clearance=0.4)
     assert route.kind == "clearance"
@@ -159,7 +159,7 @@ def test_wide_keeps_the_preferred_clearance_where_there_is_room() -> None:
     assert (smooth(plan, grid, task, kind="clearance", clearance=0.0).xy == taut.xy).all()
 
 
-def test_wide_takes_the_middle_of_a_gap_between_discs_and_of_one_at_a_wall() -> None:
+def test_clearance_takes_the_middle_of_a_gap_between_discs_and_of_one_at_a_wall() -> None:
     gap = (Disc(5, 3.7, 1.0), Disc(5, 6.5, 1.0))  # 0.8 m between them, middle at y = 5.1
     task = Task(World("gap", (0, 0, 10, 10), gap), (1.0, 2.0, 0.0), (9.0, 2.0))
     grid = rasterise(task.world, 0.25, 0.3)
@@ -193,11 +193,11 @@ def test_a_string_around_a_disc_more_than_once_keeps_its_windings() -> None:
 
 @settings(max_examples=120)
 @given(st.integers(0, 10**6))
-def test_any_plan_of_any_forest(seed: int) -> None:
+def test_any_plan_in_any_forest_is_smoothed(seed: int) -> None:
     task, grid, plan = wander(seed)
     world, inflate = task.world, grid.inflate
     line = smooth(plan, grid, task, kind="none")
-    for kind in REFINED:
+    for kind in SMOOTHED:
         route = smooth(plan, grid, task, kind=kind)
         check(route, line, task, inflate, longest=max(line.length, plan.cost))
         assert route.kind == kind
@@ -223,7 +223,7 @@ def test_any_plan_of_any_forest(seed: int) -> None:
 
 
 @settings(max_examples=40)
-@given(st.integers(0, 10**6), st.floats(0, math.tau), st.booleans(), st.sampled_from(REFINED))
+@given(st.integers(0, 10**6), st.floats(0, math.tau), st.booleans(), st.sampled_from(SMOOTHED))
 def test_a_turned_or_mirrored_world_has_a_turned_or_mirrored_route(
     seed: int, angle: float, mirror: bool, kind: str
 ) -> None:
@@ -231,14 +231,14 @@ def test_a_turned_or_mirrored_world_has_a_turned_or_mirrored_route(
     flip = -1.0 if mirror else 1.0
     turn = np.array([[math.cos(angle), -flip * math.sin(angle)], [math.sin(angle), flip * math.cos(angle)]])
 
-    def told(matrix: Floats) -> Route:
+    def smoothed(matrix: Floats) -> Route:
         discs = tuple(Disc(*map(float, matrix @ (d.x, d.y)), d.radius) for d in task.world.obstacles)
         ends = [matrix @ np.array(end) for end in (task.start[:2], task.goal)]
         far = Task(World("far", (-99, -99, 99, 99), discs), (*ends[0], 0.0), tuple(ends[1]))  # walls do not turn
         moved = dataclasses.replace(plan, waypoints=grid.fractional(grid.xy(plan.cells) @ matrix.T))
         return smooth(moved, grid, far, kind=kind)
 
-    here, there = told(np.eye(2)), told(turn)
+    here, there = smoothed(np.eye(2)), smoothed(turn)
     assert there.length == pytest.approx(here.length, abs=1e-6)
     s = np.linspace(0, 1, 50)
     ours, theirs = (np.stack([np.interp(s * r.length, r.arc, axis) for axis in r.xy.T], axis=1) for r in (here, there))
@@ -262,7 +262,7 @@ PLANNERS = (
 
 
 @pytest.mark.parametrize("name", PLANNERS)
-def test_every_planners_plans_are_refined(name: str) -> None:
+def test_every_planners_plans_are_smoothed(name: str) -> None:
     solved = 0
     for query in small_worlds().values():
         assert query.task is not None
@@ -272,7 +272,7 @@ def test_every_planners_plans_are_refined(name: str) -> None:
         solved += 1
         line = route_along(plan, query.grid, query.task)
         longest = max(line.length, plan.cost if math.isfinite(plan.cost) else 0.0)
-        taut, wide = (smooth(plan, query.grid, query.task, kind=kind) for kind in REFINED)
+        taut, wide = (smooth(plan, query.grid, query.task, kind=kind) for kind in SMOOTHED)
         check(taut, line, query.task, query.grid.inflate)
         check(wide, line, query.task, query.grid.inflate, longest=longest)
         assert (taut.kind, taut.note, wide.note) == ("taut", "", "")
@@ -284,7 +284,7 @@ def test_every_planners_plans_are_refined(name: str) -> None:
 
 
 @pytest.mark.parametrize("robot", ["turtlebot", "jackal"])
-def test_the_catalogue_with_both_robots(robot: str) -> None:
+def test_the_catalogue_is_smoothed_for_both_robots(robot: str) -> None:
     for path in list_worlds().values():
         task = load_task(path)
         grid = rasterise(task.world, task.cell, load_robot(robot).radius + 0.03)
@@ -295,7 +295,7 @@ def test_the_catalogue_with_both_robots(robot: str) -> None:
                 continue
             line = route_along(plan, grid, task)
             longest = max(line.length, plan.cost if math.isfinite(plan.cost) else 0.0)
-            for kind in REFINED:
+            for kind in SMOOTHED:
                 route = smooth(plan, grid, task, kind=kind)
                 check(route, line, task, grid.inflate, longest=longest)
                 assert route.kind == kind
@@ -321,14 +321,14 @@ def _barn() -> Iterator[Task]:
 @pytest.mark.skipif(not BARN.exists(), reason="BARN's worlds are not in ../shared/data")
 @pytest.mark.parametrize("cell", [0.15, 0.05])
 def test_barn_in_the_best_corridor_is_the_optimum(cell: float) -> None:
-    """At 0.363 m, Jackal's radius and 3 cm."""
+    """With 0.363 m of clearance: Jackal's radius and 3 cm."""
     gaps = []
     for task in barn():
         grid = rasterise(task.world, cell, 0.363)
         plan = AStar().plan(Query.between(grid, task), RNG)
         assert plan.solved
         line = route_along(plan, grid, task)
-        for kind in REFINED:
+        for kind in SMOOTHED:
             route = smooth(plan, grid, task, kind=kind)
             check(route, line, task, 0.363)
             assert (route.kind, route.note) == (kind, "")
@@ -343,10 +343,10 @@ def test_barn_in_the_best_corridor_is_the_optimum(cell: float) -> None:
     assert sum(same for _, same in gaps) >= 45
 
 
-# -- what cannot be refined, and misuse
+# -- what cannot be smoothed, and misuse
 
 
-def test_a_start_without_room_is_left_as_planned() -> None:
+def test_a_start_with_too_little_room_is_left_as_planned() -> None:
     task = Task(World("w", (0, 0, 10, 10), (Disc(2, 2, 0.5), Disc(5, 5, 1.0))), (2.6, 2.0, 0.0), (8.0, 8.0))
     grid = rasterise(task.world, 0.5, 0.4)
     query = Query.between(grid, task)
@@ -358,7 +358,7 @@ def test_a_start_without_room_is_left_as_planned() -> None:
     assert route.length == pytest.approx(load_planner("tangent").plan(query, RNG).length, rel=1e-3)
 
 
-def test_a_goal_without_room_is_reached_where_the_plan_ends() -> None:
+def test_a_route_to_a_goal_with_too_little_room_ends_where_the_plan_ends() -> None:
     task = Task(World("w", (0, 0, 10, 10), (Disc(8, 8, 0.5),)), (2.0, 2.0, 0.0), (7.4, 7.8), goal_tolerance=0.7)
     grid = rasterise(task.world, 0.5, 0.3)
     query = Query.between(grid, task)
@@ -372,7 +372,7 @@ def test_a_plan_that_comes_too_close_is_kept_there_with_a_note() -> None:
     grid = rasterise(task.world, 0.5, 0.3)
     over = [(1.0, 5.0), (1.0, 8.0), (4.0, 6.2), (6.0, 6.2), (9.0, 8.0), (9.0, 5.0)]
     plan = PlanResult(status=PlanStatus.SOLVED, waypoints=grid.fractional(over))
-    for kind in REFINED:
+    for kind in SMOOTHED:
         route = smooth(plan, grid, task, kind=kind)
         assert "closer than the clearance" in route.note
         assert all((np.abs(route.xy - point) < 1e-9).all(axis=1).any() for point in over[2:4])
@@ -380,8 +380,8 @@ def test_a_plan_that_comes_too_close_is_kept_there_with_a_note() -> None:
     assert pull_taut(over, task.world.discs, task.world.bounds, 0.3) is None
 
 
-def test_what_may_be_longer_may_be_so_once() -> None:
-    """Two parts of a line, with one that has too little room between them, and a centimetre to spare for all."""
+def test_spare_length_is_spent_only_once() -> None:
+    """Two parts of a line, between them one with too little room, and a centimetre to spare for all of them."""
     posts = ((5.0, -0.5, 0.5), (5.0, 2.6, 0.5), (10.0, 0.45, 0.3), (15.0, -0.5, 0.5), (15.0, 2.6, 0.5))
     task = Task(
         World("w", (0.0, -3.0, 20.0, 3.0), tuple(Disc(*post) for post in posts)), (1.0, 0.25, 0.0), (19.0, 0.25)
@@ -397,8 +397,8 @@ def test_what_may_be_longer_may_be_so_once() -> None:
     assert route.length <= cost + 1e-9
 
 
-def test_no_room_for_a_wider_line_leaves_the_taut_one() -> None:
-    """The taut line of a plan whose own is taut already cannot be widened without making it longer."""
+def test_without_room_for_more_clearance_the_line_stays_taut() -> None:
+    """A plan whose own line is taut has no length to spare for more clearance."""
     task, grid, plan = one_disc(1)
     taut = smooth(plan, grid, task)
     again = PlanResult(status=PlanStatus.SOLVED, waypoints=grid.fractional(taut.xy))
@@ -406,12 +406,12 @@ def test_no_room_for_a_wider_line_leaves_the_taut_one() -> None:
     assert route.length <= taut.length + 1e-9
 
 
-def test_grid_is_the_plans_own_line_and_misuse_is_refused() -> None:
+def test_none_is_the_plans_own_line_and_misuse_is_refused() -> None:
     task, grid, plan = one_disc(1)
     route = smooth(plan, grid, task, kind="none")
     assert (route.xy == route_along(plan, grid, task).xy).all()
     assert (route.kind, route.curvature) == ("none", None)
-    with pytest.raises(ValueError, match="kind: unknown route 'tight'; choose from none, taut, clearance"):
+    with pytest.raises(ValueError, match="kind: unknown smoothing 'tight'; choose from none, taut, clearance"):
         smooth(plan, grid, task, kind="tight")
     for wrong in ({"clearance": -0.1}, {"stretch": math.nan}, {"bulge": 0.0}):
         with pytest.raises(ValueError, match=next(iter(wrong))):
@@ -432,7 +432,7 @@ def test_a_routes_curvature_follows_its_points() -> None:
             Route([[0, 0], [1, 0]], wrong)
 
 
-def test_a_forest_of_400_discs_is_quick() -> None:
+def test_a_forest_of_400_discs_is_smoothed() -> None:
     import time
 
     task = forest(
@@ -440,7 +440,7 @@ def test_a_forest_of_400_discs_is_quick() -> None:
     )
     grid = rasterise(task.world, 0.25, 0.3)
     plan = AStar().plan(Query.between(grid, task), RNG)
-    for kind in REFINED:
+    for kind in SMOOTHED:
         smooth(plan, grid, task, kind=kind)
         spent = []
         for _ in range(3):

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from antdrive.planners import PLANNERS, PlanStatus, TimedPlan, load_planner, smooth
+from antdrive.planners import PLANNERS, PlanStatus, TimedPlan, capabilities_of, load_planner, smooth
 from antdrive.robots import RobotSpec, TrackedPath, Twist
 from antdrive.sim import Outcome, ReplanPolicy, Rollout, Run, Scenario, certify, plan, run
 from antdrive.sim.driving.perception import Predictor

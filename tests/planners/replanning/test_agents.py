@@ -1,4 +1,4 @@
-"""Robots that decide cell by cell, among movers that go where they like."""
+"""Agents decide cell by cell among movers that go where they like."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from antdrive.planners import (
-    Follower,
     MaxMinDStar,
-    OnlineAnt,
-    OnlinePlanner,
+    OnlineAgent,
+    PheromoneAgent,
     Query,
+    ReplanningAgent,
+    agent_for,
     load_planner,
-    online_for,
 )
-from antdrive.planners.replanning.online import PATIENCE
+from antdrive.planners.colonies.mmas_dstar import PATIENCE
 from antdrive.sim.papers.maps import environments
 from antdrive.worlds import DIRECTIONS, Grid
 from benchmarks.moving import Strollers, drive
@@ -26,13 +26,13 @@ CASES = {name[:2]: query for name, query in environments().items()}
 NOBODY: list[tuple[int, int]] = []
 
 
-def robot_by(name: str, query: Query) -> OnlinePlanner:
-    robot = online_for(load_planner(name), query, np.random.default_rng(0))
-    assert isinstance(robot, OnlinePlanner)
+def robot_by(name: str, query: Query) -> OnlineAgent:
+    robot = agent_for(load_planner(name), query, np.random.default_rng(0))
+    assert isinstance(robot, OnlineAgent)
     return robot
 
 
-def alone(robot: OnlinePlanner, limit: int = 3000) -> bool:
+def alone(robot: OnlineAgent, limit: int = 3000) -> bool:
     for _ in range(limit):
         if robot.arrived:
             return True
@@ -43,44 +43,44 @@ def alone(robot: OnlinePlanner, limit: int = 3000) -> bool:
 @pytest.mark.parametrize("count", [0, 1, 40])
 @pytest.mark.parametrize("name", ["mmas-dstar", "dstar", "dstar-lite"])
 @pytest.mark.parametrize("case", CASES)
-def test_hasans_six_cases_are_arrived_in_with_one_rule(case: str, name: str, count: int) -> None:
+def test_one_rule_arrives_in_all_six_of_hasans_cases(case: str, name: str, count: int) -> None:
     query = CASES[case]
     for seed in range(3):
         movers = Strollers(query.grid, count, np.random.default_rng(seed), (query.start, query.goal))
         robot = robot_by(name, query)
-        assert drive(robot, query, movers)  # which asserts that moves are allowed and cells not occupied
-        tally = robot.tally
-        assert tally.decisions == tally.steps + tally.waits
-        assert tally.length >= optimum(query) - 1e-9
-        assert tally.steps <= 1.6 * len(load_planner("astar").plan(query, np.random.default_rng(0)).cells) + count
+        assert drive(robot, query, movers)  # asserts that moves are allowed and cells are not occupied
+        stats = robot.stats
+        assert stats.decisions == stats.steps + stats.waits
+        assert stats.length >= optimum(query) - 1e-9
+        assert stats.steps <= 1.6 * len(load_planner("astar").plan(query, np.random.default_rng(0)).cells) + count
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_pheromone_is_spread_once(case: str) -> None:
     robot = robot_by("mmas-dstar", CASES[case])
-    assert robot.tally.propagated == load_planner("mmas-dstar").plan(CASES[case], np.random.default_rng(0)).work
-    spread = robot.tally.propagated
+    assert robot.stats.propagated == load_planner("mmas-dstar").plan(CASES[case], np.random.default_rng(0)).work
+    spread = robot.stats.propagated
     assert alone(robot)
-    assert robot.tally.propagated == spread
+    assert robot.stats.propagated == spread
 
 
 def test_the_paper_s_exponents_alone_do_not_arrive_in_5f() -> None:
-    """What the rule is for: at alpha 1 and beta 1 the ant goes in circles before the wall, as the author told."""
+    """The reason for the rule: at alpha 1 and beta 1 the ant walks in circles in front of the wall, as the author reports."""
     query = CASES["5f"]
-    robot = OnlineAnt(MaxMinDStar(), query)
+    robot = PheromoneAgent(MaxMinDStar(), query)
     robot._raise_alpha = lambda here: None  # type: ignore[method-assign]
     assert not alone(robot, 500)
-    ruled = OnlineAnt(MaxMinDStar(), query)
+    ruled = PheromoneAgent(MaxMinDStar(), query)
     assert alone(ruled, 500)
-    assert ruled.tally.cycles == 5
+    assert ruled.stats.cycles == 5
     assert ruled.note == "went in circles 5 times; alpha up to 26 did not help, and beta was set to 0"
 
 
-def test_the_rule_is_told() -> None:
-    robot = OnlineAnt(MaxMinDStar(), CASES["1a"])
+def test_the_note_reports_how_exponents_changed() -> None:
+    robot = PheromoneAgent(MaxMinDStar(), CASES["1a"])
     alone(robot)
     assert robot.note == "went in circles 3 times; alpha was raised from 1 to 8"
-    straight = OnlineAnt(MaxMinDStar(), CASES["3c"])
+    straight = PheromoneAgent(MaxMinDStar(), CASES["3c"])
     alone(straight)
     assert straight.note == ""
 
@@ -91,9 +91,9 @@ def test_total_cost_is_summed_as_the_paper_s_table_does(name: str) -> None:
     free = np.ones((1, 50))
     robot = robot_by(name, Query(Grid.from_free(free), (0, 0), (0, 49)))
     assert alone(robot)
-    assert robot.tally.cost == pytest.approx(1225)
-    assert robot.tally.steps == 49
-    assert robot.tally.length == pytest.approx(49)
+    assert robot.stats.cost == pytest.approx(1225)
+    assert robot.stats.steps == 49
+    assert robot.stats.length == pytest.approx(49)
 
 
 def test_a_decision_is_the_smallest_product_among_cells_that_are_free() -> None:
@@ -116,7 +116,7 @@ def test_a_decision_is_the_smallest_product_among_cells_that_are_free() -> None:
                 prices[cell] = field[cell] ** planner.alpha * math.dist(cell, query.goal) ** planner.beta
                 if cell == query.goal:
                     prices[cell] = -1.0
-        to = OnlineAnt(planner, query).step(blocked)
+        to = PheromoneAgent(planner, query).step(blocked)
         if to is None:
             assert not any(map(math.isfinite, prices.values()))
         else:
@@ -126,7 +126,7 @@ def test_a_decision_is_the_smallest_product_among_cells_that_are_free() -> None:
 
 
 @pytest.mark.parametrize("name", ["mmas-dstar", "dstar", "ants"])
-def test_what_blocks_the_way_for_good_is_driven_around(name: str) -> None:
+def test_an_agent_drives_around_a_lasting_block(name: str) -> None:
     free = np.ones((9, 9))
     free[4] = 0
     free[4, 1] = free[4, 7] = 1  # two doors
@@ -141,29 +141,29 @@ def test_what_blocks_the_way_for_good_is_driven_around(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["mmas-dstar", "dstar"])
-def test_a_robot_shut_in_waits_until_it_is_let_out(name: str) -> None:
+def test_an_enclosed_robot_waits_until_there_is_a_way_out(name: str) -> None:
     query = Query(Grid.from_free(np.ones((7, 7))), (3, 3), (6, 6))
     ring = [(3 + dr, 3 + dc) for dr, dc in DIRECTIONS]
     robot = robot_by(name, query)
     for _ in range(3 * PATIENCE):
         assert robot.step(ring) is None
-    assert robot.tally.waits == 3 * PATIENCE
+    assert robot.stats.waits == 3 * PATIENCE
     assert robot.cell == (3, 3)
     assert alone(robot, 20)
     assert robot.step(NOBODY) is None  # at the goal there is nothing to do
-    assert robot.tally.decisions == robot.tally.waits + robot.tally.steps
+    assert robot.stats.decisions == robot.stats.waits + robot.stats.steps
 
 
 @pytest.mark.parametrize("name", ["mmas-dstar", "dstar"])
-def test_without_a_way_it_waits_for_ever(name: str) -> None:
+def test_without_a_path_an_agent_keeps_waiting(name: str) -> None:
     robot = robot_by(name, sealed())
     assert not alone(robot, 50)
-    assert robot.tally.waits == 50
+    assert robot.stats.waits == 50
     assert name == "dstar" or "no sequence of allowed moves" in robot.note
 
 
 @pytest.mark.parametrize("name", ["mmas-dstar", "dstar"])
-def test_a_robot_that_was_carried_off_goes_on_from_there(name: str) -> None:
+def test_a_robot_that_was_moved_continues_from_there(name: str) -> None:
     query = catalogue()["slalom"]
     robot = robot_by(name, query)
     for _ in range(5):
@@ -177,7 +177,7 @@ def test_a_robot_that_was_carried_off_goes_on_from_there(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["mmas-dstar", "dstar"])
-def test_cells_outside_blocked_anyway_or_its_own_change_nothing(name: str) -> None:
+def test_cells_that_are_outside_blocked_or_its_own_change_nothing(name: str) -> None:
     query = catalogue()["gate"]
     walls = [tuple(map(int, cell)) for cell in np.argwhere(~query.grid.free)]
     one, two = robot_by(name, query), robot_by(name, query)
@@ -186,9 +186,9 @@ def test_cells_outside_blocked_anyway_or_its_own_change_nothing(name: str) -> No
     assert two.arrived
 
 
-def test_planners_online() -> None:
+def test_a_planner_s_own_agent_is_used_if_it_has_one() -> None:
     query, rng = catalogue()["empty"], np.random.default_rng(0)
-    assert isinstance(online_for(load_planner("mmas-dstar"), query, rng), OnlineAnt)
-    assert isinstance(online_for(load_planner("astar"), query, rng), Follower)
-    with pytest.raises(ValueError, match="cannot be told"):
-        online_for(load_planner("tangent"), query, rng)
+    assert isinstance(agent_for(load_planner("mmas-dstar"), query, rng), PheromoneAgent)
+    assert isinstance(agent_for(load_planner("astar"), query, rng), ReplanningAgent)
+    with pytest.raises(ValueError, match="cannot replan by blocked cells"):
+        agent_for(load_planner("tangent"), query, rng)
