@@ -1,0 +1,31 @@
+"""`antdrive warm`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from antdrive.sim.cli.console import bar, print_line
+from antdrive.sim.cli.exits import SUCCEEDED
+
+
+def warm(
+    jobs: Annotated[
+        int | None, typer.Option(min=1, max=256, metavar="NUMBER", help="Number of processes.  [default: one a core]")
+    ] = None,
+) -> int:
+    """Compile every planner into the cache.
+
+    Needed once for an installation; otherwise the first command that plans or drives does it.
+    """
+    from antdrive.sim.warm import is_warm
+    from antdrive.sim.warm import warm as compile_all
+
+    if is_warm():
+        print_line("every planner is compiled already")
+        return SUCCEEDED
+    with bar("compiling the planners") as progress:
+        compile_all(-1 if jobs is None else jobs, progress=progress)
+    print_line("every planner is compiled")
+    return SUCCEEDED
