@@ -1,21 +1,28 @@
-"""Compile every kernel into the cache: `python -m sim.warm` (the set-up command does it)."""
+"""Compile every kernel once, into the cache that `antdrive.worlds.kernel_cache` describes.
+
+Compiling takes about half a minute on two cores. The command line does it before the first command that plans, drives or
+films (`is_warm` tells it whether that is due), and `antdrive warm` does it on request.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import hashlib
+import importlib.metadata
+import os
+import platform
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from joblib import Parallel, delayed
+from antdrive.worlds.kernel_cache import cache_folder, sources_stamp
 
-from antdrive.planners import PLANNERS
-from antdrive.robots import load_robot
-from antdrive.sim.pipeline import Scenario, plan, run
-from antdrive.sim.view.film.video import film
-from antdrive.worlds import Cruising, Disc, Task, World
+if TYPE_CHECKING:
+    from antdrive.sim.pipeline import Scenario
 
-# What shares kernels is compiled by one process; the longest first.
+# Planners that share kernels are compiled by one process; the groups that take longest come first.
 TOGETHER = (
     ("tangent",),
     ("aco-han", "as", "pfaco"),
@@ -26,22 +33,65 @@ TOGETHER = (
 )
 
 
+def is_warm() -> bool:
+    """Whether `warm` has run for these sources, this Python, this numba and this processor."""
+    marker = _marker()
+    return os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0") or (marker is not None and marker.exists())
+
+
+def warm(jobs: int = -1, progress: Callable[[float], None] | None = None) -> None:
+    """Plan with every planner, drive once and film it, so that every kernel is in the cache.
+
+    Args:
+        jobs: processes; -1 means one for each core.
+        progress: called with the fraction that is done.
+    """
+    from joblib import Parallel, delayed
+
+    from antdrive.planners import PLANNERS
+
+    # The second round reads the cache, and compiles what two processes wrote at the same moment and one of them lost.
+    first = [delayed(_plan_with)(TOGETHER[0]), delayed(_drive_and_film)(), *map(delayed(_plan_with), TOGETHER[1:])]
+    second = [delayed(_plan_with)(list(PLANNERS)), delayed(_drive_and_film)()]
+    done = 0
+    for tasks in (first, second):
+        for _ in Parallel(jobs, return_as="generator_unordered")(tasks):
+            done += 1
+            if progress is not None:
+                progress(done / (len(first) + len(second)))
+    marker = _marker()
+    if marker is not None:
+        with contextlib.suppress(OSError):
+            marker.parent.mkdir(parents=True, exist_ok=True)
+            marker.touch()
+
+
 def _scenario() -> Scenario:
-    """A world so small that compiling is all it costs."""
+    """A scenario in a world so small that compiling is nearly all it costs."""
+    from antdrive.planners import PLANNERS
+    from antdrive.robots import load_robot
+    from antdrive.sim.pipeline import Scenario
+    from antdrive.worlds import Cruising, Disc, Task, World
+
     mover = Cruising(radius=0.1, position=(0.2, 2.8), velocity=(0.1, 0.0))
     world = World("warm", (0.0, 0.0, 3.0, 3.0), (Disc(1.5, 1.5, 0.2),), movers=(mover,))
     task = Task(world, (0.75, 0.75, 0.0), (2.25, 2.25), cell=0.25)
     return Scenario(task=task, planner=PLANNERS["astar"], robot=load_robot("turtlebot"))
 
 
-def plan_with(names: Sequence[str]) -> None:
-    """Plan with these planners."""
+def _plan_with(names: Sequence[str]) -> None:
+    from antdrive.planners import PLANNERS
+    from antdrive.sim.pipeline import plan
+
     for name in names:
         plan(replace(_scenario(), planner=PLANNERS[name]))
 
 
-def drive_and_film() -> None:
-    """Drive once and film it."""
+def _drive_and_film() -> None:
+    from antdrive.planners import PLANNERS
+    from antdrive.sim.pipeline import run
+    from antdrive.sim.view.film.video import film
+
     log = run(_scenario()).rollout
     ants = run(replace(_scenario(), planner=PLANNERS["as"], planner_name="as")).rollout
     assert log is not None
@@ -52,12 +102,20 @@ def drive_and_film() -> None:
         film(ants, Path(folder) / "warm.mp4", size=(160, 160), fps=2, prelude=1.0)
 
 
-def warm(jobs: int = -1) -> None:
-    """Plan with every planner, drive once and film it, on as many processes as there are cores unless told."""
-    pool = Parallel(jobs)
-    pool([delayed(plan_with)(TOGETHER[0]), delayed(drive_and_film)(), *map(delayed(plan_with), TOGETHER[1:])])
-    # Once more from the cache; what two processes wrote at the same moment, and one of them lost, is compiled now.
-    pool([delayed(plan_with)(list(PLANNERS)), delayed(drive_and_film)()])
+def _marker() -> Path | None:
+    """The file whose presence says that the kernels are compiled; None where nothing can be kept."""
+    folder = cache_folder()
+    if folder is None:
+        return None
+    numba = importlib.metadata.version("numba")
+    facts = (
+        sources_stamp(),
+        platform.python_version(),
+        platform.machine(),
+        numba,
+        os.environ.get("NUMBA_CPU_NAME", ""),
+    )
+    return folder / f"antdrive-warm-{hashlib.sha256('|'.join(facts).encode()).hexdigest()[:16]}"
 
 
 if __name__ == "__main__":

@@ -5,12 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numba
 import numpy as np
 
-# One place for the compiler's settings: cached on disk, IEEE arithmetic (no fastmath), so results repeat bit for bit.
-kernel = numba.njit(cache=True, error_model="numpy", nogil=True)
-inline = numba.njit(cache=True, error_model="numpy", nogil=True, inline="always")
+from antdrive.worlds._kernels_compiler import inline as inline
+from antdrive.worlds._kernels_compiler import kernel as kernel
 
 Array = Any
 

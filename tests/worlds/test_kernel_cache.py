@@ -1,0 +1,105 @@
+"""Machine code of kernels is kept where it can be, and damaged entries are compiled again."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from antdrive.worlds import kernel_cache
+
+MEASURE = (
+    "from antdrive.worlds import Disc, World, point_clearance\n"
+    "print(point_clearance(World('w', (0, 0, 4, 4), (Disc(2, 2, 0.5),)), [[1, 2]]))"
+)
+
+
+def measure(**environment: str) -> subprocess.CompletedProcess[str]:
+    """A process that needs one kernel."""
+    return subprocess.run(
+        [sys.executable, "-c", MEASURE], env={**os.environ, **environment}, capture_output=True, text=True, check=False
+    )
+
+
+@pytest.fixture(scope="module")
+def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A cache with the kernels that one measurement needs."""
+    folder = tmp_path_factory.mktemp("cache")
+    measure(NUMBA_CACHE_DIR=str(folder))
+    return folder
+
+
+@pytest.mark.parametrize(
+    "damage", [b"", b"\x80", b"nonsense", None], ids=["empty", "cut short", "nonsense", "another class"]
+)
+@pytest.mark.parametrize("suffix", ["*.nbi", "*.nbc"])
+def test_a_damaged_entry_is_compiled_again(filled: Path, tmp_path: Path, suffix: str, damage: bytes | None) -> None:
+    shutil.copytree(filled, tmp_path, dirs_exist_ok=True)
+    first = measure()
+    entries = list(tmp_path.rglob(suffix))
+    assert first.returncode == 0, first.stderr
+    assert entries
+    for entry in entries:
+        entry.write_bytes(entry.read_bytes().replace(b"numba", b"nunba") if damage is None else damage)
+    again = measure(NUMBA_CACHE_DIR=str(tmp_path))
+    assert (again.returncode, again.stdout, again.stderr) == (0, first.stdout, "")
+
+
+def test_an_entry_is_used_again(tmp_path: Path) -> None:
+    measure(NUMBA_CACHE_DIR=str(tmp_path))
+    before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.nb*")}
+    measure(NUMBA_CACHE_DIR=str(tmp_path))
+    assert before
+    assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.nb*")} == before
+
+
+def test_the_first_folder_that_can_be_written_is_chosen(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    closed: set[Path] = set()
+    writable = kernel_cache._writable
+    monkeypatch.setattr(kernel_cache, "_writable", lambda folder: folder not in closed and writable(folder))
+    package, user = kernel_cache.default_folders()
+    assert kernel_cache.cache_folder() == package
+    closed.add(package)
+    assert kernel_cache.cache_folder() == user
+    closed.add(user)
+    private = kernel_cache.cache_folder()
+    assert private is not None
+    assert private.parent == tmp_path
+    assert private.stat().st_mode & 0o077 == 0
+    assert kernel_cache.cache_folder() == private
+    private.chmod(0o777)  # somebody else could have put code there
+    other = kernel_cache.cache_folder()
+    assert other is not None
+    assert other != private
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "nowhere"))
+    assert kernel_cache.cache_folder() is None
+    monkeypatch.setenv("NUMBA_CACHE_DIR", "given")
+    assert kernel_cache.cache_folder() == Path("given")
+
+
+def test_kernels_work_where_nothing_can_be_written(tmp_path: Path) -> None:
+    """A copy of the package in a folder that is read-only, without a home and without a folder for temporary files."""
+    code = (
+        "import antdrive.worlds.kernel_cache as k\n"
+        "k._writable = lambda folder: False\n"
+        "import numba.core.caching as c\n"
+        "def refuse(self): raise OSError(30, 'read-only')\n"
+        "c._CacheLocator.ensure_cache_path = refuse\n"
+        "k._private_folder = lambda: None\n" + MEASURE
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert (done.returncode, done.stdout, done.stderr) == (0, measure().stdout, "")
+
+
+def test_the_stamp_covers_every_kernel_file() -> None:
+    root = Path(kernel_cache.__file__).parent.parent
+    found = sorted(
+        p for package in ("worlds", "planners", "robots", "sim") for p in (root / package).rglob("_kernels*.py")
+    )
+    assert len(found) > 15
+    assert len(kernel_cache.sources_stamp()) == 64

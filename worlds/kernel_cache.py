@@ -1,0 +1,69 @@
+"""Where the machine code of kernels is kept between runs, and for which sources it is valid. Loads no compiler."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import os
+import stat
+import tempfile
+from pathlib import Path
+
+_ROOT = Path(__file__).parent.parent  # the package antdrive
+
+
+@functools.cache
+def sources_stamp() -> str:
+    """A SHA-256 of the text of every kernel file of antdrive."""
+    sha = hashlib.sha256()
+    for package in ("worlds", "planners", "robots", "sim"):
+        for path in sorted((_ROOT / package).rglob("_kernels*.py")):
+            sha.update(path.read_bytes())
+    return sha.hexdigest()
+
+
+def cache_folder() -> Path | None:
+    """The folder for machine code; None where no folder at all can be written.
+
+    The first that can be written of: what `NUMBA_CACHE_DIR` names, the package's own `__pycache__`, the user's cache folder,
+    and a private folder among the temporary files.
+    """
+    if given := os.environ.get("NUMBA_CACHE_DIR"):
+        return Path(given)
+    for folder in default_folders():
+        if _writable(folder):
+            return folder
+    return _private_folder()
+
+
+def default_folders() -> tuple[Path, Path]:
+    """The folders that numba tries by itself, as far as antdrive's kernels are concerned."""
+    user = Path(os.environ.get("XDG_CACHE_HOME") or Path(os.path.expanduser("~")) / ".cache")
+    return _ROOT / "worlds" / "__pycache__", user / "numba"
+
+
+def _writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError:
+        return False
+    return True
+
+
+def _private_folder() -> Path | None:
+    """A folder that nobody else can write, the same one in every process of this user if possible.
+
+    Cached code is executed, so a folder that somebody else has made is never used.
+    """
+    user = os.getuid() if hasattr(os, "getuid") else None
+    try:
+        folder = Path(tempfile.gettempdir()) / f"antdrive-cache-{'user' if user is None else user}"
+        folder.mkdir(mode=0o700, exist_ok=True)
+        found = folder.lstat()
+        private = user is None or (found.st_uid == user and not found.st_mode & 0o077)
+        if stat.S_ISDIR(found.st_mode) and private and _writable(folder):
+            return folder
+        return Path(tempfile.mkdtemp(prefix="antdrive-cache-"))
+    except OSError:  # also where no folder for temporary files exists
+        return None
