@@ -8,12 +8,9 @@ import shutil
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import typer
-
-if TYPE_CHECKING:
-    from antdrive.planners import Progress
 
 
 @contextmanager
@@ -51,7 +48,7 @@ def planning(label: str) -> Iterator[None]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task(label, total=None, best="")
 
-        def update(state: Progress) -> None:
+        def update(state: Any) -> None:
             best = f"best {state.best:.2f} m" if math.isfinite(state.best) else "no path yet"
             progress.update(task, completed=state.done, total=state.total, best=best)
 

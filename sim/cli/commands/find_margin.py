@@ -79,9 +79,7 @@ def find_margin(
 
 def _slowed(scenario: Scenario, speed: float) -> Scenario:
     robot = scenario.robot
-    return dataclasses.replace(
-        scenario, robot=dataclasses.replace(robot, max_speed=min(speed, robot.max_speed))
-    )
+    return dataclasses.replace(scenario, robot=dataclasses.replace(robot, max_speed=min(speed, robot.max_speed)))
 
 
 def _generated(kind: str, seed: int) -> Task:

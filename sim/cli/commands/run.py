@@ -45,9 +45,7 @@ def run(
     replan: options.Replan = True,
     sees: options.Sees = "velocities",
     out: options.Out = None,
-    video: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Film the drive: .mp4, .gif or .webp.")
-    ] = None,
+    video: Annotated[Path | None, typer.Option(metavar="FILE", help="Film the drive: .mp4, .gif or .webp.")] = None,
     prelude: options.Prelude = 0.0,
     vector: options.Vector = False,
     figures: options.Figures = True,
