@@ -1,7 +1,5 @@
 """`antdrive compare`."""
 
-from __future__ import annotations
-
 import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -79,7 +77,7 @@ def compare(
     return SUCCEEDED if all(result.succeeded for result in results.values()) else FAILED
 
 
-def _print(results: dict[str, Run], files: dict[str, str], json: bool) -> None:
+def _print(results: "dict[str, Run]", files: dict[str, str], json: bool) -> None:
     if json:
         print_json({"runs": {name: result.as_dict() for name, result in results.items()}, "files": files})
         return
@@ -90,7 +88,7 @@ def _print(results: dict[str, Run], files: dict[str, str], json: bool) -> None:
     print_files(files)
 
 
-def _command(scenario: Scenario, world: str, robot: str) -> str:
+def _command(scenario: "Scenario", world: str, robot: str) -> str:
     """The `antdrive run` that repeats one of the compared runs."""
     given = {
         "--planner": scenario.planner_name,

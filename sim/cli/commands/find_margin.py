@@ -1,7 +1,5 @@
 """`antdrive find-margin`."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any
@@ -62,7 +60,7 @@ def find_margin(
     base = base if speed is None else _slowed(base, speed)
     tasks = {n: base.task if kind is None else _generated(kind, n) for n in range(seed, seed + seeds)}
 
-    def drive_with(margin: float, n: int) -> Run:
+    def drive_with(margin: float, n: int) -> "Run":
         return drive(dataclasses.replace(base, task=tasks[n], margin=margin, seed=n))
 
     compile_once()
@@ -77,12 +75,12 @@ def find_margin(
     return FAILED if smallest is None else SUCCEEDED
 
 
-def _slowed(scenario: Scenario, speed: float) -> Scenario:
+def _slowed(scenario: "Scenario", speed: float) -> "Scenario":
     robot = scenario.robot
     return dataclasses.replace(scenario, robot=dataclasses.replace(robot, max_speed=min(speed, robot.max_speed)))
 
 
-def _generated(kind: str, seed: int) -> Task:
+def _generated(kind: str, seed: int) -> "Task":
     import numpy as np
 
     from antdrive.worlds import GENERATORS, generate
@@ -92,7 +90,7 @@ def _generated(kind: str, seed: int) -> Task:
     return generate(kind, np.random.default_rng(seed), {}, name=f"{kind}-{seed}", note=f"seed {seed}")
 
 
-def _facts(base: Scenario, trials: Sequence[Trial]) -> dict[str, Any]:
+def _facts(base: "Scenario", trials: "Sequence[Trial]") -> dict[str, Any]:
     return {
         "robot": base.robot.name,
         "max_speed": base.robot.max_speed,
@@ -102,7 +100,7 @@ def _facts(base: Scenario, trials: Sequence[Trial]) -> dict[str, Any]:
     }
 
 
-def _print(base: Scenario, trials: Sequence[Trial], smallest: float | None) -> None:
+def _print(base: "Scenario", trials: "Sequence[Trial]", smallest: float | None) -> None:
     print_table(
         ("margin m", "driven", "no path", "least room left m", "failed"),
         (

@@ -1,7 +1,5 @@
 """`antdrive plan`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -65,7 +63,7 @@ def plan(
     return SUCCEEDED if answer.solved else FAILED
 
 
-def _facts(scenario: Scenario, grid: Grid, answer: PlanResult) -> dict[str, Any]:
+def _facts(scenario: "Scenario", grid: "Grid", answer: "PlanResult") -> dict[str, Any]:
     return {
         "world": scenario.task.world.name,
         "planner": scenario.planner_name,

@@ -1,7 +1,5 @@
 """`antdrive planners`."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

@@ -1,7 +1,5 @@
 """`antdrive run`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -86,7 +84,7 @@ def run(
     return SUCCEEDED if result.succeeded else FAILED
 
 
-def _check_views(scenario: Scenario, video: Path | None, prelude: float, gui: bool) -> None:
+def _check_views(scenario: "Scenario", video: Path | None, prelude: float, gui: bool) -> None:
     """Refuse, before any work, a film or a window that could not be made afterwards."""
     if gui:
         from antdrive.sim.view.window import check_display
@@ -105,7 +103,7 @@ def _check_views(scenario: Scenario, video: Path | None, prelude: float, gui: bo
         check_film(video)
 
 
-def _drive(scenario: Scenario) -> Run:
+def _drive(scenario: "Scenario") -> "Run":
     """Plan and drive with progress bars; Ctrl-C while planning keeps the best path so far."""
     from antdrive.planners import keep_best
     from antdrive.sim.pipeline import plan

@@ -1,7 +1,5 @@
 """`antdrive schema`."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import typer

@@ -1,7 +1,5 @@
 """`antdrive worlds export`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -71,7 +69,7 @@ def export_world(
     return SUCCEEDED
 
 
-def _export_movingai(task: Task, out: Path, resolution: float | None) -> dict[str, str]:
+def _export_movingai(task: "Task", out: Path, resolution: float | None) -> dict[str, str]:
     """Write the map and, if there is a path on its cells, the problem; the problem's file."""
     import numpy as np
 

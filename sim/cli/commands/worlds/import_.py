@@ -1,7 +1,5 @@
 """`antdrive worlds import`."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,7 +9,6 @@ import typer
 from antdrive.sim.cli import options
 from antdrive.sim.cli.console import print_files, print_json, print_line
 from antdrive.sim.cli.exits import SUCCEEDED
-from antdrive.sim.cli.import_rules import RefusedOption, import_file
 from antdrive.sim.cli.output import task_facts
 from antdrive.sim.cli.parse import numbers
 from antdrive.sim.cli.write import file_name
@@ -96,6 +93,8 @@ def import_world(
     cell beside free ground that the start or the goal can reach is fully covered by cylinders, so that the world is
     never wider than the map. The world's source says how far the cylinders protrude from the blocked cells.
     """
+    from antdrive.sim.cli.import_rules import RefusedOption, import_file
+
     try:
         tasks = import_file(
             path,
@@ -134,7 +133,7 @@ def _target(path: Path, out: Path | None) -> Path:
     return target
 
 
-def _targets(path: Path, folder: Path, tasks: Sequence[Task]) -> list[Path]:
+def _targets(path: Path, folder: Path, tasks: "Sequence[Task]") -> list[Path]:
     """A file in a folder for each world of a set."""
     files = [folder / f"{file_name(task.world.name)}.yaml" for task in tasks]
     twice = next((file for i, file in enumerate(files) if file in files[:i]), None)
@@ -143,14 +142,14 @@ def _targets(path: Path, folder: Path, tasks: Sequence[Task]) -> list[Path]:
     return files
 
 
-def _write(tasks: Sequence[Task], files: Sequence[Path]) -> None:
+def _write(tasks: "Sequence[Task]", files: Sequence[Path]) -> None:
     from antdrive.worlds import save_task
 
     for task, file in zip(tasks, files, strict=True):
         save_task(task, file)
 
 
-def _print(tasks: Sequence[Task], files: Sequence[Path], *, of_cells: bool) -> None:
+def _print(tasks: "Sequence[Task]", files: Sequence[Path], *, of_cells: bool) -> None:
     if len(tasks) == 1:
         world = tasks[0].world
         print_line(f"{world.name}: {len(world.obstacles)} obstacles, {world.source}")

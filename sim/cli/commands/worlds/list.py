@@ -1,7 +1,5 @@
 """`antdrive worlds list`."""
 
-from __future__ import annotations
-
 from antdrive.sim.cli import options
 from antdrive.sim.cli.console import print_json, print_table
 from antdrive.sim.cli.exits import SUCCEEDED
