@@ -73,7 +73,6 @@ def main() -> None:
         print_error(str(error))
         code = WRONG_INPUT
     except (KeyboardInterrupt, typer.Abort):
-        print_error("interrupted")
         code = INTERRUPTED
     except OSError as error:  # such as a full disk
         print_error(f"{error.filename or 'output'}: {error.strerror}")
@@ -81,6 +80,8 @@ def main() -> None:
     except _USAGE_ERROR as error:
         _print_usage_error(error)
         code = WRONG_INPUT
+    if code == INTERRUPTED:  # typer turns Ctrl-C within a command into this code
+        print_error("interrupted")
     sys.exit(code if isinstance(code, int) else SUCCEEDED)
 
 

@@ -1,0 +1,77 @@
+"""A fresh installation compiles its kernels once, where people can see it."""
+
+import sys
+from collections.abc import Callable
+
+import pytest
+
+from antdrive.sim.cli.compiling import compile_once
+from tests.sim.cli.calling import Call
+
+
+@pytest.fixture
+def compiled(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """What was compiled: nothing at first, and nothing is cached yet. Compiling itself is left out."""
+    done: list[str] = []
+
+    def warm(jobs: int = -1, progress: Callable[[float], None] | None = None) -> None:
+        assert progress is not None
+        progress(1.0)
+        done.append("all")
+
+    monkeypatch.setattr("antdrive.sim.warm.warm", warm)
+    monkeypatch.setattr("antdrive.sim.warm.is_warm", lambda: bool(done))
+    return done
+
+
+@pytest.fixture
+def terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "100")
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+
+
+@pytest.mark.usefixtures("terminal")
+def test_the_first_call_compiles_and_the_second_does_not(compiled: list[str]) -> None:
+    compile_once()
+    compile_once()
+    assert compiled == ["all"]
+
+
+def test_without_a_terminal_kernels_are_compiled_when_they_are_called(compiled: list[str]) -> None:
+    compile_once()
+    assert compiled == []
+
+
+@pytest.mark.usefixtures("terminal")
+def test_nothing_is_compiled_where_no_cache_can_be_kept(compiled: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("antdrive.worlds.kernel_cache.cache_folder", lambda: None)
+    compile_once()
+    assert compiled == []
+
+
+@pytest.mark.parametrize("command", ["run", "plan", "compare", "find-margin", "reproduce"])
+def test_commands_that_plan_compile_first(antdrive: Call, monkeypatch: pytest.MonkeyPatch, command: str) -> None:
+    class Compiled(Exception):
+        pass
+
+    def stop() -> None:
+        raise Compiled
+
+    words = {"compare": ["empty", "-p", "astar", "-p", "dijkstra"], "reproduce": ["lee2008"]}.get(command, ["empty"])
+    module = f"antdrive.sim.cli.commands.{command.replace('-', '_')}.compile_once"
+    monkeypatch.setattr(module, stop)
+    with pytest.raises(Compiled):
+        antdrive(command, *words)
+
+
+@pytest.mark.parametrize("words", [["planners"], ["robots"], ["worlds", "show", "empty"], ["schema"]], ids=" ".join)
+@pytest.mark.usefixtures("terminal")
+def test_commands_that_only_look_do_not_compile(antdrive: Call, compiled: list[str], words: list[str]) -> None:
+    assert antdrive(*words)[0] == 0
+    assert compiled == []
+
+
+def test_warm_compiles_on_request_and_once(antdrive: Call, compiled: list[str]) -> None:
+    assert antdrive("warm") == (0, "every planner is compiled\n", "")
+    assert antdrive("warm") == (0, "every planner is compiled already\n", "")
+    assert compiled == ["all"]
