@@ -56,5 +56,5 @@ bench: $(VENV)/.dev $(VENV)/.warm
 	@$(BIN)/python -m benchmarks.loop
 
 clean:
-	rm -rf $(VENV) out .pytest_cache .mypy_cache .ruff_cache
+	rm -rf $(VENV) .python out .pytest_cache .mypy_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

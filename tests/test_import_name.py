@@ -75,9 +75,9 @@ def test_a_wheel_installs_one_name_with_all_it_needs(wheel: Path, tmp_path: Path
     ).stdout.split()
     assert not tracked or {f"antdrive/{name}" for name in tracked} <= set(names)
     assert "antdrive/py.typed" in names
-    code = "import antdrive; print(antdrive.__file__); print(antdrive.plan(antdrive.Scenario.of('empty', 'astar'))[1].solved)"
+    code = "import antdrive; print(antdrive.__file__); print(antdrive.load_robot('jackal').name, len(antdrive.list_worlds()) > 9)"
     done = python("-c", code, cwd=tmp_path, path=tmp_path)
-    assert done.stdout.split() == [str(tmp_path / "antdrive" / "__init__.py"), "True"], done.stderr
+    assert done.stdout.split() == [str(tmp_path / "antdrive" / "__init__.py"), "jackal", "True"], done.stderr
 
 
 def test_the_source_distribution_holds_each_file_once(tmp_path: Path) -> None:

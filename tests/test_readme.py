@@ -27,6 +27,22 @@ def test_the_python_block_is_ten_lines_that_run(tmp_path: Path) -> None:
     assert (tmp_path / "forest.npz").exists()
 
 
+def test_the_python_block_passes_mypy_strict(tmp_path: Path) -> None:
+    (code,) = blocks("python")
+    (tmp_path / "readme.py").write_text(code)
+    command = [
+        sys.executable,
+        "-m",
+        "mypy",
+        "--strict",
+        "--config-file",
+        str(ROOT / "pyproject.toml"),
+        str(tmp_path / "readme.py"),
+    ]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
 def test_the_world_file_is_driven(tmp_path: Path) -> None:
     (text,) = blocks("yaml")
     (tmp_path / "two-posts.yaml").write_text(text)
@@ -63,8 +79,14 @@ def test_make_knows_the_two_commands(target: str) -> None:
     assert done.returncode == 0, done.stderr
 
 
-def test_links_and_pictures_exist() -> None:
-    targets = [t for t in re.findall(r"\]\(([^)#]+)\)", TEXT) if not t.startswith("http")]
-    assert targets
+PAGES = ["README.md", "CONTRIBUTING.md", *(str(p.relative_to(ROOT)) for p in sorted((ROOT / "docs").rglob("*.md")))]
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_links_and_pictures_exist(page: str) -> None:
+    targets = [
+        t for t in re.findall(r"\]\(([^)#\s]+)[^)]*\)", (ROOT / page).read_text()) if not t.startswith(("http", "#"))
+    ]
+    assert targets or page != "README.md"
     for target in targets:
-        assert (ROOT / target).exists(), target
+        assert ((ROOT / page).parent / target).exists(), target
