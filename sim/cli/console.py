@@ -15,7 +15,10 @@ import typer
 
 @contextmanager
 def bar(label: str) -> Iterator[Callable[[float], None]]:
-    """A progress bar on stderr. The block calls what it gets with the fraction done; without a terminal nothing is shown."""
+    """A progress bar on stderr, which shows nothing where stderr is no terminal.
+
+    Yields a function that the block calls with the fraction that is done.
+    """
     if not sys.stderr.isatty():
         yield lambda fraction: None
         return

@@ -1,4 +1,7 @@
-"""The arguments and options that commands share; each states its unit, and its default where typer cannot show it."""
+"""The arguments and options that several commands share.
+
+Each help text states the unit, and the default where typer cannot show it.
+"""
 
 from __future__ import annotations
 

@@ -66,6 +66,14 @@ def make_controller(values: dict[str, str]) -> PurePursuit:
         raise InputError(f"controller.{error}") from None
 
 
+def among_movers(avoid: bool, replan: bool, sees: str) -> dict[str, Any]:
+    """The fields of a scenario that say how the robot drives among movers."""
+    from antdrive.sim.driving.replanning import ReplanPolicy
+
+    avoidance = {} if avoid else {"yielding": None}  # the default is a record of weights
+    return {"knowledge": make_perception(sees), "replanning": ReplanPolicy(around=replan), **avoidance}
+
+
 def make_perception(text: str) -> Perception:
     """What the robot perceives of movers, from `--sees KIND[:METRES]`."""
     from antdrive.sim.driving.perception import Perception, Told

@@ -70,7 +70,10 @@ def suffixes(vector: bool) -> tuple[str, ...]:
 
 
 def write_run(run: Run, folder: Path, command: str, *, vector: bool = False, figures: bool = True) -> dict[str, str]:
-    """Write a run's log, figures and `result.json` into a folder, in place of an earlier run's; the files, by name."""
+    """Write a run's log, figures and `result.json` into a folder; the files by name.
+
+    Files of an earlier run in that folder are removed first, because they would contradict the new result.
+    """
     for name in RUN_FILES:
         (folder / name).unlink(missing_ok=True)
     files = {"result": str(folder / "result.json")}

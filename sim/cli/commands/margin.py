@@ -16,8 +16,8 @@ def margin(
 ) -> int:
     """Break a drive's safety margin down by cause.
 
-    Planning keeps the margin free around the robot. Reports how much of it the drive used up, where, and why: rounding,
-    cutting corners, tracking, slip or localisation.
+    Planning keeps the margin free around the robot. Reports how much of it the drive used up, where, and why:
+    rounding, cutting corners, tracking, slip or localisation.
     """
     from antdrive.sim.log.margin import budget
     from antdrive.sim.log.rollout import Rollout
@@ -41,5 +41,5 @@ def margin(
         ),
     )
     if spent.largest.metres:
-        print_line(f"the largest cause is {spent.largest.cause}")
+        print_line(f"the largest loss is due to {spent.largest.cause}")
     return SUCCEEDED

@@ -11,7 +11,7 @@ from antdrive.sim.cli.console import bar, planning, print_json
 from antdrive.sim.cli.exits import FAILED, SUCCEEDED
 from antdrive.sim.cli.output import print_run
 from antdrive.sim.cli.parse import disc
-from antdrive.sim.cli.scenario import make_perception, make_scenario
+from antdrive.sim.cli.scenario import among_movers, make_scenario
 from antdrive.sim.cli.write import (
     check_film,
     check_folder,
@@ -25,6 +25,9 @@ from antdrive.worlds.errors import InputError
 
 if TYPE_CHECKING:
     from antdrive.sim.pipeline import Run, Scenario
+
+Video = Annotated[Path | None, typer.Option(metavar="FILE", help="Film the drive: .mp4, .gif or .webp.")]
+Gui = Annotated[bool, typer.Option("--gui", help="Replay the drive in a window afterwards; needs a screen.")]
 
 
 def run(
@@ -43,27 +46,31 @@ def run(
     replan: options.Replan = True,
     sees: options.Sees = "velocities",
     out: options.Out = None,
-    video: Annotated[Path | None, typer.Option(metavar="FILE", help="Film the drive: .mp4, .gif or .webp.")] = None,
+    video: Video = None,
     prelude: options.Prelude = 0.0,
     vector: options.Vector = False,
     figures: options.Figures = True,
-    gui: Annotated[
-        bool, typer.Option("--gui", help="Replay the drive in a window afterwards; needs a screen.")
-    ] = False,
+    gui: Gui = False,
     json: options.Json = False,
 ) -> int:
     """Plan a path, drive it in physics and certify the drive.
 
     Exit code 0: the robot stopped at the goal, and its log proves that it touched nothing.
     """
-    from antdrive.sim.driving.replanning import ReplanPolicy
-
-    avoidance = {} if avoid else {"yielding": None}
     scenario = make_scenario(
-        world, planner, settings, robot, seed=seed, margin=margin, cell=cell, smoothing=smoothing, noise=noise,
-        unseen=tuple(disc(text) for text in unseen or ()), time_limit=time_limit,
-        knowledge=make_perception(sees), replanning=ReplanPolicy(around=replan), **avoidance,
-    )  # fmt: skip
+        world,
+        planner,
+        settings,
+        robot,
+        seed=seed,
+        margin=margin,
+        cell=cell,
+        smoothing=smoothing,
+        noise=noise,
+        unseen=tuple(disc(text) for text in unseen or ()),
+        time_limit=time_limit,
+        **among_movers(avoid, replan, sees),
+    )
     folder = out or default_folder(scenario)
     _check_views(scenario, video, prelude, gui)
     check_folder(folder)
