@@ -69,8 +69,8 @@ def suffixes(vector: bool) -> tuple[str, ...]:
     return (".png", ".pdf") if vector else (".png",)
 
 
-def write_run(run: Run, folder: Path, command: str, *, vector: bool = False, figures: bool = True) -> dict[str, str]:
-    """Write a run's log, figures and `result.json` into a folder; the files by name.
+def write_run(run: Run, folder: Path, *, vector: bool = False, figures: bool = True) -> dict[str, str]:
+    """Write a run's log and figures into a folder; the files by name, with the `result.json` that is still to write.
 
     Files of an earlier run in that folder are removed first, because they would contradict the new result.
     """
@@ -85,7 +85,6 @@ def write_run(run: Run, folder: Path, command: str, *, vector: bool = False, fig
 
         s = run.scenario
         files["figure"] = str(plan_figure(s.task, run.grid, run.plan, s.robot, folder / "overview.png"))
-    write_result(run, files, command)
     return files
 
 

@@ -12,7 +12,7 @@ from antdrive.sim.cli.console import planning, print_error, print_files, print_j
 from antdrive.sim.cli.exits import FAILED, SUCCEEDED
 from antdrive.sim.cli.output import comparison_cells
 from antdrive.sim.cli.scenario import make_scenario
-from antdrive.sim.cli.write import check_film, check_folder, write_comparison_film, write_run
+from antdrive.sim.cli.write import check_film, check_folder, write_comparison_film, write_result, write_run
 from antdrive.worlds.errors import InputError
 
 if TYPE_CHECKING:
@@ -61,7 +61,8 @@ def compare(
         check_folder(folder / name)
         with planning(f"planning and driving with {name}"):
             results[name] = drive(scenario)
-        write_run(results[name], folder / name, _command(scenario, world, robot), figures=figures)
+        written = write_run(results[name], folder / name, figures=figures)
+        write_result(results[name], written, _command(scenario, world, robot))
     logs = {name: result.rollout for name, result in results.items() if result.rollout is not None}
     files = {name: str(folder / name) for name in results}
     if len(logs) > 1 and figures:

@@ -76,10 +76,11 @@ def run(
     check_folder(folder)
     compile_once()
     result = _drive(scenario)
-    files = write_run(result, folder, this_command(), vector=vector, figures=figures)
+    files = write_run(result, folder, vector=vector, figures=figures)
+    report = write_result(result, files, this_command())
     if video is not None and result.rollout is not None:
         files["film"] = write_film(result.rollout, video, prelude=prelude)["file"]
-    report = write_result(result, files, this_command())
+        report = write_result(result, files, this_command())
     if json:
         print_json(report)
     else:
