@@ -11,8 +11,9 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from antdrive.robots.spec import NOISE_RANGE, Footprint, Noise, RobotSpec
+from antdrive.worlds.errors import input_error
 from antdrive.worlds.files.checks import SchemaVersion, check, suggest
-from antdrive.worlds.files.document import Document, input_error, read_document
+from antdrive.worlds.files.document import Document, read_document
 
 _CATALOG = Path(__file__).with_name("catalog")
 _RULES = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)

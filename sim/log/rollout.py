@@ -157,7 +157,8 @@ class Rollout:
 
         task = task_from_dict(self.meta["task"], "rollout")
         lines = [(self.route, "#182242", True), (self.pose[::12, :2], LINE, False)]
-        picture = world_svg(task.world, start=task.start, goal=(*task.goal, task.goal_tolerance), lines=lines)
+        goal = (*task.goal, task.goal_tolerance)
+        picture = world_svg(task.world.bounds, task.world.discs, start=task.start, goal=goal, lines=lines)
         facts = {"planner": self.meta["planner"]["name"], "robot": self.meta["robot"]["name"], "time": f"{self.t[-1]:.1f} s",
                  "least clearance": f"{self.clearance.min():.3f} m"}  # fmt: skip
         return card(picture, f"{task.world.name}: {self.outcome.value}", facts)

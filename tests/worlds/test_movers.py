@@ -102,25 +102,25 @@ def test_pingpong_comes_back_the_same_way():
 def test_teleport_appears_at_the_first_place_and_says_when():
     mover = Keyframed(radius=0.3, keyframes=ELL, loop="teleport")
     moving = traffic(mover)
-    assert moving.teleports(10.5)[0].tolist() == [4.0, 7.0, 10.0]
+    assert moving.jump_times(10.5)[0].tolist() == [4.0, 7.0, 10.0]
     np.testing.assert_allclose(at(mover, [3.999, 4.0, 4.5]), [(6, 3.998), (2, 2), (3, 2)])
     t = np.arange(0, 11, 0.25)
     assert t[1:][moving.jumps(t)[:, 0]].tolist() == [4.0, 7.0, 10.0]
     later = traffic(dataclasses.replace(mover, phase=3.5))
-    assert later.teleports(4.0)[0].tolist() == [0.5, 3.5]
+    assert later.jump_times(4.0)[0].tolist() == [0.5, 3.5]
 
 
 @pytest.mark.parametrize("loop", ["pingpong", "once"])
 def test_what_does_not_teleport_never_jumps(loop):
     moving = traffic(Keyframed(radius=0.3, keyframes=ELL, loop=loop))
     assert not moving.jumps(FINE).any()
-    assert len(moving.teleports(40)[0]) == 0
+    assert len(moving.jump_times(40)[0]) == 0
 
 
 def test_a_closed_loop_does_not_jump():
     mover = Keyframed(radius=0.3, keyframes=(*ELL, (6.0, 2.0, 2.0)), loop="teleport")
     assert not traffic(mover).jumps(FINE).any()
-    assert len(traffic(mover).teleports(40)[0]) == 0
+    assert len(traffic(mover).jump_times(40)[0]) == 0
 
 
 @given(keyframed(interpolation="catmull-rom"))
@@ -255,7 +255,7 @@ def test_velocity_is_how_the_place_changes_and_travel_never_less(mover):
     coarse = t[::500]
     length = np.add.reduceat(np.hypot(*moved.T) * ~jumped, np.arange(0, 20000, 500))
     assert (length <= moving.travel(coarse)[:, 0] + 1e-9).all()
-    assert jumped.sum() == len(moving.teleports(20)[0])
+    assert jumped.sum() == len(moving.jump_times(20)[0])
 
 
 def test_a_time_has_the_same_bits_whatever_stands_beside_it():
@@ -270,7 +270,7 @@ def test_the_bits_are_the_same_in_another_process(tmp_path):
     save_task(task, tmp_path / "w.yaml")
     code = (
         "import sys, hashlib, numpy as np\n"
-        "from worlds import Trajectories, load_task\n"
+        "from antdrive.worlds import Trajectories, load_task\n"
         "task = load_task(sys.argv[1])\n"
         "places = Trajectories.of(task.world, task.start[:2], 5).positions(np.linspace(0, 40, 4001))\n"
         "print(hashlib.sha256(places.tobytes()).hexdigest(), 'numba' in sys.modules)"

@@ -25,7 +25,8 @@ from antdrive.worlds import (
     task_schema,
     task_to_dict,
 )
-from antdrive.worlds.files.document import input_error, parse_document
+from antdrive.worlds.errors import input_error
+from antdrive.worlds.files.document import parse_document
 from tests.worlds.malformed import GOOD, MALFORMED
 
 TASK = Task(

@@ -63,7 +63,10 @@ def test_speeds_are_those_of_their_class():
         ([3], r"set.json: \[0\]: must be a mapping with name, bounds, start, goal and movers, got 3"),
         ([ONE | {"movers": [4]}], r"set.json: \[0\].movers\[0\]: must be a mapping"),
         ([ONE | {"movers": [{"radius": 0.5}]}], r"\[0\].movers\[0\].keyframes_t_x_y: missing"),
-        ([ONE | {"movers": [MOVER | {"period": 9}]}], r"\[0\].movers\[0\].period: must be 8, which its keyframes last"),
+        (
+            [ONE | {"movers": [MOVER | {"period": 9}]}],
+            r"\[0\].movers\[0\].period: must be 8, the time from the first",
+        ),
         ([ONE | {"movers": [MOVER | {"loop": "back"}]}], r"set.json: one: movers\[0\].loop: must be 'pingpong'"),
         (
             [ONE | {"movers": [MOVER | {"keyframes_t_x_y": [[0, 1], [8, 1]]}]}],
