@@ -30,7 +30,7 @@ from antdrive.sim.cli.commands.worlds.list import list_worlds
 from antdrive.sim.cli.commands.worlds.show import show_world
 from antdrive.sim.cli.console import print_error, print_line
 from antdrive.sim.cli.exits import INTERRUPTED, SUCCEEDED, TERMINATED, WRONG_INPUT
-from antdrive.worlds.errors import InputError
+from antdrive.worlds.errors import FieldError, InputError
 
 #: The commands by name, in the order in which `antdrive --help` lists them. Each returns its exit code.
 COMMANDS: Mapping[str, Callable[..., int]] = MappingProxyType(
@@ -69,7 +69,7 @@ def main() -> None:
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(TERMINATED))  # ends like Ctrl-C: temporary files are removed
     try:
         code = _application()(standalone_mode=False)
-    except InputError as error:
+    except (InputError, FieldError) as error:
         print_error(str(error))
         code = WRONG_INPUT
     except (KeyboardInterrupt, typer.Abort):

@@ -31,8 +31,8 @@ def make_scenario(world: str, planner: str, settings: list[str] | None, robot: s
     except InputError:
         raise
     except ValueError as error:
-        key, _, problem = str(error).partition(": ")
-        raise InputError(f"--{key.replace('_', '-')}: {problem}") from None
+        field, _, problem = str(error).partition(": ")
+        raise InputError(f"--{field.replace('_', '-')}: {problem}") from None
 
 
 def grouped(settings: list[str] | None) -> dict[str, dict[str, str]]:

@@ -12,7 +12,7 @@ from antdrive.sim.cli.exits import SUCCEEDED
 from antdrive.sim.cli.output import task_facts
 from antdrive.sim.cli.parse import numbers
 from antdrive.sim.cli.write import file_name
-from antdrive.worlds.errors import InputError
+from antdrive.worlds.errors import FieldError, InputError
 
 if TYPE_CHECKING:
     from antdrive.worlds import Task
@@ -93,32 +93,34 @@ def import_world(
     cell beside free ground that the start or the goal can reach is fully covered by cylinders, so that the world is
     never wider than the map. The world's source says how far the cylinders protrude from the blocked cells.
     """
-    from antdrive.sim.cli.import_rules import RefusedOption, import_file
+    from antdrive.worlds import import_file
+    from antdrive.worlds.formats.door import IMPORTS, import_format
 
     try:
+        file_format = import_format(path, barn=barn)
         tasks = import_file(
             path,
             start=numbers("--start", start, 3),
             goal=numbers("--goal", goal, 2),
             bounds=numbers("--bounds", bounds, 4),
             cell=cell,
-            barn=barn or None,
+            barn=barn,
             skip_unsupported=skip_unsupported or None,
             unknown=unknown,
             overhang=overhang,
             resolution=resolution,
             problem=problem,
         )
-    except RefusedOption as error:
+    except FieldError as error:
         raise InputError(f"--{error.key.replace('_', '-')}: {error.problem}") from None
-    is_set = path.suffix.lower() == ".json"
+    is_set = file_format is IMPORTS["dynabarn"]
     files = _targets(path, out or Path(path.stem), tasks) if is_set else [_target(path, out)]
     _write(tasks, files)
     if json:
         found = [{**task_facts(task), "files": {"world": str(file)}} for task, file in zip(tasks, files, strict=True)]
         print_json({"worlds": found} if is_set else found[0])
     else:
-        _print(tasks, files, of_cells=path.suffix.lower() in (".yaml", ".yml", ".map"))
+        _print(tasks, files, is_map=file_format.is_map)
     return SUCCEEDED
 
 
@@ -149,11 +151,11 @@ def _write(tasks: "Sequence[Task]", files: Sequence[Path]) -> None:
         save_task(task, file)
 
 
-def _print(tasks: "Sequence[Task]", files: Sequence[Path], *, of_cells: bool) -> None:
+def _print(tasks: "Sequence[Task]", files: Sequence[Path], *, is_map: bool) -> None:
     if len(tasks) == 1:
         world = tasks[0].world
         print_line(f"{world.name}: {len(world.obstacles)} obstacles, {world.source}")
-        if of_cells and len(world.obstacles) > MANY:
+        if is_map and len(world.obstacles) > MANY:
             print_line(f"  more than {MANY} make runs slow to start; a larger --overhang needs fewer of them")
     for file in files:
         print_files({"world": str(file)})

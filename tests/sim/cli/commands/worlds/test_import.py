@@ -130,7 +130,7 @@ def test_no_import_overwrites_its_source_or_an_unnamed_file(antdrive: Call, tmp_
         (["map.pgm"], "map.pgm: is an image; give the map's .yaml file"),
         (
             ["map.txt"],
-            "map.txt: cannot be imported; .sdf, .world, .yaml (map_server), .map (MovingAI) and .json (DynaBARN) can",
+            "map.txt: cannot be imported; files that can be end in .sdf, .world, .yaml (map_server), .map (MovingAI)",
         ),
         (["w.yaml"], "w.yaml: names no image"),
         (["none.yaml"], "none.yaml: no such file"),
@@ -142,7 +142,7 @@ def test_no_import_overwrites_its_source_or_an_unnamed_file(antdrive: Call, tmp_
             "--unknown: a MovingAI map takes",
         ),
         (["made.map", "--bounds", "0,0,1,1"], "--bounds: a MovingAI map brings its own"),
-        (["made.map", "--barn"], "--barn: a MovingAI map takes --start, --goal, --cell, --overhang"),
+        (["made.map", "--barn"], "--barn: a MovingAI map takes start, goal, cell, overhang"),
         (
             ["made.map", "--start", "0.5,0.5,0", "--goal", "2.5,0.5", "--overhang", "0.1"],
             "made.map: overhang: must be at",
@@ -175,10 +175,13 @@ def test_a_refused_import_is_one_line_and_writes_nothing(
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (["worlds", "import", "x.world", "-o", "w.yaml", "--barn", "--goal", "1,2"], "--barn brings its own"),
-        (["worlds", "import", "nothing.world", "-o", "w.yaml"], "nothing.world: cannot be read"),
+        (
+            ["worlds", "import", "x.world", "-o", "w.yaml", "--barn", "--goal", "1,2"],
+            "--goal: a BARN world brings its own",
+        ),
+        (["worlds", "import", "nothing.world", "-o", "w.yaml"], "nothing.world: no such file"),
         (["worlds", "import", "nothing.json", "-o", "folder"], "nothing.json: no such file"),
-        (["worlds", "import", "x.json", "-o", "folder", "--goal", "1,2"], "--goal: DynaBARN brings its own"),
+        (["worlds", "import", "x.json", "-o", "folder", "--goal", "1,2"], "--goal: a DynaBARN set brings its own"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
