@@ -53,7 +53,7 @@ def drive(name: str, task: Any, planner: str, robot: str, **settings: Any) -> Re
         return Result(name, done.outcome.name, False, 0, {}, math.nan, {})
     error, speed = tracking_error(log), log.twist[:, 0]
     near = {v: error[np.abs(speed - v) < 0.1 * v][::8].tolist() for v in (0.5, 1.0, 2.0)}
-    optimum = float(log.meta["plan"]["euclidean_optimum_m"])
+    optimum = log.record.plan.euclidean_optimum_m or math.inf
     return Result(name, done.outcome.name, done.succeeded, len(log.contacts), measure(log), optimum, near)
 
 

@@ -85,17 +85,19 @@ def drive(
     log = done.rollout
     if log is None:
         return Result(name, done.outcome, math.nan, 0, False, done.reason)
-    replans = len(log.meta.get("replans", ()))
+    replans = len(log.record.replans)
     return Result(name, done.outcome, float(log.t[-1]), replans, done.succeeded, done.reason)
 
 
 def told(results: Sequence[Result]) -> list[str]:
     """The columns that every table has: succeeded, the three kinds of contact, other ends, time."""
     ends = collections.Counter(r.outcome for r in results)
-    touches = [str(ends.pop(kind, 0)) for kind in (Outcome.COLLIDED, Outcome.RUN_INTO, Outcome.JUMPED_ON)]
+    touches = [
+        str(ends.pop(kind, 0)) for kind in (Outcome.COLLIDED, Outcome.HIT_WHILE_STANDING, Outcome.HIT_BY_TELEPORT)
+    ]
     good = [r.duration for r in results if r.certified]
     unsure = ends.pop(Outcome.SUCCEEDED, 0) - len(good)
-    named = {end.name.lower(): n for end, n in ends.items()} | ({"not certified": unsure} if unsure else {})
+    named = {end.key: n for end, n in ends.items()} | ({"not certified": unsure} if unsure else {})
     others = ", ".join(f"{n} {name}" for name, n in sorted(named.items())) or "–"
     share = f"{len(good)} of {len(results)} ({100 * len(good) / max(1, len(results)):.1f} %)"
     return [share, *touches, others, f"{statistics.mean(good):.1f} s" if good else "–",

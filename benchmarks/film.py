@@ -69,7 +69,7 @@ def cut(rollout: Rollout, seconds: float) -> Rollout:
 
 
 def speed(rollout: Rollout) -> None:
-    count = len(rollout.meta["task"]["obstacles"])
+    count = len(rollout.record.world.obstacles)
     print(f"{count} cylinders; best of {ROUNDS}; a moving camera renders in {processes()} processes")
     print("camera    size        film fps   on one core   full frames, bare   2x2 finer, bare")
     with tempfile.TemporaryDirectory() as folder:

@@ -4,7 +4,8 @@ from .log.certificate import Certificate as Certificate
 from .log.certificate import certify as certify
 from .log.metrics import METRICS as METRICS
 from .log.metrics import measure as measure
-from .log.rollout import Outcome as Outcome
+from .log.outcome import Outcome as Outcome
+from .log.record import DriveRecord as DriveRecord
 from .log.rollout import Rollout as Rollout
 from .physics.engine import Engine as Engine
 from .pipeline import Run as Run

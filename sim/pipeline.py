@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 import platform
 import time
 import zlib
@@ -31,9 +30,21 @@ from antdrive.sim.driving.perception import Perception, Predictor
 from antdrive.sim.driving.replanning import CellwiseMonitor, Replan, ReplanMonitor, ReplanPolicy
 from antdrive.sim.log.certificate import Certificate, certify
 from antdrive.sim.log.metrics import measure
-from antdrive.sim.log.rollout import SCHEMA, Outcome, Rollout
+from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.log.record import (
+    ComponentRecord,
+    DriveRecord,
+    PerceptionRecord,
+    PlanRecord,
+    ReplanRecord,
+    SmoothingRecord,
+    TimesRecord,
+    finite_or_none,
+    settings_of,
+)
+from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.physics.engine import Engine
-from antdrive.worlds import Disc, Grid, Route, Task, Trajectories, World, load_task, rasterise, task_to_dict
+from antdrive.worlds import Disc, Grid, Route, Task, Trajectories, World, load_task, rasterise
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,7 +156,7 @@ class Run:
     @property
     def reason(self) -> str:
         """What the outcome's sentence leaves open, if anything."""
-        return str(self.rollout.meta["reason"]) if self.rollout is not None else self.plan.reason
+        return self.rollout.record.reason if self.rollout is not None else self.plan.reason
 
     @property
     def succeeded(self) -> bool:
@@ -160,7 +171,7 @@ class Run:
             "planner": _name(s),
             "robot": s.robot.name,
             "seed": s.seed,
-            "outcome": self.outcome.name.lower(),
+            "outcome": self.outcome.key,
             "sentence": self.outcome.value,
             "reason": self.reason,
             "succeeded": self.succeeded,
@@ -234,10 +245,44 @@ def _record(
     limit: float,
     wall: float,
 ) -> Rollout:
-    task = task_to_dict(s.task)
-    known = len(s.task.world.obstacles)
-    task["obstacles"] += [dataclasses.asdict(disc) for disc in s.unseen]
+    """The rollout of a drive: its arrays, and the record of what it came from."""
     query = Query.between(grid, s.task)
+    sees, yields, among_movers = s.sees, s.yields, bool(s.built.movers)
+    record = DriveRecord(
+        task=s.task,
+        unseen=s.unseen,
+        seed=s.seed,
+        planner=ComponentRecord(name=_name(s), settings=settings_of(answer.options)),
+        plan=PlanRecord(
+            cost_m=answer.cost,
+            length_m=answer.line_length,
+            grid_optimum_m=finite_or_none(PLANNERS["astar"].plan(query, s.rng("optimum")).cost),
+            euclidean_optimum_m=finite_or_none(PLANNERS["tangent"].plan(query, s.rng("optimum")).line_length),
+            work=answer.work,
+            work_unit=answer.work_unit,
+        ),
+        robot=s.robot,
+        controller=ComponentRecord(name=type(s.controller).__name__, settings=settings_of(s.controller)),
+        smoothing=SmoothingRecord(asked=s.smoothing, made=route.kind, note=route.note),
+        perception=PerceptionRecord(kind=sees.told, range_m=finite_or_none(sees.reach)) if among_movers else None,
+        avoidance=settings_of(yields) if among_movers and yields else None,
+        replanning=settings_of(s.replanning) if among_movers and s.replanning else None,
+        replans=tuple(_replan_record(replan) for replan in replans),
+        limiters=LIMITERS,
+        noise=s.noise,
+        margin=s.margin,
+        inflate=s.inflate,
+        cell=grid.cell,
+        physics_hz=s.physics_hz,
+        control_hz=s.control_hz,
+        time_limit=limit,
+        outcome=log.outcome,
+        reason=log.reason,
+        versions=versions(),
+        times=TimesRecord(
+            plan_s=answer.wall_s, drive_wall_s=wall, replans_s=tuple(replan.wall_s for replan in replans)
+        ),
+    )
     return Rollout(
         t=log.t,
         pose=log.pose,
@@ -250,55 +295,19 @@ def _record(
         estimate=log.estimate,
         route=route.xy,
         cells=answer.cells,
-        meta={
-            "schema": SCHEMA,
-            "task": task,
-            "unseen": list(range(known, known + len(s.unseen))),
-            "planner": {"name": _name(s), "options": _plain(answer.options)},
-            "plan": {
-                "status": answer.status.name.lower(),
-                "cost_m": answer.cost,
-                "length_m": answer.line_length,
-                "grid_optimum_m": PLANNERS["astar"].plan(query, s.rng("optimum")).cost,
-                "euclidean_optimum_m": PLANNERS["tangent"].plan(query, s.rng("optimum")).line_length,
-                "work": answer.work,
-                "work_unit": answer.work_unit,
-            },
-            "robot": dataclasses.asdict(s.robot),
-            "controller": {"name": type(s.controller).__name__, **dataclasses.asdict(s.controller)},
-            **(_among_movers(s, replans) if s.built.movers else {}),
-            "limiters": list(LIMITERS),
-            "route": {"asked": s.smoothing, "kind": route.kind, "note": route.note},
-            "noise": s.noise,
-            "margin": s.margin,
-            "inflate": s.inflate,
-            "cell": grid.cell,
-            "seed": s.seed,
-            "rows": "physics",
-            "physics_hz": s.physics_hz,
-            "control_hz": s.control_hz,
-            "time_limit": limit,
-            "outcome": log.outcome.name.lower(),
-            "reason": log.reason,
-            "versions": versions(),
-            "times": {"plan_s": answer.wall_s, "drive_wall_s": wall, **_replan_times(replans)},
-        },
+        record=record,
     )
 
 
-def _among_movers(s: Scenario, replans: list[Replan]) -> dict[str, Any]:
-    """What records tell of a drive among movers."""
-    sees, yields = s.sees, s.yields
-    return {
-        "knowledge": {"told": sees.told, "reach_m": sees.reach if math.isfinite(sees.reach) else None},
-        "yielding": dataclasses.asdict(yields) if yields else None,
-        "replanning": dataclasses.asdict(s.replanning) if s.replanning else None,
-        "replans": [replan.as_dict() for replan in replans],
-    }
-
-
-def _replan_times(replans: list[Replan]) -> dict[str, list[float]]:
-    return {"replans_s": [replan.wall_s for replan in replans]} if replans else {}
+def _replan_record(replan: Replan) -> ReplanRecord:
+    return ReplanRecord(
+        t=replan.t,
+        trigger=replan.cause,
+        solved=replan.solved,
+        cost_m=finite_or_none(replan.cost),
+        work=replan.work,
+        route=tuple((x, y) for x, y in np.round(replan.route, 4).tolist()),
+    )
 
 
 def versions() -> dict[str, str]:
@@ -309,8 +318,3 @@ def versions() -> dict[str, str]:
 
 def _name(s: Scenario) -> str:
     return s.planner_name or type(s.planner).__name__
-
-
-def _plain(options: Any) -> dict[str, Any]:
-    """Planner options as JSON can hold them."""
-    return {k: v if isinstance(v, bool | int | float | str | None) else str(v) for k, v in dict(options).items()}

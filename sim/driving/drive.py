@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -26,7 +25,7 @@ from antdrive.sim.driving.perception import Predictor
 from antdrive.sim.driving.replanning import MISSED, ReplanMonitor
 from antdrive.sim.driving.schedule import held
 from antdrive.sim.log.contacts import touches
-from antdrive.sim.log.rollout import Outcome
+from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.physics.engine import Engine
 from antdrive.worlds import Floats, Pose, Task, Trajectories
 
@@ -198,7 +197,7 @@ def _blame(
     first = touches(
         contacts, pose, twist, movers, traffic.jumps(t),
         hz=engine.physics_hz, discs=discs, radii=traffic.radii,
-        footprint=dataclasses.asdict(engine.robot.footprint), deceleration=engine.robot.max_acceleration,
+        footprint=engine.robot.footprint, deceleration=engine.robot.max_acceleration,
     )[0]  # fmt: skip
     m, before = first.obstacle - discs, max(first.step - 1, 0)
     if not 0 <= m < len(traffic):

@@ -30,6 +30,7 @@ from antdrive.planners import (
 from antdrive.robots import PurePursuit, RobotSpec, TrackedPath
 from antdrive.sim.driving.perception import Predictor
 from antdrive.sim.driving.schedule import Schedule
+from antdrive.sim.log.record import DECISION
 from antdrive.worlds import Disc, Floats, Grid, Pose, Route, Task, rasterise, segment_clearance
 
 if TYPE_CHECKING:
@@ -37,7 +38,6 @@ if TYPE_CHECKING:
 
 
 MISSED = "missed the goal"
-DECISION = "decision"  # of a robot that decides at every cell
 DECIDE = 0.2  # between two decisions of a robot that decides cell by cell, at least [s]
 
 

@@ -1,51 +1,77 @@
-"""Whether a logged drive touched anything: three readings that must agree. Needs numpy alone.
+"""Certify from a drive's log that nothing was touched: three readings that must agree. Needs numpy alone.
 
 1. PyBullet's contacts of the chassis, at every physics step.
-2. The closed-form distance between footprint and obstacles at every logged pose, computed here once more.
-3. A bound on what can happen between two logged poses: no point of the footprint moves farther than the axle's centre
+2. The distance between footprint and obstacles in closed form at every logged pose, computed here a second time.
+3. A bound on what can happen between two logged poses. No point of the footprint moves farther than the axle's centre
    travels plus the footprint's radius times the turn, so the clearance in between is at least
-   (c_i + c_{i+1} - travel) / 2. To a mover it is at least that with the mover's own travel added; while the mover
-   jumps, min(c_i, c_{i+1}) - travel.
+   (c_i + c_{i+1} - travel) / 2. For a mover its own travel is added; where the mover teleports, the bound is
+   min(c_i, c_{i+1}) - travel.
 
-Movers are where the task's own definition and the run's seed put them, or the log is not certified.
+Movers must be where the record's task and seed put them. Further checks look for a log that was changed or does not
+describe one drive; each is a function `_check_...` that yields a sentence for every fault.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.sim.log.contacts import STANDING, TOUCHED, touches_of
-from antdrive.sim.log.rollout import Outcome, Rollout
+from antdrive.sim.log.contacts import STANDING_SPEED, touches_of
+from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.log.rollout import Rollout
 from antdrive.worlds.trajectories import Trajectories
 
 Floats = npt.NDArray[np.float64]
 
-SAME = 1e-9  # closed-form clearances repeat to this [m]
-AGREE = 0.012  # contact points describe the pose before a step, and a robot pushes some mm into what it hits [m]
-# How far a pose may differ from where the measured speed leads: in one step, and over a quarter of a second, where errors
-# would add up but rounding does not. Genuine runs stay below 0.1 mm and 1.2 mm, on a slippery floor below 0.6 mm and 31 mm.
-SLIP, SLIP_TURN = 0.001, 0.002  # [m], [rad]
-DRIFT, DRIFT_SHARE, DRIFT_TURN = 0.01, 0.06, 0.05  # [m], of the distance covered, [rad]
-WINDOW = 0.25  # [s]
+SAME_CLEARANCE = 1e-9  # closed-form distances, computed twice, agree to this [m]
+# Contact points describe the pose before a step, and a robot pushes some millimetres into what it hits. Physics and
+# closed form disagree if a contact is reported with more clearance than this [m].
+CONTACT_SLACK = 0.012
+START_SLACK, START_TURN_SLACK = 0.005, 0.01  # between the first row and the task's start [m], [rad]
+# How far poses may differ from where measured speeds lead: in one step, and over a quarter of a second, where errors
+# would add up but rounding does not. Genuine drives stay below 0.1 mm and 1.2 mm, on a slippery floor below 0.6 mm and
+# 31 mm.
+STEP_SLIP, STEP_SLIP_TURN = 0.001, 0.002  # [m], [rad]
+DRIFT, DRIFT_SHARE, DRIFT_TURN = 0.01, 0.06, 0.05  # [m], fraction of the distance covered, [rad]
+DRIFT_WINDOW = 0.25  # [s]
 
 
 @dataclass(frozen=True)
 class Certificate:
-    """What the log proves."""
+    """What the log proves.
 
-    certified: bool  # robot and obstacles, moving or not, never touched, and every reading agrees
-    contacts: int  # PyBullet's contact points with obstacles, movers and walls
-    min_clearance: float  # closed form, over all logged poses [m]
-    bound: float  # the clearance that is certain also between the logged poses [m]
-    problems: tuple[str, ...]  # a sentence each: why it is not certified
+    Attributes:
+        certified: whether robot and obstacles, standing or moving, provably never touched and all readings agree
+        contacts: number of PyBullet's contact points with cylinders, movers and walls
+        min_clearance: the least closed-form clearance at the logged poses [m]; NaN for a log of wrong shape
+        bound: the clearance that is certain between the logged poses, too [m]; NaN for a log of wrong shape
+        problems: why the drive is not certified, a sentence each
+    """
+
+    certified: bool
+    contacts: int
+    min_clearance: float
+    bound: float
+    problems: tuple[str, ...]
+
+    @property
+    def verdict(self) -> str:
+        """Whether the drive is certified, in words."""
+        return "certified collision-free" if self.certified else "NOT certified collision-free"
+
+    @property
+    def sentence(self) -> str:
+        """The verdict with the distances that it rests on."""
+        least, bound = in_metres(self.min_clearance), in_metres(self.bound)
+        return f"{self.verdict}: least clearance {least}, between steps at least {bound}"
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values, for JSON."""
+        """The certificate as plain values, for JSON."""
         return {
             "certified": self.certified,
             "contacts": self.contacts,
@@ -56,61 +82,56 @@ class Certificate:
 
 
 def in_metres(value: float) -> str:
-    """A distance to a tenth of a millimetre, finer where that would read as nothing."""
+    """A distance as text, to a tenth of a millimetre, and finer for distances that would read as 0.
+
+    Args:
+        value: the distance [m]
+    """
     return f"{value:.4f} m" if abs(value) >= 5e-5 or value == 0 else f"{value:.1e} m"
 
 
 def certify(rollout: Rollout) -> Certificate:
-    """Check a drive from its log alone."""
+    """Check from the log alone whether the robot and obstacles never touched."""
+    touched = len(rollout.contacts)
     problems = rollout.problems()
     if problems:
-        return Certificate(False, len(rollout.contacts), math.nan, math.nan, tuple(problems))
+        return Certificate(False, touched, math.nan, math.nan, tuple(problems))
     try:
-        traffic = rollout.traffic()
+        movers = rollout.trajectories()
     except ValueError as error:
-        return Certificate(False, len(rollout.contacts), math.nan, math.nan, (f"meta.task.{error}",))
+        return Certificate(False, touched, math.nan, math.nan, (f"record.task: {error}",))
     still, moving = _clearances(rollout)
     clearance = np.minimum(still, moving.min(axis=1, initial=math.inf))
-    bound = float(_between_steps(rollout, traffic, still, moving).min())
-    least = float(clearance.min())
-    touched = len(rollout.contacts)
-    if touched:
-        step = int(rollout.contacts[0, 0])
-        problems.append(f"physics reports {touched} contact points, the first at t = {rollout.t[step]:.3f} s")
-        if float(clearance[max(0, step - 1) : step + 2].min()) > AGREE:
-            problems.append(
-                f"readings disagree: physics touches at step {step}, closed form says {clearance[step]:.4f} m apart"
-            )
-    if not least > 0:
-        at = int(clearance.argmin())
-        problems.append(
-            f"closed form: the robot overlaps an obstacle by {in_metres(-least)} at t = {rollout.t[at]:.3f} s"
-        )
-        if not touched:
-            problems.append("readings disagree: closed form overlaps, physics reports no contact")
-    elif not bound > 0:
-        problems.append(f"between two logged poses a contact cannot be ruled out (bound {bound:.4f} m)")
-    problems += _tampering(rollout, traffic, clearance)
-    return Certificate(not problems, touched, least, bound, tuple(problems))
+    bound = float(_between_steps(rollout, movers, still, moving).min())
+    problems = [
+        *_check_readings(rollout, clearance, bound),
+        *_check_digest(rollout),
+        *_check_times(rollout),
+        *_check_clearances(rollout, clearance),
+        *_check_movers(rollout, movers),
+        *_check_start(rollout),
+        *_check_motion(rollout),
+        *_check_outcome(rollout),
+    ]
+    return Certificate(not problems, touched, float(clearance.min()), bound, tuple(problems))
 
 
 def closed_form_clearance(rollout: Rollout) -> Floats:
-    """Distance from footprint to the nearest surface of disc, mover or wall at each logged pose, shape (T,) [m].
+    """The distance from the footprint to the nearest cylinder, mover or wall at each logged pose, shape (T,) [m].
 
-    Written independently of the compiled geometry that the drive uses, so that one checks the other.
+    The code shares nothing with the compiled geometry that the drive uses, so that one checks the other.
     """
     still, moving = _clearances(rollout)
     return np.asarray(np.minimum(still, moving.min(axis=1, initial=math.inf)))
 
 
 def _clearances(rollout: Rollout) -> tuple[Floats, Floats]:
-    """Distances from the footprint to what stands still (T,) and to each mover (T, M) [m]."""
-    foot = rollout.meta["robot"]["footprint"]
-    half = np.array([foot["half_length"], foot["half_width"]])
-    rounding = foot["rounding"]
-    task = rollout.meta["task"]
-    xmin, ymin, xmax, ymax = task["bounds"]
-    discs = np.array([(d["x"], d["y"], d["radius"]) for d in task["obstacles"]]).reshape(-1, 3)
+    """The distances from the footprint to the nearest cylinder or wall (T,) and to each mover (T, M) [m]."""
+    foot, world = rollout.record.robot.footprint, rollout.record.world
+    half = np.array([foot.half_length, foot.half_width])
+    rounding = foot.rounding
+    xmin, ymin, xmax, ymax = world.bounds
+    discs = world.discs
     x, y, yaw = rollout.pose.T
     rotation = np.abs(np.stack([np.cos(yaw), np.sin(yaw)]))
     reach_x = half @ rotation + rounding
@@ -128,107 +149,144 @@ def _clearances(rollout: Rollout) -> tuple[Floats, Floats]:
             break
         nearest = distance(rows, (discs[:, 0] + 1j * discs[:, 1])[None], discs[:, 2]).min(axis=1)
         best[rows] = np.minimum(best[rows], nearest)
-    radii = np.array([mover["radius"] for mover in task.get("movers") or []])
+    radii = np.array([mover.radius for mover in world.movers])
     moving = np.empty((len(x), len(radii)))
     for rows in np.array_split(np.arange(len(x)), 1 + moving.size // 1_000_000):
         if not len(radii):
             break
-        places = rollout.movers[rows]
-        moving[rows] = distance(rows, places[..., 0] + 1j * places[..., 1], radii)
+        centres = rollout.movers[rows]
+        moving[rows] = distance(rows, centres[..., 0] + 1j * centres[..., 1], radii)
     return np.asarray(best), moving
 
 
-def _between_steps(rollout: Rollout, traffic: Trajectories, still: Floats, moving: Floats) -> Floats:
-    """A lower bound of the clearance in each interval between two rows (one interval of no length for one row)."""
+def _between_steps(rollout: Rollout, movers: Trajectories, still: Floats, moving: Floats) -> Floats:
+    """A lower bound of the clearance between each row and the next, shape (T - 1,) [m]; of one row, its clearance."""
     if len(still) < 2:
         return np.asarray(np.minimum(still, moving.min(axis=1, initial=math.inf)))
-    foot = rollout.meta["robot"]["footprint"]
-    radius = math.hypot(foot["half_length"], foot["half_width"]) + foot["rounding"]
+    radius = rollout.record.robot.footprint.radius
     dt = np.diff(rollout.t)
     moved = np.hypot(*np.diff(rollout.pose[:, :2], axis=0).T)
     turned = np.abs(_wrapped(np.diff(rollout.pose[:, 2])))
     speed = np.maximum(*np.abs([rollout.twist[:-1], rollout.twist[1:]]))
     travel = np.maximum(moved, speed[:, 0] * dt) + radius * np.maximum(turned, speed[:, 1] * dt)
     bound = (still[:-1] + still[1:] - travel) / 2
-    if traffic:
+    if movers:
         t = _clock(rollout)
-        both = travel[:, None] + traffic.travel(t)
+        both = travel[:, None] + movers.travel(t)
         steady = (moving[:-1] + moving[1:] - both) / 2
-        jumping = np.minimum(moving[:-1], moving[1:]) - both
-        bound = np.minimum(bound, np.where(traffic.jumps(t), jumping, steady).min(axis=1))
+        teleporting = np.minimum(moving[:-1], moving[1:]) - both
+        bound = np.minimum(bound, np.where(movers.jumps(t), teleporting, steady).min(axis=1))
     return np.asarray(bound)
 
 
 def _clock(rollout: Rollout) -> Floats:
-    """What the times of the rows must be, shape (T,) [s]."""
-    return np.asarray(np.arange(len(rollout.t)) / rollout.meta["physics_hz"])
+    """The times that the rows must have, shape (T,) [s]."""
+    return np.asarray(np.arange(len(rollout.t)) / rollout.record.physics_hz)
 
 
 def _wrapped(angle: Floats) -> Floats:
     return np.asarray((angle + math.pi) % (2 * math.pi) - math.pi)
 
 
-def _tampering(rollout: Rollout, traffic: Trajectories, clearance: Floats) -> list[str]:
-    """Signs that a log does not tell of one drive: rows that do not follow from each other or from the task."""
-    meta, pose, problems = rollout.meta, rollout.pose, []
-    if meta.get("digest") not in (None, rollout.digest):
-        problems.append("digest: the log was changed after it was written")
+def _check_readings(rollout: Rollout, clearance: Floats, bound: float) -> Iterator[str]:
+    """Physics, closed form and bound must agree that there is clearance at every moment."""
+    touched, least = len(rollout.contacts), float(clearance.min())
+    if touched:
+        step = int(rollout.contacts[0, 0])
+        yield f"physics reports {touched} contact points, the first at t = {rollout.t[step]:.3f} s"
+        if float(clearance[max(0, step - 1) : step + 2].min()) > CONTACT_SLACK:
+            yield (
+                f"readings disagree: physics reports a contact at row {step}, "
+                f"closed form a clearance of {clearance[step]:.4f} m"
+            )
+    if not least > 0:
+        at = float(rollout.t[clearance.argmin()])
+        yield f"closed form: the robot overlaps an obstacle by {in_metres(-least)} at t = {at:.3f} s"
+        if not touched:
+            yield "readings disagree: closed form finds an overlap, physics reports no contact"
+    elif not bound > 0:
+        yield f"between two logged poses a contact cannot be ruled out (bound {bound:.4f} m)"
+
+
+def _check_digest(rollout: Rollout) -> Iterator[str]:
+    """The log must still be as it was saved."""
+    if rollout.record.digest not in (None, rollout.digest):
+        yield "digest: the log was changed after it was written"
+
+
+def _check_times(rollout: Rollout) -> Iterator[str]:
+    """Rows must be at the physics rate."""
     if not np.allclose(rollout.t, _clock(rollout), rtol=0, atol=1e-9):
-        problems.append(f"t: rows are not {meta['physics_hz']} a second")
-    if not np.abs(rollout.clearance - clearance).max() <= SAME:
-        at = int(np.abs(rollout.clearance - clearance).argmax())
-        problems.append(
+        yield f"t: the rows are not at {rollout.record.physics_hz} Hz"
+
+
+def _check_clearances(rollout: Rollout, clearance: Floats) -> Iterator[str]:
+    """Logged clearances must be those of the logged poses."""
+    error = np.abs(rollout.clearance - clearance)
+    if not error.max() <= SAME_CLEARANCE:
+        at = int(error.argmax())
+        yield (
             f"clearance: logged {rollout.clearance[at]:.4f} m at t = {rollout.t[at]:.3f} s, "
             f"closed form says {clearance[at]:.4f} m"
         )
-    if traffic:
-        astray = np.abs(rollout.movers - traffic.positions(_clock(rollout))).max(axis=2)
-        if not astray.max() <= SAME:
-            row, m = np.unravel_index(int(astray.argmax()), astray.shape)
-            problems.append(
-                f"movers: movers[{m}] is logged {astray[row, m]:.4f} m off its course at t = {rollout.t[row]:.3f} s"
-            )
-    start = meta["task"]["start"]
-    if np.hypot(*(pose[0, :2] - start[:2])) > 0.005 or abs(_wrapped(pose[0, 2] - start[2])) > 0.01:
-        problems.append(f"pose: the first row is not the task's start {start}")
-    broken = _broken_step(rollout)
-    if broken is not None:
-        problems.append(f"pose: the steps at t = {rollout.t[broken]:.3f} s do not follow from the measured speed")
-    outcome = rollout.outcome
-    if (outcome in TOUCHED) != bool(len(rollout.contacts)):
-        problems.append(f"outcome: {outcome.name.lower()}, with {len(rollout.contacts)} contacts")
-    elif outcome in TOUCHED:
-        first = touches_of(rollout)[0].outcome
-        if outcome is not first:
-            problems.append(f"outcome: {outcome.name.lower()}, but the first contact tells of {first.name.lower()}")
-    if outcome is Outcome.SUCCEEDED:
-        goal, tolerance = meta["task"]["goal"], meta["task"]["goal_tolerance"]
-        left = float(np.hypot(*(pose[-1, :2] - goal)))
-        if not left <= tolerance:
-            problems.append(f"outcome: succeeded, but it ends {left:.3f} m from the goal (tolerance {tolerance:g} m)")
-        if not abs(rollout.twist[-1, 0]) <= STANDING:
-            problems.append(f"outcome: succeeded, but it still moves at {rollout.twist[-1, 0]:.3f} m/s at the end")
-    return problems
 
 
-def _broken_step(rollout: Rollout) -> int | None:
-    """The row from which poses do not follow from measured speeds, if there is one."""
+def _check_movers(rollout: Rollout, movers: Trajectories) -> Iterator[str]:
+    """Movers must be where the record's task and seed put them."""
+    if not movers:
+        return
+    error = np.abs(rollout.movers - movers.positions(_clock(rollout))).max(axis=2)
+    if not error.max() <= SAME_CLEARANCE:
+        row, m = np.unravel_index(int(error.argmax()), error.shape)
+        yield f"movers: movers[{m}] is logged {error[row, m]:.4f} m off its trajectory at t = {rollout.t[row]:.3f} s"
+
+
+def _check_start(rollout: Rollout) -> Iterator[str]:
+    """The drive must begin at the task's start."""
+    pose, start = rollout.pose[0], rollout.record.task.start
+    if np.hypot(*(pose[:2] - start[:2])) > START_SLACK or abs(_wrapped(pose[2] - start[2])) > START_TURN_SLACK:
+        yield f"pose: the first row is not the task's start {list(start)}"
+
+
+def _check_motion(rollout: Rollout) -> Iterator[str]:
+    """Poses must follow from the measured speeds, up to the first contact, which may throw the robot."""
     end = len(rollout.t)
     if len(rollout.contacts):
-        end = max(1, int(rollout.contacts[0, 0]))  # a collision may throw the robot
+        end = max(1, int(rollout.contacts[0, 0]))
     if end < 3:
-        return None
+        return
     pose, twist, dt = rollout.pose[:end], rollout.twist[:end], np.diff(rollout.t[:end])
     heading = np.exp(1j * (pose[:-1, 2] + _wrapped(np.diff(pose[:, 2])) / 2))
     covered = (twist[:-1, 0] + twist[1:, 0]) / 2 * dt
     slip = np.diff(pose[:, 0] + 1j * pose[:, 1]) - heading * covered
     slip_turn = _wrapped(np.diff(pose[:, 2])) - (twist[:-1, 1] + twist[1:, 1]) / 2 * dt
-    broken = (np.abs(slip) > SLIP) | (np.abs(slip_turn) > SLIP_TURN)
-    rows = max(1, round(WINDOW * rollout.meta["physics_hz"]))
+    wrong = (np.abs(slip) > STEP_SLIP) | (np.abs(slip_turn) > STEP_SLIP_TURN)
+    rows = max(1, round(DRIFT_WINDOW * rollout.record.physics_hz))
     if len(slip) >= rows:
         drift, turn, distance = (_summed(values, rows) for values in (slip, slip_turn, np.abs(covered)))
-        broken[: len(drift)] |= (np.abs(drift) > DRIFT + DRIFT_SHARE * distance.real) | (np.abs(turn) > DRIFT_TURN)
-    return int(broken.argmax()) if broken.any() else None
+        wrong[: len(drift)] |= (np.abs(drift) > DRIFT + DRIFT_SHARE * distance.real) | (np.abs(turn) > DRIFT_TURN)
+    if wrong.any():
+        yield f"pose: the steps at t = {rollout.t[wrong.argmax()]:.3f} s do not follow from the measured speed"
+
+
+def _check_outcome(rollout: Rollout) -> Iterator[str]:
+    """The outcome must be that of the first contact, or of a robot that stands at the goal."""
+    outcome, contacts, task = rollout.outcome, len(rollout.contacts), rollout.record.task
+    if outcome.with_contact != bool(contacts):
+        yield f"outcome: {outcome.key}, with {contacts} contacts"
+    elif outcome.with_contact:
+        first = touches_of(rollout)[0].outcome
+        if outcome is not first:
+            yield f"outcome: {outcome.key}, but the first contact was {first.key}"
+    if outcome is Outcome.SUCCEEDED:
+        left, speed = float(np.hypot(*(rollout.pose[-1, :2] - task.goal))), float(rollout.twist[-1, 0])
+        if not left <= task.goal_tolerance:
+            yield (
+                f"outcome: succeeded, but the drive ends {left:.3f} m from the goal "
+                f"(tolerance {task.goal_tolerance:g} m)"
+            )
+        if not abs(speed) <= STANDING_SPEED:
+            yield f"outcome: succeeded, but the robot still moves at {speed:.3f} m/s at the end"
 
 
 def _summed(values: npt.NDArray[Any], rows: int) -> npt.NDArray[Any]:

@@ -1,4 +1,7 @@
-"""Where the margin goes: what a drive used up of the room that planning kept, and how much room is enough."""
+"""The safety margin: what a drive used it up for, and how much of it is enough.
+
+Planners keep the disc around the robot `margin` metres away from every surface. A drive comes closer, for several reasons.
+"""
 
 from __future__ import annotations
 
@@ -12,115 +15,143 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.sim.log.metrics import nearest_on_route
-from antdrive.sim.log.rollout import Outcome, Rollout
-from antdrive.worlds import World, point_clearance, task_from_dict
+from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.log.rollout import Rollout
+from antdrive.worlds import point_clearance
 
 if TYPE_CHECKING:
     from antdrive.sim.pipeline import Run
 
 Floats = npt.NDArray[np.float64]
 
-#: What eats margin.
-EATERS: tuple[str, ...] = (
-    "rounding",  # the route itself comes closer than planned, where start and goal are no cell centres
-    "cutting",  # off the route to the inside of a corner
-    "tracking",  # off the route elsewhere
-    "slip",  # off the route because the wheels did not do what they were told over the last quarter of a second
-    "localisation",  # the robot is not where it believes to be
-)
-CORNER = 0.3  # a bend of the route from this angle on is a corner [rad]
-NEAR_CORNER = 0.6  # and its cutting shows within this distance [m]
-REACTION = 0.25  # slip that is older has been answered by the controller [s]
+#: The causes of a loss of margin, with what each of them is.
+CAUSES: dict[str, str] = {
+    "rounding": "the route comes closer to obstacles than planned, where start and goal are no cell centres",
+    "cutting": "the robot leaves the route to the inside of a corner",
+    "tracking": "the robot leaves the route elsewhere",
+    "slip": "the wheels did not do as commanded during the last quarter of a second",
+    "localisation": "the estimated pose is wrong",
+}
+CORNER = 0.3  # a bend of the route by at least this angle is a corner [rad]
+NEAR_CORNER = 0.6  # leaving the route within this distance of a corner is cutting [m]
+REACTION = 0.25  # the controller has answered slip that is older than this [s]
 
 
 @dataclass(frozen=True)
-class Share:
-    """What one cause ate, at the place where it ate most."""
+class Contribution:
+    """The part of the margin that one cause took, at the place where it took most.
+
+    Attributes:
+        cause: a key of `CAUSES`
+        metres: the largest loss [m]; 0 if the cause never brought the robot closer to an obstacle than planned
+        t: when the loss was largest [s]
+        x: where [m]
+        y: where [m]
+        at_tightest: the loss, or the gain where negative, at the place where the robot had least clearance [m]
+    """
 
     cause: str
-    metres: float  # at most [m]; 0 if it never did any harm
-    t: float  # when [s]
-    x: float  # where [m]
-    y: float  # [m]
-    at_tightest: float  # what it ate, or gave back, where the robot had least room [m]
+    metres: float
+    t: float
+    x: float
+    y: float
+    at_tightest: float
 
 
 @dataclass(frozen=True)
 class Budget:
-    """The margin of one drive, and who ate of it. Rooms are of the disc around the robot, which planning keeps free."""
+    """A drive's safety margin, broken down by cause. Clearances are those of the disc around the robot.
 
-    margin: float  # planned [m]
-    left: float  # the least room that was left [m]
-    t: float  # when [s]
-    x: float  # where [m]
-    y: float  # [m]
-    shares: tuple[Share, ...]  # one a cause, in the order of EATERS; `at_tightest` adds up to margin - left
+    Attributes:
+        margin: the margin that was planned with [m]
+        left: the least clearance that was left of it [m]
+        t: when that was [s]
+        x: where [m]
+        y: where [m]
+        contributions: one for each of `CAUSES`, in that order; their `at_tightest` add up to margin - left
+    """
+
+    margin: float
+    left: float
+    t: float
+    x: float
+    y: float
+    contributions: tuple[Contribution, ...]
 
     @property
-    def largest(self) -> Share:
-        """The cause that ate most."""
-        return max(self.shares, key=lambda share: share.metres)
+    def largest(self) -> Contribution:
+        """The contribution of the cause that took most."""
+        return max(self.contributions, key=lambda part: part.metres)
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values, for JSON."""
+        """The budget as plain values, for JSON."""
         return {**dataclasses.asdict(self), "largest": self.largest.cause}
 
 
 def budget(rollout: Rollout) -> Budget:
-    """Split what a drive used of its margin by cause.
+    """Break a drive's safety margin down by cause.
 
-    At each row margin - room is the sum of: what the route lacks at its point nearest to where the robot believed to be; the
-    room lost from there to that belief, which is cutting near corners and tracking elsewhere, but slip as far as the robot is
-    closer than its last commands would have brought it; and the room lost from belief to truth. Obstacles that the planner
-    was not told of are left out.
+    At each row, margin - clearance is the sum of three losses. The first is at the route's point nearest to the
+    estimated pose, where the route itself may be closer to obstacles than the margin (rounding). The second is from
+    that point to the estimated pose: cutting near corners, else tracking, but slip as far as the robot is closer to an
+    obstacle than its last commands would have brought it. The third is from the estimated to the true pose
+    (localisation). Cylinders that the planner did not know of are left out.
     """
-    world, radius, margin = _known(rollout), _radius(rollout), float(rollout.meta["margin"])
+    margin = rollout.record.margin
     true = np.ascontiguousarray(rollout.pose[:, :2])
-    believed = np.ascontiguousarray(rollout.estimate[:, :2]) if len(rollout.estimate) else true
+    estimated = np.ascontiguousarray(rollout.estimate[:, :2]) if len(rollout.estimate) else true
     foot, cutting = np.empty_like(true), np.empty(len(true), dtype=np.bool_)
-    for rows, line in rollout.legs():
-        foot[rows] = nearest_on_route(believed[rows], line)
-        cutting[rows] = _near_corner(foot[rows], line)
+    for rows, route in rollout.legs():
+        foot[rows] = nearest_on_route(estimated[rows], route)
+        cutting[rows] = _near_corner(foot[rows], route)
 
-    def room(points: Floats) -> Floats:
-        return point_clearance(world, points) - radius
+    def clearance(points: Floats) -> Floats:
+        return point_clearance(rollout.record.task.world, points) - rollout.record.robot.radius
 
-    left, by_belief, on_route = room(true), room(believed), room(foot)
-    off = on_route - by_belief
-    slip = np.clip(room(_commanded(rollout)) - left, 0.0, np.maximum(off, 0.0))
-    eaten = {
+    left, at_estimate, on_route = clearance(true), clearance(estimated), clearance(foot)
+    off_route = on_route - at_estimate
+    slip = np.clip(clearance(_as_commanded(rollout)) - left, 0.0, np.maximum(off_route, 0.0))
+    losses = {
         "rounding": margin - on_route,
-        "cutting": np.where(cutting, off - slip, 0.0),
-        "tracking": np.where(cutting, 0.0, off - slip),
+        "cutting": np.where(cutting, off_route - slip, 0.0),
+        "tracking": np.where(cutting, 0.0, off_route - slip),
         "slip": slip,
-        "localisation": by_belief - left,
+        "localisation": at_estimate - left,
     }
     tightest = int(left.argmin())
-    shares = []
-    for cause in EATERS:
-        # Only where the robot has less room than planned has anything been eaten of it.
-        harm = np.where(left < margin, np.minimum(eaten[cause], margin - left), 0.0)
+    contributions = []
+    for cause in CAUSES:
+        # A loss only counts where the robot is closer to an obstacle than planned.
+        harm = np.where(left < margin, np.minimum(losses[cause], margin - left), 0.0)
         at = int(harm.argmax())
         x, y = true[at].tolist()
         most = max(0.0, float(harm[at]))
-        shares.append(Share(cause, most, float(rollout.t[at]), x, y, float(eaten[cause][tightest])))
+        contributions.append(Contribution(cause, most, float(rollout.t[at]), x, y, float(losses[cause][tightest])))
     x, y = true[tightest].tolist()
-    return Budget(margin, float(left[tightest]), float(rollout.t[tightest]), x, y, tuple(shares))
+    return Budget(margin, float(left[tightest]), float(rollout.t[tightest]), x, y, tuple(contributions))
 
 
 @dataclass(frozen=True)
-class Trial:
-    """All drives with one margin, up to the first that failed."""
+class MarginTrial:
+    """All drives with one margin, up to the first that failed.
 
-    margin: float  # [m]
+    Attributes:
+        margin: the margin that was tried [m]
+        drives: number of drives
+        impassable: number of worlds that this margin closes; they are not counted as drives
+        failed: the seed of the drive that failed: no success, not certified, or too little clearance left; or None
+        left: the least clearance of all drives [m]
+    """
+
+    margin: float
     drives: int
-    impassable: int  # worlds that this margin closes: nothing is learnt from them
-    failed: int | None  # the seed of the drive that did not succeed, certified, with the reserve left
-    left: float  # the least room of all [m]
+    impassable: int
+    failed: int | None
+    left: float
 
     @property
     def safe(self) -> bool:
-        """Whether there were drives and all went well."""
+        """Whether there were drives and none failed."""
         return self.failed is None and self.drives > 0
 
 
@@ -131,10 +162,17 @@ def find_margin(
     reserve: float = 0.005,
     most: float = 0.2,
     resolution: float = 0.005,
-) -> Iterator[Trial]:
-    """Look for the smallest margin [m] with which every seed's drive ends well, with `reserve` of room left, by bisection.
+) -> Iterator[MarginTrial]:
+    """Search by bisection for the smallest margin with which the drives of all seeds succeed.
 
-    `drive(margin, seed)` runs one. Trials come as they are made; the smallest margin of those that are safe is the answer.
+    Trials come as they are made; the smallest margin of those that are safe is the answer.
+
+    Args:
+        drive: runs the scenario with a margin [m] and a seed
+        seeds: the seeds that each margin is tried with
+        reserve: clearance that every drive must leave [m]
+        most: the largest margin to try [m]
+        resolution: margins are multiples of this [m]
 
     Raises:
         ValueError: a setting outside its range.
@@ -142,34 +180,17 @@ def find_margin(
     if not 0 < resolution < most:
         raise ValueError(f"resolution: must be greater than 0 and less than {most:g}, got {resolution:g}")
     hardest_first = list(seeds)
-
-    def tried(margin: float) -> Trial:
-        left, drives, impassable = math.inf, 0, 0
-        for seed in hardest_first:
-            run = drive(margin, seed)
-            if run.outcome is Outcome.NO_PATH:
-                impassable += 1
-                continue
-            drives += 1
-            if run.rollout is not None:
-                left = min(left, budget(run.rollout).left)
-            if not run.succeeded or left < reserve:
-                hardest_first.remove(seed)
-                hardest_first.insert(0, seed)
-                return Trial(margin, drives, impassable, seed, left)
-        return Trial(margin, drives, impassable, None, left)
-
     low, high = (
         0,
         math.ceil(most / resolution),
-    )  # the answer, in steps, is at least low; high is safe or closes everything
-    trial = tried(high * resolution)
+    )  # in steps: the answer is at least low; high is safe or closes all worlds
+    trial = _try_margin(high * resolution, drive, hardest_first, reserve)
     yield trial
     if trial.failed is not None:
         return
     while low < high:
         middle = (low + high) // 2
-        trial = tried(middle * resolution)
+        trial = _try_margin(middle * resolution, drive, hardest_first, reserve)
         yield trial
         if trial.failed is None:
             high = middle
@@ -177,21 +198,29 @@ def find_margin(
             low = middle + 1
 
 
-def _known(rollout: Rollout) -> World:
-    task = task_from_dict(dict(rollout.meta["task"]))
-    unseen = set(rollout.meta.get("unseen", ()))
-    kept = tuple(disc for i, disc in enumerate(task.world.obstacles) if i not in unseen)
-    return dataclasses.replace(task.world, obstacles=kept)
+def _try_margin(
+    margin: float, drive: Callable[[float, int], Run], hardest_first: list[int], reserve: float
+) -> MarginTrial:
+    """Drive with one margin until a drive fails; a seed that fails moves to the front of `hardest_first`."""
+    left, drives, impassable = math.inf, 0, 0
+    for seed in hardest_first:
+        run = drive(margin, seed)
+        if run.outcome is Outcome.NO_PATH:
+            impassable += 1
+            continue
+        drives += 1
+        if run.rollout is not None:
+            left = min(left, budget(run.rollout).left)
+        if not run.succeeded or left < reserve:
+            hardest_first.remove(seed)
+            hardest_first.insert(0, seed)
+            return MarginTrial(margin, drives, impassable, seed, left)
+    return MarginTrial(margin, drives, impassable, None, left)
 
 
-def _radius(rollout: Rollout) -> float:
-    foot = rollout.meta["robot"]["footprint"]
-    return math.hypot(foot["half_length"], foot["half_width"]) + float(foot["rounding"])
-
-
-def _commanded(rollout: Rollout) -> Floats:
-    """Where each row's robot would be, (T, 2), had it done as commanded over the last `REACTION` seconds."""
-    dt = 1.0 / float(rollout.meta["physics_hz"])
+def _as_commanded(rollout: Rollout) -> Floats:
+    """Where the robot would be at each row, (T, 2) [m], if it had done as commanded over the last `REACTION` seconds."""
+    dt = 1.0 / rollout.record.physics_hz
     back = min(round(REACTION / dt), len(rollout.t) - 1)
     turned = np.concatenate(([0.0], np.cumsum(rollout.command[1:, 1] * dt)))
     begin = np.maximum(np.arange(len(rollout.t)) - back, 0)
@@ -201,13 +230,14 @@ def _commanded(rollout: Rollout) -> Floats:
         live = row <= np.arange(len(row))
         row = np.minimum(row, len(row) - 1)
         yaw = rollout.pose[begin, 2] + (turned[row] + turned[row - 1]) / 2 - turned[begin]
-        way = np.where(live, rollout.command[row, 0] * dt, 0.0)
-        xy[:, 0] += way * np.cos(yaw)
-        xy[:, 1] += way * np.sin(yaw)
+        distance = np.where(live, rollout.command[row, 0] * dt, 0.0)
+        xy[:, 0] += distance * np.cos(yaw)
+        xy[:, 1] += distance * np.sin(yaw)
     return xy
 
 
 def _near_corner(points: Floats, route: Floats) -> npt.NDArray[np.bool_]:
+    """Whether points (T, 2) are near a corner of a route (N, 2), shape (T,)."""
     steps = np.diff(route, axis=0)
     heading = np.arctan2(steps[:, 1], steps[:, 0])
     turn = np.abs((np.diff(heading) + np.pi) % (2 * np.pi) - np.pi)

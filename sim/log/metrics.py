@@ -1,114 +1,172 @@
-"""What a drive is worth, from its log alone: one name, one definition, the unit in the name."""
+"""Metrics of a drive, from its log alone. Each is one function with one definition, and has its unit in its name.
+
+`METRICS` is the table of all of them.
+"""
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
 
 from antdrive.sim.log.contacts import touches_of
-from antdrive.sim.log.rollout import Outcome, Rollout
+from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.log.rollout import Rollout
 
 Floats = npt.NDArray[np.float64]
 
-BARN_SPEED = 2.0  # the challenge's reference [m/s]
-BARN_CLOCK = 0.1  # its clock starts when the robot is this far from its start [m]
+BARN_SPEED = 2.0  # the challenge's reference speed [m/s]
+BARN_CLOCK = 0.1  # the challenge's clock starts when the robot is this far from its start [m]
 JERK_WINDOW = 0.1  # measured speed is averaged over this long before it is differentiated [s]
+AVOIDING = "yield"  # the name in `record.limiters` of the rule that avoids movers
+
+
+@dataclass(frozen=True)
+class Metric:
+    """A number that describes a drive. Call it with a rollout.
+
+    Attributes:
+        unit: the unit of the number; "1" for a ratio or a count
+        function: computes the number from a rollout
+    """
+
+    unit: str
+    function: Callable[[Rollout], float]
+
+    @property
+    def name(self) -> str:
+        """The metric's key in `METRICS`, in JSON and in reports."""
+        return self.function.__name__
+
+    @property
+    def definition(self) -> str:
+        """What the number is, in words."""
+        return " ".join((inspect.getdoc(self.function) or "").split())
+
+    def __call__(self, rollout: Rollout | None) -> float:
+        """The number for one drive.
+
+        Raises:
+            ValueError: there is no rollout, because the run ended before the robot drove.
+        """
+        return self.function(_driven(rollout))
+
+
+def _driven(rollout: Rollout | None) -> Rollout:
+    if rollout is None:
+        raise ValueError("rollout: missing; the run ended before the robot drove, so it has no metrics")
+    return rollout
 
 
 def path_length_m(rollout: Rollout) -> float:
-    """Length of the planned path: of its cells, or of a planner's own any-angle line."""
-    return float(rollout.meta["plan"]["length_m"])
+    """Length of the planned path: of its cells, or of the line of an any-angle planner."""
+    return rollout.record.plan.length_m
 
 
 def route_length_m(rollout: Rollout) -> float:
-    """Length of the line that was to be followed."""
+    """Length of the first route that the robot was to follow."""
     return _length(rollout.route)
 
 
 def driven_length_m(rollout: Rollout) -> float:
-    """Length of the way driven by the axle's centre."""
+    """Distance that the axle's centre travelled."""
     return _length(rollout.pose[:, :2])
 
 
 def gap_to_grid_optimum(rollout: Rollout) -> float:
-    """Planned length over Dijkstra's on the same moves, minus 1; any-angle lines fall below 0."""
-    return _over(path_length_m(rollout), rollout.meta["plan"]["grid_optimum_m"])
+    """Planned length over the shortest path on the same grid, minus 1; below 0 where an any-angle line is shorter."""
+    return _over(path_length_m(rollout), rollout.record.plan.grid_optimum_m)
 
 
 def gap_to_euclidean_optimum(rollout: Rollout) -> float:
-    """Route over the exact shortest path among the inflated discs, minus 1."""
-    return _over(route_length_m(rollout), rollout.meta["plan"]["euclidean_optimum_m"])
+    """Length of the route over the exact shortest path among the inflated discs, minus 1."""
+    return _over(route_length_m(rollout), rollout.record.plan.euclidean_optimum_m)
 
 
 def spl(rollout: Rollout) -> float:
     """Success weighted by path length (Anderson et al. 2018): optimum / max(driven, optimum), 0 without success."""
-    optimum = float(rollout.meta["plan"]["euclidean_optimum_m"])
-    if not succeeded(rollout) or not math.isfinite(optimum):
+    optimum = rollout.record.plan.euclidean_optimum_m
+    if not succeeded(rollout) or optimum is None:
         return 0.0
     return optimum / max(driven_length_m(rollout), optimum)
 
 
 def barn(rollout: Rollout) -> float:
-    """The BARN challenge's score: OT / clip(arrival, 2 OT, 8 OT), OT = optimum / 2 m/s; at most 0.5, 0 without success."""
-    fastest = float(rollout.meta["plan"]["euclidean_optimum_m"]) / BARN_SPEED
-    if not succeeded(rollout) or not math.isfinite(fastest):
+    """The BARN challenge's score: OT / clip(arrival, 2 OT, 8 OT), where OT = optimum / 2 m/s; at most 0.5.
+
+    A drive without success scores 0.
+    """
+    optimum = rollout.record.plan.euclidean_optimum_m
+    if not succeeded(rollout) or optimum is None:
         return 0.0
+    fastest = optimum / BARN_SPEED
     return fastest / min(max(arrival_s(rollout), 2 * fastest), 8 * fastest)
 
 
 def min_clearance_m(rollout: Rollout) -> float:
-    """Smallest distance between the robot's surface and an obstacle's or wall's."""
+    """Least distance between the robot's surface and that of an obstacle or wall."""
     return float(rollout.clearance.min())
 
 
 def mean_clearance_m(rollout: Rollout) -> float:
-    """Mean of that distance over time."""
+    """Mean over time of the distance between the robot's surface and the nearest obstacle or wall."""
     return float(rollout.clearance.mean())
 
 
 def tracking_error_max_m(rollout: Rollout) -> float:
-    """Largest distance of the axle's centre from the route that it followed then."""
+    """Largest distance of the axle's centre from the route that was followed at the time."""
     return float(tracking_error(rollout).max())
 
 
 def tracking_error_p95_m(rollout: Rollout) -> float:
-    """95th percentile of that distance over time."""
+    """95th percentile over time of the distance of the axle's centre from the route that was followed at the time."""
     return float(np.percentile(tracking_error(rollout), 95))
 
 
 def duration_s(rollout: Rollout) -> float:
-    """Simulated time."""
+    """Simulated time of the drive."""
     return float(rollout.t[-1])
 
 
 def arrival_s(rollout: Rollout) -> float:
     """Simulated time by the BARN challenge's clock: from 0.1 m off the start until first within the goal's tolerance.
 
-    inf if it never gets there.
+    It is infinite if the robot never gets there.
     """
-    task = rollout.meta["task"]
+    task = rollout.record.task
     xy = rollout.pose[:, :2]
     gone = np.hypot(*(xy - xy[0]).T) >= BARN_CLOCK
-    there = np.hypot(*(xy - task["goal"]).T) <= task["goal_tolerance"]
+    there = np.hypot(*(xy - task.goal).T) <= task.goal_tolerance
     if not there.any():
         return math.inf
     return max(0.0, float(rollout.t[there.argmax()] - rollout.t[gone.argmax()]))
 
 
+def plan_s(rollout: Rollout) -> float:
+    """Wall-clock time of planning before the drive."""
+    return rollout.record.times.plan_s
+
+
+def drive_wall_s(rollout: Rollout) -> float:
+    """Wall-clock time of driving, with physics and replanning."""
+    return rollout.record.times.drive_wall_s
+
+
 def turning_rad_per_m(rollout: Rollout) -> float:
-    """Total change of heading over the length driven."""
+    """Total change of heading over the distance travelled."""
     turned = np.abs((np.diff(rollout.pose[:, 2]) + math.pi) % (2 * math.pi) - math.pi).sum()
     length = driven_length_m(rollout)
     return float(turned / length) if length > 0 else 0.0
 
 
 def jerk_rms(rollout: Rollout) -> float:
-    """Root mean square of the second derivative of the measured speed [m/s^3], smoothed over 0.1 s."""
-    hz = int(rollout.meta["physics_hz"])
+    """Root mean square of the second derivative of the measured speed, smoothed over 0.1 s."""
+    hz = rollout.record.physics_hz
     window = max(1, round(JERK_WINDOW * hz))
     if len(rollout.t) < 3 * window:
         return 0.0
@@ -120,75 +178,82 @@ def jerk_rms(rollout: Rollout) -> float:
 
 
 def contacts_driving(rollout: Rollout) -> float:
-    """How often the robot touched something while it drove."""
+    """Number of times that the robot touched something while it drove."""
     return _touches(rollout, Outcome.COLLIDED)
 
 
 def contacts_standing(rollout: Rollout) -> float:
-    """How often a moving obstacle ran into the robot while it stood still."""
-    return _touches(rollout, Outcome.RUN_INTO)
+    """Number of times that a mover hit the robot while it stood still."""
+    return _touches(rollout, Outcome.HIT_WHILE_STANDING)
 
 
 def contacts_teleported(rollout: Rollout) -> float:
-    """How often a moving obstacle appeared on the robot, or nearer than it could stop."""
-    return _touches(rollout, Outcome.JUMPED_ON)
+    """Number of times that a mover teleported onto the robot, or nearer than the robot could stop."""
+    return _touches(rollout, Outcome.HIT_BY_TELEPORT)
 
 
 def replans(rollout: Rollout) -> float:
-    """How often a new route was looked for while driving."""
-    return float(len(rollout.meta.get("replans", ())))
+    """Number of searches for a new route while driving."""
+    return float(len(rollout.record.replans))
 
 
-def yielding_s(rollout: Rollout) -> float:
-    """Simulated time for which the robot gave way to moving obstacles."""
-    limiters = rollout.meta.get("limiters", ())
-    if "yield" not in limiters:
+def avoiding_s(rollout: Rollout) -> float:
+    """Simulated time for which the robot gave way to movers."""
+    limiters = rollout.record.limiters
+    if AVOIDING not in limiters:
         return 0.0
-    return float((rollout.limiter == limiters.index("yield")).sum() / rollout.meta["physics_hz"])
+    return float((rollout.limiter == limiters.index(AVOIDING)).sum() / rollout.record.physics_hz)
 
 
-METRICS: Mapping[str, Callable[[Rollout], float]] = MappingProxyType(
-    {
-        "path_length_m": path_length_m,
-        "route_length_m": route_length_m,
-        "driven_length_m": driven_length_m,
-        "gap_to_grid_optimum": gap_to_grid_optimum,
-        "gap_to_euclidean_optimum": gap_to_euclidean_optimum,
-        "spl": spl,
-        "barn": barn,
-        "min_clearance_m": min_clearance_m,
-        "mean_clearance_m": mean_clearance_m,
-        "tracking_error_max_m": tracking_error_max_m,
-        "tracking_error_p95_m": tracking_error_p95_m,
-        "duration_s": duration_s,
-        "arrival_s": arrival_s,
-        "plan_s": lambda rollout: float(rollout.meta["times"]["plan_s"]),
-        "drive_wall_s": lambda rollout: float(rollout.meta["times"]["drive_wall_s"]),
-        "turning_rad_per_m": turning_rad_per_m,
-        "jerk_rms": jerk_rms,
-        "contacts_driving": contacts_driving,
-        "contacts_standing": contacts_standing,
-        "contacts_teleported": contacts_teleported,
-        "replans": replans,
-        "yielding_s": yielding_s,
-    }
+_TABLE = (
+    Metric("m", path_length_m),
+    Metric("m", route_length_m),
+    Metric("m", driven_length_m),
+    Metric("1", gap_to_grid_optimum),
+    Metric("1", gap_to_euclidean_optimum),
+    Metric("1", spl),
+    Metric("1", barn),
+    Metric("m", min_clearance_m),
+    Metric("m", mean_clearance_m),
+    Metric("m", tracking_error_max_m),
+    Metric("m", tracking_error_p95_m),
+    Metric("s", duration_s),
+    Metric("s", arrival_s),
+    Metric("s", plan_s),
+    Metric("s", drive_wall_s),
+    Metric("rad/m", turning_rad_per_m),
+    Metric("m/s^3", jerk_rms),
+    Metric("1", contacts_driving),
+    Metric("1", contacts_standing),
+    Metric("1", contacts_teleported),
+    Metric("1", replans),
+    Metric("s", avoiding_s),
 )
 
+#: Every metric by its name, with unit and definition.
+METRICS: Mapping[str, Metric] = MappingProxyType({metric.name: metric for metric in _TABLE})
 
-def measure(rollout: Rollout) -> dict[str, float]:
-    """Every metric of a drive by name."""
-    return {name: metric(rollout) for name, metric in METRICS.items()}
+
+def measure(rollout: Rollout | None) -> dict[str, float]:
+    """Every metric of a drive by its name.
+
+    Raises:
+        ValueError: there is no rollout, because the run ended before the robot drove.
+    """
+    driven = _driven(rollout)
+    return {name: metric(driven) for name, metric in METRICS.items()}
 
 
 def succeeded(rollout: Rollout) -> bool:
-    """Whether the robot stopped at the goal in time without contact."""
+    """Whether the robot stopped at the goal in time and without contact."""
     return rollout.outcome is Outcome.SUCCEEDED
 
 
 def tracking_error(rollout: Rollout) -> Floats:
-    """Distance of the axle's centre from the route in force at each row, shape (T,) [m]."""
+    """The distance of the axle's centre from the route that is followed at each row, shape (T,) [m]."""
     xy = rollout.pose[:, :2]
-    return np.concatenate([np.hypot(*(nearest_on_route(xy[rows], line) - xy[rows]).T) for rows, line in rollout.legs()])
+    legs = rollout.legs()
+    return np.concatenate([np.hypot(*(nearest_on_route(xy[rows], route) - xy[rows]).T) for rows, route in legs])
 
 
 def nearest_on_route(points: Floats, route: Floats) -> Floats:
@@ -209,8 +274,8 @@ def _touches(rollout: Rollout, outcome: Outcome) -> float:
     return float(sum(touch.outcome is outcome for touch in touches_of(rollout)))
 
 
-def _over(length: float, optimum: float) -> float:
-    return length / optimum - 1 if 0 < optimum < math.inf else math.nan
+def _over(length: float, optimum: float | None) -> float:
+    return length / optimum - 1 if optimum else math.nan
 
 
 def _length(xy: Floats) -> float:

@@ -1,119 +1,117 @@
-"""The log of one drive: everything that metrics, certificates and films read.
+"""The log of one drive: everything that metrics, certificates, figures and films read.
 
-The file is a `.npz` readable with numpy alone (no pickles).
+The file is a `.npz` archive that numpy reads without pickles: one member for each array, and the member `record`, a JSON
+text. `docs/rollout-format.md` describes the format.
 """
 
 from __future__ import annotations
 
-import enum
+import dataclasses
 import hashlib
 import itertools
-import json
-import math
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.log.record import DriveRecord
 from antdrive.worlds.errors import InputError
 from antdrive.worlds.files.atomic import written_whole
-from antdrive.worlds.movers import mover_from_dict
 from antdrive.worlds.trajectories import Trajectories
-from antdrive.worlds.world import Disc, World
-
-SCHEMA = 1
-
-
-class Outcome(enum.Enum):
-    """How a run ended. The value is the sentence shown to people.
-
-    The first contact ends a drive, and says whose it is. `COLLIDED`: the robot's own, also with a mover that comes
-    towards it while it drives. `RUN_INTO`: it stood still, and a mover came. `JUMPED_ON`: a mover whose loop teleports
-    appeared on the robot, or nearer than it could stop. The last two are not counted against the planner; but none of
-    the three is a success, and no drive with a contact is certified. See `antdrive.sim.log.contacts` for the exact rule.
-    """
-
-    SUCCEEDED = "stopped at the goal without contact"
-    COLLIDED = "touched an obstacle"
-    RUN_INTO = "was run into by a moving obstacle while it stood still"
-    JUMPED_ON = "a moving obstacle appeared on the robot, or nearer than it could stop"
-    TIMED_OUT = "the time limit passed before the goal was reached"
-    STUCK = "stopped making progress"
-    NO_PATH = "no path on this grid"
-    STOPPED = "planning stopped early"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Rollout:
-    """One drive, a row per physics step; row 0 is the start, before the first step."""
+    """The log of one drive. The first T rows are physics steps; row 0 is the start, before the first step.
 
-    t: npt.NDArray[np.float64]  # (T,) [s]
-    pose: npt.NDArray[np.float64]  # (T, 3) x, y [m], yaw [rad] of the axle's centre
-    twist: npt.NDArray[np.float64]  # (T, 2) measured forward speed [m/s] and yaw rate [rad/s]
-    command: npt.NDArray[np.float64]  # (T, 2) commanded forward speed and yaw rate
-    clearance: npt.NDArray[np.float64]  # (T,) robot's surface to the nearest disc's or wall's [m]
-    limiter: npt.NDArray[np.uint8]  # (T,) the rule that held the speed, index into meta["limiters"]
-    movers: npt.NDArray[np.float64]  # (T, M, 2) centres of moving obstacles [m]; radii are in meta["task"]["movers"]
-    contacts: npt.NDArray[np.float64]  # (K, 4) step, obstacle index (discs, movers, walls), distance [m], force [N]
-    route: npt.NDArray[np.float64]  # (N, 2) the line that was followed [m]
-    cells: npt.NDArray[np.int32]  # (N, 2) the planned cells (row, col)
-    estimate: npt.NDArray[np.float64] = field(
-        default_factory=lambda: np.empty((0, 3))
-    )  # (T, 3) where a noisy robot believed to be
-    meta: Mapping[str, Any]  # world, planner, robot, seed, versions, outcome, times: see `Rollout.save`
+    Attributes:
+        t: simulated time (T,) [s]
+        pose: x, y [m] and yaw [rad] of the axle's centre (T, 3)
+        twist: measured forward speed [m/s] and yaw rate [rad/s] (T, 2)
+        command: commanded forward speed [m/s] and yaw rate [rad/s] (T, 2)
+        clearance: distance from the robot's surface to the nearest cylinder, mover or wall (T,) [m]
+        limiter: the rule that held the robot's speed (T,), an index into `record.limiters`
+        movers: centres of the movers (T, M, 2) [m]
+        contacts: contact points (K, 4): row, obstacle, distance [m] and normal force [N]; obstacles count from 0,
+            first the cylinders, then the movers, then the walls left, right, bottom and top
+        route: points (N, 2) of the first route [m]; `legs` also gives the routes after replans
+        cells: the planned cells (P, 2), (row, col)
+        estimate: the estimated pose (T, 3) of a noisy robot, x, y [m] and yaw [rad]; (0, 3) for a perfect robot
+        record: everything else: scenario, plan and outcome
+    """
+
+    t: npt.NDArray[np.float64]
+    pose: npt.NDArray[np.float64]
+    twist: npt.NDArray[np.float64]
+    command: npt.NDArray[np.float64]
+    clearance: npt.NDArray[np.float64]
+    limiter: npt.NDArray[np.uint8]
+    movers: npt.NDArray[np.float64]
+    contacts: npt.NDArray[np.float64]
+    route: npt.NDArray[np.float64]
+    cells: npt.NDArray[np.int32]
+    estimate: npt.NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))
+    record: DriveRecord
 
     @property
     def outcome(self) -> Outcome:
-        """How the run ended."""
-        return Outcome[str(self.meta["outcome"]).upper()]
+        """How the drive ended."""
+        return self.record.outcome
 
     @property
     def digest(self) -> str:
-        """A SHA-256 of every array and of the metadata that a repetition must reproduce (all but wall times)."""
+        """The SHA-256 of all that a repetition must reproduce: every array and the record without wall-clock times.
+
+        For each array, in the order of this class, the hash takes the line "name dtype shape" and the bytes in C order;
+        at last the record's JSON text, without `digest` and `times`.
+        """
         sha = hashlib.sha256()
-        for name in _ARRAYS:
+        for name in ARRAYS:
             array = np.ascontiguousarray(getattr(self, name))
             sha.update(f"{name} {array.dtype.str} {array.shape}\n".encode())
             sha.update(array.tobytes())
-        kept = {key: value for key, value in self.meta.items() if key not in ("digest", "times")}
-        sha.update(json.dumps(kept, sort_keys=True).encode())
+        sha.update(self.record.to_json(without=("digest", "times")).encode())
         return sha.hexdigest()
 
     def legs(self) -> list[tuple[slice, npt.NDArray[np.float64]]]:
-        """The lines (N, 2) that were followed [m], each with the rows in which it was: the first, then what replans led to."""
-        renewed = [(float(entry["t"]), entry["route"]) for entry in self.meta.get("replans", ()) if entry["solved"]]
-        lines = [self.route, *(np.array(route, dtype=np.float64) for _, route in renewed)]
-        rows = [0, *np.searchsorted(self.t, [t - 1e-9 for t, _ in renewed]).tolist(), len(self.t)]
-        return [(slice(*ends), line) for ends, line in zip(itertools.pairwise(rows), lines, strict=True)]
+        """The routes (N, 2) [m] that were followed, each with its rows: the first route, then one for each replan."""
+        renewals = [replan for replan in self.record.replans if replan.solved]
+        routes = [self.route, *(np.array(replan.route, dtype=np.float64) for replan in renewals)]
+        begins = np.searchsorted(self.t, [replan.t - 1e-9 for replan in renewals]).tolist()
+        ends = itertools.pairwise([0, *begins, len(self.t)])
+        return [(slice(*rows), route) for rows, route in zip(ends, routes, strict=True)]
 
-    def traffic(self) -> Trajectories:
-        """The movers as the log's own task and seed define them.
+    def trajectories(self) -> Trajectories:
+        """The movers as functions of time, from the record's world and seed.
 
         Raises:
-            ValueError: the task defines movers that cannot be.
+            InputError: a mover finds no free cell to start from.
         """
-        task = self.meta["task"]
-        entries = task.get("movers") or []
-        if not entries:
-            return Trajectories(np.empty(0), np.empty(0), ())
-        try:
-            discs = tuple(Disc(d["x"], d["y"], d["radius"], d["height"]) for d in task["obstacles"])
-            world = World("log", tuple(task["bounds"]), discs, movers=tuple(map(mover_from_dict, entries)))
-            return Trajectories.of(world, (task["start"][0], task["start"][1]), self.meta["seed"])
-        except (KeyError, TypeError, AttributeError, OverflowError) as error:
-            raise ValueError(f"movers: {error!r}") from None
+        task = self.record.task
+        return Trajectories.of(self.record.world, task.start[:2], self.record.seed)
 
     def save(self, path: str | Path) -> Path:
-        """Write the log, whole or not at all; the metadata gain the digest."""
+        """Write the log with its digest, whole or not at all.
+
+        Args:
+            path: the file to write, by custom with the suffix .npz
+
+        Raises:
+            InputError: the file cannot be written.
+            ValueError: the record holds what no log can, such as a world without a name.
+        """
         target = Path(path)
-        meta = json.dumps({**self.meta, "digest": self.digest}, sort_keys=True)
+        text = dataclasses.replace(self.record, digest=self.digest).to_json()
+        DriveRecord.from_json(text)  # a log that could not be read again is not written
         with written_whole(target) as temporary, temporary.open("wb") as file:
-            np.savez_compressed(file, meta=np.array(meta), **{name: getattr(self, name) for name in _ARRAYS})
+            np.savez_compressed(file, record=np.array(text), **{name: getattr(self, name) for name in ARRAYS})
         return target
 
     @classmethod
@@ -121,143 +119,128 @@ class Rollout:
         """Read a log.
 
         Raises:
-            InputError: no such file, not a rollout, or written by a newer version.
+            InputError: there is no such file, it is not a rollout, it was written by a later version, or an array or
+                a key of the record is missing or impossible.
         """
-        try:
-            with Path(path).open("rb") as raw, zipfile.ZipFile(raw):  # a plain array is no archive
-                pass
-            with Path(path).open("rb") as raw, np.load(raw, allow_pickle=False) as file:
-                arrays = {name: file[name] for name in (*_ARRAYS, "meta")}
-                meta = json.loads(str(arrays.pop("meta")[()]))
-        except FileNotFoundError:
-            raise InputError(f"{path}: no such file") from None
-        except KeyError as error:
-            raise InputError(f"{path}: not a rollout: {error.args[0]}") from None
-        except RecursionError:
-            raise InputError(f"{path}: meta: nested too deeply") from None
-        except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-            problem = getattr(error, "strerror", None) or str(error).splitlines()[0]
-            raise InputError(f"{path}: not a rollout ({problem})") from None
-        if not isinstance(meta, dict) or meta.get("schema") != SCHEMA:
-            found = meta.get("schema") if isinstance(meta, dict) else meta
-            raise InputError(
-                f"{path}: meta.schema: this version reads rollouts of schema {SCHEMA}, found {found!r:.40}"
-            )
-        if "digest" not in meta:
-            raise InputError(f"{path}: meta.digest: missing; a log that antdrive wrote has one")
-        loaded = cls(**arrays, meta=meta)
-        problems = loaded.problems()
-        if problems:
-            raise InputError(f"{path}: {problems[0]}")
+        with _log_file(path) as file:
+            arrays = {name: file[name] for name in ARRAYS}
+            record = _record_in(file)
+        loaded = cls(**arrays, record=record)
+        for problem in loaded.problems():
+            raise InputError(f"{path}: {problem}")
         return loaded
 
-    def _repr_html_(self) -> str:
-        from antdrive.worlds import task_from_dict
-        from antdrive.worlds.drawing import LINE, card, world_svg
-
-        task = task_from_dict(self.meta["task"], "rollout")
-        lines = [(self.route, "#182242", True), (self.pose[::12, :2], LINE, False)]
-        goal = (*task.goal, task.goal_tolerance)
-        picture = world_svg(task.world.bounds, task.world.discs, start=task.start, goal=goal, lines=lines)
-        facts = {"planner": self.meta["planner"]["name"], "robot": self.meta["robot"]["name"], "time": f"{self.t[-1]:.1f} s",
-                 "least clearance": f"{self.clearance.min():.3f} m"}  # fmt: skip
-        return card(picture, f"{task.world.name}: {self.outcome.value}", facts)
-
     def problems(self) -> list[str]:
-        """What no log of a drive can look like: a sentence for each array or entry of wrong shape or kind."""
-        return [*self._array_problems(), *_meta_problems(self.meta)]
+        """What the arrays of no drive can look like: a sentence for each array of wrong shape or kind."""
+        return list(self._array_problems())
 
     def _array_problems(self) -> Iterator[str]:
         rows = self.t.shape[0] if self.t.ndim else 0
-        shapes = {
-            "t": (rows,), "pose": (rows, 3), "twist": (rows, 2), "command": (rows, 2), "clearance": (rows,),
-            "limiter": (rows,), "contacts": (None, 4), "movers": (rows, None, 2), "route": (None, 2), "cells": (None, 2),
-            "estimate": (rows if np.size(self.estimate) else 0, 3),
-        }  # fmt: skip
         if rows == 0:
             yield "t: the log is empty"
-        for name, shape in shapes.items():
+        for name, shape in _shapes(rows, estimated=bool(np.size(self.estimate))).items():
             array = getattr(self, name)
-            fits = len(array.shape) == len(shape) and all(
-                m in (None, n) for n, m in zip(array.shape, shape, strict=True)
-            )
-            if not fits:
-                yield f"{name}: shape {array.shape} where {_told(shape)} is due"
+            if not _fits(array.shape, shape):
+                yield f"{name}: must have the shape {_shape_text(shape)}, found {array.shape}"
             elif array.dtype.kind not in "fiu":
-                yield f"{name}: holds {array.dtype} where numbers are due"
+                yield f"{name}: must hold numbers, found {array.dtype}"
             elif not np.isfinite(array).all():
-                yield f"{name}: holds numbers that are not finite"
-        steps = self.contacts[:, 0] if self.contacts.ndim == 2 and self.contacts.shape[1:] == (4,) else np.empty(0)
-        if steps.size and steps.dtype.kind in "fiu" and not (steps.min() >= 0 and steps.max() < rows):
-            yield "contacts: a step outside the log"
-        told = _mapping(self.meta.get("task")).get("movers") or []
-        if self.movers.ndim == 3 and isinstance(told, list) and self.movers.shape[1] != len(told):
-            yield f"movers: {self.movers.shape[1]} of them where the task has {len(told)}"
+                yield f"{name}: must hold finite numbers, found others"
+        if _fits(self.contacts.shape, (None, 4)) and self.contacts.dtype.kind in "fiu" and len(self.contacts):
+            steps = self.contacts[:, 0]
+            if not (steps.min() >= 0 and steps.max() < rows):
+                yield f"contacts: must be at rows from 0 to {rows - 1}"
+        count = len(self.record.task.world.movers)
+        if self.movers.ndim == 3 and self.movers.shape[1] != count:
+            yield f"movers: must be {count}, as in the record's task, found {self.movers.shape[1]}"
+        names = len(self.record.limiters)
+        if self.limiter.dtype.kind in "iu" and np.size(self.limiter) and not 0 <= self.limiter.max() < max(1, names):
+            yield f"limiter: must hold indices into the {names} of record.limiters, found {self.limiter.max()}"
+
+    def _repr_html_(self) -> str:
+        from antdrive.worlds.drawing import LINE, card, world_svg
+
+        task = self.record.task
+        lines = [(self.route, "#182242", True), (self.pose[::12, :2], LINE, False)]
+        goal = (*task.goal, task.goal_tolerance)
+        picture = world_svg(self.record.world.bounds, self.record.world.discs, start=task.start, goal=goal, lines=lines)
+        facts = {
+            "planner": self.record.planner.name,
+            "robot": self.record.robot.name,
+            "time": f"{self.t[-1]:.1f} s",
+            "least clearance": f"{self.clearance.min():.3f} m",
+        }
+        return card(picture, f"{task.world.name}: {self.outcome.value}", facts)
 
 
-_ARRAYS = tuple(f.name for f in fields(Rollout) if f.name != "meta")
+#: The names of a log's arrays, in the order of the digest.
+ARRAYS = tuple(entry.name for entry in dataclasses.fields(Rollout) if entry.name != "record")
 
 
-def _told(shape: tuple[int | None, ...]) -> str:
+def read_record(path: str | Path) -> DriveRecord:
+    """The record of a log, without its arrays.
+
+    Raises:
+        InputError: there is no such file, it is not a rollout, or a key of the record is missing or impossible.
+    """
+    with _log_file(path) as file:
+        return _record_in(file)
+
+
+@contextmanager
+def _log_file(path: str | Path) -> Iterator[Any]:
+    """An open log; whatever is wrong with it becomes an InputError of one line that names the file."""
+    try:
+        with Path(path).open("rb") as raw, zipfile.ZipFile(raw):  # np.load also reads a single array; that is no log
+            pass
+        with Path(path).open("rb") as raw, np.load(raw, allow_pickle=False) as file:
+            yield file
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file") from None
+    except _RecordProblem as error:
+        raise InputError(f"{path}: {error}") from None
+    except KeyError as error:
+        raise InputError(f"{path}: not a rollout: {error.args[0]}") from None
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        problem = getattr(error, "strerror", None) or str(error).splitlines()[0]
+        raise InputError(f"{path}: not a rollout ({problem})") from None
+
+
+class _RecordProblem(Exception):
+    """The record of a log is wrong; the message is "record.KEY: problem"."""
+
+
+def _record_in(file: Any) -> DriveRecord:
+    text = str(file["record"][()])
+    try:
+        record = DriveRecord.from_json(text)
+    except ValueError as error:
+        raise _RecordProblem(str(error)) from None
+    if record.digest is None:
+        raise _RecordProblem("record.digest: missing; a log that antdrive wrote has it")
+    return record
+
+
+def _shapes(rows: int, *, estimated: bool) -> dict[str, tuple[int | None, ...]]:
+    """The shape that each array must have; None stands for any length."""
+    return {
+        "t": (rows,),
+        "pose": (rows, 3),
+        "twist": (rows, 2),
+        "command": (rows, 2),
+        "clearance": (rows,),
+        "limiter": (rows,),
+        "movers": (rows, None, 2),
+        "contacts": (None, 4),
+        "route": (None, 2),
+        "cells": (None, 2),
+        "estimate": (rows if estimated else 0, 3),
+    }
+
+
+def _fits(found: tuple[int, ...], shape: tuple[int | None, ...]) -> bool:
+    return len(found) == len(shape) and all(m in (None, n) for n, m in zip(found, shape, strict=True))
+
+
+def _shape_text(shape: tuple[int | None, ...]) -> str:
     return "(" + ", ".join("any" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "") + ")"
-
-
-def _meta_problems(meta: Mapping[str, Any]) -> Iterator[str]:
-    """What is missing or impossible in the metadata that certificates, metrics and films read."""
-    task, robot, plan = (_mapping(meta.get(key)) for key in ("task", "robot", "plan"))
-    foot = _mapping(robot.get("footprint"))
-    checks: list[tuple[str, bool]] = [
-        ("outcome", str(meta.get("outcome")).upper() in Outcome.__members__),
-        ("physics_hz", _numbers([meta.get("physics_hz")], 1) and meta["physics_hz"] >= 1),
-        ("task.bounds", _numbers(task.get("bounds"), 4)),
-        ("task.start", _numbers(task.get("start"), 3)),
-        ("task.goal", _numbers(task.get("goal"), 2)),
-        ("task.goal_tolerance", _numbers([task.get("goal_tolerance")], 1) and task["goal_tolerance"] > 0),
-        ("robot.footprint", _numbers([foot.get(k) for k in ("half_length", "half_width", "rounding")], 3)
-            and min(foot.values()) >= 0 < max(foot.values())),
-        ("plan", all(_numbers([plan.get(k)], 1, finite=False) for k in ("length_m", "grid_optimum_m", "euclidean_optimum_m"))),
-        ("inflate", _numbers([meta.get("inflate")], 1)),
-    ]  # fmt: skip
-    for key, fine in checks:
-        if not fine:
-            yield f"meta.{key}: missing or impossible"
-    obstacles = task.get("obstacles")
-    if not isinstance(obstacles, list):
-        yield "meta.task.obstacles: missing"
-        return
-    for i, disc in enumerate(obstacles):
-        if not (_numbers([_mapping(disc).get(k) for k in ("x", "y", "radius", "height")], 4) and disc["radius"] > 0):
-            yield f"meta.task.obstacles[{i}]: missing or impossible"
-    replans = meta.get("replans", [])
-    if not isinstance(replans, list):
-        yield "meta.replans: impossible"
-        return
-    now = 0.0
-    for i, replan in enumerate(replans):
-        route: Any = _mapping(replan).get("route")
-        fine = _numbers([_mapping(replan).get("t")], 1) and isinstance(route, list)
-        fine = fine and isinstance(replan.get("cause"), str) and replan.get("solved") is (len(route) > 1)
-        if not (fine and replan["t"] >= now and all(_numbers(point, 2) for point in route)):
-            yield f"meta.replans[{i}]: missing or impossible"
-            return
-        now = replan["t"]
-    movers = task.get("movers", [])
-    if not isinstance(movers, list):
-        yield "meta.task.movers: impossible"
-        return
-    for i, mover in enumerate(movers):
-        if not (_numbers([_mapping(mover).get("radius")], 1) and mover["radius"] > 0):
-            yield f"meta.task.movers[{i}]: missing or impossible"
-
-
-def _mapping(value: Any) -> Mapping[str, Any]:
-    return value if isinstance(value, dict) else {}
-
-
-def _numbers(values: Any, count: int, *, finite: bool = True) -> bool:
-    return (
-        isinstance(values, list | tuple)
-        and len(values) == count
-        and all(isinstance(v, int | float) and not isinstance(v, bool) for v in values)
-        and (not finite or all(math.isfinite(v) for v in values))
-    )

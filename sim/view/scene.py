@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from antdrive.robots.spec import Footprint, RobotSpec
 from antdrive.sim.log.rollout import Rollout
-from antdrive.worlds.errors import InputError
 from antdrive.worlds.movers import Wandering
 from antdrive.worlds.trajectories import Trajectories
 from antdrive.worlds.world import Bounds, Point, Pose, Task
@@ -60,39 +57,24 @@ class Scene:
 
     @classmethod
     def of(cls, rollout: Rollout) -> Scene:
-        """The scene of a run.
-
-        Raises:
-            InputError: the log's metadata do not say enough.
-        """
-        meta = rollout.meta
-        try:
-            task, robot = meta["task"], meta["robot"]
-            found = task.get("obstacles") or []
-            unseen = np.zeros(len(found), dtype=np.bool_)
-            unseen[np.asarray(meta.get("unseen") or [], dtype=np.int64)] = True
-            foot = {key: float(value) for key, value in robot["footprint"].items()}
-            return cls(
-                name=str(task["name"]),
-                bounds=_floats(task["bounds"], 4),
-                obstacles=_discs(found),
-                unseen=unseen,
-                start=_floats(task["start"], 3),
-                goal=_floats(task["goal"], 2),
-                goal_tolerance=float(task.get("goal_tolerance", 0.25)),
-                inflate=float(meta.get("inflate", 0.0)),
-                margin=float(meta.get("margin", 0.0)),
-                robot=Body(
-                    str(robot["name"]),
-                    Footprint(**foot),
-                    *(float(robot[key]) for key in ("height", "wheel_radius", "track", "max_speed")),
-                ),
-                mover_radii=tuple(float(mover["radius"]) for mover in task.get("movers") or []),
-                movers=tuple((float(x), float(y)) for x, y in rollout.movers[-1]) if len(rollout.movers) else (),
-                tracks=pieces(rollout.movers),
-            )
-        except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
-            raise InputError(f"rollout: its metadata do not describe a world and a robot ({error!r})") from None
+        """The scene of a run."""
+        record, task, world = rollout.record, rollout.record.task, rollout.record.world
+        discs = [(disc.x, disc.y, disc.radius, disc.height) for disc in world.obstacles]
+        return cls(
+            name=world.name,
+            bounds=world.bounds,
+            obstacles=np.array(discs, dtype=np.float64).reshape(-1, 4),
+            unseen=np.arange(len(discs)) >= len(discs) - len(record.unseen),
+            start=task.start,
+            goal=task.goal,
+            goal_tolerance=task.goal_tolerance,
+            inflate=record.inflate,
+            margin=record.margin,
+            robot=Body.of(record.robot),
+            mover_radii=tuple(mover.radius for mover in world.movers),
+            movers=tuple((float(x), float(y)) for x, y in rollout.movers[-1]) if len(rollout.movers) else (),
+            tracks=pieces(rollout.movers),
+        )
 
     @classmethod
     def planned(cls, task: Task, robot: RobotSpec, inflate: float) -> Scene:
@@ -152,15 +134,3 @@ def pieces(movers: Floats) -> tuple[Floats, ...]:
         for piece in np.split(movers[:, m], np.flatnonzero(cuts[:, m]) + 1)
         if len(piece) > 1
     )
-
-
-def _discs(entries: list[Mapping[str, Any]]) -> Floats:
-    rows = [(entry["x"], entry["y"], entry["radius"], entry.get("height", 1.0)) for entry in entries]
-    return np.array(rows, dtype=np.float64).reshape(-1, 4)
-
-
-def _floats(values: Any, count: int) -> Any:
-    numbers = tuple(float(value) for value in values)
-    if len(numbers) != count:
-        raise ValueError(f"expected {count} numbers, found {len(numbers)}")
-    return numbers

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
 
+from antdrive.robots import load_robot
+from antdrive.robots.spec import Footprint
+from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.log.record import ComponentRecord
 from antdrive.sim.log.rollout import Rollout
+from antdrive.worlds.movers import Cruising
+from antdrive.worlds.world import Disc, Task, World
+from tests.sim.records import made_up_record
 
 
 @pytest.fixture(scope="session")
@@ -27,7 +34,7 @@ def _made_up_drive(
     size: tuple[float, float] = (4.0, 3.0),
     outcome: str = "succeeded",
 ) -> Rollout:
-    """A rollout with metadata of the usual form; `collide` puts a cylinder in the way and ends there."""
+    """A rollout with a record of the usual form; `collide` puts a cylinder in the way and ends there."""
     rng = np.random.default_rng(7)
     hz, radius = 240, 0.18
     t = np.arange(round(seconds * hz) + 1) / hz
@@ -59,43 +66,33 @@ def _made_up_drive(
     discs = np.array([(o["x"], o["y"], o["radius"]) for o in found]).reshape(-1, 3)
     away = np.hypot(pose[:, None, 0] - discs[:, 0], pose[:, None, 1] - discs[:, 1]) - discs[:, 2] - radius
     walls = np.minimum.reduce([pose[:, 0], size[0] - pose[:, 0], pose[:, 1], size[1] - pose[:, 1]]) - radius
-    foot = {"half_length": 0.2, "half_width": 0.15, "rounding": 0.0}
-    task: dict[str, Any] = {
-        "schema": 1,
-        "name": "made-up",
-        "bounds": [0.0, 0.0, *size],
-        "start": [float(value) for value in pose[0]],
-        "goal": [float(x[-1]), float(y[-1])],
-        "goal_tolerance": 0.2,
-        "cell": 0.25,
-        "obstacles": [{key: float(value) for key, value in o.items()} for o in found],
-        "movers": [{"radius": 0.12}] * movers,
-    }
-    meta = {
-        "schema": 1,
-        "task": task,
-        "unseen": [],
-        "robot": {
-            "name": "turtlebot",
-            "footprint": foot if square else {"half_length": 0.0, "half_width": 0.0, "rounding": radius},
-            "height": 0.2,
-            "mass": 3.0,
-            "wheel_radius": 0.04,
-            "track": 0.25,
-            "max_speed": float(twist[:, 0].max()) + 0.1,
-        },
-        "inflate": 0.23,
-        "margin": 0.05,
-        "planner": {"name": "mmas", "options": {}},
-        "outcome": outcome,
-        "physics_hz": hz,
-        "control_hz": 60,
-        "limiters": ["cruise", "curvature"],
-        "seed": 0,
-    }
+    here = [(float(x[0]) + 0.6 + m, float(y[0])) for m in range(movers)]
+    world = World(
+        "made-up",
+        (0.0, 0.0, *size),
+        tuple(Disc(**{key: float(value) for key, value in o.items()}) for o in found),
+        movers=tuple(Cruising(radius=0.12, position=position, velocity=(0.0, 0.5)) for position in here),
+    )
+    start_x, start_y, start_yaw = pose[0].tolist()
+    task = Task(world, (start_x, start_y, start_yaw), (float(x[-1]), float(y[-1])), goal_tolerance=0.2, cell=0.25)
+    robot = dataclasses.replace(
+        load_robot("turtlebot"),
+        footprint=Footprint(half_length=0.2, half_width=0.15) if square else Footprint.disc(radius),
+        height=0.2,
+        wheel_radius=0.04,
+        track=0.25,
+        max_speed=float(twist[:, 0].max()) + 0.1,
+    )
+    record = made_up_record(
+        task=task,
+        robot=robot,
+        planner=ComponentRecord(name="mmas", settings={}),
+        outcome=Outcome.from_key(outcome),
+        physics_hz=hz,
+    )
     places = np.empty((len(t), movers, 2))
-    for m in range(movers):
-        places[:, m] = np.column_stack([x[0] + 0.6 + m + 0 * t, y[0] + 0.5 * t])
+    for m, position in enumerate(here):
+        places[:, m] = np.column_stack([position[0] + 0 * t, position[1] + 0.5 * t])
     return Rollout(
         t=t,
         pose=pose,
@@ -107,5 +104,5 @@ def _made_up_drive(
         contacts=contacts,
         route=np.column_stack([x, y])[::24],
         cells=np.empty((0, 2), dtype=np.int32),
-        meta=meta,
+        record=record,
     )

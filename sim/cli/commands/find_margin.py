@@ -14,7 +14,7 @@ from antdrive.sim.cli.scenario import make_scenario
 from antdrive.worlds.errors import InputError
 
 if TYPE_CHECKING:
-    from antdrive.sim.log.margin import Trial
+    from antdrive.sim.log.margin import MarginTrial
     from antdrive.sim.pipeline import Run, Scenario
     from antdrive.worlds import Task
 
@@ -90,7 +90,7 @@ def _generated(kind: str, seed: int) -> "Task":
     return generate(kind, np.random.default_rng(seed), {}, name=f"{kind}-{seed}", note=f"seed {seed}")
 
 
-def _facts(base: "Scenario", trials: "Sequence[Trial]") -> dict[str, Any]:
+def _facts(base: "Scenario", trials: "Sequence[MarginTrial]") -> dict[str, Any]:
     return {
         "robot": base.robot.name,
         "max_speed": base.robot.max_speed,
@@ -100,7 +100,7 @@ def _facts(base: "Scenario", trials: "Sequence[Trial]") -> dict[str, Any]:
     }
 
 
-def _print(base: "Scenario", trials: "Sequence[Trial]", smallest: float | None) -> None:
+def _print(base: "Scenario", trials: "Sequence[MarginTrial]", smallest: float | None) -> None:
     print_table(
         ("margin m", "driven", "no path", "least room left m", "failed"),
         (

@@ -37,7 +37,7 @@ def margin(
                 f"({share.x:.2f}, {share.y:.2f}), {share.t:.2f} s" if share.metres else "-",
                 f"{share.at_tightest:+.4f}",
             )
-            for share in spent.shares
+            for share in spent.contributions
         ),
     )
     if spent.largest.metres:

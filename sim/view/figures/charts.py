@@ -188,7 +188,7 @@ def draw_speed(axes: Any, scene: Scene, rollout: Rollout) -> None:
 
 def draw_limiters(axes: Any, rollout: Rollout) -> None:
     """Which rule held the speed, as a strip."""
-    names = [str(name) for name in rollout.meta.get("limiters", [])]
+    names = rollout.record.limiters
     axes.set(xlabel="time [s]", yticks=[])
     axes.grid(False)
     axes.spines["left"].set_visible(False)

@@ -96,7 +96,7 @@ def overview(rollout: Rollout, path: str | Path, *, cells: Floats | None = None,
         strip = figure.add_subplot(grid[2, 1], sharex=gap)
         draw_limiters(strip, rollout)
         name, colour = VERDICTS[rollout.outcome]
-        planner = rollout.meta.get("planner", {}).get("name", "?")
+        planner = rollout.record.planner.name
         figure.suptitle(
             f"{scene.name}   ·   {planner}   ·   {scene.robot.name}", x=0.012, ha="left", fontsize=12, weight="bold"
         )

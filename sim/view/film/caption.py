@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image, ImageDraw
 
-from antdrive.sim.log.rollout import Outcome
+from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.view.film import _kernels_paint as kernels
 from antdrive.sim.view.film.lettering import Sprite, fitted, font, pill, plate, text_width
 from antdrive.sim.view.film.replay import SLOW
@@ -37,8 +37,8 @@ Picture = npt.NDArray[np.uint8]  # (H, W, 3)
 VERDICTS: dict[Outcome, tuple[str, Colour]] = {
     Outcome.SUCCEEDED: ("✓ SUCCEEDED", GOOD),
     Outcome.COLLIDED: ("✕ COLLIDED", BAD),
-    Outcome.RUN_INTO: ("✕ RUN INTO", DOUBT),
-    Outcome.JUMPED_ON: ("✕ JUMPED ON", DOUBT),
+    Outcome.HIT_WHILE_STANDING: ("✕ RUN INTO", DOUBT),
+    Outcome.HIT_BY_TELEPORT: ("✕ JUMPED ON", DOUBT),
     Outcome.TIMED_OUT: ("TIMED OUT", DOUBT),
     Outcome.STUCK: ("STUCK", DOUBT),
     Outcome.NO_PATH: ("NO PATH", DOUBT),

@@ -71,7 +71,7 @@ class Split:
         wide, high = (size[0] // cols) // 2 * 2, (size[1] // rows) // 2 * 2
         self._size = size
         self._corners = [((k % cols) * wide, (k // cols) * high) for k in range(len(rollouts))]
-        one_world = len({str(log.meta["task"]["name"]) for log in rollouts}) == 1
+        one_world = len({log.record.task.world.name for log in rollouts}) == 1
         self._tiles = [Tile(log, camera, (wide - 2, high - 2), one_world) for log in rollouts]
         self._open = ExitStack()
 
@@ -99,11 +99,11 @@ class Tile:
         self._unit = max(11, round(min(size[0] / 30, size[1] / 22)))
         self._head = 2 * round(1.55 * self._unit)
         self.shot = Shot(rollout, camera=camera, size=(size[0], size[1] - self._head), bare=True)
-        planner = str(rollout.meta["planner"]["name"])
-        self._name = planner if one_world else f"{planner} · {rollout.meta['task']['name']}"
+        planner = rollout.record.planner.name
+        self._name = planner if one_world else f"{planner} · {rollout.record.task.world.name}"
         self._colour = planner_style(planner)[0]
         self._outcome = rollout.outcome
-        self._length = float(rollout.meta["plan"]["length_m"])
+        self._length = rollout.record.plan.length_m
         self._last: Picture | None = None  # what stays once the run is over
 
     def picture(self, at: float) -> Picture:

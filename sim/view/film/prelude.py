@@ -18,7 +18,7 @@ from antdrive.planners import Iteration, IterativePlanner, Query, load_planner
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.view.film.caption import Values
 from antdrive.sim.view.film.video import Shot
-from antdrive.worlds import Grid, InputError, rasterise, task_from_dict
+from antdrive.worlds import Grid, InputError, rasterise
 
 Picture = npt.NDArray[np.uint8]  # (H, W, 3)
 Floats = npt.NDArray[np.float64]
@@ -30,19 +30,16 @@ def search(rollout: Rollout) -> tuple[Grid, int, Iterator[Iteration]]:
     Raises:
         InputError: the planner has no iterations, cannot be found, or its plan cannot be repeated.
     """
-    meta = rollout.meta
-    name, options = str(meta["planner"]["name"]), dict(meta["planner"].get("options") or {})
-    planner = load_planner(name, **options)
+    record = rollout.record
+    name = record.planner.name
+    planner = load_planner(name, **record.planner.settings)
     if not isinstance(planner, IterativePlanner):
         raise InputError(f"prelude: {name} does not plan in iterations; there is no field to show")
     if planner.time_budget is not None:
         raise InputError("prelude: the plan was made under a time budget and cannot be repeated")
-    known = dict(meta["task"])
-    known["obstacles"] = [disc for i, disc in enumerate(known["obstacles"]) if i not in set(meta.get("unseen") or [])]
-    task = task_from_dict(known, "rollout")
-    grid = rasterise(task.world, float(meta["cell"]), float(meta["inflate"]))
-    rng = np.random.default_rng([int(meta["seed"]), zlib.crc32(b"planner")])  # as Scenario.rng
-    states = itertools.islice(planner.iterate(Query.between(grid, task), rng), planner.iterations)
+    grid = rasterise(record.task.world, record.cell, record.inflate)
+    rng = np.random.default_rng([record.seed, zlib.crc32(b"planner")])  # as Scenario.rng
+    states = itertools.islice(planner.iterate(Query.between(grid, record.task), rng), planner.iterations)
     return grid, planner.iterations, states
 
 
@@ -53,7 +50,7 @@ def check_field(rollout: Rollout) -> None:
         InputError: there is none.
     """
     if next(search(rollout)[2]).landscape is None:
-        raise InputError(f"prelude: {rollout.meta['planner']['name']} keeps no field")
+        raise InputError(f"prelude: {rollout.record.planner.name} keeps no field")
 
 
 def planning_pictures(rollout: Rollout, setting: dict[str, Any], count: int) -> Iterator[Picture]:

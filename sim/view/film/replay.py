@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.sim.driving.replanning import DECISION
+from antdrive.sim.log.record import DECISION
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.view.scene import Scene, jumping
 
@@ -53,9 +53,9 @@ class Replay:
         self._jumping = jumping(self._movers)
         self.renewals: list[Renewal] = []
         route = rollout.route
-        for entry in rollout.meta.get("replans", ()):
-            route = np.array(entry["route"], dtype=np.float64) if entry["solved"] else route
-            self.renewals.append(Renewal(float(entry["t"]), str(entry["cause"]), bool(entry["solved"]), route))
+        for replan in rollout.record.replans:
+            route = np.array(replan.route, dtype=np.float64) if replan.solved else route
+            self.renewals.append(Renewal(replan.t, replan.trigger, replan.solved, route))
         rim = self._twist[:, 1] * robot.track / 2
         steps = np.diff(self.t)
         self._angles = []

@@ -211,7 +211,7 @@ class Shot:
             self._legend = legend_card(entries, layout) if card and not bare else None
             if self._legend is not None and self._free(self._legend):
                 break
-        planner = str(rollout.meta.get("planner", {}).get("name", "?"))
+        planner = rollout.record.planner.name
         subtitle = f"planner {planner}  ·  robot {scene.robot.name}"
         self._band = Band(
             layout, scene.name, subtitle, None if planning else note, entries, SEARCHED if planning else DRIVEN

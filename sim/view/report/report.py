@@ -12,7 +12,6 @@ import json
 import math
 import os
 import re
-import zipfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib import metadata
@@ -20,8 +19,8 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-import numpy as np
-
+from antdrive.sim.log.record import DriveRecord
+from antdrive.sim.log.rollout import read_record
 from antdrive.sim.view.style import hexed, planner_style
 from antdrive.worlds.errors import InputError
 from antdrive.worlds.files.atomic import written_whole
@@ -62,7 +61,7 @@ class Entry:
 
     folder: Path
     facts_file: Mapping[str, Any]
-    meta: Mapping[str, Any]
+    record: DriveRecord | None  # None where the run did not drive
     number: int
     figures: list[Linked] = field(default_factory=list)
     films: list[Linked] = field(default_factory=list)
@@ -139,11 +138,11 @@ class Entry:
     @property
     def facts(self) -> list[tuple[str, list[tuple[str, str]]]]:
         """Headed lists of names and values."""
-        meta = self.meta
+        record = self.record.as_dict() if self.record else {}
         settings = {
-            key: meta[key]
+            key: record[key]
             for key in ("margin", "inflate", "cell", "physics_hz", "control_hz", "time_limit")
-            if key in meta
+            if key in record
         }
         return [
             ("Metrics", _pairs(self.facts_file.get("metrics"))),
@@ -151,10 +150,10 @@ class Entry:
                 "Certificate",
                 _pairs({k: v for k, v in (self.facts_file.get("certificate") or {}).items() if k != "problems"}),
             ),
-            ("Planner", _pairs(_part(meta, "planner", "options"))),
-            ("Controller", _pairs(meta.get("controller"))),
+            ("Planner", _pairs(_part(record, "planner", "settings"))),
+            ("Controller", _pairs(_part(record, "controller", "settings"))),
             ("Run", _pairs({**settings, "digest": self.facts_file.get("digest")})),
-            ("Versions", _pairs(meta.get("versions"))),
+            ("Versions", _pairs(record.get("versions"))),
         ]
 
 
@@ -201,19 +200,12 @@ def _runs(folder: Path) -> Iterator[Entry]:
         missing = [key for key in ("world", "planner", "robot", "seed", "outcome") if key not in known]
         if missing:
             raise InputError(f"{path}: {missing[0]}: missing; `antdrive run` writes it")
-        yield Entry(path.parent, facts, _meta(path.parent / "rollout.npz"), number)
+        yield Entry(path.parent, facts, _record_of(path.parent / "rollout.npz"), number)
 
 
-def _meta(path: Path) -> Mapping[str, Any]:
-    """The metadata of a log without its arrays; none where the run did not drive."""
-    if not path.exists():
-        return {}
-    try:
-        with path.open("rb") as raw, np.load(raw, allow_pickle=False) as log:
-            found = json.loads(str(log["meta"][()]))
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-        raise InputError(f"{path}: not a rollout ({str(error).splitlines()[0]})") from None
-    return found if isinstance(found, dict) else {}
+def _record_of(path: Path) -> DriveRecord | None:
+    """The record of a log; None where the run did not drive."""
+    return read_record(path) if path.exists() else None
 
 
 def _attach(run: Entry, base: Path, embed_films: bool) -> None:

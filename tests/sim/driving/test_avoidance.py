@@ -12,6 +12,7 @@ from antdrive.planners import load_planner
 from antdrive.robots import LIMITERS, Avoidance, RobotSpec
 from antdrive.sim import Outcome, Perception, Run, Scenario, certify, run
 from antdrive.sim.driving.perception import Predictor
+from antdrive.sim.log.record import PerceptionRecord
 from antdrive.worlds import Cruising, Disc, Keyframed, Mover, Task, Trajectories, World
 
 HALL = World("hall", (0.0, 0.0, 9.0, 6.0))
@@ -107,7 +108,7 @@ def test_where_contact_cannot_be_avoided_the_robot_meets_it_standing(turtlebot: 
     """A piston as wide as the aisle, faster than the robot."""
     piston = keyframed((0.0, 8.0, 0.5), (4.0, 0.0, 0.5), radius=0.45)
     done = among(piston, robot=turtlebot, task=Task(AISLE, (1.0, 0.5, 0.0), (8.0, 0.5), cell=0.1))
-    assert done.outcome is Outcome.RUN_INTO, done.reason
+    assert done.outcome is Outcome.HIT_WHILE_STANDING, done.reason
 
 
 @pytest.mark.parametrize("gap", [0.02, 0.08])
@@ -127,7 +128,7 @@ def test_a_robot_that_cannot_get_away_does_not_twitch(turtlebot: RobotSpec) -> N
     comes = keyframed((0.0, 2.2, 0.5), (4.0, 0.2, 0.5), radius=0.4)
     task = Task(AISLE, (0.4, 0.5, math.pi / 2), (8.0, 0.5), cell=0.1)
     done = among(comes, robot=turtlebot, task=task)
-    assert done.outcome is Outcome.RUN_INTO, done.reason
+    assert done.outcome is Outcome.HIT_WHILE_STANDING, done.reason
     assert done.rollout is not None
     end = int(done.rollout.contacts[0, 0])
     assert np.abs(done.rollout.twist[end - 24 : end]).max() < 1e-3
@@ -155,7 +156,7 @@ def test_a_robot_that_sees_less_yields_to_less(turtlebot: RobotSpec) -> None:
     for told in ("positions", "motions"):
         known = among(CROSSING, robot=turtlebot, knowledge=Perception(told=told))  # type: ignore[arg-type]
         assert known.rollout is not None
-        assert known.rollout.meta["knowledge"] == {"told": told, "reach_m": None}
+        assert known.rollout.record.perception == PerceptionRecord(kind=told, range_m=None)
 
 
 @given(st.integers(0, 2000), st.sampled_from(["positions", "velocities", "motions"]))

@@ -1,7 +1,6 @@
 """Worlds that move: in physics, in logs, in certificates."""
 
 import dataclasses
-import json
 import math
 from collections.abc import Callable
 from typing import Any
@@ -10,7 +9,7 @@ import numpy as np
 import pytest
 
 from antdrive.planners import load_planner
-from antdrive.robots import PurePursuit, RobotSpec
+from antdrive.robots import Footprint, PurePursuit, RobotSpec
 from antdrive.sim import Engine, Outcome, Rollout, Run, Scenario, certify, measure, run
 from antdrive.sim.driving.drive import drive
 from antdrive.sim.log.certificate import closed_form_clearance
@@ -156,8 +155,8 @@ def standing(turtlebot: RobotSpec) -> Scenario:
 
 def test_the_log_holds_every_mover_at_every_row(passed: Rollout) -> None:
     assert passed.movers.shape == (len(passed.t), 3, 2)
-    assert [mover["radius"] for mover in passed.meta["task"]["movers"]] == [0.3, 0.2, 0.15]
-    assert (passed.movers == passed.traffic().positions(passed.t)).all()
+    assert [mover.radius for mover in passed.record.task.world.movers] == [0.3, 0.2, 0.15]
+    assert (passed.movers == passed.trajectories().positions(passed.t)).all()
 
 
 def test_clearance_is_to_movers_too(passed: Rollout) -> None:
@@ -200,7 +199,7 @@ def test_being_run_into_while_standing_is_told_apart(standing: Scenario) -> None
     mover = Keyframed(radius=0.3, keyframes=((0.0, 3.0, 1.4), (4.0, 0.0, 1.4)))
     task = dataclasses.replace(TASK, world=dataclasses.replace(ROOM, movers=(mover,)))
     result = run(dataclasses.replace(standing, task=task))
-    assert result.outcome is Outcome.RUN_INTO
+    assert result.outcome is Outcome.HIT_WHILE_STANDING
     assert not result.succeeded
     assert "movers[0] at 0.75 m/s, the robot at 0.00 m/s" in result.reason
     assert result.rollout is not None
@@ -216,7 +215,7 @@ def test_a_mover_that_jumps_onto_the_robot_is_told_apart(standing: Scenario, pla
     mover = Keyframed(radius=0.3, keyframes=frames, loop="teleport", phase=1.0)
     task = dataclasses.replace(TASK, world=dataclasses.replace(ROOM, movers=(mover,)))
     result = run(dataclasses.replace(standing, task=task))
-    assert result.outcome is Outcome.JUMPED_ON
+    assert result.outcome is Outcome.HIT_BY_TELEPORT
     assert result.rollout is not None
     assert result.rollout.t[int(result.rollout.contacts[0, 0])] == pytest.approx(1.0, abs=0.02)
     assert _contacts(result.rollout) == (0, 0, 1)
@@ -227,7 +226,7 @@ def test_a_mover_that_appears_nearer_than_the_robot_can_stop_has_jumped_on_it(tu
     clean = among(robot=turtlebot).rollout
     assert clean is not None
     x = float(clean.pose[600, 0])  # at 2.5 s
-    for gap, outcome in ((0.1, Outcome.JUMPED_ON), (0.4, Outcome.COLLIDED)):
+    for gap, outcome in ((0.1, Outcome.HIT_BY_TELEPORT), (0.4, Outcome.COLLIDED)):
         ahead = x + 0.18 + 0.3 + gap
         frames = ((0.0, ahead, 1.4), (4.0, ahead + 0.001, 1.4), (4.5, ahead + 1.0, 3.5))
         mover = Keyframed(radius=0.3, keyframes=frames, loop="teleport", phase=2.0)
@@ -237,7 +236,7 @@ def test_a_mover_that_appears_nearer_than_the_robot_can_stop_has_jumped_on_it(tu
 def test_a_robot_that_starts_in_touch_with_a_mover_was_run_into(turtlebot: RobotSpec) -> None:
     mover = Keyframed(radius=0.3, keyframes=((0.0, 0.6, 1.0), (9.0, 3.0, 1.4)))
     result = among(mover, robot=turtlebot)
-    assert result.outcome is Outcome.RUN_INTO
+    assert result.outcome is Outcome.HIT_WHILE_STANDING
     assert result.rollout is not None
     assert result.rollout.contacts[0, 0] == 0
 
@@ -251,7 +250,7 @@ def test_what_is_touched_in_the_period_that_would_end_as_stuck_was_touched(stand
     mover = Cruising(radius=0.3, position=(5.0, 1.4), velocity=(-(4.4 - 0.48) / touching, 0.0))
     task = dataclasses.replace(TASK, world=dataclasses.replace(ROOM, movers=(mover,)))
     result = run(dataclasses.replace(standing, task=task, robot=rigid, yielding=None, replanning=None))
-    assert result.outcome is Outcome.RUN_INTO
+    assert result.outcome is Outcome.HIT_WHILE_STANDING
     assert result.rollout is not None
     assert alone.t[-1] - 1 / 60 < result.rollout.t[int(result.rollout.contacts[0, 0])] <= alone.t[-1]
 
@@ -261,7 +260,7 @@ def test_the_time_limit_of_a_task_counts_unless_another_is_given(small_scenario:
     short = run(dataclasses.replace(small_scenario, task=task))
     assert short.outcome is Outcome.TIMED_OUT
     assert short.rollout is not None
-    assert short.rollout.meta["time_limit"] == 1.0
+    assert short.rollout.record.time_limit == 1.0
     assert run(dataclasses.replace(small_scenario, task=task, time_limit=60.0)).succeeded
 
 
@@ -275,7 +274,7 @@ def test_wanderers_keep_off_what_is_unseen(turtlebot: RobotSpec) -> None:
         assert np.hypot(*(places - (disc.x, disc.y)).T).min() > disc.radius + 0.15
     log = run(scenario).rollout
     assert log is not None
-    assert (log.movers == log.traffic().positions(log.t)).all()
+    assert (log.movers == log.trajectories().positions(log.t)).all()
 
 
 def test_a_robot_drives_among_movers_without_a_scenario(turtlebot: RobotSpec) -> None:
@@ -317,48 +316,52 @@ def told(contacts: list[tuple[int, int]], *, speed: float = 0.0, turn: float = 0
         movers,
         jumps,
         hz=100, discs=1, radii=np.array([0.3]), deceleration=1.0,
-        footprint={"half_length": 0.0, "half_width": 0.0, "rounding": 0.2},
+        footprint=Footprint.disc(0.2),
     )  # fmt: skip
 
 
 def test_whose_a_contact_is() -> None:
-    assert told([(9, 1)]) == [Touch(9, 1, Outcome.RUN_INTO)]
-    assert told([(9, 1)], speed=0.019)[0].outcome is Outcome.RUN_INTO
+    assert told([(9, 1)]) == [Touch(9, 1, Outcome.HIT_WHILE_STANDING)]
+    assert told([(9, 1)], speed=0.019)[0].outcome is Outcome.HIT_WHILE_STANDING
     assert told([(9, 1)], speed=-0.021)[0].outcome is Outcome.COLLIDED
     assert told([(9, 1)], turn=0.2)[0].outcome is Outcome.COLLIDED
-    assert told([(9, 1)], speed=0.009, comes=0.01)[0].outcome is Outcome.RUN_INTO
+    assert told([(9, 1)], speed=0.009, comes=0.01)[0].outcome is Outcome.HIT_WHILE_STANDING
     assert told([(9, 1)], speed=0.011, comes=0.01)[0].outcome is Outcome.COLLIDED, "rather the robot crept into it"
-    assert told([(0, 1)], comes=0.0)[0].outcome is Outcome.RUN_INTO, "nobody moved yet"
+    assert told([(0, 1)], comes=0.0)[0].outcome is Outcome.HIT_WHILE_STANDING, "nobody moved yet"
     assert [told([(9, i)])[0].outcome for i in (0, 2, 5)] == [Outcome.COLLIDED] * 3, "discs and walls do not come"
 
 
 def test_when_a_mover_has_jumped_on_a_robot() -> None:
-    assert told([(9, 1)], jump=9)[0].outcome is Outcome.JUMPED_ON
-    assert told([(8, 1)], jump=9)[0].outcome is Outcome.RUN_INTO, "it jumped later"
-    assert told([(60, 1)], jump=9)[0].outcome is Outcome.RUN_INTO, "it jumped long ago"
+    assert told([(9, 1)], jump=9)[0].outcome is Outcome.HIT_BY_TELEPORT
+    assert told([(8, 1)], jump=9)[0].outcome is Outcome.HIT_WHILE_STANDING, "it jumped later"
+    assert told([(60, 1)], jump=9)[0].outcome is Outcome.HIT_WHILE_STANDING, "it jumped long ago"
     assert told([(9, 0)], jump=9)[0].outcome is Outcome.COLLIDED, "another one did"
     # Braking from 1 m/s takes 0.5 m and 1 s.
-    assert told([(60, 1)], jump=9, speed=1.0, place=0.95)[0].outcome is Outcome.JUMPED_ON
+    assert told([(60, 1)], jump=9, speed=1.0, place=0.95)[0].outcome is Outcome.HIT_BY_TELEPORT
     assert told([(60, 1)], jump=9, speed=1.0, place=1.05)[0].outcome is Outcome.COLLIDED
     assert told([(120, 1)], jump=9, speed=1.0, place=0.95)[0].outcome is Outcome.COLLIDED
 
 
 def test_what_follows_within_half_a_second_is_one_touch() -> None:
-    assert told([(9, 1), (20, 0), (65, 1)]) == [Touch(9, 1, Outcome.RUN_INTO)]
-    assert told([(9, 1), (60, 0)]) == [Touch(9, 1, Outcome.RUN_INTO), Touch(60, 0, Outcome.COLLIDED)]
+    assert told([(9, 1), (20, 0), (65, 1)]) == [Touch(9, 1, Outcome.HIT_WHILE_STANDING)]
+    assert told([(9, 1), (60, 0)]) == [Touch(9, 1, Outcome.HIT_WHILE_STANDING), Touch(60, 0, Outcome.COLLIDED)]
 
 
 # Certificates
 
 
-def edited(log: Rollout, *path_and_value: Any) -> Rollout:
-    *path, last, value = path_and_value
-    meta = json.loads(json.dumps(dict(log.meta)))
-    place = meta["task"]["movers"]
-    for key in path:
-        place = place[key]
-    place[last] = value
-    return dataclasses.replace(log, meta=meta)
+def with_movers(log: Rollout, *movers: Mover) -> Rollout:
+    """The log with other movers in its task."""
+    task = log.record.task
+    task = dataclasses.replace(task, world=dataclasses.replace(task.world, movers=movers))
+    return dataclasses.replace(log, record=dataclasses.replace(log.record, task=task))
+
+
+def edited(log: Rollout, index: int, **changes: Any) -> Rollout:
+    """The log with one of its task's movers changed."""
+    movers = list(log.record.task.world.movers)
+    movers[index] = dataclasses.replace(movers[index], **changes)
+    return with_movers(log, *movers)
 
 
 def shifted(log: Rollout, by: float) -> Rollout:
@@ -367,46 +370,32 @@ def shifted(log: Rollout, by: float) -> Rollout:
     return dataclasses.replace(log, movers=movers)
 
 
-def replanned(log: Rollout, replans: Any) -> Rollout:
-    return dataclasses.replace(log, meta={**log.meta, "replans": replans})
-
-
-FAILED = {"t": 1.0, "cause": "waited", "solved": False, "route": []}
 TAMPERINGS: dict[str, tuple[Callable[[Rollout], Rollout], str]] = {
-    "a mover's places": (lambda log: shifted(log, 0.01), "movers[1] is logged 0.0100 m off its course at t = 0.833 s"),
-    "a mover's radius": (lambda log: edited(log, 0, "radius", 0.1), "closed form says"),
-    "a keyframe": (lambda log: edited(log, 0, "keyframes", 1, 1, 5.5), "movers[0] is logged"),
-    "a loop": (lambda log: edited(log, 0, "loop", "pingpong"), "movers[0] is logged"),
-    "a velocity": (lambda log: edited(log, 1, "velocity", 0, 0.51), "movers[1] is logged"),
-    "a walk's seed": (lambda log: edited(log, 2, "walk", "seed", 2), "movers[2] is logged"),
-    "a mover less in the task": (
-        lambda log: dataclasses.replace(log, meta={**log.meta, "task": {**log.meta["task"], "movers": []}}),
-        "3 of them where the task has 0"),
+    "a mover's positions": (
+        lambda log: shifted(log, 0.01), "movers[1] is logged 0.0100 m off its trajectory at t = 0.833 s"),
+    "a mover's radius": (lambda log: edited(log, 0, radius=0.1), "closed form says"),
+    "a keyframe": (lambda log: edited(log, 0, keyframes=later_keyframe(log)), "movers[0] is logged"),
+    "a loop": (lambda log: edited(log, 0, loop="pingpong"), "movers[0] is logged"),
+    "a velocity": (lambda log: edited(log, 1, velocity=faster(log)), "movers[1] is logged"),
+    "a walk's seed": (lambda log: edited(log, 2, seed=2), "movers[2] is logged"),
+    "no mover in the task": (lambda log: with_movers(log), "must be 0, as in the record's task, found 3"),
     "no mover left": (
-        lambda log: dataclasses.replace(log, movers=log.movers[:, :0], meta={
-            **log.meta, "task": {**log.meta["task"], "movers": []}}), "closed form says"),
-    "a mover less in the log": (lambda log: dataclasses.replace(log, movers=log.movers[:, :2]), "2 of them"),
-    "movers that are no list": (
-        lambda log: dataclasses.replace(log, meta={**log.meta, "task": {**log.meta["task"], "movers": 3}}), "impossible"),
-    "a mover without a motion": (
-        lambda log: dataclasses.replace(log, meta={**log.meta, "task": {**log.meta["task"], "movers": [{"radius": 1.0}] * 3}}),
-        "must have one of the keys"),
-    "a motion of text": (lambda log: edited(log, 0, "keyframes", "soon"), "meta.task."),
-    "a velocity of text": (lambda log: edited(log, 1, "velocity", ["a", "b"]), "meta.task."),
-    "a NaN radius": (lambda log: edited(log, 0, "radius", math.nan), "impossible"),
-    "a walk of numbers": (lambda log: edited(log, 2, "walk", 3), "meta.task."),
-    "a walk without end": (lambda log: edited(log, 2, "walk", "period", 1e-9), "walk.period: must be at least"),
-    "replans that are no list": (lambda log: replanned(log, 3), "meta.replans: impossible"),
-    "a replan of text": (lambda log: replanned(log, ["soon"]), "meta.replans[0]: missing or impossible"),
-    "a replan without a time": (lambda log: replanned(log, [{**FAILED, "t": "soon"}]), "meta.replans[0]"),
-    "replans in disorder": (
-        lambda log: replanned(log, [{**FAILED, "t": 2.0}, FAILED]), "meta.replans[1]"),
-    "a replan's route of one number": (lambda log: replanned(log, [{**FAILED, "route": [[1.0]]}]), "meta.replans[0]"),
-    "a replan without a cause": (lambda log: replanned(log, [{**FAILED, "cause": None}]), "meta.replans[0]"),
-    "a replan solved without a route": (lambda log: replanned(log, [{**FAILED, "solved": True}]), "meta.replans[0]"),
-    "the seed as text": (lambda log: dataclasses.replace(
-        edited(log, 2, "walk", "seed", None), meta={**edited(log, 2, "walk", "seed", None).meta, "seed": "x"}), "meta.task."),
+        lambda log: dataclasses.replace(with_movers(log), movers=log.movers[:, :0]), "closed form says"),
+    "a mover less in the log": (lambda log: dataclasses.replace(log, movers=log.movers[:, :2]), "found 2"),
 }  # fmt: skip
+
+
+def later_keyframe(log: Rollout) -> tuple[tuple[float, float, float], ...]:
+    mover = log.record.task.world.movers[0]
+    assert isinstance(mover, Keyframed)
+    first, (t, _, y), *rest = mover.keyframes
+    return (first, (t, 5.5, y), *rest)
+
+
+def faster(log: Rollout) -> tuple[float, float]:
+    mover = log.record.task.world.movers[1]
+    assert isinstance(mover, Cruising)
+    return 0.51, mover.velocity[1]
 
 
 def test_a_clean_moving_log_is_certified(passed: Rollout) -> None:
@@ -419,38 +408,39 @@ def test_a_clean_moving_log_is_certified(passed: Rollout) -> None:
 def test_a_moving_log_edited_by_hand_is_found_out(passed: Rollout, what: str) -> None:
     tamper, says = TAMPERINGS[what]
     log = tamper(passed)
-    certificate = certify(dataclasses.replace(log, meta={**log.meta, "digest": log.digest}))
+    certificate = certify(dataclasses.replace(log, record=dataclasses.replace(log.record, digest=log.digest)))
     assert not certificate.certified
     assert any(says in problem for problem in certificate.problems), certificate.problems
 
 
-@pytest.mark.parametrize("name", ["collided", "jumped_on", "succeeded"])
+@pytest.mark.parametrize("name", ["collided", "hit_by_teleport", "succeeded"])
 def test_a_contact_cannot_be_blamed_on_another(standing: Scenario, name: str) -> None:
     mover = Keyframed(radius=0.3, keyframes=((0.0, 3.0, 1.4), (4.0, 0.0, 1.4)))
     task = dataclasses.replace(TASK, world=dataclasses.replace(ROOM, movers=(mover,)))
     log = run(dataclasses.replace(standing, task=task)).rollout
     assert log is not None
     assert not any("outcome" in problem for problem in certify(log).problems)
-    problems = certify(dataclasses.replace(log, meta={**log.meta, "outcome": name})).problems
+    problems = certify(
+        dataclasses.replace(log, record=dataclasses.replace(log.record, outcome=Outcome.from_key(name)))
+    ).problems
     assert any(f"outcome: {name}" in problem for problem in problems)
 
 
-def grazed(passed: Rollout, mover: dict[str, Any], gap: float) -> Rollout:
+def grazed(passed: Rollout, mover: Mover, gap: float) -> Rollout:
     """The log with only one mover, of the radius that leaves `gap` at the nearest row."""
-    task = {**passed.meta["task"], "movers": [mover]}
-    log = dataclasses.replace(passed, movers=passed.movers[:, :1], meta={**passed.meta, "task": task})
-    places = log.traffic().positions(log.t)
-    log = dataclasses.replace(log, movers=places)
-    nearest = np.hypot(*np.moveaxis(places - log.pose[:, None, :2], -1, 0)).min()
-    mover["radius"] = float(nearest) - 0.18 - gap
+    log = dataclasses.replace(with_movers(passed, mover), movers=passed.movers[:, :1])
+    centres = log.trajectories().positions(log.t)
+    nearest = float(np.hypot(*np.moveaxis(centres - log.pose[:, None, :2], -1, 0)).min())
+    log = with_movers(log, dataclasses.replace(mover, radius=nearest - 0.18 - gap))
+    log = dataclasses.replace(log, movers=centres)
     return dataclasses.replace(log, clearance=closed_form_clearance(log))
 
 
 def test_the_bound_between_rows_counts_the_movers_speed(passed: Rollout) -> None:
     """A mover passes before the robot with 20 mm to spare at the rows: enough at 1 m/s, not at 18 m/s."""
     for speed, fine in ((1.0, True), (18.0, False)):
-        frames = [[0.0, 5.8, 3.5], [7.0 / speed, 5.8, -3.5]]
-        mover = {"radius": 0.1, "loop": "teleport", "keyframes": frames}
+        frames = ((0.0, 5.8, 3.5), (7.0 / speed, 5.8, -3.5))
+        mover = Keyframed(radius=0.1, loop="teleport", keyframes=frames)
         log = grazed(passed, mover, 0.02)
         certificate = certify(log)
         assert certificate.min_clearance == pytest.approx(0.02)
@@ -463,13 +453,13 @@ def test_the_bound_holds_on_a_finer_walk_with_jumps(passed: Rollout) -> None:
     rows = np.arange(len(passed.t))
     pose = np.stack([np.interp(fine, rows, np.unwrap(column)) for column in passed.pose.T], axis=1)
     for frames, phase in (
-        ([[0.0, 1.5, 0.8], [0.6301, 5.0, 0.8]], 0.0),
-        ([[0.0, 5.0, 2.0], [1.2303, 0.6, 2.0]], 0.0),
+        (((0.0, 1.5, 0.8), (0.6301, 5.0, 0.8)), 0.0),
+        (((0.0, 5.0, 2.0), (1.2303, 0.6, 2.0)), 0.0),
         # Comes towards the robot and is gone 4.95 steps after the start, nearer than at any row.
-        ([[0.0, 0.6, 3.4], [0.4, 0.6, 1.9]], 0.4 - 4.95 / 240),
+        (((0.0, 0.6, 3.4), (0.4, 0.6, 1.9)), 0.4 - 4.95 / 240),
     ):
-        log = grazed(passed, {"radius": 0.1, "loop": "teleport", "phase": phase, "keyframes": frames}, 0.05)
-        moving = log.traffic().positions(fine / 240)
+        log = grazed(passed, Keyframed(radius=0.1, loop="teleport", phase=phase, keyframes=frames), 0.05)
+        moving = log.trajectories().positions(fine / 240)
         finer = dataclasses.replace(log, pose=pose, movers=moving)
-        assert log.traffic().jumps(log.t).any()
+        assert log.trajectories().jumps(log.t).any()
         assert closed_form_clearance(finer).min() >= certify(log).bound

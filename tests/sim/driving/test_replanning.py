@@ -1,7 +1,6 @@
 """New routes while driving."""
 
 import dataclasses
-import json
 import math
 from typing import Any
 
@@ -37,11 +36,11 @@ def test_a_closed_gate_is_gone_round_only_by_replanning(turtlebot: RobotSpec) ->
     done = among(PLUG, robot=turtlebot)
     assert done.succeeded, (done.outcome, done.reason)
     assert done.rollout is not None
-    replans = done.rollout.meta["replans"]
-    assert replans[0]["cause"] == "obstructed"
-    assert 0 <= replans[0]["t"] < done.rollout.t[-1]
-    assert replans[0]["cost_m"] > 4.0
-    assert len(done.rollout.meta["times"]["replans_s"]) == len(replans)
+    replans = done.rollout.record.replans
+    assert replans[0].trigger == "obstructed"
+    assert 0 <= replans[0].t < done.rollout.t[-1]
+    assert (replans[0].cost_m or 0.0) > 4.0
+    assert len(done.rollout.record.times.replans_s) == len(replans)
     assert tracking_error_max_m(done.rollout) < 0.25, "off the route of the time, as it gave way"
     through = done.rollout.pose[np.abs(done.rollout.pose[:, 0] - 4.0).argmin()]
     assert through[1] > 4.5, "by the other gate"
@@ -53,7 +52,7 @@ def test_replans_repeat_and_stay_with_the_log(turtlebot: RobotSpec, tmp_path: ob
     assert again is not None
     assert first.digest == again.digest
     loaded = Rollout.load(first.save(f"{tmp_path}/run.npz"))
-    assert loaded.meta["replans"] == json.loads(json.dumps(first.meta["replans"]))
+    assert loaded.record.replans == first.record.replans
     assert certify(loaded).certified == certify(first).certified
 
 
@@ -66,7 +65,7 @@ def test_every_planner_replans(planner: str, turtlebot: RobotSpec) -> None:
     if done.rollout is None:  # a planner that is not complete found no way at first
         assert not getattr(load_planner(planner), "complete", False)
         return
-    assert done.rollout.meta["replans"]
+    assert done.rollout.record.replans
     assert not len(done.rollout.contacts)
 
 
@@ -75,7 +74,7 @@ def test_where_nothing_is_in_the_way_nothing_is_replanned(turtlebot: RobotSpec) 
     done = among(far, robot=turtlebot)
     assert done.succeeded
     assert done.rollout is not None
-    assert done.rollout.meta["replans"] == []
+    assert done.rollout.record.replans == ()
 
 
 GATEKEEPER = Keyframed(radius=0.45, keyframes=((0.0, 4.0, 3.0), (9.0, 4.0, 3.0001), (12.0, 1.5, 5.5)), loop="once")
@@ -88,18 +87,18 @@ def test_a_plan_in_space_and_time_is_kept_to(turtlebot: RobotSpec) -> None:
     assert done.succeeded, (done.outcome, done.reason)
     assert done.rollout is not None
     assert done.rollout.t[-1] == pytest.approx(done.plan.arrive[-1], abs=3.0)
-    assert done.rollout.meta["knowledge"]["told"] == "motions"
-    assert done.rollout.meta["yielding"]["horizon"] == 1.0, "as it was in force"
+    assert done.rollout.record.perception.kind == "motions"
+    assert done.rollout.record.avoidance["horizon"] == 1.0, "as it was in force"
 
 
 def test_the_ant_decides_cell_by_cell_and_waits_where_there_is_no_way(turtlebot: RobotSpec) -> None:
     done = among(GATEKEEPER, robot=turtlebot, planner="mmas-dstar")
     assert done.succeeded, (done.outcome, done.reason)
     assert done.rollout is not None
-    decisions = done.rollout.meta["replans"]
-    assert {d["cause"] for d in decisions} == {"decision"}
+    decisions = done.rollout.record.replans
+    assert {d.trigger for d in decisions} == {"decision"}
     assert len(decisions) > 20
-    steps = [math.dist(d["route"][-2], d["route"][-1]) for d in decisions[1:-1]]
+    steps = [math.dist(d.route[-2], d.route[-1]) for d in decisions[1:-1]]
     assert max(steps) < 0.25 * 2**0.5 + 0.25
     again = among(GATEKEEPER, robot=turtlebot, planner="mmas-dstar").rollout
     assert again is not None
@@ -117,10 +116,10 @@ def test_the_ant_stays_where_it_is_when_there_is_no_way_at_first(turtlebot: Robo
     log = run(Scenario(task=task, planner=planner, robot=turtlebot, yielding=None)).rollout
     assert log is not None
     assert np.ptp(log.pose[log.t < 4.0, 0]) < 0.01
-    decisions = log.meta["replans"]
-    assert {d["cause"] for d in decisions} == {"decision"}
-    assert decisions[0]["t"] > 4.0
-    assert max(math.dist(d["route"][0], d["route"][-1]) for d in decisions[:-1]) < 0.5
+    decisions = log.record.replans
+    assert {d.trigger for d in decisions} == {"decision"}
+    assert decisions[0].t > 4.0
+    assert max(math.dist(d.route[0], d.route[-1]) for d in decisions[:-1]) < 0.5
 
 
 @pytest.mark.parametrize(
@@ -136,8 +135,8 @@ def test_the_ant_keeps_from_what_stands_what_planners_keep(
     done = run(Scenario(task=task, planner=load_planner("mmas-dstar"), robot=turtlebot))
     assert done.succeeded, (done.outcome, done.reason)
     assert done.rollout is not None
-    for decision in done.rollout.meta["replans"][:-1]:
-        assert polyline_clearance(task.world, np.array(decision["route"])) > 0.21 - 2e-4, decision
+    for decision in done.rollout.record.replans[:-1]:
+        assert polyline_clearance(task.world, np.array(decision.route)) > 0.21 - 2e-4, decision
 
 
 def test_a_robot_that_does_not_know_that_it_missed_the_goal_does_not_go_again(turtlebot: RobotSpec) -> None:
@@ -159,7 +158,7 @@ def test_a_robot_that_does_not_know_that_it_missed_the_goal_does_not_go_again(tu
         believed = math.dist(alone.rollout.estimate[-1, :2], tight.task.goal)
         if believed <= 0.003:
             assert among_them.outcome is alone.outcome
-            assert among_them.rollout.meta["replans"] == []
+            assert among_them.rollout.record.replans == ()
             ends.append(alone.outcome)
     assert {Outcome.STUCK, Outcome.SUCCEEDED} <= set(ends), ends
 

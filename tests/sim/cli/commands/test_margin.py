@@ -19,7 +19,9 @@ def test_the_margin_of_a_noisy_drive_is_broken_down_by_cause(antdrive: Call, sma
     spent = json.loads(out)
     assert code == 0
     assert spent["left"] >= facts["certificate"]["min_clearance_m"] - 1e-9  # of the disc around a disc robot
-    assert sum(share["at_tightest"] for share in spent["shares"]) == pytest.approx(spent["margin"] - spent["left"])
+    assert sum(share["at_tightest"] for share in spent["contributions"]) == pytest.approx(
+        spent["margin"] - spent["left"]
+    )
     code, out, _ = antdrive("margin", facts["files"]["rollout"])
     assert code == 0
     assert "localisation" in out

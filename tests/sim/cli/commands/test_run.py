@@ -74,13 +74,13 @@ def test_a_run_reports_replans_and_avoidance_which_can_be_switched_off(antdrive:
     code, out, _ = antdrive(*words)
     measured = json.loads(out)["metrics"]
     assert code == 0
-    assert measured["replans"] + measured["yielding_s"] > 0
+    assert measured["replans"] + measured["avoiding_s"] > 0
     assert measured["tracking_error_max_m"] < 1.0, "from the route that it followed then"
     assert "avoided movers for" in antdrive(*words[:-1])[1]
     code, out, _ = antdrive(*words, "--no-avoid", "--no-replan")
     assert code == 1
     assert json.loads(out)["outcome"] == "collided"
-    assert json.loads(out)["metrics"]["replans"] == json.loads(out)["metrics"]["yielding_s"] == 0
+    assert json.loads(out)["metrics"]["replans"] == json.loads(out)["metrics"]["avoiding_s"] == 0
 
 
 def test_without_figures_a_run_writes_its_log_and_result(antdrive: Call, small: Path) -> None:

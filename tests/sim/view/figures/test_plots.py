@@ -11,6 +11,7 @@ from PIL import Image
 from antdrive.planners import History, PlanResult, PlanStatus, Query
 from antdrive.planners.graph.search import AStar
 from antdrive.robots import Footprint, RobotSpec
+from antdrive.sim import Outcome
 from antdrive.sim.view.figures.plots import overview, plan_figure
 from antdrive.worlds import Disc, InputError, Keyframed, Task, Wandering, World, rasterise
 
@@ -50,19 +51,25 @@ def test_the_same_run_gives_the_same_file(made_up_drive, tmp_path, suffix):
 def test_an_overview_shows_obstacles_trail_and_contact(made_up_drive, tmp_path):
     drive = made_up_drive(collide=True)
     full = pixels(overview(drive, tmp_path / "full.png", dpi=80))
-    task = {**drive.meta["task"], "obstacles": drive.meta["task"]["obstacles"][-1:]}
-    contacts = drive.contacts * [1, 0, 1, 1]
-    bare = dataclasses.replace(drive, contacts=contacts, meta={**drive.meta, "task": task})
+    world = drive.record.task.world
+    world = dataclasses.replace(world, obstacles=world.obstacles[-1:])
+    record = dataclasses.replace(drive.record, task=dataclasses.replace(drive.record.task, world=world))
+    bare = dataclasses.replace(drive, contacts=drive.contacts * [1, 0, 1, 1], record=record)
     few = pixels(overview(bare, tmp_path / "few.png", dpi=80))
     assert near(full, (121, 136, 160)) > 3 * near(few, (121, 136, 160))
-    clean = dataclasses.replace(drive, contacts=np.empty((0, 4)), meta={**drive.meta, "outcome": "stuck"})
+    clean = dataclasses.replace(
+        drive, contacts=np.empty((0, 4)), record=dataclasses.replace(drive.record, outcome=Outcome.STUCK)
+    )
     untouched = pixels(overview(clean, tmp_path / "clean.png", dpi=80))
     assert near(full, (204, 32, 42)) > near(untouched, (204, 32, 42)) + 50
 
 
 def test_unseen_obstacles_have_their_own_colour(made_up_drive, tmp_path):
     drive = made_up_drive()
-    marked = dataclasses.replace(drive, meta={**drive.meta, "unseen": [0, 1]})
+    task = drive.record.task
+    known = dataclasses.replace(task, world=dataclasses.replace(task.world, obstacles=task.world.obstacles[2:]))
+    record = dataclasses.replace(drive.record, task=known, unseen=task.world.obstacles[:2])
+    marked = dataclasses.replace(drive, record=record)
     assert near(pixels(overview(marked, tmp_path / "marked.png", dpi=80)), (196, 74, 138)) > 100
 
 

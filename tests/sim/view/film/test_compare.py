@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from antdrive.sim.log.rollout import Outcome
+from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.log.record import ComponentRecord
 from antdrive.sim.view.film.caption import VERDICTS
 from antdrive.sim.view.film.compare import Split, compare_film
 from antdrive.sim.view.style import PLANNER_STYLES, planner_style
@@ -17,9 +18,10 @@ SIZE = (640, 360)
 @pytest.fixture(scope="module")
 def drives(made_up_drive):
     short, long = made_up_drive(seconds=0.6), made_up_drive(seconds=1.0)
-    plan = {"length_m": 3.2}
-    return [replace(log, meta={**log.meta, "plan": plan, "planner": {"name": name, "options": {}}})
-            for log, name in ((short, "astar"), (long, "mmas"))]  # fmt: skip
+    return [
+        replace(log, record=replace(log.record, planner=ComponentRecord(name=name, settings={})))
+        for log, name in ((short, "astar"), (long, "mmas"))
+    ]
 
 
 def test_runs_are_side_by_side_at_the_same_moment_and_wait_for_the_last(drives):
@@ -38,7 +40,7 @@ def test_each_run_has_its_planners_colour_and_its_outcome(drives):
     with Split(drives, "top", SIZE) as split:
         end = split.picture(np.inf)
     for k, log in enumerate(drives):
-        colour = np.array(planner_style(log.meta["planner"]["name"])[0])
+        colour = np.array(planner_style(log.record.planner.name)[0])
         assert np.abs(end[2, 320 * k + 2].astype(int) - colour).max() == 0
     green = np.array(VERDICTS[Outcome.SUCCEEDED][1])
     assert (np.abs(end.astype(int) - green).max(axis=-1) < 6).sum() > 500

@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from antdrive.sim.log.record import ComponentRecord
 from antdrive.sim.pipeline import Scenario, run
 from antdrive.sim.view.film import prelude
 from antdrive.sim.view.film.prelude import field_levels, planning_pictures, search
@@ -53,14 +54,18 @@ def test_a_log_that_planning_does_not_lead_to_is_refused(walked):
 @pytest.mark.parametrize(
     ("planner", "message"),
     [
-        ({"name": "astar", "options": {}}, "astar does not plan in iterations"),
-        ({"name": "as", "options": {"time_budget": 1.0}}, "time budget"),
-        ({"name": "nobody", "options": {}}, "nobody"),
+        ({"name": "astar", "settings": {}}, "astar does not plan in iterations"),
+        ({"name": "as", "settings": {"time_budget": 1.0}}, "time budget"),
+        ({"name": "nobody", "settings": {}}, "nobody"),
     ],
 )
 def test_planners_without_a_field_are_refused_before_anything_is_drawn(walked, tmp_path, planner, message):
     with pytest.raises(InputError, match=message):
-        film(replace(walked, meta={**walked.meta, "planner": planner}), tmp_path / "a.mp4", prelude=1.0)
+        film(
+            replace(walked, record=replace(walked.record, planner=ComponentRecord(**planner))),
+            tmp_path / "a.mp4",
+            prelude=1.0,
+        )
     assert not list(tmp_path.iterdir())
 
 

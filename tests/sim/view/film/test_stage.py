@@ -13,7 +13,6 @@ from antdrive.sim.view.film.stage import Stage, drawn_height, part_pose, still_p
 from antdrive.sim.view.film.tiny import add_mesh, merged, render
 from antdrive.sim.view.scene import Scene
 from antdrive.sim.view.style import MOVER
-from antdrive.worlds import InputError
 
 SIZE = (320, 240)
 
@@ -209,13 +208,6 @@ def test_a_trail_looks_the_same_painted_at_once_or_bit_by_bit(drive, scene):
         for k in range(len(points) - 1):
             stage.drive(points[k : k + 2], speeds[k : k + 2])
         assert (stage.frame(middle(drive)) == at_once).all()
-
-
-@pytest.mark.parametrize("missing", ["task", "robot"])
-def test_metadata_without_a_world_or_a_robot_are_refused(drive, missing):
-    meta = {key: value for key, value in drive.meta.items() if key != missing}
-    with pytest.raises(InputError, match=missing):
-        Scene.of(replace(drive, meta=meta))
 
 
 def test_a_movers_way_is_foretold_on_the_ground(drive, scene):

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from antdrive.sim.log.rollout import Outcome
+from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.log.record import ReplanRecord
 from antdrive.sim.view.film import encode, video
 from antdrive.sim.view.film.caption import VERDICTS, Layout
 from antdrive.sim.view.film.video import Shot, film, frame_times, still
@@ -117,7 +118,7 @@ def test_the_caption_fits_every_size(drive, size):
 
 @pytest.mark.parametrize("outcome", list(Outcome))
 def test_every_outcome_ends_with_words_in_its_colour(drive, outcome):
-    ended = replace(drive, meta={**drive.meta, "outcome": outcome.name.lower()})
+    ended = replace(drive, record=replace(drive.record, outcome=outcome))
     with Shot(ended, camera="top", size=SIZE) as shot:
         before, after = shot.picture(1.0), shot.ending()
     colour = np.array(VERDICTS[outcome][1])
@@ -163,7 +164,7 @@ def test_a_drive_without_rows_still_makes_a_picture(drive, tmp_path):
     empty = replace(
         drive, t=drive.t[:0], pose=drive.pose[:0], twist=drive.twist[:0], command=drive.command[:0],
         clearance=drive.clearance[:0], limiter=drive.limiter[:0], movers=drive.movers[:0], route=np.empty((0, 2)),
-        meta={**drive.meta, "outcome": "no_path"},
+        record=replace(drive.record, outcome=Outcome.NO_PATH),
     )  # fmt: skip
     info = film(empty, tmp_path / "nothing.mp4", size=SIZE, fps=10)
     assert info.frames == 11
@@ -292,9 +293,9 @@ def test_a_small_robot_gets_a_glow_and_a_large_one_none(made_up_drive):
 
 def test_a_replan_is_shown_from_its_moment_on(drive):
     """The old line goes, the new one comes, a dot marks the place; the cause is told for a while."""
-    ahead, new = np.array([(1.0, 0.4), (3.5, 0.4)]), {"t": 0.3, "cause": "obstructed", "solved": True}
-    entries = [{**new, "route": ahead.tolist()}, {**new, "t": 0.8, "cause": "waited", "solved": False, "route": []}]
-    replanned = replace(drive, meta={**drive.meta, "replans": entries})
+    new = ReplanRecord(t=0.3, trigger="obstructed", solved=True, cost_m=2.5, work=1, route=((1.0, 0.4), (3.5, 0.4)))
+    failed_one = replace(new, t=0.8, trigger="waited", solved=False, cost_m=None, route=())
+    replanned = replace(drive, record=replace(drive.record, replans=(new, failed_one)))
 
     def views(rollout, news, *times):
         with Shot(rollout, camera="top", size=SIZE, bare=True) as shot:
@@ -322,8 +323,8 @@ def test_a_replan_is_shown_from_its_moment_on(drive):
 
 
 def test_decisions_at_every_cell_are_not_told(drive):
-    entry = {"t": 0.0, "cause": "decision", "solved": True, "route": [[1.0, 1.0], [1.5, 1.0]]}
-    decided = replace(drive, meta={**drive.meta, "replans": [entry]})
+    entry = ReplanRecord(t=0.0, trigger="decision", solved=True, cost_m=0.5, work=1, route=((1.0, 1.0), (1.5, 1.0)))
+    decided = replace(drive, record=replace(drive.record, replans=(entry,)))
     with Shot(decided, camera="top", size=SIZE) as shot:
         assert [renewal.told for renewal in shot.replay.renewals] == [""]
         shot.picture(0.5)
