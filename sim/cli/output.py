@@ -25,7 +25,7 @@ def print_run(run: Run, files: dict[str, str]) -> None:
             f"(route {facts['route_length_m']:.2f} m); tracking error at most {facts['tracking_error_max_m']:.3f} m"
         )
         if facts["replans"] or facts["avoiding_s"]:
-            print_line(f"  replanned {facts['replans']:.0f} times, avoided movers for {facts['yielding_s']:.1f} s")
+            print_line(f"  replanned {facts['replans']:.0f} times, avoided movers for {facts['avoiding_s']:.1f} s")
         print_line(f"  {verdict(run.certificate)}")
         for problem in run.certificate.problems:
             print_line(f"    {problem}")
