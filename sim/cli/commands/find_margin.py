@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 def find_margin(
     world: Annotated[
-        str | None, typer.Argument(metavar="[WORLD]", help="Name of a world in the catalogue, or a world file.")
+        str | None, typer.Argument(metavar="WORLD", help="Name of a world in the catalogue, or a world file.")
     ] = None,
     kind: Annotated[
         str | None,

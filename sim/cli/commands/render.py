@@ -16,7 +16,7 @@ from antdrive.worlds.errors import InputError
 
 def render(
     rollouts: Annotated[
-        list[Path], typer.Argument(metavar="ROLLOUT.npz...", help="Logs of drives; two to six are shown side by side.")
+        list[Path], typer.Argument(metavar="ROLLOUT.npz", help="Logs of drives; two to six are shown side by side.")
     ],
     out: Annotated[
         Path,

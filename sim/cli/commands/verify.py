@@ -12,7 +12,7 @@ from antdrive.sim.cli.output import verdict
 
 
 def verify(
-    rollouts: Annotated[list[Path], typer.Argument(metavar="ROLLOUT.npz...", help="Logs of drives.")],
+    rollouts: Annotated[list[Path], typer.Argument(metavar="ROLLOUT.npz", help="Logs of drives.")],
     json: options.Json = False,
 ) -> int:
     """Certify drives again, from their logs alone.

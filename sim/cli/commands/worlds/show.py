@@ -10,6 +10,8 @@ from antdrive.sim.cli.console import print_files, print_json, print_line
 from antdrive.sim.cli.exits import SUCCEEDED
 from antdrive.sim.cli.output import task_facts
 
+UNITS = {"bounds": " m", "start": " m, m, rad", "goal": " m", "goal_tolerance": " m", "cell": " m"}
+
 
 def show_world(
     world: options.World,
@@ -39,7 +41,7 @@ def show_world(
         print_json({**task_to_dict(task), "passable": passable, "robot": spec.name, "margin": margin})
         return SUCCEEDED
     for key, value in task_facts(task).items():
-        print_line(f"{key:14} {value}")
-    print_line(f"{'passable':14} {'yes' if passable else 'no'}, for {spec.name} with a margin of {margin:g} m")
+        print_line(f"{key + UNITS.get(key, ''):18} {value}")
+    print_line(f"{'passable':18} {'yes' if passable else 'no'}, for {spec.name} with a margin of {margin:g} m")
     print_files({} if out is None else {"figure": str(out)})
     return SUCCEEDED
