@@ -68,7 +68,7 @@ def main() -> None:
     """Run the command line; the exit code says how it ended."""
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(TERMINATED))  # ends like Ctrl-C: temporary files are removed
     try:
-        code = _application()(standalone_mode=False)
+        code = application()(standalone_mode=False)
     except (InputError, FieldError) as error:
         print_error(str(error))
         code = WRONG_INPUT
@@ -85,7 +85,8 @@ def main() -> None:
     sys.exit(code if isinstance(code, int) else SUCCEEDED)
 
 
-def _application() -> typer.Typer:
+def application() -> typer.Typer:
+    """The command line as typer runs it."""
     app = typer.Typer(
         name="antdrive",
         help="Plan paths, drive them in physics, certify the drives and film them.",

@@ -60,35 +60,6 @@ Noise = Annotated[
         help="Multiple of the noise that the robot's file documents; 0 is a perfect robot.",
     ),
 ]
-Unseen = Annotated[
-    list[str] | None,
-    typer.Option(
-        metavar="X,Y,RADIUS",
-        help="Add a cylinder that neither planner nor controller know of [m]. May be repeated.",
-    ),
-]
-TimeLimit = Annotated[
-    float | None,
-    typer.Option(
-        min=1e-3,
-        max=1e6,
-        metavar="SECONDS",
-        help="Simulated time allowed [s].  [default: the world's own, or 30 s plus ten times the route at full speed]",
-    ),
-]
-Avoid = Annotated[bool, typer.Option("--avoid/--no-avoid", help="Avoid movers: slow down, stop, back off or go round.")]
-Replan = Annotated[
-    bool,
-    typer.Option("--replan/--no-replan", help="Replan around movers; otherwise only after straying from the route."),
-]
-Sees = Annotated[
-    str,
-    typer.Option(
-        metavar="KIND[:METRES]",
-        help="What the robot perceives of movers: positions, velocities or motions (their whole future); "
-        "with METRES, only of movers within that range [m].",
-    ),
-]
 Out = Annotated[
     Path | None,
     typer.Option("--out", "-o", metavar="FOLDER", help="Folder for the results.  [default: a folder below out/]"),

@@ -26,6 +26,35 @@ from antdrive.worlds.errors import InputError
 if TYPE_CHECKING:
     from antdrive.sim.pipeline import Run, Scenario
 
+Unseen = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="X,Y,RADIUS",
+        help="Add a cylinder that neither planner nor controller know of [m]. May be repeated.",
+    ),
+]
+TimeLimit = Annotated[
+    float | None,
+    typer.Option(
+        min=1e-3,
+        max=1e6,
+        metavar="SECONDS",
+        help="Simulated time allowed [s].  [default: the world's own, or 30 s plus ten times the route at full speed]",
+    ),
+]
+Avoid = Annotated[bool, typer.Option("--avoid/--no-avoid", help="Avoid movers: slow down, stop, back off or go round.")]
+Replan = Annotated[
+    bool,
+    typer.Option("--replan/--no-replan", help="Replan around movers; otherwise only after straying from the route."),
+]
+Sees = Annotated[
+    str,
+    typer.Option(
+        metavar="KIND[:METRES]",
+        help="What the robot perceives of movers: positions, velocities or motions (their whole future); "
+        "with METRES, only of movers within that range [m].",
+    ),
+]
 Video = Annotated[Path | None, typer.Option(metavar="FILE", help="Film the drive: .mp4, .gif or .webp.")]
 Gui = Annotated[bool, typer.Option("--gui", help="Replay the drive in a window afterwards; needs a screen.")]
 
@@ -40,11 +69,11 @@ def run(
     cell: options.CellSize = None,
     smoothing: options.Smoothing = "clearance",
     noise: options.Noise = 0.0,
-    unseen: options.Unseen = None,
-    time_limit: options.TimeLimit = None,
-    avoid: options.Avoid = True,
-    replan: options.Replan = True,
-    sees: options.Sees = "velocities",
+    unseen: Unseen = None,
+    time_limit: TimeLimit = None,
+    avoid: Avoid = True,
+    replan: Replan = True,
+    sees: Sees = "velocities",
     out: options.Out = None,
     video: Video = None,
     prelude: options.Prelude = 0.0,

@@ -6,6 +6,7 @@ import typer
 
 from antdrive.sim.cli.console import bar, print_line
 from antdrive.sim.cli.exits import SUCCEEDED
+from antdrive.worlds.errors import InputError
 
 
 def warm(
@@ -19,7 +20,10 @@ def warm(
     """
     from antdrive.sim.warm import is_warm
     from antdrive.sim.warm import warm as compile_all
+    from antdrive.worlds.kernel_cache import cache_folder
 
+    if cache_folder() is None:
+        raise InputError("warm: no folder for compiled code can be written; name one in NUMBA_CACHE_DIR")
     if is_warm():
         print_line("every planner is compiled already")
         return SUCCEEDED

@@ -1,6 +1,7 @@
 """Calling the command line in this process, in an empty folder."""
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -45,3 +46,18 @@ def small(small_run: Run, tmp_path: Path) -> Path:
     path = tmp_path / "small.yaml"
     save_task(small_run.scenario.task, path)
     return path
+
+
+@pytest.fixture
+def compiled(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """What was compiled: nothing at first, and nothing is cached yet. Compiling itself is left out."""
+    done: list[str] = []
+
+    def warm(jobs: int = -1, progress: Callable[[float], None] | None = None) -> None:
+        assert progress is not None
+        progress(1.0)
+        done.append("all")
+
+    monkeypatch.setattr("antdrive.sim.warm.warm", warm)
+    monkeypatch.setattr("antdrive.sim.warm.is_warm", lambda: bool(done))
+    return done

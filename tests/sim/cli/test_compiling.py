@@ -1,27 +1,11 @@
 """A fresh installation compiles its kernels once, where people can see it."""
 
 import sys
-from collections.abc import Callable
 
 import pytest
 
 from antdrive.sim.cli.compiling import compile_once
 from tests.sim.cli.calling import Call
-
-
-@pytest.fixture
-def compiled(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """What was compiled: nothing at first, and nothing is cached yet. Compiling itself is left out."""
-    done: list[str] = []
-
-    def warm(jobs: int = -1, progress: Callable[[float], None] | None = None) -> None:
-        assert progress is not None
-        progress(1.0)
-        done.append("all")
-
-    monkeypatch.setattr("antdrive.sim.warm.warm", warm)
-    monkeypatch.setattr("antdrive.sim.warm.is_warm", lambda: bool(done))
-    return done
 
 
 @pytest.fixture
@@ -69,9 +53,3 @@ def test_commands_that_plan_compile_first(antdrive: Call, monkeypatch: pytest.Mo
 def test_commands_that_only_look_do_not_compile(antdrive: Call, compiled: list[str], words: list[str]) -> None:
     assert antdrive(*words)[0] == 0
     assert compiled == []
-
-
-def test_warm_compiles_on_request_and_once(antdrive: Call, compiled: list[str]) -> None:
-    assert antdrive("warm") == (0, "every planner is compiled\n", "")
-    assert antdrive("warm") == (0, "every planner is compiled already\n", "")
-    assert compiled == ["all"]
