@@ -1,6 +1,7 @@
 """`antdrive worlds import`."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -56,7 +57,7 @@ def test_a_map_of_a_building_is_imported_planned_and_driven(antdrive: Call, tmp_
         "image: office.pgm\nresolution: 0.1\norigin: [-4.0, -3.0, 0.0]\nnegate: 0\n"
         "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
     )
-    # From the lower left room, where the table stands, by both doors and the one above into the lower right one.
+    # From the lower left room with the table to the lower right room: through the two upper rooms, by three doors.
     code, out, err = antdrive(
         "worlds", "import", "office.yaml", "-o", "world.yaml", "--start=-3.0,-2.5,1.57", "--goal", "3.0,-1.5", "--json"
     )
@@ -67,45 +68,60 @@ def test_a_map_of_a_building_is_imported_planned_and_driven(antdrive: Call, tmp_
     code, out, err = antdrive("run", "world.yaml", "--out", "r", "--json")
     facts = json.loads(out)
     assert (code, facts["outcome"], facts["certificate"]["certified"]) == (0, "succeeded", True)
-    assert 10 < facts["metrics"]["route_length_m"] < 18  # around, as the wall between the rooms has no door
-    # The robot kept to free pixels: its centre to their middles, its rim to white ones.
+    assert 10 < facts["metrics"]["route_length_m"] < 18  # there is no door between the two rooms
+    # Sixteen points of the robot's rim stayed over white pixels, which are free.
     with np.load("r/rollout.npz") as log:
         x, y = log["pose"][:, 0], log["pose"][:, 1]
     for angle in np.linspace(0, 2 * np.pi, 16, endpoint=False):
         col = np.floor((x + 0.18 * np.cos(angle) + 4.0) / 0.1).astype(int)
         row = np.floor((y + 0.18 * np.sin(angle) + 3.0) / 0.1).astype(int)
         assert {levels[59 - r][c] for r, c in zip(row, col, strict=True)} == {254}
-    assert (
-        antdrive("worlds", "import", "office.yaml", "--start=-3.0,-2.5,1.57", "--goal", "3.8,-2.8", "-o", "w.yaml")[0]
-        == 2
-    )
+    goal_in_unknown_cells = ["--start=-3.0,-2.5,1.57", "--goal", "3.8,-2.8"]
+    assert antdrive("worlds", "import", "office.yaml", *goal_in_unknown_cells, "-o", "w.yaml")[0] == 2
 
 
-def test_a_dynabarn_set_becomes_one_file_for_each_world(antdrive: Call, tmp_path: Path) -> None:
+@pytest.fixture
+def dynabarn(tmp_path: Path) -> Callable[..., Path]:
+    """Write a DynaBARN file with worlds of these names."""
     mover = {"radius": 0.5, "loop": "teleport", "keyframes_t_x_y": [[0, 5, 8], [8, 5, 9]]}
-    one = {
+    world = {
         "bounds": [-12, -12, 12, 12],
         "start": [11, 0, 3.14],
         "goal": [9, 0],
         "goal_tolerance": 1.0,
         "movers": [mover],
     }
-    (tmp_path / "set.json").write_text(json.dumps([{"name": "one", **one}, {"name": "a/b", **one}]))
-    code, out, _ = antdrive("worlds", "import", "set.json", "-o", "worlds")
+
+    def write(*names: str) -> Path:
+        path = tmp_path / "set.json"
+        path.write_text(json.dumps([{"name": name, **world} for name in names]))
+        return path
+
+    return write
+
+
+def test_a_dynabarn_set_becomes_one_file_for_each_world(antdrive: Call, dynabarn: Callable[..., Path]) -> None:
+    code, out, _ = antdrive("worlds", "import", dynabarn("one", "a/b"), "-o", "worlds")
     assert code == 0
     assert [line.split()[-1] for line in out.splitlines()] == ["worlds/one.yaml", "worlds/a_b.yaml"]
     assert len(load_task("worlds/a_b.yaml").world.movers) == 1
-    code, out, _ = antdrive("worlds", "import", "set.json", "-o", "worlds", "--json")
-    listed = json.loads(out)["worlds"]
-    assert [world["files"]["world"] for world in listed] == ["worlds/one.yaml", "worlds/a_b.yaml"]
     code, out, _ = antdrive("run", "worlds/one.yaml", "--json")
+    assert (code, json.loads(out)["metrics"]["contacts_driving"]) == (0, 0)
+
+
+def test_a_dynabarn_set_is_listed_as_json(antdrive: Call, dynabarn: Callable[..., Path]) -> None:
+    code, out, _ = antdrive("worlds", "import", dynabarn("one", "a/b"), "-o", "worlds", "--json")
+    listed = json.loads(out)["worlds"]
     assert code == 0
-    report = json.loads(out)
-    assert report["metrics"]["contacts_driving"] == 0
-    (tmp_path / "set.json").write_text(json.dumps([{"name": "one", **one}] * 2))
-    code, _, err = antdrive("worlds", "import", "set.json", "-o", "twice")
-    assert (code, "two worlds would be written to twice/one.yaml" in err) == (2, True)
-    assert not (tmp_path / "twice").exists()
+    assert [world["files"]["world"] for world in listed] == ["worlds/one.yaml", "worlds/a_b.yaml"]
+
+
+def test_two_worlds_of_one_name_are_refused_before_anything_is_written(
+    refused: Refused, dynabarn: Callable[..., Path]
+) -> None:
+    says = refused("worlds", "import", dynabarn("one", "one"), "-o", "twice")
+    assert "two worlds would be written to twice/one.yaml" in says
+    assert not Path("twice").exists()
 
 
 def test_no_import_overwrites_its_source_or_an_unnamed_file(antdrive: Call, tmp_path: Path) -> None:
