@@ -126,7 +126,7 @@ def dynabarn(jobs: int, source: Path, quick: bool) -> Iterator[str]:
             some = [r for r in got if int(r.name.split("-")[1].split("+")[0]) in numbers]
             rows.append([policy if kind == "easy" else "", kind, *told(some)])
         if policy == "yield and replan":
-            wrong = [f"- {r.name}: {r.outcome.name.lower()} ({r.reason})" for r in got if not r.certified]
+            wrong = [f"- {r.name}: {r.outcome.key} ({r.reason})" for r in got if not r.certified]
     yield from table(["the robot may", "worlds", *HEADS], rows)
     yield "\nWhat did not succeed with yielding and replanning:\n"
     yield from wrong
@@ -184,7 +184,7 @@ def random(jobs: int, source: Path, quick: bool) -> Iterator[str]:
         rows.append([policy, f"{len(proved)} with a way proved", *told(proved)])
         rows.append(["", f"{len(got) - len(proved)} without", *told([r for r in got if not r.proved])])
         wrong = [
-            f"- {r.name}: {r.outcome.name.lower()} ({r.reason}){'' if r.proved else ', no way proved'}"
+            f"- {r.name}: {r.outcome.key} ({r.reason}){'' if r.proved else ', no way proved'}"
             for r in got
             if not r.certified
         ]

@@ -13,10 +13,7 @@ from antdrive.worlds.errors import FieldError, require_finite, require_positive
 from antdrive.worlds.limits import MAX_CELLS
 from antdrive.worlds.motions import first_cell, motion_of
 from antdrive.worlds.movers import Cruising, Mover, Wandering, later
-from antdrive.worlds.types import Bounds as Bounds
-from antdrive.worlds.types import Floats as Floats
-from antdrive.worlds.types import Point as Point
-from antdrive.worlds.types import Pose as Pose
+from antdrive.worlds.types import Bounds, Floats, Point, Pose
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 from antdrive.sim.cli.console import print_files, print_line
 
 if TYPE_CHECKING:
-    from antdrive.sim.log.certificate import Certificate
     from antdrive.sim.pipeline import Run
     from antdrive.worlds import Task
 
@@ -26,19 +25,10 @@ def print_run(run: Run, files: dict[str, str]) -> None:
         )
         if facts["replans"] or facts["avoiding_s"]:
             print_line(f"  replanned {facts['replans']:.0f} times, avoided movers for {facts['avoiding_s']:.1f} s")
-        print_line(f"  {verdict(run.certificate)}")
+        print_line(f"  {run.certificate.sentence}")
         for problem in run.certificate.problems:
             print_line(f"    {problem}")
     print_files(files)
-
-
-def verdict(certificate: Certificate) -> str:
-    """Whether a drive is certified, and by what distances."""
-    from antdrive.sim.log.certificate import in_metres
-
-    found = "certified collision-free" if certificate.certified else "NOT certified"
-    least, between = in_metres(certificate.min_clearance), in_metres(certificate.bound)
-    return f"{found}: least clearance {least}, between steps at least {between}"
 
 
 def in_brackets(reason: str) -> str:

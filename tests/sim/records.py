@@ -41,6 +41,6 @@ def made_up_record(**changes: Any) -> DriveRecord:
         "outcome": Outcome.SUCCEEDED,
         "reason": "",
         "versions": {"antdrive": "0"},
-        "times": TimesRecord(plan_s=0.25, drive_wall_s=1.5),
+        "times": TimesRecord(plan_s=0.25, drive_wall_s=1.5, replans_s=()),
     }
     return DriveRecord(**{**values, **changes})

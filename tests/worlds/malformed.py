@@ -1,4 +1,4 @@
-"""World files that are wrong in one way each: what is written, and what the one-line error must say.
+"""World files that are wrong in one way each, with the error message that each must cause.
 
 The file is called bad.yaml.
 """
@@ -18,7 +18,7 @@ _END = """\
 obstacles:
   - {x: 5.0, y: 5.0, radius: 0.5}
 """
-#: What all of them would be without their fault.
+#: A file without a fault; each of the malformed ones differs from it in one way.
 GOOD = _START + _END
 
 

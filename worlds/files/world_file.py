@@ -69,7 +69,7 @@ class MoverEntry(BaseModel):
     walk: WalkEntry | None = Field(None, description="write {cell: 0.5, period: 1.0}")
 
 
-class TaskFile(BaseModel):
+class WorldFile(BaseModel):
     """A world with a start and a goal, as written in a file."""
 
     model_config = _RULES
@@ -169,13 +169,13 @@ def task_from_dict(data: Mapping[str, Any], source: str = "task") -> Task:
 
 def task_schema() -> dict[str, Any]:
     """The JSON Schema of a world file, for editors."""
-    schema = TaskFile.model_json_schema(by_alias=True)
+    schema = WorldFile.model_json_schema(by_alias=True)
     schema["required"] = [key for key in schema["required"] if key != "name"]
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "antdrive world"}
 
 
 def _to_task(document: Document) -> Task:
-    entry = check(TaskFile, document)
+    entry = check(WorldFile, document)
     xmin, ymin, xmax, ymax = entry.bounds
     if (xmax - xmin) / entry.cell * (ymax - ymin) / entry.cell > MAX_CELLS:
         raise document.error(("cell",), f"{entry.cell:g} m cuts these bounds into more than {MAX_CELLS} cells")

@@ -8,7 +8,6 @@ import typer
 from antdrive.sim.cli import options
 from antdrive.sim.cli.console import print_json, print_line
 from antdrive.sim.cli.exits import FAILED, SUCCEEDED
-from antdrive.sim.cli.output import verdict
 
 
 def verify(
@@ -29,7 +28,7 @@ def verify(
         print_json({"certified": all_certified, "rollouts": found})
     else:
         for path, certificate in checked.items():
-            print_line(f"{path}: {verdict(certificate)}")
+            print_line(f"{path}: {certificate.sentence}")
             for problem in certificate.problems:
                 print_line(f"  {problem}")
     return SUCCEEDED if all_certified else FAILED

@@ -244,7 +244,7 @@ def _tell_certificate(axes: Any, certificate: Certificate, rollout: Rollout) -> 
         (certificate.bound > 0, f"in between: at least {in_metres(certificate.bound)} between any two of them"),
     )
     lines = [*readings, *((False, problem) for problem in certificate.problems[:3])]
-    verdict = "certified collision-free" if certificate.certified else "NOT certified collision-free"
+    verdict = certificate.verdict
     colour = hexed(GOOD if certificate.certified else BAD)
     axes.text(0, 0.97, verdict, weight="bold", fontsize=12, color=colour, va="top", transform=axes.transAxes)
     for k, (fine, words) in enumerate(lines):

@@ -1,5 +1,6 @@
 """Logs on disk: what is saved is read again, and what is no log is refused in one line that names the file and the key."""
 
+import hashlib
 import json
 import math
 import subprocess
@@ -69,6 +70,18 @@ def test_a_record_survives_json_with_movers_and_without_optima() -> None:
     record = replace(record, plan=replace(record.plan, grid_optimum_m=None), outcome=Outcome.HIT_BY_TELEPORT)
     assert DriveRecord.from_json(record.to_json()) == record
     assert json.loads(record.to_json())["outcome"] == "hit_by_teleport"
+
+
+def test_the_digest_is_computed_as_the_page_about_the_format_says(saved: Path) -> None:
+    sha = hashlib.sha256()
+    with np.load(saved, allow_pickle=False) as file:
+        for name in ARRAYS:
+            sha.update(f"{name} {file[name].dtype.str} {file[name].shape}\n".encode() + file[name].tobytes())
+        record = json.loads(str(file["record"]))
+    digest = record.pop("digest")
+    del record["times"]
+    sha.update(json.dumps(record, sort_keys=True).encode())
+    assert sha.hexdigest() == digest
 
 
 def test_the_digest_covers_the_record_but_not_wall_clock_times(log: Rollout) -> None:
@@ -197,7 +210,7 @@ def test_a_wrong_record_is_refused_in_one_line_that_names_the_key(what: str, sav
 REPLAN = {"t": 1.0, "trigger": "waited", "solved": False, "cost_m": None, "work": 3, "route": []}
 WRONG_REPLANS: dict[str, tuple[list[dict[str, Any]], str]] = {
     "a time of text": ([{**REPLAN, "t": "soon"}], "replans[0].t: "),
-    "in disorder": ([{**REPLAN, "t": 2.0}, REPLAN], "replans[1].t: must not be earlier than the 2 s before, got 1"),
+    "in disorder": ([{**REPLAN, "t": 2.0}, REPLAN], "replans[1].t: must not be before 2 s, got 1"),
     "a route of one number": ([{**REPLAN, "route": [[1.0]]}], "replans[0].route[0]"),
     "no trigger": ([{**REPLAN, "trigger": None}], "replans[0].trigger: "),
     "solved without a route": ([{**REPLAN, "solved": True}], "replans[0].route: must have two points or more if solved"),

@@ -1,4 +1,4 @@
-"""DynaBARN's worlds, from their decoded keyframes."""
+"""The worlds of the DynaBARN set, from their decoded keyframes."""
 
 import json
 import math
@@ -77,7 +77,7 @@ def test_speeds_are_those_of_their_class():
         ([ONE | {"start": [math.nan, 0, 0]}], r"one: start\[0\]: must be a finite number"),
     ],
 )
-def test_a_wrong_set_gets_one_line(content, says, tmp_path):
+def test_a_wrong_set_gets_a_message_of_one_line(content, says, tmp_path):
     with pytest.raises(InputError, match=says) as caught:
         import_dynabarn(written(tmp_path, content))
     assert str(caught.value).isprintable()

@@ -1,4 +1,4 @@
-"""Maps of ROS's map_server: what a pixel means, which row is which, and what is refused."""
+"""Maps of ROS's map_server: what a pixel means, the order of rows, and which files are refused."""
 
 from __future__ import annotations
 
@@ -116,11 +116,11 @@ def test_colours_are_averaged_and_other_depths_understood(tmp_path: Path) -> Non
     assert rows_of(written(tmp_path, GOOD.replace("made.pgm", "made.png"))) == [[1, 0]]
 
 
-def test_keys_of_other_tools_are_passed_over(tmp_path: Path) -> None:
+def test_keys_of_other_tools_are_ignored(tmp_path: Path) -> None:
     assert rows_of(written(tmp_path, GOOD + "name: office\n")) == [[1, 1, 1], [1, 0, 0]]
 
 
-def test_the_task_tells_where_it_comes_from_and_can_be_kept(tmp_path: Path) -> None:
+def test_the_task_has_a_source_and_can_be_saved(tmp_path: Path) -> None:
     task = import_map_server(written(tmp_path), start=(-0.7, 2.2, 0.0), goal=(0.2, 2.2))
     assert task.world.name == "made"
     assert task.world.source == (
@@ -179,7 +179,7 @@ BAD: dict[str, tuple[str, bytes | None, str]] = {
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_malformed_maps_get_one_line(case: str, tmp_path: Path) -> None:
+def test_malformed_maps_get_a_message_of_one_line(case: str, tmp_path: Path) -> None:
     text, image, says = BAD[case]
     path = written(tmp_path, text, image)
     with pytest.raises(InputError) as caught:

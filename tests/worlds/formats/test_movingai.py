@@ -87,7 +87,7 @@ def test_line_ends_and_the_order_of_the_header_do_not_matter(tmp_path: Path, con
         (b"\x89PNG\r\n\x1a\n", "1: the header must be"),
     ],
 )  # fmt: skip
-def test_malformed_maps_are_refused_in_a_line(tmp_path: Path, content: str | bytes, words: str) -> None:
+def test_malformed_maps_get_a_message_of_one_line(tmp_path: Path, content: str | bytes, words: str) -> None:
     assert words in refused(tmp_path, import_movingai_map, content)
 
 
@@ -112,7 +112,7 @@ def test_problems_are_turned_into_our_cells(tmp_path: Path) -> None:
         (PROBLEM.replace("\t1\t1\t", "\t1\t2\t"), "2: the goal (1, 2) is outside the map of width 3 and height 2"),
     ],
 )
-def test_malformed_problems_are_refused_in_a_line(tmp_path: Path, line: str, words: str) -> None:
+def test_malformed_problems_get_a_message_of_one_line(tmp_path: Path, line: str, words: str) -> None:
     assert words in refused(tmp_path, import_movingai_problems, f"version 1\n{line}\n")
 
 

@@ -1,0 +1,31 @@
+"""The page about the format of rollouts agrees with the code."""
+
+import dataclasses
+import json
+import re
+from pathlib import Path
+
+from antdrive.sim.log.format_page import with_tables
+from antdrive.sim.log.record import DriveRecord, record_keys
+from antdrive.sim.log.rollout import ARRAYS
+from tests.sim.records import made_up_record
+
+PAGE = Path(__file__).parents[3] / "docs" / "rollout-format.md"
+
+
+def test_the_pages_tables_are_those_of_the_code() -> None:
+    page = PAGE.read_text(encoding="utf-8")
+    assert with_tables(page) == page, f"run python -m antdrive.sim.log.format_page {PAGE}"
+
+
+def test_the_page_describes_every_array_and_every_key() -> None:
+    page = PAGE.read_text(encoding="utf-8")
+    record = made_up_record()
+    written = json.loads(record.to_json())
+    assert set(written) == {field.name for field in dataclasses.fields(DriveRecord)}
+    for name in (*ARRAYS, *written, *(f"plan.{key}" for key in written["plan"])):
+        assert re.search(rf"^\| `{re.escape(name)}` \|", page, re.MULTILINE), name
+
+
+def test_every_key_has_a_description() -> None:
+    assert all(kind and text for _, kind, text in record_keys())
