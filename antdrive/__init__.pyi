@@ -18,7 +18,7 @@ from .sim.log.certificate import Certificate as Certificate
 from .sim.log.certificate import certify as certify
 from .sim.log.metrics import METRICS as METRICS
 from .sim.log.metrics import measure as measure
-from .sim.log.rollout import Outcome as Outcome
+from .sim.log.outcome import Outcome as Outcome
 from .sim.log.rollout import Rollout as Rollout
 from .sim.pipeline import Run as Run
 from .sim.pipeline import Scenario as Scenario

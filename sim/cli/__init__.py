@@ -1,3 +1,3 @@
 """The command line."""
 
-from antdrive.sim.cli.commands import main as main
+from antdrive.sim.cli.app import main as main

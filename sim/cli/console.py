@@ -1,4 +1,4 @@
-"""What people see in a terminal: progress on stderr, one-line errors, tables and JSON on stdout."""
+"""How the command line prints: progress bars and errors on stderr, text, tables and JSON on stdout."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ import typer
 
 @contextmanager
 def bar(label: str) -> Iterator[Callable[[float], None]]:
-    """A progress bar on stderr, told the fraction done; silent where stderr is no terminal."""
+    """A progress bar on stderr, which shows nothing where stderr is no terminal.
+
+    Yields a function that the block calls with the fraction that is done.
+    """
     if not sys.stderr.isatty():
         yield lambda fraction: None
         return
@@ -35,7 +38,7 @@ def bar(label: str) -> Iterator[Callable[[float], None]]:
 
 @contextmanager
 def planning(label: str) -> Iterator[None]:
-    """A bar over a planner's iterations, with the best length so far."""
+    """A progress bar over the iterations of planners that run in the block, with the best length so far."""
     if not sys.stderr.isatty():
         yield
         return
@@ -44,57 +47,63 @@ def planning(label: str) -> Iterator[None]:
 
     from antdrive.planners import watch
 
-    with Progress(
-        TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[best]}"),
-        console=Console(stderr=True), transient=True,
-    ) as progress:  # fmt: skip
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[best]}"))
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task(label, total=None, best="")
 
-        def see(state: Any) -> None:
+        def update(state: Any) -> None:
             best = f"best {state.best:.2f} m" if math.isfinite(state.best) else "no path yet"
             progress.update(task, completed=state.done, total=state.total, best=best)
 
-        with watch(see):
+        with watch(update):
             yield
 
 
-def complain(message: str) -> None:
-    """One line on stderr."""
+def print_error(message: str) -> None:
+    """Print one line on stderr."""
     typer.echo(f"antdrive: {message}", err=True)
 
 
-def say(text: str = "") -> None:
-    """A line on stdout."""
+def print_line(text: str = "") -> None:
+    """Print one line on stdout."""
     typer.echo(text)
 
 
-def say_json(value: Any) -> None:
-    """One JSON object on stdout; numbers that JSON does not know become null."""
+def print_json(value: Any) -> None:
+    """Print one JSON object on stdout."""
     typer.echo(as_json(value))
 
 
 def as_json(value: Any) -> str:
-    """Indented JSON, strictly: numbers that JSON does not know become null."""
-    return json.dumps(_strict(value), indent=2, allow_nan=False)
+    """Indented JSON that every reader accepts: infinities and nan become null."""
+    return json.dumps(_json_value(value), indent=2, allow_nan=False)
 
 
-def table(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Aligned columns on stdout; on a terminal a line ends where it does, elsewhere the last column is as long as it is."""
+def print_table(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Print aligned columns on stdout. On a terminal, lines are cut at its width; elsewhere they are complete."""
     lines = [tuple(headers), *(tuple(row) for row in rows)]
     widths = [max(len(line[i]) for line in lines) for i in range(len(headers) - 1)]
-    room = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+    columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
     for line in lines:
-        text = "  ".join([*(cell.ljust(width) for cell, width in zip(line, widths, strict=False)), line[-1]]).rstrip()
-        say(text if room is None or len(text) <= room else text[: room - 1] + "…")
+        aligned = [cell.ljust(width) for cell, width in zip(line, widths, strict=False)]
+        text = "  ".join([*aligned, line[-1]]).rstrip()
+        print_line(text if columns is None or len(text) <= columns else text[: columns - 1] + "…")
 
 
-def _strict(value: Any) -> Any:
+def print_files(files: dict[str, str]) -> None:
+    """Print the written files, one line each: what a file is, and its path."""
+    width = max([8, *map(len, files)])
+    for name, path in files.items():
+        print_line(f"  {name:{width}} {path}")
+
+
+def _json_value(value: Any) -> Any:
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, dict):
-        return {str(key): _strict(item) for key, item in value.items()}
+        return {str(key): _json_value(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_strict(item) for item in value]
+        return [_json_value(item) for item in value]
     if hasattr(value, "item"):
-        return _strict(value.item())
+        return _json_value(value.item())
     return value

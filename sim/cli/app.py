@@ -1,0 +1,138 @@
+"""The command `antdrive`: its table of commands, and its exit code for everything that can end one."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Annotated, Any
+
+import typer
+
+from antdrive.sim.cli.commands.compare import compare
+from antdrive.sim.cli.commands.find_margin import find_margin
+from antdrive.sim.cli.commands.margin import margin
+from antdrive.sim.cli.commands.plan import plan
+from antdrive.sim.cli.commands.planners import planners
+from antdrive.sim.cli.commands.render import render
+from antdrive.sim.cli.commands.report import report
+from antdrive.sim.cli.commands.reproduce import reproduce
+from antdrive.sim.cli.commands.robots import robots
+from antdrive.sim.cli.commands.run import run
+from antdrive.sim.cli.commands.schema import schema
+from antdrive.sim.cli.commands.verify import verify
+from antdrive.sim.cli.commands.warm import warm
+from antdrive.sim.cli.commands.worlds.export import export_world
+from antdrive.sim.cli.commands.worlds.generate import generate_world
+from antdrive.sim.cli.commands.worlds.import_ import import_world
+from antdrive.sim.cli.commands.worlds.list import list_worlds
+from antdrive.sim.cli.commands.worlds.show import show_world
+from antdrive.sim.cli.console import print_error, print_line
+from antdrive.sim.cli.exits import INTERRUPTED, SUCCEEDED, TERMINATED, WRONG_INPUT
+from antdrive.worlds.errors import FieldError, InputError
+
+#: The commands by name, in the order in which `antdrive --help` lists them. Each returns its exit code.
+COMMANDS: Mapping[str, Callable[..., int]] = MappingProxyType(
+    {
+        "run": run,
+        "plan": plan,
+        "compare": compare,
+        "render": render,
+        "report": report,
+        "verify": verify,
+        "margin": margin,
+        "find-margin": find_margin,
+        "reproduce": reproduce,
+        "planners": planners,
+        "robots": robots,
+        "schema": schema,
+        "warm": warm,
+    }
+)
+WORLDS: Mapping[str, Callable[..., int]] = MappingProxyType(
+    {
+        "list": list_worlds,
+        "show": show_world,
+        "generate": generate_world,
+        "import": import_world,
+        "export": export_world,
+    }
+)
+
+# typer exports only descendants of the error that it raises for every wrong word.
+_USAGE_ERROR: Any = typer.BadParameter.__mro__[2]
+
+
+def main() -> None:
+    """Run the command line; the exit code says how it ended."""
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(TERMINATED))  # ends like Ctrl-C: temporary files are removed
+    try:
+        code = application()(standalone_mode=False)
+    except (InputError, FieldError) as error:
+        print_error(str(error))
+        code = WRONG_INPUT
+    except (KeyboardInterrupt, typer.Abort):
+        code = INTERRUPTED
+    except OSError as error:  # such as a full disk
+        print_error(f"{error.filename or 'output'}: {error.strerror}")
+        code = WRONG_INPUT
+    except _USAGE_ERROR as error:
+        _print_usage_error(error)
+        code = WRONG_INPUT
+    if code == INTERRUPTED:  # typer turns Ctrl-C within a command into this code
+        print_error("interrupted")
+    sys.exit(code if isinstance(code, int) else SUCCEEDED)
+
+
+def application() -> typer.Typer:
+    """The command line as typer runs it."""
+    app = typer.Typer(
+        name="antdrive",
+        help="Plan paths, drive them in physics, certify the drives and film them.",
+        no_args_is_help=True,
+        rich_markup_mode=None,
+        pretty_exceptions_enable=False,
+        add_completion=False,
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    worlds = typer.Typer(
+        help="List, show, generate, import and export worlds.", no_args_is_help=True, rich_markup_mode=None
+    )
+    for group, commands in ((app, COMMANDS), (worlds, WORLDS)):
+        for name, command in commands.items():
+            group.command(name)(command)
+    app.add_typer(worlds, name="worlds")
+    app.callback()(_global_options)
+    return app
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        print_line(f"antdrive {version('antdrive')}")
+        raise typer.Exit
+
+
+def _global_options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    pass
+
+
+def _print_usage_error(error: Any) -> None:
+    if type(error).__name__ == "NoArgsIsHelpError":
+        print_line(error.format_message())
+    else:
+        command = " ".join(["antdrive", *_command_words(error.ctx)])
+        print_error(f"{error.format_message()} (see {command} --help)")
+
+
+def _command_words(context: Any) -> list[str]:
+    """The words that name the command that was called, below the program's own name."""
+    if context is None or context.parent is None:
+        return []
+    return [*_command_words(context.parent), context.info_name]

@@ -1,0 +1,56 @@
+"""`antdrive render`."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from antdrive.sim.cli import options
+from antdrive.sim.cli.compiling import compile_once
+from antdrive.sim.cli.console import print_files, print_json
+from antdrive.sim.cli.exits import SUCCEEDED
+from antdrive.sim.cli.parse import size as parse_size
+from antdrive.sim.cli.write import caption, write_comparison_film, write_film
+from antdrive.worlds.errors import InputError
+
+
+def render(
+    rollouts: Annotated[
+        list[Path], typer.Argument(metavar="ROLLOUT.npz", help="Logs of drives; two to six are shown side by side.")
+    ],
+    out: Annotated[
+        Path,
+        typer.Option("--out", "-o", metavar="FILE", help="The film: .mp4, .gif or .webp; .png writes one frame."),
+    ],
+    camera: Annotated[str, typer.Option(metavar="NAME", help="Camera: oblique, top or follow.")] = "oblique",
+    size: Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="Size of the picture [px].")] = "1280x720",
+    fps: Annotated[int, typer.Option(min=1, max=240, metavar="NUMBER", help="Frames per second.")] = 30,
+    speed: options.Speed = 1.0,
+    prelude: options.Prelude = 0.0,
+    json: options.Json = False,
+) -> int:
+    """Film drives from their logs, from any camera.
+
+    Nothing is simulated again.
+    """
+    from antdrive.sim.log.rollout import Rollout
+
+    logs = [Rollout.load(path) for path in rollouts]
+    shape, one_frame = parse_size(size), out.suffix.lower() == ".png"
+    if len(logs) > 1 and (prelude or one_frame):
+        raise InputError(f"--out {out}: several rollouts give a film, without a prelude")
+    compile_once()
+    if one_frame:
+        from antdrive.sim.view.film.video import still
+
+        still(logs[0], out, camera=camera, size=shape, note=caption(logs[0]))
+        facts: dict[str, Any] = {"file": str(out), "frames": 1}
+    elif len(logs) > 1:
+        facts = write_comparison_film(logs, out, camera=camera, size=shape, fps=fps, speed=speed)
+    else:
+        facts = write_film(logs[0], out, camera=camera, size=shape, fps=fps, speed=speed, prelude=prelude)
+    if json:
+        print_json(facts)
+    else:
+        print_files({"film": facts["file"]})
+    return SUCCEEDED

@@ -1,0 +1,39 @@
+"""`antdrive report`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from antdrive.sim.cli import options
+from antdrive.sim.cli.console import print_files, print_json, print_line
+from antdrive.sim.cli.exits import SUCCEEDED
+
+
+def report(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Holds the folders that `antdrive run` wrote.")],
+    out: Annotated[
+        Path, typer.Option("--out", "-o", metavar="FILE", help="The page: .html, or .md for a pull request.")
+    ],
+    title: Annotated[
+        str | None, typer.Option(metavar="TEXT", help="Title of the page.  [default: the folder's name]")
+    ] = None,
+    embed_films: Annotated[
+        bool, typer.Option("--embed-films", help="Put films into the page instead of linking to them.")
+    ] = False,
+    json: options.Json = False,
+) -> int:
+    """Write one page about many runs.
+
+    A table to sort and filter, films, figures, and the commands that repeat the runs.
+    """
+    from antdrive.sim.view.report.report import write_report
+
+    count = write_report(folder, out, title=title, embed_films=embed_films)
+    size = out.stat().st_size
+    if json:
+        print_json({"file": str(out), "runs": count, "bytes": size})
+    else:
+        print_line(f"{count} runs, {size / 1e6:.2f} MB")
+        print_files({"report": str(out)})
+    return SUCCEEDED

@@ -1,0 +1,152 @@
+"""`antdrive run`."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from antdrive.sim.cli import options
+from antdrive.sim.cli.compiling import compile_once
+from antdrive.sim.cli.console import bar, planning, print_json
+from antdrive.sim.cli.exits import FAILED, SUCCEEDED
+from antdrive.sim.cli.output import print_run
+from antdrive.sim.cli.parse import disc
+from antdrive.sim.cli.scenario import among_movers, make_scenario
+from antdrive.sim.cli.write import (
+    check_film,
+    check_folder,
+    default_folder,
+    this_command,
+    write_film,
+    write_result,
+    write_run,
+)
+from antdrive.worlds.errors import InputError
+
+if TYPE_CHECKING:
+    from antdrive.sim.pipeline import Run, Scenario
+
+Unseen = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="X,Y,RADIUS",
+        help="Add a cylinder that neither planner nor controller know of [m]. May be repeated.",
+    ),
+]
+TimeLimit = Annotated[
+    float | None,
+    typer.Option(
+        min=1e-3,
+        max=1e6,
+        metavar="SECONDS",
+        help="Simulated time allowed [s].  [default: the world's own, or 30 s plus ten times the route at full speed]",
+    ),
+]
+Avoid = Annotated[bool, typer.Option("--avoid/--no-avoid", help="Avoid movers: slow down, stop, back off or go round.")]
+Replan = Annotated[
+    bool,
+    typer.Option("--replan/--no-replan", help="Replan around movers; otherwise only after straying from the route."),
+]
+Sees = Annotated[
+    str,
+    typer.Option(
+        metavar="KIND[:METRES]",
+        help="What the robot perceives of movers: positions, velocities or motions (their whole future); "
+        "with METRES, only of movers within that range [m].",
+    ),
+]
+Video = Annotated[Path | None, typer.Option(metavar="FILE", help="Film the drive: .mp4, .gif or .webp.")]
+Gui = Annotated[bool, typer.Option("--gui", help="Replay the drive in a window afterwards; needs a screen.")]
+
+
+def run(
+    world: options.World,
+    planner: options.Planner = "ants",
+    settings: options.Settings = None,
+    robot: options.Robot = "turtlebot",
+    seed: options.Seed = 0,
+    margin: options.Margin = 0.03,
+    cell: options.CellSize = None,
+    smoothing: options.Smoothing = "clearance",
+    noise: options.Noise = 0.0,
+    unseen: Unseen = None,
+    time_limit: TimeLimit = None,
+    avoid: Avoid = True,
+    replan: Replan = True,
+    sees: Sees = "velocities",
+    out: options.Out = None,
+    video: Video = None,
+    prelude: options.Prelude = 0.0,
+    vector: options.Vector = False,
+    figures: options.Figures = True,
+    gui: Gui = False,
+    json: options.Json = False,
+) -> int:
+    """Plan a path, drive it in physics and certify the drive.
+
+    Exit code 0: the robot stopped at the goal, and its log proves that it touched nothing.
+    """
+    scenario = make_scenario(
+        world,
+        planner,
+        settings,
+        robot,
+        seed=seed,
+        margin=margin,
+        cell=cell,
+        smoothing=smoothing,
+        noise=noise,
+        unseen=tuple(disc(text) for text in unseen or ()),
+        time_limit=time_limit,
+        **among_movers(avoid, replan, sees),
+    )
+    folder = out or default_folder(scenario)
+    _check_views(scenario, video, prelude, gui)
+    check_folder(folder)
+    compile_once()
+    result = _drive(scenario)
+    files = write_run(result, folder, vector=vector, figures=figures)
+    report = write_result(result, files, this_command())
+    if video is not None and result.rollout is not None:
+        files["film"] = write_film(result.rollout, video, prelude=prelude)["file"]
+        report = write_result(result, files, this_command())
+    if json:
+        print_json(report)
+    else:
+        print_run(result, files)
+    if gui and result.rollout is not None:
+        from antdrive.sim.view.window import show
+
+        show(result.rollout)
+    return SUCCEEDED if result.succeeded else FAILED
+
+
+def _check_views(scenario: "Scenario", video: Path | None, prelude: float, gui: bool) -> None:
+    """Refuse, before any work, a film or a window that could not be made afterwards."""
+    if gui:
+        from antdrive.sim.view.window import check_display
+
+        check_display()
+    if prelude > 0:
+        from antdrive.planners import IterativePlanner
+
+        if video is None:
+            raise InputError("--prelude: belongs to a film; give --video, too")
+        if not isinstance(scenario.planner, IterativePlanner):
+            raise InputError(
+                f"--prelude: {scenario.planner_name} does not plan in iterations; there is no field to show"
+            )
+    if video is not None:
+        check_film(video)
+
+
+def _drive(scenario: "Scenario") -> "Run":
+    """Plan and drive with progress bars; Ctrl-C while planning keeps the best path so far."""
+    from antdrive.planners import keep_best
+    from antdrive.sim.pipeline import plan
+    from antdrive.sim.pipeline import run as drive
+
+    with planning(f"planning with {scenario.planner_name}"), keep_best():
+        planned = plan(scenario)
+    with bar("driving") as progress:
+        return drive(scenario, planned=planned, progress=progress)

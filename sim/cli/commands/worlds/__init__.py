@@ -1,0 +1,1 @@
+"""The commands of `antdrive worlds`, one file each."""

@@ -1,0 +1,90 @@
+"""`antdrive worlds export`."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from antdrive.sim.cli import options
+from antdrive.sim.cli.console import print_files, print_json
+from antdrive.sim.cli.exits import SUCCEEDED
+from antdrive.worlds.errors import InputError
+
+if TYPE_CHECKING:
+    from antdrive.worlds import Task
+
+SDF = (".sdf", ".world")
+SUFFIXES = (*SDF, ".yaml", ".yml", ".map")
+
+
+def export_world(
+    world: options.World,
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out",
+            "-o",
+            metavar="FILE",
+            help="Gazebo: .sdf or .world; map_server: .yaml (and .pgm); MovingAI: .map (and .scen).",
+        ),
+    ],
+    resolution: Annotated[
+        float | None,
+        typer.Option(
+            min=1e-6,
+            max=1e6,
+            metavar="METRES",
+            help="Maps: side of a cell [m].  [default: the world's own cell size]",
+        ),
+    ] = None,
+    json: options.Json = False,
+) -> int:
+    """Write a world for another program.
+
+    FILE's suffix decides the format. SDF keeps everything. In a map, every cell that a cylinder reaches into is
+    blocked; importing the map again gives a similar world, not the same. A .map gets a .scen file beside it with
+    the path from start to goal, if there is one on its cells.
+    """
+    from antdrive.worlds import export_map_server, export_sdf, load_task
+
+    suffix = out.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise InputError(f"--out {out}: worlds are written as .sdf, .world, .yaml (map_server) or .map (MovingAI)")
+    task = load_task(world)
+    if out.exists() and Path(world).exists() and out.samefile(world):
+        raise InputError(f"--out {out}: is the world itself; choose another name")
+    if suffix in SDF:
+        if resolution is not None:
+            raise InputError("--resolution: an SDF world has no cells")
+        export_sdf(task, out)
+        files = {"sdf": str(out)}
+    elif suffix == ".map":
+        files = {"map": str(out), **_export_movingai(task, out, resolution)}
+    else:
+        files = {"map": str(out), "image": str(export_map_server(task, out, resolution=resolution))}
+    if json:
+        print_json({"world": task.world.name, "files": files})
+    else:
+        print_files(files)
+    return SUCCEEDED
+
+
+def _export_movingai(task: "Task", out: Path, resolution: float | None) -> dict[str, str]:
+    """Write the map and, if there is a path on its cells, the problem; the problem's file."""
+    import numpy as np
+
+    from antdrive.planners import Query, load_planner
+    from antdrive.worlds import Grid, MapProblem, export_movingai_map, export_movingai_problems
+
+    cells = export_movingai_map(task, out, resolution=resolution)
+    start, goal = cells.cell_at(*task.start[:2]), cells.cell_at(*task.goal)
+    beside = out.with_name(f"{out.name}.scen")
+    beside.unlink(missing_ok=True)  # a file from an earlier export would belong to another map
+    if start is None or goal is None or not (cells.free[start] and cells.free[goal]):
+        return {}
+    answer = load_planner("dijkstra").plan(Query(Grid.from_free(cells.free), start, goal), np.random.default_rng(0))
+    if not answer.solved:
+        return {}
+    found = MapProblem(start, goal, answer.cost, f"{answer.cost:.8f}", out.name, int(answer.cost // 4))
+    export_movingai_problems([found], cells.free.shape, beside)
+    return {"problem": str(beside)}

@@ -1,0 +1,9 @@
+"""What the command's exit code means to the shell and to scripts."""
+
+from __future__ import annotations
+
+SUCCEEDED = 0  # the command did what was asked, and its verdict is yes
+FAILED = 1  # the command ran, and its verdict is no: no path, a contact, not certified
+WRONG_INPUT = 2  # something that a person wrote is wrong, or an output cannot be written
+INTERRUPTED = 130  # Ctrl-C
+TERMINATED = 143  # SIGTERM

@@ -1,0 +1,83 @@
+"""The arguments and options that several commands share.
+
+Each help text states the unit, and the default where typer cannot show it.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+World = Annotated[str, typer.Argument(metavar="WORLD", help="Name of a world in the catalogue, or a world file.")]
+Planner = Annotated[
+    str, typer.Option("--planner", "-p", metavar="NAME", help="Planner; `antdrive planners` lists them.")
+]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        "-s",
+        metavar="GROUP.KEY=VALUE",
+        help="Set an option of the planner or the controller, such as planner.ants=50 or "
+        "controller.lookahead_time=0.5. May be repeated.",
+    ),
+]
+Robot = Annotated[
+    str, typer.Option("--robot", "-r", metavar="NAME", help="Name of a robot in the catalogue, or a robot file.")
+]
+Seed = Annotated[int, typer.Option(min=0, max=2**63 - 1, metavar="NUMBER", help="Random seed.")]
+Margin = Annotated[
+    float,
+    typer.Option(
+        min=0.0,
+        max=100.0,
+        metavar="METRES",
+        help="Distance that the plan keeps from obstacles, beyond the robot's radius [m].",
+    ),
+]
+CellSize = Annotated[
+    float | None,
+    typer.Option(
+        min=1e-6, max=1e6, metavar="METRES", help="Side of a grid cell [m].  [default: the world's own cell size]"
+    ),
+]
+Smoothing = Annotated[
+    str,
+    typer.Option(
+        metavar="KIND",
+        help="How the planned cells become a route: none (drive the cells), taut (as short as possible) or "
+        "clearance (short, and away from obstacles where there is room).",
+    ),
+]
+Noise = Annotated[
+    float,
+    typer.Option(
+        min=0.0,
+        max=100.0,
+        metavar="FACTOR",
+        help="Multiple of the noise that the robot's file documents; 0 is a perfect robot.",
+    ),
+]
+Out = Annotated[
+    Path | None,
+    typer.Option("--out", "-o", metavar="FOLDER", help="Folder for the results.  [default: a folder below out/]"),
+]
+Prelude = Annotated[
+    float,
+    typer.Option(
+        "--prelude",
+        min=0.0,
+        max=60.0,
+        metavar="SECONDS",
+        help="Begin the film with this many seconds of planning [s]; needs a planner with iterations.",
+    ),
+]
+Speed = Annotated[
+    float,
+    typer.Option(min=0.01, max=100, metavar="FACTOR", help="Speed of the film; 2 is twice as fast as real time."),
+]
+Vector = Annotated[bool, typer.Option("--vector", help="Write figures as PDF too.")]
+Figures = Annotated[bool, typer.Option("--figures/--no-figures", help="Write figures.")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else.")]

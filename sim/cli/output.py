@@ -1,0 +1,65 @@
+"""What commands print about tasks, planners, runs and certificates, as text or as plain values for JSON."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from antdrive.sim.cli.console import print_files, print_line
+
+if TYPE_CHECKING:
+    from antdrive.sim.pipeline import Run
+    from antdrive.worlds import Task
+
+
+def print_run(run: Run, files: dict[str, str]) -> None:
+    """Print how a run ended, what it measured, its certificate, and the files it wrote."""
+    s = run.scenario
+    print_line(
+        f"{s.task.world.name}: {s.robot.name} with {s.planner_name}: {run.outcome.value}" + in_brackets(run.reason)
+    )
+    if run.rollout is not None and run.certificate is not None:
+        facts = run.as_dict()["metrics"]
+        print_line(
+            f"  drove {facts['driven_length_m']:.2f} m in {facts['duration_s']:.1f} s "
+            f"(route {facts['route_length_m']:.2f} m); tracking error at most {facts['tracking_error_max_m']:.3f} m"
+        )
+        if facts["replans"] or facts["avoiding_s"]:
+            print_line(f"  replanned {facts['replans']:.0f} times, avoided movers for {facts['avoiding_s']:.1f} s")
+        print_line(f"  {run.certificate.sentence}")
+        for problem in run.certificate.problems:
+            print_line(f"    {problem}")
+    print_files(files)
+
+
+def in_brackets(reason: str) -> str:
+    """The reason behind a sentence, if there is one."""
+    return f" ({reason})" if reason else ""
+
+
+def comparison_cells(run: Run) -> tuple[str, ...]:
+    """Planned and driven length [m], duration [s] and least clearance [m], for a row of a table."""
+    if run.rollout is None:
+        return ("-",) * 4
+    facts = run.as_dict()["metrics"]
+    names = ("path_length_m", "driven_length_m", "duration_s", "min_clearance_m")
+    return tuple(f"{facts[name]:.3f}" for name in names)
+
+
+def task_facts(task: Task) -> dict[str, Any]:
+    """A task in short, as plain values."""
+    return {
+        "name": task.world.name,
+        "source": task.world.source,
+        "bounds": list(task.world.bounds),
+        "start": list(task.start),
+        "goal": list(task.goal),
+        "goal_tolerance": task.goal_tolerance,
+        "cell": task.cell,
+        "obstacles": len(task.world.obstacles),
+        "movers": len(task.world.movers),
+    }
+
+
+def plain(value: Any) -> Any:
+    """A planner's option as JSON can hold it."""
+    return value if isinstance(value, bool | int | float | str | None) else str(value)

@@ -1,0 +1,90 @@
+"""From the words of the command line to a scenario."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, get_args
+
+from antdrive.sim.cli.parse import pair
+from antdrive.worlds.errors import InputError
+
+if TYPE_CHECKING:
+    from antdrive.robots import PurePursuit
+    from antdrive.sim.driving.perception import Perception
+    from antdrive.sim.pipeline import Scenario
+
+GROUPS = ("planner", "controller")  # what `--set GROUP.KEY=VALUE` can set
+
+
+def make_scenario(world: str, planner: str, settings: list[str] | None, robot: str, **rest: Any) -> Scenario:
+    """The scenario that a command's options describe; `rest` are fields of `Scenario`.
+
+    Raises:
+        InputError: an unknown name, or a value out of range; the message names the option.
+    """
+    from antdrive.sim.pipeline import Scenario
+
+    chosen = grouped(settings)
+    controller = make_controller(chosen["controller"])
+    try:
+        return Scenario.of(world, planner, robot, options=chosen["planner"], controller=controller, **rest)
+    except InputError:
+        raise
+    except ValueError as error:
+        field, _, problem = str(error).partition(": ")
+        raise InputError(f"--{field.replace('_', '-')}: {problem}") from None
+
+
+def grouped(settings: list[str] | None) -> dict[str, dict[str, str]]:
+    """The values of every `--set GROUP.KEY=VALUE`, as text, by group and key."""
+    groups: dict[str, dict[str, str]] = {group: {} for group in GROUPS}
+    for text in settings or ():
+        key, value = pair(text)
+        group, _, name = key.partition(".")
+        if group not in groups or not name:
+            raise InputError(f"--set {text}: write GROUP.KEY=VALUE with a group of {', '.join(GROUPS)}")
+        groups[group][name] = value
+    return groups
+
+
+def make_controller(values: dict[str, str]) -> PurePursuit:
+    """The controller with these values, given as text."""
+    import dataclasses
+
+    from antdrive.planners.registry import parse
+    from antdrive.robots import PurePursuit
+
+    known = [field.name for field in dataclasses.fields(PurePursuit)]
+    for name in values:
+        if name not in known:
+            raise InputError(f"controller.{name}: unknown; choose from {', '.join(known)}")
+    try:
+        return PurePursuit(**{name: parse(f"controller.{name}", float, value) for name, value in values.items()})
+    except InputError:
+        raise
+    except ValueError as error:
+        raise InputError(f"controller.{error}") from None
+
+
+def among_movers(avoid: bool, replan: bool, sees: str) -> dict[str, Any]:
+    """The fields of a scenario that say how the robot drives among movers."""
+    from antdrive.sim.driving.replanning import ReplanPolicy
+
+    avoidance = {} if avoid else {"yielding": None}  # the default is a record of weights
+    return {"knowledge": make_perception(sees), "replanning": ReplanPolicy(around=replan), **avoidance}
+
+
+def make_perception(text: str) -> Perception:
+    """What the robot perceives of movers, from `--sees KIND[:METRES]`."""
+    from antdrive.sim.driving.perception import Perception, Told
+
+    kind, mark, metres = text.partition(":")
+    if kind not in get_args(Told):
+        raise InputError(f"--sees {text}: unknown kind {kind!r}; choose from {', '.join(get_args(Told))}")
+    try:
+        distance = float(metres) if mark else math.inf
+    except ValueError:
+        distance = math.nan
+    if not distance > 0:
+        raise InputError(f"--sees {text}: write KIND or KIND:METRES with a range greater than 0, such as positions:3")
+    return Perception(told=kind, reach=distance)  # type: ignore[arg-type]

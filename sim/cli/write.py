@@ -1,0 +1,153 @@
+"""The files that commands write: folders of results, figures, films."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from antdrive.sim.cli.console import as_json, bar
+from antdrive.worlds.errors import InputError
+
+if TYPE_CHECKING:
+    from antdrive.sim.log.rollout import Rollout
+    from antdrive.sim.pipeline import Run, Scenario
+    from antdrive.sim.view.film.video import FilmInfo
+
+FIGURES = ("overview", "certificate", "plan", "tour", "history", "field-bars", "field-contours")
+#: Every file that `write_run` may write into a folder.
+RUN_FILES = ("result.json", "rollout.npz", *(name + suffix for name in FIGURES for suffix in (".png", ".pdf")))
+
+
+def check_folder(folder: Path) -> None:
+    """Make a folder and try to write into it, before any work is done for it.
+
+    Raises:
+        InputError: the folder cannot be written to.
+    """
+    from antdrive.worlds.files.atomic import written_whole
+
+    probe = folder / ".antdrive"
+    try:
+        with written_whole(probe) as temporary:
+            temporary.touch()
+    except InputError as error:
+        raise InputError(str(error).replace(str(probe), str(folder), 1)) from None
+    probe.unlink(missing_ok=True)
+
+
+def check_film(path: Path) -> None:
+    """Check that a film can be written to `--video PATH`, before any work is done for it.
+
+    Raises:
+        InputError: an unknown suffix, or a path that cannot be written to.
+    """
+    from antdrive.sim.view.film.video import ENCODERS
+
+    if path.suffix.lower() not in ENCODERS:
+        raise InputError(f"--video {path}: films are written as {', '.join(ENCODERS)}")
+    if path.is_dir():
+        raise InputError(f"--video {path}: is a directory; name a file")
+    check_folder(path.parent)
+
+
+def default_folder(scenario: Scenario) -> Path:
+    """The folder of a run for which no `--out` is given."""
+    parts = (scenario.task.world.name, scenario.planner_name, scenario.robot.name, str(scenario.seed))
+    return Path("out") / "-".join(map(file_name, parts))
+
+
+def file_name(name: str) -> str:
+    """A name with only the characters that every file system takes."""
+    return "".join(c if c.isalnum() or c in "-_." else "_" for c in name)
+
+
+def suffixes(vector: bool) -> tuple[str, ...]:
+    """The suffixes that figures are written with."""
+    return (".png", ".pdf") if vector else (".png",)
+
+
+def write_run(run: Run, folder: Path, *, vector: bool = False, figures: bool = True) -> dict[str, str]:
+    """Write a run's log and figures into a folder; the files by name, with the `result.json` that is still to write.
+
+    Files of an earlier run in that folder are removed first, because they would contradict the new result.
+    """
+    for name in RUN_FILES:
+        (folder / name).unlink(missing_ok=True)
+    files = {"result": str(folder / "result.json")}
+    if run.rollout is not None:
+        log = str(run.rollout.save(folder / "rollout.npz"))
+        files |= _write_figures(run, folder, log, suffixes(vector)) if figures else {"rollout": log}
+    elif figures:
+        from antdrive.sim.view.figures.plots import plan_figure
+
+        s = run.scenario
+        files["figure"] = str(plan_figure(s.task, run.grid, run.plan, s.robot, folder / "overview.png"))
+    return files
+
+
+def _write_figures(run: Run, folder: Path, log: str, endings: Sequence[str]) -> dict[str, str]:
+    from antdrive.sim.view.figures.figures import certificate_figure, plan_figures
+    from antdrive.sim.view.figures.plots import overview
+
+    assert run.rollout is not None
+    s, files = run.scenario, {"rollout": log}
+    for suffix in endings:
+        end = "" if suffix == endings[0] else f" {suffix[1:]}"
+        files["figure" + end] = str(overview(run.rollout, folder / f"overview{suffix}"))
+        if run.certificate is not None:
+            path = certificate_figure(run.rollout, run.certificate, folder / f"certificate{suffix}")
+            files["certificate" + end] = str(path)
+    made = plan_figures(s.task, run.grid, run.plan, s.robot, folder, name=s.planner_name, suffixes=endings)
+    return files | {name: str(path) for name, path in made.items()}
+
+
+def write_result(run: Run, files: Mapping[str, str], command: str) -> dict[str, Any]:
+    """Write a run's `result.json`, at `files["result"]`; what was written."""
+    from antdrive.worlds.files.atomic import written_whole
+
+    result = {**run.as_dict(), "files": dict(files), "command": command}
+    with written_whole(files["result"]) as temporary:
+        temporary.write_text(as_json(result) + "\n", encoding="utf-8")
+    return result
+
+
+def write_film(log: Rollout, path: Path, **options: Any) -> dict[str, Any]:
+    """Film a rollout with a progress bar; facts about the film."""
+    from antdrive.sim.view.film.video import film
+
+    with bar("filming") as progress:
+        return _film_facts(film(log, path, note=caption(log), progress=progress, **options))
+
+
+def write_comparison_film(logs: Sequence[Rollout], path: Path, **options: Any) -> dict[str, Any]:
+    """Film rollouts side by side with a progress bar; facts about the film."""
+    from antdrive.sim.view.film.compare import compare_film
+
+    with bar("filming") as progress:
+        return _film_facts(compare_film(logs, path, progress=progress, **options))
+
+
+def _film_facts(info: FilmInfo) -> dict[str, Any]:
+    return {
+        "file": str(info.path),
+        "frames": info.frames,
+        "size": list(info.size),
+        "fps": info.fps,
+        "renderer": info.renderer,
+    }
+
+
+def caption(log: Rollout) -> str:
+    """The line in a film that says whether the drive is certified."""
+    from antdrive.sim.log.certificate import certify
+
+    c = certify(log)
+    return f"certified: never closer than {c.bound:.3f} m" if c.certified else "not certified collision-free"
+
+
+def this_command() -> str:
+    """The command that is running, as one would type it."""
+    return shlex.join(["antdrive", *sys.argv[1:]])

@@ -1,0 +1,153 @@
+"""`antdrive run`."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from antdrive.sim import Run
+from tests.sim.cli.calling import Call, Refused
+
+
+def test_a_run_writes_the_files_it_lists_and_verify_agrees(antdrive: Call, small: Path, tmp_path: Path) -> None:
+    code, out, err = antdrive("run", small, "--out", tmp_path / "r", "--json")
+    facts = json.loads(out)
+    assert (code, err) == (0, "")
+    assert facts["outcome"] == "succeeded"
+    assert facts["certificate"]["certified"]
+    for path in facts["files"].values():
+        assert Path(path).stat().st_size > 0
+    assert json.loads((tmp_path / "r" / "result.json").read_text()) == facts
+    code, out, _ = antdrive("verify", facts["files"]["rollout"])
+    assert code == 0
+    assert "certified collision-free" in out
+
+
+def test_a_run_reports_its_outcome_and_certificate(antdrive: Call, small: Path) -> None:
+    code, out, _ = antdrive("run", small, "--planner", "aco-han", "--set", "planner.ants=50", "--seed", "3")
+    assert code == 0
+    assert "stopped at the goal without contact" in out
+    assert "certified collision-free" in out
+    assert Path("out/small-aco-han-turtlebot-3/rollout.npz").exists()
+
+
+def test_a_collision_is_exit_code_1_and_verify_refuses_the_log(antdrive: Call, small: Path, collided_run: Run) -> None:
+    disc = collided_run.scenario.unseen[0]
+    hidden = f"{disc.x},{disc.y},{disc.radius}"
+    code, out, _ = antdrive("run", small, "-p", "astar", "--unseen", hidden, "--json", "--out", "r")
+    facts = json.loads(out)
+    assert code == 1
+    assert facts["outcome"] == "collided"
+    assert facts["digest"] == collided_run.rollout.digest  # type: ignore[union-attr]
+    code, out, _ = antdrive("verify", "r/rollout.npz")
+    assert code == 1
+    assert "NOT certified" in out
+
+
+def test_no_path_is_exit_code_1_with_a_reason(antdrive: Call) -> None:
+    code, out, _ = antdrive("run", "no-path", "--json")
+    facts = json.loads(out)
+    assert (code, facts["outcome"]) == (1, "no_path")
+    assert facts["reason"]
+    assert antdrive("plan", "no-path")[0] == 1
+
+
+def test_a_run_without_a_path_removes_the_log_of_an_earlier_run(antdrive: Call) -> None:
+    antdrive("run", "empty", "-p", "astar", "--no-figures", "--out", "r")
+    assert Path("r/rollout.npz").exists()
+    antdrive("run", "no-path", "-p", "astar", "--no-figures", "--out", "r")
+    assert not Path("r/rollout.npz").exists()
+
+
+def test_a_run_replaces_the_files_of_an_earlier_run_and_no_others(antdrive: Call, small: Path, tmp_path: Path) -> None:
+    antdrive(
+        "run", small, "-p", "aco-han", "-s", "planner.ants=50", "-s", "planner.iterations=5", "--vector", "--out", "o"
+    )
+    (tmp_path / "o" / "mine.txt").touch()
+    antdrive("run", "no-path", "-p", "astar", "--out", "o")
+    assert {path.name for path in (tmp_path / "o").iterdir()} == {"result.json", "overview.png", "mine.txt"}
+
+
+def test_a_run_reports_replans_and_avoidance_which_can_be_switched_off(antdrive: Call, tmp_path: Path) -> None:
+    world = tmp_path / "crossing.yaml"
+    world.write_text(
+        "schema: 1\nname: crossing\nbounds: [0, 0, 6, 4]\nstart: [1, 2, 0]\ngoal: [5, 2]\ncell: 0.25\n"
+        "movers: [{radius: 0.3, loop: once, keyframes: [[0, 3, 0.5], [3.5, 3, 1.9], [8, 3, 3.5]]}]\n"
+    )
+    words = ["run", str(world), "-p", "dstar-lite", "--out", str(tmp_path), "--json"]
+    code, out, _ = antdrive(*words)
+    measured = json.loads(out)["metrics"]
+    assert code == 0
+    assert measured["replans"] + measured["avoiding_s"] > 0
+    assert measured["tracking_error_max_m"] < 1.0, "measured from the route that was followed at the time"
+    assert "avoided movers for" in antdrive(*words[:-1])[1]
+    code, out, _ = antdrive(*words, "--no-avoid", "--no-replan")
+    assert code == 1
+    assert json.loads(out)["outcome"] == "collided"
+    assert json.loads(out)["metrics"]["replans"] == json.loads(out)["metrics"]["avoiding_s"] == 0
+
+
+def test_without_figures_a_run_writes_its_log_and_result(antdrive: Call, small: Path) -> None:
+    assert antdrive("run", small, "-p", "astar", "--no-figures", "--out", "bare")[0] == 0
+    assert sorted(path.name for path in Path("bare").iterdir()) == ["result.json", "rollout.npz"]
+
+
+def test_a_prelude_needs_a_film(refused: Refused) -> None:
+    assert "give --video" in refused("run", "empty", "-p", "as", "--prelude", "2")
+
+
+def test_a_prelude_needs_a_planner_with_iterations(refused: Refused) -> None:
+    words = ["-p", "astar", "--prelude", "2", "--video", "a.mp4"]
+    assert "astar does not plan in iterations" in refused("run", "empty", *words)
+
+
+def test_a_window_needs_a_display(refused: Refused, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("DISPLAY", raising=False)
+    assert "no display" in refused("run", "empty", "--gui")
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["run", "emty"], "did you mean empty"),
+        (["run", "empty", "--planner", "asta"], "astar"),
+        (["run", "empty", "--robot", "jackel"], "did you mean jackal"),
+        (["run", "empty", "--set", "ants=50"], "GROUP.KEY=VALUE"),
+        (["run", "empty", "--set", "planner.ants"], "KEY=VALUE"),
+        (["run", "empty", "-p", "aco-han", "--set", "planner.ant=50"], "ants"),
+        (["run", "empty", "-p", "aco-han", "--set", "planner.ants=many"], "whole number"),
+        (["run", "empty", "-p", "aco-han", "--set", "planner.ants=0"], "at least 1"),
+        (["run", "empty", "--set", "controller.lookahead=1"], "lookahead_time"),
+        (["run", "empty", "--set", "controller.guard=7"], "between 0 and 1"),
+        (["run", "empty", "--margin", "-1"], "--margin"),
+        (["run", "empty", "--cell", "nan"], "cell"),
+        (["run", "empty", "--cell", "1e-5"], "cell"),
+        (["run", "empty", "--cell", "inf"], "--cell"),
+        (["run", "empty", "--margin", "inf"], "--margin"),
+        (["run", "empty", "--time-limit", "inf"], "--time-limit"),
+        (["run", "empty", "--set", "controller.lookahead_max=inf"], "finite"),
+        (["run", "empty", "--set", "controller.lookahead_max=1e9"], "between 0.001 and 100"),
+        (["run", "empty", "--set", "controller.guard=abc"], "must be a finite number"),
+        (["run", "empty", "--unseen", "1e300,1,1"], "none beyond a million"),
+        (["run", "empty", "--unseen", "1,2"], "3 numbers"),
+        (
+            ["run", "empty", "--sees", "all"],
+            "--sees all: unknown kind 'all'; choose from positions, velocities, motions",
+        ),
+        (["run", "empty", "--sees", "positions:far"], "--sees positions:far: write KIND or KIND:METRES"),
+        (["run", "empty", "--sees", "positions:-1"], "with a range greater than 0"),
+        (["run", "empty", "--unseen", "1,2,-3"], "radius: must be greater than 0"),
+        (["run", "empty", "--video", "film.avi"], ".mp4"),
+        (["run", "empty", "--out", "/proc/nowhere"], "/proc/nowhere: cannot be written"),
+        (["run", "empty", "--video", "folder.mp4"], "--video folder.mp4: is a directory"),
+        (
+            ["run", "empty", "--smoothing", "straight"],
+            "smoothing: unknown 'straight'; choose from none, taut, clearance",
+        ),
+        (["run", "empty", "--noise", "60"], "noise: 60 times the robot's own is too much: encoder"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_wrong_input_is_one_line_and_exit_code_2(refused: Refused, words: list[str], says: str, tmp_path: Path) -> None:
+    (tmp_path / "folder.mp4").mkdir()
+    assert says in refused(*words)
