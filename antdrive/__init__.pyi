@@ -21,10 +21,10 @@ from .sim.log.metrics import measure as measure
 from .sim.log.outcome import Outcome as Outcome
 from .sim.log.rollout import Rollout as Rollout
 from .sim.pipeline import Run as Run
-from .sim.pipeline import Scenario as Scenario
 from .sim.pipeline import plan as plan
 from .sim.pipeline import run as run
-from .sim.view.figures.plots import overview as overview
+from .sim.scenario import Scenario as Scenario
+from .sim.view.figures.run_figures import overview as overview
 from .sim.view.film.video import film as film
 from .sim.view.report.report import write_report as write_report
 from .worlds.errors import InputError as InputError

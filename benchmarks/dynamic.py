@@ -147,7 +147,7 @@ def dynabarn(jobs: int, source: Path, quick: bool) -> Iterator[str]:
             some = [r for r in got if int(r.name.split("-")[1].split("+")[0]) in numbers]
             rows.append([policy if kind == "easy" else "", kind, *columns(some)])
         if policy == "avoid and replan":
-            wrong = [f"- {r.name}: {r.outcome.name.lower()} ({r.reason})" for r in got if not r.certified]
+            wrong = [f"- {r.name}: {r.outcome.key} ({r.reason})" for r in got if not r.certified]
     yield from table(["the robot may", "worlds", *HEADS], rows)
     yield "\nDrives that failed with avoidance and replanning:\n"
     yield from wrong
@@ -205,7 +205,7 @@ def random(jobs: int, source: Path, quick: bool) -> Iterator[str]:
         rows.append([policy, f"{len(proved)} with a proved path", *columns(proved)])
         rows.append(["", f"{len(got) - len(proved)} without", *columns([r for r in got if not r.proved])])
         wrong = [
-            f"- {r.name}: {r.outcome.name.lower()} ({r.reason}){'' if r.proved else ', no path proved'}"
+            f"- {r.name}: {r.outcome.key} ({r.reason}){'' if r.proved else ', no path proved'}"
             for r in got
             if not r.certified
         ]

@@ -41,7 +41,7 @@ def main() -> None:
         task = task_among(count)
         x = np.linspace(1, 19, 73)
         route = Route(np.stack([x, 10 + 0.4 * np.sin((x - 1) * np.pi / 3)], axis=1))
-        tracked = controller.guide(route, task.world, robot, 0.05, 1 / 60)
+        tracked = controller.prepare(route, task.world, robot, 0.05, 1 / 60)
         engines[count] = (Engine(task.world, robot).__enter__(), task, tracked)
     bare: dict[int, list[float]] = {count: [] for count in engines}
     loop: dict[int, list[float]] = {count: [] for count in engines}

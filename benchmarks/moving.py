@@ -58,7 +58,7 @@ class Strollers:
                 self._cells[n] = near[int(draw * len(near))]
 
 
-def drive(robot: OnlinePlanner, query: Query, movers: Strollers, limit: int = 5000) -> bool:
+def drive(robot: OnlineAgent, query: Query, movers: Strollers, limit: int = 5000) -> bool:
     """Whether the robot reaches the goal within `limit` decisions. A move into a mover fails the benchmark."""
     for _ in range(limit):
         if robot.arrived:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.worlds import Floats, MoverMotion, Point, Task
+from antdrive.worlds import Floats, Point, Task
 from antdrive.worlds.errors import FieldError
 
 if TYPE_CHECKING:  # importing a grid loads the compiler, which naming a planner should not

@@ -25,7 +25,7 @@ from antdrive.planners import (
     load_planner,
     smooth,
 )
-from antdrive.robots import LIMITERS, Avoidance, PurePursuit, RobotSpec, Senses, load_robot
+from antdrive.robots import LIMITERS, Avoidance, NoiseModel, PurePursuit, RobotSpec, load_robot
 from antdrive.sim.driving.cellwise import monitor_class
 from antdrive.sim.driving.drive import drive
 from antdrive.sim.driving.perception import Perception, Predictor
@@ -196,7 +196,7 @@ class Scenario:
         if self.avoidance is None or self.effective_perception.kind != "motions":
             return self.avoidance
         horizon = min(self.avoidance.horizon, 1.0) if self.timed else self.avoidance.horizon
-        return dataclasses.replace(self.avoidance, wary=0.0, horizon=horizon)
+        return dataclasses.replace(self.avoidance, reversal_weight=0.0, horizon=horizon)
 
     def rng(self, purpose: str) -> np.random.Generator:
         """A random stream from the seed; every `purpose` has its own, so that one does not change another."""
@@ -214,7 +214,9 @@ class Scenario:
         }
         if self.driven_world.movers:
             facts["movers"] = len(self.driven_world.movers)
-        picture = world_svg(self.driven_world, start=task.start, goal=(*task.goal, task.goal_tolerance))
+        picture = world_svg(
+            self.driven_world.bounds, self.driven_world.discs, start=task.start, goal=(*task.goal, task.goal_tolerance)
+        )
         return card(picture, task.world.name, facts)
 
 
@@ -246,7 +248,7 @@ class Run:
     @property
     def reason(self) -> str:
         """What the outcome's sentence leaves open; may be empty."""
-        return str(self.rollout.meta["reason"]) if self.rollout is not None else self.plan.reason
+        return self.rollout.record.reason if self.rollout is not None else self.plan.reason
 
     @property
     def succeeded(self) -> bool:
@@ -276,7 +278,7 @@ class Run:
     def _driven(self) -> Rollout:
         if self.rollout is None:
             reason = f": {self.reason}" if self.reason else ""
-            raise ValueError(f"no rollout: planning ended with {self.outcome.name.lower()}{reason}")
+            raise ValueError(f"no rollout: planning ended with {self.outcome.key}{reason}")
         return self.rollout
 
     def as_dict(self) -> dict[str, Any]:
@@ -284,10 +286,10 @@ class Run:
         s = self.scenario
         return {
             "world": s.task.world.name,
-            "planner": _name(s),
+            "planner": s.planner_label,
             "robot": s.robot.name,
             "seed": s.seed,
-            "outcome": self.outcome.name.lower(),
+            "outcome": self.outcome.key,
             "sentence": self.outcome.value,
             "reason": self.reason,
             "succeeded": self.succeeded,
@@ -299,7 +301,7 @@ class Run:
     def _repr_html_(self) -> str:
         s = self.scenario
         task = s.task
-        facts: dict[str, object] = {"planner": _name(s), "robot": s.robot.name}
+        facts: dict[str, object] = {"planner": s.planner_label, "robot": s.robot.name}
         lines = []
         if self.rollout is not None:
             lines = [(self.rollout.route, ROUTE_COLOUR, True), (self.rollout.pose[::12, :2], LINE, False)]
@@ -309,7 +311,7 @@ class Run:
         if self.reason:
             facts["reason"] = self.reason
         goal = (*task.goal, task.goal_tolerance)
-        picture = world_svg(s.driven_world, start=task.start, goal=goal, lines=lines)
+        picture = world_svg(s.driven_world.bounds, s.driven_world.discs, start=task.start, goal=goal, lines=lines)
         return card(picture, f"{task.world.name}: {self.outcome.value}", facts)
 
 
@@ -342,11 +344,13 @@ def run(
     if not answer.solved:
         return Run(s, grid, answer)
     route = smooth(answer, grid, s.task, kind="none" if s.timed else s.smoothing)
-    tracked = s.controller.guide(route, s.task.world, s.robot, s.margin, 1 / s.control_hz, s.task.goal_tolerance)
+    tracked = s.controller.prepare(route, s.task.world, s.robot, s.margin, 1 / s.control_hz, s.task.goal_tolerance)
     limit = s.time_limit or s.task.time_limit or 30.0 + 10.0 * route.length / s.robot.max_speed
     started = time.perf_counter()
     noise = s.robot.noise.scaled(s.noise)
-    noise_model = Senses(noise, s.robot.track, 1 / s.control_hz, s.task.start, s.rng("noise")) if noise.loud else None
+    noise_model = (
+        NoiseModel(noise, s.robot.track, 1 / s.control_hz, s.task.start, s.rng("noise")) if noise.nonzero else None
+    )
     trajectories = s.trajectories
     predictor = Predictor(trajectories, s.effective_perception, s.control_hz) if trajectories else None
     monitor = _monitor(s, grid, predictor)
@@ -419,7 +423,7 @@ def _record(
             "schema": SCHEMA,
             "task": task,
             "unseen": list(range(known, known + len(s.unseen))),
-            "planner": {"name": _name(s), "options": _plain(answer.options)},
+            "planner": {"name": s.planner_label, "options": _plain(answer.options)},
             "plan": {
                 "status": answer.status.name.lower(),
                 "cost_m": answer.cost,
@@ -443,7 +447,7 @@ def _record(
             "physics_hz": s.physics_hz,
             "control_hz": s.control_hz,
             "time_limit": limit,
-            "outcome": log.outcome.name.lower(),
+            "outcome": log.outcome.key,
             "reason": log.reason,
             "versions": versions(),
             "times": {"plan_s": answer.wall_s, "drive_wall_s": wall, **_replan_times(replans)},

@@ -12,7 +12,7 @@ import numpy as np
 
 from antdrive.planners.anyangle.lines import RouteEnds, cells_along, polyline_length, route_ends, terrain
 from antdrive.planners.iterative import Iteration, IterativePlanner, require
-from antdrive.planners.plan import Capabilities, Cells, PlanResult, Query
+from antdrive.planners.plan import Cells, PlanResult, Query
 from antdrive.worlds import Floats
 from antdrive.worlds.plane import polyline_length
 
@@ -106,7 +106,7 @@ class GaHan(ViaPointPlanner):
 
     Section 4.1 of the thesis: a chromosome is a row of via points on free cells. Each generation selects by 1 / length,
     crosses, mutates, eliminates what touches an obstacle and refills the population at random. The defaults are those
-    of the thesis. `landscape` counts the chromosomes of the last population that pass each cell.
+    of the thesis. `field` counts the chromosomes of the last population that pass each cell.
 
     The algorithm depends on chance finding a first feasible line. In worlds with many obstacles there may be no line
     over so few via points, or none that chance finds: then the answer is `STOPPED`.

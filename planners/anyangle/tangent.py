@@ -20,7 +20,6 @@ from antdrive.planners.anyangle.lines import RouteEnds, cells_along, cells_under
 from antdrive.planners.iterative import require
 from antdrive.planners.plan import Capabilities, GridPlanner, PlanResult, PlanStatus, Query, path_cost
 from antdrive.worlds import Bounds, Floats, InputError, Point, Task
-from antdrive.worlds.plane import polyline_length
 
 NO_GAP = "discs and walls leave no way from the start to the goal for this clearance"
 

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.planners.iterative import Iteration, IterativePlanner, require
-from antdrive.planners.plan import Capabilities, Query
+from antdrive.planners.plan import Query
 from antdrive.worlds import Floats
 
 Flat = npt.NDArray[np.int32]  # flat cell indices
@@ -330,7 +330,7 @@ class Colony(IterativePlanner):
                     iteration_mean=cell * summary.mean,
                     arrived=summary.arrived,
                     work=steps,
-                    landscape=picture,
+                    field=picture,
                 )
                 if self.finished(state):
                     return

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,11 +17,8 @@ from antdrive.planners.colonies.colony import (
     Weights,
 )
 from antdrive.planners.colonies.mmas import MaxMinAnts
-from antdrive.planners.colonies.warm_start import WarmStartedColony
 from antdrive.planners.iterative import require
-from antdrive.planners.plan import Capabilities, Query
 from antdrive.worlds import Floats
-from antdrive.worlds.errors import FieldError
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from antdrive.planners.colonies.colony import ColonyGraph
 from antdrive.planners.iterative import Iteration, IterativePlanner, require
-from antdrive.planners.plan import Capabilities, Query
+from antdrive.planners.plan import Query
 from antdrive.worlds import Floats
 
 if TYPE_CHECKING:  # importing kernels loads the compiler
@@ -275,5 +275,5 @@ class AntPool:
             iteration_mean=cell * float(arrivals.mean()) if len(arrivals) else math.inf,
             arrived=len(arrivals),
             work=steps,
-            landscape=trail.reshape(self.graph.shape),
+            field=trail.reshape(self.graph.shape),
         )

@@ -9,7 +9,6 @@ import numpy as np
 from antdrive.planners.plan import PlanResult
 from antdrive.worlds import Floats, Grid, Route, Task, point_clearance, segment_clearance
 from antdrive.worlds.errors import FieldError
-from antdrive.worlds.plane import segment_lengths
 
 
 def route_along(plan: PlanResult, grid: Grid, task: Task) -> Route:

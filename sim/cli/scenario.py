@@ -9,9 +9,10 @@ from antdrive.sim.cli.parse import pair
 from antdrive.worlds.errors import InputError
 
 if TYPE_CHECKING:
+    from antdrive.sim.scenario import Scenario
+
     from antdrive.robots import PurePursuit
     from antdrive.sim.driving.perception import Perception
-    from antdrive.sim.pipeline import Scenario
 
 GROUPS = ("planner", "controller")  # what `--set GROUP.KEY=VALUE` can set
 
@@ -22,7 +23,7 @@ def make_scenario(world: str, planner: str, settings: list[str] | None, robot: s
     Raises:
         InputError: an unknown name, or a value out of range; the message names the option.
     """
-    from antdrive.sim.pipeline import Scenario
+    from antdrive.sim.scenario import Scenario
 
     chosen = grouped(settings)
     controller = make_controller(chosen["controller"])
@@ -70,21 +71,21 @@ def among_movers(avoid: bool, replan: bool, sees: str) -> dict[str, Any]:
     """The fields of a scenario that say how the robot drives among movers."""
     from antdrive.sim.driving.replanning import ReplanPolicy
 
-    avoidance = {} if avoid else {"yielding": None}  # the default is a record of weights
-    return {"knowledge": make_perception(sees), "replanning": ReplanPolicy(around=replan), **avoidance}
+    avoidance = {} if avoid else {"avoidance": None}  # the default is a record of weights
+    return {"perception": make_perception(sees), "replanning": ReplanPolicy(around_movers=replan), **avoidance}
 
 
 def make_perception(text: str) -> Perception:
     """What the robot perceives of movers, from `--sees KIND[:METRES]`."""
-    from antdrive.sim.driving.perception import Perception, Told
+    from antdrive.sim.driving.perception import Perception, PerceptionKind
 
     kind, mark, metres = text.partition(":")
-    if kind not in get_args(Told):
-        raise InputError(f"--sees {text}: unknown kind {kind!r}; choose from {', '.join(get_args(Told))}")
+    if kind not in get_args(PerceptionKind):
+        raise InputError(f"--sees {text}: unknown kind {kind!r}; choose from {', '.join(get_args(PerceptionKind))}")
     try:
         distance = float(metres) if mark else math.inf
     except ValueError:
         distance = math.nan
     if not distance > 0:
         raise InputError(f"--sees {text}: write KIND or KIND:METRES with a range greater than 0, such as positions:3")
-    return Perception(told=kind, reach=distance)  # type: ignore[arg-type]
+    return Perception(kind=kind, range=distance)  # type: ignore[arg-type]

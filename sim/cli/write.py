@@ -12,8 +12,10 @@ from antdrive.sim.cli.console import as_json, bar
 from antdrive.worlds.errors import InputError
 
 if TYPE_CHECKING:
+    from antdrive.sim.scenario import Scenario
+
     from antdrive.sim.log.rollout import Rollout
-    from antdrive.sim.pipeline import Run, Scenario
+    from antdrive.sim.pipeline import Run
     from antdrive.sim.view.film.video import FilmInfo
 
 FIGURES = ("overview", "certificate", "plan", "tour", "history", "field-bars", "field-contours")
@@ -44,7 +46,7 @@ def check_film(path: Path) -> None:
     Raises:
         InputError: an unknown suffix, or a path that cannot be written to.
     """
-    from antdrive.sim.view.film.video import ENCODERS
+    from antdrive.sim.view.film.encoder import ENCODERS
 
     if path.suffix.lower() not in ENCODERS:
         raise InputError(f"--video {path}: films are written as {', '.join(ENCODERS)}")
@@ -81,7 +83,7 @@ def write_run(run: Run, folder: Path, *, vector: bool = False, figures: bool = T
         log = str(run.rollout.save(folder / "rollout.npz"))
         files |= _write_figures(run, folder, log, suffixes(vector)) if figures else {"rollout": log}
     elif figures:
-        from antdrive.sim.view.figures.plots import plan_figure
+        from antdrive.sim.view.figures.plan_figures import plan_figure
 
         s = run.scenario
         files["figure"] = str(plan_figure(s.task, run.grid, run.plan, s.robot, folder / "overview.png"))
@@ -89,8 +91,8 @@ def write_run(run: Run, folder: Path, *, vector: bool = False, figures: bool = T
 
 
 def _write_figures(run: Run, folder: Path, log: str, endings: Sequence[str]) -> dict[str, str]:
-    from antdrive.sim.view.figures.figures import certificate_figure, plan_figures
-    from antdrive.sim.view.figures.plots import overview
+    from antdrive.sim.view.figures.plan_figures import plan_figures
+    from antdrive.sim.view.figures.run_figures import certificate_figure, overview
 
     assert run.rollout is not None
     s, files = run.scenario, {"rollout": log}

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from antdrive.planners import MaxMinDStar, Planner, Query, online_for
+from antdrive.planners import Planner, Query, agent_for
 from antdrive.robots import TrackedPath
 from antdrive.sim.driving.blocking import blocked_cells, covered_discs
 from antdrive.sim.driving.replanning import DECISION, MISSED, Replan, ReplanMonitor, ReplanPolicy
@@ -25,7 +25,7 @@ class CellwiseMonitor(ReplanMonitor):
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         query = Query.between(self._grid, self._task)
-        self._online = online_for(self._planner, query, self._rng)
+        self._online = agent_for(self._planner, query, self._rng)
         self._goal = query.goal
 
     @property
@@ -47,13 +47,13 @@ class CellwiseMonitor(ReplanMonitor):
             return super().replan(tick, pose, trigger) if self._online.arrived else None
         now, started = tick / self._hz, time.perf_counter()
         self._replanned_at = now
-        here, propagated = self._online.cell, self._online.tally.propagated
+        here, propagated = self._online.cell, self._online.stats.propagated
         covered = covered_discs(self._predictor, tick, np.array([pose[:2]]), 0.0, self._grid)
         to = self._online.step(np.argwhere(blocked_cells(self._grid, covered)))
         xy = self._line(pose, here, to, tick)
         if to is not None and bool(np.ptp(xy, axis=0).any()):
             cost = float(np.hypot(*np.diff(xy, axis=0).T).sum())
-            work = self._online.tally.propagated - propagated
+            work = self._online.stats.propagated - propagated
             self.log.append(Replan(now, trigger, True, cost, work, xy, time.perf_counter() - started))
             return self._prepare(Route(xy))
         if tick == 0:  # the robot waits where it is, and must not set out on the plan for the whole way
@@ -78,4 +78,4 @@ class CellwiseMonitor(ReplanMonitor):
 
 def monitor_class(planner: Planner, policy: ReplanPolicy) -> type[ReplanMonitor]:
     """The monitor for a planner: cell by cell where the planner decides so and may go around movers."""
-    return CellwiseMonitor if isinstance(planner, MaxMinDStar) and policy.around_movers else ReplanMonitor
+    return CellwiseMonitor if capabilities_of(planner).cell_by_cell and policy.around_movers else ReplanMonitor

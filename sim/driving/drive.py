@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from antdrive.robots import Avoidance, PurePursuit, Senses, TrackedPath, Twist
+from antdrive.robots import Avoidance, NoiseModel, PurePursuit, TrackedPath, Twist
 from antdrive.sim.driving.driver import STUCK_TIME, Driver
 from antdrive.sim.driving.perception import Predictor
 from antdrive.sim.driving.recorder import Drive, Ending, Recorder
 from antdrive.sim.driving.replanning import ReplanMonitor
-from antdrive.sim.log.rollout import Outcome
+from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.physics.engine import Engine
 from antdrive.worlds import Task
 
@@ -25,7 +25,7 @@ def drive(
     *,
     control_hz: int = 60,
     time_limit: float,
-    noise_model: Senses | None = None,
+    noise_model: NoiseModel | None = None,
     avoidance: Avoidance | None = None,
     predictor: Predictor | None = None,
     monitor: ReplanMonitor | None = None,
@@ -68,17 +68,17 @@ def drive(
 
 
 def _control_period(
-    tick: int, engine: Engine, driver: Driver, log: Recorder, noise_model: Senses | None, substeps: int
+    tick: int, engine: Engine, driver: Driver, log: Recorder, noise_model: NoiseModel | None, substeps: int
 ) -> Ending | None:
     """Sense, decide, act and log for one control period; how the drive ends in it, if it does."""
     pose = log.state.pose
     if noise_model:
-        log.note_estimate(noise_model.look(pose, Twist(log.state.speed, log.state.yaw_rate)))
-        pose = noise_model.ahead()
+        log.note_estimate(noise_model.estimate_pose(pose, Twist(log.state.speed, log.state.yaw_rate)))
+        pose = noise_model.pose_after_delay()
     ending = driver.decide(tick, pose, log.state)
     if ending:
         return ending
-    engine.command(*(noise_model.act(driver.command) if noise_model else driver.command))
+    engine.command(*(noise_model.actuate(driver.command) if noise_model else driver.command))
     log.advance(substeps, driver.command, driver.pursuit.limiter)
     if log.touched:
         return Ending(Outcome.COLLIDED)

@@ -9,8 +9,8 @@ from antdrive.robots import (
     LIMITERS,
     Avoidance,
     AvoidanceState,
-    Progress,
     PurePursuit,
+    PursuitState,
     RobotSpec,
     TrackedPath,
     Twist,
@@ -19,7 +19,7 @@ from antdrive.sim.driving.perception import Predictor
 from antdrive.sim.driving.recorder import Ending
 from antdrive.sim.driving.replanning import MISSED, ReplanMonitor
 from antdrive.sim.driving.schedule import slow_down
-from antdrive.sim.log.rollout import Outcome
+from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.physics.engine import State
 from antdrive.worlds import Pose, Task
 
@@ -28,7 +28,7 @@ WAITING_SPEED = 0.1  # a robot that avoids a mover and is slower than this waits
 STUCK_TIME = 8.0  # a robot without progress for this long is stuck [s]
 STUCK_PROGRESS = 0.02  # what counts as progress along the route [m]
 GOAL_SHARE = 0.95  # of the goal's tolerance within which a robot that avoids a mover stops early
-AVOIDING = LIMITERS.index("yield")
+AVOIDING = LIMITERS.index("avoid")
 
 
 class StuckClock(NamedTuple):
@@ -44,7 +44,7 @@ class StuckClock(NamedTuple):
     driving: int = 0
     turning: int = 0
 
-    def after(self, pursuit: Progress, waiting: bool) -> StuckClock:
+    def after(self, pursuit: PursuitState, waiting: bool) -> StuckClock:
         """The clock after one more control period."""
         if pursuit.arc > self.farthest + STUCK_PROGRESS:
             return StuckClock(pursuit.arc)
@@ -75,7 +75,7 @@ class Driver:
         predictor: Predictor | None,
         monitor: ReplanMonitor | None,
     ) -> None:
-        self.tracked, self.command, self.pursuit = tracked, Twist(0.0, 0.0), Progress()
+        self.tracked, self.command, self.pursuit = tracked, Twist(0.0, 0.0), PursuitState()
         self._controller, self._task, self._robot, self._hz = controller, task, robot, control_hz
         self._avoidance, self._predictor, self._monitor = avoidance, predictor, monitor
         self._avoidance_state = AvoidanceState()
@@ -132,7 +132,7 @@ class Driver:
         """Go on along a new path; whether there is one."""
         if tracked is None:
             return False
-        self.tracked, self.pursuit = tracked, Progress(limiter=self.pursuit.limiter)
+        self.tracked, self.pursuit = tracked, PursuitState(limiter=self.pursuit.limiter)
         self._clock = self._clock._replace(farthest=0.0)
         return True
 
@@ -146,13 +146,13 @@ class Driver:
         return limit
 
     def _avoid_movers(
-        self, tick: int, pose: Pose, last: Twist, before: Progress, speed_limit: float, stopping: bool
+        self, tick: int, pose: Pose, last: Twist, before: PursuitState, speed_limit: float, stopping: bool
     ) -> None:
         """Replace the command where movers come too close. A robot that is `stopping` brakes for the goal."""
         avoidance = self._avoidance
         assert avoidance is not None
         assert self._predictor is not None
-        ahead = avoidance.ahead
+        ahead = avoidance.prediction_times
         if stopping:
             self.command = _brake(last, self._robot, self._hz)
             # A robot that stands at the goal has arrived, so only the time until it stands matters.
@@ -168,7 +168,7 @@ class Driver:
             self._avoidance_state,
             movers,
             radii,
-            top=speed_limit,
+            speed_limit=speed_limit,
         )
         if avoids or stopping:
             self.pursuit = self.pursuit._replace(turning=before.turning, limiter=AVOIDING)

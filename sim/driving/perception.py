@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.worlds import Floats, Trajectories
-from antdrive.worlds.errors import FieldError
 
 PerceptionKind: TypeAlias = Literal["positions", "velocities", "motions"]
 CHUNK = 240  # control periods whose positions and velocities are computed at once

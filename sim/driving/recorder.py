@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -12,7 +11,7 @@ import numpy as np
 from antdrive.robots import Twist, footprint_clearance
 from antdrive.sim.driving import _kernels_movers
 from antdrive.sim.log.contacts import touches
-from antdrive.sim.log.rollout import Outcome
+from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.physics.engine import Contact, Engine, State
 from antdrive.worlds import Floats, Pose, Trajectories
 
@@ -154,7 +153,7 @@ def _attribute(
         hz=engine.physics_hz,
         discs=discs,
         radii=trajectories.radii,
-        footprint=dataclasses.asdict(engine.robot.footprint),
+        footprint=engine.robot.footprint,
         deceleration=engine.robot.max_acceleration,
     )[0]
     m, before = first.obstacle - discs, max(first.step - 1, 0)

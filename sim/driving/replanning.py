@@ -243,7 +243,7 @@ class ReplanMonitor:
 
     def _plan(self, task: Task, discs: list[Disc]) -> PlanResult:
         """A plan around discs: by the planner itself if it needs the world, else by its replanner."""
-        if getattr(self._planner, "needs_world", False):
+        if capabilities_of(self._planner).needs_world:
             around = with_obstacles(task, discs)
             grid = rasterise(around.world, self._grid.cell, self._grid.inflate)
             return self._planner.plan(Query.between(grid, around), self._rng)

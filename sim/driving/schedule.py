@@ -10,7 +10,6 @@ import numpy as np
 from antdrive.planners.graph.sipp import TimedPlan
 from antdrive.robots import Twist
 from antdrive.worlds import Floats, Route
-from antdrive.worlds.plane import arc_lengths
 
 LOOKAHEAD = 0.4  # the speed limit leads to where the schedule is this much later [s]
 MAX_LAG = 0.5  # a robot farther behind its schedule than this is late [m]

@@ -23,7 +23,7 @@ from antdrive.worlds.types import Floats
 BARN_SPEED = 2.0  # the challenge's reference speed [m/s]
 BARN_CLOCK = 0.1  # the challenge's clock starts when the robot is this far from its start [m]
 JERK_WINDOW = 0.1  # measured speed is averaged over this long before it is differentiated [s]
-AVOIDING = "yield"  # the name in `record.limiters` of the rule that avoids movers
+AVOIDING = "avoid"  # the name in `record.limiters` of the rule that avoids movers
 
 
 @dataclass(frozen=True)
@@ -197,7 +197,7 @@ def replans(rollout: Rollout) -> float:
     return float(len(rollout.record.replans))
 
 
-def yielding_s(rollout: Rollout) -> float:
+def avoiding_s(rollout: Rollout) -> float:
     """Simulated time for which the robot gave way to moving obstacles."""
     limiters = rollout.meta.get("limiters", ())
     if "avoid" not in limiters:
@@ -228,7 +228,7 @@ METRICS: Mapping[str, Callable[[Rollout], float]] = MappingProxyType(
         "contacts_standing": contacts_standing,
         "contacts_teleported": contacts_teleported,
         "replans": replans,
-        "yielding_s": yielding_s,
+        "avoiding_s": avoiding_s,
     }
 )
 

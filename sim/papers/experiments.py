@@ -87,7 +87,7 @@ def suganthi2019() -> list[Experiment]:
     }
     options: dict[str, dict[str, Any]] = {
         "as": {"ants": 50, **common},
-        "pfaco": {"ants": 50, "iterations": 100, "listed": 15},
+        "pfaco": {"ants": 50, "iterations": 100, "ranks": 15},
         "iaco": {"ants": 25, "explorers": 75, **common},
     }
     printed = {

@@ -15,7 +15,7 @@ from antdrive.planners import Progress, keep_best, load_planner, watch
 from antdrive.robots import PurePursuit, RobotSpec, load_robot
 from antdrive.sim import Engine, Outcome, Run, Scenario, measure, run
 from antdrive.sim.driving.drive import drive
-from antdrive.sim.view.figures.plots import plan_figure
+from antdrive.sim.view.figures.plan_figures import plan_figure
 from antdrive.worlds import Disc, InputError, Route, Task, World, list_worlds, load_task, save_task
 
 
@@ -85,7 +85,7 @@ def test_avoidance_and_replanning_cross_a_busy_plaza(robot: str) -> None:
     assert result.succeeded, (result.outcome, result.reason)
     assert result.rollout is not None
     assert measure(result.rollout)["replans"] > 0
-    assert measure(result.rollout)["yielding_s"] > 0
+    assert measure(result.rollout)["avoiding_s"] > 0
     blind = run(Scenario.of("plaza-moving", "dstar-lite", robot, avoidance=None, replanning=None))
     assert blind.outcome is Outcome.COLLIDED
 
@@ -219,7 +219,7 @@ def test_a_route_through_an_obstacle_ends_in_contact_not_in_a_loop(turtlebot: Ro
     """The controller does not trust the route: it creeps up to the obstacle."""
     task = Task(World("w", (0, 0, 4, 3), (Disc(2, 1.5, 0.3),)), (0.6, 1.5, 0), (3.4, 1.5))
     controller = PurePursuit()
-    tracked = controller.guide(Route(np.array([(0.6, 1.5), (3.4, 1.5)])), task.world, turtlebot, 0.05, 1 / 60)
+    tracked = controller.prepare(Route(np.array([(0.6, 1.5), (3.4, 1.5)])), task.world, turtlebot, 0.05, 1 / 60)
     with Engine(task.world, turtlebot) as engine:
         log = drive(engine, controller, tracked, task, time_limit=120)
     assert log.outcome in (Outcome.COLLIDED, Outcome.STUCK)

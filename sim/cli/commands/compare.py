@@ -16,7 +16,9 @@ from antdrive.sim.cli.write import check_film, check_folder, write_comparison_fi
 from antdrive.worlds.errors import InputError
 
 if TYPE_CHECKING:
-    from antdrive.sim.pipeline import Run, Scenario
+    from antdrive.sim.scenario import Scenario
+
+    from antdrive.sim.pipeline import Run
 
 
 def compare(
@@ -66,7 +68,7 @@ def compare(
     logs = {name: result.rollout for name, result in results.items() if result.rollout is not None}
     files = {name: str(folder / name) for name in results}
     if len(logs) > 1 and figures:
-        from antdrive.sim.view.figures.figures import comparison_figure
+        from antdrive.sim.view.figures.run_figures import comparison_figure
 
         files["figure"] = str(comparison_figure(logs, folder / "comparison.png"))
     if len(logs) > 1 and video is not None:

@@ -14,8 +14,9 @@ from antdrive.sim.cli.scenario import make_scenario
 from antdrive.sim.cli.write import suffixes
 
 if TYPE_CHECKING:
+    from antdrive.sim.scenario import Scenario
+
     from antdrive.planners import PlanResult
-    from antdrive.sim.pipeline import Scenario
     from antdrive.worlds import Grid
 
 
@@ -46,7 +47,7 @@ def plan(
         grid, answer = make_plan(scenario)
     files = {}
     if out is not None:
-        from antdrive.sim.view.figures.figures import plan_figures
+        from antdrive.sim.view.figures.plan_figures import plan_figures
 
         made = plan_figures(scenario.task, grid, answer, scenario.robot, out, name=planner, suffixes=suffixes(vector))
         files = {name: str(path) for name, path in made.items()}

@@ -24,7 +24,9 @@ from antdrive.sim.cli.write import (
 from antdrive.worlds.errors import InputError
 
 if TYPE_CHECKING:
-    from antdrive.sim.pipeline import Run, Scenario
+    from antdrive.sim.scenario import Scenario
+
+    from antdrive.sim.pipeline import Run
 
 Unseen = Annotated[
     list[str] | None,
@@ -128,11 +130,11 @@ def _check_views(scenario: "Scenario", video: Path | None, prelude: float, gui: 
 
         check_display()
     if prelude > 0:
-        from antdrive.planners import IterativePlanner
+        from antdrive.planners import capabilities_of
 
         if video is None:
             raise InputError("--prelude: belongs to a film; give --video, too")
-        if not isinstance(scenario.planner, IterativePlanner):
+        if not capabilities_of(scenario.planner).iterative:
             raise InputError(
                 f"--prelude: {scenario.planner_name} does not plan in iterations; there is no field to show"
             )

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.planners import Iteration, Query, as_iterative, load_planner
+from antdrive.planners import Iteration, Query, load_planner
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.view.film.compositor import Compositor
 from antdrive.sim.view.film.overlay import Values

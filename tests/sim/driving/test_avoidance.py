@@ -40,7 +40,7 @@ SLOW = keyframed((0.0, 3.0, 3.0), (50.0, 8.0, 3.0), (52.0, 8.0, 5.0))
 @pytest.mark.parametrize("mover", [CROSSING, HEAD_ON, SLOW], ids=["crossing", "head on", "slower in front"])
 def test_a_mover_on_the_route_is_avoided(mover: Keyframed, turtlebot: RobotSpec) -> None:
     """A robot without avoidance collides with each of them."""
-    blind = among(mover, robot=turtlebot, yielding=None)
+    blind = among(mover, robot=turtlebot, avoidance=None)
     assert blind.outcome is Outcome.COLLIDED
     seeing = among(mover, robot=turtlebot)
     assert seeing.succeeded, (seeing.outcome, seeing.reason, seeing.certificate)
@@ -50,7 +50,7 @@ def test_a_mover_on_the_route_is_avoided(mover: Keyframed, turtlebot: RobotSpec)
 
 
 def test_a_faster_mover_from_behind_is_let_pass(turtlebot: RobotSpec) -> None:
-    blind, seeing = (among(OVERTAKING, robot=turtlebot, yielding=y) for y in (None, Avoidance()))
+    blind, seeing = (among(OVERTAKING, robot=turtlebot, avoidance=y) for y in (None, Avoidance()))
     assert blind.outcome is Outcome.COLLIDED
     assert seeing.succeeded, (seeing.outcome, seeing.reason)
 
@@ -92,13 +92,13 @@ def test_a_mover_that_has_just_passed_may_reverse(speed: float, t: float, turtle
     frames = ((0.0, 4.6, 3.5 - speed * t),) if begin <= 0 else ((0.0, 4.6, 1.0), (begin, 4.6, 1.0))
     turns = keyframed(*frames, (t, 4.6, 3.5), (t + 4.0, 4.6, 3.5 - 4.0 * speed), radius=0.25)
     trusting, careful = (
-        among(turns, robot=turtlebot, yielding=y) for y in (Avoidance(reversal_weight=0.0), Avoidance())
+        among(turns, robot=turtlebot, avoidance=y) for y in (Avoidance(reversal_weight=0.0), Avoidance())
     )
     assert trusting.outcome is Outcome.COLLIDED
     assert careful.succeeded, (careful.outcome, careful.reason)
-    known = Perception(told="motions")
+    known = Perception(kind="motions")
     one, other = (
-        among(turns, robot=turtlebot, yielding=y, knowledge=known)
+        among(turns, robot=turtlebot, avoidance=y, perception=known)
         for y in (Avoidance(reversal_weight=0.0), Avoidance())
     )
     assert one.rollout is not None
@@ -156,7 +156,7 @@ def test_static_obstacles_are_kept_clear_of_while_movers_are_avoided(turtlebot: 
 
 
 def test_a_robot_does_not_avoid_what_it_does_not_see(turtlebot: RobotSpec) -> None:
-    near = among(CROSSING, robot=turtlebot, knowledge=Perception(reach=1e-3))
+    near = among(CROSSING, robot=turtlebot, perception=Perception(range=1e-3))
     assert near.outcome is Outcome.COLLIDED
     for told in ("positions", "motions"):
         known = among(CROSSING, robot=turtlebot, perception=Perception(kind=told))  # type: ignore[arg-type]
@@ -169,7 +169,7 @@ def test_movers_are_predicted_as_the_perception_allows(tick: int, told: str) -> 
     movers = (CROSSING, Cruising(radius=0.2, position=(2.0, 2.0), velocity=(0.5, 0.3)))
     traffic = Trajectories.of(dataclasses.replace(HALL, movers=movers), (1.0, 3.0))
     ahead = Avoidance().prediction_times
-    places, radii = Predictor(traffic, Perception(told=told), 60).expected(tick, (0.0, 0.0), ahead)  # type: ignore[arg-type]
+    places, radii = Predictor(traffic, Perception(kind=told), 60).predict(tick, (0.0, 0.0), ahead)  # type: ignore[arg-type]
     now, speed = traffic.positions(tick / 60)[0], traffic.velocities(tick / 60)[0]
     expected = {
         "positions": np.repeat(now[None], len(ahead), axis=0),
@@ -181,10 +181,10 @@ def test_movers_are_predicted_as_the_perception_allows(tick: int, told: str) -> 
 
 
 def test_settings_out_of_range_are_refused() -> None:
-    with pytest.raises(ValueError, match=r"told: unknown 'all'; choose from positions, velocities, motions"):
-        Perception(told="all")  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="reach: must be greater than 0, got 0"):
-        Perception(reach=0.0)
+    with pytest.raises(ValueError, match=r"kind: unknown 'all'; choose from positions, velocities, motions"):
+        Perception(kind="all")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="range: must be greater than 0, got 0"):
+        Perception(range=0.0)
     with pytest.raises(ValueError, match="horizon: must be greater than 0 and at most 60, got 0"):
         Avoidance(horizon=0.0)
     with pytest.raises(ValueError, match="min_clearance: must be at least 0, got nan"):

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from antdrive.planners import Query, load_planner, smooth
-from antdrive.robots import Progress, PurePursuit, RobotSpec, Twist
+from antdrive.robots import PurePursuit, PursuitState, RobotSpec, Twist
 from antdrive.sim import Outcome, Perception
 from antdrive.sim.driving.blocking import blocked_cells, covered_discs
 from antdrive.sim.driving.driver import STUCK_PROGRESS, STUCK_TIME, Driver, StuckClock
@@ -29,25 +29,27 @@ def driver(robot: RobotSpec, monitor: Any = None) -> Driver:
     grid = hall_grid()
     plan = load_planner("astar").plan(Query.between(grid, TASK), np.random.default_rng(0))
     controller = PurePursuit()
-    tracked = controller.guide(smooth(plan, grid, TASK), HALL, robot, 0.03, 1 / 60)
+    tracked = controller.prepare(smooth(plan, grid, TASK), HALL, robot, 0.03, 1 / 60)
     return Driver(controller, tracked, TASK, robot, 60, None, None, monitor)
 
 
 def test_progress_restarts_the_stuck_clock() -> None:
     clock = StuckClock(farthest=1.0, driving=9, turning=4)
-    assert clock.after(Progress(arc=1.0 + 2 * STUCK_PROGRESS), waiting=False) == StuckClock(1.0 + 2 * STUCK_PROGRESS)
-    assert clock.after(Progress(arc=1.0 + STUCK_PROGRESS / 2), waiting=False).driving == 10
+    assert clock.after(PursuitState(arc=1.0 + 2 * STUCK_PROGRESS), waiting=False) == StuckClock(
+        1.0 + 2 * STUCK_PROGRESS
+    )
+    assert clock.after(PursuitState(arc=1.0 + STUCK_PROGRESS / 2), waiting=False).driving == 10
 
 
 def test_waiting_for_a_mover_does_not_count_as_being_stuck() -> None:
     clock = StuckClock(farthest=1.0, driving=9, turning=4)
-    assert clock.after(Progress(arc=1.0), waiting=True) == clock
-    assert clock.after(Progress(arc=1.0, turning=True), waiting=True) == clock
+    assert clock.after(PursuitState(arc=1.0), waiting=True) == clock
+    assert clock.after(PursuitState(arc=1.0, turning=True), waiting=True) == clock
 
 
 def test_turning_on_the_spot_has_a_count_of_its_own() -> None:
     clock = StuckClock(farthest=1.0, driving=9, turning=4)
-    assert clock.after(Progress(arc=1.0, turning=True), waiting=False) == StuckClock(1.0, 9, 5)
+    assert clock.after(PursuitState(arc=1.0, turning=True), waiting=False) == StuckClock(1.0, 9, 5)
 
 
 def test_a_robot_that_does_not_move_is_stuck_after_the_stuck_time(turtlebot: RobotSpec) -> None:
@@ -63,7 +65,7 @@ def test_standing_at_the_routes_end_ends_the_drive_by_the_distance_to_the_goal(t
     x, y = TASK.goal
     for distance, outcome in ((0.0, Outcome.SUCCEEDED), (0.3, Outcome.STUCK)):
         at_end = driver(turtlebot)
-        at_end.pursuit = Progress(arc=at_end.tracked.length)
+        at_end.pursuit = PursuitState(arc=at_end.tracked.length)
         ending = None
         for tick in range(9):  # the command comes to rest first
             ending = ending or at_end.decide(tick, (x, y, 0.0), State(x, y - distance, 0.0, 0.0, 0.0))

@@ -252,7 +252,7 @@ def test_a_contact_in_the_control_period_that_would_end_as_stuck_counts(standing
     mover = Cruising(radius=0.3, position=(5.0, 1.4), velocity=(-(4.4 - 0.48) / touching, 0.0))
     task = dataclasses.replace(TASK, world=dataclasses.replace(ROOM, movers=(mover,)))
     result = run(dataclasses.replace(standing, task=task, robot=rigid, avoidance=None, replanning=None))
-    assert result.outcome is Outcome.RUN_INTO
+    assert result.outcome is Outcome.HIT_WHILE_STANDING
     assert result.rollout is not None
     assert alone.t[-1] - 1 / 60 < result.rollout.t[int(result.rollout.contacts[0, 0])] <= alone.t[-1]
 
@@ -283,7 +283,7 @@ def test_a_robot_drives_among_movers_without_a_scenario(turtlebot: RobotSpec) ->
     """An engine with trajectories is all that `drive` needs to drive among movers."""
     world = dataclasses.replace(ROOM, movers=BESIDE)
     controller = PurePursuit()
-    tracked = controller.guide(Route(np.array([(0.6, 1.4), (5.4, 1.4)])), world, turtlebot, 0.05, 1 / 60)
+    tracked = controller.prepare(Route(np.array([(0.6, 1.4), (5.4, 1.4)])), world, turtlebot, 0.05, 1 / 60)
     with Engine(world, turtlebot, trajectories=Trajectories.of(world, TASK.start[:2])) as engine:
         log = drive(engine, controller, tracked, TASK, time_limit=60)
         assert engine.time == pytest.approx(log.t[-1])
@@ -323,8 +323,8 @@ def told(contacts: list[tuple[int, int]], *, speed: float = 0.0, turn: float = 0
 
 
 def test_contacts_are_attributed_to_the_robot_or_to_the_mover() -> None:
-    assert told([(9, 1)]) == [Touch(9, 1, Outcome.RUN_INTO)]
-    assert told([(9, 1)], speed=0.019)[0].outcome is Outcome.RUN_INTO
+    assert told([(9, 1)]) == [Touch(9, 1, Outcome.HIT_WHILE_STANDING)]
+    assert told([(9, 1)], speed=0.019)[0].outcome is Outcome.HIT_WHILE_STANDING
     assert told([(9, 1)], speed=-0.021)[0].outcome is Outcome.COLLIDED
     assert told([(9, 1)], turn=0.2)[0].outcome is Outcome.COLLIDED
     assert told([(9, 1)], speed=0.009, comes=0.01)[0].outcome is Outcome.HIT_WHILE_STANDING
@@ -334,9 +334,9 @@ def test_contacts_are_attributed_to_the_robot_or_to_the_mover() -> None:
 
 
 def test_contacts_soon_after_a_teleport_are_attributed_to_it() -> None:
-    assert told([(9, 1)], jump=9)[0].outcome is Outcome.JUMPED_ON
-    assert told([(8, 1)], jump=9)[0].outcome is Outcome.RUN_INTO, "it jumped later"
-    assert told([(60, 1)], jump=9)[0].outcome is Outcome.RUN_INTO, "it jumped long ago"
+    assert told([(9, 1)], jump=9)[0].outcome is Outcome.HIT_BY_TELEPORT
+    assert told([(8, 1)], jump=9)[0].outcome is Outcome.HIT_WHILE_STANDING, "it jumped later"
+    assert told([(60, 1)], jump=9)[0].outcome is Outcome.HIT_WHILE_STANDING, "it jumped long ago"
     assert told([(9, 0)], jump=9)[0].outcome is Outcome.COLLIDED, "another one did"
     # Braking from 1 m/s takes 0.5 m and 1 s.
     assert told([(60, 1)], jump=9, speed=1.0, place=0.95)[0].outcome is Outcome.HIT_BY_TELEPORT
@@ -345,8 +345,8 @@ def test_contacts_soon_after_a_teleport_are_attributed_to_it() -> None:
 
 
 def test_contacts_within_half_a_second_are_one_touch() -> None:
-    assert told([(9, 1), (20, 0), (65, 1)]) == [Touch(9, 1, Outcome.RUN_INTO)]
-    assert told([(9, 1), (60, 0)]) == [Touch(9, 1, Outcome.RUN_INTO), Touch(60, 0, Outcome.COLLIDED)]
+    assert told([(9, 1), (20, 0), (65, 1)]) == [Touch(9, 1, Outcome.HIT_WHILE_STANDING)]
+    assert told([(9, 1), (60, 0)]) == [Touch(9, 1, Outcome.HIT_WHILE_STANDING), Touch(60, 0, Outcome.COLLIDED)]
 
 
 # Certificates
@@ -415,7 +415,7 @@ def test_a_moving_log_edited_by_hand_is_found_out(passed: Rollout, what: str) ->
     assert any(says in problem for problem in certificate.problems), certificate.problems
 
 
-@pytest.mark.parametrize("name", ["collided", "jumped_on", "succeeded"])
+@pytest.mark.parametrize("name", ["collided", "hit_by_teleport", "succeeded"])
 def test_a_contact_cannot_be_attributed_to_another_cause(standing: Scenario, name: str) -> None:
     mover = Keyframed(radius=0.3, keyframes=((0.0, 3.0, 1.4), (4.0, 0.0, 1.4)))
     task = dataclasses.replace(TASK, world=dataclasses.replace(ROOM, movers=(mover,)))

@@ -36,11 +36,11 @@ def test_only_replanning_gets_around_a_closed_gate(turtlebot: RobotSpec) -> None
     done = among(PLUG, robot=turtlebot)
     assert done.succeeded, (done.outcome, done.reason)
     assert done.rollout is not None
-    replans = done.rollout.meta["replans"]
+    replans = done.rollout.record.replans
     assert replans[0]["cause"] == "obstructed"
     assert 0 <= replans[0]["t"] < done.rollout.t[-1]
     assert replans[0]["cost_m"] > 4.0
-    assert len(done.rollout.meta["times"]["replans_s"]) == len(replans)
+    assert len(done.rollout.record.times.replans_s) == len(replans)
     assert tracking_error_max_m(done.rollout) < 0.25, "measured to the route in force, while the robot avoids the mover"
     through = done.rollout.pose[np.abs(done.rollout.pose[:, 0] - 4.0).argmin()]
     assert through[1] > 4.5, "through the other gate"
@@ -63,7 +63,7 @@ def test_every_planner_replans(planner: str, turtlebot: RobotSpec) -> None:
     """All but the slowest planners, and but `sipp`, which plans around the mover at once."""
     done = among(PLUG, robot=turtlebot, planner=planner, time_limit=2.0)
     if done.rollout is None:  # a planner that is not complete found no path
-        assert not getattr(load_planner(planner), "complete", False)
+        assert not capabilities_of(load_planner(planner)).complete
         return
     assert done.rollout.record.replans
     assert not len(done.rollout.contacts)
@@ -190,7 +190,7 @@ def monitor_of(
         hz=60,
     )
     made.track(answer, route)
-    return made, s.controller.guide(route, task.world, robot, s.margin, 1 / 60)
+    return made, s.controller.prepare(route, task.world, robot, s.margin, 1 / 60)
 
 
 def test_a_robot_too_far_off_its_route_has_strayed(turtlebot: RobotSpec) -> None:

@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from antdrive.robots import LIMITERS
 from antdrive.sim import METRICS, Outcome, Rollout, measure
-from antdrive.sim.log.metrics import AVOIDING, tracking_error
+from antdrive.sim.log.metrics import tracking_error
 from antdrive.sim.log.record import PlanRecord, ReplanRecord
 from antdrive.worlds import Task, World
 from tests.sim.records import made_up_record
@@ -126,4 +125,4 @@ def test_after_a_replan_the_tracking_error_is_to_the_new_route() -> None:
 
 def test_the_time_of_giving_way_is_that_of_its_limiter() -> None:
     log = straight(limiter=np.arange(81, dtype=np.uint8) // 61)
-    assert METRICS["yielding_s"](replace(log, meta={**log.meta, "limiters": ["path", "avoid"]})) == pytest.approx(2.0)
+    assert METRICS["avoiding_s"](replace(log, meta={**log.meta, "limiters": ["path", "avoid"]})) == pytest.approx(2.0)

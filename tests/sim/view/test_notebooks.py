@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from antdrive.planners import PlanResult, PlanStatus, Query, load_planner
-from antdrive.sim import Run, Scenario, run
-from antdrive.worlds import Disc, Grid, Task, World, load_task, rasterise
+from antdrive.worlds import Disc, Task, World, load_task, rasterise
 
 TASK = load_task("slalom")
 

@@ -94,7 +94,7 @@ def import_world(
     never wider than the map. The world's source says how far the cylinders protrude from the blocked cells.
     """
     from antdrive.worlds import import_file
-    from antdrive.worlds.formats.door import IMPORTS, import_format
+    from antdrive.worlds.formats.importing import IMPORTS, import_format
 
     try:
         file_format = import_format(path, barn=barn)

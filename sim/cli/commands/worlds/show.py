@@ -34,7 +34,7 @@ def show_world(
     if out is not None:
         import numpy as np
 
-        from antdrive.sim.view.figures.plots import plan_figure
+        from antdrive.sim.view.figures.plan_figures import plan_figure
 
         plan_figure(task, grid, load_planner("astar").plan(query, np.random.default_rng(0)), spec, out)
     if json:

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from antdrive.sim.physics.engine import client
+from antdrive.sim.physics.bullet import client
 from antdrive.sim.view.film import _kernels_paint as kernels
 from antdrive.sim.view.film import compositor as composing
 from antdrive.sim.view.film.camera import Camera, camera_for
