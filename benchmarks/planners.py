@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from antdrive.planners import PLANNERS, Planner, PlanResult, Query, load_planner
+from antdrive.planners import PLANNERS, Planner, PlanResult, Query, capabilities_of, load_planner
 from antdrive.planners.colonies.colony import ColonyGraph, TourConstruction
 from antdrive.sim.papers.maps import blocks, environments, han_ants, optimum, scattered
 from antdrive.worlds import DIRECTIONS, Disc, Grid, Task, World, forest, rasterise

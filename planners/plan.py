@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.worlds import Floats, Point, Task
+from antdrive.worlds import Floats, MoverMotion, Point, Task
 from antdrive.worlds.errors import FieldError
 
 if TYPE_CHECKING:  # importing a grid loads the compiler, which naming a planner should not
@@ -30,20 +30,6 @@ class PlanStatus(enum.Enum):
     SOLVED = "found a path"
     NO_PATH = "no path on this grid"
     STOPPED = "stopped early"
-
-
-@runtime_checkable
-class Moving(Protocol):
-    """A disc whose motion is known."""
-
-    @property
-    def radius(self) -> float:
-        """The disc's radius [m]."""
-        ...
-
-    def at(self, t: Floats) -> Floats:
-        """The disc's centre (T, 2) [m] at times `t` (T,) [s]."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -69,7 +55,7 @@ class Query:
     goal: Cell
     task: Task | None = None
     unreachable: str = ""
-    motions: tuple[Moving, ...] = ()
+    motions: tuple[MoverMotion, ...] = ()
     start_time: float = 0.0
 
     def __post_init__(self) -> None:

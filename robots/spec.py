@@ -147,7 +147,7 @@ class RobotSpec:
             if isinstance(value, float | int) and not (math.isfinite(value) and value > 0):
                 raise FieldError(field.name, f"must be greater than 0, got {value:g}")
         if not self.footprint.radius > 0:
-            raise ValueError("footprint: must be larger than a point")
+            raise FieldError("footprint", "must be larger than a point")
         # Only the chassis detects contacts, so no part of a wheel may stand outside it.
         foot, half_track = self.footprint, self.track / 2
         if foot.is_disc and math.hypot(half_track, self.wheel_radius) > foot.rounding:

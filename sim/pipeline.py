@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-import math
-import os
 import platform
 import time
-import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import metadata
 from typing import Any
@@ -17,207 +14,38 @@ import numpy as np
 
 from antdrive.planners import (
     PLANNERS,
-    SMOOTHINGS,
-    Planner,
     PlanResult,
     PlanStatus,
     Query,
-    load_planner,
     smooth,
 )
-from antdrive.robots import LIMITERS, Avoidance, NoiseModel, PurePursuit, RobotSpec, load_robot
+from antdrive.robots import LIMITERS, NoiseModel
 from antdrive.sim.driving.cellwise import monitor_class
 from antdrive.sim.driving.drive import drive
-from antdrive.sim.driving.perception import Perception, Predictor
+from antdrive.sim.driving.perception import Predictor
 from antdrive.sim.driving.recorder import Drive
-from antdrive.sim.driving.replanning import Replan, ReplanMonitor, ReplanPolicy
+from antdrive.sim.driving.replanning import Replan, ReplanMonitor
 from antdrive.sim.log.certificate import Certificate, certify
 from antdrive.sim.log.metrics import METRICS, measure
-from antdrive.sim.log.rollout import SCHEMA, Outcome, Rollout
+from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.log.record import (
+    ComponentRecord,
+    DriveRecord,
+    PerceptionRecord,
+    PlanRecord,
+    ReplanRecord,
+    SmoothingRecord,
+    TimesRecord,
+    finite_or_none,
+    settings_of,
+)
+from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.physics.engine import Engine
-from antdrive.worlds import Disc, Grid, Route, Task, Trajectories, World, load_task, rasterise
+from antdrive.sim.scenario import Scenario
+from antdrive.worlds import Grid, Route, rasterise
 from antdrive.worlds.drawing import LINE, card, world_svg
-from antdrive.worlds.errors import FieldError
 
-CONTROLLER, PERCEPTION, AVOIDANCE, REPLANNING = PurePursuit(), Perception(), Avoidance(), ReplanPolicy()
 ROUTE_COLOUR = "#182242"  # of routes in notebooks
-
-
-@dataclass(frozen=True, kw_only=True)
-class Scenario:
-    """Everything a run depends on. The same scenario gives the same rollout, bit for bit, on one machine.
-
-    Attributes:
-        task: the world, the start and the goal
-        planner: finds the path
-        robot: drives it
-        planner_name: what records call the planner; empty: its class
-        margin: distance kept free around the robot, on top of its radius [m]
-        cell: grid resolution [m]; None: the task's own
-        smoothing: how the plan becomes a route: none, taut or clearance, see `antdrive.planners.smooth`
-        seed: of all random numbers
-        controller: follows the route
-        noise: the share of the robot's documented noise in sensing and acting; 0: none, 1: all of it
-        perception: what the robot perceives of movers
-        avoidance: how the robot avoids movers; None: not at all
-        replanning: when the robot looks for a new route among movers; None: never
-        unseen: obstacles that neither the planner nor the controller knows of
-        time_limit: simulated time after which the drive ends [s]; None: the task's, or ample for the route
-        physics_hz: physics steps per simulated second
-        control_hz: control periods per simulated second; must divide `physics_hz`
-
-    Raises:
-        ValueError: a setting is out of range.
-    """
-
-    task: Task
-    planner: Planner
-    robot: RobotSpec
-    planner_name: str = ""
-    margin: float = 0.03
-    cell: float | None = None
-    smoothing: str = "clearance"
-    seed: int = 0
-    controller: PurePursuit = CONTROLLER
-    noise: float = 0.0
-    perception: Perception = PERCEPTION
-    avoidance: Avoidance | None = AVOIDANCE
-    replanning: ReplanPolicy | None = REPLANNING
-    unseen: tuple[Disc, ...] = ()
-    time_limit: float | None = None
-    physics_hz: int = 240
-    control_hz: int = 60
-
-    def __post_init__(self) -> None:
-        if not self.margin >= 0:
-            raise FieldError("margin", f"must be at least 0, got {self.margin:g}")
-        if self.smoothing not in SMOOTHINGS:
-            raise FieldError("smoothing", f"unknown {self.smoothing!r}; choose from {', '.join(SMOOTHINGS)}")
-        try:
-            self.robot.noise.scaled(self.noise)
-        except ValueError as error:
-            raise FieldError("noise", f"{self.noise:g} times the robot's own is too much: {error}") from None
-        if self.time_limit is not None and not self.time_limit > 0:
-            raise FieldError("time_limit", f"must be greater than 0, got {self.time_limit:g}")
-
-    @classmethod
-    def of(
-        cls,
-        world: str | os.PathLike[str] | Task,
-        planner: str | Planner = "ants",
-        robot: str | os.PathLike[str] | RobotSpec = "turtlebot",
-        *,
-        options: Mapping[str, Any] | None = None,
-        margin: float = 0.03,
-        cell: float | None = None,
-        smoothing: str = "clearance",
-        seed: int = 0,
-        controller: PurePursuit = CONTROLLER,
-        noise: float = 0.0,
-        perception: Perception = PERCEPTION,
-        avoidance: Avoidance | None = AVOIDANCE,
-        replanning: ReplanPolicy | None = REPLANNING,
-        unseen: tuple[Disc, ...] = (),
-        time_limit: float | None = None,
-        physics_hz: int = 240,
-        control_hz: int = 60,
-    ) -> Scenario:
-        """A scenario from names, files or objects.
-
-        >>> Scenario.of("forest", "aco-han", "jackal", options={"ants": 30}, noise=1.0, seed=2)
-
-        The settings margin, cell, smoothing, seed, controller, noise, perception, avoidance, replanning,
-        unseen, time_limit, physics_hz and control_hz are the fields of `Scenario`, which describes them.
-
-        Args:
-            world: a world of the catalogue, a world file, or a task
-            planner: a planner's name, or a planner
-            robot: a robot of the catalogue, a robot file, or a robot
-            options: options of a planner that is given by name
-
-        Raises:
-            InputError: there is no such world, planner, option or robot, or a file is wrong.
-            ValueError: a setting is out of range, or `options` are given for a planner object.
-        """
-        if not isinstance(planner, str) and options:
-            raise ValueError("options: need a planner's name; set the options of a planner object itself")
-        return cls(
-            task=world if isinstance(world, Task) else load_task(world),
-            planner=load_planner(planner, **(options or {})) if isinstance(planner, str) else planner,
-            planner_name=planner if isinstance(planner, str) else "",
-            robot=robot if isinstance(robot, RobotSpec) else load_robot(robot),
-            margin=margin,
-            cell=cell,
-            smoothing=smoothing,
-            seed=seed,
-            controller=controller,
-            noise=noise,
-            perception=perception,
-            avoidance=avoidance,
-            replanning=replanning,
-            unseen=unseen,
-            time_limit=time_limit,
-            physics_hz=physics_hz,
-            control_hz=control_hz,
-        )
-
-    @property
-    def inflate(self) -> float:
-        """The distance that planners keep between the robot's centre and every surface [m]."""
-        return self.robot.radius + self.margin
-
-    @property
-    def driven_world(self) -> World:
-        """The world that the robot drives in: the task's world with the unseen obstacles."""
-        return dataclasses.replace(self.task.world, obstacles=self.task.world.obstacles + self.unseen)
-
-    @property
-    def trajectories(self) -> Trajectories:
-        """The motions of the world's movers, drawn from the seed."""
-        return Trajectories.of(self.driven_world, self.task.start[:2], self.seed)
-
-    @property
-    def timed(self) -> bool:
-        """Whether the planner plans in space and time, among movers."""
-        return bool(self.driven_world.movers) and capabilities_of(self.planner).needs_motions
-
-    @property
-    def effective_perception(self) -> Perception:
-        """What the robot perceives of movers: their motions, if the planner is given them."""
-        return Perception(kind="motions") if self.timed else self.perception
-
-    @property
-    def effective_avoidance(self) -> Avoidance | None:
-        """How the robot avoids movers, given what it knows of them.
-
-        Movers whose motions are known do not turn back unexpectedly, so reversals are not considered. A
-        timed plan has avoided the movers already, so the horizon is short.
-        """
-        if self.avoidance is None or self.effective_perception.kind != "motions":
-            return self.avoidance
-        horizon = min(self.avoidance.horizon, 1.0) if self.timed else self.avoidance.horizon
-        return dataclasses.replace(self.avoidance, reversal_weight=0.0, horizon=horizon)
-
-    def rng(self, purpose: str) -> np.random.Generator:
-        """A random stream from the seed; every `purpose` has its own, so that one does not change another."""
-        return np.random.default_rng([self.seed, zlib.crc32(purpose.encode())])
-
-    def _repr_html_(self) -> str:
-        task = self.task
-        facts = {
-            "planner": _name(self),
-            "robot": self.robot.name,
-            "smoothing": self.smoothing,
-            "margin": f"{self.margin:g} m",
-            "noise": f"{self.noise:g}",
-            "seed": self.seed,
-        }
-        if self.driven_world.movers:
-            facts["movers"] = len(self.driven_world.movers)
-        picture = world_svg(
-            self.driven_world.bounds, self.driven_world.discs, start=task.start, goal=(*task.goal, task.goal_tolerance)
-        )
-        return card(picture, task.world.name, facts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -403,10 +231,44 @@ def _record(
     limit: float,
     wall: float,
 ) -> Rollout:
-    task = task_to_dict(s.task)
-    known = len(s.task.world.obstacles)
-    task["obstacles"] += [dataclasses.asdict(disc) for disc in s.unseen]
+    """The rollout of a drive: its arrays, and the record of what it came from."""
     query = Query.between(grid, s.task)
+    sees, yields, among_movers = s.effective_perception, s.effective_avoidance, bool(s.driven_world.movers)
+    record = DriveRecord(
+        task=s.task,
+        unseen=s.unseen,
+        seed=s.seed,
+        planner=ComponentRecord(name=s.planner_label, settings=settings_of(answer.options)),
+        plan=PlanRecord(
+            cost_m=answer.cost,
+            length_m=answer.line_length,
+            grid_optimum_m=finite_or_none(PLANNERS["astar"].plan(query, s.rng("optimum")).cost),
+            euclidean_optimum_m=finite_or_none(PLANNERS["tangent"].plan(query, s.rng("optimum")).line_length),
+            work=answer.work,
+            work_unit=answer.work_unit,
+        ),
+        robot=s.robot,
+        controller=ComponentRecord(name=type(s.controller).__name__, settings=settings_of(s.controller)),
+        smoothing=SmoothingRecord(asked=s.smoothing, made=route.kind, note=route.note),
+        perception=PerceptionRecord(kind=sees.kind, range_m=finite_or_none(sees.range)) if among_movers else None,
+        avoidance=settings_of(yields) if among_movers and yields else None,
+        replanning=settings_of(s.replanning) if among_movers and s.replanning else None,
+        replans=tuple(_replan_record(replan) for replan in replans),
+        limiters=LIMITERS,
+        noise=s.noise,
+        margin=s.margin,
+        inflate=s.inflate,
+        cell=grid.cell,
+        physics_hz=s.physics_hz,
+        control_hz=s.control_hz,
+        time_limit=limit,
+        outcome=log.outcome,
+        reason=log.reason,
+        versions=versions(),
+        times=TimesRecord(
+            plan_s=answer.wall_s, drive_wall_s=wall, replans_s=tuple(replan.wall_s for replan in replans)
+        ),
+    )
     return Rollout(
         t=log.t,
         pose=log.pose,
@@ -419,67 +281,22 @@ def _record(
         estimate=log.estimate,
         route=route.xy,
         cells=answer.cells,
-        meta={
-            "schema": SCHEMA,
-            "task": task,
-            "unseen": list(range(known, known + len(s.unseen))),
-            "planner": {"name": s.planner_label, "options": _plain(answer.options)},
-            "plan": {
-                "status": answer.status.name.lower(),
-                "cost_m": answer.cost,
-                "length_m": answer.line_length,
-                "grid_optimum_m": PLANNERS["astar"].plan(query, s.rng("optimum")).cost,
-                "euclidean_optimum_m": PLANNERS["tangent"].plan(query, s.rng("optimum")).line_length,
-                "work": answer.work,
-                "work_unit": answer.work_unit,
-            },
-            "robot": dataclasses.asdict(s.robot),
-            "controller": {"name": type(s.controller).__name__, **dataclasses.asdict(s.controller)},
-            **(_among_movers(s, replans) if s.driven_world.movers else {}),
-            "limiters": list(LIMITERS),
-            "route": {"asked": s.smoothing, "kind": route.kind, "note": route.note},
-            "noise": s.noise,
-            "margin": s.margin,
-            "inflate": s.inflate,
-            "cell": grid.cell,
-            "seed": s.seed,
-            "rows": "physics",
-            "physics_hz": s.physics_hz,
-            "control_hz": s.control_hz,
-            "time_limit": limit,
-            "outcome": log.outcome.key,
-            "reason": log.reason,
-            "versions": versions(),
-            "times": {"plan_s": answer.wall_s, "drive_wall_s": wall, **_replan_times(replans)},
-        },
+        record=record,
     )
 
 
-def _among_movers(s: Scenario, replans: list[Replan]) -> dict[str, Any]:
-    """What the record holds of a drive among movers."""
-    sees, yields = s.effective_perception, s.effective_avoidance
-    return {
-        "knowledge": {"told": sees.kind, "reach_m": sees.range if math.isfinite(sees.range) else None},
-        "yielding": dataclasses.asdict(yields) if yields else None,
-        "replanning": dataclasses.asdict(s.replanning) if s.replanning else None,
-        "replans": [replan.as_dict() for replan in replans],
-    }
-
-
-def _replan_times(replans: list[Replan]) -> dict[str, list[float]]:
-    return {"replans_s": [replan.wall_s for replan in replans]} if replans else {}
+def _replan_record(replan: Replan) -> ReplanRecord:
+    return ReplanRecord(
+        t=replan.t,
+        trigger=replan.trigger,
+        solved=replan.solved,
+        cost_m=finite_or_none(replan.cost),
+        work=replan.work,
+        route=tuple((x, y) for x, y in np.round(replan.route, 4).tolist()),
+    )
 
 
 def versions() -> dict[str, str]:
     """The versions of Python and of the packages that a run depends on."""
     packages = ("antdrive", "numpy", "pybullet", "numba")
     return {"python": platform.python_version(), **{name: metadata.version(name) for name in packages}}
-
-
-def _name(s: Scenario) -> str:
-    return s.planner_name or type(s.planner).__name__
-
-
-def _plain(options: Any) -> dict[str, Any]:
-    """Planner options as JSON can hold them."""
-    return {k: v if isinstance(v, bool | int | float | str | None) else str(v) for k, v in dict(options).items()}

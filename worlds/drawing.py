@@ -9,6 +9,9 @@ import math
 from collections.abc import Iterable, Mapping
 from html import escape
 
+import numpy as np
+import numpy.typing as npt
+
 from antdrive.worlds.types import Bounds, Floats, Pose
 
 LONGER_SIDE = 420  # of a world's drawing [px]

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from antdrive.planners.anyangle.lines import RouteEnds, cells_along, polyline_length, route_ends, terrain
+from antdrive.planners.anyangle.lines import RouteEnds, cells_along, route_ends, terrain
 from antdrive.planners.iterative import Iteration, IterativePlanner, require
-from antdrive.planners.plan import Cells, PlanResult, Query
+from antdrive.planners.plan import Capabilities, Cells, PlanResult, Query
 from antdrive.worlds import Floats
 from antdrive.worlds.plane import polyline_length
 
@@ -130,7 +130,10 @@ class GaHan(ViaPointPlanner):
     elitism: bool = True
     tries: int = 1_000_000
 
-    complete: ClassVar[bool] = False
+    @property
+    def capabilities(self) -> Capabilities:
+        """What this planner can do and what it needs. It may miss a path that exists."""
+        return Capabilities(iterative=True, complete=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()

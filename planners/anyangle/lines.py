@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from antdrive.planners.plan import Cells, Query
 from antdrive.worlds import Floats, Point
+from antdrive.worlds.plane import polyline_length
 
 if TYPE_CHECKING:  # importing kernels loads the compiler
     from antdrive.planners.anyangle._kernels_lines import Terrain

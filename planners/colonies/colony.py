@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.planners.iterative import Iteration, IterativePlanner, require
-from antdrive.planners.plan import Query
+from antdrive.planners.plan import Capabilities, Query
 from antdrive.worlds import Floats
 
 Flat = npt.NDArray[np.int32]  # flat cell indices
@@ -224,9 +224,9 @@ class Colony(IterativePlanner):
         return "ant steps"
 
     @property
-    def complete(self) -> bool:
-        """Whether ants find a path wherever there is one; ants that die in dead ends may miss it."""
-        return self.backtrack or self.revisit > 0
+    def capabilities(self) -> Capabilities:
+        """What this planner can do and what it needs. Ants that die in dead ends may miss a path that exists."""
+        return Capabilities(iterative=True, complete=self.backtrack or self.revisit > 0)
 
     def default_steps(self, rows: int, cols: int) -> int:
         """How many steps an ant may take on a grid of `rows` x `cols` where `max_steps` is None.

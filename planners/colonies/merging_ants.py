@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,8 +17,11 @@ from antdrive.planners.colonies.colony import (
     Weights,
 )
 from antdrive.planners.colonies.mmas import MaxMinAnts
+from antdrive.planners.colonies.warm_start import WarmStartedColony
 from antdrive.planners.iterative import require
+from antdrive.planners.plan import Capabilities, Query
 from antdrive.worlds import Floats
+from antdrive.worlds.errors import FieldError
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,9 +74,18 @@ class MergingAnts(MaxMinAnts):
         require("settled", self.settled, at_least=1)
         for key, unset in (("beta", None), ("heuristic", "goal")):
             if getattr(self, key) != unset:
-                raise ValueError(
-                    f"{key}: must be {unset!r}, as `greed` is the heuristic of these ants; got {getattr(self, key)!r}"
+                raise FieldError(
+                    key, f"must be {unset!r}, as `greed` is the heuristic of these ants; got {getattr(self, key)!r}"
                 )
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """What this planner can do and what it needs."""
+        return replace(super().capabilities, own_replanner=True)
+
+    def replanner(self, query: Query, rng: np.random.Generator) -> WarmStartedColony:
+        """A colony that continues on its trails after every change; `rng` serves all its answers."""
+        return WarmStartedColony(self, query, rng)
 
     @property
     def kinds(self) -> tuple[int, ...]:

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from antdrive.planners.colonies.colony import ColonyGraph
 from antdrive.planners.iterative import Iteration, IterativePlanner, require
-from antdrive.planners.plan import Query
+from antdrive.planners.plan import Capabilities, Query
 from antdrive.worlds import Floats
 
 if TYPE_CHECKING:  # importing kernels loads the compiler
@@ -98,9 +98,9 @@ class PotentialFieldAnts(IterativePlanner):
         return "ant steps"
 
     @property
-    def complete(self) -> bool:
-        """Whether ants find a path wherever there is one; ants that start again in dead ends may miss it."""
-        return self.backtrack
+    def capabilities(self) -> Capabilities:
+        """What this planner can do and what it needs. Ants that start again in dead ends may miss a path that exists."""
+        return Capabilities(iterative=True, complete=self.backtrack)
 
     def potential(self, query: Query) -> Floats:
         """The field that ants climb (cells,), above 0 where free: eq. 9 from the start, lowered by eq. 11."""

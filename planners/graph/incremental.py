@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from antdrive.planners.graph.search import NO_WAY
 from antdrive.planners.plan import Capabilities, Cell, Cells, GridPlanner, Planner, PlanResult, PlanStatus, Query
+from antdrive.worlds.errors import FieldError
 
 if TYPE_CHECKING:  # importing a grid loads the compiler
     from antdrive.worlds import Grid
@@ -152,7 +153,7 @@ class EditableQuery(abc.ABC):
         if outside >= 0:
             row, col = rc[outside]
             rows, cols = self._moves.shape
-            raise ValueError(f"cells: ({row}, {col}) is outside the grid of {rows} rows and {cols} columns")
+            raise FieldError("cells", f"({row}, {col}) is outside the grid of {rows} rows and {cols} columns")
         return self._record(count)
 
     def _record(self, count: int) -> int:

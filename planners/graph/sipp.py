@@ -15,8 +15,10 @@ import numpy.typing as npt
 
 from antdrive.planners.graph.search import NO_WAY, reachable
 from antdrive.planners.iterative import require
-from antdrive.planners.plan import Capabilities, GridPlanner, Moving, PlanResult, PlanStatus, Query, path_cost
-from antdrive.worlds import Floats
+from antdrive.planners.plan import Capabilities, GridPlanner, PlanResult, PlanStatus, Query, path_cost
+from antdrive.worlds import Floats, MoverMotion
+from antdrive.worlds.errors import FieldError
+from antdrive.worlds.plane import segment_lengths
 
 STEP = 0.05  # s: how often a motion is sampled at first; samples are added where it turns in between
 INSTANT = 1e-6  # s: a motion that is not straight over so short a time is a jump
@@ -62,7 +64,7 @@ class TimedPlan(PlanResult):
         when = np.asarray(t, dtype=np.float64)
         return np.stack([np.interp(when, knots, np.repeat(self.xy[:, k], 2)) for k in (0, 1)], axis=-1)
 
-    def clearance(self, movers: Iterable[Moving], step: float = 0.01) -> float:
+    def clearance(self, movers: Iterable[MoverMotion], step: float = 0.01) -> float:
         """The least distance between the robot's centre and a mover's surface [m], sampled every `step` seconds.
 
         Args:
@@ -152,7 +154,7 @@ def plan_in_time(
 
 
 def _earliest(
-    query: Query, movers: Iterable[Moving], *, speed: float, start_time: float, horizon: float, stay: bool
+    query: Query, movers: Iterable[MoverMotion], *, speed: float, start_time: float, horizon: float, stay: bool
 ) -> TimedPlan:
     """The plan that arrives first, on a grid that can be crossed."""
     from antdrive.planners.graph import _kernels_sipp as kernels
@@ -187,7 +189,7 @@ def _earliest(
     )
 
 
-def _legs(mover: Moving, start: float, end: float, inflate: float) -> Floats:
+def _legs(mover: MoverMotion, start: float, end: float, inflate: float) -> Floats:
     """A motion as straight legs (L, 7) at constant speed, with the columns of `_kernels_sipp`."""
     from antdrive.planners.graph import _kernels_sipp as kernels
 
@@ -200,7 +202,7 @@ def _legs(mover: Moving, start: float, end: float, inflate: float) -> Floats:
     return np.column_stack([t[first], t[last], xy[first], velocity, keep])
 
 
-def _samples(mover: Moving, start: float, end: float) -> tuple[Floats, Floats, npt.NDArray[np.bool_]]:
+def _samples(mover: MoverMotion, start: float, end: float) -> tuple[Floats, Floats, npt.NDArray[np.bool_]]:
     """A motion as times (T,), positions (T, 2), and whether it jumps after each sample (T - 1,).
 
     Between samples without a jump, the motion is within `TOLERANCE` of the straight line that joins them.

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from antdrive.planners.graph.incremental import EditableQuery, Replanner, ReplanningPlanner
 from antdrive.planners.plan import Planner, PlanResult, PlanStatus, Query, capabilities_of, path_cost
+from antdrive.worlds.errors import FieldError
 
 
 def replanner_for(planner: Planner, query: Query, rng: np.random.Generator) -> Replanner:
@@ -26,7 +27,9 @@ def replanner_for(planner: Planner, query: Query, rng: np.random.Generator) -> R
     can = capabilities_of(planner)
     for needed, what in ((can.needs_world, "the world's discs"), (can.needs_motions, "known motions")):
         if needed:
-            raise ValueError(f"planner: {type(planner).__name__} plans among {what}; it cannot replan by blocked cells")
+            raise FieldError(
+                "planner", f"{type(planner).__name__} plans among {what}; it cannot replan by blocked cells"
+            )
     if can.own_replanner:
         return cast(ReplanningPlanner, planner).replanner(query, rng)
     return ReplanFromScratch(planner, query, rng)

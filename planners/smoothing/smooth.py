@@ -71,7 +71,7 @@ def smooth(
         ValueError: the plan has no path, the kind is unknown, or a setting is out of range.
     """
     if kind not in SMOOTHINGS:
-        raise ValueError(f"kind: unknown smoothing {kind!r}; choose from {', '.join(SMOOTHINGS)}")
+        raise FieldError("kind", f"unknown smoothing {kind!r}; choose from {', '.join(SMOOTHINGS)}")
     for key, value in (("clearance", clearance), ("stretch", stretch)):
         if not (math.isfinite(value) and value >= 0):
             raise FieldError(key, f"must be at least 0, got {value:g}")

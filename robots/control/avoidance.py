@@ -75,7 +75,7 @@ class Avoidance:
     def __post_init__(self) -> None:
         for key in ("horizon", "step"):
             if not 0 < getattr(self, key) <= 60:
-                raise ValueError(f"{key}: must be greater than 0 and at most 60, got {getattr(self, key):g}")
+                raise FieldError(key, f"must be greater than 0 and at most 60, got {getattr(self, key):g}")
         for key in _NOT_NEGATIVE:
             if not 0 <= getattr(self, key) < math.inf:
                 raise FieldError(key, f"must be at least 0, got {getattr(self, key):g}")

@@ -79,7 +79,7 @@ def speed_profile(
         if not (math.isfinite(value) and value > 0):
             raise FieldError(key, f"must be greater than 0, got {value:g}")
     if not 0 < braking <= 1:
-        raise ValueError(f"braking: must be greater than 0 and at most 1, got {braking:g}")
+        raise FieldError("braking", f"must be greater than 0 and at most 1, got {braking:g}")
 
     places, headings, stops, turns = _headings(route, rotate_in_place_above)
     legs: list[tuple[Floats, ...]] = []

@@ -22,6 +22,7 @@ from antdrive.robots.control._kernels_pursuit import MotionLimits, PursuitTuning
 from antdrive.robots.control.profile import SpeedProfile, speed_profile
 from antdrive.robots.spec import RobotSpec
 from antdrive.worlds import Floats, Pose, Route, World, point_clearance
+from antdrive.worlds.errors import FieldError
 
 SPACING = 0.02  # between the samples along a route [m]
 SQUARE = 0.5  # side of the squares that the obstacles are sorted into, larger in worlds of many squares [m]
@@ -145,16 +146,16 @@ class PurePursuit:
             if not 1e-3 <= getattr(self, key) <= 100:
                 raise FieldError(key, f"must be between 0.001 and 100, got {getattr(self, key):g}")
         if self.lookahead_max < self.lookahead_min:
-            raise ValueError(f"lookahead_max: must be at least lookahead_min ({self.lookahead_min:g})")
+            raise FieldError("lookahead_max", f"must be at least lookahead_min ({self.lookahead_min:g})")
         for key in ("lookahead_margin", "stopping_margin"):
             if not 0 <= getattr(self, key) <= 1:
                 raise FieldError(key, f"must be between 0 and 1, got {getattr(self, key):g}")
         if not 0 < self.braking <= 1:
-            raise ValueError(f"braking: must be between 0 and 1, got {self.braking:g}")
+            raise FieldError("braking", f"must be between 0 and 1, got {self.braking:g}")
         if not self.rotate_in_place_until < self.rotate_in_place_above < math.pi / 2:
-            raise ValueError(
-                "rotate_in_place_above: must lie between rotate_in_place_until and pi/2, "
-                f"got {self.rotate_in_place_above:g}"
+            raise FieldError(
+                "rotate_in_place_above",
+                f"must lie between rotate_in_place_until and pi/2, got {self.rotate_in_place_above:g}",
             )
 
     def prepare(

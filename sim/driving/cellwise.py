@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from antdrive.planners import Planner, Query, agent_for
+from antdrive.planners import Planner, Query, agent_for, capabilities_of
 from antdrive.robots import TrackedPath
 from antdrive.sim.driving.blocking import blocked_cells, covered_discs
 from antdrive.sim.driving.replanning import DECISION, MISSED, Replan, ReplanMonitor, ReplanPolicy
 from antdrive.worlds import Floats, Pose, Route, segment_clearance
+from antdrive.worlds.plane import polyline_length
 
 DECISION_PAUSE = 0.2  # the shortest time between two decisions [s]
 DECIDE_BEFORE = 0.6  # a decision is due when less than this many cells of the route remain
@@ -52,7 +53,7 @@ class CellwiseMonitor(ReplanMonitor):
         to = self._online.step(np.argwhere(blocked_cells(self._grid, covered)))
         xy = self._line(pose, here, to, tick)
         if to is not None and bool(np.ptp(xy, axis=0).any()):
-            cost = float(np.hypot(*np.diff(xy, axis=0).T).sum())
+            cost = polyline_length(xy)
             work = self._online.stats.propagated - propagated
             self.log.append(Replan(now, trigger, True, cost, work, xy, time.perf_counter() - started))
             return self._prepare(Route(xy))

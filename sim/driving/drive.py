@@ -12,6 +12,7 @@ from antdrive.sim.driving.replanning import ReplanMonitor
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.physics.engine import Engine
 from antdrive.worlds import Task
+from antdrive.worlds.errors import FieldError
 
 AFTER_CONTACT = 0.5  # after a collision the robot brakes for this long in the log [s]
 PROGRESS_HZ = 10  # calls of `progress` per simulated second
@@ -51,7 +52,7 @@ def drive(
     """
     substeps, rest = divmod(engine.physics_hz, control_hz)
     if rest or substeps < 1:
-        raise ValueError(f"control_hz: must divide the physics rate {engine.physics_hz}, got {control_hz}")
+        raise FieldError("control_hz", f"must divide the physics rate {engine.physics_hz}, got {control_hz}")
     driver = Driver(controller, tracked, task, engine.robot, control_hz, avoidance, predictor, monitor)
     log = Recorder(engine, task.start, noisy=noise_model is not None)
     ending = Ending(Outcome.COLLIDED) if log.touched else None

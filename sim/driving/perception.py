@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.worlds import Floats, Trajectories
+from antdrive.worlds.errors import FieldError
 
 PerceptionKind: TypeAlias = Literal["positions", "velocities", "motions"]
 CHUNK = 240  # control periods whose positions and velocities are computed at once
@@ -34,9 +35,9 @@ class Perception:
 
     def __post_init__(self) -> None:
         if self.kind not in get_args(PerceptionKind):
-            raise ValueError(f"kind: unknown {self.kind!r}; choose from {', '.join(get_args(PerceptionKind))}")
+            raise FieldError("kind", f"unknown {self.kind!r}; choose from {', '.join(get_args(PerceptionKind))}")
         if not self.range > 0:
-            raise ValueError(f"range: must be greater than 0, got {self.range:g}")
+            raise FieldError("range", f"must be greater than 0, got {self.range:g}")
 
 
 class Predictor:

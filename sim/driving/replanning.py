@@ -24,7 +24,7 @@ from antdrive.planners import (
     PlanResult,
     Query,
     TimedPlan,
-    plan_in_time,
+    capabilities_of,
     replanner_for,
     smooth,
 )
@@ -33,6 +33,7 @@ from antdrive.sim.driving.blocking import blocked_cells, covered_discs, with_obs
 from antdrive.sim.driving.perception import Predictor
 from antdrive.sim.driving.schedule import Schedule
 from antdrive.worlds import Disc, Floats, Grid, Pose, Route, Task, rasterise
+from antdrive.worlds.errors import FieldError
 
 if TYPE_CHECKING:
     from antdrive.planners import Replanner
@@ -77,7 +78,7 @@ class ReplanPolicy:
         for field in dataclasses.fields(self)[1:]:
             value = getattr(self, field.name)
             if not 0 <= value < math.inf:
-                raise ValueError(f"{field.name}: must be at least 0 and finite, got {value:g}")
+                raise FieldError(field.name, f"must be at least 0 and finite, got {value:g}")
 
 
 @dataclass(frozen=True)
@@ -151,7 +152,7 @@ class ReplanMonitor:
         self._planner, self._grid, self._rng, self._predictor, self._hz = planner, grid, rng, predictor, hz
         self._task = dataclasses.replace(task, world=dataclasses.replace(task.world, movers=()))
         self._robot, self._controller, self._margin, self._smoothing = robot, controller, margin, smoothing
-        self._timed = planner if isinstance(planner, SafeIntervals) else None
+        self._timed = capabilities_of(planner).needs_motions
         self._replanner: Replanner | None = None
         self._blocked = np.zeros(grid.shape, dtype=np.bool_)
         self._replanned_at = -math.inf
@@ -231,15 +232,9 @@ class ReplanMonitor:
         return self._controller.prepare(route, task.world, self._robot, self._margin, 1 / self._hz, task.goal_tolerance)
 
     def _plan_in_time(self, task: Task, now: float) -> PlanResult:
-        assert self._timed is not None
-        return plan_in_time(
-            Query.between(self._grid, task),
-            self._predictor.trajectories.motions,
-            speed=self._timed.speed,
-            start_time=now,
-            horizon=self._timed.horizon,
-            stay=self._timed.stay,
-        )
+        query = Query.between(self._grid, task)
+        query = dataclasses.replace(query, motions=self._predictor.trajectories.motions, start_time=now)
+        return self._planner.plan(query, self._rng)
 
     def _plan(self, task: Task, discs: list[Disc]) -> PlanResult:
         """A plan around discs: by the planner itself if it needs the world, else by its replanner."""

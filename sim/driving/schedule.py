@@ -10,6 +10,7 @@ import numpy as np
 from antdrive.planners.graph.sipp import TimedPlan
 from antdrive.robots import Twist
 from antdrive.worlds import Floats, Route
+from antdrive.worlds.plane import arc_lengths
 
 LOOKAHEAD = 0.4  # the speed limit leads to where the schedule is this much later [s]
 MAX_LAG = 0.5  # a robot farther behind its schedule than this is late [m]
@@ -30,7 +31,7 @@ class Schedule:
     @classmethod
     def of(cls, plan: TimedPlan, route: Route) -> Schedule:
         """The schedule of a timed plan, along the route through the plan's cells."""
-        covered = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(plan.xy, axis=0).T))))
+        covered = arc_lengths(plan.xy)
         share = covered / covered[-1] if covered[-1] > 0 else covered
         return cls(np.stack([plan.arrive, plan.leave], axis=1).ravel(), np.repeat(share * route.length, 2))
 

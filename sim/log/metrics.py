@@ -198,38 +198,36 @@ def replans(rollout: Rollout) -> float:
 
 
 def avoiding_s(rollout: Rollout) -> float:
-    """Simulated time for which the robot gave way to moving obstacles."""
-    limiters = rollout.meta.get("limiters", ())
-    if "avoid" not in limiters:
+    """Simulated time for which the robot gave way to movers."""
+    limiters = rollout.record.limiters
+    if AVOIDING not in limiters:
         return 0.0
-    return float((rollout.limiter == limiters.index("avoid")).sum() / rollout.meta["physics_hz"])
+    return float((rollout.limiter == limiters.index(AVOIDING)).sum() / rollout.record.physics_hz)
 
 
-METRICS: Mapping[str, Callable[[Rollout], float]] = MappingProxyType(
-    {
-        "path_length_m": path_length_m,
-        "route_length_m": route_length_m,
-        "driven_length_m": driven_length_m,
-        "gap_to_grid_optimum": gap_to_grid_optimum,
-        "gap_to_euclidean_optimum": gap_to_euclidean_optimum,
-        "spl": spl,
-        "barn": barn,
-        "min_clearance_m": min_clearance_m,
-        "mean_clearance_m": mean_clearance_m,
-        "tracking_error_max_m": tracking_error_max_m,
-        "tracking_error_p95_m": tracking_error_p95_m,
-        "duration_s": duration_s,
-        "arrival_s": arrival_s,
-        "plan_s": lambda rollout: float(rollout.meta["times"]["plan_s"]),
-        "drive_wall_s": lambda rollout: float(rollout.meta["times"]["drive_wall_s"]),
-        "turning_rad_per_m": turning_rad_per_m,
-        "jerk_rms": jerk_rms,
-        "contacts_driving": contacts_driving,
-        "contacts_standing": contacts_standing,
-        "contacts_teleported": contacts_teleported,
-        "replans": replans,
-        "avoiding_s": avoiding_s,
-    }
+_TABLE = (
+    Metric("m", path_length_m),
+    Metric("m", route_length_m),
+    Metric("m", driven_length_m),
+    Metric("1", gap_to_grid_optimum),
+    Metric("1", gap_to_euclidean_optimum),
+    Metric("1", spl),
+    Metric("1", barn),
+    Metric("m", min_clearance_m),
+    Metric("m", mean_clearance_m),
+    Metric("m", tracking_error_max_m),
+    Metric("m", tracking_error_p95_m),
+    Metric("s", duration_s),
+    Metric("s", arrival_s),
+    Metric("s", plan_s),
+    Metric("s", drive_wall_s),
+    Metric("rad/m", turning_rad_per_m),
+    Metric("m/s^3", jerk_rms),
+    Metric("1", contacts_driving),
+    Metric("1", contacts_standing),
+    Metric("1", contacts_teleported),
+    Metric("1", replans),
+    Metric("s", avoiding_s),
 )
 
 #: Every metric by its name, with unit and definition.

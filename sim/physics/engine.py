@@ -20,6 +20,7 @@ from antdrive.robots.spec import RobotSpec
 from antdrive.sim.physics.bullet import CHASSIS, GROUND, OBSTACLE, WHEELS, bullet, client
 from antdrive.sim.physics.movers import MoverBodies
 from antdrive.sim.physics.urdf import CASTER_GAP, robot_urdf
+from antdrive.worlds.errors import FieldError
 from antdrive.worlds.trajectories import Trajectories
 from antdrive.worlds.types import Floats, Pose
 from antdrive.worlds.world import World
@@ -90,7 +91,7 @@ class Engine:
         self, world: World, robot: RobotSpec, *, physics_hz: int = 240, trajectories: Trajectories | None = None
     ) -> None:
         if len(trajectories or ()) != len(world.movers):
-            raise ValueError(f"trajectories: must be those of the world's {len(world.movers)} movers")
+            raise FieldError("trajectories", f"must be those of the world's {len(world.movers)} movers")
         self.world = world
         self.robot = robot
         self.physics_hz = physics_hz

@@ -15,6 +15,7 @@ from antdrive.planners import Progress, keep_best, load_planner, watch
 from antdrive.robots import PurePursuit, RobotSpec, load_robot
 from antdrive.sim import Engine, Outcome, Run, Scenario, measure, run
 from antdrive.sim.driving.drive import drive
+from antdrive.sim.log.record import SmoothingRecord
 from antdrive.sim.view.figures.plan_figures import plan_figure
 from antdrive.worlds import Disc, InputError, Route, Task, World, list_worlds, load_task, save_task
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.planners import Iteration, Query, load_planner
+from antdrive.planners import Iteration, Query, as_iterative, load_planner
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.view.film.compositor import Compositor
 from antdrive.sim.view.film.overlay import Values
@@ -34,8 +34,8 @@ def plan_again(rollout: Rollout) -> tuple[Grid, int, Iterator[Iteration]]:
     """
     record = rollout.record
     name = record.planner.name
-    planner = load_planner(name, **record.planner.settings)
-    if not isinstance(planner, IterativePlanner):
+    planner = as_iterative(load_planner(name, **record.planner.settings))
+    if planner is None:
         raise InputError(f"prelude: {name} does not plan in iterations; there is no field to show")
     if planner.time_budget is not None:
         raise InputError("prelude: the plan was made under a time budget and cannot be repeated")

@@ -168,7 +168,7 @@ def test_no_path_arrives_sooner_and_none_is_missed(seeds: range, stay: bool) -> 
 
 
 def test_reaching_a_goal_that_must_stay_safe_may_take_longer(
-    small_plans: list[tuple[Query, list[Moving], TimedPlan]],
+    small_plans: list[tuple[Query, list[MoverMotion], TimedPlan]],
 ) -> None:
     later = 0
     for query, movers, plan in small_plans:

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from antdrive.robots import LIMITERS
 from antdrive.sim import METRICS, Outcome, Rollout, measure
-from antdrive.sim.log.metrics import tracking_error
+from antdrive.sim.log.metrics import AVOIDING, tracking_error
 from antdrive.sim.log.record import PlanRecord, ReplanRecord
 from antdrive.worlds import Task, World
 from tests.sim.records import made_up_record
@@ -125,4 +126,30 @@ def test_after_a_replan_the_tracking_error_is_to_the_new_route() -> None:
 
 def test_the_time_of_giving_way_is_that_of_its_limiter() -> None:
     log = straight(limiter=np.arange(81, dtype=np.uint8) // 61)
-    assert METRICS["avoiding_s"](replace(log, meta={**log.meta, "limiters": ["path", "avoid"]})) == pytest.approx(2.0)
+    assert METRICS["avoiding_s"](with_record(log, limiters=("path", AVOIDING))) == pytest.approx(2.0)
+    assert AVOIDING in LIMITERS
+
+
+def test_where_there_is_no_optimum_there_is_no_gap_and_no_score() -> None:
+    plan = replace(straight().record.plan, grid_optimum_m=None, euclidean_optimum_m=None)
+    log = with_record(straight(), plan=plan)
+    assert math.isnan(METRICS["gap_to_grid_optimum"](log))
+    assert math.isnan(METRICS["gap_to_euclidean_optimum"](log))
+    assert METRICS["spl"](log) == METRICS["barn"](log) == 0
+
+
+def test_a_run_that_never_drove_has_no_metrics() -> None:
+    with pytest.raises(ValueError, match="the run ended before the robot drove"):
+        measure(None)
+    with pytest.raises(ValueError, match="the run ended before the robot drove"):
+        METRICS["spl"](None)
+
+
+@pytest.mark.parametrize("name", METRICS)
+def test_every_metric_has_a_unit_and_a_definition(name: str) -> None:
+    metric = METRICS[name]
+    assert metric.name == name
+    assert metric.definition.endswith(".")
+    units = {"turning_rad_per_m": "rad/m", "jerk_rms": "m/s^3"}
+    suffix = name.rpartition("_")[2]
+    assert metric.unit == units.get(name, suffix if suffix in ("m", "s") else "1")
