@@ -19,7 +19,8 @@ import numpy as np
 
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.physics.bullet import client
-from antdrive.sim.pipeline import Scenario, run
+from antdrive.sim.pipeline import run
+from antdrive.sim.scenario import Scenario
 from antdrive.sim.view.film.camera import camera_for
 from antdrive.sim.view.film.model import robot_parts
 from antdrive.sim.view.film.parallel import processes

@@ -8,9 +8,9 @@ from .log.rollout import Outcome as Outcome
 from .log.rollout import Rollout as Rollout
 from .physics.engine import Engine as Engine
 from .pipeline import Run as Run
-from .pipeline import Scenario as Scenario
 from .pipeline import plan as plan
 from .pipeline import run as run
+from .scenario import Scenario as Scenario
 from .view.figures.plots import overview as overview
 from .view.figures.plots import plan_figure as plan_figure
 from .view.film.video import FilmInfo as FilmInfo

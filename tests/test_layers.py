@@ -20,7 +20,17 @@ BELOW = {
 MODULES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
 
 #: Inside sim: a part may import its own modules and those of the parts in lower ranks.
-SIM_RANKS = {"physics": 0, "log": 0, "driving": 1, "pipeline": 2, "view": 3, "papers": 4, "warm": 4, "cli": 5}
+SIM_RANKS = {
+    "physics": 0,
+    "log": 0,
+    "driving": 1,
+    "scenario": 2,
+    "pipeline": 3,
+    "view": 4,
+    "papers": 5,
+    "warm": 5,
+    "cli": 6,
+}
 #: Modules that still import each other inside functions.
 CIRCLES = (
     {"worlds.drawing", "worlds.trajectories", "worlds.world"},

@@ -15,7 +15,8 @@ from antdrive.worlds.errors import InputError
 
 if TYPE_CHECKING:
     from antdrive.sim.driving.perception import Perception
-    from antdrive.sim.pipeline import Run, Scenario
+    from antdrive.sim.pipeline import Run
+    from antdrive.sim.scenario import Scenario
     from antdrive.worlds import Disc, Task
 
 SUCCEEDED, FAILED, WRONG_INPUT, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
@@ -769,7 +770,7 @@ def _scenario(world: str, planner: str, settings: list[str] | None, robot: str, 
 
     from antdrive.planners.registry import parse
     from antdrive.robots import PurePursuit
-    from antdrive.sim.pipeline import Scenario
+    from antdrive.sim.scenario import Scenario
 
     groups: dict[str, dict[str, str]] = {"planner": {}, "controller": {}}
     for text in settings or ():

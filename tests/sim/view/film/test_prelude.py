@@ -3,7 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from antdrive.sim.pipeline import Scenario, run
+from antdrive.sim.pipeline import run
+from antdrive.sim.scenario import Scenario
 from antdrive.sim.view.film import prelude
 from antdrive.sim.view.film.prelude import field_levels, planning_pictures, search
 from antdrive.sim.view.film.video import film
