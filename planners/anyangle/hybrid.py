@@ -15,11 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from antdrive.planners.anyangle.ga_han import Leader, ViaPlanner, seeded
-from antdrive.planners.anyangle.lines import Ends, ends, polyline_length, terrain
+from antdrive.planners.anyangle.lines import Ends, ends, terrain
 from antdrive.planners.colonies.colony import Colony
 from antdrive.planners.iterative import Iteration, require
 from antdrive.planners.plan import Cells, Query
 from antdrive.worlds import Floats, InputError
+from antdrive.worlds.plane import polyline_length
 
 ROUNDS = 20  # times that every via point of a new path is pulled taut
 

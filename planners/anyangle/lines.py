@@ -79,12 +79,6 @@ def clear_line(query: Query, start: Point, goal: Point) -> bool:
     return bool(_kernels_anyangle.clear_line(terrain(query), *map(float, (*start, *goal))))
 
 
-def polyline_length(xy: npt.ArrayLike) -> float:
-    """The length of a polyline (M, 2), in the unit of its points."""
-    steps = np.diff(np.asarray(xy, dtype=np.float64).reshape(-1, 2), axis=0)
-    return float(np.hypot(*steps.T).sum())
-
-
 def cells_along(query: Query, waypoints: npt.ArrayLike) -> Cells:
     """A path of allowed moves from start to goal beside a polyline in fractional cells; empty if there is none.
 

@@ -17,10 +17,11 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.planners.anyangle.lines import Ends, cells_along, cells_under, ends, polyline_length
+from antdrive.planners.anyangle.lines import Ends, cells_along, cells_under, ends
 from antdrive.planners.iterative import require
 from antdrive.planners.plan import GridPlanner, PlanResult, PlanStatus, Query, path_cost
 from antdrive.worlds import Bounds, Floats, InputError, Point, Task
+from antdrive.worlds.plane import polyline_length
 
 NO_GAP = "discs and walls leave no way from the start to the goal for this clearance"
 

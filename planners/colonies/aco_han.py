@@ -11,6 +11,7 @@ import numpy as np
 from antdrive.planners.colonies.colony import FIRST, ChoiceContext, Colony, ColonyGraph, Desire, IterationState, Weights
 from antdrive.planners.iterative import require
 from antdrive.worlds import Floats
+from antdrive.worlds.errors import FieldError
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +43,7 @@ class AcoHan(Colony):
         require("revisit", self.revisit, at_least=0)
         require("least", self.least, at_least=0)
         if self.form not in ("equation", "listing"):
-            raise ValueError(f"form: must be 'equation' or 'listing', got {self.form!r}")
+            raise FieldError("form", f"must be 'equation' or 'listing', got {self.form!r}")
 
     def lay(self, ground: ColonyGraph, rng: np.random.Generator) -> Floats:
         """No trails: tau(0) = 0."""

@@ -16,6 +16,7 @@ import numpy as np
 from antdrive.planners.colonies.colony import FIRST, ChoiceContext, Colony, ColonyGraph, Desire, IterationState, Weights
 from antdrive.planners.iterative import require
 from antdrive.worlds import Floats
+from antdrive.worlds.errors import FieldError
 
 #: Length of each move [cells].
 STEP = np.sqrt([1.0, 2.0, 1.0, 2.0, 1.0, 2.0, 1.0, 2.0])
@@ -46,7 +47,7 @@ class AntSystem(Colony):
         require("deposit", self.deposit, above=0)
         require("initial", self.initial, above=0)
         if self.heuristic not in ("goal", "step"):
-            raise ValueError(f"heuristic: must be 'goal' or 'step', got {self.heuristic!r}")
+            raise FieldError("heuristic", f"must be 'goal' or 'step', got {self.heuristic!r}")
 
     def lay(self, ground: ColonyGraph, rng: np.random.Generator) -> Floats:
         """tau(0) = C on every arc."""

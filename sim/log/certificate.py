@@ -24,9 +24,9 @@ import numpy.typing as npt
 from antdrive.sim.log.contacts import STANDING_SPEED, touches_of
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
+from antdrive.worlds.plane import segment_lengths, wrap_angle
 from antdrive.worlds.trajectories import Trajectories
-
-Floats = npt.NDArray[np.float64]
+from antdrive.worlds.types import Floats
 
 SAME_CLEARANCE = 1e-9  # closed-form distances, computed twice, agree to this [m]
 # Contact points describe the pose before a step, and a robot pushes some millimetres into what it hits. Physics and
@@ -165,7 +165,7 @@ def _between_steps(rollout: Rollout, movers: Trajectories, still: Floats, moving
         return np.asarray(np.minimum(still, moving.min(axis=1, initial=math.inf)))
     radius = rollout.record.robot.footprint.radius
     dt = np.diff(rollout.t)
-    moved = np.hypot(*np.diff(rollout.pose[:, :2], axis=0).T)
+    moved = segment_lengths(rollout.pose[:, :2])
     turned = np.abs(_wrapped(np.diff(rollout.pose[:, 2])))
     speed = np.maximum(*np.abs([rollout.twist[:-1], rollout.twist[1:]]))
     travel = np.maximum(moved, speed[:, 0] * dt) + radius * np.maximum(turned, speed[:, 1] * dt)
@@ -185,7 +185,7 @@ def _clock(rollout: Rollout) -> Floats:
 
 
 def _wrapped(angle: Floats) -> Floats:
-    return np.asarray((angle + math.pi) % (2 * math.pi) - math.pi)
+    return np.asarray(wrap_angle(angle))
 
 
 def _check_readings(rollout: Rollout, clearance: Floats, bound: float) -> Iterator[str]:

@@ -22,8 +22,7 @@ import numpy.typing as npt
 from antdrive.robots.spec import Footprint
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
-
-Floats = npt.NDArray[np.float64]
+from antdrive.worlds.types import Floats
 
 STANDING_SPEED = 0.02  # no point of a standing robot moves faster [m/s]
 TOUCH_GAP = 0.5  # contacts that are farther apart in time belong to different touches [s]

@@ -18,11 +18,12 @@ from antdrive.sim.log.metrics import nearest_on_route
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
 from antdrive.worlds import point_clearance
+from antdrive.worlds.errors import FieldError
+from antdrive.worlds.plane import wrap_angle
+from antdrive.worlds.types import Floats
 
 if TYPE_CHECKING:
     from antdrive.sim.pipeline import Run
-
-Floats = npt.NDArray[np.float64]
 
 #: The causes of a loss of margin, with what each of them is.
 CAUSES: dict[str, str] = {
@@ -175,10 +176,10 @@ def find_margin(
         resolution: margins are multiples of this [m]
 
     Raises:
-        ValueError: a setting outside its range.
+        FieldError: a setting outside its range.
     """
     if not 0 < resolution < most:
-        raise ValueError(f"resolution: must be greater than 0 and less than {most:g}, got {resolution:g}")
+        raise FieldError("resolution", f"must be greater than 0 and less than {most:g}, got {resolution:g}")
     hardest_first = list(seeds)
     low, high = (
         0,
@@ -240,7 +241,7 @@ def _near_corner(points: Floats, route: Floats) -> npt.NDArray[np.bool_]:
     """Whether points (T, 2) are near a corner of a route (N, 2), shape (T,)."""
     steps = np.diff(route, axis=0)
     heading = np.arctan2(steps[:, 1], steps[:, 0])
-    turn = np.abs((np.diff(heading) + np.pi) % (2 * np.pi) - np.pi)
+    turn = np.abs(wrap_angle(np.diff(heading)))
     near = np.zeros(len(points), dtype=np.bool_)
     for corner in route[1:-1][turn >= CORNER]:
         near |= np.hypot(*(points - corner).T) <= NEAR_CORNER

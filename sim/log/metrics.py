@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
-import numpy.typing as npt
 
 from antdrive.sim.log.contacts import touches_of
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
-
-Floats = npt.NDArray[np.float64]
+from antdrive.worlds.errors import FieldError
+from antdrive.worlds.plane import polyline_length, wrap_angle
+from antdrive.worlds.types import Floats
 
 BARN_SPEED = 2.0  # the challenge's reference speed [m/s]
 BARN_CLOCK = 0.1  # the challenge's clock starts when the robot is this far from its start [m]
@@ -52,14 +52,14 @@ class Metric:
         """The number for one drive.
 
         Raises:
-            ValueError: there is no rollout, because the run ended before the robot drove.
+            FieldError: there is no rollout, because the run ended before the robot drove.
         """
         return self.function(_driven(rollout))
 
 
 def _driven(rollout: Rollout | None) -> Rollout:
     if rollout is None:
-        raise ValueError("rollout: missing; the run ended before the robot drove, so it has no metrics")
+        raise FieldError("rollout", "missing; the run ended before the robot drove, so it has no metrics")
     return rollout
 
 
@@ -159,7 +159,7 @@ def drive_wall_s(rollout: Rollout) -> float:
 
 def turning_rad_per_m(rollout: Rollout) -> float:
     """Total change of heading over the distance travelled."""
-    turned = np.abs((np.diff(rollout.pose[:, 2]) + math.pi) % (2 * math.pi) - math.pi).sum()
+    turned = np.abs(wrap_angle(np.diff(rollout.pose[:, 2]))).sum()
     length = driven_length_m(rollout)
     return float(turned / length) if length > 0 else 0.0
 
@@ -238,7 +238,7 @@ def measure(rollout: Rollout | None) -> dict[str, float]:
     """Every metric of a drive by its name.
 
     Raises:
-        ValueError: there is no rollout, because the run ended before the robot drove.
+        FieldError: there is no rollout, because the run ended before the robot drove.
     """
     driven = _driven(rollout)
     return {name: metric(driven) for name, metric in METRICS.items()}
@@ -279,4 +279,4 @@ def _over(length: float, optimum: float | None) -> float:
 
 
 def _length(xy: Floats) -> float:
-    return float(np.hypot(*np.diff(xy, axis=0).T).sum())
+    return polyline_length(xy)

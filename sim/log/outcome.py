@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import enum
 
+from antdrive.worlds.errors import FieldError
+
 
 class Outcome(enum.Enum):
     """How a run ended. The value is the sentence shown to people.
@@ -43,9 +45,9 @@ class Outcome(enum.Enum):
             key: a word such as `timed_out`
 
         Raises:
-            ValueError: there is no such outcome.
+            FieldError: there is no such outcome.
         """
         known = {outcome.key: outcome for outcome in cls}
         if key not in known:
-            raise ValueError(f"unknown outcome {key!r:.40}; choose from {', '.join(known)}")
+            raise FieldError("", f"unknown outcome {key!r:.40}; choose from {', '.join(known)}")
         return known[key]

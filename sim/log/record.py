@@ -21,8 +21,10 @@ from pydantic import PlainValidator, TypeAdapter, ValidationError
 
 from antdrive.robots.spec import RobotSpec
 from antdrive.sim.log.outcome import Outcome
+from antdrive.worlds.errors import FieldError
 from antdrive.worlds.files.world_file import task_from_dict, task_to_dict
-from antdrive.worlds.world import Disc, Point, Task, World
+from antdrive.worlds.types import Point
+from antdrive.worlds.world import Disc, Task, World
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
@@ -130,7 +132,7 @@ class ReplanRecord:
     def __post_init__(self) -> None:
         _at_least(self, 0.0, "t")
         if self.solved != (len(self.route) > 1):
-            raise ValueError(f"route: must have two points or more if solved, else none, got {len(self.route)}")
+            raise FieldError("route", f"must have two points or more if solved, else none, got {len(self.route)}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -191,7 +193,7 @@ class DriveRecord:
         digest: the SHA-256 over arrays and record, see `Rollout.digest`; null until the log is saved
 
     Raises:
-        ValueError: a value that no drive can have; the message is "key: problem".
+        FieldError: a value that no drive can have.
     """
 
     __pydantic_config__ = _RULES
@@ -227,17 +229,17 @@ class DriveRecord:
         _at_least(self, 0, "seed", "noise", "margin", "inflate")
         for key in ("physics_hz", "control_hz"):
             if not 1 <= getattr(self, key) <= MAX_HZ:
-                raise ValueError(f"{key}: must be between 1 and {MAX_HZ}, got {getattr(self, key)!r:.40}")
+                raise FieldError(key, f"must be between 1 and {MAX_HZ}, got {getattr(self, key)!r:.40}")
         for key in ("cell", "time_limit"):
             if not getattr(self, key) > 0:
-                raise ValueError(f"{key}: must be greater than 0, got {getattr(self, key)!r:.40}")
+                raise FieldError(key, f"must be greater than 0, got {getattr(self, key)!r:.40}")
         foot = self.robot.footprint
         for key in ("half_length", "half_width", "rounding"):
             if not 0 <= getattr(foot, key) < math.inf:
-                raise ValueError(f"robot.footprint.{key}: must be at least 0, got {getattr(foot, key)!r:.40}")
+                raise FieldError(f"robot.footprint.{key}", f"must be at least 0, got {getattr(foot, key)!r:.40}")
         for i, (before, after) in enumerate(zip(self.replans, self.replans[1:], strict=False), 1):
             if after.t < before.t:
-                raise ValueError(f"replans[{i}].t: must not be earlier than the {before.t:g} s before, got {after.t:g}")
+                raise FieldError(f"replans[{i}].t", f"must not be before {before.t:g} s, got {after.t:g}")
 
     @property
     def world(self) -> World:
@@ -268,23 +270,23 @@ class DriveRecord:
             text: what `to_json` wrote
 
         Raises:
-            ValueError: a key is missing or unknown, or a value is impossible; the message is "record.KEY: problem".
+            FieldError: a key is missing or unknown, or a value is impossible.
         """
         try:
             found = json.loads(text, parse_constant=_refuse_constant)
         except (RecursionError, ValueError) as error:
             problem = "nested too deeply" if isinstance(error, RecursionError) else str(error)
-            raise ValueError(f"record: not JSON: {problem}") from None
+            raise FieldError("record", f"not JSON: {problem}") from None
         if not isinstance(found, dict) or found.get("schema") != SCHEMA:
             schema = found.get("schema") if isinstance(found, dict) else found
-            raise ValueError(f"record.schema: this version reads schema {SCHEMA}, found {_shown(schema)}")
+            raise FieldError("record.schema", f"this version reads schema {SCHEMA}, found {_shown(schema)}")
         try:
             record = _adapter().validate_json(text)
             record.to_json()  # settings of any kind hold nothing that JSON cannot
         except ValidationError as error:
-            raise ValueError(_problem(error.errors(include_url=False)[0])) from None
+            raise _field_error(error.errors(include_url=False)[0]) from None
         except (RecursionError, OverflowError, ValueError) as error:
-            raise ValueError(f"record: {error}") from None
+            raise FieldError("record", str(error)) from None
         return record
 
 
@@ -389,28 +391,32 @@ def _adapter() -> TypeAdapter[DriveRecord]:
 def _at_least(record: Any, least: float, *keys: str) -> None:
     for key in keys:
         if not least <= getattr(record, key) < math.inf:
-            raise ValueError(f"{key}: must be at least {least:g}, got {getattr(record, key)!r:.40}")
+            raise FieldError(key, f"must be at least {least:g}, got {getattr(record, key)!r:.40}")
 
 
 def _refuse_constant(name: str) -> NoReturn:
     raise ValueError(f"{name} is no number of JSON")
 
 
-def _problem(fault: ErrorDetails) -> str:
-    """One line about a fault that pydantic found: the key, the problem and what would be right."""
+def _field_error(fault: ErrorDetails) -> FieldError:
+    """The key and the problem of a fault that pydantic found, with what would be right."""
     key = "record" + "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in fault["loc"])
-    kind = fault["type"]
-    if kind == "missing":
+    if fault["type"] == "missing":
         name = str(fault["loc"][-1])
-        return f"{key}: missing; {attributes_of(DriveRecord).get(name, 'a log that antdrive wrote has it')}"
-    if kind == "unexpected_keyword_argument":
-        return f"{key}: unknown key; a later version of antdrive may have written it"
-    if kind != "value_error":
+        described = attributes_of(DriveRecord).get(name, "a log that antdrive wrote has it")
+        return FieldError(key, f"missing; {described}")
+    if fault["type"] == "unexpected_keyword_argument":
+        return FieldError(key, "unknown key; a later version of antdrive may have written it")
+    if fault["type"] != "value_error":
         problem = fault["msg"].replace("Input should be", "must be")
-        return f"{key}: {problem}, got {_shown(fault['input'])}"
-    # A record's own check names the key within the record; a world file's also names the file, here the key itself.
-    inner = str(fault["ctx"]["error"]).removeprefix("task: ")
-    return f"{key}.{inner}" if re.match(r"\w[\w.\[\]]*: ", inner) else f"{key}: {inner}"
+        return FieldError(key, f"{problem}, got {_shown(fault['input'])}")
+    error = fault["ctx"]["error"]
+    if isinstance(error, FieldError):
+        return error.under(key)
+    # A world file's error is text: the name of the file, here the key itself, then often a key within the file.
+    text = str(error).removeprefix("task: ")
+    inner = re.match(r"(\w[\w.\[\]]*): (.*)", text)
+    return FieldError(f"{key}.{inner[1]}", inner[2]) if inner else FieldError(key, text)
 
 
 def _shown(value: Any) -> str:

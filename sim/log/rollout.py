@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import DriveRecord
-from antdrive.worlds.errors import InputError
+from antdrive.worlds.errors import FieldError, InputError
 from antdrive.worlds.files.atomic import written_whole
 from antdrive.worlds.trajectories import Trajectories
 
@@ -105,7 +105,7 @@ class Rollout:
 
         Raises:
             InputError: the file cannot be written.
-            ValueError: the record holds what no log can, such as a world without a name.
+            FieldError: the record holds what no log can, such as a world without a name.
         """
         target = Path(path)
         text = dataclasses.replace(self.record, digest=self.digest).to_json()
@@ -160,10 +160,10 @@ class Rollout:
     def _repr_html_(self) -> str:
         from antdrive.worlds.drawing import LINE, card, world_svg
 
-        task = self.record.task
+        task, world = self.record.task, self.record.world
         lines = [(self.route, "#182242", True), (self.pose[::12, :2], LINE, False)]
         goal = (*task.goal, task.goal_tolerance)
-        picture = world_svg(self.record.world, start=task.start, goal=goal, lines=lines)
+        picture = world_svg(world.bounds, world.discs, start=task.start, goal=goal, lines=lines)
         facts = {
             "planner": self.record.planner.name,
             "robot": self.record.robot.name,
@@ -197,7 +197,7 @@ def _log_file(path: str | Path) -> Iterator[Any]:
             yield file
     except FileNotFoundError:
         raise InputError(f"{path}: no such file") from None
-    except _RecordProblem as error:
+    except FieldError as error:
         raise InputError(f"{path}: {error}") from None
     except KeyError as error:
         raise InputError(f"{path}: not a rollout: {error.args[0]}") from None
@@ -206,18 +206,10 @@ def _log_file(path: str | Path) -> Iterator[Any]:
         raise InputError(f"{path}: not a rollout ({problem})") from None
 
 
-class _RecordProblem(Exception):
-    """The record of a log is wrong; the message is "record.KEY: problem"."""
-
-
 def _record_in(file: Any) -> DriveRecord:
-    text = str(file["record"][()])
-    try:
-        record = DriveRecord.from_json(text)
-    except ValueError as error:
-        raise _RecordProblem(str(error)) from None
+    record = DriveRecord.from_json(str(file["record"][()]))
     if record.digest is None:
-        raise _RecordProblem("record.digest: missing; a log that antdrive wrote has it")
+        raise FieldError("record.digest", "missing; a log that antdrive wrote has it")
     return record
 
 

@@ -210,7 +210,7 @@ def test_a_wrong_record_is_refused_in_one_line_that_names_the_key(what: str, sav
 REPLAN = {"t": 1.0, "trigger": "waited", "solved": False, "cost_m": None, "work": 3, "route": []}
 WRONG_REPLANS: dict[str, tuple[list[dict[str, Any]], str]] = {
     "a time of text": ([{**REPLAN, "t": "soon"}], "replans[0].t: "),
-    "in disorder": ([{**REPLAN, "t": 2.0}, REPLAN], "replans[1].t: must not be earlier than the 2 s before, got 1"),
+    "in disorder": ([{**REPLAN, "t": 2.0}, REPLAN], "replans[1].t: must not be before 2 s, got 1"),
     "a route of one number": ([{**REPLAN, "route": [[1.0]]}], "replans[0].route[0]"),
     "no trigger": ([{**REPLAN, "trigger": None}], "replans[0].trigger: "),
     "solved without a route": ([{**REPLAN, "solved": True}], "replans[0].route: must have two points or more if solved"),
