@@ -16,7 +16,6 @@ import time
 from pathlib import Path
 
 import numpy as np
-from antdrive.sim.scenario import Scenario
 
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.physics.bullet import client

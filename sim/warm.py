@@ -68,10 +68,9 @@ def warm(jobs: int = -1, progress: Callable[[float], None] | None = None) -> Non
 
 def _scenario() -> Scenario:
     """A scenario in a world so small that compiling is nearly all it costs."""
-    from antdrive.sim.scenario import Scenario
-
     from antdrive.planners import PLANNERS
     from antdrive.robots import load_robot
+    from antdrive.sim.scenario import Scenario
     from antdrive.worlds import Cruising, Disc, Task, World
 
     mover = Cruising(radius=0.1, position=(0.2, 2.8), velocity=(0.1, 0.0))

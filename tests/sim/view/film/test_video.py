@@ -296,8 +296,8 @@ def test_a_small_robot_gets_a_glow_and_a_large_one_none(made_up_drive):
 def test_a_replan_shows_its_new_route_and_its_cause(drive):
     """The new route replaces the old one, a dot marks the place, and the cause is shown for a while."""
     new = ReplanRecord(t=0.3, trigger="obstructed", solved=True, cost_m=2.5, work=1, route=((1.0, 0.4), (3.5, 0.4)))
-    failed_one = replace(new, t=0.8, trigger="waited", solved=False, cost_m=None, route=())
-    replanned = replace(drive, record=replace(drive.record, replans=(new, failed_one)))
+    unsolved = replace(new, t=0.8, trigger="waited", solved=False, cost_m=None, route=())
+    replanned = replace(drive, record=replace(drive.record, replans=(new, unsolved)))
 
     def views(rollout, news, *times):
         with Shot(rollout, camera="top", size=SIZE, bare=True) as shot:
