@@ -1,4 +1,4 @@
-"""Where the robot drives: tasks, discs, exact geometry, grids, generators, importers and a catalogue."""
+"""Where the robot drives: worlds and tasks, movers, exact geometry, grids, files, other formats, and a catalogue."""
 
 import lazy_loader
 

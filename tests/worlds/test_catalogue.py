@@ -65,7 +65,7 @@ def test_robots_get_through_where_the_table_says(task, radius, who):
 
 
 def test_both_ends_have_room_for_every_robot(task):
-    # hasan's ends lie in cells beside walls.
+    # The ends of hasan's worlds lie in cells next to walls.
     room = TURTLEBOT + MARGIN if task.world.name.startswith("hasan") else JACKAL + 0.2
     assert (point_clearance(task.world, [task.start[:2], task.goal]) > room).all()
 
@@ -117,7 +117,7 @@ def test_hasans_worlds_are_recreated_in_fifty_by_fifty_cells(case):
     assert grid.shape == (50, 50)
     start, goal = ((row, col) for col, row in HASAN[case])
     np.testing.assert_allclose(grid.xy([start, goal]), [task.start[:2], task.goal])
-    # A cylinder fills its cell and closes no other: what is free is what the paper's robot of one cell may enter.
+    # A cylinder blocks its own cell and no other, so the free cells are those that the paper's robot can enter.
     blocked = {grid.cell_at(disc.x, disc.y) for disc in task.world.obstacles}
     assert {tuple(cell) for cell in np.argwhere(~grid.free).tolist()} == blocked
     assert set(np.unique([disc.radius for disc in task.world.obstacles])) == {task.cell / 2}
@@ -144,7 +144,7 @@ def test_hasans_mover_walks_over_free_cells_from_a_random_one(case):
     assert len(homes) == 5
 
 
-def test_the_benchmarks_draw_the_same_environments():
+def test_hasans_worlds_are_the_environments_of_the_papers_experiments():
     drawn = {name.split()[0]: query for name, query in environments().items()}
     assert list(drawn) == list(HASAN)
     for case, query in drawn.items():
@@ -162,12 +162,12 @@ def test_the_gate_is_just_wide_enough():
     assert not passable(task, rasterise(task.world, 0.02, 0.401))
 
 
-def test_not_even_a_point_leaves_the_ring_of_no_path():
+def test_in_no_path_not_even_a_point_leaves_the_ring():
     task = load_task("no-path")
     assert not passable(task, rasterise(task.world, 0.02))
 
 
-def test_the_straight_way_of_the_trap_ends_in_the_u():
+def test_the_straight_line_of_the_trap_ends_in_the_u():
     task = load_task("u-trap")
     way = np.linspace(task.start[:2], task.goal, 200)
     hits = np.flatnonzero(point_clearance(task.world, way) < 0)
@@ -175,7 +175,7 @@ def test_the_straight_way_of_the_trap_ends_in_the_u():
     assert way[hits[0], 0] > 7.5
 
 
-def test_the_forest_is_the_generators():
+def test_the_forest_comes_from_the_generator():
     made = forest(
         np.random.default_rng(3),
         size=12.0,

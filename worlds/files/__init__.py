@@ -1,1 +1,1 @@
-"""World files: read, checked and written whole."""
+"""World files: reading, checking and writing them."""

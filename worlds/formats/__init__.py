@@ -1,1 +1,1 @@
-"""Other formats: Gazebo SDF, ROS map_server, MovingAI, BARN and DynaBARN."""
+"""Formats of other programs, one module each: Gazebo SDF, BARN, DynaBARN, ROS map_server and MovingAI."""

@@ -17,7 +17,7 @@ from antdrive.worlds.formats.movingai import import_movingai_task
 from antdrive.worlds.formats.sdf import import_sdf
 from antdrive.worlds.world import Task
 
-#: What a task needs; formats that do not take one of these options bring their own.
+#: Values that every task has; a format that does not take them as options brings its own.
 _OF_EVERY_TASK = ("start", "goal", "bounds")
 
 
@@ -27,10 +27,10 @@ class Format:
 
     Attributes:
         name: what people call a file of this format
-        suffixes: of its files, in lower case
-        options: the options of `read` that people may give
-        read: the tasks in a file
-        is_map: whether it holds a map of cells, which is covered by cylinders
+        suffixes: the suffixes of its files, in lower case
+        options: the options that `read` takes besides the path
+        read: the function that reads the tasks in a file
+        is_map: whether a file holds a map of cells, which the import covers with cylinders
     """
 
     name: str
