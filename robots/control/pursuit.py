@@ -97,7 +97,7 @@ class TrackedPath:
 
 @dataclass(frozen=True, kw_only=True)
 class PurePursuit:
-    """The controller and its settings.
+    """A pure-pursuit controller, given by its settings.
 
     Attributes:
         lookahead_time: the lookahead is the speed times this [s]
@@ -150,7 +150,7 @@ class PurePursuit:
             if not 0 <= getattr(self, key) <= 1:
                 raise ValueError(f"{key}: must be between 0 and 1, got {getattr(self, key):g}")
         if not 0 < self.braking <= 1:
-            raise ValueError(f"braking: must be between 0 and 1, got {self.braking:g}")
+            raise ValueError(f"braking: must be greater than 0 and at most 1, got {self.braking:g}")
         if not self.rotate_in_place_until < self.rotate_in_place_above < math.pi / 2:
             raise ValueError(
                 "rotate_in_place_above: must lie between rotate_in_place_until and pi/2, "
