@@ -177,7 +177,7 @@ def test_any_grid_like_route_is_driven_to_its_end(turns: list[int], step: float)
     [
         ("lookahead_time", 0.0, "between 0.001 and 100"),
         ("lookahead_margin", 1.5, "between 0 and 1"),
-        ("braking", 0.0, "between 0 and 1"),
+        ("braking", 0.0, "greater than 0 and at most 1"),
         ("lookahead_max", 0.01, "at least lookahead_min"),
         ("rotate_in_place_above", 3.0, "between rotate_in_place_until and pi/2"),
     ],
