@@ -14,8 +14,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from antdrive.planners import Moving, Query, TimedPlan, plan_in_time, reachable
-from antdrive.worlds import Floats, Grid
+from antdrive.planners import Query, TimedPlan, plan_in_time, reachable
+from antdrive.worlds import Floats, Grid, MoverMotion
 from benchmarks.planners import seconds, table
 
 CELL, SPEED, INFLATE, WORLDS = 0.2, 0.5, 0.25, 20
@@ -44,20 +44,20 @@ class Carousel:
         return np.asarray(self.centre + self.far * np.stack([np.cos(angle), np.sin(angle)], axis=-1))
 
 
-def shuttle(rng: np.random.Generator, side: float) -> Moving:
+def shuttle(rng: np.random.Generator, side: float) -> MoverMotion:
     ends = rng.uniform(0, side, (2, 2))
     return Shuttle(float(rng.uniform(0.2, 0.5)), ends, math.dist(*ends) / float(rng.uniform(0.1, 0.5)))
 
 
-def carousel(rng: np.random.Generator, side: float) -> Moving:
+def carousel(rng: np.random.Generator, side: float) -> MoverMotion:
     far, speed = float(rng.uniform(0.5, side / 3)), float(rng.uniform(0.1, 0.5))
     return Carousel(float(rng.uniform(0.2, 0.5)), rng.uniform(0, side, 2), far, speed)
 
 
-Maker = Callable[[np.random.Generator, float], Moving]
+Maker = Callable[[np.random.Generator, float], MoverMotion]
 
 
-def world(size: int, count: int, make: Maker, rng: np.random.Generator) -> tuple[Query, list[Moving]]:
+def world(size: int, count: int, make: Maker, rng: np.random.Generator) -> tuple[Query, list[MoverMotion]]:
     while True:
         free = rng.random((size, size)) >= 0.15
         free[0, 0] = free[-1, -1] = True

@@ -31,7 +31,6 @@ from .plan import Cell as Cell
 from .plan import Cells as Cells
 from .plan import GridPlanner as GridPlanner
 from .plan import History as History
-from .plan import Moving as Moving
 from .plan import Planner as Planner
 from .plan import PlanResult as PlanResult
 from .plan import PlanStatus as PlanStatus

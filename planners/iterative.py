@@ -18,6 +18,7 @@ import numpy as np
 from antdrive.planners.graph.search import NO_WAY, reachable
 from antdrive.planners.plan import Cells, GridPlanner, History, PlanResult, PlanStatus, Query, path_cost
 from antdrive.worlds import Floats
+from antdrive.worlds.errors import FieldError
 
 
 class Iteration(NamedTuple):
@@ -181,4 +182,4 @@ def require(
         if math.isfinite(bound)
     ]
     if not (at_least <= value <= at_most and above < value < below):
-        raise ValueError(f"{key}: must be {' and '.join(bounds) or 'finite'}, got {value:g}")
+        raise FieldError(key, f"must be {' and '.join(bounds) or 'finite'}, got {value:g}")

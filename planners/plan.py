@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.worlds import Floats, Point, Task
+from antdrive.worlds import Floats, MoverMotion, Point, Task
+from antdrive.worlds.errors import FieldError
 
 if TYPE_CHECKING:  # a grid brings the compiler with it; naming a planner should not
     from antdrive.worlds import Grid
@@ -31,20 +32,6 @@ class PlanStatus(enum.Enum):
     STOPPED = "stopped early"
 
 
-@runtime_checkable
-class Moving(Protocol):
-    """A disc whose motion is known."""
-
-    @property
-    def radius(self) -> float:
-        """Its radius [m]."""
-        ...
-
-    def at(self, t: Floats) -> Floats:
-        """Its centre (T, 2) [m] at times (T,) [s]."""
-        ...
-
-
 @dataclass(frozen=True)
 class Query:
     """A grid with a start and a goal cell.
@@ -58,13 +45,13 @@ class Query:
     goal: Cell
     task: Task | None = None  # the world behind the grid, for planners that are not bound to cells
     unreachable: str = ""  # why an end cannot be used although its cell may be free
-    motions: tuple[Moving, ...] = ()  # what moves, for planners of space and time; t = 0 is when the robot sets out
+    motions: tuple[MoverMotion, ...] = ()  # for planners of space and time; t = 0 is when the robot sets out
 
     def __post_init__(self) -> None:
         rows, cols = self.grid.shape
         for key, (row, col) in (("start", self.start), ("goal", self.goal)):
             if not (0 <= row < rows and 0 <= col < cols):
-                raise ValueError(f"{key}: cell ({row}, {col}) is outside the grid of {rows} rows and {cols} columns")
+                raise FieldError(key, f"cell ({row}, {col}) is outside the grid of {rows} rows and {cols} columns")
 
     @classmethod
     def between(cls, grid: Grid, task: Task) -> Query:

@@ -24,7 +24,7 @@ from antdrive.planners.graph.dstar_lite import DStarLite
 from antdrive.planners.graph.search import AStar, Dijkstra
 from antdrive.planners.graph.sipp import SafeIntervals
 from antdrive.planners.plan import Planner
-from antdrive.worlds import InputError
+from antdrive.worlds import FieldError, InputError
 
 #: The planners of this package.
 PLANNERS: Mapping[str, Planner] = MappingProxyType(
@@ -169,8 +169,10 @@ def _with_options(name: str, planner: Planner, options: Mapping[str, Any]) -> Pl
         values[key] = parse(f"planner.{key}", hints[key], value)
     try:
         return typing.cast(Planner, dataclasses.replace(typing.cast(Any, planner), **values))
-    except ValueError as wrong:
-        raise InputError(f"planner.{wrong}") from None
+    except FieldError as error:
+        raise InputError(str(error.under("planner"))) from None
+    except ValueError as error:  # of another package's planner
+        raise InputError(f"planner: {error}") from None
 
 
 def _fields(planner: Planner) -> tuple[dataclasses.Field[Any], ...]:

@@ -11,8 +11,9 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from antdrive.robots.spec import NOISE_RANGE, Footprint, Noise, RobotSpec
+from antdrive.worlds.errors import FieldError, input_error
 from antdrive.worlds.files.checks import SchemaVersion, check, suggest
-from antdrive.worlds.files.document import Document, input_error, read_document
+from antdrive.worlds.files.document import Document, read_document
 
 _CATALOG = Path(__file__).with_name("catalog")
 _RULES = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
@@ -125,9 +126,8 @@ def _to_spec(entry: RobotFile, document: Document) -> RobotSpec:
     values["noise"] = Noise(**dict(entry.noise))
     try:
         return RobotSpec(**values)
-    except ValueError as error:
-        key, _, problem = str(error).partition(": ")
-        raise document.error((key,), problem) from None
+    except FieldError as error:
+        raise document.field_error(error) from None
 
 
 def robot_to_dict(robot: RobotSpec) -> dict[str, Any]:

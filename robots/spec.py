@@ -6,6 +6,8 @@ import dataclasses
 import math
 from dataclasses import dataclass
 
+from antdrive.worlds.errors import FieldError
+
 
 @dataclass(frozen=True)
 class Footprint:
@@ -65,7 +67,7 @@ class Noise:
             value = getattr(self, field.name)
             low, high = NOISE_RANGE[field.name]
             if not low <= value <= high:
-                raise ValueError(f"{field.name}: must be between {low:g} and {high:g}, got {value:g}")
+                raise FieldError(field.name, f"must be between {low:g} and {high:g}, got {value:g}")
 
     def scaled(self, factor: float) -> Noise:
         """The same robot with all errors and the delay `factor` times as large."""
@@ -107,19 +109,19 @@ class RobotSpec:
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
             if isinstance(value, float | int) and not (math.isfinite(value) and value > 0):
-                raise ValueError(f"{field.name}: must be greater than 0, got {value:g}")
+                raise FieldError(field.name, f"must be greater than 0, got {value:g}")
         if not self.footprint.radius > 0:
-            raise ValueError("footprint: must have an extent")
+            raise FieldError("footprint", "must have an extent")
         # Contacts are felt by the chassis alone, so no part of the wheels may stand outside it.
         foot, half_track = self.footprint, self.track / 2
         if foot.is_disc and math.hypot(half_track, self.wheel_radius) > foot.rounding:
-            raise ValueError(
-                f"track: wheels of {self.wheel_radius:g} m, {self.track:g} m apart, stand outside the footprint"
+            raise FieldError(
+                "track", f"wheels of {self.wheel_radius:g} m, {self.track:g} m apart, stand outside the footprint"
             )
         if not foot.is_disc and half_track > foot.half_width + foot.rounding:
-            raise ValueError(f"track: wheels {self.track:g} m apart stand outside the footprint")
+            raise FieldError("track", f"wheels {self.track:g} m apart stand outside the footprint")
         if not foot.is_disc and self.wheel_radius > foot.half_length + foot.rounding:
-            raise ValueError(f"wheel_radius: wheels of {self.wheel_radius:g} m stand outside the footprint")
+            raise FieldError("wheel_radius", f"wheels of {self.wheel_radius:g} m stand outside the footprint")
 
     @property
     def radius(self) -> float:

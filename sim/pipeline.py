@@ -34,6 +34,7 @@ from antdrive.sim.log.metrics import measure
 from antdrive.sim.log.rollout import SCHEMA, Outcome, Rollout
 from antdrive.sim.physics.engine import Engine
 from antdrive.worlds import Disc, Grid, Route, Task, Trajectories, World, load_task, rasterise, task_to_dict
+from antdrive.worlds.errors import FieldError
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,15 +63,15 @@ class Scenario:
 
     def __post_init__(self) -> None:
         if not self.margin >= 0:
-            raise ValueError(f"margin: must be at least 0, got {self.margin:g}")
+            raise FieldError("margin", f"must be at least 0, got {self.margin:g}")
         if self.smoothing not in SMOOTHINGS:
-            raise ValueError(f"smoothing: unknown {self.smoothing!r}; choose from {', '.join(SMOOTHINGS)}")
+            raise FieldError("smoothing", f"unknown {self.smoothing!r}; choose from {', '.join(SMOOTHINGS)}")
         try:
             self.robot.noise.scaled(self.noise)
         except ValueError as error:
-            raise ValueError(f"noise: {self.noise:g} times the robot's own is too much: {error}") from None
+            raise FieldError("noise", f"{self.noise:g} times the robot's own is too much: {error}") from None
         if self.time_limit is not None and not self.time_limit > 0:
-            raise ValueError(f"time_limit: must be greater than 0, got {self.time_limit:g}")
+            raise FieldError("time_limit", f"must be greater than 0, got {self.time_limit:g}")
 
     @property
     def inflate(self) -> float:

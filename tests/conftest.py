@@ -1,5 +1,6 @@
-"""Worlds and runs that many tests share."""
+"""Robots, tasks and runs that many tests share."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import hypothesis
@@ -45,9 +46,7 @@ def small_run(small_scenario: Scenario) -> Run:
 
 @pytest.fixture(scope="session")
 def collided_run(small_scenario: Scenario) -> Run:
-    """The same, with a cylinder on the way that nobody told the planner of."""
-    from dataclasses import replace
-
+    """The small run again, with a cylinder on its way that the planner does not know of."""
     clean = run(small_scenario)
     assert clean.rollout is not None
     x, y = clean.rollout.pose[len(clean.rollout.pose) // 2, :2]

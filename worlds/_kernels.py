@@ -22,7 +22,7 @@ DCOL = np.array([1, 1, 0, -1, -1, -1, 0, 1], dtype=np.int64)
 
 @kernel
 def doubled(array: Array) -> Array:
-    """A vector with room for as many entries again, which are left undefined."""
+    """A copy of a vector with twice its length; the second half is undefined."""
     out = np.empty(2 * len(array), dtype=array.dtype)
     for i in range(len(array)):
         out[i] = array[i]
@@ -31,7 +31,7 @@ def doubled(array: Array) -> Array:
 
 @kernel
 def doubled_rows(array: Array) -> Array:
-    """The same for a table (N, M)."""
+    """A copy of a table (N, M) with twice its rows; the second half is undefined."""
     out = np.empty((2 * len(array), array.shape[1]), dtype=array.dtype)
     for i in range(len(array)):
         for j in range(array.shape[1]):
@@ -72,7 +72,7 @@ def point_clearances(points: Array, discs: Array, bounds: Array, out: Array) -> 
 @kernel
 def segment_clearance(ax: float, ay: float, bx: float, by: float, discs: Array, bounds: Array) -> float:
     """Distance from a segment to the nearest disc surface or wall."""
-    # The distance to a wall is concave inside the box, so its minimum is at an end.
+    # Inside the box the distance to the nearest wall is concave along a segment, so its minimum is at an end.
     best = min(wall_distance(ax, ay, bounds), wall_distance(bx, by, bounds))
     for j in range(discs.shape[0]):
         best = min(best, math.sqrt(segment_distance2(discs[j, 0], discs[j, 1], ax, ay, bx, by)) - discs[j, 2])
@@ -90,10 +90,10 @@ def segment_clearances(starts: Array, ends: Array, discs: Array, bounds: Array, 
 def rasterise(
     discs: Array, bounds: Array, x0: float, y0: float, cell: float, inflate: float, free: Array, closed: Array
 ) -> None:
-    """Mark the blocked cells in `free` and, in `closed`, the moves that a disc blocks.
+    """Fill `free` with the free cells, and mark in `closed` the moves between free cells that a disc blocks.
 
     A cell is blocked when its centre is no farther than `inflate` from a disc or a wall.
-    `closed` uses the bits of E, NE, N and NW only: each move once.
+    `closed` has the bits of E, NE, N and NW only, so that each pair of opposite moves is stored once.
     """
     rows, cols = free.shape
     for r in range(rows):
@@ -114,7 +114,7 @@ def rasterise(
                 dx = x0 + c * cell - cx
                 if dx * dx + dy * dy <= radius * radius:
                     free[r, c] = False
-    # A move between two free cells can only be blocked by a disc that both ends are close to: walk its rim.
+    # Only a disc close to both ends can block a move between free cells, so look at the cells along each disc's rim.
     for j in range(discs.shape[0]):
         cx, cy, radius = discs[j, 0], discs[j, 1], discs[j, 2] + inflate
         reach = radius + SQRT2 * cell
@@ -132,7 +132,7 @@ def rasterise(
             c = c_lo
             while c <= c_hi:
                 x = x0 + c * cell
-                if abs(x - cx) < inner:  # deep inside the disc: jump to the other side
+                if abs(x - cx) < inner:  # deep inside the disc all cells are blocked: skip to the other side
                     c = max(c + 1, int(math.floor((cx + inner - x0) / cell)))
                     continue
                 if free[r, c]:
@@ -148,7 +148,7 @@ def rasterise(
 
 @kernel
 def allowed_moves(free: Array, closed: Array, moves: Array) -> None:
-    """Fill `moves` with the 8-bit masks of allowed moves; a diagonal needs both its orthogonal neighbours free."""
+    """Fill `moves` (all 0 before) with the masks of allowed moves; a diagonal needs both orthogonal neighbours free."""
     rows, cols = free.shape
     for r in range(rows):
         for c in range(cols):

@@ -1,7 +1,7 @@
 """Exact distances to discs and walls.
 
-Clearance is measured to the nearest disc surface or wall, in metres, and is negative inside a disc or beyond a wall.
-A robot of radius R swept along a segment touches something when the segment's clearance is at most R.
+Clearance is the distance to the nearest disc surface or wall, in metres, negative inside a disc or beyond a wall.
+A robot of radius R that moves along a segment touches something when the segment's clearance is at most R.
 """
 
 from __future__ import annotations
@@ -10,11 +10,17 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.worlds import _kernels
-from antdrive.worlds.world import Floats, World
+from antdrive.worlds.types import Floats
+from antdrive.worlds.world import World
 
 
 def point_clearance(world: World, points: npt.ArrayLike) -> Floats:
-    """Clearance of each point, shape (N,) for points of shape (N, 2) [m]."""
+    """The clearance of each point, shape (N,) [m].
+
+    Args:
+        world: the obstacles and walls; movers do not count
+        points: (N, 2) [m]
+    """
     xy = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 2)
     out = np.empty(len(xy))
     _kernels.point_clearances(xy, world.discs, np.asarray(world.bounds, dtype=np.float64), out)
@@ -22,7 +28,13 @@ def point_clearance(world: World, points: npt.ArrayLike) -> Floats:
 
 
 def segment_clearance(world: World, starts: npt.ArrayLike, ends: npt.ArrayLike) -> Floats:
-    """Clearance of each straight segment, shape (N,) for ends of shape (N, 2) [m]."""
+    """The clearance of each straight segment, shape (N,) [m].
+
+    Args:
+        world: the obstacles and walls; movers do not count
+        starts: the segments' first points (N, 2) [m]
+        ends: the segments' last points (N, 2) [m]
+    """
     a = np.ascontiguousarray(starts, dtype=np.float64).reshape(-1, 2)
     b = np.ascontiguousarray(ends, dtype=np.float64).reshape(-1, 2)
     out = np.empty(len(a))
@@ -31,12 +43,24 @@ def segment_clearance(world: World, starts: npt.ArrayLike, ends: npt.ArrayLike) 
 
 
 def swept_clearance(world: World, starts: npt.ArrayLike, ends: npt.ArrayLike, radius: float) -> Floats:
-    """Gap left by a disc of `radius` swept along each segment, shape (N,) [m]; it touches where this is <= 0."""
+    """The gap left by a disc that is swept along each segment, shape (N,) [m]; the disc touches where it is <= 0.
+
+    Args:
+        world: the obstacles and walls; movers do not count
+        starts: the segments' first points (N, 2) [m]
+        ends: the segments' last points (N, 2) [m]
+        radius: the disc's radius [m]
+    """
     return segment_clearance(world, starts, ends) - radius
 
 
 def polyline_clearance(world: World, xy: npt.ArrayLike) -> float:
-    """Clearance of a whole polyline of shape (N, 2), N >= 1 [m]."""
+    """The clearance of a whole polyline [m].
+
+    Args:
+        world: the obstacles and walls; movers do not count
+        xy: the polyline's points (N, 2), N >= 1 [m]
+    """
     line = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
     if len(line) == 1:
         return float(point_clearance(world, line)[0])

@@ -12,24 +12,32 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.worlds import _kernels
-from antdrive.worlds.errors import InputError
-from antdrive.worlds.world import Floats, Point, World
+from antdrive.worlds.errors import FieldError, InputError
+from antdrive.worlds.limits import MAX_CELLS
+from antdrive.worlds.types import Floats, Point
+from antdrive.worlds.world import World
 
 #: The eight moves by bit of `Grid.moves`, as (row, column) steps: E, NE, N, NW, W, SW, S, SE.
 DIRECTIONS: tuple[tuple[int, int], ...] = ((0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1))
 
-MAX_CELLS = 25_000_000  # a guard against a resolution mistyped by orders of magnitude
-
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Free cells and allowed moves, for a robot of radius `inflate`."""
+    """Free cells and allowed moves, for a robot of radius `inflate`.
 
-    free: npt.NDArray[np.bool_]  # (R, C), read-only
-    moves: npt.NDArray[np.uint8]  # (R, C), bit k set when the move DIRECTIONS[k] is allowed, read-only
-    cell: float = 1.0  # side of a cell [m]
-    origin: Point = (0.0, 0.0)  # centre of cell (0, 0) [m]
-    inflate: float = 0.0  # robot radius + margin [m]
+    Attributes:
+        free: which cells are free (R, C), read-only
+        moves: bit k is set where the move `DIRECTIONS[k]` is allowed (R, C), read-only
+        cell: side of a cell [m]
+        origin: centre of cell (0, 0), x and y [m]
+        inflate: the robot's radius plus the margin [m]
+    """
+
+    free: npt.NDArray[np.bool_]
+    moves: npt.NDArray[np.uint8]
+    cell: float = 1.0
+    origin: Point = (0.0, 0.0)
+    inflate: float = 0.0
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -38,20 +46,32 @@ class Grid:
         return rows, cols
 
     def xy(self, cells: npt.ArrayLike) -> Floats:
-        """World coordinates (N, 2) [m] of cells (N, 2); fractional cells are allowed.
+        """The centres of cells in world coordinates, shape (N, 2) [m].
 
         This is the one place where (row, col) becomes (x, y).
+
+        Args:
+            cells: (row, col) of each cell (N, 2); fractional cells are allowed
         """
         rc = np.asarray(cells, dtype=np.float64).reshape(-1, 2)
         return np.asarray(rc[:, ::-1] * self.cell + np.asarray(self.origin))
 
     def fractional(self, xy: npt.ArrayLike) -> Floats:
-        """Fractional cells (N, 2) of world coordinates (N, 2) [m]: `xy` the other way round."""
+        """The fractional cells (N, 2) of points: the inverse of `Grid.xy`.
+
+        Args:
+            xy: world coordinates (N, 2) [m]
+        """
         points = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
         return np.asarray((points - np.asarray(self.origin)) / self.cell)[:, ::-1]
 
     def cell_at(self, x: float, y: float) -> tuple[int, int]:
-        """The (row, col) of the cell that holds a point; points outside get the nearest cell."""
+        """The (row, col) of the cell that holds a point; points outside the grid get the nearest cell.
+
+        Args:
+            x: world coordinate [m]
+            y: world coordinate [m]
+        """
         rows, cols = self.shape
         row = math.floor((y - self.origin[1]) / self.cell + 0.5)
         col = math.floor((x - self.origin[0]) / self.cell + 0.5)
@@ -59,7 +79,13 @@ class Grid:
 
     @classmethod
     def from_free(cls, free: npt.ArrayLike, cell: float = 1.0, origin: Point = (0.0, 0.0)) -> Grid:
-        """A grid from an occupancy picture alone; diagonals need both orthogonal neighbours free."""
+        """A grid from its free cells alone; a diagonal move needs both orthogonal neighbours free.
+
+        Args:
+            free: which cells are free (R, C)
+            cell: side of a cell [m]
+            origin: centre of cell (0, 0) [m]
+        """
         cells = np.array(free, dtype=np.bool_, ndmin=2)
         return cls._finish(cells, np.zeros(cells.shape, dtype=np.uint8), cell, origin, 0.0)
 
@@ -75,20 +101,25 @@ class Grid:
 
 
 def rasterise(world: World, cell: float, inflate: float = 0.0) -> Grid:
-    """The grid of a world for a robot of radius `inflate` (its radius plus the margin) [m].
+    """The grid of a world, for a robot of a given size.
 
-    A cell is free when a disc of that radius at its centre touches nothing. A move is allowed when both cells are free,
-    the disc swept along the move touches nothing (exact segment-disc distance), and, for a diagonal, both orthogonal
-    neighbours are free.
+    A cell is free when a disc of radius `inflate` at its centre touches nothing. A move is allowed when both cells are
+    free, the disc swept along the move touches nothing (exact segment-disc distance), and, for a diagonal, both
+    orthogonal neighbours are free.
+
+    Args:
+        world: the obstacles and walls; movers do not count
+        cell: side of a cell [m]
+        inflate: the robot's radius plus the margin [m]
 
     Raises:
-        InputError: the cell size is not positive or cuts the world into absurdly many cells.
-        ValueError: the inflation is negative.
+        InputError: the cell size is not positive or cuts the world into too many cells.
+        FieldError: the inflation is negative.
     """
     if not cell > 0:
         raise InputError(f"cell: must be greater than 0, got {cell:g}")
     if not inflate >= 0:
-        raise ValueError(f"inflate: must be at least 0, got {inflate:g}")
+        raise FieldError("inflate", f"must be at least 0, got {inflate:g}")
     width, height = world.size
     rows, cols = (max(1, math.ceil(side / cell - 1e-9)) for side in (height, width))
     if rows * cols > MAX_CELLS:

@@ -10,10 +10,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from antdrive.planners.anyangle.lines import RouteEnds, cells_along, polyline_length, route_ends, terrain
+from antdrive.planners.anyangle.lines import RouteEnds, cells_along, route_ends, terrain
 from antdrive.planners.iterative import Iteration, IterativePlanner, require
 from antdrive.planners.plan import Cells, PlanResult, Query
 from antdrive.worlds import Floats
+from antdrive.worlds.plane import polyline_length
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,12 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from antdrive.planners.anyangle.ga_han import Incumbent, ViaPointPlanner, seeded
-from antdrive.planners.anyangle.lines import RouteEnds, polyline_length, route_ends, terrain
+from antdrive.planners.anyangle.lines import RouteEnds, route_ends, terrain
 from antdrive.planners.colonies.catalog import colonies
 from antdrive.planners.colonies.colony import Colony
 from antdrive.planners.iterative import Iteration, require
 from antdrive.planners.plan import Cells, Query
 from antdrive.worlds import Floats
+from antdrive.worlds.errors import FieldError
+from antdrive.worlds.plane import polyline_length
 
 ROUNDS = 20  # how often each via point of a new path is tightened
 
@@ -65,7 +67,7 @@ class Hybrid(ViaPointPlanner):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.colony not in colonies():
-            raise ValueError(f"colony: must be an ant planner, one of {', '.join(colonies())}; got {self.colony!r}")
+            raise FieldError("colony", f"must be an ant planner, one of {', '.join(colonies())}; got {self.colony!r}")
         require("ants", self.ants, at_least=1, at_most=1_000_000)
         require("ant_runs", self.ant_runs, at_least=1)
         require("ant_iterations", self.ant_iterations, at_least=1)

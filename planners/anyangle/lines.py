@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from antdrive.planners.plan import Cells, Query
 from antdrive.worlds import Floats, Point
+from antdrive.worlds.plane import polyline_length
 
 if TYPE_CHECKING:  # importing kernels loads the compiler
     from antdrive.planners.anyangle._kernels_lines import Terrain
@@ -93,12 +94,6 @@ def clear_line(query: Query, start: Point, goal: Point) -> bool:
     from antdrive.planners.anyangle import _kernels_lines
 
     return bool(_kernels_lines.clear_line(terrain(query), *map(float, (*start, *goal))))
-
-
-def polyline_length(xy: npt.ArrayLike) -> float:
-    """The length of a polyline (M, 2), in the unit of its points."""
-    steps = np.diff(np.asarray(xy, dtype=np.float64).reshape(-1, 2), axis=0)
-    return float(np.hypot(*steps.T).sum())
 
 
 def cells_along(query: Query, waypoints: npt.ArrayLike) -> Cells:

@@ -19,6 +19,7 @@ from antdrive.planners.colonies.colony import (
 )
 from antdrive.planners.iterative import require
 from antdrive.worlds import Floats
+from antdrive.worlds.errors import FieldError
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +68,7 @@ class AcoHan(Colony):
         require("revisit", self.revisit, at_least=0)
         require("min_weight", self.min_weight, at_least=0)
         if self.form not in ("equation", "listing"):
-            raise ValueError(f"form: must be 'equation' or 'listing', got {self.form!r}")
+            raise FieldError("form", f"must be 'equation' or 'listing', got {self.form!r}")
 
     def initial_trail(self, graph: ColonyGraph, rng: np.random.Generator) -> Floats:
         """tau(0) = 0 on every cell of `graph`."""

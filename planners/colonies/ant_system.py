@@ -24,6 +24,7 @@ from antdrive.planners.colonies.colony import (
 )
 from antdrive.planners.iterative import require
 from antdrive.worlds import Floats
+from antdrive.worlds.errors import FieldError
 
 #: The length of each move [cells].
 STEP = np.sqrt([1.0, 2.0, 1.0, 2.0, 1.0, 2.0, 1.0, 2.0])
@@ -66,7 +67,7 @@ class AntSystem(Colony):
         require("deposit", self.deposit, above=0)
         require("initial", self.initial, above=0)
         if self.heuristic not in ("goal", "step"):
-            raise ValueError(f"heuristic: must be 'goal' or 'step', got {self.heuristic!r}")
+            raise FieldError("heuristic", f"must be 'goal' or 'step', got {self.heuristic!r}")
 
     def initial_trail(self, graph: ColonyGraph, rng: np.random.Generator) -> Floats:
         """tau(0) = `initial` on every arc of `graph`."""

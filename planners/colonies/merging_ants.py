@@ -19,6 +19,7 @@ from antdrive.planners.colonies.colony import (
 from antdrive.planners.colonies.mmas import MaxMinAnts
 from antdrive.planners.iterative import require
 from antdrive.worlds import Floats
+from antdrive.worlds.errors import FieldError
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,8 +72,8 @@ class MergingAnts(MaxMinAnts):
         require("settled", self.settled, at_least=1)
         for key, unset in (("beta", None), ("heuristic", "goal")):
             if getattr(self, key) != unset:
-                raise ValueError(
-                    f"{key}: must be {unset!r}, as `greed` is the heuristic of these ants; got {getattr(self, key)!r}"
+                raise FieldError(
+                    key, f"must be {unset!r}, as `greed` is the heuristic of these ants; got {getattr(self, key)!r}"
                 )
 
     @property

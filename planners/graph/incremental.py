@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from antdrive.planners.graph.search import NO_WAY
 from antdrive.planners.plan import Cell, Cells, GridPlanner, PlanResult, PlanStatus, Query
+from antdrive.worlds.errors import FieldError
 
 if TYPE_CHECKING:  # a grid brings the compiler with it
     from antdrive.worlds import Grid
@@ -118,7 +119,7 @@ class EditableQuery(abc.ABC):
             ValueError: the shape is another.
         """
         if grid.shape != self._query.grid.shape:
-            raise ValueError(f"grid: must have the shape {self._query.grid.shape}, got {grid.shape}")
+            raise FieldError("grid", f"must have the shape {self._query.grid.shape}, got {grid.shape}")
         self._free[:] = grid.free
         self._closed = None
         return self._tell(int(self._common.adopt(self._moves, grid.moves, self._seen)))
@@ -145,7 +146,7 @@ class EditableQuery(abc.ABC):
         if outside >= 0:
             row, col = rc[outside]
             rows, cols = self._moves.shape
-            raise ValueError(f"cells: ({row}, {col}) is outside the grid of {rows} rows and {cols} columns")
+            raise FieldError("cells", f"({row}, {col}) is outside the grid of {rows} rows and {cols} columns")
         return self._tell(count)
 
     def _tell(self, count: int) -> int:

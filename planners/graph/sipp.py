@@ -16,8 +16,10 @@ import numpy.typing as npt
 
 from antdrive.planners.graph.search import NO_WAY, reachable
 from antdrive.planners.iterative import require
-from antdrive.planners.plan import GridPlanner, Moving, PlanResult, PlanStatus, Query, path_cost
-from antdrive.worlds import Floats
+from antdrive.planners.plan import GridPlanner, PlanResult, PlanStatus, Query, path_cost
+from antdrive.worlds import Floats, MoverMotion
+from antdrive.worlds.errors import FieldError
+from antdrive.worlds.plane import segment_lengths
 
 STEP = 0.05  # s: how often a motion is looked at; turns in between are then looked for
 INSTANT = 1e-6  # s: a motion that is not straight over so short a time jumps
@@ -52,12 +54,12 @@ class TimedPlan(PlanResult):
             ValueError: there is no way.
         """
         if not self.solved:
-            raise ValueError("plan: has no path to follow")
+            raise FieldError("plan", "has no path to follow")
         knots = np.stack([self.arrive, self.leave], axis=1).ravel()
         when = np.asarray(t, dtype=np.float64)
         return np.stack([np.interp(when, knots, np.repeat(self.xy[:, k], 2)) for k in (0, 1)], axis=-1)
 
-    def clearance(self, movers: Iterable[Moving], step: float = 0.01) -> float:
+    def clearance(self, movers: Iterable[MoverMotion], step: float = 0.01) -> float:
         """The least distance between the robot's centre and a mover's surface [m], looked at every `step` seconds."""
         ticks = max(1, math.ceil(self.duration / step))
         t = np.linspace(self.arrive[0], self.arrive[-1], ticks + 1)
@@ -88,7 +90,7 @@ class SafeIntervals(GridPlanner):
 
 def plan_in_time(
     query: Query,
-    movers: Iterable[Moving],
+    movers: Iterable[MoverMotion],
     *,
     speed: float,
     start_time: float = 0.0,
@@ -154,7 +156,7 @@ def plan_in_time(
 UNIT = "safe intervals expanded"
 
 
-def _legs(mover: Moving, start: float, end: float, inflate: float) -> Floats:
+def _legs(mover: MoverMotion, start: float, end: float, inflate: float) -> Floats:
     """A motion as straight legs (L, 7) at constant speed: t0, t1, x, y, vx, vy, the distance to be kept."""
     from antdrive.planners.graph import _kernels_sipp as kernels
 
@@ -167,7 +169,7 @@ def _legs(mover: Moving, start: float, end: float, inflate: float) -> Floats:
     return np.column_stack([t[first], t[last], xy[first], velocity, reach])
 
 
-def _samples(mover: Moving, start: float, end: float) -> tuple[Floats, Floats, npt.NDArray[np.bool_]]:
+def _samples(mover: MoverMotion, start: float, end: float) -> tuple[Floats, Floats, npt.NDArray[np.bool_]]:
     """Times (T,), places (T, 2) that straight lines join to within `TOLERANCE`, and, (T - 1,), where it jumps instead."""
     t = np.linspace(start, end, max(2, math.ceil((end - start) / STEP) + 1))
     xy = np.asarray(mover.at(t), dtype=np.float64)
@@ -185,5 +187,5 @@ def _samples(mover: Moving, start: float, end: float) -> tuple[Floats, Floats, n
         halves = at + np.arange(len(at))  # where the middles have come to be
         open_ = np.stack([halves - 1, halves], axis=1).ravel()
     if not np.isfinite(xy).all():
-        raise ValueError("movers: a mover's position is not finite")
-    return t, xy, (np.diff(t) <= INSTANT) & (np.hypot(*np.diff(xy, axis=0).T) > TOLERANCE)
+        raise FieldError("movers", "a mover's position is not finite")
+    return t, xy, (np.diff(t) <= INSTANT) & (segment_lengths(xy) > TOLERANCE)

@@ -16,6 +16,7 @@ from antdrive.planners.graph.incremental import EditableQuery, Replanner, Replan
 from antdrive.planners.iterative import require
 from antdrive.planners.plan import Planner, PlanResult, PlanStatus, Query, path_cost
 from antdrive.worlds import Floats
+from antdrive.worlds.errors import FieldError
 
 
 def replanner_for(planner: Planner, query: Query, rng: np.random.Generator) -> Replanner:
@@ -29,7 +30,7 @@ def replanner_for(planner: Planner, query: Query, rng: np.random.Generator) -> R
     """
     for key, instead in (("needs_world", "among the world's discs"), ("needs_motions", "among known motions")):
         if getattr(planner, key, False):
-            raise ValueError(f"planner: {type(planner).__name__} plans {instead}; it cannot be told of blocked cells")
+            raise FieldError("planner", f"{type(planner).__name__} plans {instead}; it cannot be told of blocked cells")
     if isinstance(planner, ReplanningPlanner):
         return planner.replanner(query)
     if isinstance(planner, MergingAnts):

@@ -8,6 +8,8 @@ import numpy as np
 
 from antdrive.planners.plan import PlanResult
 from antdrive.worlds import Floats, Grid, Route, Task, point_clearance, segment_clearance
+from antdrive.worlds.errors import FieldError
+from antdrive.worlds.plane import segment_lengths
 
 
 def route_along(plan: PlanResult, grid: Grid, task: Task) -> Route:
@@ -21,7 +23,7 @@ def route_along(plan: PlanResult, grid: Grid, task: Task) -> Route:
         ValueError: the plan has no path.
     """
     if not plan.solved:
-        raise ValueError("plan: has no path to follow")
+        raise FieldError("plan", "has no path to follow")
     xy = _join(grid.xy(plan.line), np.array(task.start[:2]), grid, task)
     if point_clearance(task.world, [task.goal])[0] >= grid.inflate - 1e-9:
         xy = _join(xy[::-1], np.array(task.goal), grid, task)[::-1]
@@ -40,7 +42,7 @@ def _join(xy: Floats, end: Floats, grid: Grid, task: Task) -> Floats:
 
 
 def _straightened(xy: Floats) -> Floats:
-    far = np.hypot(*np.diff(xy[:-1], axis=0).T) > 1e-6  # points that rounding alone tells apart have no direction
+    far = segment_lengths(xy[:-1]) > 1e-6  # points that rounding alone tells apart have no direction
     xy = np.vstack([xy[:1], xy[1:-1][far], xy[-1:]])
     if len(xy) > 2 and np.hypot(*(xy[-1] - xy[-2])) <= 1e-6:
         xy = np.vstack([xy[:-2], xy[-1:]])

@@ -27,6 +27,8 @@ from antdrive.planners.anyangle.tangent import Arc, Line, TangentPath
 from antdrive.planners.plan import PlanResult
 from antdrive.planners.smoothing.cells import route_along
 from antdrive.worlds import Bounds, Floats, Route, Task, World, polyline_clearance, segment_clearance
+from antdrive.worlds.errors import FieldError
+from antdrive.worlds.plane import polyline_length
 
 if TYPE_CHECKING:  # brings the compiler with it
     from antdrive.worlds import Grid
@@ -60,12 +62,12 @@ def smooth(
         ValueError: the plan has no path, an unknown kind, or a setting outside its range.
     """
     if kind not in SMOOTHINGS:
-        raise ValueError(f"kind: unknown route {kind!r}; choose from {', '.join(SMOOTHINGS)}")
+        raise FieldError("kind", f"unknown route {kind!r}; choose from {', '.join(SMOOTHINGS)}")
     for key, value in (("clearance", clearance), ("stretch", stretch)):
         if not (math.isfinite(value) and value >= 0):
-            raise ValueError(f"{key}: must be at least 0, got {value:g}")
+            raise FieldError(key, f"must be at least 0, got {value:g}")
     if not (math.isfinite(bulge) and bulge > 0):
-        raise ValueError(f"bulge: must be greater than 0, got {bulge:g}")
+        raise FieldError("bulge", f"must be greater than 0, got {bulge:g}")
     line = route_along(plan, grid, task)
     if kind == "none":
         return line
@@ -243,7 +245,7 @@ def _fault(string: String, xy: Floats, line: Floats, world: World, inflate: floa
 
 
 def _length(xy: Floats) -> float:
-    return float(np.hypot(*np.diff(xy, axis=0).T).sum())
+    return polyline_length(xy)
 
 
 def _widened(

@@ -21,6 +21,7 @@ from antdrive.robots.control import _kernels_avoidance as kernels
 from antdrive.robots.control.pursuit import LIMITERS, Progress, TrackedPath, Twist
 from antdrive.robots.spec import RobotSpec
 from antdrive.worlds import Floats, Pose
+from antdrive.worlds.errors import FieldError
 
 YIELD = LIMITERS.index("yield")
 
@@ -54,10 +55,10 @@ class Avoidance:
     def __post_init__(self) -> None:
         for key in ("horizon", "step"):
             if not 0 < getattr(self, key) <= 60:
-                raise ValueError(f"{key}: must be greater than 0 and at most 60, got {getattr(self, key):g}")
+                raise FieldError(key, f"must be greater than 0 and at most 60, got {getattr(self, key):g}")
         for key in ("keep", "comfort", "worth", "lateral", "turn", "doubt", "berth", "wary"):
             if not 0 <= getattr(self, key) < math.inf:
-                raise ValueError(f"{key}: must be at least 0, got {getattr(self, key):g}")
+                raise FieldError(key, f"must be at least 0, got {getattr(self, key):g}")
 
     @property
     def ahead(self) -> Floats:

@@ -16,6 +16,7 @@ import numpy as np
 
 from antdrive.robots.spec import RobotSpec
 from antdrive.worlds import Floats, Route
+from antdrive.worlds.errors import FieldError
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,9 +62,9 @@ def speed_profile(
     """
     for key, value in (("blend", blend), ("stop_from", stop_from), ("step", step)):
         if not (math.isfinite(value) and value > 0):
-            raise ValueError(f"{key}: must be greater than 0, got {value:g}")
+            raise FieldError(key, f"must be greater than 0, got {value:g}")
     if not 0 < braking <= 1:
-        raise ValueError(f"braking: must be greater than 0 and at most 1, got {braking:g}")
+        raise FieldError("braking", f"must be greater than 0 and at most 1, got {braking:g}")
     from antdrive.robots.control import _kernels_profile
 
     places, headings, stops, turns = _headings(route, stop_from)

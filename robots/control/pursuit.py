@@ -18,6 +18,7 @@ from antdrive.robots import _kernels
 from antdrive.robots.control.profile import speed_profile
 from antdrive.robots.spec import RobotSpec
 from antdrive.worlds import Pose, Route, World, point_clearance
+from antdrive.worlds.errors import FieldError
 
 #: What can hold the robot's speed, by the code in the log.
 LIMITERS: tuple[str, ...] = (
@@ -96,16 +97,16 @@ class PurePursuit:
     def __post_init__(self) -> None:
         for key in _LENGTHS_AND_TIMES:
             if not 1e-3 <= getattr(self, key) <= 100:
-                raise ValueError(f"{key}: must be between 0.001 and 100, got {getattr(self, key):g}")
+                raise FieldError(key, f"must be between 0.001 and 100, got {getattr(self, key):g}")
         if self.lookahead_max < self.lookahead_min:
-            raise ValueError(f"lookahead_max: must be at least lookahead_min ({self.lookahead_min:g})")
+            raise FieldError("lookahead_max", f"must be at least lookahead_min ({self.lookahead_min:g})")
         for key in ("guard", "floor"):
             if not 0 <= getattr(self, key) <= 1:
-                raise ValueError(f"{key}: must be between 0 and 1, got {getattr(self, key):g}")
+                raise FieldError(key, f"must be between 0 and 1, got {getattr(self, key):g}")
         if not 0 < self.braking <= 1:
-            raise ValueError(f"braking: must be between 0 and 1, got {self.braking:g}")
+            raise FieldError("braking", f"must be between 0 and 1, got {self.braking:g}")
         if not self.turn_to < self.turn_from < math.pi / 2:
-            raise ValueError(f"turn_from: must lie between turn_to and pi/2, got {self.turn_from:g}")
+            raise FieldError("turn_from", f"must lie between turn_to and pi/2, got {self.turn_from:g}")
 
     def guide(
         self, route: Route, world: World, robot: RobotSpec, margin: float, period: float, tolerance: float = math.inf

@@ -29,6 +29,7 @@ from antdrive.sim.log.contacts import touches
 from antdrive.sim.log.rollout import Outcome
 from antdrive.sim.physics.engine import Engine
 from antdrive.worlds import Floats, Pose, Task, Trajectories
+from antdrive.worlds.errors import FieldError
 
 STOPPED_SPEED = 0.01  # slower than this counts as standing [m/s]
 STUCK_AFTER = 8.0  # without progress for this long the robot is stuck [s]
@@ -81,7 +82,7 @@ def drive(
     """
     substeps, rest = divmod(engine.physics_hz, control_hz)
     if rest or substeps < 1:
-        raise ValueError(f"control_hz: must divide the physics rate {engine.physics_hz}, got {control_hz}")
+        raise FieldError("control_hz", f"must divide the physics rate {engine.physics_hz}, got {control_hz}")
     engine.place(task.start)
     rows = [(*engine.state(), 0.0, 0.0, 0)]
     errors = [(0.0, 0.0, 0.0)]  # of the belief, a row each: it moves with the robot between two looks

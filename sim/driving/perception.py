@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.worlds import Floats, Trajectories
+from antdrive.worlds.errors import FieldError
 
 Told: TypeAlias = Literal["positions", "velocities", "motions"]
 CHUNK = 240  # instants worked out at once
@@ -32,9 +33,9 @@ class Perception:
 
     def __post_init__(self) -> None:
         if self.told not in get_args(Told):
-            raise ValueError(f"told: unknown {self.told!r}; choose from {', '.join(get_args(Told))}")
+            raise FieldError("told", f"unknown {self.told!r}; choose from {', '.join(get_args(Told))}")
         if not self.reach > 0:
-            raise ValueError(f"reach: must be greater than 0, got {self.reach:g}")
+            raise FieldError("reach", f"must be greater than 0, got {self.reach:g}")
 
 
 class Predictor:

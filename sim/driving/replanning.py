@@ -31,6 +31,8 @@ from antdrive.robots import PurePursuit, RobotSpec, TrackedPath
 from antdrive.sim.driving.perception import Predictor
 from antdrive.sim.driving.schedule import Schedule
 from antdrive.worlds import Disc, Floats, Grid, Pose, Route, Task, rasterise, segment_clearance
+from antdrive.worlds.errors import FieldError
+from antdrive.worlds.plane import polyline_length
 
 if TYPE_CHECKING:
     from antdrive.planners import Replanner
@@ -60,7 +62,7 @@ class ReplanPolicy:
     def __post_init__(self) -> None:
         for key in ("within", "patience", "strayed", "beside", "pause", "ahead"):
             if not 0 <= getattr(self, key) < math.inf:
-                raise ValueError(f"{key}: must be at least 0, got {getattr(self, key):g}")
+                raise FieldError(key, f"must be at least 0, got {getattr(self, key):g}")
 
 
 @dataclass(frozen=True)
@@ -268,7 +270,7 @@ class CellwiseMonitor(ReplanMonitor):
         near = math.dist(pose[:2], ends[0]) <= 0.25 * self._grid.cell or tick == 0
         xy = np.vstack([pose[:2], ends[1 if near and self._clear(pose[:2], ends[1]) else 0 :]])
         moved = to is not None and bool(np.ptp(xy, axis=0).any())
-        cost = float(np.hypot(*np.diff(xy, axis=0).T).sum())
+        cost = polyline_length(xy)
         work = self._online.tally.propagated - propagated
         if moved:
             self.log.append(Replan(tick / self._hz, cause, True, cost, work, xy, time.perf_counter() - started))

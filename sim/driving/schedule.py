@@ -10,6 +10,7 @@ import numpy as np
 from antdrive.planners.graph.sipp import TimedPlan
 from antdrive.robots import Twist
 from antdrive.worlds import Floats, Route
+from antdrive.worlds.plane import arc_lengths
 
 LOOK = 0.4  # the robot drives so as to be where it should be in this time [s]
 LATE = 0.5  # behind by more than this it needs another plan [m]
@@ -25,7 +26,7 @@ class Schedule:
     @classmethod
     def of(cls, plan: TimedPlan, route: Route) -> Schedule:
         """A timed plan's, along the route through its cells."""
-        covered = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(plan.xy, axis=0).T))))
+        covered = arc_lengths(plan.xy)
         share = covered / covered[-1] if covered[-1] > 0 else covered
         return cls(np.stack([plan.arrive, plan.leave], axis=1).ravel(), np.repeat(share * route.length, 2))
 

@@ -21,6 +21,7 @@ import numpy.typing as npt
 
 from antdrive.sim.log.contacts import STANDING, TOUCHED, touches_of
 from antdrive.sim.log.rollout import Outcome, Rollout
+from antdrive.worlds.plane import segment_lengths, wrap_angle
 from antdrive.worlds.trajectories import Trajectories
 
 Floats = npt.NDArray[np.float64]
@@ -145,7 +146,7 @@ def _between_steps(rollout: Rollout, traffic: Trajectories, still: Floats, movin
     foot = rollout.meta["robot"]["footprint"]
     radius = math.hypot(foot["half_length"], foot["half_width"]) + foot["rounding"]
     dt = np.diff(rollout.t)
-    moved = np.hypot(*np.diff(rollout.pose[:, :2], axis=0).T)
+    moved = segment_lengths(rollout.pose[:, :2])
     turned = np.abs(_wrapped(np.diff(rollout.pose[:, 2])))
     speed = np.maximum(*np.abs([rollout.twist[:-1], rollout.twist[1:]]))
     travel = np.maximum(moved, speed[:, 0] * dt) + radius * np.maximum(turned, speed[:, 1] * dt)
@@ -165,7 +166,7 @@ def _clock(rollout: Rollout) -> Floats:
 
 
 def _wrapped(angle: Floats) -> Floats:
-    return np.asarray((angle + math.pi) % (2 * math.pi) - math.pi)
+    return np.asarray(wrap_angle(angle))
 
 
 def _tampering(rollout: Rollout, traffic: Trajectories, clearance: Floats) -> list[str]:

@@ -14,6 +14,8 @@ import numpy.typing as npt
 from antdrive.sim.log.metrics import nearest_on_route
 from antdrive.sim.log.rollout import Outcome, Rollout
 from antdrive.worlds import World, point_clearance, task_from_dict
+from antdrive.worlds.errors import FieldError
+from antdrive.worlds.plane import wrap_angle
 
 if TYPE_CHECKING:
     from antdrive.sim.pipeline import Run
@@ -140,7 +142,7 @@ def find_margin(
         ValueError: a setting outside its range.
     """
     if not 0 < resolution < most:
-        raise ValueError(f"resolution: must be greater than 0 and less than {most:g}, got {resolution:g}")
+        raise FieldError("resolution", f"must be greater than 0 and less than {most:g}, got {resolution:g}")
     hardest_first = list(seeds)
 
     def tried(margin: float) -> Trial:
@@ -210,7 +212,7 @@ def _commanded(rollout: Rollout) -> Floats:
 def _near_corner(points: Floats, route: Floats) -> npt.NDArray[np.bool_]:
     steps = np.diff(route, axis=0)
     heading = np.arctan2(steps[:, 1], steps[:, 0])
-    turn = np.abs((np.diff(heading) + np.pi) % (2 * np.pi) - np.pi)
+    turn = np.abs(wrap_angle(np.diff(heading)))
     near = np.zeros(len(points), dtype=np.bool_)
     for corner in route[1:-1][turn >= CORNER]:
         near |= np.hypot(*(points - corner).T) <= NEAR_CORNER

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from antdrive.sim.log.contacts import touches_of
 from antdrive.sim.log.rollout import Outcome, Rollout
+from antdrive.worlds.plane import polyline_length, wrap_angle
 
 Floats = npt.NDArray[np.float64]
 
@@ -101,7 +102,7 @@ def arrival_s(rollout: Rollout) -> float:
 
 def turning_rad_per_m(rollout: Rollout) -> float:
     """Total change of heading over the length driven."""
-    turned = np.abs((np.diff(rollout.pose[:, 2]) + math.pi) % (2 * math.pi) - math.pi).sum()
+    turned = np.abs(wrap_angle(np.diff(rollout.pose[:, 2]))).sum()
     length = driven_length_m(rollout)
     return float(turned / length) if length > 0 else 0.0
 
@@ -214,4 +215,4 @@ def _over(length: float, optimum: float) -> float:
 
 
 def _length(xy: Floats) -> float:
-    return float(np.hypot(*np.diff(xy, axis=0).T).sum())
+    return polyline_length(xy)

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.worlds.errors import InputError
+from antdrive.worlds.errors import FieldError, InputError
 from antdrive.worlds.files.atomic import written_whole
 from antdrive.worlds.movers import mover_from_dict
 from antdrive.worlds.trajectories import Trajectories
@@ -106,7 +106,7 @@ class Rollout:
             world = World("log", tuple(task["bounds"]), discs, movers=tuple(map(mover_from_dict, entries)))
             return Trajectories.of(world, (task["start"][0], task["start"][1]), self.meta["seed"])
         except (KeyError, TypeError, AttributeError, OverflowError) as error:
-            raise ValueError(f"movers: {error!r}") from None
+            raise FieldError("movers", f"{error!r}") from None
 
     def save(self, path: str | Path) -> Path:
         """Write the log, whole or not at all; the metadata gain the digest."""
@@ -157,7 +157,8 @@ class Rollout:
 
         task = task_from_dict(self.meta["task"], "rollout")
         lines = [(self.route, "#182242", True), (self.pose[::12, :2], LINE, False)]
-        picture = world_svg(task.world, start=task.start, goal=(*task.goal, task.goal_tolerance), lines=lines)
+        goal = (*task.goal, task.goal_tolerance)
+        picture = world_svg(task.world.bounds, task.world.discs, start=task.start, goal=goal, lines=lines)
         facts = {"planner": self.meta["planner"]["name"], "robot": self.meta["robot"]["name"], "time": f"{self.t[-1]:.1f} s",
                  "least clearance": f"{self.clearance.min():.3f} m"}  # fmt: skip
         return card(picture, f"{task.world.name}: {self.outcome.value}", facts)

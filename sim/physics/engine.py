@@ -22,8 +22,10 @@ import numpy as np
 
 from antdrive.robots.footprint import footprint_clearance
 from antdrive.robots.spec import RobotSpec
+from antdrive.worlds.errors import FieldError
 from antdrive.worlds.trajectories import Trajectories
-from antdrive.worlds.world import Floats, Pose, World
+from antdrive.worlds.types import Floats, Pose
+from antdrive.worlds.world import World
 
 
 @functools.cache
@@ -88,7 +90,7 @@ class Engine:
         self, world: World, robot: RobotSpec, *, physics_hz: int = 240, traffic: Trajectories | None = None
     ) -> None:
         if len(traffic or ()) != len(world.movers):
-            raise ValueError(f"traffic: must be that of the world's {len(world.movers)} movers")
+            raise FieldError("traffic", f"must be that of the world's {len(world.movers)} movers")
         self.world = world
         self.robot = robot
         self.physics_hz = physics_hz

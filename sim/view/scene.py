@@ -15,7 +15,8 @@ from antdrive.sim.log.rollout import Rollout
 from antdrive.worlds.errors import InputError
 from antdrive.worlds.movers import Wandering
 from antdrive.worlds.trajectories import Trajectories
-from antdrive.worlds.world import Bounds, Point, Pose, Task
+from antdrive.worlds.types import Bounds, Point, Pose
+from antdrive.worlds.world import Task
 
 Floats = npt.NDArray[np.float64]
 

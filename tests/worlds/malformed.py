@@ -1,4 +1,4 @@
-"""World files that are wrong in one way each: what is written, and what the one-line error must say.
+"""World files that are wrong in one way each, with the error message that each must cause.
 
 The file is called bad.yaml.
 """
@@ -18,7 +18,7 @@ _END = """\
 obstacles:
   - {x: 5.0, y: 5.0, radius: 0.5}
 """
-#: What all of them would be without their fault.
+#: A file without a fault; each of the malformed ones differs from it in one way.
 GOOD = _START + _END
 
 
@@ -66,8 +66,8 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
     "python object": (GOOD + "source: !!python/name:os.system\n", "bad.yaml:10: source: must be plain data"),
     "own tag": (GOOD + "source: !mine [1]\n", "bad.yaml:10: source: must be plain data, got the tag !mine"),
     "set": (GOOD + "source: !!set {a, b}\n", "bad.yaml:10: source: must be plain data, got the tag !!set"),
-    "alias bomb": (_bomb(), "unfolds to too much; write the values out"),
-    "alias to itself": (GOOD + "movers: &m [*m]\n", "bad.yaml:10: movers: unfolds to too much"),
+    "alias bomb": (_bomb(), "its aliases stand for too much; write the values out"),
+    "alias to itself": (GOOD + "movers: &m [*m]\n", "bad.yaml:10: movers: its aliases stand for too much"),
     "list as a key": (GOOD + "? [a, b]\n: 1\n", "bad.yaml:10: a key must be a word"),
     "duplicate key": (GOOD + "cell: 0.25\n", "bad.yaml:10: cell: is given twice, first on line 7"),
     "duplicate key inside": (
@@ -272,9 +272,9 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
         _mover("{radius: -1, velocity: [1, 0], position: [5, 2]}"),
         "bad.yaml:11: movers[0].radius: must be greater than 0, got -1",
     ),
-    "mover of two minds": (
+    "mover with two motions": (
         _mover("{radius: 0.3, keyframes: [[0, 5, 1], [8, 5, 9]], velocity: [1, 0]}"),
-        "bad.yaml:11: movers[0].velocity: stands beside keyframes; a mover moves in one way",
+        "bad.yaml:11: movers[0].velocity: cannot be given together with keyframes; a mover moves in one way",
     ),
     "misspelt key of a mover": (
         _mover("{radius: 0.3, keyframe: [[0, 5, 1], [8, 5, 9]]}"),
@@ -314,7 +314,7 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
     ),
     "keyframes at one place": (
         _mover("{radius: 0.3, keyframes: [[0, 5, 1], [8, 5, 1]]}"),
-        "bad.yaml:11: movers[0].keyframes: all at one place; write what never moves under obstacles",
+        "bad.yaml:11: movers[0].keyframes: are all at one place; list what never moves under obstacles",
     ),
     "keyframes too fast": (
         _mover("{radius: 0.3, keyframes: [[0, 5, 1], [0.1, 5, 9]]}"),
@@ -338,7 +338,7 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
     ),
     "velocity without a position": (
         _mover("{radius: 0.3, velocity: [1, 0]}"),
-        "bad.yaml:11: movers[0].position: missing; write [x, y], where it is at first",
+        "bad.yaml:11: movers[0].position: missing; write [x, y], the centre at first",
     ),
     "velocity of nothing": (
         _mover("{radius: 0.3, velocity: [0, 0], position: [5, 2]}"),
@@ -358,7 +358,7 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
     ),
     "walk without a period": (
         _mover("{radius: 0.2, walk: {cell: 0.5}}"),
-        "bad.yaml:11: movers[0].walk.period: missing; time for one cell [s]",
+        "bad.yaml:11: movers[0].walk.period: missing; time for one step [s]",
     ),
     "walk is a number": (
         _mover("{radius: 0.2, walk: 3}"),
@@ -394,7 +394,7 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
     ),
     "walk without room": (
         _mover("{radius: 4.9, walk: {cell: 0.5, period: 1}}"),
-        "bad.yaml:11: movers[0].walk: found no free cell of 0.5 m, 1 m from the robot's start, to begin in",
+        "bad.yaml:11: movers[0].walk: found no free cell of 0.5 m to begin in, 1 m from the robot's start",
     ),
     "start in a mover": (
         _mover("{radius: 0.5, keyframes: [[0, 1.2, 1], [8, 5, 9]]}"),

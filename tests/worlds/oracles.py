@@ -1,4 +1,4 @@
-"""Slow, plain ways to the same answers, sharing no code with the compiled ones, and worlds to ask about."""
+"""Oracles: slow, simple functions that share no code with the compiled ones; and random worlds to compare them on."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def clearance_of_point(world: World, x: float, y: float) -> float:
 
 
 def clearance_of_segment(world: World, a: tuple[float, float], b: tuple[float, float]) -> float:
-    """By ternary search for the closest point, as the distance to a disc is convex along a line."""
+    """Ternary search for the closest point: the distance to a disc is convex along a segment."""
     p, q = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
     best = min(clearance_of_point(world, *p), clearance_of_point(world, *q))
     for disc in world.obstacles:
@@ -44,7 +44,7 @@ def segment_distances(points: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.nd
 
 
 def moves_by_force(grid: Grid, world: World) -> np.ndarray:
-    """Every move of every cell decided from its definition; NaN where rounding could decide it, (R, C, 8)."""
+    """Whether each move of each cell is allowed, from the definition (R, C, 8); NaN where rounding could decide."""
     rows, cols = grid.shape
     discs = np.array([(d.x, d.y, d.radius) for d in world.obstacles]).reshape(-1, 3)
     centres = grid.xy(np.argwhere(np.ones(grid.shape))).reshape(rows, cols, 2)

@@ -1,4 +1,4 @@
-"""The worlds that come along: sound, and passable for whom they are meant."""
+"""The catalogue: its worlds are free of mistakes, and robots get through where they should."""
 
 import dataclasses
 import itertools
@@ -54,7 +54,7 @@ def task(request: pytest.FixtureRequest) -> Task:
     return load_task(request.param)
 
 
-def test_the_table_names_the_whole_catalogue():
+def test_the_table_lists_the_whole_catalogue():
     assert list(list_worlds()) == list(PASSABLE)
 
 
@@ -70,7 +70,7 @@ def test_both_ends_have_room_for_every_robot(task):
     assert (point_clearance(task.world, [task.start[:2], task.goal]) > room).all()
 
 
-def test_a_world_is_called_as_its_file_and_says_where_it_comes_from(task):
+def test_a_catalogue_world_has_the_name_of_its_file_and_a_source(task):
     assert task.world.name in PASSABLE
     assert task.world.source
     assert task.goal_tolerance == 0.25

@@ -1,4 +1,4 @@
-"""Clearances against slow oracles, and what must not change them."""
+"""Clearances against slow oracles, and transformations that must not change them."""
 
 import math
 from itertools import pairwise
@@ -72,7 +72,7 @@ def test_moving_everything_changes_no_clearance(world, a, b, dx, dy):
 
 
 @given(worlds(), points, points)
-def test_mirroring_or_turning_everything_changes_no_clearance(world, a, b):
+def test_mirroring_or_rotating_everything_changes_no_clearance(world, a, b):
     here = segment_clearance(world, [a], [b])[0]
     assert segment_clearance(mirrored(world), [(-a[0], a[1])], [(-b[0], b[1])])[0] == pytest.approx(here)
     assert segment_clearance(turned(world), [(-a[1], a[0])], [(-b[1], b[0])])[0] == pytest.approx(here)

@@ -1,4 +1,4 @@
-"""Cells and moves against their definitions."""
+"""Free cells and allowed moves, against their definitions."""
 
 import numpy as np
 import pytest
@@ -125,7 +125,7 @@ def test_cells_that_the_walls_cut_are_kept():
     assert rasterise(World("w", (0.0, 0.0, 0.3, 0.3)), 0.1).shape == (3, 3)
 
 
-def test_a_picture_alone_gives_moves_without_cut_corners():
+def test_a_grid_from_its_free_cells_alone_cuts_no_corners():
     grid = Grid.from_free([[True, True, False], [True, False, True], [True, True, True]])
     here = bits(grid)
     assert not here[0, 1].tolist()[DIRECTIONS.index((1, 1))]
@@ -150,6 +150,6 @@ def test_a_grid_cannot_be_written_to():
         (float("nan"), 0, "cell"),
     ],
 )
-def test_sizes_that_make_no_sense_are_named(cell, inflate, key):
+def test_unusable_sizes_are_named(cell, inflate, key):
     with pytest.raises(ValueError, match=f"^{key}: "):
         rasterise(crowd(0), cell, inflate)

@@ -1,4 +1,4 @@
-"""Where movers are: against walks along the path that share no code, and against what their files say."""
+"""Where movers are: against oracles that share no code, and against the files that declare them."""
 
 import dataclasses
 import json
@@ -33,19 +33,19 @@ ELL = ((1.0, 2.0, 2.0), (3.0, 6.0, 2.0), (4.0, 6.0, 4.0))  # 2 m/s east from t =
 FINE = np.linspace(0, 40, 4001)
 
 
-def traffic(*movers, seed=0, obstacles=()):
+def trajectories(*movers, seed=0, obstacles=()):
     return Trajectories.of(World("w", BOX, tuple(obstacles), movers=movers), START, seed)
 
 
 def at(mover, t):
-    return traffic(mover).positions(t)[:, 0]
+    return trajectories(mover).positions(t)[:, 0]
 
 
 # Keyframes
 
 
 def walk(mover, t):
-    """Where a keyframed mover is, by walking from lap to lap."""
+    """An oracle: where a keyframed mover is, lap by lap."""
     frames = list(mover.keyframes)
     t = t + mover.phase
     if t <= frames[0][0]:
@@ -87,7 +87,7 @@ def test_before_the_first_keyframe_and_after_the_last_it_stands():
     mover = Keyframed(radius=0.3, keyframes=ELL, loop="once")
     assert at(mover, [0.0, 0.5, 1.0]).tolist() == [[2, 2]] * 3
     assert at(mover, [4.0, 5.0, 99.0]).tolist() == [[6, 4]] * 3
-    velocity = traffic(mover).velocities([0.5, 1.0, 3.0, 3.5, 4.0])[:, 0]
+    velocity = trajectories(mover).velocities([0.5, 1.0, 3.0, 3.5, 4.0])[:, 0]
     np.testing.assert_allclose(velocity, [(0, 0), (2, 0), (0, 2), (0, 2), (0, 0)])
 
 
@@ -95,32 +95,32 @@ def test_pingpong_comes_back_the_same_way():
     mover = Keyframed(radius=0.3, keyframes=ELL)
     np.testing.assert_allclose(at(mover, [4.5, 5.0, 6.0, 7.0, 8.0]), [(6, 3), (6, 2), (4, 2), (2, 2), (4, 2)])
     np.testing.assert_allclose(
-        traffic(mover).velocities([4.0, 4.5, 5.0, 7.0])[:, 0], [(0, -2), (0, -2), (-2, 0), (2, 0)]
+        trajectories(mover).velocities([4.0, 4.5, 5.0, 7.0])[:, 0], [(0, -2), (0, -2), (-2, 0), (2, 0)]
     )
 
 
 def test_teleport_appears_at_the_first_place_and_says_when():
     mover = Keyframed(radius=0.3, keyframes=ELL, loop="teleport")
-    moving = traffic(mover)
-    assert moving.teleports(10.5)[0].tolist() == [4.0, 7.0, 10.0]
+    moving = trajectories(mover)
+    assert moving.jump_times(10.5)[0].tolist() == [4.0, 7.0, 10.0]
     np.testing.assert_allclose(at(mover, [3.999, 4.0, 4.5]), [(6, 3.998), (2, 2), (3, 2)])
     t = np.arange(0, 11, 0.25)
     assert t[1:][moving.jumps(t)[:, 0]].tolist() == [4.0, 7.0, 10.0]
-    later = traffic(dataclasses.replace(mover, phase=3.5))
-    assert later.teleports(4.0)[0].tolist() == [0.5, 3.5]
+    later = trajectories(dataclasses.replace(mover, phase=3.5))
+    assert later.jump_times(4.0)[0].tolist() == [0.5, 3.5]
 
 
 @pytest.mark.parametrize("loop", ["pingpong", "once"])
-def test_what_does_not_teleport_never_jumps(loop):
-    moving = traffic(Keyframed(radius=0.3, keyframes=ELL, loop=loop))
+def test_only_teleporting_loops_jump(loop):
+    moving = trajectories(Keyframed(radius=0.3, keyframes=ELL, loop=loop))
     assert not moving.jumps(FINE).any()
-    assert len(moving.teleports(40)[0]) == 0
+    assert len(moving.jump_times(40)[0]) == 0
 
 
 def test_a_closed_loop_does_not_jump():
     mover = Keyframed(radius=0.3, keyframes=(*ELL, (6.0, 2.0, 2.0)), loop="teleport")
-    assert not traffic(mover).jumps(FINE).any()
-    assert len(traffic(mover).teleports(40)[0]) == 0
+    assert not trajectories(mover).jumps(FINE).any()
+    assert len(trajectories(mover).jump_times(40)[0]) == 0
 
 
 @given(keyframed(interpolation="catmull-rom"))
@@ -132,19 +132,19 @@ def test_the_cubic_goes_through_every_place(mover):
 
 def test_the_cubic_has_the_tangents_of_catmull_and_rom():
     mover = Keyframed(radius=0.3, keyframes=ELL, loop="once", interpolation="catmull-rom")
-    # Half the way from the place before to the one after, per segment: (4, 2) / 2 at the corner.
+    # The tangent at a place is half the way from the one before to the one after: (4, 2) / 2 at the corner.
     eps = 1e-6
     before, after = (at(mover, 3 + eps) - at(mover, 3.0))[0] / eps, (at(mover, 3.0) - at(mover, 3 - eps))[0] / eps
     np.testing.assert_allclose(after, np.array([2.0, 1.0]) / 2, atol=1e-4)  # the segment before lasts 2 s
     np.testing.assert_allclose(before, np.array([2.0, 1.0]) / 1, atol=1e-4)
-    assert np.ptp(at(mover, FINE)[:, 1]) > 2.0  # it swings
+    assert np.ptp(at(mover, FINE)[:, 1]) > 2.0  # the cubic overshoots
 
 
 # Straight on
 
 
 def bounced(mover, t):
-    """Where a cruising mover is, from wall to wall."""
+    """An oracle: where a cruising mover is, wall by wall."""
     x, v = list(mover.position), list(mover.velocity)
     left = t + mover.phase
     for k in range(2):
@@ -168,14 +168,14 @@ def test_a_cruising_mover_bounces_like_a_ball(x, y, vx, vy, phase, t):
     assert at(mover, t)[0] == pytest.approx(place, abs=1e-9)
     rim = np.array([(0.3, 0.3), (9.7, 7.7)])
     if np.abs(rim - place).min() > 1e-6:
-        assert traffic(mover).velocities(t)[0, 0] == pytest.approx(velocity)
+        assert trajectories(mover).velocities(t)[0, 0] == pytest.approx(velocity)
 
 
 def test_at_the_wall_it_already_comes_back():
     mover = Cruising(radius=0.5, position=(7.5, 4.0), velocity=(2.0, 0.0))
-    assert traffic(mover).velocities([0.999, 1.0, 1.5])[:, 0, 0].tolist() == [2, -2, -2]
+    assert trajectories(mover).velocities([0.999, 1.0, 1.5])[:, 0, 0].tolist() == [2, -2, -2]
     back = Cruising(radius=0.5, position=(2.5, 4.0), velocity=(-2.0, 0.0))
-    assert traffic(back).velocities([0.999, 1.0, 1.5])[:, 0, 0].tolist() == [-2, 2, 2]
+    assert trajectories(back).velocities([0.999, 1.0, 1.5])[:, 0, 0].tolist() == [-2, 2, 2]
 
 
 # Wandering
@@ -186,7 +186,7 @@ POSTS = tuple(Disc(2.25 + 1.5 * i, 1.75 + 1.5 * j, 0.35) for i in range(5) for j
 @pytest.mark.parametrize("seed", range(4))
 def test_a_wanderer_goes_from_cell_to_free_neighbouring_cell(seed):
     mover = Wandering(radius=0.2, cell=0.5, period=0.4)
-    moving = traffic(mover, seed=seed, obstacles=POSTS)
+    moving = trajectories(mover, seed=seed, obstacles=POSTS)
     stops = moving.positions(np.arange(300) * 0.4)[:, 0]
     cells = (stops - 0.25) / 0.5
     assert np.abs(cells - cells.round()).max() < 1e-9
@@ -204,30 +204,30 @@ def test_a_wanderer_goes_from_cell_to_free_neighbouring_cell(seed):
 def test_a_wanderer_that_is_boxed_in_waits():
     ring = [Disc(5.25 + dx, 4.25 + dy, 0.2) for dx in (-0.5, 0, 0.5) for dy in (-0.5, 0, 0.5) if (dx, dy) != (0, 0)]
     mover = Wandering(radius=0.2, cell=0.5, period=0.4, start=(5.3, 4.1))
-    moving = traffic(mover, obstacles=ring)
+    moving = trajectories(mover, obstacles=ring)
     assert (moving.positions(FINE)[:, 0] == (5.25, 4.25)).all()
     assert (moving.velocities(FINE) == 0).all()
 
 
-def test_chance_comes_from_the_run_unless_a_wanderer_has_a_seed_of_its_own():
+def test_wanderers_draw_from_the_runs_seed_unless_they_have_one_of_their_own():
     own, shared = (Wandering(radius=0.2, cell=0.5, period=0.4, seed=seed) for seed in (7, None))
-    one, other = (traffic(own, shared, shared, seed=seed).positions(FINE) for seed in (0, 1))
+    one, other = (trajectories(own, shared, shared, seed=seed).positions(FINE) for seed in (0, 1))
     assert (one[:, 0] == other[:, 0]).all()
     assert (one[:, 1] != other[:, 1]).any()
     assert (one[:, 1] != one[:, 2]).any()
-    assert (one == traffic(own, shared, shared, seed=0).positions(FINE)).all()
+    assert (one == trajectories(own, shared, shared, seed=0).positions(FINE)).all()
 
 
 def test_asking_for_more_of_a_walk_does_not_change_it():
     mover = Wandering(radius=0.2, cell=0.5, period=0.4)
-    whole, parts = traffic(mover, obstacles=POSTS), traffic(mover, obstacles=POSTS)
+    whole, parts = trajectories(mover, obstacles=POSTS), trajectories(mover, obstacles=POSTS)
     asked = [parts.positions(t)[0] for t in FINE]
     assert (whole.positions(FINE) == np.array(asked)).all()
 
 
-def test_without_a_free_cell_there_is_a_sentence():
+def test_a_wanderer_without_a_free_cell_is_wrong_input():
     with pytest.raises(InputError, match=r"movers\[0\].walk: found no free cell of 0.5 m"):
-        traffic(Wandering(radius=3.95, cell=0.5, period=1.0))
+        trajectories(Wandering(radius=3.95, cell=0.5, period=1.0))
 
 
 # All kinds
@@ -244,22 +244,22 @@ KINDS = [
 
 
 @pytest.mark.parametrize("mover", KINDS, ids=lambda m: f"{type(m).__name__} {getattr(m, 'loop', '')}")
-def test_velocity_is_how_the_place_changes_and_travel_never_less(mover):
-    moving = traffic(mover)
+def test_velocity_is_the_change_of_place_and_travel_is_never_less(mover):
+    moving = trajectories(mover)
     t = np.linspace(0, 20, 20001)
     places, velocity = moving.positions(t)[:, 0], moving.velocities(t)[:, 0]
     moved, jumped = np.diff(places, axis=0), moving.jumps(t)[:, 0]
     error = np.abs(moved / np.diff(t)[:, None] - (velocity[:-1] + velocity[1:]) / 2).max(axis=1)
-    assert np.mean(error > 0.01) < 0.01  # but for corners
+    assert np.mean(error > 0.01) < 0.01  # velocity is undefined at corners
     assert (np.hypot(*moved.T) <= moving.travel(t)[:, 0] + 1e-12)[~jumped].all()
     coarse = t[::500]
     length = np.add.reduceat(np.hypot(*moved.T) * ~jumped, np.arange(0, 20000, 500))
     assert (length <= moving.travel(coarse)[:, 0] + 1e-9).all()
-    assert jumped.sum() == len(moving.teleports(20)[0])
+    assert jumped.sum() == len(moving.jump_times(20)[0])
 
 
-def test_a_time_has_the_same_bits_whatever_stands_beside_it():
-    moving = traffic(*KINDS)
+def test_a_time_has_the_same_bits_whichever_other_times_are_asked_for():
+    moving = trajectories(*KINDS)
     whole = moving.positions(FINE)
     assert (whole[::7] == moving.positions(FINE[::7])).all()
     assert (whole[1234] == moving.positions(FINE[1234])[0]).all()
@@ -270,7 +270,7 @@ def test_the_bits_are_the_same_in_another_process(tmp_path):
     save_task(task, tmp_path / "w.yaml")
     code = (
         "import sys, hashlib, numpy as np\n"
-        "from worlds import Trajectories, load_task\n"
+        "from antdrive.worlds import Trajectories, load_task\n"
         "task = load_task(sys.argv[1])\n"
         "places = Trajectories.of(task.world, task.start[:2], 5).positions(np.linspace(0, 40, 4001))\n"
         "print(hashlib.sha256(places.tobytes()).hexdigest(), 'numba' in sys.modules)"
@@ -291,15 +291,15 @@ def test_a_later_world_is_where_the_same_world_will_be(mover):
     np.testing.assert_allclose(later.positions(FINE), now.positions(FINE + 12.5), atol=1e-9)
 
 
-def test_a_world_without_movers_has_empty_traffic():
-    moving = traffic()
+def test_a_world_without_movers_has_empty_trajectories():
+    moving = trajectories()
     assert len(moving) == 0
     assert moving.positions(FINE).shape == (4001, 0, 2)
     assert moving.jumps(FINE).shape == moving.travel(FINE).shape == (4000, 0)
 
 
-def test_motions_tell_radius_and_place_one_by_one():
-    moving = traffic(*KINDS)
+def test_each_motion_has_the_radius_and_the_places_of_its_mover():
+    moving = trajectories(*KINDS)
     assert [motion.radius for motion in moving.motions] == moving.radii.tolist()
     assert (moving.motions[0].at(FINE) == moving.positions(FINE)[:, 0]).all()
 
@@ -335,7 +335,7 @@ def test_the_example_of_the_format_is_read(tmp_path):
     )
 
 
-def test_a_world_that_stands_still_is_written_without_a_word_of_movers():
+def test_keys_that_a_task_does_not_need_are_not_written():
     assert "movers" not in task_to_dict(Task(World("w", BOX), (1, 1, 0), (2, 2)))
     assert "time_limit" not in task_to_dict(Task(World("w", BOX), (1, 1, 0), (2, 2)))
 
@@ -354,6 +354,6 @@ def test_a_world_that_stands_still_is_written_without_a_word_of_movers():
         (lambda: Wandering(radius=0.2, cell=0.5, period=1.0, start=(1, math.nan)), "walk.start: must be 2 finite"),
     ],
 )
-def test_what_cannot_move_is_refused(make, says):
+def test_movers_with_wrong_values_are_refused(make, says):
     with pytest.raises(ValueError, match=says):
         make()

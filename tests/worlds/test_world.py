@@ -1,4 +1,4 @@
-"""Records that cannot be wrong."""
+"""Discs, worlds, tasks and routes: what they compute, and which values they refuse."""
 
 import math
 
@@ -10,20 +10,20 @@ from antdrive.worlds import Disc, Route, Task, World
 ROOM = World("room", (0.0, 0.0, 10.0, 8.0), (Disc(5.0, 4.0, 1.0), Disc(2.0, 6.0, 0.5)))
 
 
-def test_a_world_tells_its_discs_and_size():
+def test_a_world_has_its_discs_as_an_array_and_its_size():
     assert ROOM.discs.tolist() == [[5.0, 4.0, 1.0], [2.0, 6.0, 0.5]]
     assert ROOM.size == (10.0, 8.0)
     assert World("none", (0, 0, 1, 1)).discs.shape == (0, 3)
 
 
 @pytest.mark.parametrize("values", [(0, 0, 0), (0, 0, -1), (math.nan, 0, 1), (0, math.inf, 1), (0, 0, 1, 0)])
-def test_a_disc_has_a_place_and_a_size(values):
+def test_a_disc_needs_a_finite_place_and_a_positive_size(values):
     with pytest.raises(ValueError, match="must be"):
         Disc(*values)
 
 
 @pytest.mark.parametrize("bounds", [(0, 0, 0, 1), (0, 2, 1, 1), (0, 0, math.inf, 1), (math.nan, 0, 1, 1)])
-def test_bounds_enclose_something(bounds):
+def test_bounds_that_enclose_nothing_are_refused(bounds):
     with pytest.raises(ValueError, match=r"^bounds: "):
         World("w", bounds)
 
@@ -44,7 +44,7 @@ def test_bounds_enclose_something(bounds):
         ({"goal": (1.0, 1.0)}, "^goal: is where the robot starts"),
     ],
 )
-def test_a_task_can_be_stood_in(change, message):
+def test_a_task_needs_a_free_start_and_a_free_goal(change, message):
     with pytest.raises(ValueError, match=message):
         Task(**{"world": ROOM, "start": (1.0, 1.0, 0.0), "goal": (9.0, 7.0)} | change)
 

@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all."""
+"""Files that are written whole or not at all, so that nobody ever reads half a file."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ from antdrive.worlds.errors import InputError
 
 @contextmanager
 def written_whole(path: str | Path) -> Iterator[Path]:
-    """A temporary path beside `path`, renamed to it when the block ends well and removed when it does not.
+    """A context with a temporary path, which replaces `path` when the block succeeds and is removed when it fails.
+
+    Args:
+        path: the file to write
 
     Raises:
         InputError: the folder cannot be written to.

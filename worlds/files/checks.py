@@ -1,4 +1,4 @@
-"""Documents checked against pydantic models; a fault becomes one line that says what would be right."""
+"""Documents checked against pydantic models. A fault becomes one line that says what would be right."""
 
 from __future__ import annotations
 
@@ -16,21 +16,25 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 def _exactly_one(value: Any) -> Any:
-    # To Python, and so to pydantic, true and 1.0 equal 1.
+    # Python, and so pydantic, takes true and 1.0 for 1.
     if type(value) is not int:
         raise ValueError(f"must be 1, got {show(value)}")
     return value
 
 
-#: The version of a file's form, of which there has been one.
+#: The version of the file format; so far there has been one.
 SchemaVersion = Annotated[Literal[1], BeforeValidator(_exactly_one)]
 
 
 def check(model: type[Model], document: Document) -> Model:
-    """The document as `model`.
+    """The document as a checked model.
+
+    Args:
+        model: the pydantic model that says which keys and values are valid
+        document: the data to check
 
     Raises:
-        InputError: something in it is wrong; of several faults the first is told, unknown keys before others.
+        InputError: something in the document is wrong. Of several faults the first is reported, unknown keys first.
     """
     if not isinstance(document.data, dict):
         raise document.error((), f"must be {_mapping_of(model)}, got {show(document.data)}")
@@ -45,14 +49,24 @@ def check(model: type[Model], document: Document) -> Model:
 
 
 def suggest(word: str, choices: Iterable[str]) -> str:
-    """A hint at what `word` should have been: the close choice, or all of them."""
+    """A hint at what a wrong word should have been: the one choice that is close, or else all choices.
+
+    Args:
+        word: the wrong word
+        choices: the valid words
+    """
     valid = list(choices)
     close = difflib.get_close_matches(word, valid, n=1)
     return f"did you mean {close[0]}?" if close else f"choose from {', '.join(valid)}"
 
 
 def show(value: Any, limit: int = 40) -> str:
-    """A value as people would write it in a file, cut to a length that fits a line."""
+    """A value as people would write it in a file, shortened to fit into an error message.
+
+    Args:
+        value: plain data
+        limit: the longest text
+    """
     if isinstance(value, Mapping):
         return "a mapping"
     if isinstance(value, list) and len(value) > 6:
@@ -67,7 +81,11 @@ def show(value: Any, limit: int = 40) -> str:
 
 
 def yaml_number(value: float) -> str:
-    """The shortest text that YAML 1.1 reads back as this number: it wants a point and the exponent's sign."""
+    """The shortest text that YAML 1.1 reads back as this number; it requires a decimal point and the exponent's sign.
+
+    Args:
+        value: any number, also infinite or not a number
+    """
     if not math.isfinite(value):
         return ".nan" if math.isnan(value) else (".inf" if value > 0 else "-.inf")
     text = repr(float(value))
@@ -85,22 +103,23 @@ def _mapping_of(model: type[BaseModel]) -> str:
 
 
 def _model_at(model: type[BaseModel], location: Location) -> type[BaseModel]:
-    """The model of the mapping at `location`, found along annotations such as list[Inner]."""
+    """The model of the mapping at a location, found by following annotations such as list[Inner]."""
     for part in location:
         if isinstance(part, int):
             continue
-        todo: list[Any] = [next(i.annotation for n, i in model.model_fields.items() if (i.alias or n) == part)]
-        while todo:
-            kind = todo.pop()
-            if isinstance(kind, type) and issubclass(kind, BaseModel):
-                model = kind
+        annotations: list[Any] = [next(i.annotation for n, i in model.model_fields.items() if (i.alias or n) == part)]
+        while annotations:
+            annotation = annotations.pop()
+            if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+                model = annotation
                 break
-            todo.extend(get_args(kind))
+            annotations.extend(get_args(annotation))
     return model
 
 
 def _describe(model: type[BaseModel], location: Location) -> str:
-    while location and isinstance(location[-1], int):  # an entry is described with its list
+    """The model's own description of the value at a location; empty where it has none."""
+    while location and isinstance(location[-1], int):  # the description of a list holds for its entries
         location = location[:-1]
     parent = _model_at(model, location[:-1])
     for name, info in parent.model_fields.items():
@@ -154,7 +173,7 @@ def _problem(model: type[BaseModel], location: Location, fault: Mapping[str, Any
 
 
 def _as_number(value: Any) -> str:
-    """For text that means a number: how YAML wants that number written."""
+    """For a text that people meant as a number: how to write that number in YAML; empty for other texts."""
     if not isinstance(value, str):
         return ""
     try:

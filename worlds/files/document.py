@@ -1,4 +1,4 @@
-"""Files that people write: plain YAML with the line on which each value stands."""
+"""Files that people write: plain YAML, with the line of each value for error messages."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ import os
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, TypeAlias
 
 import yaml
 
-from antdrive.worlds.errors import InputError
+from antdrive.worlds.errors import FieldError, InputError, input_error
+from antdrive.worlds.files.reading import read_bytes
 
-Location: TypeAlias = tuple[str | int, ...]  # the way to a value: ("obstacles", 0, "radius")
+Location: TypeAlias = tuple[str | int, ...]  # the path to a value: ("obstacles", 0, "radius")
 
 MAX_BYTES = 2_000_000  # a world of 20 000 obstacles; more is a mistake
-MAX_DEPTH = 20  # nesting that no file of ours needs; also ends aliases that contain themselves
-MAX_VALUES = 200_000  # values after aliases are followed, against files that unfold to gigabytes
+MAX_DEPTH = 20  # levels of nesting; no file of ours needs as many, and aliases that contain themselves end here
+MAX_VALUES = 200_000  # values after aliases are followed; small files of nested aliases can stand for gigabytes
 
 _NUMBER = re.compile(r"[-+]?(0|[1-9]\d*|(?=\.\d))(\.\d*)?([eE][-+]?\d+)?|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
 _TAG = "tag:yaml.org,2002:"
@@ -26,22 +26,37 @@ _TAG = "tag:yaml.org,2002:"
 
 @dataclass(frozen=True, eq=False)
 class Document:
-    """Plain data with the line on which each value stands."""
+    """Plain data, with the line of each value.
 
-    source: str  # the file's path, or what else people call it
+    Attributes:
+        source: the file's path, or what people call the data
+        data: mappings, lists, numbers, texts, true, false and null
+        lines: the line of each value, counted from 1; empty where lines are not known
+    """
+
+    source: str
     data: Any
-    lines: Mapping[Location, int] = field(default_factory=dict)  # from 1
+    lines: Mapping[Location, int] = field(default_factory=dict)
 
     def error(self, location: Location, problem: str) -> InputError:
-        """The error for a value: source, line where known, key, problem."""
+        """The error for a value: source, line where known, key and problem.
+
+        Args:
+            location: the path to the value
+            problem: what is wrong and what would be right
+        """
         line = next((self.lines[p] for p in _prefixes(location) if p in self.lines), None)
         place = self.source if line is None else f"{self.source}:{line}"
         return input_error(place, *([_key(location)] if location else []), problem)
 
+    def field_error(self, error: FieldError, *above: str | int) -> InputError:
+        """The error for a record's field that was read from this document.
 
-def input_error(*parts: str) -> InputError:
-    """An InputError whose parts are joined by colons on one line of printable characters."""
-    return InputError("".join(c if c.isprintable() else repr(c)[1:-1] for c in ": ".join(parts)))
+        Args:
+            error: the record's own error
+            above: the path to the record, where it is not the whole document
+        """
+        return self.error((*above, *_location(error.key)), error.problem)
 
 
 def read_document(path: str | os.PathLike[str]) -> Document:
@@ -50,17 +65,17 @@ def read_document(path: str | os.PathLike[str]) -> Document:
     Raises:
         InputError: the file cannot be read, is not UTF-8 text, or is not plain YAML.
     """
-    return parse_document(_read_text(path, "YAML"), os.fspath(path))
+    return parse_document(_read_text(path, "a YAML file"), os.fspath(path))
 
 
 def read_json(path: str | os.PathLike[str]) -> Document:
-    """The JSON file at `path`; its lines are not known.
+    """The JSON file at `path`, without the lines of its values.
 
     Raises:
         InputError: the file cannot be read, is not UTF-8 text, or is not JSON.
     """
     source = os.fspath(path)
-    text = _read_text(path, "JSON")
+    text = _read_text(path, "a JSON file")
     try:
         return Document(source, json.loads(text))
     except json.JSONDecodeError as error:
@@ -70,30 +85,23 @@ def read_json(path: str | os.PathLike[str]) -> Document:
 
 
 def _read_text(path: str | os.PathLike[str], kind: str) -> str:
-    source = os.fspath(path)
-    try:
-        with Path(path).open("rb") as stream:
-            content = stream.read(MAX_BYTES + 1)
-    except FileNotFoundError:
-        raise input_error(source, "no such file") from None
-    except IsADirectoryError:
-        raise input_error(source, f"is a directory; give a {kind} file") from None
-    except (OSError, ValueError) as error:  # ValueError: a null character in the path
-        raise input_error(source, f"cannot be read: {getattr(error, 'strerror', None) or error}") from None
-    if len(content) > MAX_BYTES:
-        raise input_error(source, f"is too large; the limit is {MAX_BYTES // 1_000_000} MB")
+    content = read_bytes(path, MAX_BYTES, kind)
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
-        raise input_error(f"{source}:{line}", "is not a text file in UTF-8") from None
+        raise input_error(f"{os.fspath(path)}:{line}", "is not a text file in UTF-8") from None
 
 
 def parse_document(text: str, source: str) -> Document:
-    """The YAML in `text`: mappings, lists, decimal numbers, text, true, false and null, nothing else.
+    """The YAML in a text: mappings, lists, decimal numbers, text, true, false and null, nothing else.
+
+    Args:
+        text: the YAML
+        source: what error messages call the text
 
     Raises:
-        InputError: not YAML, a duplicate key, or nested or unfolding beyond reason.
+        InputError: the text is not YAML, repeats a key, is nested too deeply, or has aliases that stand for too much.
     """
     try:
         node = _compose(text)
@@ -115,7 +123,7 @@ def parse_document(text: str, source: str) -> Document:
 
 
 class _Loader(yaml.SafeLoader):
-    """Stops at a bounded depth, where PyYAML would exhaust the interpreter's stack."""
+    """A loader that stops at a bounded depth; PyYAML would exhaust the interpreter's stack."""
 
     depth = 0
 
@@ -138,7 +146,9 @@ def _compose(text: str) -> yaml.Node | None:
 
 @dataclass
 class _Builder:
-    document: Document  # only for its errors
+    """Turns YAML nodes into plain data and remembers the line of each value."""
+
+    document: Document  # for its errors and its lines
     count: int = 0
 
     @property
@@ -150,7 +160,9 @@ class _Builder:
         self.lines.setdefault(location, node.start_mark.line + 1)
         self.count += 1
         if self.count > MAX_VALUES or len(location) > MAX_DEPTH:
-            raise self.document.error(location[:1], "unfolds to too much; write the values out without aliases")
+            raise self.document.error(
+                location[:1], "its aliases stand for too much; write the values out without aliases"
+            )
         if isinstance(node, yaml.ScalarNode):
             return self.scalar(node, location)
         if isinstance(node, yaml.SequenceNode) and node.tag == _TAG + "seq":
@@ -183,7 +195,7 @@ class _Builder:
         if kind == "bool":
             return text.lower() in ("true", "yes", "on")
         if kind in ("int", "float"):
-            # YAML 1.1 also reads 010 as 8, 1:30 as 90 and 1_0 as 10, which nobody who writes a world means.
+            # YAML 1.1 also reads 010 as 8, 1:30 as 90 and 1_0 as 10, which nobody means who writes a world.
             if not _NUMBER.fullmatch(text):
                 raise self.document.error(location, f"must be a plain decimal number, got {text[:40]}")
             if text.lower().lstrip("+-").startswith((".inf", ".nan")):
@@ -195,10 +207,17 @@ class _Builder:
 
 
 def _prefixes(location: Location) -> Iterable[Location]:
-    """The location and the ones around it, but not the whole file: its first line says nothing."""
+    """The location and those around it, innermost first, without the whole file: its first line helps nobody."""
     return (location[:n] for n in range(len(location), 0, -1))
 
 
 def _key(location: Location) -> str:
+    """The path to a value as errors write it: the inverse of `_location`."""
     parts = (f"[{part}]" if isinstance(part, int) else f".{part}" for part in location)
     return "".join(parts).removeprefix(".")
+
+
+def _location(key: str) -> Location:
+    """The path to a value from an error's key, such as "movers[0].walk.start"."""
+    parts = re.findall(r"[^.\[\]]+", key)
+    return tuple(int(part) if part.isdigit() else part for part in parts)

@@ -1,9 +1,8 @@
-"""World files: tasks read from YAML and written to it, and the catalogue that comes with the package."""
+"""World files: tasks in YAML, read and written, and the catalogue of worlds that comes with the package."""
 
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -11,17 +10,16 @@ from typing import Annotated, Any, Literal
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
+from antdrive.worlds.errors import FieldError, input_error
 from antdrive.worlds.files.atomic import written_whole
 from antdrive.worlds.files.checks import SchemaVersion, check, suggest, yaml_number
-from antdrive.worlds.files.document import Document, Location, input_error, read_document
-from antdrive.worlds.movers import MAX_PHASE, MIN_PERIOD, Mover, mover_from_dict, mover_to_dict
+from antdrive.worlds.files.document import Document, read_document
+from antdrive.worlds.limits import MAX_CELLS, MAX_COORDINATE, MAX_PHASE, MIN_PERIOD
+from antdrive.worlds.movers import Mover, mover_from_dict, mover_to_dict
 from antdrive.worlds.world import Disc, Task, World
 
-LIMIT = 1e6  # farthest coordinate and largest size [m]: beyond it something was mistyped
-MAX_CELLS = 25_000_000  # as in worlds.grid, which is not imported here because it loads the compiler
-
-Coordinate = Annotated[float, Field(ge=-LIMIT, le=LIMIT)]
-Size = Annotated[float, Field(gt=0, le=LIMIT)]
+Coordinate = Annotated[float, Field(ge=-MAX_COORDINATE, le=MAX_COORDINATE)]
+Size = Annotated[float, Field(gt=0, le=MAX_COORDINATE)]
 Pair = Annotated[list[Coordinate], Field(min_length=2, max_length=2)]
 Keyframe = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
 
@@ -41,48 +39,54 @@ class DiscEntry(BaseModel):
 
 
 class WalkEntry(BaseModel):
-    """Goes, in every period, from a cell's centre to that of a random free neighbour."""
+    """A random walk: in every period from a cell's centre to that of a random free neighbour."""
 
     model_config = _RULES
 
-    cell: Size = Field(description="side of the cells it walks on [m]")
-    period: float = Field(ge=MIN_PERIOD, le=LIMIT, description="time for one cell [s]")
-    start: Pair | None = Field(None, description="write [x, y], where it begins; by default a random free cell")
-    seed: int | None = Field(None, ge=0, lt=2**63, description="of its own; by default the run's")
+    cell: Size = Field(description="side of a cell [m]")
+    period: float = Field(ge=MIN_PERIOD, le=MAX_COORDINATE, description="time for one step [s]")
+    start: Pair | None = Field(
+        None, description="write [x, y] of a point in the first cell; by default a random free cell"
+    )
+    seed: int | None = Field(None, ge=0, lt=2**63, description="random seed; by default the run's")
 
 
 class MoverEntry(BaseModel):
-    """A moving cylinder; one of keyframes, velocity and walk says how it moves."""
+    """A moving cylinder; exactly one of keyframes, velocity and walk says how it moves."""
 
     model_config = _RULES
 
     radius: Size = Field(description="the radius as built [m]")
     height: Size = Field(1.0, description="the height [m]")
-    phase: float = Field(0.0, ge=0, le=MAX_PHASE, description="how much of its motion has passed at the start [s]")
+    phase: float = Field(
+        0.0, ge=0, le=MAX_PHASE, description="how much of the motion has already passed at the start [s]"
+    )
     keyframes: list[Keyframe] | None = Field(None, max_length=10_000, description="write [t, x, y] for each")
-    loop: Literal["pingpong", "teleport", "once"] | None = Field(None, description="after the last keyframe")
-    interpolation: Literal["linear", "catmull-rom"] | None = Field(None, description="between keyframes")
-    position: Pair | None = Field(None, description="write [x, y], where it is at first")
+    loop: Literal["pingpong", "teleport", "once"] | None = Field(None, description="what follows the last keyframe")
+    interpolation: Literal["linear", "catmull-rom"] | None = Field(None, description="how it moves between keyframes")
+    position: Pair | None = Field(None, description="write [x, y], the centre at first")
     velocity: Pair | None = Field(None, description="write [vx, vy] in m/s; it bounces off the walls")
     walk: WalkEntry | None = Field(None, description="write {cell: 0.5, period: 1.0}")
 
 
-class TaskFile(BaseModel):
+class WorldFile(BaseModel):
     """A world with a start and a goal, as written in a file."""
 
     model_config = _RULES
 
     # "schema" is also a method of BaseModel, hence the alias.
     schema_: SchemaVersion = Field(alias="schema", description="write schema: 1")
-    name: str = Field(min_length=1, max_length=200, description="what the world is called, by default the file's name")
+    name: str = Field(
+        min_length=1, max_length=200, description="what people call the world; by default the file's name"
+    )
     source: str | None = Field(None, description="where the world comes from, free text")
     bounds: list[Coordinate] = Field(min_length=4, max_length=4, description="write [xmin, ymin, xmax, ymax] in metres")
     start: list[Coordinate] = Field(min_length=3, max_length=3, description="write [x, y, yaw] in metres and radians")
     goal: list[Coordinate] = Field(min_length=2, max_length=2, description="write [x, y] in metres")
-    goal_tolerance: Size = Field(0.25, description="the robot must stop this close to the goal [m]")
-    cell: Size = Field(0.5, description="grid resolution a planner uses unless told otherwise [m]")
+    goal_tolerance: Size = Field(0.25, description="how close to the goal the robot must stop [m]")
+    cell: Size = Field(0.5, description="grid resolution for planners unless another is given [m]")
     obstacles: list[DiscEntry] = Field([], description="upright cylinders")
-    time_limit: Size | None = Field(None, description="simulated time allowed [s], by default ample for the route")
+    time_limit: Size | None = Field(None, description="simulated time allowed [s]; by default ample for the route")
     movers: list[MoverEntry] = Field([], max_length=1000, description="moving cylinders")
 
     @field_validator("name")
@@ -99,12 +103,13 @@ def list_worlds() -> Mapping[str, Path]:
 
 
 def load_task(world: str | os.PathLike[str]) -> Task:
-    """The task in a world file, or in the catalogue under a name.
+    """The task in a world file, or in the catalogue.
 
-    A text without a folder or a suffix is taken for a name of the catalogue first.
+    Args:
+        world: a name of the catalogue, or a path; a text that is both means the catalogue
 
     Raises:
-        InputError: there is no such world or something in the file is wrong.
+        InputError: there is no such world, or something in the file is wrong.
     """
     known = list_worlds()
     path = known[world] if isinstance(world, str) and world in known else Path(world)
@@ -121,8 +126,7 @@ def save_task(task: Task, path: str | Path) -> None:
     """Write a task as a world file, whole or not at all.
 
     Raises:
-        InputError: the file cannot be written.
-        ValueError: the task holds what a world file cannot, such as an empty name.
+        InputError: the file cannot be written, or a world file cannot hold the task, such as one with an empty name.
     """
     _to_task(Document("task", task_to_dict(task)))
     with written_whole(path) as part:
@@ -130,7 +134,7 @@ def save_task(task: Task, path: str | Path) -> None:
 
 
 def task_to_dict(task: Task) -> dict[str, Any]:
-    """A task as plain data, in the same form as in a file and ready for JSON."""
+    """A task as plain data with the keys of a world file, ready for JSON."""
     world = task.world
     return {
         "schema": 1,
@@ -151,23 +155,27 @@ def task_to_dict(task: Task) -> dict[str, Any]:
 
 
 def task_from_dict(data: Mapping[str, Any], source: str = "task") -> Task:
-    """The task in plain data, as `task_to_dict` gives it; `source` is what errors call it.
+    """The task in plain data, as `task_to_dict` returns it.
+
+    Args:
+        data: mappings, lists, numbers and texts with the keys of a world file
+        source: what error messages call the data
 
     Raises:
-        InputError: something in it is wrong.
+        InputError: something in the data is wrong.
     """
     return _to_task(Document(source, dict(data)))
 
 
 def task_schema() -> dict[str, Any]:
     """The JSON Schema of a world file, for editors."""
-    schema = TaskFile.model_json_schema(by_alias=True)
+    schema = WorldFile.model_json_schema(by_alias=True)
     schema["required"] = [key for key in schema["required"] if key != "name"]
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "antdrive world"}
 
 
 def _to_task(document: Document) -> Task:
-    entry = check(TaskFile, document)
+    entry = check(WorldFile, document)
     xmin, ymin, xmax, ymax = entry.bounds
     if (xmax - xmin) / entry.cell * (ymax - ymin) / entry.cell > MAX_CELLS:
         raise document.error(("cell",), f"{entry.cell:g} m cuts these bounds into more than {MAX_CELLS} cells")
@@ -178,23 +186,15 @@ def _to_task(document: Document) -> Task:
         world = World(entry.name, (xmin, ymin, xmax, ymax), discs, entry.source, movers)
         goal = entry.goal[0], entry.goal[1]
         return Task(world, (x, y, yaw), goal, entry.goal_tolerance, entry.cell, entry.time_limit)
-    except ValueError as error:
-        key, _, problem = str(error).partition(": ")
-        raise document.error(_location(key), problem) from None
+    except FieldError as error:
+        raise document.field_error(error) from None
 
 
 def _to_mover(document: Document, index: int, entry: MoverEntry) -> Mover:
     try:
         return mover_from_dict(entry.model_dump(exclude_unset=True))
-    except ValueError as error:
-        key, _, problem = str(error).partition(": ")
-        raise document.error(("movers", index, *_location(key)), problem) from None
-
-
-def _location(key: str) -> Location:
-    """The way to a value from how errors write it: movers[0].walk.start."""
-    parts = re.findall(r"[^.\[\]]+", key)
-    return tuple(int(part) if part.isdigit() else part for part in parts)
+    except FieldError as error:
+        raise document.field_error(error, "movers", index) from None
 
 
 def _to_yaml(task: Task) -> str:

@@ -1,4 +1,4 @@
-"""Compiled work on maps of cells: what can be reached, and discs that cover cells.
+"""Compiled work on maps of cells: which cells can be reached, and which discs cover the blocked ones.
 
 Lengths are in half cells: the corners, edge middles and centres of cells are then points (i, j) of a lattice of whole
 numbers, cell (r, c) spans 2r..2r+2 by 2c..2c+2, and every distance from such a point to a cell is the root of a whole number.
@@ -18,7 +18,7 @@ DCOL4 = np.array([1, 0, -1, 0], dtype=np.int64)
 
 @kernel
 def flood(free: Array, row: int, col: int, reached: Array) -> None:
-    """Mark the free cells that steps over shared sides lead to."""
+    """Mark in `reached` the free cells that steps over shared sides join to a cell."""
     rows, cols = free.shape
     if not free[row, col] or reached[row, col]:
         return
@@ -40,8 +40,8 @@ def flood(free: Array, row: int, col: int, reached: Array) -> None:
 def squared_distances(free: Array, cap: int, out: Array) -> None:
     """out[i, j] = squared distance from a lattice point to the nearest free cell, at most cap squared.
 
-    From such a point, the nearest point of a cell is one of the lattice's, so whole numbers tell it exactly: along columns
-    first, then along rows.
+    The point of a cell nearest to a lattice point is itself a lattice point, so whole numbers are exact. Distances are
+    found along columns first, then along rows.
     """
     height, width = out.shape
     column = np.full((height, width), cap, dtype=np.int32)
@@ -70,7 +70,10 @@ def squared_distances(free: Array, cap: int, out: Array) -> None:
 
 @kernel
 def span(low: int, centre_i: int, centre_j: int, reach2: float, cols: int) -> tuple[int, int]:
-    """First and last-but-one column of the cells in the row that begins at `low` and lie wholly in the disc."""
+    """The columns of the cells in one row that lie fully in a disc: the first, and the one after the last.
+
+    The row spans `low` to `low` + 2; the disc has the centre (`centre_i`, `centre_j`) and the squared radius `reach2`.
+    """
     far = max(abs(low - centre_i), abs(low + 2 - centre_i))
     rest = reach2 - far * far
     if rest < 0.0:
@@ -83,15 +86,17 @@ def span(low: int, centre_i: int, centre_j: int, reach2: float, cols: int) -> tu
 
 @kernel
 def greedy_cover(needed: Array, distance2: Array, extra: float, chosen: Array) -> int:
-    """Choose discs until each needed cell lies wholly in one; how many they are.
+    """Choose discs until each needed cell lies fully in one of them, and return how many.
 
-    Candidates are centred on lattice points and reach `extra` beyond the nearest free cell. Each time one that holds most of
-    the cells not yet covered is taken (Chvátal, *A greedy heuristic for the set-covering problem*, 1979) and shrunk to
-    those cells. A row of `chosen` is a centre i, j, the squared radius and the centre's squared distance to free cells.
+    Candidates are centred on lattice points and reach `extra` beyond the nearest free cell. In each step the candidate
+    with most of the cells not yet covered is chosen (Chvátal, *A greedy heuristic for the set-covering problem*, 1979)
+    and shrunk to those cells. A row of `chosen` is the centre i, j, the squared radius and the centre's squared
+    distance to free cells.
     """
     rows, cols = needed.shape
     height, width = distance2.shape
-    # before[r, c] = number of needed cells ahead of cell (r, c), row by row: a span of a row is a range of their list
+    # Needed cells are numbered row by row; before[r, c] is the number of those before cell (r, c), so a span of columns
+    # in a row is a range of numbers.
     before = np.zeros((rows, cols + 1), dtype=np.int64)
     count = 0
     for r in range(rows):
@@ -115,7 +120,7 @@ def greedy_cover(needed: Array, distance2: Array, extra: float, chosen: Array) -
                 for r in range(max(0, int((i - reach) / 2)), min(rows, int((i + reach) / 2) + 1)):
                     first, last = span(2 * r, i, j, reach2, cols)
                     gain[i * width + j] += before[r, last] - before[r, first]
-    # Candidates wait in stacks by what they held when last looked at, which only shrinks.
+    # Candidates wait in stacks, one for each number of uncovered cells they held when last counted; it only shrinks.
     best = gain.max() if count else 0
     head, below = np.full(best + 1, -1, dtype=np.int32), np.empty(height * width, dtype=np.int32)
     for candidate in range(height * width - 1, -1, -1):

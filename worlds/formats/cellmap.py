@@ -1,39 +1,48 @@
-"""Maps of square cells, free or blocked, and how they and worlds of discs become one another.
+"""Maps of square cells, free or blocked: how a map becomes a world of discs, and a world a map.
 
-Cells are exact squares; discs are not. A world made from a map therefore errs to one side only: its discs cover the blocked
-cells wholly, never less, and stick out by a stated length. A map made from a world errs the same way: a cell
-is blocked as soon as a disc reaches into it.
+Discs cannot fill squares exactly, so both conversions err to the safe side. A world made from a map has discs that fully
+cover the blocked cells and protrude by a stated length. In a map made from a world, a cell is blocked as soon as a
+disc reaches into it.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.worlds.files.document import input_error
-from antdrive.worlds.world import Bounds, Disc, Floats, Point, Pose, Task, World
+from antdrive.worlds.errors import FieldError, InputError, input_error
+from antdrive.worlds.limits import MAX_CELLS
+from antdrive.worlds.types import Bounds, Floats, Point, Pose
+from antdrive.worlds.world import Disc, Task, World
 
-MAX_CELLS = 25_000_000  # as in worlds.grid, which is not imported here because it loads the compiler
-MAX_COVERED = 4_000_000  # cells of the part of a map that is covered; keeps the work within some 300 MB
-MAX_DISCS = 20_000  # what a world file holds
+MAX_COVERED = 4_000_000  # cells of the part of a map that is covered; keeps the memory below some 300 MB
+MAX_DISCS = 20_000  # as many obstacles as a world file can hold
 
-SLACK = 1e-9  # discs reach this much farther than they must, against rounding; less than this is no overlap [m]
-CORNER = (math.sqrt(2.0) - 1.0) / 2.0  # what the disc around a cell sticks out by, in cells
-CAP = 32  # centres are at most this deep inside blocked cells [half cells]: larger discs hardly save any
+SLACK = 1e-9  # discs reach this much farther than necessary, against rounding; a smaller overlap does not count [m]
+CORNER = (math.sqrt(2.0) - 1.0) / 2.0  # how far the disc around a cell protrudes, in cells
+CAP = 32  # how deep inside blocked cells centres are at most [half cells]; larger discs hardly save any
+TOLERANCE = 0.25  # goal tolerance of a map's task when none is given [m]
 
 Cells = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
 class CellMap:
-    """Square cells that are free or blocked; all that lies beyond them is blocked."""
+    """Square cells that are free or blocked; everything beyond them is blocked.
 
-    free: Cells  # (R, C), the row along +y, read-only
-    resolution: float  # side of a cell [m]
-    origin: Point = (0.0, 0.0)  # lower left corner of cell (0, 0) [m]
+    Attributes:
+        free: which cells are free (R, C), rows along +y, read-only
+        resolution: side of a cell [m]
+        origin: lower left corner of cell (0, 0): x, y [m]
+    """
+
+    free: Cells
+    resolution: float
+    origin: Point = (0.0, 0.0)
 
     @property
     def bounds(self) -> Bounds:
@@ -42,7 +51,12 @@ class CellMap:
         return x, y, x + cols * self.resolution, y + rows * self.resolution
 
     def cell_at(self, x: float, y: float) -> tuple[int, int] | None:
-        """The (row, col) of the cell that holds a point, if any does."""
+        """The (row, col) of the cell that holds a point; None outside the map.
+
+        Args:
+            x: world coordinate [m]
+            y: world coordinate [m]
+        """
         col = math.floor((x - self.origin[0]) / self.resolution)
         row = math.floor((y - self.origin[1]) / self.resolution)
         rows, cols = self.free.shape
@@ -51,18 +65,28 @@ class CellMap:
 
 @dataclass(frozen=True, eq=False)
 class Cover:
-    """Discs that cover all blocked cells that free ground touches."""
+    """Discs that cover all blocked cells next to free ones.
 
-    discs: Floats  # (N, 3): x, y, radius [m]
-    cells: int  # how many cells are covered wholly
-    overhang: float  # how far a disc reaches beyond blocked cells, at most [m]
+    Attributes:
+        discs: (N, 3): x, y, radius [m]
+        cells: how many cells are fully covered
+        overhang: how far a disc reaches beyond blocked cells, at most [m]
+    """
+
+    discs: Floats
+    cells: int
+    overhang: float
 
 
 def cell_map(world: World, resolution: float) -> CellMap:
-    """The cells of `resolution` [m] that no disc and no wall reaches into by more than a nanometre.
+    """The map of a world: a cell is free where no disc and no wall reaches into it by more than a nanometre.
+
+    Args:
+        world: the obstacles and walls; movers do not count
+        resolution: side of a cell [m]
 
     Raises:
-        InputError: the resolution is not positive or cuts the world into absurdly many cells.
+        InputError: the resolution is not positive or cuts the world into too many cells.
     """
     if not (math.isfinite(resolution) and resolution > 0):
         raise input_error("resolution", f"must be greater than 0, got {resolution:g}")
@@ -88,7 +112,7 @@ def cell_map(world: World, resolution: float) -> CellMap:
 
 
 def _window(edges: Floats, centre: float, radius: float) -> tuple[int, int]:
-    """First and last-but-one cell between the edges that a disc may reach."""
+    """The range of cells between the edges that a disc may reach: the first, and the one after the last."""
     last = len(edges) - 1
     first = int(np.searchsorted(edges, centre - radius)) - 1
     stop = int(np.searchsorted(edges, centre + radius)) + 1
@@ -96,14 +120,18 @@ def _window(edges: Floats, centre: float, radius: float) -> tuple[int, int]:
 
 
 def cover(cells: CellMap, overhang: float | None = None) -> Cover:
-    """As few discs as a greedy choice finds that cover each blocked cell with a free one beside it, or at its corner.
+    """A cover of the blocked cells that touch a free one, with as few discs as a greedy choice finds.
 
-    They do not reach farther than `overhang` [m] beyond blocked cells: 0.207 cells by default, which the disc around a single
-    cell needs; more makes for fewer discs. Between them and beyond, no way leads from free cells into others:
-    blocked cells that no free one touches are left out.
+    Free cells stay separated where the map separates them: no way leads between or past the discs. Blocked cells that
+    no free cell touches are left out.
+
+    Args:
+        cells: the map
+        overhang: how far discs may reach beyond blocked cells [m]; by default 0.207 cells, which the disc around a
+            single cell needs. A larger overhang needs fewer discs.
 
     Raises:
-        InputError: an overhang that the disc around a cell exceeds, or too many cells.
+        InputError: the overhang is too small for the disc around a cell, or the map has too many cells.
     """
     from antdrive.worlds.formats import _kernels_cover as kernels
 
@@ -116,9 +144,10 @@ def cover(cells: CellMap, overhang: float | None = None) -> Cover:
         )
     if free.size > MAX_COVERED:
         rows, cols = free.shape
-        raise input_error("map", f"has {rows} x {cols} cells that matter; the limit is {MAX_COVERED}")
+        raise input_error("map", f"has {rows} x {cols} cells that can be reached; the limit is {MAX_COVERED}")
     needed = _beside(free) & ~free
-    # As if free ground lay around the map: a disc would do no harm there, but look as if it did.
+    # The map counts as surrounded by free cells here: discs then do not reach beyond it, where they would do no harm
+    # but look as if they did.
     distance2 = np.empty((2 * free.shape[0] + 5, 2 * free.shape[1] + 5), dtype=np.int32)
     kernels.squared_distances(np.pad(free, 1, constant_values=True), CAP, distance2)
     distance2 = np.ascontiguousarray(distance2[2:-2, 2:-2])
@@ -132,7 +161,7 @@ def cover(cells: CellMap, overhang: float | None = None) -> Cover:
 
 
 def _beside(cells: Cells) -> Cells:
-    """The cells that share a side or a corner with one of these, and these."""
+    """The given cells and all that share a side or a corner with one of them."""
     rows, cols = cells.shape
     padded, near = np.pad(cells, 1), np.zeros_like(cells)
     for r, c in np.ndindex(3, 3):
@@ -148,21 +177,29 @@ def map_task(
     name: str,
     source: str = "a map of cells",
     overhang: float | None = None,
-    goal_tolerance: float = 0.25,
+    goal_tolerance: float = TOLERANCE,
     cell: float | None = None,
 ) -> Task:
-    """A map as a world of discs that can be planned and driven, between a start and a goal on free cells.
+    """A map as a task: a world of discs, which can be planned and driven, between two points on free cells.
 
-    ColonyGraph that free cells do not join to the start or the goal, side by side, counts as blocked, and the bounds, which
-    are solid and straight, are drawn in to the free cells that remain. `cover` tells how the discs stand to the others;
-    the world's source does, too. Planners use the map's own cells unless `cell` [m] is given.
+    Free cells that steps over shared sides do not join to the start or the goal count as blocked. The bounds, which are
+    solid and straight, are drawn in to the free cells that remain. `cover` chooses the discs; the world's source says
+    how many there are and how far they protrude.
+
+    Args:
+        cells: the map
+        start: the robot's first pose [m, m, rad]
+        goal: [m]
+        name: the world's name
+        source: where the map comes from
+        overhang: how far discs may reach beyond blocked cells [m]; see `cover`
+        goal_tolerance: how close to the goal the robot must stop [m]
+        cell: the task's grid resolution [m]; by default the map's own
 
     Raises:
-        InputError: the start or the goal is missing, not on free ground or inside an overhang; the map is
-            too large or needs too many discs.
+        InputError: the start or the goal is missing, not on a free cell or inside a disc; or the map is too large or
+            needs too many discs.
     """
-    from antdrive.worlds.formats import _kernels_cover as kernels
-
     if start is None or goal is None:
         missing = " and ".join(key for key, end in (("start", start), ("goal", goal)) if end is None)
         xmin, ymin, xmax, ymax = cells.bounds
@@ -170,12 +207,7 @@ def map_task(
             missing,
             f"maps have none; give it on free ground, within x {xmin:g} to {xmax:g} and y {ymin:g} to {ymax:g} m",
         )
-    here, there = (_free_cell(cells, key, *end[:2]) for key, end in (("start", start), ("goal", goal)))
-    reached = np.zeros(cells.free.shape, dtype=np.bool_)
-    kernels.flood(cells.free, *here, reached)
-    joined = bool(reached[there])
-    kernels.flood(cells.free, *there, reached)
-    used = _cropped(CellMap(reached, cells.resolution, cells.origin))
+    used, joined = _reachable(cells, start, goal)
     found = cover(used, overhang)
     if len(found.discs) > MAX_DISCS:
         more = f"; a larger overhang than {found.overhang:.3g} m needs fewer" if overhang is None else ""
@@ -183,15 +215,53 @@ def map_task(
     rows, cols = cells.free.shape
     source = (
         f"{source}, {rows} x {cols} cells of {cells.resolution:g} m; the {found.cells} blocked cells next to free "
-        f"ground are wholly covered by {len(found.discs)} cylinders that reach at most {found.overhang:.4g} m "
+        f"cells are fully covered by {len(found.discs)} cylinders that reach at most {found.overhang:.4g} m "
         "beyond blocked cells" + ("" if joined else "; start and goal are not joined")
     )
     try:
         world = World(name, used.bounds, tuple(Disc(*map(float, disc)) for disc in found.discs), source)
         return Task(world, start, goal, goal_tolerance, cells.resolution if cell is None else cell)
-    except ValueError as error:
-        hint = f"; it is within {found.overhang:.4g} m of a blocked cell" if "inside" in str(error) else ""
-        raise input_error(f"{error}{hint}") from None
+    except FieldError as error:
+        hint = f"; it is within {found.overhang:.4g} m of a blocked cell" if "inside" in error.problem else ""
+        raise input_error(error.key, f"{error.problem}{hint}") from None
+
+
+def file_task(
+    file: Path,
+    cells: CellMap,
+    start: Pose | None,
+    goal: Point | None,
+    *,
+    source: str,
+    overhang: float | None,
+    cell: float | None,
+    goal_tolerance: float | None,
+) -> Task:
+    """`map_task` for a map from a file, which gives the world's name and is named in errors.
+
+    Raises:
+        InputError: as for `map_task`.
+    """
+    name = "".join(filter(str.isprintable, file.stem))[:200] or "map"
+    tolerance = TOLERANCE if goal_tolerance is None else goal_tolerance
+    try:
+        return map_task(
+            cells, start, goal, name=name, source=source, overhang=overhang, cell=cell, goal_tolerance=tolerance
+        )
+    except InputError as error:
+        raise input_error(str(file), str(error)) from None
+
+
+def _reachable(cells: CellMap, start: Pose, goal: Point) -> tuple[CellMap, bool]:
+    """The part of a map that is joined to the start or the goal, and whether they are joined to each other."""
+    from antdrive.worlds.formats import _kernels_cover as kernels
+
+    here, there = _free_cell(cells, "start", start[0], start[1]), _free_cell(cells, "goal", goal[0], goal[1])
+    reached = np.zeros(cells.free.shape, dtype=np.bool_)
+    kernels.flood(cells.free, *here, reached)
+    joined = bool(reached[there])
+    kernels.flood(cells.free, *there, reached)
+    return _cropped(CellMap(reached, cells.resolution, cells.origin)), joined
 
 
 def _free_cell(cells: CellMap, key: str, x: float, y: float) -> tuple[int, int]:
@@ -207,7 +277,7 @@ def _free_cell(cells: CellMap, key: str, x: float, y: float) -> tuple[int, int]:
 
 
 def _cropped(cells: CellMap) -> CellMap:
-    """The smallest rectangle of cells that holds all free ones: beyond it all is blocked anyway."""
+    """The smallest rectangle of cells with all the free ones; everything beyond it is blocked anyway."""
     kept = np.argwhere(cells.free)
     (low, left), (high, right) = kept.min(axis=0), kept.max(axis=0) + 1
     x, y = cells.origin

@@ -1,15 +1,16 @@
 """Maps of ROS's map_server (wiki.ros.org/map_server, Nav2's nav2_map_server): a YAML file and the image it names.
 
-A pixel of shade s, from 0 black to 1 white, is occupied with p = 1 − s, or p = s where `negate` is set. Its cell is free when
-p < free_thresh, occupied when p > occupied_thresh and unknown in between; the image's last row is the lowest. The modes differ
-in little that matters here: `scale` takes pixels that are not opaque for unknown, `raw` takes the shades 0..100
-(of 255) for p in percent, never negated, and those above for unknown.
+A pixel of shade s, from 0 (black) to 1 (white), is occupied with probability p = 1 - s, or p = s where `negate` is set.
+Its cell is free when p < free_thresh, occupied when p > occupied_thresh, and unknown in between; the image's last row is
+the lowest. The other modes differ little: in `scale`, pixels that are not opaque are unknown; in `raw`, the shades 0..100
+(of 255) are p in percent, never negated, and higher shades are unknown.
 """
 
 from __future__ import annotations
 
 import os
 import warnings
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -17,20 +18,26 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 
-from antdrive.worlds.files.checks import check
+from antdrive.worlds.errors import input_error
+from antdrive.worlds.files.atomic import written_whole
+from antdrive.worlds.files.checks import check, yaml_number
 from antdrive.worlds.files.document import read_document
 from antdrive.worlds.files.world_file import Coordinate, Size
-from antdrive.worlds.formats.cellmap import MAX_CELLS, CellMap, Cells
-from antdrive.worlds.world import Floats
+from antdrive.worlds.formats.cellmap import CellMap, Cells, cell_map, file_task
+from antdrive.worlds.formats.checks import require_no_movers
+from antdrive.worlds.limits import MAX_CELLS
+from antdrive.worlds.types import Floats, Point, Pose
+from antdrive.worlds.world import Task
 
-FORMATS = ("PPM", "PNG", "BMP")  # Pillow calls all of PBM, PGM and PPM so
-MODES = {"1": "L", "P": "RGB"}  # what black and white and palettes become
+FORMATS = ("PPM", "PNG", "BMP")  # Pillow's "PPM" includes PBM and PGM
+MODES = {"1": "L", "P": "RGB"}  # black-and-white images become grey, palettes become colours
+FREE, OCCUPIED = 254, 0  # the shades that map_saver writes
 
 Share = Annotated[float, Field(ge=0, le=1)]
 
 
-class Ends(BaseModel):
-    """What `export_map_server` adds for the way back."""
+class KeptEnds(BaseModel):
+    """Start, goal and tolerance, which `export_map_server` adds to a map for `import_map_server`."""
 
     model_config = ConfigDict(strict=True, extra="ignore", allow_inf_nan=False, frozen=True)
 
@@ -40,7 +47,7 @@ class Ends(BaseModel):
 
 
 class MapFile(BaseModel):
-    """The YAML file of a map. Keys of other tools are passed over, as map_server does."""
+    """The YAML file of a map. Keys of other tools are ignored, as by map_server."""
 
     model_config = ConfigDict(strict=True, extra="ignore", allow_inf_nan=False, frozen=True)
 
@@ -50,10 +57,12 @@ class MapFile(BaseModel):
         min_length=3, max_length=3, description="write [x, y, yaw] of the lower left corner in metres and radians"
     )
     negate: bool = Field(description="write 0, or 1 where black is free")
-    occupied_thresh: Share = Field(description="cells occupied with more than this probability are; 0.65 is usual")
-    free_thresh: Share = Field(description="cells occupied with less than this probability are free; 0.196 is usual")
+    occupied_thresh: Share = Field(
+        description="cells that are occupied with a higher probability are occupied; 0.65 is usual"
+    )
+    free_thresh: Share = Field(description="cells that are occupied with a lower probability are free; 0.196 is usual")
     mode: Literal["trinary", "scale", "raw"] = "trinary"
-    antdrive: Ends | None = None
+    antdrive: KeptEnds | None = None
 
     @field_validator("negate", mode="before")
     @classmethod
@@ -78,22 +87,71 @@ class MapFile(BaseModel):
 
 @dataclass(frozen=True, eq=False)
 class ServedMap:
-    """A map as map_server would serve it."""
+    """A map as map_server would serve it.
 
-    cells: CellMap  # free as far as known to be so, or not known not to be
-    unknown: int  # how many cells are neither free nor occupied
-    ends: Ends | None  # start and goal, where antdrive wrote the map
+    Attributes:
+        cells: the free cells; unknown cells are free only where that was asked for
+        unknown: how many cells are neither free nor occupied
+        ends: start and goal, where antdrive wrote the map
+    """
+
+    cells: CellMap
+    unknown: int
+    ends: KeptEnds | None
+
+
+def import_map_server(
+    path: str | os.PathLike[str],
+    *,
+    start: Pose | None = None,
+    goal: Point | None = None,
+    unknown_is_free: bool = False,
+    overhang: float | None = None,
+    cell: float | None = None,
+    goal_tolerance: float | None = None,
+) -> Task:
+    """A map of map_server as a world of discs; see `map_task`.
+
+    Args:
+        path: the YAML file, which names the image
+        start: the robot's first pose [m, m, rad]; needed unless `export_map_server` wrote the map
+        goal: [m]; needed unless `export_map_server` wrote the map
+        unknown_is_free: whether unknown cells are free instead of blocked
+        overhang: how far discs may reach beyond blocked cells [m]; see `map_task`
+        cell: the task's grid resolution [m]; by default that of the map
+        goal_tolerance: how close to the goal the robot must stop [m]; by default 0.25
+
+    Raises:
+        InputError: a file is wrong, or `map_task` refuses the map.
+    """
+    file = Path(path)
+    served = read_map(file, unknown_is_free=unknown_is_free)
+    ends = served.ends
+    if ends is not None:
+        start = start or (ends.start[0], ends.start[1], ends.start[2])
+        goal = goal or (ends.goal[0], ends.goal[1])
+        goal_tolerance = goal_tolerance or ends.goal_tolerance
+    source = f"the map_server map {file.name}"
+    if served.unknown:
+        source += f" with {served.unknown} unknown cells taken for {'free' if unknown_is_free else 'blocked'}"
+    return file_task(
+        file, served.cells, start, goal, source=source, overhang=overhang, cell=cell, goal_tolerance=goal_tolerance
+    )
 
 
 def read_map(path: str | os.PathLike[str], *, unknown_is_free: bool = False) -> ServedMap:
-    """The map described by a YAML file.
+    """The map that a YAML file describes.
+
+    Args:
+        path: the YAML file
+        unknown_is_free: whether unknown cells are free instead of blocked
 
     Raises:
         InputError: a file cannot be read or is wrong.
     """
     document = read_document(path)
     if isinstance(document.data, dict) and "image" not in document.data:
-        raise document.error((), "names no image, so it is no map of map_server")
+        raise document.error((), "names no image, so it is not a map of map_server")
     entry = check(MapFile, document)
     try:
         level, opaque = _levels(Path(path).parent / entry.image, average_alpha=entry.mode == "trinary")
@@ -109,12 +167,12 @@ def read_map(path: str | os.PathLike[str], *, unknown_is_free: bool = False) -> 
 
 
 def _levels(path: Path, average_alpha: bool) -> tuple[Floats, Cells]:
-    """How bright the pixels are, 0..255, in rows from the top, and which are opaque; both (R, C).
+    """The brightness of the pixels, 0..255, and which pixels are opaque; both (R, C), the image's top row first.
 
-    Channels are averaged; map_server's trinary mode counts the alpha channel among them.
+    Brightness is the mean of the channels; in its trinary mode map_server counts the alpha channel among them.
 
     Raises:
-        ValueError: the image cannot be read; the message tells why.
+        ValueError: the image cannot be read; the message says why.
     """
     from PIL import Image, UnidentifiedImageError
 
@@ -130,7 +188,7 @@ def _levels(path: Path, average_alpha: bool) -> tuple[Floats, Cells]:
                     raise ValueError(f"Pillow reads it as {image.mode}; save it in grey or in colours")
                 pixels = np.asarray(image, dtype=np.float64) / (257 if image.mode.startswith("I") else 1)
     except UnidentifiedImageError:
-        raise ValueError(f"{path} is no PGM, PNG or BMP image") from None
+        raise ValueError(f"{path} is not a PGM, PNG or BMP image") from None
     except FileNotFoundError:
         raise ValueError(f"{path}: no such file") from None
     except (OSError, ValueError, SyntaxError, OverflowError, Image.DecompressionBombError) as error:
@@ -140,3 +198,53 @@ def _levels(path: Path, average_alpha: bool) -> tuple[Floats, Cells]:
     if image.mode not in ("LA", "RGBA"):
         return layers.mean(axis=2), np.ones((height, width), dtype=np.bool_)
     return (layers if average_alpha else layers[..., :-1]).mean(axis=2), layers[..., -1] == 255
+
+
+def export_map_server(task: Task, path: str | Path, *, resolution: float | None = None) -> Path:
+    """Write a world as a map of map_server: a YAML file, and a PGM image of the same name beside it.
+
+    A cell is occupied when a disc or a wall reaches into it by more than a nanometre; no cell is unknown. Heights are
+    lost. Start, goal and tolerance are kept under the key `antdrive`, which map_server ignores and
+    `import_map_server` reads.
+
+    Args:
+        task: the world to write
+        path: the YAML file
+        resolution: side of a cell [m]; by default the task's own
+
+    Returns:
+        The image's path.
+
+    Raises:
+        InputError: a file cannot be written, the world has movers, or the resolution is not usable.
+    """
+    require_no_movers(task, path)
+    target = Path(path)
+    cells = cell_map(task.world, task.cell if resolution is None else resolution)
+    rows, cols = cells.free.shape
+    picture = np.where(cells.free[::-1], FREE, OCCUPIED).astype(np.uint8)
+    image = target.with_suffix(".pgm")
+    name = image.name.replace("'", "''")
+    if not name.isprintable():
+        raise input_error(str(target), "a map's name must be printable")
+    text = (
+        f"image: '{name}'\n"
+        f"resolution: {yaml_number(cells.resolution)}\n"
+        f"origin: {_yaml_list((*cells.origin, 0.0))}\n"
+        "negate: 0\n"
+        "occupied_thresh: 0.65\n"
+        "free_thresh: 0.196\n"
+        "antdrive:\n"
+        f"  start: {_yaml_list(task.start)}\n"
+        f"  goal: {_yaml_list(task.goal)}\n"
+        f"  goal_tolerance: {yaml_number(task.goal_tolerance)}\n"
+    )
+    with written_whole(image) as part:
+        part.write_bytes(b"P5\n%d %d\n255\n" % (cols, rows) + picture.tobytes())
+    with written_whole(target) as part:
+        part.write_text(text, encoding="utf-8", newline="\n")
+    return image
+
+
+def _yaml_list(values: Iterable[float]) -> str:
+    return f"[{', '.join(map(yaml_number, values))}]"

@@ -1,195 +1,247 @@
-"""Gazebo SDF read as far as upright cylinders go: XML made safe, poses composed, models sorted out."""
+"""Gazebo worlds (SDF, `.sdf` and `.world`): static upright cylinders, in and out."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
-from xml.parsers import expat
+from xml.sax.saxutils import quoteattr
 
-import numpy as np
+from antdrive.worlds.errors import FieldError, input_error
+from antdrive.worlds.files.atomic import written_whole
+from antdrive.worlds.formats.checks import require_no_movers
+from antdrive.worlds.formats.sdf_models import Models, read_models
+from antdrive.worlds.formats.xml import parse_xml
+from antdrive.worlds.types import Bounds, Point, Pose
+from antdrive.worlds.world import Disc, Task, World
 
-from antdrive.worlds.files.document import input_error
-from antdrive.worlds.world import Disc, Floats
+MARGIN = 1.0  # room left around the cylinders when no bounds are given [m]
+CELL = 0.25  # grid resolution of a task when none is given [m]
+TOLERANCE = 0.25  # goal tolerance when none is given [m]
+WALL_THICKNESS, WALL_HEIGHT = 0.2, 1.0  # of an exported world's bounds [m]
 
-#: What an exported world tells beyond SDF, in an element of our own as SDF allows, and its walls, which `bounds` brings back.
-TASK, NAMESPACE, WALLS = "antdrive:task", "urn:antdrive:task:1", "antdrive_walls"
-
-MAX_BYTES = 50_000_000  # BARN's worlds have 0.7 MB
-MAX_DEPTH = 100
-UPRIGHT = 1e-3  # how far a cylinder's axis may lean [rad]
-
-
-class Unsupported(Exception):
-    """What keeps a model from becoming cylinders."""
-
-
-@dataclass
-class Found:
-    """What a world file holds."""
-
-    discs: list[Disc] = field(default_factory=list)
-    unsupported: list[str] = field(default_factory=list)  # "name (reason)"
+#: An exported world has an element of our own, as SDF allows, with all of the task that SDF cannot hold.
+TASK_TAG, NAMESPACE = "antdrive:task", "urn:antdrive:task:1"
+#: The model of an exported world's walls. The import ignores it, as the bounds are in the task element.
+WALLS = "antdrive_walls"
 
 
-def parse_xml(path: Path) -> ET.Element:
-    """The root element of an XML file that declares no types and no entities.
+def import_sdf(
+    path: str | os.PathLike[str],
+    *,
+    start: Pose | None = None,
+    goal: Point | None = None,
+    bounds: Bounds | None = None,
+    cell: float | None = None,
+    goal_tolerance: float | None = None,
+    skip_unsupported: bool = False,
+) -> Task:
+    """The upright cylinders of a Gazebo world as a task.
+
+    Poses of models, links and collisions are composed; those in <state> replace the models' own, as in Gazebo.
+    A cylinder's height is that of its top above z = 0. Ground planes, models without collision geometry and
+    everything below the floor are ignored. A world that `export_sdf` wrote brings its own values for everything
+    that is left out here.
+
+    Args:
+        path: the SDF file
+        start: the robot's first pose [m, m, rad]; by default at the lower left, towards the goal
+        goal: [m]; by default at the upper right
+        bounds: the walls' inner faces [m]; by default with 1 m of room around the cylinders and the given ends
+        cell: the task's grid resolution [m]; by default 0.25
+        goal_tolerance: how close to the goal the robot must stop [m]; by default 0.25
+        skip_unsupported: leave out moving and included models and collision shapes other than upright cylinders,
+            instead of refusing the file
 
     Raises:
-        InputError: the file cannot be read, is no XML, or is not that harmless.
+        InputError: the file cannot be read, or a model in it is not supported.
     """
+    file = Path(path)
+    world = _world_element(file)
+    kept = _KeptTask.take(file, world)
+    models = read_models(world)
+    if models.unsupported and not skip_unsupported:
+        raise input_error(str(file), _about_unsupported(models))
+    start = start or kept.numbers("start", 3)
+    goal = goal or kept.numbers("goal", 2)
+    bounds = bounds or kept.numbers("bounds", 4)
+    if bounds is None:
+        if not models.discs:
+            raise input_error(str(file), "holds no upright cylinder; give the bounds")
+        bounds = _bounds_around(models.discs, start, goal)
+    if goal is None:
+        goal = bounds[2] - MARGIN / 2, bounds[3] - MARGIN / 2
+    if start is None:
+        x, y = bounds[0] + MARGIN / 2, bounds[1] + MARGIN / 2
+        start = x, y, math.atan2(goal[1] - y, goal[0] - x)
     try:
-        with path.open("rb") as stream:
-            content = stream.read(MAX_BYTES + 1)
-    except (OSError, ValueError) as error:
-        raise input_error(str(path), f"cannot be read: {getattr(error, 'strerror', None) or error}") from None
-    if len(content) > MAX_BYTES:
-        raise input_error(str(path), f"is too large; the limit is {MAX_BYTES // 1_000_000} MB")
-    parser, builder, depth = expat.ParserCreate(), ET.TreeBuilder(), 0
-
-    def start(tag: str, attributes: dict[str, str]) -> None:
-        nonlocal depth
-        depth += 1
-        if depth > MAX_DEPTH:
-            raise input_error(f"{path}:{parser.CurrentLineNumber}", f"nested deeper than {MAX_DEPTH} levels")
-        builder.start(tag, attributes)
-
-    def end(tag: str) -> None:
-        nonlocal depth
-        depth -= 1
-        builder.end(tag)
-
-    def refuse(*_: Any) -> None:
-        # Entities can unfold to gigabytes or read other files; no world needs them.
-        place = f"{path}:{parser.CurrentLineNumber}"
-        raise input_error(place, "declares a document type or entities; remove the declaration")
-
-    parser.StartElementHandler, parser.EndElementHandler = start, end
-    parser.CharacterDataHandler = builder.data
-    parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = refuse
-    try:
-        parser.Parse(content, True)
-    except expat.ExpatError as error:
-        raise input_error(f"{path}:{error.lineno}", f"not XML: {expat.ErrorString(error.code)}") from None
-    except (LookupError, ValueError) as error:
-        if isinstance(error, expat.error) or "encoding" in str(error):
-            raise input_error(str(path), f"not XML: {error}") from None
-        raise
-    return builder.close()
+        return Task(
+            World(kept.text("name", file.stem), bounds, tuple(models.discs), kept.source),
+            start,
+            goal,
+            kept.number("goal_tolerance", TOLERANCE) if goal_tolerance is None else goal_tolerance,
+            kept.number("cell", CELL) if cell is None else cell,
+            kept.number("time_limit", None),
+        )
+    except FieldError as error:
+        raise input_error(str(file), str(error)) from None
 
 
-def read_models(world: ET.Element) -> Found:
-    """The upright cylinders of a <world>, and the models that are something else.
+def _world_element(file: Path) -> ET.Element:
+    root = parse_xml(file)
+    world = root.find("world") if root.tag == "sdf" else None
+    if world is None:
+        raise input_error(str(file), f"must be an <sdf> with a <world> in it, got <{root.tag}>")
+    return world
 
-    ColonyGraph planes and models without collision geometry are passed over. Where the world has a <state>,
-    Gazebo starts from the poses in it, so they win: a model's and a link's pose there are both in the
-    world's frame, and its <scale> stretches the cylinders.
-    """
-    found = Found()
-    states = {s.get("name", ""): s for s in world.findall("state/model")}
-    for model in world.findall("model"):
-        name = model.get("name", "without a name")
+
+@dataclass(frozen=True)
+class _KeptTask:
+    """What an exported world keeps of its task; empty for any other world."""
+
+    file: Path
+    values: Mapping[str, str]
+
+    @classmethod
+    def take(cls, file: Path, world: ET.Element) -> _KeptTask:
+        """The kept values of a <world>, from which the exported walls are removed."""
+        element = next((e for e in world if e.tag == TASK_TAG), None)
+        if element is None:
+            return cls(file, {})
+        for model in [m for m in world.findall("model") if m.get("name") == WALLS]:
+            world.remove(model)
+        return cls(file, dict(element.attrib))
+
+    @property
+    def source(self) -> str | None:
+        return self.values.get("source") if self.values else f"imported from {self.file.name}"
+
+    def text(self, key: str, default: str) -> str:
+        return self.values.get(key, default)
+
+    def numbers(self, key: str, count: int) -> Any:
+        """The numbers under a key as a tuple; None where there is no such key."""
+        if key not in self.values:
+            return None
         try:
-            found.discs.extend(_cylinders(model, np.eye(4), False, states.get(name)))
-        except Unsupported as reason:
-            found.unsupported.append(f"{name} ({reason})")
-    for include in world.iter("include"):
-        uri = (include.findtext("uri") or "").strip()
-        if uri.rpartition("/")[2] not in ("sun", "ground_plane"):
-            found.unsupported.append(f"{uri or 'include'} (included from another file)")
-    for tag in ("actor", "population", "state/insertions/model"):
-        found.unsupported.extend(f"{e.get('name', tag)} ({tag})" for e in world.findall(tag))
-    return found
+            numbers = tuple(float(word) for word in self.values[key].split())
+        except ValueError:
+            numbers = ()
+        if len(numbers) != count:
+            problem = f"must be {count} numbers, got {self.values[key][:40]!r}"
+            raise input_error(str(self.file), TASK_TAG, key, problem)
+        return numbers
+
+    def number(self, key: str, default: Any) -> Any:
+        """The one number under a key."""
+        (number,) = self.numbers(key, 1) or (default,)
+        return number
 
 
-def read_task_element(world: ET.Element) -> dict[str, str] | None:
-    """The attributes of the element that an exported <world> has for the way back; its walls are taken out."""
-    element = next((e for e in world if e.tag == TASK), None)
-    if element is None:
-        return None
-    for model in [m for m in world.findall("model") if m.get("name") == WALLS]:
-        world.remove(model)
-    return dict(element.attrib)
+def _about_unsupported(models: Models) -> str:
+    more = len(models.unsupported) - 5
+    names = ", ".join(models.unsupported[:5]) + (f" and {more} more" if more > 0 else "")
+    return f"only static models of upright cylinders can be imported; leave out or skip {names}"
 
 
-def _cylinders(model: ET.Element, frame: Floats, static: bool, state: ET.Element | None) -> list[Disc]:
-    static = static or (model.findtext("static") or "").strip().lower() in ("1", "true")
-    if model.get("placement_frame"):
-        raise Unsupported("has a placement_frame")
-    pose = frame @ _pose(model)
-    scale, links = np.ones(3), {}
-    if state is not None:
-        pose = _pose(state) if state.find("pose") is not None else pose
-        scale = _numbers(state.findtext("scale") or "1 1 1", 3, "scale")
-        links = {link.get("name"): _pose(link) for link in state.findall("link") if link.find("pose") is not None}
-    discs: list[Disc] = []
-    for link in model.findall("link"):
-        link_pose = links.get(link.get("name"), pose @ _pose(link))
-        for collision in link.findall("collision"):
-            discs.extend(_shape(collision, link_pose @ _pose(collision), scale))
-    if discs and not static:
-        raise Unsupported("not static")
-    for inner in model.findall("model"):
-        discs.extend(_cylinders(inner, pose, static, None))
-    return discs
-
-
-def _shape(collision: ET.Element, pose: Floats, scale: Floats) -> Iterator[Disc]:
-    """The cylinder of a collision, or nothing for a floor and for what lies wholly below it."""
-    shape = next(iter(collision.find("geometry") or ()), None)
-    if shape is None or shape.tag == "empty":
-        return
-    if shape.tag == "plane":
-        normal = pose[:3, :3] @ _numbers(shape.findtext("normal") or "0 0 1", 3, "normal")
-        if math.hypot(normal[0], normal[1]) > UPRIGHT * abs(normal[2]):
-            raise Unsupported("a plane that is no floor")
-        return
-    if shape.tag != "cylinder":
-        raise Unsupported(shape.tag)
-    if math.hypot(pose[0, 2], pose[1, 2]) > UPRIGHT:
-        raise Unsupported("a tilted cylinder")
-    radius, length = (float(_numbers(shape.findtext(tag) or "", 1, tag)[0]) for tag in ("radius", "length"))
-    if abs(scale[0] - scale[1]) > 1e-9 or not (scale > 0).all():
-        raise Unsupported("scaled to something that is no cylinder")
-    radius, length = radius * float(scale[0]), length * float(scale[2])
-    if not (radius > 0 and length > 0):
-        raise Unsupported(f"a cylinder of radius {radius:g} and length {length:g}")
-    x, y, z = (float(v) for v in pose[:3, 3])
-    top = z + length / 2
-    if top > 0:
-        yield Disc(x, y, radius, top)
-
-
-def _pose(element: ET.Element) -> Floats:
-    """The (4, 4) transform of an element's <pose>: x y z [m] roll pitch yaw [rad], about the fixed axes."""
-    pose = element.find("pose")
-    if pose is None or not (pose.text or "").strip():
-        return np.eye(4)
-    for key in ("frame", "relative_to", "rotation_format"):
-        if pose.get(key) and (key, pose.get(key)) != ("rotation_format", "euler_rpy"):
-            raise Unsupported(f"a pose with {key}={pose.get(key)!r}")
-    x, y, z, *angles = _numbers(pose.text or "", 6, "pose")
-    if (pose.get("degrees") or "").lower() in ("1", "true"):
-        angles = [math.radians(a) for a in angles]
-    (sr, cr), (sp, cp), (sy, cy) = ((math.sin(a), math.cos(a)) for a in angles)
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr, x],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr, y],
-            [-sp, cp * sr, cp * cr, z],
-            [0.0, 0.0, 0.0, 1.0],
-        ]
+def _bounds_around(discs: list[Disc], start: Pose | None, goal: Point | None) -> Bounds:
+    """Bounds with `MARGIN` around the cylinders and the given ends."""
+    spots = [(d.x, d.y, d.radius) for d in discs]
+    spots += [(end[0], end[1], 0.0) for end in (start, goal) if end is not None]
+    return (
+        min(x - r for x, _, r in spots) - MARGIN,
+        min(y - r for _, y, r in spots) - MARGIN,
+        max(x + r for x, _, r in spots) + MARGIN,
+        max(y + r for _, y, r in spots) + MARGIN,
     )
 
 
-def _numbers(text: str, count: int, key: str) -> Floats:
-    try:
-        values = np.array([float(word) for word in text.split()])
-    except ValueError:
-        values = np.empty(0)
-    if len(values) != count or not np.isfinite(values).all():
-        raise Unsupported(f"{key} must be {count} numbers, got {text.strip()[:40]!r}")
-    return values
+def export_sdf(task: Task, path: str | Path) -> None:
+    """Write a world for Gazebo (SDF 1.6): static cylinders, the bounds as four walls, a floor and a sun.
+
+    Name, bounds, start and goal are kept in an element `antdrive:task`, which Gazebo ignores. `import_sdf` reads it and
+    returns an equal task, every number to the last bit.
+
+    Raises:
+        InputError: the file cannot be written, or the world has movers.
+    """
+    require_no_movers(task, path)
+    lines = [
+        '<?xml version="1.0" encoding="UTF-8"?>',
+        '<sdf version="1.6">',
+        f"<world name={quoteattr(_xml_text(task.world.name))}>",
+        _task_element(task),
+        '<light name="sun" type="directional"><cast_shadows>true</cast_shadows><pose>0 0 10 0 0 0</pose>'
+        "<direction>-0.5 0.1 -0.9</direction></light>",
+        _model("ground_plane", "0 0 0", ["<plane><normal>0 0 1</normal><size>1000 1000</size></plane>"]),
+        _model(WALLS, "0 0 0", *_walls(task)),
+        *(_cylinder(i, disc) for i, disc in enumerate(task.world.obstacles)),
+        "</world>",
+        "</sdf>",
+    ]
+    with written_whole(path) as part:
+        part.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+
+
+def _task_element(task: Task) -> str:
+    values = {
+        "name": task.world.name,
+        "bounds": _numbers(task.world.bounds),
+        "start": _numbers(task.start),
+        "goal": _numbers(task.goal),
+        "goal_tolerance": repr(float(task.goal_tolerance)),
+        "cell": repr(float(task.cell)),
+    }
+    if task.time_limit is not None:
+        values["time_limit"] = repr(float(task.time_limit))
+    if task.world.source is not None:
+        values["source"] = task.world.source
+    attributes = " ".join(f"{key}={quoteattr(_xml_text(value))}" for key, value in values.items())
+    return f"<{TASK_TAG} xmlns:antdrive={quoteattr(NAMESPACE)} {attributes}/>"
+
+
+def _model(name: str, pose: str, *parts: Sequence[str]) -> str:
+    """A static model; each part is a shape and, where it differs from the model's, its pose."""
+    bodies = []
+    for n, (shape, *place) in enumerate(parts):
+        inside = "".join(f"<pose>{p}</pose>" for p in place) + f"<geometry>{shape}</geometry>"
+        bodies.append(f'<collision name="c{n}">{inside}</collision><visual name="v{n}">{inside}</visual>')
+    return (
+        f'<model name="{name}"><static>true</static><pose>{pose} 0 0 0</pose>'
+        f'<link name="link">{"".join(bodies)}</link></model>'
+    )
+
+
+def _cylinder(number: int, disc: Disc) -> str:
+    x, y, radius, height = (float(v) for v in (disc.x, disc.y, disc.radius, disc.height))
+    shape = f"<cylinder><radius>{radius!r}</radius><length>{height!r}</length></cylinder>"
+    return _model(f"obstacle_{number}", f"{x!r} {y!r} {height / 2!r}", [shape])
+
+
+def _walls(task: Task) -> Iterable[tuple[str, str]]:
+    """Shape and pose of each of the four walls."""
+    xmin, ymin, xmax, ymax = (float(v) for v in task.world.bounds)
+    thick, high = WALL_THICKNESS, WALL_HEIGHT
+    x, y, wide, deep = (xmin + xmax) / 2, (ymin + ymax) / 2, xmax - xmin + 2 * thick, ymax - ymin
+    for size, spot in (
+        ((thick, deep, high), (xmin - thick / 2, y)),
+        ((thick, deep, high), (xmax + thick / 2, y)),
+        ((wide, thick, high), (x, ymin - thick / 2)),
+        ((wide, thick, high), (x, ymax + thick / 2)),
+    ):
+        yield f"<box><size>{_numbers(size)}</size></box>", f"{_numbers((*spot, high / 2))} 0 0 0"
+
+
+def _numbers(values: Iterable[float]) -> str:
+    return " ".join(repr(float(value)) for value in values)
+
+
+def _xml_text(text: str) -> str:
+    """The text with spaces for the characters that XML cannot hold."""
+    return "".join(
+        c if c in "\t\r\n" or " " <= c < "\ud800" or "\ue000" <= c < "\ufffe" or c > "\uffff" else " " for c in text
+    )

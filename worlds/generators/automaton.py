@@ -1,4 +1,4 @@
-"""The field of a BARN world: a cellular automaton, and the cylinders that stand for it."""
+"""The field of a BARN world: filled cells from a cellular automaton, and a cylinder for each of them."""
 
 from __future__ import annotations
 
@@ -8,19 +8,25 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.worlds.formats.importers import BARN_BOUNDS, BARN_CELL
+from antdrive.worlds.formats.barn import BARN_BOUNDS, BARN_CELL
 from antdrive.worlds.grid import DIRECTIONS
 from antdrive.worlds.world import Disc
 
 Picture: TypeAlias = npt.NDArray[np.bool_]  # (rows, columns), True where filled
 
 SIDE = 30  # rows and columns of the automaton
-RUNWAY = 34  # rows before the field, the first of them a wall
-HEIGHT = 0.5  # of a cylinder above the floor [m]
+RUNWAY = 34  # rows before the field; the first row is a wall
+HEIGHT = 0.5  # of a cylinder [m]
 
 
 def grow_field(rng: np.random.Generator, fill: float, rounds: int) -> Picture:
-    """The field after smoothing, (30, 30), rows along the way from start to goal."""
+    """A random field after smoothing, (30, 30), rows in the direction from start to goal.
+
+    Args:
+        rng: the source of randomness
+        fill: the probability that a cell is filled at first
+        rounds: how many rounds of smoothing follow
+    """
     field = rng.random((SIDE, SIDE)) < fill
     field[:, [0, -1]] = True
     for _ in range(rounds):
@@ -31,19 +37,24 @@ def grow_field(rng: np.random.Generator, fill: float, rounds: int) -> Picture:
 
 
 def _neighbours(field: Picture) -> npt.NDArray[np.int64]:
-    """Filled neighbours of each cell; beyond the side walls all is filled, beyond the ends nothing."""
+    """The number of filled neighbours of each cell. Beyond the side walls all cells count as filled, beyond the ends none."""
     rows, cols = field.shape
-    wide = np.zeros((rows + 2, cols + 2), dtype=np.int64)
-    wide[:, [0, -1]] = 1
-    wide[1:-1, 1:-1] = field
+    padded = np.zeros((rows + 2, cols + 2), dtype=np.int64)
+    padded[:, [0, -1]] = 1
+    padded[1:-1, 1:-1] = field
     count = np.zeros(field.shape, dtype=np.int64)
     for dr, dc in DIRECTIONS:
-        count += wide[1 + dr : 1 + dr + rows, 1 + dc : 1 + dc + cols]
+        count += padded[1 + dr : 1 + dr + rows, 1 + dc : 1 + dc + cols]
     return count
 
 
 def crossable(field: Picture, robot_radius: float) -> bool:
-    """Whether cells with room for the robot lead through the field: cheap, and necessary for a way."""
+    """Whether cells with room for the robot join the field's ends: a cheap test that every crossable field passes.
+
+    Args:
+        field: the filled cells
+        robot_radius: [m]
+    """
     reach = math.floor((robot_radius / BARN_CELL) + 0.5)
     free = np.ones(field.shape, dtype=np.bool_)
     rows, cols = field.shape
@@ -67,7 +78,11 @@ def crossable(field: Picture, robot_radius: float) -> bool:
 
 
 def cylinders(field: Picture) -> tuple[Disc, ...]:
-    """The field behind its walled runway, one cylinder to a filled cell."""
+    """The cylinders of a world: one for each filled cell of the field and of the walled runway before it.
+
+    Args:
+        field: the filled cells
+    """
     runway = np.zeros((RUNWAY, SIDE), dtype=np.bool_)
     runway[0] = True
     runway[:, [0, -1]] = True

@@ -1,22 +1,23 @@
-"""Random worlds: the same generator state gives the same world."""
+"""Random worlds: the same random state gives the same world."""
 
 from __future__ import annotations
 
 import inspect
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from antdrive.worlds.files.document import input_error
-from antdrive.worlds.formats.importers import BARN_BOUNDS, BARN_CELL, BARN_GOAL, BARN_START, BARN_TOLERANCE
+from antdrive.worlds.errors import FieldError, input_error, require_positive
+from antdrive.worlds.formats.barn import BARN_BOUNDS, BARN_CELL, BARN_GOAL, BARN_START, BARN_TOLERANCE
 from antdrive.worlds.generators.automaton import crossable, cylinders, grow_field
 from antdrive.worlds.geometry import point_clearance
 from antdrive.worlds.grid import DIRECTIONS, Grid, rasterise
-from antdrive.worlds.world import Disc, Point, Task, World
+from antdrive.worlds.types import Point
+from antdrive.worlds.world import Disc, Task, World
 
 #: The BARN set's fill ratios and smoothing rounds; every pair of them was used for 25 of its 300 worlds.
 BARN_FILLS = (0.15, 0.20, 0.25, 0.30)
@@ -37,78 +38,112 @@ def forest(
     tries: int = 300,
     name: str = "forest",
 ) -> Task:
-    """A square of `size` metres with `count` cylinders, crossed from corner to corner.
+    """A square with random cylinders, crossed from corner to corner.
 
     The rule is that of K. Han, *Collision free path planning algorithms for robot navigation problem*, MSc
-    thesis, Missouri 2007, section 3: cylinders of random size, 1 to 5 grid units, centred on random grid
-    points (`spacing`), none near the start or the goal; the defaults are his with 0.5 m to a unit. Here
-    "near" means that no surface lies within `clearance` of either. Cylinders may overlap unless `gap` asks
-    for a distance between their surfaces. A world that a disc of `robot_radius` cannot cross on a grid of
-    `cell` is thrown away, up to `tries` times.
+    thesis, Missouri 2007, section 3: cylinders of random size, 1 to 5 grid units, are centred on random grid
+    points, none near the start or the goal. The defaults are his, with 0.5 m to a unit. Here "near" means that
+    a surface lies within `clearance`. A world that the robot cannot cross is thrown away.
+
+    Args:
+        rng: the source of randomness
+        size: side of the square [m]
+        count: how many cylinders
+        radius: smallest and largest radius of a cylinder [m]
+        clearance: least distance from the start and the goal to any surface [m]
+        spacing: distance between the grid points on which cylinders are centred [m]
+        gap: least distance between the surfaces of two cylinders [m]; None: cylinders may overlap
+        robot_radius: the robot that must be able to cross the world [m]
+        cell: the task's grid resolution, on which crossing is tested [m]
+        tries: how many worlds are tried, and how many places for each cylinder
+        name: the world's name
 
     Raises:
-        ValueError: an argument makes no sense, or no world could be made with them.
+        FieldError: an argument is out of its range, or no world was found (with the key "forest").
     """
-    low, high = radius
-    if not 0.001 <= low <= high:
-        raise ValueError(f"radius: must be (smallest, largest) of at least a millimetre, got {radius}")
     for key, value in (("spacing", spacing), ("robot_radius", robot_radius), ("cell", cell)):
-        if not (math.isfinite(value) and value > 0):
-            raise ValueError(f"{key}: must be greater than 0, got {value:g}")
-    for key, value in (("clearance", clearance), ("gap", gap or 0.0)):
-        if not (math.isfinite(value) and value >= 0):
-            raise ValueError(f"{key}: must be at least 0, got {value:g}")
+        require_positive(key, value)
+    inset = robot_radius + cell  # the ends are one cell away from where the walls stop the robot
+    rule = _Rule(size, radius, spacing, clearance, gap, tries, inset)
     if not 0 <= count <= 10_000:
-        raise ValueError(f"count: must be from 0 to 10000, got {count}")
-    if tries < 1:
-        raise ValueError(f"tries: must be at least 1, got {tries}")
-    inset = robot_radius + cell  # the ends stand one cell clear of where the walls stop the robot
-    if not (math.isfinite(size) and size > 2 * inset):
-        raise ValueError(f"size: must be greater than {2 * inset:g} m for this robot, got {size:g}")
-    start, goal = (inset, inset), (size - inset, size - inset)
-
-    def draw() -> Disc:
-        x, y = rng.integers(0, math.floor(size / spacing) + 1, size=2) * spacing
-        return Disc(float(x), float(y), round(float(rng.uniform(low, high)), 3))  # files tell millimetres
-
-    def fits(disc: Disc, others: list[Disc]) -> bool:
-        if min(_distance(disc, start), _distance(disc, goal)) < clearance:
-            return False
-        return gap is None or all(_distance(disc, (o.x, o.y)) - o.radius >= gap for o in others)
-
+        raise FieldError("count", f"must be from 0 to 10000, got {count}")
+    start, goal = rule.ends
     source = f"the random worlds of han2007, section 3, with {count} cylinders"
-    for _ in range(
-        min(tries, max(20, 60_000 // max(count, 1)))
-    ):  # where so many hardly fit, more tries would only take long
-        discs = _scatter(count, tries, draw, fits)
+    # Where so many cylinders hardly fit, all the tries would take minutes and find nothing.
+    for _ in range(min(tries, max(20, 60_000 // max(count, 1)))):
+        discs = rule.scatter(rng, count)
         if discs is None:
             continue
         world = World(name, (0.0, 0.0, size, size), discs, source)
         task = Task(world, (*start, math.pi / 4), goal, cell=cell)
         if _connected(rasterise(world, cell, robot_radius), task):
             return task
-    raise ValueError(
-        f"forest: no world with {count} cylinders of radius {low:g} to {high:g} m that a disc of radius "
-        f"{robot_radius:g} m can cross was found in {tries} tries; use fewer or smaller cylinders"
+    raise FieldError(
+        "forest",
+        f"no world with {count} cylinders of radius {radius[0]:g} to {radius[1]:g} m that a disc of radius "
+        f"{robot_radius:g} m can cross was found in {tries} tries; use fewer or smaller cylinders",
     )
 
 
-def _scatter(
-    count: int, tries: int, draw: Callable[[], Disc], fits: Callable[[Disc, list[Disc]], bool]
-) -> tuple[Disc, ...] | None:
-    """Cylinders placed one by one, each within `tries` draws; None when one found no place."""
-    discs: list[Disc] = []
-    for _ in range(count):
-        found = next((d for d in (draw() for _ in range(tries)) if fits(d, discs)), None)
-        if found is None:
-            return None
-        discs.append(found)
-    return tuple(discs)
+@dataclass(frozen=True)
+class _Rule:
+    """How `forest` places cylinders; see there."""
+
+    size: float
+    radius: tuple[float, float]
+    spacing: float
+    clearance: float
+    gap: float | None
+    tries: int
+    inset: float  # from a corner to the start or the goal, in x and in y [m]
+
+    def __post_init__(self) -> None:
+        low, high = self.radius
+        if not 0.001 <= low <= high:
+            raise FieldError("radius", f"must be (smallest, largest) of at least a millimetre, got {self.radius}")
+        for key, value in (("clearance", self.clearance), ("gap", self.gap or 0.0)):
+            if not (math.isfinite(value) and value >= 0):
+                raise FieldError(key, f"must be at least 0, got {value:g}")
+        _require_tries(self.tries)
+        if not (math.isfinite(self.size) and self.size > 2 * self.inset):
+            raise FieldError("size", f"must be greater than {2 * self.inset:g} m for this robot, got {self.size:g}")
+
+    @property
+    def ends(self) -> tuple[Point, Point]:
+        """The start and the goal [m]."""
+        far = self.size - self.inset
+        return (self.inset, self.inset), (far, far)
+
+    def scatter(self, rng: np.random.Generator, count: int) -> tuple[Disc, ...] | None:
+        """Cylinders placed one after the other; None when one of them found no place in `tries` draws."""
+        discs: list[Disc] = []
+        for _ in range(count):
+            found = next((d for d in (self.draw(rng) for _ in range(self.tries)) if self.fits(d, discs)), None)
+            if found is None:
+                return None
+            discs.append(found)
+        return tuple(discs)
+
+    def draw(self, rng: np.random.Generator) -> Disc:
+        """A random cylinder, with a radius in whole millimetres."""
+        x, y = rng.integers(0, math.floor(self.size / self.spacing) + 1, size=2) * self.spacing
+        return Disc(float(x), float(y), round(float(rng.uniform(*self.radius)), 3))
+
+    def fits(self, disc: Disc, others: list[Disc]) -> bool:
+        """Whether a cylinder keeps the distances from both ends and from the other cylinders."""
+        if min(_distance(disc, end) for end in self.ends) < self.clearance:
+            return False
+        return self.gap is None or all(_distance(disc, (o.x, o.y)) - o.radius >= self.gap for o in others)
 
 
 def _distance(disc: Disc, point: Point) -> float:
-    """From a disc's surface to a point [m]."""
+    """The distance from a disc's surface to a point [m]."""
     return math.dist((disc.x, disc.y), point) - disc.radius
+
+
+def _require_tries(tries: int) -> None:
+    if tries < 1:
+        raise FieldError("tries", f"must be at least 1, got {tries}")
 
 
 def barn(
@@ -120,28 +155,33 @@ def barn(
     tries: int = 20_000,
     name: str = "barn",
 ) -> Task:
-    """A world in the manner of BARN: a field of cylinders grown by a cellular automaton between two walls.
+    """A world like those of the BARN set: a field of cylinders between two walls, grown by a cellular automaton.
 
-    After D. Perille, A. Truong, X. Xiao, P. Stone, *Benchmarking metric ground navigation*, SSRR 2020: 30 x
-    30 cells of 0.15 m are filled with probability `fill` and smoothed for `rounds` rounds; in each, a cell
-    with five or more filled neighbours of eight is filled and one with one or none is cleared. The walls at
-    the field's sides stay filled and, for counting, all beyond them is. Every filled cell holds a cylinder
-    of radius 0.075 m. Layout, start and goal are those of the BARN data, whose `fill` and `rounds` are
-    `BARN_FILLS` and `BARN_ROUNDS`. A world that a disc of `robot_radius` cannot cross is thrown away, up to
-    `tries` times; of those with a fill of 0.30 a Jackal crosses one in some hundreds, so they take up to
-    some seconds (BARN cut a way through instead).
+    After D. Perille, A. Truong, X. Xiao, P. Stone, *Benchmarking metric ground navigation*, SSRR 2020: 30 x 30 cells
+    of 0.15 m are filled at random and smoothed in rounds. In each round, a cell with five or more filled neighbours of
+    eight is filled and one with one or none is cleared; the walls at the field's sides stay filled, and all cells
+    beyond them count as filled. Every filled cell holds a cylinder of radius 0.075 m. Layout, start and goal are those
+    of the BARN set. A world that the robot cannot cross is thrown away: with a fill of 0.30 a Jackal crosses one of
+    some hundreds, so such worlds take up to some seconds. (BARN cut a way through them instead.)
+
+    Args:
+        rng: the source of randomness
+        fill: the probability that a cell is filled at first; BARN's are `BARN_FILLS`
+        rounds: how many rounds of smoothing follow; BARN's are `BARN_ROUNDS`
+        robot_radius: the robot that must be able to cross the world [m]
+        tries: how many fields are tried
+        name: the world's name
 
     Raises:
-        ValueError: an argument makes no sense, or no world could be made with them.
+        FieldError: an argument is out of its range, or no world was found (with the key "barn").
     """
     if not 0 <= fill < 1:
-        raise ValueError(f"fill: must be at least 0 and less than 1, got {fill:g}")
+        raise FieldError("fill", f"must be at least 0 and less than 1, got {fill:g}")
     if rounds < 0:
-        raise ValueError(f"rounds: must be at least 0, got {rounds}")
+        raise FieldError("rounds", f"must be at least 0, got {rounds}")
     if not 0 < robot_radius <= 2:
-        raise ValueError(f"robot_radius: must be greater than 0 and at most 2, got {robot_radius:g}")
-    if tries < 1:
-        raise ValueError(f"tries: must be at least 1, got {tries}")
+        raise FieldError("robot_radius", f"must be greater than 0 and at most 2, got {robot_radius:g}")
+    _require_tries(tries)
     source = f"the cellular automaton of BARN (Perille et al. 2020), fill {fill:g}, {rounds} rounds"
     for _ in range(tries):
         field = grow_field(rng, fill, rounds)
@@ -151,9 +191,10 @@ def barn(
         task = Task(world, BARN_START, BARN_GOAL, BARN_TOLERANCE, BARN_CELL)
         if _connected(rasterise(task.world, BARN_CELL, robot_radius), task):
             return task
-    raise ValueError(
-        f"barn: no world of fill {fill:g} that a disc of radius {robot_radius:g} m can cross was found in "
-        f"{tries} tries; use a smaller fill or a smaller robot_radius"
+    raise FieldError(
+        "barn",
+        f"no world of fill {fill:g} that a disc of radius {robot_radius:g} m can cross was found in "
+        f"{tries} tries; use a smaller fill or a smaller robot_radius",
     )
 
 
@@ -169,12 +210,17 @@ def generate(
     name: str | None = None,
     note: str = "",
 ) -> Task:
-    """A random world with options given as texts, such as {"count": "20", "radius": "0.2,0.5"}.
+    """A random world, with options as texts.
 
-    The world is called `name`, and `note` is added to its source.
+    Args:
+        kind: a name of `GENERATORS`
+        rng: the source of randomness
+        options: the generator's arguments by name, such as {"count": "20", "radius": "0.2,0.5"}
+        name: the world's name; by default the kind
+        note: a text to add to the world's source
 
     Raises:
-        InputError: an unknown kind or option, an option of the wrong kind, or no world to be had.
+        InputError: an unknown kind or option, a wrong value, or no such world was found.
     """
     if kind not in GENERATORS:
         raise input_error("generate", f"unknown kind {kind!r}; choose from {', '.join(GENERATORS)}")
@@ -190,14 +236,14 @@ def generate(
         values[key] = _value(kind, key, text, defaults[key])
     try:
         task = GENERATORS[kind](rng, **values)
-    except ValueError as error:
-        raise input_error(kind, str(error).removeprefix(f"{kind}: ")) from None
+    except FieldError as error:
+        raise input_error(kind, *([error.key] if error.key != kind else []), error.problem) from None
     source = "; ".join(part for part in (task.world.source, note) if part)
     return replace(task, world=replace(task.world, name=name or kind, source=source))
 
 
 def _value(kind: str, key: str, text: str, default: Any) -> Any:
-    """The text as a value of the default's type."""
+    """An option's text as a value of the default's type."""
     words, convert = text.split(","), int if isinstance(default, int) else float
     count = len(default) if isinstance(default, tuple) else 1
     one = "a whole number" if convert is int else "a number"
@@ -212,7 +258,7 @@ def _value(kind: str, key: str, text: str, default: Any) -> Any:
 
 
 def _connected(grid: Grid, task: Task) -> bool:
-    """Whether allowed moves lead from the start's cell to the goal's, with room for the robot at both."""
+    """Whether allowed moves lead from the start's cell to the goal's, and the robot has room at both ends."""
     ends = [task.start[:2], task.goal]
     if not (point_clearance(task.world, ends) > grid.inflate).all():
         return False

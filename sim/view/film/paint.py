@@ -11,6 +11,7 @@ from antdrive.sim.view.film import _kernels_paint as kernels
 from antdrive.sim.view.film.camera import Camera
 from antdrive.sim.view.scene import Scene
 from antdrive.sim.view.style import GOAL, GRID, GROUND, PAPER, ROUTE, START, ZONE, Colour
+from antdrive.worlds.plane import segment_lengths
 
 Floats = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -66,7 +67,7 @@ def grid_step(camera: Camera) -> float:
 
 def dashes(line: Floats, on: float, off: float, half: float) -> Floats:
     """Capsules (M, 5) that draw a polyline (N, 2) dashed, `on` metres and `off` metres in turn."""
-    steps = np.hypot(*np.diff(line, axis=0).T)
+    steps = segment_lengths(line)
     arc = np.concatenate([[0.0], np.cumsum(steps)])
     starts = np.arange(0.0, arc[-1], on + off)
     at = np.unique(np.concatenate([arc, starts, np.minimum(starts + on, arc[-1])]))

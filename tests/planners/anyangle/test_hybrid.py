@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from antdrive.planners import AcoHan, Hybrid, PlanResult, PlanStatus, Query, Tangent, keep_best, load_planner, watch
-from antdrive.planners.anyangle.lines import polyline_length
 from antdrive.planners.iterative import Progress
 from antdrive.worlds import Disc, Grid, InputError, Task, World, load_task, polyline_clearance, rasterise
+from antdrive.worlds.plane import polyline_length
 from tests.planners.worlds_to_solve import catalogue, optimum
 
 FLOOR = 30.0711

@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from antdrive.planners import Moving, PlanStatus, Query, TimedPlan, load_planner, plan_in_time
+from antdrive.planners import PlanStatus, Query, TimedPlan, load_planner, plan_in_time
 from antdrive.planners.graph.sipp import TOLERANCE, _legs, _samples
-from antdrive.worlds import Grid
+from antdrive.worlds import Grid, MoverMotion
 from tests.planners.worlds_to_solve import optimum, random_query
 
 SPEED, CELL, INFLATE = 0.5, 0.5, 0.2
@@ -63,7 +63,7 @@ def ground(free: np.ndarray) -> Grid:
     return dataclasses.replace(Grid.from_free(free, cell=CELL), inflate=INFLATE)
 
 
-def some_mover(rng: np.random.Generator, side: float) -> Moving:
+def some_mover(rng: np.random.Generator, side: float) -> MoverMotion:
     radius = float(rng.uniform(0.05, 0.4))
     if rng.random() < 0.3:
         far = float(rng.uniform(0.3, side / 2))
@@ -80,7 +80,7 @@ MOVES = [(dr, dc) for dr, dc in itertools.product((-1, 0, 1), repeat=2) if (dr, 
 
 
 def first_tick(
-    query: Query, movers: Sequence[Moving], horizon: float, *, slack: float, hurry: bool, stay: bool = False
+    query: Query, movers: Sequence[MoverMotion], horizon: float, *, slack: float, hurry: bool, stay: bool = False
 ) -> float:
     """When the goal is reached at the earliest by a robot that acts on ticks only [s]; inf: not within the horizon.
 
@@ -128,7 +128,7 @@ def first_tick(
     return float(np.argmax(reached)) * TICK if reached.any() else math.inf
 
 
-def small_world(seed: int) -> tuple[Query, list[Moving]]:
+def small_world(seed: int) -> tuple[Query, list[MoverMotion]]:
     rng = np.random.default_rng([17, seed])
     free = rng.random((5, 5)) >= 0.2
     free[0, 0] = free[4, 4] = True
@@ -142,7 +142,7 @@ ABOVE, BELOW = 0.03, -2.0 * TICK  # m: what robot and mover move between two loo
 
 
 @pytest.fixture(scope="module")
-def small_plans() -> list[tuple[Query, list[Moving], TimedPlan]]:
+def small_plans() -> list[tuple[Query, list[MoverMotion], TimedPlan]]:
     worlds = [small_world(seed) for seed in range(60)]
     return [(q, m, plan_in_time(q, m, speed=SPEED, horizon=HORIZON)) for q, m in worlds]
 
@@ -167,7 +167,7 @@ def test_no_way_arrives_sooner_and_none_is_missed(seeds: range, stay: bool) -> N
     assert without > 0
 
 
-def test_a_goal_to_stay_at_may_take_longer(small_plans: list[tuple[Query, list[Moving], TimedPlan]]) -> None:
+def test_a_goal_to_stay_at_may_take_longer(small_plans: list[tuple[Query, list[MoverMotion], TimedPlan]]) -> None:
     later = 0
     for query, movers, plan in small_plans:
         stays = plan_in_time(query, movers, speed=SPEED, horizon=HORIZON, stay=True)
@@ -179,7 +179,7 @@ def test_a_goal_to_stay_at_may_take_longer(small_plans: list[tuple[Query, list[M
     assert later > 3
 
 
-def test_the_distance_is_kept_at_every_instant(small_plans: list[tuple[Query, list[Moving], TimedPlan]]) -> None:
+def test_the_distance_is_kept_at_every_instant(small_plans: list[tuple[Query, list[MoverMotion], TimedPlan]]) -> None:
     careless = 0
     for query, movers, plan in small_plans:
         if plan.solved:
@@ -190,7 +190,7 @@ def test_the_distance_is_kept_at_every_instant(small_plans: list[tuple[Query, li
 
 
 def test_a_timed_plan_moves_at_its_speed_along_allowed_moves(
-    small_plans: list[tuple[Query, list[Moving], TimedPlan]],
+    small_plans: list[tuple[Query, list[MoverMotion], TimedPlan]],
 ) -> None:
     waits = 0
     for query, _, plan in small_plans:
@@ -274,7 +274,7 @@ def test_the_planner_of_the_registry_plans_among_the_motions_of_the_query() -> N
     query = dataclasses.replace(corridor(3), motions=(mover,))
     plan = load_planner("sipp", speed=SPEED).plan(query, np.random.default_rng(0))
     assert isinstance(plan, TimedPlan)
-    assert isinstance(mover, Moving)
+    assert isinstance(mover, MoverMotion)
     np.testing.assert_array_equal(plan.leave, plan_in_time(query, [mover], speed=SPEED).leave)
     assert plan.waited > 5
     assert plan.options["horizon"] == 120.0

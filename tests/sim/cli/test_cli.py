@@ -163,7 +163,7 @@ def test_there_are_at_least_30_malformed_worlds() -> None:
         (["worlds", "generate", "desert", "-o", "w.yaml"], "forest"),
         (["worlds", "generate", "forest", "-o", "w.yaml", "--set", "cuont=3"], "count"),
         (["worlds", "generate", "forest", "-o", "w.yaml", "--set", "count=1000"], "no world with 1000"),
-        (["worlds", "import", "nothing.world", "-o", "w.yaml"], "nothing.world: cannot be read"),
+        (["worlds", "import", "nothing.world", "-o", "w.yaml"], "nothing.world: no such file"),
         (["worlds", "import", "nothing.json", "-o", "folder"], "nothing.json: no such file"),
         (["worlds", "import", "x.json", "-o", "folder", "--goal", "1,2"], "--goal: DynaBARN brings its own"),
         (["schema", "moon"], "world, robot"),

@@ -1,4 +1,4 @@
-"""Maps of cells: what discs cover of them, and which cells discs reach into."""
+"""Maps of cells: the discs that cover a map, and the map of a world of discs."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def centre(cells: CellMap, row: int, col: int) -> tuple[float, float]:
 
 
 def joined(free: np.ndarray, *starts: tuple[int, int]) -> np.ndarray:
-    """The free cells that steps over sides lead to."""
+    """The free cells that steps over shared sides lead to."""
     seen, todo = np.zeros_like(free), deque(starts)
     while todo:
         r, c = todo.popleft()
@@ -73,7 +73,9 @@ def beyond_blocked(cells: CellMap, points: np.ndarray) -> np.ndarray:
 
 @given(maps(), st.sampled_from([None, 0.25, 0.6, 1.3]))
 @settings(max_examples=60)
-def test_cells_are_covered_wholly_and_discs_reach_no_farther_than_told(cells: CellMap, wanted: float | None) -> None:
+def test_cells_are_fully_covered_and_discs_reach_no_farther_than_the_overhang(
+    cells: CellMap, wanted: float | None
+) -> None:
     side = cells.resolution
     found = cover(cells, None if wanted is None else wanted * side)
     assert found.overhang <= (CORNER if wanted is None else wanted) * side + 1e-9
@@ -90,7 +92,7 @@ def test_cells_are_covered_wholly_and_discs_reach_no_farther_than_told(cells: Ce
             assert (beyond_blocked(cells, inside) <= found.overhang + 2e-9).all()
 
 
-def test_a_disc_too_small_or_too_large_would_be_seen() -> None:
+def test_the_check_of_covers_notices_a_disc_too_small_or_too_large() -> None:
     cells = CellMap(np.array([[True, True, True], [True, False, True], [True, True, True]]), 0.05, (-12.2, 3.7))
     (disc,) = cover(cells).discs
     assert covered(cells, 1, 1, np.array([disc]))
@@ -108,7 +110,7 @@ def test_solid_ground_takes_fewer_discs_than_cells_and_a_larger_overhang_fewer_s
 @given(maps(), st.data())
 @settings(max_examples=60)
 def test_planners_see_the_very_cells_of_the_map(cells: CellMap, data: st.DataObject) -> None:
-    """For a robot that is smaller than what the discs leave of a passage one cell wide."""
+    """The robot fits through what the discs leave of a passage one cell wide."""
     spots = [tuple(spot) for spot in np.argwhere(cells.free).tolist()]
     assume(spots)
     start, goal = data.draw(st.sampled_from(spots)), data.draw(st.sampled_from(spots))
@@ -124,7 +126,7 @@ def test_planners_see_the_very_cells_of_the_map(cells: CellMap, data: st.DataObj
     )
 
 
-def test_ground_that_cannot_be_reached_costs_no_discs_and_the_bounds_are_drawn_in() -> None:
+def test_unreachable_cells_need_no_discs_and_the_bounds_are_drawn_in() -> None:
     free = np.zeros((20, 30), dtype=bool)
     free[5:8, 10:14] = True
     alone = map_task(CellMap(free, 1.0, (100.0, 0.0)), (110.5, 5.5, 0.0), (113.5, 7.5), name="room")
@@ -155,7 +157,7 @@ MAP = CellMap(np.array([[True, True, True, False], [True, True, True, True]]), 0
         ((0.2, 0.2, 0.0), (1.2, 0.2), math.nan, "overhang: must be at least 0.103553 m"),
     ],
 )
-def test_ends_and_overhangs_that_cannot_be_are_told(start, goal, overhang, says) -> None:  # type: ignore[no-untyped-def]
+def test_unusable_ends_and_overhangs_are_named(start, goal, overhang, says) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(InputError) as caught:
         map_task(MAP, start, goal, name="m", overhang=overhang)
     assert says in str(caught.value)
@@ -169,7 +171,7 @@ def test_a_map_of_too_many_discs_is_refused() -> None:
         map_task(CellMap(free, 1.0), (0.5, 0.5, 0.0), (0.5, 599.5), name="posts")
 
 
-# The other way: cells of a world
+# The map of a world
 
 
 @given(worlds(), st.sampled_from([0.25, 0.3, 0.7, 1.1, 30.0]))
@@ -209,13 +211,13 @@ def test_a_world_made_from_a_worlds_cells_blocks_all_that_the_world_does(world: 
     task: Task = map_task(cells, (*start, 0.0), goal, name="m")
     again = cell_map(task.world, 0.5)
     reached = joined(cells.free, tuple(spots[0]), tuple(spots[-1]))
-    # Its discs reach into cells beside the blocked ones; none of those that were blocked and touched is free now.
+    # The discs reach into cells beside the blocked ones, but a blocked cell that a free one touches stays blocked.
     for row, col in touched_by(reached):
         spot = again.cell_at(*centre(cells, row, col))
         assert spot is None or not again.free[spot]
 
 
 @pytest.mark.parametrize("resolution", [0.0, -1.0, math.nan, math.inf, 1e-5])
-def test_resolutions_that_cannot_be_are_refused(resolution: float) -> None:
+def test_unusable_resolutions_are_refused(resolution: float) -> None:
     with pytest.raises(InputError, match="resolution: "):
         cell_map(World("w", (0.0, 0.0, 10.0, 10.0)), resolution)

@@ -1,4 +1,4 @@
-"""DynaBARN's worlds, from their decoded keyframes."""
+"""The worlds of the DynaBARN set, from their decoded keyframes."""
 
 import json
 import math
@@ -63,7 +63,10 @@ def test_speeds_are_those_of_their_class():
         ([3], r"set.json: \[0\]: must be a mapping with name, bounds, start, goal and movers, got 3"),
         ([ONE | {"movers": [4]}], r"set.json: \[0\].movers\[0\]: must be a mapping"),
         ([ONE | {"movers": [{"radius": 0.5}]}], r"\[0\].movers\[0\].keyframes_t_x_y: missing"),
-        ([ONE | {"movers": [MOVER | {"period": 9}]}], r"\[0\].movers\[0\].period: must be 8, which its keyframes last"),
+        (
+            [ONE | {"movers": [MOVER | {"period": 9}]}],
+            r"\[0\].movers\[0\].period: must be 8, the time from the first",
+        ),
         ([ONE | {"movers": [MOVER | {"loop": "back"}]}], r"set.json: one: movers\[0\].loop: must be 'pingpong'"),
         (
             [ONE | {"movers": [MOVER | {"keyframes_t_x_y": [[0, 1], [8, 1]]}]}],
@@ -74,7 +77,7 @@ def test_speeds_are_those_of_their_class():
         ([ONE | {"start": [math.nan, 0, 0]}], r"one: start\[0\]: must be a finite number"),
     ],
 )
-def test_a_wrong_set_gets_one_line(content, says, tmp_path):
+def test_a_wrong_set_gets_a_message_of_one_line(content, says, tmp_path):
     with pytest.raises(InputError, match=says) as caught:
         import_dynabarn(written(tmp_path, content))
     assert str(caught.value).isprintable()

@@ -1,4 +1,4 @@
-"""Maps of ROS's map_server: what a pixel means, which row is which, and what is refused."""
+"""Maps of ROS's map_server: what a pixel means, the order of rows, and which files are refused."""
 
 from __future__ import annotations
 
@@ -116,16 +116,16 @@ def test_colours_are_averaged_and_other_depths_understood(tmp_path: Path) -> Non
     assert rows_of(written(tmp_path, GOOD.replace("made.pgm", "made.png"))) == [[1, 0]]
 
 
-def test_keys_of_other_tools_are_passed_over(tmp_path: Path) -> None:
+def test_keys_of_other_tools_are_ignored(tmp_path: Path) -> None:
     assert rows_of(written(tmp_path, GOOD + "name: office\n")) == [[1, 1, 1], [1, 0, 0]]
 
 
-def test_the_task_tells_where_it_comes_from_and_can_be_kept(tmp_path: Path) -> None:
+def test_the_task_has_a_source_and_can_be_saved(tmp_path: Path) -> None:
     task = import_map_server(written(tmp_path), start=(-0.7, 2.2, 0.0), goal=(0.2, 2.2))
     assert task.world.name == "made"
     assert task.world.source == (
         "the map_server map made.yaml with 1 unknown cells taken for blocked, 2 x 3 cells of 0.5 m; the 2 blocked cells next "
-        "to free ground are wholly covered by 2 cylinders that reach at most 0.1036 m beyond blocked cells"
+        "to free cells are fully covered by 2 cylinders that reach at most 0.1036 m beyond blocked cells"
     )
     assert task.cell == 0.5
     save_task(task, tmp_path / "kept.yaml")
@@ -140,7 +140,7 @@ def _without(key: str) -> str:
 BAD: dict[str, tuple[str, bytes | None, str]] = {
     "empty": ("", PGM, "made.yaml: is empty"),
     "a list": ("- 1\n", PGM, "made.yaml: must be a mapping with the keys image, resolution, origin, negate"),
-    "a world": ("schema: 1\nbounds: [0, 0, 1, 1]\n", PGM, "made.yaml: names no image, so it is no map of map_server"),
+    "a world": ("schema: 1\nbounds: [0, 0, 1, 1]\n", PGM, "made.yaml: names no image, so it is not a map of map_server"),
     **{
         f"no {key}": (_without(key), PGM, f"made.yaml: {key}: missing; ")
         for key in ("resolution", "origin", "negate", "occupied_thresh", "free_thresh")
@@ -161,13 +161,13 @@ BAD: dict[str, tuple[str, bytes | None, str]] = {
     "bad ends": (GOOD + "antdrive: {start: [0.0, 0.0]}\n", PGM, "made.yaml:7: antdrive.start: must have 3 entries"),
     "no image": (GOOD, None, "made.pgm: no such file"),
     "image is a folder": (GOOD.replace("made.pgm", "."), PGM, "cannot be read: Is a directory"),
-    "no picture": (GOOD, b"hello", "made.pgm is no PGM, PNG or BMP image"),
-    "wrong magic": (GOOD, PGM.replace(b"P5", b"P9"), "made.pgm is no PGM, PNG or BMP image"),
-    "gif": (GOOD, b"GIF89a\x01\x00\x01\x00\x80\x00\x00", "made.pgm is no PGM, PNG or BMP image"),
+    "no picture": (GOOD, b"hello", "made.pgm is not a PGM, PNG or BMP image"),
+    "wrong magic": (GOOD, PGM.replace(b"P5", b"P9"), "made.pgm is not a PGM, PNG or BMP image"),
+    "gif": (GOOD, b"GIF89a\x01\x00\x01\x00\x80\x00\x00", "made.pgm is not a PGM, PNG or BMP image"),
     "cut off": (GOOD, PGM[:-2], "made.pgm cannot be read: image file is truncated"),
     "cut off in plain": (GOOD, b"P2 3 2 255\n1 2 3", "made.pgm cannot be read: not enough image data"),
     "cut off in the header": (GOOD, b"P5\n3", "made.pgm cannot be read: Reached EOF while reading header"),
-    "no pixels": (GOOD, b"P5\n0 2\n255\n", "made.pgm is no PGM, PNG or BMP image"),
+    "no pixels": (GOOD, b"P5\n0 2\n255\n", "made.pgm is not a PGM, PNG or BMP image"),
     "word for a pixel": (GOOD, b"P2 3 1 255\n1 x 3", "made.pgm cannot be read: invalid literal"),
     "pixel too bright": (GOOD, b"P2 3 1 255\n1 600 3", "made.pgm cannot be read: Channel value too large"),
     "maxval": (GOOD, b"P5 3 1 0\n123", "made.pgm cannot be read: maxval must be greater than 0"),
@@ -179,7 +179,7 @@ BAD: dict[str, tuple[str, bytes | None, str]] = {
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_malformed_maps_get_one_line(case: str, tmp_path: Path) -> None:
+def test_malformed_maps_get_a_message_of_one_line(case: str, tmp_path: Path) -> None:
     text, image, says = BAD[case]
     path = written(tmp_path, text, image)
     with pytest.raises(InputError) as caught:

@@ -78,16 +78,16 @@ def test_line_ends_and_the_order_of_the_header_do_not_matter(tmp_path: Path, con
         (MAP.replace("width 3", "width 3 4"), "3: the header must be"),
         (MAP.replace("width 3", "width 3\nwidth 3"), "4: the header must be"),
         (MAP.replace("height 2", "height 99999").replace("width 3", "width 99999"), "the limit is"),
-        (MAP + "...\n", "must have 2 lines of cells as its height says, got 3"),
-        (MAP.replace("G.S\n", ""), "must have 2 lines of cells as its height says, got 1"),
-        (MAP.replace("G.S", "G.SS"), "6: must have 3 cells as the width says, got 4"),
+        (MAP + "...\n", "must have 2 lines of cells, as its height says, got 3"),
+        (MAP.replace("G.S\n", ""), "must have 2 lines of cells, as its height says, got 1"),
+        (MAP.replace("G.S", "G.SS"), "6: must have 3 cells, as the width says, got 4"),
         (MAP.replace("G.S", "G.x"), "6: cell 3 must be one of . G S @ O T W, got 'x'"),
         (MAP.replace("G.S", "G.").encode() + b"\xff", "must have 2 lines"),
         (b"type octile\nheight 1\nwidth 1\nmap\n\xff\n", r"5: cell 1 must be one of . G S @ O T W, got '\\xff'"),
         (b"\x89PNG\r\n\x1a\n", "1: the header must be"),
     ],
 )  # fmt: skip
-def test_malformed_maps_are_refused_in_a_line(tmp_path: Path, content: str | bytes, words: str) -> None:
+def test_malformed_maps_get_a_message_of_one_line(tmp_path: Path, content: str | bytes, words: str) -> None:
     assert words in refused(tmp_path, import_movingai_map, content)
 
 
@@ -112,7 +112,7 @@ def test_problems_are_turned_into_our_cells(tmp_path: Path) -> None:
         (PROBLEM.replace("\t1\t1\t", "\t1\t2\t"), "2: the goal (1, 2) is outside the map of width 3 and height 2"),
     ],
 )
-def test_malformed_problems_are_refused_in_a_line(tmp_path: Path, line: str, words: str) -> None:
+def test_malformed_problems_get_a_message_of_one_line(tmp_path: Path, line: str, words: str) -> None:
     assert words in refused(tmp_path, import_movingai_problems, f"version 1\n{line}\n")
 
 

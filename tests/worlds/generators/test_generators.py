@@ -1,4 +1,4 @@
-"""Random worlds keep their own rules."""
+"""Random worlds follow the rules they state."""
 
 import math
 from itertools import pairwise
@@ -16,7 +16,7 @@ def rng(seed: int) -> np.random.Generator:
 
 
 def field_of(task) -> np.ndarray:
-    """A BARN world back as a picture of the whole lattice, (64, 30)."""
+    """The number of cylinders on each point of a BARN world's lattice, (64, 30)."""
     picture = np.zeros((64, 30), dtype=int)
     for disc in task.world.obstacles:
         col, row = (disc.x + 4.425) / 0.15, (disc.y - 0.075) / 0.15
@@ -85,7 +85,7 @@ def test_an_empty_forest_is_empty():
         {"count": 40, "gap": 5.0, "radius": (0.1, 0.2)},
     ],
 )
-def test_a_forest_that_cannot_be_is_given_up_in_words(options):
+def test_forest_gives_up_with_a_message_where_no_world_is_found(options):
     with pytest.raises(ValueError, match=r"^forest: no world with \d+ cylinders .* in 20 tries; use fewer"):
         forest(rng(0), tries=20, **options)
 
@@ -108,7 +108,7 @@ def test_a_forest_that_cannot_be_is_given_up_in_words(options):
         ({"tries": 0}, "tries"),
     ],
 )
-def test_a_forest_of_nonsense_is_refused(options, key):
+def test_forest_arguments_outside_their_range_are_named(options, key):
     with pytest.raises(ValueError, match=f"^{key}: "):
         forest(rng(0), **options)
 
@@ -130,7 +130,7 @@ def test_a_barn_world_is_laid_out_like_the_data_and_lets_the_robot_through(fill,
 
 
 def neighbours(picture: np.ndarray, row: int, col: int) -> int:
-    """Filled neighbours in a field whose sides go on for ever and whose ends are open."""
+    """Filled neighbours of a cell; beyond the field's sides all cells are filled, beyond its ends none."""
     around = [(row + dr, col + dc) for dr in (-1, 0, 1) for dc in (-1, 0, 1) if dr or dc]
     return sum(1 if not 0 <= c < 30 else (0 if not 0 <= r < 30 else int(picture[r, c])) for r, c in around)
 
@@ -161,7 +161,7 @@ def test_the_automaton_is_filled_like_the_data():
         assert low < filled < high
 
 
-def test_a_barn_world_that_cannot_be_is_given_up_in_words():
+def test_barn_gives_up_with_a_message_where_no_world_is_found():
     with pytest.raises(ValueError, match=r"^barn: no world of fill 0\.6 .* in 50 tries; use a smaller fill"):
         barn(rng(0), 0.6, 3, tries=50)
 
@@ -177,19 +177,19 @@ def test_a_barn_world_that_cannot_be_is_given_up_in_words():
         ({"robot_radius": 1e9}, "robot_radius"),
     ],
 )
-def test_a_barn_world_of_nonsense_is_refused(options, key):
+def test_barn_arguments_outside_their_range_are_named(options, key):
     with pytest.raises(ValueError, match=f"^{key}: "):
         barn(rng(0), **options)
 
 
 @pytest.mark.parametrize("kind", GENERATORS)
-def test_a_generated_world_can_be_kept(kind, tmp_path):
+def test_a_generated_world_can_be_saved(kind, tmp_path):
     task = GENERATORS[kind](rng(2))
     save_task(task, tmp_path / "w.yaml")
     assert load_task(tmp_path / "w.yaml") == task
 
 
-def test_options_may_come_as_texts():
+def test_options_can_be_texts():
     task = generate("forest", rng(1), {"count": "4", "radius": "0.2,0.5", "gap": "0.1"}, name="mine", note="seed 1")
     assert task.world.name == "mine"
     assert (task.world.source or "").endswith("; seed 1")
@@ -210,6 +210,6 @@ def test_options_may_come_as_texts():
         ("forest", {"rng": "1"}, "^forest: rng: unknown option"),
     ],
 )
-def test_wrong_options_get_one_line(kind, options, message):
+def test_wrong_options_get_a_message_of_one_line(kind, options, message):
     with pytest.raises(InputError, match=message):
         generate(kind, rng(0), options)

@@ -1,4 +1,4 @@
-"""Worlds written for other programs, and back again."""
+"""Worlds exported to other formats and imported again."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def test_every_world_of_the_catalogue_comes_back_from_sdf(name: str, tmp_path: P
     assert import_sdf(tmp_path / "w.world") == task
 
 
-def test_what_is_given_wins_over_what_an_exported_world_keeps(tmp_path: Path) -> None:
+def test_given_values_replace_those_that_an_exported_world_keeps(tmp_path: Path) -> None:
     export_sdf(load_task("slalom"), tmp_path / "w.sdf")
     given = {"start": (1.0, 1.0, 0.5), "goal": (2.0, 1.0), "goal_tolerance": 0.125, "cell": 0.0625}
     task = import_sdf(tmp_path / "w.sdf", **given)  # type: ignore[arg-type]
@@ -122,7 +122,7 @@ def test_without_its_own_element_an_exported_world_has_walls_that_cannot_be_impo
         ('cell="0.5"', 'cell="0.5', "not XML"),
     ],
 )
-def test_a_spoilt_element_gets_one_line(old: str, new: str, says: str, tmp_path: Path) -> None:
+def test_a_damaged_task_element_gets_a_message_of_one_line(old: str, new: str, says: str, tmp_path: Path) -> None:
     path = tmp_path / "w.sdf"
     world = World("w", (0.0, 0.0, 11.0, 11.0), (Disc(5.0, 5.0, 0.5),))
     export_sdf(Task(world, (1.0, 1.0, 0.0), (10.0, 10.0)), path)

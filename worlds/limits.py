@@ -1,0 +1,10 @@
+"""How large and how fast a world may be. A value beyond these limits was mistyped, by orders of magnitude."""
+
+from __future__ import annotations
+
+MAX_COORDINATE = 1e6  # farthest coordinate and largest size in a file [m]
+MAX_CELLS = 25_000_000  # of a grid or a map
+
+MAX_SPEED = 20.0  # of a mover [m/s]; physics feels movers up to five times as fast
+MIN_PERIOD = 0.05  # the shortest step of a wanderer [s]
+MAX_PHASE = 1e4  # [s]
