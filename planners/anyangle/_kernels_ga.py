@@ -1,7 +1,7 @@
 """Compiled evolution of via points: arrays in, arrays out, nothing validated.
 
-A chromosome is a row of via points between the two fixed ends. Random numbers come from one xorshift64 state; every
-function that draws some returns the new state.
+A chromosome is a row of via points between the two fixed ends. Random numbers come from one xorshift64 state;
+every function that draws some returns the new state.
 """
 
 from __future__ import annotations
@@ -220,9 +220,9 @@ def breed_feasible(
 ) -> Any:
     """Breed feasible chromosomes from feasible ones in place, the best one kept in front; state.
 
-    A parent is the shorter of two chromosomes drawn at random. A tail is taken over where the new segment is clear. A
-    gene mutates by tightening or by a random shift, and only as far as its segments stay clear, so no chromosome needs
-    to be eliminated.
+    A parent is the shorter of two chromosomes drawn at random. A tail is taken over where the new segment is
+    clear. A gene mutates by tightening or by a random shift, and only as far as its segments stay clear, so
+    no chromosome needs to be eliminated.
     """
     room, n = population.shape[0], population.shape[1]
     bred = np.empty_like(population)

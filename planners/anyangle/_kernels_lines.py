@@ -89,7 +89,8 @@ def clear_cells(free: Array, r0: float, c0: float, r1: float, c1: float) -> bool
 def pull(land: Terrain, xy: Array) -> Array:
     """The indices of the points that remain when a polyline (M, 2) is pulled straight, first and last included.
 
-    Each point kept is joined to the last point that a clear line from it reaches, or to the next if there is none.
+    Each point kept is joined to the last point that a clear line from it reaches, or to the next if there is
+    none.
     """
     n = xy.shape[0]
     kept = np.empty(n, dtype=np.int64)

@@ -1,8 +1,8 @@
 """Compiled search for the shortest path among discs: arrays in, arrays out, nothing validated.
 
-A shortest path consists of straight lines and of arcs along the rims of the discs that it bends around. A turn to the
-left around a disc is `1`, to the right `-1`. A line in direction `a` touches a disc at the angle `a - turn * pi / 2`,
-seen from the disc's centre. Angles lie in [0, 2 pi).
+A shortest path consists of straight lines and of arcs along the rims of the discs that it bends around. A
+turn to the left around a disc is `1`, to the right `-1`. A line in direction `a` touches a disc at the angle
+`a - turn * pi / 2`, seen from the disc's centre. Angles lie in [0, 2 pi).
 """
 
 from __future__ import annotations
@@ -457,8 +457,8 @@ def doubled_lines(lines: Lines) -> Lines:
 def add_tangents(obstacles: Obstacles, ends: Array, line: int, lines: Lines, count: int) -> tuple[int, int]:
     """Add the tangents that leave the disc and turn which `line` reaches; for -1, those from the start.
 
-    There are 2 N + 1 at most, one to the goal and two to each disc; `lines` has room for them. Returns the number of
-    lines in the table, and the number of lines that were checked against the other discs.
+    There are 2 N + 1 at most, one to the goal and two to each disc; `lines` has room for them. Returns the
+    number of lines in the table, and the number of lines that were checked against the other discs.
     """
     discs, bounds, grid, gates, checked = obstacles.discs, obstacles.bounds, obstacles.bins, obstacles.gates, 0
     first, begin, width = obstacles.rims.first, obstacles.rims.begin, obstacles.rims.width
@@ -542,8 +542,9 @@ def relax(
 def next_line(obstacles: Obstacles, lines: Lines, latest: Array, heap: Heap, waiting: int) -> tuple[int, int]:
     """The most promising line to follow, -1 if there is none, and the heap's new size.
 
-    A line is passed over if one that was followed earlier reaches the same point of the rim by a way as short. Lines
-    that were followed form a linked list per arc and turn, from `latest` (2 A,) on by `Lines.earlier`.
+    A line is passed over if one that was followed earlier reaches the same point of the rim by a way as
+    short. Lines that were followed form a linked list per arc and turn, from `latest` (2 A,) on by
+    `Lines.earlier`.
     """
     while waiting > 0:
         e = heap.line[0]
@@ -590,12 +591,12 @@ def way_to(line: int, lines: Lines) -> Array:
 def shortest_path(discs: Array, bounds: Array, ends: Array) -> tuple[Array, float, int]:
     """The shortest path from point ends[0] to ends[1]: its lines (L, 6), its length, how many lines were checked.
 
-    `discs` are inflated, `bounds` shrunk; none of the discs lies within another (`keep_outer`). A line is x, y where
-    it begins, x, y where it ends, and the disc that it reaches with the turn (1 left, -1 right) around it; the disc is
-    -1 at the goal. There is no path if there are no lines.
+    `discs` are inflated, `bounds` shrunk; none of the discs lies within another (`keep_outer`). A line is x,
+    y where it begins, x, y where it ends, and the disc that it reaches with the turn (1 left, -1 right)
+    around it; the disc is -1 at the goal. There is no path if there are no lines.
 
-    A* over the tangents between discs. The tangents from a disc are found when the search first reaches that disc and
-    turn; every line that arrives there tries all that leave the same free arc ahead of it.
+    A* over the tangents between discs. The tangents from a disc are found when the search first reaches that
+    disc and turn; every line that arrives there tries all that leave the same free arc ahead of it.
     """
     n = discs.shape[0]
     obstacles = Obstacles(discs, bounds, free_arcs(discs, bounds), bins(discs, bounds), gates(discs, bounds))

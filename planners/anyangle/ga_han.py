@@ -104,12 +104,13 @@ def seeded(rng: np.random.Generator) -> Any:
 class GaHan(ViaPointPlanner):
     """A genetic algorithm on a few via points, refilled with random chromosomes (Han 2007).
 
-    Section 4.1 of the thesis: a chromosome is a row of via points on free cells. Each generation selects by 1 / length,
-    crosses, mutates, eliminates what touches an obstacle and refills the population at random. The defaults are those
-    of the thesis. `field` counts the chromosomes of the last population that pass each cell.
+    Section 4.1 of the thesis: a chromosome is a row of via points on free cells. Each generation selects by 1
+    / length, crosses, mutates, eliminates what touches an obstacle and refills the population at random. The
+    defaults are those of the thesis. `landscape` counts the chromosomes of the last population that pass each
+    cell.
 
-    The algorithm depends on chance finding a first feasible line. In worlds with many obstacles there may be no line
-    over so few via points, or none that chance finds: then the answer is `STOPPED`.
+    The algorithm depends on chance finding a first feasible line. In worlds with many obstacles there may be
+    no line over so few via points, or none that chance finds: then the answer is `STOPPED`.
 
     Attributes:
         population: chromosomes

@@ -1,8 +1,9 @@
 """Ants find the corridor, a genetic algorithm finds the line within it (after Han, MSc thesis, Missouri 2007, 6.3).
 
-The thesis proposes to combine the strengths of its two planners. Ants reach the goal, but along the moves of the grid;
-via points give straight lines, but random ones rarely pass many obstacles. Here the ants' path, pulled straight, is the
-ancestor of every chromosome, so all chromosomes are feasible from the start and none is drawn at random.
+The thesis proposes to combine the strengths of its two planners. Ants reach the goal, but along the moves of
+the grid; via points give straight lines, but random ones rarely pass many obstacles. Here the ants' path,
+pulled straight, is the ancestor of every chromosome, so all chromosomes are feasible from the start and none
+is drawn at random.
 """
 
 from __future__ import annotations
@@ -31,14 +32,15 @@ ROUNDS = 20  # how often each via point of a new path is tightened
 class Hybrid(ViaPointPlanner):
     """Ants find the corridor, then a genetic algorithm moves via points freely within it (after Han 2007).
 
-    Section 6.3 of the thesis only proposes the combination; how it is done is antdrive's own. `ant_runs` colonies run
-    one after the other, each for `ant_iterations`, and longer while none of its ants has arrived. The best of their
-    paths, pulled straight, becomes the first population; the remaining `iterations` are generations. While ants run,
-    the history's means and counts and `field` are those of the ants, afterwards those of the chromosomes. The
-    history's best is always the length of the line to be driven.
+    Section 6.3 of the thesis only proposes the combination; how it is done is antdrive's own. `ant_runs`
+    colonies run one after the other, each for `ant_iterations`, and longer while none of its ants has
+    arrived. The best of their paths, pulled straight, becomes the first population; the remaining
+    `iterations` are generations. While ants run, the history's means and counts and `landscape` are those of
+    the ants, afterwards those of the chromosomes. The history's best is always the length of the line to be
+    driven.
 
-    The line stays in the corridor that the ants have chosen: where the best corridor is too narrow for the grid, or the
-    ants miss it, the result is longer than the shortest line by some per cent.
+    The line stays in the corridor that the ants have chosen: where the best corridor is too narrow for the
+    grid, or the ants miss it, the result is longer than the shortest line by some per cent.
 
     Attributes:
         iterations: iterations of ants and generations together
@@ -49,7 +51,8 @@ class Hybrid(ViaPointPlanner):
         population: chromosomes
         crossover: the probability that a chromosome is crossed with another
         mutation: the probability that a gene mutates
-        degrees_per_point: a corner of the pulled line gets one via point for every so many degrees it turns by [deg]
+        degrees_per_point: a corner of the pulled line gets one via point for every so many degrees it turns
+            by [deg]
         max_shift: the longest move of a via point in a mutation [cells]
     """
 

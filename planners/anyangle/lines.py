@@ -25,8 +25,10 @@ class RouteEnds(NamedTuple):
     Attributes:
         start: where the part that keeps the clearance starts [m]
         goal: where it stops [m]
-        lead_in: the exact start, where it has too little room itself and is left on a straight line to `start`
-        lead_out: the exact goal, where it has just the clearance and is reached on a straight line from `goal`
+        lead_in: the exact start, where it has too little room itself and is left on a straight line to
+            `start`
+        lead_out: the exact goal, where it has just the clearance and is reached on a straight line from
+            `goal`
     """
 
     start: Point
@@ -48,9 +50,9 @@ class RouteEnds(NamedTuple):
 def route_ends(query: Query, *, touching: bool = False) -> RouteEnds:
     """The exact start and goal of the query's task; without a task, the centres of its end cells.
 
-    A start with too little room is left on the straight line to the centre of its cell, which `Query.between` has
-    found clear. A goal with too little room is not reached: the route ends at the centre of its cell. A goal with just
-    the clearance is reached from that centre.
+    A start with too little room is left on the straight line to the centre of its cell, which `Query.between`
+    has found clear. A goal with too little room is not reached: the route ends at the centre of its cell. A
+    goal with just the clearance is reached from that centre.
 
     Args:
         query: the query
@@ -88,8 +90,8 @@ def terrain(query: Query) -> Terrain:
 def clear_line(query: Query, start: Point, goal: Point) -> bool:
     """Whether the straight line between two points [m] keeps the clearance; contact counts as too close.
 
-    With a world, the exact distance to discs and walls decides. On a bare grid, every cell that the line touches, if
-    only at a corner, must be free.
+    With a world, the exact distance to discs and walls decides. On a bare grid, every cell that the line
+    touches, if only at a corner, must be free.
     """
     from antdrive.planners.anyangle import _kernels_lines
 
@@ -99,7 +101,8 @@ def clear_line(query: Query, start: Point, goal: Point) -> bool:
 def cells_along(query: Query, waypoints: npt.ArrayLike) -> Cells:
     """A path of allowed moves from start to goal beside a polyline in fractional cells; empty if there is none.
 
-    It is the shortest path within a corridor around the polyline; the corridor widens until it contains a path.
+    It is the shortest path within a corridor around the polyline; the corridor widens until it contains a
+    path.
     """
     from antdrive.planners.anyangle import _kernels_lines
     from antdrive.planners.graph import _kernels_search

@@ -1,9 +1,9 @@
 """The lower bound on every planner's length: the shortest path in the plane among inflated discs.
 
-A shortest path among discs consists of lines tangent to two of them and of arcs along their rims, as described for
-polygons by Lozano-Pérez & Wesley (*An algorithm for planning collision-free paths among polyhedral obstacles*, CACM
-22, 1979) and for curved obstacles by Liu & Arimoto (*Path planning using a tangent graph for mobile robots among
-polygonal and curved obstacles*, IJRR 11, 1992).
+A shortest path among discs consists of lines tangent to two of them and of arcs along their rims, as
+described for polygons by Lozano-Pérez & Wesley (*An algorithm for planning collision-free paths among
+polyhedral obstacles*, CACM 22, 1979) and for curved obstacles by Liu & Arimoto (*Path planning using a
+tangent graph for mobile robots among polygonal and curved obstacles*, IJRR 11, 1992).
 """
 
 from __future__ import annotations
@@ -117,8 +117,9 @@ class TangentPath:
 def shortest(discs: npt.ArrayLike, bounds: Bounds, inflate: float, start: Point, goal: Point) -> TangentPath | None:
     """The shortest path that stays `inflate` [m] from all discs (N, 3: x, y, radius) and inside the bounds.
 
-    None if there is no such path. Contact closes a gap: nothing passes between two discs exactly 2 `inflate` apart, or
-    between such a disc and a wall. Both ends must have the clearance; having just the clearance suffices.
+    None if there is no such path. Contact closes a gap: nothing passes between two discs exactly 2 `inflate`
+    apart, or between such a disc and a wall. Both ends must have the clearance; having just the clearance
+    suffices.
     """
     from antdrive.planners.anyangle import _kernels_tangent
 
@@ -144,11 +145,11 @@ def shortest(discs: npt.ArrayLike, bounds: Bounds, inflate: float, start: Point,
 class Tangent(GridPlanner):
     """The shortest path in the plane, over the tangents between inflated discs: a lower bound for every planner.
 
-    A* on the tangent graph of Liu & Arimoto (1992); the result is exact. It plans among the discs of the query's world,
-    not on the grid, so it may find a path where the grid is too coarse for one. `cells` are then the cells that the
-    path passes over, and `cost` is infinite. Ends with too little room are left and reached through the centres of
-    their cells, as for all planners. The path grazes discs at exactly the clearance, which leaves a driving robot no
-    margin.
+    A* on the tangent graph of Liu & Arimoto (1992); the result is exact. It plans among the discs of the
+    query's world, not on the grid, so it may find a path where the grid is too coarse for one. `cells` are
+    then the cells that the path passes over, and `cost` is infinite. Ends with too little room are left and
+    reached through the centres of their cells, as for all planners. The path grazes discs at exactly the
+    clearance, which leaves a driving robot no margin.
 
     Attributes:
         bulge: how far corners of the driven polyline may stand off an arc [m]

@@ -1,8 +1,8 @@
 """Compiled ants: arrays in, arrays out, nothing validated.
 
-Cells are flat indices. The rules of a colony reach its ants as one table `weights` (cells, 8) of float32: how much
-each move attracts, 0 where the move is not allowed. The table is filled once per iteration, so `walk_ants` serves
-every rule.
+Cells are flat indices. The rules of a colony reach its ants as one table `weights` (cells, 8) of float32: how
+much each move attracts, 0 where the move is not allowed. The table is filled once per iteration, so
+`walk_ants` serves every rule.
 """
 
 from __future__ import annotations
@@ -67,13 +67,14 @@ def walk_ants(
 ) -> int:
     """Send one ant per seed from start to goal; the steps that all of them took.
 
-    Row a of `walks` receives the cells of ant a, sizes[a] their number and lengths[a] the length [cells]. An ant that
-    does not arrive, because it dies where no move has any weight or has taken `limit` steps, has size 0 and length
-    inf. A cell that the ant has visited weighs `revisit`; at 0 it is never visited again. With `backtrack` an ant
-    steps back where it would die: the dead cell is no longer part of the walk, but counts as visited.
+    Row a of `walks` receives the cells of ant a, sizes[a] their number and lengths[a] the length [cells]. An
+    ant that does not arrive, because it dies where no move has any weight or has taken `limit` steps, has
+    size 0 and length inf. A cell that the ant has visited weighs `revisit`; at 0 it is never visited again.
+    With `backtrack` an ant steps back where it would die: the dead cell is no longer part of the walk, but
+    counts as visited.
 
-    The eight moves are written out and summed in pairs. A loop over them was measured 1 to 2 % slower and, as it adds
-    in another order, would round differently and so change plans.
+    The eight moves are written out and summed in pairs. A loop over them was measured 1 to 2 % slower and, as
+    it adds in another order, would round differently and so change plans.
     """
     pad = offset[1]  # no move leads farther, so the cells around the grid can be read without a check
     visited = np.zeros(len(mask) + 2 * pad, dtype=np.int32)  # the number of the last ant at each cell, from 1
@@ -185,9 +186,9 @@ def cut_loops(
 def cut_one_short(walk: Array, size: int, mask: Array, offset: Array, first: int, place: Array, tour: Array) -> int:
     """`tour` receives the walk cut short: from each cell it goes straight to the neighbour that comes last in the walk.
 
-    Returns the size of the tour. A tour is never longer than its walk: what is left out has at least two steps, and
-    the move that replaces it measures sqrt(2) at most. `place` holds the position of each cell in the walk, counted
-    from `first`; entries that earlier walks left there are below `first`.
+    Returns the size of the tour. A tour is never longer than its walk: what is left out has at least two
+    steps, and the move that replaces it measures sqrt(2) at most. `place` holds the position of each cell in
+    the walk, counted from `first`; entries that earlier walks left there are below `first`.
     """
     for s in range(size):
         place[walk[s]] = first + s
@@ -347,8 +348,9 @@ def detour_weights(
 ) -> None:
     """weights[i, k] = exp(-greed * detour), the detour being how much longer than necessary move k makes the path.
 
-    The path from a cell to the goal counts as long as over open ground plus `lane_pull` times the distance to a lane:
-    the line parallel to that from start to goal, `lane` cells to its side. `to_goal` (cells,) is working memory.
+    The path from a cell to the goal counts as long as over open ground plus `lane_pull` times the distance to
+    a lane: the line parallel to that from start to goal, `lane` cells to its side. `to_goal` (cells,) is
+    working memory.
     """
     r0, c0, r1, c1 = start // cols, start % cols, goal // cols, goal % cols
     distance = max(math.hypot(r1 - r0, c1 - c0), 1.0)

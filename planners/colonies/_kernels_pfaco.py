@@ -241,11 +241,12 @@ def run_colony(
 ) -> tuple[int, float, int, int]:
     """Move every ant by a cell per tick until `rules.quota` walks have ended.
 
-    A walk ends at the goal, in a dead end, after `rules.limit` steps, or when it is longer than every walk of the full
-    ranking; the ant then starts again. `best` receives the cells of the best walk if it is shorter than `shortest`,
-    `arrivals` the lengths of the walks that arrived.
+    A walk ends at the goal, in a dead end, after `rules.limit` steps, or when it is longer than every walk of
+    the full ranking; the ant then starts again. `best` receives the cells of the best walk if it is shorter
+    than `shortest`, `arrivals` the lengths of the walks that arrived.
 
-    Returns the size of the new best walk (0: none), the length of the best walk, the steps taken, and how many arrived.
+    Returns the size of the new best walk (0: none), the length of the best walk, the steps taken, and how
+    many arrived.
     """
     # Arrays are taken out of their tuples here: the loop below runs once per step of every ant.
     mask, offset, goal = graph.mask, graph.offset, graph.goal

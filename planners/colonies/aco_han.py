@@ -26,15 +26,15 @@ from antdrive.worlds.errors import FieldError
 class AcoHan(Colony):
     """Ants guided by pheromone on cells and by the direction of the goal (Han 2007).
 
-    Section 4.2 of the thesis: a move attracts by the next cell's share of the pheromone plus alpha times the cosine
-    between the move and the direction of the goal (eq. 4.2.1); pheromone evaporates (eq. 4.2.2), every ant that arrives
-    deposits on its cells (eq. 4.2.3) and an elite deposits more (eq. 4.2.4). The thesis' program differs from its
-    equations; `form` chooses between them.
+    Section 4.2 of the thesis: a move attracts by the next cell's share of the pheromone plus alpha times the
+    cosine between the move and the direction of the goal (eq. 4.2.1); pheromone evaporates (eq. 4.2.2), every
+    ant that arrives deposits on its cells (eq. 4.2.3) and an elite deposits more (eq. 4.2.4). The thesis'
+    program differs from its equations; `form` chooses between them.
 
-    By eq. 4.2.1 alone a move away from the goal weighs 0, less than a step back, and no ant leaves a dead end.
-    A comment in the program asks that ants turn back only when every neighbour has been visited; `min_weight` gives
-    moves to unvisited cells that priority. Walks are long and full of loops, so paths of large grids are ten to twenty
-    per cent longer than the shortest.
+    By eq. 4.2.1 alone a move away from the goal weighs 0, less than a step back, and no ant leaves a dead
+    end. A comment in the program asks that ants turn back only when every neighbour has been visited;
+    `min_weight` gives moves to unvisited cells that priority. Walks are long and full of loops, so paths of
+    large grids are ten to twenty per cent longer than the shortest.
 
     Attributes:
         ants: ants per iteration
@@ -43,8 +43,9 @@ class AcoHan(Colony):
         deposit: an ant deposits deposit / length on its cells; the thesis has 1 in its text, 5 in its program
         attraction: alpha of eq. 4.2.1
         elitism: e of eq. 4.2.4, by how many ants' worth the best tour so far deposits; 0: no elite
-        form: "equation": as the equations; "listing": as the program, with pheromone in place of its shares, one
-            direction from start to goal for all cells, moves not normalised, and evaporation only where ants deposit
+        form: "equation": as the equations; "listing": as the program, with pheromone in place of its shares,
+            one direction from start to goal for all cells, moves not normalised, and evaporation only where
+            ants deposit
         revisit: the weight of a cell that the ant has already visited
         min_weight: the least weight of an unvisited cell; 0 is the equation to the letter
     """

@@ -1,9 +1,10 @@
 """The ant system and its two variants for robots: ants that deposit less with age, and exploratory ants.
 
 ibraheem2016: I. K. Ibraheem, F. H. Ajeil, *Path planning of an autonomous mobile robot using swarm based
-optimization techniques*, Al-Khwarizmi Engineering Journal, 2016. suganthi2019: P. H. Suganthi, K. Subha, *Path
-navigation in ACO using mobile robot*, IJTSRD 3(3), 2019. lee2008: J.-W. Lee, J.-J. Kim, B.-S. Choi, J.-J. Lee,
-*Improved ant colony optimization algorithm by potential field concept for optimal path planning*, 2008.
+optimization techniques*, Al-Khwarizmi Engineering Journal, 2016. suganthi2019: P. H. Suganthi, K. Subha,
+*Path navigation in ACO using mobile robot*, IJTSRD 3(3), 2019. lee2008: J.-W. Lee, J.-J. Kim, B.-S. Choi,
+J.-J. Lee, *Improved ant colony optimization algorithm by potential field concept for optimal path planning*,
+2008.
 """
 
 from __future__ import annotations
@@ -34,17 +35,19 @@ STEP = np.sqrt([1.0, 2.0, 1.0, 2.0, 1.0, 2.0, 1.0, 2.0])
 class AntSystem(Colony):
     """Ants guided by pheromone on arcs and by a heuristic: the ant system, as ibraheem2016 sets it up.
 
-    Section 3.1 of ibraheem2016: p ~ tau^alpha eta^beta (eq. 1), and every ant that arrives deposits Q / length on the
-    arcs it used. The defaults are the values of ibraheem2016. suganthi2019 uses beta 1 and heuristic "step"; lee2008
-    uses 500 ants, beta 2 and evaporation 0.01.
+    Section 3.1 of ibraheem2016: p ~ tau^alpha eta^beta (eq. 1), and every ant that arrives deposits Q /
+    length on the arcs it used. The defaults are the values of ibraheem2016. suganthi2019 uses beta 1 and
+    heuristic "step"; lee2008 uses 500 ants, beta 2 and evaporation 0.01.
 
-    Ants die in dead ends, as in the papers, so on large grids with scattered obstacles few arrive or none, and paths
-    are far from the shortest. With `backtrack` and `shortcut` the same colony arrives.
+    Ants die in dead ends, as in the papers, so on large grids with scattered obstacles few arrive or none,
+    and paths are far from the shortest. With `backtrack` and `shortcut` the same colony arrives.
 
     Attributes:
         alpha: the exponent of the pheromone
-        beta: the exponent of the heuristic; None: 0.22 N on a map of N x N cells, the rule of ibraheem2016, Table 1
-        evaporation: rho, the share of the pheromone that is lost per iteration; rho of lee2008 is the share retained
+        beta: the exponent of the heuristic; None: 0.22 N on a map of N x N cells, the rule of ibraheem2016,
+            Table 1
+        evaporation: rho, the share of the pheromone that is lost per iteration; rho of lee2008 is the share
+            retained
         deposit: Q; an ant deposits Q / length on each of its arcs
         initial: the pheromone on every arc at the start
         heuristic: "goal": eta = 1 / distance from the next cell to the goal (ibraheem2016 eq. 6, lee2008);
@@ -116,8 +119,9 @@ class AntSystem(Colony):
 class AgeingAnts(AntSystem):
     """An ant system in which older ants deposit less pheromone: the modified ACO of ibraheem2016, section 3.2.
 
-    Ant m of M deposits Q_m / length, and Q_m falls from Q_max to Q_min with m (eq. 5). The paper gives no values for
-    the two bounds. On large grids with scattered obstacles these ants die as those of `AntSystem` do.
+    Ant m of M deposits Q_m / length, and Q_m falls from Q_max to Q_min with m (eq. 5). The paper gives no
+    values for the two bounds. On large grids with scattered obstacles these ants die as those of `AntSystem`
+    do.
 
     Attributes:
         q_max: Q_max, the deposit of a young ant
@@ -152,9 +156,10 @@ class AgeingAnts(AntSystem):
 class ExploringAnts(AntSystem):
     """Common ants, exploratory ants that avoid pheromone, and an elite: the improved ACO of suganthi2019.
 
-    Section IV of suganthi2019: common ants choose by tau^alpha eta^beta (eq. 1), exploratory ants by eta^beta /
-    tau^alpha (eq. 5), and the best ants of an iteration deposit more (eq. 7-8). Exploratory ants keep paths long: with
-    the paper's settings this colony is the weakest of the ant systems, and no ant crosses a grid of 100 x 100 cells.
+    Section IV of suganthi2019: common ants choose by tau^alpha eta^beta (eq. 1), exploratory ants by eta^beta
+    / tau^alpha (eq. 5), and the best ants of an iteration deposit more (eq. 7-8). Exploratory ants keep paths
+    long: with the paper's settings this colony is the weakest of the ant systems, and no ant crosses a grid
+    of 100 x 100 cells.
 
     Attributes:
         ants: the number of common ants
@@ -190,7 +195,8 @@ class ExploringAnts(AntSystem):
     ) -> None:
         """p ~ eta^beta tau^alpha for common ants (eq. 1), eta^beta / tau^alpha for exploratory ants (eq. 5).
 
-        `context` says which kind the `weights` are for; they depend on `trail` and `heuristic`, not on `graph`.
+        `context` says which kind the `weights` are for; they depend on `trail` and `heuristic`, not on
+        `graph`.
         """
         from antdrive.planners.colonies import _kernels_colony
 
@@ -211,7 +217,8 @@ def ibraheem_beta(side: int) -> float:
 def shares(eta: Floats, beta: float) -> Weights:
     """eta^beta (cells, 8) as a share of each cell's largest value; 0 for moves that are not allowed (eta = -inf).
 
-    Ants choose by ratios within a cell, so the scale does not matter to them, and no power leaves the range of float32.
+    Ants choose by ratios within a cell, so the scale does not matter to them, and no power leaves the range
+    of float32.
     """
     largest = eta.max(axis=1, keepdims=True)
     with np.errstate(invalid="ignore"):

@@ -184,16 +184,16 @@ FIRST_KIND = ChoiceContext()
 class Colony(IterativePlanner):
     """Ants that walk from the start to the goal, guided by the pheromone trails of ants that arrived before.
 
-    This class holds the loop: ants walk, loops are cut out of their walks, the best tour is kept, work is counted.
-    A planner of the family adds its rules, named as in ACOTSP (Stützle) and in Dorigo & Stützle, *Ant Colony
-    Optimization*, 2004:
+    This class holds the loop: ants walk, loops are cut out of their walks, the best tour is kept, work is
+    counted. A planner of the family adds its rules, named as in ACOTSP (Stützle) and in Dorigo & Stützle,
+    *Ant Colony Optimization*, 2004:
 
     - `initial_trail`: tau before the first iteration
     - `heuristic_values`: eta, what attracts ants whatever the trails are
     - `choice_weights`: how trails and heuristic combine into the attraction of each move
     - `update`: how trails evaporate and which ants deposit
-    - `kinds`, `daemon_action` and `finished`, where a planner has several kinds of ants, improves on the tours of an
-      iteration in one central step, or can stop early
+    - `kinds`, `daemon_action` and `finished`, where a planner has several kinds of ants, improves on the
+      tours of an iteration in one central step, or can stop early
 
     Attributes:
         ants: ants per iteration
@@ -231,8 +231,8 @@ class Colony(IterativePlanner):
     def default_steps(self, rows: int, cols: int) -> int:
         """How many steps an ant may take on a grid of `rows` x `cols` where `max_steps` is None.
 
-        One step per cell, but at least 100 and at most 20 000. Ants that backtrack get two steps per cell, one in and
-        one out, which suffices for every ant to reach the goal.
+        One step per cell, but at least 100 and at most 20 000. Ants that backtrack get two steps per cell,
+        one in and one out, which suffices for every ant to reach the goal.
         """
         return 2 * rows * cols if self.backtrack else min(max(100, rows * cols), 20_000)
 

@@ -30,17 +30,19 @@ class MergingAnts(MaxMinAnts):
 
     Bounds, backtracking, cutting tours short and resets are those of `MaxMinAnts`. New are:
 
-    - The heuristic is exp(-greed * detour). The detour of a move is how much longer than necessary it makes the path
-      over open ground to the goal. Unlike a power of the distance, it is as strong far from the goal as near it.
+    - The heuristic is exp(-greed * detour). The detour of a move is how much longer than necessary it makes
+      the path over open ground to the goal. Unlike a power of the distance, it is as strong far from the goal
+      as near it.
     - Scouts ignore the trails. They follow a lane parallel to the line from start to goal, drawn anew in each
       iteration, so that ways around the other side of obstacles are not forgotten.
-    - As daemon action, the shortest path over the arcs of this iteration's tours and of the best tour is found, and
-      that path deposits. Ants find the pieces; the search puts the best of them together. It looks at no other arc,
-      which leaves about nine tenths of a grid out.
-    - The colony stops after `settled` iterations without a better tour, or when no tour on any grid could be shorter.
+    - As daemon action, the shortest path over the arcs of this iteration's tours and of the best tour is
+      found, and that path deposits. Ants find the pieces; the search puts the best of them together. It looks
+      at no other arc, which leaves about nine tenths of a grid out.
+    - The colony stops after `settled` iterations without a better tour, or when no tour on any grid could be
+      shorter.
 
-    These rules are antdrive's own; no paper describes them. A path of many turns is only as good as the pieces that
-    ants have found: on very large grids it may stay a little longer than the shortest.
+    These rules are antdrive's own; no paper describes them. A path of many turns is only as good as the
+    pieces that ants have found: on very large grids it may stay a little longer than the shortest.
 
     Attributes:
         ants: ants that follow trails
@@ -51,8 +53,8 @@ class MergingAnts(MaxMinAnts):
         evaporation: rho
         patience: iterations without a better tour after which all trails return to the upper bound
         iterations: iterations at most
-        settled: the colony stops after this many iterations without a better tour; where tours are short, after
-            0.6 times their length in cells, but not before 20
+        settled: the colony stops after this many iterations without a better tour; where tours are short,
+            after 0.6 times their length in cells, but not before 20
     """
 
     ants: int = 25

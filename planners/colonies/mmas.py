@@ -16,16 +16,19 @@ from antdrive.worlds import Floats
 class MaxMinAnts(AntSystem):
     """MAX-MIN ant system: one ant deposits per iteration, on trails kept between two bounds.
 
-    Stützle & Hoos 2000: the ant is the best of the iteration or the best so far (section 5), the bounds follow the best
-    tour (eq. 7 and 11), all trails start at the upper bound (section 3.3) and return there when the search stagnates
-    (section 3.4). The paper's problems have no dead ends; on a grid these ants backtrack out of them. Cutting tours
-    short takes the place of the paper's local search, and evaporation and schedule are those the paper uses with it.
+    Stützle & Hoos 2000: the ant is the best of the iteration or the best so far (section 5), the bounds
+    follow the best tour (eq. 7 and 11), all trails start at the upper bound (section 3.3) and return there
+    when the search stagnates (section 3.4). The paper's problems have no dead ends; on a grid these ants
+    backtrack out of them. Cutting tours short takes the place of the paper's local search, and evaporation
+    and schedule are those the paper uses with it.
 
-    Paths are the shortest on small grids and, on grids of 100 x 100 cells, typically one or two per cent longer.
+    Paths are the shortest on small grids and, on grids of 100 x 100 cells, typically one or two per cent
+    longer.
 
     Attributes:
         evaporation: rho; the paper retains 0.8 with local search
-        initial: the pheromone before the first update; arbitrarily high, so that the bounds bring it to tau_max
+        initial: the pheromone before the first update; arbitrarily high, so that the bounds bring it to
+            tau_max
         p_best: the probability of building the best tour once the trails have converged (eq. 11)
         patience: iterations without a better tour after which all trails return to the upper bound
         backtrack: as in `Colony`

@@ -1,7 +1,7 @@
 """Ants on a potential field, without generations.
 
-J.-W. Lee, J.-J. Kim, B.-S. Choi, J.-J. Lee, *Improved ant colony optimization algorithm by potential field concept
-for optimal path planning*, 2008 (lee2008), section IV.
+J.-W. Lee, J.-J. Kim, B.-S. Choi, J.-J. Lee, *Improved ant colony optimization algorithm by potential field
+concept for optimal path planning*, 2008 (lee2008), section IV.
 """
 
 from __future__ import annotations
@@ -27,15 +27,16 @@ if TYPE_CHECKING:  # importing kernels loads the compiler
 class PotentialFieldAnts(IterativePlanner):
     """Ants guided by a potential field, which rank their paths and start again one by one: lee2008's improved ACO.
 
-    Section IV of lee2008: an ant chooses the next cell by pheromone^alpha potential^beta (eq. 13). The potential rises
-    away from the start (eq. 9) and falls near obstacles (eq. 11); the first pheromone is a mix of potential and chance
-    (eq. 14). All ants move by one cell per tick. An ant that arrives enters its path into a ranking list by length
-    times number of cells (eq. 15), deposits by rank and starts again. Where the pheromone has converged it is rebuilt
-    from the list (section IV-B). An iteration here is as many ticks as it takes for `ants` walks to end.
+    Section IV of lee2008: an ant chooses the next cell by pheromone^alpha potential^beta (eq. 13). The
+    potential rises away from the start (eq. 9) and falls near obstacles (eq. 11); the first pheromone is a
+    mix of potential and chance (eq. 14). All ants move by one cell per tick. An ant that arrives enters its
+    path into a ranking list by length times number of cells (eq. 15), deposits by rank and starts again.
+    Where the pheromone has converged it is rebuilt from the list (section IV-B). An iteration here is as many
+    ticks as it takes for `ants` walks to end.
 
-    The paper gives no values for the constants from `attraction` on; these are ours. Ants that start again in dead ends
-    rarely cross large grids with scattered obstacles, and then by paths several times too long; with `backtrack` and
-    `shortcut` they arrive.
+    The paper gives no values for the constants from `attraction` on; these are ours. Ants that start again in
+    dead ends rarely cross large grids with scattered obstacles, and then by paths several times too long;
+    with `backtrack` and `shortcut` they arrive.
 
     Attributes:
         ants: ants, and walks per iteration
@@ -44,7 +45,8 @@ class PotentialFieldAnts(IterativePlanner):
         mix: k_mix of eq. 14, the share of chance in the first pheromone
         alpha_1: the exponent of the pheromone in stage 1, until the list has been filled twice
         beta_1: the exponent of the potential in stage 1
-        alpha_2: the exponent of the pheromone in stage 2, until as many more paths as ants have entered the list
+        alpha_2: the exponent of the pheromone in stage 2, until as many more paths as ants have entered the
+            list
         beta_2: the exponent of the potential in stage 2
         alpha_3: the exponent of the pheromone in stage 3
         beta_3: the exponent of the potential in stage 3
@@ -54,8 +56,10 @@ class PotentialFieldAnts(IterativePlanner):
         deposit: the deposit on each cell of a path of the first rank; it falls linearly with the rank
         min_pheromone: the pheromone of a free cell does not decay below this
         convergence: the pheromone has converged when its sum changes by less than this share in an iteration
-        max_steps: a walk ends after this many steps; None: one step per cell, but at least 100 and at most 20 000
-        backtrack: whether an ant in a dead end steps back until it finds another way; otherwise it starts again
+        max_steps: a walk ends after this many steps; None: one step per cell, but at least 100 and at most 20
+            000
+        backtrack: whether an ant in a dead end steps back until it finds another way; otherwise it starts
+            again
         shortcut: whether paths are cut short where they pass next to an earlier part of themselves
     """
 
