@@ -53,10 +53,10 @@ def history_figure(
             longest = max(len(run) for run in runs)
             best = np.array([np.pad(run.best, (0, longest - len(run)), mode="edge") for run in runs if len(run)])
             best = np.where(np.isfinite(best), best, np.nan)
-            turns = np.arange(1, longest + 1)
+            iterations = np.arange(1, longest + 1)
             known = np.isfinite(best).all(axis=0)
             axes.plot(
-                turns[known],
+                iterations[known],
                 np.median(best[:, known], axis=0),
                 color=hexed(colour),
                 ls=dash,
@@ -66,7 +66,7 @@ def history_figure(
             )
             if len(runs) > 1:
                 axes.fill_between(
-                    turns[known],
+                    iterations[known],
                     best[:, known].min(axis=0),
                     best[:, known].max(axis=0),
                     step="post",
@@ -75,7 +75,7 @@ def history_figure(
                     lw=0,
                 )
         if optimum is not None:
-            axes.axhline(optimum, color=hexed(MUTED), ls="--", lw=1.0, label="shortest on these moves")
+            axes.axhline(optimum, color=hexed(MUTED), ls="--", lw=1.0, label="shortest with these moves")
         axes.set(xlabel="iteration", ylabel=f"best path so far [{unit}]")
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.legend(loc="upper right")
@@ -118,26 +118,13 @@ def ants_figure(
         for count in counts:
             axes.plot([count] * len(lengths[count]), lengths[count], "o", ms=4, color=colour, alpha=0.35, mew=0)
         means = [float(np.mean(lengths[count])) for count in counts]
-        axes.plot(
-            counts,
-            means,
-            "-o",
-            ms=6,
-            color=colour,
-            lw=2.0,
-            label=f"{planner}, mean of {len(lengths[counts[0]])}",
-        )
+        name = f"{planner}, mean of {len(lengths[counts[0]])} seeds"
+        axes.plot(counts, means, "-o", ms=6, color=colour, lw=2.0, label=name)
         if printed:
             known = sorted(printed)
-            axes.plot(
-                known,
-                [printed[count] for count in known],
-                "s--",
-                color=hexed(INK),
-                mfc="white",
-                label="in the paper",
-            )
-        axes.axhline(optimum, color=hexed(MUTED), ls="--", lw=1.0, label="shortest on these moves")
+            values = [printed[count] for count in known]
+            axes.plot(known, values, "s--", color=hexed(INK), mfc="white", label="in the paper")
+        axes.axhline(optimum, color=hexed(MUTED), ls="--", lw=1.0, label="shortest with these moves")
         axes.set(xscale="log", xlabel="number of ants", ylabel=f"path length [{unit}]")
         axes.set_xticks(counts, [str(count) for count in counts])
         axes.minorticks_off()

@@ -25,22 +25,22 @@ class ReplanEvent(NamedTuple):
 
     Attributes:
         t: when [s]
-        cause: why the robot replanned
+        trigger: why the robot replanned
         solved: whether it found a new route
         route: the polyline followed from then on (N, 2) [m]
     """
 
     t: float
-    cause: str
+    trigger: str
     solved: bool
     route: Floats
 
     @property
     def caption(self) -> str:
         """The replan in a few words; empty for the steps of a robot that plans anew at every cell."""
-        if self.cause == DECISION:
+        if self.trigger == DECISION:
             return ""
-        return f"{'new route' if self.solved else 'no new route'}: {self.cause}"
+        return f"{'new route' if self.solved else 'no new route'}: {self.trigger}"
 
 
 class Replay:

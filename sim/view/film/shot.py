@@ -69,10 +69,8 @@ class Shot:
         self.outcome = rollout.outcome
         self._follows = camera == "follow"
         replans = not planning and any(event.caption for event in self.replay.replans)
-        for card in (
-            True,
-            False,
-        ):  # the legend is a card in the picture's corner, or a row of the band if it does not fit
+        # The legend is a card in the picture's corner or, if that would cover the world, a row of the band.
+        for card in (True, False):
             self._layout = layout = Layout.of(size, card)
             band = 0 if bare else layout.height
             self._camera = self._aim(camera, rollout, (size[0], size[1] - band))

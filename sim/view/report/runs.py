@@ -239,11 +239,11 @@ def find_runs(folder: Path) -> Iterator[ReportedRun]:
         missing = [key for key in REQUIRED if key not in result]
         if missing:
             raise InputError(f"{path}: {missing[0]}: missing; `antdrive run` writes it")
-        yield ReportedRun(path.parent, result, _record_of(path.parent / "rollout.npz"), number)
+        yield ReportedRun(path.parent, result, _record(path.parent / "rollout.npz"), number)
 
 
-def _record_of(path: Path) -> DriveRecord | None:
-    """The record of a log, without its arrays; None if there is no log."""
+def _record(path: Path) -> DriveRecord | None:
+    """The record of a log; None if there is no log, because the robot did not drive."""
     return read_record(path) if path.exists() else None
 
 

@@ -60,5 +60,5 @@ def test_looking_at_a_world_imports_nothing_heavy():
         "import sys; from antdrive.worlds import load_task; load_task('slalom')._repr_html_(); "
         "print([m for m in ('matplotlib', 'numba', 'antdrive.sim', 'pybullet') if m in sys.modules])"
     )
-    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert said.stdout.strip() == "[]"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "[]"

@@ -59,9 +59,8 @@ def test_an_overview_shows_obstacles_trail_and_contact(made_up_drive, tmp_path):
     bare = dataclasses.replace(drive, contacts=drive.contacts * [1, 0, 1, 1], record=record)
     few = pixels(overview(bare, tmp_path / "few.png", dpi=80))
     assert near(full, (121, 136, 160)) > 3 * near(few, (121, 136, 160))
-    clean = dataclasses.replace(
-        drive, contacts=np.empty((0, 4)), record=dataclasses.replace(drive.record, outcome=Outcome.STUCK)
-    )
+    stuck = dataclasses.replace(drive.record, outcome=Outcome.STUCK)
+    clean = dataclasses.replace(drive, contacts=np.empty((0, 4)), record=stuck)
     untouched = pixels(overview(clean, tmp_path / "clean.png", dpi=80))
     assert near(full, (204, 32, 42)) > near(untouched, (204, 32, 42)) + 50
 

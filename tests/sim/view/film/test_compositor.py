@@ -177,11 +177,11 @@ def test_a_movers_motion_ahead_is_drawn_on_the_ground(drive, scene):
     with Compositor(moving, camera(moving, size=(640, 480)), route=np.empty((0, 2))) as compositor:
         without = compositor.frame(pose, (0, 0), places)
         still = compositor.frame(pose, (0, 0), places, 0 * velocities)
-        told = compositor.frame(pose, (0, 0), places, velocities)
+        forecast = compositor.frame(pose, (0, 0), places, velocities)
         ahead, end = (around(compositor, x, 0.6, half=5) for x in (2.3, 1.5))
         beyond, behind = (around(compositor, x, 0.6, half=5) for x in (1.2, 3.4))
     assert (still == without).all()
-    difference = changed(told, without)
+    difference = changed(forecast, without)
     assert difference[ahead].max() > 30
     assert difference[end].max() > 60
     assert difference[beyond].max() == difference[behind].max() == 0

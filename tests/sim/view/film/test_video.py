@@ -296,8 +296,8 @@ def test_a_small_robot_gets_a_glow_and_a_large_one_none(made_up_drive):
 def test_a_replan_shows_its_new_route_and_its_cause(drive):
     """The new route replaces the old one, a dot marks the place, and the cause is shown for a while."""
     new = ReplanRecord(t=0.3, trigger="obstructed", solved=True, cost_m=2.5, work=1, route=((1.0, 0.4), (3.5, 0.4)))
-    unsolved = replace(new, t=0.8, trigger="waited", solved=False, cost_m=None, route=())
-    replanned = replace(drive, record=replace(drive.record, replans=(new, unsolved)))
+    failed_one = replace(new, t=0.8, trigger="waited", solved=False, cost_m=None, route=())
+    replanned = replace(drive, record=replace(drive.record, replans=(new, failed_one)))
 
     def views(rollout, news, *times):
         with Shot(rollout, camera="top", size=SIZE, bare=True) as shot:
@@ -306,7 +306,7 @@ def test_a_replan_shows_its_new_route_and_its_cause(drive):
 
     kept, plain = views(drive, 0.0, 0.2, 0.5)
     before, after, failed = views(replanned, 0.0, 0.2, 0.5, 0.85)
-    told = views(replanned, 1.0, 0.5)[0]
+    captioned = views(replanned, 1.0, 0.5)[0]
     with Shot(drive, camera="top", size=SIZE, bare=True) as shot:
         new_line = [shot._compositor.pixel(x, 0.4) for x in np.linspace(1.0, 3.5, 200)]
         x = np.linspace(2.4, 3.1, 100)
@@ -321,7 +321,7 @@ def test_a_replan_shows_its_new_route_and_its_cause(drive):
     assert dark(failed, new_line) > 0.3
     assert dark(plain, old_line) > 0.2
     assert dark(after, old_line) == 0
-    assert (np.abs(told - after).max(axis=-1) > 60).sum() > 100
+    assert (np.abs(captioned - after).max(axis=-1) > 60).sum() > 100
 
 
 def test_replans_at_every_cell_have_no_caption(drive):

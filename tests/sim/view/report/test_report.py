@@ -27,21 +27,21 @@ window.addEventListener("error", lost, true);
 window.onload = async () => {
   const rows = () => [...document.querySelectorAll("#runs tbody tr")].filter((r) => !r.hidden);
   const column = (k) => rows().map((r) => r.cells[k].textContent);
-  const heads = [...document.querySelectorAll("#runs th button")], said = {};
+  const heads = [...document.querySelectorAll("#runs th button")], found = {};
   const named = (name) => heads.find((h) => h.textContent === name);
-  named("planner").click(); said.up = column(1);
-  named("planner").click(); said.down = column(1);
-  named("driven [m]").click(); said.driven = column(6);
+  named("planner").click(); found.up = column(1);
+  named("planner").click(); found.down = column(1);
+  named("driven [m]").click(); found.driven = column(6);
   const filter = document.querySelector("#filter");
   filter.value = "astar COLLIDED"; filter.dispatchEvent(new Event("input"));
-  said.filtered = column(0); said.sections = [...document.querySelectorAll("section")].filter((s) => !s.hidden).length;
+  found.filtered = column(0); found.sections = [...document.querySelectorAll("section")].filter((s) => !s.hidden).length;
   filter.value = "nothing at all"; filter.dispatchEvent(new Event("input"));
-  said.nothing = !document.querySelector("#none").hidden;
+  found.nothing = !document.querySelector("#none").hidden;
   filter.value = ""; filter.dispatchEvent(new Event("input"));
   const outcome = document.querySelector("#outcome"); outcome.value = "succeeded"; outcome.dispatchEvent(new Event("change"));
-  said.succeeded = rows().length;
-  said.pictures = [...document.images].every((i) => i.complete && i.naturalWidth > 0);
-  said.overflow = document.documentElement.scrollWidth - document.documentElement.clientWidth;
+  found.succeeded = rows().length;
+  found.pictures = [...document.images].every((i) => i.complete && i.naturalWidth > 0);
+  found.overflow = document.documentElement.scrollWidth - document.documentElement.clientWidth;
   const film = document.querySelector("video");
   if (film) {
     film.muted = true;
@@ -50,10 +50,10 @@ window.onload = async () => {
       await new Promise((r) => setTimeout(r, 50));
       for (let i = 0; i < 2e6; i++) x += Math.sqrt(i);  // the page's time is virtual; the decoder needs some of ours
     }
-    said.film = [film.videoWidth, film.videoHeight, film.currentTime > 0.1, film.error && film.error.message];
+    found.film = [film.videoWidth, film.videoHeight, film.currentTime > 0.1, film.error && film.error.message];
   }
-  said.faults = faults;
-  const out = document.createElement("pre"); out.id = "said"; out.textContent = JSON.stringify(said); document.body.append(out);
+  found.faults = faults;
+  const out = document.createElement("pre"); out.id = "found"; out.textContent = JSON.stringify(found); document.body.append(out);
 };
 </script>"""
 
@@ -86,7 +86,7 @@ def dumped(page: Path, *words: str) -> dict:
     common = ("--headless", "--no-sandbox", "--disable-gpu", "--autoplay-policy=no-user-gesture-required",
               "--allow-file-access-from-files", "--virtual-time-budget=20000", "--dump-dom", *words)  # fmt: skip
     done = subprocess.run([BROWSER, *common, page.as_uri()], capture_output=True, text=True, timeout=120, check=True)
-    return json.loads(html.unescape(re.search(r'<pre id="said">(.*?)</pre>', done.stdout, re.S).group(1)))
+    return json.loads(html.unescape(re.search(r'<pre id="found">(.*?)</pre>', done.stdout, re.S).group(1)))
 
 
 def with_probe(page: Path) -> Path:
@@ -100,30 +100,30 @@ def with_probe(page: Path) -> Path:
 def test_in_a_browser_it_sorts_filters_and_plays(runs, tmp_path, embed):
     page = (tmp_path if embed else runs) / "report.html"
     write_report(runs, page, embed_films=embed)
-    said = dumped(with_probe(page))
-    assert said["faults"] == []
-    assert said["up"] == ["<b>odd</b>", "astar", "mmas"]
-    assert said["down"] == said["up"][::-1]
-    assert said["driven"] == ["9.25", "10.50", "100.00"], "as numbers, not as text"
-    assert said["filtered"] == ["made-up"]
-    assert said["sections"] == 1
-    assert said["nothing"]
-    assert said["succeeded"] == 2
-    assert said["pictures"]
-    assert said["film"] == [320, 240, True, None]
+    found = dumped(with_probe(page))
+    assert found["faults"] == []
+    assert found["up"] == ["<b>odd</b>", "astar", "mmas"]
+    assert found["down"] == found["up"][::-1]
+    assert found["driven"] == ["9.25", "10.50", "100.00"], "as numbers, not as text"
+    assert found["filtered"] == ["made-up"]
+    assert found["sections"] == 1
+    assert found["nothing"]
+    assert found["succeeded"] == 2
+    assert found["pictures"]
+    assert found["film"] == [320, 240, True, None]
 
 
 @needs_browser
 def test_on_a_phone_the_page_is_as_wide_as_the_screen(runs, tmp_path):
     write_report(runs, tmp_path / "report.html")
     with_probe(tmp_path / "report.html")
-    copy = "document.body.append(f.contentDocument.querySelector('#said').cloneNode(true))"
+    copy = "document.body.append(f.contentDocument.querySelector('#found').cloneNode(true))"
     (tmp_path / "phone.html").write_text(
         f"<script>onload = () => setTimeout(() => {{ {copy} }}, 18000)</script>"
         "<iframe id=f width=390 height=800 src=probed.html></iframe>"
     )
-    said = dumped(tmp_path / "phone.html")
-    assert said["overflow"] == 0
+    found = dumped(tmp_path / "phone.html")
+    assert found["overflow"] == 0
 
 
 def test_the_page_needs_no_network_and_escapes_its_content(runs, tmp_path):
