@@ -1,7 +1,10 @@
-"""How well paths are driven: `python -m benchmarks.drives [--worlds N] [--jobs N] [--barn FOLDER] [TABLE ...]`.
+"""Drives by planner, smoothing and noise: `python -m benchmarks.drives [--worlds N] [--jobs N] [TABLE ...]`.
 
-Tables: barn (the challenge's worlds, by planner, route and noise), forests (random worlds, every failure with its seed) and
-refine (how far refined routes are from the exact optimum). `barn` needs the folder or archive of BARN's worlds.
+Tables:
+
+- barn: the BARN challenge's worlds, by planner, smoothing and noise; needs their folder or archive (`--barn`)
+- forests: random worlds; every failure is listed with its seed
+- smooth: how much longer taut routes are than the exact optimum
 """
 
 from __future__ import annotations
@@ -32,19 +35,29 @@ BARN = Path(__file__).parent.parent.parent / "shared" / "data" / "barn" / "barn5
 
 
 class Result(NamedTuple):
-    """What one drive leaves behind."""
+    """The result of one drive.
+
+    Attributes:
+        name: the world
+        outcome: how the drive ended
+        succeeded: whether the robot reached the goal and its log proves that nothing was touched
+        contacts: how many contacts the log holds
+        metrics: every metric by name; empty without a rollout
+        optimum: length of the exact shortest path among the inflated discs [m]
+        errors: distances from the route near a speed [m], by speed [m/s]
+    """
 
     name: str
     outcome: str
     succeeded: bool
     contacts: int
     metrics: dict[str, float]
-    optimum: float  # the shortest path of the plane [m]
-    errors: dict[float, list[float]]  # tracking errors near a speed [m]
+    optimum: float
+    errors: dict[float, list[float]]
 
 
 def drive(name: str, task: Any, planner: str, robot: str, **settings: Any) -> Result:
-    """One drive; heavy arrays stay here."""
+    """Drive once; the rollout stays in this process."""
     done = run(
         Scenario(task=task, planner=load_planner(planner), planner_name=planner, robot=load_robot(robot), **settings)
     )
@@ -81,22 +94,22 @@ def barn_tasks(source: Path) -> dict[str, Any]:
 
 
 def barn(jobs: int, source: Path, worlds: int) -> Iterator[str]:
-    """BARN with jackal."""
+    """BARN's worlds, driven by the jackal."""
     tasks = barn_tasks(source)
     rows = []
-    for planner, route, noise in (
+    for planner, smoothing, noise in (
         ("astar", "clearance", 0.0), ("astar", "taut", 0.0), ("astar", "none", 0.0), ("ants", "clearance", 0.0),
         ("aco-han", "clearance", 0.0),
         ("astar", "clearance", 1.0),
     ):  # fmt: skip
-        given = {"smoothing": route, "noise": noise}
+        given = {"smoothing": smoothing, "noise": noise}
         got = all_of(jobs, (delayed(drive)(name, task, planner, "jackal", **given) for name, task in tasks.items()))
         driven = [r for r in got if r.metrics]
         ratios = [r.metrics["arrival_s"] / (r.optimum / 2.0) for r in driven if r.succeeded]
         rows.append(
             [
                 f"`{planner}`",
-                route,
+                smoothing,
                 f"{noise:g}",
                 f"{sum(r.succeeded for r in got)} of {len(got)}",
                 str(sum(r.contacts for r in got)),
@@ -109,14 +122,14 @@ def barn(jobs: int, source: Path, worlds: int) -> Iterator[str]:
             ]
         )
     heads = [
-        "planner", "route", "noise", "certified", "contacts", "mean score", "duration / OT: mean / most", "least clearance",
-        "off the route at 1 m/s, p95", "at 2 m/s", "failures",
+        "planner", "smoothing", "noise", "certified", "contacts", "mean score", "duration / OT: mean / max", "min. clearance",
+        "tracking error at 1 m/s, p95", "at 2 m/s", "failures",
     ]  # fmt: skip
     yield from table(heads, rows)
 
 
 def forests(jobs: int, source: Path, worlds: int) -> Iterator[str]:
-    """Half of the worlds by each generator's rule."""
+    """Random worlds, half of them from each generator."""
     rows, wrong = [], []
     kinds = {
         kind: [generate(kind, np.random.default_rng(n), {}, name=f"{kind} {n}", note="") for n in range(worlds // 2)]
@@ -149,8 +162,8 @@ def forests(jobs: int, source: Path, worlds: int) -> Iterator[str]:
         "without",
         "certified",
         "with contacts",
-        "both",
-        "least clearance",
+        "certified with contacts",
+        "min. clearance",
     ]
     yield from table(heads, rows)
     yield "Failures: " + ("; ".join(wrong) or "none.")
@@ -158,8 +171,8 @@ def forests(jobs: int, source: Path, worlds: int) -> Iterator[str]:
 
 
 def smooth(jobs: int, source: Path, worlds: int) -> Iterator[str]:
-    """Pulled taut from the grid's corridor, against the shortest path of the plane between the same ends."""
-    gaps: dict[str, list[float]] = {"the optimal one": [], "another": []}
+    """Taut routes compared with the exact shortest paths between the same ends."""
+    gaps: dict[str, list[float]] = {"as by the optimum": [], "on other sides": []}
     for kind, n in itertools.product(("forest", "barn"), range(worlds // 2)):
         task = generate(kind, np.random.default_rng(n), {}, name="", note="")
         world = task.world
@@ -173,9 +186,9 @@ def smooth(jobs: int, source: Path, worlds: int) -> Iterator[str]:
         assert taut is not None
         assert best is not None
         same = not encloses(line, best.polyline(1e-4, world.discs, world.bounds, grid.inflate), world.discs)
-        gaps["the optimal one" if same else "another"].append(taut.length / best.length - 1)
+        gaps["as by the optimum" if same else "on other sides"].append(taut.length / best.length - 1)
     yield from table(
-        ["corridor of the grid's path", "worlds", "gap to the optimum: median", "most"],
+        ["obstacles are passed", "worlds", "gap to the optimum: median", "max"],
         [
             [k, str(len(v)), f"{100 * statistics.median(v):.4f} %", f"{100 * max(v):.4f} %"]
             for k, v in gaps.items()
@@ -186,10 +199,10 @@ def smooth(jobs: int, source: Path, worlds: int) -> Iterator[str]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("tables", nargs="*", help="which to print, all by default")
-    parser.add_argument("--worlds", type=int, default=1000, help="how many random worlds")
-    parser.add_argument("--jobs", type=int, default=-1, help="processes; -1: one a core")
-    parser.add_argument("--barn", type=Path, default=BARN, help="folder or archive of BARN's world_*.world")
+    parser.add_argument("tables", nargs="*", help="tables to print; default: all")
+    parser.add_argument("--worlds", type=int, default=1000, help="number of random worlds")
+    parser.add_argument("--jobs", type=int, default=-1, help="processes; -1: one per core")
+    parser.add_argument("--barn", type=Path, default=BARN, help="folder or archive of BARN's world_*.world files")
     arguments = parser.parse_args()
     makers = {f.__name__: f for f in (barn, forests, smooth)}
     for name in arguments.tables or makers:

@@ -1,7 +1,10 @@
 """Drives among movers: `python -m benchmarks.dynamic [--quick] [--jobs N] [--dynabarn FILE] [TABLE ...]`.
 
-Tables: dynabarn (ten of its worlds, each from ten moments on, by what the robot may do), random (worlds with 1 to 10 movers as
-fast as the robot; every outcome but success with its seed) and hasan (his cases, driven).
+Tables:
+
+- dynabarn: ten DynaBARN worlds, each started at ten moments, by what the robot may do
+- random: worlds with 1 to 10 movers as fast as the robot; every failure is listed with its seed
+- hasan: the cases of hasan's paper, driven
 """
 
 from __future__ import annotations
@@ -39,28 +42,38 @@ from benchmarks.planners import table
 
 DYNABARN = Path(__file__).parent.parent.parent / "shared" / "data" / "dynabarn" / "dynabarn10.json"
 CLASSES = {"easy": range(20), "medium": range(20, 40), "hard": range(40, 60)}
-APART = 7.3  # between the moments at which drives in one world begin [s]
-KNOWN = Perception(told="motions")
+START_INTERVAL = 7.3  # between the moments at which drives in one world start [s]
+KNOWN = Perception(kind="motions")
 POLICIES: dict[str, dict[str, Any]] = {
-    "neither": {"yielding": None, "replanning": None},
-    "yield": {"replanning": ReplanPolicy(around=False)},
-    "replan": {"yielding": None},
-    "yield and replan": {},
-    "the same, motions known": {"knowledge": KNOWN},
+    "neither": {"avoidance": None, "replanning": None},
+    "avoid": {"replanning": ReplanPolicy(around_movers=False)},
+    "replan": {"avoidance": None},
+    "avoid and replan": {},
+    "the same, motions known": {"perception": KNOWN},
     "keep to a plan in space and time": {"planner": "sipp", "options": {"speed": "1.5"}, "margin": 0.15},
 }
 
 
 class Result(NamedTuple):
-    """What one drive leaves behind."""
+    """The result of one drive.
+
+    Attributes:
+        name: the world and the moment, or the seed
+        outcome: how the drive ended
+        duration: simulated time [s]
+        replans: attempts to find a new route
+        certified: whether the robot reached the goal and its log proves that nothing was touched
+        reason: what the outcome leaves open
+        proved: whether the planner in space and time found a path
+    """
 
     name: str
     outcome: Outcome
-    duration: float  # [s]
+    duration: float
     replans: int
     certified: bool
     reason: str
-    proved: bool = True  # whether the space-time planner finds a way
+    proved: bool = True
 
 
 def drive(
@@ -72,7 +85,7 @@ def drive(
     options: dict[str, str] | None = None,
     **settings: Any,
 ) -> Result:
-    """One drive; heavy arrays stay here."""
+    """Drive once; the rollout stays in this process."""
     scenario = Scenario(
         task=task,
         planner=load_planner(planner, **(options or {})),
@@ -89,8 +102,8 @@ def drive(
     return Result(name, done.outcome, float(log.t[-1]), replans, done.succeeded, done.reason)
 
 
-def told(results: Sequence[Result]) -> list[str]:
-    """The columns that every table has: succeeded, the three kinds of contact, other ends, time."""
+def columns(results: Sequence[Result]) -> list[str]:
+    """The columns that every table has, see `HEADS`."""
     ends = collections.Counter(r.outcome for r in results)
     touches = [
         str(ends.pop(kind, 0)) for kind in (Outcome.COLLIDED, Outcome.HIT_WHILE_STANDING, Outcome.HIT_BY_TELEPORT)
@@ -104,13 +117,21 @@ def told(results: Sequence[Result]) -> list[str]:
             f"{statistics.mean(r.replans for r in results):.1f}" if results else "–"]  # fmt: skip
 
 
-HEADS = ("certified successes", "contacts driving", "standing", "jumped on", "other ends", "mean time", "replans")
+HEADS = (
+    "certified successes",
+    "collided",
+    "hit while standing",
+    "hit by a teleport",
+    "other endings",
+    "mean time",
+    "replans",
+)
 
 
 def dynabarn(jobs: int, source: Path, quick: bool) -> Iterator[str]:
-    """DynaBARN with jackal."""
+    """DynaBARN's worlds, driven by the jackal."""
     tasks = import_dynabarn(source)
-    offsets = [APART * k for k in range(2 if quick else 10)]
+    offsets = [START_INTERVAL * k for k in range(2 if quick else 10)]
     cases = [
         (f"{task.world.name}+{off:g}s", dataclasses.replace(task, world=task.world.later(off)))
         for task, off in itertools.product(tasks, offsets)
@@ -124,16 +145,16 @@ def dynabarn(jobs: int, source: Path, quick: bool) -> Iterator[str]:
         got = list(Parallel(n_jobs=jobs)(calls))
         for kind, numbers in CLASSES.items():
             some = [r for r in got if int(r.name.split("-")[1].split("+")[0]) in numbers]
-            rows.append([policy if kind == "easy" else "", kind, *told(some)])
-        if policy == "yield and replan":
+            rows.append([policy if kind == "easy" else "", kind, *columns(some)])
+        if policy == "avoid and replan":
             wrong = [f"- {r.name}: {r.outcome.key} ({r.reason})" for r in got if not r.certified]
     yield from table(["the robot may", "worlds", *HEADS], rows)
-    yield "\nWhat did not succeed with yielding and replanning:\n"
+    yield "\nDrives that failed with avoidance and replanning:\n"
     yield from wrong
 
 
 def random_task(seed: int) -> tuple[Task, int]:
-    """A hall of 10 m with some columns and 1 to 10 movers at up to the turtlebot's own speed."""
+    """A hall of 10 m with 8 columns and 1 to 10 movers, at most as fast as the turtlebot; the number of movers."""
     rng = np.random.default_rng([seed, 77])
     start, goal = (1.0, 1.0, 0.785), (9.0, 9.0)
     count, fastest = int(rng.integers(1, 11)), load_robot("turtlebot").max_speed
@@ -164,7 +185,7 @@ def random_task(seed: int) -> tuple[Task, int]:
 
 
 def random_drive(seed: int, settings: dict[str, Any]) -> Result:
-    """One of them; whether a way is proved is asked at the robot's own speed."""
+    """Drive through a random hall; whether a path exists is proved at the robot's top speed."""
     task, _ = random_task(seed)
     robot = load_robot("turtlebot")
     grid = rasterise(task.world, task.cell, robot.radius + 0.03)
@@ -176,25 +197,25 @@ def random_drive(seed: int, settings: dict[str, Any]) -> Result:
 
 
 def random(jobs: int, source: Path, quick: bool) -> Iterator[str]:
-    """Random worlds with turtlebot."""
+    """Random worlds, driven by the turtlebot."""
     seeds, rows, wrong = range(20 if quick else 500), [], []
-    for policy in ("neither", "yield and replan"):
+    for policy in ("neither", "avoid and replan"):
         got = list(Parallel(n_jobs=jobs)(delayed(random_drive)(seed, POLICIES[policy]) for seed in seeds))
         proved = [r for r in got if r.proved]
-        rows.append([policy, f"{len(proved)} with a way proved", *told(proved)])
-        rows.append(["", f"{len(got) - len(proved)} without", *told([r for r in got if not r.proved])])
+        rows.append([policy, f"{len(proved)} with a proved path", *columns(proved)])
+        rows.append(["", f"{len(got) - len(proved)} without", *columns([r for r in got if not r.proved])])
         wrong = [
-            f"- {r.name}: {r.outcome.key} ({r.reason}){'' if r.proved else ', no way proved'}"
+            f"- {r.name}: {r.outcome.key} ({r.reason}){'' if r.proved else ', no path proved'}"
             for r in got
             if not r.certified
         ]
     yield from table(["the robot may", "worlds", *HEADS], rows)
-    yield "\nWhat did not succeed with yielding and replanning:\n"
+    yield "\nDrives that failed with avoidance and replanning:\n"
     yield from wrong
 
 
 def hasan(jobs: int, source: Path, quick: bool) -> Iterator[str]:
-    """hasan's cases with turtlebot."""
+    """hasan's cases, driven by the turtlebot."""
     names = [name for name in list_worlds() if name.startswith("hasan") and load_task(name).world.movers]
     rows = []
     for planner in ("mmas-dstar", "dstar"):
@@ -202,7 +223,7 @@ def hasan(jobs: int, source: Path, quick: bool) -> Iterator[str]:
             calls = (
                 delayed(drive)(name, load_task(name), planner, "turtlebot", seed=k) for k in range(1 if quick else 5)
             )
-            rows.append([f"`{planner}`", name, *told(list(Parallel(n_jobs=jobs)(calls)))])
+            rows.append([f"`{planner}`", name, *columns(list(Parallel(n_jobs=jobs)(calls)))])
     yield from table(["planner", "case", *HEADS], rows)
 
 
@@ -213,7 +234,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("tables", nargs="*", metavar="TABLE", default=list(TABLES), help=", ".join(TABLES))
     parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--quick", action="store_true", help="fewer drives")
+    parser.add_argument("--quick", action="store_true", help="drive fewer scenarios")
     parser.add_argument("--dynabarn", type=Path, default=DYNABARN, metavar="FILE")
     given = parser.parse_args()
     for name in given.tables:

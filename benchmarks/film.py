@@ -18,8 +18,9 @@ from pathlib import Path
 import numpy as np
 
 from antdrive.sim.log.rollout import Rollout
-from antdrive.sim.physics.engine import client
-from antdrive.sim.pipeline import Scenario, run
+from antdrive.sim.physics.bullet import client
+from antdrive.sim.pipeline import run
+from antdrive.sim.scenario import Scenario
 from antdrive.sim.view.film.camera import camera_for
 from antdrive.sim.view.film.compositor import drawn_height, merged_by_colour, still_meshes
 from antdrive.sim.view.film.meshes import robot_parts

@@ -1,7 +1,8 @@
-"""What the drive loop costs beside bare physics: `make bench`.
+"""The cost of the drive loop compared with bare physics: `make bench`.
 
-The same world, robot and commands are stepped twice in turn: once by the whole loop (control, contacts, clearance, log), once by
-`stepSimulation` alone. Ratios are taken pair by pair within one run.
+The same world, robot and commands are stepped twice in turn: by the whole loop (control, contacts,
+clearance, log) and by `stepSimulation` alone. The table shows the median over all rounds of the ratio
+within a round.
 """
 
 from __future__ import annotations
@@ -13,14 +14,15 @@ import numpy as np
 
 from antdrive.robots import PurePursuit, load_robot
 from antdrive.sim.driving.drive import drive
-from antdrive.sim.physics.engine import Engine, bullet
+from antdrive.sim.physics.bullet import bullet
+from antdrive.sim.physics.engine import Engine
 from antdrive.worlds import Disc, Route, Task, World
 
 ROUNDS = 9
 
 
 def task_among(count: int) -> Task:
-    """A 20 m drive between `count` thin cylinders."""
+    """An 18 m drive among `count` thin cylinders."""
     rng = np.random.default_rng(0)
     discs: list[Disc] = []
     while len(discs) < count:
@@ -39,14 +41,14 @@ def main() -> None:
         task = task_among(count)
         x = np.linspace(1, 19, 73)
         route = Route(np.stack([x, 10 + 0.4 * np.sin((x - 1) * np.pi / 3)], axis=1))
-        guide = controller.guide(route, task.world, robot, 0.05, 1 / 60)
-        engines[count] = (Engine(task.world, robot).__enter__(), task, guide)
+        tracked = controller.guide(route, task.world, robot, 0.05, 1 / 60)
+        engines[count] = (Engine(task.world, robot).__enter__(), task, tracked)
     bare: dict[int, list[float]] = {count: [] for count in engines}
     loop: dict[int, list[float]] = {count: [] for count in engines}
     for turn in range(ROUNDS + 1):
-        for count, (engine, task, guide) in engines.items():
+        for count, (engine, task, tracked) in engines.items():
             started = time.perf_counter()
-            log = drive(engine, controller, guide, task, time_limit=120)
+            log = drive(engine, controller, tracked, task, time_limit=120)
             middle = time.perf_counter()
             assert log.outcome.name == "SUCCEEDED", log.outcome
             commands = log.command[1::4].tolist()
@@ -58,7 +60,7 @@ def main() -> None:
                 for _ in range(4):
                     p.stepSimulation(client)
             ended = time.perf_counter()
-            if turn:  # the first round warms up
+            if turn:  # the first round compiles and fills caches
                 loop[count].append((middle - started) / steps * 1e6)
                 bare[count].append((ended - before) / steps * 1e6)
     for count in engines:

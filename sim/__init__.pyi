@@ -9,9 +9,9 @@ from .log.record import DriveRecord as DriveRecord
 from .log.rollout import Rollout as Rollout
 from .physics.engine import Engine as Engine
 from .pipeline import Run as Run
-from .pipeline import Scenario as Scenario
 from .pipeline import plan as plan
 from .pipeline import run as run
+from .scenario import Scenario as Scenario
 from .view.figures.plan_figures import plan_figure as plan_figure
 from .view.figures.run_figures import overview as overview
 from .view.film.video import FilmInfo as FilmInfo

@@ -5,9 +5,8 @@ from __future__ import annotations
 import dataclasses
 import platform
 import time
-import zlib
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from importlib import metadata
 from typing import Any
 
@@ -15,21 +14,19 @@ import numpy as np
 
 from antdrive.planners import (
     PLANNERS,
-    SMOOTHINGS,
-    MaxMinDStar,
-    Planner,
     PlanResult,
     PlanStatus,
     Query,
-    load_planner,
     smooth,
 )
-from antdrive.robots import LIMITERS, Avoidance, PurePursuit, RobotSpec, Senses, load_robot
-from antdrive.sim.driving.drive import Drive, drive
-from antdrive.sim.driving.perception import Perception, Predictor
-from antdrive.sim.driving.replanning import CellwiseMonitor, Replan, ReplanMonitor, ReplanPolicy
+from antdrive.robots import LIMITERS, Senses
+from antdrive.sim.driving.cellwise import monitor_class
+from antdrive.sim.driving.drive import drive
+from antdrive.sim.driving.perception import Predictor
+from antdrive.sim.driving.recorder import Drive
+from antdrive.sim.driving.replanning import Replan, ReplanMonitor
 from antdrive.sim.log.certificate import Certificate, certify
-from antdrive.sim.log.metrics import measure
+from antdrive.sim.log.metrics import METRICS, measure
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import (
     ComponentRecord,
@@ -44,102 +41,25 @@ from antdrive.sim.log.record import (
 )
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.physics.engine import Engine
-from antdrive.worlds import Disc, Grid, Route, Task, Trajectories, World, load_task, rasterise
+from antdrive.sim.scenario import Scenario
+from antdrive.worlds import Grid, Route, rasterise
+from antdrive.worlds.drawing import LINE, card, world_svg
 from antdrive.worlds.errors import FieldError
 
-
-@dataclass(frozen=True, kw_only=True)
-class Scenario:
-    """Everything a run depends on. The same scenario gives the same rollout, bit for bit, on one machine."""
-
-    task: Task
-    planner: Planner
-    robot: RobotSpec
-    planner_name: str = ""  # what records call the planner; its class by default
-    margin: float = 0.03  # kept free around the robot, on top of its radius [m]
-    cell: float | None = None  # grid resolution [m]; None: the task's own
-    smoothing: str = (
-        "clearance"  # how the plan becomes a route: none, taut or clearance, see `antdrive.planners.smoothing`
-    )
-    seed: int = 0
-    controller: PurePursuit = field(default_factory=PurePursuit)
-    noise: float = 0.0  # how much of the robot's documented noise it has; 1 is all of it
-    knowledge: Perception = field(default_factory=Perception)  # what the robot knows of movers
-    yielding: Avoidance | None = field(default_factory=Avoidance)  # how it keeps clear of them; None: not at all
-    replanning: ReplanPolicy | None = field(default_factory=ReplanPolicy)  # when it looks for a new route among them
-    unseen: tuple[Disc, ...] = ()  # obstacles that neither planner nor controller know of
-    time_limit: float | None = None  # simulated time allowed [s]; None: the task's, or ample for the route
-    physics_hz: int = 240
-    control_hz: int = 60
-
-    def __post_init__(self) -> None:
-        if not self.margin >= 0:
-            raise FieldError("margin", f"must be at least 0, got {self.margin:g}")
-        if self.smoothing not in SMOOTHINGS:
-            raise FieldError("smoothing", f"unknown {self.smoothing!r}; choose from {', '.join(SMOOTHINGS)}")
-        try:
-            self.robot.noise.scaled(self.noise)
-        except ValueError as error:
-            raise FieldError("noise", f"{self.noise:g} times the robot's own is too much: {error}") from None
-        if self.time_limit is not None and not self.time_limit > 0:
-            raise FieldError("time_limit", f"must be greater than 0, got {self.time_limit:g}")
-
-    @property
-    def inflate(self) -> float:
-        """What planners keep between the robot's centre and every surface [m]."""
-        return self.robot.radius + self.margin
-
-    @property
-    def timed(self) -> bool:
-        """Whether the planner plans in space and time, among movers."""
-        return bool(self.built.movers) and getattr(self.planner, "needs_motions", False)
-
-    @property
-    def sees(self) -> Perception:
-        """What the robot knows of movers: whose planner knows the motions, knows them while it drives."""
-        return Perception(told="motions") if self.timed else self.knowledge
-
-    @property
-    def yields(self) -> Avoidance | None:
-        """How it keeps clear of them. Whose motions are known do not turn back unforeseen; what a timed plan foresees comes
-        to pass, so that only what is near is looked at again."""
-        if self.yielding is None or self.sees.told != "motions":
-            return self.yielding
-        horizon = min(self.yielding.horizon, 1.0) if self.timed else self.yielding.horizon
-        return dataclasses.replace(self.yielding, wary=0.0, horizon=horizon)
-
-    def rng(self, purpose: str) -> np.random.Generator:
-        """A stream of random numbers of its own for each purpose, from the one seed."""
-        return np.random.default_rng([self.seed, zlib.crc32(purpose.encode())])
-
-    @property
-    def built(self) -> World:
-        """The world as it is driven in: with what is unseen."""
-        return dataclasses.replace(self.task.world, obstacles=self.task.world.obstacles + self.unseen)
-
-    @property
-    def traffic(self) -> Trajectories:
-        """The world's movers as functions of time, drawn from the seed."""
-        return Trajectories.of(self.built, self.task.start[:2], self.seed)
-
-    @classmethod
-    def of(
-        cls, world: str, planner: str = "ants", robot: str = "turtlebot", *, options: dict[str, Any] | None = None,
-        **settings: Any,
-    ) -> Scenario:  # fmt: skip
-        """A scenario by names: of a world and a robot (or their files) and of a planner with its options."""
-        return cls(
-            task=load_task(world),
-            planner=load_planner(planner, **(options or {})),
-            planner_name=planner,
-            robot=load_robot(robot),
-            **settings,
-        )
+ROUTE_COLOUR = "#182242"  # of routes in notebooks
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """What came of a scenario: a plan and, if that found a path, a rollout with its certificate."""
+    """The result of a scenario: a plan and, if the planner found a path, a rollout with its certificate.
+
+    Attributes:
+        scenario: what was planned and driven
+        grid: the grid that was planned on
+        plan: the planner's answer
+        rollout: the log of the drive; None if planning found no path
+        certificate: whether the log proves that nothing was touched; None without a rollout
+    """
 
     scenario: Scenario
     grid: Grid
@@ -149,27 +69,53 @@ class Run:
 
     @property
     def outcome(self) -> Outcome:
-        """How it ended."""
+        """How the run ended."""
         if self.rollout is not None:
             return self.rollout.outcome
         return Outcome.NO_PATH if self.plan.status is PlanStatus.NO_PATH else Outcome.STOPPED
 
     @property
     def reason(self) -> str:
-        """What the outcome's sentence leaves open, if anything."""
+        """What the outcome's sentence leaves open; may be empty."""
         return self.rollout.record.reason if self.rollout is not None else self.plan.reason
 
     @property
     def succeeded(self) -> bool:
-        """Whether the robot stopped at the goal in time, and its log proves that nothing and it touched each other."""
+        """Whether the robot stopped at the goal in time and its log proves that nothing was touched."""
         return self.outcome is Outcome.SUCCEEDED and self.certificate is not None and self.certificate.certified
+
+    @property
+    def metrics(self) -> dict[str, float]:
+        """Every metric of the drive by name; `METRICS` defines them.
+
+        Raises:
+            ValueError: the run has no rollout, because planning found no path.
+        """
+        return measure(self._driven())
+
+    def metric(self, name: str) -> float:
+        """One metric of the drive, such as `run.metric("spl")`.
+
+        Raises:
+            ValueError: the run has no rollout, because planning found no path; or there is no such metric.
+        """
+        rollout = self._driven()
+        if name not in METRICS:
+            raise FieldError("metric", f"unknown {name!r}; choose from {', '.join(METRICS)}")
+        return METRICS[name](rollout)
+
+    def _driven(self) -> Rollout:
+        if self.rollout is None:
+            reason = f": {self.reason}" if self.reason else ""
+            raise ValueError(f"no rollout: planning ended with {self.outcome.key}{reason}")
+        return self.rollout
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values, for JSON."""
         s = self.scenario
         return {
             "world": s.task.world.name,
-            "planner": _name(s),
+            "planner": s.planner_label,
             "robot": s.robot.name,
             "seed": s.seed,
             "outcome": self.outcome.key,
@@ -181,13 +127,32 @@ class Run:
             "digest": self.rollout.digest if self.rollout else None,
         }
 
+    def _repr_html_(self) -> str:
+        s = self.scenario
+        task = s.task
+        facts: dict[str, object] = {"planner": s.planner_label, "robot": s.robot.name}
+        lines = []
+        if self.rollout is not None:
+            lines = [(self.rollout.route, ROUTE_COLOUR, True), (self.rollout.pose[::12, :2], LINE, False)]
+            facts["time"] = f"{self.rollout.t[-1]:.1f} s"
+            facts["least clearance"] = f"{self.rollout.clearance.min():.3f} m"
+            facts["certified"] = "yes" if self.certificate and self.certificate.certified else "no"
+        if self.reason:
+            facts["reason"] = self.reason
+        goal = (*task.goal, task.goal_tolerance)
+        picture = world_svg(s.driven_world.bounds, s.driven_world.discs, start=task.start, goal=goal, lines=lines)
+        return card(picture, f"{task.world.name}: {self.outcome.value}", facts)
+
 
 def plan(s: Scenario) -> tuple[Grid, PlanResult]:
-    """Rasterise the world and plan on it. Movers are not on the grid; a planner of space and time is told their motions."""
+    """Rasterise the world of a scenario and plan on it; the grid and the planner's answer.
+
+    Movers are not on the grid. A planner in space and time is given their motions.
+    """
     grid = rasterise(s.task.world, s.cell or s.task.cell, s.inflate)
     query = Query.between(grid, s.task)
     if s.timed:
-        query = dataclasses.replace(query, motions=s.traffic.motions)
+        query = dataclasses.replace(query, motions=s.trajectories.motions)
     return grid, s.planner.plan(query, s.rng("planner"))
 
 
@@ -197,43 +162,62 @@ def run(
     planned: tuple[Grid, PlanResult] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Run:
-    """Plan and drive one scenario, or drive what `plan` planned for it; `progress` is told the fraction driven."""
+    """Plan and drive one scenario.
+
+    Args:
+        s: the scenario
+        planned: what `plan` returned for the scenario; None: plan first
+        progress: is called with the fraction of the route that is done
+    """
     grid, answer = planned or plan(s)
     if not answer.solved:
         return Run(s, grid, answer)
     route = smooth(answer, grid, s.task, kind="none" if s.timed else s.smoothing)
-    guide = s.controller.guide(route, s.task.world, s.robot, s.margin, 1 / s.control_hz, s.task.goal_tolerance)
+    tracked = s.controller.guide(route, s.task.world, s.robot, s.margin, 1 / s.control_hz, s.task.goal_tolerance)
     limit = s.time_limit or s.task.time_limit or 30.0 + 10.0 * route.length / s.robot.max_speed
     started = time.perf_counter()
     noise = s.robot.noise.scaled(s.noise)
-    senses = Senses(noise, s.robot.track, 1 / s.control_hz, s.task.start, s.rng("noise")) if noise.loud else None
-    traffic = s.traffic
-    watch = Predictor(traffic, s.sees, s.control_hz) if traffic else None
-    rerouter = None
-    if watch and s.replanning:
-        rerouter = (CellwiseMonitor if isinstance(s.planner, MaxMinDStar) and s.replanning.around else ReplanMonitor)(
-            s.replanning, s.planner, grid, s.task, s.rng("replanner"),
-            watch=watch, robot=s.robot, controller=s.controller, margin=s.margin, kind=s.smoothing, hz=s.control_hz,
-        )  # fmt: skip
-        rerouter.follows(answer, route)
-    with Engine(s.built, s.robot, physics_hz=s.physics_hz, traffic=traffic) as engine:
+    noise_model = Senses(noise, s.robot.track, 1 / s.control_hz, s.task.start, s.rng("noise")) if noise.loud else None
+    trajectories = s.trajectories
+    predictor = Predictor(trajectories, s.effective_perception, s.control_hz) if trajectories else None
+    monitor = _monitor(s, grid, predictor)
+    if monitor:
+        monitor.track(answer, route)
+    with Engine(s.driven_world, s.robot, physics_hz=s.physics_hz, trajectories=trajectories) as engine:
         log = drive(
             engine,
             s.controller,
-            guide,
+            tracked,
             s.task,
             control_hz=s.control_hz,
             time_limit=limit,
-            senses=senses,
-            yielding=s.yields,
-            watch=watch,
-            rerouter=rerouter,
+            noise_model=noise_model,
+            avoidance=s.effective_avoidance,
+            predictor=predictor,
+            monitor=monitor,
             progress=progress,
         )
-    rollout = _record(
-        s, grid, answer, route, log, rerouter.log if rerouter else [], limit, time.perf_counter() - started
-    )
+    rollout = _record(s, grid, answer, route, log, monitor.log if monitor else [], limit, time.perf_counter() - started)
     return Run(s, grid, answer, rollout, certify(rollout))
+
+
+def _monitor(s: Scenario, grid: Grid, predictor: Predictor | None) -> ReplanMonitor | None:
+    """What finds new routes during the drive; None without movers or where the scenario says never."""
+    if predictor is None or s.replanning is None:
+        return None
+    return monitor_class(s.planner, s.replanning)(
+        s.replanning,
+        s.planner,
+        grid,
+        s.task,
+        s.rng("replanner"),
+        predictor=predictor,
+        robot=s.robot,
+        controller=s.controller,
+        margin=s.margin,
+        smoothing=s.smoothing,
+        hz=s.control_hz,
+    )
 
 
 def _record(
@@ -248,12 +232,12 @@ def _record(
 ) -> Rollout:
     """The rollout of a drive: its arrays, and the record of what it came from."""
     query = Query.between(grid, s.task)
-    sees, yields, among_movers = s.sees, s.yields, bool(s.built.movers)
+    sees, yields, among_movers = s.effective_perception, s.effective_avoidance, bool(s.driven_world.movers)
     record = DriveRecord(
         task=s.task,
         unseen=s.unseen,
         seed=s.seed,
-        planner=ComponentRecord(name=_name(s), settings=settings_of(answer.options)),
+        planner=ComponentRecord(name=s.planner_label, settings=settings_of(answer.options)),
         plan=PlanRecord(
             cost_m=answer.cost,
             length_m=answer.line_length,
@@ -265,7 +249,7 @@ def _record(
         robot=s.robot,
         controller=ComponentRecord(name=type(s.controller).__name__, settings=settings_of(s.controller)),
         smoothing=SmoothingRecord(asked=s.smoothing, made=route.kind, note=route.note),
-        perception=PerceptionRecord(kind=sees.told, range_m=finite_or_none(sees.reach)) if among_movers else None,
+        perception=PerceptionRecord(kind=sees.kind, range_m=finite_or_none(sees.range)) if among_movers else None,
         avoidance=settings_of(yields) if among_movers and yields else None,
         replanning=settings_of(s.replanning) if among_movers and s.replanning else None,
         replans=tuple(_replan_record(replan) for replan in replans),
@@ -303,7 +287,7 @@ def _record(
 def _replan_record(replan: Replan) -> ReplanRecord:
     return ReplanRecord(
         t=replan.t,
-        trigger=replan.cause,
+        trigger=replan.trigger,
         solved=replan.solved,
         cost_m=finite_or_none(replan.cost),
         work=replan.work,
@@ -312,10 +296,6 @@ def _replan_record(replan: Replan) -> ReplanRecord:
 
 
 def versions() -> dict[str, str]:
-    """What a run was made with."""
+    """The versions of Python and of the packages that a run depends on."""
     packages = ("antdrive", "numpy", "pybullet", "numba")
     return {"python": platform.python_version(), **{name: metadata.version(name) for name in packages}}
-
-
-def _name(s: Scenario) -> str:
-    return s.planner_name or type(s.planner).__name__

@@ -11,7 +11,8 @@ from joblib import Parallel, delayed
 
 from antdrive.planners import PLANNERS
 from antdrive.robots import load_robot
-from antdrive.sim.pipeline import Scenario, plan, run
+from antdrive.sim.pipeline import plan, run
+from antdrive.sim.scenario import Scenario
 from antdrive.sim.view.film.video import film
 from antdrive.worlds import Cruising, Disc, Task, World
 

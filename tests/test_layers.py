@@ -19,16 +19,68 @@ BELOW = {
 }
 MODULES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
 
+#: Inside sim: a part may import its own modules and those of the parts in lower ranks.
+SIM_RANKS = {
+    "physics": 0,
+    "log": 0,
+    "driving": 1,
+    "scenario": 2,
+    "pipeline": 3,
+    "view": 4,
+    "papers": 5,
+    "warm": 5,
+    "cli": 6,
+}
+#: Modules that still import each other inside functions.
+CIRCLES = (
+    {"worlds.drawing", "worlds.trajectories", "worlds.world"},
+    {"planners.anyangle.hybrid", "planners.registry"},
+    {"sim.view.film.parallel", "sim.view.film.prelude", "sim.view.film.video"},
+)
 
-def imported(path: Path) -> set[str]:
+
+def imported(path: Path, *, types: bool = True) -> set[str]:
+    """All that a module imports, inside functions too; `types`: also what it imports for type checking alone."""
     names = set()
-    for node in ast.walk(ast.parse(path.read_text())):
+    nodes = [ast.parse(path.read_text())]
+    while nodes:
+        node = nodes.pop()
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{path}: imports are written in full"
             names |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
+        elif types or not (isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"):
+            nodes += ast.iter_child_nodes(node)
     return names
+
+
+def module_name(path: Path) -> str:
+    return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+
+
+def module_imports() -> dict[str, set[str]]:
+    """The modules of the four packages that each of them imports when it runs."""
+    known = {module_name(path) for path in MODULES}
+    return {
+        module_name(path): {name.removeprefix("antdrive.") for name in imported(path, types=False)}
+        & known - {module_name(path)}
+        for path in MODULES
+    }
+
+
+def circles(graph: dict[str, set[str]]) -> list[set[str]]:
+    """The groups of nodes that reach each other."""
+    reached = {}
+    for start in graph:
+        found, todo = set(), [start]
+        while todo:
+            fresh = graph.get(todo.pop(), set()) - found
+            found |= fresh
+            todo += fresh
+        reached[start] = found
+    groups = {frozenset(b for b in graph if b in reached[a] and a in reached[b]) for a in graph}
+    return [set(group) for group in groups if group]
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda p: str(p.relative_to(ROOT)))
@@ -48,8 +100,38 @@ def test_a_climbing_import_would_be_seen(tmp_path: Path) -> None:
 
 
 def test_pybullet_is_imported_by_one_module_and_numba_by_kernels() -> None:
-    assert [p.name for p in MODULES if "pybullet" in imported(p)] == ["engine.py"]
+    assert [p.name for p in MODULES if "pybullet" in imported(p)] == ["bullet.py"]
     assert all(p.name.startswith("_kernels") for p in MODULES if "numba" in imported(p))
+
+
+@pytest.mark.parametrize("path", [p for p in MODULES if p.is_relative_to(ROOT / "sim")], ids=module_name)
+def test_the_parts_of_sim_have_an_order(path: Path) -> None:
+    part = path.relative_to(ROOT / "sim").with_suffix("").parts[0]
+    if part == "__init__":
+        return
+    for name in imported(path, types=False):
+        if name.startswith("antdrive.sim."):
+            other = name.split(".")[2]
+            assert other == part or SIM_RANKS[other] < SIM_RANKS[part], f"{module_name(path)} imports {name}"
+
+
+def test_modules_have_no_circles() -> None:
+    assert [group for group in circles(module_imports()) if not any(group <= known for known in CIRCLES)] == []
+
+
+def test_subpackages_have_no_circles() -> None:
+    graph: dict[str, set[str]] = {}
+    folders = {module_name(path): module_name(path.parent) for path in MODULES if path.name != "__init__.py"}
+    for module, others in module_imports().items():
+        for other in others & folders.keys():
+            a, b = folders.get(module, module), folders[other]
+            if not f"{a}.".startswith(f"{b}.") and not f"{b}.".startswith(f"{a}."):
+                graph.setdefault(a, set()).add(b)
+    assert circles(graph) == []
+
+
+def test_a_circle_would_be_seen() -> None:
+    assert circles({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}) == [{"a", "b", "c"}]
 
 
 @pytest.mark.parametrize("package", PACKAGES)

@@ -9,9 +9,13 @@ import math
 from collections.abc import Iterable, Mapping
 from html import escape
 
+import numpy as np
+import numpy.typing as npt
+
 from antdrive.worlds.types import Bounds, Floats, Pose
 
 LONGER_SIDE = 420  # of a world's drawing [px]
+MAX_DRAWN = 200  # cells along the longer side of a drawn grid; more would make notebooks slow
 OBSTACLE, WALL, START, GOAL, LINE = "#7988a0", "#c4cbd5", "#345cbe", "#008a5c", "#ff7a0e"
 
 
@@ -69,6 +73,23 @@ def path_svg(points: Floats, longer_side: int = 240) -> str:
         for (x, y), colour in ((points[0], START), (points[-1], GOAL))
     ]
     return _svg((float(x0), float(y0), float(x1), float(y1)), [line, *ends], longer_side)
+
+
+def cells_svg(free: npt.NDArray[np.bool_]) -> str:
+    """The blocked cells of a grid (R, C) as SVG, rows upwards. Large grids are drawn coarser."""
+    coarse = -(-max(free.shape) // MAX_DRAWN)
+    blocked = np.pad(~free, [(0, -side % coarse) for side in free.shape], constant_values=False)
+    rows, cols = blocked.shape[0] // coarse, blocked.shape[1] // coarse
+    blocked = np.any(blocked.reshape(rows, coarse, cols, coarse), axis=(1, 3)).reshape(rows, cols)
+    parts = [f'<rect x="0" y="0" width="{cols}" height="{rows}" fill="#f3f5f8" stroke="{WALL}" stroke-width="0.1"/>']
+    edges = np.diff(np.pad(blocked, ((0, 0), (1, 1))).astype(np.int8), axis=1)
+    runs = [
+        f"M{start} {row}h{end - start}v1h{start - end}z"
+        for row, steps in enumerate(edges)
+        for start, end in zip(np.flatnonzero(steps > 0).tolist(), np.flatnonzero(steps < 0).tolist(), strict=True)
+    ]
+    parts.append(f'<path d="{"".join(runs)}" fill="{OBSTACLE}"/>')
+    return _svg((0.0, 0.0, float(cols), float(rows)), parts, LONGER_SIDE)
 
 
 def curve_svg(values: Floats, width: int = 240, height: int = 90) -> str:

@@ -77,6 +77,18 @@ class Grid:
         col = math.floor((x - self.origin[0]) / self.cell + 0.5)
         return min(max(row, 0), rows - 1), min(max(col, 0), cols - 1)
 
+    def _repr_html_(self) -> str:
+        from antdrive.worlds.drawing import card, cells_svg
+
+        rows, cols = self.shape
+        facts = {
+            "cells": f"{rows} × {cols}",
+            "free": f"{100 * self.free.mean():.1f} %",
+            "cell": f"{self.cell:g} m",
+            "inflated by": f"{self.inflate:g} m",
+        }
+        return card(cells_svg(self.free), f"grid of {rows} × {cols} cells", facts)
+
     @classmethod
     def from_free(cls, free: npt.ArrayLike, cell: float = 1.0, origin: Point = (0.0, 0.0)) -> Grid:
         """A grid from its free cells alone; a diagonal move needs both orthogonal neighbours free.

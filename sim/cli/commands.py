@@ -15,7 +15,8 @@ from antdrive.worlds.errors import InputError
 
 if TYPE_CHECKING:
     from antdrive.sim.driving.perception import Perception
-    from antdrive.sim.pipeline import Run, Scenario
+    from antdrive.sim.pipeline import Run
+    from antdrive.sim.scenario import Scenario
     from antdrive.worlds import Disc, Task
 
 SUCCEEDED, FAILED, WRONG_INPUT, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
@@ -104,8 +105,8 @@ def run(
     scenario = _scenario(
         world, planner, settings, robot, seed=seed, margin=margin, cell=cell, smoothing=smoothing, noise=noise,
         time_limit=time_limit,
-        unseen=tuple(_disc(text) for text in unseen or ()), knowledge=_knowledge(sees),
-        **({} if yields else {"yielding": None}), replanning=ReplanPolicy(around=replan),
+        unseen=tuple(_disc(text) for text in unseen or ()), perception=_knowledge(sees),
+        **({} if yields else {"avoidance": None}), replanning=ReplanPolicy(around_movers=replan),
     )  # fmt: skip
     folder = out or Path("out") / _slug(scenario)
     if gui:
@@ -769,7 +770,7 @@ def _scenario(world: str, planner: str, settings: list[str] | None, robot: str, 
 
     from antdrive.planners.registry import parse
     from antdrive.robots import PurePursuit
-    from antdrive.sim.pipeline import Scenario
+    from antdrive.sim.scenario import Scenario
 
     groups: dict[str, dict[str, str]] = {"planner": {}, "controller": {}}
     for text in settings or ():
@@ -804,7 +805,7 @@ def _knowledge(text: str) -> Perception:
     except ValueError:
         raise InputError(f"--sees {text}: write WHAT or WHAT:METRES, such as positions:3") from None
     try:
-        return Perception(told=told, reach=reach)  # type: ignore[arg-type]
+        return Perception(kind=told, range=reach)  # type: ignore[arg-type]
     except ValueError as error:
         raise InputError(f"--sees {text}: {error}") from None
 

@@ -1,1 +1,1 @@
-"""The drive loop."""
+"""Driving a route in physics: the loop, the driver, perception, replanning and the log."""

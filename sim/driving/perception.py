@@ -1,4 +1,4 @@
-"""What a robot knows of movers, and where it expects them."""
+"""What a robot perceives of movers, and the prediction that follows from it."""
 
 from __future__ import annotations
 
@@ -12,57 +12,75 @@ import numpy.typing as npt
 from antdrive.worlds import Floats, Trajectories
 from antdrive.worlds.errors import FieldError
 
-Told: TypeAlias = Literal["positions", "velocities", "motions"]
-CHUNK = 240  # instants worked out at once
+PerceptionKind: TypeAlias = Literal["positions", "velocities", "motions"]
+CHUNK = 240  # control periods whose positions and velocities are computed at once
 
 
 @dataclass(frozen=True, kw_only=True)
 class Perception:
-    """What a robot is told of movers, without error, at every control period.
+    """What the robot perceives of movers in every control period, without error.
 
-    `positions`: where they are; they are expected to stay. `velocities`: how they move, too; they are expected to move
-    on so. `motions`: where they will be at any time, turns and jumps included. Each of those only whose surface is
-    within `reach` of the robot's centre.
+    Attributes:
+        kind: `positions`: where movers are; the robot predicts that they stay there. `velocities`: their
+            velocities too; the robot predicts constant velocity. `motions`: their positions at any time,
+            turns and teleports included; the prediction is exact.
+        range: movers are perceived if their surface is within this distance of the robot's centre [m]
 
     Raises:
-        ValueError: an unknown kind, or a reach that is not positive.
+        ValueError: an unknown kind, or a range that is not positive.
     """
 
-    told: Told = "velocities"
-    reach: float = math.inf  # [m]
+    kind: PerceptionKind = "velocities"
+    range: float = math.inf
 
     def __post_init__(self) -> None:
-        if self.told not in get_args(Told):
-            raise FieldError("told", f"unknown {self.told!r}; choose from {', '.join(get_args(Told))}")
-        if not self.reach > 0:
-            raise FieldError("reach", f"must be greater than 0, got {self.reach:g}")
+        if self.kind not in get_args(PerceptionKind):
+            raise FieldError("kind", f"unknown {self.kind!r}; choose from {', '.join(get_args(PerceptionKind))}")
+        if not self.range > 0:
+            raise FieldError("range", f"must be greater than 0, got {self.range:g}")
 
 
 class Predictor:
-    """The movers of one drive, as the robot knows them, at multiples of its control period."""
+    """Predicts the movers of one drive from what the robot perceives of them.
 
-    def __init__(self, traffic: Trajectories, knowledge: Perception, hz: int) -> None:
-        self.traffic, self._knowledge, self._hz = traffic, knowledge, hz
-        self._first, self._places, self._speeds = 0, np.empty((0, 0, 2)), np.empty((0, 0, 2))
+    Attributes:
+        trajectories: the movers' true motions
+    """
 
-    def expected(self, tick: int, robot: tuple[float, float], ahead: Floats) -> tuple[Floats, Floats]:
-        """Where movers are expected (K, M, 2) [m] `ahead` (K,) [s] of a tick, and their radii (M,) [m]."""
-        places, speeds = self._now(tick)
-        seen = self.sensed(tick, robot)
-        if self._knowledge.told == "motions":
-            places = self.traffic.positions(ahead + tick / self._hz)
-            return np.ascontiguousarray(places[:, seen]), self.traffic.radii[seen]
-        if self._knowledge.told == "positions":
-            speeds = np.zeros_like(speeds)
-        return places[seen] + ahead[:, None, None] * speeds[seen], self.traffic.radii[seen]
+    def __init__(self, trajectories: Trajectories, perception: Perception, hz: int) -> None:
+        self.trajectories, self._perception, self._hz = trajectories, perception, hz
+        self._first, self._positions, self._velocities = 0, np.empty((0, 0, 2)), np.empty((0, 0, 2))
 
-    def sensed(self, tick: int, robot: tuple[float, float]) -> npt.NDArray[np.int64]:
-        """Which movers (S,) are within reach."""
-        away = np.hypot(*(self._now(tick)[0] - robot).T) - self.traffic.radii
-        return np.flatnonzero(away <= self._knowledge.reach)
+    def predict(self, tick: int, robot: tuple[float, float], ahead: Floats) -> tuple[Floats, Floats]:
+        """Predict the movers that the robot perceives.
+
+        Args:
+            tick: the control period in which the prediction is made
+            robot: the robot's position [m]
+            ahead: times after the tick (K,) [s]
+
+        Returns:
+            The movers' positions (K, M, 2) [m] and radii (M,) [m].
+        """
+        perceived = self.within_range(tick, robot)
+        radii = self.trajectories.radii[perceived]
+        if self._perception.kind == "motions":
+            positions = self.trajectories.positions(ahead + tick / self._hz)
+            return np.ascontiguousarray(positions[:, perceived]), radii
+        positions, velocities = self._now(tick)
+        if self._perception.kind == "positions":
+            velocities = np.zeros_like(velocities)
+        return positions[perceived] + ahead[:, None, None] * velocities[perceived], radii
+
+    def within_range(self, tick: int, robot: tuple[float, float]) -> npt.NDArray[np.int64]:
+        """The indices (M,) of the movers that a robot at a position [m] perceives in a tick."""
+        distances = np.hypot(*(self._now(tick)[0] - robot).T) - self.trajectories.radii
+        return np.flatnonzero(distances <= self._perception.range)
 
     def _now(self, tick: int) -> tuple[Floats, Floats]:
-        if not self._first <= tick < self._first + len(self._places):
+        """True positions (M, 2) [m] and velocities (M, 2) [m/s] at a tick."""
+        if not self._first <= tick < self._first + len(self._positions):
             t = np.arange(tick, tick + CHUNK) / self._hz
-            self._first, self._places, self._speeds = tick, self.traffic.positions(t), self.traffic.velocities(t)
-        return self._places[tick - self._first], self._speeds[tick - self._first]
+            self._first = tick
+            self._positions, self._velocities = self.trajectories.positions(t), self.trajectories.velocities(t)
+        return self._positions[tick - self._first], self._velocities[tick - self._first]

@@ -1,8 +1,12 @@
-"""New routes while driving: around movers, or back to where the robot was going.
+"""New routes while driving: around movers, or back to the goal after straying from the route.
 
-A replan takes the planner's own replanner: what movers cover soon is blocked, grown exactly as the grid's obstacles are, and
-what they have left is cleared. Planners of the plane plan anew among discs in the movers' places. One of space and time plans
-anew where the robot is late. hasan's ant decides at every cell.
+How a planner replans:
+
+- Most planners use their own replanner on the grid. Cells that movers will cover soon are blocked, grown
+  exactly as the grid's obstacles are; cells that movers have left are cleared.
+- Planners that need the world plan again in a world with discs in the movers' places.
+- Planners in space and time plan again when the robot is late.
+- Cell-by-cell planners decide on one cell after the other, see `cellwise`.
 """
 
 from __future__ import annotations
@@ -14,7 +18,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from antdrive.planners import (
     Planner,
@@ -22,273 +25,261 @@ from antdrive.planners import (
     Query,
     SafeIntervals,
     TimedPlan,
-    online_for,
     plan_in_time,
     replanner_for,
     smooth,
 )
 from antdrive.robots import PurePursuit, RobotSpec, TrackedPath
+from antdrive.sim.driving.blocking import blocked_cells, covered_discs, with_obstacles
 from antdrive.sim.driving.perception import Predictor
 from antdrive.sim.driving.schedule import Schedule
-from antdrive.sim.log.record import DECISION
-from antdrive.worlds import Disc, Floats, Grid, Pose, Route, Task, rasterise, segment_clearance
+from antdrive.worlds import Disc, Floats, Grid, Pose, Route, Task, rasterise
 from antdrive.worlds.errors import FieldError
-from antdrive.worlds.plane import polyline_length
 
 if TYPE_CHECKING:
     from antdrive.planners import Replanner
 
-
+# Triggers, as the log records them.
+STRAYED = "strayed"
+LATE = "late"
+WAITED = "waited"
+OBSTRUCTED = "obstructed"
 MISSED = "missed the goal"
-DECIDE = 0.2  # between two decisions of a robot that decides cell by cell, at least [s]
 
 
 @dataclass(frozen=True, kw_only=True)
 class ReplanPolicy:
     """When the robot looks for a new route.
 
+    Attributes:
+        around_movers: movers count as obstacles; otherwise the robot replans only after it has strayed from
+            its route
+        obstruction_range: replan when a mover is predicted on the route within this distance ahead [m]
+        max_wait: replan when the robot has waited for movers for this long [s]
+        max_deviation: replan when the robot is farther off its route than this [m]
+        max_shortfall: replan when the straight-line distance to the route's end exceeds the remaining route
+            by this much [m]
+        min_interval: the shortest time between two replans [s]
+        prediction_time: whatever movers are predicted to cover within this time is blocked [s]
+
     Raises:
-        ValueError: a setting outside its range.
+        ValueError: a setting is out of range.
     """
 
-    around: bool = True  # movers count as obstacles; else the route is only renewed where the robot has left it
-    within: float = 3.0  # a mover that is expected on the route so near ahead is a cause [m]
-    patience: float = 2.0  # and so is having waited so long [s]
-    strayed: float = 0.75  # and being so far off the route [m]
-    beside: float = 0.25  # and so much farther from its end than what is left of it [m]
-    pause: float = 1.0  # the least time between two replans [s]
-    ahead: float = 1.0  # what a mover covers in this time is blocked [s]
+    around_movers: bool = True
+    obstruction_range: float = 3.0
+    max_wait: float = 2.0
+    max_deviation: float = 0.75
+    max_shortfall: float = 0.25
+    min_interval: float = 1.0
+    prediction_time: float = 1.0
 
     def __post_init__(self) -> None:
-        for key in ("within", "patience", "strayed", "beside", "pause", "ahead"):
-            if not 0 <= getattr(self, key) < math.inf:
-                raise FieldError(key, f"must be at least 0, got {getattr(self, key):g}")
+        for field in dataclasses.fields(self)[1:]:
+            value = getattr(self, field.name)
+            if not 0 <= value < math.inf:
+                raise FieldError(field.name, f"must be at least 0 and finite, got {value:g}")
 
 
 @dataclass(frozen=True)
 class Replan:
-    """One renewal of the route."""
+    """One attempt to find a new route.
 
-    t: float  # [s]
-    cause: str
+    Attributes:
+        t: simulated time of the attempt [s]
+        trigger: what caused it
+        solved: whether a new route was found
+        cost: length of the new plan [m]; inf without one
+        work: the planner's work, in its own unit
+        route: the new route (N, 2) [m]; empty without one
+        wall_s: wall time that the attempt took [s]
+    """
+
+    t: float
+    trigger: str
     solved: bool
-    cost: float  # of the new plan [m]; inf without one
+    cost: float
     work: int
-    route: Floats  # (N, 2) [m]; empty without one
+    route: Floats
     wall_s: float
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values, for JSON; what it took of wall time is not among them."""
-        cost = self.cost if math.isfinite(self.cost) else None
-        return {"t": self.t, "cause": self.cause, "solved": self.solved, "cost_m": cost, "work": self.work,
-                "route": np.round(self.route, 4).tolist()}  # fmt: skip
+        """Plain values, for JSON. The wall time is left out, because it differs from run to run."""
+        return {
+            "t": self.t,
+            "cause": self.trigger,
+            "solved": self.solved,
+            "cost_m": self.cost if math.isfinite(self.cost) else None,
+            "work": self.work,
+            "route": np.round(self.route, 4).tolist(),
+        }
 
 
 class ReplanMonitor:
-    """One drive's replanner: it knows the world that stands, and of movers what the robot does."""
+    """Decides during one drive when a new route is due, and finds it.
+
+    It knows the world's obstacles, and of its movers what the robot perceives.
+
+    Attributes:
+        policy: when to replan
+        log: the attempts so far
+        schedule: where the robot should be at each time; None unless the route comes from a plan in space
+            and time
+
+    Args:
+        margin: distance kept free around the robot, on top of its radius [m]
+        smoothing: how plans become routes, one of `SMOOTHINGS`
+        hz: control periods per simulated second
+    """
 
     def __init__(
-        self, settings: ReplanPolicy, planner: Planner, grid: Grid, task: Task, rng: np.random.Generator, *,
-        watch: Predictor, robot: RobotSpec, controller: PurePursuit, margin: float, kind: str, hz: int,
-    ) -> None:  # fmt: skip
-        self.settings, self.log = settings, list[Replan]()
-        self._planner, self._grid, self._rng, self._watch, self._hz = planner, grid, rng, watch, hz
+        self,
+        policy: ReplanPolicy,
+        planner: Planner,
+        grid: Grid,
+        task: Task,
+        rng: np.random.Generator,
+        *,
+        predictor: Predictor,
+        robot: RobotSpec,
+        controller: PurePursuit,
+        margin: float,
+        smoothing: str,
+        hz: int,
+    ) -> None:
+        self.policy, self.log = policy, list[Replan]()
+        self.schedule: Schedule | None = None
+        self._planner, self._grid, self._rng, self._predictor, self._hz = planner, grid, rng, predictor, hz
         self._task = dataclasses.replace(task, world=dataclasses.replace(task.world, movers=()))
-        self._robot, self._controller, self._margin, self._kind = robot, controller, margin, kind
-        self._search: Replanner | None = None
-        self._blocked = np.zeros(grid.shape, dtype=np.bool_)
-        self._rest = -math.inf  # when the last replan was
-        self._wait_began = math.nan
+        self._robot, self._controller, self._margin, self._smoothing = robot, controller, margin, smoothing
         self._timed = planner if isinstance(planner, SafeIntervals) else None
-        self.schedule: Schedule | None = None  # where the route says when
+        self._replanner: Replanner | None = None
+        self._blocked = np.zeros(grid.shape, dtype=np.bool_)
+        self._replanned_at = -math.inf
+        self._waiting_since = math.nan
 
     @property
-    def waits(self) -> bool:
-        """Whether it may have a way on later where it has none now."""
+    def may_wait(self) -> bool:
+        """Whether a robot at the end of its route may wait there for a way on."""
         return False
 
-    def follows(self, answer: PlanResult, route: Route) -> None:
-        """The robot sets out by this plan."""
-        self.schedule = Schedule.of(answer, route) if isinstance(answer, TimedPlan) and self._timed else None
+    def track(self, plan: PlanResult, route: Route) -> None:
+        """Take note that the robot sets out on a route, made from a plan."""
+        self.schedule = Schedule.of(plan, route) if self._timed and isinstance(plan, TimedPlan) else None
 
-    def cause(self, tick: int, pose: Pose, waits: bool, guide: TrackedPath, arc: float) -> str:
-        """Why a new route is due; empty if none is."""
-        now, s = tick / self._hz, self.settings
-        if not waits:
-            self._wait_began = math.nan
-        elif math.isnan(self._wait_began):
-            self._wait_began = now
-        if now - self._rest < s.pause:
+    def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
+        """Why a new route is due now; empty if none is.
+
+        Args:
+            tick: the number of the control period
+            pose: the robot's estimated pose [m, m, rad]
+            waiting: whether the robot waits for a mover
+            tracked: the path that the robot follows
+            arc: how far the robot has got along the path [m]
+        """
+        now, policy = tick / self._hz, self.policy
+        if not waiting:
+            self._waiting_since = math.nan
+        elif math.isnan(self._waiting_since):
+            self._waiting_since = now
+        if now - self._replanned_at < policy.min_interval:
             return ""
-        x, y = _place(guide.route, arc)
-        beside = math.dist(guide.route.xy[-1], pose[:2]) - (guide.length - arc)
-        if math.dist((x, y), pose[:2]) > s.strayed or beside > s.beside:
-            return "strayed"
+        deviation = math.dist(_point_at(tracked.route, arc), pose[:2])
+        shortfall = math.dist(tracked.route.xy[-1], pose[:2]) - (tracked.length - arc)
+        if deviation > policy.max_deviation or shortfall > policy.max_shortfall:
+            return STRAYED
         if self._timed:
-            return "late" if self.schedule is None or self.schedule.late(now, arc) else ""
-        if s.around and now - self._wait_began >= s.patience:
-            return "waited"
-        if s.around and self._obstructed(tick, pose, guide, arc):
-            return "obstructed"
+            return LATE if self.schedule is None or self.schedule.late(now, arc) else ""
+        if policy.around_movers and now - self._waiting_since >= policy.max_wait:
+            return WAITED
+        if policy.around_movers and self._obstructed(tick, pose, tracked, arc):
+            return OBSTRUCTED
         return ""
 
-    def again(self, tick: int, pose: Pose, cause: str) -> TrackedPath | None:
-        """A new route from a pose, made ready for following; None where there is none."""
-        self._rest, self._wait_began = tick / self._hz, math.nan
+    def replan(self, tick: int, pose: Pose, trigger: str) -> TrackedPath | None:
+        """A new path from a pose [m, m, rad], prepared for the controller; None if there is none.
+
+        Args:
+            tick: the number of the control period
+            pose: the robot's estimated pose [m, m, rad]
+            trigger: why, for the log
+        """
+        now = tick / self._hz
+        self._replanned_at, self._waiting_since = now, math.nan
         started = time.perf_counter()
-        around = self.settings.around and cause != MISSED  # at the goal it is enough to yield
-        discs = self._discs(tick, pose) if around and not self._timed else []
+        # A robot that has missed the goal is near it, where avoiding movers is enough.
+        around_movers = self.policy.around_movers and trigger != MISSED and not self._timed
+        discs = self._discs(tick, pose) if around_movers else []
         try:
             task = dataclasses.replace(self._task, start=pose)
-        except ValueError:  # the robot believes to be where it cannot be
-            self.log.append(Replan(tick / self._hz, cause, False, math.inf, 0, np.empty((0, 2)), 0.0))
+        except ValueError:  # the estimated pose lies outside the world or in an obstacle
+            self.log.append(Replan(now, trigger, False, math.inf, 0, np.empty((0, 2)), 0.0))
             return None
-        answer = self._in_time(task, tick / self._hz) if self._timed else self._answer(task, discs)
+        plan = self._plan_in_time(task, now) if self._timed else self._plan(task, discs)
         route = None
-        if answer.solved and len(answer.cells):
-            kind = "none" if self._timed else self._kind  # times are those of the cells
-            route = smooth(answer, self._grid, _with(task, discs), kind=kind)
-            self.follows(answer, route)
-        self.log.append(
-            Replan(
-                tick / self._hz, cause, route is not None, answer.cost if route else math.inf, answer.work,
-                route.xy if route else np.empty((0, 2)), time.perf_counter() - started,
-            )
-        )  # fmt: skip
-        return self._guide(route) if route else None
+        if plan.solved and len(plan.cells):
+            # A timed plan's times are those of its cells, so its route must follow the cells.
+            smoothing = "none" if self._timed else self._smoothing
+            route = smooth(plan, self._grid, with_obstacles(task, discs), kind=smoothing)
+            self.track(plan, route)
+        cost, xy = (plan.cost, route.xy) if route else (math.inf, np.empty((0, 2)))
+        wall_s = time.perf_counter() - started
+        self.log.append(Replan(now, trigger, route is not None, cost, plan.work, xy, wall_s))
+        return self._prepare(route) if route else None
 
-    def _guide(self, route: Route) -> TrackedPath:
+    def _prepare(self, route: Route) -> TrackedPath:
         task = self._task
         return self._controller.guide(route, task.world, self._robot, self._margin, 1 / self._hz, task.goal_tolerance)
 
-    def _in_time(self, task: Task, now: float) -> PlanResult:
+    def _plan_in_time(self, task: Task, now: float) -> PlanResult:
         assert self._timed is not None
-        motions = self._watch.traffic.motions
-        query = Query.between(self._grid, task)
         return plan_in_time(
-            query, motions, speed=self._timed.speed, start_time=now, horizon=self._timed.horizon, stay=self._timed.stay
+            Query.between(self._grid, task),
+            self._predictor.trajectories.motions,
+            speed=self._timed.speed,
+            start_time=now,
+            horizon=self._timed.horizon,
+            stay=self._timed.stay,
         )
 
-    def _answer(self, task: Task, discs: list[Disc]) -> PlanResult:
+    def _plan(self, task: Task, discs: list[Disc]) -> PlanResult:
+        """A plan around discs: by the planner itself if it needs the world, else by its replanner."""
         if getattr(self._planner, "needs_world", False):
-            around = _with(task, discs)
+            around = with_obstacles(task, discs)
             grid = rasterise(around.world, self._grid.cell, self._grid.inflate)
             return self._planner.plan(Query.between(grid, around), self._rng)
         query = Query.between(self._grid, task)
-        if self._search is None:
-            self._search = replanner_for(self._planner, query, self._rng)
-        blocked = self._cells(discs)
+        if self._replanner is None:
+            self._replanner = replanner_for(self._planner, query, self._rng)
+        blocked = blocked_cells(self._grid, discs)
         blocked[query.start] = blocked[query.goal] = False
-        self._search.clear(np.argwhere(self._blocked & ~blocked))
-        self._search.block(np.argwhere(blocked & ~self._blocked))
+        self._replanner.clear(np.argwhere(self._blocked & ~blocked))
+        self._replanner.block(np.argwhere(blocked & ~self._blocked))
         self._blocked = blocked
-        self._search.move(query.start)
-        return self._search.result()
+        self._replanner.move(query.start)
+        return self._replanner.result()
 
     def _discs(self, tick: int, pose: Pose) -> list[Disc]:
-        """What movers cover soon; they close neither of the ends."""
-        return self._covered(tick, np.array([pose[:2], self._task.goal]), self.settings.ahead)
+        """What movers will cover soon; they close neither the robot's position nor the goal."""
+        ends = np.array([pose[:2], self._task.goal])
+        return covered_discs(self._predictor, tick, ends, self.policy.prediction_time, self._grid)
 
-    def _covered(self, tick: int, ends: Floats, ahead: float) -> list[Disc]:
-        """What movers cover within a time, as discs; none so large that an end (N, 2) lies within its inflation.
-
-        The first of the ends is where the robot is.
-        """
-        x, y = ends[0].tolist()
-        steps = np.linspace(0.0, ahead, 1 + math.ceil(ahead / 0.25))
-        places, radii = self._watch.expected(tick, (x, y), steps)
-        inflate, cell = self._grid.inflate, self._grid.cell
-        room = np.hypot(*np.moveaxis(places[:, :, None] - ends, -1, 0)).min(axis=-1) - inflate - cell
-        radius = np.minimum(radii, room)
-        return [
-            Disc(float(places[k, m, 0]), float(places[k, m, 1]), float(radius[k, m]))
-            for k, m in np.argwhere(radius > 0.01).tolist()
-        ]
-
-    def _cells(self, discs: list[Disc]) -> npt.NDArray[np.bool_]:
-        """The free cells whose centres are closer to a disc than planners keep."""
-        grid = self._grid
-        rows, cols = grid.shape
-        x = grid.origin[0] + grid.cell * np.arange(cols)
-        y = grid.origin[1] + grid.cell * np.arange(rows)
-        blocked = np.zeros(grid.shape, dtype=np.bool_)
-        for disc in discs:
-            reach = disc.radius + grid.inflate
-            c0, c1 = np.searchsorted(x, (disc.x - reach, disc.x + reach))
-            r0, r1 = np.searchsorted(y, (disc.y - reach, disc.y + reach))
-            near = np.hypot(x[None, c0:c1] - disc.x, y[r0:r1, None] - disc.y) <= reach
-            blocked[r0:r1, c0:c1] |= near
-        return blocked & grid.free
-
-    def _obstructed(self, tick: int, pose: Pose, guide: TrackedPath, arc: float) -> bool:
-        """Whether a mover covers a place of the route ahead soon."""
+    def _obstructed(self, tick: int, pose: Pose, tracked: TrackedPath, arc: float) -> bool:
+        """Whether a mover will soon cover a point of the route ahead."""
         discs = self._discs(tick, pose)
         if not discs:
             return False
-        ahead = np.arange(arc, min(arc + self.settings.within, guide.length), 0.1)
+        ahead = np.arange(arc, min(arc + self.policy.obstruction_range, tracked.length), 0.1)
         if not len(ahead):
             return False
-        line = np.stack([np.interp(ahead, guide.route.arc, guide.route.xy[:, k]) for k in (0, 1)], axis=1)
-        movers = np.array([(d.x, d.y, d.radius) for d in discs])
-        gaps = np.hypot(*np.moveaxis(line[:, None] - movers[None, :, :2], -1, 0)) - movers[:, 2]
+        route = tracked.route
+        points = np.stack([np.interp(ahead, route.arc, route.xy[:, k]) for k in (0, 1)], axis=1)
+        movers = np.array([(disc.x, disc.y, disc.radius) for disc in discs])
+        gaps = np.hypot(*np.moveaxis(points[:, None] - movers[None, :, :2], -1, 0)) - movers[:, 2]
         return bool((gaps < self._grid.inflate).any())
 
 
-class CellwiseMonitor(ReplanMonitor):
-    """A robot that decides cell by cell, as hasan's does: the route is never longer than the cells decided on."""
-
-    def __init__(self, *given: Any, **named: Any) -> None:
-        super().__init__(*given, **named)
-        query = Query.between(self._grid, self._task)
-        self._online = online_for(self._planner, query, self._rng)
-        self._goal = query.goal
-
-    @property
-    def waits(self) -> bool:
-        """Whether it may have a way on later where it has none now."""
-        return not self._online.arrived
-
-    def cause(self, tick: int, pose: Pose, waits: bool, guide: TrackedPath, arc: float) -> str:
-        """A decision is due before the end of the last is reached, and again and again while the robot waits."""
-        if tick == 0:
-            return DECISION
-        if self._online.arrived or tick / self._hz - self._rest < DECIDE:
-            return ""
-        return DECISION if guide.length - arc < 0.6 * self._grid.cell else ""
-
-    def again(self, tick: int, pose: Pose, cause: str) -> TrackedPath | None:
-        """The way on to the next cell; None: wait."""
-        if cause == MISSED:  # or else it waits, and the next decision is due in a while
-            return super().again(tick, pose, cause) if self._online.arrived else None
-        self._rest, started = tick / self._hz, time.perf_counter()
-        here, propagated = self._online.cell, self._online.tally.propagated
-        blocked = self._cells(self._covered(tick, np.array([pose[:2]]), 0.0))
-        to = self._online.step(np.argwhere(blocked))
-        ends = self._grid.xy(np.array([here, to or here]))
-        if to == self._goal and self._clear(ends[0], self._task.goal):
-            ends[1] = self._task.goal
-        near = math.dist(pose[:2], ends[0]) <= 0.25 * self._grid.cell or tick == 0
-        xy = np.vstack([pose[:2], ends[1 if near and self._clear(pose[:2], ends[1]) else 0 :]])
-        moved = to is not None and bool(np.ptp(xy, axis=0).any())
-        cost = polyline_length(xy)
-        work = self._online.tally.propagated - propagated
-        if moved:
-            self.log.append(Replan(tick / self._hz, cause, True, cost, work, xy, time.perf_counter() - started))
-        if not moved and tick == 0:  # it waits where it is, and does not set out by the plan of all the way
-            xy = np.array(pose[:2]) + 1e-4 * np.array([(0.0, 0.0), (math.cos(pose[2]), math.sin(pose[2]))])
-        return self._guide(Route(xy)) if moved or tick == 0 else None
-
-    def _clear(self, a: tuple[float, ...] | Floats, b: tuple[float, ...] | Floats) -> bool:
-        """Whether the straight way between two points keeps what planners keep from all that stands."""
-        return bool(segment_clearance(self._task.world, np.array([a]), np.array([b]))[0] >= self._grid.inflate - 1e-9)
-
-
-def _with(task: Task, discs: list[Disc]) -> Task:
-    """A task among more discs."""
-    obstacles = (*task.world.obstacles, *discs)
-    return dataclasses.replace(task, world=dataclasses.replace(task.world, obstacles=obstacles))
-
-
-def _place(route: Route, arc: float) -> tuple[float, float]:
+def _point_at(route: Route, arc: float) -> tuple[float, float]:
+    """The point of a route at a distance from its start [m]."""
     x, y = (float(np.interp(arc, route.arc, route.xy[:, k])) for k in (0, 1))
     return x, y

@@ -1,1 +1,1 @@
-"""Physics: the only package that imports PyBullet."""
+"""Physics: PyBullet behind an engine that speaks in poses, twists and contacts."""

@@ -9,7 +9,7 @@ import time
 import numpy as np
 
 from antdrive.sim.log.rollout import Rollout
-from antdrive.sim.physics.engine import bullet
+from antdrive.sim.physics.bullet import bullet
 from antdrive.sim.view.film.compositor import drawn_height, merged_by_colour, part_pose, still_meshes
 from antdrive.sim.view.film.meshes import robot_parts
 from antdrive.sim.view.film.replay import Replay

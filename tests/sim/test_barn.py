@@ -1,4 +1,4 @@
-"""BARN's worlds, which nobody here made: driven with the jackal."""
+"""BARN's worlds, driven by the jackal."""
 
 import tarfile
 from pathlib import Path
@@ -17,7 +17,7 @@ from tests.conftest import SHARED
 ARCHIVE = SHARED / "barn" / "barn50.tar.xz"
 WORLDS = range(0, 300, 6)
 
-pytestmark = pytest.mark.skipif(not ARCHIVE.exists(), reason="BARN's worlds are not in ../shared/data")
+pytestmark = pytest.mark.skipif(not ARCHIVE.exists(), reason="needs BARN's worlds in ../shared/data")
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +34,7 @@ def test_the_jackal_drives_a_barn_world(number: int, barn: Path, jackal: RobotSp
     result = run(Scenario(task=task, planner=load_planner("astar"), robot=jackal))
     assert result.succeeded, (result.outcome, result.certificate)
     assert result.rollout is not None
-    assert barn_score(result.rollout) == pytest.approx(0.5)  # the most there is
+    assert barn_score(result.rollout) == pytest.approx(0.5)  # the highest score
     error, speed = tracking_error(result.rollout), result.rollout.twist[:, 0]
     assert np.percentile(error[np.abs(speed - 1) < 0.1], 95) < 0.02
     assert np.percentile(error[speed > 1.8], 95) < 0.01
@@ -46,7 +46,7 @@ def test_the_jackal_drives_a_barn_world(number: int, barn: Path, jackal: RobotSp
     [("ants", 0.0, "clearance"), ("aco-han", 0.0, "taut"), ("astar", 1.0, "clearance")],
 )
 @pytest.mark.parametrize("number", WORLDS)
-def test_no_planners_path_is_unsafe_to_follow(
+def test_every_planners_path_is_safe_to_follow(
     number: int, planner: str, noise: float, smoothing: str, barn: Path, jackal: RobotSpec
 ) -> None:
     task = import_barn(barn / f"world_{number}.world")

@@ -1,22 +1,23 @@
-"""The whole job: plan, drive, certify."""
+"""Runs: plan, drive, certify."""
 
+import inspect
 import json
 import math
 import subprocess
 import sys
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from antdrive.planners import Progress, keep_best, load_planner, watch
-from antdrive.robots import PurePursuit, RobotSpec
+from antdrive.robots import PurePursuit, RobotSpec, load_robot
 from antdrive.sim import Engine, Outcome, Run, Scenario, measure, run
 from antdrive.sim.driving.drive import drive
 from antdrive.sim.log.record import SmoothingRecord
 from antdrive.sim.view.figures.plan_figures import plan_figure
-from antdrive.worlds import Disc, InputError, Route, Task, World, list_worlds, load_task
+from antdrive.worlds import Disc, InputError, Route, Task, World, list_worlds, load_task, save_task
 
 
 def test_a_run_ends_at_the_goal_certified(small_run: Run) -> None:
@@ -44,13 +45,13 @@ def test_metrics_have_sensible_values(small_run: Run) -> None:
     assert m["duration_s"] > direct / 0.7
 
 
-STILL = [name for name in list_worlds() if not name.endswith("-moving")]
+STATIC = [name for name in list_worlds() if not name.endswith("-moving")]
 
 
 @pytest.mark.parametrize("planner", ["astar", "aco-han"])
 @pytest.mark.parametrize("robot", ["turtlebot", "jackal"])
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.slow) if name.startswith("hasan") else name for name in STILL]
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name.startswith("hasan") else name for name in STATIC]
 )
 def test_every_catalogue_world_is_driven(name: str, robot: str, planner: str) -> None:
     result = run(Scenario.of(name, planner, robot))
@@ -60,7 +61,7 @@ def test_every_catalogue_world_is_driven(name: str, robot: str, planner: str) ->
     assert (result.certificate is not None) == fits
 
 
-TOO_NARROW_FOR_JACKAL = {"hasan-3c", "hasan-5f"}  # their ends lie in cells beside walls
+TOO_NARROW_FOR_JACKAL = {"hasan-3c", "hasan-5f"}  # start or goal lies in a cell beside a wall
 
 
 def test_a_large_world_is_driven_in_the_fast_suite_too() -> None:
@@ -69,9 +70,9 @@ def test_a_large_world_is_driven_in_the_fast_suite_too() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("name", sorted(set(list_worlds()) - set(STILL)))
-def test_every_moving_world_is_driven_and_what_came_of_it_is_certain(name: str, seed: int) -> None:
-    """Nobody promises that each is; whether a drive was met, all three readings agree."""
+@pytest.mark.parametrize("name", sorted(set(list_worlds()) - set(STATIC)))
+def test_the_outcome_of_every_world_with_movers_is_certain(name: str, seed: int) -> None:
+    """Not every drive succeeds, but all three readings agree on whether something was touched."""
     result = run(Scenario.of(name, seed=seed))
     assert result.outcome in (Outcome.SUCCEEDED, Outcome.COLLIDED, Outcome.HIT_WHILE_STANDING)
     assert result.certificate is not None
@@ -80,13 +81,13 @@ def test_every_moving_world_is_driven_and_what_came_of_it_is_certain(name: str, 
 
 
 @pytest.mark.parametrize("robot", ["turtlebot", "jackal"])
-def test_a_busy_plaza_is_crossed_by_new_routes_and_giving_way(robot: str) -> None:
+def test_avoidance_and_replanning_cross_a_busy_plaza(robot: str) -> None:
     result = run(Scenario.of("plaza-moving", "dstar-lite", robot))
     assert result.succeeded, (result.outcome, result.reason)
     assert result.rollout is not None
     assert measure(result.rollout)["replans"] > 0
     assert measure(result.rollout)["avoiding_s"] > 0
-    blind = run(Scenario.of("plaza-moving", "dstar-lite", robot, yielding=None, replanning=None))
+    blind = run(Scenario.of("plaza-moving", "dstar-lite", robot, avoidance=None, replanning=None))
     assert blind.outcome is Outcome.COLLIDED
 
 
@@ -97,7 +98,7 @@ def test_the_seed_decides_where_a_wanderer_goes() -> None:
     assert (one.movers != other.movers).any()
 
 
-def test_an_obstacle_put_on_the_route_after_planning_is_hit(collided_run: Run) -> None:
+def test_an_unseen_obstacle_on_the_route_is_hit(collided_run: Run) -> None:
     assert collided_run.outcome is Outcome.COLLIDED
     assert not collided_run.succeeded
     log, certificate = collided_run.rollout, collided_run.certificate
@@ -123,7 +124,7 @@ def test_no_path_is_an_outcome_with_a_reason(turtlebot: RobotSpec) -> None:
 
 
 def test_a_goal_without_room_is_no_path(turtlebot: RobotSpec) -> None:
-    """The goal lies 2 cm from a disc: nothing within the tolerance lets the robot stand."""
+    """The goal lies 2 cm from a disc: the robot fits nowhere within the tolerance."""
     task = Task(World("w", (0, 0, 4, 3), (Disc(3, 1.5, 0.3),)), (0.6, 1.5, 0), (2.68, 1.5), 0.05, 0.2)
     result = run(Scenario(task=task, planner=load_planner("astar"), robot=turtlebot))
     assert result.outcome is Outcome.NO_PATH
@@ -132,14 +133,14 @@ def test_a_goal_without_room_is_no_path(turtlebot: RobotSpec) -> None:
     assert run(Scenario(task=near, planner=load_planner("astar"), robot=turtlebot)).succeeded
 
 
-def test_a_budget_that_ends_first_is_told(small_scenario: Scenario) -> None:
+def test_a_planner_that_ends_without_a_path_has_stopped(small_scenario: Scenario) -> None:
     blind = load_planner("aco-han", ants=1, iterations=1, max_steps=2)
     result = run(replace(small_scenario, planner=blind))
     assert result.outcome is Outcome.STOPPED
     assert result.plan.reason
 
 
-def test_the_planner_is_our_ants_unless_told() -> None:
+def test_the_default_planner_is_ants() -> None:
     assert Scenario.of("empty").planner_name == "ants"
 
 
@@ -163,7 +164,7 @@ def test_time_runs_out(small_scenario: Scenario) -> None:
     assert result.rollout is not None
     assert result.rollout.t[-1] == pytest.approx(1.0)
     assert result.certificate is not None
-    assert result.certificate.certified  # it touched nothing, as far as it came
+    assert result.certificate.certified  # nothing was touched until then
     assert not result.succeeded
 
 
@@ -188,8 +189,8 @@ def test_a_small_tolerance_is_met(robot: str, request: pytest.FixtureRequest) ->
     assert result.succeeded, result.reason
 
 
-def test_a_robot_that_stands_where_it_should_need_not_drive(turtlebot: RobotSpec) -> None:
-    """The goal has no room, and the only cell near it is the one that the robot starts in."""
+def test_a_robot_that_starts_at_the_goal_need_not_drive(turtlebot: RobotSpec) -> None:
+    """The robot does not fit at the goal, and the only cell within the tolerance is the one it starts in."""
     task = Task(World("w", (0, 0, 1, 1)), (0.5, 0.5, 0.0), (0.5, 0.3), 0.25, 1.0)
     result = run(Scenario(task=task, planner=load_planner("astar"), robot=turtlebot, margin=0.15))
     assert result.succeeded
@@ -197,7 +198,7 @@ def test_a_robot_that_stands_where_it_should_need_not_drive(turtlebot: RobotSpec
     assert len(result.rollout.t) == 1
 
 
-def test_no_obstacle_is_too_low_to_be_felt(small_scenario: Scenario, collided_run: Run) -> None:
+def test_no_obstacle_is_too_low_to_be_touched(small_scenario: Scenario, collided_run: Run) -> None:
     low = replace(collided_run.scenario.unseen[0], height=0.003)
     assert run(replace(small_scenario, unseen=(low,))).outcome is Outcome.COLLIDED
 
@@ -216,12 +217,12 @@ def test_a_start_that_touches_is_a_collision_at_once(turtlebot: RobotSpec, gap: 
 
 
 def test_a_route_through_an_obstacle_ends_in_contact_not_in_a_loop(turtlebot: RobotSpec) -> None:
-    """The controller trusts no planner: it creeps up to the obstacle and the outcome is told."""
+    """The controller does not trust the route: it creeps up to the obstacle."""
     task = Task(World("w", (0, 0, 4, 3), (Disc(2, 1.5, 0.3),)), (0.6, 1.5, 0), (3.4, 1.5))
     controller = PurePursuit()
-    guide = controller.guide(Route(np.array([(0.6, 1.5), (3.4, 1.5)])), task.world, turtlebot, 0.05, 1 / 60)
+    tracked = controller.guide(Route(np.array([(0.6, 1.5), (3.4, 1.5)])), task.world, turtlebot, 0.05, 1 / 60)
     with Engine(task.world, turtlebot) as engine:
-        log = drive(engine, controller, guide, task, time_limit=120)
+        log = drive(engine, controller, tracked, task, time_limit=120)
     assert log.outcome in (Outcome.COLLIDED, Outcome.STUCK)
 
 
@@ -230,7 +231,7 @@ def test_the_control_rate_must_divide_the_physics_rate(small_scenario: Scenario)
         run(replace(small_scenario, control_hz=70))
 
 
-def test_other_rates_arrive_too(small_scenario: Scenario) -> None:
+def test_other_physics_and_control_rates_work(small_scenario: Scenario) -> None:
     for physics, control in ((120, 60), (240, 30), (240, 240)):
         assert run(replace(small_scenario, physics_hz=physics, control_hz=control)).succeeded
 
@@ -253,12 +254,10 @@ def test_the_same_scenario_gives_the_same_bits_in_any_order(small_scenario: Scen
 
 
 def test_the_same_scenario_gives_the_same_bits_in_another_process(small_run: Run, tmp_path: Path) -> None:
-    from antdrive.worlds import save_task
-
     assert small_run.rollout is not None
     save_task(small_run.scenario.task, tmp_path / "small.yaml")
     code = (
-        "import sys; from sim import Scenario, run\n"
+        "import sys; from antdrive.sim import Scenario, run\n"
         "print(run(Scenario.of(sys.argv[1], 'astar', 'turtlebot')).rollout.digest)"
     )
     command = [sys.executable, "-c", code, str(tmp_path / "small.yaml")]
@@ -275,14 +274,14 @@ def test_noise_is_seeded_logged_and_survived(small_scenario: Scenario, small_run
     assert small_run.rollout is not None
     assert first.succeeded
     assert first.rollout.digest == again.rollout.digest != other.rollout.digest
-    gone = np.hypot(*(first.rollout.estimate - first.rollout.pose)[:, :2].T)
-    assert 0.001 < np.percentile(gone, 95) < 0.03  # the robot's fixes err by a centimetre
+    error = np.hypot(*(first.rollout.estimate - first.rollout.pose)[:, :2].T)
+    assert 0.001 < np.percentile(error, 95) < 0.03  # the robot measures its position to a centimetre
     assert small_run.rollout.estimate.shape == (0, 3)
     assert not (first.rollout.pose[:500] == small_run.rollout.pose[:500]).all()
 
 
 @pytest.mark.parametrize("kind", ["none", "taut", "clearance"])
-def test_every_kind_of_route_is_driven_and_told(kind: str, small_scenario: Scenario) -> None:
+def test_every_smoothing_is_driven_and_recorded(kind: str, small_scenario: Scenario) -> None:
     result = run(replace(small_scenario, smoothing=kind))
     assert result.succeeded
     assert result.rollout is not None
@@ -296,9 +295,38 @@ def test_settings_out_of_range_are_refused(small_scenario: Scenario) -> None:
         Scenario.of("empti")
 
 
-def test_the_planner_does_not_see_what_is_unseen(small_run: Run, collided_run: Run) -> None:
+def test_a_scenario_is_made_of_names_files_or_objects(tmp_path: Path) -> None:
+    task, robot, planner = load_task("empty"), load_robot("jackal"), load_planner("astar")
+    save_task(task, tmp_path / "copy.yaml")
+    of_objects = Scenario.of(task, planner, robot)
+    assert (of_objects.task, of_objects.planner, of_objects.robot) == (task, planner, robot)
+    assert of_objects.planner_name == ""
+    assert Scenario.of(tmp_path / "copy.yaml", "astar").task.goal == task.goal
+    assert Scenario.of("empty", "aco-han", options={"ants": 3}).planner == load_planner("aco-han", ants=3)
+    with pytest.raises(ValueError, match="options: need a planner's name"):
+        Scenario.of("empty", planner, options={"ants": 3})
+
+
+def test_a_scenario_made_of_names_has_the_same_defaults() -> None:
+    parameters = inspect.signature(Scenario.of).parameters
+    for setting in fields(Scenario):
+        if setting.name not in ("task", "planner", "robot", "planner_name"):
+            assert parameters[setting.name].default == setting.default, setting.name
+
+
+def test_metrics_of_a_run_without_a_rollout_say_why(small_run: Run) -> None:
+    assert small_run.metrics["spl"] == small_run.metric("spl")
+    with pytest.raises(ValueError, match=r"metric: unknown 'speed'; choose from path_length_m, .*spl"):
+        small_run.metric("speed")
+    nowhere = run(Scenario.of("no-path", "astar"))
+    for ask in (lambda: nowhere.metrics, lambda: nowhere.metric("spl")):
+        with pytest.raises(ValueError, match="no rollout: planning ended with no_path: "):
+            ask()
+
+
+def test_the_planner_does_not_know_unseen_obstacles(small_run: Run, collided_run: Run) -> None:
     np.testing.assert_array_equal(small_run.plan.cells, collided_run.plan.cells)
 
 
-def test_load_task_of_a_catalogue_name_is_used_by_of() -> None:
+def test_scenarios_use_the_catalogue() -> None:
     assert Scenario.of("empty").task == load_task("empty")

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.sim.physics.engine import bullet, client
+from antdrive.sim.physics.bullet import bullet, client
 from antdrive.sim.view.film import _kernels_paint as kernels
 from antdrive.sim.view.film.camera import Camera
 from antdrive.sim.view.film.ground import dashes, kerb_width, paint_ground

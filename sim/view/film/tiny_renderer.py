@@ -6,7 +6,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from antdrive.sim.physics.engine import bullet
+from antdrive.sim.physics.bullet import bullet
 from antdrive.sim.view.film.camera import Camera
 from antdrive.sim.view.film.meshes import Mesh
 from antdrive.sim.view.style import Colour

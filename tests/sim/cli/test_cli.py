@@ -147,7 +147,7 @@ def test_there_are_at_least_30_malformed_worlds() -> None:
         (["run", "empty", "--unseen", "1,2"], "3 numbers"),
         (["run", "empty", "--sees", "all"], "positions, velocities, motions"),
         (["run", "empty", "--sees", "positions:far"], "--sees positions:far: write WHAT or WHAT:METRES"),
-        (["run", "empty", "--sees", "positions:-1"], "reach: must be greater than 0"),
+        (["run", "empty", "--sees", "positions:-1"], "range: must be greater than 0"),
         (["run", "empty", "--unseen", "1,2,-3"], "radius: must be greater than 0"),
         (["run", "empty", "--video", "film.avi"], ".mp4"),
         (["run", "empty", "--out", "/proc/nowhere"], "/proc/nowhere: cannot be written"),

@@ -40,7 +40,7 @@ SLOW = keyframed((0.0, 3.0, 3.0), (50.0, 8.0, 3.0), (52.0, 8.0, 5.0))
 @pytest.mark.parametrize("mover", [CROSSING, HEAD_ON, SLOW], ids=["crossing", "head on", "slower, ahead"])
 def test_what_would_be_hit_is_given_way_to(mover: Keyframed, turtlebot: RobotSpec) -> None:
     """Each of them is in the way: a robot that does not yield proves it."""
-    blind = among(mover, robot=turtlebot, yielding=None)
+    blind = among(mover, robot=turtlebot, avoidance=None)
     assert blind.outcome is Outcome.COLLIDED
     seeing = among(mover, robot=turtlebot)
     assert seeing.succeeded, (seeing.outcome, seeing.reason, seeing.certificate)
@@ -50,7 +50,7 @@ def test_what_would_be_hit_is_given_way_to(mover: Keyframed, turtlebot: RobotSpe
 
 
 def test_a_faster_mover_from_behind_is_let_past(turtlebot: RobotSpec) -> None:
-    blind, seeing = (among(OVERTAKING, robot=turtlebot, yielding=y) for y in (None, Avoidance()))
+    blind, seeing = (among(OVERTAKING, robot=turtlebot, avoidance=y) for y in (None, Avoidance()))
     assert blind.outcome is Outcome.COLLIDED
     assert seeing.succeeded, (seeing.outcome, seeing.reason)
 
@@ -58,7 +58,7 @@ def test_a_faster_mover_from_behind_is_let_past(turtlebot: RobotSpec) -> None:
 def test_in_a_narrow_aisle_the_robot_stops_before_what_crosses_and_goes_on(turtlebot: RobotSpec) -> None:
     crossing = keyframed((0.0, 4.5, -1.0), (4.0, 4.5, 0.4), (7.5, 4.5, 0.6), (9.0, 4.5, 2.5), radius=0.2)
     task = Task(AISLE, (1.0, 0.5, 0.0), (8.0, 0.5), cell=0.1)
-    assert among(crossing, robot=turtlebot, task=task, yielding=None).outcome is Outcome.COLLIDED
+    assert among(crossing, robot=turtlebot, task=task, avoidance=None).outcome is Outcome.COLLIDED
     done = among(crossing, robot=turtlebot, task=task)
     assert done.succeeded, (done.outcome, done.reason)
     assert done.rollout is not None
@@ -70,7 +70,7 @@ def test_in_a_narrow_aisle_the_robot_stops_before_what_crosses_and_goes_on(turtl
 def test_in_a_narrow_aisle_the_robot_backs_off_from_what_comes_for_it(turtlebot: RobotSpec) -> None:
     comes = keyframed((0.0, 6.0, 0.5), (12.0, 2.0, 0.5), (20.0, 8.7, 0.5), radius=0.2)
     task = Task(AISLE, (3.0, 0.5, 0.0), (7.0, 0.5), cell=0.1, time_limit=40.0)
-    assert among(comes, robot=turtlebot, task=task, yielding=None).outcome is Outcome.COLLIDED
+    assert among(comes, robot=turtlebot, task=task, avoidance=None).outcome is Outcome.COLLIDED
     done = among(comes, robot=turtlebot, task=task)
     assert done.rollout is not None
     assert not len(done.rollout.contacts), (done.outcome, done.reason)
@@ -91,12 +91,12 @@ def test_what_has_just_gone_by_may_turn_back(speed: float, t: float, turtlebot: 
     begin = t - 2.5 / speed
     frames = ((0.0, 4.6, 3.5 - speed * t),) if begin <= 0 else ((0.0, 4.6, 1.0), (begin, 4.6, 1.0))
     turns = keyframed(*frames, (t, 4.6, 3.5), (t + 4.0, 4.6, 3.5 - 4.0 * speed), radius=0.25)
-    trusting, wary = (among(turns, robot=turtlebot, yielding=y) for y in (Avoidance(wary=0.0), Avoidance()))
+    trusting, wary = (among(turns, robot=turtlebot, avoidance=y) for y in (Avoidance(wary=0.0), Avoidance()))
     assert trusting.outcome is Outcome.COLLIDED
     assert wary.succeeded, (wary.outcome, wary.reason)
-    known = Perception(told="motions")
+    known = Perception(kind="motions")
     one, other = (
-        among(turns, robot=turtlebot, yielding=y, knowledge=known) for y in (Avoidance(wary=0.0), Avoidance())
+        among(turns, robot=turtlebot, avoidance=y, perception=known) for y in (Avoidance(wary=0.0), Avoidance())
     )
     assert one.rollout is not None
     assert other.rollout is not None
@@ -117,7 +117,7 @@ def test_what_stands_nearer_than_is_kept_is_not_driven_into(turtlebot: RobotSpec
     """Nothing goes past it in the aisle, and nothing pushes."""
     plug = keyframed((0.0, 1.48 + gap, 0.5), (100.0, 1.48 + gap, 0.501))
     task = Task(AISLE, (1.0, 0.5, 0.0), (8.0, 0.5), cell=0.1, time_limit=12.0)
-    done = among(plug, robot=turtlebot, task=task, knowledge=Perception(told=told))  # type: ignore[arg-type]
+    done = among(plug, robot=turtlebot, task=task, perception=Perception(kind=told))  # type: ignore[arg-type]
     assert done.outcome is Outcome.TIMED_OUT
     assert done.rollout is not None
     assert np.abs(done.rollout.twist[:, 0]).max() < 1e-3
@@ -151,10 +151,10 @@ def test_what_stands_is_kept_clear_of_while_yielding(turtlebot: RobotSpec) -> No
 
 
 def test_a_robot_that_sees_less_yields_to_less(turtlebot: RobotSpec) -> None:
-    near = among(CROSSING, robot=turtlebot, knowledge=Perception(reach=1e-3))
+    near = among(CROSSING, robot=turtlebot, perception=Perception(range=1e-3))
     assert near.outcome is Outcome.COLLIDED
     for told in ("positions", "motions"):
-        known = among(CROSSING, robot=turtlebot, knowledge=Perception(told=told))  # type: ignore[arg-type]
+        known = among(CROSSING, robot=turtlebot, perception=Perception(kind=told))  # type: ignore[arg-type]
         assert known.rollout is not None
         assert known.rollout.record.perception == PerceptionRecord(kind=told, range_m=None)
 
@@ -164,7 +164,7 @@ def test_movers_are_expected_where_knowledge_puts_them(tick: int, told: str) -> 
     movers = (CROSSING, Cruising(radius=0.2, position=(2.0, 2.0), velocity=(0.5, 0.3)))
     traffic = Trajectories.of(dataclasses.replace(HALL, movers=movers), (1.0, 3.0))
     ahead = Avoidance().ahead
-    places, radii = Predictor(traffic, Perception(told=told), 60).expected(tick, (0.0, 0.0), ahead)  # type: ignore[arg-type]
+    places, radii = Predictor(traffic, Perception(kind=told), 60).predict(tick, (0.0, 0.0), ahead)  # type: ignore[arg-type]
     now, speed = traffic.positions(tick / 60)[0], traffic.velocities(tick / 60)[0]
     expected = {
         "positions": np.repeat(now[None], len(ahead), axis=0),
@@ -176,10 +176,10 @@ def test_movers_are_expected_where_knowledge_puts_them(tick: int, told: str) -> 
 
 
 def test_nonsense_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"told: unknown 'all'; choose from positions, velocities, motions"):
-        Perception(told="all")  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="reach: must be greater than 0, got 0"):
-        Perception(reach=0.0)
+    with pytest.raises(ValueError, match=r"kind: unknown 'all'; choose from positions, velocities, motions"):
+        Perception(kind="all")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="range: must be greater than 0, got 0"):
+        Perception(range=0.0)
     with pytest.raises(ValueError, match="horizon: must be greater than 0 and at most 60, got 0"):
         Avoidance(horizon=0.0)
     with pytest.raises(ValueError, match="keep: must be at least 0, got nan"):
@@ -189,7 +189,7 @@ def test_nonsense_is_refused() -> None:
 def test_a_robot_with_too_little_room_makes_more(turtlebot: RobotSpec) -> None:
     """What creeps up on it at less than the room it keeps is got away from."""
     creeps = keyframed((0.0, 1.51, 3.0), (20.0, -2.5, 3.0), radius=0.25)
-    assert among(creeps, robot=turtlebot, yielding=None).outcome is Outcome.COLLIDED
+    assert among(creeps, robot=turtlebot, avoidance=None).outcome is Outcome.COLLIDED
     done = among(creeps, robot=turtlebot)
     assert done.succeeded, (done.outcome, done.reason)
 

@@ -1,4 +1,4 @@
-"""Worlds that move: in physics, in logs, in certificates."""
+"""Worlds with movers: in physics, in logs and in certificates."""
 
 import dataclasses
 import math
@@ -21,15 +21,15 @@ ZIGZAG = ((0.0, -3.0, 3.0), (2.0, 0.0, 4.0), (2.5, 1.0, 4.0), (4.0, 1.0, 6.0))
 
 
 def placed(engine: Engine, steps: int) -> tuple[list[int], Floats, Floats]:
-    """Where movers' bodies and traffic are at each of some steps, and at which the robot was touched."""
+    """The steps with contacts, and the movers' positions at each step: those of the bodies and those of the trajectories."""
     engine.place((0.0, 0.0, 0.0))
-    bodies, touched = [engine.mover_places()], []
+    bodies, touched = [engine.mover_positions()], []
     for k in range(steps):
         if engine.step():
             touched.append(k)
-        bodies.append(engine.mover_places())
-    assert engine.traffic is not None
-    return touched, np.array(bodies), engine.traffic.positions(np.arange(steps + 1) / engine.physics_hz)
+        bodies.append(engine.mover_positions())
+    assert engine.trajectories is not None
+    return touched, np.array(bodies), engine.trajectories.positions(np.arange(steps + 1) / engine.physics_hz)
 
 
 def built(*movers: Mover, obstacles: tuple[Disc, ...] = ()) -> tuple[World, Trajectories]:
@@ -40,26 +40,26 @@ def built(*movers: Mover, obstacles: tuple[Disc, ...] = ()) -> tuple[World, Traj
 # Physics
 
 
-def test_bodies_are_where_the_traffic_is_at_every_step(turtlebot: RobotSpec) -> None:
-    world, traffic = built(
+def test_bodies_follow_the_trajectories_at_every_step(turtlebot: RobotSpec) -> None:
+    world, trajectories = built(
         *(Keyframed(radius=0.3, keyframes=ZIGZAG, loop=loop, phase=0.3) for loop in ("pingpong", "teleport", "once")),
         Keyframed(radius=0.3, keyframes=ZIGZAG, loop="teleport", interpolation="catmull-rom"),
         Cruising(radius=0.3, position=(-5.0, 5.0), velocity=(9.7, 6.3)),
         Wandering(radius=0.2, cell=0.5, period=0.21),
         obstacles=(Disc(5.0, 5.0, 1.0),),
     )
-    with Engine(world, turtlebot, traffic=traffic) as engine:
-        for _ in range(2):  # placed again, everything begins again
+    with Engine(world, turtlebot, trajectories=trajectories) as engine:
+        for _ in range(2):  # placing the robot restarts the movers
             _, bodies, expected = placed(engine, 1600)
             assert np.abs(bodies - expected).max() < 1e-9
 
 
 @pytest.mark.parametrize("speed", [0.25, 1.0, 4.0, 17.0])
 @pytest.mark.parametrize("robot", ["turtlebot", "jackal"])
-def test_what_crosses_a_standing_robot_is_felt_and_what_passes_is_not(
+def test_a_mover_that_crosses_a_standing_robot_touches_it_and_one_that_passes_does_not(
     robot: str, speed: float, request: pytest.FixtureRequest
 ) -> None:
-    """At 4 m/s a mover covers 17 mm a step, and a graze of 1 mm is shorter than 40 mm: no step may be missed."""
+    """At 4 m/s a mover covers 17 mm per step, and a graze of 1 mm lasts less than 40 mm: no step may be missed."""
     spec: RobotSpec = request.getfixturevalue(robot)
     radius, reach = 0.2, spec.footprint.half_width + spec.footprint.rounding
     graze = 0.001 if speed <= 4 else 0.03
@@ -67,20 +67,20 @@ def test_what_crosses_a_standing_robot_is_felt_and_what_passes_is_not(
         for aside, expected in ((0.0, True), (reach + radius - graze, True), (reach + radius + 0.002, False)):
             lead = 0.75 + speed * float(phase)
             mover = Cruising(radius=radius, position=(-lead, aside), velocity=(speed, 0.0))
-            world, traffic = built(mover)
-            with Engine(world, spec, traffic=traffic) as engine:
+            world, trajectories = built(mover)
+            with Engine(world, spec, trajectories=trajectories) as engine:
                 touched, bodies, way = placed(engine, math.ceil(1.3 * lead / speed * 240))
             assert bool(touched) == expected, (phase, aside)
             assert np.abs(bodies - way).max() < 1e-9, "nothing slows a mover"
 
 
-def test_a_mover_pushes_the_robot_before_it(turtlebot: RobotSpec) -> None:
-    world, traffic = built(Cruising(radius=0.3, position=(-1.0, 0.0), velocity=(1.0, 0.0)))
-    with Engine(world, turtlebot, traffic=traffic) as engine:
+def test_a_mover_pushes_the_robot_ahead(turtlebot: RobotSpec) -> None:
+    world, trajectories = built(Cruising(radius=0.3, position=(-1.0, 0.0), velocity=(1.0, 0.0)))
+    with Engine(world, turtlebot, trajectories=trajectories) as engine:
         engine.place((0.0, 0.0, 0.0))
         contacts = [contact for _ in range(480) for contact in engine.step()]
         x, y = engine.state()[:2]
-        (place,) = engine.mover_places()
+        (place,) = engine.mover_positions()
     assert {contact.obstacle for contact in contacts} == {0}
     assert place[0] == pytest.approx(1.0)
     assert math.dist((x, y), place) > 0.3 + 0.18 - 0.01
@@ -94,30 +94,30 @@ def test_movers_are_numbered_after_the_discs_and_before_the_walls(turtlebot: Rob
         Keyframed(radius=0.1, keyframes=((0.0, 0.0, 0.5), (9.0, 0.0, 0.6))),
     )
     world = World("w", (-2.0, -0.5, 2.0, 2.0), (Disc(0.5, 0.0, 0.1),), movers=movers)
-    with Engine(world, turtlebot, traffic=Trajectories.of(world, (0.0, 0.0))) as engine:
+    with Engine(world, turtlebot, trajectories=Trajectories.of(world, (0.0, 0.0))) as engine:
         engine.place((0.0, 0.0, yaw))
         engine.command(0.5, 0.0)
         touched = [contact.obstacle for _ in range(240) for contact in engine.step()]
     assert set(touched) == {index}
 
 
-def test_movers_pass_through_each_other_and_through_what_stands(turtlebot: RobotSpec) -> None:
-    world, traffic = built(
+def test_movers_pass_through_each_other_and_through_obstacles(turtlebot: RobotSpec) -> None:
+    world, trajectories = built(
         Cruising(radius=0.5, position=(-5.0, 5.0), velocity=(2.0, 0.0)),
         Cruising(radius=0.5, position=(5.0, 5.0), velocity=(-2.0, 0.0)),
         obstacles=(Disc(2.0, 5.0, 0.5),),
     )
-    with Engine(world, turtlebot, traffic=traffic) as engine:
+    with Engine(world, turtlebot, trajectories=trajectories) as engine:
         _, bodies, way = placed(engine, 1200)
     assert np.abs(bodies - way).max() < 1e-9
 
 
-def test_an_engine_wants_the_traffic_of_its_world(turtlebot: RobotSpec) -> None:
-    world, traffic = built(Cruising(radius=0.5, position=(-5.0, 5.0), velocity=(2.0, 0.0)))
-    with pytest.raises(ValueError, match="traffic: must be that of the world's 1 movers"):
+def test_an_engine_needs_the_trajectories_of_its_world(turtlebot: RobotSpec) -> None:
+    world, trajectories = built(Cruising(radius=0.5, position=(-5.0, 5.0), velocity=(2.0, 0.0)))
+    with pytest.raises(ValueError, match="trajectories: must be those of the world's 1 movers"):
         Engine(world, turtlebot)
-    with pytest.raises(ValueError, match="traffic: must be that of the world's 0 movers"):
-        Engine(World("w", OPEN), turtlebot, traffic=traffic)
+    with pytest.raises(ValueError, match="trajectories: must be those of the world's 0 movers"):
+        Engine(World("w", OPEN), turtlebot, trajectories=trajectories)
 
 
 # Runs
@@ -132,8 +132,8 @@ BESIDE = (
 
 
 def among(*movers: Mover, robot: RobotSpec, **settings: Any) -> Run:
-    """A drive among movers, by a robot that gives way to none."""
-    settings = {"yielding": None, "replanning": None, **settings}
+    """A drive among movers, by a robot that does not avoid them."""
+    settings = {"avoidance": None, "replanning": None, **settings}
     task = dataclasses.replace(TASK, world=dataclasses.replace(ROOM, movers=movers))
     return run(Scenario(task=task, planner=load_planner("astar"), planner_name="astar", robot=robot, **settings))
 
@@ -159,7 +159,7 @@ def test_the_log_holds_every_mover_at_every_row(passed: Rollout) -> None:
     assert (passed.movers == passed.trajectories().positions(passed.t)).all()
 
 
-def test_clearance_is_to_movers_too(passed: Rollout) -> None:
+def test_clearance_includes_movers(passed: Rollout) -> None:
     np.testing.assert_allclose(closed_form_clearance(passed), passed.clearance, atol=1e-12)
     centre = np.hypot(*np.moveaxis(passed.movers - passed.pose[:, None, :2], -1, 0)) - [0.3, 0.2, 0.15] - 0.18
     assert (passed.clearance <= centre.min(axis=1) + 1e-12).all()
@@ -172,7 +172,7 @@ def test_the_same_moving_scenario_gives_the_same_bits(passed: Rollout, turtlebot
     assert again.digest == passed.digest
 
 
-def test_movers_far_away_change_nothing_of_the_drive(passed: Rollout, turtlebot: RobotSpec) -> None:
+def test_distant_movers_do_not_change_the_drive(passed: Rollout, turtlebot: RobotSpec) -> None:
     """Movers are not on the grid, and none was near."""
     alone = among(robot=turtlebot, seed=3).rollout
     assert alone is not None
@@ -195,7 +195,7 @@ def test_driving_into_a_mover_is_a_collision(turtlebot: RobotSpec) -> None:
     assert _contacts(log) == (1, 0, 0)
 
 
-def test_being_run_into_while_standing_is_told_apart(standing: Scenario) -> None:
+def test_being_hit_while_standing_is_an_outcome_of_its_own(standing: Scenario) -> None:
     mover = Keyframed(radius=0.3, keyframes=((0.0, 3.0, 1.4), (4.0, 0.0, 1.4)))
     task = dataclasses.replace(TASK, world=dataclasses.replace(ROOM, movers=(mover,)))
     result = run(dataclasses.replace(standing, task=task))
@@ -210,7 +210,9 @@ def test_being_run_into_while_standing_is_told_apart(standing: Scenario) -> None
 
 
 @pytest.mark.parametrize("place", [(0.7, 1.4), (0.6, 1.0)])
-def test_a_mover_that_jumps_onto_the_robot_is_told_apart(standing: Scenario, place: tuple[float, float]) -> None:
+def test_being_hit_by_a_teleporting_mover_is_an_outcome_of_its_own(
+    standing: Scenario, place: tuple[float, float]
+) -> None:
     frames = ((0.0, *place), (2.0, 3.0, 1.4))
     mover = Keyframed(radius=0.3, keyframes=frames, loop="teleport", phase=1.0)
     task = dataclasses.replace(TASK, world=dataclasses.replace(ROOM, movers=(mover,)))
@@ -221,8 +223,8 @@ def test_a_mover_that_jumps_onto_the_robot_is_told_apart(standing: Scenario, pla
     assert _contacts(result.rollout) == (0, 0, 1)
 
 
-def test_a_mover_that_appears_nearer_than_the_robot_can_stop_has_jumped_on_it(turtlebot: RobotSpec) -> None:
-    """At 0.7 m/s the turtlebot brakes over 0.245 m; it appears 0.1 m before it, or 0.4 m."""
+def test_a_mover_that_appears_within_the_braking_distance_counts_as_a_teleport_hit(turtlebot: RobotSpec) -> None:
+    """At 0.7 m/s the turtlebot needs 0.245 m to brake; the mover appears 0.1 m or 0.4 m ahead of it."""
     clean = among(robot=turtlebot).rollout
     assert clean is not None
     x = float(clean.pose[600, 0])  # at 2.5 s
@@ -233,7 +235,7 @@ def test_a_mover_that_appears_nearer_than_the_robot_can_stop_has_jumped_on_it(tu
         assert among(mover, robot=turtlebot).outcome is outcome
 
 
-def test_a_robot_that_starts_in_touch_with_a_mover_was_run_into(turtlebot: RobotSpec) -> None:
+def test_a_robot_that_starts_touching_a_mover_was_hit_while_standing(turtlebot: RobotSpec) -> None:
     mover = Keyframed(radius=0.3, keyframes=((0.0, 0.6, 1.0), (9.0, 3.0, 1.4)))
     result = among(mover, robot=turtlebot)
     assert result.outcome is Outcome.HIT_WHILE_STANDING
@@ -241,15 +243,15 @@ def test_a_robot_that_starts_in_touch_with_a_mover_was_run_into(turtlebot: Robot
     assert result.rollout.contacts[0, 0] == 0
 
 
-def test_what_is_touched_in_the_period_that_would_end_as_stuck_was_touched(standing: Scenario) -> None:
+def test_a_contact_in_the_control_period_that_would_end_as_stuck_counts(standing: Scenario) -> None:
     rigid = dataclasses.replace(standing.robot, wheel_torque=1e-12)
     alone = run(dataclasses.replace(standing, robot=rigid)).rollout
     assert alone is not None
     assert alone.outcome is Outcome.STUCK
-    touching = float(alone.t[-1]) - 1.5 / 240  # it comes after the last period's first step
+    touching = float(alone.t[-1]) - 1.5 / 240  # after the first physics step of the last control period
     mover = Cruising(radius=0.3, position=(5.0, 1.4), velocity=(-(4.4 - 0.48) / touching, 0.0))
     task = dataclasses.replace(TASK, world=dataclasses.replace(ROOM, movers=(mover,)))
-    result = run(dataclasses.replace(standing, task=task, robot=rigid, yielding=None, replanning=None))
+    result = run(dataclasses.replace(standing, task=task, robot=rigid, avoidance=None, replanning=None))
     assert result.outcome is Outcome.HIT_WHILE_STANDING
     assert result.rollout is not None
     assert alone.t[-1] - 1 / 60 < result.rollout.t[int(result.rollout.contacts[0, 0])] <= alone.t[-1]
@@ -264,12 +266,12 @@ def test_the_time_limit_of_a_task_counts_unless_another_is_given(small_scenario:
     assert run(dataclasses.replace(small_scenario, task=task, time_limit=60.0)).succeeded
 
 
-def test_wanderers_keep_off_what_is_unseen(turtlebot: RobotSpec) -> None:
+def test_wanderers_avoid_unseen_obstacles(turtlebot: RobotSpec) -> None:
     task = dataclasses.replace(TASK, world=dataclasses.replace(ROOM, movers=BESIDE[2:]))
     scenario = Scenario(
         task=task, planner=load_planner("astar"), robot=turtlebot, unseen=(Disc(5.0, 3.4, 0.2), Disc(5.5, 2.6, 0.2))
     )
-    places = scenario.traffic.positions(np.arange(0, 60, 0.05))[:, 0]
+    places = scenario.trajectories.positions(np.arange(0, 60, 0.05))[:, 0]
     for disc in scenario.unseen:
         assert np.hypot(*(places - (disc.x, disc.y)).T).min() > disc.radius + 0.15
     log = run(scenario).rollout
@@ -278,12 +280,12 @@ def test_wanderers_keep_off_what_is_unseen(turtlebot: RobotSpec) -> None:
 
 
 def test_a_robot_drives_among_movers_without_a_scenario(turtlebot: RobotSpec) -> None:
-    """What a drive needs of an engine: its traffic."""
+    """An engine with trajectories is all that `drive` needs to drive among movers."""
     world = dataclasses.replace(ROOM, movers=BESIDE)
     controller = PurePursuit()
-    guide = controller.guide(Route(np.array([(0.6, 1.4), (5.4, 1.4)])), world, turtlebot, 0.05, 1 / 60)
-    with Engine(world, turtlebot, traffic=Trajectories.of(world, TASK.start[:2])) as engine:
-        log = drive(engine, controller, guide, TASK, time_limit=60)
+    tracked = controller.guide(Route(np.array([(0.6, 1.4), (5.4, 1.4)])), world, turtlebot, 0.05, 1 / 60)
+    with Engine(world, turtlebot, trajectories=Trajectories.of(world, TASK.start[:2])) as engine:
+        log = drive(engine, controller, tracked, TASK, time_limit=60)
         assert engine.time == pytest.approx(log.t[-1])
     assert log.outcome is Outcome.SUCCEEDED
     assert log.movers.shape == (len(log.t), 3, 2)
@@ -294,7 +296,7 @@ def _contacts(log: Rollout) -> tuple[float, ...]:
     return m["contacts_driving"], m["contacts_standing"], m["contacts_teleported"]
 
 
-# Whose a contact is
+# Attribution of contacts
 
 
 def told(contacts: list[tuple[int, int]], *, speed: float = 0.0, turn: float = 0.0, jump: int | None = None,
@@ -320,7 +322,7 @@ def told(contacts: list[tuple[int, int]], *, speed: float = 0.0, turn: float = 0
     )  # fmt: skip
 
 
-def test_whose_a_contact_is() -> None:
+def test_contacts_are_attributed_to_the_robot_or_to_the_mover() -> None:
     assert told([(9, 1)]) == [Touch(9, 1, Outcome.HIT_WHILE_STANDING)]
     assert told([(9, 1)], speed=0.019)[0].outcome is Outcome.HIT_WHILE_STANDING
     assert told([(9, 1)], speed=-0.021)[0].outcome is Outcome.COLLIDED
@@ -331,7 +333,7 @@ def test_whose_a_contact_is() -> None:
     assert [told([(9, i)])[0].outcome for i in (0, 2, 5)] == [Outcome.COLLIDED] * 3, "discs and walls do not come"
 
 
-def test_when_a_mover_has_jumped_on_a_robot() -> None:
+def test_contacts_soon_after_a_teleport_are_attributed_to_it() -> None:
     assert told([(9, 1)], jump=9)[0].outcome is Outcome.HIT_BY_TELEPORT
     assert told([(8, 1)], jump=9)[0].outcome is Outcome.HIT_WHILE_STANDING, "it jumped later"
     assert told([(60, 1)], jump=9)[0].outcome is Outcome.HIT_WHILE_STANDING, "it jumped long ago"
@@ -342,7 +344,7 @@ def test_when_a_mover_has_jumped_on_a_robot() -> None:
     assert told([(120, 1)], jump=9, speed=1.0, place=0.95)[0].outcome is Outcome.COLLIDED
 
 
-def test_what_follows_within_half_a_second_is_one_touch() -> None:
+def test_contacts_within_half_a_second_are_one_touch() -> None:
     assert told([(9, 1), (20, 0), (65, 1)]) == [Touch(9, 1, Outcome.HIT_WHILE_STANDING)]
     assert told([(9, 1), (60, 0)]) == [Touch(9, 1, Outcome.HIT_WHILE_STANDING), Touch(60, 0, Outcome.COLLIDED)]
 
@@ -414,7 +416,7 @@ def test_a_moving_log_edited_by_hand_is_found_out(passed: Rollout, what: str) ->
 
 
 @pytest.mark.parametrize("name", ["collided", "hit_by_teleport", "succeeded"])
-def test_a_contact_cannot_be_blamed_on_another(standing: Scenario, name: str) -> None:
+def test_a_contact_cannot_be_attributed_to_another_cause(standing: Scenario, name: str) -> None:
     mover = Keyframed(radius=0.3, keyframes=((0.0, 3.0, 1.4), (4.0, 0.0, 1.4)))
     task = dataclasses.replace(TASK, world=dataclasses.replace(ROOM, movers=(mover,)))
     log = run(dataclasses.replace(standing, task=task)).rollout
@@ -437,7 +439,7 @@ def grazed(passed: Rollout, mover: Mover, gap: float) -> Rollout:
 
 
 def test_the_bound_between_rows_counts_the_movers_speed(passed: Rollout) -> None:
-    """A mover passes before the robot with 20 mm to spare at the rows: enough at 1 m/s, not at 18 m/s."""
+    """A mover passes the robot 20 mm away at the logged rows: that is enough at 1 m/s, not at 18 m/s."""
     for speed, fine in ((1.0, True), (18.0, False)):
         frames = ((0.0, 5.8, 3.5), (7.0 / speed, 5.8, -3.5))
         mover = Keyframed(radius=0.1, loop="teleport", keyframes=frames)
@@ -455,7 +457,7 @@ def test_the_bound_holds_on_a_finer_walk_with_jumps(passed: Rollout) -> None:
     for frames, phase in (
         (((0.0, 1.5, 0.8), (0.6301, 5.0, 0.8)), 0.0),
         (((0.0, 5.0, 2.0), (1.2303, 0.6, 2.0)), 0.0),
-        # Comes towards the robot and is gone 4.95 steps after the start, nearer than at any row.
+        # Approaches the robot and teleports away 4.95 steps after the start: closest between two rows.
         (((0.0, 0.6, 3.4), (0.4, 0.6, 1.9)), 0.4 - 4.95 / 240),
     ):
         log = grazed(passed, Keyframed(radius=0.1, loop="teleport", phase=phase, keyframes=frames), 0.05)

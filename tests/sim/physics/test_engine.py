@@ -1,4 +1,4 @@
-"""Physics against closed forms."""
+"""Physics compared with closed forms."""
 
 import math
 
@@ -7,7 +7,7 @@ import pytest
 
 from antdrive.robots import RobotSpec, footprint_clearance
 from antdrive.sim import Engine
-from antdrive.sim.physics.engine import bullet, client
+from antdrive.sim.physics.bullet import bullet, client
 from antdrive.worlds import Disc, World
 
 OPEN = World("open", (-10, -10, 10, 10))
@@ -22,7 +22,7 @@ def test_the_robot_moves_as_commanded(
     v, w = share_v * min(spec.max_speed, 1.0), share_w * spec.max_yaw_rate
     with Engine(OPEN, spec) as engine:
         engine.place((0, 0, 0.3))
-        for i in range(240):  # speed up gently
+        for i in range(240):  # accelerate gently
             engine.command(v * i / 240, w * i / 240)
             engine.step()
         engine.command(v, w)
@@ -44,7 +44,7 @@ def test_the_robot_moves_as_commanded(
 def test_contacts_agree_with_the_closed_form(
     robot: str, bearing: float, gap: float, request: pytest.FixtureRequest
 ) -> None:
-    """A cylinder put 4 mm into the footprint's edge is felt; one 2 mm off it is not."""
+    """A cylinder that overlaps the footprint by 4 mm is touched; one that is 2 mm away is not."""
     spec: RobotSpec = request.getfixturevalue(robot)
     pose = (1.0, -2.0, 0.5)
     low, high = 0.0, 2.0
@@ -80,14 +80,14 @@ def test_walls_are_solid(turtlebot: RobotSpec, yaw: float, wall: int) -> None:
     assert max(abs(state.x), abs(state.y)) == pytest.approx(1 - turtlebot.radius, abs=0.01)
 
 
-def test_a_low_obstacle_is_met(turtlebot: RobotSpec) -> None:
+def test_a_low_obstacle_is_touched(turtlebot: RobotSpec) -> None:
     with Engine(World("w", OPEN.bounds, (Disc(1, 0, 0.2, height=0.02),)), turtlebot) as engine:
         engine.place((0, 0, 0))
         engine.command(0.5, 0)
         assert any(engine.step() for _ in range(480))
 
 
-def test_torque_limits_what_the_wheels_can_do(turtlebot: RobotSpec) -> None:
+def test_torque_limits_acceleration(turtlebot: RobotSpec) -> None:
     from dataclasses import replace
 
     reached = []
@@ -112,8 +112,8 @@ def test_clients_are_closed_even_after_an_error(turtlebot: RobotSpec) -> None:
         assert bullet().getConnectionInfo(fresh)["isConnected"] == 1
 
 
-def test_the_pose_read_is_that_of_the_axle(jackal: RobotSpec) -> None:
-    """The centre of mass hangs below the axle; a tilt must not shift the pose."""
+def test_the_pose_is_that_of_the_axle(jackal: RobotSpec) -> None:
+    """The centre of mass hangs below the axle: a tilt must not shift the pose."""
     with Engine(OPEN, jackal) as engine:
         engine.place((1.25, -2.5, 2.0))
         np.testing.assert_allclose(engine.state(), (1.25, -2.5, 2.0, 0, 0), atol=2e-4)

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from antdrive.planners import PlanResult, PlanStatus, Query, load_planner
-from antdrive.worlds import Disc, Task, World, load_task, rasterise
+from antdrive.sim import Run, Scenario, run
+from antdrive.worlds import Disc, Grid, Task, World, load_task, rasterise
 
 TASK = load_task("slalom")
 
@@ -60,5 +61,42 @@ def test_looking_at_a_world_imports_nothing_heavy():
         "import sys; from antdrive.worlds import load_task; load_task('slalom')._repr_html_(); "
         "print([m for m in ('matplotlib', 'numba', 'antdrive.sim', 'pybullet') if m in sys.modules])"
     )
-    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert found.stdout.strip() == "[]"
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert said.stdout.strip() == "[]"
+
+
+def test_a_scenario_shows_its_world_and_its_settings():
+    html = Scenario.of("slalom", "as", unseen=(Disc(1.0, 1.0, 0.125),), seed=7)._repr_html_()
+    assert ElementTree.fromstring(html)[0].tag.endswith("svg")
+    assert 'r="0.125"' in html, "what is unseen is drawn too"
+    assert ">as<" in html
+    assert ">7<" in html
+
+
+def test_a_run_shows_its_drive_and_how_it_ended(small_run: Run):
+    html = small_run._repr_html_()
+    assert ElementTree.fromstring(html)[0].tag.endswith("svg")
+    assert html.count("<polyline") == 2
+    assert "stopped at the goal" in html
+
+
+def test_a_run_without_a_drive_shows_why():
+    html = run(Scenario.of("no-path", "astar"))._repr_html_()
+    assert "<polyline" not in html
+    assert "reason" in html
+
+
+def test_a_grid_shows_its_blocked_cells():
+    grid = Grid.from_free([[True, False, False], [True, True, True]])
+    html = grid._repr_html_()
+    assert ElementTree.fromstring(html)[0].tag.endswith("svg")
+    assert 'd="M1 0h2v1h-2z"' in html, "one run of two cells in the lower row"
+    assert "66.7 %" in html
+
+
+def test_a_large_grid_is_drawn_coarser():
+    free = np.ones((1000, 500), dtype=bool)
+    free[0, 499] = False
+    html = Grid.from_free(free)._repr_html_()
+    assert 'd="M99 0h1v1h-1z"' in html
+    assert "1000 × 500" in html

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from antdrive.sim.log.record import ComponentRecord
-from antdrive.sim.pipeline import Scenario, run
+from antdrive.sim.pipeline import run
+from antdrive.sim.scenario import Scenario
 from antdrive.sim.view.film import prelude
 from antdrive.sim.view.film.prelude import field_levels, plan_again, planning_frames
 from antdrive.sim.view.film.video import film

@@ -1,0 +1,82 @@
+"""Driving cell by cell, as hasan's robot does: each decision goes no farther than the next cell."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import Any
+
+import numpy as np
+
+from antdrive.planners import MaxMinDStar, Planner, Query, online_for
+from antdrive.robots import TrackedPath
+from antdrive.sim.driving.blocking import blocked_cells, covered_discs
+from antdrive.sim.driving.replanning import MISSED, Replan, ReplanMonitor, ReplanPolicy
+from antdrive.sim.log.record import DECISION
+from antdrive.worlds import Floats, Pose, Route, segment_clearance
+
+DECISION_PAUSE = 0.2  # the shortest time between two decisions [s]
+DECIDE_BEFORE = 0.6  # a decision is due when less than this many cells of the route remain
+AT_CELL = 0.25  # a robot this close to its cell's centre, in cells, need not drive through it
+
+
+class CellwiseMonitor(ReplanMonitor):
+    """Monitors a robot that decides cell by cell: its route never goes beyond the next cell."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        query = Query.between(self._grid, self._task)
+        self._online = online_for(self._planner, query, self._rng)
+        self._goal = query.goal
+
+    @property
+    def may_wait(self) -> bool:
+        """Whether a robot at the end of its route may wait there for a way on."""
+        return not self._online.arrived
+
+    def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
+        """A decision is due shortly before the robot reaches its cell, and repeatedly while it waits."""
+        if tick == 0:
+            return DECISION
+        if self._online.arrived or tick / self._hz - self._replanned_at < DECISION_PAUSE:
+            return ""
+        return DECISION if tracked.length - arc < DECIDE_BEFORE * self._grid.cell else ""
+
+    def replan(self, tick: int, pose: Pose, trigger: str) -> TrackedPath | None:
+        """The path to the next cell, prepared for the controller; None if the robot waits."""
+        if trigger == MISSED:  # a robot that has not arrived waits: its next decision will be due soon
+            return super().replan(tick, pose, trigger) if self._online.arrived else None
+        now, started = tick / self._hz, time.perf_counter()
+        self._replanned_at = now
+        here, propagated = self._online.cell, self._online.tally.propagated
+        covered = covered_discs(self._predictor, tick, np.array([pose[:2]]), 0.0, self._grid)
+        to = self._online.step(np.argwhere(blocked_cells(self._grid, covered)))
+        xy = self._line(pose, here, to, tick)
+        if to is not None and bool(np.ptp(xy, axis=0).any()):
+            cost = float(np.hypot(*np.diff(xy, axis=0).T).sum())
+            work = self._online.tally.propagated - propagated
+            self.log.append(Replan(now, trigger, True, cost, work, xy, time.perf_counter() - started))
+            return self._prepare(Route(xy))
+        if tick == 0:  # the robot waits where it is, and must not set out on the plan for the whole way
+            heading = np.array([(0.0, 0.0), (math.cos(pose[2]), math.sin(pose[2]))])
+            return self._prepare(Route(np.array(pose[:2]) + 1e-4 * heading))
+        return None
+
+    def _line(self, pose: Pose, here: tuple[int, int], to: tuple[int, int] | None, tick: int) -> Floats:
+        """From the robot to the next cell (2 or 3, 2) [m], by the centre of its own cell where it must."""
+        ends = self._grid.xy(np.array([here, to or here]))
+        if to == self._goal and self._clear(ends[0], self._task.goal):
+            ends[1] = self._task.goal
+        near = math.dist(pose[:2], ends[0]) <= AT_CELL * self._grid.cell or tick == 0
+        direct = near and self._clear(pose[:2], ends[1])
+        return np.vstack([pose[:2], ends[1 if direct else 0 :]])
+
+    def _clear(self, a: tuple[float, ...] | Floats, b: tuple[float, ...] | Floats) -> bool:
+        """Whether the straight line between two points keeps the grid's inflation from every obstacle."""
+        clearance = segment_clearance(self._task.world, np.array([a]), np.array([b]))[0]
+        return bool(clearance >= self._grid.inflate - 1e-9)
+
+
+def monitor_class(planner: Planner, policy: ReplanPolicy) -> type[ReplanMonitor]:
+    """The monitor for a planner: cell by cell where the planner decides so and may go around movers."""
+    return CellwiseMonitor if isinstance(planner, MaxMinDStar) and policy.around_movers else ReplanMonitor

@@ -1,0 +1,222 @@
+"""What the robot does in one control period: replan, pursue, keep to a schedule, avoid movers, arrive."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from antdrive.robots import (
+    LIMITERS,
+    Avoidance,
+    AvoidanceState,
+    Progress,
+    PurePursuit,
+    RobotSpec,
+    TrackedPath,
+    Twist,
+)
+from antdrive.sim.driving.perception import Predictor
+from antdrive.sim.driving.recorder import Ending
+from antdrive.sim.driving.replanning import MISSED, ReplanMonitor
+from antdrive.sim.driving.schedule import slow_down
+from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.physics.engine import State
+from antdrive.worlds import Pose, Task
+
+STANDING_SPEED = 0.01  # a robot slower than this stands [m/s], [rad/s]
+WAITING_SPEED = 0.1  # a robot that avoids a mover and is slower than this waits for it [m/s]
+STUCK_TIME = 8.0  # a robot without progress for this long is stuck [s]
+STUCK_PROGRESS = 0.02  # what counts as progress along the route [m]
+GOAL_SHARE = 0.95  # of the goal's tolerance within which a robot that avoids a mover stops early
+AVOIDING = LIMITERS.index("yield")
+
+
+class StuckClock(NamedTuple):
+    """How long the robot has made no progress along its route. Waiting for a mover does not count.
+
+    Attributes:
+        farthest: the farthest that the robot has got along the route [m]
+        driving: control periods since then in which the robot was to drive
+        turning: control periods since then in which the robot turned on the spot
+    """
+
+    farthest: float = 0.0
+    driving: int = 0
+    turning: int = 0
+
+    def after(self, pursuit: Progress, waiting: bool) -> StuckClock:
+        """The clock after one more control period."""
+        if pursuit.arc > self.farthest + STUCK_PROGRESS:
+            return StuckClock(pursuit.arc)
+        if waiting:
+            return self
+        if pursuit.turning:
+            return StuckClock(self.farthest, self.driving, self.turning + 1)
+        return StuckClock(self.farthest, self.driving + 1, self.turning)
+
+
+class Driver:
+    """Drives a robot along a path, period by period. `decide` chooses each command.
+
+    Attributes:
+        tracked: the path that the robot follows now
+        pursuit: the controller's memory: how far the robot has got, and what held its speed
+        command: the twist that was commanded last
+    """
+
+    def __init__(
+        self,
+        controller: PurePursuit,
+        tracked: TrackedPath,
+        task: Task,
+        robot: RobotSpec,
+        control_hz: int,
+        avoidance: Avoidance | None,
+        predictor: Predictor | None,
+        monitor: ReplanMonitor | None,
+    ) -> None:
+        self.tracked, self.command, self.pursuit = tracked, Twist(0.0, 0.0), Progress()
+        self._controller, self._task, self._robot, self._hz = controller, task, robot, control_hz
+        self._avoidance, self._predictor, self._monitor = avoidance, predictor, monitor
+        self._avoidance_state = AvoidanceState()
+        self._clock = StuckClock()
+        self._patience = round(STUCK_TIME * control_hz)
+        self._full_turn = round(2 * math.pi / robot.max_yaw_rate * control_hz)
+
+    @property
+    def stuck(self) -> bool:
+        """Whether the robot has made no progress for too long; turning may take a full turn longer."""
+        clock = self._clock
+        return clock.driving >= self._patience or clock.turning >= self._patience + self._full_turn
+
+    @property
+    def fraction(self) -> float:
+        """The fraction of the route that is done."""
+        return self.pursuit.arc / self.tracked.length
+
+    def decide(self, tick: int, pose: Pose, state: State) -> Ending | None:
+        """Choose the command of one control period, or end the drive.
+
+        Args:
+            tick: the number of the control period
+            pose: where the robot estimates to be when its command takes effect [m, m, rad]
+            state: the robot's true pose and its velocity
+
+        Returns:
+            How the drive ends now; None if it goes on.
+        """
+        if self._monitor is not None:
+            self._replan_if_triggered(tick, pose, state)
+        last, before = self.command, self.pursuit
+        self.command, self.pursuit = self._controller.step(self.tracked, pose, last, before)
+        speed_limit = self._keep_to_schedule(tick, last)
+        if self._avoidance is not None and self._predictor is not None:
+            stopping = before.limiter == AVOIDING and self._stops_at_goal(pose, last)
+            if stopping and _standing(state):
+                return self._arrival(state)
+            self._avoid_movers(tick, pose, last, before, speed_limit, stopping)
+        ending = self._end_of_route(tick, pose, state)
+        waiting = self.pursuit.limiter == AVOIDING or speed_limit < WAITING_SPEED
+        self._clock = self._clock.after(self.pursuit, waiting)
+        return ending
+
+    def _replan_if_triggered(self, tick: int, pose: Pose, state: State) -> None:
+        """Go on along a new path, if one is due and there is one."""
+        assert self._monitor is not None
+        waiting = self.pursuit.limiter == AVOIDING and abs(state.speed) < WAITING_SPEED
+        trigger = self._monitor.trigger(tick, pose, waiting, self.tracked, self.pursuit.arc)
+        if trigger:
+            self._follow(self._monitor.replan(tick, pose, trigger))
+
+    def _follow(self, tracked: TrackedPath | None) -> bool:
+        """Go on along a new path; whether there is one."""
+        if tracked is None:
+            return False
+        self.tracked, self.pursuit = tracked, Progress(limiter=self.pursuit.limiter)
+        self._clock = self._clock._replace(farthest=0.0)
+        return True
+
+    def _keep_to_schedule(self, tick: int, last: Twist) -> float:
+        """Slow the command down to the schedule, if there is one. Returns the speed that it allows [m/s]."""
+        schedule = self._monitor.schedule if self._monitor is not None else None
+        if schedule is None:
+            return math.inf
+        limit = schedule.speed_limit(tick / self._hz, self.pursuit.arc)
+        self.command = slow_down(self.command, last, limit, self._robot.max_acceleration / self._hz)
+        return limit
+
+    def _avoid_movers(
+        self, tick: int, pose: Pose, last: Twist, before: Progress, speed_limit: float, stopping: bool
+    ) -> None:
+        """Replace the command where movers come too close. A robot that is `stopping` brakes for the goal."""
+        avoidance = self._avoidance
+        assert avoidance is not None
+        assert self._predictor is not None
+        ahead = avoidance.ahead
+        if stopping:
+            self.command = _brake(last, self._robot, self._hz)
+            # A robot that stands at the goal has arrived, so only the time until it stands matters.
+            ahead = ahead[: 2 + math.ceil(_stopping_time(last, self._robot) / avoidance.step)]
+        movers, radii = self._predictor.predict(tick, pose[:2], ahead)
+        self.command, avoids, self._avoidance_state = avoidance.avoid(
+            self.tracked,
+            self._robot,
+            pose,
+            last,
+            before,
+            self.command,
+            self._avoidance_state,
+            movers,
+            radii,
+            top=speed_limit,
+        )
+        if avoids or stopping:
+            self.pursuit = self.pursuit._replace(turning=before.turning, limiter=AVOIDING)
+
+    def _end_of_route(self, tick: int, pose: Pose, state: State) -> Ending | None:
+        """The ending of a robot that stands at the end of its route, unless it can still get to the goal."""
+        left = self.tracked.length - self.pursuit.arc
+        if left > self.tracked.goal_distance or not _standing(state) or any(self.command):
+            return None
+        ending, monitor, task = self._arrival(state), self._monitor, self._task
+        # A robot that estimates to be at the goal does not know that it missed it, and stays.
+        knows = math.dist(pose[:2], task.goal) > task.goal_tolerance
+        if monitor is None or ending.outcome is Outcome.SUCCEEDED or not knows:
+            return ending
+        if self._follow(monitor.replan(tick, pose, MISSED)) or monitor.may_wait:
+            return None
+        return ending
+
+    def _arrival(self, state: State) -> Ending:
+        """How a drive ends whose robot stops here of its own accord."""
+        task = self._task
+        left = math.dist((state.x, state.y), task.goal)
+        if left <= task.goal_tolerance:
+            return Ending(Outcome.SUCCEEDED)
+        return Ending(
+            Outcome.STUCK,
+            f"the route ends here, {left:.3f} m from the goal; the tolerance is {task.goal_tolerance:g} m",
+        )
+
+    def _stops_at_goal(self, pose: Pose, command: Twist) -> bool:
+        """Whether a robot that brakes now stops within the goal's tolerance."""
+        x, y, yaw = pose
+        goal = self._task.goal
+        distance = command.speed * abs(command.speed) / (2 * self._robot.max_acceleration)
+        end = (x + distance * math.cos(yaw), y + distance * math.sin(yaw))
+        return max(math.dist((x, y), goal), math.dist(end, goal)) < GOAL_SHARE * self._task.goal_tolerance
+
+
+def _standing(state: State) -> bool:
+    return abs(state.speed) < STANDING_SPEED and abs(state.yaw_rate) < STANDING_SPEED
+
+
+def _stopping_time(command: Twist, robot: RobotSpec) -> float:
+    """How long a robot takes to stop [s]."""
+    return max(abs(command.speed) / robot.max_acceleration, abs(command.yaw_rate) / robot.max_yaw_acceleration)
+
+
+def _brake(command: Twist, robot: RobotSpec, hz: int) -> Twist:
+    """The command of a robot that brakes on the same curve."""
+    share = max(0.0, 1 - robot.max_acceleration / hz / abs(command.speed)) if command.speed else 0.0
+    return Twist(command.speed * share, command.yaw_rate * share)

@@ -1,0 +1,204 @@
+"""A scenario: everything that a run depends on."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from antdrive.planners import SMOOTHINGS, Planner, load_planner
+from antdrive.robots import Avoidance, PurePursuit, RobotSpec, load_robot
+from antdrive.sim.driving.perception import Perception
+from antdrive.sim.driving.replanning import ReplanPolicy
+from antdrive.worlds import Disc, Task, Trajectories, World, load_task
+from antdrive.worlds.drawing import card, world_svg
+from antdrive.worlds.errors import FieldError
+
+CONTROLLER, PERCEPTION, AVOIDANCE, REPLANNING = PurePursuit(), Perception(), Avoidance(), ReplanPolicy()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scenario:
+    """Everything a run depends on. The same scenario gives the same rollout, bit for bit, on one machine.
+
+    Attributes:
+        task: the world, the start and the goal
+        planner: finds the path
+        robot: drives it
+        planner_name: what records call the planner; empty: its class
+        margin: distance kept free around the robot, on top of its radius [m]
+        cell: grid resolution [m]; None: the task's own
+        smoothing: how the plan becomes a route: none, taut or clearance, see `antdrive.planners.smooth`
+        seed: of all random numbers
+        controller: follows the route
+        noise: the share of the robot's documented noise in sensing and acting; 0: none, 1: all of it
+        perception: what the robot perceives of movers
+        avoidance: how the robot avoids movers; None: not at all
+        replanning: when the robot looks for a new route among movers; None: never
+        unseen: obstacles that neither the planner nor the controller knows of
+        time_limit: simulated time after which the drive ends [s]; None: the task's, or ample for the route
+        physics_hz: physics steps per simulated second
+        control_hz: control periods per simulated second; must divide `physics_hz`
+
+    Raises:
+        ValueError: a setting is out of range.
+    """
+
+    task: Task
+    planner: Planner
+    robot: RobotSpec
+    planner_name: str = ""
+    margin: float = 0.03
+    cell: float | None = None
+    smoothing: str = "clearance"
+    seed: int = 0
+    controller: PurePursuit = CONTROLLER
+    noise: float = 0.0
+    perception: Perception = PERCEPTION
+    avoidance: Avoidance | None = AVOIDANCE
+    replanning: ReplanPolicy | None = REPLANNING
+    unseen: tuple[Disc, ...] = ()
+    time_limit: float | None = None
+    physics_hz: int = 240
+    control_hz: int = 60
+
+    def __post_init__(self) -> None:
+        if not self.margin >= 0:
+            raise FieldError("margin", f"must be at least 0, got {self.margin:g}")
+        if self.smoothing not in SMOOTHINGS:
+            raise FieldError("smoothing", f"unknown {self.smoothing!r}; choose from {', '.join(SMOOTHINGS)}")
+        try:
+            self.robot.noise.scaled(self.noise)
+        except ValueError as error:
+            raise FieldError("noise", f"{self.noise:g} times the robot's own is too much: {error}") from None
+        if self.time_limit is not None and not self.time_limit > 0:
+            raise FieldError("time_limit", f"must be greater than 0, got {self.time_limit:g}")
+
+    @classmethod
+    def of(
+        cls,
+        world: str | os.PathLike[str] | Task,
+        planner: str | Planner = "ants",
+        robot: str | os.PathLike[str] | RobotSpec = "turtlebot",
+        *,
+        options: Mapping[str, Any] | None = None,
+        margin: float = 0.03,
+        cell: float | None = None,
+        smoothing: str = "clearance",
+        seed: int = 0,
+        controller: PurePursuit = CONTROLLER,
+        noise: float = 0.0,
+        perception: Perception = PERCEPTION,
+        avoidance: Avoidance | None = AVOIDANCE,
+        replanning: ReplanPolicy | None = REPLANNING,
+        unseen: tuple[Disc, ...] = (),
+        time_limit: float | None = None,
+        physics_hz: int = 240,
+        control_hz: int = 60,
+    ) -> Scenario:
+        """A scenario from names, files or objects.
+
+        >>> Scenario.of("forest", "aco-han", "jackal", options={"ants": 30}, noise=1.0, seed=2)
+
+        The settings margin, cell, smoothing, seed, controller, noise, perception, avoidance, replanning,
+        unseen, time_limit, physics_hz and control_hz are the fields of `Scenario`, which describes them.
+
+        Args:
+            world: a world of the catalogue, a world file, or a task
+            planner: a planner's name, or a planner
+            robot: a robot of the catalogue, a robot file, or a robot
+            options: options of a planner that is given by name
+
+        Raises:
+            InputError: there is no such world, planner, option or robot, or a file is wrong.
+            ValueError: a setting is out of range, or `options` are given for a planner object.
+        """
+        if not isinstance(planner, str) and options:
+            raise FieldError("options", "need a planner's name; set the options of a planner object itself")
+        return cls(
+            task=world if isinstance(world, Task) else load_task(world),
+            planner=load_planner(planner, **(options or {})) if isinstance(planner, str) else planner,
+            planner_name=planner if isinstance(planner, str) else "",
+            robot=robot if isinstance(robot, RobotSpec) else load_robot(robot),
+            margin=margin,
+            cell=cell,
+            smoothing=smoothing,
+            seed=seed,
+            controller=controller,
+            noise=noise,
+            perception=perception,
+            avoidance=avoidance,
+            replanning=replanning,
+            unseen=unseen,
+            time_limit=time_limit,
+            physics_hz=physics_hz,
+            control_hz=control_hz,
+        )
+
+    @property
+    def planner_label(self) -> str:
+        """What records call the planner."""
+        return self.planner_name or type(self.planner).__name__
+
+    @property
+    def inflate(self) -> float:
+        """The distance that planners keep between the robot's centre and every surface [m]."""
+        return self.robot.radius + self.margin
+
+    @property
+    def driven_world(self) -> World:
+        """The world that the robot drives in: the task's world with the unseen obstacles."""
+        return dataclasses.replace(self.task.world, obstacles=self.task.world.obstacles + self.unseen)
+
+    @property
+    def trajectories(self) -> Trajectories:
+        """The motions of the world's movers, drawn from the seed."""
+        return Trajectories.of(self.driven_world, self.task.start[:2], self.seed)
+
+    @property
+    def timed(self) -> bool:
+        """Whether the planner plans in space and time, among movers."""
+        return bool(self.driven_world.movers) and getattr(self.planner, "needs_motions", False)
+
+    @property
+    def effective_perception(self) -> Perception:
+        """What the robot perceives of movers: their motions, if the planner is given them."""
+        return Perception(kind="motions") if self.timed else self.perception
+
+    @property
+    def effective_avoidance(self) -> Avoidance | None:
+        """How the robot avoids movers, given what it knows of them.
+
+        Movers whose motions are known do not turn back unexpectedly, so reversals are not considered. A
+        timed plan has avoided the movers already, so the horizon is short.
+        """
+        if self.avoidance is None or self.effective_perception.kind != "motions":
+            return self.avoidance
+        horizon = min(self.avoidance.horizon, 1.0) if self.timed else self.avoidance.horizon
+        return dataclasses.replace(self.avoidance, wary=0.0, horizon=horizon)
+
+    def rng(self, purpose: str) -> np.random.Generator:
+        """A random stream from the seed; every `purpose` has its own, so that one does not change another."""
+        return np.random.default_rng([self.seed, zlib.crc32(purpose.encode())])
+
+    def _repr_html_(self) -> str:
+        task = self.task
+        facts = {
+            "planner": self.planner_label,
+            "robot": self.robot.name,
+            "smoothing": self.smoothing,
+            "margin": f"{self.margin:g} m",
+            "noise": f"{self.noise:g}",
+            "seed": self.seed,
+        }
+        if self.driven_world.movers:
+            facts["movers"] = len(self.driven_world.movers)
+        picture = world_svg(
+            self.driven_world.bounds, self.driven_world.discs, start=task.start, goal=(*task.goal, task.goal_tolerance)
+        )
+        return card(picture, task.world.name, facts)

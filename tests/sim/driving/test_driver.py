@@ -1,0 +1,135 @@
+"""The parts of a control period, without physics."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from antdrive.planners import Query, load_planner, smooth
+from antdrive.robots import Progress, PurePursuit, RobotSpec, Twist
+from antdrive.sim import Outcome, Perception
+from antdrive.sim.driving.blocking import blocked_cells, covered_discs
+from antdrive.sim.driving.driver import STUCK_PROGRESS, STUCK_TIME, Driver, StuckClock
+from antdrive.sim.driving.perception import Predictor
+from antdrive.sim.physics.engine import State
+from antdrive.worlds import Cruising, Disc, Grid, Keyframed, Task, Trajectories, World, rasterise
+
+HALL = World("hall", (0.0, 0.0, 9.0, 6.0), (Disc(4.5, 4.5, 0.5),))
+TASK = Task(HALL, (1.0, 3.0, 0.0), (8.0, 3.0), cell=0.25)
+
+
+def hall_grid(world: World = HALL) -> Grid:
+    return rasterise(world, 0.25, 0.21)
+
+
+def driver(robot: RobotSpec, monitor: Any = None) -> Driver:
+    grid = hall_grid()
+    plan = load_planner("astar").plan(Query.between(grid, TASK), np.random.default_rng(0))
+    controller = PurePursuit()
+    tracked = controller.guide(smooth(plan, grid, TASK), HALL, robot, 0.03, 1 / 60)
+    return Driver(controller, tracked, TASK, robot, 60, None, None, monitor)
+
+
+def test_progress_restarts_the_stuck_clock() -> None:
+    clock = StuckClock(farthest=1.0, driving=9, turning=4)
+    assert clock.after(Progress(arc=1.0 + 2 * STUCK_PROGRESS), waiting=False) == StuckClock(1.0 + 2 * STUCK_PROGRESS)
+    assert clock.after(Progress(arc=1.0 + STUCK_PROGRESS / 2), waiting=False).driving == 10
+
+
+def test_waiting_for_a_mover_does_not_count_as_being_stuck() -> None:
+    clock = StuckClock(farthest=1.0, driving=9, turning=4)
+    assert clock.after(Progress(arc=1.0), waiting=True) == clock
+    assert clock.after(Progress(arc=1.0, turning=True), waiting=True) == clock
+
+
+def test_turning_on_the_spot_has_a_count_of_its_own() -> None:
+    clock = StuckClock(farthest=1.0, driving=9, turning=4)
+    assert clock.after(Progress(arc=1.0, turning=True), waiting=False) == StuckClock(1.0, 9, 5)
+
+
+def test_a_robot_that_does_not_move_is_stuck_after_the_stuck_time(turtlebot: RobotSpec) -> None:
+    still = driver(turtlebot)
+    ticks = 0
+    while not still.stuck:
+        assert still.decide(ticks, TASK.start, State(*TASK.start, 0.0, 0.0)) is None
+        ticks += 1
+    assert ticks == pytest.approx(STUCK_TIME * 60, abs=2)
+
+
+def test_standing_at_the_routes_end_ends_the_drive_by_the_distance_to_the_goal(turtlebot: RobotSpec) -> None:
+    x, y = TASK.goal
+    for distance, outcome in ((0.0, Outcome.SUCCEEDED), (0.3, Outcome.STUCK)):
+        at_end = driver(turtlebot)
+        at_end.pursuit = Progress(arc=at_end.tracked.length)
+        ending = None
+        for tick in range(9):  # the command comes to rest first
+            ending = ending or at_end.decide(tick, (x, y, 0.0), State(x, y - distance, 0.0, 0.0, 0.0))
+        assert ending is not None
+        assert ending.outcome is outcome
+        assert ("0.300 m from the goal" in ending.reason) == (outcome is Outcome.STUCK)
+
+
+class OneReplan:
+    """A monitor that replans once, back along the route that it is given."""
+
+    schedule = None
+    may_wait = False
+
+    def __init__(self) -> None:
+        self.tracked: Any = None
+
+    def trigger(self, tick: int, *_: Any) -> str:
+        return "strayed" if tick == 1 else ""
+
+    def replan(self, *_: Any) -> Any:
+        return self.tracked
+
+
+def test_a_replan_starts_its_route_from_the_beginning(turtlebot: RobotSpec) -> None:
+    monitor = OneReplan()
+    robot = driver(turtlebot, monitor)
+    monitor.tracked = driver(turtlebot).tracked
+    robot.decide(0, (3.0, 3.0, 0.0), State(3.0, 3.0, 0.0, 0.5, 0.0))
+    old = robot.tracked
+    assert robot.pursuit.arc > 0
+    robot.decide(1, TASK.start, State(*TASK.start, 0.5, 0.0))
+    assert robot.tracked is monitor.tracked is not old
+    assert robot.pursuit.arc == pytest.approx(0.0, abs=0.02)
+
+
+def test_the_first_command_accelerates_within_the_robots_limit(turtlebot: RobotSpec) -> None:
+    first = driver(turtlebot)
+    first.decide(0, TASK.start, State(*TASK.start, 0.0, 0.0))
+    assert Twist(0.0, 0.0) != first.command
+    assert 0 < first.command.speed <= turtlebot.max_acceleration / 60 + 1e-12
+
+
+@given(
+    st.lists(st.tuples(st.floats(0.5, 8.5), st.floats(0.5, 5.5), st.floats(0.05, 1.0)), max_size=5),
+)
+def test_discs_block_the_cells_that_the_same_obstacles_would(discs: list[tuple[float, float, float]]) -> None:
+    """The oracle rasterises a world with the discs as obstacles; cells on a disc's very edge may differ."""
+    found = [Disc(*disc) for disc in discs]
+    grid = hall_grid()
+    blocked = blocked_cells(grid, found)
+    oracle = grid.free & ~hall_grid(World("hall", HALL.bounds, (*HALL.obstacles, *found))).free
+    rows, cols = np.nonzero(blocked != oracle)
+    for x, y in grid.xy(np.stack([rows, cols], axis=1)):
+        assert min(abs(math.dist((x, y), (d.x, d.y)) - d.radius - grid.inflate) for d in found) < 1e-9
+
+
+def test_movers_close_neither_the_robots_position_nor_the_goal() -> None:
+    over_goal = Keyframed(radius=0.6, keyframes=((0.0, 8.0, 3.2), (9.0, 8.0, 3.2001)))
+    crossing = Cruising(radius=0.3, position=(4.0, 1.0), velocity=(0.0, 0.5))
+    world = World("hall", HALL.bounds, HALL.obstacles, movers=(over_goal, crossing))
+    predictor = Predictor(Trajectories.of(world, TASK.start[:2]), Perception(), 60)
+    grid = hall_grid()
+    ends = np.array([TASK.start[:2], TASK.goal])
+    discs = covered_discs(predictor, 0, ends, 1.0, grid)
+    blocked = blocked_cells(grid, discs)
+    for end in ends:
+        assert not blocked[grid.cell_at(*end)]
+    assert [disc.y for disc in discs if disc.radius == 0.3] == pytest.approx([1.0, 1.125, 1.25, 1.375, 1.5])
