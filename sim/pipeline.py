@@ -44,6 +44,7 @@ from antdrive.sim.physics.engine import Engine
 from antdrive.sim.scenario import Scenario
 from antdrive.worlds import Grid, Route, rasterise
 from antdrive.worlds.drawing import LINE, card, world_svg
+from antdrive.worlds.errors import FieldError
 
 ROUTE_COLOUR = "#182242"  # of routes in notebooks
 
@@ -100,7 +101,7 @@ class Run:
         """
         rollout = self._driven()
         if name not in METRICS:
-            raise ValueError(f"metric: unknown {name!r}; choose from {', '.join(METRICS)}")
+            raise FieldError("metric", f"unknown {name!r}; choose from {', '.join(METRICS)}")
         return METRICS[name](rollout)
 
     def _driven(self) -> Rollout:
@@ -232,21 +233,13 @@ def _record(
     wall: float,
 ) -> Rollout:
     """The rollout of a drive: its arrays, and the record of what it came from."""
-    query = Query.between(grid, s.task)
     sees, yields, among_movers = s.effective_perception, s.effective_avoidance, bool(s.driven_world.movers)
     record = DriveRecord(
         task=s.task,
         unseen=s.unseen,
         seed=s.seed,
         planner=ComponentRecord(name=s.planner_label, settings=settings_of(answer.options)),
-        plan=PlanRecord(
-            cost_m=answer.cost,
-            length_m=answer.line_length,
-            grid_optimum_m=finite_or_none(PLANNERS["astar"].plan(query, s.rng("optimum")).cost),
-            euclidean_optimum_m=finite_or_none(PLANNERS["tangent"].plan(query, s.rng("optimum")).line_length),
-            work=answer.work,
-            work_unit=answer.work_unit,
-        ),
+        plan=_plan_record(s, grid, answer),
         robot=s.robot,
         controller=ComponentRecord(name=type(s.controller).__name__, settings=settings_of(s.controller)),
         smoothing=SmoothingRecord(asked=s.smoothing, made=route.kind, note=route.note),
@@ -282,6 +275,18 @@ def _record(
         route=route.xy,
         cells=answer.cells,
         record=record,
+    )
+
+
+def _plan_record(s: Scenario, grid: Grid, answer: PlanResult) -> PlanRecord:
+    query = Query.between(grid, s.task)
+    return PlanRecord(
+        cost_m=answer.cost,
+        length_m=answer.line_length,
+        grid_optimum_m=finite_or_none(PLANNERS["astar"].plan(query, s.rng("optimum")).cost),
+        euclidean_optimum_m=finite_or_none(PLANNERS["tangent"].plan(query, s.rng("optimum")).line_length),
+        work=answer.work,
+        work_unit=answer.work_unit,
     )
 
 

@@ -17,6 +17,7 @@ from antdrive.sim.driving.perception import Perception
 from antdrive.sim.driving.replanning import ReplanPolicy
 from antdrive.worlds import Disc, Task, Trajectories, World, load_task
 from antdrive.worlds.drawing import card, world_svg
+from antdrive.worlds.errors import FieldError
 
 CONTROLLER, PERCEPTION, AVOIDANCE, REPLANNING = PurePursuit(), Perception(), Avoidance(), ReplanPolicy()
 
@@ -68,15 +69,15 @@ class Scenario:
 
     def __post_init__(self) -> None:
         if not self.margin >= 0:
-            raise ValueError(f"margin: must be at least 0, got {self.margin:g}")
+            raise FieldError("margin", f"must be at least 0, got {self.margin:g}")
         if self.smoothing not in SMOOTHINGS:
-            raise ValueError(f"smoothing: unknown {self.smoothing!r}; choose from {', '.join(SMOOTHINGS)}")
+            raise FieldError("smoothing", f"unknown {self.smoothing!r}; choose from {', '.join(SMOOTHINGS)}")
         try:
             self.robot.noise.scaled(self.noise)
         except ValueError as error:
-            raise ValueError(f"noise: {self.noise:g} times the robot's own is too much: {error}") from None
+            raise FieldError("noise", f"{self.noise:g} times the robot's own is too much: {error}") from None
         if self.time_limit is not None and not self.time_limit > 0:
-            raise ValueError(f"time_limit: must be greater than 0, got {self.time_limit:g}")
+            raise FieldError("time_limit", f"must be greater than 0, got {self.time_limit:g}")
 
     @classmethod
     def of(
@@ -118,7 +119,7 @@ class Scenario:
             ValueError: a setting is out of range, or `options` are given for a planner object.
         """
         if not isinstance(planner, str) and options:
-            raise ValueError("options: need a planner's name; set the options of a planner object itself")
+            raise FieldError("options", "need a planner's name; set the options of a planner object itself")
         return cls(
             task=world if isinstance(world, Task) else load_task(world),
             planner=load_planner(planner, **(options or {})) if isinstance(planner, str) else planner,

@@ -11,7 +11,8 @@ import numpy as np
 from antdrive.planners import Planner, Query, agent_for, capabilities_of
 from antdrive.robots import TrackedPath
 from antdrive.sim.driving.blocking import blocked_cells, covered_discs
-from antdrive.sim.driving.replanning import DECISION, MISSED, Replan, ReplanMonitor, ReplanPolicy
+from antdrive.sim.driving.replanning import MISSED, Replan, ReplanMonitor, ReplanPolicy
+from antdrive.sim.log.record import DECISION
 from antdrive.worlds import Floats, Pose, Route, segment_clearance
 from antdrive.worlds.plane import polyline_length
 

@@ -15,7 +15,7 @@ import dataclasses
 import math
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -102,17 +102,6 @@ class Replan:
     work: int
     route: Floats
     wall_s: float
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain values, for JSON. The wall time is left out, because it differs from run to run."""
-        return {
-            "t": self.t,
-            "cause": self.trigger,
-            "solved": self.solved,
-            "cost_m": self.cost if math.isfinite(self.cost) else None,
-            "work": self.work,
-            "route": np.round(self.route, 4).tolist(),
-        }
 
 
 class ReplanMonitor:
