@@ -106,7 +106,7 @@ class GaHan(ViaPointPlanner):
 
     Section 4.1 of the thesis: a chromosome is a row of via points on free cells. Each generation selects by 1
     / length, crosses, mutates, eliminates what touches an obstacle and refills the population at random. The
-    defaults are those of the thesis. `landscape` counts the chromosomes of the last population that pass each
+    defaults are those of the thesis. `field` counts the chromosomes of the last population that pass each
     cell.
 
     The algorithm depends on chance finding a first feasible line. In worlds with many obstacles there may be

@@ -35,7 +35,7 @@ class Hybrid(ViaPointPlanner):
     Section 6.3 of the thesis only proposes the combination; how it is done is antdrive's own. `ant_runs`
     colonies run one after the other, each for `ant_iterations`, and longer while none of its ants has
     arrived. The best of their paths, pulled straight, becomes the first population; the remaining
-    `iterations` are generations. While ants run, the history's means and counts and `landscape` are those of
+    `iterations` are generations. While ants run, the history's means and counts and `field` are those of
     the ants, afterwards those of the chromosomes. The history's best is always the length of the line to be
     driven.
 

@@ -151,7 +151,7 @@ class PurePursuit:
             if not 0 <= getattr(self, key) <= 1:
                 raise FieldError(key, f"must be between 0 and 1, got {getattr(self, key):g}")
         if not 0 < self.braking <= 1:
-            raise ValueError(f"braking: must be greater than 0 and at most 1, got {self.braking:g}")
+            raise FieldError("braking", f"must be greater than 0 and at most 1, got {self.braking:g}")
         if not self.rotate_in_place_until < self.rotate_in_place_above < math.pi / 2:
             raise FieldError(
                 "rotate_in_place_above",

@@ -9,10 +9,9 @@ from antdrive.sim.cli.parse import pair
 from antdrive.worlds.errors import InputError
 
 if TYPE_CHECKING:
-    from antdrive.sim.scenario import Scenario
-
     from antdrive.robots import PurePursuit
     from antdrive.sim.driving.perception import Perception
+    from antdrive.sim.scenario import Scenario
 
 GROUPS = ("planner", "controller")  # what `--set GROUP.KEY=VALUE` can set
 

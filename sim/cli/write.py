@@ -12,10 +12,9 @@ from antdrive.sim.cli.console import as_json, bar
 from antdrive.worlds.errors import InputError
 
 if TYPE_CHECKING:
-    from antdrive.sim.scenario import Scenario
-
     from antdrive.sim.log.rollout import Rollout
     from antdrive.sim.pipeline import Run
+    from antdrive.sim.scenario import Scenario
     from antdrive.sim.view.film.video import FilmInfo
 
 FIGURES = ("overview", "certificate", "plan", "tour", "history", "field-bars", "field-contours")

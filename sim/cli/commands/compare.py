@@ -16,9 +16,8 @@ from antdrive.sim.cli.write import check_film, check_folder, write_comparison_fi
 from antdrive.worlds.errors import InputError
 
 if TYPE_CHECKING:
-    from antdrive.sim.scenario import Scenario
-
     from antdrive.sim.pipeline import Run
+    from antdrive.sim.scenario import Scenario
 
 
 def compare(

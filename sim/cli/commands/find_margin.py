@@ -14,10 +14,9 @@ from antdrive.sim.cli.scenario import make_scenario
 from antdrive.worlds.errors import InputError
 
 if TYPE_CHECKING:
-    from antdrive.sim.scenario import Scenario
-
     from antdrive.sim.log.margin import MarginTrial
     from antdrive.sim.pipeline import Run
+    from antdrive.sim.scenario import Scenario
     from antdrive.worlds import Task
 
 

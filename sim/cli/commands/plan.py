@@ -14,9 +14,8 @@ from antdrive.sim.cli.scenario import make_scenario
 from antdrive.sim.cli.write import suffixes
 
 if TYPE_CHECKING:
-    from antdrive.sim.scenario import Scenario
-
     from antdrive.planners import PlanResult
+    from antdrive.sim.scenario import Scenario
     from antdrive.worlds import Grid
 
 

@@ -24,9 +24,8 @@ from antdrive.sim.cli.write import (
 from antdrive.worlds.errors import InputError
 
 if TYPE_CHECKING:
-    from antdrive.sim.scenario import Scenario
-
     from antdrive.sim.pipeline import Run
+    from antdrive.sim.scenario import Scenario
 
 Unseen = Annotated[
     list[str] | None,
