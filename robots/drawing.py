@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
-from antdrive.robots.spec import RobotSpec
 from antdrive.worlds.drawing import card
+
+if TYPE_CHECKING:  # a robot draws itself with this module
+    from antdrive.robots.spec import RobotSpec
 
 WIDTH = 240  # of a drawing [px]
 BODY, BODY_EDGE, WHEEL, HEADING, RULER = "#e8ecf6", "#345cbe", "#39424f", "#ff7a0e", "#5b6576"

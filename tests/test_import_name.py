@@ -35,7 +35,7 @@ def test_a_project_with_packages_of_the_same_names_can_drive(tmp_path: Path) -> 
     assert done.returncode == 0, done.stderr
     code = "import worlds, planners, robots, sim; from antdrive import Scenario; print(sim.OWNER, Scenario.__module__)"
     done = python("-c", code, cwd=tmp_path, path=tmp_path)
-    assert done.stdout.split() == ["the", "project", "that", "has", "its", "own", "sim", "antdrive.sim.pipeline"], (
+    assert done.stdout.split() == ["the", "project", "that", "has", "its", "own", "sim", "antdrive.sim.scenario"], (
         done.stderr
     )
 

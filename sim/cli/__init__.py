@@ -1,3 +1,1 @@
-"""The command line."""
-
-from antdrive.sim.cli.app import main as main
+"""The command line: a file for each command."""

@@ -128,9 +128,9 @@ def test_backtracking_ants_leave_a_trap_in_which_others_die(planner: Colony) -> 
     lost = solve(replace(planner, ants=5, iterations=2), query)
     assert lost.status is PlanStatus.STOPPED
     assert "nothing arrived within 2 iterations" in lost.reason
-    assert not planner.complete
+    assert not planner.capabilities.complete
     found = replace(planner, ants=5, iterations=2, backtrack=True)
-    assert found.complete
+    assert found.capabilities.complete
     assert solve(found, query).solved
 
 

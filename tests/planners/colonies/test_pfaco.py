@@ -126,8 +126,8 @@ def test_backtracking_ants_leave_dead_ends() -> None:
     free[2] = True
     free[1, ::2] = free[3, 1::2] = True  # teeth of a double comb, each a dead end
     query = Query(Grid.from_free(free), (2, 0), (2, 29))
-    assert not PotentialFieldAnts().complete
-    assert PotentialFieldAnts(backtrack=True).complete
+    assert not PotentialFieldAnts().capabilities.complete
+    assert PotentialFieldAnts(backtrack=True).capabilities.complete
     lost = solve(PotentialFieldAnts(ants=3, iterations=2, beta_1=0.0, max_steps=29), query)
     assert lost.status is PlanStatus.STOPPED
     assert solve(PotentialFieldAnts(ants=3, iterations=2, beta_1=0.0, backtrack=True), query).cost == pytest.approx(29)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from antdrive.sim import Run
-from antdrive.sim.cli import main
+from antdrive.sim.cli.app import main
 from antdrive.worlds import save_task
 from tests.sim.cli.calling import Call, Refused
 

@@ -455,10 +455,10 @@ def test_the_bound_holds_on_a_finer_walk_with_jumps(passed: Rollout) -> None:
     rows = np.arange(len(passed.t))
     pose = np.stack([np.interp(fine, rows, np.unwrap(column)) for column in passed.pose.T], axis=1)
     for frames, phase in (
-        ([[0.0, 1.5, 0.8], [0.6301, 5.0, 0.8]], 0.0),
-        ([[0.0, 5.0, 2.0], [1.2303, 0.6, 2.0]], 0.0),
+        (((0.0, 1.5, 0.8), (0.6301, 5.0, 0.8)), 0.0),
+        (((0.0, 5.0, 2.0), (1.2303, 0.6, 2.0)), 0.0),
         # Approaches the robot and teleports away 4.95 steps after the start: closest between two rows.
-        ([[0.0, 0.6, 3.4], [0.4, 0.6, 1.9]], 0.4 - 4.95 / 240),
+        (((0.0, 0.6, 3.4), (0.4, 0.6, 1.9)), 0.4 - 4.95 / 240),
     ):
         log = grazed(passed, Keyframed(radius=0.1, loop="teleport", phase=phase, keyframes=frames), 0.05)
         moving = log.trajectories().positions(fine / 240)

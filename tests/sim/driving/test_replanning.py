@@ -37,9 +37,9 @@ def test_only_replanning_gets_around_a_closed_gate(turtlebot: RobotSpec) -> None
     assert done.succeeded, (done.outcome, done.reason)
     assert done.rollout is not None
     replans = done.rollout.record.replans
-    assert replans[0]["cause"] == "obstructed"
-    assert 0 <= replans[0]["t"] < done.rollout.t[-1]
-    assert replans[0]["cost_m"] > 4.0
+    assert replans[0].trigger == "obstructed"
+    assert 0 <= replans[0].t < done.rollout.t[-1]
+    assert (replans[0].cost_m or 0.0) > 4.0
     assert len(done.rollout.record.times.replans_s) == len(replans)
     assert tracking_error_max_m(done.rollout) < 0.25, "measured to the route in force, while the robot avoids the mover"
     through = done.rollout.pose[np.abs(done.rollout.pose[:, 0] - 4.0).argmin()]
@@ -87,8 +87,11 @@ def test_the_robot_keeps_to_a_plan_in_space_and_time(turtlebot: RobotSpec) -> No
     assert done.succeeded, (done.outcome, done.reason)
     assert done.rollout is not None
     assert done.rollout.t[-1] == pytest.approx(done.plan.arrive[-1], abs=3.0)
-    assert done.rollout.meta["knowledge"]["told"] == "motions"
-    assert done.rollout.meta["yielding"]["horizon"] == 1.0, "the horizon that was in force"
+    record = done.rollout.record
+    assert record.perception is not None
+    assert record.avoidance is not None
+    assert record.perception.kind == "motions"
+    assert record.avoidance["horizon"] == 1.0, "the horizon that was in force"
 
 
 def test_mmas_dstar_decides_cell_by_cell_and_waits_if_there_is_no_path(turtlebot: RobotSpec) -> None:

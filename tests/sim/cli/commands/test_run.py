@@ -118,7 +118,7 @@ def test_a_window_needs_a_display(refused: Refused, monkeypatch: pytest.MonkeyPa
         (["run", "empty", "-p", "aco-han", "--set", "planner.ants=many"], "whole number"),
         (["run", "empty", "-p", "aco-han", "--set", "planner.ants=0"], "at least 1"),
         (["run", "empty", "--set", "controller.lookahead=1"], "lookahead_time"),
-        (["run", "empty", "--set", "controller.guard=7"], "between 0 and 1"),
+        (["run", "empty", "--set", "controller.lookahead_margin=7"], "between 0 and 1"),
         (["run", "empty", "--margin", "-1"], "--margin"),
         (["run", "empty", "--cell", "nan"], "cell"),
         (["run", "empty", "--cell", "1e-5"], "cell"),
@@ -127,7 +127,7 @@ def test_a_window_needs_a_display(refused: Refused, monkeypatch: pytest.MonkeyPa
         (["run", "empty", "--time-limit", "inf"], "--time-limit"),
         (["run", "empty", "--set", "controller.lookahead_max=inf"], "finite"),
         (["run", "empty", "--set", "controller.lookahead_max=1e9"], "between 0.001 and 100"),
-        (["run", "empty", "--set", "controller.guard=abc"], "must be a finite number"),
+        (["run", "empty", "--set", "controller.lookahead_margin=abc"], "must be a finite number"),
         (["run", "empty", "--unseen", "1e300,1,1"], "none beyond a million"),
         (["run", "empty", "--unseen", "1,2"], "3 numbers"),
         (
