@@ -159,7 +159,7 @@ def hard(quick: bool) -> Iterator[str]:
 def paper_maps(quick: bool) -> Iterator[tuple[str, str, str, dict[str, Any], list[Query], str]]:
     """Paper, map, planner, its options there, recreated maps, and what the paper printed."""
     seeds = SEEDS[:3] if quick else SEEDS
-    # suganthi2019, Table 2: sizes; how much is blocked is not told.
+    # suganthi2019, Table 2: sizes; the blocked share is not stated.
     common = {"alpha": 1.0, "beta": 1.0, "evaporation": 0.3, "deposit": 1.0, "heuristic": "step", "iterations": 100}
     printed = {
         10: (13.899, 13.899, 13.899), 20: (28.627, 38.627, 28.627), 30: (46.527, 59.355, 42.184), 50: (96.125, 109.761, 94.326),
@@ -172,7 +172,7 @@ def paper_maps(quick: bool) -> Iterator[tuple[str, str, str, dict[str, Any], lis
             ("iaco", {"ants": 25, "explorers": 75, **common}, figures[2]),
         ):
             yield "suganthi2019", f"{size}×{size}, 15 % blocked", name, options, queries, f"{figure:g}"
-    # ibraheem2016, Table 2: 5 and 10 obstacles; those of the larger maps are not told.
+    # ibraheem2016, Table 2: 5 and 10 obstacles; those of the larger maps are not stated.
     for size, count, figures in (
         (10, 5, (15.07, 1.217, 15.07, 1.155)), (20, 10, (28.6274, 9.073, 28.6274, 7.839)),
         (30, 15, (45.9411, 52.854, 45.1127, 52.017)), (40, 20, (62.6690, 134.771, 61.8406, 132.678)),
@@ -189,7 +189,7 @@ def paper_maps(quick: bool) -> Iterator[tuple[str, str, str, dict[str, Any], lis
     ):  # fmt: skip
         queries = [blocks(rows, cols, 25, max(rows, cols) // 6, 100 * number + seed) for seed in seeds]
         place = f"{number}: {rows}×{cols}, 25 obstacles"
-        # How many iterations is not told; its times are hours for the one, minutes for the other.
+        # The number of iterations is not stated; the paper's times are hours for the one, minutes for the other.
         old = {"ants": 500, "beta": 2.0, "evaporation": 0.01, "iterations": 1000}
         new = {"iterations": 200}
         for name, options, length, wall in (("as", old, *figures[:2]), ("pfaco", new, *figures[2:])):

@@ -41,8 +41,8 @@ class Query:
         start: the start cell (row, col)
         goal: the goal cell (row, col)
         task: the task whose world the grid was made from, for planners that are not bound to cells
-        unreachable: why an end cannot be used although its cell may be free; empty if both can be used
-        motions: the discs that move, for planners of space and time
+        unreachable: why the robot cannot get from the start to a free cell, or from one to the goal; empty if it can
+        motions: the motions of the movers, for planners in space and time
         start_time: when the robot sets out, on the clock of the motions [s]
 
     Raises:
@@ -74,8 +74,8 @@ class Query:
 
         room = float(point_clearance(task.world, [task.goal])[0])
         start, can_leave = _entrance(grid, task, task.start[:2], math.inf)
-        # If the goal has less room than the inflation, the robot stops at a free cell within the goal
-        # tolerance. It does so a little short of the goal, or beside it, hence the allowance.
+        # If the goal is closer to an obstacle than the inflation, the robot stops at a free cell within the goal
+        # tolerance. It stops a little short of that cell's centre, or beside it, hence the allowance.
         within = task.goal_tolerance - min(0.02, task.goal_tolerance / 2)
         goal, can_arrive = _entrance(grid, task, task.goal, math.inf if room >= grid.inflate else within)
         ends = {"the start": can_leave, "the goal": can_arrive}
@@ -96,9 +96,9 @@ class Query:
 
 
 def _entrance(grid: Grid, task: Task, point: Point, within: float) -> tuple[Cell, bool]:
-    """The nearest free cell, at most `within` [m] away, whose centre a clear straight line joins to a point; and True.
+    """The nearest free cell within `within` [m] whose centre a clear straight line joins to the point, and True.
 
-    If there is none, the cell that holds the point and False.
+    If there is none, the cell that holds the point, and False.
     """
     from antdrive.worlds.geometry import point_clearance, segment_clearance
 
@@ -134,7 +134,7 @@ class History:
     Attributes:
         best: length of the best path so far (I,) [m]
         iteration_best: length of the iteration's best path (I,) [m]
-        iteration_mean: mean length over those of the iteration that arrived (I,) [m]
+        iteration_mean: mean length of the iteration's paths that arrived (I,) [m]
         arrived: how many ants or chromosomes arrived in the iteration (I,)
     """
 
@@ -152,7 +152,7 @@ class PlanResult:
     """A planner's answer, in cells.
 
     `cells` runs along allowed moves of the grid from start to goal. A planner that was interrupted returns
-    its best path so far, if it has one, with the status `STOPPED`: to be looked at, not to be driven. A
+    its best path so far, if it has one, with the status `STOPPED`; such a path is drawn, not driven. A
     planner that is not bound to the grid's eight directions also returns `waypoints`.
 
     Attributes:
@@ -163,7 +163,7 @@ class PlanResult:
         length: exact length of the curve that `waypoints` approximates, arcs included [m]; None if that is
             `cost`
         reason: why there is no path, or a remark on the plan; may be empty
-        work: how many cells were expanded, ant steps taken or chromosomes rated
+        work: the planner's effort, such as the number of cells expanded, in units of `work_unit`
         work_unit: what `work` counts
         history: what each iteration achieved
         field: the planner's field, such as pheromone or potential, at the end (R, C), for plots; None
@@ -223,8 +223,8 @@ class Capabilities:
         needs_motions: it plans in space and time among the query's motions, and solves it with a `TimedPlan`
         own_replanner: it has a method `replanner(query, rng)`; planners without one plan anew after every
             change
-        cell_by_cell: it has a method `agent(query, rng)` for driving; planners without one have their route
-            followed
+        cell_by_cell: it has a method `agent(query, rng)` for driving; for planners without one, the robot
+            follows the route
     """
 
     complete: bool = True

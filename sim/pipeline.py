@@ -1,4 +1,4 @@
-"""Plan and drive one scenario: the whole of antdrive on one page."""
+"""Plan and drive one scenario: every step from the grid to the certificate."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class Run:
 
     @property
     def reason(self) -> str:
-        """What the outcome's sentence leaves open; may be empty."""
+        """Details that the outcome's sentence leaves out; may be empty."""
         return self.rollout.record.reason if self.rollout is not None else self.plan.reason
 
     @property
@@ -145,7 +145,7 @@ class Run:
 
 
 def plan(s: Scenario) -> tuple[Grid, PlanResult]:
-    """Rasterise the world of a scenario and plan on it; the grid and the planner's answer.
+    """Rasterise the world of a scenario and plan on it; returns the grid and the planner's answer.
 
     Movers are not on the grid. A planner in space and time is given their motions.
     """
@@ -167,7 +167,7 @@ def run(
     Args:
         s: the scenario
         planned: what `plan` returned for the scenario; None: plan first
-        progress: is called with the fraction of the route that is done
+        progress: called with the fraction of the route that is done
     """
     grid, answer = planned or plan(s)
     if not answer.solved:
@@ -204,7 +204,7 @@ def run(
 
 
 def _monitor(s: Scenario, grid: Grid, predictor: Predictor | None) -> ReplanMonitor | None:
-    """What finds new routes during the drive; None without movers or where the scenario says never."""
+    """The monitor that finds new routes during the drive; None without movers or without a replanning policy."""
     if predictor is None or s.replanning is None:
         return None
     return monitor_class(s.planner, s.replanning)(

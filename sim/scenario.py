@@ -30,18 +30,19 @@ class Scenario:
         task: the world, the start and the goal
         planner: finds the path
         robot: drives it
-        planner_name: what records call the planner; empty: its class
+        planner_name: the planner's name in records; empty: the name of its class
         margin: distance kept free around the robot, on top of its radius [m]
         cell: grid resolution [m]; None: the task's own
         smoothing: how the plan becomes a route: none, taut or clearance, see `antdrive.planners.smooth`
-        seed: of all random numbers
+        seed: the seed of all random numbers
         controller: follows the route
-        noise: the share of the robot's documented noise in sensing and acting; 0: none, 1: all of it
+        noise: the factor on the robot's documented noise in sensing and acting; 0: a perfect robot
         perception: what the robot perceives of movers
         avoidance: how the robot avoids movers; None: not at all
-        replanning: when the robot looks for a new route among movers; None: never
+        replanning: when the robot looks for a new route in a world with movers; None: never
         unseen: obstacles that neither the planner nor the controller knows of
-        time_limit: simulated time after which the drive ends [s]; None: the task's, or ample for the route
+        time_limit: simulated time after which the drive ends [s]; None: the task's own, or 30 s plus ten times the
+            route at full speed
         physics_hz: physics steps per simulated second
         control_hz: control periods per simulated second; must divide `physics_hz`
 
@@ -142,7 +143,7 @@ class Scenario:
 
     @property
     def planner_label(self) -> str:
-        """What records call the planner."""
+        """The planner's name in records."""
         return self.planner_name or type(self.planner).__name__
 
     @property
@@ -174,8 +175,8 @@ class Scenario:
     def effective_avoidance(self) -> Avoidance | None:
         """How the robot avoids movers, given what it knows of them.
 
-        Movers whose motions are known do not turn back unexpectedly, so reversals are not considered. A
-        timed plan has avoided the movers already, so the horizon is short.
+        Movers whose motions are known do not reverse unexpectedly, so reversals are not considered. A plan in
+        space and time avoids the movers already, so the horizon is short.
         """
         if self.avoidance is None or self.effective_perception.kind != "motions":
             return self.avoidance

@@ -1,4 +1,4 @@
-"""A world cut into square cells: which are free, and which moves between them a robot can sweep.
+"""A world cut into square cells: which are free, and which moves between them are free of collisions.
 
 Cells are (row, col) with the row along +y; cell (0, 0) holds the world's lower-left corner.
 """
@@ -26,7 +26,7 @@ class Grid:
     """Free cells and allowed moves, for a robot of radius `inflate`.
 
     Attributes:
-        free: which cells are free (R, C), read-only
+        free: which cells are free (R, C): those at whose centre the robot touches nothing; read-only
         moves: bit k is set where the move `DIRECTIONS[k]` is allowed (R, C), read-only
         cell: side of a cell [m]
         origin: centre of cell (0, 0), x and y [m]

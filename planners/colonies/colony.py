@@ -162,7 +162,7 @@ class IterationState(NamedTuple):
         tours: the same walks without loops and, with `Colony.shortcut`, cut short
         daemon_tour: the tour that `Colony.daemon_action` made, a single row
         best: the best tour so far, a single row
-        since: how many iterations ago the best tour was found
+        since: number of iterations since the best tour was found
         rng: the colony's source of random numbers
     """
 
@@ -184,12 +184,12 @@ FIRST_KIND = ChoiceContext()
 class Colony(IterativePlanner):
     """Ants that walk from the start to the goal, guided by the pheromone trails of ants that arrived before.
 
-    This class holds the loop: ants walk, loops are cut out of their walks, the best tour is kept, work is
+    This class runs the iterations: ants walk, loops are cut out of their walks, the best tour is kept, work is
     counted. A planner of the family adds its rules, named as in ACOTSP (Stützle) and in Dorigo & Stützle,
     *Ant Colony Optimization*, 2004:
 
     - `initial_trail`: tau before the first iteration
-    - `heuristic_values`: eta, what attracts ants whatever the trails are
+    - `heuristic_values`: eta, how much each move attracts ants regardless of the trails
     - `choice_weights`: how trails and heuristic combine into the attraction of each move
     - `update`: how trails evaporate and which ants deposit
     - `kinds`, `daemon_action` and `finished`, where a planner has several kinds of ants, improves on the
@@ -247,7 +247,7 @@ class Colony(IterativePlanner):
 
     @abc.abstractmethod
     def heuristic_values(self, graph: ColonyGraph) -> Heuristic:
-        """What each move of `graph` attracts by whatever the trails are (cells, 8); `choice_weights` receives it."""
+        """Eta of each move of `graph` (cells, 8), which does not depend on the trails; `choice_weights` receives it."""
 
     @abc.abstractmethod
     def choice_weights(
@@ -278,7 +278,7 @@ class Colony(IterativePlanner):
         Args:
             graph: the graph that ants walk on
             tours: the tours of this iteration
-            best: the best tour before it
+            best: the best tour before this iteration; in the first, that of the memory, if any
         """
         return None
 
@@ -287,13 +287,14 @@ class Colony(IterativePlanner):
         return False
 
     def iterate(self, query: Query, rng: np.random.Generator) -> Iterator[Iteration]:
-        """Walk, rate and update the trails until `finished`."""
+        """Construct tours and update the trails, iteration by iteration, until `finished`."""
         return self.resume(query, rng, Memory())
 
     def resume(self, query: Query, rng: np.random.Generator, memory: Memory) -> Iterator[Iteration]:
         """Iterate with the trails and the best tour in `memory`, and keep both up to date there.
 
-        The grid may have changed since: of the remembered tour only the arcs that are still allowed are used.
+        If the grid has changed since the memory was filled, only those arcs of the remembered tour are used that are
+        still allowed.
         """
         graph = ColonyGraph.of(query)
         if memory.trail is None:

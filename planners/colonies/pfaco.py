@@ -25,7 +25,7 @@ if TYPE_CHECKING:  # importing kernels loads the compiler
 
 @dataclass(frozen=True, kw_only=True)
 class PotentialFieldAnts(IterativePlanner):
-    """Ants guided by a potential field, which rank their paths and start again one by one: lee2008's improved ACO.
+    """Ants guided by a potential field, with ranked paths and without generations: lee2008's improved ACO.
 
     Section IV of lee2008: an ant chooses the next cell by pheromone^alpha potential^beta (eq. 13). The
     potential rises away from the start (eq. 9) and falls near obstacles (eq. 11); the first pheromone is a

@@ -15,7 +15,7 @@ from antdrive.worlds import Floats
 
 @dataclass(frozen=True, kw_only=True)
 class PotentialField(GridPlanner):
-    """Rolls downhill between an attracting goal and repelling obstacles (Lee et al. 2008, III); may get stuck.
+    """Descends the potential of an attracting goal and repelling obstacles (Lee et al. 2008, III); may get stuck.
 
     The potential U = 1/2 k_att d_goal^2 (eq. 9) + 1/2 k_rep (1/d - 1/d0)^2 for d <= d0 (eq. 11) is followed
     along the allowed move of steepest descent. U has local minima besides the goal. There the planner stops

@@ -20,9 +20,11 @@ from antdrive.worlds import Floats, MoverMotion
 from antdrive.worlds.errors import FieldError
 from antdrive.worlds.plane import segment_lengths
 
-STEP = 0.05  # s: how often a motion is sampled at first; samples are added where it turns in between
-INSTANT = 1e-6  # s: a motion that is not straight over so short a time is a jump
-TOLERANCE = 1e-3  # m: how far a motion may stray from the straight legs that stand for it; kept in addition
+STEP = 0.05  # time between the first samples of a motion; more are added where it turns in between [s]
+INSTANT = 1e-6  # a motion that is not straight over so short a time is a jump [s]
+# How far a motion may stray from its samples' chords, and those samples from the legs that replace them [m]. Twice this
+# is added to the distance that the robot keeps.
+TOLERANCE = 1e-3
 UNIT = "safe intervals expanded"
 
 
@@ -49,7 +51,7 @@ class TimedPlan(PlanResult):
 
     @property
     def waited(self) -> float:
-        """How long the robot waits on its way in all [s]."""
+        """The total time that the robot waits on its way [s]."""
         return float((self.leave - self.arrive).sum())
 
     def at(self, t: npt.ArrayLike) -> Floats:
@@ -68,7 +70,7 @@ class TimedPlan(PlanResult):
         """The least distance between the robot's centre and a mover's surface [m], sampled every `step` seconds.
 
         Args:
-            movers: the discs that move
+            movers: the motions of the movers
             step: time between two samples [s]
         """
         ticks = max(1, math.ceil(self.duration / step))
@@ -85,7 +87,7 @@ class SafeIntervals(GridPlanner):
 
     Attributes:
         speed: the robot's speed on every move [m/s]
-        horizon: how long from the departure on the motions are known, and the goal must be reached [s]
+        horizon: time from the departure for which the motions are known, and within which the robot must arrive [s]
         stay: whether the goal must also be safe from the arrival to the horizon
     """
 
@@ -99,7 +101,7 @@ class SafeIntervals(GridPlanner):
 
     @property
     def capabilities(self) -> Capabilities:
-        """What this planner can do and what it needs: knowing the cells blocked now is not enough."""
+        """What this planner can do, and that it needs the movers' motions."""
         return Capabilities(needs_motions=True)
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
@@ -124,15 +126,15 @@ def plan_in_time(
 ) -> TimedPlan:
     """The path over the grid's moves that arrives first, or `NO_PATH` if none arrives within `horizon` seconds.
 
-    The robot makes each move at `speed` and may wait in any cell for any time. Its centre always keeps the
-    grid's `inflate` from every mover's surface, and up to `2 * TOLERANCE` more from motions that do not
-    consist of straight legs. Over those legs the answer is exact: no path on this grid, at this speed,
-    arrives sooner. Motions are sampled `STEP` apart, closer near turns and jumps; a motion that turns twice
-    within half a `STEP` may be missed.
+    The robot makes each move at `speed` and may wait in any cell for any time. Each motion is replaced by
+    straight legs, at most `2 * TOLERANCE` off. The robot's centre keeps the grid's `inflate` and `2 * TOLERANCE`
+    from a mover's surface on these legs, and so at least `inflate` from the mover itself. Over the legs the
+    answer is exact: no path on this grid, at this speed, arrives sooner. Motions are sampled `STEP` apart,
+    closer near turns and jumps; two turns within half a `STEP` may be missed.
 
     Args:
         query: the grid and its ends; its own motions are not used
-        movers: the discs that move
+        movers: the motions of the movers
         speed: the robot's speed on every move [m/s]
         start_time: when the robot sets out, on the clock of the motions [s]
         horizon: how long after `start_time` the robot may arrive [s]
@@ -213,8 +215,8 @@ def _samples(mover: MoverMotion, start: float, end: float) -> tuple[Floats, Floa
     while len(unchecked):
         middle = (t[unchecked] + t[unchecked + 1]) / 2
         there = np.asarray(mover.at(middle), dtype=np.float64)
-        # If two straight legs meet within a stretch, they stray from it at most twice as far as its middle
-        # does.
+        # A motion of two straight legs that meet within a stretch strays from the stretch's chord at most twice as
+        # far as its middle does.
         stray = 2 * np.hypot(*(there - (xy[unchecked] + xy[unchecked + 1]) / 2).T)
         bent = (stray > TOLERANCE) & (t[unchecked + 1] - t[unchecked] > INSTANT)
         if not bent.any():

@@ -1,10 +1,10 @@
-"""From a plan to a line worth driving: pulled taut in the plan's own corridor, and moved away from discs where it is cheap.
+"""From a plan to a route: pulled taut in the plan's own corridor, and moved away from discs where there is room.
 
 The shortest line among discs that is homotopic to a given one consists of tangents and of arcs along the
 discs. It is found by carrying the end of a string along the given line, as the funnel algorithm does in a
 sleeve of triangles (Lee & Preparata, *Euclidean shortest paths in the presence of rectilinear barriers*,
 Networks 14, 1984; for homotopy among obstacles Hershberger & Snoeyink, *Computing minimum length paths of a
-given homotopy class*, Comput. Geom. 4, 1994). Here the bends are the discs themselves, so no triangles are
+given homotopy class*, Comput. Geom. 4, 1994). Here the string bends around the discs themselves, so no triangles are
 needed: between two events the string's last link turns about one disc, and the next event is the first of its
 tangents to come. Walls are left out, as leaving a convex room never makes a line shorter.
 
@@ -36,8 +36,8 @@ if TYPE_CHECKING:  # importing a grid loads the compiler
 #: The kinds of smoothing: the plan's own line, that line pulled taut, or taut with more clearance where there is room.
 SMOOTHINGS: tuple[str, ...] = ("none", "taut", "clearance")
 
-SLACK = 1e-9  # m: rounding, by which a line may be too close or too long
-SHRINK = 2e-9  # m: strings are first pulled among discs that are smaller by this, which the plan's line surely clears
+SLACK = 1e-9  # how much too close or too long a line may be, by rounding [m]
+SHRINK = 2e-9  # strings are first pulled among discs that are smaller by this, which the plan's line surely clears [m]
 
 
 def smooth(
@@ -53,9 +53,9 @@ def smooth(
     """The route for a plan.
 
     A smoothed route keeps the grid's clearance exactly, passes every disc on the same side as the plan's
-    line, and is never longer than that line or than the plan's cells. Parts that cannot be smoothed so stay
-    as planned, and the route's note says why. Where the plan's line itself comes closer than the grid's
-    clearance, as a start with too little room does, the line is kept.
+    line, and is never longer than that line or than the plan's cells. Parts that cannot be smoothed this way
+    stay as planned, and the route's note says why. Where the plan's line itself comes closer than the grid's
+    clearance, for example at a start close to a disc, the line is kept.
 
     Args:
         plan: a plan with a path
@@ -64,7 +64,7 @@ def smooth(
         kind: `none` for the plan's own line, `taut` for that line pulled taut, `clearance` for a taut line
             that keeps more distance from discs where there is room
         clearance: how much more than the grid's clearance the kind `clearance` keeps at most [m]
-        stretch: how much longer than the taut line that may make it, as a fraction
+        stretch: how much longer than the taut line the kind `clearance` may be, as a fraction of its length
         bulge: how far the corners of the route's polyline may stand off an arc [m]
 
     Raises:
@@ -289,9 +289,9 @@ def _length(xy: Floats) -> float:
 def _with_clearance(
     taut: TautString, xy: Floats, world: World, inflate: float, extra: float, longest: float, bulge: float
 ) -> Piece | None:
-    """The line with the most clearance among those no longer than `longest`; None if there is no room or length for any.
+    """The line with the most clearance that is no longer than `longest`; None if there is no room or length for more.
 
-    Its discs grow together, found by bisection.
+    All discs grow by the same fraction of `extra`, each by at most its room; bisection finds the largest fraction.
     """
     from antdrive.planners.smoothing import _kernels_smooth as kernels
 

@@ -24,8 +24,8 @@ from antdrive.robots.spec import RobotSpec
 from antdrive.worlds import Floats, Pose
 from antdrive.worlds.errors import FieldError
 
-SPEED_WEIGHT = 0.3  # metres of the route that 1 m/s of final speed along the route is worth [s]
-PERSISTENCE = 0.05  # metres of the route that keeping to the last decision is worth
+SPEED_WEIGHT = 0.3  # progress that 1 m/s of final speed along the route is worth [m per m/s]
+PERSISTENCE = 0.05  # progress that keeping to the last decision is worth [m]
 
 
 class AvoidanceState(NamedTuple):
@@ -48,14 +48,14 @@ class Avoidance:
     Attributes:
         horizon: how far ahead movers are predicted [s]
         step: time between two predicted instants [s]
-        min_clearance: the least clearance to movers; where it is less already, that much is kept [m]
+        min_clearance: the least clearance to movers; one that is closer already may come only a little closer [m]
         preferred_clearance: clearance beyond the least from which more makes no difference [m]
-        clearance_weight: progress that each metre of missing clearance costs [m/m]
+        clearance_weight: progress that each metre short of the preferred clearance costs [m/m]
         cross_track_weight: progress that each metre off the route costs [m/m]
         heading_weight: progress that each radian off the route's direction costs [m/rad]
         reversal_time: how far ahead a sudden reversal of a mover is considered [s]
-        reversal_margin: clearance, beyond the least, to where a mover would be had it reversed [m]
-        reversal_weight: progress that each metre less than that costs [m/m]; 0 trusts the prediction
+        reversal_margin: clearance, beyond `min_clearance`, to keep from where a mover that reverses would be [m]
+        reversal_weight: progress that each metre of this clearance that is missing costs [m/m]; 0 ignores reversals
 
     Raises:
         ValueError: a setting is out of range.
@@ -123,7 +123,7 @@ class Avoidance:
         candidate = candidates[chosen]
         stopping = abs(last.speed) / limits.acceleration
         if contact < max(stopping, self._too_late(tracked, pose, places[0], radii)):
-            # The robot cannot avoid the contact, so it stops: a contact while standing is the mover's.
+            # The robot cannot avoid the contact, so it stops: a contact while standing is attributed to the mover.
             speed, yaw_rate, state = 0.0, 0.0, AvoidanceState()
         elif candidate[kernels.KIND] == kernels.FOLLOW_ROUTE:
             slowest = last.speed - limits.acceleration * period
@@ -139,7 +139,7 @@ class Avoidance:
         return Twist(*reachable_twist(speed, yaw_rate, *last, period, limits)), True, state
 
     def _too_late(self, tracked: TrackedPath, pose: Pose, places: Floats, radii: Floats) -> float:
-        """A contact sooner than this is unavoidable where a mover is closer than the least clearance [s]."""
+        """A contact sooner than this counts as unavoidable [s]: 0 unless a mover is within the least clearance."""
         away = np.hypot(*(places - pose[:2]).T) - radii
         close = away.min(initial=math.inf) < tracked.tuning.robot_radius + self.min_clearance
         return 2 * self.step if close else 0.0
@@ -187,9 +187,9 @@ _NOT_NEGATIVE = (
 
 @functools.cache
 def _candidate_table(max_speed: float, max_yaw_rate: float, lateral_acceleration: float) -> Floats:
-    """What a robot chooses from (N, 6): the controller's motion twice, the same more slowly, pairs of twists.
+    """What a robot chooses from (N, 6): the controller's motion at full and at lower speeds, and pairs of twists.
 
-    Row 1 is the place of the last decision. The second twist of a pair drives straight or stands.
+    Row 1 repeats row 0, and is where the last decision goes. The second twist of a pair drives straight or stands.
     """
     shares = (1.0, 1.0, 0.7, 0.45, 0.2)
     rows = [(kernels.FOLLOW_ROUTE, share * max_speed, 0.0, 0.0, 0.0, 0.0) for share in shares]

@@ -1,6 +1,6 @@
 """Pure pursuit that cuts corners only where there is room (after R. C. Coulter, CMU-RI-TR-92-01, 1992).
 
-The carrot is the point of the route at the true lookahead distance from the robot. Before a drive, the
+The carrot is the point of the route at the lookahead distance from the robot, measured straight. Before a drive, the
 controller computes for samples along the route how far ahead the robot may look so that the straight line to
 the carrot keeps clear of obstacles. During the drive it shortens the lookahead further until the arc to the
 carrot is clear. The robot is slow where the lookahead is short, and rotates in place where not even the
@@ -24,16 +24,16 @@ from antdrive.robots.spec import RobotSpec
 from antdrive.worlds import Floats, Pose, Route, World, point_clearance
 from antdrive.worlds.errors import FieldError
 
-SPACING = 0.02  # between the samples along a route [m]
-SQUARE = 0.5  # side of the squares that the obstacles are sorted into, larger in worlds of many squares [m]
-MAX_SQUARES = 250_000
+SPACING = 0.02  # distance between the samples along a route [m]
+SQUARE = 0.5  # least side of the squares that the obstacles are sorted into [m]
+MAX_SQUARES = 250_000  # in larger worlds the squares are larger instead
 
 #: The rules that can limit the robot's speed. Logs hold a rule's index.
 LIMITERS: tuple[str, ...] = (
-    "cruise",  # none: the robot drives at its top speed
+    "cruise",  # no rule: the robot drives at its top speed
     "curvature",  # lateral acceleration or yaw rate in a curve
     "route",  # the route's bends, lines of sight or clearance, here or within braking distance
-    "yaw rate",  # the yaw rate of the curve is not reached yet
+    "yaw rate",  # the robot has not yet reached the yaw rate that the curve needs
     "goal",  # braking for the goal
     "rotate",  # rotating in place
     "creep",  # no arc to the carrot is clear: the robot advances very slowly
@@ -115,9 +115,9 @@ class PurePursuit:
         corner_lookahead_time: `lookahead_time` for routes with corners, such as those through cells [s]
         corner_blend: `blend` for such routes [m]
         min_speed_near_obstacles: speed allowed without any clearance beside the robot [m/s]
-        clearance_time: clearance divided by this is the speed allowed in addition [s]
+        clearance_time: the clearance beside the robot, divided by this, is added to that speed [s]
         creep_speed: slowest forward speed [m/s]
-        goal_distance: the robot stops when this much of the route remains [m]
+        goal_distance: the robot stops when this much of the route remains; half the goal's tolerance if less [m]
 
     Raises:
         ValueError: a setting is out of range.
@@ -258,7 +258,7 @@ class PurePursuit:
     def _speed_limits(
         self, route: Route, world: World, robot: RobotSpec, profile: SpeedProfile, lookahead: Floats, time: float
     ) -> Floats:
-        """The speed limit (S,) at the samples: `lookahead` (S,) in `time`, the profile, the obstacles."""
+        """The speed limit at the samples (S,) [m/s]: the least of profile, obstacles and `lookahead` / `time`."""
         at = SPACING * np.arange(len(lookahead))
         xy = np.stack([np.interp(at, route.arc, values) for values in route.xy.T], axis=1)
         clearance = point_clearance(world, xy) - robot.radius

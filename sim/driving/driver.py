@@ -23,11 +23,11 @@ from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.physics.engine import State
 from antdrive.worlds import Pose, Task
 
-STANDING_SPEED = 0.01  # a robot slower than this stands [m/s], [rad/s]
+STANDING_SPEED = 0.01  # a robot slower than this counts as standing [m/s], [rad/s]
 WAITING_SPEED = 0.1  # a robot that avoids a mover and is slower than this waits for it [m/s]
 STUCK_TIME = 8.0  # a robot without progress for this long is stuck [s]
 STUCK_PROGRESS = 0.02  # what counts as progress along the route [m]
-GOAL_SHARE = 0.95  # of the goal's tolerance within which a robot that avoids a mover stops early
+GOAL_SHARE = 0.95  # a robot that avoids a mover may stop early within this fraction of the goal's tolerance
 AVOIDING = LIMITERS.index("avoid")
 
 
@@ -36,8 +36,8 @@ class StuckClock(NamedTuple):
 
     Attributes:
         farthest: the farthest that the robot has got along the route [m]
-        driving: control periods since then in which the robot was to drive
-        turning: control periods since then in which the robot turned on the spot
+        driving: control periods since then in which the robot was to drive, not rotate
+        turning: control periods since then in which the robot rotated in place
     """
 
     farthest: float = 0.0
@@ -60,7 +60,7 @@ class Driver:
 
     Attributes:
         tracked: the path that the robot follows now
-        pursuit: the controller's memory: how far the robot has got, and what held its speed
+        pursuit: the controller's state: how far the robot has got, and what limited its speed
         command: the twist that was commanded last
     """
 
@@ -85,7 +85,7 @@ class Driver:
 
     @property
     def stuck(self) -> bool:
-        """Whether the robot has made no progress for too long; turning may take a full turn longer."""
+        """Whether the robot has made no progress for too long; rotating in place may take a full turn's time longer."""
         clock = self._clock
         return clock.driving >= self._patience or clock.turning >= self._patience + self._full_turn
 
@@ -99,7 +99,7 @@ class Driver:
 
         Args:
             tick: the number of the control period
-            pose: where the robot estimates to be when its command takes effect [m, m, rad]
+            pose: the estimated pose for the moment when the command takes effect [m, m, rad]
             state: the robot's true pose and its velocity
 
         Returns:
@@ -179,7 +179,7 @@ class Driver:
         if left > self.tracked.goal_distance or not _standing(state) or any(self.command):
             return None
         ending, monitor, task = self._arrival(state), self._monitor, self._task
-        # A robot that estimates to be at the goal does not know that it missed it, and stays.
+        # A robot whose estimate is at the goal does not know that it missed it, and stays.
         knows = math.dist(pose[:2], task.goal) > task.goal_tolerance
         if monitor is None or ending.outcome is Outcome.SUCCEEDED or not knows:
             return ending
@@ -188,7 +188,7 @@ class Driver:
         return ending
 
     def _arrival(self, state: State) -> Ending:
-        """How a drive ends whose robot stops here of its own accord."""
+        """How the drive ends if the robot stops here without a contact."""
         task = self._task
         left = math.dist((state.x, state.y), task.goal)
         if left <= task.goal_tolerance:

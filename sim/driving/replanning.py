@@ -6,7 +6,7 @@ How a planner replans:
   exactly as the grid's obstacles are; cells that movers have left are cleared.
 - Planners that need the world plan again in a world with discs in the movers' places.
 - Planners in space and time plan again when the robot is late.
-- Cell-by-cell planners decide on one cell after the other, see `cellwise`.
+- Cell-by-cell planners choose one cell after the other; see `antdrive.sim.driving.cellwise`.
 """
 
 from __future__ import annotations
@@ -52,8 +52,8 @@ class ReplanPolicy:
     """When the robot looks for a new route.
 
     Attributes:
-        around_movers: movers count as obstacles; otherwise the robot replans only after it has strayed from
-            its route
+        around_movers: whether predicted movers count as obstacles; if not, the robot replans only after it has
+            strayed from its route
         obstruction_range: replan when a mover is predicted on the route within this distance ahead [m]
         max_wait: replan when the robot has waited for movers for this long [s]
         max_deviation: replan when the robot is farther off its route than this [m]
@@ -87,10 +87,10 @@ class Replan:
 
     Attributes:
         t: simulated time of the attempt [s]
-        trigger: what caused it
+        trigger: what set it off, such as `OBSTRUCTED`
         solved: whether a new route was found
         cost: length of the new plan [m]; inf without one
-        work: the planner's work, in its own unit
+        work: the planner's effort, in units of `PlanResult.work_unit`
         route: the new route (N, 2) [m]; empty without one
         wall_s: wall time that the attempt took [s]
     """
@@ -153,7 +153,7 @@ class ReplanMonitor:
         return False
 
     def track(self, plan: PlanResult, route: Route) -> None:
-        """Take note that the robot sets out on a route, made from a plan."""
+        """Note that the robot sets out on a route that was made from a plan."""
         self.schedule = Schedule.of(plan, route) if self._timed and isinstance(plan, TimedPlan) else None
 
     def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
@@ -191,7 +191,7 @@ class ReplanMonitor:
         Args:
             tick: the number of the control period
             pose: the robot's estimated pose [m, m, rad]
-            trigger: why, for the log
+            trigger: why a new route is due; goes into the log
         """
         now = tick / self._hz
         self._replanned_at, self._waiting_since = now, math.nan

@@ -1,14 +1,14 @@
 """Certify from a drive's log that nothing was touched: three readings that must agree. Needs numpy alone.
 
 1. PyBullet's contacts of the chassis, at every physics step.
-2. The distance between footprint and obstacles in closed form at every logged pose, computed here a second time.
+2. The distance between footprint and obstacles in closed form at every logged pose, computed here independently.
 3. A bound on what can happen between two logged poses. No point of the footprint moves farther than the axle's centre
    travels plus the footprint's radius times the turn, so the clearance in between is at least
    (c_i + c_{i+1} - travel) / 2. For a mover its own travel is added; where the mover teleports, the bound is
    min(c_i, c_{i+1}) - travel.
 
 Movers must be where the record's task and seed put them. Further checks look for a log that was changed or does not
-describe one drive; each is a function `_check_...` that yields a sentence for every fault.
+describe one drive; each is a function `_check_...` that gives a sentence for every fault.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ SAME_CLEARANCE = 1e-9  # closed-form distances, computed twice, agree to this [m
 # closed form disagree if a contact is reported with more clearance than this [m].
 CONTACT_SLACK = 0.012
 START_SLACK, START_TURN_SLACK = 0.005, 0.01  # between the first row and the task's start [m], [rad]
-# How far poses may differ from where measured speeds lead: in one step, and over a quarter of a second, where errors
-# would add up but rounding does not. Genuine drives stay below 0.1 mm and 1.2 mm, on a slippery floor below 0.6 mm and
+# How far poses may differ from where measured speeds lead: in one step, and over DRIFT_WINDOW, in which systematic
+# errors add up but rounding does not. Genuine drives stay below 0.1 mm and 1.2 mm, on a slippery floor below 0.6 mm and
 # 31 mm.
 STEP_SLIP, STEP_SLIP_TURN = 0.001, 0.002  # [m], [rad]
 DRIFT, DRIFT_SHARE, DRIFT_TURN = 0.01, 0.06, 0.05  # [m], fraction of the distance covered, [rad]

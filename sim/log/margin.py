@@ -171,7 +171,7 @@ def find_margin(
     Args:
         drive: runs the scenario with a margin [m] and a seed
         seeds: the seeds that each margin is tried with
-        reserve: clearance that every drive must leave [m]
+        reserve: part of the margin that every drive must leave unused [m]
         most: the largest margin to try [m]
         resolution: margins are multiples of this [m]
 

@@ -47,7 +47,7 @@ class ComponentRecord:
     """A part of the scenario that has a name and settings.
 
     Attributes:
-        name: the registered name of the planner, or the class of the controller
+        name: the registered name of the planner, or the class of a planner or controller
         settings: every setting by its name, as it was in force; null stands for "no limit"
     """
 
@@ -85,7 +85,7 @@ class SmoothingRecord:
     """How the planned cells became the route.
 
     Attributes:
-        asked: the smoothing that the scenario asked for: none, taut or clearance
+        asked: the smoothing that was requested: none, taut or clearance
         made: the smoothing of the route that was driven; plans in space and time are not smoothed, and a smoothing
             that fails is given up
         note: why a smoothing was given up, in words; may be empty
@@ -176,9 +176,9 @@ class DriveRecord:
         smoothing: how the planned cells became the route
         perception: what the robot knew of movers; null in a world without movers
         avoidance: the settings of `Avoidance` as they were in force; null if the robot did not avoid movers
-        replanning: the settings of `ReplanPolicy`; null if the robot did not replan
+        replanning: the settings of `ReplanPolicy`; null without movers, or if the robot was never to replan
         replans: every search for a new route while driving, in the order of time
-        limiters: names of the rules that can hold the robot's speed; the array `limiter` holds indices into them
+        limiters: names of the rules that can limit the robot's speed; the array `limiter` holds indices into them
         noise: the factor on the robot's documented noise; 0 is a perfect robot
         margin: clearance that was planned with on top of the robot's radius [m]
         inflate: the robot's radius plus the margin: how far planners keep the robot's centre from every surface [m]
@@ -187,7 +187,7 @@ class DriveRecord:
         control_hz: rate of control [Hz]
         time_limit: simulated time that was allowed [s]
         outcome: how the drive ended, such as succeeded, collided or timed_out
-        reason: what the outcome leaves open, in words; may be empty
+        reason: details of the outcome, in words; may be empty
         versions: versions of antdrive, Python and the packages that computed the drive
         times: wall-clock times, not covered by the digest
         digest: the SHA-256 over arrays and record, see `Rollout.digest`; null until the log is saved

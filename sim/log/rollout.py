@@ -29,7 +29,7 @@ from antdrive.worlds.trajectories import Trajectories
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Rollout:
-    """The log of one drive. The first T rows are physics steps; row 0 is the start, before the first step.
+    """The log of one drive. Each of its T rows is a physics step; row 0 is the start, before the first step.
 
     Attributes:
         t: simulated time (T,) [s]
@@ -37,11 +37,11 @@ class Rollout:
         twist: measured forward speed [m/s] and yaw rate [rad/s] (T, 2)
         command: commanded forward speed [m/s] and yaw rate [rad/s] (T, 2)
         clearance: distance from the robot's surface to the nearest cylinder, mover or wall (T,) [m]
-        limiter: the rule that held the robot's speed (T,), an index into `record.limiters`
+        limiter: the rule that limited the robot's speed (T,), an index into `record.limiters`
         movers: centres of the movers (T, M, 2) [m]
         contacts: contact points (K, 4): row, obstacle, distance [m] and normal force [N]; obstacles count from 0,
             first the cylinders, then the movers, then the walls left, right, bottom and top
-        route: points (N, 2) of the first route [m]; `legs` also gives the routes after replans
+        route: points (N, 2) of the first route [m]; `Rollout.legs` adds the routes after replans
         cells: the planned cells (P, 2), (row, col)
         estimate: the estimated pose (T, 3) of a noisy robot, x, y [m] and yaw [rad]; (0, 3) for a perfect robot
         record: everything else: scenario, plan and outcome

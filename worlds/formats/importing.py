@@ -17,16 +17,16 @@ from antdrive.worlds.formats.movingai import import_movingai_task
 from antdrive.worlds.formats.sdf import import_sdf
 from antdrive.worlds.world import Task
 
-#: Values that every task has; a format that does not take them as options brings its own.
+#: Values that every task has; a format that does not take them as options provides them itself.
 _OF_EVERY_TASK = ("start", "goal", "bounds")
 
 
 @dataclass(frozen=True)
 class Format:
-    """A format of another program that can be imported.
+    """A file format of another program that can be imported.
 
     Attributes:
-        name: what people call a file of this format
+        name: what messages call a file of this format
         suffixes: the suffixes of its files, in lower case
         options: the options that `read` takes besides the path
         read: the function that reads the tasks in a file
@@ -86,7 +86,7 @@ def import_format(path: str | os.PathLike[str], *, barn: bool = False) -> Format
 
     Raises:
         InputError: files with this suffix cannot be imported.
-        FieldError: only an SDF world can be one of the BARN set.
+        FieldError: `barn` was given for a file that is not an SDF world.
     """
     suffix = Path(path).suffix.lower()
     if suffix in (".pgm", ".png", ".bmp"):
@@ -111,10 +111,10 @@ def import_file(path: str | os.PathLike[str], *, barn: bool = False, **options: 
         path: the file
         barn: whether an SDF world is one of the BARN set, with the challenge's start, goal and bounds
         options: as for `import_sdf`, `import_barn`, `import_map_server`, `import_movingai_task` and `import_dynabarn`,
-            with `unknown`, "blocked" or "free", for the unknown cells of map_server; None counts as not given
+            but a map_server map takes `unknown`, "blocked" or "free", for its unknown cells; None counts as not given
 
     Raises:
-        InputError: the file cannot be imported, is wrong, or does not suit a value that was given.
+        InputError: the file cannot be imported, is wrong, or contradicts an option that was given.
         FieldError: an option that does not belong to the format, or has a value that it cannot have.
     """
     file_format = import_format(path, barn=barn)

@@ -44,13 +44,15 @@ def find_margin(
     ] = None,
     reserve: Annotated[
         float,
-        typer.Option(min=0.0, max=1.0, metavar="METRES", help="Part of the margin that every drive must leave [m]."),
+        typer.Option(
+            min=0.0, max=1.0, metavar="METRES", help="Part of the margin that every drive must leave unused [m]."
+        ),
     ] = 0.005,
     json: options.Json = False,
 ) -> int:
     """Find the smallest margin with which every drive is safe.
 
-    Exit code 0: there is one, up to 0.2 m.
+    Exit code 0: there is a safe margin of at most 0.2 m.
     """
     from antdrive.sim.log.margin import find_margin as search
     from antdrive.sim.pipeline import run as drive

@@ -31,7 +31,7 @@ Unseen = Annotated[
     list[str] | None,
     typer.Option(
         metavar="X,Y,RADIUS",
-        help="Add a cylinder that neither planner nor controller know of [m]. May be repeated.",
+        help="Add a cylinder that neither planner nor controller knows about [m]. May be repeated.",
     ),
 ]
 TimeLimit = Annotated[
@@ -46,7 +46,10 @@ TimeLimit = Annotated[
 Avoid = Annotated[bool, typer.Option("--avoid/--no-avoid", help="Avoid movers: slow down, stop, back off or go round.")]
 Replan = Annotated[
     bool,
-    typer.Option("--replan/--no-replan", help="Replan around movers; otherwise only after straying from the route."),
+    typer.Option(
+        "--replan/--no-replan",
+        help="In worlds with movers: replan around them; otherwise only after straying from the route.",
+    ),
 ]
 Sees = Annotated[
     str,

@@ -1,4 +1,4 @@
-"""Films and stills of a run from its log: physics never waits for pixels, and an old run can be filmed again.
+"""Films and stills of a run, rendered from its log after the drive, so that an old run can be filmed again.
 
 Frames go straight to the encoder, one at a time, so a long film needs no more memory than a short one. A file appears
 when it is complete.
@@ -35,7 +35,7 @@ HOLD = 1.0  # the last picture stays this long [s]
 
 @dataclass(frozen=True)
 class FilmInfo:
-    """What was written.
+    """Facts about a film that was written.
 
     Attributes:
         path: the file
@@ -85,16 +85,16 @@ def film(
         camera: `oblique`, `top` or `follow`
         size: width and height, even numbers from 160 to 4096 [px]
         fps: frames per second, at most 240
-        speed: how many times as fast as the run the film is
+        speed: the film's speed relative to the run; 2 is twice as fast
         note: a line for the band below the picture, for example the certificate's verdict
         prelude: the length of an introduction that shows how the path was planned [s]: the field of an iterative
             planner on the ground, and its best path so far; the path is planned again from the run's seed
-        jobs: how many processes render for a moving camera, by default one per core; the film is the same
+        jobs: how many processes render for the camera `follow`, by default one per core; the film does not depend on it
         progress: called after each frame with the fraction that is done
 
     Raises:
-        InputError: an unknown camera or suffix, an odd or tiny size, a rate or speed that is not positive, or a
-            prelude for a planner without a field.
+        InputError: an unknown camera or suffix, a size, rate or speed that is out of range, or a prelude for a
+            planner without a field.
         OSError: the encoder could not write the film.
     """
     target = Path(path)
@@ -157,7 +157,7 @@ def still(
         The file's path.
 
     Raises:
-        InputError: an unknown camera, a suffix other than .png, an odd or tiny size.
+        InputError: an unknown camera, a suffix other than .png, or a size that is out of range.
     """
     target = Path(path)
     if target.suffix.lower() != ".png":
@@ -176,7 +176,7 @@ def frame_times(duration: float, fps: float, speed: float, slow: tuple[float, fl
     Args:
         duration: the run's length [s]
         fps: frames per second
-        speed: how many times as fast as the run the film is
+        speed: the film's speed relative to the run; 2 is twice as fast
         slow: when slow motion starts and ends [s], if there is any
     """
     if slow is None:
@@ -190,7 +190,7 @@ def check_options(camera: str, size: tuple[int, int], fps: float, speed: float) 
     """Check a film's options before any work.
 
     Raises:
-        InputError: an unknown camera, an odd or tiny size, a rate or speed that is not positive.
+        InputError: an unknown camera, or a size, rate or speed that is out of range.
     """
     if camera not in CAMERAS:
         raise InputError(f"camera: unknown camera {camera!r}; choose one of {', '.join(CAMERAS)}")

@@ -31,7 +31,7 @@ Target = Annotated[
         "--out",
         "-o",
         metavar="FILE",
-        help="The world file to write; for .json a folder.  [default: FILE's name, in this folder]",
+        help="The world file to write; for DynaBARN's .json a folder of them.  [default: FILE's name, in this folder]",
     ),
 ]
 Barn = Annotated[bool, typer.Option("--barn", help="SDF: use the start and goal of the BARN challenge.")]
@@ -46,7 +46,7 @@ Bounds = Annotated[
     ),
 ]
 SkipUnsupported = Annotated[
-    bool, typer.Option("--skip-unsupported", help="SDF: leave out whatever is not an upright cylinder.")
+    bool, typer.Option("--skip-unsupported", help="SDF: skip whatever is not an upright cylinder.")
 ]
 Unknown = Annotated[
     str | None,
@@ -90,8 +90,8 @@ def import_world(
     """Turn a world or map of another program into a world file.
 
     Worlds are made of upright cylinders. Those of an SDF file stay as they are. A map is converted: every blocked
-    cell beside free ground that the start or the goal can reach is fully covered by cylinders, so that the world is
-    never wider than the map. The world's source says how far the cylinders protrude from the blocked cells.
+    cell beside free ground that the start or the goal can reach is fully covered by cylinders, so that no passage is
+    wider than on the map. The key `source` of the world file says how far cylinders protrude from blocked cells.
     """
     from antdrive.worlds import import_file
     from antdrive.worlds.formats.importing import IMPORTS, import_format
