@@ -233,7 +233,7 @@ def _record(
     wall: float,
 ) -> Rollout:
     """The rollout of a drive: its arrays, and the record of what it came from."""
-    sees, yields, among_movers = s.effective_perception, s.effective_avoidance, bool(s.driven_world.movers)
+    perception, avoidance, among_movers = s.effective_perception, s.effective_avoidance, bool(s.driven_world.movers)
     record = DriveRecord(
         task=s.task,
         unseen=s.unseen,
@@ -243,8 +243,10 @@ def _record(
         robot=s.robot,
         controller=ComponentRecord(name=type(s.controller).__name__, settings=settings_of(s.controller)),
         smoothing=SmoothingRecord(asked=s.smoothing, made=route.kind, note=route.note),
-        perception=PerceptionRecord(kind=sees.kind, range_m=finite_or_none(sees.range)) if among_movers else None,
-        avoidance=settings_of(yields) if among_movers and yields else None,
+        perception=PerceptionRecord(kind=perception.kind, range_m=finite_or_none(perception.range))
+        if among_movers
+        else None,
+        avoidance=settings_of(avoidance) if among_movers and avoidance else None,
         replanning=settings_of(s.replanning) if among_movers and s.replanning else None,
         replans=tuple(_replan_record(replan) for replan in replans),
         limiters=LIMITERS,

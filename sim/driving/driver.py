@@ -23,7 +23,7 @@ from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.physics.engine import State
 from antdrive.worlds import Pose, Task
 
-STANDING_SPEED = 0.01  # a robot slower than this counts as standing [m/s], [rad/s]
+STOPPED_SPEED = 0.01  # a robot slower than this has stopped [m/s], [rad/s]
 WAITING_SPEED = 0.1  # a robot that avoids a mover and is slower than this waits for it [m/s]
 STUCK_TIME = 8.0  # a robot without progress for this long is stuck [s]
 STUCK_PROGRESS = 0.02  # what counts as progress along the route [m]
@@ -208,7 +208,7 @@ class Driver:
 
 
 def _standing(state: State) -> bool:
-    return abs(state.speed) < STANDING_SPEED and abs(state.yaw_rate) < STANDING_SPEED
+    return abs(state.speed) < STOPPED_SPEED and abs(state.yaw_rate) < STOPPED_SPEED
 
 
 def _stopping_time(command: Twist, robot: RobotSpec) -> float:

@@ -44,7 +44,6 @@ LATE = "late"
 WAITED = "waited"
 OBSTRUCTED = "obstructed"
 MISSED = "missed the goal"
-DECISION = "decision"  # of a cell-by-cell planner
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -38,7 +38,7 @@ def find_margin(
     cell: options.CellSize = None,
     smoothing: options.Smoothing = "clearance",
     noise: options.Noise = 0.0,
-    speed: Annotated[
+    max_speed: Annotated[
         float | None,
         typer.Option(min=1e-3, metavar="SPEED", help="Speed limit [m/s].  [default: the robot's own]"),
     ] = None,
@@ -60,7 +60,7 @@ def find_margin(
     if (world is None) == (kind is None):
         raise InputError("find-margin: name a world, or a kind of random worlds with --generate forest|barn")
     base = make_scenario(world or "empty", planner, settings, robot, cell=cell, smoothing=smoothing, noise=noise)
-    base = base if speed is None else _slowed(base, speed)
+    base = base if max_speed is None else _slowed(base, max_speed)
     tasks = {n: base.task if kind is None else _generated(kind, n) for n in range(seed, seed + seeds)}
 
     def drive_with(margin: float, n: int) -> "Run":

@@ -14,7 +14,9 @@ def test_the_smallest_safe_margin_is_found(antdrive: Call, small: Path) -> None:
     assert (code, err) == (0, "")
     assert 0 <= facts["margin_m"] <= 0.03
     assert facts["trials"][0]["margin"] == pytest.approx(0.2)
-    assert "smallest safe margin" in antdrive("find-margin", small, "--seeds", "1", "-p", "astar", "--speed", "0.3")[1]
+    assert (
+        "smallest safe margin" in antdrive("find-margin", small, "--seeds", "1", "-p", "astar", "--max-speed", "0.3")[1]
+    )
 
 
 @pytest.mark.parametrize(
