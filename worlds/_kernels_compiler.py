@@ -61,7 +61,7 @@ def _cached(dispatcher: Any, function: F) -> F:
 
 def _choose_folder() -> None:
     folder = cache_folder()
-    if not _settings.CACHE_DIR and folder is not None and folder not in default_folders():
+    if folder is not None and folder not in default_folders():
         _settings.CACHE_DIR = str(folder)
 
 

@@ -28,9 +28,8 @@ def cache_folder() -> Path | None:
     The first that can be written of: what `NUMBA_CACHE_DIR` names, the package's own `__pycache__`, the user's cache folder,
     and a private folder among the temporary files.
     """
-    if given := os.environ.get("NUMBA_CACHE_DIR"):
-        return Path(given)
-    for folder in default_folders():
+    given = os.environ.get("NUMBA_CACHE_DIR")
+    for folder in (*([Path(given)] if given else []), *default_folders()):
         if _writable(folder):
             return folder
     return _private_folder()

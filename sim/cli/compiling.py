@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import sys
 
-from antdrive.sim.cli.console import bar
+from antdrive.sim.cli.console import bar, print_error
 
 
 def compile_once() -> None:
-    """Compile every kernel with a progress bar if this installation has not done so yet.
+    """Compile every kernel if this installation has not done so yet: with a bar on a terminal, else with a line.
 
-    Nothing is done where stderr is no terminal, because nobody would see the bar, and where no cache can be kept. Each
-    kernel is then compiled when it is first called, which for a single command is quicker than compiling all of them.
+    Nothing is done where no cache can be kept. Each kernel is then compiled when it is first called, which for a
+    single command is quicker than compiling all of them.
     """
-    if not sys.stderr.isatty():
-        return
     from antdrive.sim.warm import is_warm, warm
     from antdrive.worlds.kernel_cache import cache_folder
 
     if is_warm() or cache_folder() is None:
         return
+    if not sys.stderr.isatty():
+        print_error("compiling the planners, once for this installation; this takes about half a minute")
     with bar("compiling the planners, once") as progress:
         warm(progress=progress)

@@ -78,8 +78,11 @@ def test_the_first_folder_that_can_be_written_is_chosen(monkeypatch: pytest.Monk
     assert other != private
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "nowhere"))
     assert kernel_cache.cache_folder() is None
-    monkeypatch.setenv("NUMBA_CACHE_DIR", "given")
-    assert kernel_cache.cache_folder() == Path("given")
+    given = tmp_path / "given"
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(given))
+    assert kernel_cache.cache_folder() == given
+    closed.add(given)
+    assert kernel_cache.cache_folder() is None
 
 
 def test_kernels_work_where_nothing_can_be_written(tmp_path: Path) -> None:
