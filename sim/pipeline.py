@@ -17,6 +17,8 @@ from antdrive.planners import (
     PlanResult,
     PlanStatus,
     Query,
+    ask,
+    checked,
     smooth,
 )
 from antdrive.robots import LIMITERS, NoiseModel
@@ -47,6 +49,11 @@ from antdrive.worlds.drawing import LINE, card, world_svg
 from antdrive.worlds.errors import FieldError
 
 ROUTE_COLOUR = "#182242"  # of routes in notebooks
+ENDED_BY = {
+    PlanStatus.NO_PATH: Outcome.NO_PATH,
+    PlanStatus.STOPPED: Outcome.STOPPED,
+    PlanStatus.INVALID: Outcome.INVALID_PLAN,
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +79,7 @@ class Run:
         """How the run ended."""
         if self.rollout is not None:
             return self.rollout.outcome
-        return Outcome.NO_PATH if self.plan.status is PlanStatus.NO_PATH else Outcome.STOPPED
+        return ENDED_BY[self.plan.status]
 
     @property
     def reason(self) -> str:
@@ -145,15 +152,22 @@ class Run:
 
 
 def plan(s: Scenario) -> tuple[Grid, PlanResult]:
-    """Rasterise the world of a scenario and plan on it; the grid and the planner's answer.
+    """Rasterise the world of a scenario and plan on it; the grid and the planner's answer, checked.
 
-    Movers are not on the grid. A planner in space and time is given their motions.
+    Movers are not on the grid. A planner in space and time is given their motions. A wrong answer is replaced by one
+    without a path, whose status is `INVALID` and whose reason says what is wrong.
+
+    Raises:
+        PlannerError: the planner raised something, or returned something that is no `PlanResult`.
     """
     grid = rasterise(s.task.world, s.cell or s.task.cell, s.inflate)
+    query = _query(s, grid)
+    return grid, checked(query, ask(s.planner, query, s.rng("planner"), s.planner_label))
+
+
+def _query(s: Scenario, grid: Grid) -> Query:
     query = Query.between(grid, s.task)
-    if s.timed:
-        query = dataclasses.replace(query, motions=s.trajectories.motions)
-    return grid, s.planner.plan(query, s.rng("planner"))
+    return dataclasses.replace(query, motions=s.trajectories.motions) if s.timed else query
 
 
 def run(
@@ -166,10 +180,16 @@ def run(
 
     Args:
         s: the scenario
-        planned: what `plan` returned for the scenario; None: plan first
+        planned: what `plan` returned for the scenario, or a plan of one's own on that grid, which is checked; None: plan
+            first
         progress: is called with the fraction of the route that is done
+
+    Raises:
+        PlannerError: the planner raised something, or returned something that is no `PlanResult`.
     """
     grid, answer = planned or plan(s)
+    if planned and answer.status is not PlanStatus.INVALID:
+        answer = checked(_query(s, grid), answer)
     if not answer.solved:
         return Run(s, grid, answer)
     route = smooth(answer, grid, s.task, kind="none" if s.timed else s.smoothing)

@@ -13,7 +13,7 @@ import pytest
 
 from antdrive.planners import Progress, keep_best, load_planner, watch
 from antdrive.robots import PurePursuit, RobotSpec, load_robot
-from antdrive.sim import Engine, Outcome, Run, Scenario, measure, run
+from antdrive.sim import Engine, Outcome, Run, Scenario, measure, plan, run
 from antdrive.sim.driving.drive import drive
 from antdrive.sim.log.record import SmoothingRecord
 from antdrive.sim.view.figures.plan_figures import plan_figure
@@ -138,6 +138,14 @@ def test_a_planner_that_ends_without_a_path_has_stopped(small_scenario: Scenario
     result = run(replace(small_scenario, planner=blind))
     assert result.outcome is Outcome.STOPPED
     assert result.plan.reason
+
+
+def test_a_plan_of_ones_own_is_checked_before_it_is_driven(small_scenario: Scenario) -> None:
+    grid, right = plan(small_scenario)
+    wrong = run(small_scenario, planned=(grid, replace(right, cost=right.cost + 0.01)))
+    assert (wrong.outcome, wrong.rollout) == (Outcome.INVALID_PLAN, None)
+    assert wrong.reason.startswith("cost: ")
+    assert wrong.as_dict()["outcome"] == "invalid_plan"
 
 
 def test_the_default_planner_is_ants() -> None:
