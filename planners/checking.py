@@ -15,16 +15,12 @@ import numpy as np
 
 from antdrive.planners.graph.sipp import TimedPlan
 from antdrive.planners.plan import Planner, PlanResult, PlanStatus, Query, path_cost
-from antdrive.worlds import DIRECTIONS, Floats
+from antdrive.worlds import Floats
 from antdrive.worlds.errors import InputError, input_error
 from antdrive.worlds.plane import polyline_length, segment_lengths, wrap_angle
 
 RELATIVE = 1e-9  # how far a cost may be off, as a fraction
 NEAR = 1e-6  # m: how far a waypoint may be off, and how much a line may come too close
-#: The bit of `Grid.moves` by row and column step, each + 1; 8 is no bit: no step, or no neighbour.
-BITS = np.full((3, 3), 8)
-for _bit, (_row, _col) in enumerate(DIRECTIONS):
-    BITS[_row + 1, _col + 1] = _bit
 
 
 class PlannerError(RuntimeError):
@@ -186,7 +182,7 @@ def _cells(query: Query, result: PlanResult, off_grid: bool) -> str:
         if tuple(cells[k].tolist()) != wanted:
             return f"cells: the {'first' if k == 0 else 'last'} is {_cell(cells[k])}, but the {key} is {_cell(wanted)}"
     steps = np.diff(cells, axis=0)
-    bits = BITS[tuple(np.clip(steps, -1, 1).T + 1)]
+    bits = _bits()[tuple(np.clip(steps, -1, 1).T + 1)]
     bits[(np.abs(steps) > 1).any(axis=1)] = 8
     wrong = bits == 8
     if not off_grid:
@@ -199,6 +195,16 @@ def _cells(query: Query, result: PlanResult, off_grid: bool) -> str:
     if not off_grid and not _same(result.cost, cost):
         return f"cost: {result.cost:.9g} m, but the cells are {cost:.9g} m long"
     return ""
+
+
+def _bits() -> Any:
+    """The bit of `Grid.moves` by row and column step, each + 1 (3, 3); 8 is no bit, because it is no step."""
+    from antdrive.worlds import DIRECTIONS  # imports the compiler
+
+    bits = np.full((3, 3), 8)
+    for bit, (row, col) in enumerate(DIRECTIONS):
+        bits[row + 1, col + 1] = bit
+    return bits
 
 
 def _cell(cell: Any) -> str:
