@@ -2,6 +2,10 @@ from .anyangle.ga_han import GaHan as GaHan
 from .anyangle.hybrid import Hybrid as Hybrid
 from .anyangle.tangent import Tangent as Tangent
 from .anyangle.tangent import TangentPath as TangentPath
+from .checking import PlannerError as PlannerError
+from .checking import ask as ask
+from .checking import check_plan as check_plan
+from .checking import checked as checked
 from .colonies.aco_han import AcoHan as AcoHan
 from .colonies.ant_system import AgeingAnts as AgeingAnts
 from .colonies.ant_system import AntSystem as AntSystem

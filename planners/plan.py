@@ -30,6 +30,7 @@ class PlanStatus(enum.Enum):
     SOLVED = "found a path"
     NO_PATH = "no path on this grid"
     STOPPED = "stopped early"
+    INVALID = "gave a wrong plan"
 
 
 @dataclass(frozen=True)

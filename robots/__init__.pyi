@@ -13,6 +13,7 @@ from .files import robot_schema as robot_schema
 from .files import robot_to_dict as robot_to_dict
 from .footprint import footprint_clearance as footprint_clearance
 from .noise import NoiseModel as NoiseModel
+from .placing import overlap_at as overlap_at
 from .spec import Footprint as Footprint
 from .spec import Noise as Noise
 from .spec import RobotSpec as RobotSpec

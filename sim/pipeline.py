@@ -17,11 +17,14 @@ from antdrive.planners import (
     PlanResult,
     PlanStatus,
     Query,
+    ask,
+    checked,
     smooth,
 )
-from antdrive.robots import LIMITERS, NoiseModel
+from antdrive.robots import LIMITERS, NoiseModel, TrackedPath
 from antdrive.sim.driving.cellwise import monitor_class
 from antdrive.sim.driving.drive import drive
+from antdrive.sim.driving.leaving import cannot_leave, is_narrow
 from antdrive.sim.driving.perception import Predictor
 from antdrive.sim.driving.recorder import Drive
 from antdrive.sim.driving.replanning import Replan, ReplanMonitor
@@ -47,6 +50,11 @@ from antdrive.worlds.drawing import LINE, card, world_svg
 from antdrive.worlds.errors import FieldError
 
 ROUTE_COLOUR = "#182242"  # of routes in notebooks
+ENDED_BY = {
+    PlanStatus.NO_PATH: Outcome.NO_PATH,
+    PlanStatus.STOPPED: Outcome.STOPPED,
+    PlanStatus.INVALID: Outcome.INVALID_PLAN,
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +80,7 @@ class Run:
         """How the run ended."""
         if self.rollout is not None:
             return self.rollout.outcome
-        return Outcome.NO_PATH if self.plan.status is PlanStatus.NO_PATH else Outcome.STOPPED
+        return ENDED_BY[self.plan.status]
 
     @property
     def reason(self) -> str:
@@ -145,15 +153,49 @@ class Run:
 
 
 def plan(s: Scenario) -> tuple[Grid, PlanResult]:
-    """Rasterise the world of a scenario and plan on it; returns the grid and the planner's answer.
+    """Rasterise the world of a scenario and plan on it; the grid and the planner's answer, checked.
 
-    Movers are not on the grid. A planner in space and time is given their motions.
+    Movers are not on the grid. A planner in space and time is given their motions. A wrong answer is replaced by one
+    without a path, whose status is `INVALID` and whose reason says what is wrong. If the robot has too little room at the
+    start to get away along the path, the answer is `NO_PATH` with the reason.
+
+    Raises:
+        PlannerError: the planner raised something, or returned something that is no `PlanResult`.
     """
     grid = rasterise(s.task.world, s.cell or s.task.cell, s.inflate)
+    query = _query(s, grid)
+    return grid, _drivable(s, grid, checked(query, ask(s.planner, query, s.rng("planner"), s.planner_label)))
+
+
+def _drivable(s: Scenario, grid: Grid, answer: PlanResult) -> PlanResult:
+    """The answer, without its path if the robot cannot get away from its start along it."""
+    world, start = s.task.world, s.task.start
+    if not answer.solved or not is_narrow(world, s.robot, start):
+        return answer
+    _, tracked = _tracked(s, grid, answer)
+    reason = cannot_leave(tracked, s.controller, world, s.robot, start, s.control_hz)
+    if not reason:
+        return answer
+    return PlanResult(
+        status=PlanStatus.NO_PATH,
+        reason=reason,
+        work=answer.work,
+        work_unit=answer.work_unit,
+        options=answer.options,
+        wall_s=answer.wall_s,
+    )
+
+
+def _tracked(s: Scenario, grid: Grid, answer: PlanResult) -> tuple[Route, TrackedPath]:
+    """The route of a plan, and the same prepared for the controller."""
+    route = smooth(answer, grid, s.task, kind="none" if s.timed else s.smoothing)
+    period, tolerance = 1 / s.control_hz, s.task.goal_tolerance
+    return route, s.controller.prepare(route, s.task.world, s.robot, s.margin, period, tolerance)
+
+
+def _query(s: Scenario, grid: Grid) -> Query:
     query = Query.between(grid, s.task)
-    if s.timed:
-        query = dataclasses.replace(query, motions=s.trajectories.motions)
-    return grid, s.planner.plan(query, s.rng("planner"))
+    return dataclasses.replace(query, motions=s.trajectories.motions) if s.timed else query
 
 
 def run(
@@ -166,14 +208,19 @@ def run(
 
     Args:
         s: the scenario
-        planned: what `plan` returned for the scenario; None: plan first
-        progress: called with the fraction of the route that is done
+        planned: what `plan` returned for the scenario, or a plan of one's own on that grid, which is checked; None: plan
+            first
+        progress: is called with the fraction of the route that is done
+
+    Raises:
+        PlannerError: the planner raised something, or returned something that is no `PlanResult`.
     """
     grid, answer = planned or plan(s)
+    if planned and answer.status is not PlanStatus.INVALID:
+        answer = _drivable(s, grid, checked(_query(s, grid), answer))
     if not answer.solved:
         return Run(s, grid, answer)
-    route = smooth(answer, grid, s.task, kind="none" if s.timed else s.smoothing)
-    tracked = s.controller.prepare(route, s.task.world, s.robot, s.margin, 1 / s.control_hz, s.task.goal_tolerance)
+    route, tracked = _tracked(s, grid, answer)
     limit = s.time_limit or s.task.time_limit or 30.0 + 10.0 * route.length / s.robot.max_speed
     started = time.perf_counter()
     noise = s.robot.noise.scaled(s.noise)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from antdrive.planners import SMOOTHINGS, Planner, capabilities_of, load_planner
-from antdrive.robots import Avoidance, PurePursuit, RobotSpec, load_robot
+from antdrive.robots import Avoidance, PurePursuit, RobotSpec, load_robot, overlap_at
 from antdrive.sim.driving.perception import Perception
 from antdrive.sim.driving.replanning import ReplanPolicy
 from antdrive.worlds import Disc, Task, Trajectories, World, load_task
@@ -47,7 +47,7 @@ class Scenario:
         control_hz: control periods per simulated second; must divide `physics_hz`
 
     Raises:
-        ValueError: a setting is out of range.
+        ValueError: a setting is out of range, or the robot's footprint overlaps an obstacle or a wall at the start.
     """
 
     task: Task
@@ -79,6 +79,10 @@ class Scenario:
             raise FieldError("noise", f"{self.noise:g} times the robot's own is too much: {error}") from None
         if self.time_limit is not None and not self.time_limit > 0:
             raise FieldError("time_limit", f"must be greater than 0, got {self.time_limit:g}")
+        overlap = overlap_at(self.task.world, self.robot, self.task.start, self.unseen)
+        if overlap:
+            x, y, _ = self.task.start
+            raise FieldError("start", f"{self.robot.name} at ({x:g}, {y:g}) {overlap}; move the start away from it")
 
     @classmethod
     def of(
@@ -117,7 +121,8 @@ class Scenario:
 
         Raises:
             InputError: there is no such world, planner, option or robot, or a file is wrong.
-            ValueError: a setting is out of range, or `options` are given for a planner object.
+            ValueError: a setting is out of range, the robot does not fit at the start, or `options` are given for a
+                planner object.
         """
         if not isinstance(planner, str) and options:
             raise FieldError("options", "need a planner's name; set the options of a planner object itself")

@@ -10,6 +10,7 @@ from typing import cast
 import numpy as np
 import numpy.typing as npt
 
+from antdrive.planners.checking import ask
 from antdrive.planners.graph.incremental import EditableQuery, Replanner, ReplanningPlanner
 from antdrive.planners.plan import Planner, PlanResult, PlanStatus, Query, capabilities_of, path_cost
 from antdrive.worlds.errors import FieldError
@@ -76,4 +77,4 @@ class ReplanFromScratch(CachedReplanner):
         self._planner, self._rng = planner, rng
 
     def _plan_anew(self, query: Query, changed: npt.NDArray[np.int64]) -> PlanResult:
-        return dataclasses.replace(self._planner.plan(query, self._rng), waypoints=None, length=None)
+        return dataclasses.replace(ask(self._planner, query, self._rng), waypoints=None, length=None)

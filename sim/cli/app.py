@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import sys
+import traceback
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Annotated, Any
@@ -29,8 +30,8 @@ from antdrive.sim.cli.commands.worlds.import_ import import_world
 from antdrive.sim.cli.commands.worlds.list import list_worlds
 from antdrive.sim.cli.commands.worlds.show import show_world
 from antdrive.sim.cli.console import print_error, print_line
-from antdrive.sim.cli.exits import INTERRUPTED, SUCCEEDED, TERMINATED, WRONG_INPUT
-from antdrive.worlds.errors import FieldError, InputError
+from antdrive.sim.cli.exits import FAULT, INTERRUPTED, SUCCEEDED, TERMINATED, WRONG_INPUT
+from antdrive.worlds.errors import FieldError, InputError, input_error
 
 #: The commands by name, in the order in which `antdrive --help` lists them. Each returns its exit code.
 COMMANDS: Mapping[str, Callable[..., int]] = MappingProxyType(
@@ -64,11 +65,20 @@ WORLDS: Mapping[str, Callable[..., int]] = MappingProxyType(
 _USAGE_ERROR: Any = typer.BadParameter.__mro__[2]
 
 
+HELP = """Plan paths, drive them in physics, certify the drives and film them.
+
+Exit codes: 0: success. 1: the drive or the plan failed, or a log proves nothing. 2: wrong input. 3: a fault of a planner or of
+antdrive. 130, 143: interrupted.
+"""
+DEBUG = "--debug"  # is taken wherever it stands, so that it can be added to a command that failed
+
+
 def main() -> None:
     """Run the command line; the exit code says how it ended."""
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(TERMINATED))  # ends like Ctrl-C: temporary files are removed
+    words = [word for word in sys.argv[1:] if word != DEBUG]
     try:
-        code = application()(standalone_mode=False)
+        code = application()(args=words, standalone_mode=False)
     except (InputError, FieldError) as error:
         print_error(str(error))
         code = WRONG_INPUT
@@ -80,6 +90,9 @@ def main() -> None:
     except _USAGE_ERROR as error:
         _print_usage_error(error)
         code = WRONG_INPUT
+    except Exception as error:
+        _print_fault(error, debug=DEBUG in sys.argv[1:])
+        code = FAULT
     if code == INTERRUPTED:  # typer turns Ctrl-C within a command into this code
         print_error("interrupted")
     sys.exit(code if isinstance(code, int) else SUCCEEDED)
@@ -89,7 +102,7 @@ def application() -> typer.Typer:
     """The command line as typer runs it."""
     app = typer.Typer(
         name="antdrive",
-        help="Plan paths, drive them in physics, certify the drives and film them.",
+        help=HELP,
         no_args_is_help=True,
         rich_markup_mode=None,
         pretty_exceptions_enable=False,
@@ -119,8 +132,24 @@ def _global_options(
     version: Annotated[
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version and exit.")
     ] = False,
+    debug: Annotated[
+        bool, typer.Option(DEBUG, help="Show the traceback of a fault, with exit code 3; may stand anywhere.")
+    ] = False,
 ) -> None:
     pass
+
+
+def _print_fault(error: Exception, debug: bool) -> None:
+    """Print one line about a fault of a planner or of antdrive itself; with `debug`, the traceback before it."""
+    from antdrive.planners import PlannerError
+
+    if debug:
+        traceback.print_exception(error)
+    if isinstance(error, PlannerError):
+        says = str(error)
+    else:
+        says = str(input_error("internal error", type(error).__name__, *filter(None, [str(error)])))
+    print_error(says if debug else f"{says} (run again with {DEBUG} for the traceback)")
 
 
 def _print_usage_error(error: Any) -> None:

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any, get_args
 
 from antdrive.sim.cli.parse import pair
-from antdrive.worlds.errors import InputError
+from antdrive.worlds.errors import InputError, input_error
 
 if TYPE_CHECKING:
     from antdrive.robots import PurePursuit
@@ -32,6 +32,8 @@ def make_scenario(world: str, planner: str, settings: list[str] | None, robot: s
         raise
     except ValueError as error:
         field, _, problem = str(error).partition(": ")
+        if field == "start":  # no option sets it
+            raise input_error(world, str(error)) from None
         raise InputError(f"--{field.replace('_', '-')}: {problem}") from None
 
 

@@ -24,7 +24,9 @@ from antdrive.planners import (
     PlanResult,
     Query,
     TimedPlan,
+    ask,
     capabilities_of,
+    checked,
     replanner_for,
     smooth,
 )
@@ -222,14 +224,15 @@ class ReplanMonitor:
     def _plan_in_time(self, task: Task, now: float) -> PlanResult:
         query = Query.between(self._grid, task)
         query = dataclasses.replace(query, motions=self._predictor.trajectories.motions, start_time=now)
-        return self._planner.plan(query, self._rng)
+        return checked(query, ask(self._planner, query, self._rng))
 
     def _plan(self, task: Task, discs: list[Disc]) -> PlanResult:
         """A plan around discs: by the planner itself if it needs the world, else by its replanner."""
         if capabilities_of(self._planner).needs_world:
             around = with_obstacles(task, discs)
             grid = rasterise(around.world, self._grid.cell, self._grid.inflate)
-            return self._planner.plan(Query.between(grid, around), self._rng)
+            query = Query.between(grid, around)
+            return checked(query, ask(self._planner, query, self._rng))
         query = Query.between(self._grid, task)
         if self._replanner is None:
             self._replanner = replanner_for(self._planner, query, self._rng)
@@ -239,7 +242,7 @@ class ReplanMonitor:
         self._replanner.block(np.argwhere(blocked & ~self._blocked))
         self._blocked = blocked
         self._replanner.move(query.start)
-        return self._replanner.result()
+        return checked(query, self._replanner.result())
 
     def _discs(self, tick: int, pose: Pose) -> list[Disc]:
         """What movers will cover soon; they close neither the robot's position nor the goal."""

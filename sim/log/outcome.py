@@ -13,7 +13,7 @@ class Outcome(enum.Enum):
     The first contact ends a drive, and the outcome says who caused the contact; `antdrive.sim.log.contacts` has the
     exact rule. `COLLIDED` is the robot's own doing, also when a mover comes towards the driving robot. The planner is
     not blamed for `HIT_WHILE_STANDING` and `HIT_BY_TELEPORT`, but neither is a success, and no drive with a contact is
-    certified. `NO_PATH` and `STOPPED` end a run before the robot drives, so that there is no rollout.
+    certified. `NO_PATH`, `STOPPED` and `INVALID_PLAN` end a run before the robot drives, so that there is no rollout.
 
     `antdrive run` exits with 0 if the run ended with `SUCCEEDED` and the drive is certified, else with 1.
     """
@@ -26,6 +26,7 @@ class Outcome(enum.Enum):
     STUCK = "stopped making progress"
     NO_PATH = "no path on this grid"
     STOPPED = "planning stopped early"
+    INVALID_PLAN = "the planner gave a wrong plan"
 
     @property
     def key(self) -> str:

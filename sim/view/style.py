@@ -53,6 +53,7 @@ VERDICTS: Mapping[Outcome, tuple[str, Colour]] = MappingProxyType(
         Outcome.STUCK: ("STUCK", DOUBT),
         Outcome.NO_PATH: ("NO PATH", DOUBT),
         Outcome.STOPPED: ("STOPPED", DOUBT),
+        Outcome.INVALID_PLAN: ("INVALID PLAN", BAD),
     }
 )
 

@@ -9,7 +9,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from antdrive.planners import PLANNERS, Planner, PlanResult, PlanStatus, Query, capabilities_of, load_planner, path_cost
+from antdrive.planners import (
+    PLANNERS,
+    Planner,
+    PlanResult,
+    PlanStatus,
+    Query,
+    capabilities_of,
+    check_plan,
+    load_planner,
+    path_cost,
+)
 from antdrive.worlds import DIRECTIONS, Grid, InputError, polyline_clearance
 from tests.planners.worlds_to_solve import catalogue, optimum, random_query, sealed
 
@@ -28,7 +38,10 @@ def quick(name: str) -> Planner:
 
 
 def solve(name: str, query: Query, seed: int = 0) -> PlanResult:
-    return quick(name).plan(query, np.random.default_rng(seed))
+    """A planner's answer, which `check_plan` accepts whatever it is."""
+    result = quick(name).plan(query, np.random.default_rng(seed))
+    assert check_plan(query, result) == ""
+    return result
 
 
 def assert_valid(result: PlanResult, query: Query) -> None:

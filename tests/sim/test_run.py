@@ -13,11 +13,11 @@ import pytest
 
 from antdrive.planners import Progress, keep_best, load_planner, watch
 from antdrive.robots import PurePursuit, RobotSpec, load_robot
-from antdrive.sim import Engine, Outcome, Run, Scenario, measure, run
+from antdrive.sim import Engine, Outcome, Run, Scenario, measure, plan, run
 from antdrive.sim.driving.drive import drive
 from antdrive.sim.log.record import SmoothingRecord
 from antdrive.sim.view.figures.plan_figures import plan_figure
-from antdrive.worlds import Disc, InputError, Route, Task, World, list_worlds, load_task, save_task
+from antdrive.worlds import Disc, FieldError, InputError, Route, Task, World, list_worlds, load_task, save_task
 
 
 def test_a_run_ends_at_the_goal_certified(small_run: Run) -> None:
@@ -140,6 +140,27 @@ def test_a_planner_that_ends_without_a_path_has_stopped(small_scenario: Scenario
     assert result.plan.reason
 
 
+def test_a_start_that_overlaps_an_obstacle_is_wrong_input(turtlebot: RobotSpec) -> None:
+    task = Task(World("w", (0, 0, 6, 4), (Disc(2.5, 1.8, 0.4),)), (3.0, 2.0, 0.0), (5.3, 2.0))
+    with pytest.raises(
+        FieldError, match=r"start: turtlebot at \(3, 2\) overlaps obstacles\[0\] .* by 0\.0\d+ m"
+    ) as found:
+        Scenario(task=task, planner=load_planner("astar"), robot=turtlebot)
+    assert found.value.key == "start"
+    away = replace(task, start=(3.2, 2.0, 0.0))
+    free = Scenario(task=away, planner=load_planner("astar"), robot=turtlebot)
+    with pytest.raises(FieldError, match=r"overlaps unseen\[0\]"):
+        replace(free, unseen=(Disc(3.2, 2.3, 0.2),))
+
+
+def test_a_plan_of_ones_own_is_checked_before_it_is_driven(small_scenario: Scenario) -> None:
+    grid, right = plan(small_scenario)
+    wrong = run(small_scenario, planned=(grid, replace(right, cost=right.cost + 0.01)))
+    assert (wrong.outcome, wrong.rollout) == (Outcome.INVALID_PLAN, None)
+    assert wrong.reason.startswith("cost: ")
+    assert wrong.as_dict()["outcome"] == "invalid_plan"
+
+
 def test_the_default_planner_is_ants() -> None:
     assert Scenario.of("empty").planner_name == "ants"
 
@@ -204,7 +225,11 @@ def test_no_obstacle_is_too_low_to_be_touched(small_scenario: Scenario, collided
 
 
 @pytest.mark.parametrize("gap", [-0.03, -0.08, -0.15])
-def test_a_start_that_touches_is_a_collision_at_once(turtlebot: RobotSpec, gap: float) -> None:
+def test_a_start_that_touches_is_a_collision_at_once(
+    turtlebot: RobotSpec, gap: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Physics and the certificate see it, too, should a scenario ever let it pass."""
+    monkeypatch.setattr("antdrive.sim.scenario.overlap_at", lambda *_: "")
     start = (0.6 + 0.1 + turtlebot.radius + gap, 1.5, 0)
     task = Task(World("w", (0, 0, 4, 3), (Disc(0.6, 1.5, 0.1),)), start, (3.4, 1.5), cell=0.2)
     result = run(Scenario(task=task, planner=load_planner("astar"), robot=turtlebot))

@@ -4,13 +4,16 @@ import json
 import re
 import subprocess
 import sys
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import typer
 
-from antdrive.planners import Progress, watch
+from antdrive.planners import PLANNERS, PlanResult, Progress, Query, watch
 from antdrive.sim.cli.app import COMMANDS, WORLDS, application
 from tests.sim.cli.calling import Call, Refused
 
@@ -102,3 +105,89 @@ def test_a_full_disk_is_one_line(refused: Refused, monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr("antdrive.worlds.save_task", full)
     assert refused("worlds", "generate", "forest", "-o", "w.yaml") == "antdrive: w.yaml: No space left on device\n"
+
+
+class Faulty:
+    """A planner of somebody else that gets it wrong."""
+
+    def __init__(self, answer: Any) -> None:
+        self.answer = answer
+
+    def plan(self, query: Query, rng: Any) -> PlanResult:
+        if isinstance(self.answer, Exception):
+            raise self.answer
+        right = PLANNERS["astar"].plan(query, rng)
+        return self.answer(right) if callable(self.answer) else self.answer  # type: ignore[no-any-return]
+
+
+@pytest.fixture
+def faulty(monkeypatch: pytest.MonkeyPatch) -> Callable[[Any], None]:
+    """Make a planner `mine` known that answers so, or raises."""
+
+    def install(answer: Any) -> None:
+        monkeypatch.setattr("antdrive.planners.registry.PLANNERS", {**PLANNERS, "mine": Faulty(answer)})
+
+    return install
+
+
+@pytest.mark.parametrize("command", ["run", "plan"])
+@pytest.mark.parametrize(
+    ("answer", "says"),
+    [
+        (ZeroDivisionError("by zero"), r"raised ZeroDivisionError: by zero \(test_app\.py:\d+\)"),
+        (ValueError(), r"raised ValueError \(test_app\.py:\d+\)"),
+        (OSError(2, "No such file", "x"), r"raised FileNotFoundError: .* \(test_app\.py:\d+\)"),
+        (None, r"returned None where a PlanResult is due \(test_app\.py:\d+\)"),
+    ],
+    ids=["ZeroDivisionError", "ValueError", "OSError", "None"],
+)
+def test_a_fault_of_a_planner_is_one_line_with_exit_code_3(
+    antdrive: Call, small: Path, faulty: Callable[[Any], None], command: str, answer: Any, says: str
+) -> None:
+    faulty(answer)
+    code, out, err = antdrive(command, small, "-p", "mine")
+    assert (code, out) == (3, "")
+    assert re.fullmatch(rf"antdrive: planner mine {says} \(run again with --debug for the traceback\)\n", err)
+
+
+@pytest.mark.parametrize("place", [0, 4])
+def test_debug_shows_the_traceback_wherever_it_stands(
+    antdrive: Call, small: Path, faulty: Callable[[Any], None], place: int
+) -> None:
+    faulty(ZeroDivisionError("by zero"))
+    words: list[str | Path] = ["run", small, "-p", "mine"]
+    words.insert(place, "--debug")
+    code, _, err = antdrive(*words)
+    assert code == 3
+    assert err.startswith("Traceback")
+    assert re.fullmatch(r"antdrive: planner mine raised ZeroDivisionError: .*:\d+\)", err.splitlines()[-1])
+
+
+def test_any_other_exception_is_one_line_with_exit_code_3(antdrive: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise ValueError("two\nlines")
+
+    monkeypatch.setattr("antdrive.sim.pipeline.plan", fail)
+    code, out, err = antdrive("run", "empty")
+    assert (code, out) == (3, "")
+    assert err == r"antdrive: internal error: ValueError: two\nlines (run again with --debug for the traceback)" + "\n"
+
+
+def test_a_wrong_plan_is_an_outcome_and_is_not_driven(
+    antdrive: Call, small: Path, faulty: Callable[[Any], None]
+) -> None:
+    faulty(lambda right: replace(right, cells=np.delete(right.cells, 2, axis=0)))
+    code, out, err = antdrive("run", small, "-p", "mine", "--json", "-o", "r")
+    result = json.loads(out)
+    assert (code, err, result["outcome"], result["digest"]) == (1, "", "invalid_plan", None)
+    assert result["reason"].startswith("cells: step 1 from ")
+    assert not Path("r/rollout.npz").exists()
+    code, out, err = antdrive("plan", small, "-p", "mine")
+    assert (code, err) == (1, "")
+    assert "mine gave a wrong plan (cells: step 1 from " in out
+
+
+def test_the_help_explains_the_exit_codes(antdrive: Call) -> None:
+    words = " ".join(antdrive("--help")[1].split())
+    for code in ("0: success", "1: the drive", "2: wrong input", "3: a fault", "--debug"):
+        assert code in words

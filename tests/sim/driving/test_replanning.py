@@ -9,7 +9,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from antdrive.planners import PLANNERS, PlanStatus, TimedPlan, capabilities_of, load_planner, smooth
+from antdrive.planners import (
+    PLANNERS,
+    PlannerError,
+    PlanResult,
+    PlanStatus,
+    Query,
+    TimedPlan,
+    capabilities_of,
+    load_planner,
+    smooth,
+)
 from antdrive.robots import RobotSpec, TrackedPath, Twist
 from antdrive.sim import Outcome, ReplanPolicy, Rollout, Run, Scenario, certify, plan, run
 from antdrive.sim.driving.perception import Predictor
@@ -292,3 +302,34 @@ def test_a_command_is_slowed_down_no_faster_than_the_robot_brakes() -> None:
 def test_settings_out_of_range_are_refused() -> None:
     with pytest.raises(ValueError, match="max_wait: must be at least 0 and finite, got nan"):
         ReplanPolicy(max_wait=math.nan)
+
+
+class WrongLater:
+    """A planner whose first plan is right; later ones lack a cell, or it raises."""
+
+    def __init__(self, raises: bool) -> None:
+        self.raises, self.calls = raises, 0
+
+    def plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        right = PLANNERS["astar"].plan(query, rng)
+        self.calls += 1
+        if self.calls == 1 or len(right.cells) < 4:
+            return right
+        if self.raises:
+            raise KeyError("later")
+        return dataclasses.replace(right, cells=np.delete(right.cells, 2, axis=0))
+
+
+def test_a_wrong_plan_on_the_way_is_no_new_route() -> None:
+    planner = WrongLater(raises=False)
+    task = dataclasses.replace(TASK, world=dataclasses.replace(HALL, movers=(PLUG,)))
+    result = run(Scenario.of(task, planner, time_limit=10.0))
+    assert result.rollout is not None
+    assert planner.calls > 1
+    assert not any(replan.solved for replan in result.rollout.record.replans)
+
+
+def test_a_planner_that_raises_on_the_way_is_named() -> None:
+    task = dataclasses.replace(TASK, world=dataclasses.replace(HALL, movers=(PLUG,)))
+    with pytest.raises(PlannerError, match=r"planner WrongLater raised KeyError: 'later' \(test_replanning.py:"):
+        run(Scenario.of(task, WrongLater(raises=True)))

@@ -24,13 +24,15 @@ def show_world(
 ) -> int:
     """Describe a world, and whether a robot can cross it."""
     from antdrive.planners import Query, load_planner, reachable
-    from antdrive.robots import load_robot
+    from antdrive.robots import list_robots, load_robot, overlap_at
     from antdrive.worlds import load_task, rasterise, task_to_dict
 
     task, spec = load_task(world), load_robot(robot)
     grid = rasterise(task.world, task.cell, spec.radius + margin)
     query = Query.between(grid, task)
-    passable = query.blocked_end is None and reachable(query)
+    known = {name: load_robot(name) for name in list_robots()}
+    starts = {each.name: overlap_at(task.world, each, task.start) for each in (*known.values(), spec)}
+    passable = not starts[spec.name] and query.blocked_end is None and reachable(query)
     if out is not None:
         import numpy as np
 
@@ -38,10 +40,12 @@ def show_world(
 
         plan_figure(task, grid, load_planner("astar").plan(query, np.random.default_rng(0)), spec, out)
     if json:
-        print_json({**task_to_dict(task), "passable": passable, "robot": spec.name, "margin": margin})
+        print_json({**task_to_dict(task), "passable": passable, "robot": spec.name, "margin": margin, "starts": starts})
         return SUCCEEDED
     for key, value in task_facts(task).items():
         print_line(f"{key + UNITS.get(key, ''):18} {value}")
     print_line(f"{'passable':18} {'yes' if passable else 'no'}, for {spec.name} with a margin of {margin:g} m")
+    for name, overlap in starts.items():
+        print_line(f"{'start for ' + name:18} {overlap or 'free'}")
     print_files({} if out is None else {"figure": str(out)})
     return SUCCEEDED

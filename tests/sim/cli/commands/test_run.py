@@ -5,7 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from antdrive.robots import list_robots
 from antdrive.sim import Run
+from antdrive.worlds import Disc, Task, World, save_task
 from tests.sim.cli.calling import Call, Refused
 
 
@@ -151,3 +153,19 @@ def test_a_window_needs_a_display(refused: Refused, monkeypatch: pytest.MonkeyPa
 def test_wrong_input_is_one_line_and_exit_code_2(refused: Refused, words: list[str], says: str, tmp_path: Path) -> None:
     (tmp_path / "folder.mp4").mkdir()
     assert says in refused(*words)
+
+
+def test_a_start_that_overlaps_an_obstacle_is_refused_by_name(refused: Refused, antdrive: Call, tmp_path: Path) -> None:
+    world = World("tight", (0, 0, 6, 4), (Disc(2.5, 1.8, 0.4),))
+    save_task(Task(world, (3.0, 2.0, 0.0), (5.3, 2.0)), tmp_path / "tight.yaml")
+    for command in (["run"], ["plan"], ["compare", "-p", "dijkstra"]):
+        line = refused(command[0], "tight.yaml", "-p", "astar", *command[1:])
+        assert line.startswith("antdrive: tight.yaml: start: turtlebot at (3, 2) overlaps obstacles[0] at (2.5, 1.8)")
+    assert "overlaps unseen[0]" in refused("run", "empty", "--unseen", "1,1,0.5", "--unseen", "3,3,0.5")
+    _, out, _ = antdrive("worlds", "show", "tight.yaml")
+    assert "passable           no" in out
+    for robot in list_robots():
+        assert f"start for {robot}" in out
+    assert "start for turtlebot overlaps obstacles[0] at" in out
+    starts = json.loads(antdrive("worlds", "show", "gate", "--json")[1])["starts"]
+    assert starts == dict.fromkeys(list_robots(), "")

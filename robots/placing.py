@@ -1,0 +1,67 @@
+"""Whether a robot fits where it stands, and what is in its way. Needs numpy alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.robots.spec import RobotSpec
+from antdrive.worlds import Disc, Floats, Pose, World
+
+WALLS = ("the left wall", "the lower wall", "the right wall", "the upper wall")
+
+
+def gaps(world: World, robot: RobotSpec, poses: npt.ArrayLike) -> Floats:
+    """The distance from the robot's footprint to each obstacle and then each of `WALLS`, negative in it, (P, N + 4) [m].
+
+    Args:
+        world: the obstacles and walls; movers do not count
+        robot: the robot
+        poses: x, y and yaw of the robot's centre (P, 3) [m, rad]
+    """
+    x, y, yaw = np.asarray(poses, dtype=np.float64).reshape(-1, 3, 1).swapaxes(0, 1)
+    foot, discs = robot.footprint, world.discs
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    dx, dy = discs[:, 0] - x, discs[:, 1] - y
+    ahead, beside = np.abs(cos * dx + sin * dy) - foot.half_length, np.abs(cos * dy - sin * dx) - foot.half_width
+    outside = np.hypot(np.maximum(ahead, 0.0), np.maximum(beside, 0.0))
+    to_discs = outside + np.minimum(np.maximum(ahead, beside), 0.0) - foot.rounding - discs[:, 2]
+    reach_x = foot.half_length * np.abs(cos) + foot.half_width * np.abs(sin) + foot.rounding
+    reach_y = foot.half_length * np.abs(sin) + foot.half_width * np.abs(cos) + foot.rounding
+    xmin, ymin, xmax, ymax = world.bounds
+    return np.hstack([to_discs, x - reach_x - xmin, y - reach_y - ymin, xmax - x - reach_x, ymax - y - reach_y])
+
+
+def name_of(world: World, index: int, unseen: int = 0) -> str:
+    """What messages call an obstacle or a wall.
+
+    Args:
+        world: the obstacles and walls
+        index: the column of `gaps`
+        unseen: how many of the obstacles, the last ones, nobody knows of
+    """
+    count = len(world.obstacles)
+    if index >= count:
+        return WALLS[index - count]
+    disc, known = world.obstacles[index], count - unseen
+    key = f"obstacles[{index}]" if index < known else f"unseen[{index - known}]"
+    return f"{key} at ({disc.x:g}, {disc.y:g}) with radius {disc.radius:g}"
+
+
+def overlap_at(world: World, robot: RobotSpec, pose: Pose, unseen: tuple[Disc, ...] = ()) -> str:
+    """What the robot's footprint overlaps or touches most at a pose, and by how much; empty where it fits.
+
+    Args:
+        world: the obstacles and walls; movers do not count
+        robot: the robot
+        pose: x, y and yaw of its centre [m, rad]
+        unseen: further obstacles
+    """
+    full = World(world.name, world.bounds, world.obstacles + unseen)
+    gap = gaps(full, robot, [pose])[0]
+    worst = int(gap.argmin())
+    if gap[worst] > 0:
+        return ""
+    depth = -float(gap[worst])
+    touches = f"overlaps {{}} by {depth:.3g} m" if depth > 1e-9 else "touches {}"
+    return touches.format(name_of(full, worst, len(unseen)))
