@@ -169,8 +169,9 @@ class RobotSpec:
         for key in ("height", "mass", "wheel_radius", "track"):
             _require_range(key, getattr(self, key))
         foot = self.footprint
-        if not (foot.half_length >= 0 and foot.half_width >= 0 and foot.rounding >= 0):
-            raise FieldError("footprint", "must have sizes of at least 0")
+        for key in ("half_length", "half_width", "rounding"):
+            if not getattr(foot, key) >= 0:
+                raise FieldError(f"footprint.{key}", f"must be at least 0, got {getattr(foot, key):g}")
         for side in (foot.half_length, foot.half_width):
             _require_range("footprint", 2 * (side + foot.rounding))
         self._require_wheels_inside()
