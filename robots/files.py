@@ -8,9 +8,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
-from antdrive.robots.spec import NOISE_RANGE, Footprint, Noise, RobotSpec
+from antdrive.robots.feasible import require_feasible
+from antdrive.robots.spec import NOISE_RANGE, ROBOT_RANGE, Footprint, Noise, RobotSpec
 from antdrive.worlds.errors import FieldError, input_error
 from antdrive.worlds.files.checks import SchemaVersion, check, suggest
 from antdrive.worlds.files.document import Document, read_document
@@ -18,7 +19,7 @@ from antdrive.worlds.files.document import Document, read_document
 _CATALOG = Path(__file__).with_name("catalog")
 _RULES = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
 
-Positive = Annotated[float, Field(gt=0, le=1e6)]
+_Size = Annotated[float, Field(gt=0)]
 
 
 class FootprintEntry(BaseModel):
@@ -26,9 +27,9 @@ class FootprintEntry(BaseModel):
 
     model_config = _RULES
 
-    radius: Positive | None = Field(None, description="radius of a round robot [m]")
-    length: Positive | None = Field(None, description="length of a rectangular robot, along its heading [m]")
-    width: Positive | None = Field(None, description="width of a rectangular robot [m]")
+    radius: _Size | None = Field(None, description="radius of a round robot [m]")
+    length: _Size | None = Field(None, description="length of a rectangular robot, along its heading [m]")
+    width: _Size | None = Field(None, description="width of a rectangular robot [m]")
 
     @model_validator(mode="after")
     def _one_kind(self) -> FootprintEntry:
@@ -47,6 +48,11 @@ class FootprintEntry(BaseModel):
 def _level(key: str, description: str) -> Any:
     low, high = NOISE_RANGE[key]
     return Field(getattr(Noise(), key), ge=low, le=high, description=description)
+
+
+def _number(key: str, description: str, default: Any = ...) -> Any:
+    low, high = ROBOT_RANGE[key]
+    return Field(default, ge=low, le=high, description=description)
 
 
 class NoiseEntry(BaseModel):
@@ -73,21 +79,28 @@ class RobotFile(BaseModel):
     footprint: FootprintEntry = Field(
         description="write {radius: 0.18} for a disc or {length: 0.5, width: 0.4} for a rectangle [m]"
     )
-    height: Positive = Field(description="height of the body [m]")
-    mass: Positive = Field(description="mass of the whole robot [kg]")
-    wheel_radius: Positive = Field(description="radius of the driven wheels [m]")
-    track: Positive = Field(description="distance between the driven wheels [m]")
-    max_speed: Positive = Field(description="limit of the forward speed [m/s]")
-    max_yaw_rate: Positive = Field(description="limit of the yaw rate [rad/s]")
-    max_acceleration: Positive = Field(description="limit of acceleration and deceleration [m/s^2]")
-    max_yaw_acceleration: Positive = Field(description="limit of the change of the yaw rate [rad/s^2]")
-    max_lateral_acceleration: Positive = Field(description="limit of speed times yaw rate [m/s^2]")
-    max_wheel_speed: Positive = Field(description="limit of each wheel's speed [rad/s]")
-    wheel_torque: Positive = Field(description="highest torque of each wheel's motor [N m]")
-    wheel_friction: Positive = Field(1.5, description="Coulomb friction coefficient of the wheels on the floor")
+    height: float = _number("height", "height of the body [m]")
+    mass: float = _number("mass", "mass of the whole robot [kg]")
+    wheel_radius: float = _number("wheel_radius", "radius of the driven wheels [m]")
+    track: float = _number("track", "distance between the driven wheels [m]")
+    max_speed: float = _number("max_speed", "limit of the forward speed [m/s]")
+    max_yaw_rate: float = _number("max_yaw_rate", "limit of the yaw rate [rad/s]")
+    max_acceleration: float = _number("max_acceleration", "limit of acceleration and deceleration [m/s^2]")
+    max_yaw_acceleration: float = _number("max_yaw_acceleration", "limit of the change of the yaw rate [rad/s^2]")
+    max_lateral_acceleration: float = _number("max_lateral_acceleration", "limit of speed times yaw rate [m/s^2]")
+    max_wheel_speed: float = _number("max_wheel_speed", "limit of each wheel's speed [rad/s]")
+    wheel_torque: float = _number("wheel_torque", "highest torque of each wheel's motor [N m]")
+    wheel_friction: float = _number("wheel_friction", "Coulomb friction coefficient of the wheels on the floor", 1.5)
     noise: NoiseEntry = Field(
         NoiseEntry(), description="errors of pose, encoders and wheels, and delay; `--noise` multiplies them"
     )
+
+    @field_validator("name")
+    @classmethod
+    def _one_line(cls, name: str) -> str:
+        if not name.isprintable():
+            raise ValueError("must be one line of printable characters")
+        return name
 
 
 def list_robots() -> Mapping[str, Path]:
@@ -111,7 +124,7 @@ def load_robot(robot: str | os.PathLike[str]) -> RobotSpec:
         raise input_error(os.fspath(robot), f"no such file and no such robot in the catalogue; {hint}")
     document = read_document(path)
     if isinstance(document.data, dict):
-        document.data.setdefault("name", path.stem)
+        document.data.setdefault("name", "".join(filter(str.isprintable, path.stem))[:200] or "robot")
     entry = check(RobotFile, document)
     return _to_spec(entry, document)
 
@@ -128,9 +141,11 @@ def _to_spec(entry: RobotFile, document: Document) -> RobotSpec:
     values["footprint"] = entry.footprint.footprint()
     values["noise"] = Noise(**dict(entry.noise))
     try:
-        return RobotSpec(**values)
+        robot = RobotSpec(**values)
+        require_feasible(robot)
     except FieldError as error:
         raise document.field_error(error) from None
+    return robot
 
 
 def robot_to_dict(robot: RobotSpec) -> dict[str, Any]:

@@ -98,6 +98,25 @@ class Noise:
         return any(getattr(self, f.name) for f in dataclasses.fields(self) if f.name != "pose_rate")
 
 
+#: The lowest and highest value of each number in a robot's file: the robots that antdrive is meant for.
+ROBOT_RANGE = {
+    "footprint": (0.02, 20.0),  # diameter, length, width
+    "height": (0.01, 10.0),
+    "mass": (0.01, 1e5),
+    "wheel_radius": (0.005, 5.0),
+    "track": (0.01, 20.0),
+    "max_speed": (0.05, 10.0),  # slower ones would count as standing; faster ones wobble
+    "max_yaw_rate": (0.05, 50.0),
+    "max_acceleration": (0.01, 100.0),
+    "max_yaw_acceleration": (0.01, 1000.0),
+    "max_lateral_acceleration": (0.01, 100.0),
+    "max_wheel_speed": (0.1, 1e4),
+    "wheel_torque": (1e-6, 1e6),
+    "wheel_friction": (0.1, 100.0),
+}
+WHEEL_ROOM = 0.05  # the least distance from a wheel's middle to the footprint's edge, in wheel radii
+
+
 @dataclass(frozen=True, kw_only=True)
 class RobotSpec:
     """A differential-drive robot: two driven wheels on one axle through the centre, and two casters.
@@ -121,7 +140,8 @@ class RobotSpec:
         source: where these values come from
 
     Raises:
-        ValueError: a value is not positive, or the wheels stand outside the footprint.
+        FieldError: a value is not positive, a size or the mass is outside its ROBOT_RANGE, or the wheels stand
+            outside the footprint.
     """
 
     name: str
@@ -146,8 +166,17 @@ class RobotSpec:
             value = getattr(self, field.name)
             if isinstance(value, float | int) and not (math.isfinite(value) and value > 0):
                 raise FieldError(field.name, f"must be greater than 0, got {value:g}")
-        if not self.footprint.radius > 0:
-            raise FieldError("footprint", "must be larger than a point")
+        for key in ("height", "mass", "wheel_radius", "track"):
+            _require_range(key, getattr(self, key))
+        foot = self.footprint
+        for key in ("half_length", "half_width", "rounding"):
+            if not getattr(foot, key) >= 0:
+                raise FieldError(f"footprint.{key}", f"must be at least 0, got {getattr(foot, key):g}")
+        for side in (foot.half_length, foot.half_width):
+            _require_range("footprint", 2 * (side + foot.rounding))
+        self._require_wheels_inside()
+
+    def _require_wheels_inside(self) -> None:
         # Only the chassis detects contacts, so no part of a wheel may stand outside it.
         foot, half_track = self.footprint, self.track / 2
         if foot.is_disc and math.hypot(half_track, self.wheel_radius) > foot.rounding:
@@ -158,14 +187,32 @@ class RobotSpec:
             raise FieldError("track", f"wheels {self.track:g} m apart stand outside the footprint")
         if not foot.is_disc and self.wheel_radius > foot.half_length + foot.rounding:
             raise FieldError("wheel_radius", f"wheels of {self.wheel_radius:g} m stand outside the footprint")
+        if self.wheel_room < WHEEL_ROOM * self.wheel_radius:
+            raise FieldError(
+                "track",
+                f"wheels {self.track:g} m apart have their middles {self.wheel_room:g} m from the footprint's edge; "
+                f"their own width needs {WHEEL_ROOM * self.wheel_radius:g} m",
+            )
 
     @property
     def radius(self) -> float:
         """Radius of the footprint's circumscribed circle, by which planners inflate obstacles [m]."""
         return self.footprint.radius
 
+    @property
+    def wheel_room(self) -> float:
+        """Distance from the middle of a wheel to the footprint's edge, seen from above [m]."""
+        foot = self.footprint
+        return min(foot.half_length, foot.half_width - self.track / 2) + foot.rounding
+
     def _repr_html_(self) -> str:
         """The robot as notebooks show it."""
         from antdrive.robots.drawing import robot_card
 
         return robot_card(self)
+
+
+def _require_range(key: str, value: float) -> None:
+    low, high = ROBOT_RANGE[key]
+    if not low <= value <= high:
+        raise FieldError(key, f"must be between {low:g} and {high:g}, got {value:g}")

@@ -10,7 +10,7 @@ import numpy as np
 
 from antdrive.worlds.drawing import card, world_svg
 from antdrive.worlds.errors import FieldError, require_finite, require_positive
-from antdrive.worlds.limits import MAX_CELLS
+from antdrive.worlds.limits import MAX_CELLS, MAX_WALK
 from antdrive.worlds.motions import first_cell, motion_of
 from antdrive.worlds.movers import Cruising, Mover, Wandering, later
 from antdrive.worlds.types import Bounds, Floats, Point, Pose
@@ -54,7 +54,8 @@ class World:
         movers: the cylinders that move; `Trajectories` computes where they are
 
     Raises:
-        FieldError: bounds that enclose nothing or are not finite, or a mover without room where it begins.
+        FieldError: bounds that enclose nothing or are not finite, a mover without room where it begins, or wanderers
+            with more steps behind them than can be drawn at once.
     """
 
     name: str
@@ -74,6 +75,7 @@ class World:
                 self._require_room(mover)
             except FieldError as error:
                 raise error.under(f"movers[{i}]") from None
+        self._require_short_walks()
 
     def later(self, seconds: float) -> World:
         """The same world, with every mover further into its motion when a run starts.
@@ -97,6 +99,18 @@ class World:
                 raise FieldError("walk.cell", f"{mover.cell:g} m cuts this world into more than {MAX_CELLS} cells")
             if mover.start is not None:
                 first_cell(mover, self.bounds, self.discs)
+
+    def _require_short_walks(self) -> None:
+        """Refuse phases of wanderers that are too many steps: they are drawn one by one before a run starts."""
+        steps = {i: math.floor(m.phase / m.period) for i, m in enumerate(self.movers) if isinstance(m, Wandering)}
+        most = MAX_WALK // (200 + len(self.obstacles))
+        if sum(steps.values()) > most:
+            i = max(steps, key=lambda i: steps[i])
+            raise FieldError(
+                f"movers[{i}].phase",
+                f"{self.movers[i].phase:g} s are {steps[i]} steps before the start; the wanderers of this world may "
+                f"have {most:.0f} together; lower phase, or give another walk.seed",
+            )
 
     @property
     def discs(self) -> Floats:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import functools
 import os
 from collections.abc import Iterator
@@ -27,19 +28,62 @@ def bullet() -> Any:
     return pybullet
 
 
+class _CStdout:
+    """C's `stdout`, which leads nowhere while a client is open: Bullet prints its warnings there.
+
+    Python writes to file descriptor 1 by itself and is not affected. To redirect the descriptor instead would cost each
+    step a flush of C's buffer, and would swallow what Python prints.
+    """
+
+    def __init__(self) -> None:
+        self._clients = 0
+        libc = ctypes.CDLL(None)
+        libc.fopen.restype = ctypes.c_void_p
+        self._nowhere = libc.fopen(os.fsencode(os.devnull), b"w")
+        self._real: int | None = None
+        self._stream: ctypes.c_void_p | None = None
+        for name in ("stdout", "__stdoutp"):  # glibc, macOS
+            with contextlib.suppress(ValueError):
+                self._stream = ctypes.c_void_p.in_dll(libc, name)
+                break
+
+    def shut(self) -> None:
+        """One more client is open."""
+        self._clients += 1
+        if self._clients == 1 and self._stream is not None and self._nowhere:
+            self._real, self._stream.value = self._stream.value, self._nowhere
+
+    def release(self) -> None:
+        """One client less is open."""
+        self._clients -= 1
+        if self._clients == 0 and self._real is not None and self._stream is not None:
+            self._stream.value, self._real = self._real, None
+
+
+@functools.cache
+def _c_stdout() -> _CStdout:
+    return _CStdout()
+
+
 @contextlib.contextmanager
 def client() -> Iterator[int]:
     """The number of a new headless PyBullet client, which is disconnected at the end of the `with` block.
 
+    Within the block Bullet prints nothing on stdout, which may be JSON.
+
     Raises:
         RuntimeError: PyBullet refuses another client.
     """
-    p = bullet()
-    number = p.connect(p.DIRECT)
-    if number < 0:
-        raise RuntimeError("PyBullet opened no physics client; more than 1024 may be open already")
+    p, stdout = bullet(), _c_stdout()
+    stdout.shut()
     try:
-        p.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=number)
-        yield number
+        number = p.connect(p.DIRECT)
+        if number < 0:
+            raise RuntimeError("PyBullet opened no physics client; more than 1024 may be open already")
+        try:
+            p.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=number)
+            yield number
+        finally:
+            p.disconnect(number)
     finally:
-        p.disconnect(number)
+        stdout.release()

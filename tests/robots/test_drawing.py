@@ -42,7 +42,7 @@ def test_the_footprint_is_drawn_to_scale(turtlebot: RobotSpec, jackal: RobotSpec
         (Footprint.disc(0.18), 0.036, 0.23),
         (Footprint.disc(0.2), 0.1, 0.34),  # the wheels nearly reach the edge
         (Footprint.rectangle(0.508, 0.43), 0.098, 0.3756),
-        (Footprint.rectangle(0.5, 0.4), 0.1, 0.4),  # the wheels' middles stand on the edge
+        (Footprint.rectangle(0.5, 0.4), 0.1, 0.39),  # the wheels' middles stand next to the edge
         (Footprint(0.1, 0.1, 0.1), 0.15, 0.3),
     ],
 )

@@ -3,7 +3,8 @@ from pathlib import Path
 import pytest
 
 from antdrive.robots import list_robots, load_robot, robot_schema
-from antdrive.worlds import InputError
+from antdrive.sim import Engine
+from antdrive.worlds import InputError, World
 
 GOOD = """\
 schema: 1
@@ -40,7 +41,7 @@ def test_a_robot_is_described_by_one_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
-        ("mass: 5.0", "mass: -5.0", "mass: must be greater than 0, got -5.0"),
+        ("mass: 5.0", "mass: -5.0", "mass: must be at least 0.01, got -5.0"),
         ("mass: 5.0", "mass: heavy", "mass: must be a number"),
         ("mass: 5.0\n", "", "mass: missing"),
         ("mass: 5.0", "mas: 5.0", "mas: unknown key; did you mean mass?"),
@@ -51,6 +52,27 @@ def test_a_robot_is_described_by_one_file(tmp_path: Path) -> None:
         ("{radius: 0.2}", "{length: 0.6, width: 0.2}", "track: wheels 0.25 m apart stand outside the footprint"),
         ("{radius: 0.2}", "{length: 0.06, width: 0.3}", "wheel_radius: wheels of 0.04 m stand outside the footprint"),
         ("max_speed: 1", "max_speed: .inf", "max_speed: must be"),
+        ("max_speed: 1", "max_speed: 0.0024", "max_speed: must be at least 0.05, got 0.0024"),
+        ("max_speed: 1", "max_speed: 30", "max_speed: must be at most 10, got 30"),
+        ("mass: 5.0", "mass: 1.0e-300", "mass: must be at least 0.01, got 1.0e-300"),
+        ("height: 0.3", "height: 1.0e-300", "height: must be at least 0.01, got 1.0e-300"),
+        ("{radius: 0.2}", "{radius: 0.005}", "footprint: must be between 0.02 and 20, got 0.01"),
+        ("{radius: 0.2}", "{length: 0.6, width: 0.252}", "track: wheels 0.25 m apart have their middles 0.001 m from"),
+        ("height: 0.3", "height: 0.05", "wheel_radius: wheels of 0.04 m are higher than the body of 0.05 m"),
+        (
+            "max_wheel_speed: 40.0",
+            "max_wheel_speed: 20.0",
+            "max_wheel_speed: 20 rad/s on a robot of 5 kg with wheels of 0.04 m, 0.25 m apart, reach 0.8 m/s at most, "
+            "but max_speed is 1; raise max_wheel_speed or lower max_speed",
+        ),
+        ("max_yaw_rate: 3.0", "max_yaw_rate: 13.0", "reach 12.8 rad/s at most, but max_yaw_rate is 13"),
+        ("wheel_torque: 2.0", "wheel_torque: 0.09", "reach 0.9 m/s2 at most, but max_acceleration is 1"),
+        ("mass: 5.0", "mass: 20000.0", "reach 0.005 m/s2 at most, but max_acceleration is 1"),
+        ("max_yaw_acceleration: 8.0", "max_yaw_acceleration: 93.0", "reach 92 rad/s2 at most, but"),
+        ("wheel_torque: 2.0", "wheel_torque: 2.0\nwheel_friction: 0.1", "wheel_friction: a friction of 0.1 on a robot"),
+        ("schema: 1", 'schema: 1\nname: "a\\0b"', "name: must be one line of printable characters"),
+        ("schema: 1", 'schema: 1\nname: "a\\nb"', "name: must be one line of printable characters"),
+        ("schema: 1", 'schema: 1\nname: "\\e[2J"', "name: must be one line of printable characters"),
         ("schema: 1", "schema: 9", "schema: must be 1, got 9"),
     ],
 )
@@ -66,6 +88,47 @@ def test_an_error_is_one_line_that_names_the_file_and_the_key(
     assert str(path) in message
     assert expected in message
     assert "\n" not in message
+
+
+def test_a_heavy_robot_whose_motors_are_too_weak_is_refused(tmp_path: Path) -> None:
+    """20 t and 8 rad/s2, with motors for 0.55: it would oscillate and never arrive."""
+    path = tmp_path / "truck.yaml"
+    path.write_text(
+        GOOD.replace("{radius: 0.2}", "{length: 6.0, width: 2.5}")
+        .replace("height: 0.3", "height: 3.0")
+        .replace("mass: 5.0", "mass: 2.0e+4")
+        .replace("track: 0.25", "track: 2.0")
+        .replace("wheel_radius: 0.04", "wheel_radius: 0.5")
+        .replace("wheel_torque: 2.0", "wheel_torque: 1.0e+4")
+    )
+    with pytest.raises(
+        InputError, match=r"reach 0\.568 rad/s2 at most, but max_yaw_acceleration is 8; raise wheel_torque"
+    ):
+        load_robot(path)
+
+
+def test_the_promised_accelerations_are_reached_in_physics(tmp_path: Path) -> None:
+    """A robot whose motors can just do what it promises does so in physics; closed form and PyBullet agree."""
+    path = tmp_path / "mine.yaml"
+    path.write_text(
+        GOOD.replace("wheel_torque: 2.0", "wheel_torque: 0.1001").replace(
+            "max_yaw_acceleration: 8.0", "max_yaw_acceleration: 6.2"
+        )
+    )
+    robot = load_robot(path)
+    for twist, rate, reached in (((1.0, 0.0), "speed", 1.0), ((0.0, 3.0), "yaw_rate", 6.25)):
+        with Engine(World("open", (-5, -5, 5, 5)), robot) as engine:
+            engine.place((0, 0, 0))
+            engine.command(*twist)
+            for _ in range(60):
+                engine.step()
+            assert getattr(engine.state(), rate) * 4 == pytest.approx(reached, rel=0.1)
+
+
+def test_the_files_name_is_made_printable_where_it_names_the_robot(tmp_path: Path) -> None:
+    path = tmp_path / "a\nb.yaml"
+    path.write_text(GOOD)
+    assert load_robot(path).name == "ab"
 
 
 def test_an_unknown_name_suggests_a_robot_of_the_catalogue() -> None:

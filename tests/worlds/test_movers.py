@@ -1,5 +1,6 @@
 """Where movers are: against oracles that share no code, and against the files that declare them."""
 
+import contextlib
 import dataclasses
 import json
 import math
@@ -14,6 +15,7 @@ from hypothesis import strategies as st
 from antdrive.worlds import (
     Cruising,
     Disc,
+    FieldError,
     InputError,
     Keyframed,
     Task,
@@ -357,3 +359,32 @@ def test_keys_that_a_task_does_not_need_are_not_written():
 def test_movers_with_wrong_values_are_refused(make, says):
     with pytest.raises(ValueError, match=says):
         make()
+
+
+@pytest.mark.parametrize(
+    ("movers", "discs", "problem"),
+    [
+        (
+            [(0.05, 1e4)],
+            0,
+            "movers[0].phase: 10000 s are 200000 steps before the start; the wanderers of this world may",
+        ),
+        (
+            [(1.0, 30.0)] * 400,
+            0,
+            "movers[0].phase: 30 s are 30 steps before the start; the wanderers of this world may",
+        ),
+        ([(1.0, 0.0), (1.0, 2000.0)], 801, "movers[1].phase: 2000 s are 2000 steps"),
+        ([(1.0, 0.0), (1.0, 2000.0)], 800, None),
+        ([(0.05, 0.0)] * 1000, 20_000, None),
+    ],
+)
+def test_the_steps_that_wanderers_have_behind_them_are_bounded(
+    movers: list[tuple[float, float]], discs: int, problem: str | None
+) -> None:
+    """They are drawn one by one: 200,000 of them took 9 s."""
+    walking = tuple(Wandering(radius=0.1, cell=0.5, period=period, phase=phase) for period, phase in movers)
+    with pytest.raises(FieldError) if problem else contextlib.nullcontext() as caught:
+        World("w", (0.0, 0.0, 10.0, 8.0), (Disc(5.0, 4.0, 0.5),) * discs, None, walking)
+    if problem:
+        assert str(caught.value).startswith(problem)

@@ -59,6 +59,16 @@ class Document:
         return self.error((*above, *_location(error.key)), error.problem)
 
 
+def count_values(data: Any) -> int:
+    """How many values plain data hold: each mapping, list and scalar, as MAX_VALUES counts them.
+
+    Args:
+        data: mappings, lists, numbers and texts
+    """
+    inner = data.values() if isinstance(data, Mapping) else data if isinstance(data, list | tuple) else ()
+    return 1 + sum(map(count_values, inner))
+
+
 def read_document(path: str | os.PathLike[str]) -> Document:
     """The YAML file at `path`.
 

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 from antdrive.worlds.errors import FieldError, input_error
 from antdrive.worlds.files.atomic import written_whole
 from antdrive.worlds.files.checks import SchemaVersion, check, suggest, yaml_number
-from antdrive.worlds.files.document import Document, read_document
+from antdrive.worlds.files.document import MAX_BYTES, MAX_VALUES, Document, count_values, read_document
 from antdrive.worlds.limits import MAX_CELLS, MAX_COORDINATE, MAX_PHASE, MIN_PERIOD
 from antdrive.worlds.movers import Mover, mover_from_dict, mover_to_dict
 from antdrive.worlds.world import Disc, Task, World
@@ -126,11 +126,23 @@ def save_task(task: Task, path: str | Path) -> None:
     """Write a task as a world file, whole or not at all.
 
     Raises:
-        InputError: the file cannot be written, or a world file cannot hold the task, such as one with an empty name.
+        InputError: the file cannot be written, or a world file cannot hold the task, such as one with an empty name or
+            with too many obstacles.
     """
-    _to_task(Document("task", task_to_dict(task)))
+    data = task_to_dict(task)
+    _to_task(Document("task", data))
+    text = _to_yaml(task)
+    size = len(text.encode())
+    values = count_values(data)
+    if size > MAX_BYTES or values > MAX_VALUES:
+        raise input_error(
+            os.fspath(path),
+            f"not written: {len(task.world.obstacles)} obstacles and {len(task.world.movers)} movers make "
+            f"{size / 1e6:.1f} MB and {values} values, and a world file has at most {MAX_BYTES / 1e6:g} MB and "
+            f"{MAX_VALUES} values; use fewer, larger cylinders (for maps, a larger overhang)",
+        )
     with written_whole(path) as part:
-        part.write_text(_to_yaml(task), encoding="utf-8")
+        part.write_text(text, encoding="utf-8")
 
 
 def task_to_dict(task: Task) -> dict[str, Any]:

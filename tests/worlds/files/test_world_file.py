@@ -262,6 +262,45 @@ def test_a_task_that_no_file_can_hold_is_not_written(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize(
+    ("count", "place", "problem"),
+    [
+        (36_000, 1 / 3, "not written: 36000 obstacles and 0 movers make 2."),
+        (41_000, 2.0, "values, and a world file has at most 2 MB and 200000 values; use fewer"),
+    ],
+)
+def test_a_world_that_could_not_be_read_back_is_not_written(
+    tmp_path: Path, count: int, place: float, problem: str
+) -> None:
+    discs = (Disc(5.0, 4.0 + place, 0.1),) * count
+    with pytest.raises(InputError) as caught:
+        save_task(
+            Task(World("many", (0.0, 0.0, 10.0, 8.0), discs), (1.0, 1.0, 0.0), (9.0, 7.0)), tmp_path / "many.yaml"
+        )
+    assert str(caught.value).startswith(f"{tmp_path / 'many.yaml'}: not written: {count} obstacles")
+    assert problem in str(caught.value)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_largest_world_that_is_written_reads_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Values are counted alike in writing and in reading."""
+    from antdrive.worlds.files import document, world_file
+
+    values = document.count_values(task_to_dict(TASK))
+    for limit, written in ((values - 1, False), (values, True)):
+        for module in (document, world_file):
+            monkeypatch.setattr(module, "MAX_VALUES", limit)
+        if written:
+            save_task(TASK, tmp_path / "one.yaml")
+            assert load_task(tmp_path / "one.yaml").world == TASK.world
+        else:
+            with pytest.raises(InputError, match="not written"):
+                save_task(TASK, tmp_path / "one.yaml")
+    monkeypatch.setattr(document, "MAX_VALUES", values - 1)
+    with pytest.raises(InputError):
+        load_task(tmp_path / "one.yaml")
+
+
 def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch):
     path = tmp_path / "w.yaml"
     path.write_text("the old one")

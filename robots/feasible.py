@@ -1,0 +1,59 @@
+"""Whether a robot can do what its file promises. Closed forms, with the numbers in the message."""
+
+from __future__ import annotations
+
+from antdrive.robots.spec import RobotSpec
+from antdrive.worlds.errors import FieldError
+
+GRAVITY = 9.81  # [m/s^2]
+
+
+def require_feasible(robot: RobotSpec) -> None:
+    """Refuse a robot whose wheels and motors cannot reach its own limits.
+
+    Args:
+        robot: the robot that a file describes
+
+    Raises:
+        FieldError: the wheels are higher than the body, turn too slowly, or cannot push as hard as promised.
+    """
+    if 2 * robot.wheel_radius > robot.height:
+        raise FieldError(
+            "wheel_radius",
+            f"wheels of {robot.wheel_radius:g} m are higher than the body of {robot.height:g} m; "
+            f"at most {robot.height / 2:.3g} m fits",
+        )
+    rim = robot.max_wheel_speed * robot.wheel_radius
+    _require_reached("max_wheel_speed", f"{robot.max_wheel_speed:g} rad/s", robot, "max_speed", rim, "m/s")
+    turn = 2 * rim / robot.track
+    _require_reached("max_wheel_speed", f"{robot.max_wheel_speed:g} rad/s", robot, "max_yaw_rate", turn, "rad/s")
+    motor = robot.wheel_torque / robot.wheel_radius
+    grip = robot.wheel_friction * robot.mass * GRAVITY / 2
+    for key, what, force in (
+        ("wheel_torque", f"motors of {robot.wheel_torque:g} N m", motor),
+        ("wheel_friction", f"a friction of {robot.wheel_friction:g}", grip),
+    ):
+        _require_reached(key, what, robot, "max_acceleration", 2 * force / robot.mass, "m/s2")
+        _require_reached(key, what, robot, "max_yaw_acceleration", force * robot.track / yaw_inertia(robot), "rad/s2")
+    held = robot.wheel_friction * GRAVITY
+    what = f"a friction of {robot.wheel_friction:g}"
+    _require_reached("wheel_friction", what, robot, "max_lateral_acceleration", held, "m/s2")
+
+
+def yaw_inertia(robot: RobotSpec) -> float:
+    """Moment of inertia of a robot's body about its vertical axis, mass spread evenly [kg m^2]."""
+    foot = robot.footprint
+    if foot.is_disc:
+        return robot.mass * foot.rounding**2 / 2
+    half_length, half_width = foot.half_length + foot.rounding, foot.half_width + foot.rounding
+    return robot.mass * (half_length**2 + half_width**2) / 3
+
+
+def _require_reached(key: str, what: str, robot: RobotSpec, limit: str, reached: float, unit: str) -> None:
+    promised = getattr(robot, limit)
+    if reached < promised:
+        raise FieldError(
+            key,
+            f"{what} on a robot of {robot.mass:g} kg with wheels of {robot.wheel_radius:g} m, {robot.track:g} m apart, "
+            f"reach {reached:.3g} {unit} at most, but {limit} is {promised:g}; raise {key} or lower {limit}",
+        )
