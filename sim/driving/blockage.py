@@ -51,12 +51,12 @@ class Blockage:
             tick: the number of the control period
             robot: the robot's position [m]
         """
-        if not self.failures or tick / self._hz >= self._due:
+        if not self.failures:
             return False
-        if len(self._still_there(tick, robot)) < len(self._standing):
+        if not self._still_there(tick, robot):
             self.found()
             return False
-        return True
+        return tick / self._hz < self._due
 
     def found(self) -> None:
         """Take note that there is a way, or that there may be one soon."""
@@ -66,8 +66,7 @@ class Blockage:
         """Take note that a search from a pose [m, m, rad] found no route."""
         now, robot = tick / self._hz, pose[:2]
         standing = self._standing_now(tick, robot)
-        stayed = np.intersect1d(standing, self._still_there(tick, robot))
-        if self.failures and not self._closed(tick, pose, stayed):
+        if self.failures and not self._closed(tick, pose, np.intersect1d(standing, self._standing)):
             self.found()
         if not self.failures:
             if not self._closed(tick, pose, standing):
@@ -87,11 +86,11 @@ class Blockage:
         positions, _ = self._predictor.predict(tick, robot, ahead)
         return np.asarray(perceived[np.hypot(*np.moveaxis(positions - positions[0], -1, 0)).max(axis=0) <= STILL])
 
-    def _still_there(self, tick: int, robot: tuple[float, float]) -> npt.NDArray[np.int64]:
-        """Those of the movers noted at the first failure that the robot sees where they stood."""
+    def _still_there(self, tick: int, robot: tuple[float, float]) -> bool:
+        """Whether the robot sees all movers that it noted at the first failure where they stood."""
         perceived, positions = self._predictor.perceived(tick, robot)
         near = np.hypot(*(positions[self._standing] - self._places).T) <= STILL
-        return np.asarray(self._standing[near & np.isin(self._standing, perceived)])
+        return bool(near.all() and np.isin(self._standing, perceived).all())
 
     def _closed(self, tick: int, pose: Pose, movers: npt.NDArray[np.int64]) -> bool:
         """Whether these movers alone close every way that is open without them."""

@@ -76,7 +76,7 @@ class CellwiseMonitor(ReplanMonitor):
     def _note_no_way(self, tick: int, pose: Pose) -> None:
         """Take note that the robot does not get on; the attempt at which it gives up is logged."""
         now = tick / self._hz
-        if now - self._noted_at < self.policy.min_interval or self.blockage.pause(tick, pose[:2]):
+        if self.blockage.pause(tick, pose[:2]) or now - self._noted_at < self.policy.min_interval:
             return
         self._noted_at = now
         self.blockage.failed(tick, pose)

@@ -178,7 +178,7 @@ class ReplanMonitor:
             self._waiting_since = math.nan
         elif math.isnan(self._waiting_since):
             self._waiting_since = now
-        if now - self._replanned_at < policy.min_interval or self.blockage.pause(tick, pose[:2]):
+        if self.blockage.pause(tick, pose[:2]) or now - self._replanned_at < policy.min_interval:
             return ""
         deviation = math.dist(_point_at(tracked.route, arc), pose[:2])
         shortfall = math.dist(tracked.route.xy[-1], pose[:2]) - (tracked.length - arc)
@@ -223,7 +223,7 @@ class ReplanMonitor:
         self.log.append(Replan(now, trigger, route is not None, cost, plan.work, xy, wall_s))
         if route:
             self.blockage.found()
-        elif around_movers:
+        else:
             self.blockage.failed(tick, pose)
         return self._prepare(route) if route else None
 

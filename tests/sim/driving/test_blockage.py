@@ -67,6 +67,16 @@ def test_a_mover_that_is_known_to_leave_is_waited_for_without_end(turtlebot: Rob
     assert among(leaves, robot=turtlebot, replanning=policy, perception=Perception(kind="motions")).succeeded
 
 
+def test_patience_begins_anew_when_the_mover_moves_on(turtlebot: RobotSpec) -> None:
+    frames = ((0.0, 5.0, 0.6), (10.0, 5.0, 0.6), (12.0, 5.6, 0.6))
+    moves_on = Keyframed(radius=0.3, keyframes=frames, loop="once")
+    done = among(moves_on, robot=turtlebot, replanning=ReplanPolicy(patience=12.0))
+    assert done.outcome is Outcome.BLOCKED
+    assert "(5.60, 0.60)" in done.reason
+    assert done.rollout is not None
+    assert 22.0 < done.rollout.t[-1] < 26.0
+
+
 def test_a_mover_that_moves_is_never_given_up_on(turtlebot: RobotSpec) -> None:
     """It walks to and fro by 0.3 m, and the lane is closed all the time; the robot looks for a way every second."""
     restless = Keyframed(radius=0.3, keyframes=((0.0, 5.0, 0.6), (3.0, 5.3, 0.6)))
