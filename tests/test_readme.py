@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from antdrive.sim import Outcome
 from antdrive.worlds import load_task
 
 ROOT = Path(__file__).parent.parent
@@ -16,6 +17,12 @@ TEXT = (ROOT / "README.md").read_text()
 
 def blocks(language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", TEXT, flags=re.DOTALL)
+
+
+def test_the_outcomes_that_are_no_success_are_listed() -> None:
+    listed = re.search(r"with 1 if it did not\s+\(([^)]*)\)", TEXT)
+    assert listed
+    assert re.findall(r"`(\w+)`", listed[1]) == [o.key for o in Outcome if o is not Outcome.SUCCEEDED]
 
 
 def test_the_python_block_is_ten_lines_that_run(tmp_path: Path) -> None:

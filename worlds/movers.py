@@ -49,7 +49,8 @@ class Keyframed(_Body):
         radius: as built, never inflated [m], > 0
         height: [m], > 0
         phase: how much of the motion has already passed when a run starts [s], >= 0
-        keyframes: time [s], x [m] and y [m] of each place, at least two, in the order of time
+        keyframes: time [s], x [m] and y [m] of each place, at least two, in the order of time; a mover whose
+            keyframes are all at one place stands still
         loop: after the last keyframe the mover goes back the way it came, and forth again ("pingpong"), appears at
             the first place again ("teleport"), or stays where it is ("once")
         interpolation: between keyframes the mover goes straight at constant speed ("linear"), or along a cubic through
@@ -81,8 +82,6 @@ class Keyframed(_Body):
                 raise FieldError(
                     f"keyframes[{i}]", f"is reached at {speed:.4g} m/s; at most {MAX_SPEED:g} m/s are allowed"
                 )
-        if len({frame[1:] for frame in self.keyframes}) == 1:
-            raise FieldError("keyframes", "are all at one place; list what never moves under obstacles")
 
 
 @dataclass(frozen=True, kw_only=True)

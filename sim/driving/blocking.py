@@ -15,8 +15,15 @@ STEP = 0.25  # movers are predicted at least this often [s]
 MIN_RADIUS = 0.01  # smaller discs are left out [m]
 
 
-def covered_discs(predictor: Predictor, tick: int, ends: Floats, duration: float, grid: Grid) -> list[Disc]:
-    """The discs that movers cover within `duration` [s] of a tick.
+def covered_discs(
+    predictor: Predictor,
+    tick: int,
+    ends: Floats,
+    duration: float,
+    grid: Grid,
+    only: npt.NDArray[np.int64] | None = None,
+) -> list[Disc]:
+    """The discs that movers cover within `duration` [s] of a tick; with `only`, those of these movers.
 
     Discs are made smaller where an end (N, 2) [m] would lie within the inflation around them: movers close
     neither end. The first of the ends is the robot's position.
@@ -24,6 +31,9 @@ def covered_discs(predictor: Predictor, tick: int, ends: Floats, duration: float
     x, y = ends[0].tolist()
     times = np.linspace(0.0, duration, 1 + math.ceil(duration / STEP))
     positions, radii = predictor.predict(tick, (x, y), times)
+    if only is not None:
+        wanted = np.isin(predictor.within_range(tick, (x, y)), only)
+        positions, radii = positions[:, wanted], radii[wanted]
     room = np.hypot(*np.moveaxis(positions[:, :, None] - ends, -1, 0)).min(axis=-1) - grid.inflate - grid.cell
     radius = np.minimum(radii, room)
     return [

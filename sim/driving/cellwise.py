@@ -29,6 +29,7 @@ class CellwiseMonitor(ReplanMonitor):
         query = Query.between(self._grid, self._task)
         self._online = agent_for(self._planner, query, self._rng)
         self._goal = query.goal
+        self._noted_at = -math.inf
 
     @property
     def may_wait(self) -> bool:
@@ -39,7 +40,12 @@ class CellwiseMonitor(ReplanMonitor):
         """A decision is due shortly before the robot reaches its cell, and repeatedly while it waits."""
         if tick == 0:
             return DECISION
-        if self._online.arrived or tick / self._hz - self._replanned_at < DECISION_PAUSE:
+        since = tick / self._hz - self._replanned_at
+        if self._online.arrived or since < DECISION_PAUSE:
+            return ""
+        if since >= self.policy.max_wait:  # movers keep the robot from its cell
+            self._note_no_way(tick, pose)
+        if self.blockage.reason:
             return ""
         return DECISION if tracked.length - arc < DECIDE_BEFORE * self._grid.cell else ""
 
@@ -53,6 +59,10 @@ class CellwiseMonitor(ReplanMonitor):
         covered = covered_discs(self._predictor, tick, np.array([pose[:2]]), 0.0, self._grid)
         to = self._online.step(np.argwhere(blocked_cells(self._grid, covered)))
         xy = self._line(pose, here, to, tick)
+        if to is not None:
+            self.blockage.found()
+        else:
+            self._note_no_way(tick, pose)
         if to is not None and bool(np.ptp(xy, axis=0).any()):
             cost = polyline_length(xy)
             work = self._online.stats.propagated - propagated
@@ -62,6 +72,16 @@ class CellwiseMonitor(ReplanMonitor):
             heading = np.array([(0.0, 0.0), (math.cos(pose[2]), math.sin(pose[2]))])
             return self._prepare(Route(np.array(pose[:2]) + 1e-4 * heading))
         return None
+
+    def _note_no_way(self, tick: int, pose: Pose) -> None:
+        """Take note that the robot does not get on; the attempt at which it gives up is logged."""
+        now = tick / self._hz
+        if self.blockage.pause(tick, pose[:2]) or now - self._noted_at < self.policy.min_interval:
+            return
+        self._noted_at = now
+        self.blockage.failed(tick, pose)
+        if self.blockage.reason:
+            self.log.append(Replan(now, DECISION, False, math.inf, 0, np.empty((0, 2)), 0.0))
 
     def _line(self, pose: Pose, here: tuple[int, int], to: tuple[int, int] | None, tick: int) -> Floats:
         """From the robot to the next cell (2 or 3, 2) [m], by the centre of its own cell where it must."""

@@ -107,6 +107,8 @@ class Driver:
         """
         if self._monitor is not None:
             self._replan_if_triggered(tick, pose, state)
+            if self._monitor.blockage.reason:
+                return Ending(Outcome.BLOCKED, self._monitor.blockage.reason)
         last, before = self.command, self.pursuit
         self.command, self.pursuit = self._controller.step(self.tracked, pose, last, before)
         speed_limit = self._keep_to_schedule(tick, last)

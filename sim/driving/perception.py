@@ -72,6 +72,10 @@ class Predictor:
             velocities = np.zeros_like(velocities)
         return positions[perceived] + ahead[:, None, None] * velocities[perceived], radii
 
+    def perceived(self, tick: int, robot: tuple[float, float]) -> tuple[npt.NDArray[np.int64], Floats]:
+        """The indices (P,) of the movers that a robot at a position [m] perceives, and where all movers are (M, 2) [m]."""
+        return self.within_range(tick, robot), self._now(tick)[0]
+
     def within_range(self, tick: int, robot: tuple[float, float]) -> npt.NDArray[np.int64]:
         """The indices (M,) of the movers that a robot at a position [m] perceives in a tick."""
         distances = np.hypot(*(self._now(tick)[0] - robot).T) - self.trajectories.radii

@@ -31,6 +31,7 @@ from antdrive.planners import (
     smooth,
 )
 from antdrive.robots import PurePursuit, RobotSpec, TrackedPath
+from antdrive.sim.driving.blockage import Blockage
 from antdrive.sim.driving.blocking import blocked_cells, covered_discs, with_obstacles
 from antdrive.sim.driving.perception import Predictor
 from antdrive.sim.driving.schedule import Schedule
@@ -62,6 +63,7 @@ class ReplanPolicy:
             by this much [m]
         min_interval: the shortest time between two replans [s]
         prediction_time: whatever movers are predicted to cover within this time is blocked [s]
+        patience: the drive ends as blocked when movers that stand still have closed every way for this long [s]
 
     Raises:
         ValueError: a setting is out of range.
@@ -74,6 +76,7 @@ class ReplanPolicy:
     max_shortfall: float = 0.25
     min_interval: float = 1.0
     prediction_time: float = 1.0
+    patience: float = 30.0
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self)[1:]:
@@ -115,6 +118,7 @@ class ReplanMonitor:
         log: the attempts so far
         schedule: where the robot should be at each time; None unless the route comes from a plan in space
             and time
+        blockage: whether movers that stand still close every way
 
     Args:
         margin: distance kept free around the robot, on top of its radius [m]
@@ -147,6 +151,9 @@ class ReplanMonitor:
         self._blocked = np.zeros(grid.shape, dtype=np.bool_)
         self._replanned_at = -math.inf
         self._waiting_since = math.nan
+        self.blockage = Blockage(
+            self._task, grid, predictor, hz, interval=policy.min_interval, patience=policy.patience
+        )
 
     @property
     def may_wait(self) -> bool:
@@ -172,7 +179,7 @@ class ReplanMonitor:
             self._waiting_since = math.nan
         elif math.isnan(self._waiting_since):
             self._waiting_since = now
-        if now - self._replanned_at < policy.min_interval:
+        if self.blockage.pause(tick, pose[:2]) or now - self._replanned_at < policy.min_interval:
             return ""
         deviation = math.dist(_point_at(tracked.route, arc), pose[:2])
         shortfall = math.dist(tracked.route.xy[-1], pose[:2]) - (tracked.length - arc)
@@ -215,6 +222,10 @@ class ReplanMonitor:
         cost, xy = (plan.cost, route.xy) if route else (math.inf, np.empty((0, 2)))
         wall_s = time.perf_counter() - started
         self.log.append(Replan(now, trigger, route is not None, cost, plan.work, xy, wall_s))
+        if route:
+            self.blockage.found()
+        else:
+            self.blockage.failed(tick, pose)
         return self._prepare(route) if route else None
 
     def _prepare(self, route: Route) -> TrackedPath:

@@ -13,6 +13,7 @@ describe one drive; each is a function `_check_...` that gives a sentence for ev
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -39,6 +40,7 @@ START_SLACK, START_TURN_SLACK = 0.005, 0.01  # between the first row and the tas
 STEP_SLIP, STEP_SLIP_TURN = 0.001, 0.002  # [m], [rad]
 DRIFT, DRIFT_SHARE, DRIFT_TURN = 0.01, 0.06, 0.05  # [m], fraction of the distance covered, [rad]
 DRIFT_WINDOW = 0.25  # [s]
+BLOCKER_MOVED = 0.1  # a mover that blocks the robot for good has not moved farther than this [m]
 
 
 @dataclass(frozen=True)
@@ -112,6 +114,7 @@ def certify(rollout: Rollout) -> Certificate:
         *_check_start(rollout),
         *_check_motion(rollout),
         *_check_outcome(rollout),
+        *_check_blocked(rollout),
     ]
     return Certificate(not problems, touched, float(clearance.min()), bound, tuple(problems))
 
@@ -287,6 +290,20 @@ def _check_outcome(rollout: Rollout) -> Iterator[str]:
             )
         if not abs(speed) <= STANDING_SPEED:
             yield f"outcome: succeeded, but the robot still moves at {speed:.3f} m/s at the end"
+
+
+def _check_blocked(rollout: Rollout) -> Iterator[str]:
+    """A blocked drive ends with searches that found no route, and a mover stood still since the first of them."""
+    if rollout.outcome is not Outcome.BLOCKED:
+        return
+    failed = list(itertools.takewhile(lambda replan: not replan.solved, reversed(rollout.record.replans)))
+    if not failed:
+        yield "outcome: blocked, but the drive does not end with a search that found no route"
+        return
+    places = rollout.movers[min(int(np.searchsorted(rollout.t, failed[-1].t)), len(rollout.t) - 1) :]
+    moved = np.hypot(*np.moveaxis(places - places[-1], -1, 0)).max(axis=0)
+    if not (moved <= BLOCKER_MOVED).any():
+        yield f"outcome: blocked, but no mover stood still from t = {failed[-1].t:.3f} s on"
 
 
 def _summed(values: npt.NDArray[Any], rows: int) -> npt.NDArray[Any]:

@@ -13,7 +13,9 @@ class Outcome(enum.Enum):
     The first contact ends a drive, and the outcome says who caused the contact; `antdrive.sim.log.contacts` has the
     exact rule. `COLLIDED` is the robot's own doing, also when a mover comes towards the driving robot. The planner is
     not blamed for `HIT_WHILE_STANDING` and `HIT_BY_TELEPORT`, but neither is a success, and no drive with a contact is
-    certified. `NO_PATH`, `STOPPED` and `INVALID_PLAN` end a run before the robot drives, so that there is no rollout.
+    certified. `BLOCKED` means that movers closed every way and stood still until the robot's patience was over
+    (`ReplanPolicy.patience`). `NO_PATH`, `STOPPED` and `INVALID_PLAN` end a run before the robot drives, so that there is
+    no rollout.
 
     `antdrive run` exits with 0 if the run ended with `SUCCEEDED` and the drive is certified, else with 1.
     """
@@ -23,6 +25,7 @@ class Outcome(enum.Enum):
     HIT_WHILE_STANDING = "was hit by a moving obstacle while it stood still"
     HIT_BY_TELEPORT = "a moving obstacle appeared on the robot, or nearer than it could stop"
     TIMED_OUT = "the time limit passed before the goal was reached"
+    BLOCKED = "obstacles that stand still block the way to the goal"
     STUCK = "stopped making progress"
     NO_PATH = "no path on this grid"
     STOPPED = "planning stopped early"

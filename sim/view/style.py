@@ -50,6 +50,7 @@ VERDICTS: Mapping[Outcome, tuple[str, Colour]] = MappingProxyType(
         Outcome.HIT_WHILE_STANDING: ("✕ HIT WHILE STANDING", DOUBT),
         Outcome.HIT_BY_TELEPORT: ("✕ HIT BY TELEPORT", DOUBT),
         Outcome.TIMED_OUT: ("TIMED OUT", DOUBT),
+        Outcome.BLOCKED: ("BLOCKED", DOUBT),
         Outcome.STUCK: ("STUCK", DOUBT),
         Outcome.NO_PATH: ("NO PATH", DOUBT),
         Outcome.STOPPED: ("STOPPED", DOUBT),

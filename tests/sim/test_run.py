@@ -113,6 +113,15 @@ def test_an_unseen_obstacle_on_the_route_is_hit(collided_run: Run) -> None:
     assert not any("disagree" in problem for problem in certificate.problems)
 
 
+def test_half_a_second_of_braking_is_logged_after_a_contact(collided_run: Run) -> None:
+    log = collided_run.rollout
+    assert log is not None
+    rows = len(log.t) - 1 - int(log.contacts[0, 0])
+    period = log.record.physics_hz // log.record.control_hz  # the control period of the contact is logged to its end
+    assert 0 <= rows - 0.5 * log.record.physics_hz < period
+    assert not log.command[-round(0.5 * log.record.physics_hz) :].any()
+
+
 def test_no_path_is_an_outcome_with_a_reason(turtlebot: RobotSpec) -> None:
     wall = tuple(Disc(2, 0.1 + 0.2 * i, 0.11) for i in range(15))
     task = Task(World("cut", (0, 0, 4, 3), wall), (0.6, 1.5, 0), (3.4, 1.5), cell=0.2)

@@ -312,10 +312,6 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
         _mover("{radius: 0.3, keyframes: [[8, 5, 1], [0, 5, 9]]}"),
         "bad.yaml:11: movers[0].keyframes[1]: its time must be later than the 8 s",
     ),
-    "keyframes at one place": (
-        _mover("{radius: 0.3, keyframes: [[0, 5, 1], [8, 5, 1]]}"),
-        "bad.yaml:11: movers[0].keyframes: are all at one place; list what never moves under obstacles",
-    ),
     "keyframes too fast": (
         _mover("{radius: 0.3, keyframes: [[0, 5, 1], [0.1, 5, 9]]}"),
         "bad.yaml:11: movers[0].keyframes[1]: is reached at 80 m/s; at most 20 m/s are allowed",

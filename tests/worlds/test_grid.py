@@ -120,6 +120,14 @@ def test_a_point_outside_belongs_to_the_nearest_cell():
     assert grid.cell_at(9, -9) == (0, 5)
 
 
+@pytest.mark.parametrize(
+    ("side", "cell", "cells"), [(1.1, 0.1, 11), (0.3, 0.1, 3), (2.1, 0.7, 3), (1.15, 0.1, 12), (1.101, 0.1, 12)]
+)
+def test_a_side_that_the_cells_fill_exactly_has_no_cell_more(side, cell, cells):
+    """1.1 / 0.1 is 11.000000000000002."""
+    assert rasterise(World("w", (0.0, 0.0, side, 2 * side)), cell).shape[1] == cells
+
+
 def test_cells_that_the_walls_cut_are_kept():
     assert rasterise(World("w", (0.0, 0.0, 3.1, 1.9)), 0.5).shape == (4, 7)
     assert rasterise(World("w", (0.0, 0.0, 0.3, 0.3)), 0.1).shape == (3, 3)

@@ -46,6 +46,20 @@ def at(mover, t):
 # Keyframes
 
 
+@pytest.mark.parametrize("loop", ["pingpong", "teleport", "once"])
+@pytest.mark.parametrize("interpolation", ["linear", "catmull-rom"])
+def test_a_mover_whose_keyframes_are_all_at_one_place_stands_still(loop, interpolation):
+    mover = Keyframed(radius=0.3, keyframes=((0.0, 2.0, 3.0), (4.0, 2.0, 3.0)), loop=loop, interpolation=interpolation)
+    moving = trajectories(mover)
+    assert (moving.positions(FINE) == (2.0, 3.0)).all()
+    assert not moving.velocities(FINE).any()
+    assert not moving.travel(FINE).any()
+    assert not moving.jumps(FINE).any()
+    assert moving.jump_times(40.0)[0].size == 0
+    task = Task(World("w", BOX, movers=(mover,)), (1.0, 1.0, 0.0), (9.0, 7.0))
+    assert task_from_dict(task_to_dict(task)) == task
+
+
 def walk(mover, t):
     """An oracle: where a keyframed mover is, lap by lap."""
     frames = list(mover.keyframes)

@@ -1,6 +1,7 @@
 """The parts of a control period, without physics."""
 
 import math
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -61,6 +62,32 @@ def test_a_robot_that_does_not_move_is_stuck_after_the_stuck_time(turtlebot: Rob
     assert ticks == pytest.approx(STUCK_TIME * 60, abs=2)
 
 
+@pytest.mark.parametrize(("outside", "outcome"), [(-0.002, Outcome.SUCCEEDED), (0.002, Outcome.STUCK)])
+def test_a_robot_that_stops_just_outside_the_tolerance_has_not_arrived(
+    turtlebot: RobotSpec, outside: float, outcome: Outcome
+) -> None:
+    x, y = TASK.goal
+    away = TASK.goal_tolerance + outside
+    at_end = driver(turtlebot)
+    at_end.pursuit = PursuitState(arc=at_end.tracked.length)
+    endings = [at_end.decide(tick, (x, y, 0.0), State(x - away, y, 0.0, 0.0, 0.0)) for tick in range(9)]
+    assert {ending.outcome for ending in endings if ending is not None} == {outcome}
+
+
+def test_a_mover_beside_the_goal_closes_no_cell_within_the_inflation_of_it() -> None:
+    """The goal's cell and those around it stay free, wherever in its cell the goal is."""
+    for x in (7.9, 8.0, 8.1):
+        for y in (3.5, 3.6):
+            goal = (x, y - 0.6)
+            mover = Keyframed(radius=0.5, keyframes=((0.0, x, y), (9.0, x, y)))
+            still = Predictor(Trajectories.of(World("w", HALL.bounds, movers=(mover,)), (1.0, 3.0)), Perception(), 60)
+            grid = hall_grid()
+            discs = covered_discs(still, 0, np.array([(1.0, 3.0), goal]), 0.0, grid)
+            assert discs
+            assert discs[0].radius == pytest.approx(0.6 - grid.inflate - grid.cell)
+            assert not blocked_cells(grid, discs)[grid.cell_at(*goal)]
+
+
 def test_standing_at_the_routes_end_ends_the_drive_by_the_distance_to_the_goal(turtlebot: RobotSpec) -> None:
     x, y = TASK.goal
     for distance, outcome in ((0.0, Outcome.SUCCEEDED), (0.3, Outcome.STUCK)):
@@ -78,6 +105,7 @@ class OneReplan:
     """A monitor that replans once, back along the route that it is given."""
 
     schedule = None
+    blockage = SimpleNamespace(reason="")
     may_wait = False
 
     def __init__(self) -> None:

@@ -54,3 +54,32 @@ def test_contact_points_lie_on_obstacles_movers_and_walls(jumped):
     assert contact_point(scene, (0.2, 1.0, 0.0), count + 5, movers) == (0.2, 3.0)
     ox, oy, radius, _ = scene.obstacles[0]
     assert contact_point(scene, (ox + 1.0, oy, 0.0), 0, movers) == pytest.approx((ox + radius, oy))
+
+
+def test_in_a_left_turn_the_right_wheel_turns_farther(made_up_drive):
+    drive = made_up_drive()
+    drive = replace(drive, twist=np.column_stack([np.full(len(drive.t), 0.5), np.full(len(drive.t), 1.0)]))
+    robot = drive.record.robot
+    left, right = Replay(drive).wheels(1.0)
+    assert left == pytest.approx((0.5 - robot.track / 2) / robot.wheel_radius)
+    assert right == pytest.approx((0.5 + robot.track / 2) / robot.wheel_radius)
+
+
+def test_slow_motion_is_around_the_first_contact(made_up_drive):
+    replay = Replay(made_up_drive(collide=True, seconds=2.0))
+    first = replay.duration  # the made-up drive ends at its contact
+    assert replay.slow_motion(1.0) == pytest.approx((first - 0.3, first))
+    assert replay.slow_motion(2.0) == pytest.approx((first - 0.6, first))
+    early = made_up_drive(seconds=2.0)
+    early = replace(early, contacts=np.array([[24.0, 0.0, -0.001, 9.0], [480.0, 0.0, -0.001, 9.0]]))
+    assert Replay(early).slow_motion(1.0) == pytest.approx((0.0, 0.1 + 0.1))
+    assert Replay(made_up_drive()).slow_motion(1.0) is None
+
+
+def test_the_least_clearance_is_that_of_the_rows_so_far(made_up_drive):
+    drive = made_up_drive()
+    clearance = np.full(len(drive.t), 0.5)
+    clearance[100] = 0.1
+    replay = Replay(replace(drive, clearance=clearance))
+    shown = [replay.min_clearance(row / 240) for row in (99, 99.5, 100, 101)]
+    assert shown == [0.5, 0.5, 0.1, 0.1]
