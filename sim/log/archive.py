@@ -34,8 +34,7 @@ def guarded_log(path: str | Path) -> Iterator[Archive]:
         InputError: there is no such file, it is no regular file, it is not a rollout, or reading it fails.
     """
     try:
-        # A pipe without a writer would wait for ever.
-        with open(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb") as raw:
+        with open(path, "rb", opener=_without_waiting) as raw:
             kind = os.fstat(raw.fileno())
             if not stat.S_ISREG(kind.st_mode):
                 raise input_error(str(path), "not a rollout (no regular file)")
@@ -90,6 +89,11 @@ def read_array(archive: Archive, name: str) -> npt.NDArray[Any]:
             raise FieldError(name, f"its header promises {wanted} bytes, the file has {_more(len(content), wanted)}")
     flat = np.frombuffer(content, dtype=dtype) if wanted else np.empty(0, dtype=dtype)
     return flat.reshape(shape, order="F" if fortran else "C")
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    """Open a file; a pipe without a writer would wait for ever."""
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def _check_members(archive: Archive) -> None:
