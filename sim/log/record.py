@@ -36,6 +36,9 @@ SCHEMA = 2
 #: The highest rate of physics or control that a log can have [Hz].
 MAX_HZ = 10_000
 
+#: The largest margin and inflation that a log can have [m].
+MAX_MARGIN = 1000.0
+
 #: The trigger of a replan by a planner that decides anew at every cell.
 DECISION = "decision"
 
@@ -234,6 +237,9 @@ class DriveRecord:
         for i, disc in enumerate(self.unseen):
             if not 0 < disc.height <= MAX_COORDINATE:
                 raise FieldError(f"unseen[{i}].height", f"must be greater than 0, got {disc.height!r:.40}")
+        for key, most in (("margin", MAX_MARGIN), ("inflate", MAX_MARGIN), ("cell", MAX_COORDINATE)):
+            if not getattr(self, key) <= most:
+                raise FieldError(key, f"must be at most {most:g} m, got {getattr(self, key)!r:.40}")
         for key in ("cell", "time_limit"):
             if not getattr(self, key) > 0:
                 raise FieldError(key, f"must be greater than 0, got {getattr(self, key)!r:.40}")
