@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from antdrive.sim import Outcome, Rollout, Run, certify
+from antdrive.sim import Outcome, Rollout, Run, Scenario, certify, run
 from antdrive.sim.log.certificate import closed_form_clearance, in_metres
 from antdrive.worlds import Disc
 
@@ -260,3 +260,15 @@ def test_a_robot_that_stays_where_it_is_gets_a_verdict_of_its_own(log: Rollout) 
     assert certificate.sentence.startswith("certified: touched nothing, went nowhere: ")
     assert certify(log).verdict == "certified collision-free"
     assert certify(log).moved > 1.0
+
+
+def test_a_noisy_log_whose_targets_or_estimates_are_made_up_is_not_certified(small_scenario: Scenario) -> None:
+    log = run(replace(small_scenario, noise=1.0, seed=4)).rollout
+    assert log is not None
+    assert certify(log).certified
+    other = certify(replace(log, actuated=log.actuated * 1.5))
+    assert any("not the delayed command" in problem for problem in other.problems)
+    elsewhere = certify(replace(log, estimate=log.estimate + 5.0))
+    assert any("more than the robot's noise allows" in problem for problem in elsewhere.problems)
+    without = certify(replace(log, actuated=log.actuated[:0]))
+    assert any("actuated: must have" in problem for problem in without.problems)
