@@ -321,6 +321,7 @@ def _record(
         movers=log.movers,
         contacts=log.contacts,
         estimate=log.estimate,
+        actuated=log.actuated,
         route=route.xy,
         cells=answer.cells,
         record=record,

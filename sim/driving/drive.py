@@ -79,8 +79,9 @@ def _control_period(
     ending = driver.decide(tick, pose, log.state)
     if ending:
         return ending
-    engine.command(*(noise_model.actuate(driver.command) if noise_model else driver.command))
-    log.advance(substeps, driver.command, driver.pursuit.limiter)
+    actuated = noise_model.actuate(driver.command) if noise_model else driver.command
+    engine.command(*actuated)
+    log.advance(substeps, driver.command, driver.pursuit.limiter, actuated)
     if log.touched:
         return Ending(Outcome.COLLIDED)
     if driver.stuck:

@@ -44,6 +44,7 @@ class Drive:
         movers: positions of the movers (T, M, 2) [m]
         contacts: one line per contact (K, 4): row, obstacle, distance [m], force [N]
         estimate: estimated poses (T, 3) [m, m, rad]; (0, 3) where the robot knows its pose exactly
+        actuated: the twists that the wheels' motors were set to (T, 2) [m/s, rad/s]; (0, 2) where they are the commands
     """
 
     outcome: Outcome
@@ -57,6 +58,7 @@ class Drive:
     movers: Floats
     contacts: Floats
     estimate: Floats
+    actuated: Floats
 
 
 class Recorder:
@@ -70,7 +72,7 @@ class Recorder:
         self._engine = engine
         engine.place(start)
         self.state: State = engine.state()
-        self._rows: list[tuple[float, ...]] = [(*self.state, 0.0, 0.0, 0)]
+        self._rows: list[tuple[float, ...]] = [(*self.state, 0.0, 0.0, 0, 0.0, 0.0)]
         self._contacts: list[tuple[float, ...]] = []
         self._add_contacts(engine.contacts())
         # The error of the estimate in each row. Between two measurements it stays the same.
@@ -88,13 +90,21 @@ class Recorder:
         turned = math.remainder(estimate[2] - yaw, 2 * math.pi)
         self._errors[-1] = (estimate[0] - x, estimate[1] - y, turned)
 
-    def advance(self, steps: int, command: Twist, limiter: int) -> None:
-        """Advance a number of physics steps; the rows show the command and the limiter in force."""
+    def advance(self, steps: int, command: Twist, limiter: int, actuated: Twist | None = None) -> None:
+        """Advance a number of physics steps; the rows show the command and the limiter in force.
+
+        Args:
+            steps: how many
+            command: the robot's command
+            limiter: what held its speed
+            actuated: what the motors were set to; None: the command
+        """
+        in_force = (*command, limiter, *(actuated or command))
         engine, rows = self._engine, self._rows
         for _ in range(steps):
             contacts = engine.step()
             self.state = engine.state()
-            rows.append((*self.state, *command, limiter))
+            rows.append((*self.state, *in_force))
             if contacts:
                 self._add_contacts(contacts)
         if self._errors is not None:
@@ -127,6 +137,7 @@ class Recorder:
             movers=movers,
             contacts=contacts,
             estimate=np.empty((0, 3)) if self._errors is None else pose + np.array(self._errors),
+            actuated=np.empty((0, 2)) if self._errors is None else np.ascontiguousarray(rows[:, 8:10]),
         )
 
     def _add_contacts(self, contacts: list[Contact]) -> None:

@@ -23,6 +23,7 @@ from antdrive.robots.spec import RobotSpec
 from antdrive.sim.log.outcome import Outcome
 from antdrive.worlds.errors import FieldError
 from antdrive.worlds.files.world_file import task_from_dict, task_to_dict
+from antdrive.worlds.limits import MAX_COORDINATE
 from antdrive.worlds.types import Point
 from antdrive.worlds.world import Disc, Task, World
 
@@ -30,10 +31,13 @@ if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
 #: The version of the log's format.
-SCHEMA = 1
+SCHEMA = 2
 
 #: The highest rate of physics or control that a log can have [Hz].
-MAX_HZ = 1_000_000
+MAX_HZ = 10_000
+
+#: The largest margin and inflation that a log can have [m].
+MAX_MARGIN = 1000.0
 
 #: The trigger of a replan by a planner that decides anew at every cell.
 DECISION = "decision"
@@ -165,7 +169,7 @@ class DriveRecord:
     """What a log says beside its arrays: the scenario, the plan, and how the drive ended.
 
     Attributes:
-        schema: the version of the format, 1
+        schema: the version of the format, 2
         task: the world, start and goal that planner and controller knew, in the form of a world file
         unseen: cylinders {x, y, radius, height} [m] that also stood in the world, unknown to planner and controller
         seed: the seed that all of the run's random numbers follow from
@@ -230,6 +234,12 @@ class DriveRecord:
         for key in ("physics_hz", "control_hz"):
             if not 1 <= getattr(self, key) <= MAX_HZ:
                 raise FieldError(key, f"must be between 1 and {MAX_HZ}, got {getattr(self, key)!r:.40}")
+        for i, disc in enumerate(self.unseen):
+            if not 0 < disc.height <= MAX_COORDINATE:
+                raise FieldError(f"unseen[{i}].height", f"must be greater than 0, got {disc.height!r:.40}")
+        for key, most in (("margin", MAX_MARGIN), ("inflate", MAX_MARGIN), ("cell", MAX_COORDINATE)):
+            if not getattr(self, key) <= most:
+                raise FieldError(key, f"must be at most {most:g} m, got {getattr(self, key)!r:.40}")
         for key in ("cell", "time_limit"):
             if not getattr(self, key) > 0:
                 raise FieldError(key, f"must be greater than 0, got {getattr(self, key)!r:.40}")

@@ -9,22 +9,24 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import itertools
-import zipfile
-import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from antdrive.sim.log.archive import Archive, guarded_log, read_array
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import DriveRecord
-from antdrive.worlds.errors import FieldError, InputError
+from antdrive.worlds.errors import FieldError
 from antdrive.worlds.files.atomic import written_whole
 from antdrive.worlds.trajectories import Trajectories
+
+MAX_ROWS = 20_000_000  # a day at 240 Hz
+MAX_VALUE = 1e12  # of any number in the arrays; sums and squares of greater ones lose all meaning
+#: The dtypes of the arrays that do not hold float64.
+DTYPES = {"limiter": np.dtype("u1"), "cells": np.dtype("<i4")}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -44,6 +46,8 @@ class Rollout:
         route: points (N, 2) of the first route [m]; `Rollout.legs` adds the routes after replans
         cells: the planned cells (P, 2), (row, col)
         estimate: the estimated pose (T, 3) of a noisy robot, x, y [m] and yaw [rad]; (0, 3) for a perfect robot
+        actuated: forward speed [m/s] and yaw rate [rad/s] that the motors of a noisy robot were set to (T, 2), after
+            delay and slip; (0, 2) for a perfect robot, whose motors are set to `command`
         record: everything else: scenario, plan and outcome
     """
 
@@ -58,6 +62,7 @@ class Rollout:
     route: npt.NDArray[np.float64]
     cells: npt.NDArray[np.int32]
     estimate: npt.NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))
+    actuated: npt.NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
     record: DriveRecord
 
     @property
@@ -122,12 +127,11 @@ class Rollout:
             InputError: there is no such file, it is not a rollout, it was written by a later version, or an array or
                 a key of the record is missing or impossible.
         """
-        with _log_file(path) as file:
-            arrays = {name: file[name] for name in ARRAYS}
-            record = _record_in(file)
-        loaded = cls(**arrays, record=record)
-        for problem in loaded.problems():
-            raise InputError(f"{path}: {problem}")
+        with guarded_log(path) as archive:
+            arrays = {name: read_array(archive, name) for name in ARRAYS}
+            loaded = cls(**arrays, record=_record_in(archive))
+            for problem in loaded.problems():
+                raise ValueError(problem)
         return loaded
 
     def problems(self) -> list[str]:
@@ -138,18 +142,28 @@ class Rollout:
         rows = self.t.shape[0] if self.t.ndim else 0
         if rows == 0:
             yield "t: the log is empty"
-        for name, shape in _shapes(rows, estimated=bool(np.size(self.estimate))).items():
+        elif rows > MAX_ROWS:
+            yield f"t: must have at most {MAX_ROWS} rows, found {rows}"
+        noisy = {name for name in ("estimate", "actuated") if np.size(getattr(self, name))}
+        for name, shape in _shapes(rows, noisy).items():
             array = getattr(self, name)
             if not _fits(array.shape, shape):
                 yield f"{name}: must have the shape {_shape_text(shape)}, found {array.shape}"
-            elif array.dtype.kind not in "fiu":
-                yield f"{name}: must hold numbers, found {array.dtype}"
+            elif array.dtype != DTYPES.get(name, np.dtype("<f8")):
+                yield f"{name}: must hold {DTYPES.get(name, np.dtype('<f8'))}, found {array.dtype}"
             elif not np.isfinite(array).all():
                 yield f"{name}: must hold finite numbers, found others"
-        if _fits(self.contacts.shape, (None, 4)) and self.contacts.dtype.kind in "fiu" and len(self.contacts):
+            elif array.size and float(np.abs(array.astype(np.float64)).max()) > MAX_VALUE:
+                yield f"{name}: must hold numbers within {MAX_VALUE:g}, found others"
+        if _fits(self.contacts.shape, (None, 4)) and self.contacts.dtype.kind == "f" and len(self.contacts):
             steps = self.contacts[:, 0]
             if not (steps.min() >= 0 and steps.max() < rows):
                 yield f"contacts: must be at rows from 0 to {rows - 1}"
+            elif (np.diff(steps) < 0).any() or (self.contacts[:, :2] % 1).any():
+                yield "contacts: rows must be in order, and rows and obstacles whole numbers"
+            things = len(self.record.world.obstacles) + len(self.record.world.movers) + 4
+            if not (self.contacts[:, 1].min() >= 0 and self.contacts[:, 1].max() < things):
+                yield f"contacts: must be with one of the {things} obstacles, movers and walls"
         count = len(self.record.task.world.movers)
         if self.movers.ndim == 3 and self.movers.shape[1] != count:
             yield f"movers: must be {count}, as in the record's task, found {self.movers.shape[1]}"
@@ -183,37 +197,21 @@ def read_record(path: str | Path) -> DriveRecord:
     Raises:
         InputError: there is no such file, it is not a rollout, or a key of the record is missing or impossible.
     """
-    with _log_file(path) as file:
-        return _record_in(file)
+    with guarded_log(path) as archive:
+        return _record_in(archive)
 
 
-@contextmanager
-def _log_file(path: str | Path) -> Iterator[Any]:
-    """An open log; whatever is wrong with it becomes an InputError of one line that names the file."""
-    try:
-        with Path(path).open("rb") as raw, zipfile.ZipFile(raw):  # np.load also reads a single array; that is no log
-            pass
-        with Path(path).open("rb") as raw, np.load(raw, allow_pickle=False) as file:
-            yield file
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file") from None
-    except FieldError as error:
-        raise InputError(f"{path}: {error}") from None
-    except KeyError as error:
-        raise InputError(f"{path}: not a rollout: {error.args[0]}") from None
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-        problem = getattr(error, "strerror", None) or str(error).splitlines()[0]
-        raise InputError(f"{path}: not a rollout ({problem})") from None
-
-
-def _record_in(file: Any) -> DriveRecord:
-    record = DriveRecord.from_json(str(file["record"][()]))
+def _record_in(archive: Archive) -> DriveRecord:
+    text = read_array(archive, "record")
+    if text.shape != () or text.dtype.kind != "U":
+        raise FieldError("record", "must be one text")
+    record = DriveRecord.from_json(str(text[()]))
     if record.digest is None:
         raise FieldError("record.digest", "missing; a log that antdrive wrote has it")
     return record
 
 
-def _shapes(rows: int, *, estimated: bool) -> dict[str, tuple[int | None, ...]]:
+def _shapes(rows: int, noisy: set[str]) -> dict[str, tuple[int | None, ...]]:
     """The shape that each array must have; None stands for any length."""
     return {
         "t": (rows,),
@@ -226,7 +224,8 @@ def _shapes(rows: int, *, estimated: bool) -> dict[str, tuple[int | None, ...]]:
         "contacts": (None, 4),
         "route": (None, 2),
         "cells": (None, 2),
-        "estimate": (rows if estimated else 0, 3),
+        "estimate": (rows if "estimate" in noisy else 0, 3),
+        "actuated": (rows if "actuated" in noisy else 0, 2),
     }
 
 

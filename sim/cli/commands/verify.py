@@ -1,7 +1,9 @@
 """`antdrive verify`."""
 
+from __future__ import annotations
+
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -9,26 +11,88 @@ from antdrive.sim.cli import options
 from antdrive.sim.cli.console import print_json, print_line
 from antdrive.sim.cli.exits import FAILED, SUCCEEDED
 
+if TYPE_CHECKING:
+    from antdrive.robots.spec import RobotSpec
+    from antdrive.worlds.world import Task
+
+RobotFile = Annotated[
+    str | None,
+    typer.Option("--robot", "-r", metavar="NAME", help="The logs must be about this robot of the catalogue or file."),
+]
+
 
 def verify(
     rollouts: Annotated[list[Path], typer.Argument(metavar="ROLLOUT.npz", help="Logs of drives.")],
+    world: Annotated[
+        str | None,
+        typer.Option("--world", "-w", metavar="WORLD", help="The logs must be about this world: a name or a file."),
+    ] = None,
+    robot: RobotFile = None,
+    replay: Annotated[
+        bool, typer.Option("--replay", help="Drive the logged commands in physics again: they must give the log.")
+    ] = False,
     json: options.Json = False,
 ) -> int:
     """Certify drives again, from their logs alone.
 
-    Exit code 0: every log proves that the robot touched nothing.
+    With --world and --robot, a log must also be about these. Exit code 0: every log proves that the robot touched nothing.
     """
+    task, spec = _expected(world, robot)
+    checked = {str(path): _checked(path, task, spec, replay) for path in rollouts}
+    all_certified = all(found["certified"] for found in checked.values())
+    if json:
+        print_json({"certified": all_certified, "rollouts": checked})
+    else:
+        for path, found in checked.items():
+            print_line(f"{path}: {'; '.join(_sentences(found, world, robot))}")
+            for problem in found["problems"]:
+                print_line(f"  {problem}")
+    return SUCCEEDED if all_certified else FAILED
+
+
+def _expected(world: str | None, robot: str | None) -> tuple[Task | None, RobotSpec | None]:
+    from antdrive.robots.files import load_robot
+    from antdrive.worlds.files.world_file import load_task
+
+    return (
+        None if world is None else load_task(world),
+        None if robot is None else load_robot(robot),
+    )
+
+
+def _checked(path: Path, task: Task | None, robot: RobotSpec | None, again: bool) -> dict[str, Any]:
+    """Everything that is found out about one log, ready for JSON."""
+    from antdrive.sim.log.binding import differences, hashes_of
     from antdrive.sim.log.certificate import certify
     from antdrive.sim.log.rollout import Rollout
 
-    checked = {str(path): certify(Rollout.load(path)) for path in rollouts}
-    all_certified = all(certificate.certified for certificate in checked.values())
-    if json:
-        found = {path: certificate.as_dict() for path, certificate in checked.items()}
-        print_json({"certified": all_certified, "rollouts": found})
-    else:
-        for path, certificate in checked.items():
-            print_line(f"{path}: {certificate.sentence}")
-            for problem in certificate.problems:
-                print_line(f"  {problem}")
-    return SUCCEEDED if all_certified else FAILED
+    rollout = Rollout.load(path)
+    certificate = certify(rollout)
+    found = certificate.as_dict()
+    problems = [*certificate.problems, *differences(rollout.record, task=task, robot=robot)]
+    sentence = certificate.sentence
+    if again:
+        from antdrive.sim.driving.replay import replay
+
+        try:
+            check = replay(rollout)
+        except ValueError as error:  # the record is of no drive
+            problems.append(f"replay: {error}")
+        else:
+            found["replay"] = check.as_dict()
+            problems += check.problems
+            sentence += f"; {check.sentence}"
+    if problems and certificate.certified:
+        sentence = f"NOT verified; the log alone is {sentence}"
+    return {
+        **found,
+        "certified": not problems,
+        "problems": problems,
+        "hashes": hashes_of(rollout.record),
+        "sentence": sentence,
+    }
+
+
+def _sentences(found: dict[str, Any], world: str | None, robot: str | None) -> list[str]:
+    about = [name for name in (world, robot) if name is not None]
+    return [found["sentence"], *([f"about {' and '.join(about)}"] if about and found["certified"] else [])]

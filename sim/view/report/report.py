@@ -9,16 +9,19 @@ from __future__ import annotations
 import base64
 import io
 import os
+import re
+import warnings
 from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
 from urllib.parse import quote
 
-from antdrive.sim.view.report.runs import COLUMN_NOTES, COLUMNS, Attachment, ReportedRun, find_runs
+from antdrive.sim.view.report.runs import COLUMN_NOTES, COLUMNS, Attachment, ReportedRun, find_runs, shown
 from antdrive.worlds.errors import InputError
 from antdrive.worlds.files.atomic import written_whole
 
 EMBEDDED_BYTES = 4_500_000  # of all embedded figures together, as base64
+MAX_PIXELS = 100_000_000  # of a figure
 FIGURE_WIDTH = 1200  # of an embedded figure, at most [px]
 FILM_TYPES = {".mp4": "video/mp4", ".gif": "image/gif", ".webp": "image/webp"}
 FIGURE_CAPTIONS: Mapping[str, str] = {
@@ -64,8 +67,9 @@ def write_report(folder: Path, out: Path, *, title: str | None = None, embed_fil
         undefined=jinja2.StrictUndefined,
         autoescape=jinja2.select_autoescape(["html.j2"]),
     )
+    environment.filters |= {"md": markdown_text, "fence": fence_for}
     text = environment.get_template(f"report{kind}.j2").render(
-        title=title or folder.resolve().name,
+        title=shown(title or folder.resolve().name),
         version=metadata.version("antdrive"),
         runs=runs,
         columns=COLUMNS,
@@ -79,24 +83,32 @@ def write_report(folder: Path, out: Path, *, title: str | None = None, embed_fil
 
 
 def _attach_files(run: ReportedRun, base: Path, embed_films: bool) -> None:
-    """Attach the films and files of a run's folder, and its film if that was written elsewhere."""
-    films = {path for path in run.folder.iterdir() if path.suffix.lower() in FILM_TYPES}
-    named = (run.result.get("files") or {}).get("film")
-    if named and Path(named).is_file():
-        films.add(Path(named))
-    seen: set[Path] = set()
-    for path in sorted(films):
-        if path.resolve() in seen:
+    """Attach the films and files of a run's folder. A film that is older than the log shows another drive."""
+    log = run.folder / "rollout.npz"
+    driven = log.stat().st_mtime if log.exists() else 0.0
+    for path in sorted(run.folder.iterdir()):
+        kind = FILM_TYPES.get(path.suffix.lower())
+        if kind is None or not _lies_in(path, run.folder):
             continue
-        seen.add(path.resolve())
-        kind = FILM_TYPES[path.suffix.lower()]
+        if path.stat().st_mtime < driven:
+            run.links.append(Attachment(f"{path.name} (older than the log)", _link(path, base)))
+            continue
         source = _data_uri(kind, path.read_bytes()) if embed_films else _link(path, base)
         run.films.append(Attachment(path.name, source, is_video=kind.startswith("video/")))
     for names, found in (
         (("rollout.npz", "result.json"), run.links),
         (("overview.png", "plan.png"), run.pictures),
     ):
-        found += [Attachment(name, _link(run.folder / name, base)) for name in names if (run.folder / name).exists()]
+        found += [
+            Attachment(name, _link(run.folder / name, base))
+            for name in names
+            if _lies_in(run.folder / name, run.folder)
+        ]
+
+
+def _lies_in(path: Path, folder: Path) -> bool:
+    """Whether a path is a regular file in a folder, also where links lead."""
+    return path.is_file() and path.resolve().is_relative_to(folder.resolve())
 
 
 def _attach_figures(runs: list[ReportedRun], base: Path) -> None:
@@ -105,7 +117,7 @@ def _attach_figures(runs: list[ReportedRun], base: Path) -> None:
     for name, caption in FIGURE_CAPTIONS.items():
         for run in runs:
             path = run.folder / name
-            if not path.exists():
+            if not _lies_in(path, run.folder):
                 continue
             figure = _embedded(path, caption)
             if used + len(figure.source) <= EMBEDDED_BYTES:
@@ -117,12 +129,16 @@ def _attach_figures(runs: list[ReportedRun], base: Path) -> None:
 
 def _embedded(path: Path, caption: str) -> Attachment:
     """A figure as a data URI, at most `FIGURE_WIDTH` pixels wide."""
-    from PIL import Image, UnidentifiedImageError
+    from PIL import Image
 
     try:
-        with Image.open(path) as picture:
-            small = picture.convert("RGB")
-    except (OSError, UnidentifiedImageError):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            with Image.open(path) as picture:
+                if picture.width * picture.height > MAX_PIXELS:
+                    raise InputError(f"{path}: more than {MAX_PIXELS:,} pixels")
+                small = picture.convert("RGB")
+    except (OSError, SyntaxError, EOFError, Image.DecompressionBombError):
         raise InputError(f"{path}: not a picture") from None
     small.thumbnail((FIGURE_WIDTH, FIGURE_WIDTH), Image.Resampling.LANCZOS)
     content = io.BytesIO()
@@ -143,8 +159,8 @@ def _link(path: Path, base: Path) -> str:
 def _summary(runs: list[ReportedRun]) -> list[tuple[str, str]]:
     """The report's headline numbers, each with its meaning."""
     certified = sum(run.succeeded for run in runs)
-    bounds = [float(run.result["certificate"]["bound_m"]) for run in runs if run.succeeded]
-    driven = sum(float(value) for run in runs if (value := run.cells[1][0]))
+    bounds = [run.log.certificate.bound for run in runs if run.log and run.succeeded]
+    driven = sum(float(value) for run in runs if run.log and (value := run.cells[1][0]))
     worlds, planners = len({run.world for run in runs}), len({run.planner for run in runs})
     return [
         (f"{certified} / {len(runs)}", "reached the goal, certified collision-free"),
@@ -153,3 +169,13 @@ def _summary(runs: list[ReportedRun]) -> list[tuple[str, str]]:
         (str(worlds), "world" if worlds == 1 else "worlds"),
         (str(planners), "planner" if planners == 1 else "planners"),
     ]
+
+
+def markdown_text(value: object) -> str:
+    """A text that Markdown shows as it is, in tables and in HTML blocks, too."""
+    return re.sub(r"[&<>|`*_~\[\]\\@#]", lambda found: f"&#{ord(found[0])};", str(value))
+
+
+def fence_for(code: str) -> str:
+    """A code fence longer than any run of backticks in the code."""
+    return "`" * max(3, 1 + max(map(len, re.findall("`+", code)), default=0))

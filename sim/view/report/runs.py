@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import json
 import math
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from antdrive.sim.log.certificate import Certificate, certify
+from antdrive.sim.log.metrics import measure
+from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import DriveRecord
-from antdrive.sim.log.rollout import read_record
+from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.view.style import hexed, planner_style
-from antdrive.worlds.errors import InputError
+from antdrive.worlds.errors import InputError, input_error
 
+MAX_RESULT_BYTES = 10_000_000  # of a result.json
+LONGEST, LONGEST_COMMAND = 200, 4000  # characters of a text, of a command
+UNDRIVEN = (Outcome.NO_PATH.key, Outcome.STOPPED.key)  # outcomes of runs that have no log
 REQUIRED = ("world", "planner", "robot", "seed", "outcome")  # keys of result.json
 
 
@@ -75,14 +80,31 @@ class Attachment:
     height: int = 0
 
 
+@dataclass(frozen=True)
+class LogFacts:
+    """What the log of a run says.
+
+    Attributes:
+        record: the log's record
+        certificate: the log's, computed for the report
+        metrics: the log's metrics by name
+        digest: of the log's content
+    """
+
+    record: DriveRecord
+    certificate: Certificate
+    metrics: Mapping[str, float]
+    digest: str
+
+
 @dataclass
 class ReportedRun:
-    """A run as the report's templates show it.
+    """A run as the report's templates show it: from its log alone, and as a claim of result.json where there is none.
 
     Attributes:
         folder: where the run's files are
         result: the content of result.json
-        record: the record of the log; None if the robot did not drive
+        log: what the log says; None if there is none
         number: its place among the runs of the report
         figures: embedded figures
         films: films, embedded or linked
@@ -92,7 +114,7 @@ class ReportedRun:
 
     folder: Path
     result: Mapping[str, Any]
-    record: DriveRecord | None
+    log: LogFacts | None
     number: int
     figures: list[Attachment] = field(default_factory=list)
     films: list[Attachment] = field(default_factory=list)
@@ -100,34 +122,34 @@ class ReportedRun:
     pictures: list[Attachment] = field(default_factory=list)
 
     @property
-    def world(self) -> Any:
+    def world(self) -> str:
         """The world's name."""
-        return self.result["world"]
+        return shown(self.log.record.task.world.name if self.log else self.result["world"])
 
     @property
-    def planner(self) -> Any:
+    def planner(self) -> str:
         """The planner's name."""
-        return self.result["planner"]
+        return shown(self.log.record.planner.name if self.log else self.result["planner"])
 
     @property
-    def robot(self) -> Any:
+    def robot(self) -> str:
         """The robot's name."""
-        return self.result["robot"]
+        return shown(self.log.record.robot.name if self.log else self.result["robot"])
 
     @property
-    def seed(self) -> Any:
+    def seed(self) -> str:
         """The random seed."""
-        return self.result["seed"]
+        return shown(self.log.record.seed if self.log else self.result["seed"])
 
     @property
-    def reason(self) -> Any:
-        """Why there is no path, if the planner gave a reason."""
-        return self.result.get("reason", "")
+    def reason(self) -> str:
+        """What the outcome leaves open."""
+        return shown((self.log.record.reason if self.log else self.result.get("reason")) or "")
 
     @property
-    def command(self) -> Any:
-        """The command that repeats the run."""
-        return self.result.get("command", "")
+    def command(self) -> str:
+        """The command that repeats the run, as result.json claims it."""
+        return shown(self.result.get("command") or "", LONGEST_COMMAND)
 
     @property
     def anchor(self) -> str:
@@ -140,85 +162,97 @@ class ReportedRun:
         return f"{self.world} {self.planner} {self.robot} {self.seed}"
 
     @property
+    def claimed(self) -> bool:
+        """Whether only result.json says that the robot drove."""
+        return self.log is None and self.result["outcome"] not in UNDRIVEN
+
+    @property
     def outcome(self) -> str:
         """The outcome's name in words."""
-        return str(self.result["outcome"]).replace("_", " ")
+        name = self.log.record.outcome.key if self.log else shown(self.result["outcome"])
+        return name.replace("_", " ") + (", claimed" if self.claimed else "")
 
     @property
     def sentence(self) -> str:
         """The outcome as a sentence."""
-        text = str(self.result.get("sentence", ""))
+        text = self.log.record.outcome.value if self.log else shown(self.result.get("sentence") or "")
         return text[:1].upper() + text[1:]
 
     @property
     def succeeded(self) -> bool:
-        """Whether the robot reached the goal and the drive is certified."""
-        return self.result.get("succeeded") is True
+        """Whether the robot reached the goal and its log certifies the drive."""
+        return self.log is not None and self.log.record.outcome is Outcome.SUCCEEDED and self.log.certificate.certified
 
     @property
     def badge(self) -> str:
         """The CSS class of the outcome's badge; a success that is not certified has its own."""
-        name = str(self.result["outcome"])
-        return "doubt" if name == "succeeded" and not self.succeeded else name
+        if self.log is None:
+            return "doubt"
+        name = self.log.record.outcome.key
+        return "doubt" if name == Outcome.SUCCEEDED.key and not self.succeeded else name
 
     @property
     def colour(self) -> str:
         """The planner's colour as #rrggbb."""
-        return hexed(planner_style(str(self.planner))[0])
+        return hexed(planner_style(self.planner)[0])
 
     @property
     def problems(self) -> list[str]:
-        """Why the drive is not certified, a sentence each."""
-        return list((self.result.get("certificate") or {}).get("problems") or [])
+        """Why the drive is not certified, and where result.json contradicts the log, a sentence each."""
+        if self.log is None:
+            return []
+        other = self.result.get("digest") != self.log.digest
+        return [*self.log.certificate.problems, *(["result.json is about another log: its digest differs"] * other)]
 
     @property
     def verdict(self) -> str:
         """The certificate as a sentence."""
-        c = self.result.get("certificate")
-        if not c:
-            return "The robot did not drive."
-        if not c.get("certified"):
+        if self.log is None:
+            return "Claimed by result.json: there is no log." if self.claimed else "The robot did not drive."
+        certificate = self.log.certificate
+        if not certificate.certified:
             return "Not certified collision-free."
-        return f"Certified collision-free: at least {c['bound_m']:.4f} m of clearance, between logged poses, too."
+        verdict = certificate.verdict[:1].upper() + certificate.verdict[1:]
+        return f"{verdict}: at least {certificate.bound:.4f} m of clearance, between logged poses, too."
+
+    @property
+    def metrics(self) -> Mapping[str, Any]:
+        """The log's metrics, or those that result.json claims."""
+        if self.log is not None:
+            return self.log.metrics
+        claimed = self.result.get("metrics")
+        return claimed if isinstance(claimed, Mapping) else {}
 
     @property
     def cells(self) -> list[tuple[str, str]]:
         """The values of the numeric columns after the seed: each as a sort key and as shown."""
-        metrics, certificate = self.result.get("metrics") or {}, self.result.get("certificate") or {}
-        gap = metrics.get("gap_to_euclidean_optimum")
+        metrics, gap = self.metrics, number(self.metrics.get("gap_to_euclidean_optimum"))
         values = (
-            (metrics.get("path_length_m"), 2),
-            (metrics.get("driven_length_m"), 2),
+            (number(metrics.get("path_length_m")), 2),
+            (number(metrics.get("driven_length_m")), 2),
             (None if gap is None else 100 * gap, 1),
-            (metrics.get("duration_s"), 1),
-            (metrics.get("min_clearance_m"), 3),
-            (certificate.get("bound_m"), 3),
-            (metrics.get("plan_s"), 3),
+            (number(metrics.get("duration_s")), 1),
+            (number(metrics.get("min_clearance_m")), 3),
+            (number(self.log.certificate.bound) if self.log else None, 3),
+            (number(metrics.get("plan_s")), 3),
         )
-        return [
-            (repr(float(v)), f"{round(v, digits) + 0.0:.{digits}f}")
-            if isinstance(v, int | float) and math.isfinite(v)
-            else ("", "–")
-            for v, digits in values
-        ]
+        return [("", "–") if v is None else (repr(v), f"{round(v, digits) + 0.0:.{digits}f}") for v, digits in values]
 
     @property
     def details(self) -> list[tuple[str, list[tuple[str, str]]]]:
         """Lists of names and values, each with its heading."""
-        record = self.record.as_dict() if self.record else {}
-        settings = {
-            key: record[key]
-            for key in ("margin", "inflate", "cell", "physics_hz", "control_hz", "time_limit")
-            if key in record
-        }
-        certificate = {k: v for k, v in (self.result.get("certificate") or {}).items() if k != "problems"}
+        if self.log is None:
+            return [("Claimed metrics", _pairs(self.metrics)), ("Run", _pairs({"digest": self.result.get("digest")}))]
+        record = self.log.record.as_dict()
+        settings = {key: record[key] for key in ("margin", "inflate", "cell", "physics_hz", "control_hz", "time_limit")}
+        certificate = {k: v for k, v in self.log.certificate.as_dict().items() if k != "problems"}
         return [
-            ("Metrics", _pairs(self.result.get("metrics"))),
+            ("Metrics", _pairs(self.metrics)),
             ("Certificate", _pairs(certificate)),
-            ("Planner", _pairs(_part(record, "planner", "settings"))),
-            ("Controller", _pairs(_part(record, "controller", "settings"))),
-            ("Run", _pairs({**settings, "digest": self.result.get("digest")})),
-            ("Versions", _pairs(record.get("versions"))),
+            ("Planner", _pairs(record["planner"]["settings"])),
+            ("Controller", _pairs(record["controller"]["settings"])),
+            ("Run", _pairs({**settings, "digest": self.log.digest})),
+            ("Versions", _pairs(record["versions"])),
         ]
 
 
@@ -230,40 +264,66 @@ def find_runs(folder: Path) -> Iterator[ReportedRun]:
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder")
-    for number, path in enumerate(sorted(folder.rglob("result.json"))):
-        try:
-            content = json.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise InputError(f"{path}: cannot be read ({error})") from None
-        result = content if isinstance(content, dict) else {}
+    for place, path in enumerate(sorted(folder.rglob("result.json"))):
+        result = _result(path)
         missing = [key for key in REQUIRED if key not in result]
         if missing:
             raise InputError(f"{path}: {missing[0]}: missing; `antdrive run` writes it")
-        yield ReportedRun(path.parent, result, _record_of(path.parent / "rollout.npz"), number)
+        log = path.parent / "rollout.npz"
+        yield ReportedRun(path.parent, result, _facts(log) if log.exists() else None, place)
 
 
-def _record_of(path: Path) -> DriveRecord | None:
-    """The record of a log, without its arrays; None if there is no log."""
-    return read_record(path) if path.exists() else None
+def _result(path: Path) -> Mapping[str, Any]:
+    """The content of a result.json; empty if it is no object."""
+    if not path.is_file():
+        raise input_error(str(path), "cannot be read (no regular file)")
+    if path.stat().st_size > MAX_RESULT_BYTES:
+        raise input_error(str(path), f"cannot be read (larger than {MAX_RESULT_BYTES // 1_000_000} MB)")
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise input_error(str(path), f"cannot be read ({error})") from None
+    return content if isinstance(content, dict) else {}
 
 
-def _part(values: Mapping[str, Any], *keys: str) -> Any:
-    """The value at a path of keys, None if there is none."""
-    found: Any = values
-    for key in keys:
-        found = found.get(key) if isinstance(found, Mapping) else None
-    return found
+def _facts(path: Path) -> LogFacts:
+    """What a log says, computed from the log alone."""
+    rollout = Rollout.load(path)
+    try:
+        return LogFacts(rollout.record, certify(rollout), measure(rollout), rollout.digest)
+    except ValueError as error:
+        raise input_error(str(path), str(error)) from None
 
 
-def _pairs(values: Any) -> list[tuple[str, str]]:
-    return [(str(key), _shown(value)) for key, value in values.items()] if isinstance(values, Mapping) else []
+def number(value: Any) -> float | None:
+    """A finite number; None for anything else."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    try:
+        found = float(value)
+    except OverflowError:
+        return None
+    return found if math.isfinite(found) else None
 
 
-def _shown(value: Any) -> str:
+def shown(value: Any, longest: int = LONGEST) -> str:
+    """A value as text on one line of printable characters, cut to a length.
+
+    Args:
+        value: any value of JSON
+        longest: the most characters
+    """
     if isinstance(value, bool):
         return "yes" if value else "no"
     if value is None:
         return "–"
     if isinstance(value, float):
         return f"{value:.6g}"
-    return re.sub(r"\s+", " ", str(value))
+    text = repr(value) if isinstance(value, list | dict) else str(value)
+    text = "".join(c if c.isprintable() else " " for c in text[: 4 * longest])
+    text = " ".join(text.split())
+    return text if len(text) <= longest else f"{text[:longest]}…"
+
+
+def _pairs(values: Any) -> list[tuple[str, str]]:
+    return [(shown(key), shown(value)) for key, value in values.items()] if isinstance(values, Mapping) else []

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from antdrive.sim import Outcome, Rollout, Run, certify
+from antdrive.sim import Outcome, Rollout, Run, Scenario, certify, run
 from antdrive.sim.log.certificate import closed_form_clearance, in_metres
 from antdrive.worlds import Disc
 
@@ -89,15 +89,95 @@ TAMPERINGS: dict[str, tuple[Callable[[Rollout], Rollout], str]] = {
     "the start": (lambda log: with_task(log, start=(0.6, 1.3, 0.0)), "not the task's start"),
     "the rate": (lambda log: with_record(log, physics_hz=120), "rows are not at 120 Hz"),
     "a rule of the speed": (lambda log: with_record(log, limiters=("cruise",)), "indices into the 1 of record.limiters"),
-    "text for poses": (lambda log: changed(log, "pose", lambda p: p.astype(str)), "must hold numbers"),
-    "complex poses": (lambda log: changed(log, "pose", lambda p: p.astype(complex)), "must hold numbers"),
+    "text for poses": (lambda log: changed(log, "pose", lambda p: p.astype(str)), "must hold float64"),
+    "complex poses": (lambda log: changed(log, "pose", lambda p: p.astype(complex)), "must hold float64"),
     "time as one number": (lambda log: changed(log, "t", lambda t: np.array(3.0)), "must have the shape"),
     "a detour": (lambda log: _detour(log), "do not follow from the measured speed"),
+    "bytes for poses": (lambda log: changed(log, "pose", lambda p: p.astype(np.int8)), "must hold float64, found int8"),
+    "two rows 8 m apart": (lambda log: _two_rows(log), "do not follow from the measured speed"),
+    "a full turn between rows": (lambda log: _full_turn(log), "limit is"),
+    "a bend of 35 mm in a second": (lambda log: _bent(log, 0.035, 240), "do not follow from the measured speed"),
+    "a bend of 20 mm in a second": (lambda log: _bent(log, 0.020, 240), "do not follow from the measured speed"),
+    "a slide of 4 cm/s": (lambda log: _sliding(log), "do not follow from the measured speed"),
+    "a speed of 5 m/s": (lambda log: changed(log, "twist", lambda t: t * 10), "the robot's limit is"),
+    "a speed that leaps": (lambda log: _leaping(log), "changes faster than the robot can"),
+    "a heading of 7 rad": (lambda log: changed(log, "pose", lambda p: p + [0, 0, 2 * math.pi]), "from -pi to pi"),
+    "commands of 1e9": (lambda log: changed(log, "command", lambda c: c * 1e9), "command: beyond the robot's limits"),
+    "commands within a period": (lambda log: changed(log, "command", _hasty), "changes within a control period"),
+    "commands that leap": (lambda log: changed(log, "command", _start_at_once), "changes faster than the robot's limits"),
+    "a first command": (lambda log: changed(log, "command", lambda c: np.full_like(c, 0.1)), "row 0 is before"),
+    "no route": (lambda log: replace(log, route=log.route[:1]), "two points or more"),
+    "a route outside": (lambda log: changed(log, "route", lambda r: r + 50.0), "leaves the world's bounds"),
+    "a route elsewhere": (lambda log: replace(log, route=log.route[::-1].copy()), "from the task's start"),
+    "cells outside": (lambda log: changed(log, "cells", lambda c: c + 99), "must lie on the grid"),
+    "cells that leap": (lambda log: replace(log, cells=log.cells[::2].copy()), "must be neighbours"),
+    "an estimate without noise": (lambda log: replace(log, estimate=log.pose + 0.0), "estimate: must have 0 rows"),
+    "targets without noise": (lambda log: replace(log, actuated=log.command * 2), "actuated: must have 0 rows"),
+    "a margin": (lambda log: with_record(log, margin=1.0), "plus the margin"),
+    "an inflation": (lambda log: with_record(log, inflate=0.01), "plus the margin"),
+    "no path": (lambda log: with_record(log, outcome=Outcome.NO_PATH), "before the robot drives"),
+    "time over": (lambda log: with_record(log, outcome=Outcome.TIMED_OUT), "timed_out, but the drive ends after"),
+    "a short time limit": (lambda log: with_record(log, time_limit=1.0), "but the drive lasts"),
+    "a row a second": (lambda log: _at_rate(log, 1), "must be at least 60 Hz"),
+    "a control rate": (lambda log: with_record(log, control_hz=70), "does not divide the physics rate"),
     "nothing left": (
         lambda log: replace(log, **{k: getattr(log, k)[:0] for k in ROWS}),
         "empty",
     ),
 }  # fmt: skip
+
+
+def _two_rows(log: Rollout) -> Rollout:
+    """Only the start and, 4 ms later, the goal, at rest in both."""
+    rows = [0, len(log.t) - 1]
+    short = replace(log, **{k: getattr(log, k)[rows] for k in ROWS})
+    return replace(short, t=log.t[:2], twist=np.zeros((2, 2)))
+
+
+def _full_turn(log: Rollout) -> Rollout:
+    twist = log.twist.copy()
+    twist[300:302, 1] = 2 * math.pi * log.record.physics_hz
+    return replace(log, twist=twist)
+
+
+def _bent(log: Rollout, aside: float, rows: int) -> Rollout:
+    """The path bent to the side within some rows, and back within as many."""
+    pose = log.pose.copy()
+    pose[200 : 200 + 2 * rows, 1] += aside * np.sin(np.linspace(0, math.pi, 2 * rows)) ** 2
+    bent = replace(log, pose=pose)
+    return replace(bent, clearance=closed_form_clearance(bent))
+
+
+def _sliding(log: Rollout) -> Rollout:
+    """A robot that stands at the goal and slides sideways, as its speeds do not say."""
+    rows = 240
+    last = {k: np.repeat(getattr(log, k)[-1:], rows, axis=0) for k in ROWS}
+    last["twist"][:] = 0.0
+    heading = last["pose"][:, 2]
+    slide = 0.04 * np.arange(rows) / log.record.physics_hz
+    last["pose"][:, 0] -= slide * np.sin(heading)
+    last["pose"][:, 1] += slide * np.cos(heading)
+    longer = replace(log, **{k: np.concatenate([getattr(log, k), last[k]]) for k in ROWS})
+    longer = replace(longer, t=np.arange(len(longer.t)) / log.record.physics_hz)
+    return replace(longer, clearance=closed_form_clearance(longer))
+
+
+def _leaping(log: Rollout) -> Rollout:
+    twist = log.twist.copy()
+    twist[300] = 0.0
+    return replace(log, twist=twist)
+
+
+def _hasty(command: np.ndarray) -> None:
+    command[303] *= 0.9
+
+
+def _start_at_once(command: np.ndarray) -> None:
+    command[1:5, 0] = 0.4
+
+
+def _at_rate(log: Rollout, hz: int) -> Rollout:
+    return with_record(replace(log, t=np.arange(len(log.t)) / hz), physics_hz=hz, control_hz=1)
 
 
 def _detour(log: Rollout) -> Rollout:
@@ -169,3 +249,26 @@ def test_verify_needs_neither_physics_nor_compiler(log: Rollout, tmp_path: Path)
     )
     assert done.returncode == 0, done.stderr
     assert ": certified collision-free: " in done.stdout
+
+
+def test_a_robot_that_stays_where_it_is_gets_a_verdict_of_its_own(log: Rollout) -> None:
+    x, y, _ = log.record.task.start
+    stays = with_task(replace(log, **{k: getattr(log, k)[:1] for k in ROWS}), goal=(x + 0.1, y))
+    stays = replace(stays, route=np.array([[x, y], [x + 0.1, y]]))
+    certificate = certify(stays)
+    assert certificate.certified, certificate.problems
+    assert certificate.sentence.startswith("certified: touched nothing, went nowhere: ")
+    assert certify(log).verdict == "certified collision-free"
+    assert certify(log).moved > 1.0
+
+
+def test_a_noisy_log_whose_targets_or_estimates_are_made_up_is_not_certified(small_scenario: Scenario) -> None:
+    log = run(replace(small_scenario, noise=1.0, seed=4)).rollout
+    assert log is not None
+    assert certify(log).certified
+    other = certify(replace(log, actuated=log.actuated * 1.5))
+    assert any("not the delayed command" in problem for problem in other.problems)
+    elsewhere = certify(replace(log, estimate=log.estimate + 5.0))
+    assert any("more than the robot's noise allows" in problem for problem in elsewhere.problems)
+    without = certify(replace(log, actuated=log.actuated[:0]))
+    assert any("actuated: must have" in problem for problem in without.problems)

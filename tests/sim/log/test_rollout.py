@@ -1,10 +1,13 @@
 """Logs on disk: what is saved is read again, and what is no log is refused in one line that names the file and the key."""
 
 import hashlib
+import io
 import json
 import math
+import os
 import subprocess
 import sys
+import zipfile
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -13,10 +16,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from antdrive.sim import Outcome, Rollout, Run
+from antdrive.sim import Outcome, Rollout, Run, certify, measure
+from antdrive.sim.log.margin import budget
 from antdrive.sim.log.record import DriveRecord
 from antdrive.sim.log.rollout import ARRAYS, read_record
 from antdrive.worlds import InputError
+from antdrive.worlds.errors import FieldError
 from antdrive.worlds.movers import Cruising, Keyframed, Wandering
 from tests.sim.records import made_up_record
 
@@ -125,7 +130,7 @@ def test_a_log_of_a_later_version_is_refused(saved: Path, tmp_path: Path) -> Non
     def later(record: dict[str, Any]) -> None:
         record["schema"] = 99
 
-    with pytest.raises(InputError, match=r"changed\.npz: record\.schema: this version reads schema 1, found 99"):
+    with pytest.raises(InputError, match=r"changed\.npz: record\.schema: this version reads schema 2, found 99"):
         Rollout.load(rewritten(saved, tmp_path, later))
 
 
@@ -142,11 +147,14 @@ WRONG: dict[str, tuple[str, Any, str]] = {
     "a margin of text": ("margin", "wide", 'must be a valid number, got "wide"'),
     "a margin of 400 digits": ("margin", LONG, "must be a finite number, got "),
     "a negative margin": ("margin", -0.1, "must be at least 0, got -0.1"),
+    "a margin of a light year": ("margin", 9.5e15, "must be at most 1000 m, got 9"),
+    "an inflation of a light year": ("inflate", 9.5e15, "must be at most 1000 m, got 9"),
+    "a cell of a light year": ("cell", 9.5e15, "must be at most 1e+06 m, got 9"),
     "a NaN margin": ("margin", math.nan, ""),
     "a margin that is true": ("margin", True, "must be a valid number, got true"),
     "a rate of text": ("physics_hz", "fast", "must be a valid integer"),
-    "a rate of 400 digits": ("physics_hz", LONG, "must be between 1 and 1000000"),
-    "no rate": ("physics_hz", 0, "must be between 1 and 1000000, got 0"),
+    "a rate of 400 digits": ("physics_hz", LONG, "must be between 1 and 10000"),
+    "no rate": ("physics_hz", 0, "must be between 1 and 10000, got 0"),
     "half a rate": ("physics_hz", 240.5, "must be a valid integer"),
     "an unknown outcome": ("outcome", "flew", "unknown outcome 'flew'; choose from succeeded, collided"),
     "an outcome of numbers": ("outcome", [3], "unknown outcome '[3]'; choose from"),
@@ -263,3 +271,162 @@ def test_reading_a_log_needs_neither_compiler_nor_planners(saved: Path) -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+NOT_LOGS: dict[str, Callable[[Path, Path], Path]] = {}
+
+
+def not_a_log(make: Callable[[Path, Path], None]) -> Callable[[Path, Path], None]:
+    def made(saved: Path, folder: Path) -> Path:
+        make(saved, folder / "odd.npz")
+        return folder / "odd.npz"
+
+    NOT_LOGS[make.__name__.strip("_")] = made
+    return make
+
+
+def members(saved: Path) -> dict[str, bytes]:
+    with zipfile.ZipFile(saved) as archive:
+        return {info.filename: archive.read(info) for info in archive.infolist()}
+
+
+def packed(content: dict[str, bytes], path: Path, kind: int = zipfile.ZIP_DEFLATED) -> None:
+    with zipfile.ZipFile(path, "w", kind) as archive:
+        for name, data in content.items():
+            archive.writestr(name, data)
+
+
+@not_a_log
+def _a_pipe(saved: Path, path: Path) -> None:
+    os.mkfifo(path)
+
+
+@not_a_log
+def _zeros_without_end(saved: Path, path: Path) -> None:
+    path.symlink_to("/dev/zero")
+
+
+@not_a_log
+def _lzma(saved: Path, path: Path) -> None:
+    packed(members(saved), path, zipfile.ZIP_LZMA)
+
+
+@not_a_log
+def _ten_billion_rows(saved: Path, path: Path) -> None:
+    content = members(saved)
+    head = io.BytesIO()
+    np.lib.format.write_array_header_1_0(head, {"descr": "<f8", "fortran_order": False, "shape": (10**10,)})
+    packed({**content, "t.npy": head.getvalue()}, path)
+
+
+@not_a_log
+def _members_without_magic(saved: Path, path: Path) -> None:
+    packed({**members(saved), "pose.npy": b"pose"}, path)
+
+
+@not_a_log
+def _a_broken_header(saved: Path, path: Path) -> None:
+    content = members(saved)
+    packed({**content, "pose.npy": content["pose.npy"].replace(b"{'descr'", b"{'descr(")}, path)
+
+
+@not_a_log
+def _a_bomb(saved: Path, path: Path) -> None:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive, archive.open("t.npy", "w") as member:
+        for _ in range(70):
+            member.write(bytes(10_000_000))
+
+
+@not_a_log
+def _encrypted(saved: Path, path: Path) -> None:
+    content = bytearray(saved.read_bytes())
+    at = content.rindex(b"PK\x01\x02")
+    content[at + 8] |= 1
+    path.write_bytes(content)
+
+
+@not_a_log
+def _a_version_to_come(saved: Path, path: Path) -> None:
+    content = bytearray(saved.read_bytes())
+    content[content.rindex(b"PK\x01\x02") + 6] = 99
+    path.write_bytes(content)
+
+
+@not_a_log
+def _a_name_twice(saved: Path, path: Path) -> None:
+    packed(members(saved), path)
+    with zipfile.ZipFile(path, "a") as archive, pytest.warns(UserWarning, match="Duplicate"):
+        archive.writestr("t.npy", b"")
+
+
+@not_a_log
+def _numbers_of_8_bits(saved: Path, path: Path) -> None:
+    with np.load(saved) as file:
+        arrays = dict(file)
+    np.savez(path, **{**arrays, "pose": arrays["pose"].astype(np.int8)})
+
+
+@pytest.mark.parametrize("what", NOT_LOGS)
+def test_hostile_archives_are_refused_in_one_line(what: str, saved: Path, tmp_path: Path) -> None:
+    path = NOT_LOGS[what](saved, tmp_path)
+    with pytest.raises(InputError) as caught:
+        Rollout.load(path)
+    message = str(caught.value)
+    assert message.startswith(f"{path}: ")
+    assert "\n" not in message
+    assert len(message) < len(str(path)) + 400
+
+
+def test_no_log_whatever_ends_in_anything_but_one_line(saved: Path, tmp_path: Path) -> None:
+    """Random bytes, numbers and keys: what can be read at all can be certified, measured and broken down."""
+    rng = np.random.default_rng(11)
+    raw, content = saved.read_bytes(), members(saved)
+    read, refusals = 0, []
+    for case in range(240):
+        path = tmp_path / "odd.npz"
+        if case % 3 == 0:
+            path.write_bytes(_flipped(raw, rng))
+        elif case % 3 == 1:
+            name = str(rng.choice(list(content)))
+            packed({**content, name: _flipped(content[name], rng)}, path, zipfile.ZIP_STORED)
+        else:
+            record = json.loads(str(np.load(io.BytesIO(content["record.npy"]))[()]))
+            _edit(record, rng)
+            buffer = io.BytesIO()
+            np.save(buffer, np.array(json.dumps(record)))
+            packed({**content, "record.npy": buffer.getvalue()}, path, zipfile.ZIP_STORED)
+        try:
+            log = Rollout.load(path)
+            certificate = certify(log)
+            assert not certificate.certified or log.digest == log.record.digest
+            assert all("\n" not in problem for problem in certificate.problems)
+            measure(log)
+            budget(log)
+            read += 1
+        except (InputError, FieldError) as error:
+            refusals.append(str(error))
+    assert not any("\n" in refusal for refusal in refusals)
+    assert read > 20, "some are read"
+
+
+def _flipped(content: bytes, rng: np.random.Generator) -> bytes:
+    changed = bytearray(content)
+    for at in rng.integers(0, len(changed), rng.integers(1, 6)):
+        changed[at] = rng.integers(0, 256)
+    return bytes(changed)
+
+
+ODD = (None, True, -1, 0, 1e300, -1e-300, 10**400, 2**70, "", "a|b\n", [], {}, [[1, 2]], {"x": 1}, math.nan)
+
+
+def _edit(record: dict[str, Any], rng: np.random.Generator) -> None:
+    """Another value somewhere in the record."""
+    place: Any = record
+    while True:
+        keys = list(place) if isinstance(place, dict) else list(range(len(place)))
+        key = keys[rng.integers(len(keys))]
+        if isinstance(place[key], dict | list) and place[key] and rng.random() < 0.8:
+            place = place[key]
+        else:
+            place[key] = ODD[rng.integers(len(ODD))]
+            return

@@ -1,10 +1,14 @@
 """`antdrive verify`."""
 
+import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from tests.sim.cli.calling import Refused
+from antdrive.sim import Run
+from antdrive.worlds import save_task
+from tests.sim.cli.calling import Call, Refused
 
 
 @pytest.mark.parametrize(
@@ -18,3 +22,63 @@ from tests.sim.cli.calling import Refused
 def test_wrong_input_is_one_line_and_exit_code_2(refused: Refused, words: list[str], says: str, tmp_path: Path) -> None:
     (tmp_path / "folder.mp4").mkdir()
     assert says in refused(*words)
+
+
+@pytest.fixture
+def log(small_run: Run, tmp_path: Path) -> Path:
+    assert small_run.rollout is not None
+    return small_run.rollout.save(tmp_path / "rollout.npz")
+
+
+def test_a_log_is_about_the_given_world_and_robot(antdrive: Call, log: Path, small: Path) -> None:
+    code, out, _ = antdrive("verify", log, "--world", small, "--robot", "turtlebot", "--replay")
+    assert code == 0, out
+    assert "certified collision-free" in out
+    assert "replayed bit for bit" in out
+    assert f"about {small} and turtlebot" in out
+
+
+def test_the_meaning_of_a_world_file_counts_not_its_text(antdrive: Call, log: Path, small: Path) -> None:
+    small.write_text("# another text\n" + small.read_text().replace("name: ", "name: other-"))
+    assert antdrive("verify", log, "--world", small)[0] == 0
+
+
+def test_a_log_of_another_world_or_robot_is_exit_code_1(
+    antdrive: Call, log: Path, small_run: Run, tmp_path: Path
+) -> None:
+    task = small_run.scenario.task
+    save_task(replace(task, goal_tolerance=0.3), tmp_path / "other.yaml")
+    code, out, _ = antdrive("verify", log, "--world", tmp_path / "other.yaml", "--robot", "jackal")
+    assert code == 1
+    assert "NOT verified" in out
+    assert "  world: the log is about another one; its goal_tolerance differs" in out
+    assert "  robot: the log is about another one; its footprint, " in out
+
+
+def test_json_has_the_hashes_and_the_replay(antdrive: Call, log: Path) -> None:
+    code, out, _ = antdrive("verify", log, "--replay", "--json")
+    assert code == 0
+    (found,) = json.loads(out)["rollouts"].values()
+    assert set(found["hashes"]) == {"world", "robot", "settings"}
+    assert all(len(value) == 64 for value in found["hashes"].values())
+    assert found["replay"] == {"exact": True, "position_m": 0.0, "turn_rad": 0.0, "twist": 0.0}
+
+
+def test_a_log_whose_commands_lead_elsewhere_is_exit_code_1(antdrive: Call, small_run: Run, tmp_path: Path) -> None:
+    assert small_run.rollout is not None
+    command = small_run.rollout.command * [1.0, 0.5]
+    path = replace(small_run.rollout, command=command).save(tmp_path / "forged.npz")
+    assert antdrive("verify", path)[0] == 0, "the log alone does not show it"
+    code, out, _ = antdrive("verify", path, "--replay")
+    assert code == 1
+    assert "  replay: the logged commands lead up to " in out
+
+
+def test_a_record_that_cannot_be_driven_is_a_problem_not_a_traceback(
+    antdrive: Call, small_run: Run, tmp_path: Path
+) -> None:
+    assert small_run.rollout is not None
+    odd = replace(small_run.rollout, record=replace(small_run.rollout.record, control_hz=70))
+    code, out, _ = antdrive("verify", odd.save(tmp_path / "odd.npz"), "--replay")
+    assert code == 1
+    assert "control_hz: must divide the physics rate 240" in out

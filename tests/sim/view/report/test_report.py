@@ -2,11 +2,14 @@
 
 import html
 import json
+import os
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from antdrive.sim.view.figures.run_figures import overview
@@ -38,7 +41,8 @@ window.onload = async () => {
   filter.value = "nothing at all"; filter.dispatchEvent(new Event("input"));
   found.nothing = !document.querySelector("#none").hidden;
   filter.value = ""; filter.dispatchEvent(new Event("input"));
-  const outcome = document.querySelector("#outcome"); outcome.value = "succeeded"; outcome.dispatchEvent(new Event("change"));
+  const outcome = document.querySelector("#outcome"); outcome.value = "succeeded, claimed";
+  outcome.dispatchEvent(new Event("change"));
   found.succeeded = rows().length;
   found.pictures = [...document.images].every((i) => i.complete && i.naturalWidth > 0);
   found.overflow = document.documentElement.scrollWidth - document.documentElement.clientWidth;
@@ -60,7 +64,7 @@ window.onload = async () => {
 
 @pytest.fixture(scope="module")
 def runs(made_up_drive, tmp_path_factory):
-    """Three runs as the command line leaves them, one with a film, one that collided."""
+    """Three runs without logs, one with a film, one that collided."""
     from antdrive.sim.view.film.video import film
 
     folder = tmp_path_factory.mktemp("runs")
@@ -181,3 +185,142 @@ def test_folders_without_runs_and_broken_files_are_refused_by_name(tmp_path, nam
         write_report(tmp_path, tmp_path / "report.html")
     with pytest.raises(InputError, match=r"choose .html or .md"):
         write_report(tmp_path, tmp_path / "report.pdf")
+
+
+def write_run(run, folder, **claims):
+    """A run as the command line leaves it, with some claims of result.json edited."""
+    folder.mkdir(parents=True)
+    run.rollout.save(folder / "rollout.npz")
+    facts = {**run.as_dict(), "command": "antdrive run small", **claims}
+    (folder / "result.json").write_text(json.dumps(facts))
+    return folder
+
+
+def reported(folder, tmp_path, kind="html"):
+    write_report(folder, tmp_path / f"report.{kind}")
+    return (tmp_path / f"report.{kind}").read_text()
+
+
+@pytest.mark.parametrize("kind", ["html", "md"])
+def test_the_log_is_believed_and_not_result_json(small_run, collided_run, tmp_path, kind):
+    claims = {**small_run.as_dict(), "digest": collided_run.rollout.digest, "world": "elsewhere"}
+    write_run(collided_run, tmp_path / "runs" / "a", **claims)
+    text = reported(tmp_path / "runs", tmp_path, kind)
+    assert "0 / 1" in text
+    assert "Not certified collision-free." in text
+    assert "physics reports" in text
+    assert "elsewhere" not in text
+    assert collided_run.rollout.record.outcome.value.capitalize() in text
+
+
+def test_a_genuine_run_is_shown_as_certified(small_run, tmp_path):
+    write_run(small_run, tmp_path / "runs" / "a")
+    text = reported(tmp_path / "runs", tmp_path)
+    assert "1 / 1" in text
+    assert "Certified collision-free: at least" in text
+    assert "result.json is about another log" not in text
+
+
+def test_a_result_of_another_run_is_told(small_run, tmp_path):
+    write_run(small_run, tmp_path / "runs" / "a", digest="0" * 64)
+    assert "result.json is about another log: its digest differs" in reported(tmp_path / "runs", tmp_path)
+
+
+def test_without_a_log_a_drive_is_a_claim(small_run, tmp_path):
+    (write_run(small_run, tmp_path / "runs" / "a") / "rollout.npz").unlink()
+    text = reported(tmp_path / "runs", tmp_path)
+    assert "0 / 1" in text
+    assert "succeeded, claimed" in text
+    assert "Claimed by result.json: there is no log." in text
+
+
+def test_only_films_of_the_folder_and_of_this_log_are_shown(small_run, tmp_path):
+    outside = tmp_path / "outside.mp4"
+    outside.write_bytes(b"secret")
+    folder = write_run(small_run, tmp_path / "runs" / "a", files={"film": str(outside)})
+    (folder / "link.mp4").symlink_to(outside)
+    (folder / "folder.mp4").mkdir()
+    (folder / "earlier.mp4").write_bytes(b"old")
+    os.utime(folder / "earlier.mp4", (0, 0))
+    (folder / "mine.mp4").write_bytes(b"new")
+    write_report(tmp_path / "runs", tmp_path / "report.html", embed_films=True)
+    text = (tmp_path / "report.html").read_text()
+    assert "outside" not in text
+    assert "link.mp4" not in text
+    assert text.count("data:video/mp4") == 1
+    assert "earlier.mp4 (older than the log)" in text
+
+
+ODD_NAME = "a|b|c `x` <script>alert(1)</script> ``` </details> [u](v) *s*"
+
+
+def test_markdown_shows_odd_names_as_they_are(small_run, tmp_path):
+    task = small_run.scenario.task
+    record = replace(small_run.rollout.record, task=replace(task, world=replace(task.world, name=ODD_NAME)))
+    odd = replace(small_run, rollout=replace(small_run.rollout, record=record))
+    write_run(odd, tmp_path / "runs" / "a", command="antdrive run ```x\n```\n<b>")
+    text = reported(tmp_path / "runs", tmp_path, "md")
+    assert "<script>" not in text
+    assert text.count("</details>") == 1
+    rows = [line for line in text.splitlines() if line.startswith("|")]
+    assert len(rows) == 3
+    assert len({line.count("|") for line in rows}) == 1
+    assert "````sh\nantdrive run ```x ``` <b>\n````" in text
+    assert "a&#124;b&#124;c" in text
+
+
+ODD_VALUES = [
+    None,
+    True,
+    0,
+    -1.5,
+    10**400,
+    "",
+    "x" * 5000,
+    "a\nb\x00\ud800",
+    [],
+    [1, [2]],
+    {},
+    {"film": {}},
+    "/etc/hosts",
+]
+
+
+def test_no_value_in_result_json_ends_in_a_traceback(small_run, collided_run, tmp_path):
+    rng = np.random.default_rng(3)
+    driven = write_run(small_run, tmp_path / "runs" / "driven") / "result.json"
+    facts = json.loads(driven.read_text())
+    claimed = tmp_path / "runs" / "claimed" / "result.json"
+    claimed.parent.mkdir()
+    for key in [*facts, "files", "metrics.spl", "metrics.driven_length_m", "certificate.bound_m"]:
+        value = ODD_VALUES[rng.integers(len(ODD_VALUES))]
+        for odd in (value, None, [], 10**400, "a\ud800"):
+            edited = json.loads(json.dumps(facts))
+            place, _, inner = key.partition(".")
+            if inner:
+                edited[place][inner] = odd
+            else:
+                edited[place] = odd
+            for path in (driven, claimed):
+                path.write_text(json.dumps(edited))
+            for kind in ("html", "md"):
+                text = reported(tmp_path / "runs", tmp_path, kind)
+                assert "1 / 2" in text
+
+
+def test_files_that_cannot_be_read_are_one_line(small_run, tmp_path):
+    folder = write_run(small_run, tmp_path / "runs" / "a")
+    result = folder / "result.json"
+    good = result.read_text()
+    for content in ("[" * 100_000, good.replace('"seed": 0', f'"seed": {"9" * 5000}'), "{" + " " * 10_000_001):
+        result.write_text(content)
+        with pytest.raises(InputError, match=r"result\.json: cannot be read"):
+            write_report(tmp_path / "runs", tmp_path / "report.html")
+    result.write_text(good)
+    (folder / "overview.png").write_bytes(b"no picture")
+    with pytest.raises(InputError, match=r"overview\.png: not a picture"):
+        write_report(tmp_path / "runs", tmp_path / "report.html")
+    (folder / "overview.png").unlink()
+    (folder / "rollout.npz").write_bytes(b"no log")
+    with pytest.raises(InputError, match=r"rollout\.npz: not a rollout"):
+        write_report(tmp_path / "runs", tmp_path / "report.html")

@@ -1,0 +1,95 @@
+"""Drive a logged drive again: the motors' logged targets, open loop, in the record's world with the record's robot.
+
+Nothing is planned or decided, so the replay depends on physics alone. On the machine and with the versions that wrote a
+log it gives the same bits; elsewhere rounding differs, and `ROUNDING` says how much is allowed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from antdrive.robots import Twist
+from antdrive.sim.driving.recorder import Ending, Recorder
+from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.physics.engine import Engine
+from antdrive.worlds.errors import FieldError
+from antdrive.worlds.plane import wrap_angle
+from antdrive.worlds.types import Floats
+
+#: How far a replay on another machine or with other versions may be off, in metres, radians, m/s and rad/s.
+ROUNDING = 1e-3
+
+
+@dataclass(frozen=True)
+class ReplayCheck:
+    """How a replay differs from the log.
+
+    Attributes:
+        exact: whether pose, twist and contacts are the log's, bit for bit
+        position: the largest distance between replayed and logged positions [m]
+        turn: the largest difference of headings [rad]
+        twist: the largest difference of speeds [m/s] or yaw rates [rad/s]
+        problems: why the log is not that of a drive, a sentence each
+    """
+
+    exact: bool
+    position: float
+    turn: float
+    twist: float
+    problems: tuple[str, ...]
+
+    @property
+    def sentence(self) -> str:
+        """The outcome in words."""
+        if self.exact:
+            return "replayed bit for bit"
+        same = "differs" if self.problems else "replayed within rounding"
+        return f"{same}: at most {self.position:.3g} m, {self.turn:.3g} rad and {self.twist:.3g} m/s or rad/s off"
+
+    def as_dict(self) -> dict[str, Any]:
+        """The comparison as plain values, for JSON."""
+        return {"exact": self.exact, "position_m": self.position, "turn_rad": self.turn, "twist": self.twist}
+
+
+def replay(rollout: Rollout) -> ReplayCheck:
+    """Drive the logged targets of the motors again and compare.
+
+    Raises:
+        InputError: the log's movers find no place to start from.
+        FieldError: the control rate does not divide the physics rate.
+    """
+    record = rollout.record
+    substeps, rest = divmod(record.physics_hz, record.control_hz)
+    if rest or substeps < 1:
+        raise FieldError("record.control_hz", f"must divide the physics rate {record.physics_hz}")
+    targets = rollout.actuated if len(rollout.actuated) else rollout.command
+    movers = rollout.trajectories()
+    with Engine(record.world, record.robot, physics_hz=record.physics_hz, trajectories=movers) as engine:
+        log = Recorder(engine, record.task.start, noisy=False)
+        for row in range(1, len(rollout.t), substeps):
+            target = Twist(*targets[row].tolist())
+            engine.command(*target)
+            log.advance(min(substeps, len(rollout.t) - row), target, 0)
+        drive = log.finish(Ending(rollout.outcome))
+    moved = drive.pose - rollout.pose
+    position = _most(np.hypot(moved[:, 0], moved[:, 1]))
+    turn, twist = _most(np.abs(wrap_angle(moved[:, 2]))), _most(np.abs(drive.twist - rollout.twist))
+    same = np.array_equal(drive.pose, rollout.pose) and np.array_equal(drive.twist, rollout.twist)
+    exact = same and np.array_equal(drive.contacts, rollout.contacts)
+    problems = []
+    if not max(position, turn, twist) <= ROUNDING:
+        problems.append(f"replay: the logged commands lead up to {position:.3g} m and {turn:.3g} rad away from the log")
+    if bool(len(drive.contacts)) != bool(len(rollout.contacts)) or (same and not exact):
+        problems.append(
+            f"replay: physics reports {len(drive.contacts)} contact points, the log {len(rollout.contacts)}"
+        )
+    return ReplayCheck(exact, position, turn, twist, tuple(problems))
+
+
+def _most(values: Floats) -> float:
+    most = float(values.max())
+    return most if math.isfinite(most) else math.inf
