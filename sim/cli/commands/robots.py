@@ -16,7 +16,7 @@ def robots(
     ] = None,
     json: options.Json = False,
 ) -> int:
-    """List the robots in the catalogue, or print the file of one as a start for your own."""
+    """List the robots in the catalogue, or print one's file."""
     from antdrive.robots import list_robots, load_robot, robot_to_dict
 
     if name is not None:
