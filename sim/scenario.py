@@ -69,6 +69,7 @@ class Scenario:
     control_hz: int = 60
 
     def __post_init__(self) -> None:
+        self._check_kinds()
         if not self.margin >= 0:
             raise FieldError("margin", f"must be at least 0, got {self.margin:g}")
         if self.smoothing not in SMOOTHINGS:
@@ -83,6 +84,32 @@ class Scenario:
         if overlap:
             x, y, _ = self.task.start
             raise FieldError("start", f"{self.robot.name} at ({x:g}, {y:g}) {overlap}; move the start away from it")
+
+    def _check_kinds(self) -> None:
+        """Refuse values of the wrong type here, where the setting can be named, and not deep in a run."""
+        kinds: tuple[tuple[str, type | tuple[type, ...], str], ...] = (
+            ("task", Task, "a Task, such as load_task gives"),
+            ("robot", RobotSpec, "a RobotSpec, such as load_robot gives"),
+            ("controller", PurePursuit, "a PurePursuit"),
+            ("perception", Perception, "a Perception, such as Perception(kind='positions')"),
+            ("avoidance", (Avoidance, type(None)), "an Avoidance, or None for no avoidance"),
+            ("replanning", (ReplanPolicy, type(None)), "a ReplanPolicy, or None for no replanning"),
+            ("unseen", tuple, "a tuple of Disc"),
+            ("seed", (int, np.integer), "a whole number"),
+        )
+        for key, kind, wanted in kinds:
+            value = getattr(self, key)
+            if not isinstance(value, kind) or isinstance(value, bool):
+                raise FieldError(key, f"must be {wanted}, got {value!r:.60}")
+        if not all(isinstance(disc, Disc) for disc in self.unseen):
+            raise FieldError("unseen", f"must hold Disc objects, got {self.unseen!r:.60}")
+        if self.seed < 0:
+            raise FieldError("seed", f"must be at least 0, got {self.seed}")
+        for key in ("margin", "noise", "cell", "time_limit"):
+            value = getattr(self, key)
+            optional = value is None and key in ("cell", "time_limit")
+            if not optional and (not isinstance(value, int | float | np.number) or isinstance(value, bool)):
+                raise FieldError(key, f"must be a number, got {value!r:.60}")
 
     @classmethod
     def of(

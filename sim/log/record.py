@@ -297,7 +297,27 @@ class DriveRecord:
             raise _field_error(error.errors(include_url=False)[0]) from None
         except (RecursionError, OverflowError, ValueError) as error:
             raise FieldError("record", str(error)) from None
+        lacking = _missing_key(record.as_dict(), found)
+        if lacking:
+            raise FieldError(f"record{lacking}", "missing; a log that antdrive wrote has it")
         return record
+
+
+def _missing_key(written: Any, found: Any) -> str:
+    """The first key that `written` has and `found` lacks, as a path; empty if there is none.
+
+    A key that a record could do without, because it has a default, is missed like any other: a log says everything.
+    """
+    if isinstance(written, dict) and isinstance(found, dict):
+        for key, value in written.items():
+            deeper = _missing_key(value, found[key]) if key in found else ""
+            if key not in found or deeper:
+                return f".{key}{deeper}"
+    elif isinstance(written, list) and isinstance(found, list):
+        for i, (value, other) in enumerate(zip(written, found, strict=False)):
+            if deeper := _missing_key(value, other):
+                return f"[{i}]{deeper}"
+    return ""
 
 
 def plain_value(value: Any) -> Any:

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -327,6 +328,22 @@ def test_settings_out_of_range_are_refused(small_scenario: Scenario) -> None:
         replace(small_scenario, margin=-0.1)
     with pytest.raises(InputError, match="did you mean"):
         Scenario.of("empti")
+
+
+@pytest.mark.parametrize(
+    "setting",
+    [
+        {"seed": "a"}, {"seed": -1}, {"seed": 1.5}, {"seed": True}, {"margin": "0.1"}, {"noise": None}, {"cell": "fine"},
+        {"unseen": [Disc(3, 3, 0.2)]}, {"unseen": ((3, 3, 0.2),)}, {"perception": "positions"}, {"avoidance": False},
+        {"replanning": True}, {"controller": None}, {"task": "forest"}, {"robot": "jackal"}, {"time_limit": "long"},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_a_setting_of_the_wrong_type_is_named(small_scenario: Scenario, setting: dict[str, Any]) -> None:
+    with pytest.raises(FieldError) as refused:
+        replace(small_scenario, **setting)
+    assert refused.value.key == next(iter(setting))
+    assert "must" in refused.value.problem
 
 
 def test_a_scenario_is_made_of_names_files_or_objects(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import os
 import subprocess
 import sys
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -259,6 +259,31 @@ def test_every_key_that_is_left_out_is_missed(saved: Path, tmp_path: Path) -> No
         path = rewritten(saved, tmp_path, lambda record, key=key: record.pop(key))  # type: ignore[misc]
         with pytest.raises(InputError, match=rf"record\.{key}: "):
             Rollout.load(path)
+
+
+def inner_keys(values: dict[str, Any], place: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
+    """The places of all keys below the record's own; settings and versions are mappings with free names."""
+    for key, value in values.items():
+        if isinstance(value, dict) and key not in ("settings", "versions"):
+            yield from ((*place, key, inner) for inner in value)
+            yield from inner_keys(value, (*place, key))
+
+
+def test_keys_with_defaults_are_missed_like_any_other(saved: Path, tmp_path: Path) -> None:
+    places = sorted(set(inner_keys(json.loads(str(np.load(saved)["record"])))) - {("task", "source")})
+    assert ("robot", "wheel_friction") in places
+    assert ("robot", "noise", "slip") in places
+    for place in places:
+
+        def remove(record: dict[str, Any], place: tuple[str, ...] = place) -> None:
+            for key in place[:-1]:
+                record = record[key]
+            del record[place[-1]]
+
+        with pytest.raises(InputError) as refused:
+            Rollout.load(rewritten(saved, tmp_path, remove))
+        assert ".".join(place[:-1]) in str(refused.value)
+        assert "\n" not in str(refused.value)
 
 
 def test_reading_a_log_needs_neither_compiler_nor_planners(saved: Path) -> None:
