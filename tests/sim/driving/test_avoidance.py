@@ -206,3 +206,13 @@ def test_a_robot_that_can_stop_at_its_goal_in_time_does_so(turtlebot: RobotSpec)
     assert done.succeeded, (done.outcome, done.reason)
     assert done.rollout is not None
     assert done.rollout.t[-1] < 11.0
+
+
+def test_an_abrupt_turn_of_the_avoidance_is_no_reason_to_refuse_a_log() -> None:
+    """Slowed along the same curve, the commanded yaw rate falls faster than the robot could turn by itself."""
+    done = run(Scenario.of("plaza-moving", "mmas-dstar", seed=1))
+    assert done.rollout is not None
+    assert done.certificate is not None
+    steps = np.abs(np.diff(done.rollout.command[1::4, 1]))
+    assert steps.max() > 1.5 * done.scenario.robot.max_yaw_acceleration / 60
+    assert done.certificate.problems == ()
