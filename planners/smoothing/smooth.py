@@ -88,7 +88,7 @@ def smooth(
         piece = Piece(run, np.zeros(len(run)))
         if clear:
             piece = _smoothed(run, world, inflate, extra, stretch, spare, bulge)
-            spare -= max(0.0, _length(piece.xy) - _length(run))
+            spare -= max(0.0, polyline_length(piece.xy) - polyline_length(run))
             kinds.append(piece.kind)
         elif len(run) > 2 or not (run[0] == line.xy[0]).all():
             piece = replace(piece, note="the plan's line comes closer than the clearance and is kept there")
@@ -220,7 +220,7 @@ def _smoothed(
     line: Floats, world: World, inflate: float, extra: float, stretch: float, spare: float, bulge: float
 ) -> Piece:
     """A clear polyline, smoothed as far as the checks allow."""
-    own = _length(line)
+    own = polyline_length(line)
     taut = _pulled(line, world.discs, inflate)
     if taut is None:
         return Piece(line, np.zeros(len(line)), note="the line could not be pulled taut")
@@ -273,17 +273,13 @@ def _fault(string: TautString, xy: Floats, line: Floats, world: World, inflate: 
     """The reason why a smoothed line cannot be used; empty if it can."""
     from antdrive.planners.smoothing import _kernels_smooth as kernels
 
-    if _length(xy) > longest + SLACK:
+    if polyline_length(xy) > longest + SLACK:
         return "the smoothed line would be longer than the plan's"
     if min(string.clearance(world), polyline_clearance(world, xy)) < inflate - SLACK:
         return "the smoothed line would come closer than the clearance"
     if kernels.encloses(line, xy, world.discs):
         return "the smoothed line would pass an obstacle on its other side"
     return ""
-
-
-def _length(xy: Floats) -> float:
-    return polyline_length(xy)
 
 
 def _with_clearance(

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any, get_args
 
 from antdrive.sim.cli.parse import pair
-from antdrive.worlds.errors import InputError, input_error
+from antdrive.worlds.errors import FieldError, InputError, input_error
 
 if TYPE_CHECKING:
     from antdrive.robots import PurePursuit
@@ -28,13 +28,10 @@ def make_scenario(world: str, planner: str, settings: list[str] | None, robot: s
     controller = make_controller(chosen["controller"])
     try:
         return Scenario.of(world, planner, robot, options=chosen["planner"], controller=controller, **rest)
-    except InputError:
-        raise
-    except ValueError as error:
-        field, _, problem = str(error).partition(": ")
-        if field == "start":  # no option sets it
+    except FieldError as error:
+        if error.key == "start":  # no option sets it
             raise input_error(world, str(error)) from None
-        raise InputError(f"--{field.replace('_', '-')}: {problem}") from None
+        raise InputError(f"--{error.key.replace('_', '-')}: {error.problem}") from None
 
 
 def grouped(settings: list[str] | None) -> dict[str, dict[str, str]]:

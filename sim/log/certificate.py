@@ -179,7 +179,7 @@ def _between_steps(rollout: Rollout, movers: Trajectories, still: Floats, moving
     radius = rollout.record.robot.footprint.radius
     dt = np.diff(_clock(rollout))
     moved = segment_lengths(rollout.pose[:, :2])
-    turned = np.abs(_wrapped(np.diff(rollout.pose[:, 2])))
+    turned = np.abs(wrap_angle(np.diff(rollout.pose[:, 2])))
     speed = np.maximum(*np.abs([rollout.twist[:-1], rollout.twist[1:]]))
     travel = np.maximum(moved, speed[:, 0] * dt) + radius * np.maximum(turned, speed[:, 1] * dt)
     bound = (still[:-1] + still[1:] - travel) / 2
@@ -195,10 +195,6 @@ def _between_steps(rollout: Rollout, movers: Trajectories, still: Floats, moving
 def _clock(rollout: Rollout) -> Floats:
     """The times that the rows must have, shape (T,) [s]."""
     return np.asarray(np.arange(len(rollout.t)) / rollout.record.physics_hz)
-
-
-def _wrapped(angle: Floats) -> Floats:
-    return np.asarray(wrap_angle(angle))
 
 
 def _check_readings(rollout: Rollout, clearance: Floats, bound: float) -> Iterator[str]:
@@ -259,7 +255,7 @@ def _check_start(rollout: Rollout) -> Iterator[str]:
     if np.abs(rollout.pose[:, 2]).max() > math.pi + SAME_CLEARANCE:
         yield "pose: headings must be from -pi to pi"
     pose, start = rollout.pose[0], rollout.record.task.start
-    if np.hypot(*(pose[:2] - start[:2])) > START_SLACK or abs(_wrapped(pose[2] - start[2])) > START_TURN_SLACK:
+    if np.hypot(*(pose[:2] - start[:2])) > START_SLACK or abs(wrap_angle(pose[2] - start[2])) > START_TURN_SLACK:
         yield f"pose: the first row is not the task's start {list(start)}"
 
 
@@ -271,10 +267,10 @@ def _check_motion(rollout: Rollout) -> Iterator[str]:
     if end < 2:
         return
     pose, twist, dt = rollout.pose[:end], rollout.twist[:end], np.diff(rollout.t[:end])
-    heading = np.exp(1j * (pose[:-1, 2] + _wrapped(np.diff(pose[:, 2])) / 2))
+    heading = np.exp(1j * (pose[:-1, 2] + wrap_angle(np.diff(pose[:, 2])) / 2))
     covered = (twist[:-1, 0] + twist[1:, 0]) / 2 * dt
     slip = np.diff(pose[:, 0] + 1j * pose[:, 1]) - heading * covered
-    slip_turn = _wrapped(np.diff(pose[:, 2])) - (twist[:-1, 1] + twist[1:, 1]) / 2 * dt
+    slip_turn = wrap_angle(np.diff(pose[:, 2])) - (twist[:-1, 1] + twist[1:, 1]) / 2 * dt
     coarse = max(1.0, USUAL_HZ / rollout.record.physics_hz)
     wrong = (np.abs(slip) > STEP_SLIP * coarse) | (np.abs(slip_turn) > STEP_SLIP_TURN * coarse)
     share = DRIFT_SHARE * max(1.0, GRIP / rollout.record.robot.wheel_friction)

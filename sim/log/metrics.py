@@ -70,12 +70,12 @@ def path_length_m(rollout: Rollout) -> float:
 
 def route_length_m(rollout: Rollout) -> float:
     """Length of the first route that the robot was to follow."""
-    return _length(rollout.route)
+    return polyline_length(rollout.route)
 
 
 def driven_length_m(rollout: Rollout) -> float:
     """Distance that the axle's centre travelled."""
-    return _length(rollout.pose[:, :2])
+    return polyline_length(rollout.pose[:, :2])
 
 
 def gap_to_grid_optimum(rollout: Rollout) -> float:
@@ -276,7 +276,3 @@ def _touches(rollout: Rollout, outcome: Outcome) -> float:
 
 def _over(length: float, optimum: float | None) -> float:
     return length / optimum - 1 if optimum else math.nan
-
-
-def _length(xy: Floats) -> float:
-    return polyline_length(xy)
