@@ -140,7 +140,7 @@ class RobotSpec:
         source: where these values come from
 
     Raises:
-        FieldError: a value is not positive, a size or the mass is outside its ROBOT_RANGE, or the wheels stand
+        FieldError: a value is not positive or outside its ROBOT_RANGE, or the wheels stand
             outside the footprint.
     """
 
@@ -166,7 +166,7 @@ class RobotSpec:
             value = getattr(self, field.name)
             if isinstance(value, float | int) and not (math.isfinite(value) and value > 0):
                 raise FieldError(field.name, f"must be greater than 0, got {value:g}")
-        for key in ("height", "mass", "wheel_radius", "track"):
+        for key in (key for key in ROBOT_RANGE if key != "footprint"):
             _require_range(key, getattr(self, key))
         foot = self.footprint
         for key in ("half_length", "half_width", "rounding"):

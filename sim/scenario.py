@@ -19,6 +19,9 @@ from antdrive.worlds import Disc, Task, Trajectories, World, load_task
 from antdrive.worlds.drawing import card, world_svg
 from antdrive.worlds.errors import FieldError
 
+PHYSICS_HZ = (60, 10_000)  # slower physics jolts the robot
+SLOWEST_CONTROL = 10  # [Hz]
+
 CONTROLLER, PERCEPTION, AVOIDANCE, REPLANNING = PurePursuit(), Perception(), Avoidance(), ReplanPolicy()
 
 
@@ -43,8 +46,8 @@ class Scenario:
         unseen: obstacles that neither the planner nor the controller knows of
         time_limit: simulated time after which the drive ends [s]; None: the task's own, or 30 s plus ten times the
             route at full speed
-        physics_hz: physics steps per simulated second
-        control_hz: control periods per simulated second; must divide `physics_hz`
+        physics_hz: physics steps per simulated second, 60 to 10000
+        control_hz: control periods per simulated second, at least 10; must divide `physics_hz`
 
     Raises:
         ValueError: a setting is out of range, or the robot's footprint overlaps an obstacle or a wall at the start.
@@ -80,10 +83,25 @@ class Scenario:
             raise FieldError("noise", f"{self.noise:g} times the robot's own is too much: {error}") from None
         if self.time_limit is not None and not self.time_limit > 0:
             raise FieldError("time_limit", f"must be greater than 0, got {self.time_limit:g}")
+        self._check_rates()
         overlap = overlap_at(self.task.world, self.robot, self.task.start, self.unseen)
         if overlap:
             x, y, _ = self.task.start
             raise FieldError("start", f"{self.robot.name} at ({x:g}, {y:g}) {overlap}; move the start away from it")
+
+    def _check_rates(self) -> None:
+        """Refuse rates at which the robot is not simulated as it would drive."""
+        low, high = PHYSICS_HZ
+        if not low <= self.physics_hz <= high:
+            raise FieldError("physics_hz", f"must be between {low} and {high}, got {self.physics_hz}")
+        if not SLOWEST_CONTROL <= self.control_hz <= self.physics_hz or self.physics_hz % self.control_hz:
+            rates = (hz for hz in range(SLOWEST_CONTROL, self.physics_hz + 1) if not self.physics_hz % hz)
+            nearest = min(rates, key=lambda hz: abs(hz - self.control_hz))
+            raise FieldError(
+                "control_hz",
+                f"must divide the physics rate {self.physics_hz} and be at least {SLOWEST_CONTROL}, "
+                f"got {self.control_hz}; {nearest} would do",
+            )
 
     def _check_kinds(self) -> None:
         """Refuse values of the wrong type here, where the setting can be named, and not deep in a run."""
@@ -96,6 +114,8 @@ class Scenario:
             ("replanning", (ReplanPolicy, type(None)), "a ReplanPolicy, or None for no replanning"),
             ("unseen", tuple, "a tuple of Disc"),
             ("seed", (int, np.integer), "a whole number"),
+            ("physics_hz", (int, np.integer), "a whole number"),
+            ("control_hz", (int, np.integer), "a whole number"),
         )
         for key, kind, wanted in kinds:
             value = getattr(self, key)

@@ -267,10 +267,10 @@ def _check_motion(rollout: Rollout) -> Iterator[str]:
     if end < 2:
         return
     pose, twist, dt = rollout.pose[:end], rollout.twist[:end], np.diff(rollout.t[:end])
-    heading = np.exp(1j * (pose[:-1, 2] + wrap_angle(np.diff(pose[:, 2])) / 2))
-    covered = (twist[:-1, 0] + twist[1:, 0]) / 2 * dt
-    slip = np.diff(pose[:, 0] + 1j * pose[:, 1]) - heading * covered
-    slip_turn = wrap_angle(np.diff(pose[:, 2])) - (twist[:-1, 1] + twist[1:, 1]) / 2 * dt
+    # Physics computes the new speed first, then moves with it along the old heading (semi-implicit Euler).
+    covered = twist[1:, 0] * dt
+    slip = np.diff(pose[:, 0] + 1j * pose[:, 1]) - np.exp(1j * pose[:-1, 2]) * covered
+    slip_turn = wrap_angle(np.diff(pose[:, 2])) - twist[1:, 1] * dt
     coarse = max(1.0, USUAL_HZ / rollout.record.physics_hz)
     wrong = (np.abs(slip) > STEP_SLIP * coarse) | (np.abs(slip_turn) > STEP_SLIP_TURN * coarse)
     share = DRIFT_SHARE * max(1.0, GRIP / rollout.record.robot.wheel_friction)

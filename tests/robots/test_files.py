@@ -1,8 +1,10 @@
+import dataclasses
+import math
 from pathlib import Path
 
 import pytest
 
-from antdrive.robots import list_robots, load_robot, robot_schema
+from antdrive.robots import RobotSpec, list_robots, load_robot, robot_schema
 from antdrive.sim import Engine
 from antdrive.worlds import InputError, World
 
@@ -140,3 +142,19 @@ def test_the_schema_requires_what_the_file_requires() -> None:
     schema = robot_schema()
     assert set(schema["required"]) >= {"schema", "footprint", "mass", "track"}
     assert "name" not in schema["required"]
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "says"),
+    [
+        ("max_speed", 0.0025, "max_speed: must be between 0.05 and 10, got 0.0025"),
+        ("max_speed", math.nan, "max_speed: must be greater than 0, got nan"),
+        ("wheel_friction", 0.01, "wheel_friction: must be between 0.1 and 100, got 0.01"),
+        ("wheel_torque", 1e7, r"wheel_torque: must be between 1e-06 and 1e\+06, got 1e\+07"),
+    ],
+)
+def test_robots_that_antdrive_is_not_meant_for_cannot_be_made_in_python_either(
+    jackal: RobotSpec, key: str, value: float, says: str
+) -> None:
+    with pytest.raises(ValueError, match=says):
+        dataclasses.replace(jackal, **{key: value})

@@ -1,5 +1,6 @@
 """Runs: plan, drive, certify."""
 
+import dataclasses
 import inspect
 import json
 import math
@@ -13,7 +14,7 @@ import numpy as np
 import pytest
 
 from antdrive.planners import Progress, keep_best, load_planner, watch
-from antdrive.robots import PurePursuit, RobotSpec, load_robot
+from antdrive.robots import Footprint, PurePursuit, RobotSpec, load_robot
 from antdrive.sim import Engine, Outcome, Run, Scenario, measure, plan, run
 from antdrive.sim.driving.drive import drive
 from antdrive.sim.log.record import SmoothingRecord
@@ -261,14 +262,79 @@ def test_a_route_through_an_obstacle_ends_in_contact_not_in_a_loop(turtlebot: Ro
     assert log.outcome in (Outcome.COLLIDED, Outcome.STUCK)
 
 
-def test_the_control_rate_must_divide_the_physics_rate(small_scenario: Scenario) -> None:
-    with pytest.raises(ValueError, match="control_hz: must divide"):
-        run(replace(small_scenario, control_hz=70))
+@pytest.mark.parametrize(
+    ("rates", "says"),
+    [
+        ({"control_hz": 70}, "control_hz: must divide the physics rate 240 and be at least 10, got 70; 60 would do"),
+        ({"control_hz": 5}, "control_hz: must divide the physics rate 240 and be at least 10, got 5; 10 would do"),
+        ({"control_hz": 480}, "got 480; 240 would do"),
+        ({"physics_hz": 30, "control_hz": 30}, "physics_hz: must be between 60 and 10000, got 30"),
+        ({"physics_hz": 20_000, "control_hz": 50}, "physics_hz: must be between 60 and 10000, got 20000"),
+        ({"physics_hz": 240.0}, "physics_hz: must be a whole number, got 240.0"),
+        ({"control_hz": True}, "control_hz: must be a whole number, got True"),
+    ],
+    ids=str,
+)
+def test_rates_at_which_nothing_can_be_simulated_are_refused(
+    small_scenario: Scenario, rates: dict[str, Any], says: str
+) -> None:
+    with pytest.raises(ValueError, match=says):
+        replace(small_scenario, **rates)
 
 
 def test_other_physics_and_control_rates_work(small_scenario: Scenario) -> None:
     for physics, control in ((120, 60), (240, 30), (240, 240)):
         assert run(replace(small_scenario, physics_hz=physics, control_hz=control)).succeeded
+
+
+def test_a_robot_that_brakes_hard_is_certified_at_the_slowest_rates() -> None:
+    for physics, control in ((60, 60), (60, 10), (70, 70), (90, 45)):
+        assert run(Scenario.of("slalom", "astar", "jackal", physics_hz=physics, control_hz=control)).succeeded
+
+
+def small_copy(robot: RobotSpec, k: float) -> RobotSpec:
+    """A robot `k` times as long that behaves the same: accelerations and friction are equal, speeds go with the root."""
+    root = math.sqrt(k)
+    return replace(
+        robot,
+        footprint=Footprint(*(k * side for side in dataclasses.astuple(robot.footprint))),
+        height=k * robot.height,
+        mass=k**3 * robot.mass,
+        wheel_radius=k * robot.wheel_radius,
+        track=k * robot.track,
+        max_speed=root * robot.max_speed,
+        max_yaw_rate=robot.max_yaw_rate / root,
+        max_yaw_acceleration=robot.max_yaw_acceleration / k,
+        max_wheel_speed=robot.max_wheel_speed / root,
+        wheel_torque=k**4 * robot.wheel_torque,
+    )
+
+
+@pytest.mark.parametrize("k", [0.12, 10.0])
+def test_a_copy_of_another_size_drives_a_world_of_that_size(jackal: RobotSpec, k: float) -> None:
+    task = load_task("slalom")
+    world = World(
+        "copy",
+        tuple(k * side for side in task.world.bounds),  # type: ignore[arg-type]
+        tuple(Disc(k * disc.x, k * disc.y, k * disc.radius, k * disc.height) for disc in task.world.obstacles),
+    )
+    x, y, yaw = task.start
+    copy = Task(
+        world, (k * x, k * y, yaw), (k * task.goal[0], k * task.goal[1]), k * task.goal_tolerance, k * task.cell
+    )
+    lookaheads = ("preferred_lookahead_min", "lookahead_min", "lookahead_max", "goal_distance")
+    usual = PurePursuit()
+    controller = replace(usual, **{name: k * getattr(usual, name) for name in lookaheads})
+    done = run(
+        Scenario(
+            task=copy,
+            planner=load_planner("astar"),
+            robot=small_copy(jackal, k),
+            margin=0.03 * k,
+            controller=controller,
+        )
+    )
+    assert done.succeeded, done.certificate
 
 
 def test_the_same_scenario_gives_the_same_bits_in_any_order(small_scenario: Scenario, small_run: Run) -> None:

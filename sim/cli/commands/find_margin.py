@@ -40,7 +40,7 @@ def find_margin(
     noise: options.Noise = 0.0,
     max_speed: Annotated[
         float | None,
-        typer.Option(min=1e-3, metavar="SPEED", help="Speed limit [m/s].  [default: the robot's own]"),
+        typer.Option(min=0.05, metavar="SPEED", help="Speed limit [m/s].  [default: the robot's own]"),
     ] = None,
     reserve: Annotated[
         float,
