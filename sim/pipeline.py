@@ -254,6 +254,7 @@ def _monitor(s: Scenario, grid: Grid, predictor: Predictor | None) -> ReplanMoni
     """The monitor that finds new routes during the drive; None without movers or without a replanning policy."""
     if predictor is None or s.replanning is None:
         return None
+    avoidance = s.effective_avoidance
     return monitor_class(s.planner, s.replanning)(
         s.replanning,
         s.planner,
@@ -266,6 +267,7 @@ def _monitor(s: Scenario, grid: Grid, predictor: Predictor | None) -> ReplanMoni
         margin=s.margin,
         smoothing=s.smoothing,
         hz=s.control_hz,
+        keeps=s.robot.radius + avoidance.min_clearance if avoidance else 0.0,
     )
 
 

@@ -11,10 +11,10 @@ import numpy.typing as npt
 from antdrive.planners import Query
 from antdrive.planners.graph.search import reachable
 from antdrive.sim.driving.blocking import covered_discs, with_obstacles
+from antdrive.sim.driving.gaps import STILL, NarrowGaps
 from antdrive.sim.driving.perception import Predictor
 from antdrive.worlds import Floats, Grid, Pose, Task, rasterise
 
-STILL = 0.05  # a mover that stays this close to where it was stands still [m]
 LOOK = 1.0  # predictions are checked this often for a mover that sets out again [s]
 
 
@@ -27,17 +27,28 @@ class Blockage:
     Attributes:
         failures: failed searches in a row
         reason: which mover stands where, once the robot has no patience left; empty before
+        gaps: the movers beside which there is too little room for local avoidance
 
     Args:
         task: start, goal and what stands in the world; without movers
         interval: the shortest time between two searches [s]
         patience: how long after the first failed search the robot gives up [s]
+        keeps: the distance that local avoidance keeps between the robot's centre and a mover's surface [m]
     """
 
     def __init__(
-        self, task: Task, grid: Grid, predictor: Predictor, hz: int, *, interval: float, patience: float
+        self,
+        task: Task,
+        grid: Grid,
+        predictor: Predictor,
+        hz: int,
+        *,
+        interval: float,
+        patience: float,
+        keeps: float = 0.0,
     ) -> None:
         self.failures, self.reason = 0, ""
+        self.gaps = NarrowGaps(grid, predictor, keeps)
         self._task, self._grid, self._predictor, self._hz = task, grid, predictor, hz
         self._interval, self._patience = interval, patience
         self._since = self._due = -math.inf
@@ -65,7 +76,7 @@ class Blockage:
     def failed(self, tick: int, pose: Pose) -> None:
         """Take note that a search from a pose [m, m, rad] found no route."""
         now, robot = tick / self._hz, pose[:2]
-        standing = self._standing_now(tick, robot)
+        standing = self.standing(tick, robot)
         if self.failures and not self._closed(tick, pose, np.intersect1d(standing, self._standing)):
             self.found()
         if not self.failures:
@@ -79,8 +90,22 @@ class Blockage:
         wait = self._interval * 2.0 ** min(self.failures - 1, 30)
         self._due = min(now + wait, max(self._since + self._patience, now + self._interval))
 
-    def _standing_now(self, tick: int, robot: tuple[float, float]) -> npt.NDArray[np.int64]:
-        """The movers (S,) that the robot perceives and predicts to stand still for as long as its patience lasts."""
+    def may_pass(self, tick: int, robot: tuple[float, float]) -> bool:
+        """Whether the robot now passes through a gap at the safety margin that it waited before; not at the first failure.
+
+        Args:
+            tick: the number of the control period
+            robot: the robot's position [m]
+        """
+        return self.failures > 0 and self.gaps.may_pass(tick, robot, self.standing(tick, robot))
+
+    def standing(self, tick: int, robot: tuple[float, float]) -> npt.NDArray[np.int64]:
+        """The movers (S,) that the robot perceives and predicts to stand still for as long as its patience lasts.
+
+        Args:
+            tick: the number of the control period
+            robot: the robot's position [m]
+        """
         perceived = self._predictor.within_range(tick, robot)
         ahead = np.linspace(0.0, self._patience, 1 + math.ceil(self._patience / LOOK))
         positions, _ = self._predictor.predict(tick, robot, ahead)
@@ -96,11 +121,12 @@ class Blockage:
         """Whether these movers alone close every way that is open without them."""
         return bool(len(movers)) and self._way(tick, pose, movers[:0]) and not self._way(tick, pose, movers)
 
-    def _way(self, tick: int, pose: Pose, movers: npt.NDArray[np.int64]) -> bool:
-        """Whether the grid has a way from a pose to the goal among these movers."""
+    def _way(self, tick: int, pose: Pose, movers: npt.NDArray[np.int64], narrow: bool = False) -> bool:
+        """Whether the grid has a way from a pose to the goal among these movers; `narrow`: even one that is refused."""
         task = dataclasses.replace(self._task, start=pose)
         ends: Floats = np.array([pose[:2], task.goal])
         discs = covered_discs(self._predictor, tick, ends, 0.0, self._grid, only=movers)
+        discs += [] if narrow else self.gaps.discs(tick, ends, only=movers)
         world = with_obstacles(task, discs).world
         return reachable(Query.between(rasterise(world, self._grid.cell, self._grid.inflate), task))
 
@@ -111,7 +137,13 @@ class Blockage:
         alone = (m for m in order.tolist() if self._way(tick, pose, order[order != m]))
         mover = next(alone, int(order[0]))
         x, y = positions[mover].tolist()
+        narrow = mover in self.gaps.noted(tick, pose[:2]) and self._way(tick, pose, order, narrow=True)
+        closes = (
+            f"leaves a gap too narrow for local avoidance, which keeps the robot's centre {self.gaps.keeps:.3g} m from it"
+            if narrow
+            else "closes the way"
+        )
         return (
-            f"movers[{mover}] stands still at ({x:.2f}, {y:.2f}) and closes the way; "
+            f"movers[{mover}] stands still at ({x:.2f}, {y:.2f}) and {closes}; "
             f"no route to the goal for {self._patience:g} s, in {self.failures} attempts"
         )

@@ -22,8 +22,9 @@ def covered_discs(
     duration: float,
     grid: Grid,
     only: npt.NDArray[np.int64] | None = None,
+    wider: float = 0.0,
 ) -> list[Disc]:
-    """The discs that movers cover within `duration` [s] of a tick; with `only`, those of these movers.
+    """The discs that movers cover within `duration` [s] of a tick; with `only`, those of these movers, `wider` [m].
 
     Discs are made smaller where an end (N, 2) [m] would lie within the inflation around them: movers close
     neither end. The first of the ends is the robot's position.
@@ -35,7 +36,7 @@ def covered_discs(
         wanted = np.isin(predictor.within_range(tick, (x, y)), only)
         positions, radii = positions[:, wanted], radii[wanted]
     room = np.hypot(*np.moveaxis(positions[:, :, None] - ends, -1, 0)).min(axis=-1) - grid.inflate - grid.cell
-    radius = np.minimum(radii, room)
+    radius = np.minimum(radii + wider, room)
     return [
         Disc(float(positions[k, m, 0]), float(positions[k, m, 1]), float(radius[k, m]))
         for k, m in np.argwhere(radius > MIN_RADIUS).tolist()

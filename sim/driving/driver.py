@@ -160,6 +160,8 @@ class Driver:
             # A robot that stands at the goal has arrived, so only the time until it stands matters.
             ahead = ahead[: 2 + math.ceil(_stopping_time(last, self._robot) / avoidance.step)]
         movers, radii = self._predictor.predict(tick, pose[:2], ahead)
+        if self._monitor is not None:
+            radii = radii - self._monitor.blockage.gaps.closer(tick, pose[:2])
         self.command, avoids, self._avoidance_state = avoidance.avoid(
             self.tracked,
             self._robot,

@@ -124,6 +124,7 @@ class ReplanMonitor:
         margin: distance kept free around the robot, on top of its radius [m]
         smoothing: how plans become routes, one of `SMOOTHINGS`
         hz: control periods per simulated second
+        keeps: the distance that local avoidance keeps between the robot's centre and a mover's surface [m]
     """
 
     def __init__(
@@ -140,6 +141,7 @@ class ReplanMonitor:
         margin: float,
         smoothing: str,
         hz: int,
+        keeps: float = 0.0,
     ) -> None:
         self.policy, self.log = policy, list[Replan]()
         self.schedule: Schedule | None = None
@@ -152,7 +154,7 @@ class ReplanMonitor:
         self._replanned_at = -math.inf
         self._waiting_since = math.nan
         self.blockage = Blockage(
-            self._task, grid, predictor, hz, interval=policy.min_interval, patience=policy.patience
+            self._task, grid, predictor, hz, interval=policy.min_interval, patience=policy.patience, keeps=keeps
         )
 
     @property
@@ -188,6 +190,7 @@ class ReplanMonitor:
         if self._timed:
             return LATE if self.schedule is None or self.schedule.late(now, arc) else ""
         if policy.around_movers and now - self._waiting_since >= policy.max_wait:
+            self.blockage.gaps.note(tick, pose[:2], tracked, arc, self.blockage.standing(tick, pose[:2]))
             return WAITED
         if policy.around_movers and self._obstructed(tick, pose, tracked, arc):
             return OBSTRUCTED
@@ -213,6 +216,9 @@ class ReplanMonitor:
             self.log.append(Replan(now, trigger, False, math.inf, 0, np.empty((0, 2)), 0.0))
             return None
         plan = self._plan_in_time(task, now) if self._timed else self._plan(task, discs)
+        if not plan.solved and around_movers and self.blockage.may_pass(tick, pose[:2]):
+            discs = self._discs(tick, pose)
+            plan = self._plan(task, discs)
         route = None
         if plan.solved and len(plan.cells):
             # A timed plan's times are those of its cells, so its route must follow the cells.
@@ -258,7 +264,8 @@ class ReplanMonitor:
     def _discs(self, tick: int, pose: Pose) -> list[Disc]:
         """What movers will cover soon; they close neither the robot's position nor the goal."""
         ends = np.array([pose[:2], self._task.goal])
-        return covered_discs(self._predictor, tick, ends, self.policy.prediction_time, self._grid)
+        soon = covered_discs(self._predictor, tick, ends, self.policy.prediction_time, self._grid)
+        return soon + self.blockage.gaps.discs(tick, ends)
 
     def _obstructed(self, tick: int, pose: Pose, tracked: TrackedPath, arc: float) -> bool:
         """Whether a mover will soon cover a point of the route ahead."""
