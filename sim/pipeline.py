@@ -44,6 +44,7 @@ from antdrive.sim.log.record import (
 )
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.physics.engine import Engine
+from antdrive.sim.reasons import no_path_reason
 from antdrive.sim.scenario import Scenario
 from antdrive.worlds import Grid, Route, rasterise
 from antdrive.worlds.drawing import LINE, card, world_svg
@@ -164,7 +165,10 @@ def plan(s: Scenario) -> tuple[Grid, PlanResult]:
     """
     grid = rasterise(s.task.world, s.cell or s.task.cell, s.inflate)
     query = _query(s, grid)
-    return grid, _drivable(s, grid, checked(query, ask(s.planner, query, s.rng("planner"), s.planner_label)))
+    answer = checked(query, ask(s.planner, query, s.rng("planner"), s.planner_label))
+    if answer.status is PlanStatus.NO_PATH:
+        return grid, dataclasses.replace(answer, reason=no_path_reason(s, grid, answer.reason))
+    return grid, _drivable(s, grid, answer)
 
 
 def _drivable(s: Scenario, grid: Grid, answer: PlanResult) -> PlanResult:
@@ -333,7 +337,7 @@ def _record(
 def _plan_record(s: Scenario, grid: Grid, answer: PlanResult) -> PlanRecord:
     query = Query.between(grid, s.task)
     return PlanRecord(
-        cost_m=answer.cost,
+        cost_m=finite_or_none(answer.cost),
         length_m=answer.line_length,
         grid_optimum_m=finite_or_none(PLANNERS["astar"].plan(query, s.rng("optimum")).cost),
         euclidean_optimum_m=finite_or_none(PLANNERS["tangent"].plan(query, s.rng("optimum")).line_length),

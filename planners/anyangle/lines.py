@@ -126,7 +126,7 @@ def cells_under(query: Query, waypoints: npt.ArrayLike) -> Cells:
     line = np.vstack([query.start, line, query.goal])
     parts = [line[:1]]
     for a, b in itertools.pairwise(line):
-        steps = max(1, math.ceil(np.abs(b - a).max()))
+        steps = max(1, math.ceil(2 * np.abs(b - a).max()))  # with steps of a whole cell, rounding may skip one
         parts.append(a + np.linspace(0.0, 1.0, steps + 1)[1:, None] * (b - a))
     cells = np.floor(np.vstack(parts) + 0.5).astype(np.int32)
     cells = np.clip(cells, 0, np.array(query.grid.shape, dtype=np.int32) - 1)

@@ -64,7 +64,8 @@ class PlanRecord:
     """The plan's size beside the shortest paths that are possible.
 
     Attributes:
-        cost_m: length of the planned cells, along the grid's eight directions [m]
+        cost_m: length of the planned cells, along the grid's eight directions [m]; null where the grid has no path and
+            an any-angle planner found one beside it
         length_m: length of the planned line, of an any-angle planner's own line where it has one [m]
         grid_optimum_m: length of the shortest path on the same grid [m]; null if there is none
         euclidean_optimum_m: length of the shortest path among the inflated discs, without a grid [m]; null if there
@@ -73,7 +74,7 @@ class PlanRecord:
         work_unit: what `work` counts, such as "cells expanded"
     """
 
-    cost_m: float
+    cost_m: float | None
     length_m: float
     grid_optimum_m: float | None
     euclidean_optimum_m: float | None
@@ -81,7 +82,7 @@ class PlanRecord:
     work_unit: str
 
     def __post_init__(self) -> None:
-        _at_least(self, 0.0, "cost_m", "length_m", "work")
+        _at_least(self, 0.0, *(() if self.cost_m is None else ("cost_m",)), "length_m", "work")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -244,7 +244,7 @@ def test_a_robot_that_starts_touching_a_mover_was_hit_while_standing(turtlebot: 
 
 
 def test_a_contact_in_the_control_period_that_would_end_as_stuck_counts(standing: Scenario) -> None:
-    rigid = dataclasses.replace(standing.robot, wheel_torque=1e-12)
+    rigid = dataclasses.replace(standing.robot, wheel_torque=1e-6)
     alone = run(dataclasses.replace(standing, robot=rigid)).rollout
     assert alone is not None
     assert alone.outcome is Outcome.STUCK

@@ -1,0 +1,90 @@
+"""The reason of a run without a path: for which disc, on which cells, where it is narrow, and what helps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from antdrive.planners import GridPlanner, PlanResult, PlanStatus, Query, load_planner
+from antdrive.robots import RobotSpec
+from antdrive.sim import Outcome, Scenario, run
+from antdrive.worlds import Disc, Task, World
+
+
+def gate(robot: RobotSpec, width: float, *, planner: str = "astar", cell: float = 0.1, **settings: object) -> Scenario:
+    """A wall of overlapping cylinders with one opening around (3, 2)."""
+    ys = np.arange(2 + width / 2 + 0.25, 4.2, 0.3)
+    wall = tuple(Disc(3.0, float(y), 0.25) for y in (*ys, *(4 - ys)))
+    task = Task(World("gate", (0.0, 0.0, 6.0, 4.0), wall), (1.0, 2.0, 0.0), (5.0, 2.0), cell=cell)
+    return Scenario(task=task, planner=load_planner(planner), planner_name=planner, robot=robot, **settings)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("planner", ["astar", "ants", "tangent"])
+def test_a_gate_that_is_too_narrow_for_the_margin_is_named_with_a_margin_that_would_do(
+    turtlebot: RobotSpec, planner: str
+) -> None:
+    tight = gate(turtlebot, 0.45, planner=planner, margin=0.08)
+    done = run(tight)
+    assert done.outcome is Outcome.NO_PATH
+    assert done.reason.startswith("no path for a disc of 0.26 m (radius 0.18 + margin 0.08) on cells of 0.1 m: ")
+    assert done.reason.endswith(
+        "; the widest disc that passes has a radius of 0.225 m, at (3.00, 2.00), between obstacles[0] at (3, 2.475) with "
+        f"radius 0.25 and obstacles[{len(tight.task.world.obstacles) // 2}] at (3, 1.525) with radius 0.25; "
+        "a margin below 0.045 m leaves a way, on cells that are fine enough"
+    )
+    assert run(replace(tight, margin=0.035, cell=0.0125)).succeeded, "the advice is right"
+
+
+def test_a_robot_that_is_wider_than_the_gate_is_told_so(turtlebot: RobotSpec) -> None:
+    assert run(gate(turtlebot, 0.3)).reason.endswith("this robot does not fit through")
+
+
+def test_cells_that_would_do_are_named(turtlebot: RobotSpec) -> None:
+    coarse = gate(turtlebot, 0.45, cell=0.6)
+    reason = run(coarse).reason
+    assert reason.startswith("no path for a disc of 0.21 m (radius 0.18 + margin 0.03) on cells of 0.6 m")
+    assert reason.endswith("; there is one on cells of 0.075 m")
+    assert run(replace(coarse, cell=float(reason.split()[-2]))).succeeded
+
+
+def test_a_goal_behind_a_closed_wall_is_not_blamed_on_the_margin(turtlebot: RobotSpec) -> None:
+    closed = gate(turtlebot, 0.45)
+    task = replace(
+        closed.task, world=replace(closed.task.world, obstacles=(*closed.task.world.obstacles, Disc(3.0, 2.0, 0.4)))
+    )
+    assert run(replace(closed, task=task)).reason.endswith("; not even a point gets through")
+
+
+def test_a_start_without_room_for_the_margin_is_the_narrowest_place(turtlebot: RobotSpec) -> None:
+    task = Task(World("corner", (0.0, 0.0, 6.0, 4.0)), (2.0, 2.0, 0.0), (5.7, 2.0), cell=0.1)
+    done = run(Scenario(task=task, planner=load_planner("astar"), robot=turtlebot, margin=0.5))
+    assert done.reason.endswith(
+        "has a radius of 0.3 m, at (5.70, 2.00), the goal has no more room; a margin below 0.12 m leaves a way, on cells "
+        "that are fine enough"
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class GivesUp(GridPlanner):
+    """Finds no path, ever."""
+
+    def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        return PlanResult(status=PlanStatus.NO_PATH, reason="too tired")
+
+
+def test_a_planner_that_misses_a_path_is_told_from_a_world_without_one(small_scenario: Scenario) -> None:
+    done = run(replace(small_scenario, planner=GivesUp(), planner_name="lazy"))
+    assert done.reason == (
+        "lazy found no path for a disc of 0.21 m (radius 0.18 + margin 0.03): too tired; astar finds one on these cells of 0.2 m"
+    )
+
+
+@pytest.mark.parametrize("margin", [0.035, 0.04])
+def test_a_line_where_the_grid_has_no_path_is_driven_and_recorded(turtlebot: RobotSpec, margin: float) -> None:
+    done = run(gate(turtlebot, 0.45, planner="tangent", cell=0.05, margin=margin))
+    assert done.succeeded, done.reason
+    assert done.rollout is not None
+    assert done.rollout.record.plan.cost_m is None
+    assert done.rollout.record.plan.length_m > 4.0 - 1e-9
