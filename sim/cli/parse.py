@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from antdrive.worlds.errors import InputError
@@ -49,3 +50,20 @@ def size(text: str) -> tuple[int, int]:
     if not (text.isascii() and width.isdigit() and height.isdigit()):
         raise InputError(f"--size {text}: write WIDTHxHEIGHT in pixels, such as 1280x720")
     return int(width), int(height)
+
+
+def log_at(path: Path) -> Path:
+    """The log that a path means: the file itself, or the log in the folder of a run.
+
+    Raises:
+        InputError: a folder without a log; the message says how its run ended, if it did.
+    """
+    if not path.is_dir():
+        return path
+    log = path / "rollout.npz"
+    if log.exists():
+        return log
+    ended = (
+        "the run there ended before the robot drove" if (path / "result.json").exists() else "antdrive run writes it"
+    )
+    raise InputError(f"{path}: no rollout.npz in this folder; {ended}")

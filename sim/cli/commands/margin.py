@@ -8,10 +8,11 @@ import typer
 from antdrive.sim.cli import options
 from antdrive.sim.cli.console import print_json, print_line, print_table
 from antdrive.sim.cli.exits import SUCCEEDED
+from antdrive.sim.cli.parse import log_at
 
 
 def margin(
-    rollout: Annotated[Path, typer.Argument(metavar="ROLLOUT.npz", help="Log of a drive.")],
+    rollout: Annotated[Path, typer.Argument(metavar="ROLLOUT", help="Log of a drive, or the folder of a run.")],
     json: options.Json = False,
 ) -> int:
     """Break a drive's safety margin down by cause.
@@ -22,7 +23,7 @@ def margin(
     from antdrive.sim.log.margin import budget
     from antdrive.sim.log.rollout import Rollout
 
-    spent = budget(Rollout.load(rollout))
+    spent = budget(Rollout.load(log_at(rollout)))
     if json:
         print_json(spent.as_dict())
         return SUCCEEDED

@@ -9,6 +9,7 @@ from antdrive.sim.cli import options
 from antdrive.sim.cli.compiling import compile_once
 from antdrive.sim.cli.console import print_files, print_json
 from antdrive.sim.cli.exits import SUCCEEDED
+from antdrive.sim.cli.parse import log_at
 from antdrive.sim.cli.parse import size as parse_size
 from antdrive.sim.cli.write import caption, write_comparison_film, write_film
 from antdrive.worlds.errors import InputError
@@ -16,7 +17,8 @@ from antdrive.worlds.errors import InputError
 
 def render(
     rollouts: Annotated[
-        list[Path], typer.Argument(metavar="ROLLOUT.npz", help="Logs of drives; two to six are shown side by side.")
+        list[Path],
+        typer.Argument(metavar="ROLLOUT", help="Logs of drives or folders of runs; two to six are shown side by side."),
     ],
     out: Annotated[
         Path,
@@ -35,7 +37,7 @@ def render(
     """
     from antdrive.sim.log.rollout import Rollout
 
-    logs = [Rollout.load(path) for path in rollouts]
+    logs = [Rollout.load(log_at(path)) for path in rollouts]
     shape, one_frame = parse_size(size), out.suffix.lower() == ".png"
     if len(logs) > 1 and (prelude or one_frame):
         raise InputError(f"--out {out}: several rollouts give a film, without a prelude")

@@ -10,6 +10,7 @@ import typer
 from antdrive.sim.cli import options
 from antdrive.sim.cli.console import print_json, print_line
 from antdrive.sim.cli.exits import FAILED, SUCCEEDED
+from antdrive.sim.cli.parse import log_at
 
 if TYPE_CHECKING:
     from antdrive.robots.spec import RobotSpec
@@ -22,7 +23,7 @@ RobotFile = Annotated[
 
 
 def verify(
-    rollouts: Annotated[list[Path], typer.Argument(metavar="ROLLOUT.npz", help="Logs of drives.")],
+    rollouts: Annotated[list[Path], typer.Argument(metavar="ROLLOUT", help="Logs of drives, or the folders of runs.")],
     world: Annotated[
         str | None,
         typer.Option("--world", "-w", metavar="WORLD", help="The logs must be about this world: a name or a file."),
@@ -38,7 +39,7 @@ def verify(
     With --world and --robot, a log must also be about these. Exit code 0: every log proves that the robot touched nothing.
     """
     task, spec = _expected(world, robot)
-    checked = {str(path): _checked(path, task, spec, replay) for path in rollouts}
+    checked = {str(path): _checked(path, task, spec, replay) for path in map(log_at, rollouts)}
     all_certified = all(found["certified"] for found in checked.values())
     if json:
         print_json({"certified": all_certified, "rollouts": checked})

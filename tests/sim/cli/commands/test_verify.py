@@ -15,7 +15,7 @@ from tests.sim.cli.calling import Call, Refused
     ("words", "says"),
     [
         (["verify", "nothing.npz"], "no such file"),
-        (["verify", "folder.mp4"], "folder.mp4: not a rollout (Is a directory)"),
+        (["verify", "folder.mp4"], "folder.mp4: no rollout.npz in this folder; antdrive run writes it"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
@@ -82,3 +82,20 @@ def test_a_record_that_cannot_be_driven_is_a_problem_not_a_traceback(
     code, out, _ = antdrive("verify", odd.save(tmp_path / "odd.npz"), "--replay")
     assert code == 1
     assert "control_hz: must divide the physics rate 240" in out
+
+
+def test_the_folder_of_a_run_stands_for_its_log(antdrive: Call, refused: Refused, log: Path, tmp_path: Path) -> None:
+    code, out, _ = antdrive("verify", log.parent, "--json")
+    assert code == 0
+    assert list(json.loads(out)["rollouts"]) == [str(log)]
+    code, out, _ = antdrive("margin", log.parent)
+    assert code == 0
+    assert out == antdrive("margin", log)[1].replace(f"{log}:", f"{log.parent}:")
+    code, _, _ = antdrive("render", log.parent, "-o", "still.png", "--size", "160x160")
+    assert code == 0
+    assert Path("still.png").exists()
+    log.unlink()
+    (tmp_path / "result.json").write_text("{}")
+    for command in (["verify"], ["margin"], ["render", "-o", "x.mp4"]):
+        line = refused(command[0], tmp_path, *command[1:])
+        assert f"{tmp_path}: no rollout.npz in this folder; the run there ended before the robot drove" in line
