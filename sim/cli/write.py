@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import shlex
 import sys
 from collections.abc import Mapping, Sequence
@@ -55,9 +57,32 @@ def check_film(path: Path) -> None:
 
 
 def default_folder(scenario: Scenario) -> Path:
-    """The folder of a run for which no `--out` is given."""
+    """The folder of a run for which no `--out` is given: below `out`, and never that of another scenario.
+
+    Where the folder of that name holds a run of another scenario, the fingerprint is part of the name.
+    """
     parts = (scenario.task.world.name, scenario.planner_name, scenario.robot.name, str(scenario.seed))
-    return Path("out") / "-".join(map(file_name, parts))
+    folder, own = Path("out") / "-".join(map(file_name, parts)), fingerprint(scenario)
+    try:
+        found = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return folder
+    except (OSError, ValueError, RecursionError):
+        found = None
+    same = isinstance(found, dict) and found.get("fingerprint") == own
+    return folder if same else folder.with_name(f"{folder.name}-{own}")
+
+
+def fingerprint(scenario: Scenario) -> str:
+    """Eight hexadecimal digits that differ between scenarios: of SHA-256 over all of its fields."""
+    import dataclasses
+
+    from antdrive.sim.log.record import settings_of
+
+    fields = {field.name: getattr(scenario, field.name) for field in dataclasses.fields(scenario)}
+    planner = fields.pop("planner")
+    settings = settings_of(planner) if dataclasses.is_dataclass(planner) else type(planner).__qualname__
+    return hashlib.sha256(repr((settings, fields)).encode()).hexdigest()[:8]
 
 
 def file_name(name: str) -> str:
@@ -109,7 +134,7 @@ def write_result(run: Run, files: Mapping[str, str], command: str) -> dict[str, 
     """Write a run's `result.json`, at `files["result"]`; what was written."""
     from antdrive.worlds.files.atomic import written_whole
 
-    result = {**run.as_dict(), "files": dict(files), "command": command}
+    result = {**run.as_dict(), "fingerprint": fingerprint(run.scenario), "files": dict(files), "command": command}
     with written_whole(files["result"]) as temporary:
         temporary.write_text(as_json(result) + "\n", encoding="utf-8")
     return result

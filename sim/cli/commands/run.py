@@ -22,6 +22,7 @@ from antdrive.sim.cli.write import (
     write_run,
 )
 from antdrive.worlds.errors import InputError
+from antdrive.worlds.files.atomic import claimed
 
 if TYPE_CHECKING:
     from antdrive.sim.pipeline import Run
@@ -108,12 +109,13 @@ def run(
     _check_views(scenario, video, prelude, gui)
     check_folder(folder)
     compile_once()
-    result = _drive(scenario)
-    files = write_run(result, folder, vector=vector, figures=figures)
-    report = write_result(result, files, this_command())
-    if video is not None and result.rollout is not None:
-        files["film"] = write_film(result.rollout, video, prelude=prelude)["file"]
+    with claimed(folder):
+        result = _drive(scenario)
+        files = write_run(result, folder, vector=vector, figures=figures)
         report = write_result(result, files, this_command())
+        if video is not None and result.rollout is not None:
+            files["film"] = write_film(result.rollout, video, prelude=prelude)["file"]
+            report = write_result(result, files, this_command())
     if json:
         print_json(report)
     else:

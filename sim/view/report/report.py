@@ -83,15 +83,19 @@ def write_report(folder: Path, out: Path, *, title: str | None = None, embed_fil
 
 
 def _attach_files(run: ReportedRun, base: Path, embed_films: bool) -> None:
-    """Attach the films and files of a run's folder. A film that is older than the log shows another drive."""
+    """Attach the films and files of a run's folder. A film that is older than the log shows another drive.
+
+    Where there is no log, nothing shows that an older film is of this run either.
+    """
     log = run.folder / "rollout.npz"
-    driven = log.stat().st_mtime if log.exists() else 0.0
+    driven = (log if log.exists() else run.folder / "result.json").stat().st_mtime
+    other = "older than the log" if log.exists() else "older than result.json"
     for path in sorted(run.folder.iterdir()):
         kind = FILM_TYPES.get(path.suffix.lower())
         if kind is None or not _lies_in(path, run.folder):
             continue
         if path.stat().st_mtime < driven:
-            run.links.append(Attachment(f"{path.name} (older than the log)", _link(path, base)))
+            run.links.append(Attachment(f"{path.name} ({other})", _link(path, base)))
             continue
         source = _data_uri(kind, path.read_bytes()) if embed_films else _link(path, base)
         run.films.append(Attachment(path.name, source, is_video=kind.startswith("video/")))

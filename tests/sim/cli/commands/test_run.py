@@ -1,6 +1,8 @@
 """`antdrive run`."""
 
 import json
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -8,6 +10,7 @@ import pytest
 from antdrive.robots import list_robots
 from antdrive.sim import Run
 from antdrive.worlds import Disc, Task, World, save_task
+from antdrive.worlds.files.atomic import claimed
 from tests.sim.cli.calling import Call, Refused
 
 
@@ -169,3 +172,33 @@ def test_a_start_that_overlaps_an_obstacle_is_refused_by_name(refused: Refused, 
     assert "start for turtlebot overlaps obstacles[0] at" in out
     starts = json.loads(antdrive("worlds", "show", "gate", "--json")[1])["starts"]
     assert starts == dict.fromkeys(list_robots(), "")
+
+
+def test_runs_that_differ_have_folders_of_their_own(antdrive: Call, small_run: Run, tmp_path: Path) -> None:
+    task = small_run.scenario.task
+    save_task(task, tmp_path / "a.yaml")
+    save_task(replace(task, goal_tolerance=0.3), tmp_path / "b.yaml")  # of the same name
+
+    def folder(*words: str) -> Path:
+        return Path(
+            json.loads(antdrive("run", *words, "-p", "astar", "--no-figures", "--json")[1])["files"]["result"]
+        ).parent
+
+    first = folder("a.yaml")
+    digest = json.loads((first / "result.json").read_text())["digest"]
+    assert first == Path("out/small-astar-turtlebot-0")
+    others = [
+        folder("b.yaml"),
+        folder("a.yaml", "--margin", "0.05"),
+        folder("a.yaml", "--set", "controller.braking=0.5"),
+    ]
+    assert all(re.fullmatch(r"small-astar-turtlebot-0-[0-9a-f]{8}", other.name) for other in others)
+    assert len({first, *others}) == 4
+    assert [folder("a.yaml"), folder("b.yaml")] == [first, others[0]], "the same run again keeps its folder"
+    assert json.loads((first / "result.json").read_text())["digest"] == digest
+
+
+def test_two_runs_do_not_write_into_one_folder_at_once(refused: Refused, small: Path) -> None:
+    with claimed("r"):
+        line = refused("run", small, "-p", "astar", "--out", "r")
+    assert line.startswith("antdrive: r: another run (process ")

@@ -249,6 +249,9 @@ def test_only_films_of_the_folder_and_of_this_log_are_shown(small_run, tmp_path)
     assert "link.mp4" not in text
     assert text.count("data:video/mp4") == 1
     assert "earlier.mp4 (older than the log)" in text
+    (folder / "rollout.npz").unlink()
+    write_report(tmp_path / "runs", tmp_path / "report.html", embed_films=True)
+    assert "earlier.mp4 (older than result.json)" in (tmp_path / "report.html").read_text()
 
 
 ODD_NAME = "a|b|c `x` <script>alert(1)</script> ``` </details> [u](v) *s*"
