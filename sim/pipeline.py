@@ -149,7 +149,9 @@ class Run:
         if self.reason:
             facts["reason"] = self.reason
         goal = (*task.goal, task.goal_tolerance)
-        picture = world_svg(s.driven_world.bounds, s.driven_world.discs, start=task.start, goal=goal, lines=lines)
+        world = s.driven_world
+        movers = world.ways(task.start[:2], s.seed)
+        picture = world_svg(world.bounds, world.discs, start=task.start, goal=goal, lines=lines, movers=movers)
         return card(picture, f"{task.world.name}: {self.outcome.value}", facts)
 
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from antdrive.planners import Query
 from antdrive.planners.anyangle.passage import MOST_OBSTACLES, widest_passage
 from antdrive.planners.anyangle.tangent import shortest
 from antdrive.planners.graph.search import reachable
 from antdrive.robots.placing import name_of
-from antdrive.sim.scenario import Scenario
 from antdrive.worlds import Grid, Task, rasterise
+
+if TYPE_CHECKING:
+    from antdrive.sim.scenario import Scenario
 
 FINER = (2, 4, 8)  # cells are tried this many times smaller
 MOST_CELLS = 2_000_000  # of a grid that is made only to see whether it has a path

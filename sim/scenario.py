@@ -6,7 +6,7 @@ import dataclasses
 import os
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -61,11 +61,11 @@ class Scenario:
     cell: float | None = None
     smoothing: str = "clearance"
     seed: int = 0
-    controller: PurePursuit = CONTROLLER
+    controller: PurePursuit = field(default_factory=PurePursuit)
     noise: float = 0.0
-    perception: Perception = PERCEPTION
-    avoidance: Avoidance | None = AVOIDANCE
-    replanning: ReplanPolicy | None = REPLANNING
+    perception: Perception = field(default_factory=Perception)
+    avoidance: Avoidance | None = field(default_factory=Avoidance)
+    replanning: ReplanPolicy | None = field(default_factory=ReplanPolicy)
     unseen: tuple[Disc, ...] = ()
     time_limit: float | None = None
     physics_hz: int = 240
@@ -252,5 +252,6 @@ class Scenario:
         if self.driven_world.movers:
             facts["movers"] = len(self.driven_world.movers)
         world = self.driven_world
-        picture = world_svg(world.bounds, world.discs, start=task.start, goal=(*task.goal, task.goal_tolerance))
+        goal, movers = (*task.goal, task.goal_tolerance), world.ways(task.start[:2], self.seed)
+        picture = world_svg(world.bounds, world.discs, start=task.start, goal=goal, movers=movers)
         return card(picture, task.world.name, facts)

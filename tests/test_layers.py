@@ -25,6 +25,7 @@ SIM_RANKS = {
     "log": 0,
     "driving": 1,
     "scenario": 2,
+    "reasons": 2,
     "pipeline": 3,
     "view": 4,
     "papers": 5,

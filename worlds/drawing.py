@@ -17,6 +17,7 @@ from antdrive.worlds.types import Bounds, Floats, Pose
 LONGER_SIDE = 420  # of a world's drawing [px]
 MAX_DRAWN = 200  # cells along the longer side of a drawn grid; more would make notebooks slow
 OBSTACLE, WALL, START, GOAL, LINE = "#7988a0", "#c4cbd5", "#345cbe", "#008a5c", "#ff7a0e"
+MOVER = "#a8329e"
 
 
 def world_svg(
@@ -26,6 +27,7 @@ def world_svg(
     start: Pose | None = None,
     goal: tuple[float, float, float] | None = None,
     lines: Iterable[tuple[Floats, str, bool]] = (),
+    movers: Iterable[tuple[Floats, float]] = (),
 ) -> str:
     """A world from above, as SVG.
 
@@ -35,12 +37,18 @@ def world_svg(
         start: the robot's first pose, drawn as an arrowhead
         goal: x, y and tolerance [m]
         lines: polylines: points (N, 2) [m], colour, whether dashed
+        movers: the way (N, 2) [m] and the radius [m] of each; drawn as a disc at the first point and a dotted line
     """
     x0, y0, x1, y1 = bounds
     scale = LONGER_SIDE / max(x1 - x0, y1 - y0)
     pen = 1.6 / scale
     parts = [_rectangle(bounds, 'fill="#f3f5f8"')]
     parts += [f'<circle cx="{x:.4g}" cy="{y:.4g}" r="{radius:.4g}" fill="{OBSTACLE}"/>' for x, y, radius in discs]
+    for way, radius in movers:
+        style = f'stroke="{MOVER}" stroke-width="{pen:.3g}"'
+        x, y = way[0]
+        parts.append(_polyline(way, f'{style} stroke-dasharray="{pen:.3g} {2 * pen:.3g}"'))
+        parts.append(f'<circle class="mover" cx="{x:.4g}" cy="{y:.4g}" r="{radius:.4g}" fill="{MOVER}55" {style}/>')
     for points, colour, dashed in lines:
         dash = f' stroke-dasharray="{5 * pen:.3g} {3 * pen:.3g}"' if dashed else ""
         parts.append(_polyline(points, f'stroke="{colour}" stroke-width="{1.4 * pen:.3g}"{dash}'))

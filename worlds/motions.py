@@ -20,6 +20,7 @@ from antdrive.worlds.types import Bounds, Floats, Point
 
 CLEAR_OF_ROBOT = 1.0  # a wanderer's random first cell is at least this far from the robot's start, surface to point [m]
 TRIES = 10_000
+WAY_POINTS = 120  # of a line that is drawn
 _NEIGHBOURS = np.array([(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)], dtype=np.float64)  # x, y
 
 
@@ -96,6 +97,18 @@ def motion_of(mover: Mover, index: int, bounds: Bounds, discs: Floats, robot: Po
         return _CruisingMotion(mover, bounds)
     key = [seed, zlib.crc32(b"mover"), index] if mover.seed is None else [mover.seed]
     return _WanderingMotion(mover, bounds, discs, robot, np.random.default_rng(key))
+
+
+def way_ahead(motion: Motion, seconds: float) -> Floats:
+    """Where a mover goes from a run's start on, up to its first jump (N, 2) [m]: a line to draw.
+
+    Args:
+        motion: the mover
+        seconds: how far ahead [s]
+    """
+    end = float(min(motion.jump_times(seconds), default=seconds))
+    times = np.linspace(0.0, end, WAY_POINTS)
+    return motion.at(times[:-1] if end < seconds else times)
 
 
 class _KeyframedMotion(Motion):

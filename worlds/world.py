@@ -11,9 +11,11 @@ import numpy as np
 from antdrive.worlds.drawing import card, world_svg
 from antdrive.worlds.errors import FieldError, require_finite, require_positive
 from antdrive.worlds.limits import MAX_CELLS, MAX_WALK
-from antdrive.worlds.motions import first_cell, motion_of
+from antdrive.worlds.motions import first_cell, motion_of, way_ahead
 from antdrive.worlds.movers import Cruising, Mover, Wandering, later
 from antdrive.worlds.types import Bounds, Floats, Point, Pose
+
+WAY_DRAWN = 20.0  # how far ahead notebooks show the ways of movers [s]
 
 
 @dataclass(frozen=True)
@@ -125,7 +127,23 @@ class World:
 
     def _repr_html_(self) -> str:
         facts = {"obstacles": len(self.obstacles), "size": "{:g} × {:g} m".format(*self.size)}
-        return card(world_svg(self.bounds, self.discs), self.name, facts)
+        facts |= {"movers": len(self.movers)} if self.movers else {}
+        return card(world_svg(self.bounds, self.discs, movers=self.ways()), self.name, facts)
+
+    def ways(self, start: Point | None = None, seed: int | None = None) -> list[tuple[Floats, float]]:
+        """The way (N, 2) [m] and the radius [m] of each mover over the next 20 s, to draw.
+
+        Args:
+            start: the robot's start [m]
+            seed: the run's random seed; None: wanderers whose way depends on it are left out
+        """
+        ways = []
+        for i, mover in enumerate(self.movers):
+            if isinstance(mover, Wandering) and seed is None and (mover.seed is None or mover.start is None):
+                continue
+            motion = motion_of(mover, i, self.bounds, self.discs, start or (math.inf, math.inf), seed or 0)
+            ways.append((way_ahead(motion, WAY_DRAWN), mover.radius))
+        return ways
 
 
 @dataclass(frozen=True)
@@ -203,4 +221,6 @@ class Task:
             "start": "{:g}, {:g}".format(*self.start[:2]),
             "goal": "{:g}, {:g}".format(*self.goal),
         }
-        return card(world_svg(world.bounds, world.discs, start=self.start, goal=goal), world.name, facts)
+        facts |= {"movers": len(world.movers)} if world.movers else {}
+        movers = world.ways()
+        return card(world_svg(world.bounds, world.discs, start=self.start, goal=goal, movers=movers), world.name, facts)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from antdrive.planners.anyangle.tangent import shortest
 from antdrive.worlds import Floats, Point, Task, point_clearance
@@ -57,7 +58,7 @@ def widest_passage(task: Task, most: float) -> Passage | None:
     return Passage(float(radii[low - 1]), (x, y), tuple(int(k) for k in pairs[low - 1] if k >= 0))
 
 
-def _candidates(task: Task, most: float) -> tuple[Floats, Floats, Floats]:
+def _candidates(task: Task, most: float) -> tuple[Floats, Floats, npt.NDArray[np.int64]]:
     """The radii (C,) up to `most` at which something closes; where (C, 2); between what (C, 2), or -1."""
     discs, (xmin, ymin, xmax, ymax) = task.world.discs, task.world.bounds
     x, y, r = discs.T
@@ -95,4 +96,4 @@ def _candidates(task: Task, most: float) -> tuple[Floats, Floats, Floats]:
     order = order[(all_radii[order] > CLOSER) & (all_radii[order] <= most)]
     # A gap with something else in its middle is none.
     order = order[(point_clearance(task.world, all_places[order]) >= all_radii[order] - CLOSER)]
-    return all_radii[order], all_places[order], all_pairs[order]
+    return all_radii[order], all_places[order], all_pairs[order].astype(np.int64)

@@ -79,6 +79,18 @@ class Certificate:
         least, bound = in_metres(self.min_clearance), in_metres(self.bound)
         return f"{self.verdict}: least clearance {least}, between steps at least {bound}"
 
+    def _repr_html_(self) -> str:
+        from antdrive.worlds.drawing import card
+
+        facts: dict[str, object] = {
+            "least clearance": in_metres(self.min_clearance),
+            "between steps at least": in_metres(self.bound),
+            "contact points": self.contacts,
+            "moved at most": in_metres(self.moved),
+        }
+        facts |= {f"problem {i}": problem for i, problem in enumerate(self.problems, 1)}
+        return card("", self.verdict, facts)
+
     def as_dict(self) -> dict[str, Any]:
         """The certificate as plain values, for JSON."""
         return {

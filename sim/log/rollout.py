@@ -177,7 +177,8 @@ class Rollout:
         task, world = self.record.task, self.record.world
         lines = [(self.route, "#182242", True), (self.pose[::12, :2], LINE, False)]
         goal = (*task.goal, task.goal_tolerance)
-        picture = world_svg(world.bounds, world.discs, start=task.start, goal=goal, lines=lines)
+        movers = world.ways(task.start[:2], self.record.seed)
+        picture = world_svg(world.bounds, world.discs, start=task.start, goal=goal, lines=lines, movers=movers)
         facts = {
             "planner": self.record.planner.name,
             "robot": self.record.robot.name,

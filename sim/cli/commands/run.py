@@ -1,7 +1,7 @@
 """`antdrive run`."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -112,10 +112,7 @@ def run(
     with claimed(folder):
         result = _drive(scenario)
         files = write_run(result, folder, vector=vector, figures=figures)
-        report = write_result(result, files, this_command())
-        if video is not None and result.rollout is not None:
-            files["film"] = write_film(result.rollout, video, prelude=prelude)["file"]
-            report = write_result(result, files, this_command())
+        report = _write_views(result, files, video, prelude)
     if json:
         print_json(report)
     else:
@@ -125,6 +122,15 @@ def run(
 
         show(result.rollout)
     return SUCCEEDED if result.succeeded else FAILED
+
+
+def _write_views(result: "Run", files: dict[str, str], video: Path | None, prelude: float) -> dict[str, Any]:
+    """Write the result and, if asked for, the film, and the result again with it; what was written."""
+    report = write_result(result, files, this_command())
+    if video is None or result.rollout is None:
+        return report
+    files["film"] = write_film(result.rollout, video, prelude=prelude)["file"]
+    return write_result(result, files, this_command())
 
 
 def _check_views(scenario: "Scenario", video: Path | None, prelude: float, gui: bool) -> None:

@@ -1,15 +1,18 @@
 """The HTML that notebooks show for worlds, plans and rollouts."""
 
+import pydoc
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
 from antdrive.planners import PlanResult, PlanStatus, Query, load_planner
-from antdrive.worlds import Disc, Task, World, load_task, rasterise
+from antdrive.sim import Scenario, certify
+from antdrive.worlds import Cruising, Disc, Keyframed, Task, Trajectories, Wandering, World, load_task, rasterise
 
 TASK = load_task("slalom")
 
@@ -62,3 +65,57 @@ def test_looking_at_a_world_imports_nothing_heavy():
     )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "[]"
+
+
+def moving():
+    to_and_fro = Keyframed(radius=0.25, keyframes=((0.0, 1.0, 1.0), (4.0, 3.0, 1.0)), loop="teleport")
+    straight = Cruising(radius=0.2, position=(2.0, 2.0), velocity=(0.3, 0.1))
+    walker = Wandering(radius=0.15, cell=0.5, period=0.8)
+    world = World("moving", (0.0, 0.0, 6.0, 4.0), movers=(to_and_fro, straight, walker))
+    return Task(world, (5.0, 3.5, 0.0), (5.0, 0.5))
+
+
+def drawn(html):
+    """The discs of movers (M, 3) and the points of their dotted ways."""
+    root = ElementTree.fromstring(html)
+    discs = [[float(e.get(k)) for k in ("cx", "cy", "r")] for e in root.iter() if e.get("class") == "mover"]
+    lines = [
+        [[float(v) for v in point.split(",")] for point in e.get("points").split()]
+        for e in root.iter() if e.tag.endswith("polyline") and e.get("stroke") == "#a8329e"
+    ]  # fmt: skip
+    return np.array(discs), [np.array(line) for line in lines]
+
+
+def test_movers_are_drawn_where_they_begin_with_their_ways():
+    task = moving()
+    scenario = Scenario.of(task, "astar", seed=5)
+    discs, ways = drawn(scenario._repr_html_())
+    begin = Trajectories.of(task.world, task.start[:2], 5).positions(0.0)[0]
+    np.testing.assert_allclose(discs, np.column_stack([begin, [0.25, 0.2, 0.15]]), rtol=1e-3)
+    assert np.ptp(ways[0][:, 0]) == pytest.approx(2.0, abs=0.05), "up to the jump, and not back"
+    assert len(ways) == 3
+    for shown in (task, task.world):
+        discs, ways = drawn(shown._repr_html_())
+        assert len(discs) == len(ways) == 2, "where the walker goes depends on the seed"
+
+
+def test_a_run_and_its_log_show_movers(small_run):
+    assert len(drawn(small_run._repr_html_())[0]) == 0
+    record = small_run.rollout.record
+    world = replace(record.task.world, movers=moving().world.movers[:2])
+    log = replace(small_run.rollout, record=replace(record, task=replace(record.task, world=world)))
+    assert len(drawn(log._repr_html_())[0]) == 2
+
+
+def test_a_certificate_shows_its_verdict_and_its_problems(small_run):
+    assert "certified collision-free" in small_run.certificate._repr_html_()
+    other = certify(replace(small_run.rollout, pose=small_run.rollout.pose + 0.01))
+    html = other._repr_html_()
+    assert "NOT certified" in html
+    assert "problem 1" in html
+    ElementTree.fromstring(html)
+
+
+def test_the_help_of_a_scenario_begins_with_what_it_is():
+    text = pydoc.render_doc(Scenario, renderer=pydoc.plaintext)
+    assert text.index("Everything a run depends on") < 900
