@@ -44,8 +44,20 @@ def test_a_drive_with_a_chosen_margin_says_how_it_was_chosen(antdrive: Call, sma
     assert record.margin == 0.047
     assert record.margin_choice is not None
     assert (record.margin_choice.loss_m, record.margin_choice.drives) == (pytest.approx(0.036), 80)
-    code, out, _ = antdrive("verify", "r/rollout.npz")
-    assert code == 0
+    assert antdrive("verify", "r/rollout.npz")[0] == 0
+    _, out, _ = antdrive("margin", "r/rollout.npz", "--json")
+    told = json.loads(out)["prediction"]
+    bound = json.loads(Path("r/result.json").read_text())["certificate"]["bound_m"]
+    assert told["footprint_loss_m"] == pytest.approx(0.047 - bound)
+    assert told["loss_m"] == pytest.approx(0.036)
+    assert "auto for a predicted loss of 0.0360 m; the footprint lost" in antdrive("margin", "r/rollout.npz")[1]
+
+
+def test_movers_and_unseen_obstacles_are_no_part_of_the_prediction(antdrive: Call, small: Path) -> None:
+    keep(0.047)
+    antdrive("run", small, "-p", "astar", "--margin", "auto", "--unseen", "2.0,2.7,0.1", "--no-figures", "--out", "r")
+    assert json.loads(antdrive("margin", "r/rollout.npz", "--json")[1])["prediction"]["footprint_loss_m"] is None
+    assert "this drive had movers or unseen obstacles" in antdrive("margin", "r/rollout.npz")[1]
 
 
 def test_a_margin_given_as_a_number_leaves_no_trace(antdrive: Call, small: Path) -> None:
@@ -53,6 +65,7 @@ def test_a_margin_given_as_a_number_leaves_no_trace(antdrive: Call, small: Path)
     code, out, _ = antdrive("run", small, "-p", "astar", "--margin", "0.047", "--no-figures", "--out", "r")
     assert code == 0
     assert "chosen" not in out
+    assert json.loads(antdrive("margin", "r/rollout.npz", "--json")[1])["prediction"] is None
     with np.load("r/rollout.npz") as log:
         assert "margin_choice" not in json.loads(str(log["record"]))
 
