@@ -100,6 +100,7 @@ class Scenario:
             ("avoidance", (Avoidance, type(None)), "an Avoidance, or None for no avoidance"),
             ("replanning", (ReplanPolicy, type(None)), "a ReplanPolicy, or None for no replanning"),
             ("unseen", tuple, "a tuple of Disc"),
+            ("calibration", (Calibration, type(None)), "a Calibration, such as choose_margin gives, or None"),
             ("seed", (int, np.integer), "a whole number"),
         )
         for key, kind, wanted in kinds:

@@ -65,8 +65,10 @@ def _driving(
 ) -> Callable[[float], list[float]]:
     """A function that drives every course with a margin and returns the losses."""
     from joblib import Parallel, delayed
+    from joblib.parallel import get_active_backend
 
-    done = 0
+    # Within a process of somebody else's pool joblib would start threads, and one process of PyBullet is one thread.
+    jobs, done = (1 if get_active_backend()[0].nesting_level else jobs), 0
 
     def losses_with(margin: float) -> list[float]:
         nonlocal done
