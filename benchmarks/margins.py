@@ -87,7 +87,7 @@ def main() -> None:
     arguments = parser.parse_args()
     rows, wrong = [], []
     for robot, noise, smoothing in itertools.product(
-        ("turtlebot", "jackal"), (0.0, 1.0), ("none", "taut", "clearance")
+        arguments.robots.split(","), (0.0, 1.0), ("none", "taut", "clearance")
     ):
         calibration = choose_margin(scenario("forest", FIRST_SEED, robot, noise, smoothing).conditions)
         worlds = [(kind, FIRST_SEED + n) for n in range(arguments.worlds // 2) for kind in ("forest", "barn")]
