@@ -34,6 +34,7 @@ from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import (
     ComponentRecord,
     DriveRecord,
+    MarginRecord,
     PerceptionRecord,
     PlanRecord,
     ReplanRecord,
@@ -127,6 +128,7 @@ class Run:
             "planner": s.planner_label,
             "robot": s.robot.name,
             "seed": s.seed,
+            "margin_m": s.margin,
             "outcome": self.outcome.key,
             "sentence": self.outcome.value,
             "reason": self.reason,
@@ -307,6 +309,7 @@ def _record(
         limiters=LIMITERS,
         noise=s.noise,
         margin=s.margin,
+        margin_choice=_margin_record(s),
         inflate=s.inflate,
         cell=grid.cell,
         physics_hz=s.physics_hz,
@@ -345,6 +348,15 @@ def _plan_record(s: Scenario, grid: Grid, answer: PlanResult) -> PlanRecord:
         euclidean_optimum_m=finite_or_none(PLANNERS["tangent"].plan(query, s.rng("optimum")).line_length),
         work=answer.work,
         work_unit=answer.work_unit,
+    )
+
+
+def _margin_record(s: Scenario) -> MarginRecord | None:
+    chosen = s.chosen
+    if chosen is None:
+        return None
+    return MarginRecord(
+        loss_m=chosen.loss, reserve_m=chosen.reserve, probability=chosen.probability, drives=chosen.drives
     )
 
 
