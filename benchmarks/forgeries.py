@@ -299,7 +299,7 @@ for _name, _path, _to in (
     ("a schema of true", ("schema",), True),
     ("a later schema", ("schema",), 3),
     ("an unknown key", ("extra",), 1),
-    ("a seed of 400 digits", ("seed",), _HUGE),
+    ("a time limit of 400 digits", ("time_limit",), _HUGE),
     ("a margin of 400 digits", ("margin",), _HUGE),
     ("an unknown outcome", ("outcome",), "won"),
     ("physics at 1 MHz", ("physics_hz",), 1_000_000),
@@ -329,6 +329,18 @@ def _(log: Log) -> Log | None:
         return None
     log.world["movers"] = [log.world["movers"][0]] * 5000
     log.arrays["movers"] = np.repeat(log["movers"][:, :1], 5000, axis=1)
+    return log
+
+
+@forgery("1,000 wanderers that take 20 steps a second", "load")
+def _(log: Log) -> Log | None:
+    """In a log of a row per second, whose few rows are hours."""
+    if not moving(log):
+        return None
+    walk = {"cell": 0.5, "period": 0.05, "start": [5.2, 0.6]}
+    log.world["movers"] = [{"radius": 0.15, "height": 1.0, "walk": walk}] * 1000
+    log.record["physics_hz"] = log.record["control_hz"] = 1
+    log.arrays["movers"] = np.repeat(log["movers"][:, :1], 1000, axis=1)
     return log
 
 
@@ -1356,9 +1368,9 @@ def _(data: bytes) -> bytes:
     return _with_record(data, '{"schema": 2, "task": ' + "[" * 100_000 + "]" * 100_000 + "}")
 
 
-@breakage("a record of 60 MB")
+@breakage("a record of 160 MB")
 def _(data: bytes) -> bytes:
-    return _with_record(data, '{"schema": 2, "reason": "' + "x" * 15_000_000 + '"}')
+    return _with_record(data, '{"schema": 2, "reason": "' + "x" * 40_000_000 + '"}')
 
 
 def _npy(descr: str, shape: str) -> bytes:
