@@ -34,6 +34,7 @@ from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import (
     ComponentRecord,
     DriveRecord,
+    MarginRecord,
     PerceptionRecord,
     PlanRecord,
     ReplanRecord,
@@ -126,6 +127,7 @@ class Run:
             "planner": s.planner_label,
             "robot": s.robot.name,
             "seed": s.seed,
+            "margin_m": s.margin,
             "outcome": self.outcome.key,
             "sentence": self.outcome.value,
             "reason": self.reason,
@@ -164,7 +166,19 @@ def plan(s: Scenario) -> tuple[Grid, PlanResult]:
     """
     grid = rasterise(s.task.world, s.cell or s.task.cell, s.inflate)
     query = _query(s, grid)
-    return grid, _drivable(s, grid, checked(query, ask(s.planner, query, s.rng("planner"), s.planner_label)))
+    answer = checked(query, ask(s.planner, query, s.rng("planner"), s.planner_label))
+    return grid, _drivable(s, grid, _with_margin_named(s, grid, answer))
+
+
+def _with_margin_named(s: Scenario, grid: Grid, answer: PlanResult) -> PlanResult:
+    """The answer; without a path at a margin that was chosen, the reason says whether the margin is what closes the way."""
+    if answer.status is not PlanStatus.NO_PATH or s.chosen is None:
+        return answer
+    bare = Query.between(rasterise(s.task.world, grid.cell, s.robot.radius), s.task)
+    solved = PLANNERS["astar"].plan(bare, s.rng("bare")).solved
+    without = "without margin there is one" if solved else "without margin there is none, either"
+    named = f"no path with a margin of {s.margin:.3f} m on cells of {grid.cell:g} m; {without}"
+    return dataclasses.replace(answer, reason="; ".join(filter(None, (named, answer.reason))))
 
 
 def _drivable(s: Scenario, grid: Grid, answer: PlanResult) -> PlanResult:
@@ -299,6 +313,7 @@ def _record(
         limiters=LIMITERS,
         noise=s.noise,
         margin=s.margin,
+        margin_choice=_margin_record(s),
         inflate=s.inflate,
         cell=grid.cell,
         physics_hz=s.physics_hz,
@@ -337,6 +352,15 @@ def _plan_record(s: Scenario, grid: Grid, answer: PlanResult) -> PlanRecord:
         euclidean_optimum_m=finite_or_none(PLANNERS["tangent"].plan(query, s.rng("optimum")).line_length),
         work=answer.work,
         work_unit=answer.work_unit,
+    )
+
+
+def _margin_record(s: Scenario) -> MarginRecord | None:
+    chosen = s.chosen
+    if chosen is None:
+        return None
+    return MarginRecord(
+        loss_m=chosen.loss, reserve_m=chosen.reserve, probability=chosen.probability, drives=chosen.drives
     )
 
 

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from antdrive.planners import SMOOTHINGS, Planner, capabilities_of, load_planner
 from antdrive.robots import Avoidance, PurePursuit, RobotSpec, load_robot, overlap_at
+from antdrive.sim.calibration.choice import choose_margin
+from antdrive.sim.calibration.prediction import Calibration
+from antdrive.sim.calibration.trial import Conditions
 from antdrive.sim.driving.perception import Perception
 from antdrive.sim.driving.replanning import ReplanPolicy
 from antdrive.sim.log.streams import random_stream
@@ -45,6 +48,7 @@ class Scenario:
             route at full speed
         physics_hz: physics steps per simulated second
         control_hz: control periods per simulated second; must divide `physics_hz`
+        calibration: what the margin was chosen by; see `with_chosen_margin`
 
     Raises:
         ValueError: a setting is out of range, or the robot's footprint overlaps an obstacle or a wall at the start.
@@ -67,6 +71,7 @@ class Scenario:
     time_limit: float | None = None
     physics_hz: int = 240
     control_hz: int = 60
+    calibration: Calibration | None = None
 
     def __post_init__(self) -> None:
         self._check_kinds()
@@ -95,6 +100,7 @@ class Scenario:
             ("avoidance", (Avoidance, type(None)), "an Avoidance, or None for no avoidance"),
             ("replanning", (ReplanPolicy, type(None)), "a ReplanPolicy, or None for no replanning"),
             ("unseen", tuple, "a tuple of Disc"),
+            ("calibration", (Calibration, type(None)), "a Calibration, such as choose_margin gives, or None"),
             ("seed", (int, np.integer), "a whole number"),
         )
         for key, kind, wanted in kinds:
@@ -119,7 +125,7 @@ class Scenario:
         robot: str | os.PathLike[str] | RobotSpec = "turtlebot",
         *,
         options: Mapping[str, Any] | None = None,
-        margin: float = 0.03,
+        margin: float | Literal["auto"] = 0.03,
         cell: float | None = None,
         smoothing: str = "clearance",
         seed: int = 0,
@@ -138,7 +144,7 @@ class Scenario:
         >>> Scenario.of("forest", "aco-han", "jackal", options={"ants": 30}, noise=1.0, seed=2)
 
         The settings margin, cell, smoothing, seed, controller, noise, perception, avoidance, replanning,
-        unseen, time_limit, physics_hz and control_hz are the fields of `Scenario`, which describes them.
+        unseen, time_limit, physics_hz and control_hz are the fields of `Scenario`. "auto": see `with_chosen_margin`.
 
         Args:
             world: a world of the catalogue, a world file, or a task
@@ -148,17 +154,16 @@ class Scenario:
 
         Raises:
             InputError: there is no such world, planner, option or robot, or a file is wrong.
-            ValueError: a setting is out of range, the robot does not fit at the start, or `options` are given for a
-                planner object.
+            ValueError: a setting is out of range, the robot does not fit, or `options` are given for a planner object.
         """
         if not isinstance(planner, str) and options:
             raise FieldError("options", "need a planner's name; set the options of a planner object itself")
-        return cls(
+        scenario = cls(
             task=world if isinstance(world, Task) else load_task(world),
             planner=load_planner(planner, **(options or {})) if isinstance(planner, str) else planner,
             planner_name=planner if isinstance(planner, str) else "",
             robot=robot if isinstance(robot, RobotSpec) else load_robot(robot),
-            margin=margin,
+            margin=0.0 if margin == "auto" else margin,
             cell=cell,
             smoothing=smoothing,
             seed=seed,
@@ -172,6 +177,41 @@ class Scenario:
             physics_hz=physics_hz,
             control_hz=control_hz,
         )
+        return scenario.with_chosen_margin() if margin == "auto" else scenario
+
+    @property
+    def conditions(self) -> Conditions:
+        """What the loss of margin depends on."""
+        return Conditions(
+            robot=self.robot,
+            controller=self.controller,
+            noise=float(self.noise),
+            smoothing="none" if self.timed else self.smoothing,
+            physics_hz=self.physics_hz,
+            control_hz=self.control_hz,
+        )
+
+    def with_chosen_margin(self, progress: Callable[[int, float], None] | None = None) -> Scenario:
+        """The scenario with the least margin whose predicted loss leaves a reserve, see `antdrive.sim.calibration`.
+
+        Short drives of this robot predict the loss, once; the cache keeps the result. Movers are no part of it.
+
+        Args:
+            progress: is called after each of these drives with their number so far and the margin that is tried [m]
+
+        Raises:
+            FieldError: no margin leaves the reserve.
+        """
+        calibration = choose_margin(self.conditions, progress=progress)
+        return dataclasses.replace(self, margin=calibration.margin, calibration=calibration)
+
+    @property
+    def chosen(self) -> Calibration | None:
+        """The calibration that the margin comes from; None where the margin was given, or the conditions have changed."""
+        calibration = self.calibration
+        if calibration is None or calibration.margin != self.margin or calibration.key != self.conditions.key:
+            return None
+        return calibration
 
     @property
     def planner_label(self) -> str:

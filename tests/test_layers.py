@@ -24,6 +24,7 @@ SIM_RANKS = {
     "physics": 0,
     "log": 0,
     "driving": 1,
+    "calibration": 1.5,
     "scenario": 2,
     "pipeline": 3,
     "view": 4,

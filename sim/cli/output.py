@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from antdrive.sim.cli.console import print_files, print_line
 
 if TYPE_CHECKING:
+    from antdrive.sim.calibration.prediction import Calibration
     from antdrive.sim.pipeline import Run
     from antdrive.worlds import Task
 
@@ -17,6 +18,8 @@ def print_run(run: Run, files: dict[str, str]) -> None:
     print_line(
         f"{s.task.world.name}: {s.robot.name} with {s.planner_name}: {run.outcome.value}" + in_brackets(run.reason)
     )
+    if s.chosen is not None:
+        print_line(f"  {chosen_margin(s.chosen)}")
     if run.rollout is not None and run.certificate is not None:
         facts = run.as_dict()["metrics"]
         print_line(
@@ -29,6 +32,14 @@ def print_run(run: Run, files: dict[str, str]) -> None:
         for problem in run.certificate.problems:
             print_line(f"    {problem}")
     print_files(files)
+
+
+def chosen_margin(chosen: Calibration) -> str:
+    """A margin that was chosen by calibration, with what it rests on."""
+    return (
+        f"margin {chosen.margin:.3f} m, chosen: a loss of {chosen.loss:.3f} m is predicted from {chosen.drives} drives, "
+        f"at least {chosen.reserve:.3f} m are left"
+    )
 
 
 def in_brackets(reason: str) -> str:

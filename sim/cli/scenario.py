@@ -19,15 +19,21 @@ GROUPS = ("planner", "controller")  # what `--set GROUP.KEY=VALUE` can set
 def make_scenario(world: str, planner: str, settings: list[str] | None, robot: str, **rest: Any) -> Scenario:
     """The scenario that a command's options describe; `rest` are fields of `Scenario`.
 
+    With the margin "auto" the robot is calibrated, if that was not done before.
+
     Raises:
         InputError: an unknown name, or a value out of range; the message names the option.
     """
+    from antdrive.sim.cli.calibrating import with_chosen_margin
     from antdrive.sim.scenario import Scenario
 
     chosen = grouped(settings)
     controller = make_controller(chosen["controller"])
+    auto = rest.get("margin") == "auto"
+    given = {**rest, "margin": 0.0} if auto else rest
     try:
-        return Scenario.of(world, planner, robot, options=chosen["planner"], controller=controller, **rest)
+        scenario = Scenario.of(world, planner, robot, options=chosen["planner"], controller=controller, **given)
+        return with_chosen_margin(scenario) if auto else scenario
     except FieldError as error:
         if error.key == "start":  # no option sets it
             raise input_error(world, str(error)) from None

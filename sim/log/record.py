@@ -40,6 +40,8 @@ MAX_HZ = 10_000
 #: The largest margin and inflation that a log can have [m].
 MAX_MARGIN = 1000.0
 
+MARGIN_ROUNDING = 1e-9  # [m]
+
 #: The trigger of a replan by a planner that decides anew at every cell.
 DECISION = "decision"
 
@@ -141,6 +143,26 @@ class ReplanRecord:
 
 
 @dataclass(frozen=True, kw_only=True)
+class MarginRecord:
+    """How `--margin auto` chose the margin.
+
+    Attributes:
+        loss_m: how much of the margin a drive was predicted to use up [m]; no part of it are movers
+        reserve_m: what the predicted loss was to leave of the margin, at least [m]
+        probability: of a larger loss than predicted, for a drive along a course of the calibration
+        drives: number of drives that the prediction rests on
+    """
+
+    loss_m: float
+    reserve_m: float
+    probability: float
+    drives: int
+
+    def __post_init__(self) -> None:
+        _at_least(self, 0.0, "reserve_m", "probability", "drives")
+
+
+@dataclass(frozen=True, kw_only=True)
 class TimesRecord:
     """Wall-clock times. They differ between repetitions, so the digest does not cover them.
 
@@ -186,6 +208,7 @@ class DriveRecord:
         limiters: names of the rules that can limit the robot's speed; the array `limiter` holds indices into them
         noise: the factor on the robot's documented noise; 0 is a perfect robot
         margin: clearance that was planned with on top of the robot's radius [m]
+        margin_choice: how the margin was chosen; the key is left out where it was given as a number
         inflate: the robot's radius plus the margin: how far planners keep the robot's centre from every surface [m]
         cell: grid resolution of the plan [m]
         physics_hz: rate of the physics and of the log's rows [Hz]
@@ -228,6 +251,7 @@ class DriveRecord:
     reason: str
     versions: Mapping[str, str]
     times: TimesRecord
+    margin_choice: MarginRecord | None = None
     digest: str | None = None
 
     def __post_init__(self) -> None:
@@ -244,6 +268,9 @@ class DriveRecord:
         for key in ("cell", "time_limit"):
             if not getattr(self, key) > 0:
                 raise FieldError(key, f"must be greater than 0, got {getattr(self, key)!r:.40}")
+        choice = self.margin_choice
+        if choice is not None and not choice.loss_m + choice.reserve_m <= self.margin + MARGIN_ROUNDING:
+            raise FieldError("margin_choice", f"loss_m and reserve_m must not exceed the margin of {self.margin:g} m")
         foot = self.robot.footprint
         for key in ("half_length", "half_width", "rounding"):
             if not 0 <= getattr(foot, key) < math.inf:
@@ -259,7 +286,10 @@ class DriveRecord:
 
     def as_dict(self) -> dict[str, Any]:
         """The record as plain values, for JSON."""
-        return {field.name: plain_value(getattr(self, field.name)) for field in dataclasses.fields(self)}
+        values = {field.name: plain_value(getattr(self, field.name)) for field in dataclasses.fields(self)}
+        if self.margin_choice is None:  # logs without it are as they were before margins could be chosen
+            del values["margin_choice"]
+        return values
 
     def to_json(self, *, without: Sequence[str] = ()) -> str:
         """The record as JSON text, the keys sorted.
@@ -388,6 +418,7 @@ _NESTED: Mapping[str, type[Any]] = {
     "smoothing": SmoothingRecord,
     "perception": PerceptionRecord,
     "replans": ReplanRecord,
+    "margin_choice": MarginRecord,
     "times": TimesRecord,
 }
 

@@ -361,7 +361,7 @@ def test_a_scenario_is_made_of_names_files_or_objects(tmp_path: Path) -> None:
 def test_a_scenario_made_of_names_has_the_same_defaults() -> None:
     parameters = inspect.signature(Scenario.of).parameters
     for setting in fields(Scenario):
-        if setting.name not in ("task", "planner", "robot", "planner_name"):
+        if setting.name not in ("task", "planner", "robot", "planner_name", "calibration"):
             assert parameters[setting.name].default == setting.default, setting.name
 
 

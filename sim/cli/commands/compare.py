@@ -96,7 +96,7 @@ def _command(scenario: "Scenario", world: str, robot: str) -> str:
         "--planner": scenario.planner_name,
         "--robot": robot,
         "--seed": scenario.seed,
-        "--margin": scenario.margin,
+        "--margin": "auto" if scenario.chosen else scenario.margin,
         "--smoothing": scenario.smoothing,
         "--noise": scenario.noise,
     }

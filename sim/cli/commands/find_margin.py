@@ -50,9 +50,9 @@ def find_margin(
     ] = 0.005,
     json: options.Json = False,
 ) -> int:
-    """Find the smallest margin with which every drive is safe.
+    """Find the smallest margin with which every drive is safe, in these worlds.
 
-    Exit code 0: there is a safe margin of at most 0.2 m.
+    `--margin auto` of the other commands predicts one for any world. Exit code 0: there is a safe margin of at most 0.2 m.
     """
     from antdrive.sim.log.margin import find_margin as search
     from antdrive.sim.pipeline import run as drive

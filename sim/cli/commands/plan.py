@@ -9,7 +9,7 @@ from antdrive.sim.cli import options
 from antdrive.sim.cli.compiling import compile_once
 from antdrive.sim.cli.console import planning, print_files, print_json, print_line
 from antdrive.sim.cli.exits import FAILED, SUCCEEDED
-from antdrive.sim.cli.output import in_brackets, plain
+from antdrive.sim.cli.output import chosen_margin, in_brackets, plain
 from antdrive.sim.cli.scenario import make_scenario
 from antdrive.sim.cli.write import suffixes
 
@@ -57,6 +57,8 @@ def plan(
         if len(answer.cells):
             length, count = answer.line_length, len(answer.cells)
             print_line(f"  length {length:.3f} m over {count} cells, {answer.work} {answer.work_unit}")
+        if scenario.chosen is not None:
+            print_line(f"  {chosen_margin(scenario.chosen)}")
         rows, columns = grid.shape
         print_line(f"  planned in {answer.wall_s * 1000:.1f} ms on {rows} x {columns} cells of {grid.cell:g} m")
         print_files(files)
@@ -72,6 +74,7 @@ def _facts(scenario: "Scenario", grid: "Grid", answer: "PlanResult") -> dict[str
         "status": answer.status.name.lower(),
         "sentence": answer.status.value,
         "reason": answer.reason,
+        "margin_m": scenario.margin,
         "cost_m": answer.cost,
         "length_m": answer.line_length,
         "work": answer.work,

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from antdrive.sim.log.format_page import with_tables
-from antdrive.sim.log.record import DriveRecord, record_keys
+from antdrive.sim.log.record import DriveRecord, MarginRecord, record_keys
 from antdrive.sim.log.rollout import ARRAYS
 from tests.sim.records import made_up_record
 
@@ -20,10 +20,11 @@ def test_the_pages_tables_are_those_of_the_code() -> None:
 
 def test_the_page_describes_every_array_and_every_key() -> None:
     page = PAGE.read_text(encoding="utf-8")
-    record = made_up_record()
+    choice = MarginRecord(loss_m=0.03, reserve_m=0.01, probability=1e-3, drives=80)
+    record = made_up_record(margin_choice=choice)
     written = json.loads(record.to_json())
     assert set(written) == {field.name for field in dataclasses.fields(DriveRecord)}
-    for name in (*ARRAYS, *written, *(f"plan.{key}" for key in written["plan"])):
+    for name in (*ARRAYS, *written, *(f"plan.{key}" for key in written["plan"]), "margin_choice.loss_m"):
         assert re.search(rf"^\| `{re.escape(name)}` \|", page, re.MULTILINE), name
 
 

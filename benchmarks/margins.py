@@ -1,0 +1,113 @@
+"""Predicted and measured losses of margin: `python -m benchmarks.margins [--worlds N] [--jobs N]`.
+
+Every combination of robot, noise and smoothing drives random worlds, half of them forests and half of them like BARN's, with
+`--margin auto`. The worlds' seeds are none of the calibration's.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import math
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from joblib import Parallel, delayed
+
+from antdrive.planners import load_planner
+from antdrive.robots import load_robot
+from antdrive.sim import Outcome, Scenario, run
+from antdrive.sim.calibration.choice import choose_margin
+from antdrive.sim.calibration.prediction import Calibration
+from antdrive.worlds import generate
+from benchmarks.planners import table
+
+FIRST_SEED = 50_000
+
+
+class Driven(NamedTuple):
+    """One drive.
+
+    Attributes:
+        name: the world
+        loss: the margin minus the certificate's bound [m]; nan without a drive
+        outcome: how it ended
+        contacts: number of contacts
+        certified: whether the robot reached the goal and its log proves that nothing was touched
+    """
+
+    name: str
+    loss: float
+    outcome: Outcome
+    contacts: int
+    certified: bool
+
+
+def scenario(kind: str, seed: int, robot: str, noise: float, smoothing: str) -> Scenario:
+    task = generate(kind, np.random.default_rng(seed), {}, name=f"{kind} {seed}", note="")
+    return Scenario(
+        task=task, planner=load_planner("astar"), planner_name="astar", robot=load_robot(robot), noise=noise,
+        smoothing=smoothing, seed=seed, margin=0.0,
+    )  # fmt: skip
+
+
+def drive(kind: str, seed: int, robot: str, noise: float, smoothing: str, margin: float | None) -> Driven:
+    """Drive a world with a margin; None: with the one that the cache holds."""
+    made = scenario(kind, seed, robot, noise, smoothing)
+    done = run(made.with_chosen_margin() if margin is None else replace(made, margin=margin))
+    if done.rollout is None or done.certificate is None:
+        return Driven(made.task.world.name, math.nan, done.outcome, 0, False)
+    loss = done.scenario.margin - done.certificate.bound
+    return Driven(made.task.world.name, loss, done.outcome, len(done.rollout.contacts), done.succeeded)
+
+
+def row(calibration: Calibration, drives: list[Driven]) -> list[str]:
+    losses = np.array([d.loss for d in drives if not math.isnan(d.loss)])
+    driven = [d for d in drives if d.outcome is not Outcome.NO_PATH]
+
+    def mm(value: float) -> str:
+        return f"{1000 * value:.0f}"
+
+    median, high = np.quantile(losses, (0.5, 0.95)) if len(losses) else (math.nan, math.nan)
+    return [
+        mm(calibration.margin), mm(calibration.loss), mm(calibration.largest),
+        f"{mm(median)} / {mm(high)} / {mm(losses.max(initial=-math.inf))}" if len(losses) else "–",
+        str(int((losses > calibration.loss).sum())), f"{len(driven)} of {len(drives)}",
+        str(sum(d.contacts > 0 for d in driven)), str(sum(not d.certified for d in driven)),
+    ]  # fmt: skip
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--worlds", type=int, default=60, help="number of random worlds for each row")
+    parser.add_argument("--jobs", type=int, default=-1, help="processes; -1: one per core")
+    parser.add_argument("--fixed", type=float, help="drive with this margin instead [m]; predictions are those of auto")
+    arguments = parser.parse_args()
+    rows, wrong = [], []
+    for robot, noise, smoothing in itertools.product(
+        ("turtlebot", "jackal"), (0.0, 1.0), ("none", "taut", "clearance")
+    ):
+        calibration = choose_margin(scenario("forest", FIRST_SEED, robot, noise, smoothing).conditions)
+        worlds = [(kind, FIRST_SEED + n) for n in range(arguments.worlds // 2) for kind in ("forest", "barn")]
+        calls = [delayed(drive)(*world, robot, noise, smoothing, arguments.fixed) for world in worlds]
+        drives = list(Parallel(arguments.jobs)(calls))
+        rows.append([robot, f"{noise:g}", smoothing, *row(calibration, drives)])
+        print("|", " | ".join(rows[-1]), "|", flush=True)
+        wrong += [
+            f"{d.name}, {robot}, noise {noise:g}, {smoothing}: {d.outcome.key}, loss {1000 * d.loss:.1f} mm"
+            for d in drives
+            if d.outcome is not Outcome.NO_PATH and not (d.certified and d.loss <= calibration.loss)
+        ]
+    heads = [
+        "robot", "noise", "smoothing", "margin, mm", "predicted loss", "largest on courses", "measured: median / 95 % / largest",
+        "beyond the prediction", "with a path", "with contacts", "not certified",
+    ]  # fmt: skip
+    print()
+    for line in table(heads, rows):
+        print(line)
+    print("Not certified, or beyond the prediction: " + ("; ".join(wrong) or "none."))
+
+
+if __name__ == "__main__":
+    main()
