@@ -697,8 +697,16 @@ def _(log: Log) -> Log:
 
 @forgery("a plan along the wall", "verify")
 def _(log: Log) -> Log | None:
-    if collided(log):
-        return None
+    return None if collided(log) or moving(log) else _along_the_wall(log)
+
+
+@forgery("a plan along the wall, among movers", "none")
+def _(log: Log) -> Log | None:
+    """The robot may leave its route for a mover."""
+    return _along_the_wall(log) if moving(log) else None
+
+
+def _along_the_wall(log: Log) -> Log:
     (x, y, _), (gx, gy) = log.world["start"], log.world["goal"]
     low = float(log.record["inflate"]) + 0.01
     log.arrays["route"] = np.array([[x, y], [x, low], [gx, low], [gx, gy]])
