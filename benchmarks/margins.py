@@ -81,12 +81,13 @@ def row(calibration: Calibration, drives: list[Driven]) -> list[str]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--worlds", type=int, default=60, help="number of random worlds for each row")
+    parser.add_argument("--robots", default="turtlebot,jackal", help="robots, separated by commas")
     parser.add_argument("--jobs", type=int, default=-1, help="processes; -1: one per core")
     parser.add_argument("--fixed", type=float, help="drive with this margin instead [m]; predictions are those of auto")
     arguments = parser.parse_args()
     rows, wrong = [], []
     for robot, noise, smoothing in itertools.product(
-        ("turtlebot", "jackal"), (0.0, 1.0), ("none", "taut", "clearance")
+        arguments.robots.split(","), (0.0, 1.0), ("none", "taut", "clearance")
     ):
         calibration = choose_margin(scenario("forest", FIRST_SEED, robot, noise, smoothing).conditions)
         worlds = [(kind, FIRST_SEED + n) for n in range(arguments.worlds // 2) for kind in ("forest", "barn")]

@@ -13,7 +13,7 @@ from pathlib import Path
 from pydantic import TypeAdapter
 
 from antdrive.sim.calibration.prediction import Calibration, least_margin
-from antdrive.sim.calibration.trial import Conditions, loss_on_course
+from antdrive.sim.calibration.trial import Conditions, Loss, loss_on_course
 from antdrive.worlds.errors import InputError
 from antdrive.worlds.files.atomic import written_whole
 from antdrive.worlds.kernel_cache import cache_folder
@@ -62,7 +62,7 @@ def known_margin(conditions: Conditions) -> Calibration | None:
 
 def _driving(
     conditions: Conditions, jobs: int, progress: Callable[[int, float], None] | None
-) -> Callable[[float], list[float]]:
+) -> Callable[[float], list[Loss]]:
     """A function that drives every course with a margin and returns the losses."""
     from joblib import Parallel, delayed
     from joblib.parallel import get_active_backend
@@ -70,7 +70,7 @@ def _driving(
     # Within a process of somebody else's pool joblib would start threads, and one process of PyBullet is one thread.
     jobs, done = (1 if get_active_backend()[0].nesting_level else jobs), 0
 
-    def losses_with(margin: float) -> list[float]:
+    def losses_with(margin: float) -> list[Loss]:
         nonlocal done
         losses = []
         drives = (delayed(loss_on_course)(conditions, margin, seed) for seed in range(DRIVES))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from antdrive.sim.calibration.trial import Loss
 from antdrive.worlds.errors import FieldError
 
 PROBABILITY = 1e-3  # of a drive along a course that loses more than predicted
@@ -80,7 +81,7 @@ def predicted_loss(losses: Sequence[float], probability: float = PROBABILITY) ->
 
 
 def least_margin(
-    losses_with: Callable[[float], Sequence[float]], key: str, radius: float, reserve: float = RESERVE
+    losses_with: Callable[[float], Sequence[Loss]], key: str, radius: float, reserve: float = RESERVE
 ) -> Calibration:
     """The least margin whose predicted loss leaves a reserve, to within `CLOSE`.
 
@@ -101,12 +102,14 @@ def least_margin(
     unsafe, safe = (-1.0, -math.inf), (math.inf, math.inf)  # the margins next to the least one, and what they spare
     for _ in range(ROUNDS):
         losses = losses_with(margin)
-        loss = predicted_loss(losses)
+        # A footprint never loses more than the disc around it, so what bounds the one bounds the other. The losses of a
+        # rectangle depend on how it stands to the pillars, and spread far more than those of the disc.
+        loss = min(predicted_loss([each.footprint for each in losses]), predicted_loss([each.disc for each in losses]))
         spare = margin - loss - reserve
         if spare < 0:
             unsafe = (margin, spare)
         else:
-            safe, largest = (margin, spare), max(losses)
+            safe, largest = (margin, spare), max(each.footprint for each in losses)
             found = Calibration(
                 margin=margin, loss=loss, largest=largest, reserve=reserve, probability=PROBABILITY,
                 drives=len(losses), key=key,

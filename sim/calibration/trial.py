@@ -9,6 +9,7 @@ import math
 import zlib
 from dataclasses import dataclass
 from importlib import metadata
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,12 +20,24 @@ from antdrive.sim.driving.drive import drive
 from antdrive.sim.driving.recorder import Drive
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.physics.engine import Engine
-from antdrive.worlds import rasterise
+from antdrive.worlds import Floats, point_clearance, rasterise
 from antdrive.worlds.errors import FieldError
 from antdrive.worlds.kernel_cache import sources_stamp
 from antdrive.worlds.plane import segment_lengths, wrap_angle
 
-METHOD = 1  # to be counted up when courses, statistic or search change, so that older results are not used
+METHOD = 2  # to be counted up when courses, statistic or search change, so that older results are not used
+
+
+class Loss(NamedTuple):
+    """How much of the margin a drive used up.
+
+    Attributes:
+        footprint: by the robot's footprint [m]
+        disc: by the smallest disc around it, for which plans are made; never less than by the footprint [m]
+    """
+
+    footprint: float
+    disc: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,12 +75,12 @@ class Conditions:
         return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
 
 
-def loss_on_course(conditions: Conditions, margin: float, seed: int) -> float:
-    """How much of the margin a drive along a random course uses up [m]; infinite where it does not reach the goal.
+def loss_on_course(conditions: Conditions, margin: float, seed: int) -> Loss:
+    """How much of the margin a drive along a random course uses up; infinite where it does not reach the goal.
 
-    The loss is the margin minus the least distance between the footprint and an obstacle that a certificate would
-    prove. It exceeds the margin where the drive could not be certified, and is negative where the footprint always was
-    farther from obstacles than the disc that the plan was made for.
+    A loss is the margin minus the least distance from an obstacle that a certificate would prove. It exceeds the margin where
+    the drive could not be certified. That of the footprint is negative where the footprint always was farther from
+    obstacles than the disc that the plan was made for.
 
     Args:
         conditions: how the robot drives
@@ -93,23 +106,27 @@ def loss_on_course(conditions: Conditions, margin: float, seed: int) -> float:
             time_limit=30.0 + 10.0 * route.length / robot.max_speed,
             noise_model=model,
         )
-    return margin - least_bound(log, robot.radius) if log.outcome is Outcome.SUCCEEDED else math.inf
+    if log.outcome is not Outcome.SUCCEEDED:
+        return Loss(math.inf, math.inf)
+    disc = point_clearance(task.world, log.pose[:, :2]) - robot.radius
+    return Loss(*(margin - least_bound(log, robot.radius, clearance) for clearance in (log.clearance, disc)))
 
 
-def least_bound(log: Drive, radius: float) -> float:
+def least_bound(log: Drive, radius: float, clearance: Floats) -> float:
     """The clearance from standing obstacles that is certain at and between all rows of a drive [m].
 
     Args:
         log: the drive
         radius: of the smallest disc around the footprint [m]
+        clearance: at each row (T,) [m]
     """
     dt, speed = np.diff(log.t), np.abs(log.twist)
     speed = np.maximum(speed[:-1], speed[1:])
     turned = np.abs(wrap_angle(np.diff(log.pose[:, 2])))
     travel = np.maximum(segment_lengths(log.pose[:, :2]), speed[:, 0] * dt)
     travel += radius * np.maximum(turned, speed[:, 1] * dt)
-    between = (log.clearance[:-1] + log.clearance[1:] - travel) / 2
-    return float(between.min(initial=log.clearance.min()))
+    between = (clearance[:-1] + clearance[1:] - travel) / 2
+    return float(between.min(initial=clearance.min()))
 
 
 def _rng(seed: int, purpose: str) -> np.random.Generator:

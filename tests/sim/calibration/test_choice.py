@@ -8,7 +8,7 @@ import pytest
 from antdrive.robots import PurePursuit, RobotSpec
 from antdrive.sim.calibration import choice
 from antdrive.sim.calibration.choice import choose_margin, known_margin
-from antdrive.sim.calibration.trial import Conditions
+from antdrive.sim.calibration.trial import Conditions, Loss
 
 
 @pytest.fixture
@@ -23,9 +23,9 @@ def driven(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """The seeds that were driven. The drives are made up: each loses a millimetre more than that of the seed before."""
     seeds: list[int] = []
 
-    def loss(conditions: Conditions, margin: float, seed: int) -> float:
+    def loss(conditions: Conditions, margin: float, seed: int) -> Loss:
         seeds.append(seed)
-        return 0.001 * (seed % 20) * conditions.noise
+        return Loss(*[0.001 * (seed % 20) * conditions.noise] * 2)
 
     monkeypatch.setattr(choice, "loss_on_course", loss)
     return seeds

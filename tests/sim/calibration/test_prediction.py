@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from antdrive.sim.calibration.prediction import CLOSE, PROBABILITY, RESERVE, Calibration, least_margin, predicted_loss
+from antdrive.sim.calibration.trial import Loss
 from antdrive.worlds.errors import FieldError
 
 DRAWS = {
@@ -53,16 +54,23 @@ def test_a_failed_drive_makes_any_loss_possible_and_few_drives_say_nothing() -> 
         predicted_loss([0.01] * 10)
 
 
-def spread(loss: float) -> list[float]:
+def spread(loss: float) -> list[Loss]:
     """Losses whose prediction is exactly `loss`."""
-    return [loss] * 80
+    return [Loss(loss, loss)] * 80
+
+
+def test_a_footprint_whose_losses_spread_is_bounded_by_its_disc() -> None:
+    rng = np.random.default_rng(0)
+    losses = [Loss(0.03 - each, 0.03) for each in rng.exponential(0.05, 80)]
+    assert predicted_loss([each.footprint for each in losses]) > 0.03
+    assert least_margin(lambda margin: losses, "k", 0.2).loss == 0.03
 
 
 @given(st.floats(-0.2, 0.2), st.floats(0.0, 0.7), st.floats(0.0, 0.08))
 def test_the_least_margin_is_found_where_the_loss_grows_with_it(base: float, growth: float, fails_below: float) -> None:
     tried: list[float] = []
 
-    def losses_with(margin: float) -> Sequence[float]:
+    def losses_with(margin: float) -> Sequence[Loss]:
         tried.append(margin)
         return spread(math.inf if margin < fails_below else base + growth * margin)
 

@@ -10,7 +10,7 @@ from antdrive.planners import load_planner
 from antdrive.robots import PurePursuit, RobotSpec
 from antdrive.sim import Scenario
 from antdrive.sim.calibration import choice
-from antdrive.sim.calibration.trial import Conditions
+from antdrive.sim.calibration.trial import Conditions, Loss
 from antdrive.worlds.errors import FieldError
 
 
@@ -18,7 +18,7 @@ from antdrive.worlds.errors import FieldError
 def made_up(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """An empty cache, and drives that all lose 2 cm for each unit of noise."""
     monkeypatch.setattr(choice, "cache_folder", lambda: tmp_path)
-    monkeypatch.setattr(choice, "_driving", lambda c, *_: lambda margin: [0.02 * c.noise] * 80)
+    monkeypatch.setattr(choice, "_driving", lambda c, *_: lambda margin: [Loss(0.02 * c.noise, 0.02 * c.noise)] * 80)
 
 
 def test_a_margin_is_chosen_for_the_scenarios_own_settings(jackal: RobotSpec) -> None:
@@ -60,9 +60,9 @@ def threads_within_a_pool(conditions: Conditions) -> int:
 
     used = set()
 
-    def drive(conditions: Conditions, margin: float, seed: int) -> float:
+    def drive(conditions: Conditions, margin: float, seed: int) -> Loss:
         used.add(threading.get_ident())
-        return 0.0
+        return Loss(0.0, 0.0)
 
     choice.loss_on_course = drive
     choice._driving(conditions, 2, None)(0.05)

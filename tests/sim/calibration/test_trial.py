@@ -23,7 +23,8 @@ def test_the_bound_is_that_of_the_certificate(small_run: Run, collided_run: Run)
     for done in (small_run, collided_run):
         assert done.rollout is not None
         assert done.certificate is not None
-        assert least_bound(done.rollout, done.scenario.robot.radius) == pytest.approx(done.certificate.bound, abs=1e-9)
+        found = least_bound(done.rollout, done.scenario.robot.radius, done.rollout.clearance)
+        assert found == pytest.approx(done.certificate.bound, abs=1e-9)
 
 
 @pytest.mark.parametrize("smoothing", ["none", "taut", "clearance"])
@@ -36,14 +37,15 @@ def test_a_trial_is_the_drive_that_the_pipeline_makes(jackal: RobotSpec, smoothi
     done = run(Scenario.of(task, "astar", jackal, margin=margin, smoothing=smoothing))
     assert done.succeeded
     assert done.certificate is not None
-    assert without == pytest.approx(margin - done.certificate.bound, abs=1e-12)
-    assert with_noise != without
+    assert without.footprint == pytest.approx(margin - done.certificate.bound, abs=1e-12)
+    assert without.disc > without.footprint
+    assert with_noise.footprint != without.footprint
 
 
 def test_a_drive_that_fails_loses_everything(turtlebot: RobotSpec) -> None:
     blind = dataclasses.replace(turtlebot.noise, pose_xy=0.5, pose_yaw=0.5)
     lost = dataclasses.replace(turtlebot, noise=blind)
-    assert math.isinf(loss_on_course(conditions(lost), 0.01, 0))
+    assert loss_on_course(conditions(lost), 0.01, 0) == (math.inf, math.inf)
 
 
 def test_every_condition_has_a_part_in_the_key_and_labels_have_none(turtlebot: RobotSpec) -> None:

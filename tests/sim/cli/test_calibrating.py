@@ -11,7 +11,7 @@ from antdrive.robots import PurePursuit, load_robot
 from antdrive.sim import Rollout
 from antdrive.sim.calibration import choice
 from antdrive.sim.calibration.prediction import Calibration
-from antdrive.sim.calibration.trial import Conditions
+from antdrive.sim.calibration.trial import Conditions, Loss
 from tests.sim.cli.calling import Call, Refused
 
 
@@ -109,7 +109,7 @@ def test_where_the_chosen_margin_closes_every_way_the_reason_says_so(antdrive: C
 
 
 def test_a_calibration_that_is_due_is_announced(antdrive: Call, small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(choice, "_driving", lambda *_: lambda margin: [0.012] * choice.DRIVES)
+    monkeypatch.setattr(choice, "_driving", lambda *_: lambda margin: [Loss(0.012, 0.012)] * choice.DRIVES)
     code, _, err = antdrive("plan", small, "-p", "astar", "--margin", "auto")
     assert (code, err.count("\n")) == (0, 1)
     assert err.startswith("antdrive: calibrating turtlebot, noise 0, smoothing clearance: about 320 short drives, once")
@@ -125,6 +125,6 @@ def test_other_words_are_refused(refused: Refused, small: Path, text: str) -> No
 def test_where_no_margin_is_enough_the_option_is_named(
     refused: Refused, small: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(choice, "_driving", lambda *_: lambda margin: [margin] * choice.DRIVES)
+    monkeypatch.setattr(choice, "_driving", lambda *_: lambda margin: [Loss(margin, margin)] * choice.DRIVES)
     monkeypatch.setattr("antdrive.sim.cli.calibrating.print_error", lambda text: None)
     assert "--margin: auto: no margin up to 0.5 m leaves 0.01 m" in refused("plan", small, "--margin", "auto")
