@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import os
-import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -18,6 +17,7 @@ from antdrive.sim.calibration.prediction import Calibration
 from antdrive.sim.calibration.trial import Conditions
 from antdrive.sim.driving.perception import Perception
 from antdrive.sim.driving.replanning import ReplanPolicy
+from antdrive.sim.log.streams import random_stream
 from antdrive.worlds import Disc, Task, Trajectories, World, load_task
 from antdrive.worlds.drawing import card, world_svg
 from antdrive.worlds.errors import FieldError
@@ -277,7 +277,7 @@ class Scenario:
 
     def rng(self, purpose: str) -> np.random.Generator:
         """A random stream from the seed; every `purpose` has its own, so that one does not change another."""
-        return np.random.default_rng([self.seed, zlib.crc32(purpose.encode())])
+        return random_stream(self.seed, purpose)
 
     def _repr_html_(self) -> str:
         task = self.task

@@ -9,3 +9,5 @@ MAX_SPEED = 20.0  # of a mover [m/s]; physics feels movers up to five times as f
 MIN_PERIOD = 0.05  # the shortest step of a wanderer [s]
 MAX_PHASE = 1e4  # [s]
 MAX_WALK = 2e6  # steps that wanderers have behind them when a run starts, times (200 + obstacles): half a second
+MAX_LOG_WALK = 4e8  # the same for all steps that wanderers take in a log: two minutes
+MAX_DRAWS = 200_000  # of first cells for all wanderers of a world that have no start: some seconds

@@ -9,12 +9,14 @@ from __future__ import annotations
 import math
 import zlib
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
 
 from antdrive.worlds.errors import FieldError
+from antdrive.worlds.limits import MAX_DRAWS
 from antdrive.worlds.movers import Cruising, Keyframed, Mover, Wandering
 from antdrive.worlds.types import Bounds, Floats, Point
 
@@ -52,9 +54,11 @@ class Motion(ABC):
 
     Attributes:
         radius: the mover's radius [m]
+        draws: how many random places were tried before a wanderer had its first cell
     """
 
     radius: float
+    draws: int = 0
 
     @abstractmethod
     def at(self, t: Floats) -> Floats:
@@ -75,6 +79,21 @@ class Motion(ABC):
     def jump_times(self, until: float) -> Floats:
         """The times of the jumps up to `until`, (J,) [s]."""
         return np.empty(0)
+
+
+def require_few_draws(motions: Iterable[Motion]) -> None:
+    """Refuse wanderers that took too many draws together to find free first cells.
+
+    Args:
+        motions: the motions so far of a world's movers
+
+    Raises:
+        FieldError: there were more than MAX_DRAWS.
+    """
+    if sum(motion.draws for motion in motions) > MAX_DRAWS:
+        raise FieldError(
+            "walk.start", f"missing; finding free first cells takes more than {MAX_DRAWS} draws in this world"
+        )
 
 
 def motion_of(mover: Mover, index: int, bounds: Bounds, discs: Floats, robot: Point, seed: int) -> Motion:
@@ -270,7 +289,8 @@ class _WanderingMotion(Motion):
         if mover.start is not None:
             return first_cell(mover, bounds, self._discs)
         cols, rows = _cells_across(bounds, mover.cell)
-        for _ in range(TRIES):
+        for draw in range(TRIES):
+            self.draws = draw + 1
             col, row = self._rng.integers(cols), self._rng.integers(rows)
             x = float(bounds[0] + mover.cell / 2 + col * mover.cell)
             y = float(bounds[1] + mover.cell / 2 + row * mover.cell)

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.worlds.errors import FieldError, InputError
-from antdrive.worlds.motions import Motion, motion_of
+from antdrive.worlds.motions import Motion, motion_of, require_few_draws
 from antdrive.worlds.types import Floats, Point
 from antdrive.worlds.world import World
 
@@ -45,6 +45,7 @@ class Trajectories:
         for i, mover in enumerate(world.movers):
             try:
                 motions.append(motion_of(mover, i, world.bounds, discs, start, seed))
+                require_few_draws(motions)
             except FieldError as error:
                 raise InputError(str(error.under(f"movers[{i}]"))) from None
         radii, heights = (np.array([getattr(m, key) for m in world.movers]) for key in ("radius", "height"))

@@ -11,7 +11,7 @@ import numpy as np
 from antdrive.worlds.drawing import card, world_svg
 from antdrive.worlds.errors import FieldError, require_finite, require_positive
 from antdrive.worlds.limits import MAX_CELLS, MAX_WALK
-from antdrive.worlds.motions import first_cell, motion_of, way_ahead
+from antdrive.worlds.motions import Motion, first_cell, motion_of, require_few_draws, way_ahead
 from antdrive.worlds.movers import Cruising, Mover, Wandering, later
 from antdrive.worlds.types import Bounds, Floats, Point, Pose
 
@@ -199,9 +199,12 @@ class Task:
         """Refuse a start inside a mover, and a wanderer without a free first cell."""
         x, y = self.start[:2]
         discs = self.world.discs if self.world.movers else np.empty((0, 3))
+        motions: list[Motion] = []
         for i, mover in enumerate(self.world.movers):
             try:
                 motion = motion_of(mover, i, self.world.bounds, discs, (x, y), seed=0)
+                motions.append(motion)
+                require_few_draws(motions)
             except FieldError as error:
                 raise error.under(f"movers[{i}]") from None
             mx, my = motion.at(np.zeros(1))[0]

@@ -1,20 +1,24 @@
 """Drive a logged drive again: the motors' logged targets, open loop, in the record's world with the record's robot.
 
-Nothing is planned or decided, so the replay depends on physics alone. On the machine and with the versions that wrote a
+Nothing is planned or decided, so the replay depends on physics alone. The noise of a noisy robot is drawn again from the
+record's seed: it must turn the logged commands into the logged targets, and the logged poses into the logged estimates.
+On the machine and with the versions that wrote a
 log it gives the same bits; elsewhere rounding differs, and `ROUNDING` says how much is allowed.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from antdrive.robots import Twist
+from antdrive.robots import NoiseModel, Twist
 from antdrive.sim.driving.recorder import Ending, Recorder
 from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.log.streams import random_stream
 from antdrive.sim.physics.engine import Engine
 from antdrive.worlds.errors import FieldError
 from antdrive.worlds.plane import wrap_angle
@@ -22,6 +26,8 @@ from antdrive.worlds.types import Floats
 
 #: How far a replay on another machine or with other versions may be off, in metres, radians, m/s and rad/s.
 ROUNDING = 1e-3
+#: How far noise that is drawn again may be off, in metres, radians, m/s and rad/s: it takes a few dozen operations only.
+SAME_NOISE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -87,7 +93,37 @@ def replay(rollout: Rollout) -> ReplayCheck:
         problems.append(
             f"replay: physics reports {len(drive.contacts)} contact points, the log {len(rollout.contacts)}"
         )
+    problems += _other_noise(rollout)
     return ReplayCheck(exact, position, turn, twist, tuple(problems))
+
+
+def _other_noise(rollout: Rollout) -> Iterator[str]:
+    """What of a noisy log is not as the seed's noise makes it."""
+    record, start = rollout.record, rollout.record.task.start
+    noise = record.robot.noise.scaled(record.noise)
+    if not noise.nonzero or len(rollout.actuated) != len(rollout.t):
+        return
+    rng = random_stream(record.seed, "noise")
+    model = NoiseModel(noise, record.robot.track, 1 / record.control_hz, start, rng)
+    found: list[tuple[float, ...]] = []
+    # A period's first row is the last of the period before; a contact ends the control of the robot.
+    touched = int(rollout.contacts[0, 0]) if len(rollout.contacts) else len(rollout.t)
+    rows = range(0, min(touched, len(rollout.t) - 1), record.physics_hz // record.control_hz)
+    for row in rows:
+        x, y, yaw = rollout.pose[row].tolist()
+        estimate = model.estimate_pose((x, y, yaw), Twist(*rollout.twist[row].tolist()))
+        actuated = model.actuate(Twist(*rollout.command[row + 1].tolist()))
+        found.append((*estimate, *actuated))
+    if not found:
+        return
+    drawn = np.array(found)
+    off = drawn[:, :3] - rollout.estimate[rows]
+    off[:, 2] = wrap_angle(off[:, 2])
+    for name, error in (("estimate", off), ("actuated", drawn[:, 3:] - rollout.actuated[np.array(rows) + 1])):
+        wrong = (np.abs(error) > SAME_NOISE).any(axis=1)
+        if wrong.any():
+            t = rollout.t[rows[int(wrong.argmax())]]
+            yield f"replay: {name} is not what the noise of seed {record.seed} makes of the log, from t = {t:.3f} s"
 
 
 def _most(values: Floats) -> float:

@@ -13,6 +13,7 @@ describe one drive; each is a function `_check_...` that gives a sentence for ev
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
 from collections.abc import Iterator
@@ -22,7 +23,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.sim.log.consistency import inconsistencies
+from antdrive.sim.log.consistency import GRIP, inconsistencies, windowed
 from antdrive.sim.log.contacts import STANDING_SPEED, touches_of
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
@@ -34,6 +35,7 @@ SAME_CLEARANCE = 1e-9  # closed-form distances, computed twice, agree to this [m
 # Contact points describe the pose before a step, and a robot pushes some millimetres into what it hits. Physics and
 # closed form disagree if a contact is reported with more clearance than this [m].
 CONTACT_SLACK = 0.012
+TOUCHING = 2e-4  # physics reports contacts of surfaces that are no farther apart, rounded up from 0.1 mm [m]
 START_SLACK, START_TURN_SLACK = 0.005, 0.01  # between the first row and the task's start [m], [rad]
 # How far poses may differ from where measured speeds lead: in one step, and over some seconds, where errors would add up
 # but rounding does not. Genuine drives stay below 0.07 mm in a step and below 0.6 mm plus 1 % of the way in any window.
@@ -41,7 +43,6 @@ STEP_SLIP, STEP_SLIP_TURN = 0.001, 0.002  # [m], [rad], of steps at USUAL_HZ or 
 USUAL_HZ = 240
 DRIFT, DRIFT_SHARE, DRIFT_TURN = 0.004, 0.015, 0.05  # [m], fraction of the distance covered, [rad]
 DRIFT_WINDOWS = (0.25, 1.0, 4.0)  # [s]
-GRIP = 0.8  # wheels with less friction slide sideways in curves, the more the less
 NOWHERE = 0.001  # a robot that never was farther from its start went nowhere [m]
 BLOCKER_MOVED = 0.1  # a mover that blocks the robot for good has not moved farther than this [m]
 
@@ -134,6 +135,7 @@ def certify(rollout: Rollout) -> Certificate:
         *_check_start(rollout),
         *_check_motion(rollout),
         *_check_outcome(rollout),
+        *_check_contacts(rollout),
         *_check_blocked(rollout),
         *inconsistencies(rollout),
     ]
@@ -288,7 +290,7 @@ def _check_motion(rollout: Rollout) -> Iterator[str]:
     share = DRIFT_SHARE * max(1.0, GRIP / rollout.record.robot.wheel_friction)
     for seconds in DRIFT_WINDOWS:
         rows = min(len(slip), max(1, round(seconds * rollout.record.physics_hz)))
-        drift, turn, distance = (_summed(values, rows) for values in (slip, slip_turn, np.abs(covered)))
+        drift, turn, distance = (windowed(values, rows) for values in (slip, slip_turn, np.abs(covered)))
         wrong[: len(drift)] |= (np.abs(drift) > DRIFT + share * distance.real) | (np.abs(turn) > DRIFT_TURN)
     if wrong.any():
         yield f"pose: the steps at t = {rollout.t[wrong.argmax()]:.3f} s do not follow from the measured speed"
@@ -314,6 +316,45 @@ def _check_outcome(rollout: Rollout) -> Iterator[str]:
             yield f"outcome: succeeded, but the robot still moves at {speed:.3f} m/s at the end"
 
 
+def _check_contacts(rollout: Rollout) -> Iterator[str]:
+    """Each contact must be with an obstacle that is there, and be what physics can report."""
+    contacts = rollout.contacts
+    if not len(contacts):
+        return
+    if not (contacts[:, 2] <= TOUCHING).all() or not (contacts[:, 3] >= 0).all():
+        yield f"contacts: physics reports surfaces no farther apart than {TOUCHING:g} m, and forces of at least 0"
+    first = contacts[contacts[:, 0] == contacts[0, 0]]
+    row = int(first[0, 0])
+    some = slice(max(0, row - 1), row + 2)
+    nearby = dataclasses.replace(rollout, pose=rollout.pose[some], movers=rollout.movers[some])
+    gaps = _gaps(nearby).min(axis=0)
+    for obstacle in np.unique(first[:, 1]).astype(int).tolist():
+        if gaps[obstacle] > CONTACT_SLACK:
+            yield (
+                f"readings disagree: physics reports a contact with obstacle {obstacle} at row {row}, "
+                f"closed form a clearance of {gaps[obstacle]:.4f} m"
+            )
+
+
+def _gaps(rollout: Rollout) -> Floats:
+    """The distance from the footprint to each cylinder, mover and wall, numbered as in contacts, shape (T, N) [m]."""
+    world, foot = rollout.record.world, rollout.record.robot.footprint
+    discs = np.tile(world.discs, (len(rollout.pose), 1, 1))
+    radii = np.array([mover.radius for mover in world.movers])
+    moving = np.concatenate([rollout.movers, np.tile(radii[:, None], (len(rollout.pose), 1, 1))], axis=2)
+    x, y, yaw = (column[:, None] for column in rollout.pose.T)
+    round_ones = np.concatenate([discs, moving], axis=1)
+    body = (round_ones[..., 0] - x + 1j * (round_ones[..., 1] - y)) * np.exp(-1j * yaw)
+    ahead, aside = np.abs(body.real) - foot.half_length, np.abs(body.imag) - foot.half_width
+    apart = np.hypot(np.maximum(ahead, 0.0), np.maximum(aside, 0.0)) - foot.rounding - round_ones[..., 2]
+    xmin, ymin, xmax, ymax = world.bounds
+    cos, sin = np.abs(np.cos(yaw)), np.abs(np.sin(yaw))
+    reach_x = foot.half_length * cos + foot.half_width * sin + foot.rounding
+    reach_y = foot.half_length * sin + foot.half_width * cos + foot.rounding
+    walls = [x - reach_x - xmin, xmax - x - reach_x, y - reach_y - ymin, ymax - y - reach_y]
+    return np.concatenate([apart, *walls], axis=1)
+
+
 def _check_blocked(rollout: Rollout) -> Iterator[str]:
     """A blocked drive ends with searches that found no route, and a mover stood still since the first of them."""
     if rollout.outcome is not Outcome.BLOCKED:
@@ -326,9 +367,3 @@ def _check_blocked(rollout: Rollout) -> Iterator[str]:
     moved = np.hypot(*np.moveaxis(places - places[-1], -1, 0)).max(axis=0)
     if not (moved <= BLOCKER_MOVED).any():
         yield f"outcome: blocked, but no mover stood still from t = {failed[-1].t:.3f} s on"
-
-
-def _summed(values: npt.NDArray[Any], rows: int) -> npt.NDArray[Any]:
-    """The sum over each window of `rows` values."""
-    total = np.concatenate(([0], np.cumsum(values)))
-    return np.asarray(total[rows:] - total[:-rows])

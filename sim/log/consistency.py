@@ -1,4 +1,4 @@
-"""What a log's own record says about its rows: limits of the robot, commands, noise, route, cells and outcome.
+"""What a log's own record says about its rows: limits of the robot, commands, noise and outcome.
 
 Each check is a function that yields a sentence for every fault. Tolerances are some times what genuine drives show, over
 the catalogue's worlds and robots with and without noise, collided drives up to the contact.
@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from antdrive.sim.log.outcome import Outcome
-from antdrive.sim.log.record import DECISION
+from antdrive.sim.log.planned import contradictions
 from antdrive.sim.log.rollout import Rollout
 from antdrive.worlds.plane import wrap_angle
 from antdrive.worlds.types import Floats
@@ -23,6 +23,16 @@ SIGMAS = 8.0  # noise stays within so many standard deviations; genuine drives: 
 ACCELERATION_WINDOW, HARDER = 0.25, 1.5  # [s], times the robot's limit; genuine drives: 1.16
 SLOWEST_PHYSICS = 60  # at a lower rate robots jolt, and poses do not follow from the speeds [Hz]
 EXACT = 1e-6  # commands keep their limits to this share
+# How far the way by measured speeds may differ from the way by the motors' targets, over some seconds; motors are late by
+# a few periods, which shows while speeds change. Genuine drives in 0.25 s: 2.1 mm and 0.011 rad.
+FOLLOW_WINDOWS = (0.25, 1.0, 4.0)  # [s]
+FOLLOW, FOLLOW_TURN, FOLLOW_SHARE = 0.01, 0.05, 0.02  # [m], [rad], fraction of the way
+LATE = 2.0  # periods of control and of physics by which motors are late, at most
+GRIP = 0.8  # wheels with less friction slide, the more the less
+AFTER_CONTACT = 0.5  # a drive ends this long after the first contact [s]
+STUCK_TIME = 8.0  # without progress for so long, a robot is stuck [s]
+STUCK_SHARE = 0.25  # a stuck robot gets no farther in that time than this share of what it could drive
+STOPPED = 0.02  # a robot at the end of its route stands: it is slower than this [m/s], [rad/s]
 
 
 def inconsistencies(rollout: Rollout) -> Iterator[str]:
@@ -35,7 +45,8 @@ def inconsistencies(rollout: Rollout) -> Iterator[str]:
     yield from _check_commands(rollout, end)
     yield from _check_actuated(rollout, end)
     yield from _check_estimate(rollout)
-    yield from _check_plan(rollout)
+    yield from _check_targets(rollout, end)
+    yield from contradictions(rollout, end)
     yield from _check_end(rollout)
 
 
@@ -127,6 +138,42 @@ def _check_actuated(rollout: Rollout, end: int) -> Iterator[str]:
         yield f"actuated: not the delayed command with the wheels' slip, at row {int(wrong.any(axis=1).argmax())}"
 
 
+def _check_targets(rollout: Rollout, end: int) -> Iterator[str]:
+    """Measured speeds must follow the targets of the motors."""
+    record, robot = rollout.record, rollout.record.robot
+    targets = rollout.actuated if len(rollout.actuated) else rollout.command
+    if len(targets) != len(rollout.t) or end < 3:
+        return
+    off = (rollout.twist[1:end] - targets[1:end]) / record.physics_hz
+    way = np.abs(rollout.twist[1:end]) / record.physics_hz
+    late = LATE * (1 / record.control_hz + 1 / record.physics_hz)
+    share = FOLLOW_SHARE * max(1.0, GRIP / robot.wheel_friction)
+    limits = (
+        ("forward speed", FOLLOW, robot.max_acceleration, robot.max_speed),
+        ("yaw rate", FOLLOW_TURN, robot.max_yaw_acceleration, robot.max_yaw_rate),
+    )
+    for k, (what, least, harder, fastest) in enumerate(limits):
+        for seconds in FOLLOW_WINDOWS:
+            rows = min(len(off), max(1, round(seconds * record.physics_hz)))
+            apart, covered = (windowed(values[:, k], rows) for values in (off, way))
+            change = min(HARDER * harder * seconds, 2 * fastest)
+            wrong = np.abs(apart) > least + share * covered + late * change
+            if wrong.any():
+                yield f"twist: the {what} does not follow the motors' targets, from t = {rollout.t[1 + wrong.argmax()]:.3f} s"
+                break
+
+
+def windowed(values: Floats, rows: int) -> Floats:
+    """The sum over each window of a number of values, (N - rows + 1,).
+
+    Args:
+        values: what is summed (N,), real or complex
+        rows: length of a window
+    """
+    total = np.concatenate(([0], np.cumsum(values)))
+    return np.asarray(total[rows:] - total[:-rows])
+
+
 def _check_estimate(rollout: Rollout) -> Iterator[str]:
     """The estimated pose must be as near to the true one as pose fixes and odometry keep it."""
     if not len(rollout.estimate):
@@ -143,38 +190,37 @@ def _check_estimate(rollout: Rollout) -> Iterator[str]:
         yield f"estimate: up to {far:.3g} m and {turned:.3g} rad off the pose, more than the robot's noise allows"
 
 
-def _check_plan(rollout: Rollout) -> Iterator[str]:
-    """Route and cells must lie in the world and lead from the start to the goal."""
-    record, route, cells = rollout.record, rollout.route, rollout.cells
-    xmin, ymin, xmax, ymax = record.world.bounds
-    task, near = record.task, 1.5 * record.cell
-    if len(route) < 2:
-        yield f"route: must have two points or more, found {len(route)}"
-        return
-    if (route < (xmin, ymin)).any() or (route > (xmax, ymax)).any():
-        yield "route: leaves the world's bounds"
-    if math.dist(route[0], task.start[:2]) > near:
-        yield f"route: begins {math.dist(route[0], task.start[:2]):.3g} m from the task's start"
-    by_cells = any(replan.trigger == DECISION for replan in record.replans)
-    if not by_cells and math.dist(route[-1], task.goal) > near:
-        yield f"route: ends {math.dist(route[-1], task.goal):.3g} m from the task's goal"
-    rows, cols = math.ceil((ymax - ymin) / record.cell) + 1, math.ceil((xmax - xmin) / record.cell) + 1
-    if (cells < 0).any() or (cells >= (rows, cols)).any():
-        yield f"cells: must lie on the grid of {record.cell:g} m"
-    elif (np.abs(np.diff(cells, axis=0)) > 1).any():
-        yield "cells: must be neighbours on the grid"
-
-
 def _check_end(rollout: Rollout) -> Iterator[str]:
     """The drive must end when its outcome says."""
     record, end = rollout.record, float(rollout.t[-1])
     period = 1 / record.control_hz
-    if rollout.outcome in (Outcome.NO_PATH, Outcome.STOPPED):
+    if rollout.outcome in (Outcome.NO_PATH, Outcome.STOPPED, Outcome.INVALID_PLAN):
         yield f"outcome: {rollout.outcome.key} ends a run before the robot drives, but the log has rows"
     if rollout.outcome is Outcome.TIMED_OUT and end < record.time_limit - period:
         yield f"outcome: timed_out, but the drive ends after {end:.3f} s of {record.time_limit:g} s"
     if not len(rollout.contacts) and end > record.time_limit + period:
         yield f"record.time_limit: {record.time_limit:g} s, but the drive lasts {end:.3f} s"
+    if len(rollout.contacts):
+        after = end - float(rollout.contacts[0, 0]) / record.physics_hz
+        if after > AFTER_CONTACT + 2 * period:
+            yield f"contacts: the first contact ends a drive, but the log goes on for {after:.3f} s"
+    if rollout.outcome is Outcome.STUCK:
+        yield from _check_stuck(rollout)
+
+
+def _check_stuck(rollout: Rollout) -> Iterator[str]:
+    """A stuck robot stands off the goal, at the end of its route, or has made no progress for some time."""
+    record, task, last = rollout.record, rollout.record.task, rollout.pose[-1, :2]
+    left = math.dist(last, task.goal)
+    stands = bool((np.abs(rollout.twist[-1]) <= STOPPED).all())
+    if stands and left > task.goal_tolerance:
+        return
+    if rollout.t[-1] < STUCK_TIME:
+        yield f"outcome: stuck, but the drive ends after {rollout.t[-1]:.3f} s; that takes {STUCK_TIME:g} s without progress"
+        return
+    before = rollout.pose[-1 - round(STUCK_TIME * record.physics_hz), :2]
+    if math.dist(before, last) > STUCK_SHARE * STUCK_TIME * record.robot.max_speed:
+        yield f"outcome: stuck, but the robot got {math.dist(before, last):.3g} m farther in the last {STUCK_TIME:g} s"
 
 
 def _wheels(twist: Floats, track: float) -> Floats:

@@ -11,7 +11,7 @@ import inspect
 import json
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
@@ -22,6 +22,7 @@ from pydantic import PlainValidator, TypeAdapter, ValidationError
 from antdrive.robots.spec import RobotSpec
 from antdrive.sim.log.outcome import Outcome
 from antdrive.worlds.errors import FieldError
+from antdrive.worlds.files.document import MAX_DEPTH
 from antdrive.worlds.files.world_file import task_from_dict, task_to_dict
 from antdrive.worlds.limits import MAX_COORDINATE
 from antdrive.worlds.types import Point
@@ -315,6 +316,7 @@ class DriveRecord:
         """
         try:
             found = json.loads(text, parse_constant=_refuse_constant)
+            _require_shallow(found)
         except (RecursionError, ValueError) as error:
             problem = "nested too deeply" if isinstance(error, RecursionError) else str(error)
             raise FieldError("record", f"not JSON: {problem}") from None
@@ -332,6 +334,20 @@ class DriveRecord:
         if lacking:
             raise FieldError(f"record{lacking}", "missing; a log that antdrive wrote has it")
         return record
+
+
+def _require_shallow(value: Any) -> None:
+    """Refuse values that are nested deeper than those of any file; readers that follow them would run out of stack."""
+    layer = [value]
+    for _ in range(MAX_DEPTH):
+        layer = [v for outer in layer for v in _inner(outer) if isinstance(v, dict | list)]
+        if not layer:
+            return
+    raise ValueError(f"nested deeper than {MAX_DEPTH} levels")
+
+
+def _inner(value: Any) -> Iterable[Any]:
+    return value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
 
 
 def _missing_key(written: Any, found: Any) -> str:

@@ -21,10 +21,13 @@ from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import DriveRecord
 from antdrive.worlds.errors import FieldError
 from antdrive.worlds.files.atomic import written_whole
+from antdrive.worlds.limits import MAX_LOG_WALK
+from antdrive.worlds.movers import Wandering
 from antdrive.worlds.trajectories import Trajectories
 
 MAX_ROWS = 20_000_000  # a day at 240 Hz
 MAX_VALUE = 1e12  # of any number in the arrays; sums and squares of greater ones lose all meaning
+MAX_RECORD = 32_000_000  # characters of the record; a world of 20,000 cylinders takes 2 million
 #: The dtypes of the arrays that do not hold float64.
 DTYPES = {"limiter": np.dtype("u1"), "cells": np.dtype("<i4")}
 
@@ -167,9 +170,20 @@ class Rollout:
         count = len(self.record.task.world.movers)
         if self.movers.ndim == 3 and self.movers.shape[1] != count:
             yield f"movers: must be {count}, as in the record's task, found {self.movers.shape[1]}"
+        if rows <= MAX_ROWS:
+            yield from self._walk_problems(rows)
         names = len(self.record.limiters)
         if self.limiter.dtype.kind in "iu" and np.size(self.limiter) and not 0 <= self.limiter.max() < max(1, names):
             yield f"limiter: must hold indices into the {names} of record.limiters, found {self.limiter.max()}"
+
+    def _walk_problems(self, rows: int) -> Iterator[str]:
+        """Wanderers that would take too many steps: they are drawn one by one when the log is checked."""
+        world = self.record.world
+        wanderers = [mover for mover in world.movers if isinstance(mover, Wandering)]
+        steps = sum((mover.phase + rows / self.record.physics_hz) / mover.period for mover in wanderers)
+        most = MAX_LOG_WALK / (200 + len(world.obstacles))
+        if steps > most:
+            yield f"movers: the wanderers of record.task take {steps:.3g} steps in this log; at most {most:.3g} are checked"
 
     def _repr_html_(self) -> str:
         from antdrive.worlds.drawing import LINE, card, world_svg
@@ -204,6 +218,8 @@ def read_record(path: str | Path) -> DriveRecord:
 
 def _record_in(archive: Archive) -> DriveRecord:
     text = read_array(archive, "record")
+    if text.dtype.itemsize > 4 * MAX_RECORD:
+        raise FieldError("record", f"must have at most {MAX_RECORD} characters, found {text.dtype.itemsize // 4}")
     if text.shape != () or text.dtype.kind != "U":
         raise FieldError("record", "must be one text")
     record = DriveRecord.from_json(str(text[()]))

@@ -402,3 +402,17 @@ def test_the_steps_that_wanderers_have_behind_them_are_bounded(
         World("w", (0.0, 0.0, 10.0, 8.0), (Disc(5.0, 4.0, 0.5),) * discs, None, walking)
     if problem:
         assert str(caught.value).startswith(problem)
+
+
+def test_worlds_whose_wanderers_hardly_find_a_free_cell_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Posts in every cell but a few: each wanderer alone finds one, all of them together take too many draws."""
+    posts = tuple(Disc(x + 0.5, y + 0.5, 0.3) for x in range(20) for y in range(20) if (x + 20 * y) % 50)
+    one = Wandering(radius=0.2, cell=1.0, period=1.0)
+    few, many = (World("w", (0.0, 0.0, 20.0, 20.0), posts, movers=(one,) * n) for n in (2, 100))
+    ends = (10.0, 10.0, 0.0), (12.0, 12.0)
+    monkeypatch.setattr("antdrive.worlds.motions.MAX_DRAWS", 1500)
+    assert len(Trajectories.of(Task(few, *ends).world, ends[0][:2])) == 2
+    with pytest.raises(FieldError, match=r"movers\[\d+\].walk.start: missing; .* more than 1500 draws"):
+        Task(many, *ends)
+    with pytest.raises(InputError, match=r"movers\[\d+\].walk.start: missing"):
+        Trajectories.of(many, ends[0][:2])

@@ -1,0 +1,1372 @@
+"""Kinds of forged and broken logs, for `benchmarks.forgeries`: each changes a genuine log, and the digest with it."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import hashlib
+import io
+import json
+import math
+import struct
+import warnings
+import zipfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.sim import Rollout
+from antdrive.sim.log.certificate import closed_form_clearance
+from antdrive.sim.log.record import DriveRecord
+from antdrive.sim.log.rollout import ARRAYS
+from antdrive.worlds.errors import FieldError, InputError
+
+Array = npt.NDArray[Any]
+LEVELS = ("load", "verify", "files", "replay", "none")
+ROWS = ("t", "pose", "twist", "command", "clearance", "limiter", "movers", "estimate", "actuated")
+
+
+@dataclass
+class Log:
+    """A log that can be changed at will.
+
+    Attributes:
+        arrays: the arrays by name
+        record: the record as JSON holds it
+    """
+
+    arrays: dict[str, Array]
+    record: dict[str, Any]
+
+    @classmethod
+    def of(cls, rollout: Rollout) -> Log:
+        """A copy of a log."""
+        return cls({name: getattr(rollout, name).copy() for name in ARRAYS}, copy.deepcopy(rollout.record.as_dict()))
+
+    def __getitem__(self, name: str) -> Array:
+        return self.arrays[name]
+
+    @property
+    def hz(self) -> int:
+        return int(self.record["physics_hz"])
+
+    @property
+    def world(self) -> dict[str, Any]:
+        world: dict[str, Any] = self.record["task"]
+        return world
+
+    def rows(self, chosen: slice | Array) -> Log:
+        """Only some rows, at the times that rows must have; contacts in other rows are left out."""
+        count = len(self["t"])
+        where = np.arange(count)[chosen]
+        for name in ROWS:
+            if len(self[name]) == count:
+                self.arrays[name] = self[name][where]
+        self.arrays["t"] = np.arange(len(where)) / self.hz
+        contacts = self["contacts"][np.isin(self["contacts"][:, 0], where)]
+        contacts[:, 0] = np.searchsorted(where, contacts[:, 0])
+        self.arrays["contacts"] = contacts
+        return self
+
+    def rollout(self) -> Rollout:
+        """The log as antdrive reads it."""
+        return Rollout(**self.arrays, record=DriveRecord.from_json(json.dumps(self.record)))
+
+    def consistent(self) -> Log:
+        """The log with movers and clearances that its own record and poses ask for."""
+        rollout = self.rollout()
+        movers = rollout.trajectories().positions(rollout.t)
+        rollout = dataclasses.replace(rollout, movers=movers)
+        self.arrays |= {"movers": movers, "clearance": closed_form_clearance(rollout)}
+        return self
+
+    def write(self, path: Path) -> None:
+        """Write the log with a digest that fits it, as docs/rollout-format.md describes it."""
+        try:
+            text = DriveRecord.from_json(json.dumps(self.record)).to_json(without=("digest", "times"))
+        except (FieldError, InputError, ValueError):
+            values = {key: value for key, value in self.record.items() if key not in ("digest", "times")}
+            text = json.dumps(values, sort_keys=True)
+        self.record["digest"] = digest(self.arrays, text)
+        arrays = {**self.arrays, "record": np.array(json.dumps(self.record, sort_keys=True))}
+        with path.open("wb") as file:
+            np.savez_compressed(file, **arrays)
+
+
+def digest(arrays: Mapping[str, Array], text: str) -> str:
+    """The digest of a log, computed anew."""
+    sha = hashlib.sha256()
+    for name in ARRAYS:
+        array = np.ascontiguousarray(arrays[name])
+        sha.update(f"{name} {array.dtype.str} {array.shape}\n".encode() + array.tobytes())
+    sha.update(text.encode())
+    return sha.hexdigest()
+
+
+# The forgeries. Each changes a log, and returns None where it makes no sense.
+
+Forger = Callable[[Log], Log | None]
+Breaker = Callable[[bytes], bytes]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of forgery.
+
+    Attributes:
+        name: what is forged
+        level: the last level at which one of these must be found
+        forge: changes a log
+        breaks: changes a file's bytes instead
+    """
+
+    name: str
+    level: str
+    forge: Forger | None = None
+    breaks: Breaker | None = None
+
+
+KINDS: dict[str, Kind] = {}
+
+
+def forgery(name: str, level: str) -> Callable[[Forger], Forger]:
+    """Register a function as a kind of forgery."""
+
+    def register(forge: Forger) -> Forger:
+        KINDS[name] = Kind(name, level, forge=forge)
+        return forge
+
+    return register
+
+
+def breakage(name: str) -> Callable[[Breaker], Breaker]:
+    """Register a function as a way to break a file."""
+
+    def register(breaks: Breaker) -> Breaker:
+        KINDS[name] = Kind(name, "load", breaks=breaks)
+        return breaks
+
+    return register
+
+
+def collided(log: Log) -> bool:
+    return bool(len(log["contacts"]))
+
+
+def noisy(log: Log) -> bool:
+    return bool(len(log["actuated"]))
+
+
+def moving(log: Log) -> bool:
+    return bool(log["movers"].shape[1])
+
+
+# Arrays of other kinds, shapes and values
+
+_DTYPES = {
+    "int8": "i1", "int16": "i2", "int32": "i4", "float16": "f2", "float32": "f4", "complex numbers": "c16",
+    "big-endian numbers": ">f8", "text": "U32", "truth values": "?",
+}  # fmt: skip
+for _as, _dtype in _DTYPES.items():
+
+    @forgery(f"poses as {_as}", "load")
+    def _(log: Log, dtype: str = _dtype) -> Log:
+        log.arrays["pose"] = log["pose"].astype(dtype)
+        return log
+
+
+for _value, _named in ((np.nan, "NaN"), (np.inf, "infinity"), (1e300, "1e300")):
+
+    @forgery(f"a pose of {_named}", "load")
+    def _(log: Log, value: float = _value) -> Log:
+        log["pose"][5, 0] = value
+        return log
+
+
+@forgery("rows missing in one array", "load")
+def _(log: Log) -> Log:
+    log.arrays["twist"] = log["twist"][:-1]
+    return log
+
+
+@forgery("a fourth column", "load")
+def _(log: Log) -> Log:
+    log.arrays["pose"] = np.column_stack([log["pose"], log["pose"][:, 0]])
+    return log
+
+
+@forgery("no rows", "load")
+def _(log: Log) -> Log:
+    return log.rows(slice(0))
+
+
+@forgery("a contact in a row that does not exist", "load")
+def _(log: Log) -> Log:
+    log.arrays["contacts"] = np.array([[len(log["t"]) + 5.0, 0.0, -0.001, 1.0]])
+    return log
+
+
+@forgery("a contact with an obstacle that does not exist", "load")
+def _(log: Log) -> Log:
+    log.arrays["contacts"] = np.array([[5.0, 99.0, -0.001, 1.0]])
+    return log
+
+
+@forgery("a limiter that has no name", "load")
+def _(log: Log) -> Log:
+    log["limiter"][5] = 200
+    return log
+
+
+# Records of no drive
+
+
+def edited(*path: str | int, to: Any) -> Forger:
+    """Replace one value of the record."""
+
+    def forge(log: Log) -> Log | None:
+        inner: Any = log.record
+        for key in path[:-1]:
+            if isinstance(inner, dict) and key not in inner:
+                return None
+            inner = inner[key]
+        inner[path[-1]] = to
+        return log
+
+    return forge
+
+
+_HUGE = 10**400
+_DEEP: Any = []
+for _ in range(150):
+    _DEEP = [_DEEP]
+for _name, _path, _to in (
+    ("a schema of true", ("schema",), True),
+    ("a later schema", ("schema",), 3),
+    ("an unknown key", ("extra",), 1),
+    ("a time limit of 400 digits", ("time_limit",), _HUGE),
+    ("a margin of 400 digits", ("margin",), _HUGE),
+    ("an unknown outcome", ("outcome",), "won"),
+    ("physics at 1 MHz", ("physics_hz",), 1_000_000),
+    ("a time limit of 0", ("time_limit",), 0.0),
+    ("a cell of -1", ("cell",), -1.0),
+    ("a robot without mass", ("robot", "mass"), 0.0),
+    ("a robot of 1 mm", ("robot", "footprint", "rounding"), 0.001),
+    ("an unknown key in the footprint", ("robot", "footprint", "colour"), 1),
+    ("a cylinder of height -5", ("task", "obstacles", 0, "height"), -5.0),
+    ("a cylinder of radius 0", ("task", "obstacles", 0, "radius"), 0.0),
+    ("a start out of bounds", ("task", "start"), [-5.0, 1.0, 0.0]),
+    ("bounds the wrong way round", ("task", "bounds"), [6.0, 0.0, 0.0, 3.5]),
+    ("a mover of 1 km/s", ("task", "movers", 0, "velocity"), [1000.0, 0.0]),
+    ("a mover 1e300 s ahead", ("task", "movers", 0, "phase"), 1e300),
+    ("a wanderer of 1e-9 s a step", ("task", "movers", 2, "walk", "period"), 1e-9),
+    ("a wanderer of cells of 1e-9 m", ("task", "movers", 2, "walk", "cell"), 1e-9),
+    ("a wanderer 200,000 steps ahead", ("task", "movers", 2), {
+        "radius": 0.15, "height": 1.0, "phase": 1e4, "walk": {"cell": 0.5, "period": 0.05, "start": [5.2, 0.6]},
+    }),
+):  # fmt: skip
+    KINDS[_name] = Kind(_name, "load", forge=edited(*_path, to=_to))
+
+
+@forgery("5,000 movers", "load")
+def _(log: Log) -> Log | None:
+    if not moving(log):
+        return None
+    log = log.rows(slice(50))
+    log.world["movers"] = [log.world["movers"][0]] * 5000
+    log.arrays["movers"] = np.repeat(log["movers"][:, :1], 5000, axis=1)
+    return log
+
+
+@forgery("1,000 wanderers that take 20 steps a second", "load")
+def _(log: Log) -> Log | None:
+    """In a log of a row per second, whose few rows are hours."""
+    if not moving(log):
+        return None
+    log = log.rows(slice(500))
+    walk = {"cell": 0.5, "period": 0.05, "start": [5.2, 0.6]}
+    log.world["movers"] = [{"radius": 0.15, "height": 1.0, "walk": walk}] * 1000
+    log.record["physics_hz"] = log.record["control_hz"] = 1
+    log.arrays["movers"] = np.repeat(log["movers"][:, :1], 1000, axis=1)
+    return log
+
+
+@forgery("no seed in the record", "load")
+def _(log: Log) -> Log:
+    del log.record["seed"]
+    return log
+
+
+@forgery("settings nested 150 deep", "load")
+def _(log: Log) -> Log:
+    log.record["planner"]["settings"] = {"deep": _DEEP}
+    return log
+
+
+# Rows that are those of no drive
+
+
+@forgery("two rows, the start and the goal, at rest", "verify")
+def _(log: Log) -> Log:
+    log = log.rows(np.array([0, len(log["t"]) - 1]))
+    log["twist"][:] = 0.0
+    return log.consistent()
+
+
+@forgery("two rows on either side of a post", "verify")
+def _(log: Log) -> Log:
+    log = log.rows(np.arange(2))
+    log.record["outcome"] = "stuck"
+    x, y = log.world["obstacles"][0]["x"], log.world["obstacles"][0]["y"]
+    log.world["start"] = [x - 0.8, y, 0.0]
+    log["pose"][:] = [[x - 0.8, y, 0.0], [x + 0.8, y, 0.0]]
+    log["twist"][:] = 0.0
+    return log.consistent()
+
+
+@forgery("only the first row, as a success", "verify")
+def _(log: Log) -> Log:
+    log = log.rows(slice(1))
+    log.record["outcome"] = "succeeded"
+    return log
+
+
+@forgery("a full turn between two rows", "verify")
+def _(log: Log) -> Log:
+    log["twist"][300:302, 1] = 2 * math.pi * log.hz
+    return log
+
+
+@forgery("a speed of 800 m/s", "verify")
+def _(log: Log) -> Log:
+    log["twist"][:, 0] *= 800.0 / max(1e-9, float(np.abs(log["twist"][:, 0]).max()))
+    return log
+
+
+@forgery("speeds three times as high", "verify")
+def _(log: Log) -> Log:
+    log["twist"][:] *= 3.0
+    return log
+
+
+@forgery("a slide of 4 cm/s at the end", "verify")
+def _(log: Log) -> Log | None:
+    if collided(log):
+        return None
+    extra = 240
+    for name in ROWS:
+        if len(log[name]) == len(log["t"]) and name != "t":
+            log.arrays[name] = np.concatenate([log[name], np.repeat(log[name][-1:], extra, axis=0)])
+    log.arrays["t"] = np.arange(len(log["t"]) + extra) / log.hz
+    aside = 0.04 * np.arange(1, extra + 1) / log.hz
+    yaw = log["pose"][-1, 2]
+    for name in ("pose", "estimate") if noisy(log) else ("pose",):
+        log[name][-extra:, 0] -= aside * math.sin(yaw)
+        log[name][-extra:, 1] += aside * math.cos(yaw)
+    log["twist"][-extra:] = 0.0
+    log["command"][-extra:] = 0.0
+    return log.consistent()
+
+
+@forgery("100 rows per second", "verify")
+def _(log: Log) -> Log:
+    log.record["physics_hz"] = 100
+    log.record["control_hz"] = 50
+    log.arrays["t"] = np.arange(len(log["t"])) / 100
+    return log.consistent()
+
+
+@forgery("one row per second", "verify")
+def _(log: Log) -> Log:
+    log.record["physics_hz"] = log.record["control_hz"] = 1
+    log.record["time_limit"] = 1e6
+    log.arrays["t"] = np.arange(len(log["t"]), dtype=np.float64)
+    return log.consistent()
+
+
+@forgery("10,000 rows per second", "verify")
+def _(log: Log) -> Log:
+    log.record["physics_hz"] = log.record["control_hz"] = 10_000
+    log.arrays["t"] = np.arange(len(log["t"])) / 10_000
+    return log.consistent()
+
+
+@forgery("half a second left out", "verify")
+def _(log: Log) -> Log:
+    middle = len(log["t"]) // 3
+    return log.rows(np.concatenate([np.arange(middle), np.arange(middle + log.hz // 2, len(log["t"]))])).consistent()
+
+
+@forgery("time stretched by 1 %", "verify")
+def _(log: Log) -> Log:
+    log["t"][:] *= 1.01
+    return log
+
+
+@forgery("a heading of 7 rad", "verify")
+def _(log: Log) -> Log:
+    log["pose"][:, 2] += 2 * math.pi
+    return log
+
+
+@forgery("the path shifted by 5 cm", "verify")
+def _(log: Log) -> Log:
+    log["pose"][:, 1] += 0.05
+    return log.consistent()
+
+
+@forgery("the path mirrored", "verify")
+def _(log: Log) -> Log:
+    _mirror_rows(log, sum(log.world["bounds"][1::2]))
+    return log.consistent()
+
+
+@forgery("one row 5 mm aside", "verify")
+def _(log: Log) -> Log:
+    log["pose"][len(log["t"]) // 3, 1] += 0.005
+    return log.consistent()
+
+
+@forgery("a bend of 35 mm in 1 s", "verify")
+def _(log: Log) -> Log:
+    return _bent(log, 0.035, follow=False)
+
+
+@forgery("a bend of 35 mm in 1 s, speeds to match", "verify")
+def _(log: Log) -> Log:
+    return _bent(log, 0.035, follow=True)
+
+
+@forgery("a bend of 35 mm in 1 s, speeds and commands to match", "replay")
+def _(log: Log) -> Log:
+    log = _bent(log, 0.035, follow=True)
+    return _commanded(log)
+
+
+@forgery("a bend of 0.2 m over the whole drive, all to match", "replay")
+def _(log: Log) -> Log | None:
+    if collided(log):
+        return None
+    return _commanded(_bent(log, 0.2, follow=True, whole=True))
+
+
+@forgery("a bend of 3 mm in 2 s", "replay")
+def _(log: Log) -> Log:
+    return _bent(log, 0.003, follow=False, seconds=2.0)
+
+
+@forgery("a drive that was made up", "replay")
+def _(log: Log) -> Log | None:
+    if collided(log) or moving(log):
+        return None
+    log = _bent(log, -0.15, follow=True, whole=True)
+    log = _commanded(log)
+    log.record["seed"] = 77
+    return log
+
+
+def _bent(log: Log, aside: float, *, follow: bool, seconds: float = 1.0, whole: bool = False) -> Log:
+    """The path bent to the side and back; `follow`: heading and measured speeds follow the bend."""
+    end = int(log["contacts"][0, 0]) - 2 if collided(log) else len(log["t"])
+    length = end if whole else min(end - 2, round(2 * seconds * log.hz))
+    first = 0 if whole else max(1, (end - length) // 3)
+    some = slice(first, first + length)
+    bump = aside * np.sin(np.linspace(0.0, math.pi, length)) ** 2
+    before = log["pose"].copy()
+    pose = log["pose"]
+    yaw = np.unwrap(pose[:, 2])
+    pose[some, 0] -= bump * np.sin(yaw[some])
+    pose[some, 1] += bump * np.cos(yaw[some])
+    if follow:
+        speed = log["twist"][some, 0]
+        slope = np.gradient(bump) * log.hz
+        lean = np.where(np.abs(speed) > 0.05, np.arctan2(slope, np.maximum(speed, 0.05)), 0.0)
+        pose[some, 2] += lean
+        step = np.diff(pose[some, :2], axis=0)
+        middle = pose[some, 2][:-1] + np.diff(np.unwrap(pose[some, 2])) / 2
+        along = (step * np.column_stack([np.cos(middle), np.sin(middle)])).sum(axis=1) * log.hz
+        rate = np.diff(np.unwrap(pose[some, 2])) * log.hz
+        log["twist"][some, 0] = np.interp(np.arange(length), np.arange(length - 1) + 0.5, along)
+        log["twist"][some, 1] = np.interp(np.arange(length), np.arange(length - 1) + 0.5, rate)
+        pose[:, 2] = np.angle(np.exp(1j * pose[:, 2]))
+    if noisy(log):
+        log["estimate"][:] += pose - before
+    return log.consistent()
+
+
+def _commanded(log: Log) -> Log:
+    """Commands and targets of the motors that fit the measured speeds."""
+    period = log.hz // int(log.record["control_hz"])
+    count = len(log["t"])
+    held = 1 + (np.arange(1, count) - 1) // period * period + period - 1
+    target = log["twist"][np.minimum(held, count - 1)]
+    robot = log.record["robot"]
+    limits = np.array([robot["max_speed"], robot["max_yaw_rate"]])
+    target = np.clip(target, -limits, limits)
+    log["command"][1:] = target
+    if noisy(log):
+        late = round(robot["noise"]["delay"] * log.record["noise"] * log.record["control_hz"]) * period
+        log["actuated"][1:] = target
+        log["command"][:] = np.concatenate([log["actuated"][late:], np.repeat(log["actuated"][-1:], late, axis=0)])
+        log["command"][0] = 0.0
+    return log
+
+
+def _mirror_rows(log: Log, axis: float) -> None:
+    for name in ("pose", "estimate"):
+        if len(log[name]):
+            log[name][:, 1] = axis - log[name][:, 1]
+            log[name][:, 2] *= -1
+    for name in ("twist", "command", "actuated"):
+        log[name][:, 1] *= -1
+
+
+# Commands, noise, plan
+
+
+@forgery("commands of 1e9", "verify")
+def _(log: Log) -> Log:
+    log["command"][1:] *= 1e9
+    return log
+
+
+@forgery("no commands", "verify")
+def _(log: Log) -> Log:
+    log["command"][:] = 0.0
+    return log
+
+
+@forgery("commands 10 % lower", "verify")
+def _(log: Log) -> Log:
+    log["command"][:] *= 0.9
+    return log
+
+
+@forgery("commands and targets 10 % lower", "verify")
+def _(log: Log) -> Log | None:
+    if not noisy(log):
+        return None
+    log["command"][:] *= 0.9
+    log["actuated"][:] *= 0.9
+    return log
+
+
+@forgery("commands 1 % lower", "replay")
+def _(log: Log) -> Log:
+    log["command"][:] *= 0.99
+    if noisy(log):
+        log["actuated"][:] *= 0.99
+    return log
+
+
+@forgery("commands a second early", "verify")
+def _(log: Log) -> Log:
+    log["command"][1:] = np.concatenate([log["command"][1 + log.hz :], np.repeat(log["command"][-1:], log.hz, axis=0)])
+    return log
+
+
+@forgery("a command within a control period", "verify")
+def _(log: Log) -> Log:
+    log["command"][len(log["t"]) // 3 // 4 * 4 + 3] *= 0.9
+    return log
+
+
+@forgery("a first command before the start", "verify")
+def _(log: Log) -> Log:
+    log["command"][0] = 0.1
+    return log
+
+
+@forgery("targets half as large again", "verify")
+def _(log: Log) -> Log | None:
+    if not noisy(log):
+        return None
+    log["actuated"][:] *= 1.5
+    return log
+
+
+@forgery("targets without slip", "replay")
+def _(log: Log) -> Log | None:
+    if not noisy(log):
+        return None
+    late = round(log.record["robot"]["noise"]["delay"] * log.record["control_hz"]) * log.hz // log.record["control_hz"]
+    log.arrays["actuated"] = np.concatenate([np.zeros((late, 2)), log["command"][:-late]])
+    log["actuated"][: late + 1] = 0.0
+    return log
+
+
+@forgery("an estimate 5 m off", "verify")
+def _(log: Log) -> Log | None:
+    if not noisy(log):
+        return None
+    log["estimate"][:] += 5.0
+    return log
+
+
+@forgery("an estimate without error", "replay")
+def _(log: Log) -> Log | None:
+    if not noisy(log):
+        return None
+    log.arrays["estimate"] = log["pose"].copy()
+    return log
+
+
+@forgery("noise left out", "none")
+def _(log: Log) -> Log | None:
+    if not noisy(log):
+        return None
+    log.record["noise"] = 0.0
+    log.arrays |= {"command": log["actuated"], "actuated": np.empty((0, 2)), "estimate": np.empty((0, 3))}
+    return log
+
+
+@forgery("noise that was not there", "replay")
+def _(log: Log) -> Log | None:
+    if noisy(log):
+        return None
+    log.record["noise"] = 0.01
+    return _with_noise(log)
+
+
+def _with_noise(log: Log) -> Log:
+    late = round(log.record["robot"]["noise"]["delay"] * log.record["noise"] * log.record["control_hz"])
+    assert late == 0
+    log.arrays |= {"actuated": log["command"].copy(), "estimate": log["pose"].copy()}
+    return log
+
+
+@forgery("a higher noise level", "replay")
+def _(log: Log) -> Log | None:
+    if not noisy(log):
+        return None
+    log.record["noise"] = 1.1
+    return log
+
+
+@forgery("another seed", "none")
+def _(log: Log) -> Log | None:
+    if noisy(log) or moving(log):
+        return None
+    log.record["seed"] += 1
+    return log
+
+
+@forgery("another seed of a noisy drive", "replay")
+def _(log: Log) -> Log | None:
+    if not noisy(log):
+        return None
+    log.record["seed"] += 1
+    return log.consistent() if moving(log) else log
+
+
+@forgery("another seed among movers", "verify")
+def _(log: Log) -> Log | None:
+    if not moving(log):
+        return None
+    log.record["seed"] += 1
+    return log
+
+
+@forgery("a route of one point", "verify")
+def _(log: Log) -> Log:
+    log.arrays["route"] = log["route"][:1]
+    return log
+
+
+@forgery("a route 50 m away", "verify")
+def _(log: Log) -> Log:
+    log["route"][:] += 50.0
+    return log
+
+
+@forgery("a route the wrong way round", "verify")
+def _(log: Log) -> Log:
+    log.arrays["route"] = log["route"][::-1].copy()
+    return log
+
+
+@forgery("a plan straight through the posts", "verify")
+def _(log: Log) -> Log:
+    log.arrays["route"] = np.array([log.world["start"][:2], log.world["goal"]])
+    return log
+
+
+@forgery("a plan along the wall", "verify")
+def _(log: Log) -> Log | None:
+    return None if collided(log) or moving(log) else _along_the_wall(log)
+
+
+@forgery("a plan along the wall, among movers", "none")
+def _(log: Log) -> Log | None:
+    """The robot may leave its route for a mover."""
+    return _along_the_wall(log) if moving(log) else None
+
+
+def _along_the_wall(log: Log) -> Log:
+    (x, y, _), (gx, gy) = log.world["start"], log.world["goal"]
+    low = float(log.record["inflate"]) + 0.01
+    log.arrays["route"] = np.array([[x, y], [x, low], [gx, low], [gx, gy]])
+    return log
+
+
+@forgery("a route with 5 m more", "verify")
+def _(log: Log) -> Log:
+    log.record["plan"]["length_m"] += 5.0
+    return log
+
+
+@forgery("cells 99 rows away", "verify")
+def _(log: Log) -> Log:
+    log["cells"][:] += 99
+    return log
+
+
+@forgery("every other cell", "verify")
+def _(log: Log) -> Log:
+    log.arrays["cells"] = log["cells"][::2].copy()
+    return log
+
+
+@forgery("cells straight through the posts", "verify")
+def _(log: Log) -> Log:
+    (r, c), (gr, gc) = log["cells"][0], log["cells"][-1]
+    steps = max(abs(gr - r), abs(gc - c)) + 1
+    line = np.column_stack([np.linspace(r, gr, steps), np.linspace(c, gc, steps)])
+    log.arrays["cells"] = np.rint(line).astype(np.int32)
+    return log
+
+
+@forgery("a plan that costs half", "verify")
+def _(log: Log) -> Log:
+    log.record["plan"]["cost_m"] /= 2
+    return log
+
+
+@forgery("an optimum shorter than the straight line", "verify")
+def _(log: Log) -> Log:
+    log.record["plan"]["euclidean_optimum_m"] = 1.0
+    return log
+
+
+@forgery("an optimum longer than the plan", "verify")
+def _(log: Log) -> Log:
+    log.record["plan"]["grid_optimum_m"] = 2 * log.record["plan"]["cost_m"]
+    return log
+
+
+@forgery("another planner's name", "none")
+def _(log: Log) -> Log:
+    log.record["planner"]["name"] = "ants"
+    return log
+
+
+@forgery("less work", "none")
+def _(log: Log) -> Log:
+    log.record["plan"]["work"] = 1
+    return log
+
+
+@forgery("other versions", "none")
+def _(log: Log) -> Log:
+    log.record["versions"] = {"antdrive": "9.9"}
+    return log
+
+
+@forgery("other rules that limited the speed", "none")
+def _(log: Log) -> Log:
+    log["limiter"][:] = 0
+    return log
+
+
+@forgery("other settings of the controller", "none")
+def _(log: Log) -> Log:
+    log.record["controller"]["settings"]["lookahead_max"] = 9.0
+    return log
+
+
+@forgery("a margin of 1 m", "verify")
+def _(log: Log) -> Log:
+    log.record["margin"] = 1.0
+    return log
+
+
+@forgery("a margin of 1 m, inflation to match", "verify")
+def _(log: Log) -> Log:
+    log.record["inflate"] += 1.0 - log.record["margin"]
+    log.record["margin"] = 1.0
+    return log
+
+
+@forgery("an inflation of 1 cm", "verify")
+def _(log: Log) -> Log:
+    log.record["inflate"] = 0.01
+    return log
+
+
+# Outcome and end
+
+
+@forgery("a success that was timed out", "verify")
+def _(log: Log) -> Log | None:
+    if collided(log):
+        return None
+    log.record["outcome"] = "timed_out"
+    return log
+
+
+@forgery("a success that was stuck", "verify")
+def _(log: Log) -> Log | None:
+    if collided(log) or moving(log):
+        return None
+    log.record["outcome"] = "stuck"
+    return log
+
+
+@forgery("a success among movers that was stuck", "none")
+def _(log: Log) -> Log | None:
+    if not moving(log):
+        return None
+    log.record["outcome"] = "stuck"
+    return log
+
+
+@forgery("a success that was blocked", "verify")
+def _(log: Log) -> Log | None:
+    if collided(log):
+        return None
+    log.record["outcome"] = "blocked"
+    return log
+
+
+@forgery("no path, with rows", "verify")
+def _(log: Log) -> Log:
+    log.record["outcome"] = "no_path"
+    log.arrays["contacts"] = log["contacts"][:0]
+    return log
+
+
+@forgery("an invalid plan, with rows", "verify")
+def _(log: Log) -> Log:
+    log.record["outcome"] = "invalid_plan"
+    log.arrays["contacts"] = log["contacts"][:0]
+    return log
+
+
+@forgery("a collision that is none", "verify")
+def _(log: Log) -> Log | None:
+    if collided(log):
+        return None
+    log.record["outcome"] = "collided"
+    return log
+
+
+@forgery("a collision called a success", "verify")
+def _(log: Log) -> Log | None:
+    if not collided(log):
+        return None
+    log.record["outcome"] = "succeeded"
+    return log
+
+
+@forgery("contacts left out", "verify")
+def _(log: Log) -> Log | None:
+    if not collided(log):
+        return None
+    log.arrays["contacts"] = log["contacts"][:0]
+    log.record["outcome"] = "stuck"
+    return log
+
+
+@forgery("contacts left out, with the post", "files")
+def _(log: Log) -> Log | None:
+    if not collided(log):
+        return None
+    log.arrays["contacts"] = log["contacts"][:0]
+    log.record["outcome"] = "timed_out"
+    log.record["time_limit"] = float(log["t"][-1])
+    log.record["unseen"] = []
+    return log.consistent()
+
+
+@forgery("contacts left out, the poses held back", "verify")
+def _(log: Log) -> Log | None:
+    """The robot stops 2 cm before the post, at once."""
+    if not collided(log):
+        return None
+    touch = int(log["contacts"][0, 0])
+    last = int(np.flatnonzero(log["clearance"][:touch] > 0.02)[-1])
+    for name in ("pose", "twist"):
+        log[name][last:] = log[name][last]
+    log["twist"][last:] = 0.0
+    log.arrays["contacts"] = log["contacts"][:0]
+    log.record["outcome"] = "timed_out"
+    log.record["time_limit"] = float(log["t"][-1])
+    return log.consistent()
+
+
+@forgery("contacts left out, the path bent around", "verify")
+def _(log: Log) -> Log | None:
+    if not collided(log):
+        return None
+    count = len(log["t"])
+    aside = 0.35 * np.sin(np.linspace(0.0, math.pi / 2, count)) ** 2
+    yaw = log["pose"][:, 2].copy()
+    log["pose"][:, 0] -= aside * np.sin(yaw)
+    log["pose"][:, 1] += aside * np.cos(yaw)
+    log.arrays["contacts"] = log["contacts"][:0]
+    log.record["outcome"] = "timed_out"
+    log.record["time_limit"] = float(log["t"][-1])
+    return log.consistent()
+
+
+@forgery("a collision cut off before the contact", "none")
+def _(log: Log) -> Log | None:
+    """What is left is what physics gives, and the time limit is the forger's."""
+    if not collided(log):
+        return None
+    period = log.hz // int(log.record["control_hz"])
+    log = log.rows(slice(((int(log["contacts"][0, 0]) - 8) // period - 2) * period + 1))
+    log.record["outcome"] = "timed_out"
+    log.record["time_limit"] = float(log["t"][-1])
+    return log
+
+
+@forgery("a collision cut off before the contact, stuck", "verify")
+def _(log: Log) -> Log | None:
+    if not collided(log):
+        return None
+    log = log.rows(slice(int(log["contacts"][0, 0]) - 8))
+    log.record["outcome"] = "stuck"
+    return log
+
+
+@forgery("a contact that happens at the start", "verify")
+def _(log: Log) -> Log | None:
+    if not collided(log):
+        return None
+    log["contacts"][:, 0] = 3.0
+    return log
+
+
+@forgery("a contact with another obstacle", "verify")
+def _(log: Log) -> Log | None:
+    if not collided(log):
+        return None
+    log["contacts"][:, 1] = 0.0
+    return log
+
+
+@forgery("a contact of impossible depth and force", "verify")
+def _(log: Log) -> Log | None:
+    if not collided(log):
+        return None
+    log["contacts"][:, 2:] = (3.0, -5.0)
+    return log
+
+
+@forgery("a success cut off at speed", "verify")
+def _(log: Log) -> Log | None:
+    if collided(log):
+        return None
+    left = np.hypot(*(log["pose"][:, :2] - log.world["goal"]).T)
+    return log.rows(slice(int((left < log.world["goal_tolerance"]).argmax()) + 1))
+
+
+@forgery("a success cut off half way", "verify")
+def _(log: Log) -> Log | None:
+    return None if collided(log) else log.rows(slice(len(log["t"]) // 2))
+
+
+@forgery("a success cut off half way, timed out", "none")
+def _(log: Log) -> Log | None:
+    if collided(log):
+        return None
+    log = log.rows(slice(len(log["t"]) // 8 * 4 + 1))
+    log.record["outcome"] = "timed_out"
+    log.record["time_limit"] = float(log["t"][-1])
+    log.record["replans"] = [r for r in log.record["replans"] if r["t"] <= log["t"][-1]]
+    log.record["times"]["replans_s"] = log.record["times"]["replans_s"][: len(log.record["replans"])]
+    return log
+
+
+@forgery("a time limit that was over", "verify")
+def _(log: Log) -> Log:
+    log.record["time_limit"] = 1.0
+    return log if not collided(log) else None  # type: ignore[return-value]
+
+
+# Other worlds and robots, all else to match
+
+
+@forgery("a post left out", "files")
+def _(log: Log) -> Log | None:
+    if collided(log):
+        return None
+    del log.world["obstacles"][0]
+    return log.consistent()
+
+
+@forgery("a post half as wide", "files")
+def _(log: Log) -> Log | None:
+    if collided(log):
+        return None
+    log.world["obstacles"][0]["radius"] /= 2
+    return log.consistent()
+
+
+@forgery("a goal elsewhere", "verify")
+def _(log: Log) -> Log | None:
+    if collided(log):
+        return None
+    log.world["goal"] = [1.0, 2.8]
+    return log
+
+
+@forgery("a tolerance of 100 m", "files")
+def _(log: Log) -> Log | None:
+    if collided(log):
+        return None
+    log.world["goal_tolerance"] = 100.0
+    return log
+
+
+@forgery("cut half way, a tolerance of 100 m", "verify")
+def _(log: Log) -> Log | None:
+    if collided(log):
+        return None
+    log.world["goal_tolerance"] = 100.0
+    return log.rows(slice(len(log["t"]) // 2))
+
+
+@forgery("a robot 2 cm smaller", "files")
+def _(log: Log) -> Log | None:
+    foot = log.record["robot"]["footprint"]
+    if collided(log):
+        return None
+    if foot["half_length"]:
+        foot["half_length"] -= 0.01
+    else:
+        foot["rounding"] -= 0.01
+    rollout = log.rollout()
+    log.record["inflate"] = rollout.record.robot.radius + log.record["margin"]
+    return log.consistent()
+
+
+@forgery("a robot that may be faster", "files")
+def _(log: Log) -> Log | None:
+    log.record["robot"]["max_speed"] *= 2
+    return None if collided(log) else log
+
+
+@forgery("a lighter robot", "files")
+def _(log: Log) -> Log | None:
+    log.record["robot"]["mass"] *= 0.9
+    return None if collided(log) else log
+
+
+@forgery("world and drive mirrored", "files")
+def _(log: Log) -> Log | None:
+    if moving(log) or collided(log):
+        return None
+    axis = sum(log.world["bounds"][1::2])
+    _mirror_rows(log, axis)
+    for disc in log.world["obstacles"]:
+        disc["y"] = axis - disc["y"]
+    (x, y, yaw), (gx, gy) = log.world["start"], log.world["goal"]
+    log.world["start"], log.world["goal"] = [x, axis - y, -yaw], [gx, axis - gy]
+    log["route"][:, 1] = axis - log["route"][:, 1]
+    rows = round((log.world["bounds"][3] - log.world["bounds"][1]) / log.record["cell"] - 0.5)
+    log["cells"][:, 0] = rows - log["cells"][:, 0]
+    return log.consistent()
+
+
+@forgery("world and drive shifted by 1 m", "files")
+def _(log: Log) -> Log | None:
+    if moving(log) or collided(log):
+        return None
+    for name in ("pose", "route", "estimate"):
+        log[name][:, 0] += 1.0
+    for disc in log.world["obstacles"]:
+        disc["x"] += 1.0
+    for key in ("start", "goal"):
+        log.world[key][0] += 1.0
+    log.world["bounds"] = [v + 1.0 * (i % 2 == 0) for i, v in enumerate(log.world["bounds"])]
+    return log.consistent()
+
+
+@forgery("a post that was not there", "none")
+def _(log: Log) -> Log | None:
+    """A cylinder more among those that the planner did not know can make a drive harder only."""
+    if collided(log):
+        return None
+    log.record["unseen"] = [{"x": 5.85, "y": 3.35, "radius": 0.05, "height": 1.0}]
+    return log.consistent()
+
+
+# Movers
+
+
+@forgery("a mover logged elsewhere", "verify")
+def _(log: Log) -> Log | None:
+    if not moving(log):
+        return None
+    log["movers"][:, 0] += 0.05
+    rollout = log.rollout()
+    log.arrays["clearance"] = closed_form_clearance(rollout)
+    return log
+
+
+@forgery("a mover that starts elsewhere", "files")
+def _(log: Log) -> Log | None:
+    if not moving(log):
+        return None
+    log.world["movers"][0]["position"] = [3.2, 3.0]
+    return log.consistent()
+
+
+@forgery("a mover left out", "files")
+def _(log: Log) -> Log | None:
+    if not moving(log):
+        return None
+    del log.world["movers"][1]
+    return log.consistent()
+
+
+@forgery("all movers left out", "verify")
+def _(log: Log) -> Log | None:
+    if not moving(log):
+        return None
+    del log.world["movers"]
+    return log.consistent()
+
+
+@forgery("smaller movers", "files")
+def _(log: Log) -> Log | None:
+    if not moving(log):
+        return None
+    for mover in log.world["movers"]:
+        mover["radius"] *= 0.9
+    return log.consistent()
+
+
+@forgery("nothing perceived among movers", "verify")
+def _(log: Log) -> Log | None:
+    if not moving(log):
+        return None
+    log.record["perception"] = None
+    return log
+
+
+@forgery("movers perceived where there are none", "verify")
+def _(log: Log) -> Log | None:
+    if moving(log):
+        return None
+    log.record["perception"] = {"kind": "velocities", "range_m": None}
+    return log
+
+
+@forgery("no avoidance", "none")
+def _(log: Log) -> Log | None:
+    if not moving(log):
+        return None
+    log.record["avoidance"] = None
+    return log
+
+
+@forgery("a replan after the end", "verify")
+def _(log: Log) -> Log | None:
+    if not moving(log):
+        return None
+    replan = {
+        "t": float(log["t"][-1]) + 5.0,
+        "trigger": "waited",
+        "solved": False,
+        "cost_m": None,
+        "work": 1,
+        "route": [],
+    }
+    log.record["replans"] = [*log.record["replans"], replan]
+    log.record["times"]["replans_s"] = [*log.record["times"]["replans_s"], 0.1]
+    return log
+
+
+@forgery("a replan that leads elsewhere", "verify")
+def _(log: Log) -> Log | None:
+    if not moving(log):
+        return None
+    route = [[0.4, 3.0], [0.4, 3.2]]
+    replan = {
+        "t": float(log["t"][-1]) / 2,
+        "trigger": "waited",
+        "solved": True,
+        "cost_m": 1.0,
+        "work": 1,
+        "route": route,
+    }
+    log.record["replans"] = [replan]
+    log.record["times"]["replans_s"] = [0.1]
+    return log
+
+
+@forgery("replans in a world without movers", "verify")
+def _(log: Log) -> Log | None:
+    if moving(log):
+        return None
+    replan = {"t": 1.0, "trigger": "waited", "solved": False, "cost_m": None, "work": 1, "route": []}
+    log.record["replans"] = [replan]
+    log.record["times"]["replans_s"] = [0.1]
+    return log
+
+
+# What is left as it was
+
+
+@forgery("a pose edited by a picometre", "none")
+def _(log: Log) -> Log:
+    """Within rounding; the replay says that it is not bit for bit."""
+    log["pose"][len(log["t"]) // 3, 0] += 1e-12
+    return log
+
+
+@forgery("other wall-clock times", "none")
+def _(log: Log) -> Log:
+    log.record["times"]["plan_s"] = 0.0
+    return log
+
+
+# Broken files
+
+
+@breakage("half the file")
+def _(data: bytes) -> bytes:
+    return data[: len(data) // 2]
+
+
+@breakage("an empty file")
+def _(data: bytes) -> bytes:
+    return b""
+
+
+@breakage("text instead of an archive")
+def _(data: bytes) -> bytes:
+    return b"not an archive\n" * 100
+
+
+@breakage("100 bytes flipped")
+def _(data: bytes) -> bytes:
+    broken = np.frombuffer(data, dtype=np.uint8).copy()
+    broken[np.random.default_rng(7).integers(0, len(data), 100)] ^= 0xFF
+    return broken.tobytes()
+
+
+@breakage("a bomb of 600 MB")
+def _(data: bytes) -> bytes:
+    return _with_member(data, "pose.npy", lambda _: bytes(600 << 20), level=1)
+
+
+@breakage("a header that promises 1e10 rows")
+def _(data: bytes) -> bytes:
+    return _with_member(data, "pose.npy", lambda _: _npy("'<f8'", "(10000000000, 3)"))
+
+
+@breakage("a header of wrong length")
+def _(data: bytes) -> bytes:
+    return _with_member(data, "pose.npy", lambda old: old[:8] + struct.pack("<H", 60_000) + old[10:])
+
+
+@breakage("a header that is code")
+def _(data: bytes) -> bytes:
+    return _with_member(data, "pose.npy", lambda _: _npy("__import__('os').getcwd()", "(1, 3)"))
+
+
+@breakage("objects that numpy would unpickle")
+def _(data: bytes) -> bytes:
+    return _with_member(data, "pose.npy", lambda _: _npy("'|O'", "(1, 3)") + b"cos\ngetcwd\n(tR.")
+
+
+@breakage("a member less")
+def _(data: bytes) -> bytes:
+    return _with_member(data, "command.npy", lambda _: None)
+
+
+@breakage("100 members more")
+def _(data: bytes) -> bytes:
+    out = io.BytesIO(data)
+    with zipfile.ZipFile(out, "a") as archive:
+        for n in range(100):
+            archive.writestr(f"more-{n}.npy", b"x")
+    return out.getvalue()
+
+
+@breakage("two members of one name")
+def _(data: bytes) -> bytes:
+    out = io.BytesIO(data)
+    with warnings.catch_warnings(), zipfile.ZipFile(out, "a") as archive:
+        warnings.simplefilter("ignore")
+        archive.writestr("pose.npy", b"x")
+    return out.getvalue()
+
+
+@breakage("a member packed with LZMA")
+def _(data: bytes) -> bytes:
+    return _with_member(data, "pose.npy", lambda old: old, method=zipfile.ZIP_LZMA)
+
+
+@breakage("a member that claims to be encrypted")
+def _(data: bytes) -> bytes:
+    at = data.index(b"PK\x01\x02")
+    return data[: at + 8] + bytes([data[at + 8] | 1]) + data[at + 9 :]
+
+
+@breakage("a record that is no JSON")
+def _(data: bytes) -> bytes:
+    return _with_record(data, "{")
+
+
+@breakage("a record with NaN")
+def _(data: bytes) -> bytes:
+    return _with_record(data, '{"schema": 2, "noise": NaN}')
+
+
+@breakage("a record nested 100,000 deep")
+def _(data: bytes) -> bytes:
+    return _with_record(data, '{"schema": 2, "task": ' + "[" * 100_000 + "]" * 100_000 + "}")
+
+
+@breakage("a record of 160 MB")
+def _(data: bytes) -> bytes:
+    return _with_record(data, '{"schema": 2, "reason": "' + "x" * 40_000_000 + '"}')
+
+
+def _npy(descr: str, shape: str) -> bytes:
+    text = f"{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}, }}".ljust(117) + "\n"
+    return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text.encode()
+
+
+def _with_record(data: bytes, text: str) -> bytes:
+    out = io.BytesIO()
+    np.save(out, np.array(text))
+    return _with_member(data, "record.npy", lambda _: out.getvalue())
+
+
+def _with_member(
+    data: bytes,
+    name: str,
+    change: Callable[[bytes], bytes | None],
+    method: int = zipfile.ZIP_DEFLATED,
+    level: int = 1,
+) -> bytes:
+    """The archive with one member changed, or left out."""
+    out = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(data)) as old, zipfile.ZipFile(out, "w") as new:
+        for info in old.infolist():
+            content = old.read(info)
+            changed = change(content) if info.filename == name else content
+            if changed is not None:
+                chosen = method if info.filename == name else zipfile.ZIP_DEFLATED
+                new.writestr(info.filename, changed, compress_type=chosen, compresslevel=level)
+    return out.getvalue()

@@ -1,0 +1,254 @@
+"""Drives in worlds that no test knows: `python -m benchmarks.held_out [--drives 10000] [--jobs 2] [--seed S]`.
+
+Drive n of a seed is always the same: its world, planner, robot, noise and smoothing follow from n and the seed. Planners
+take turns, so that each gets its share of every kind of world. Each drive is certified, and a second audit
+(`benchmarks.second_audit`) that shares no code with the certificate looks for the least clearance again.
+
+Worlds: forests by han2007's rule; thickets of 20 to 60 thinner cylinders; fields by BARN's cellular automaton; halls with
+columns and 1 to 10 movers. Results are kept line by line in a JSONL file, where an interrupted run goes on. `--only N`
+drives one of them again and prints all about it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import collections
+import itertools
+import json
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from joblib import Parallel, delayed
+from rich.progress import Progress
+
+from antdrive.planners import PLANNERS
+from antdrive.sim import Certificate, Rollout, Scenario, run
+from antdrive.worlds import Task, generate
+from antdrive.worlds.files.world_file import save_task
+from benchmarks.dynamic import random_task
+from benchmarks.planners import table
+from benchmarks.second_audit import Least, least_clearance
+
+LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the same values, read ten times faster
+ROOT = Path(__file__).parent.parent
+RESULTS = ROOT / "out" / "held_out"
+STREAM = 0x48454C44  # keeps these worlds apart from those of all other seeds
+SAME = 2e-4  # the certificate's and the second audit's least clearance at the rows agree to this [m]
+# The share of worlds of each kind; drives among movers take several times as long.
+KINDS = ("forest", "thicket", "barn", "forest", "thicket", "barn", "forest", "thicket", "barn", "hall")
+SETTINGS = tuple(itertools.product(("turtlebot", "jackal"), (0.0, 1.0), ("none", "taut", "clearance")))
+MARGINS = {"fixed": {0.0: 0.03, 1.0: 0.06}, "auto": {0.0: "auto", 1.0: "auto"}}  # [m], by noise
+
+
+def world_of(kind: str, rng: np.random.Generator) -> Task:
+    """A random world of a kind."""
+    if kind == "hall":
+        return random_task(int(rng.integers(1_000_000, 2**31)))[0]
+    options = {
+        "forest": lambda: {"count": rng.integers(4, 11)},
+        "thicket": lambda: {"count": rng.integers(20, 61), "radius": "0.05,0.4", "clearance": "0.7"},
+        "barn": lambda: {"fill": rng.choice((0.15, 0.20, 0.25)), "rounds": rng.integers(2, 5)},
+    }[kind]()
+    generator = "barn" if kind == "barn" else "forest"
+    return generate(generator, rng, {key: str(value) for key, value in options.items()}, name=kind)
+
+
+def case(n: int) -> dict[str, Any]:
+    """What drive n is: the kind of world, robot, noise, smoothing and planner."""
+    lap, place = divmod(n, len(KINDS))
+    robot, noise, smoothing = SETTINGS[lap % len(SETTINGS)]
+    names = tuple(PLANNERS)
+    planner = names[(lap // len(SETTINGS) + place) % len(names)]
+    return {"kind": KINDS[place], "robot": robot, "noise": noise, "smoothing": smoothing, "planner": planner}
+
+
+def drive(n: int, seed: int, margins: str) -> dict[str, Any]:
+    """Drive n: what it was, how it ended, and what both audits say."""
+    started = time.perf_counter()
+    found: dict[str, Any] = {"n": n, "seed": seed, "margins": margins, **case(n)}
+    try:
+        found |= audited(scenario(n, seed, margins))
+    except Exception as error:  # a fault of the program is a result, too
+        found |= {"outcome": "error", "reason": f"{type(error).__name__}: {error}"}
+    return found | {"wall_s": round(time.perf_counter() - started, 3)}
+
+
+def scenario(n: int, seed: int, margins: str) -> Scenario:
+    """The scenario of drive n."""
+    what = case(n)
+    task = world_of(what["kind"], np.random.default_rng([STREAM, seed, n]))
+    return Scenario.of(
+        task,
+        what["planner"],
+        what["robot"],
+        noise=what["noise"],
+        smoothing=what["smoothing"],
+        margin=MARGINS[margins][what["noise"]],
+        seed=n,
+    )
+
+
+def audited(s: Scenario) -> dict[str, Any]:
+    """The outcome of a scenario, its certificate, and the second audit's findings."""
+    done = run(s)
+    found: dict[str, Any] = {"outcome": done.outcome.key, "reason": done.reason}
+    log, certificate = done.rollout, done.certificate
+    if log is None or certificate is None:
+        return found
+    world, robot = files_of(s)
+    least = least_clearance(world, robot["footprint"], log.pose, log.twist, log.record.physics_hz)
+    return found | {
+        "margin": log.record.margin,
+        "digest": log.digest,
+        "rows": len(log.t),
+        "contacts": len(log.contacts),
+        "certified": certificate.certified,
+        "problems": list(certificate.problems),
+        "min_clearance": certificate.min_clearance,
+        "bound": certificate.bound,
+        "second_rows": least.rows,
+        "second": least.between,
+        "second_at": least.t,
+        "second_near": least.near,
+        "wrong": list(contradictions(log, world, certificate, least)),
+    }
+
+
+def files_of(s: Scenario) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The world's file and the robot's file, as plain YAML."""
+    folder = RESULTS / "worlds"
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{s.task.world.name}-{s.seed}.yaml"
+    save_task(s.task, path)
+    world = yaml.load(path.read_text(), LOADER)
+    path.unlink()
+    return world, yaml.load((ROOT / "robots" / "catalog" / f"{s.robot.name}.yaml").read_text(), LOADER)
+
+
+def contradictions(log: Rollout, world: dict[str, Any], certificate: Certificate, least: Least) -> Iterator[str]:
+    """What the second audit has against a certificate, a sentence each."""
+    if abs(least.rows - certificate.min_clearance) > SAME:
+        yield (
+            f"the least clearance at the rows is {certificate.min_clearance:.5f} m in the certificate, "
+            f"{least.rows:.5f} m in the second audit"
+        )
+    if not certificate.certified:
+        return
+    if not least.between > 0:
+        yield f"certified, but the second audit finds an overlap of {-least.between:.5f} m"
+    if least.between < certificate.bound:
+        yield f"certified to keep {certificate.bound:.5f} m, but the second audit finds {least.between:.5f} m"
+    if len(log.contacts):
+        yield "certified with contacts"
+    x, y, yaw = world["start"]
+    if math.dist(log.pose[0, :2], (x, y)) > 0.005 or abs(math.remainder(log.pose[0, 2] - yaw, 2 * math.pi)) > 0.01:
+        yield "certified, but the drive does not begin at the start"
+    left = math.dist(log.pose[-1, :2], world["goal"])
+    if log.outcome.key == "succeeded" and left > world.get("goal_tolerance", 0.25):
+        yield f"certified as a success, but it ends {left:.3f} m from the goal"
+
+
+def has_log(r: dict[str, Any]) -> bool:
+    return "contacts" in r
+
+
+def refused(r: dict[str, Any]) -> bool:
+    """Whether nothing was touched, and the log is not certified none the less."""
+    return has_log(r) and not r["contacts"] and not r["certified"]
+
+
+def succeeded(r: dict[str, Any]) -> bool:
+    return bool(r["outcome"] == "succeeded" and r.get("certified"))
+
+
+#: What a table counts, by heading. A drive that did not arrive touched nothing, but ended elsewhere or was too slow.
+COUNTS: dict[str, Callable[[dict[str, Any]], bool]] = {
+    "driven": has_log,
+    "no plan": lambda r: r["outcome"] in ("no_path", "stopped"),
+    "certified": succeeded,
+    "contacts": lambda r: bool(r.get("contacts")),
+    "not arrived": lambda r: has_log(r) and not r["contacts"] and r["outcome"] != "succeeded",
+    "refused": refused,
+    "wrong": lambda r: bool(r.get("wrong")),
+    "errors": lambda r: r["outcome"] in ("error", "invalid_plan"),
+}
+
+
+def counted(keys: Sequence[str], results: Sequence[dict[str, Any]]) -> Iterator[str]:
+    """A table with a row for each combination of some keys of the results, and one for all."""
+    groups: dict[tuple[str, ...], list[dict[str, Any]]] = collections.defaultdict(list)
+    for r in results:
+        groups[tuple(f"{r[key]:g}" if isinstance(r[key], float) else str(r[key]) for key in keys)].append(r)
+    rows = [*sorted(groups.items()), (("all", *[""] * (len(keys) - 1)), list(results))]
+    lines = []
+    for names, some in rows:
+        good = [r for r in some if succeeded(r)]
+        apart = [r["second"] - r["bound"] for r in good]
+        lines.append([
+            *names,
+            *(str(sum(map(count, some))) for count in COUNTS.values()),
+            f"{1000 * min((r['second'] for r in good), default=math.nan):.1f} mm",
+            f"{1000 * min(apart, default=math.nan):.2f} mm",
+        ])  # fmt: skip
+    yield from table([*keys, *COUNTS, "least clearance", "least above the bound"], lines)
+
+
+def failures(results: Sequence[dict[str, Any]]) -> Iterator[str]:
+    """Each drive that is not as it should be, with the command that repeats it."""
+    for r in results:
+        wrong = bool(r.get("wrong")) or refused(r)
+        if not wrong and (succeeded(r) or r["outcome"] in ("no_path", "stopped")):
+            continue
+        why = "; ".join([*r.get("wrong", []), *r.get("problems", []), *([r["reason"]] if r["reason"] else [])])
+        what = f"{r['kind']}, {r['robot']}, noise {r['noise']:g}, {r['smoothing']}, {r['planner']}"
+        again = f"python -m benchmarks.held_out --seed {r['seed']} --margins {r['margins']} --only {r['n']}"
+        yield f"- {what}: {r['outcome']}{f' ({why})' if why else ''}: `{again}`"
+
+
+def results_of(path: Path) -> list[dict[str, Any]]:
+    """What a file of results holds; a last line that was cut off does not count."""
+    lines = path.read_text().splitlines(keepends=True) if path.exists() else []
+    return [json.loads(line) for line in lines if line.endswith("}\n")]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--drives", type=int, default=10_000)
+    parser.add_argument("--first", type=int, default=0, metavar="N", help="number of the first drive")
+    parser.add_argument("--jobs", type=int, default=2, help="processes")
+    parser.add_argument("--seed", type=int, default=2026, help="another seed gives other worlds")
+    parser.add_argument("--margins", choices=MARGINS, default="auto", help="0.03 m, with noise 0.06 m; or auto")
+    parser.add_argument("--only", type=int, metavar="N", help="drive one again and print all about it")
+    parser.add_argument("--results", type=Path, help="JSONL file; the default is below out/held_out")
+    given = parser.parse_args()
+    if given.only is not None:
+        print(json.dumps(drive(given.only, given.seed, given.margins), indent=1))
+        return
+    path = given.results or RESULTS / f"{given.margins}-{given.seed}.jsonl"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    wanted = range(given.first, given.first + given.drives)
+    results = {r["n"]: r for r in results_of(path)}
+    path.write_text("".join(json.dumps(r) + "\n" for r in results.values()))
+    todo = [n for n in wanted if n not in results]
+    with Progress() as bar, path.open("a") as file:
+        task = bar.add_task("drives", total=len(wanted), completed=len(wanted) - len(todo))
+        calls = (delayed(drive)(n, given.seed, given.margins) for n in todo)
+        for r in Parallel(n_jobs=given.jobs, return_as="generator_unordered")(calls):
+            results[r["n"]] = r
+            file.write(json.dumps(r) + "\n")
+            file.flush()
+            bar.advance(task)
+    chosen = [results[n] for n in wanted]
+    for keys in (("kind", "robot", "noise", "smoothing"), ("planner",)):
+        print("\n".join(counted(keys, chosen)))
+    print("Drives that are not certified successes:\n")
+    print("\n".join(failures(chosen)) or "none")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,160 @@
+"""What a log's plan says about itself and about the rows: route, cells, costs, replans, and what was known of movers.
+
+Each check is a function that yields a sentence for every fault. Tolerances are some times what genuine drives show, over
+the catalogue's worlds and robots and generated worlds, with every planner.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from antdrive.sim.log.record import DECISION
+from antdrive.sim.log.rollout import Rollout
+from antdrive.worlds.plane import arc_lengths, polyline_length
+from antdrive.worlds.types import Floats
+
+NEAR = 1.5  # cells between a route's end and the point that it belongs to, at most
+ROUTE_SLACK = 0.012  # smoothing keeps the inflation to a centimetre, and replans are rounded to 0.1 mm [m]
+SAME_LENGTH = 1e-6  # lengths that are computed twice agree to this share
+DETOUR = 3.0  # cells by which an any-angle planner's line may be longer than its cells
+AWAY_TIME = 0.5  # a robot is no farther off its route than its radius and what it drives in this time [s]
+POINT_SPACING = 0.05  # of the points of a route whose clearance is looked at [m]
+
+
+def contradictions(rollout: Rollout, end: int) -> Iterator[str]:
+    """Every way in which the plan contradicts the world, itself or the rows.
+
+    Args:
+        end: the rows before this one come before any contact
+    """
+    yield from _check_routes(rollout)
+    yield from _check_cells(rollout)
+    yield from _check_lengths(rollout)
+    yield from _check_movers_known(rollout)
+    yield from _check_replans(rollout)
+    yield from _check_followed(rollout, end)
+
+
+def _by_cells(rollout: Rollout) -> bool:
+    """Whether the planner decided anew at every cell, so that its first route need not reach the goal."""
+    return any(replan.trigger == DECISION for replan in rollout.record.replans)
+
+
+def _check_routes(rollout: Rollout) -> Iterator[str]:
+    """Routes must lie in the world, keep off what stands still, and lead from the start to the goal."""
+    record, route = rollout.record, rollout.route
+    task, near = record.task, NEAR * record.cell
+    if len(route) < 2:
+        yield f"route: must have two points or more, found {len(route)}"
+        return
+    if math.dist(route[0], task.start[:2]) > near:
+        yield f"route: begins {math.dist(route[0], task.start[:2]):.3g} m from the task's start"
+    if not _by_cells(rollout) and math.dist(route[-1], task.goal) > near:
+        yield f"route: ends {math.dist(route[-1], task.goal):.3g} m from the task's goal"
+    routes = [("route", route)]
+    routes += [(f"record.replans[{i}].route", np.array(r.route)) for i, r in enumerate(record.replans) if r.solved]
+    for name, points in routes:
+        xmin, ymin, xmax, ymax = record.world.bounds
+        if (points < (xmin, ymin)).any() or (points > (xmax, ymax)).any():
+            yield f"{name}: leaves the world's bounds"
+            continue
+        least = _room_on(rollout, points)
+        if not least >= record.inflate - ROUTE_SLACK:
+            yield f"{name}: leads {least:.3g} m past an obstacle; the plan's inflation is {record.inflate:.3g} m"
+
+
+def _room_on(rollout: Rollout, route: Floats) -> float:
+    """The least distance of a route's points from what stands still and was known, but for its ends [m]."""
+    task, near = rollout.record.task, NEAR * rollout.record.cell
+    arc = arc_lengths(route)
+    along = np.linspace(0.0, arc[-1], min(100_000, 2 + math.ceil(float(arc[-1]) / POINT_SPACING)))
+    points = np.stack([np.interp(along, arc, route[:, k]) for k in (0, 1)], axis=1)
+    away = np.minimum(*(np.hypot(*(points - end).T) for end in (route[0], np.array(task.goal))))
+    points = points[away > near]
+    if not len(points):
+        return math.inf
+    xmin, ymin, xmax, ymax = task.world.bounds
+    least = float(np.minimum(points - (xmin, ymin), (xmax, ymax) - points).min())
+    discs = task.world.discs
+    for some in np.array_split(points, 1 + len(points) * len(discs) // 1_000_000):
+        gaps = np.hypot(some[:, :1] - discs[:, 0], some[:, 1:] - discs[:, 1]) - discs[:, 2]
+        least = min(least, float(gaps.min(initial=math.inf)))
+    return least
+
+
+def _check_cells(rollout: Rollout) -> Iterator[str]:
+    """Cells must be neighbours on the grid."""
+    record, cells = rollout.record, rollout.cells
+    xmin, ymin, xmax, ymax = record.world.bounds
+    rows, cols = math.ceil((ymax - ymin) / record.cell) + 1, math.ceil((xmax - xmin) / record.cell) + 1
+    if (cells < 0).any() or (cells >= (rows, cols)).any():
+        yield f"cells: must lie on the grid of {record.cell:g} m"
+    elif (np.abs(np.diff(cells, axis=0)) > 1).any():
+        yield "cells: must be neighbours on the grid"
+
+
+def _check_lengths(rollout: Rollout) -> Iterator[str]:
+    """The plan's length must be that of its cells, and no shorter than what is shortest."""
+    plan, cell, task = rollout.record.plan, rollout.record.cell, rollout.record.task
+    length = polyline_length(rollout.cells) * cell
+    slack = SAME_LENGTH * max(1.0, length)
+    if abs(plan.cost_m - length) > slack:
+        yield f"record.plan.cost_m: {plan.cost_m:.6g} m, but the cells are {length:.6g} m long"
+    if plan.grid_optimum_m is not None and plan.grid_optimum_m > plan.cost_m + slack:
+        yield f"record.plan.grid_optimum_m: {plan.grid_optimum_m:.6g} m is longer than the plan's {plan.cost_m:.6g} m"
+    straight = math.dist(task.start[:2], task.goal) - 2 * NEAR * cell
+    for key in ("length_m", "euclidean_optimum_m", "grid_optimum_m"):
+        value = getattr(plan, key)
+        if value is not None and not _by_cells(rollout) and value < straight:
+            yield f"record.plan.{key}: {value:.6g} m, but start and goal are farther apart"
+    if plan.length_m > plan.cost_m + DETOUR * cell:
+        yield f"record.plan.length_m: {plan.length_m:.6g} m, but the cells are {plan.cost_m:.6g} m long"
+
+
+def _check_movers_known(rollout: Rollout) -> Iterator[str]:
+    """What was known of movers, and how they were avoided, is recorded where there are movers, and nowhere else."""
+    record = rollout.record
+    moving = bool(record.world.movers)
+    if (record.perception is not None) != moving:
+        yield f"record.perception: must {'not ' if moving else ''}be null {'among' if moving else 'without'} movers"
+    for key in ("avoidance", "replanning"):
+        if getattr(record, key) is not None and not moving:
+            yield f"record.{key}: must be null without movers"
+
+
+def _check_replans(rollout: Rollout) -> Iterator[str]:
+    """Replans must happen during the drive, where the robot is, and with a policy for them."""
+    record, near = rollout.record, NEAR * rollout.record.cell
+    if record.replans and record.replanning is None:
+        yield "record.replans: must be empty, since record.replanning is null"
+    seen = rollout.estimate if len(rollout.estimate) else rollout.pose
+    for i, replan in enumerate(record.replans):
+        if replan.t > rollout.t[-1] + 1 / record.control_hz:
+            yield f"record.replans[{i}].t: {replan.t:g} s is after the end of the drive, {rollout.t[-1]:g} s"
+        elif replan.solved:
+            here = seen[min(len(seen) - 1, round(replan.t * record.physics_hz)), :2]
+            late = record.robot.noise.delay * record.noise * record.robot.max_speed
+            if math.dist(replan.route[0], here) > near + late:
+                away = math.dist(replan.route[0], here)
+                yield f"record.replans[{i}].route: begins {away:.3g} m from the robot"
+
+
+def _check_followed(rollout: Rollout, end: int) -> Iterator[str]:
+    """In a world without movers, the robot must stay near its route."""
+    record = rollout.record
+    if record.world.movers or len(rollout.route) < 2:
+        return
+    every = max(1, record.physics_hz // 20)
+    places = rollout.pose[:end:every, :2]
+    best = np.full(len(places), np.inf)
+    for a, b in zip(rollout.route[:-1], rollout.route[1:], strict=True):
+        along = b - a
+        share = np.clip((places - a) @ along / max(float(along @ along), 1e-300), 0.0, 1.0)
+        best = np.minimum(best, np.hypot(*(a + share[:, None] * along - places).T))
+    most = record.robot.radius + AWAY_TIME * record.robot.max_speed + NEAR * record.cell
+    if not best.max() <= most:
+        t = float(rollout.t[int(best.argmax()) * every])
+        yield f"route: the robot is {best.max():.3g} m off it at t = {t:.3f} s"

@@ -1,0 +1,125 @@
+"""Every kind of forged or broken log is found by the check that must find it, although its digest is right."""
+
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+
+from antdrive.sim import Rollout, certify
+from antdrive.sim.driving.replay import replay
+from antdrive.sim.log.binding import differences
+from benchmarks.forged_logs import KINDS, LEVELS, Log, digest
+from benchmarks.forgeries import all_findings, forged, found, genuine_drives
+
+#: What is said of a forgery, for the checks that nothing else covers: the drive, and words of the sentence.
+SENTENCES = {
+    "1,000 wanderers that take 20 steps a second": ("turtlebot, movers", "steps in this log"),
+    "settings nested 150 deep": ("jackal", "nested deeper than 20 levels"),
+    "a record of 160 MB": ("turtlebot", "must have at most 32000000 characters"),
+    "no commands": ("turtlebot", "forward speed does not follow the motors' targets"),
+    "commands and targets 10 % lower": ("jackal, noise", "does not follow the motors' targets"),
+    "a plan straight through the posts": ("turtlebot", "past an obstacle; the plan's inflation"),
+    "a margin of 1 m, inflation to match": ("jackal", "past an obstacle; the plan's inflation"),
+    "a plan along the wall": ("turtlebot", "the robot is"),
+    "a plan that costs half": ("jackal", "cost_m: "),
+    "a route with 5 m more": ("jackal", "length_m: "),
+    "an optimum longer than the plan": ("jackal", "is longer than the plan's"),
+    "an optimum shorter than the straight line": ("jackal", "start and goal are farther apart"),
+    "nothing perceived among movers": ("turtlebot, movers", "must not be null among movers"),
+    "movers perceived where there are none": ("turtlebot", "must be null without movers"),
+    "a replan after the end": ("turtlebot, movers", "after the end of the drive"),
+    "a replan that leads elsewhere": ("turtlebot, movers", "m from the robot"),
+    "replans in a world without movers": ("turtlebot", "record.replanning is null"),
+    "a success that was stuck": ("turtlebot", "outcome: stuck, but"),
+    "a collision cut off before the contact, stuck": ("turtlebot, collided", "8 s without progress"),
+    "an invalid plan, with rows": ("turtlebot", "invalid_plan ends a run before the robot drives"),
+    "a contact that happens at the start": ("turtlebot, collided", "but the log goes on for"),
+    "a contact with another obstacle": ("turtlebot, collided", "a contact with obstacle 0"),
+    "a contact of impossible depth and force": ("turtlebot, collided", "no farther apart than"),
+}
+#: What only the noise that is drawn again shows.
+NOISE = {
+    "an estimate without error": ("turtlebot, noise", "estimate is not what the noise"),
+    "a higher noise level": ("jackal, noise", "estimate is not what the noise"),
+    "another seed of a noisy drive": ("jackal, movers, noise", "estimate is not what the noise"),
+    "targets without slip": ("turtlebot, noise", "actuated is not what the noise"),
+}
+
+
+@pytest.fixture(scope="module")
+def drives() -> Mapping[str, Rollout]:
+    return genuine_drives()
+
+
+def test_genuine_drives_pass_every_check_and_have_the_digest_that_a_forger_computes(
+    drives: Mapping[str, Rollout],
+) -> None:
+    for name, log in drives.items():
+        assert certify(log).certified != ("collided" in name)
+        assert list(differences(log.record, task=log.record.task, robot=log.record.robot)) == []
+        assert replay(log).exact, name
+        assert replay(log).problems == ()
+        copy = Log.of(log)
+        assert digest(copy.arrays, log.record.to_json(without=("digest", "times"))) == log.digest
+
+
+def test_there_are_40_kinds_and_more() -> None:
+    assert len(KINDS) >= 40
+
+
+@pytest.mark.parametrize("turn", range(len(KINDS)), ids=list(KINDS))
+def test_each_kind_is_found_in_one_of_the_drives(turn: int, drives: Mapping[str, Rollout], tmp_path: Path) -> None:
+    """The drives take turns; `slow` tests look at all of them."""
+    kind = list(KINDS.values())[turn]
+    names = ["turtlebot"] if kind.breaks else [*list(drives)[turn % len(drives) :], *drives]
+    path = tmp_path / "forged.npz"
+    name = next(name for name in names if forged(kind, drives[name], path))
+    level, why = found(path, drives[name])
+    assert LEVELS.index(level) <= LEVELS.index(kind.level), f"{name}: {level} {why}"
+
+
+@pytest.mark.slow
+def test_each_kind_is_found_in_every_drive(drives: Mapping[str, Rollout]) -> None:
+    late = [f for f in all_findings(drives) if LEVELS.index(f.level) > LEVELS.index(KINDS[f.kind].level)]
+    assert late == []
+
+
+@pytest.mark.parametrize("kind", SENTENCES)
+def test_the_check_that_a_kind_is_there_for_says_so(kind: str, drives: Mapping[str, Rollout], tmp_path: Path) -> None:
+    name, words = SENTENCES[kind]
+    path = tmp_path / "forged.npz"
+    assert forged(KINDS[kind], drives[name], path)
+    level, why = found(path, drives[name])
+    said = [why] if level == "load" else certify(Rollout.load(path)).problems
+    assert any(words in sentence for sentence in said), said
+
+
+@pytest.mark.parametrize("kind", NOISE)
+def test_noise_that_the_seed_does_not_give_is_found_by_the_replay(
+    kind: str, drives: Mapping[str, Rollout], tmp_path: Path
+) -> None:
+    name, words = NOISE[kind]
+    path = tmp_path / "forged.npz"
+    assert forged(KINDS[kind], drives[name], path)
+    assert any(words in sentence for sentence in replay(Rollout.load(path)).problems)
+
+
+def test_a_noisy_collision_has_the_noise_of_its_seed(drives: Mapping[str, Rollout]) -> None:
+    """After the contact the robot is no longer controlled, and no noise is drawn."""
+    from antdrive.planners import load_planner
+    from antdrive.sim import Scenario, run
+    from antdrive.worlds import Disc
+
+    log = drives["jackal, noise"]
+    x, y = log.pose[len(log.t) // 2, :2].tolist()
+    scenario = Scenario(
+        task=log.record.task, planner=load_planner("astar"), robot=log.record.robot, noise=1.0, seed=5,
+        unseen=(Disc(x, y, 0.1),),
+    )  # fmt: skip
+    collided = run(scenario).rollout
+    assert collided is not None
+    assert len(collided.contacts)
+    assert replay(collided).problems == ()
+    late = dataclasses.replace(collided, record=dataclasses.replace(collided.record, seed=6))
+    assert any("noise of seed 6" in problem for problem in replay(late).problems)
