@@ -101,16 +101,19 @@ def _check_lengths(rollout: Rollout) -> Iterator[str]:
     plan, cell, task = rollout.record.plan, rollout.record.cell, rollout.record.task
     length = polyline_length(rollout.cells) * cell
     slack = SAME_LENGTH * max(1.0, length)
-    if abs(plan.cost_m - length) > slack:
+    if plan.cost_m is None:
+        if plan.grid_optimum_m is not None:
+            yield f"record.plan.cost_m: must not be null, since the grid has a path of {plan.grid_optimum_m:.6g} m"
+    elif abs(plan.cost_m - length) > slack:
         yield f"record.plan.cost_m: {plan.cost_m:.6g} m, but the cells are {length:.6g} m long"
-    if plan.grid_optimum_m is not None and plan.grid_optimum_m > plan.cost_m + slack:
+    elif plan.grid_optimum_m is not None and plan.grid_optimum_m > plan.cost_m + slack:
         yield f"record.plan.grid_optimum_m: {plan.grid_optimum_m:.6g} m is longer than the plan's {plan.cost_m:.6g} m"
     straight = math.dist(task.start[:2], task.goal) - 2 * NEAR * cell
     for key in ("length_m", "euclidean_optimum_m", "grid_optimum_m"):
         value = getattr(plan, key)
         if value is not None and not _by_cells(rollout) and value < straight:
             yield f"record.plan.{key}: {value:.6g} m, but start and goal are farther apart"
-    if plan.length_m > plan.cost_m + DETOUR * cell:
+    if plan.cost_m is not None and plan.length_m > plan.cost_m + DETOUR * cell:
         yield f"record.plan.length_m: {plan.length_m:.6g} m, but the cells are {plan.cost_m:.6g} m long"
 
 

@@ -6,7 +6,7 @@ import json
 import math
 import subprocess
 import sys
-from dataclasses import fields, replace
+from dataclasses import MISSING, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -428,7 +428,8 @@ def test_a_scenario_made_of_names_has_the_same_defaults() -> None:
     parameters = inspect.signature(Scenario.of).parameters
     for setting in fields(Scenario):
         if setting.name not in ("task", "planner", "robot", "planner_name", "calibration"):
-            assert parameters[setting.name].default == setting.default, setting.name
+            made = setting.default_factory() if setting.default_factory is not MISSING else setting.default
+            assert parameters[setting.name].default == made, setting.name
 
 
 def test_metrics_of_a_run_without_a_rollout_say_why(small_run: Run) -> None:
