@@ -35,7 +35,7 @@ def drive(speed: float = 0.0, *, hz: int = HZ, rows: int = ROWS, **record: Any) 
         "task": Task(world, (1.0, 1.0, 0.0), (5.0, 1.0)),
         "outcome": Outcome.TIMED_OUT,
         "physics_hz": hz,
-        "time_limit": float(t[-1]),
+        "time_limit": max(float(t[-1]), 1 / hz),
         **record,
     }
     moving = np.tile([speed, 0.0], (rows, 1))
@@ -230,6 +230,11 @@ def test_between_rows_no_point_gets_farther_than_the_travel(
         assert certify(log).bound == pytest.approx((at + after - travel) / 2, abs=1e-12)
     tight = with_task(log, world=World("w", (0.0, 0.0, 6.0, 1.0 + 0.18 + step[1] + 0.4 * travel)))
     assert says(with_clearance(tight), "cannot be ruled out") is (step[1] == 0.0)
+
+
+def test_two_rows_have_one_way_between_them_and_one_row_has_none() -> None:
+    for rows, travel in ((1, 0.0), (2, 2.4 / HZ), (3, 2.4 / HZ)):
+        assert certify(drive(2.4, rows=rows)).bound == pytest.approx(0.82 - travel / 2)
 
 
 @functools.cache
