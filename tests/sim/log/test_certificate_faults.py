@@ -435,6 +435,13 @@ def test_row_0_has_no_command_and_others_change_with_the_period() -> None:
         assert says(filled(drive(), "command", (0.0, 0.01), rows), "command: changes within a control period")
 
 
+def test_the_first_command_that_changes_too_fast_is_named() -> None:
+    allowed = filled(drive(), "command", (1.5 / 60, 0.0), slice(101, None))
+    assert not says(allowed, TOO_FAST)
+    too_fast = filled(allowed, "command", (1.5 / 60 + 0.03, 0.0), slice(401, None))
+    assert says(too_fast, "faster than the robot's limits allow, at row 401")
+
+
 @functools.cache
 def noisy(speed: float = 0.0) -> Rollout:
     """A noisy robot with perfect senses whose motors do late what it commands: three periods of four rows."""
