@@ -2,7 +2,7 @@
 # make test   the whole test suite (make test-slow: the long ones too)
 # Everything else that these need they set up themselves, in .venv.
 .DELETE_ON_ERROR:
-.PHONY: demo test test-slow lint format bench warm clean help
+.PHONY: demo test test-slow lint format bench mutants warm clean help
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -54,6 +54,9 @@ format: $(VENV)/.dev
 
 bench: $(VENV)/.dev $(VENV)/.warm
 	@$(BIN)/python -m benchmarks.loop
+
+mutants: $(VENV)/.dev $(VENV)/.warm
+	@$(BIN)/python -m tools.mutants
 
 clean:
 	rm -rf $(VENV) .python out .pytest_cache .mypy_cache .ruff_cache

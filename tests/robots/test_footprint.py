@@ -64,3 +64,15 @@ def test_many_poses_at_once_give_the_same_distances_as_one_by_one() -> None:
 def test_the_radius_is_that_of_the_circumscribed_circle() -> None:
     assert Footprint.rectangle(0.508, 0.430).radius == pytest.approx(0.3328, abs=1e-4)
     assert Footprint.disc(0.18).radius == 0.18
+
+
+def test_discs_whose_centres_are_far_may_still_be_the_nearest() -> None:
+    """Beside a blade of 2 m: one disc lies before its tip, one is so large that it comes near."""
+    blade = Footprint.rectangle(2.0, 0.2)
+    beside = Disc(0.0, -0.6, 0.05)
+    for far, gap in ((Disc(1.2, 0.0, 0.05), 0.15), (Disc(0.0, 3.0, 2.5), 0.4)):
+        world = World("w", (-50, -50, 50, 50), (beside, far))
+        np.testing.assert_allclose(footprint_clearance(world, blade, [(0.0, 0.0, 0.0)]), gap)
+        walk = [(0.01 * k, 0.0, 0.0) for k in range(60)]
+        alone = [footprint_clearance(world, blade, [pose])[0] for pose in walk]
+        np.testing.assert_array_equal(footprint_clearance(world, blade, walk), alone)

@@ -1,0 +1,550 @@
+"""The size of every tolerance of the certificate: what is just within it passes, what is just beyond is named.
+
+The logs are made up row by row; each claim looks for one check's sentence and leaves the others aside.
+"""
+
+import functools
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from antdrive.robots import load_robot
+from antdrive.robots.spec import Footprint
+from antdrive.sim import Outcome, Rollout, certify
+from antdrive.sim.log.certificate import Certificate, closed_form_clearance
+from antdrive.sim.log.record import DECISION, ReplanRecord
+from antdrive.worlds import Cruising, Disc, Floats, Keyframed, Task, World
+from tests.sim.records import made_up_record
+
+HZ, ROWS = 240, 1201
+ROBOT = load_robot("turtlebot")
+DISC = Disc(3.0, 2.5, 0.3)
+
+
+@functools.cache
+def drive(speed: float = 0.0, *, hz: int = HZ, rows: int = ROWS, **record: Any) -> Rollout:
+    """A robot that drives along y = 1 from x = 1 at a constant speed, with nothing near; five seconds at 240 Hz."""
+    t = np.arange(rows) / hz
+    pose = np.stack([1.0 + speed * t, np.full(rows, 1.0), np.zeros(rows)], axis=1)
+    world = World("made-up", (0.0, 0.0, 6.0, 4.0), (DISC,))
+    values = {
+        "task": Task(world, (1.0, 1.0, 0.0), (5.0, 1.0)),
+        "outcome": Outcome.TIMED_OUT,
+        "physics_hz": hz,
+        "time_limit": max(float(t[-1]), 1 / hz),
+        **record,
+    }
+    moving = np.tile([speed, 0.0], (rows, 1))
+    return with_clearance(
+        Rollout(
+            t=t, pose=pose, twist=moving, command=np.concatenate([np.zeros((1, 2)), moving[1:]]),
+            clearance=np.zeros(rows), limiter=np.zeros(rows, np.uint8), movers=np.empty((rows, 0, 2)),
+            contacts=np.empty((0, 4)), route=np.array([(1.0, 1.0), (5.0, 1.0)]),
+            cells=np.array([(4, c) for c in range(4, 21)], np.int32), record=made_up_record(**values),
+        )
+    )  # fmt: skip
+
+
+def with_clearance(log: Rollout) -> Rollout:
+    """The log with the clearances of a disc among discs and walls."""
+    x, y = log.pose[:, 0], log.pose[:, 1]
+    xmin, ymin, xmax, ymax = log.record.world.bounds
+    gaps = [x - xmin, xmax - x, y - ymin, ymax - y]
+    gaps += [np.hypot(x - d.x, y - d.y) - d.radius for d in log.record.world.obstacles]
+    return replace(log, clearance=np.minimum.reduce(gaps) - log.record.robot.footprint.rounding)
+
+
+def edited(log: Rollout, name: str, change: Callable[[np.ndarray], None]) -> Rollout:
+    array = getattr(log, name).copy()
+    change(array)
+    return with_clearance(replace(log, **{name: array}))
+
+
+def with_record(log: Rollout, **changes: Any) -> Rollout:
+    return replace(log, record=replace(log.record, **changes))
+
+
+def with_task(log: Rollout, **changes: Any) -> Rollout:
+    return with_record(log, task=replace(log.record.task, **changes))
+
+
+def shifted(log: Rollout, by: float, column: int, rows: int = 1) -> Rollout:
+    """Poses that creep aside by so much within some rows, and stay there."""
+
+    def shift(pose: np.ndarray) -> None:
+        pose[:, column] += by * np.clip((np.arange(len(pose)) - 99) / rows, 0, 1)
+
+    return edited(log, "pose", shift)
+
+
+def filled(log: Rollout, name: str, value: tuple[float, float], rows: slice = slice(None)) -> Rollout:
+    def fill(array: np.ndarray) -> None:
+        array[rows] = value
+
+    return edited(log, name, fill)
+
+
+def says(log: Rollout, text: str) -> bool:
+    return any(text in problem for problem in certify(log).problems)
+
+
+def only_beyond(limit: float, make: Callable[[float], Rollout], text: str, share: float = 0.01) -> None:
+    """Nothing is said of a log just within a limit, and the text of one just beyond it."""
+    assert not says(make(limit * (1 - share)), text), (
+        f"{limit} - {share:.0%}: {certify(make(limit * (1 - share))).problems}"
+    )
+    assert says(make(limit * (1 + share)), text), f"{limit} + {share:.0%}"
+
+
+def test_a_made_up_drive_is_certified() -> None:
+    certificate = certify(drive())
+    assert certificate.certified, certificate.problems
+    assert certificate.min_clearance == certificate.bound == pytest.approx(0.82)
+    assert certificate.verdict == "certified: touched nothing, went nowhere"
+    assert certificate.contacts == 0
+    assert certificate.as_dict() == {
+        "certified": True,
+        "contacts": 0,
+        "min_clearance_m": certificate.min_clearance,
+        "bound_m": certificate.bound,
+        "problems": [],
+        "moved_m": 0.0,
+    }
+
+
+SLIPS = "do not follow from the measured speed"
+POSES: dict[str, tuple[float, Callable[[float], Rollout], str]] = {
+    "a clearance": (1e-9, lambda e: replace(drive(), clearance=drive().clearance + e), "closed form says"),
+    "a clearance too small": (1e-9, lambda e: replace(drive(), clearance=drive().clearance - e), "closed form says"),
+    "the start": (0.005, lambda e: with_task(drive(), start=(1.0, 1.0 + e, 0.0)), "not the task's start"),
+    "the start's x": (0.005, lambda e: with_task(drive(), start=(1.0 - e, 1.0, 0.0)), "not the task's start"),
+    "the start's yaw": (0.01, lambda e: with_task(drive(), start=(1.0, 1.0, -e)), "not the task's start"),
+    "a step aside": (0.001, lambda e: shifted(drive(), e, 1), SLIPS),
+    "a step back": (0.001, lambda e: shifted(drive(0.5), -e, 0), SLIPS),
+    "a turn": (0.002, lambda e: shifted(drive(), e, 2), SLIPS),
+    "a turn back": (0.002, lambda e: shifted(drive(), -e, 2), SLIPS),
+    "a step aside at 120 Hz": (0.002, lambda e: shifted(drive(hz=120), e, 1), SLIPS),
+    "a step aside at 480 Hz": (0.001, lambda e: shifted(drive(hz=480), e, 1), SLIPS),
+    "a turn at 120 Hz": (0.004, lambda e: shifted(drive(hz=120), e, 2), SLIPS),
+    "a creep of a robot that stands": (0.004, lambda e: shifted(drive(), e, 1, 50), SLIPS),
+    "a slow turn": (0.05, lambda e: shifted(drive(), e, 2, 200), SLIPS),
+    "a creep for 4 s": (0.016, lambda e: shifted(drive(0.2), e, 1, 960), SLIPS),
+    "a creep for 1 s": (0.007, lambda e: shifted(drive(0.2), e, 1, 240), SLIPS),
+    "a creep for 0.25 s": (0.00475, lambda e: shifted(drive(0.2), e, 1, 60), SLIPS),
+    "a creep with little grip": (0.028, lambda e: shifted(slippery(drive(0.2), 0.4), e, 1, 960), SLIPS),
+    "a creep with much grip": (0.016, lambda e: shifted(slippery(drive(0.2), 1.0), e, 1, 960), SLIPS),
+    "the goal": (0.25, lambda e: arrived(goal=(1.0 + e, 1.0)), "from the goal"),
+    "the speed at the end": (0.02, lambda e: filled(arrived(), "twist", (e, 0.0), slice(-1, None)), "still moves"),
+    "backwards at the end": (0.02, lambda e: filled(arrived(), "twist", (-e, 0.0), slice(-1, None)), "still moves"),
+}  # fmt: skip
+
+
+def slippery(log: Rollout, friction: float) -> Rollout:
+    return with_record(log, robot=replace(log.record.robot, wheel_friction=friction))
+
+
+def arrived(**task: Any) -> Rollout:
+    values = {"goal": (1.2, 1.0), "goal_tolerance": 0.25, **task}
+    return with_task(drive(outcome=Outcome.SUCCEEDED), **values)
+
+
+@pytest.mark.parametrize("what", POSES)
+def test_poses_may_be_off_by_so_much(what: str) -> None:
+    only_beyond(*POSES[what])
+
+
+def test_the_heading_is_an_angle() -> None:
+    for yaw in (math.pi, -math.pi):
+        turned = edited(drive(), "pose", lambda pose: pose.__setitem__((slice(None), 2), yaw))  # noqa: B023
+        assert not says(turned, "from -pi to pi")
+        beyond = edited(drive(), "pose", lambda pose: pose.__setitem__((5, 2), yaw * 1.001))  # noqa: B023
+        assert says(beyond, "from -pi to pi")
+
+
+def test_a_start_across_the_cut_of_the_angles_is_the_same_start() -> None:
+    log = edited(drive(), "pose", lambda pose: pose.__setitem__((slice(None), 2), math.pi))
+    assert not says(with_task(log, start=(1.0, 1.0, -math.pi + 0.005)), "not the task's start")
+
+
+@pytest.mark.parametrize(("far", "verdict"), [(0.0009, "went nowhere"), (0.0011, "certified collision-free")])
+def test_a_robot_that_got_a_millimetre_away_went_somewhere(far: float, verdict: str) -> None:
+    log = shifted(drive(), far, 1, 20)
+    assert certify(log).certified, certify(log).problems
+    assert certify(log).moved == pytest.approx(far)
+    assert verdict in certify(log).verdict
+    assert certify(with_record(log, margin=1.0)).verdict == "NOT certified collision-free"
+
+
+def test_a_millimetre_itself_is_nowhere() -> None:
+    assert "went nowhere" in Certificate(True, 0, 1.0, 1.0, (), moved=0.001).verdict
+
+
+def touched(gap: float, row: int = 400, at: int = 400) -> Rollout:
+    """A contact in a row, where the closed form says a clearance of `gap` in row `at` alone and much elsewhere."""
+    log = drive(outcome=Outcome.COLLIDED)
+    log = edited(log, "pose", lambda pose: pose.__setitem__((at, 1), 4.0 - 0.18 - gap))
+    return replace(log, contacts=np.array([[row, 0, -0.001, 5.0]]))
+
+
+def test_a_contact_is_felt_where_the_closed_form_is_within_12_mm() -> None:
+    only_beyond(0.012, touched, "readings disagree: physics reports")
+    assert says(touched(0.01), "physics reports 1 contact points, the first at t = 1.667 s")
+    for at, near in ((398, False), (399, True), (401, True), (402, False)):
+        assert says(touched(0.001, at=at), "readings disagree: physics reports") is not near
+    assert not says(touched(0.001, row=0, at=0), "readings disagree")
+    assert certify(touched(0.01)).contacts == 1
+
+
+def test_an_overlap_without_a_contact_is_a_disagreement() -> None:
+    inside = edited(drive(), "pose", lambda pose: pose.__setitem__((400, 1), 3.9))
+    assert says(inside, "closed form: the robot overlaps an obstacle by 0.0800 m at t = 1.667 s")
+    assert says(inside, "finds an overlap, physics reports no contact")
+    assert not says(touched(-0.08), "finds an overlap, physics reports no contact")
+    assert says(touched(-0.08), "overlaps an obstacle")
+    assert not says(inside, "cannot be ruled out")
+
+
+@pytest.mark.parametrize(
+    ("twist", "step", "travel"),
+    [
+        ((0.0, 0.0), (0.0, 0.01, 0.0), 0.01),
+        ((0.0, 0.0), (0.0, 0.0, 0.05), 0.05 * 0.18),
+        ((0.0, 0.0), (0.003, 0.004, -0.05), 0.005 + 0.05 * 0.18),
+        ((-2.4, 0.0), (0.0, 0.0, 0.0), 0.01),
+        ((0.0, -24.0), (0.0, 0.0, 0.0), 0.1 * 0.18),
+        ((2.4, 24.0), (0.001, 0.0, 0.01), 0.01 + 0.1 * 0.18),
+    ],
+)
+def test_between_rows_no_point_gets_farther_than_the_travel(
+    twist: tuple[float, float], step: tuple[float, float, float], travel: float
+) -> None:
+    """The larger of what the poses and what the speeds say, either row's speed."""
+    for row in (600, 601):
+        log = filled(drive(), "twist", twist, slice(row, row + 1))
+        log = edited(log, "pose", lambda pose: pose.__setitem__(slice(601, None), pose[601:] + step))
+        at, after = log.clearance[600], log.clearance[601]
+        assert certify(log).bound == pytest.approx((at + after - travel) / 2, abs=1e-12)
+    tight = with_task(log, world=World("w", (0.0, 0.0, 6.0, 1.0 + 0.18 + step[1] + 0.4 * travel)))
+    assert says(with_clearance(tight), "cannot be ruled out") is (step[1] == 0.0)
+
+
+def test_two_rows_have_one_way_between_them_and_one_row_has_none() -> None:
+    for rows, travel in ((1, 0.0), (2, 2.4 / HZ), (3, 2.4 / HZ)):
+        assert certify(drive(2.4, rows=rows)).bound == pytest.approx(0.82 - travel / 2)
+
+
+@functools.cache
+def among(*movers: Cruising | Keyframed) -> Rollout:
+    """A robot that stands among movers which are where they should be."""
+    log = with_task(drive(), world=World("w", (0.0, 0.0, 6.0, 4.0), (DISC,), movers=movers))
+    log = replace(log, movers=log.trajectories().positions(log.t))
+    return replace(log, clearance=closed_form_clearance(log))
+
+
+CRUISER = Cruising(radius=0.2, position=(1.6, 1.5), velocity=(0.0, -0.2))
+LEAPER = Keyframed(radius=0.2, keyframes=((0.0, 3.0, 0.7), (1.0, 2.0, 0.7)), loop="teleport")
+
+
+def test_a_mover_s_travel_lowers_the_bound() -> None:
+    log = among(CRUISER)
+    gap = np.hypot(*(log.movers[:, 0] - log.pose[:, :2]).T) - 0.38
+    assert certify(log).min_clearance == pytest.approx(gap.min())
+    assert certify(log).bound == pytest.approx(((gap[:-1] + gap[1:] - 0.2 / HZ) / 2).min(), abs=1e-12)
+    assert not says(log, "movers")
+
+
+def test_where_a_mover_teleports_only_the_nearer_end_counts() -> None:
+    log = among(LEAPER)
+    gap = np.hypot(*(log.movers[:, 0] - log.pose[:, :2]).T) - 0.38
+    row = int(np.abs(np.diff(gap)).argmax())
+    assert certify(log).bound < certify(log).min_clearance
+    assert certify(log).bound == pytest.approx(min(gap[row], gap[row + 1]) - log.trajectories().travel(log.t)[row, 0])
+
+
+def test_a_mover_is_where_the_task_puts_it() -> None:
+    for column in (0, 1):
+        for sign in (1, -1):
+
+            def off(error: float, column: int = column, sign: int = sign) -> Rollout:
+                log = among(LEAPER, CRUISER)
+                movers = log.movers.copy()
+                movers[70, 1, column] += sign * error
+                return replace(log, movers=movers)
+
+            only_beyond(1e-9, off, "movers[1] is logged")
+
+
+def blocked(moved: float, *, since: int = 600, solved: tuple[bool, ...] = (True, False, False)) -> Rollout:
+    """Movers that are logged to go `moved` after a row, where searches are at rows 500, 600 and 700."""
+    log = with_record(among(CRUISER, CRUISER), outcome=Outcome.BLOCKED)
+    movers = np.full_like(log.movers, 2.0)
+    movers[:since] += np.linspace(3.0, 1.0 + moved, since)[:, None, None] * (1.0, 0.0) * (moved > 0)
+    movers[since:, :, 0] += np.linspace(moved, 0.0, ROWS - since)[:, None]
+    movers[:, 1] += np.linspace(0.0, 4.0, ROWS)[:, None]
+    replans = tuple(
+        ReplanRecord(t=row / HZ, trigger="waited", solved=found, cost_m=1.0 if found else None, work=1,
+                     route=((1.0, 1.0), (5.0, 1.0)) if found else ())
+        for row, found in zip((500, 600, 700), solved, strict=True)
+    )  # fmt: skip
+    return with_record(replace(log, movers=movers), replans=replans)
+
+
+def test_a_blocked_drive_has_a_mover_that_stood_since_the_first_search_in_vain() -> None:
+    only_beyond(0.1, blocked, "no mover stood still from t = 2.500 s on")
+    assert says(blocked(0.01, since=610), "no mover stood still")
+    assert says(blocked(0.01, solved=(False, False, False)), "no mover stood still from t = 2.083 s on")
+    assert says(blocked(0.01, solved=(False, False, True)), "does not end with a search")
+    assert says(with_record(blocked(0.01), replans=()), "does not end with a search")
+    assert not says(with_record(blocked(5.0), outcome=Outcome.TIMED_OUT), "outcome: blocked")
+    late = blocked(0.01)
+    last = replace(late.record.replans[-1], t=100.0)
+    assert not says(with_record(late, replans=(last,)), "no mover stood still")
+
+
+@pytest.mark.parametrize(
+    "foot",
+    [Footprint.disc(0.2), Footprint.rectangle(0.6, 0.3), Footprint(half_length=0.1, half_width=0.3, rounding=0.05)],
+)
+def test_the_closed_form_is_the_distance_of_a_dense_outline(foot: Footprint) -> None:
+    rng = np.random.default_rng(5)
+    rows = 120
+    discs = tuple(Disc(*rng.uniform((0.5, 0.5, 0.05), (5.5, 3.5, 0.3))) for _ in range(3))
+    log = with_task(drive(rows=rows), world=World("w", (0.0, 0.0, 6.0, 4.0), discs, movers=(CRUISER, LEAPER)))
+    log = with_record(log, robot=replace(ROBOT, footprint=foot))
+    pose = rng.uniform((0.3, 0.3, -math.pi), (5.7, 3.7, math.pi), (rows, 3))
+    movers = rng.uniform((0.5, 0.5), (5.5, 3.5), (rows, 2, 2))
+    log = replace(log, pose=pose, movers=movers)
+    found = closed_form_clearance(log)
+    outlined = [outline_clearance(foot, pose[i], discs, movers[i], (0.2, 0.2)) for i in range(rows)]
+    free = np.array([clear for clear, _ in outlined])
+    assert free.sum() > 20
+    np.testing.assert_allclose(found[free], np.array([value for _, value in outlined])[free], atol=2e-3)
+
+
+def test_a_disc_within_a_rectangle_overlaps_it_by_its_way_out() -> None:
+    foot = Footprint.rectangle(0.6, 0.3)
+    log = with_record(drive(rows=2), robot=replace(ROBOT, footprint=foot))
+    for yaw, ahead, aside, deep in ((0.0, 0.1, 0.02, 0.13), (0.5, 0.28, 0.0, 0.02), (-2.0, -0.1, -0.14, 0.01)):
+        turn = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
+        x, y = np.array([3.0, 2.5]) - turn @ (ahead, aside)
+        poses = np.array([[x, y, yaw], [x, y, yaw]])
+        np.testing.assert_allclose(closed_form_clearance(replace(log, pose=poses)), -deep - DISC.radius)
+
+
+def outline_clearance(
+    foot: Footprint, pose: Floats, discs: tuple[Disc, ...], movers: Floats, radii: tuple[float, ...]
+) -> tuple[bool, float]:
+    """Whether the footprint is free, and its clearance, from points along the edge of its rectangle."""
+    s = np.linspace(-1, 1, 301)
+    one = np.ones_like(s)
+    u, v = np.concatenate([s, s, one, -one]), np.concatenate([one, -one, s, s])
+    edge = (u * foot.half_length + 1j * v * foot.half_width) * np.exp(1j * pose[2]) + pose[0] + 1j * pose[1]
+    walls = min(edge.real.min(), 6.0 - edge.real.max(), edge.imag.min(), 4.0 - edge.imag.max())
+    round_ones = [(d.x, d.y, d.radius) for d in discs] + [(*m, r) for m, r in zip(movers.tolist(), radii, strict=True)]
+    gaps = [np.abs(edge - complex(x, y)).min() - r for x, y, r in round_ones]
+    inside = [abs((complex(x, y) - complex(*pose[:2])) * np.exp(-1j * pose[2])) for x, y, _ in round_ones]
+    free = min([walls, *gaps]) > foot.rounding and min(inside) > max(foot.half_length, foot.half_width)
+    return free, float(min([walls, *gaps])) - foot.rounding
+
+
+FORWARD, WHEEL = "forward speed of", "wheel speed of"
+SPEED_JUMPS, YAW_JUMPS, TOO_FAST = "the forward speed changes", "the yaw rate changes", "command: changes faster"
+
+
+def driving_limits(noise: float) -> tuple[float, float, float]:
+    more = 8 * 0.02 * noise
+    return 0.7 * (1.03 + more) + 0.02, (3.14 + more * 0.7 * 2 / 0.23) * (1.03 + more) + 0.02, 25 * (1.03 + more) + 0.02
+
+
+CONSISTENCY: dict[str, tuple[float, Callable[[float], Rollout], str]] = {
+    "inflation": (1e-6, lambda e: with_record(drive(), inflate=ROBOT.radius + 0.05 + e), "record.inflate"),
+    "a smaller inflation": (1e-6, lambda e: with_record(drive(), inflate=ROBOT.radius + 0.05 - e), "record.inflate"),
+    "forward speed": (driving_limits(0)[0], lambda v: filled(drive(), "twist", (v, 0.0)), FORWARD),
+    "backward speed": (driving_limits(0)[0], lambda v: filled(drive(), "twist", (-v, 0.0)), FORWARD),
+    "yaw rate": (driving_limits(0)[1], lambda w: filled(drive(), "twist", (0.0, w)), "yaw rate of"),
+    "yaw rate to the right": (driving_limits(0)[1], lambda w: filled(drive(), "twist", (0.0, -w)), "yaw rate of"),
+    "wheel speed": (driving_limits(0)[2], lambda r: filled(drive(), "twist", rim(r, 0.6)), WHEEL),
+    "the other wheel's speed": (driving_limits(0)[2], lambda r: filled(drive(), "twist", rim(r, -0.6)), WHEEL),
+    "a wheel's speed backwards": (driving_limits(0)[2], lambda r: filled(drive(), "twist", rim(-r, 0.6)), WHEEL),
+    "forward speed with noise": (driving_limits(1)[0], lambda v: filled(drive(noise=1.0), "twist", (v, 0.0)), FORWARD),
+    "yaw rate with noise": (driving_limits(1)[1], lambda v: filled(drive(noise=1.0), "twist", (0.0, v)), "yaw rate of"),
+    "acceleration": (1.5 * (0.25 + 1 / 60) + 0.02, lambda v: starting(drive(), v), SPEED_JUMPS),
+    "deceleration": (1.5 * (0.25 + 1 / 60) + 0.02, lambda v: starting(drive(), -v), SPEED_JUMPS),
+    "acceleration with noise": (0.42 + 0.16 * 0.7, lambda v: starting(drive(noise=1.0), v), SPEED_JUMPS),
+    "yaw acceleration": (1.5 * 8 * (0.25 + 1 / 60) + 0.1, lambda w: swinging(drive(), w), YAW_JUMPS),
+    "yaw acceleration with noise": (3.3 + 2 * 0.16 * 0.7 / 0.23, lambda w: swinging(drive(noise=1.0), w), YAW_JUMPS),
+    "a change of the command": (1.5 / 60, lambda v: filled(drive(), "command", (v, 0.0), slice(401, None)), TOO_FAST),
+    "a braking command": (1.5 / 60, lambda v: filled(drive(), "command", (-v, 0.0), slice(401, None)), TOO_FAST),
+    "a first command": (1.5 / 60, lambda v: filled(drive(), "command", (v, 0.0), slice(1, None)), TOO_FAST),
+    "a change of the turn": (1.5 * 8 / 60, lambda w: filled(drive(), "command", (0.0, w), slice(401, None)), TOO_FAST),
+    "a change among movers": (1.5 / 60, lambda v: filled(among(CRUISER), "command", (v, 1.0), slice(401, None)), TOO_FAST),
+    "the route's start": (0.375, lambda e: replace(drive(), route=np.array([(1.0, 1.0 + e), (5.0, 1.0)])), "route: begins"),
+    "the route's end": (0.375, lambda e: replace(drive(), route=np.array([(1.0, 1.0), (5.0, 1.0 - e)])), "route: ends"),
+}  # fmt: skip
+
+
+def rim(wheel_speed: float, share: float) -> tuple[float, float]:
+    """A twist whose faster wheel turns so fast [rad/s], most of it from driving straight."""
+    speed = wheel_speed * 0.036
+    return speed * (1 - abs(share)), speed * share / (0.23 / 2)
+
+
+def starting(log: Rollout, speed: float) -> Rollout:
+    return filled(log, "twist", (speed, 0.0), slice(300, None))
+
+
+def swinging(log: Rollout, change: float) -> Rollout:
+    return filled(filled(log, "twist", (0.0, change / 2)), "twist", (0.0, -change / 2), slice(300, None))
+
+
+@pytest.mark.parametrize("what", CONSISTENCY)
+def test_rows_may_exceed_the_record_by_so_much(what: str) -> None:
+    only_beyond(*CONSISTENCY[what])
+
+
+@pytest.mark.parametrize(
+    ("hz", "control", "text"), [(60, 60, ""), (59, 59, "at least 60 Hz"), (240, 48, ""), (240, 50, "not divide")]
+)
+def test_the_rates_fit(hz: int, control: int, text: str) -> None:
+    log = drive(hz=hz, control_hz=control)
+    rates = [problem for problem in certify(log).problems if "physics_hz" in problem or "control_hz" in problem]
+    assert len(rates) == bool(text)
+    assert all(text in problem for problem in rates)
+
+
+def test_commands_keep_the_limits_exactly() -> None:
+    for index, limit in enumerate((0.7, 3.14)):
+        for sign in (1, -1):
+            value = sign * limit * np.eye(2)[index]
+            only_beyond(
+                1.0, lambda s, v=value: filled(drive(), "command", tuple(v * s)), "beyond the robot's limits", 1e-3
+            )  # type: ignore[misc]
+            only_beyond(
+                1 + 1e-6, lambda s, v=value: filled(drive(), "command", tuple(v * s)), "beyond the robot's limits", 1e-7
+            )  # type: ignore[misc]
+
+
+def test_row_0_has_no_command_and_others_change_with_the_period() -> None:
+    assert says(filled(drive(), "command", (0.0, 1e-9), slice(0, 1)), "row 0 is before")
+    assert not says(filled(drive(), "command", (0.0, 0.01), slice(401, 405)), "within a control period")
+    for rows in (slice(402, 405), slice(401, 404), slice(404, 405), slice(403, 409)):
+        assert says(filled(drive(), "command", (0.0, 0.01), rows), "command: changes within a control period")
+
+
+def test_the_first_command_that_changes_too_fast_is_named() -> None:
+    allowed = filled(drive(), "command", (1.5 / 60, 0.0), slice(101, None))
+    assert not says(allowed, TOO_FAST)
+    too_fast = filled(allowed, "command", (1.5 / 60 + 0.03, 0.0), slice(401, None))
+    assert says(too_fast, "faster than the robot's limits allow, at row 401")
+
+
+@functools.cache
+def noisy(speed: float = 0.0) -> Rollout:
+    """A noisy robot with perfect senses whose motors do late what it commands: three periods of four rows."""
+    log = drive(speed, noise=1.0)
+    ramp = np.repeat(np.minimum(np.arange(1, 301) * 0.01, 0.5), 4)
+    command = np.concatenate([np.zeros((1, 2)), np.stack([ramp, -ramp], axis=1)])
+    actuated = np.zeros_like(command)
+    actuated[13:] = command[1:-12]
+    return replace(log, command=command, estimate=log.pose.copy(), actuated=actuated)
+
+
+def test_motors_do_the_delayed_command_but_for_slip() -> None:
+    assert not says(noisy(), "actuated")
+    for factor in (1 + 0.16 * 0.99, 1 - 0.16 * 0.99):
+        assert not says(replace(noisy(), actuated=noisy().actuated * factor), "not the delayed command")
+    for factor in (1 + 0.16 * 1.01, 1 - 0.16 * 1.01):
+        assert says(replace(noisy(), actuated=noisy().actuated * factor), "not the delayed command")
+    for rows in (-4, 4):
+        assert says(replace(noisy(), actuated=np.roll(noisy().actuated, rows, axis=0)), "not the delayed command")
+    assert says(filled(noisy(), "actuated", (1e-5, 0.0), slice(12, 13)), "not the delayed command, at row 12") is False
+    assert says(filled(noisy(), "actuated", (1e-5, 0.0), slice(12, 13)), "slip, at row 12")
+
+
+@pytest.mark.parametrize("name", ["estimate", "actuated"])
+def test_only_noisy_logs_have_estimates_and_targets(name: str) -> None:
+    empty = {name: getattr(noisy(), name)[:0]}
+    assert says(replace(noisy(), **empty), f"{name}: must have 1201 rows at a noise of 1")
+    assert says(replace(drive(), **{name: getattr(noisy(), name)}), f"{name}: must have 0 rows at a noise of 0")
+
+
+def test_the_estimate_is_as_near_as_fixes_and_odometry_keep_it() -> None:
+    odometry = 20 * 8 * 0.04 / 20 * 0.7
+    far, turned = 8 * (0.01 + 0.7 * 0.01) + odometry + 0.02, 8 * 0.01 + 2 * odometry / 0.23 + 0.02
+    for column, limit in ((0, far), (1, -far), (2, turned), (2, -turned)):
+
+        def off(error: float, column: int = column) -> Rollout:
+            estimate = noisy().estimate.copy()
+            estimate[77, column] += error
+            return replace(noisy(), estimate=estimate)
+
+        only_beyond(limit, off, "estimate: up to")
+    around = noisy().estimate + (0.0, 0.0, 2 * math.pi)
+    assert not says(replace(noisy(), estimate=around), "estimate")
+
+
+@pytest.mark.parametrize("corner", [(-0.01, 1.0), (6.01, 1.0), (3.0, -0.01), (3.0, 4.01)])
+def test_routes_stay_in_the_world(corner: tuple[float, float]) -> None:
+    inside = tuple(np.clip(corner, (0.0, 0.0), (6.0, 4.0)).tolist())
+    for point, leaves in ((corner, True), (inside, False)):
+        log = replace(drive(), route=np.array([(1.0, 1.0), point, (5.0, 1.0)]))
+        assert says(log, "leaves the world's bounds") is leaves
+    assert not says(replace(drive(), route=np.array([(1.0, 1.0), (5.0, 1.0)])), "route")
+    assert says(replace(drive(), route=np.array([(1.0, 1.0)])), "two points or more, found 1")
+
+
+def test_a_route_of_decisions_need_not_reach_the_goal() -> None:
+    short = replace(drive(), route=np.array([(1.0, 1.0), (1.25, 1.0)]))
+    step = ReplanRecord(t=1.0, trigger="cell", solved=True, cost_m=1.0, work=1, route=((1.0, 1.0), (5.0, 1.0)))
+    assert says(short, "route: ends")
+    assert says(with_record(short, replans=(replace(step, trigger="waited"),)), "route: ends")
+    assert not says(with_record(short, replans=(replace(step, trigger=DECISION),)), "route: ends")
+
+
+@pytest.mark.parametrize(
+    ("cell", "fits"),
+    [((0, 0), True), ((16, 24), True), ((-1, 0), False), ((0, -1), False), ((17, 0), False), ((0, 25), False)],
+)
+def test_cells_lie_on_the_grid(cell: tuple[int, int], fits: bool) -> None:
+    assert says(replace(drive(), cells=np.array([cell], np.int32)), "cells: must lie on the grid") is not fits
+
+
+def test_cells_are_neighbours() -> None:
+    for step, fits in (((1, 1), True), ((-1, 0), True), ((2, 0), False), ((0, -2), False)):
+        cells = np.array([(4, 4), (4 + step[0], 4 + step[1])], np.int32)
+        assert says(replace(drive(), cells=cells), "must be neighbours") is not fits
+
+
+def test_a_drive_ends_when_its_outcome_says() -> None:
+    for outcome in (Outcome.NO_PATH, Outcome.STOPPED):
+        assert says(with_record(drive(), outcome=outcome), "before the robot drives")
+    assert not says(drive(), "before the robot drives")
+    period = 1 / 60
+    assert not says(with_record(drive(), time_limit=5.0 + 0.9 * period), "timed_out")
+    assert says(with_record(drive(), time_limit=5.0 + 1.1 * period), "timed_out, but the drive ends after 5.000 s")
+    assert not says(with_record(drive(outcome=Outcome.STUCK), time_limit=50.0), "ends after")
+    assert not says(with_record(drive(), time_limit=5.0 - 0.9 * period), "but the drive lasts")
+    longer = with_record(drive(), time_limit=5.0 - 1.1 * period)
+    assert says(longer, "but the drive lasts 5.000 s")
+    assert not says(replace(longer, contacts=np.array([[400, 0, -0.001, 5.0]])), "but the drive lasts")
+
+
+def test_rows_after_the_first_contact_are_not_held_against_the_drive() -> None:
+    """A contact may throw the robot; the row of the contact itself is the first that it may have thrown."""
+    contact = np.array([[400, 0, -0.001, 5.0], [420, 0, -0.001, 5.0]])
+    for row, told in ((398, True), (399, True), (400, False), (410, False)):
+        log = filled(
+            replace(drive(outcome=Outcome.COLLIDED), contacts=contact), "twist", (5.0, 0.0), slice(row, row + 1)
+        )
+        assert says(log, FORWARD) is told
+        aside = edited(
+            replace(drive(), contacts=contact), "pose", lambda pose, r=row: pose.__setitem__((slice(r, None), 1), 1.1)
+        )  # type: ignore[misc]
+        assert says(aside, SLIPS) is told
+    first = replace(drive(), contacts=np.array([[0, 0, -0.001, 5.0]]))
+    assert not says(filled(first, "twist", (5.0, 0.0), slice(1, None)), FORWARD)
+    assert says(filled(first, "twist", (5.0, 0.0)), FORWARD)

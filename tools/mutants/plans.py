@@ -1,0 +1,186 @@
+"""Which files are mutated, by how much, and which tests should notice. `named.yaml` and `equivalent.yaml` belong to it."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+from typing import Any, Literal
+
+import yaml
+from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
+
+from tools.mutants.operators import Mutant, described, mutants_of
+from tools.mutants.running import Plan
+
+HERE = Path(__file__).parent
+ROOT = HERE.parent.parent
+SEED = 1
+
+_LOG, _DRIVING, _CONTROL = "tests/sim/log/", "tests/sim/driving/", "tests/robots/control/"
+_COLONIES, _GRAPH, _LINES = "tests/planners/colonies/", "tests/planners/graph/", "tests/planners/anyangle/"
+_CERTIFY = (f"{_LOG}test_certificate_faults.py", f"{_LOG}test_certificate_mutants.py", f"{_LOG}test_certificate.py")
+_PURSUE = (f"{_CONTROL}test_kernel_faults.py", f"{_CONTROL}test_rules.py", f"{_CONTROL}test_pursuit.py")
+_DRIVE = (f"{_DRIVING}test_drive_faults.py", f"{_DRIVING}test_driver.py", f"{_DRIVING}test_moving.py")
+
+#: The files in the order of the report.
+PLANS: dict[str, Plan] = {
+    "sim/log/certificate.py": Plan(_CERTIFY, 50),
+    "sim/log/consistency.py": Plan(_CERTIFY, 50),
+    "sim/log/contacts.py": Plan((f"{_LOG}test_contacts.py", f"{_DRIVING}test_moving.py"), 40),
+    "sim/log/metrics.py": Plan((f"{_LOG}test_metrics.py", f"{_LOG}test_metrics_faults.py"), 40),
+    "sim/driving/drive.py": Plan(_DRIVE, 8),
+    "sim/driving/driver.py": Plan(_DRIVE, 8),
+    "sim/driving/recorder.py": Plan(_DRIVE, 8),
+    "sim/driving/leaving.py": Plan((f"{_DRIVING}test_leaving.py",), 8),
+    "sim/driving/blocking.py": Plan((f"{_DRIVING}test_driver.py",), 0),
+    "sim/view/film/replay.py": Plan(("tests/sim/view/film/test_replay.py",), 0),
+    "robots/_kernels_footprint.py": Plan(("tests/robots/test_footprint.py",), 4, plain=True),
+    "robots/control/_kernels_obstacles.py": Plan(_PURSUE, 8, plain=True),
+    "robots/control/_kernels_path.py": Plan(_PURSUE, 8, plain=True),
+    "robots/control/_kernels_pursuit.py": Plan(_PURSUE, 10, plain=True),
+    "robots/control/_kernels_profile.py": Plan((f"{_CONTROL}test_profile.py",), 6, plain=True),
+    "robots/control/_kernels_avoidance.py": Plan((f"{_CONTROL}test_avoidance_rules.py",), 6, plain=True),
+    "robots/control/pursuit.py": Plan(_PURSUE, 6, plain=True),
+    "robots/control/profile.py": Plan((f"{_CONTROL}test_profile.py",), 6, plain=True),
+    "planners/graph/_kernels_search.py": Plan((f"{_GRAPH}test_search.py",), 4),
+    "planners/graph/_kernels_apf.py": Plan((f"{_GRAPH}test_apf.py",), 5, plain=True),
+    "planners/graph/_kernels_dstar.py": Plan((f"{_GRAPH}test_dstar.py",), 5, plain=True),
+    "planners/graph/_kernels_dstar_lite.py": Plan((f"{_GRAPH}test_dstar_lite.py",), 5, plain=True),
+    "planners/graph/_kernels_incremental.py": Plan((f"{_GRAPH}test_incremental.py",), 4),
+    "planners/graph/_kernels_sipp.py": Plan((f"{_GRAPH}test_sipp.py",), 4),
+    "planners/colonies/_kernels_colony.py": Plan((f"{_COLONIES}test_colony.py", f"{_COLONIES}test_aco_han.py"), 5),
+    "planners/colonies/_kernels_pfaco.py": Plan((f"{_COLONIES}test_pfaco.py",), 5),
+    "planners/colonies/_kernels_mmas_dstar.py": Plan((f"{_COLONIES}test_mmas_dstar.py",), 5, plain=True),
+    "planners/colonies/ant_system.py": Plan((f"{_COLONIES}test_sharing.py", f"{_COLONIES}test_colony.py"), 0),
+    "planners/colonies/pfaco.py": Plan((f"{_COLONIES}test_sharing.py", f"{_COLONIES}test_pfaco.py"), 0),
+    "planners/anyangle/_kernels_lines.py": Plan((f"{_LINES}test_lines.py",), 5, plain=True),
+    "planners/anyangle/_kernels_ga.py": Plan((f"{_LINES}test_ga_han.py",), 4),
+    "planners/anyangle/_kernels_tangent.py": Plan((f"{_LINES}test_tangent.py",), 4),
+    "planners/smoothing/_kernels_smooth.py": Plan(("tests/planners/smoothing/test_smooth.py",), 4),
+    "planners/smoothing/smooth.py": Plan(
+        ("tests/planners/smoothing/test_safety_nets.py", "tests/planners/smoothing/test_smooth.py"), 6
+    ),
+    "worlds/_kernels.py": Plan(("tests/worlds/test_grid.py", "tests/worlds/test_geometry.py"), 8, plain=True),
+    "worlds/geometry.py": Plan(("tests/worlds/test_geometry.py",), 6, plain=True),
+    "worlds/grid.py": Plan(("tests/worlds/test_grid.py",), 6, plain=True),
+}
+
+
+class StaleTable(Exception):
+    """A table names a piece of code that its file no longer holds, or no file."""
+
+
+class NamedFault(BaseModel):
+    """A fault written by hand.
+
+    Attributes:
+        name: what it leaves out or gets wrong
+        file: the file, relative to the root of the project
+        was: a piece of its text that occurs once
+        now: what replaces it
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    name: str
+    file: str
+    was: str
+    now: str
+
+
+class EquivalentFault(BaseModel):
+    """A generated mutant that no test can notice, because the program does the same.
+
+    Attributes:
+        file: the file, relative to the root of the project
+        function: the function that holds it, with its class; empty at the top of the file
+        was: the lines as they were, as the list of survivors shows them
+        now: the lines as they are
+        why: the reason
+        kind: "same" if the results are the same, "cost" if they are and only the work or memory differs
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    file: str
+    function: str
+    was: str
+    now: str
+    why: str
+    kind: Literal["same", "cost"] = "same"
+
+
+def named_mutants(root: Path = ROOT) -> list[Mutant]:
+    """The mutants of `named.yaml`.
+
+    Raises:
+        StaleTable: a snippet does not occur exactly once in its file.
+    """
+    return [_placed(fault, root) for fault in _table("named.yaml", NamedFault)]
+
+
+def equivalents() -> dict[tuple[str, str, str, str], str]:
+    """The reason for each mutant of `equivalent.yaml`, by the mutant's key."""
+    table = _table("equivalent.yaml", EquivalentFault)
+    return {(entry.file, entry.function, entry.was, entry.now): entry.why for entry in table}
+
+
+def drawn(file: str, count: int, seed: int = SEED, root: Path = ROOT) -> list[Mutant]:
+    """A sample of the mutants of a file: one of each function in turn, so that every function has its share.
+
+    Args:
+        file: the file, relative to the root of the project
+        count: how many, if there are as many
+        seed: another seed gives another sample
+        root: the root of the project
+    """
+    rng = random.Random(f"{seed} {file}")  # noqa: S311 - nothing is kept secret
+    by_function: dict[str, list[Mutant]] = {}
+    for mutant in mutants_of(file, (root / file).read_text()):
+        by_function.setdefault(mutant.function, []).append(mutant)
+    groups = list(by_function.values())
+    rng.shuffle(groups)
+    for group in groups:
+        rng.shuffle(group)
+    found: list[Mutant] = []
+    while len(found) < count and any(groups):
+        found += [group.pop() for group in groups if group]
+    return sorted(found[:count], key=lambda mutant: (mutant.line, mutant.was, mutant.now))
+
+
+def check_tables(root: Path = ROOT) -> None:
+    """See that every table speaks of code that exists.
+
+    Raises:
+        StaleTable: one does not.
+    """
+    for file, plan in PLANS.items():
+        for name in (file, *(test for test in plan.tests if test.startswith("tests/"))):
+            if not (root / name).is_file():
+                raise StaleTable(f"tools/mutants/plans.py: {name} does not exist")
+    for mutant in named_mutants(root):
+        if mutant.file not in PLANS:
+            raise StaleTable(f"tools/mutants/named.yaml: {mutant.file} has no plan in tools/mutants/plans.py")
+    wanted = equivalents()
+    for file in {key[0] for key in wanted}:
+        known = {mutant.key for mutant in mutants_of(file, (root / file).read_text())}
+        for key in wanted:
+            if key[0] == file and key not in known:
+                raise StaleTable(f"tools/mutants/equivalent.yaml: no mutant of {file} turns {key[2]!r} into {key[3]!r}")
+
+
+def _placed(fault: NamedFault, root: Path) -> Mutant:
+    source = (root / fault.file).read_text()
+    if source.count(fault.was) != 1:
+        found = source.count(fault.was)
+        raise StaleTable(
+            f"tools/mutants/named.yaml: {fault.name}: {fault.was!r} occurs {found} times in {fault.file}, must once"
+        )
+    return described(fault.file, fault.name, "", source, source.replace(fault.was, fault.now))
+
+
+def _table(name: str, kind: type[Any]) -> list[Any]:
+    try:
+        return TypeAdapter(list[kind]).validate_python(yaml.safe_load((HERE / name).read_text()) or [])  # type: ignore[valid-type]
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(map(str, first["loc"]))
+        raise StaleTable(f"tools/mutants/{name}: {place}: {first['msg']}") from error

@@ -1,0 +1,286 @@
+"""Run tests on mutants, each in a copy of the project in which one file is changed.
+
+The copy keeps the machine code of the kernels, and `sources_stamp` in it always gives the stamp of the original, because
+an entry of the cache is otherwise valid for one text of all kernel files and every mutant would compile every kernel.
+Instead exactly those entries are deleted that depend on the changed file. Copies share nothing.
+"""
+
+from __future__ import annotations
+
+import ast
+import contextlib
+import json
+import os
+import select
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO
+
+from tools.mutants.operators import Mutant
+
+PACKAGES = ("worlds", "planners", "robots", "sim")
+LEFT_OUT = (".*", "out", "examples", "benchmarks", "docs")
+LOADED = ("worlds/*.py", "worlds/files/*.py", "planners/**/*.py", "robots/**/*.py", "sim/log/*.py", "sim/physics/*.py",
+          "sim/driving/*.py", "sim/pipeline.py")  # fmt: skip
+LIBRARIES = ["pytest", "numpy", "yaml", "pydantic", "joblib", "pybullet", "numba"]
+PASSED, USAGE, NO_TESTS = 0, 4, 5  # pytest's exit codes
+# The time limit of a mutant: at least [s], times the time without a fault, and for compiling kernels [s].
+LEAST_TIME, MORE_TIME, COMPILING = 30.0, 6.0, 120.0
+
+
+class TestsUnfit(Exception):
+    """The tests of a file do not pass on the original, or there are none, so they can judge no mutant of it."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How the mutants of a file are judged.
+
+    Attributes:
+        tests: arguments for pytest, the tests that are quick and notice much first
+        count: how many mutants are drawn
+        plain: whether kernels run as plain Python, which for small tests is quicker than compiling them for each mutant
+    """
+
+    tests: tuple[str, ...]
+    count: int
+    plain: bool = False
+
+
+@dataclass
+class Processes:
+    """The processes that run at the moment, each with its children in a group of its own.
+
+    Attributes:
+        stopped: whether all were told to end and no more may start
+    """
+
+    stopped: bool = False
+    _running: set[subprocess.Popen[str]] = field(default_factory=set)
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def start(self, command: list[str], folder: Path, environment: dict[str, str]) -> subprocess.Popen[str]:
+        """Start a process that reads and writes lines."""
+        with self._lock:
+            if self.stopped:
+                raise KeyboardInterrupt
+            process = subprocess.Popen(  # noqa: S603 - our own interpreter and module
+                command, cwd=folder, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                start_new_session=True, text=True,
+            )  # fmt: skip
+            self._running.add(process)
+            return process
+
+    def end(self, process: subprocess.Popen[str]) -> None:
+        """End a process with its children."""
+        with self._lock:
+            self._running.discard(process)
+            _kill(process)
+
+    def stop(self) -> None:
+        """End every process, and start no more."""
+        with self._lock:
+            self.stopped = True
+            for process in self._running:
+                _kill(process)
+
+
+def _kill(process: subprocess.Popen[str]) -> None:
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    for pipe in (process.stdin, process.stdout):
+        with contextlib.suppress(OSError):
+            _open(pipe).close()
+
+
+def _open(pipe: IO[str] | None) -> IO[str]:
+    assert pipe is not None
+    return pipe
+
+
+class Copy:
+    """A copy of the project in which one file at a time is changed.
+
+    Attributes:
+        root: its folder
+    """
+
+    def __init__(self, original: Path, root: Path, processes: Processes) -> None:
+        self.root = root
+        self._original, self._processes = original, processes
+        shutil.copytree(original, root, symlinks=True, ignore=shutil.ignore_patterns(*LEFT_OUT))
+        cache = root / "worlds" / "kernel_cache.py"
+        _write(cache, f"{cache.read_text()}\n\ndef sources_stamp() -> str:\n    return {stamp_of(original)!r}\n")
+
+    def fates(self, mutants: list[Mutant], plan: Plan) -> Iterator[tuple[Mutant, str]]:
+        """What becomes of each mutant of one file: "killed", "timeout" or "alive".
+
+        Args:
+            mutants: the faults, one or more, all in the same file
+            plan: the tests that should notice them
+
+        Raises:
+            TestsUnfit: the tests fail on the unchanged file, or there are none.
+        """
+        file = mutants[0].file
+        dependent = dependents(self._original, file)
+        kernels = (
+            [] if plan.plain else [self.root / name for name in dependent if Path(name).name.startswith("_kernels")]
+        )
+        server = Server(self.root, self._processes, file, dependent, plan.plain)
+        try:
+            begin = time.monotonic()
+            code = server.run(plan.tests, 900.0)
+            if code != PASSED:
+                said = "\n".join(server.output.splitlines()[-15:])
+                raise TestsUnfit(f"{file}: its tests do not pass on the unchanged code (exit {code})\n{said}")
+            limit = max(LEAST_TIME, MORE_TIME * (time.monotonic() - begin)) + (COMPILING if kernels else 0.0)
+            for mutant in mutants:
+                _forget(kernels)
+                _write(self.root / file, mutant.source)
+                code = server.run(plan.tests, limit)
+                if code in (USAGE, NO_TESTS):
+                    raise TestsUnfit(f"{file}: pytest ran no test (exit {code})\n{server.output[-2000:]}")
+                yield mutant, "timeout" if code is None else "alive" if code == PASSED else "killed"
+        finally:
+            server.end()
+            _write(self.root / file, (self._original / file).read_text())
+            self._restore(kernels)
+
+    def _restore(self, kernels: list[Path]) -> None:
+        """Bring back the machine code that mutants have replaced by their own."""
+        _forget(kernels)
+        for kernel in kernels:
+            cache = kernel.parent / "__pycache__"
+            for entry in (self._original / cache.relative_to(self.root)).glob(f"{kernel.stem}.*.nb?"):
+                shutil.copy2(entry, cache / entry.name)
+
+
+class Server:
+    """A process that runs pytest in forks of itself, as `server.py` says.
+
+    Attributes:
+        output: what the last run printed
+    """
+
+    def __init__(self, root: Path, processes: Processes, file: str, dependent: set[str], plain: bool) -> None:
+        self.output = ""
+        self._root, self._processes, self._plain = root, processes, plain
+        free = sorted({str(p.relative_to(root)) for pattern in LOADED for p in root.glob(pattern)} - dependent)
+        names = [f"antdrive.{_module(name)}" for name in free if not name.endswith("__init__.py")]
+        self._first = {"modules": LIBRARIES + names, "changing": f"antdrive.{_module(file)}"}
+        self._start()
+
+    def run(self, tests: tuple[str, ...], limit: float) -> int | None:
+        """Pytest's exit code, None if the time limit passed [s]."""
+        arguments = ["-x", "--tb=line", "--no-header", "-p", "no:cacheprovider", *tests]
+        if self._plain:
+            arguments += ["-W", "ignore"]  # numpy's numbers warn where compiled ones wrap around
+        output = self._root.parent / "output.txt"
+        self._tell({"arguments": arguments, "output": str(output)})
+        answer = _open(self._process.stdout)
+        ready, _, _ = select.select([answer], [], [], limit)
+        if not ready:
+            self.end()
+            self._start()
+            return None
+        line = answer.readline()
+        if not line:
+            if self._processes.stopped:
+                raise KeyboardInterrupt
+            raise TestsUnfit(f"{self._first['changing']}: the process that runs its tests has ended")
+        self.output = output.read_text(errors="replace") if output.exists() else ""
+        return int(line)
+
+    def end(self) -> None:
+        """End the process."""
+        self._processes.end(self._process)
+
+    def _start(self) -> None:
+        environment = {key: value for key, value in os.environ.items() if not key.startswith(("NUMBA_", "PYTEST_"))}
+        environment |= {"PYTHONPATH": str(self._root), "PYTHONDONTWRITEBYTECODE": "1"}
+        environment |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+        if self._plain:
+            environment |= {"NUMBA_DISABLE_JIT": "1", "PYTHONWARNINGS": "ignore"}
+        self._process = self._processes.start([sys.executable, "-m", "tools.mutants.server"], self._root, environment)
+        self._tell(self._first)
+
+    def _tell(self, message: object) -> None:
+        pipe = _open(self._process.stdin)
+        with contextlib.suppress(OSError):  # a process that has ended is noticed when it gives no answer
+            pipe.write(json.dumps(message) + "\n")
+            pipe.flush()
+
+
+def stamp_of(root: Path) -> str:
+    """The stamp that the cache of machine code has in a project."""
+    code = "from antdrive.worlds.kernel_cache import sources_stamp; print(sources_stamp())"
+    environment = {**os.environ, "PYTHONPATH": str(root)}
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, cwd=root, env=environment, capture_output=True, text=True, check=True)  # noqa: S603
+    return done.stdout.strip()
+
+
+def dependents(root: Path, file: str) -> set[str]:
+    """A file and all files of the packages that import it, directly or through others, relative to the root."""
+    lazy = _lazy_names(root)
+    imported: dict[str, set[str]] = {}
+    for package in PACKAGES:
+        for path in (root / package).rglob("*.py"):
+            names = _imports(path)
+            imported[str(path.relative_to(root))] = names | {lazy[name] for name in names if name in lazy}
+    found = {file}
+    while True:
+        modules = {_module(name) for name in found}
+        more = {name for name, names in imported.items() if names & modules} - found
+        if not more:
+            return found
+        found |= more
+
+
+def _module(file: str) -> str:
+    return file.removesuffix(".py").replace("/", ".")
+
+
+def _imports(path: Path) -> set[str]:
+    """What a file imports, without the leading package name: modules, and names in them."""
+    names: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            names |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
+        elif isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+    return {name.removeprefix("antdrive.") for name in names if name.startswith("antdrive.")}
+
+
+def _lazy_names(root: Path) -> dict[str, str]:
+    """The module that holds each name that a package offers: "worlds.Disc" is in "worlds.world"."""
+    found = {}
+    for package in ("", *(f"{name}." for name in PACKAGES)):
+        folder = root / (package.rstrip(".") or "antdrive")
+        for node in ast.parse((folder / "__init__.pyi").read_text()).body:
+            if isinstance(node, ast.ImportFrom) and node.module:
+                found |= {f"{package}{alias.asname or alias.name}": f"{package}{node.module}" for alias in node.names}
+    return found
+
+
+def _forget(kernels: list[Path]) -> None:
+    """Delete the machine code of kernels."""
+    for kernel in kernels:
+        for entry in (kernel.parent / "__pycache__").glob(f"{kernel.stem}.*.nb?"):
+            entry.unlink()
+
+
+def _write(path: Path, text: str) -> None:
+    """Write a source file, and drop its bytecode, which Python would take for current within the same second."""
+    path.write_text(text)
+    for entry in (path.parent / "__pycache__").glob(f"{path.stem}.*.pyc"):
+        entry.unlink()
