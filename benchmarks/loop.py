@@ -3,6 +3,8 @@
 The same world, robot and commands are stepped twice in turn: by the whole loop (control, contacts,
 clearance, log) and by `stepSimulation` alone. The table shows the median over all rounds of the ratio
 within a round.
+
+A second table compares the loop among 24 movers that the robot avoids with the loop in the same hall without movers.
 """
 
 from __future__ import annotations
@@ -12,13 +14,16 @@ import time
 
 import numpy as np
 
-from antdrive.robots import PurePursuit, load_robot
+from antdrive.robots import Avoidance, PurePursuit, TrackedPath, load_robot
+from antdrive.sim import Perception
 from antdrive.sim.driving.drive import drive
+from antdrive.sim.driving.perception import Predictor
 from antdrive.sim.physics.bullet import bullet
 from antdrive.sim.physics.engine import Engine
-from antdrive.worlds import Disc, Route, Task, World
+from antdrive.worlds import Cruising, Disc, Route, Task, Trajectories, World
 
 ROUNDS = 9
+MOVERS = 24
 
 
 def task_among(count: int) -> Task:
@@ -30,6 +35,45 @@ def task_among(count: int) -> Task:
         if abs(y - 10) > 1:
             discs.append(Disc(x, y, 0.1))
     return Task(World(f"bench-{count}", (0, 0, 20, 20), tuple(discs)), (1, 10, 0), (19, 10))
+
+
+def with_movers(task: Task) -> Task:
+    """The task with movers at 0.2 to 0.7 m/s, none of them within 2 m of the start."""
+    rng, movers = np.random.default_rng(1), list[Cruising]()
+    while len(movers) < MOVERS:
+        x, y = rng.uniform(0.5, 19.5, 2).tolist()
+        angle, speed = rng.uniform(0, 2 * np.pi), rng.uniform(0.2, 0.7)
+        if np.hypot(x - task.start[0], y - task.start[1]) > 2:
+            velocity = (float(speed * np.cos(angle)), float(speed * np.sin(angle)))
+            movers.append(Cruising(radius=0.3, position=(x, y), velocity=velocity))
+    world = World("bench-movers", task.world.bounds, task.world.obstacles, movers=tuple(movers))
+    return Task(world, task.start, task.goal)
+
+
+def table_of_movers(route: Route) -> None:
+    """Print what the loop costs among movers: seen and avoided, not seen, and absent."""
+    robot, controller, still = load_robot("turtlebot"), PurePursuit(), task_among(10)
+    moving = with_movers(still)
+    tracked: TrackedPath = controller.prepare(route, still.world, robot, 0.05, 1 / 60)
+    motions = Trajectories.of(moving.world, moving.start[:2])
+    costs: dict[str, list[float]] = {}
+    with Engine(still.world, robot) as empty, Engine(moving.world, robot, trajectories=motions) as full:
+        for turn in range(ROUNDS + 1):
+            for name, engine, task in (
+                ("no movers", empty, still),
+                (f"{MOVERS} movers, not seen", full, moving),
+                (f"{MOVERS} movers, avoided", full, moving),
+            ):
+                avoidance = Avoidance() if name.endswith("avoided") else None
+                predictor = Predictor(motions, Perception(), 60)
+                started = time.perf_counter()
+                log = drive(engine, controller, tracked, task, time_limit=30, avoidance=avoidance, predictor=predictor)
+                if turn:
+                    costs.setdefault(name, []).append((time.perf_counter() - started) / (len(log.t) - 1) * 1e6)
+    print("\nloop                     us/step   / no movers")
+    for name, values in costs.items():
+        ratio = statistics.median(a / b for a, b in zip(values, costs["no movers"], strict=True))
+        print(f"{name:22}   {statistics.median(values):7.1f}   {ratio:11.2f}")
 
 
 def main() -> None:
@@ -71,6 +115,7 @@ def main() -> None:
             f"{count:5}   {statistics.median(bare[count]):12.1f}   {us:12.1f}   {ratio:11.2f}   {1e6 / 240 / us:11.0f}"
             f"   {growth:20.2f}"
         )
+    table_of_movers(route)
     for engine, _, _ in engines.values():
         engine.__exit__()
 

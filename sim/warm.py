@@ -91,8 +91,12 @@ def _drive_and_film() -> None:
     from antdrive.planners import PLANNERS
     from antdrive.sim.pipeline import run
     from antdrive.sim.view.film.video import film
+    from antdrive.worlds import Cruising
 
     log = run(_scenario()).rollout
+    task = _scenario().task
+    comes = Cruising(radius=0.2, position=(2.5, 0.75), velocity=(-2.0, 0.0))  # the robot has to escape from it
+    run(replace(_scenario(), task=replace(task, world=replace(task.world, movers=(comes,)))))
     ants = run(replace(_scenario(), planner=PLANNERS["as"], planner_name="as")).rollout
     assert log is not None
     assert ants is not None

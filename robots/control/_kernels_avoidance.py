@@ -24,6 +24,7 @@ FOLLOW_ROUTE, TWO_TWISTS = 0.0, 1.0
 
 CONTACT_MARGIN = 0.005  # a mover that is already closer than the minimum counts as met at this clearance [m]
 START_TIME = 0.25  # the time a standing robot needs to start moving [s]
+ESCAPE_TIME = 1.2  # an escape from a mover that cannot be kept clear of is judged for this long [s]
 ROUTE_END = 0.1  # closer to the route's end than this, the heading no longer counts [m]
 
 
@@ -42,6 +43,7 @@ class AvoidanceWeights(NamedTuple):
         reversal_time: how far ahead a sudden reversal of a mover is considered [s]
         reversal_distance: what the robot's centre keeps to the surface of a mover that reverses [m]
         reversal_weight: metres of the route that each metre closer than that costs
+        narrowest: distance from the robot's centre to its outline where that is nearest [m]
     """
 
     step: float
@@ -55,6 +57,7 @@ class AvoidanceWeights(NamedTuple):
     reversal_time: float
     reversal_distance: float
     reversal_weight: float
+    narrowest: float
 
 
 class Simulated(NamedTuple):
@@ -244,3 +247,28 @@ def choose(
         if best_contact < math.inf or value > best_score:
             best, best_score, best_contact = n, value, end.contact
     return best, best_contact
+
+
+@kernel
+def best_escape(
+    x: float, y: float, yaw: float, v: float, w: float, s: float, rotating: bool, candidates: Array,
+    path: PathSamples, obstacles: ObstacleIndex, limits: MotionLimits, tuning: PursuitTuning,
+    weights: AvoidanceWeights, places: Array, radii: Array,
+) -> int:  # fmt: skip
+    """The candidate that stays farthest from movers in the near future; -1 if each meets an obstacle or a mover.
+
+    A mover that has turned towards the robot may leave no candidate that keeps the minimum. The minimum holds a
+    margin, and the robot is narrower than its circumscribed circle, so a robot that dodges is often missed.
+    """
+    near, _ = relevant_movers(x, y, limits, tuning, weights, places, radii)
+    soon = places[: min(places.shape[0], int(ESCAPE_TIME / weights.step) + 2)]
+    bodies = radii + weights.narrowest
+    best, most = -1, -math.inf
+    for n in range(candidates.shape[0]):
+        end = simulate(
+            x, y, yaw, v, w, s, rotating, candidates[n], path, obstacles, limits, tuning, weights, soon, radii,
+            near, bodies,
+        )  # fmt: skip
+        if end.contact == math.inf and end.clearance > most + 1e-6:
+            best, most = n, end.clearance
+    return best

@@ -6,6 +6,11 @@ lower speeds, and pairs of constant twists, forwards and backwards, one after th
 dynamic window (after D. Fox, W. Burgard and S. Thrun, *The dynamic window approach to collision avoidance*,
 IEEE Robotics & Automation Magazine 4, 1997). Every candidate must keep clear of static obstacles. Standing
 still is simulated like any other candidate, so the robot moves out of the way of a mover that approaches it.
+
+A mover that turns close by may leave no candidate with the least clearance. While the robot can still stop in time,
+it takes the candidate whose contact comes last. After that it takes the one that stays farthest from movers, and
+stops only if each would touch one (T. Fraichard and H. Asama, *Inevitable collision states*, Advanced Robotics 18,
+2004, judge a state by its best escape in the same way).
 """
 
 from __future__ import annotations
@@ -20,7 +25,7 @@ import numpy as np
 from antdrive.robots.control import _kernels_avoidance as kernels
 from antdrive.robots.control._kernels_pursuit import reachable_twist
 from antdrive.robots.control.pursuit import PursuitState, TrackedPath, Twist
-from antdrive.robots.spec import RobotSpec
+from antdrive.robots.spec import Footprint, RobotSpec
 from antdrive.worlds import Floats, Pose
 from antdrive.worlds.errors import FieldError
 
@@ -113,16 +118,20 @@ class Avoidance:
             speed_limit: the speed that the schedule of a timed plan allows [m/s]
         """
         candidates = self._candidates(robot, state, speed_limit)
-        chosen, contact = kernels.choose(
+        situation = (
             *pose, *last, before.arc, before.turning, candidates, tracked.samples, tracked.obstacles,
-            tracked.limits, tracked.tuning._replace(period=self.step), self._weights(tracked), places, radii,
+            tracked.limits, tracked.tuning._replace(period=self.step), self._weights(tracked, robot.footprint),
+            places, radii,
         )  # fmt: skip
+        chosen, contact = kernels.choose(*situation)
         if chosen == 0 and contact == math.inf:
             return wanted, False, AvoidanceState()
         limits, period = tracked.limits, tracked.tuning.period
-        candidate = candidates[chosen]
         stopping = abs(last.speed) / limits.acceleration
         if contact < max(stopping, self._too_late(tracked, pose, places[0], radii)):
+            chosen = kernels.best_escape(*situation)
+        candidate = candidates[chosen]
+        if chosen < 0:
             # The robot cannot avoid the contact, so it stops: a contact while standing is attributed to the mover.
             speed, yaw_rate, state = 0.0, 0.0, AvoidanceState()
         elif candidate[kernels.KIND] == kernels.FOLLOW_ROUTE:
@@ -156,7 +165,7 @@ class Avoidance:
             table[1, kernels.DURATION] = state.remaining
         return table
 
-    def _weights(self, tracked: TrackedPath) -> kernels.AvoidanceWeights:
+    def _weights(self, tracked: TrackedPath, footprint: Footprint) -> kernels.AvoidanceWeights:
         radius = tracked.tuning.robot_radius
         return kernels.AvoidanceWeights(
             step=self.step,
@@ -170,6 +179,7 @@ class Avoidance:
             reversal_time=self.reversal_time,
             reversal_distance=radius + self.min_clearance + self.reversal_margin,
             reversal_weight=self.reversal_weight,
+            narrowest=min(footprint.half_length, footprint.half_width) + footprint.rounding,
         )
 
 

@@ -221,6 +221,7 @@ def _stopping_time(command: Twist, robot: RobotSpec) -> float:
 
 
 def _brake(command: Twist, robot: RobotSpec, hz: int) -> Twist:
-    """The command of a robot that brakes on the same curve."""
+    """The command of a robot that brakes on the same curve, as far as it can slow its turn as fast."""
     share = max(0.0, 1 - robot.max_acceleration / hz / abs(command.speed)) if command.speed else 0.0
-    return Twist(command.speed * share, command.yaw_rate * share)
+    turning = max(abs(command.yaw_rate) * share, abs(command.yaw_rate) - robot.max_yaw_acceleration / hz, 0.0)
+    return Twist(command.speed * share, math.copysign(turning, command.yaw_rate))

@@ -51,6 +51,11 @@ class Predictor:
         self.trajectories, self._perception, self._hz = trajectories, perception, hz
         self._first, self._positions, self._velocities = 0, np.empty((0, 0, 2)), np.empty((0, 0, 2))
 
+    @property
+    def guesses(self) -> bool:
+        """Whether the robot sees velocities but does not know what movers do next."""
+        return self._perception.kind == "velocities"
+
     def predict(self, tick: int, robot: tuple[float, float], ahead: Floats) -> tuple[Floats, Floats]:
         """Predict the movers that the robot perceives.
 

@@ -35,6 +35,7 @@ from antdrive.sim.driving.blockage import Blockage
 from antdrive.sim.driving.blocking import blocked_cells, covered_discs, with_obstacles
 from antdrive.sim.driving.perception import Predictor
 from antdrive.sim.driving.schedule import Schedule
+from antdrive.sim.driving.traffic import Traffic, Zone
 from antdrive.worlds import Disc, Floats, Grid, Pose, Route, Task, rasterise
 from antdrive.worlds.errors import FieldError
 
@@ -46,6 +47,7 @@ STRAYED = "strayed"
 LATE = "late"
 WAITED = "waited"
 OBSTRUCTED = "obstructed"
+TRAFFIC = "traffic"
 MISSED = "missed the goal"
 
 
@@ -64,6 +66,9 @@ class ReplanPolicy:
         min_interval: the shortest time between two replans [s]
         prediction_time: whatever movers are predicted to cover within this time is blocked [s]
         patience: the drive ends as blocked when movers that stand still have closed every way for this long [s]
+        max_traffic: where more movers a second than this would meet a standing robot, routes lead round the ground that
+            movers roam [1/s]
+        max_detour: how many times as long as the straight line to the goal such a route may be
 
     Raises:
         ValueError: a setting is out of range.
@@ -77,6 +82,8 @@ class ReplanPolicy:
     min_interval: float = 1.0
     prediction_time: float = 1.0
     patience: float = 30.0
+    max_traffic: float = 0.07
+    max_detour: float = 2.5
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self)[1:]:
@@ -153,6 +160,8 @@ class ReplanMonitor:
         self._blocked = np.zeros(grid.shape, dtype=np.bool_)
         self._replanned_at = -math.inf
         self._waiting_since = math.nan
+        learns = policy.around_movers and predictor.guesses and not self._timed
+        self._traffic = Traffic(predictor, robot.radius, task.world.bounds, hz) if learns else None
         self.blockage = Blockage(
             self._task, grid, predictor, hz, interval=policy.min_interval, patience=policy.patience, keeps=keeps
         )
@@ -177,6 +186,8 @@ class ReplanMonitor:
             arc: how far the robot has got along the path [m]
         """
         now, policy = tick / self._hz, self.policy
+        if self._traffic is not None:
+            self._traffic.look(tick, pose[:2])
         if not waiting:
             self._waiting_since = math.nan
         elif math.isnan(self._waiting_since):
@@ -194,7 +205,7 @@ class ReplanMonitor:
             return WAITED
         if policy.around_movers and self._obstructed(tick, pose, tracked, arc):
             return OBSTRUCTED
-        return ""
+        return TRAFFIC if self._in_traffic(tick, pose, tracked, arc) else ""
 
     def replan(self, tick: int, pose: Pose, trigger: str) -> TrackedPath | None:
         """A new path from a pose [m, m, rad], prepared for the controller; None if there is none.
@@ -215,7 +226,10 @@ class ReplanMonitor:
         except ValueError:  # the estimated pose lies outside the world or in an obstacle
             self.log.append(Replan(now, trigger, False, math.inf, 0, np.empty((0, 2)), 0.0))
             return None
-        plan = self._plan_in_time(task, now) if self._timed else self._plan(task, discs)
+        if self._timed:
+            plan = self._plan_in_time(task, now)
+        else:
+            plan, discs = self._plan_around(task, discs, self._zones(tick, pose) if around_movers else [])
         if not plan.solved and around_movers and self.blockage.may_pass(tick, pose[:2]):
             discs = self._discs(tick, pose)
             plan = self._plan(task, discs)
@@ -243,10 +257,21 @@ class ReplanMonitor:
         query = dataclasses.replace(query, motions=self._predictor.trajectories.motions, start_time=now)
         return checked(query, ask(self._planner, query, self._rng))
 
-    def _plan(self, task: Task, discs: list[Disc]) -> PlanResult:
-        """A plan around discs: by the planner itself if it needs the world, else by its replanner."""
+    def _plan_around(self, task: Task, discs: list[Disc], zones: list[Zone]) -> tuple[PlanResult, list[Disc]]:
+        """A plan around the first zone where it is not too long, else around discs; and what it goes around."""
+        here = task.start[:2]
+        for zone in zones:
+            # Movers that are far away will have moved on: they must not close the only way to the goal.
+            near = [d for d in discs if math.dist((d.x, d.y), here) <= self.policy.obstruction_range and zone.holds(d)]
+            plan = self._plan(task, near, zone)
+            if plan.cost <= self.policy.max_detour * math.dist(here, task.goal):
+                return plan, near + zone.discs
+        return self._plan(task, discs), discs
+
+    def _plan(self, task: Task, discs: list[Disc], zone: Zone | None = None) -> PlanResult:
+        """A plan around discs, and a zone: by the planner itself if it needs the world, else by its replanner."""
         if capabilities_of(self._planner).needs_world:
-            around = with_obstacles(task, discs)
+            around = with_obstacles(task, discs + zone.discs if zone is not None else discs)
             grid = rasterise(around.world, self._grid.cell, self._grid.inflate)
             query = Query.between(grid, around)
             return checked(query, ask(self._planner, query, self._rng))
@@ -254,6 +279,8 @@ class ReplanMonitor:
         if self._replanner is None:
             self._replanner = replanner_for(self._planner, query, self._rng)
         blocked = blocked_cells(self._grid, discs)
+        if zone is not None:
+            blocked |= zone.blocked
         blocked[query.start] = blocked[query.goal] = False
         self._replanner.clear(np.argwhere(self._blocked & ~blocked))
         self._replanner.block(np.argwhere(blocked & ~self._blocked))
@@ -266,6 +293,23 @@ class ReplanMonitor:
         ends = np.array([pose[:2], self._task.goal])
         soon = covered_discs(self._predictor, tick, ends, self.policy.prediction_time, self._grid)
         return soon + self.blockage.gaps.discs(tick, ends)
+
+    def _zones(self, tick: int, pose: Pose) -> list[Zone]:
+        """The ground that movers roam, largest first, if there is so much traffic that the robot should go round it."""
+        if self._traffic is None or self._traffic.rate(tick, pose[:2]) <= self.policy.max_traffic:
+            return []
+        return self._traffic.zones(tick, pose[:2], self._task.goal, self._grid)
+
+    def _in_traffic(self, tick: int, pose: Pose, tracked: TrackedPath, arc: float) -> bool:
+        """Whether the route ahead leads through ground that movers roam, as has just been seen."""
+        if self._traffic is None or not self._traffic.grown(self._grid.cell):
+            return False
+        zones = self._zones(tick, pose)
+        if not zones:
+            return False
+        ahead = np.arange(arc, tracked.length, 0.5 * self._grid.cell)
+        points = np.stack([np.interp(ahead, tracked.route.arc, tracked.route.xy[:, k]) for k in (0, 1)], axis=1)
+        return any(zones[-1].blocked[self._grid.cell_at(x, y)] for x, y in points.tolist())
 
     def _obstructed(self, tick: int, pose: Pose, tracked: TrackedPath, arc: float) -> bool:
         """Whether a mover will soon cover a point of the route ahead."""

@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from antdrive.planners import Query, load_planner, smooth
-from antdrive.robots import PurePursuit, PursuitState, RobotSpec, Twist
+from antdrive.robots import PurePursuit, PursuitState, RobotSpec, Twist, load_robot
 from antdrive.sim import Outcome, Perception
 from antdrive.sim.driving.blocking import blocked_cells, covered_discs
-from antdrive.sim.driving.driver import STUCK_PROGRESS, STUCK_TIME, Driver, StuckClock
+from antdrive.sim.driving.driver import STUCK_PROGRESS, STUCK_TIME, Driver, StuckClock, _brake
 from antdrive.sim.driving.perception import Predictor
 from antdrive.sim.physics.engine import State
 from antdrive.worlds import Cruising, Disc, Grid, Keyframed, Task, Trajectories, World, rasterise
@@ -163,3 +163,15 @@ def test_movers_close_neither_the_robots_position_nor_the_goal() -> None:
     for end in ends:
         assert not blocked[grid.cell_at(*end)]
     assert [disc.y for disc in discs if disc.radius == 0.3] == pytest.approx([1.0, 1.125, 1.25, 1.375, 1.5])
+
+
+@given(speed=st.floats(-2.0, 2.0), yaw_rate=st.floats(-4.0, 4.0))
+def test_a_robot_that_brakes_for_the_goal_slows_its_turn_no_faster_than_it_can(speed: float, yaw_rate: float) -> None:
+    jackal, last = load_robot("jackal"), Twist(speed, yaw_rate)
+    braked = _brake(last, jackal, 60)
+    assert abs(last.speed - braked.speed) <= jackal.max_acceleration / 60 + 1e-12
+    assert abs(last.yaw_rate - braked.yaw_rate) <= jackal.max_yaw_acceleration / 60 + 1e-12
+    assert abs(braked.yaw_rate) <= abs(last.yaw_rate)
+    gentle = abs(yaw_rate) * jackal.max_acceleration <= abs(speed) * jackal.max_yaw_acceleration
+    if gentle and speed:
+        assert braked.yaw_rate * last.speed == pytest.approx(last.yaw_rate * braked.speed, abs=1e-9), "the same curve"
