@@ -50,7 +50,7 @@ def find_margin(
     ] = 0.005,
     json: options.Json = False,
 ) -> int:
-    """Find the smallest margin with which every drive is safe, in these worlds.
+    """Find the least margin with which all drives are safe.
 
     `--margin auto` of the other commands predicts one for any world. Exit code 0: there is a safe margin of at most 0.2 m.
     """
