@@ -1,0 +1,17 @@
+"""`antdrive check`."""
+
+from antdrive.sim.cli import options, suites
+from antdrive.sim.cli.suites import drive_suites, print_results
+
+
+def check(
+    tests: suites.Suites,
+    only: suites.Only = None,
+    jobs: suites.Jobs = None,
+    json: options.Json = False,
+) -> int:
+    """Drive the scenarios of suites and compare them with their baselines.
+
+    Exit code 0: every drive is as its suite expects, and none is worse than its baseline.
+    """
+    return print_results(drive_suites(tests, only, jobs, ""), json, "passed")
