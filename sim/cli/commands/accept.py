@@ -15,7 +15,7 @@ def accept(
     jobs: suites.Jobs = None,
     json: options.Json = False,
 ) -> int:
-    """Drive the scenarios of suites and write their baselines.
+    """Drive suites and write their baselines.
 
     A drive that is not as its suite expects is not accepted. Exit code 0: every drive was accepted.
     """

@@ -10,7 +10,7 @@ def check(
     jobs: suites.Jobs = None,
     json: options.Json = False,
 ) -> int:
-    """Drive the scenarios of suites and compare them with their baselines.
+    """Drive suites and compare with their baselines.
 
     Exit code 0: every drive is as its suite expects, and none is worse than its baseline.
     """

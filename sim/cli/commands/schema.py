@@ -12,7 +12,7 @@ from antdrive.worlds.errors import InputError
 def schema(
     kind: Annotated[str, typer.Argument(metavar="KIND", help="Kind of file: world, robot or suite.")] = "world",
 ) -> int:
-    """Print the JSON Schema of world files, robot files or suites of drives.
+    """Print the JSON Schema of world, robot or suite files.
 
     An editor that knows it completes keys and marks mistakes.
     """
