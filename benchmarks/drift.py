@@ -63,7 +63,10 @@ def drive_all(small: bool) -> dict[str, Any]:
             continue
         log = done.rollout
         moments = np.arange(0.0, float(log.t[-1]), 1 / HZ)
-        line = [[float(v) for v in np.interp(moments, log.t, log.pose[:, axis])] + [float(log.pose[-1, axis])] for axis in (0, 1)]
+        line = [
+            [float(v) for v in np.interp(moments, log.t, log.pose[:, axis])] + [float(log.pose[-1, axis])]
+            for axis in (0, 1)
+        ]
         metrics = {key: value for key, value in measure(log).items() if key not in WALL_CLOCK}
         found[name] = {
             "kind": kind, "outcome": done.outcome.key, "certified": done.succeeded, "metrics": metrics, "line": line,
@@ -116,7 +119,9 @@ def apart(a: Mapping[str, Any], b: Mapping[str, Any]) -> float:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--python", action="append", default=[], metavar="NAME=PATH", help="another interpreter; may be repeated")
+    parser.add_argument(
+        "--python", action="append", default=[], metavar="NAME=PATH", help="another interpreter; may be repeated"
+    )
     parser.add_argument("--write", type=Path, help="drive in this process and write what came out as JSON")
     parser.add_argument("--small", action="store_true", help="some scenarios only")
     arguments = parser.parse_args()

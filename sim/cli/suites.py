@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, cast, get_args
 
 import typer
 
 from antdrive.sim.cli.compiling import compile_once
 from antdrive.sim.cli.console import bar, print_json, print_line
 from antdrive.sim.cli.exits import FAILED, SUCCEEDED
+from antdrive.worlds.errors import InputError
 
 if TYPE_CHECKING:
+    from antdrive.sim.regression.artefacts import Films, Results
     from antdrive.sim.regression.checking import CheckResult, Update
 
 Suites = Annotated[
@@ -28,8 +31,42 @@ Jobs = Annotated[
 ]
 
 
-def drive_suites(suites: list[str], only: str | None, jobs: int | None, update: Update) -> list[CheckResult]:
+ResultsFolder = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FOLDER", help="Folder for logs, pictures and films of tests.  [default: in the user's cache]"
+    ),
+]
+Film = Annotated[str, typer.Option(metavar="WHEN", help="Of which tests a film is made: never, failed or always.")]
+
+
+def results_in(folder: Path | None, film: str) -> Results:
+    """Where results are written, checked before any work.
+
+    Raises:
+        InputError: the folder cannot be written to, or an unknown word for `--film`.
+    """
+    from antdrive.sim.cli.write import check_folder
+    from antdrive.sim.regression.artefacts import Films, Results, default_folder
+
+    if film not in get_args(Films):
+        raise InputError(f"--film {film}: unknown; choose from {', '.join(get_args(Films))}")
+    if folder is not None:
+        check_folder(folder)
+    return Results(folder or default_folder(Path.cwd()), cast("Films", film))
+
+
+def drive_suites(
+    suites: list[str], only: str | None, jobs: int | None, *, update: Update, results: Results | None
+) -> list[CheckResult]:
     """Drive and judge all tests that the words name, with a progress bar.
+
+    Args:
+        suites: the words
+        only: a pattern for scenarios' names
+        jobs: number of processes; None: one per core
+        update: which baselines to write
+        results: where logs, pictures and films are written; None: nowhere
 
     Raises:
         InputError: there is no such suite or test, or something in a suite is wrong.
@@ -43,7 +80,7 @@ def drive_suites(suites: list[str], only: str | None, jobs: int | None, update: 
     processes = min(jobs or os.cpu_count() or 1, len(cases))
     found = []
     with bar("driving") as progress:
-        for result in check_cases(cases, jobs=processes, update=update):
+        for result in check_cases(cases, jobs=processes, update=update, results=results):
             found.append(result)
             progress(len(found) / len(cases))
     return found

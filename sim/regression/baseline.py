@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import json
 import math
 from collections.abc import Mapping
@@ -50,7 +51,7 @@ class Baseline:
         bound_m: the clearance that the certificate proved [m]; None without one
         metrics: every metric but wall-clock times; empty if the robot did not drive
         nearest: what the robot came nearest to; None if it did not drive
-        hashes: of the world, the robot and the settings; empty if the robot did not drive
+        hashes: of the world, the unseen obstacles, the robot and the settings; empty if the robot did not drive
         versions: of antdrive, Python and the packages that computed the drive
         drive_digest: `Rollout.drive_digest`; empty if the robot did not drive
         limiters: names of the rules that can limit the robot's speed
@@ -115,7 +116,7 @@ class Baseline:
             bound_m=_rounded(certificate.bound) if certificate else None,
             metrics=_metrics(rollout) if rollout else {},
             nearest=nearest_of(rollout) if rollout else None,
-            hashes=hashes_of(rollout.record) if rollout else {},
+            hashes=conditions(rollout) if rollout else {},
             versions=dict(rollout.record.versions) if rollout else versions(),
             drive_digest=rollout.drive_digest if rollout else "",
             limiters=rollout.record.limiters if rollout else (),
@@ -175,6 +176,12 @@ class Baseline:
 
 
 _ADAPTER = TypeAdapter(Baseline)
+
+
+def conditions(rollout: Rollout) -> dict[str, str]:
+    """The hashes of all that a drive depends on, by name: world, robot, settings, unseen obstacles."""
+    unseen = json.dumps([dataclasses.asdict(disc) for disc in rollout.record.unseen], sort_keys=True)
+    return {**hashes_of(rollout.record), "unseen obstacles": hashlib.sha256(unseen.encode()).hexdigest()}
 
 
 def _rounded(value: float) -> float | None:

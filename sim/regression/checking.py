@@ -14,12 +14,13 @@ from typing import Any, Literal, TypeAlias
 from antdrive.planners import PlannerError
 from antdrive.sim.pipeline import Run
 from antdrive.sim.pipeline import run as drive
+from antdrive.sim.regression.artefacts import Films, Results, remove_artefacts, write_artefacts
 from antdrive.sim.regression.baseline import Baseline
 from antdrive.sim.regression.demands import Demands
 from antdrive.sim.regression.explaining import explain
 from antdrive.sim.regression.judging import Judgement, judge, unfulfilled
 from antdrive.sim.regression.scenarios import run_command, scenario_of
-from antdrive.sim.regression.suite import SuiteCase, load_suite, shown_path
+from antdrive.sim.regression.suite import SUFFIX, SuiteCase, load_suite, shown_path
 from antdrive.worlds.errors import InputError
 
 #: Which baselines are written: none, only those that are missing, or all.
@@ -72,12 +73,13 @@ class CheckResult:
         return dataclasses.asdict(self)
 
 
-def check_case(case: SuiteCase, *, update: Update = "") -> CheckResult:
+def check_case(case: SuiteCase, *, update: Update = "", results: Results | None = None) -> CheckResult:
     """Drive a suite's test and judge it.
 
     Args:
         case: the test
         update: which baselines to write
+        results: where logs, pictures and films are written; None: nowhere
 
     Raises:
         InputError: the suite, a file that it names, or the baseline is wrong.
@@ -91,38 +93,54 @@ def check_case(case: SuiteCase, *, update: Update = "") -> CheckResult:
             address=case.address, passed=False, outcome=RAISED, certified=False, faults=(str(error),), commands=commands
         )
     path = case.baseline_path if case.entry.baseline else None
-    return check_run(run, case.demands, path, address=case.address, name=case.id, update=update, commands=commands)
+    folder = results.of(case.suite.name.removesuffix(SUFFIX), case.id) if results else None
+    return check_run(
+        run,
+        case.demands,
+        path,
+        address=case.address,
+        name=case.id,
+        update=update,
+        commands=commands,
+        folder=folder,
+        films=results.films if results else "never",
+    )
 
 
-def check_cases(cases: Sequence[SuiteCase], *, jobs: int = 1, update: Update = "") -> Iterator[CheckResult]:
+def check_cases(
+    cases: Sequence[SuiteCase], *, jobs: int = 1, update: Update = "", results: Results | None = None
+) -> Iterator[CheckResult]:
     """Drive and judge many tests; the results come in the order of the tests and do not depend on `jobs`.
 
     Args:
         cases: the tests
         jobs: number of processes
         update: which baselines to write
+        results: where logs, pictures and films are written; None: nowhere
 
     Raises:
         InputError: a suite, a file that it names, or a baseline is wrong.
     """
     if jobs == 1 or len(cases) == 1:
         for case in cases:
-            yield check_case(case, update=update)
+            yield check_case(case, update=update, results=results)
         return
     import joblib
 
-    calls = (joblib.delayed(_check_by_name)(str(case.suite), case.id, str(Path.cwd()), update) for case in cases)
+    calls = (
+        joblib.delayed(_check_by_name)(str(case.suite), case.id, str(Path.cwd()), update, results) for case in cases
+    )
     for result in joblib.Parallel(n_jobs=jobs, return_as="generator")(calls):
         if isinstance(result, str):
             raise InputError(result)
         yield result
 
 
-def _check_by_name(suite: str, name: str, folder: str, update: Update) -> CheckResult | str:
+def _check_by_name(suite: str, name: str, folder: str, update: Update, results: Results | None) -> CheckResult | str:
     """The result of a test that another process names; a text is the message of an InputError."""
     os.chdir(folder)
     try:
-        return check_case(next(case for case in load_suite(suite) if case.id == name), update=update)
+        return check_case(next(case for case in load_suite(suite) if case.id == name), update=update, results=results)
     except InputError as error:
         return str(error)
 
@@ -137,6 +155,8 @@ def check_run(
     update: Update = "",
     commands: tuple[str, ...] = (),
     accept: str = "",
+    folder: Path | None = None,
+    films: Films = "failed",
 ) -> CheckResult:
     """Judge a run.
 
@@ -149,9 +169,11 @@ def check_run(
         update: which baselines to write
         commands: how to repeat the test
         accept: the command that writes its baseline; by default `antdrive accept`
+        folder: where to write log and pictures if the test fails; None: nowhere
+        films: when to make a film
 
     Raises:
-        InputError: the baseline is wrong, or cannot be written.
+        InputError: the baseline is wrong, or it or the folder cannot be written.
     """
     started = time.perf_counter()
     baseline = None if path is None or update == "all" else Baseline.load(path)
@@ -168,6 +190,12 @@ def check_run(
         judgement = Judgement(tuple(faults))
     else:
         judgement = judge(run, demands, baseline)
+    files: dict[str, str] = {}
+    if folder is not None:
+        remove_artefacts(folder)
+        if not judgement.passed or films == "always":
+            wanted = films != "never"
+            files = write_artefacts(run, folder, baseline, film=wanted, faults=judgement.faults, commands=commands)
     details = () if judgement.passed else tuple(explain(run, dataclasses.replace(judgement, faults=()), baseline))
     return CheckResult(
         address=address,
@@ -179,6 +207,7 @@ def check_run(
         details=details,
         accepted=accepted,
         commands=commands,
+        files=files,
         metrics=run.metrics if run.rollout is not None else {},
         wall_s=_wall(run) + time.perf_counter() - started,
     )

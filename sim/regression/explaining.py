@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from antdrive.sim.log.binding import hashes_of
 from antdrive.sim.pipeline import Run, versions
-from antdrive.sim.regression.baseline import Baseline
+from antdrive.sim.regression.baseline import Baseline, conditions
 from antdrive.sim.regression.judging import Judgement
 from antdrive.sim.regression.nearest import touched_in
 from antdrive.sim.regression.parting import distances, parting
 
-UNCHANGED = "world, robot and settings are those of the baseline"
+UNCHANGED = "world, robot and settings are those of the baseline; so the code is what changed"
 
 
 def explain(run: Run, judgement: Judgement, baseline: Baseline | None) -> Iterator[str]:
@@ -55,7 +54,7 @@ def changes(run: Run, baseline: Baseline) -> Iterator[str]:
         run: the present run
         baseline: the earlier drive
     """
-    hashes = hashes_of(run.rollout.record) if run.rollout else {}
+    hashes = conditions(run.rollout) if run.rollout else {}
     if hashes and baseline.hashes:
         changed = [name for name in hashes if hashes[name] != baseline.hashes.get(name)]
         yield f"changed since the baseline: {', '.join(changed)}" if changed else UNCHANGED

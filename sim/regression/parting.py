@@ -37,10 +37,15 @@ class Parting:
     def sentence(self) -> str:
         """The parting in words."""
         (x, y), (x0, y0) = self.now, self.then
-        rule = f"{self.limiter} limits the speed then"
+        rule = f"{_rule(self.limiter)} limits the speed then"
         if self.limiter != self.limiter_then:
-            rule += f", in the baseline {self.limiter_then} did"
+            rule += f", in the baseline {_rule(self.limiter_then)} did"
         return f"the drives part at t = {self.t:.1f} s, at ({x:.2f}, {y:.2f}) instead of ({x0:.2f}, {y0:.2f}); {rule}"
+
+
+def _rule(name: str) -> str:
+    """A rule's name as the subject of a sentence; at cruise no rule limits the speed."""
+    return "no rule" if name == "cruise" else f"the rule {name!r}"
 
 
 def distances(baseline: Baseline, rollout: Rollout) -> Floats:
@@ -82,6 +87,6 @@ def parting(baseline: Baseline, rollout: Rollout, apart: float = APART) -> Parti
         t,
         (x, y),
         baseline.line[at][:2],
-        names[rule] if rule < len(names) else "no rule",
-        names_then[rule_then] if rule_then < len(names_then) else "no rule",
+        names[rule] if rule < len(names) else "cruise",
+        names_then[rule_then] if rule_then < len(names_then) else "cruise",
     )
