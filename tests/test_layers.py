@@ -27,6 +27,7 @@ SIM_RANKS = {
     "scenario": 2,
     "pipeline": 3,
     "view": 4,
+    "falsify": 5,
     "papers": 5,
     "warm": 5,
     "cli": 6,

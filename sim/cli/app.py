@@ -22,6 +22,7 @@ from antdrive.sim.cli.commands.reproduce import reproduce
 from antdrive.sim.cli.commands.robots import robots
 from antdrive.sim.cli.commands.run import run
 from antdrive.sim.cli.commands.schema import schema
+from antdrive.sim.cli.commands.shrink import shrink
 from antdrive.sim.cli.commands.verify import verify
 from antdrive.sim.cli.commands.warm import warm
 from antdrive.sim.cli.commands.worlds.export import export_world
@@ -44,6 +45,7 @@ COMMANDS: Mapping[str, Callable[..., int]] = MappingProxyType(
         "verify": verify,
         "margin": margin,
         "find-margin": find_margin,
+        "shrink": shrink,
         "reproduce": reproduce,
         "planners": planners,
         "robots": robots,

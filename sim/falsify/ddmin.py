@@ -5,6 +5,7 @@ A. Zeller, R. Hildebrandt, *Simplifying and isolating failure-inducing input*, I
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable, Sequence
 from typing import TypeVar
 
@@ -29,7 +30,7 @@ def one_minimal(
         if subset is not None:
             kept, parts = list(subset), 2
             continue
-        complements = [sum(chunks[:i] + chunks[i + 1 :], []) for i in range(len(chunks))]
+        complements = [list(itertools.chain(*chunks[:i], *chunks[i + 1 :])) for i in range(len(chunks))]
         rest = first(complements) if parts > 2 else None  # of two chunks, the complements are the chunks
         if rest is not None:
             kept, parts = list(rest), max(parts - 1, 2)
@@ -43,4 +44,4 @@ def one_minimal(
 def _split(items: list[Item], parts: int) -> list[list[Item]]:
     """Consecutive pieces of nearly equal length."""
     cuts = [round(i * len(items) / parts) for i in range(parts + 1)]
-    return [items[a:b] for a, b in zip(cuts, cuts[1:], strict=False) if a < b]
+    return [items[a:b] for a, b in itertools.pairwise(cuts) if a < b]

@@ -281,7 +281,7 @@ def _disc_rounded(index: int) -> Callable[[Scenario, int], Scenario | None]:
     return rounded
 
 
-def _roundings(scenario: Scenario) -> list[Callable[[Scenario, int], Scenario | None]]:  # noqa: N802
+def _roundings(scenario: Scenario) -> list[Callable[[Scenario, int], Scenario | None]]:
     """What is rounded by itself: start and goal, and each obstacle."""
     return [_ends_rounded, *map(_disc_rounded, range(len(scenario.task.world.obstacles)))]
 

@@ -19,7 +19,7 @@ from antdrive.worlds.errors import FieldError, InputError
 Settings = TypeVar("Settings", PurePursuit, Avoidance, ReplanPolicy)
 
 
-def scenario_of(record: DriveRecord, planner: Planner | None = None) -> Scenario:
+def rebuilt(record: DriveRecord, planner: Planner | None = None) -> Scenario:
     """The scenario that a log's record describes. It gives the same drive, bit for bit, with the same versions.
 
     Args:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -84,27 +83,30 @@ def shrink(
     if failure is None:
         counts = "a failure is anything but a certified success" if bound is None else f"the bound is {bound}"
         raise InputError(f"{scenario.task.world.name}: this run does not fail, so there is nothing to shrink; {counts}")
-    at = ""
     trials = Trials(
-        failure,
-        bound,
-        seconds=seconds,
-        journal=journal,
-        identity=identity_of(scenario),
-        jobs=jobs,
-        progress=None if progress is None else lambda made: progress(at, made),
+        failure, bound, seconds=seconds, journal=journal, identity=identity_of(scenario), jobs=jobs, progress=progress
     )
-    small, complete = scenario, False
+    try:
+        small, complete = _smallest(scenario, trials)
+        if trials.recalled and failure_in(small, bound) != failure:  # the journal is older than the planner's code
+            trials.forget()
+            small, complete = _smallest(scenario, trials)
+    finally:
+        trials.save()
+    return Shrunk(scenario, small, failure, complete, trials.made, len(trials.recalled))
+
+
+def _smallest(scenario: Scenario, trials: Trials) -> tuple[Scenario, bool]:
+    """What all passes make of a scenario, again and again until none changes anything; whether they came that far."""
+    small = scenario
     try:
         for _ in range(ROUNDS):
             before = changeable(small)
-            for at, shrinking in PASSES:  # noqa: B007 - progress reads it
+            for name, shrinking in PASSES:
+                trials.stage = name
                 small = shrinking(small, trials)
             if changeable(small) == before:
-                complete = True
-                break
+                return small, True
     except OutOfTimeError:
         pass
-    finally:
-        trials.save()
-    return Shrunk(scenario, small, failure, complete, trials.made, trials.recalled)
+    return small, False

@@ -15,7 +15,7 @@ from antdrive.planners import PlannerError
 from antdrive.sim.falsify.failure import Failure, MetricBound, failure_of
 from antdrive.sim.log.record import settings_of
 from antdrive.sim.log.rollout import Rollout
-from antdrive.sim.pipeline import run, versions
+from antdrive.sim.pipeline import ENDED_BY, Run, plan, run, versions
 from antdrive.sim.scenario import Scenario
 from antdrive.worlds.errors import FieldError, InputError
 from antdrive.worlds.files.atomic import written_whole
@@ -28,15 +28,19 @@ class OutOfTimeError(Exception):
     """The time for trials is over."""
 
 
-def failure_in(scenario: Scenario, bound: MetricBound | None = None) -> Failure | None:
+def failure_in(scenario: Scenario, bound: MetricBound | None = None, *, drive: bool = True) -> Failure | None:
     """How a scenario fails when it is run; None if it does not, or cannot be run at all.
 
     Args:
         scenario: what to run
         bound: what counts as failure; None: everything but a certified success
+        drive: whether to drive where there is a plan; else only failures of planning are found
     """
     try:
-        return failure_of(run(scenario), bound)
+        if drive:
+            return failure_of(run(scenario), bound)
+        grid, answer = plan(scenario)
+        return None if answer.solved else failure_of(Run(scenario, grid, answer), bound)
     except (FieldError, InputError, PlannerError):  # such as a wanderer without a free cell in a smaller world
         return None
 
@@ -47,8 +51,9 @@ class Trials:
     The answers depend on the candidates alone, not on time, processes, or what a journal already knew.
 
     Attributes:
+        stage: what is being tried, for the progress
         made: how many candidates were run so far
-        recalled: how many answers came from an earlier session's journal
+        recalled: the candidates whose answers came from an earlier session's journal
     """
 
     def __init__(
@@ -60,9 +65,9 @@ class Trials:
         journal: Path | None = None,
         identity: str = "",
         jobs: int = 1,
-        progress: Callable[[int], None] | None = None,
+        progress: Callable[[str, int], None] | None = None,
     ) -> None:
-        self.made = self.recalled = 0
+        self.stage, self.made, self.recalled = "", 0, set[str]()
         self._wanted, self._bound, self._jobs, self._progress = wanted, bound, max(1, jobs), progress
         self._deadline = time.monotonic() + seconds
         self._journal, self._written = journal, time.monotonic()
@@ -97,7 +102,7 @@ class Trials:
     def forget(self) -> None:
         """Drop all answers, also those of the journal."""
         self._answers.clear()
-        self._known = frozenset()
+        self._known, self._latest = frozenset(), None
         self.save()
 
     def save(self) -> None:
@@ -109,7 +114,7 @@ class Trials:
                 part.write_text(text + "\n", encoding="utf-8")
 
     def _try(self, batch: list[tuple[str, Scenario]]) -> None:
-        self.recalled += sum(key in self._known for key, _ in batch)
+        self.recalled |= {key for key, _ in batch} & self._known
         fresh = {key: candidate for key, candidate in batch if key not in self._answers}
         if not fresh:
             return
@@ -118,17 +123,20 @@ class Trials:
         self._answers.update(zip(fresh, self._run(list(fresh.values())), strict=True))
         self.made += len(fresh)
         if self._progress is not None:
-            self._progress(self.made)
+            self._progress(self.stage, self.made)
         if time.monotonic() - self._written > JOURNAL_EVERY:
             self.save()
 
     def _run(self, candidates: list[Scenario]) -> Iterator[bool]:
+        drive = self._wanted.outcome not in {outcome.key for outcome in ENDED_BY.values()}
         if len(candidates) == 1:
-            found = [failure_in(candidates[0], self._bound)]
+            found = [failure_in(candidates[0], self._bound, drive=drive)]
         else:
             from joblib import Parallel, delayed
 
-            found = Parallel(self._jobs)(delayed(failure_in)(candidate, self._bound) for candidate in candidates)
+            found = Parallel(self._jobs)(
+                delayed(failure_in)(candidate, self._bound, drive=drive) for candidate in candidates
+            )
         return (failure == self._wanted for failure in found)
 
 
