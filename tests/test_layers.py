@@ -30,7 +30,8 @@ SIM_RANKS = {
     "falsify": 5,
     "papers": 5,
     "warm": 5,
-    "cli": 6,
+    "regression": 5,
+    "cli": 7,
 }
 
 
