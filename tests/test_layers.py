@@ -27,10 +27,10 @@ SIM_RANKS = {
     "scenario": 2,
     "pipeline": 3,
     "view": 4,
-    "falsify": 5,
     "papers": 5,
     "warm": 5,
     "regression": 5,
+    "falsify": 6,
     "cli": 7,
 }
 

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import operator
 import re
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 
 from antdrive.sim.log.contacts import touches_of
 from antdrive.sim.log.margin import budget
@@ -16,63 +13,32 @@ from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import Run
+from antdrive.sim.regression.demands import Bound
 from antdrive.worlds.errors import FieldError
+from antdrive.worlds.files.checks import suggest
 
 #: The kinds of things that a robot can touch.
 CYLINDER, UNSEEN, MOVER, WALL = "cylinder", "unseen cylinder", "mover", "wall"
 NOTHING = "nothing"
 
-_RELATIONS: Mapping[str, Callable[[float, float], bool]] = MappingProxyType(
-    {"<=": operator.le, ">=": operator.ge, "<": operator.lt, ">": operator.gt}
-)
+_BOUND = re.compile(r"\s*(\w+)\s*(<=|>=|<|>|==)\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*")
 
 
-@dataclass(frozen=True)
-class MetricBound:
-    """A bound that a metric crosses in a drive that counts as failed, such as "min_clearance_m < 0.02".
+def parse_bound(text: str) -> Bound:
+    """The bound in a text such as "min_clearance_m < 0.02".
 
-    Attributes:
-        metric: a name of `METRICS`
-        relation: <, <=, > or >=
-        value: in the metric's unit
+    Args:
+        text: metric, relation and number
 
     Raises:
-        FieldError: an unknown metric or relation, or a value that is no finite number.
+        FieldError: it is not of that form, or there is no such metric.
     """
-
-    metric: str
-    relation: str
-    value: float
-
-    def __post_init__(self) -> None:
-        if self.metric not in METRICS:
-            raise FieldError("while", f"unknown metric {self.metric!r:.60}; choose from {', '.join(METRICS)}")
-        if self.relation not in _RELATIONS:
-            raise FieldError("while", f"unknown relation {self.relation!r:.20}; choose from {', '.join(_RELATIONS)}")
-        if not math.isfinite(self.value):
-            raise FieldError("while", f"must compare with a finite number, got {self.value}")
-
-    @classmethod
-    def parse(cls, text: str) -> MetricBound:
-        """The bound in a text such as "min_clearance_m < 0.02".
-
-        Args:
-            text: metric, relation and number
-
-        Raises:
-            FieldError: it is not of that form, or has no such metric.
-        """
-        found = re.fullmatch(r"\s*(\w+)\s*(<=|>=|<|>)\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*", text)
-        if found is None or found[3].count(".") > 1 or not re.search(r"\d", found[3]):
-            raise FieldError("while", f"write METRIC < NUMBER, with <, <=, > or >=; got {text!r:.60}")
-        return cls(found[1], found[2], float(found[3]))
-
-    def __str__(self) -> str:
-        return f"{self.metric} {self.relation} {self.value:g}"
-
-    def holds(self, rollout: Rollout) -> bool:
-        """Whether a drive is on the failing side of the bound."""
-        return _RELATIONS[self.relation](METRICS[self.metric](rollout), self.value)
+    found = _BOUND.fullmatch(text)
+    if found is None or not math.isfinite(float(found[3])):
+        raise FieldError("--while", f"write METRIC < NUMBER, with <, <=, >, >= or ==; got {text!r:.60}")
+    if found[1] not in METRICS:
+        raise FieldError("--while", f"unknown metric {found[1]!r:.60}; {suggest(found[1], METRICS)}")
+    return Bound(found[1], found[2], float(found[3]))
 
 
 @dataclass(frozen=True)
@@ -101,7 +67,7 @@ class Failure:
         return " ".join(parts) + (f" ({self.cause})" if self.cause else "")
 
 
-def failure_of(run: Run, bound: MetricBound | None = None) -> Failure | None:
+def failure_of(run: Run, bound: Bound | None = None) -> Failure | None:
     """How a run failed; None if it did not.
 
     Args:
@@ -111,7 +77,7 @@ def failure_of(run: Run, bound: MetricBound | None = None) -> Failure | None:
     rollout = run.rollout
     touched = NOTHING if rollout is None else touched_first(rollout)
     if bound is not None:
-        if rollout is None or not bound.holds(rollout):
+        if rollout is None or not bound.holds(METRICS[bound.metric](rollout)):
             return None
         return Failure(run.outcome.key, touched, str(bound))
     if run.succeeded:

@@ -14,14 +14,12 @@ import yaml
 from antdrive.planners import list_planners
 from antdrive.robots import Avoidance, PurePursuit, RobotSpec, list_robots, load_robot
 from antdrive.sim.driving.replanning import ReplanPolicy
-from antdrive.sim.falsify.failure import MetricBound
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.pipeline import Run, run
+from antdrive.sim.regression.demands import Bound
 from antdrive.sim.scenario import Scenario
 from antdrive.worlds import save_task
 from antdrive.worlds.files.atomic import written_whole
-
-SUFFIX = ".drive.yaml"
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +35,7 @@ class Handover:
 
     name: str
     run: Run
-    bound: MetricBound | None = None
+    bound: Bound | None = None
     note: str = ""
 
 
@@ -105,7 +103,7 @@ def suite_entry(scenario: Scenario, robot: str) -> dict[str, Any]:
     return plain | (_among_movers(scenario) if scenario.task.world.movers else {})
 
 
-def expectation(failed: Run, bound: MetricBound | None = None) -> dict[str, Any]:
+def expectation(failed: Run, bound: Bound | None = None) -> dict[str, Any]:
     """What a suite expects of a scenario that is to fail as it did.
 
     Args:
@@ -116,7 +114,7 @@ def expectation(failed: Run, bound: MetricBound | None = None) -> dict[str, Any]
     if failed.outcome is Outcome.SUCCEEDED:
         expected["certified"] = failed.succeeded
     if bound is not None:
-        expected[bound.metric] = f"{bound.relation} {bound.value!r}"
+        expected[bound.metric] = f"{bound.sign} {bound.value!r}"
     return expected
 
 

@@ -6,10 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from antdrive.sim.falsify.failure import Failure, MetricBound, failure_of
+from antdrive.sim.falsify.failure import Failure, failure_of
 from antdrive.sim.falsify.passes import PASSES
 from antdrive.sim.falsify.trials import OutOfTimeError, Trials, changeable, failure_in, identity_of
 from antdrive.sim.pipeline import run
+from antdrive.sim.regression.demands import Bound
 from antdrive.sim.scenario import Scenario
 from antdrive.worlds.errors import InputError
 
@@ -56,7 +57,7 @@ class Shrunk:
 def shrink(
     scenario: Scenario,
     *,
-    bound: MetricBound | None = None,
+    bound: Bound | None = None,
     seconds: float = 60.0,
     journal: Path | None = None,
     jobs: int = 1,

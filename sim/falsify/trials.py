@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from antdrive.planners import PlannerError
-from antdrive.sim.falsify.failure import Failure, MetricBound, failure_of
+from antdrive.sim.falsify.failure import Failure, failure_of
 from antdrive.sim.log.record import settings_of
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import ENDED_BY, Run, plan, run, versions
+from antdrive.sim.regression.demands import Bound
 from antdrive.sim.scenario import Scenario
 from antdrive.worlds.errors import FieldError, InputError
 from antdrive.worlds.files.atomic import written_whole
@@ -28,7 +29,7 @@ class OutOfTimeError(Exception):
     """The time for trials is over."""
 
 
-def failure_in(scenario: Scenario, bound: MetricBound | None = None, *, drive: bool = True) -> Failure | None:
+def failure_in(scenario: Scenario, bound: Bound | None = None, *, drive: bool = True) -> Failure | None:
     """How a scenario fails when it is run; None if it does not, or cannot be run at all.
 
     Args:
@@ -59,7 +60,7 @@ class Trials:
     def __init__(
         self,
         wanted: Failure,
-        bound: MetricBound | None = None,
+        bound: Bound | None = None,
         *,
         seconds: float = float("inf"),
         journal: Path | None = None,

@@ -14,8 +14,8 @@ from antdrive.sim.cli.write import check_folder, file_name, this_command, write_
 from antdrive.worlds.errors import InputError
 
 if TYPE_CHECKING:
-    from antdrive.sim.falsify.failure import MetricBound
     from antdrive.sim.falsify.shrink import Shrunk
+    from antdrive.sim.regression.demands import Bound
     from antdrive.sim.scenario import Scenario
 
 While = Annotated[
@@ -52,11 +52,11 @@ def shrink(
     with the scenario and how it fails, the log and a film. Exit code 0: the result fails in the same way, in another process
     too.
     """
-    from antdrive.sim.falsify.failure import MetricBound
+    from antdrive.sim.falsify.failure import parse_bound
     from antdrive.sim.falsify.shrink import shrink as make_small
 
-    crossed = None if bound is None else MetricBound.parse(bound)
-    scenario = _scenario(failure)
+    crossed = None if bound is None else parse_bound(bound)
+    scenario = _of_a_test(failure) if "::" in failure else _of_a_log(failure)
     name = f"{file_name(scenario.task.world.name)}-small"
     folder = out or Path("out") / name
     check_folder(folder)
@@ -72,7 +72,18 @@ def shrink(
     return SUCCEEDED if repeats else FAILED
 
 
-def _scenario(words: str) -> "Scenario":
+def _of_a_test(words: str) -> "Scenario":
+    """The scenario of a suite's test."""
+    from antdrive.sim.regression.scenarios import scenario_of
+    from antdrive.sim.regression.selecting import select
+
+    cases = select([words])
+    if len(cases) > 1:
+        raise InputError(f"{words}: name one of {', '.join(case.address for case in cases[:5])}")
+    return scenario_of(cases[0])
+
+
+def _of_a_log(words: str) -> "Scenario":
     """The scenario of a log, rebuilt from its record."""
     from antdrive.sim.falsify.rebuild import rebuilt
     from antdrive.sim.log.rollout import read_record
@@ -85,7 +96,7 @@ def _scenario(words: str) -> "Scenario":
 
 
 def _write(
-    shrunk: "Shrunk", bound: "MetricBound | None", name: str, folder: Path, film: bool, figures: bool
+    shrunk: "Shrunk", bound: "Bound | None", name: str, folder: Path, film: bool, figures: bool
 ) -> tuple[dict[str, Any], bool]:
     """Write everything about a small failure; the report, and whether another process gives the same run."""
     from antdrive.sim.falsify.failure import failure_of

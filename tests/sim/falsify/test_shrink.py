@@ -9,7 +9,7 @@ import pytest
 from antdrive.planners import PLANNERS, Planner, PlanResult, Query
 from antdrive.sim import Scenario, run
 from antdrive.sim.falsify import passes
-from antdrive.sim.falsify.failure import Failure, MetricBound, failure_of
+from antdrive.sim.falsify.failure import Failure, failure_of, parse_bound
 from antdrive.sim.falsify.shrink import Shrunk, shrink
 from antdrive.sim.falsify.trials import Trials, changeable
 from antdrive.worlds import Cruising, Disc, InputError, Task, World
@@ -96,7 +96,7 @@ def test_the_mover_that_was_touched_is_kept_alone(small_scenario: Scenario) -> N
 
 
 def test_a_bound_on_a_metric_persists(small_scenario: Scenario) -> None:
-    bound = MetricBound.parse("min_clearance_m < 0.05")
+    bound = parse_bound("min_clearance_m < 0.05")
     tight = replace(small_scenario, task=task_with(Disc(3.0, 2.5, 0.3), Disc(3.0, 3.5, 0.25), Disc(1.0, 5.0, 0.2)))
     tight = replace(tight, margin=0.0, smoothing="taut")
     shrunk = shrink(tight, bound=bound)
