@@ -14,6 +14,7 @@ import typer
 from antdrive.sim.cli.commands.accept import accept
 from antdrive.sim.cli.commands.check import check
 from antdrive.sim.cli.commands.compare import compare
+from antdrive.sim.cli.commands.falsify import falsify
 from antdrive.sim.cli.commands.find_margin import find_margin
 from antdrive.sim.cli.commands.margin import margin
 from antdrive.sim.cli.commands.plan import plan
@@ -49,6 +50,7 @@ COMMANDS: Mapping[str, Callable[..., int]] = MappingProxyType(
         "accept": accept,
         "margin": margin,
         "find-margin": find_margin,
+        "falsify": falsify,
         "shrink": shrink,
         "reproduce": reproduce,
         "planners": planners,
