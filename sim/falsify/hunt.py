@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -11,16 +10,14 @@ import numpy as np
 
 from antdrive.sim.falsify.diversity import driven_line, is_new
 from antdrive.sim.falsify.failure import Failure, failure_of
-from antdrive.sim.falsify.search import METHODS, Probe
+from antdrive.sim.falsify.search import METHODS
 from antdrive.sim.falsify.space import WorldSpace, feasible
-from antdrive.sim.log.metrics import nearest_on_route
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.pipeline import Run, run
 from antdrive.sim.scenario import Scenario
 from antdrive.worlds import Floats
 from antdrive.worlds.errors import FieldError
 
-NEAR = 2.0  # cylinders that leave the route so much more than the planned clearance are not near it [robot radii]
 TRIES = 1000  # worlds that are drawn for one run; those without a path are not driven
 
 
@@ -94,17 +91,14 @@ def find_failures(
         raise FieldError("method", f"unknown {method!r:.40}; choose from {', '.join(METHODS)}")
     if budget < 1:
         raise FieldError("budget", f"must be at least 1, got {budget}")
-    space = WorldSpace(obstacles, setup.robot.radius)
-    search = METHODS[method](space.dimensions, np.random.default_rng([seed, obstacles]))
+    space, rng = WorldSpace(obstacles, setup.robot.radius), np.random.default_rng([seed, obstacles])
     findings: list[Finding] = []
     number = 0
     try:
         for number in range(1, budget + 1):
-            drawn = dataclasses.replace(setup, seed=number)
-            point, scenario = _next_world(search.ask, space, drawn, f"falsify-{seed}-{number}")
-            done = run(scenario)
+            numbered = dataclasses.replace(setup, seed=number)
+            done = run(_next_world(space, rng, method, numbered, f"falsify-{seed}-{number}"))
             failure = _failure(done)
-            search.tell(_probe(point, space, done, failure))
             if failure is not None:
                 findings.append(_finding(done, failure, number, findings))
             if progress is not None:
@@ -114,16 +108,22 @@ def find_failures(
     return Hunt(tuple(findings), number)
 
 
-def _next_world(ask: Callable[[], Floats], space: WorldSpace, setup: Scenario, name: str) -> tuple[Floats, Scenario]:
-    """The next point whose world has a path with the clearance that the set-up claims, and the set-up in it."""
+def _next_world(space: WorldSpace, rng: np.random.Generator, method: str, setup: Scenario, name: str) -> Scenario:
+    """The set-up in the next world, which has a path with the clearance that the set-up claims."""
+
+    def draw() -> Scenario | None:
+        task = space.task(rng.random(space.dimensions), name)
+        if not feasible(task, setup.inflate):
+            return None
+        try:
+            return dataclasses.replace(setup, task=task)
+        except FieldError:  # the footprint does not fit at the start
+            return None
+
     for _ in range(TRIES):
-        point = ask()
-        task = space.task(point, name)
-        if feasible(task, setup.inflate):
-            try:
-                return point, dataclasses.replace(setup, task=task)
-            except FieldError:  # the footprint does not fit at the start
-                continue
+        scenario = METHODS[method](draw)
+        if scenario is not None:
+            return scenario
     raise FieldError(
         "obstacles", f"no world of {space.count} cylinders with a path was found in {TRIES} draws; use fewer"
     )
@@ -137,37 +137,6 @@ def _failure(done: Run) -> Failure | None:
     scenario = done.scenario
     cell = scenario.cell or scenario.task.cell
     return failure if feasible(scenario.task, scenario.inflate + cell) else None
-
-
-def _probe(point: Floats, space: WorldSpace, done: Run, failure: Failure | None) -> Probe:
-    """What the search learns from a run."""
-    rollout, none = done.rollout, np.zeros_like(point)
-    if rollout is None:
-        return Probe(point, (0.0, 0.0), 0.0 if failure else math.inf, none)
-    row = int(rollout.contacts[0, 0]) if len(rollout.contacts) else int(rollout.clearance.argmin())
-    x, y, _ = rollout.pose[row].tolist()
-    width, height = done.scenario.task.world.size
-    place = (_fraction(x / width), _fraction(y / height))
-    if failure is not None:
-        return Probe(point, place, 0.0, none)
-    return Probe(point, place, float(rollout.clearance[row]), _push(space, done, rollout.route))
-
-
-def _push(space: WorldSpace, done: Run, route: Floats) -> Floats:
-    """The change of coordinates (D,) that moves cylinders towards the route until they leave it the planned clearance."""
-    push = np.zeros(space.dimensions)
-    discs = done.scenario.task.world.discs
-    feet = nearest_on_route(discs[:, :2], route)
-    for i, (offset, radius) in enumerate(zip(feet - discs[:, :2], discs[:, 2], strict=True)):
-        away = float(np.hypot(*offset))
-        slack = away - float(radius) - done.scenario.inflate
-        if 0 < slack < NEAR * done.scenario.robot.radius:
-            push += space.step(i, *(slack / away * offset).tolist())
-    return push
-
-
-def _fraction(value: float) -> float:
-    return min(max(value, 0.0), 1.0)
 
 
 def _finding(done: Run, failure: Failure, number: int, known: list[Finding]) -> Finding:

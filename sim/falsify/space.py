@@ -68,19 +68,6 @@ class WorldSpace:
             cell=float(f"{CELL * r:.2g}"),
         )
 
-    def step(self, index: int, dx: float, dy: float) -> Floats:
-        """The change of a point (D,) that moves one cylinder.
-
-        Args:
-            index: which cylinder
-            dx: how far, along x [m]
-            dy: how far, along y [m]
-        """
-        low, high = self._range
-        change = np.zeros((self.count, 3))
-        change[index, :2] = (dx, dy) / (high - low)[:2]
-        return change.ravel()
-
     @property
     def _range(self) -> tuple[Floats, Floats]:
         """The least and the largest x, y and radius of a cylinder [m]."""

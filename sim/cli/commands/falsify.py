@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Budget = Annotated[int, typer.Option(min=1, max=1_000_000, metavar="NUMBER", help="Runs that the search may make.")]
 Method = Annotated[
-    str, typer.Option(metavar="NAME", help="How worlds are chosen: guided (near misses are varied) or random.")
+    str, typer.Option(metavar="NAME", help="How worlds are chosen: guided (by rehearsals without physics) or random.")
 ]
 Obstacles = Annotated[int, typer.Option(min=1, max=50, metavar="NUMBER", help="Cylinders in each world.")]
 Seconds = Annotated[
@@ -52,10 +52,10 @@ def falsify(
     film: Film = True,
     json: options.Json = False,
 ) -> int:
-    """Look for worlds in which a set-up fails although a path exists.
+    """Look for worlds where a set-up fails.
 
-    Failures are run again in another process, shrunk, and written as a suite with a film each. Ctrl-C keeps what was found.
-    Exit code 0: nothing was found. Exit code 1: the set-up fails in some world.
+    A path exists in each of them. Failures are run again in another process, shrunk, and written as a suite with a film
+    each. Ctrl-C keeps what was found. Exit code 0: nothing was found. Exit code 1: the set-up fails in some world.
     """
     from antdrive.sim.falsify.hunt import find_failures
 
