@@ -25,38 +25,40 @@ HZ = 10
 WALL_CLOCK = ("plan_s", "drive_wall_s")
 
 
-def scenarios(small: bool) -> Iterator[tuple[str, str, Any]]:
-    """Kind, name and scenario of each drive."""
+def scenarios(size: str) -> Iterator[tuple[str, str, Any]]:
+    """Kind, name and scenario of each drive; a smaller size has the first of each kind, `tiny` two in one forest."""
     from antdrive.sim import Scenario
     from antdrive.worlds import generate
 
-    for kind in ("forest", "barn"):
-        for seed in range(1 if small else 6):
+    for kind in ("forest",) if size == "tiny" else ("forest", "barn"):
+        for seed in range(6 if size == "full" else 1):
             task = generate(kind, np.random.default_rng(seed), {}, name=f"{kind}-{seed}", note="")
-            for robot in ("turtlebot", "jackal"):
+            for robot in ("turtlebot",) if size == "tiny" else ("turtlebot", "jackal"):
                 for noise in (0.0, 1.0):
                     name = f"{kind}-{seed} {robot} noise {noise:g}"
                     what = "standing, noise 1" if noise else "standing, noise 0"
                     yield what, name, Scenario.of(task, "astar", robot, noise=noise, seed=seed)
-    if small:
+    if size == "tiny":
         return
-    for planner in ("aco-han", "ants", "mmas", "pfaco", "ga-han", "hybrid", "tangent"):
+    planners = ("aco-han", "ants", "mmas", "pfaco", "ga-han", "hybrid", "tangent")
+    for planner in planners if size == "full" else planners[:1]:
         for seed in range(2):
             yield "standing, ants and genes", f"forest {planner} {seed}", Scenario.of("forest", planner, seed=seed)
-    for world, planner in (
+    worlds = (
         ("plaza-moving", "dstar-lite"), ("plaza-moving", "astar"), ("plaza-moving", "sipp"), ("hasan-1a-moving", "dstar-lite"),
         ("hasan-3c-moving", "dstar-lite"), ("hasan-5e-moving", "ants"),
-    ):  # fmt: skip
-        for seed in range(3):
+    )  # fmt: skip
+    for world, planner in worlds if size == "full" else worlds[:1]:
+        for seed in range(3 if size == "full" else 2):
             yield "among movers", f"{world} {planner} {seed}", Scenario.of(world, planner, seed=seed)
 
 
-def drive_all(small: bool) -> dict[str, Any]:
+def drive_all(size: str) -> dict[str, Any]:
     """What each drive did, by name, as plain values."""
     from antdrive.sim import measure, run
 
     found = {}
-    for kind, name, scenario in scenarios(small):
+    for kind, name, scenario in scenarios(size):
         done = run(scenario)
         if done.rollout is None:
             found[name] = {"kind": kind, "outcome": done.outcome.key}
@@ -75,13 +77,12 @@ def drive_all(small: bool) -> dict[str, Any]:
     return found
 
 
-def other(python: str, small: bool, extra: Mapping[str, str]) -> dict[str, Any]:
+def other(python: str, size: str, extra: Mapping[str, str]) -> dict[str, Any]:
     """The drives of another process."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "drives.json"
-        words = [python, "-m", "benchmarks.drift", "--write", str(path), *(["--small"] if small else [])]
-        environment = {**os.environ, "NUMBA_CACHE_DIR": str(Path(folder) / "cache"), **extra}
-        subprocess.run(words, env=environment, check=True)
+        words = [python, "-m", "benchmarks.drift", "--write", str(path), "--size", size]
+        subprocess.run(words, env={**os.environ, **extra}, check=True)
         content = json.loads(path.read_text())
         assert isinstance(content, dict)
         return content
@@ -123,28 +124,29 @@ def main() -> None:
         "--python", action="append", default=[], metavar="NAME=PATH", help="another interpreter; may be repeated"
     )
     parser.add_argument("--write", type=Path, help="drive in this process and write what came out as JSON")
-    parser.add_argument("--small", action="store_true", help="some scenarios only")
+    parser.add_argument("--size", choices=("tiny", "small", "full"), default="full", help="how many scenarios")
     arguments = parser.parse_args()
-    ours = drive_all(arguments.small)
+    ours = drive_all(arguments.size)
     if arguments.write:
         arguments.write.write_text(json.dumps(ours))
         return
-    variants: list[tuple[str, str, bool, dict[str, str]]] = [
-        ("again", sys.executable, arguments.small, {}),
-        ("generic CPU", sys.executable, arguments.small, {"NUMBA_CPU_NAME": "generic"}),
-        ("not compiled", sys.executable, True, {"NUMBA_DISABLE_JIT": "1"}),
+    variants: list[tuple[str, str, str, dict[str, str]]] = [
+        ("again", sys.executable, arguments.size, {}),
+        ("generic CPU", sys.executable, arguments.size, {"NUMBA_CPU_NAME": "generic"}),
+        ("not compiled", sys.executable, "tiny", {"NUMBA_DISABLE_JIT": "1"}),
     ]
     for text in arguments.python:
         name, _, path = text.partition("=")
-        variants.append((name, path, arguments.small, {}))
+        variants.append((name, path, arguments.size, {}))
     heads = [
         "drives", "kind", "bit-identical", "other verdict", "line [m]", "min_clearance_m", "driven_length_m", "duration_s",
         "tracking_error_max_m", "metrics that changed by more than 1e-6",
     ]  # fmt: skip
-    found = []
-    for name, python, small, extra in variants:
+    found: list[list[str]] = []
+    for name, python, size, extra in variants:
         print(f"driving: {name}", file=sys.stderr)
-        found += list(rows(name, ours, other(python, small, extra)))
+        found += rows(name, ours, other(python, size, extra))
+        print(*found[-1], sep=" | ", file=sys.stderr)
     for line in table(heads, found):
         print(line)
 

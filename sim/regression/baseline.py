@@ -116,7 +116,7 @@ class Baseline:
             bound_m=_rounded(certificate.bound) if certificate else None,
             metrics=_metrics(rollout) if rollout else {},
             nearest=nearest_of(rollout) if rollout else None,
-            hashes=conditions(rollout) if rollout else {},
+            hashes=conditions(run),
             versions=dict(rollout.record.versions) if rollout else versions(),
             drive_digest=rollout.drive_digest if rollout else "",
             limiters=rollout.record.limiters if rollout else (),
@@ -178,10 +178,17 @@ class Baseline:
 _ADAPTER = TypeAdapter(Baseline)
 
 
-def conditions(rollout: Rollout) -> dict[str, str]:
-    """The hashes of all that a drive depends on, by name: world, robot, settings, unseen obstacles."""
-    unseen = json.dumps([dataclasses.asdict(disc) for disc in rollout.record.unseen], sort_keys=True)
-    return {**hashes_of(rollout.record), "unseen obstacles": hashlib.sha256(unseen.encode()).hexdigest()}
+def conditions(run: Run) -> dict[str, str]:
+    """The hashes of all that a run depends on, by name: world, robot, settings, unseen obstacles; none without a rollout.
+
+    The record's time limit counts only where it was given: by default it follows from the robot and the route.
+    """
+    if run.rollout is None:
+        return {}
+    scenario, record = run.scenario, run.rollout.record
+    given = dataclasses.replace(record, time_limit=scenario.time_limit or scenario.task.time_limit or 1.0)
+    unseen = json.dumps([dataclasses.asdict(disc) for disc in record.unseen], sort_keys=True)
+    return {**hashes_of(given), "unseen obstacles": hashlib.sha256(unseen.encode()).hexdigest()}
 
 
 def _rounded(value: float) -> float | None:

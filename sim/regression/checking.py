@@ -21,7 +21,7 @@ from antdrive.sim.regression.explaining import explain
 from antdrive.sim.regression.judging import Judgement, judge, unfulfilled
 from antdrive.sim.regression.scenarios import run_command, scenario_of
 from antdrive.sim.regression.suite import SUFFIX, SuiteCase, load_suite, shown_path
-from antdrive.worlds.errors import InputError
+from antdrive.worlds.errors import InputError, input_error
 
 #: Which baselines are written: none, only those that are missing, or all.
 Update: TypeAlias = Literal["", "new", "all"]
@@ -177,6 +177,10 @@ def check_run(
     """
     started = time.perf_counter()
     baseline = None if path is None or update == "all" else Baseline.load(path)
+    if baseline is not None and baseline.case != name:
+        raise input_error(
+            shown_path(path or Path()), "case", f"belongs to {baseline.case}, not to {name}; accept {name} anew"
+        )
     accepted, faults = "", list(unfulfilled(run, demands))
     if path is not None and baseline is None:
         if not update:

@@ -54,7 +54,7 @@ def changes(run: Run, baseline: Baseline) -> Iterator[str]:
         run: the present run
         baseline: the earlier drive
     """
-    hashes = conditions(run.rollout) if run.rollout else {}
+    hashes = conditions(run)
     if hashes and baseline.hashes:
         changed = [name for name in hashes if hashes[name] != baseline.hashes.get(name)]
         yield f"changed since the baseline: {', '.join(changed)}" if changed else UNCHANGED

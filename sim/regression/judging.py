@@ -27,6 +27,8 @@ _WORDS = {
     "tracking_error_max_m": "farther off",
     "tracking_error_p95_m": "farther off",
 }
+#: The metrics that messages begin with.
+FIRST = ("contacts_driving", "min_clearance_m", "duration_s", "driven_length_m")
 _PLACED = ("min_clearance_m",)
 
 
@@ -62,7 +64,7 @@ def judge(run: Run, demands: Demands, baseline: Baseline | None) -> Judgement:
         verdict = _verdict(run, baseline)
         (gains if verdict and run.succeeded else faults).extend(verdict)
         if run.rollout is not None and baseline.line and run.outcome is baseline.outcome:
-            for name in METRICS:
+            for name in (*FIRST, *(name for name in METRICS if name not in FIRST)):
                 _compare(name, run.rollout, baseline, demands, faults, gains)
             faults += _line_faults(run.rollout, baseline, demands)
     return Judgement(tuple(faults), tuple(gains))
