@@ -46,11 +46,11 @@ def shrink(
     jobs: Jobs = 1,
     json: options.Json = False,
 ) -> int:
-    """Make a failure small: the smallest world that still fails in the same way.
+    """Find the smallest world that still fails.
 
-    Leaves out obstacles and movers, noise and digits, and moves start, goal and walls nearer. Writes the world, a suite
-    with the scenario and how it fails, the log and a film. Exit code 0: the result fails in the same way, in another process
-    too.
+    It fails in the same way: same outcome, same kind of thing touched, same cause. Leaves out obstacles and movers, noise and
+    digits, and moves start, goal and walls nearer. Writes the world, a suite with the scenario and how it fails, the log and
+    a film. Exit code 0: the result fails in the same way, in another process too.
     """
     from antdrive.sim.falsify.failure import parse_bound
     from antdrive.sim.falsify.shrink import shrink as make_small
