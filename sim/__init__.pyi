@@ -1,5 +1,16 @@
 from .driving.perception import Perception as Perception
 from .driving.replanning import ReplanPolicy as ReplanPolicy
+from .falsify.failure import Failure as Failure
+from .falsify.failure import failure_of as failure_of
+from .falsify.failure import parse_bound as parse_bound
+from .falsify.handover import Handover as Handover
+from .falsify.handover import write_suite as write_suite
+from .falsify.hunt import Finding as Finding
+from .falsify.hunt import Hunt as Hunt
+from .falsify.hunt import find_failures as find_failures
+from .falsify.rebuild import rebuilt as rebuilt
+from .falsify.shrink import Shrunk as Shrunk
+from .falsify.shrink import shrink as shrink
 from .log.certificate import Certificate as Certificate
 from .log.certificate import certify as certify
 from .log.metrics import METRICS as METRICS

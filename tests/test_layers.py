@@ -32,6 +32,7 @@ SIM_RANKS = {
     "papers": 5,
     "warm": 5,
     "regression": 5,
+    "falsify": 6,
     "cli": 7,
 }
 

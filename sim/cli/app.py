@@ -14,6 +14,7 @@ import typer
 from antdrive.sim.cli.commands.accept import accept
 from antdrive.sim.cli.commands.check import check
 from antdrive.sim.cli.commands.compare import compare
+from antdrive.sim.cli.commands.falsify import falsify
 from antdrive.sim.cli.commands.find_margin import find_margin
 from antdrive.sim.cli.commands.margin import margin
 from antdrive.sim.cli.commands.plan import plan
@@ -24,6 +25,7 @@ from antdrive.sim.cli.commands.reproduce import reproduce
 from antdrive.sim.cli.commands.robots import robots
 from antdrive.sim.cli.commands.run import run
 from antdrive.sim.cli.commands.schema import schema
+from antdrive.sim.cli.commands.shrink import shrink
 from antdrive.sim.cli.commands.verify import verify
 from antdrive.sim.cli.commands.warm import warm
 from antdrive.sim.cli.commands.worlds.export import export_world
@@ -48,6 +50,8 @@ COMMANDS: Mapping[str, Callable[..., int]] = MappingProxyType(
         "accept": accept,
         "margin": margin,
         "find-margin": find_margin,
+        "falsify": falsify,
+        "shrink": shrink,
         "reproduce": reproduce,
         "planners": planners,
         "robots": robots,

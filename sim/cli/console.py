@@ -37,6 +37,24 @@ def bar(label: str) -> Iterator[Callable[[float], None]]:
 
 
 @contextmanager
+def working(label: str) -> Iterator[Callable[[str, int], None]]:
+    """A bar on stderr for work of unknown length, which shows nothing where stderr is no terminal.
+
+    Yields a function that the block calls with what it is doing and how many steps it has done.
+    """
+    if not sys.stderr.isatty():
+        yield lambda stage, done: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[at]}"), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task(label, total=None, at="")
+        yield lambda stage, done: progress.update(task, at=f"{stage}, {done} runs")
+
+
+@contextmanager
 def planning(label: str) -> Iterator[None]:
     """A progress bar over the iterations of planners that run in the block, with the best length so far."""
     if not sys.stderr.isatty():

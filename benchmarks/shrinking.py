@@ -1,0 +1,77 @@
+"""How small failures become, and how long it takes: `python -m benchmarks.shrinking [--failures N] [--seconds S]`.
+
+Random forests of 60 cylinders on 14 m, driven by `jackal` without a margin, without smoothing and with its noise; the first
+drives that fail are shrunk.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import statistics
+import time
+from collections.abc import Iterator
+
+import numpy as np
+
+from antdrive.sim import Run, Scenario, run
+from antdrive.sim.falsify.failure import failure_of
+from antdrive.sim.falsify.passes import with_obstacles
+from antdrive.sim.falsify.shrink import shrink
+from antdrive.worlds import generate
+from benchmarks.planners import table
+
+FOREST = {"count": "60", "size": "14", "radius": "0.15,0.5", "clearance": "1.0"}
+
+
+def failed_runs() -> Iterator[Run]:
+    """Drives that fail, by seed."""
+    for seed in itertools.count():
+        task = generate("forest", np.random.default_rng(seed), FOREST, name=f"forest-{seed}", note="")
+        done = run(Scenario.of(task, "astar", "jackal", margin=0.0, noise=1.0, smoothing="none", seed=seed))
+        if not done.succeeded:
+            yield done
+
+
+def is_one_minimal(scenario: Scenario) -> bool:
+    """Whether the failure vanishes with each single obstacle."""
+    failure, discs = failure_of(run(scenario)), scenario.task.world.obstacles
+    smaller = (with_obstacles(scenario, discs[:i] + discs[i + 1 :]) for i in range(len(discs)))
+    return all(one is None or failure_of(run(one)) != failure for one in smaller)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--failures", type=int, default=10, help="how many failures are shrunk")
+    parser.add_argument("--seconds", type=float, default=600.0, help="wall-clock time for each [s]")
+    arguments = parser.parse_args()
+    rows, counts, times = [], [], []
+    for done in itertools.islice(failed_runs(), arguments.failures):
+        started, cpu = time.perf_counter(), time.process_time()
+        shrunk = shrink(done.scenario, seconds=arguments.seconds)
+        wall, cpu = time.perf_counter() - started, time.process_time() - cpu
+        small = shrunk.scenario
+        counts.append(len(small.task.world.obstacles))
+        times.append(cpu)
+        rows.append(
+            [
+                done.scenario.task.world.name,
+                shrunk.failure.sentence,
+                f"60 → {counts[-1]}",
+                f"1 → {small.noise:g}",
+                f"{small.task.world.size[0]:g} × {small.task.world.size[1]:g} m",
+                str(shrunk.trials),
+                f"{wall:.0f} s",
+                f"{cpu:.1f} s",
+                "yes" if shrunk.complete and is_one_minimal(small) else "no",
+            ]
+        )
+        print(rows[-1], flush=True)
+    heads = ["world", "failure", "obstacles", "noise", "size", "runs", "wall time", "CPU time", "1-minimal"]
+    for line in table(heads, rows):
+        print(line)
+    print(f"Median: {statistics.median(counts):g} obstacles, {statistics.median(times):.1f} s of CPU time.")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,131 @@
+"""`antdrive falsify`."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from antdrive.sim.cli import options
+from antdrive.sim.cli.compiling import compile_once
+from antdrive.sim.cli.console import bar, print_json, print_line, print_table
+from antdrive.sim.cli.exits import FAILED, SUCCEEDED
+from antdrive.sim.cli.scenario import make_scenario
+from antdrive.sim.cli.write import check_folder, write_film
+
+if TYPE_CHECKING:
+    from antdrive.sim.falsify.hunt import Hunt
+    from antdrive.sim.falsify.report import Reported
+    from antdrive.sim.scenario import Scenario
+
+Budget = Annotated[int, typer.Option(min=1, max=1_000_000, metavar="NUMBER", help="Runs that the search may make.")]
+Method = Annotated[
+    str, typer.Option(metavar="NAME", help="How worlds are chosen: guided (by rehearsals without physics) or random.")
+]
+Obstacles = Annotated[int, typer.Option(min=1, max=50, metavar="NUMBER", help="Cylinders in each world.")]
+Seconds = Annotated[
+    float,
+    typer.Option("--shrink", min=0.0, max=1e6, metavar="SECONDS", help="Time to shrink each failure [s]; 0: none."),
+]
+Film = Annotated[bool, typer.Option("--film/--no-film", help="Film each failure.")]
+Seed = Annotated[
+    int,
+    typer.Option(
+        "--seed", min=0, max=2**63 - 1, metavar="NUMBER", help="Seed of the search; each run's is its number."
+    ),
+]
+
+
+def falsify(
+    budget: Budget = 100,
+    seed: Seed = 0,
+    method: Method = "guided",
+    obstacles: Obstacles = 10,
+    planner: options.Planner = "ants",
+    settings: options.Settings = None,
+    robot: options.Robot = "turtlebot",
+    margin: options.Margin = 0.03,
+    cell: options.CellSize = None,
+    smoothing: options.Smoothing = "clearance",
+    noise: options.Noise = 0.0,
+    out: options.Out = None,
+    seconds: Seconds = 20.0,
+    film: Film = True,
+    json: options.Json = False,
+) -> int:
+    """Look for worlds where a set-up fails.
+
+    A path exists in each of them. Failures are run again in another process, shrunk, and written as a suite with a film
+    each. Ctrl-C keeps what was found. Exit code 0: nothing was found. Exit code 1: the set-up fails in some world.
+    """
+    from antdrive.sim.falsify.hunt import find_failures
+
+    setup = make_scenario("empty", planner, settings, robot, margin=margin, cell=cell, smoothing=smoothing, noise=noise)
+    folder = out or Path("out") / f"falsify-{planner}-{setup.robot.name}-{seed}"
+    check_folder(folder)
+    compile_once()
+    with bar("looking for failures") as progress:
+        hunt = find_failures(
+            setup,
+            budget=budget,
+            seed=seed,
+            method=method,
+            obstacles=obstacles,
+            progress=lambda runs, found: progress(runs / budget),
+        )
+    reported = _report(hunt, folder, seconds, film)
+    if json:
+        print_json(_facts(setup, hunt, reported, {"budget": budget, "seed": seed, "method": method}, folder))
+    else:
+        _print(hunt, reported, folder)
+    return FAILED if hunt.findings else SUCCEEDED
+
+
+def _report(hunt: "Hunt", folder: Path, seconds: float, film: bool) -> "list[Reported]":
+    """Shrink, repeat and write every failure that differs from the others."""
+    from antdrive.sim.falsify.report import report, write_report
+
+    if not hunt.findings:
+        return []
+    with bar("shrinking") as progress:
+        reported = report(hunt, folder, seconds=seconds, progress=progress)
+    write_report(reported, folder)
+    for one in reported if film else ():
+        if one.run.rollout is not None:
+            write_film(one.run.rollout, folder / f"{one.name}.mp4")
+    return reported
+
+
+def _facts(
+    setup: "Scenario", hunt: "Hunt", reported: "list[Reported]", asked: dict[str, Any], folder: Path
+) -> dict[str, Any]:
+    return {
+        "planner": setup.planner_label,
+        "robot": setup.robot.name,
+        **asked,
+        "runs": hunt.runs,
+        "interrupted": hunt.interrupted,
+        "failures": len(hunt.findings),
+        "distinct": len(hunt.distinct),
+        "folder": str(folder) if reported else None,
+        "reported": [one.as_dict() for one in reported],
+    }
+
+
+def _print(hunt: "Hunt", reported: "list[Reported]", folder: Path) -> None:
+    ended = "interrupted after" if hunt.interrupted else "after"
+    print_line(f"{ended} {hunt.runs} runs: {len(hunt.findings)} failures, {len(hunt.distinct)} of them different")
+    if reported:
+        print_table(
+            ("name", "run", "repeats", "obstacles", "failure"),
+            (
+                (
+                    one.name,
+                    str(one.finding.number),
+                    "yes" if one.repeats else "NO",
+                    f"{len(one.finding.scenario.task.world.obstacles)} -> {len(one.run.scenario.task.world.obstacles)}",
+                    one.finding.failure.sentence,
+                )
+                for one in reported
+            ),
+        )
+        print_line(f"the failures as a suite, with worlds and films: {folder}")

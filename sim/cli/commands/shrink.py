@@ -1,0 +1,141 @@
+"""`antdrive shrink`."""
+
+import dataclasses
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from antdrive.sim.cli import options
+from antdrive.sim.cli.compiling import compile_once
+from antdrive.sim.cli.console import print_files, print_json, print_line, working
+from antdrive.sim.cli.exits import FAILED, SUCCEEDED
+from antdrive.sim.cli.write import check_folder, file_name, this_command, write_film, write_result, write_run
+from antdrive.worlds.errors import InputError
+
+if TYPE_CHECKING:
+    from antdrive.sim.falsify.shrink import Shrunk
+    from antdrive.sim.regression.demands import Bound
+    from antdrive.sim.scenario import Scenario
+
+While = Annotated[
+    str | None,
+    typer.Option(
+        "--while",
+        metavar="BOUND",
+        help='What counts as failing, such as "min_clearance_m < 0.02".  [default: anything but a certified success]',
+    ),
+]
+Seconds = Annotated[
+    float,
+    typer.Option(min=1.0, max=1e6, metavar="SECONDS", help="Time for the search [s]; a later call goes on from there."),
+]
+Film = Annotated[bool, typer.Option("--film/--no-film", help="Film the small failure.")]
+Jobs = Annotated[int, typer.Option(min=1, max=64, metavar="NUMBER", help="Processes; the result is the same.")]
+
+
+def shrink(
+    failure: Annotated[
+        str, typer.Argument(metavar="ROLLOUT.npz|SUITE::SCENARIO", help="Log of a failed drive, or a test of a suite.")
+    ],
+    bound: While = None,
+    seconds: Seconds = 60.0,
+    out: options.Out = None,
+    film: Film = True,
+    figures: options.Figures = True,
+    jobs: Jobs = 1,
+    json: options.Json = False,
+) -> int:
+    """Find the smallest world that still fails.
+
+    It fails in the same way: same outcome, same kind of thing touched, same cause. Leaves out obstacles and movers, noise and
+    digits, and moves start, goal and walls nearer. Writes the world, a suite with the scenario and how it fails, the log and
+    a film. Exit code 0: the result fails in the same way, in another process too.
+    """
+    from antdrive.sim.falsify.failure import parse_bound
+    from antdrive.sim.falsify.shrink import shrink as make_small
+
+    crossed = None if bound is None else parse_bound(bound)
+    scenario = _of_a_test(failure) if "::" in failure else _of_a_log(failure)
+    name = f"{file_name(scenario.task.world.name)}-small"
+    folder = out or Path("out") / name
+    check_folder(folder)
+    compile_once()
+    with working("shrinking") as progress:
+        journal = folder / "journal.json"
+        shrunk = make_small(scenario, bound=crossed, seconds=seconds, journal=journal, jobs=jobs, progress=progress)
+    report, repeats = _write(shrunk, crossed, name, folder, film, figures)
+    if json:
+        print_json(report)
+    else:
+        _print(shrunk, report, repeats)
+    return SUCCEEDED if repeats else FAILED
+
+
+def _of_a_test(words: str) -> "Scenario":
+    """The scenario of a suite's test."""
+    from antdrive.sim.regression.scenarios import scenario_of
+    from antdrive.sim.regression.selecting import select
+
+    cases = select([words])
+    if len(cases) > 1:
+        raise InputError(f"{words}: name one of {', '.join(case.address for case in cases[:5])}")
+    return scenario_of(cases[0])
+
+
+def _of_a_log(words: str) -> "Scenario":
+    """The scenario of a log, rebuilt from its record."""
+    from antdrive.sim.falsify.rebuild import rebuilt
+    from antdrive.sim.log.rollout import read_record
+    from antdrive.worlds.errors import input_error
+
+    try:
+        return rebuilt(read_record(words))
+    except InputError as error:
+        raise error if str(error).startswith(words) else input_error(words, str(error)) from None
+
+
+def _write(
+    shrunk: "Shrunk", bound: "Bound | None", name: str, folder: Path, film: bool, figures: bool
+) -> tuple[dict[str, Any], bool]:
+    """Write everything about a small failure; the report, and whether another process gives the same run."""
+    from antdrive.sim.falsify.failure import failure_of
+    from antdrive.sim.falsify.handover import Handover, fingerprint_of, run_elsewhere, write_suite
+    from antdrive.sim.pipeline import run
+
+    note = f"shrunk from {shrunk.original.task.world.name}: {shrunk.summary}"
+    small = named(shrunk.scenario, name, note)
+    result = run(small)
+    repeats = failure_of(result, bound) == shrunk.failure and run_elsewhere([small]) == [fingerprint_of(result)]
+    files = write_run(result, folder, figures=figures)
+    suite = write_suite(folder / f"{name}.drive.yaml", [Handover(name, result, bound, shrunk.failure.sentence)])
+    files |= {"suite": str(suite), "world": str(folder / "worlds" / f"{name}.yaml")}
+    if film and result.rollout is not None:
+        files["film"] = write_film(result.rollout, folder / f"{name}.mp4")["file"]
+    facts = {
+        "failure": dataclasses.asdict(shrunk.failure),
+        "summary": shrunk.summary,
+        "complete": shrunk.complete,
+        "repeats": repeats,
+        "trials": shrunk.trials,
+        "recalled": shrunk.recalled,
+    }
+    return {**write_result(result, files, this_command()), **facts}, repeats
+
+
+def named(scenario: "Scenario", name: str, note: str) -> "Scenario":
+    """The scenario with another name of its world, and a note where the world comes from."""
+    task = scenario.task
+    source = "; ".join(part for part in (task.world.source, note) if part)
+    world = dataclasses.replace(task.world, name=name, source=source)
+    return dataclasses.replace(scenario, task=dataclasses.replace(task, world=world))
+
+
+def _print(shrunk: "Shrunk", report: dict[str, Any], repeats: bool) -> None:
+    print_line(f"{shrunk.original.task.world.name}: {shrunk.failure.sentence}")
+    print_line(f"smaller after {shrunk.trials} runs: {shrunk.summary}")
+    if not shrunk.complete:
+        print_line("the time was over: the same command goes on from here, --seconds gives it longer")
+    if not repeats:
+        print_line("the small scenario did not repeat in another process; what it uses is not deterministic")
+    print_files(report["files"])

@@ -1,0 +1,125 @@
+"""What a failure is, and when two runs fail in the same way."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from dataclasses import dataclass
+
+from antdrive.sim.log.contacts import touches_of
+from antdrive.sim.log.margin import budget
+from antdrive.sim.log.metrics import METRICS
+from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.pipeline import Run
+from antdrive.sim.regression.demands import Bound
+from antdrive.worlds.errors import FieldError
+from antdrive.worlds.files.checks import suggest
+
+#: The kinds of things that a robot can touch.
+CYLINDER, UNSEEN, MOVER, WALL = "cylinder", "unseen cylinder", "mover", "wall"
+NOTHING = "nothing"
+
+_BOUND = re.compile(r"\s*(\w+)\s*(<=|>=|<|>|==)\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*")
+
+
+def parse_bound(text: str) -> Bound:
+    """The bound in a text such as "min_clearance_m < 0.02".
+
+    Args:
+        text: metric, relation and number
+
+    Raises:
+        FieldError: it is not of that form, or there is no such metric.
+    """
+    found = _BOUND.fullmatch(text)
+    if found is None or not math.isfinite(float(found[3])):
+        raise FieldError("--while", f"write METRIC < NUMBER, with <, <=, >, >= or ==; got {text!r:.60}")
+    if found[1] not in METRICS:
+        raise FieldError("--while", f"unknown metric {found[1]!r:.60}; {suggest(found[1], METRICS)}")
+    return Bound(found[1], found[2], float(found[3]))
+
+
+@dataclass(frozen=True)
+class Failure:
+    """How a run failed. Two runs fail in the same way if their failures are equal.
+
+    Attributes:
+        outcome: the key of the run's outcome, such as collided; succeeded for a drive that ends at the goal but is
+            not certified or crosses a bound
+        touched: what was touched first: cylinder, unseen cylinder, mover, wall, or nothing
+        cause: for contacts with cylinders that the planner knew of and with walls, the cause that took most of the
+            margin until then (a key of `antdrive.sim.log.margin.CAUSES`); else what the run's reason says, without its
+            numbers; for a refused certificate the check that refused it; for a bound, the bound
+    """
+
+    outcome: str
+    touched: str
+    cause: str
+
+    @property
+    def sentence(self) -> str:
+        """The failure in words."""
+        parts = [self.outcome]
+        if self.touched != NOTHING:
+            parts.append(f"with a {self.touched}" if self.touched != UNSEEN else f"with an {self.touched}")
+        return " ".join(parts) + (f" ({self.cause})" if self.cause else "")
+
+
+def failure_of(run: Run, bound: Bound | None = None) -> Failure | None:
+    """How a run failed; None if it did not.
+
+    Args:
+        run: the run
+        bound: what counts as failure; None: everything but a certified success
+    """
+    rollout = run.rollout
+    touched = NOTHING if rollout is None else touched_first(rollout)
+    if bound is not None:
+        if rollout is None or not bound.holds(METRICS[bound.metric](rollout)):
+            return None
+        return Failure(run.outcome.key, touched, str(bound))
+    if run.succeeded:
+        return None
+    if run.outcome is Outcome.SUCCEEDED:
+        assert run.certificate is not None
+        return Failure(run.outcome.key, touched, "certificate: " + without_numbers(run.certificate.problems[0]))
+    if rollout is not None and touched in (CYLINDER, WALL):
+        return Failure(run.outcome.key, touched, _cause_of_contact(rollout))
+    return Failure(run.outcome.key, touched, "" if touched != NOTHING else without_numbers(run.reason))
+
+
+def touched_first(rollout: Rollout) -> str:
+    """The kind of thing that a drive touched first, or `NOTHING`."""
+    found = touches_of(rollout)
+    if not found:
+        return NOTHING
+    index, record = found[0].obstacle, rollout.record
+    known = len(record.task.world.obstacles)
+    for kind, count in ((CYLINDER, known), (UNSEEN, len(record.unseen)), (MOVER, len(record.task.world.movers))):
+        if index < count:
+            return kind
+        index -= count
+    return WALL
+
+
+def without_numbers(text: str) -> str:
+    """A reason without what differs from world to world: its numbers, and the names of single obstacles.
+
+    Args:
+        text: a sentence
+    """
+    masked = re.sub(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?", "#", text)
+    masked = re.sub(r"the (?:left|lower|right|upper) wall|(?:obstacles|movers|unseen)\[#\]", "#", masked)
+    return re.sub(r" at \(#, #\)(?: with radius #)?", "", masked)
+
+
+def _cause_of_contact(rollout: Rollout) -> str:
+    """What took most of the margin at the tightest place up to the first contact."""
+    rows = int(rollout.contacts[0, 0]) + 1
+    arrays = ("t", "pose", "twist", "command", "clearance", "limiter", "movers")
+    cut = {name: getattr(rollout, name)[:rows] for name in arrays}
+    cut |= {name: getattr(rollout, name)[:rows] for name in ("estimate", "actuated") if len(getattr(rollout, name))}
+    spent = budget(dataclasses.replace(rollout, **cut))
+    return max(spent.contributions, key=lambda part: part.at_tightest).cause

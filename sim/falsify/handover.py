@@ -1,0 +1,177 @@
+"""Failures handed over: world files, robot files and a suite that expects each scenario to fail as it did."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from antdrive.planners import list_planners
+from antdrive.robots import Avoidance, PurePursuit, RobotSpec, list_robots, load_robot
+from antdrive.sim.driving.replanning import ReplanPolicy
+from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.pipeline import Run, run
+from antdrive.sim.regression.demands import Bound
+from antdrive.sim.scenario import Scenario
+from antdrive.worlds import save_task
+from antdrive.worlds.files.atomic import written_whole
+
+
+@dataclass(frozen=True, eq=False)
+class Handover:
+    """A failing run under a name.
+
+    Attributes:
+        name: the scenario's name in the suite, and that of its world file
+        run: the run that failed
+        bound: the metric's bound that it crosses, if that is its failure
+        note: what people should know about it; may be empty
+    """
+
+    name: str
+    run: Run
+    bound: Bound | None = None
+    note: str = ""
+
+
+def write_suite(path: Path, handovers: Sequence[Handover]) -> Path:
+    """Write a suite, and beside it the worlds, and the robots that are not in the catalogue.
+
+    The suite has no baselines: it holds as long as the scenarios fail as they did.
+
+    Args:
+        path: the suite's file; its name ends in .drive.yaml
+        handovers: the failures, with different names
+
+    Returns:
+        The suite's path.
+
+    Raises:
+        InputError: a file cannot be written.
+    """
+    entries = {}
+    for handover in handovers:
+        scenario = handover.run.scenario
+        world = Path("worlds") / f"{handover.name}.yaml"
+        save_task(scenario.task, path.parent / world)
+        entries[handover.name] = {
+            **({"note": handover.note} if handover.note else {}),
+            "world": str(world),
+            **suite_entry(scenario, _robot(scenario.robot, path.parent)),
+            "expect": expectation(handover.run, handover.bound),
+            "baseline": False,
+        }
+    with written_whole(path) as part:
+        text = yaml.safe_dump({"schema": 1, "scenarios": entries}, sort_keys=False, allow_unicode=True, width=110)
+        part.write_text(text, encoding="utf-8")
+    return path
+
+
+def suite_entry(scenario: Scenario, robot: str) -> dict[str, Any]:
+    """A scenario as plain data with the keys of a suite, without its world and what is expected.
+
+    Args:
+        scenario: the scenario
+        robot: the robot's name in the catalogue, or its file relative to the suite
+    """
+    plain: dict[str, Any] = {
+        "robot": robot,
+        "planner": _planner(scenario),
+        "smoothing": scenario.smoothing,
+        "margin": float(scenario.margin),
+        "noise": float(scenario.noise),
+        "seeds": [int(scenario.seed)],
+    }
+    if controller := _changed(scenario.controller, PurePursuit()):
+        plain["controller"] = controller
+    if scenario.cell is not None and scenario.cell != scenario.task.cell:
+        plain["cell"] = float(scenario.cell)
+    if scenario.time_limit is not None:
+        plain["time_limit"] = float(scenario.time_limit)
+    if scenario.unseen:
+        plain["unseen"] = [
+            {key: float(value) for key, value in dataclasses.asdict(disc).items()} for disc in scenario.unseen
+        ]
+    for key, usual in (("physics_hz", 240), ("control_hz", 60)):
+        if getattr(scenario, key) != usual:
+            plain[key] = getattr(scenario, key)
+    return plain | (_among_movers(scenario) if scenario.task.world.movers else {})
+
+
+def expectation(failed: Run, bound: Bound | None = None) -> dict[str, Any]:
+    """What a suite expects of a scenario that is to fail as it did.
+
+    Args:
+        failed: the run that failed
+        bound: the metric's bound that it crosses, if that is its failure
+    """
+    expected: dict[str, Any] = {"outcome": failed.outcome.key}
+    if failed.outcome is Outcome.SUCCEEDED:
+        expected["certified"] = failed.succeeded
+    if bound is not None:
+        expected[bound.metric] = f"{bound.sign} {bound.value!r}"
+    return expected
+
+
+def fingerprint_of(done: Run) -> str:
+    """A run in one text, which is the same wherever the run is the same bit for bit."""
+    return done.rollout.digest if done.rollout is not None else f"{done.outcome.key}: {done.reason}"
+
+
+def run_elsewhere(scenarios: Sequence[Scenario]) -> list[str]:
+    """The fingerprints of scenarios that are run in other processes."""
+    from joblib import Parallel, delayed
+
+    return list(Parallel(2)(delayed(_fingerprint)(scenario) for scenario in scenarios))
+
+
+def _fingerprint(scenario: Scenario) -> str:
+    return fingerprint_of(run(scenario))
+
+
+def _planner(scenario: Scenario) -> str | dict[str, Any]:
+    """The planner's name, with the options that differ from those of that name."""
+    name, planner = scenario.planner_label, scenario.planner
+    options = _changed(planner, list_planners().get(name))
+    return {"name": name, **options} if options else name
+
+
+def _changed(settings: Any, usual: Any) -> dict[str, Any]:
+    """The fields of a record that differ from the usual ones."""
+    if not dataclasses.is_dataclass(settings) or type(settings) is not type(usual):
+        return {}
+    names = [field.name for field in dataclasses.fields(settings) if field.init]
+    return {name: getattr(settings, name) for name in names if getattr(settings, name) != getattr(usual, name)}
+
+
+def _among_movers(scenario: Scenario) -> dict[str, Any]:
+    """How the robot drives among movers, where it is not the usual way."""
+    plain: dict[str, Any] = {}
+    perception = scenario.perception
+    if perception.kind != "velocities" or math.isfinite(perception.range):
+        reach = f":{perception.range!r}" if math.isfinite(perception.range) else ""
+        plain["sees"] = perception.kind + reach
+    plain["avoid"] = scenario.avoidance is not None and (_changed(scenario.avoidance, Avoidance()) or True)
+    plain["replan"] = _changed(scenario.replanning, ReplanPolicy()) or True
+    return {key: value for key, value in plain.items() if value is not True}
+
+
+def _robot(robot: RobotSpec, folder: Path) -> str:
+    """The robot's name in the catalogue, or the file beside the suite that is written for it."""
+    if robot.name in list_robots() and load_robot(robot.name) == robot:
+        return robot.name
+    data = {"schema": 1, **dataclasses.asdict(robot)}
+    foot = robot.footprint
+    sides = {"length": 2 * foot.half_length, "width": 2 * foot.half_width}
+    data["footprint"] = {"radius": foot.radius} if foot.is_disc else sides
+    name = "".join(c if c.isalnum() or c in "-_." else "_" for c in robot.name)
+    target = folder / "robots" / f"{name}.yaml"
+    with written_whole(target) as part:
+        text = yaml.safe_dump({key: value for key, value in data.items() if value is not None}, sort_keys=False)
+        part.write_text(text, encoding="utf-8")
+    return f"robots/{name}.yaml"

@@ -1,0 +1,99 @@
+"""From a log's record back to the scenario that was driven."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import typing
+from collections.abc import Mapping
+from typing import Any, TypeVar
+
+from antdrive.planners import Planner, list_planners, load_planner
+from antdrive.robots import Avoidance, PurePursuit
+from antdrive.sim.driving.perception import Perception
+from antdrive.sim.driving.replanning import ReplanPolicy
+from antdrive.sim.log.record import DriveRecord
+from antdrive.sim.scenario import Scenario
+from antdrive.worlds.errors import FieldError, InputError
+
+Settings = TypeVar("Settings", PurePursuit, Avoidance, ReplanPolicy)
+
+
+def rebuilt(record: DriveRecord, planner: Planner | None = None) -> Scenario:
+    """The scenario that a log's record describes. It gives the same drive, bit for bit, with the same versions.
+
+    Args:
+        record: the record of a log
+        planner: the planner that was used; None: the registered one of the record's name, with the record's settings
+
+    Raises:
+        InputError: the planner or the controller is not one that can be found by its name, or has settings of its own.
+    """
+    name = record.planner.name
+    if planner is None:
+        name, planner = _planner(name, record.planner.settings)
+    if record.controller.name != PurePursuit.__name__:
+        raise InputError(f"record.controller.name: {record.controller.name!r:.60} cannot be rebuilt, only PurePursuit")
+    perception = record.perception
+    try:
+        among_movers: dict[str, Any] = {}
+        if perception is not None:
+            distance = math.inf if perception.range_m is None else perception.range_m
+            among_movers["perception"] = Perception(kind=perception.kind, range=distance)  # type: ignore[arg-type]
+            among_movers["avoidance"] = _settings(Avoidance, record.avoidance, "avoidance")
+            among_movers["replanning"] = _settings(ReplanPolicy, record.replanning, "replanning")
+        controller = _settings(PurePursuit, record.controller.settings, "controller.settings")
+        assert controller is not None
+        return Scenario(
+            task=record.task,
+            planner=planner,
+            planner_name=name,
+            robot=record.robot,
+            margin=record.margin,
+            cell=record.cell,
+            smoothing=record.smoothing.asked,
+            seed=record.seed,
+            controller=controller,
+            noise=record.noise,
+            unseen=record.unseen,
+            time_limit=record.time_limit,
+            physics_hz=record.physics_hz,
+            control_hz=record.control_hz,
+            **among_movers,
+        )
+    except FieldError as error:
+        raise InputError(str(error.under("record"))) from None
+
+
+def _planner(name: str, settings: Mapping[str, Any]) -> tuple[str, Planner]:
+    """The registered name and the planner of a record's name, which may be that of a planner's class."""
+    known = list_planners()
+    if name not in known:
+        of_class = [key for key, planner in known.items() if type(planner).__name__ == name]
+        if not of_class:
+            raise InputError(
+                f"record.planner.name: {name!r:.60} is not registered, so the run cannot be rebuilt; register the class "
+                f"under the entry point antdrive.planners, or give the planner from Python"
+            )
+        name = of_class[0]
+    kind = type(known[name])
+    hints = typing.get_type_hints(kind)
+    options = {key: _restored(hints.get(key), value) for key, value in settings.items()}
+    return name, load_planner(name, **options)
+
+
+def _settings(kind: type[Settings], values: Mapping[str, Any] | None, key: str) -> Settings | None:
+    """The record of settings, with the infinite numbers that JSON cannot hold."""
+    if values is None:
+        return None
+    fields = {field.name: field for field in dataclasses.fields(kind)}
+    for name in values:
+        if name not in fields:
+            raise FieldError(f"{key}.{name}", f"unknown; choose from {', '.join(fields)}")
+    hints = typing.get_type_hints(kind)
+    return kind(**{name: _restored(hints[name], value) for name, value in values.items()})
+
+
+def _restored(hint: Any, value: Any) -> Any:
+    """A setting as it was: null stands for "no limit" where a number cannot be left out."""
+    return math.inf if value is None and hint is float else value

@@ -1,0 +1,52 @@
+"""`antdrive falsify`."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from antdrive.sim.regression.scenarios import scenario_of
+from antdrive.sim.regression.suite import load_suite
+from tests.sim.cli.calling import Call, Refused
+
+CARELESS = ["-p", "astar", "-r", "jackal", "--margin", "0", "--noise", "6", "--smoothing", "none"]
+
+
+def test_failures_are_handed_over_as_a_suite(antdrive: Call) -> None:
+    words = ["falsify", *CARELESS, "--budget", "2", "--seed", "3", "--method", "random", "--shrink", "0", "--no-film"]
+    code, out, err = antdrive(*words, "--json", "--out", "found")
+    assert (code, err) == (1, "")
+    facts = json.loads(out)
+    assert (facts["runs"], facts["interrupted"]) == (2, False)
+    assert all(one["repeats"] for one in facts["reported"])
+    cases = load_suite(Path("found") / "failures.drive.yaml")
+    assert len(cases) == facts["distinct"] == len(facts["reported"])
+    assert {scenario_of(case).noise for case in cases} == {6.0}
+    assert len(list(Path("found").glob("failure-*.npz"))) == len(cases)
+
+
+def test_a_set_up_without_failures_is_exit_code_0(antdrive: Call) -> None:
+    code, out, err = antdrive("falsify", "-p", "astar", "--budget", "1", "--out", "none")
+    assert (code, err) == (0, "")
+    assert out == "after 1 runs: 0 failures, 0 of them different\n"
+    assert list(Path("none").iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [(["--method", "wise"], "choose from guided, random"), (["-p", "nobody"], "no planner is called 'nobody'")],
+    ids=["method", "planner"],
+)
+def test_wrong_input_is_one_line(refused: Refused, words: list[str], says: str) -> None:
+    assert says in refused("falsify", *words)
+
+
+@pytest.mark.slow
+def test_failures_are_shrunk_and_filmed(antdrive: Call) -> None:
+    code, out, _ = antdrive(
+        "falsify", *CARELESS, "--budget", "2", "--seed", "3", "--method", "random", "--out", "found"
+    )
+    assert code == 1
+    assert "failure-1  " in out
+    assert Path("found/failure-1.mp4").stat().st_size > 10_000
+    assert antdrive("check", "found/failures.drive.yaml", "--jobs", "1")[0] == 0

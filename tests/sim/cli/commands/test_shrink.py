@@ -1,0 +1,63 @@
+"""`antdrive shrink`."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from antdrive.sim import Run, run
+from antdrive.worlds import Disc, load_task
+from tests.sim.cli.calling import Call, Refused
+
+
+@pytest.fixture
+def collided(collided_run: Run, tmp_path: Path) -> Path:
+    """The log of a drive into an unseen cylinder, beside another one and an obstacle out of the way."""
+    scenario = collided_run.scenario
+    rollout = run(replace(scenario, unseen=(*scenario.unseen, Disc(3.6, 0.4, 0.1)), margin=0.04)).rollout
+    assert rollout is not None
+    return rollout.save(tmp_path / "collided.npz")
+
+
+def test_a_failure_becomes_a_world_and_a_suite(antdrive: Call, collided: Path, tmp_path: Path) -> None:
+    code, out, err = antdrive("shrink", collided, "--out", "small", "--json", "--no-figures", "--no-film")
+    assert (code, err) == (0, "")
+    facts = json.loads(out)
+    assert (facts["failure"]["outcome"], facts["failure"]["touched"]) == ("collided", "unseen cylinder")
+    assert (facts["complete"], facts["repeats"]) == (True, True)
+    folder = tmp_path / "small"
+    written = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+    name = "small-small"
+    files = {f"{name}.drive.yaml", "journal.json", "result.json", "rollout.npz", f"worlds/{name}.yaml"}
+    assert written == files
+    assert load_task(folder / "worlds" / f"{name}.yaml").world.obstacles == ()
+    suite = folder / f"{name}.drive.yaml"
+    assert antdrive("check", suite, "--jobs", "1")[0] == 0, "the suite expects the failure"
+    code, out, _ = antdrive("shrink", f"{suite}::{name}", "--out", "again", "--no-film", "--no-figures")
+    assert code == 0
+    assert "obstacles 0 -> 0" in out
+
+
+@pytest.mark.slow
+def test_the_small_failure_is_filmed_and_a_second_call_asks_the_journal(antdrive: Call, collided: Path) -> None:
+    assert antdrive("shrink", collided, "--out", "small", "--no-film", "--no-figures")[0] == 0
+    code, out, _ = antdrive("shrink", collided, "--out", "small")
+    assert code == 0
+    assert "smaller after 0 runs" in out
+    assert Path("small/small-small.mp4").stat().st_size > 10_000
+
+
+def test_what_cannot_be_shrunk_is_one_line(refused: Refused, small_run: Run, collided: Path, tmp_path: Path) -> None:
+    assert small_run.rollout is not None
+    fine = small_run.rollout.save(tmp_path / "fine.npz")
+    assert "small: this run does not fail" in refused("shrink", fine)
+    assert "no such file" in refused("shrink", "nothing.npz").lower()
+    assert "--while: unknown metric 'clearance'" in refused("shrink", collided, "--while", "clearance < 1")
+    suite = tmp_path / "two.drive.yaml"
+    suite.write_text("{schema: 1, scenarios: {a: {world: empty, seeds: [0, 1]}}}")
+    assert "name one of two.drive.yaml::a[0], two.drive.yaml::a[1]" in refused("shrink", "two.drive.yaml::a")
+    rollout = run(replace(small_run.scenario, planner_name="mine")).rollout
+    assert rollout is not None
+    mine = rollout.save(tmp_path / "mine.npz")
+    assert f"{mine}: record.planner.name: 'mine' is not registered" in refused("shrink", mine)

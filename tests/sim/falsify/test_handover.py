@@ -1,0 +1,82 @@
+"""A suite that is handed over stands for exactly the scenarios that failed."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from antdrive.planners import load_planner
+from antdrive.robots import Avoidance, PurePursuit
+from antdrive.sim import Certificate, Perception, ReplanPolicy, Run, Scenario
+from antdrive.sim.falsify.handover import Handover, expectation, fingerprint_of, run_elsewhere, write_suite
+from antdrive.sim.regression.checking import check_case
+from antdrive.sim.regression.demands import Bound
+from antdrive.sim.regression.scenarios import scenario_of
+from antdrive.sim.regression.suite import load_suite
+from antdrive.worlds import Disc
+
+SCENARIOS: dict[str, dict[str, Any]] = {
+    "plain": {},
+    "planner": {"planner": load_planner("aco-han", ants=7), "planner_name": "aco-han", "seed": 3},
+    "settings": {"margin": 0.0, "noise": 1 / 3, "smoothing": "none", "controller": PurePursuit(lookahead_time=0.5)},
+    "unseen": {"unseen": (Disc(2.0, 2.6, 0.1, 0.5), Disc(3.0, 2.6, 0.1)), "time_limit": 12.5, "cell": 0.21},
+    "rates": {"physics_hz": 120, "control_hz": 30},
+}
+MOVERS: dict[str, dict[str, Any]] = {
+    "sees": {"perception": Perception(kind="positions", range=1 / 3)},
+    "blind": {"avoidance": None, "replanning": ReplanPolicy(around_movers=False)},
+    "careful": {"avoidance": Avoidance(horizon=2.0), "replanning": ReplanPolicy(patience=5.0)},
+}
+
+
+@pytest.mark.parametrize("name", [*SCENARIOS, *MOVERS])
+def test_the_suite_gives_the_same_scenario(small_run: Run, tmp_path: Path, name: str) -> None:
+    scenario = replace(small_run.scenario, **SCENARIOS.get(name, {}))
+    if name in MOVERS:
+        scenario = replace(Scenario.of("plaza-moving", "dstar-lite"), **MOVERS[name])
+    suite = write_suite(tmp_path / "s.drive.yaml", [Handover(name, replace(small_run, scenario=scenario))])
+    (case,) = load_suite(suite)
+    assert scenario_of(case) == scenario
+
+
+@pytest.mark.parametrize("shape", ["disc", "rectangle"])
+def test_a_robot_of_ones_own_is_written_beside_the_suite(
+    small_run: Run, jackal: Any, tmp_path: Path, shape: str
+) -> None:
+    own = replace(small_run.scenario.robot if shape == "disc" else jackal, name="my own/1", max_speed=0.61, source=None)
+    scenario = replace(small_run.scenario, robot=own)
+    suite = write_suite(tmp_path / "s.drive.yaml", [Handover("own", replace(small_run, scenario=scenario))])
+    (case,) = load_suite(suite)
+    assert scenario_of(case).robot == own
+
+
+def test_the_suite_holds_as_long_as_the_failure_repeats(collided_run: Run, tmp_path: Path) -> None:
+    suite = write_suite(tmp_path / "s.drive.yaml", [Handover("hit", collided_run, note="as it was")])
+    (case,) = load_suite(suite)
+    assert check_case(case).passed
+    mended = yaml.safe_load(suite.read_text())
+    del mended["scenarios"]["hit"]["unseen"]
+    suite.write_text(yaml.safe_dump(mended))
+    (case,) = load_suite(suite)
+    result = check_case(case)
+    assert not result.passed
+    assert "collided" in result.message
+
+
+def test_what_is_expected_of_a_success_that_fails_otherwise(small_run: Run) -> None:
+    bound = Bound("min_clearance_m", "<", 0.02)
+    assert expectation(small_run, bound) == {
+        "outcome": "succeeded",
+        "certified": True,
+        "min_clearance_m": "< 0.02",
+    }
+    refused = replace(small_run, certificate=Certificate(False, 0, 0.1, 0.1, ("digest",)))
+    assert expectation(refused) == {"outcome": "succeeded", "certified": False}
+
+
+def test_another_process_gives_the_same_bits(small_run: Run) -> None:
+    assert run_elsewhere([small_run.scenario]) == [fingerprint_of(small_run)]
+    changed = replace(small_run.scenario, margin=0.031)
+    assert run_elsewhere([changed]) != [fingerprint_of(small_run)]
