@@ -156,6 +156,10 @@ def least_clearance(
         if not len(r):
             break
         for sub, poses in enumerate(arcs):
+            if sub == 1:  # movers go on after the last row, but the drive does not
+                r, k = r[r < len(pose) - 1], k[r < len(pose) - 1]
+                if not len(r):
+                    break
             here = poses[r]
             centre = np.empty((len(r), 2))
             still = k < len(discs)

@@ -58,6 +58,12 @@ def test_a_post_between_two_rows_is_seen_on_the_arc() -> None:
     assert found.t == pytest.approx(0.5 / HZ)
 
 
+def test_a_mover_that_comes_after_the_last_row_does_not_count() -> None:
+    mover = {"radius": 0.1, "position": [6.0, 5.0], "velocity": [-0.6, 0.0]}
+    found = audit({"movers": [mover]}, DISC, *straight(5.0, rows=100))
+    assert found.between == found.rows
+
+
 def test_walls_and_movers_count() -> None:
     wall = audit({}, BOX, *straight(0.3))
     assert (wall.near, wall.rows) == ("bottom wall", pytest.approx(0.085, abs=1e-4))
