@@ -181,8 +181,8 @@ class Rollout:
         world = self.record.world
         things = len(world.obstacles) + len(world.movers)
         if rows * things > MAX_LOG_DISTANCES:
-            most = int(MAX_LOG_DISTANCES / things)
-            yield f"t: must have at most {most} rows in a world of {things} obstacles and movers, found {rows}"
+            rows_checked = int(MAX_LOG_DISTANCES / things)
+            yield f"t: must have at most {rows_checked} rows in a world of {things} obstacles and movers, found {rows}"
         wanderers = [mover for mover in world.movers if isinstance(mover, Wandering)]
         steps = sum((mover.phase + rows / self.record.physics_hz) / mover.period for mover in wanderers)
         most = MAX_LOG_WALK / (200 + len(world.obstacles))
