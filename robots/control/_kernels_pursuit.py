@@ -301,6 +301,31 @@ def rotation(new_v: float, v: float, w: float, bearing: float, limits: MotionLim
 
 
 @kernel
+def full_braking(
+    x: float, y: float, yaw: float, v: float, w: float, curvature: float, required: float,
+    discs: Array, bounds: Array, limits: MotionLimits, tuning: PursuitTuning,
+) -> tuple[float, float]:  # fmt: skip
+    """Speed and yaw rate of a robot that brakes as hard as it can: on its present curve as long as that is clear.
+
+    The last command passed the check of the arc on which the robot can stop, so its curve is clear if the robot
+    drives as commanded. Where slip or a corrected estimate has brought that arc closer to obstacles than `required`,
+    the robot steers towards `curvature` while it brakes, if it then stops farther from them.
+    """
+    period, deceleration = tuning.period, limits.acceleration
+    new_v = max(v - deceleration * period, 0.0)
+    held = w * new_v / v if v > 0.0 else 0.0
+    if new_v == 0.0:
+        return new_v, held
+    clear = stopping_clearance(x, y, yaw, new_v, held, deceleration, period, discs, bounds)
+    if clear >= required:
+        return new_v, held
+    steered = reachable_yaw_rate(curvature * new_v, w, period, limits)
+    if stopping_clearance(x, y, yaw, new_v, steered, deceleration, period, discs, bounds) <= clear:
+        return new_v, held
+    return keep_wheels_within(new_v, steered, limits.half_track, limits.rim_speed)
+
+
+@kernel
 def pursue(
     x: float, y: float, yaw: float, v: float, w: float, progress: float, rotating: bool,
     path: PathSamples, obstacles: ObstacleIndex, limits: MotionLimits, tuning: PursuitTuning,
@@ -342,12 +367,12 @@ def pursue(
     new_w = reachable_yaw_rate(wanted, w, period, limits)
     new_v, new_w = keep_wheels_within(new_v, new_w, limits.half_track, limits.rim_speed)
 
-    # Whatever the rules above allow, the arc on which the robot can still stop must be clear. The last
-    # command passed this check, so braking on its curve is safe.
-    if new_v > tuning.creep_speed and stopping_clearance(
-        x, y, yaw, new_v, new_w, limits.acceleration, period, discs, bounds
-    ) < min(tuning.stopping_clearance, clearance):
+    # Whatever the rules above allow, the arc on which the robot can still stop must be clear.
+    required = min(tuning.stopping_clearance, clearance)
+    if (
+        new_v > tuning.creep_speed
+        and stopping_clearance(x, y, yaw, new_v, new_w, limits.acceleration, period, discs, bounds) < required
+    ):
         limiter = BRAKING
-        new_v = max(v - limits.acceleration * period, 0.0)
-        new_w = w * new_v / v if v > 0.0 else 0.0
+        new_v, new_w = full_braking(x, y, yaw, v, w, curvature, required, discs, bounds, limits, tuning)
     return new_v, new_w, s, rotating, limiter

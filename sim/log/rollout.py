@@ -21,7 +21,7 @@ from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import DriveRecord
 from antdrive.worlds.errors import FieldError
 from antdrive.worlds.files.atomic import written_whole
-from antdrive.worlds.limits import MAX_LOG_WALK
+from antdrive.worlds.limits import MAX_LOG_DISTANCES, MAX_LOG_WALK
 from antdrive.worlds.movers import Wandering
 from antdrive.worlds.trajectories import Trajectories
 
@@ -186,14 +186,18 @@ class Rollout:
         if self.movers.ndim == 3 and self.movers.shape[1] != count:
             yield f"movers: must be {count}, as in the record's task, found {self.movers.shape[1]}"
         if rows <= MAX_ROWS:
-            yield from self._walk_problems(rows)
+            yield from self._work_problems(rows)
         names = len(self.record.limiters)
         if self.limiter.dtype.kind in "iu" and np.size(self.limiter) and not 0 <= self.limiter.max() < max(1, names):
             yield f"limiter: must hold indices into the {names} of record.limiters, found {self.limiter.max()}"
 
-    def _walk_problems(self, rows: int) -> Iterator[str]:
-        """Wanderers that would take too many steps: they are drawn one by one when the log is checked."""
+    def _work_problems(self, rows: int) -> Iterator[str]:
+        """Too many distances to compute when the log is checked, or too many steps of wanderers, drawn one by one."""
         world = self.record.world
+        things = len(world.obstacles) + len(world.movers)
+        if rows * things > MAX_LOG_DISTANCES:
+            rows_checked = int(MAX_LOG_DISTANCES / things)
+            yield f"t: must have at most {rows_checked} rows in a world of {things} obstacles and movers, found {rows}"
         wanderers = [mover for mover in world.movers if isinstance(mover, Wandering)]
         steps = sum((mover.phase + rows / self.record.physics_hz) / mover.period for mover in wanderers)
         most = MAX_LOG_WALK / (200 + len(world.obstacles))

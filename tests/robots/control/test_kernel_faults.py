@@ -4,10 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex, index_discs, nearby
 from antdrive.robots.control._kernels_path import PathSamples
-from antdrive.robots.control._kernels_pursuit import pursue, stopping_clearance
+from antdrive.robots.control._kernels_pursuit import full_braking, pursue, stopping_clearance
 from tests.robots.control.test_rules import LIMITS, TUNING
 
 WIDE = np.array([-50.0, -50.0, 50.0, 50.0])
@@ -57,3 +59,43 @@ def test_the_discs_near_a_place_are_all_those_that_come_within_the_distance() ->
             gap = np.hypot(*(discs[:, :2] - inside).T) - discs[:, 2]
             assert {tuple(row) for row in discs[gap <= distance].tolist()} <= here
             assert all(gap[k] <= distance + side * math.sqrt(2) for k in range(40) if tuple(discs[k].tolist()) in here)
+
+
+def room_to_stop(v: float, w: float, disc: np.ndarray) -> float:
+    """The clearance of a robot at the origin that drives for a period, then brakes on its curve; in small steps."""
+    length = v * TUNING.period + v * v / (2 * LIMITS.acceleration)
+    s = np.linspace(0, length, 2001)
+    yaw = w / v * (s[1:] + s[:-1]) / 2
+    x, y = (np.concatenate([[0.0], np.cumsum(f(yaw) * np.diff(s))]) for f in (np.cos, np.sin))
+    return float(np.hypot(x - disc[0], y - disc[1]).min() - disc[2])
+
+
+@given(
+    v=st.floats(0.2, 1.0),
+    bend=st.floats(-2.5, 2.5),
+    curvature=st.floats(-3, 3),
+    disc=st.tuples(st.floats(0.3, 1.0), st.floats(-0.6, 0.6), st.floats(0.05, 0.2)),
+    required=st.floats(0.0, 0.4),
+)
+def test_a_braking_robot_leaves_its_curve_only_where_that_is_not_clear_and_only_for_a_clearer_one(
+    v: float, bend: float, curvature: float, disc: tuple[float, float, float], required: float
+) -> None:
+    discs, w = np.array([disc]), bend * v
+    new_v, new_w = full_braking(0, 0, 0, v, w, curvature, required, discs, WIDE, LIMITS, TUNING)
+    assert new_v == v - LIMITS.acceleration * TUNING.period
+    held, found = (room_to_stop(new_v, yaw_rate, discs[0]) for yaw_rate in (bend * new_v, new_w))
+    if held > required + 1e-4:
+        assert new_w == pytest.approx(bend * new_v, abs=1e-12)
+    assert found >= held - 1e-4
+    assert abs(new_w - w) <= LIMITS.yaw_acceleration * TUNING.period + 1e-12 or new_w == pytest.approx(bend * new_v)
+
+
+def test_a_braking_robot_whose_curve_leads_into_a_pillar_steers_away_from_it() -> None:
+    """On the bend to the left it stops 225 mm from the pillar's surface, straight ahead 314 mm."""
+    pillar = np.array([[0.6, 0.4, 0.1]])
+    clear = full_braking(0, 0, 0, 1.0, 0.8, 0.0, 0.2, pillar, WIDE, LIMITS, TUNING)
+    assert clear == pytest.approx((0.9, 0.72))
+    assert full_braking(0, 0, 0, 1.0, 0.8, 0.0, 0.25, pillar, WIDE, LIMITS, TUNING) == pytest.approx((0.9, 0.0))
+    right = np.array([[0.6, -0.3, 0.1]])
+    assert full_braking(0, 0, 0, 1.0, 0.8, 0.0, 0.9, right, WIDE, LIMITS, TUNING) == pytest.approx((0.9, 0.72))
+    assert full_braking(0, 0, 0, 0.1, 0.08, 0.0, 0.9, pillar, WIDE, LIMITS, TUNING) == (0.0, 0.0)

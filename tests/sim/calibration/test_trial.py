@@ -48,6 +48,14 @@ def test_a_drive_that_fails_loses_everything(turtlebot: RobotSpec) -> None:
     assert loss_on_course(conditions(lost), 0.01, 0) == (math.inf, math.inf)
 
 
+@pytest.mark.parametrize(("smoothing", "margin", "seed"), [("none", 0.1, 37), ("clearance", 0.03, 3)])
+def test_a_robot_that_brakes_in_a_bend_does_not_follow_it_into_a_pillar(
+    jackal: RobotSpec, smoothing: str, margin: float, seed: int
+) -> None:
+    """Slip brings the arc on which the robot can stop nearer to a pillar; held, it took the whole margin."""
+    assert loss_on_course(conditions(jackal, smoothing=smoothing), margin, seed).disc < margin / 2
+
+
 def test_every_condition_has_a_part_in_the_key_and_labels_have_none(turtlebot: RobotSpec) -> None:
     usual = conditions(turtlebot)
     others = [

@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 from antdrive.sim import Outcome, Rollout, Run, certify, measure
+from antdrive.sim.log import rollout
 from antdrive.sim.log.margin import budget
 from antdrive.sim.log.record import DriveRecord
 from antdrive.sim.log.rollout import ARRAYS, read_record
@@ -132,6 +133,21 @@ def test_a_log_of_a_later_version_is_refused(saved: Path, tmp_path: Path) -> Non
 
     with pytest.raises(InputError, match=r"changed\.npz: record\.schema: this version reads schema 2, found 99"):
         Rollout.load(rewritten(saved, tmp_path, later))
+
+
+def test_more_distances_than_can_be_checked_are_a_problem_of_the_log(
+    log: Rollout, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    rows = len(log.t)
+    things = len(log.record.world.obstacles) + len(log.record.world.movers)
+    log.save(tmp_path / "run.npz")
+    monkeypatch.setattr(rollout, "MAX_LOG_DISTANCES", rows * things)
+    assert log.problems() == []
+    monkeypatch.setattr(rollout, "MAX_LOG_DISTANCES", rows * things - 1)
+    found = f"t: must have at most {rows - 1} rows in a world of {things} obstacles and movers, found {rows}"
+    assert log.problems() == [found]
+    with pytest.raises(InputError, match=rf"run\.npz: not a rollout \({found}\)"):
+        Rollout.load(tmp_path / "run.npz")
 
 
 LONG = 10**400
