@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import time
 from typing import Any
 
 import numpy as np
 
-from antdrive.planners import Planner, Query, agent_for, capabilities_of
+from antdrive.planners import PLANNERS, Planner, Query, agent_for, capabilities_of, smooth
 from antdrive.robots import TrackedPath
 from antdrive.sim.driving.blocking import blocked_cells, covered_discs
 from antdrive.sim.driving.replanning import MISSED, Replan, ReplanMonitor, ReplanPolicy
@@ -18,6 +19,7 @@ from antdrive.worlds.plane import polyline_length
 
 DECISION_PAUSE = 0.2  # the shortest time between two decisions [s]
 DECIDE_BEFORE = 0.6  # a decision is due when less than this many cells of the route remain
+STRAIGHT_BACK = 1.5  # a robot within this many cells of its cell's centre goes back to it straight
 AT_CELL = 0.25  # a robot this close to its cell's centre, in cells, need not drive through it
 
 
@@ -89,8 +91,22 @@ class CellwiseMonitor(ReplanMonitor):
         if to == self._goal and self._clear(ends[0], self._task.goal):
             ends[1] = self._task.goal
         near = math.dist(pose[:2], ends[0]) <= AT_CELL * self._grid.cell or tick == 0
-        direct = near and self._clear(pose[:2], ends[1])
-        return np.vstack([pose[:2], ends[1 if direct else 0 :]])
+        if near and self._clear(pose[:2], ends[1]):
+            return np.vstack([pose[:2], ends[1:]])
+        return np.vstack([self._way_back(pose, ends[0]), ends[1:]])
+
+    def _way_back(self, pose: Pose, centre: Floats) -> Floats:
+        """From the robot to the centre of its own cell (N, 2) [m]; around obstacles if avoiding movers took it far away."""
+        straight = np.array([pose[:2], centre])
+        far = math.dist(pose[:2], centre) > STRAIGHT_BACK * self._grid.cell
+        if not far or self._clear(pose[:2], centre):
+            return straight
+        try:
+            task = dataclasses.replace(self._task, start=pose, goal=(float(centre[0]), float(centre[1])))
+        except ValueError:  # the estimated pose lies outside the world or in an obstacle
+            return straight
+        plan = PLANNERS["astar"].plan(Query.between(self._grid, task), self._rng)
+        return smooth(plan, self._grid, task, kind="taut").xy if plan.solved else straight
 
     def _clear(self, a: tuple[float, ...] | Floats, b: tuple[float, ...] | Floats) -> bool:
         """Whether the straight line between two points keeps the grid's inflation from every obstacle."""

@@ -22,10 +22,12 @@ from antdrive.planners import (
 )
 from antdrive.robots import RobotSpec, TrackedPath, Twist
 from antdrive.sim import Outcome, ReplanPolicy, Rollout, Run, Scenario, certify, plan, run
+from antdrive.sim.driving.cellwise import CellwiseMonitor
 from antdrive.sim.driving.perception import Predictor
 from antdrive.sim.driving.replanning import ReplanMonitor
 from antdrive.sim.driving.schedule import MAX_LAG, Schedule, slow_down
 from antdrive.sim.log.metrics import tracking_error_max_m
+from antdrive.sim.pipeline import _monitor
 from antdrive.worlds import Disc, Keyframed, Mover, Route, Task, World, polyline_clearance
 
 # A wall with two gates; the path through the nearer gate is shorter.
@@ -116,6 +118,22 @@ def test_mmas_dstar_decides_cell_by_cell_and_waits_if_there_is_no_path(turtlebot
     again = among(GATEKEEPER, robot=turtlebot, planner="mmas-dstar").rollout
     assert again is not None
     assert again.digest == done.rollout.digest
+
+
+def test_a_robot_that_left_its_cell_returns_around_obstacles(turtlebot: RobotSpec) -> None:
+    """Avoiding movers has taken the robot to the other side of the wall; its own cell lies behind a post."""
+    task = dataclasses.replace(TASK, world=dataclasses.replace(HALL, movers=(GATEKEEPER,)))
+    scenario = Scenario(task=task, planner=load_planner("mmas-dstar"), robot=turtlebot)
+    grid, _ = plan(scenario)
+    monitor = _monitor(scenario, grid, Predictor(scenario.trajectories, scenario.effective_perception, 60))
+    assert isinstance(monitor, CellwiseMonitor)
+    centre = grid.xy(np.array([grid.cell_at(3.4, 1.5)]))[0]
+    for x, straight in ((4.7, False), (2.6, True), (3.2, True)):
+        way = monitor._way_back((x, 1.5, 0.0), centre)
+        assert way[0] == pytest.approx((x, 1.5))
+        assert way[-1] == pytest.approx(centre)
+        assert (len(way) == 2) == straight
+        assert float(polyline_clearance(HALL, way)) >= scenario.inflate - 0.012
 
 
 def test_mmas_dstar_stays_at_the_start_while_there_is_no_path(turtlebot: RobotSpec) -> None:
