@@ -25,6 +25,8 @@ FOLLOW_ROUTE, TWO_TWISTS = 0.0, 1.0
 CONTACT_MARGIN = 0.005  # a mover that is already closer than the minimum counts as met at this clearance [m]
 START_TIME = 0.25  # the time a standing robot needs to start moving [s]
 ESCAPE_TIME = 1.2  # an escape from a mover that cannot be kept clear of is judged for this long [s]
+ROUNDING = 1e-6  # movers are left out only if they are this much farther away than matters [m]
+LEVELS = 64  # of distance, for which the progress is tabulated
 ROUTE_END = 0.1  # closer to the route's end than this, the heading no longer counts [m]
 
 
@@ -60,37 +62,54 @@ class AvoidanceWeights(NamedTuple):
     narrowest: float
 
 
-class Simulated(NamedTuple):
-    """What following a candidate leads to.
+class Trail(NamedTuple):
+    """How far following a candidate leads, whatever movers do.
+
+    Attributes:
+        steps: how many steps it takes
+        blocked: whether it comes too close to an obstacle, in the last of these steps
+    """
+
+    steps: int
+    blocked: bool
+
+
+class Encounter(NamedTuple):
+    """How a candidate gets on with movers.
 
     Attributes:
         contact: when it first meets a mover or an obstacle [s], inf if never
-        clearance: least clearance to movers before that, beyond the minimum [m]
+        clearance: least clearance to movers before that, beyond the minimum [m]; exact below the `cap` of `encounter`
         intrusion: how far it intrudes on movers that reverse [m]
-        x: where it ends [m]
-        y: where it ends [m]
-        yaw: heading at the end [rad]
-        speed: speed at the end [m/s]
     """
 
     contact: float
     clearance: float
     intrusion: float
-    x: float
-    y: float
-    yaw: float
-    speed: float
+
+
+class Reachable(NamedTuple):
+    """The movers that matter in each step, for all candidates alike.
+
+    Attributes:
+        near: their indices, step by step (K, M); a row is filled up to its count
+        counts: how many matter in each step (K,)
+    """
+
+    near: Array
+    counts: Array
 
 
 @kernel
 def first_contact(
     x0: float, y0: float, x1: float, y1: float, places: Array, k: int, radii: Array, near: Array,
-    contact_distances: Array, min_distance: float,
+    contact_distances: Array, min_distance: float, cap: float,
 ) -> tuple[float, float]:  # fmt: skip
     """The share of a step after which a mover is at its contact distance, 2 if none is, and the clearance.
 
     The robot moves straight from (x0, y0) to (x1, y1), and each mover straight from its place k to the next.
-    The clearance is the least to a mover's surface, beyond `min_distance`.
+    The clearance is the least to a mover's surface, beyond `min_distance`; movers without contact that are no closer
+    than `cap` may be left out.
     """
     share, clearance = 2.0, math.inf
     for m in near:
@@ -99,8 +118,12 @@ def first_contact(
         reach = contact_distances[m]
         length2 = ux * ux + uy * uy
         along = ax * ux + ay * uy
-        f = clip(-along / length2, 0.0, 1.0) if length2 > 0.0 else 0.0
-        away = math.hypot(ax + f * ux, ay + f * uy)
+        f = clip(-along / length2, 0.0, 1.0) if length2 > 0.0 and along < 0.0 else 0.0
+        dx, dy = ax + f * ux, ay + f * uy
+        matters = max(reach, radii[m] + min_distance + min(clearance, cap)) + ROUNDING
+        if dx * dx + dy * dy > matters * matters:
+            continue
+        away = math.hypot(dx, dy)
         clearance = min(clearance, away - radii[m] - min_distance)
         if away < reach:
             over = ax * ax + ay * ay - reach * reach
@@ -114,26 +137,35 @@ def intrusion(x: float, y: float, places: Array, k: int, radii: Array, near: Arr
     """How much closer than `distance` a point is to a mover at instant k, if movers reversed at instant 0."""
     most = 0.0
     for m in near:
-        back_x, back_y = 2.0 * places[0, m, 0] - places[k, m, 0], 2.0 * places[0, m, 1] - places[k, m, 1]
-        most = max(most, radii[m] + distance - math.hypot(x - back_x, y - back_y))
+        dx = x - (2.0 * places[0, m, 0] - places[k, m, 0])
+        dy = y - (2.0 * places[0, m, 1] - places[k, m, 1])
+        matters = radii[m] + distance - most + ROUNDING
+        if dx * dx + dy * dy <= matters * matters:
+            most = max(most, radii[m] + distance - math.hypot(dx, dy))
     return most
 
 
 @kernel
-def simulate(
+def follow(
     x: float, y: float, yaw: float, v: float, w: float, s: float, rotating: bool, candidate: Array,
     path: PathSamples, obstacles: ObstacleIndex, limits: MotionLimits, tuning: PursuitTuning,
-    weights: AvoidanceWeights, places: Array, radii: Array, near: Array, contact_distances: Array,
-) -> Simulated:  # fmt: skip
-    """A candidate followed through the instants of `places` (K + 1, M, 2), `weights.step` apart."""
+    step: float, first: int, trail: Array,
+) -> Trail:  # fmt: skip
+    """A candidate followed from step `first` on, for as many steps as `trail` (K + 1, 5) has rows after its first.
+
+    A row of `trail` is a place [m, m], a heading [rad], a speed [m/s] and a yaw rate [rad/s]. Row 0 is the start, from
+    which all obstacles are judged; row `first` is (x, y, yaw, v, w), and the rows after it are filled.
+    """
     capped = MotionLimits(
         min(limits.speed, candidate[SPEED]), limits.yaw_rate, limits.acceleration, limits.yaw_acceleration,
         limits.lateral_acceleration, limits.half_track, limits.rim_speed,
     )  # fmt: skip
-    step, min_distance = weights.step, weights.min_distance
-    required = min(tuning.stopping_clearance, clearance_at(x, y, obstacles) - 1e-3)
-    least, risk, now = math.inf, 0.0, 0.0
-    for k in range(places.shape[0] - 1):
+    required = min(tuning.stopping_clearance, clearance_at(trail[0, 0], trail[0, 1], obstacles) - 1e-3)
+    cos, sin, facing, now = 1.0, 0.0, 0.0, 0.0
+    for k in range(trail.shape[0] - 1):
+        if k < first:
+            now += step
+            continue
         if candidate[KIND] == FOLLOW_ROUTE:
             v1, w1, s, rotating, _ = pursue(x, y, yaw, v, w, s, rotating, path, obstacles, capped, tuning)
         else:
@@ -143,18 +175,75 @@ def simulate(
             v1, w1 = reachable_twist(speed, yaw_rate, v, w, step, limits)
         middle = yaw + 0.25 * (w + w1) * step
         length = 0.5 * (v + v1) * step
-        x1, y1 = x + length * math.cos(middle), y + length * math.sin(middle)
-        share, clearance = first_contact(x, y, x1, y1, places, k, radii, near, contact_distances, min_distance)
+        if middle != facing:
+            cos, sin, facing = math.cos(middle), math.sin(middle), middle
+        x1, y1 = x + length * cos, y + length * sin
+        yaw1 = yaw + 0.5 * (w + w1) * step
+        trail[k + 1, 0], trail[k + 1, 1], trail[k + 1, 2], trail[k + 1, 3], trail[k + 1, 4] = x1, y1, yaw1, v1, w1
+        if abs(length) > 1e-6:
+            discs = nearby(x, y, obstacles)
+            if segment_clearance(x, y, x1, y1, discs, obstacles.bounds) < required:
+                return Trail(k + 1, True)
+        x, y, yaw, v, w, now = x1, y1, yaw1, v1, w1, now + step
+    return Trail(trail.shape[0] - 1, False)
+
+
+@kernel
+def follow_all(
+    s: float, rotating: bool, candidates: Array, path: PathSamples, obstacles: ObstacleIndex, limits: MotionLimits,
+    tuning: PursuitTuning, step: float, trails: Array, steps: Array, blocked: Array,
+) -> None:  # fmt: skip
+    """Fill `trails` (N, K + 1, 5), `steps` and `blocked` (N,) for the candidates after the first.
+
+    Row 0 of each trail is given. Candidates with the same first twist share its trail up to their second one.
+    """
+    stem = -1
+    for n in range(1, candidates.shape[0]):
+        candidate, trail = candidates[n], trails[n]
+        first = 0
+        if candidate[KIND] == TWO_TWISTS and stem >= 0 and (
+            candidate[SPEED] == candidates[stem, SPEED] and candidate[YAW_RATE] == candidates[stem, YAW_RATE]
+        ):  # fmt: skip
+            now = 0.0
+            while first < steps[stem] and now < candidate[DURATION] - 1e-9:
+                first, now = first + 1, now + step
+            for k in range(1, first + 1):
+                for j in range(5):
+                    trail[k, j] = trails[stem, k, j]
+            if first == steps[stem]:
+                steps[n], blocked[n] = steps[stem], blocked[stem]
+                continue
+        got = follow(
+            trail[first, 0], trail[first, 1], trail[first, 2], trail[first, 3], trail[first, 4], s, rotating,
+            candidate, path, obstacles, limits, tuning, step, first, trail,
+        )  # fmt: skip
+        steps[n], blocked[n] = got.steps, got.blocked
+        if candidate[KIND] == TWO_TWISTS and candidate[DURATION] == math.inf:
+            stem = n
+
+
+@kernel
+def encounter(
+    trail: Array, end: Trail, places: Array, radii: Array, near: Array, by_step: Reachable, contact_distances: Array,
+    weights: AvoidanceWeights, cap: float,
+) -> Encounter:  # fmt: skip
+    """How a candidate that follows a trail gets on with the movers `near`, those of `by_step` in particular."""
+    least, risk, now = math.inf, 0.0, 0.0
+    for k in range(end.steps):
+        x1, y1 = trail[k + 1, 0], trail[k + 1, 1]
+        share, clearance = first_contact(
+            trail[k, 0], trail[k, 1], x1, y1, places, k, radii, by_step.near[k, : by_step.counts[k]],
+            contact_distances, weights.min_distance, min(cap, least),
+        )  # fmt: skip
         if share <= 1.0:
-            return Simulated(now + share * step, least, risk, x, y, yaw, v)
+            return Encounter(now + share * weights.step, least, risk)
         if weights.reversal_weight > 0.0 and now < weights.reversal_time:
             risk = max(risk, intrusion(x1, y1, places, k + 1, radii, near, weights.reversal_distance))
-        discs = nearby(x, y, obstacles)
-        if abs(length) > 1e-6 and segment_clearance(x, y, x1, y1, discs, obstacles.bounds) < required:
-            return Simulated(now, least, risk, x, y, yaw, v)
+        if end.blocked and k == end.steps - 1:
+            return Encounter(now, least, risk)
         least = min(least, clearance)
-        x, y, yaw, v, w, now = x1, y1, yaw + 0.5 * (w + w1) * step, v1, w1, now + step
-    return Simulated(math.inf, least, risk, x, y, yaw, v)
+        now += weights.step
+    return Encounter(math.inf, least, risk)
 
 
 @kernel
@@ -172,8 +261,11 @@ def relevant_movers(
     for m in range(radii.shape[0]):
         closest = math.inf
         for k in range(places.shape[0]):
-            away = math.hypot(places[k, m, 0] - x, places[k, m, 1] - y)
-            closest = min(closest, away - limits.speed * k * weights.step)
+            dx, dy = places[k, m, 0] - x, places[k, m, 1] - y
+            matters = closest + limits.speed * k * weights.step + ROUNDING
+            if matters > 0.0 and dx * dx + dy * dy > matters * matters:
+                continue
+            closest = min(closest, math.hypot(dx, dy) - limits.speed * k * weights.step)
         if closest - radii[m] - weights.min_distance > weights.preferred_clearance:
             continue
         near[count] = m
@@ -189,27 +281,136 @@ def relevant_movers(
 
 
 @kernel
-def score(
-    end: Simulated, s: float, window: float, path: PathSamples, tuning: PursuitTuning, weights: AvoidanceWeights
-) -> float:
-    """What a candidate without contact is worth: its progress, less what its shortcomings cost [m].
+def reachable_by_step(
+    x: float, y: float, speed: float, weights: AvoidanceWeights, places: Array, radii: Array, near: Array, cap: float
+) -> Reachable:
+    """Which of the movers `near` a robot no faster than `speed` can get closer to than `cap`, in each step."""
+    rows, counts = np.empty((places.shape[0] - 1, near.shape[0]), np.int64), np.zeros(places.shape[0] - 1, np.int64)
+    for k in range(places.shape[0] - 1):
+        for m in near:
+            dx, dy = places[k, m, 0] - x, places[k, m, 1] - y
+            ux, uy = places[k + 1, m, 0] - places[k, m, 0], places[k + 1, m, 1] - places[k, m, 1]
+            moves = speed * (k + 1) * weights.step + math.sqrt(ux * ux + uy * uy)
+            matters = moves + radii[m] + weights.min_distance + cap + ROUNDING
+            if dx * dx + dy * dy <= matters * matters:
+                rows[k, counts[k]] = m
+                counts[k] += 1
+    return Reachable(rows, counts)
 
-    `s` is the progress now [m], `window` how much farther the candidate can get at most [m].
+
+@kernel
+def fastest(v: float, candidates: Array, limits: MotionLimits) -> float:
+    """A speed that no candidate exceeds [m/s]."""
+    most = max(abs(v), limits.speed)
+    for n in range(candidates.shape[0]):
+        most = max(most, max(abs(candidates[n, SPEED]), abs(candidates[n, NEXT_SPEED])))
+    return most
+
+
+@kernel
+def worth(
+    end: Array, s: float, window: float, path: PathSamples, tuning: PursuitTuning, weights: AvoidanceWeights
+) -> float:
+    """What a candidate is worth that ends at `end`, a row of its trail, among movers that are far away [m].
+
+    That is its progress, less what its shortcomings cost. `s` is the progress now [m], `window` how much farther the
+    candidate can get at most [m].
     """
+    x, y, yaw, v = end[0], end[1], end[2], end[3]
     xy, arc = path.xy, path.arc
-    progress, k = project(end.x, end.y, s, window, xy, arc)
+    progress, k = project(x, y, s, window, xy, arc)
     px, py, k = point_at(progress, k, xy, arc)
-    cross_track = math.hypot(end.x - px, end.y - py)
+    cross_track = math.hypot(x - px, y - py)
     qx, qy, _ = point_at(min(progress + tuning.lookahead_max, arc[-1]), k, xy, arc)
-    bearing = math.atan2(qy - end.y, qx - end.x)
+    bearing = math.atan2(qy - y, qx - x)
     off = 0.0
     if arc[-1] - progress > ROUTE_END:
-        off = abs((end.yaw - bearing + math.pi) % (2.0 * math.pi) - math.pi)
+        off = abs((yaw - bearing + math.pi) % (2.0 * math.pi) - math.pi)
     total = progress - weights.cross_track_weight * cross_track - weights.heading_weight * off
-    total += weights.speed_weight * end.speed * math.cos(off)
-    total -= weights.reversal_weight * end.intrusion
-    total -= weights.clearance_weight * max(weights.preferred_clearance - end.clearance, 0.0)
-    return total
+    total += weights.speed_weight * v * math.cos(off)
+    return float(total)
+
+
+@kernel
+def among_movers(alone: float, met: Encounter, weights: AvoidanceWeights) -> float:
+    """What a candidate is worth that is worth `alone` among movers that are far away [m]."""
+    value = alone - weights.reversal_weight * met.intrusion
+    return value - weights.clearance_weight * max(weights.preferred_clearance - met.clearance, 0.0)
+
+
+@kernel
+def progress_by_distance(
+    x: float, y: float, yaw: float, s: float, window: float, path: PathSamples, farthest: float, out: Array
+) -> float:
+    """Fill `out` (N,): the progress of a robot that ends no farther from (x, y) than 0 to `farthest` [m].
+
+    The nearest point of a route is no farther along a segment than the robot's own place along its direction. Returns
+    the largest angle between the robot's heading and a segment that it may get to [rad].
+    """
+    xy, arc = path.xy, path.arc
+    k, aligned = 0, 1.0
+    while k < xy.shape[0] - 2 and arc[k + 1] < s:
+        k += 1
+    out[:] = s
+    while k < xy.shape[0] - 1 and arc[k] <= s + window:
+        length = arc[k + 1] - arc[k]
+        ux, uy = (xy[k + 1, 0] - xy[k, 0]) / length, (xy[k + 1, 1] - xy[k, 1]) / length
+        ahead = (xy[k, 0] - x) * ux + (xy[k, 1] - y) * uy
+        aligned = min(aligned, ux * math.cos(yaw) + uy * math.sin(yaw))
+        for i in range(out.shape[0]):
+            distance = farthest * i / (out.shape[0] - 1)
+            if distance >= ahead - ROUNDING:
+                out[i] = max(out[i], min(min(arc[k + 1], s + window), arc[k] + distance - ahead))
+        k += 1
+    return math.acos(max(aligned, -1.0))
+
+
+@kernel
+def travel(
+    candidate: Array, v: float, w: float, span: float, step: float, off: float, limits: MotionLimits
+) -> tuple[float, float]:
+    """How far a candidate gets at most in the route's direction [m], and how fast it is at the end at most [m/s].
+
+    `off` is the largest angle between the robot's heading and the route: a robot that drives backwards and turns less
+    than what is left to a right angle gets no farther.
+    """
+    brake, first, second = 0.5 / limits.acceleration, candidate[SPEED], candidate[NEXT_SPEED]
+    until = min(candidate[DURATION] + step, span)
+    if candidate[KIND] == FOLLOW_ROUTE:
+        first, second, until = min(first, limits.speed), 0.0, span
+    over = max(abs(v) - abs(first), 0.0) if v * first > 0.0 else v
+    slowing = over * over * brake + limits.acceleration * step * step
+    fall = max(abs(first) - abs(second), 0.0) if first * second >= 0.0 else abs(first)
+    driven = abs(first) * until + abs(second) * (span - until) + (fall * fall * brake if until < span else 0.0)
+    speed = max(abs(first), abs(v))
+    if until < span:
+        speed = max(abs(second), speed - limits.acceleration * (span - until))
+    if candidate[KIND] == TWO_TWISTS and first < 0.0 and second <= 0.0:
+        turning = max(abs(w), abs(candidate[YAW_RATE]))
+        if off + turning * min(until + turning / limits.yaw_acceleration, span) < 0.5 * math.pi:
+            driven = 0.0
+    return slowing + driven + ROUNDING, speed
+
+
+@kernel
+def limit_worths(
+    x: float, y: float, yaw: float, v: float, w: float, s: float, candidates: Array, path: PathSamples,
+    limits: MotionLimits, tuning: PursuitTuning, weights: AvoidanceWeights, span: float, window: float,
+) -> Array:  # fmt: skip
+    """More than each candidate (N, 6) can be worth, without following it (N,) [m]."""
+    most = fastest(v, candidates, limits)
+    brake, step = 0.5 / limits.acceleration, weights.step
+    farthest = most * span + (v * v + most * most) * brake + limits.acceleration * step * step + 2.0 * ROUNDING
+    progress = np.empty(LEVELS + 1)
+    off = progress_by_distance(x, y, yaw, s, window, path, farthest, progress)
+    limit = np.empty(candidates.shape[0])
+    for n in range(candidates.shape[0]):
+        distance, speed = travel(candidates[n], v, w, span, step, off, limits)
+        i = min(int(LEVELS * distance / farthest) + 1, LEVELS)
+        limit[n] = progress[i] + weights.speed_weight * speed + ROUNDING
+        if n <= 1:
+            limit[n] += weights.persistence
+    return limit
 
 
 @kernel
@@ -223,30 +424,70 @@ def choose(
     Row 0 is the controller's own motion, row 1 the last decision. Row 0 is taken if it has the preferred
     clearance and no risk; otherwise the candidate without contact that scores best; if each has a contact,
     the one whose comes last.
+
+    Movers only lower a score. So the candidate with the highest limit is followed next, which lowers its limit to what
+    it is worth without movers, and judged among movers once it comes first again, until none can beat the best.
     """
     near, contact_distances = relevant_movers(x, y, limits, tuning, weights, places, radii)
     if near.shape[0] == 0:
         return 0, math.inf
-    span = weights.step * (places.shape[0] - 1)
+    count, instants, cap = candidates.shape[0], places.shape[0], weights.preferred_clearance
+    by_step = reachable_by_step(x, y, fastest(v, candidates, limits), weights, places, radii, near, cap)
+    trails, steps, blocked = np.empty((count, instants, 5)), np.empty(count, np.int64), np.empty(count, np.bool_)
+    trails[:, 0, 0], trails[:, 0, 1], trails[:, 0, 2], trails[:, 0, 3], trails[:, 0, 4] = x, y, yaw, v, w
+    own = follow(
+        x, y, yaw, v, w, s, rotating, candidates[0], path, obstacles, limits, tuning, weights.step, 0, trails[0]
+    )
+    steps[0], blocked[0] = own.steps, own.blocked
+    met = encounter(trails[0], own, places, radii, near, by_step, contact_distances, weights, cap)
+    if met.contact == math.inf and met.clearance >= cap and met.intrusion == 0.0:
+        return 0, met.contact
+    span = weights.step * (instants - 1)
     window = limits.speed * span + tuning.lookahead_max
-    best, best_score, best_contact = 0, -math.inf, -1.0
-    for n in range(candidates.shape[0]):
-        end = simulate(
-            x, y, yaw, v, w, s, rotating, candidates[n], path, obstacles, limits, tuning, weights, places, radii,
-            near, contact_distances,
-        )  # fmt: skip
-        if end.contact < math.inf:
-            if best_contact < math.inf and end.contact > best_contact + 1e-9:
-                best, best_contact = n, end.contact
+    limit = limit_worths(x, y, yaw, v, w, s, candidates, path, limits, tuning, weights, span, window)
+    if (candidates[1] == candidates[0]).all():
+        limit[1] = -math.inf  # never better than row 0
+    limit[0] = -math.inf  # judged below
+    followed = np.zeros(count, np.bool_)
+    best, best_score = -1, -math.inf
+    if met.contact == math.inf:
+        alone = worth(trails[0, instants - 1], s, window, path, tuning, weights)
+        best, best_score = 0, among_movers(alone, met, weights) + weights.persistence
+    while True:
+        n = int(np.argmax(limit))
+        if limit[n] == -math.inf or limit[n] < best_score or (limit[n] == best_score and n > best):
+            break
+        if not followed[n]:
+            end = follow(
+                x, y, yaw, v, w, s, rotating, candidates[n], path, obstacles, limits, tuning, weights.step, 0, trails[n]
+            )
+            followed[n], limit[n] = True, -math.inf
+            if not end.blocked:
+                limit[n] = worth(trails[n, instants - 1], s, window, path, tuning, weights)
+                if n <= 1:
+                    limit[n] += weights.persistence
             continue
-        if n == 0 and end.clearance >= weights.preferred_clearance and end.intrusion == 0.0:
-            return 0, end.contact
-        value = score(end, s, window, path, tuning, weights)
+        met = encounter(
+            trails[n], Trail(instants - 1, False), places, radii, near, by_step, contact_distances, weights, cap
+        )
+        alone = worth(trails[n, instants - 1], s, window, path, tuning, weights)
+        value = among_movers(alone, met, weights)
         if n <= 1:
             value += weights.persistence
-        if best_contact < math.inf or value > best_score:
-            best, best_score, best_contact = n, value, end.contact
-    return best, best_contact
+        if met.contact == math.inf and (value > best_score or (value == best_score and n < best)):
+            best, best_score = n, value
+        limit[n] = -math.inf
+    if best >= 0:
+        return best, math.inf
+    follow_all(s, rotating, candidates, path, obstacles, limits, tuning, weights.step, trails, steps, blocked)
+    best, latest = 0, -1.0
+    for n in range(count):
+        met = encounter(
+            trails[n], Trail(steps[n], blocked[n]), places, radii, near, by_step, contact_distances, weights, cap
+        )
+        if met.contact > latest + 1e-9:
+            best, latest = n, met.contact
+    return best, latest
 
 
 @kernel
@@ -262,13 +503,20 @@ def best_escape(
     """
     near, _ = relevant_movers(x, y, limits, tuning, weights, places, radii)
     soon = places[: min(places.shape[0], int(ESCAPE_TIME / weights.step) + 2)]
-    bodies = radii + weights.narrowest
+    bodies, count = radii + weights.narrowest, candidates.shape[0]
+    by_step = reachable_by_step(x, y, math.inf, weights, soon, radii, near, math.inf)
+    trails, steps, blocked = np.empty((count, soon.shape[0], 5)), np.empty(count, np.int64), np.empty(count, np.bool_)
+    trails[:, 0, 0], trails[:, 0, 1], trails[:, 0, 2], trails[:, 0, 3], trails[:, 0, 4] = x, y, yaw, v, w
+    own = follow(
+        x, y, yaw, v, w, s, rotating, candidates[0], path, obstacles, limits, tuning, weights.step, 0, trails[0]
+    )
+    steps[0], blocked[0] = own.steps, own.blocked
+    follow_all(s, rotating, candidates, path, obstacles, limits, tuning, weights.step, trails, steps, blocked)
     best, most = -1, -math.inf
-    for n in range(candidates.shape[0]):
-        end = simulate(
-            x, y, yaw, v, w, s, rotating, candidates[n], path, obstacles, limits, tuning, weights, soon, radii,
-            near, bodies,
-        )  # fmt: skip
-        if end.contact == math.inf and end.clearance > most + 1e-6:
-            best, most = n, end.clearance
+    for n in range(count):
+        if blocked[n]:
+            continue
+        met = encounter(trails[n], Trail(steps[n], False), soon, radii, near, by_step, bodies, weights, math.inf)
+        if met.contact == math.inf and met.clearance > most + 1e-6:
+            best, most = n, met.clearance
     return best

@@ -88,7 +88,7 @@ class Avoidance:
     @property
     def prediction_times(self) -> Floats:
         """The times from now (K + 1,) for which `avoid` needs the movers' places [s]."""
-        return np.arange(math.ceil(self.horizon / self.step - 1e-9) + 1) * np.float64(self.step)
+        return _instants(self.horizon, self.step)
 
     def avoid(
         self,
@@ -120,8 +120,8 @@ class Avoidance:
         candidates = self._candidates(robot, state, speed_limit)
         situation = (
             *pose, *last, before.arc, before.turning, candidates, tracked.samples, tracked.obstacles,
-            tracked.limits, tracked.tuning._replace(period=self.step), self._weights(tracked, robot.footprint),
-            places, radii,
+            tracked.limits, tracked.tuning._replace(period=self.step),
+            _weights(self, tracked.tuning.robot_radius, robot.footprint), places, radii,
         )  # fmt: skip
         chosen, contact = kernels.choose(*situation)
         if chosen == 0 and contact == math.inf:
@@ -165,23 +165,6 @@ class Avoidance:
             table[1, kernels.DURATION] = state.remaining
         return table
 
-    def _weights(self, tracked: TrackedPath, footprint: Footprint) -> kernels.AvoidanceWeights:
-        radius = tracked.tuning.robot_radius
-        return kernels.AvoidanceWeights(
-            step=self.step,
-            min_distance=radius + self.min_clearance,
-            preferred_clearance=self.preferred_clearance,
-            clearance_weight=self.clearance_weight,
-            cross_track_weight=self.cross_track_weight,
-            heading_weight=self.heading_weight,
-            speed_weight=SPEED_WEIGHT,
-            persistence=PERSISTENCE,
-            reversal_time=self.reversal_time,
-            reversal_distance=radius + self.min_clearance + self.reversal_margin,
-            reversal_weight=self.reversal_weight,
-            narrowest=min(footprint.half_length, footprint.half_width) + footprint.rounding,
-        )
-
 
 _NOT_NEGATIVE = (
     "min_clearance",
@@ -217,3 +200,30 @@ def _candidate_table(max_speed: float, max_yaw_rate: float, lateral_acceleration
                 ahead = (v,) if v else (max_speed, -max_speed)
                 rows += [(kernels.TWO_TWISTS, v, w, duration, next_speed, 0.0) for next_speed in ahead if w]
     return np.array(rows)
+
+
+@functools.lru_cache(maxsize=64)
+def _instants(horizon: float, step: float) -> Floats:
+    """The times of a prediction (K + 1,) [s], read-only."""
+    times = np.arange(math.ceil(horizon / step - 1e-9) + 1) * np.float64(step)
+    times.flags.writeable = False
+    return times
+
+
+@functools.lru_cache(maxsize=64)
+def _weights(avoidance: Avoidance, radius: float, footprint: Footprint) -> kernels.AvoidanceWeights:
+    """The settings as they apply to a robot of a circumscribed radius [m]."""
+    return kernels.AvoidanceWeights(
+        step=avoidance.step,
+        min_distance=radius + avoidance.min_clearance,
+        preferred_clearance=avoidance.preferred_clearance,
+        clearance_weight=avoidance.clearance_weight,
+        cross_track_weight=avoidance.cross_track_weight,
+        heading_weight=avoidance.heading_weight,
+        speed_weight=SPEED_WEIGHT,
+        persistence=PERSISTENCE,
+        reversal_time=avoidance.reversal_time,
+        reversal_distance=radius + avoidance.min_clearance + avoidance.reversal_margin,
+        reversal_weight=avoidance.reversal_weight,
+        narrowest=min(footprint.half_length, footprint.half_width) + footprint.rounding,
+    )

@@ -49,6 +49,7 @@ class Predictor:
 
     def __init__(self, trajectories: Trajectories, perception: Perception, hz: int) -> None:
         self.trajectories, self._perception, self._hz = trajectories, perception, hz
+        self._everyone = np.arange(len(trajectories.radii))
         self._first, self._positions, self._velocities = 0, np.empty((0, 0, 2)), np.empty((0, 0, 2))
 
     @property
@@ -83,6 +84,8 @@ class Predictor:
 
     def within_range(self, tick: int, robot: tuple[float, float]) -> npt.NDArray[np.int64]:
         """The indices (M,) of the movers that a robot at a position [m] perceives in a tick."""
+        if self._perception.range == math.inf:
+            return self._everyone
         distances = np.hypot(*(self._now(tick)[0] - robot).T) - self.trajectories.radii
         return np.flatnonzero(distances <= self._perception.range)
 

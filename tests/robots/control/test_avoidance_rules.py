@@ -28,7 +28,7 @@ def test_the_first_contact_is_that_of_sampled_motion(
 ) -> None:
     places = np.array([[mover], [mover_end]])
     share, clearance = first_contact(
-        *start, *end, places, 0, np.array([radius]), NEAR, np.array([distance]), distance - radius
+        *start, *end, places, 0, np.array([radius]), NEAR, np.array([distance]), distance - radius, math.inf
     )
     f = np.linspace(0, 1, 2001)[:, None]
     gap = np.hypot(*((1 - f) * mover + f * mover_end - (1 - f) * start - f * end).T)

@@ -1,0 +1,104 @@
+"""The search for the best candidate leaves out most of them: it must find what judging each of them in turn finds."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from antdrive.robots import Avoidance, AvoidanceState, PurePursuit, TrackedPath, load_robot
+from antdrive.robots.control import _kernels_avoidance as kernels
+from antdrive.robots.control.avoidance import _weights
+from antdrive.worlds import Disc, Floats, Route, World
+
+ROBOT, AVOIDANCE = load_robot("turtlebot"), Avoidance()
+TABLE = AVOIDANCE._candidates(ROBOT, AvoidanceState((1.0, 0.3, 0.4, 0.4, 0.3, 0.0), 0.2), 0.6)
+near = st.floats(-2.5, 2.5)
+speed = st.floats(-0.9, 0.9)
+
+
+@pytest.fixture(scope="module")
+def tracked() -> TrackedPath:
+    x = np.linspace(-6, 6, 49)
+    world = World("bends", (-8, -8, 8, 8), (Disc(1.2, 1.3, 0.3), Disc(-1.0, -0.9, 0.2)))
+    return PurePursuit().prepare(Route(np.stack([x, 0.4 * np.sin(2 * x)], axis=1)), world, ROBOT, 0.05, 1 / 60)
+
+
+def in_turn(situation: tuple[Any, ...], contact_distances: Floats, near: Floats) -> tuple[int, float]:
+    """The choice and its contact: each candidate followed and judged, in their order."""
+    x, y, yaw, v, w, s, _, candidates, path, obstacles, limits, tuning, weights, places, radii = situation
+    steps = len(places) - 1
+    everyone = kernels.Reachable(np.tile(near, (steps, 1)), np.full(steps, len(near)))
+    window = limits.speed * (weights.step * steps) + tuning.lookahead_max
+    best, best_score, best_contact = 0, -math.inf, -1.0
+    for n, candidate in enumerate(candidates):
+        trail = np.empty((steps + 1, 5))
+        trail[0] = x, y, yaw, v, w
+        end = kernels.follow(
+            *situation[:7], candidate, path, obstacles, limits, tuning, weights.step, 0, trail
+        )  # fmt: skip
+        met = kernels.encounter(trail, end, places, radii, near, everyone, contact_distances, weights, math.inf)
+        if met.contact < math.inf:
+            if best_contact < math.inf and met.contact > best_contact + 1e-9:
+                best, best_contact = n, met.contact
+            continue
+        if n == 0 and met.clearance >= weights.preferred_clearance and met.intrusion == 0:
+            return 0, math.inf
+        value = kernels.worth(trail[-1], s, window, path, tuning, weights)
+        value -= weights.reversal_weight * met.intrusion
+        value -= weights.clearance_weight * max(weights.preferred_clearance - met.clearance, 0.0)
+        value += weights.persistence if n <= 1 else 0.0
+        if best_contact < math.inf or value > best_score:
+            best, best_score, best_contact = n, value, math.inf
+    return best, best_contact
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    yaw=st.floats(-3.2, 3.2),
+    aside=st.floats(-0.5, 0.5),
+    v=st.floats(-0.7, 0.7),
+    w=st.floats(-1.5, 1.5),
+    movers=st.lists(st.tuples(near, near, speed, speed, st.floats(0.1, 0.5)), min_size=1, max_size=8),
+)
+def test_no_candidate_that_is_left_out_is_better(
+    tracked: TrackedPath, yaw: float, aside: float, v: float, w: float, movers: list[tuple[float, ...]]
+) -> None:
+    table = np.array(movers)
+    table[:, :2] += np.where(np.hypot(*table[:, :2].T) < 0.6, 1.0, 0.0)[:, None]
+    places = table[:, :2] + AVOIDANCE.prediction_times[:, None, None] * table[:, 2:4]
+    radii = table[:, 4].copy()
+    weights = _weights(AVOIDANCE, tracked.tuning.robot_radius, ROBOT.footprint)
+    tuning = tracked.tuning._replace(period=AVOIDANCE.step)
+    here = (0.0, aside, yaw, v, w, 6.2, False)
+    situation = (*here, TABLE, tracked.samples, tracked.obstacles, tracked.limits, tuning, weights, places, radii)
+    close, distances = kernels.relevant_movers(0.0, aside, tracked.limits, tuning, weights, places, radii)
+    if len(close):
+        assert kernels.choose(*situation) == in_turn(situation, distances, close)
+    else:
+        assert kernels.choose(*situation) == (0, math.inf)
+
+
+def test_the_limit_of_a_candidate_is_no_less_than_it_is_worth(tracked: TrackedPath) -> None:
+    weights = _weights(AVOIDANCE, tracked.tuning.robot_radius, ROBOT.footprint)
+    tuning, rng = tracked.tuning._replace(period=AVOIDANCE.step), np.random.default_rng(0)
+    steps = len(AVOIDANCE.prediction_times) - 1
+    window = tracked.limits.speed * (weights.step * steps) + tuning.lookahead_max
+    tight = 0
+    for _ in range(40):
+        v, w, yaw = rng.uniform(-0.7, 0.7), rng.uniform(-1.5, 1.5), rng.uniform(-math.pi, math.pi)
+        here = (rng.uniform(-4, 4), rng.uniform(-1, 1), yaw, v, w)
+        s = float(tracked.route.arc[np.argmin(np.hypot(*(tracked.route.xy - here[:2]).T))])
+        common = (tracked.samples, tracked.limits, tuning, weights)
+        limit = kernels.limit_worths(*here, s, TABLE, *common, weights.step * steps, window)
+        for n, candidate in enumerate(TABLE):
+            trail = np.empty((steps + 1, 5))
+            trail[0] = here
+            motion = (tracked.samples, tracked.obstacles, tracked.limits, tuning, weights.step, 0, trail)
+            if not kernels.follow(*here, s, False, candidate, *motion).blocked:
+                worth = kernels.worth(trail[-1], s, window, tracked.samples, tuning, weights)
+                assert worth <= limit[n]
+                tight += limit[n] < worth + 0.3
+    assert tight > 50  # the limits are worth having
