@@ -81,7 +81,7 @@ def _made_up_drive(
         height=0.2,
         wheel_radius=0.04,
         track=0.25,
-        max_speed=float(twist[:, 0].max()) + 0.1,
+        max_speed=min(10.0, float(twist[:, 0].max()) + 0.1),
     )
     record = made_up_record(
         task=task,

@@ -43,11 +43,13 @@ def test_a_robot_that_brakes_stops_at_the_goal_if_both_ends_of_its_way_are_there
         assert driver(turtlebot)._stops_at_goal(pose, Twist(speed, 0.0)) is stops, yaw
 
 
-def test_braking_keeps_the_curve(turtlebot: RobotSpec) -> None:
+def test_braking_keeps_the_curve_as_far_as_the_turn_can_be_slowed(turtlebot: RobotSpec) -> None:
     assert _brake(Twist(0.5, 1.0), turtlebot, 60) == pytest.approx((0.5 - 1 / 60, (0.5 - 1 / 60) / 0.5))
     assert _brake(Twist(-0.5, 1.0), turtlebot, 60) == pytest.approx((-0.5 + 1 / 60, (0.5 - 1 / 60) / 0.5))
-    assert _brake(Twist(0.01, 1.0), turtlebot, 60) == (0.0, 0.0)
-    assert _brake(Twist(0.0, 1.0), turtlebot, 60) == (0.0, 0.0)
+    slower = 1.0 - turtlebot.max_yaw_acceleration / 60  # the wheels cannot stop the turn at once
+    assert _brake(Twist(0.01, 1.0), turtlebot, 60) == pytest.approx((0.0, slower))
+    assert _brake(Twist(0.0, -1.0), turtlebot, 60) == pytest.approx((0.0, -slower))
+    assert _brake(Twist(0.0, 0.01), turtlebot, 60) == (0.0, 0.0)
 
 
 def test_stopping_takes_as_long_as_the_slower_of_speed_and_turn(turtlebot: RobotSpec) -> None:

@@ -16,7 +16,7 @@ from antdrive.robots import load_robot
 from antdrive.robots.spec import Footprint
 from antdrive.sim import Outcome, Rollout, certify
 from antdrive.sim.log.certificate import Certificate, closed_form_clearance
-from antdrive.sim.log.record import DECISION, ReplanRecord
+from antdrive.sim.log.record import DECISION, PerceptionRecord, ReplanRecord
 from antdrive.worlds import Cruising, Disc, Floats, Keyframed, Task, World
 from tests.sim.records import made_up_record
 
@@ -191,11 +191,11 @@ def touched(gap: float, row: int = 400, at: int = 400) -> Rollout:
 
 
 def test_a_contact_is_felt_where_the_closed_form_is_within_12_mm() -> None:
-    only_beyond(0.012, touched, "readings disagree: physics reports")
+    only_beyond(0.012, touched, "readings disagree: physics reports a contact at row")
     assert says(touched(0.01), "physics reports 1 contact points, the first at t = 1.667 s")
     for at, near in ((398, False), (399, True), (401, True), (402, False)):
-        assert says(touched(0.001, at=at), "readings disagree: physics reports") is not near
-    assert not says(touched(0.001, row=0, at=0), "readings disagree")
+        assert says(touched(0.001, at=at), "readings disagree: physics reports a contact at row") is not near
+    assert not says(touched(0.001, row=0, at=0), "readings disagree: physics reports a contact at row")
     assert certify(touched(0.01)).contacts == 1
 
 
@@ -241,6 +241,7 @@ def test_two_rows_have_one_way_between_them_and_one_row_has_none() -> None:
 def among(*movers: Cruising | Keyframed) -> Rollout:
     """A robot that stands among movers which are where they should be."""
     log = with_task(drive(), world=World("w", (0.0, 0.0, 6.0, 4.0), (DISC,), movers=movers))
+    log = with_record(log, perception=PerceptionRecord(kind="velocities", range_m=None))
     log = replace(log, movers=log.trajectories().positions(log.t))
     return replace(log, clearance=closed_form_clearance(log))
 
