@@ -1,6 +1,7 @@
 from . import planners as planners
 from . import robots as robots
 from . import sim as sim
+from . import testing as testing
 from . import worlds as worlds
 from .planners.plan import GridPlanner as GridPlanner
 from .planners.plan import Planner as Planner

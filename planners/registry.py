@@ -66,6 +66,20 @@ def load_planner(name: str, /, **options: Any) -> Planner:
     return _with_options(name, planner, options)
 
 
+def make_planner(made: Any, name: str, /, **options: Any) -> Planner:
+    """The planner that people's own code defines, with options set.
+
+    Args:
+        made: an object with `plan`, or a class of such objects
+        name: what messages call it
+        options: the planner's options by name; values may be text
+
+    Raises:
+        InputError: it is no planner, its class cannot be called without arguments, or an option is wrong.
+    """
+    return _with_options(name, _instance(made, f"planner {name!r}"), options)
+
+
 def list_planners() -> Mapping[str, Planner]:
     """All planners by name, those of other packages last.
 
@@ -220,11 +234,19 @@ def _load(entry: importlib.metadata.EntryPoint) -> Planner:
     who = f"planner {entry.name!r} of {_maker(entry)}"
     try:
         made = entry.load()
-        planner = made() if isinstance(made, type) else made
-    except Exception as error:  # another package's import or constructor may raise anything
+    except Exception as error:  # another package's import may raise anything
         raise InputError(f"{who} cannot be loaded ({entry.value}): {type(error).__name__}: {error}") from error
+    return _instance(made, who, f" ({entry.value})")
+
+
+def _instance(made: Any, who: str, source: str = "") -> Planner:
+    """What other people's code defines, as a planner; `who` and `source` are for messages."""
+    try:
+        planner = made() if isinstance(made, type) else made
+    except Exception as error:  # another package's constructor may raise anything
+        raise InputError(f"{who} cannot be loaded{source}: {type(error).__name__}: {error}") from error
     if not isinstance(planner, Planner):
-        raise InputError(f"{who} is not a planner ({entry.value}): it has no method `plan(query, rng)`")
+        raise InputError(f"{who} is not a planner{source}: it has no method `plan(query, rng)`")
     return planner
 
 

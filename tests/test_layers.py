@@ -31,7 +31,8 @@ SIM_RANKS = {
     "view": 4,
     "papers": 5,
     "warm": 5,
-    "cli": 6,
+    "regression": 5,
+    "cli": 7,
 }
 
 

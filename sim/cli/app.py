@@ -11,6 +11,8 @@ from typing import Annotated, Any
 
 import typer
 
+from antdrive.sim.cli.commands.accept import accept
+from antdrive.sim.cli.commands.check import check
 from antdrive.sim.cli.commands.compare import compare
 from antdrive.sim.cli.commands.find_margin import find_margin
 from antdrive.sim.cli.commands.margin import margin
@@ -42,6 +44,8 @@ COMMANDS: Mapping[str, Callable[..., int]] = MappingProxyType(
         "render": render,
         "report": report,
         "verify": verify,
+        "check": check,
+        "accept": accept,
         "margin": margin,
         "find-margin": find_margin,
         "reproduce": reproduce,

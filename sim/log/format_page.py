@@ -37,8 +37,8 @@ def _tables() -> dict[str, str]:
         "record": _table(("key", "JSON", "content"), ((f"`{key}`", kind, text) for key, kind, text in record_keys())),
         "outcomes": _table(("outcome", "sentence"), ((f"`{outcome.key}`", outcome.value) for outcome in Outcome)),
         "metrics": _table(
-            ("metric", "unit", "definition"),
-            ((f"`{metric.name}`", metric.unit, metric.definition) for metric in METRICS.values()),
+            ("metric", "unit", "better", "definition"),
+            ((f"`{metric.name}`", metric.unit, metric.better, metric.definition) for metric in METRICS.values()),
         ),
     }
 

@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -26,6 +27,30 @@ JERK_WINDOW = 0.1  # measured speed is averaged over this long before it is diff
 AVOIDING = "avoid"  # the name in `record.limiters` of the rule that avoids movers
 
 
+Better: TypeAlias = Literal["lower", "higher", "neither"]
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """How much worse a metric may become before a comparison with an earlier drive fails.
+
+    Attributes:
+        absolute: in the metric's unit
+        relative: a share of the earlier value; the two allowances add up
+    """
+
+    absolute: float = 0.0
+    relative: float = 0.0
+
+    def allowed(self, earlier: float) -> float:
+        """The allowance, in the metric's unit.
+
+        Args:
+            earlier: the earlier drive's value
+        """
+        return self.absolute + self.relative * abs(earlier)
+
+
 @dataclass(frozen=True)
 class Metric:
     """A number that describes a drive. Call it with a rollout.
@@ -33,10 +58,15 @@ class Metric:
     Attributes:
         unit: the unit of the number; "1" for a ratio or a count
         function: computes the number from a rollout
+        better: whether a lower or a higher number is better, or neither
+        tolerance: how much worse than in an earlier drive it may be; None where it is not to be compared, as with
+            wall-clock times
     """
 
     unit: str
     function: Callable[[Rollout], float]
+    better: Better = "neither"
+    tolerance: Tolerance | None = None
 
     @property
     def name(self) -> str:
@@ -206,26 +236,26 @@ def avoiding_s(rollout: Rollout) -> float:
 
 
 _TABLE = (
-    Metric("m", path_length_m),
-    Metric("m", route_length_m),
-    Metric("m", driven_length_m),
-    Metric("1", gap_to_grid_optimum),
-    Metric("1", gap_to_euclidean_optimum),
-    Metric("1", spl),
-    Metric("1", barn),
-    Metric("m", min_clearance_m),
-    Metric("m", mean_clearance_m),
-    Metric("m", tracking_error_max_m),
-    Metric("m", tracking_error_p95_m),
-    Metric("s", duration_s),
-    Metric("s", arrival_s),
-    Metric("s", plan_s),
-    Metric("s", drive_wall_s),
-    Metric("rad/m", turning_rad_per_m),
-    Metric("m/s^3", jerk_rms),
-    Metric("1", contacts_driving),
-    Metric("1", contacts_standing),
-    Metric("1", contacts_teleported),
+    Metric("m", path_length_m, "lower", Tolerance(0.01, 0.01)),
+    Metric("m", route_length_m, "lower", Tolerance(0.01, 0.01)),
+    Metric("m", driven_length_m, "lower", Tolerance(0.02, 0.01)),
+    Metric("1", gap_to_grid_optimum, "lower", Tolerance(0.01)),
+    Metric("1", gap_to_euclidean_optimum, "lower", Tolerance(0.01)),
+    Metric("1", spl, "higher", Tolerance(0.01)),
+    Metric("1", barn, "higher", Tolerance(0.01)),
+    Metric("m", min_clearance_m, "higher", Tolerance(0.005)),
+    Metric("m", mean_clearance_m, "higher", Tolerance(0.01, 0.02)),
+    Metric("m", tracking_error_max_m, "lower", Tolerance(0.005, 0.05)),
+    Metric("m", tracking_error_p95_m, "lower", Tolerance(0.005, 0.05)),
+    Metric("s", duration_s, "lower", Tolerance(0.1, 0.01)),
+    Metric("s", arrival_s, "lower", Tolerance(0.1, 0.01)),
+    Metric("s", plan_s, "lower"),
+    Metric("s", drive_wall_s, "lower"),
+    Metric("rad/m", turning_rad_per_m, "lower", Tolerance(0.02, 0.05)),
+    Metric("m/s^3", jerk_rms, "lower", Tolerance(0.1, 0.1)),
+    Metric("1", contacts_driving, "lower", Tolerance()),
+    Metric("1", contacts_standing, "lower", Tolerance()),
+    Metric("1", contacts_teleported, "lower", Tolerance()),
     Metric("1", replans),
     Metric("s", avoiding_s),
 )

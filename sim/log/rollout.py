@@ -80,12 +80,27 @@ class Rollout:
         For each array, in the order of this class, the hash takes the line "name dtype shape" and the bytes in C order;
         at last the record's JSON text, without `digest` and `times`.
         """
+        return self._hash(self.record.to_json(without=("digest", "times")))
+
+    @property
+    def drive_digest(self) -> str:
+        """The SHA-256 of what was driven, whatever it was driven with: every array, the outcome and the replans.
+
+        It is computed as `digest` is, with the record reduced to the keys `outcome` and `replans`. Two drives with other
+        settings or versions have the same one if the robot did the same, bit for bit.
+        """
+        record = self.record
+        others = [entry.name for entry in dataclasses.fields(record) if entry.name not in ("outcome", "replans")]
+        return self._hash(record.to_json(without=others))
+
+    def _hash(self, record: str) -> str:
+        """The SHA-256 of every array and of a JSON text."""
         sha = hashlib.sha256()
         for name in ARRAYS:
             array = np.ascontiguousarray(getattr(self, name))
             sha.update(f"{name} {array.dtype.str} {array.shape}\n".encode())
             sha.update(array.tobytes())
-        sha.update(self.record.to_json(without=("digest", "times")).encode())
+        sha.update(record.encode())
         return sha.hexdigest()
 
     def legs(self) -> list[tuple[slice, npt.NDArray[np.float64]]]:

@@ -6,7 +6,7 @@ import difflib
 import json
 import math
 from collections.abc import Iterable, Mapping
-from typing import Annotated, Any, Literal, TypeVar, get_args
+from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, BeforeValidator, ValidationError
 
@@ -104,10 +104,13 @@ def _mapping_of(model: type[BaseModel]) -> str:
 
 def _model_at(model: type[BaseModel], location: Location) -> type[BaseModel]:
     """The model of the mapping at a location, found by following annotations such as list[Inner]."""
+    named = False  # whether the next part is a key of people's choice: that of a field such as dict[str, Inner]
     for part in location:
-        if isinstance(part, int):
+        if named or isinstance(part, int):
+            named = False
             continue
         annotations: list[Any] = [next(i.annotation for n, i in model.model_fields.items() if (i.alias or n) == part)]
+        named = get_origin(annotations[0]) is dict
         while annotations:
             annotation = annotations.pop()
             if isinstance(annotation, type) and issubclass(annotation, BaseModel):

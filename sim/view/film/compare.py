@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -35,6 +36,8 @@ def compare_film(
     size: tuple[int, int] = (1280, 720),
     fps: float = 30.0,
     speed: float = 1.0,
+    titles: Sequence[str] | None = None,
+    mark: Mark | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> FilmInfo:
     """Film two to six runs side by side. A run that ends before the others keeps its last picture.
@@ -46,6 +49,8 @@ def compare_film(
         size: width and height, even numbers from 160 to 4096 [px]
         fps: frames per second, at most 240
         speed: how many times as fast as the runs the film is
+        titles: the name of each run's tile; None: its planner's name
+        mark: a place and a moment that are marked in every tile from then on
         progress: called after each frame with the fraction that is done
 
     Raises:
@@ -63,7 +68,7 @@ def compare_film(
     with (
         written_whole(target) as temporary,
         encoding(temporary, size, fps) as send,
-        SplitScreen(rollouts, camera, size) as screen,
+        SplitScreen(rollouts, camera, size, titles, mark) as screen,
     ):
         for k, at in enumerate(itertools.chain(times, itertools.repeat(np.inf, total - len(times)))):
             send(screen.frame(float(at)))
@@ -72,16 +77,41 @@ def compare_film(
     return FilmInfo(target, total, size, float(fps), camera, time.perf_counter() - started)
 
 
+class Mark(NamedTuple):
+    """A place that is marked in a film.
+
+    Attributes:
+        t: from when on [s]
+        x: where [m]
+        y: where [m]
+        text: what is written there
+    """
+
+    t: float
+    x: float
+    y: float
+    text: str
+
+
 class SplitScreen:
     """The frames of several runs, each in a tile. Use it in a `with` block."""
 
-    def __init__(self, rollouts: Sequence[Rollout], camera: str, size: tuple[int, int]) -> None:
+    def __init__(
+        self,
+        rollouts: Sequence[Rollout],
+        camera: str,
+        size: tuple[int, int],
+        titles: Sequence[str] | None = None,
+        mark: Mark | None = None,
+    ) -> None:
         cols, rows = _arrangement(len(rollouts), size)
         wide, high = (size[0] // cols) // 2 * 2, (size[1] // rows) // 2 * 2
         self._size = size
         self._corners = [((k % cols) * wide, (k // cols) * high) for k in range(len(rollouts))]
         one_world = len({log.record.task.world.name for log in rollouts}) == 1
-        self._tiles = [Tile(log, camera, (wide - 2, high - 2), one_world) for log in rollouts]
+        names = titles or [_title(log, one_world) for log in rollouts]
+        room = (wide - 2, high - 2)
+        self._tiles = [Tile(log, camera, room, name, mark) for log, name in zip(rollouts, names, strict=True)]
         self._open = ExitStack()
 
     def __enter__(self) -> SplitScreen:
@@ -102,15 +132,16 @@ class SplitScreen:
 
 
 class Tile:
-    """One run among several: a head with the planner's name and the run's numbers, and the picture below."""
+    """One run among several: a head with its name and the run's numbers, and the picture below."""
 
-    def __init__(self, rollout: Rollout, camera: str, size: tuple[int, int], one_world: bool) -> None:
+    def __init__(
+        self, rollout: Rollout, camera: str, size: tuple[int, int], name: str, mark: Mark | None = None
+    ) -> None:
         self._unit = max(11, round(min(size[0] / 30, size[1] / 22)))
         self._head = 2 * round(1.55 * self._unit)
         self.shot = Shot(rollout, camera=camera, size=(size[0], size[1] - self._head), bare=True)
-        planner = rollout.record.planner.name
-        self._name = planner if one_world else f"{planner} · {rollout.record.task.world.name}"
-        self._colour = planner_style(planner)[0]
+        self._name, self._mark = name, mark
+        self._colour = planner_style(rollout.record.planner.name)[0]
         self._outcome = rollout.outcome
         self._length = rollout.record.plan.length_m
         self._last: Picture | None = None  # the tile once the run is over
@@ -119,10 +150,16 @@ class Tile:
         """The tile (h, w, 3) at a moment [s]; after the run's end, the last one."""
         end = self.shot.replay.duration
         if at < end:
-            return self._with_head(self.shot.view(at), at, False)
+            return self._with_head(self._marked(self.shot.view(at), at), at, False)
         if self._last is None:
-            self._last = self._with_head(self.shot.view(end, last=True), end, True)
+            self._last = self._with_head(self._marked(self.shot.view(end, last=True), end), end, True)
         return self._last
+
+    def _marked(self, view: Picture, at: float) -> Picture:
+        """The picture with the mark, from its moment on."""
+        if self._mark is not None and at >= self._mark.t:
+            self.shot.put_label(view, self._mark.text, self._mark.x, self._mark.y)
+        return view
 
     def _with_head(self, view: Picture, at: float, over: bool) -> Picture:
         unit, wide = self._unit, view.shape[1]
@@ -143,6 +180,11 @@ class Tile:
         head = np.array(image)
         kernels.put_sprite(head, verdict, wide - verdict.shape[1] - round(0.5 * unit), round(0.25 * unit), 1.0)
         return np.vstack([head, view])
+
+
+def _title(log: Rollout, one_world: bool) -> str:
+    planner = log.record.planner.name
+    return planner if one_world else f"{planner} · {log.record.task.world.name}"
 
 
 def _arrangement(count: int, size: tuple[int, int]) -> tuple[int, int]:

@@ -158,6 +158,22 @@ class Shot:
         self._put_legend(view)
         return view
 
+    def put_label(self, view: Picture, text: str, x: float, y: float) -> None:
+        """Mark a place on the ground in a picture, with a text above it.
+
+        Args:
+            view: the picture, as `view` returned it
+            text: what is written there
+            x: where [m]
+            y: where [m]
+        """
+        size = 2 * round(1.1 * self._layout.unit)
+        px, py = self._compositor.pixel(x, y)
+        kernels.put_sprite(view, burst(size, CONTACT), round(px - size / 2), round(py - size / 2), 1.0)
+        sprite = label(text, round(0.95 * self._layout.unit), CONTACT)
+        left = min(max(px - sprite.shape[1] / 2, 0), view.shape[1] - sprite.shape[1])
+        kernels.put_sprite(view, sprite, round(left), round(max(py - size - sprite.shape[0], 0)), 1.0)
+
     def _with_band(self, view: Picture, at: float, verdict: tuple[str, Colour]) -> Picture:
         replay = self.replay
         reading = Reading(at, replay.speed(at), replay.clearance(at), replay.min_clearance(at))

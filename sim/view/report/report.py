@@ -25,6 +25,7 @@ MAX_PIXELS = 100_000_000  # of a figure
 FIGURE_WIDTH = 1200  # of an embedded figure, at most [px]
 FILM_TYPES = {".mp4": "video/mp4", ".gif": "image/gif", ".webp": "image/webp"}
 FIGURE_CAPTIONS: Mapping[str, str] = {
+    "then-and-now.png": "The baseline's drive and this one: where they part, their clearances, and the distance between them",
     "overview.png": "Map with the driven path; clearance, speed, and the rule that limited the speed",
     "certificate.png": "Driven path against route, and the certificate",
     "plan.png": "Plan with the planner's field, and path lengths by iteration",

@@ -7,7 +7,7 @@ from PIL import Image
 
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import ComponentRecord
-from antdrive.sim.view.film.compare import SplitScreen, compare_film
+from antdrive.sim.view.film.compare import Mark, SplitScreen, compare_film
 from antdrive.sim.view.style import VERDICTS, planner_style
 from antdrive.worlds import InputError
 
@@ -67,3 +67,19 @@ def test_the_film_has_the_frames_it_claims(drives, tmp_path):
 def test_one_or_seven_runs_are_refused(drives, tmp_path, count):
     with pytest.raises(InputError, match=re.escape(f"needs 2 to 6 runs, got {count}")):
         compare_film((drives * 4)[:count], tmp_path / "c.mp4")
+
+
+def test_a_mark_is_in_every_tile_from_its_moment_on(drives):
+    x, y = drives[1].pose[len(drives[1].pose) // 3, :2]
+    mark = Mark(0.3, float(x), float(y), "here")
+    with SplitScreen(drives, "top", SIZE) as plain, SplitScreen(drives, "top", SIZE, mark=mark) as marked:
+        for at, shown in ((0.2, False), (0.4, True), (np.inf, True)):
+            differs = (plain.frame(at) != marked.frame(at)).any(axis=-1)
+            assert differs[:, :318].any() == differs[:, 320:].any() == shown
+
+
+def test_titles_replace_the_planners_names(drives):
+    with SplitScreen(drives, "top", SIZE, ("then", "now")) as named, SplitScreen(drives, "top", SIZE) as plain:
+        differs = (named.frame(0.1) != plain.frame(0.1)).any(axis=-1)
+    assert differs[:30].any()
+    assert not differs[60:].any()

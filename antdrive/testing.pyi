@@ -1,0 +1,10 @@
+from .sim.regression.baseline import Baseline as Baseline
+from .sim.regression.checking import CheckResult as CheckResult
+from .sim.regression.checking import check_case as check_case
+from .sim.regression.fixture import DriveFailure as DriveFailure
+from .sim.regression.fixture import DriveFixture as DriveFixture
+from .sim.regression.fixture import assert_collision_free as assert_collision_free
+from .sim.regression.fixture import assert_reached_goal as assert_reached_goal
+from .sim.regression.strategies import tasks as tasks
+from .sim.regression.strategies import worlds as worlds
+from .sim.regression.suite import load_suite as load_suite

@@ -1,0 +1,22 @@
+"""`antdrive accept`."""
+
+from typing import Annotated
+
+import typer
+
+from antdrive.sim.cli import options, suites
+from antdrive.sim.cli.suites import drive_suites, print_results
+
+
+def accept(
+    tests: suites.Suites,
+    only: suites.Only = None,
+    new: Annotated[bool, typer.Option("--new", help="Write missing baselines only.")] = False,
+    jobs: suites.Jobs = None,
+    json: options.Json = False,
+) -> int:
+    """Drive suites and write their baselines.
+
+    A drive that is not as its suite expects is not accepted. Exit code 0: every drive was accepted.
+    """
+    return print_results(drive_suites(tests, only, jobs, update="new" if new else "all", results=None), json, "passed")

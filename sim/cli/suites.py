@@ -1,0 +1,119 @@
+"""What `antdrive check` and `antdrive accept` share: their arguments, the progress bar, and how results are printed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, cast, get_args
+
+import typer
+
+from antdrive.sim.cli.compiling import compile_once
+from antdrive.sim.cli.console import bar, print_json, print_line
+from antdrive.sim.cli.exits import FAILED, SUCCEEDED
+from antdrive.worlds.errors import InputError
+
+if TYPE_CHECKING:
+    from antdrive.sim.regression.artefacts import Films, Results
+    from antdrive.sim.regression.checking import CheckResult, Update
+
+Suites = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="SUITE", help="Suites (*.drive.yaml), folders with suites, SUITE::scenario or SUITE::scenario[seed]."
+    ),
+]
+Only = Annotated[
+    str | None, typer.Option(metavar="PATTERN", help="Only scenarios whose name matches, such as 'aisle-*'.")
+]
+Jobs = Annotated[
+    int | None,
+    typer.Option("--jobs", "-j", min=1, max=256, metavar="NUMBER", help="Processes.  [default: one per core]"),
+]
+
+
+ResultsFolder = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FOLDER", help="Folder for logs, pictures and films of tests.  [default: in the user's cache]"
+    ),
+]
+Film = Annotated[str, typer.Option(metavar="WHEN", help="Of which tests a film is made: never, failed or always.")]
+
+
+def results_in(folder: Path | None, film: str) -> Results:
+    """Where results are written, checked before any work.
+
+    Raises:
+        InputError: the folder cannot be written to, or an unknown word for `--film`.
+    """
+    from antdrive.sim.cli.write import check_folder
+    from antdrive.sim.regression.artefacts import Films, Results, default_folder
+
+    if film not in get_args(Films):
+        raise InputError(f"--film {film}: unknown; choose from {', '.join(get_args(Films))}")
+    if folder is not None:
+        check_folder(folder)
+    return Results(folder or default_folder(Path.cwd()), cast("Films", film))
+
+
+def drive_suites(
+    suites: list[str], only: str | None, jobs: int | None, *, update: Update, results: Results | None
+) -> list[CheckResult]:
+    """Drive and judge all tests that the words name, with a progress bar.
+
+    Args:
+        suites: the words
+        only: a pattern for scenarios' names
+        jobs: number of processes; None: one per core
+        update: which baselines to write
+        results: where logs, pictures and films are written; None: nowhere
+
+    Raises:
+        InputError: there is no such suite or test, or something in a suite is wrong.
+    """
+    import os
+
+    from antdrive.sim.regression import check_cases, select
+
+    cases = select(suites, only)
+    compile_once()
+    processes = min(jobs or os.cpu_count() or 1, len(cases))
+    found = []
+    with bar("driving") as progress:
+        for result in check_cases(cases, jobs=processes, update=update, results=results):
+            found.append(result)
+            progress(len(found) / len(cases))
+    return found
+
+
+def print_results(results: list[CheckResult], json: bool, words: str) -> int:
+    """Print what came out; the exit code.
+
+    Args:
+        results: one for each test
+        json: print one JSON object instead of text
+        words: what is said about a test that passed and changed no baseline
+    """
+    failed = [result for result in results if not result.passed]
+    if json:
+        facts: dict[str, Any] = {"passed": not failed, "tests": [result.as_dict() for result in results]}
+        print_json(facts)
+        return FAILED if failed else SUCCEEDED
+    for result in results:
+        if result.passed:
+            print_line(f"{result.address}: {result.accepted or words}")
+            _print_lines(result.gains)
+        else:
+            print_line(f"{result.address}: FAILED")
+            _print_lines(result.message.splitlines())
+    better = sum(bool(result.gains) and result.passed for result in results)
+    summary = [f"{len(results) - len(failed)} of {len(results)} passed"]
+    if better:
+        summary.append(f"{better} better than the baseline; antdrive accept renews it")
+    print_line("; ".join(summary))
+    return FAILED if failed else SUCCEEDED
+
+
+def _print_lines(lines: Any) -> None:
+    for line in lines:
+        print_line(f"  {line}")

@@ -1,0 +1,15 @@
+from .baseline import Baseline as Baseline
+from .checking import CheckResult as CheckResult
+from .checking import check_case as check_case
+from .checking import check_cases as check_cases
+from .demands import Bound as Bound
+from .demands import Demands as Demands
+from .judging import Judgement as Judgement
+from .judging import judge as judge
+from .parting import Parting as Parting
+from .parting import parting as parting
+from .scenarios import scenario_of as scenario_of
+from .selecting import select as select
+from .suite import SuiteCase as SuiteCase
+from .suite import load_suite as load_suite
+from .suite import suite_schema as suite_schema

@@ -1,0 +1,235 @@
+"""Drive a test's scenario, judge it, and say what came out: the core of the pytest plugin and of `antdrive check`."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import shlex
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, TypeAlias
+
+from antdrive.planners import PlannerError
+from antdrive.sim.pipeline import Run
+from antdrive.sim.pipeline import run as drive
+from antdrive.sim.regression.artefacts import Films, Results, remove_artefacts, write_artefacts
+from antdrive.sim.regression.baseline import Baseline
+from antdrive.sim.regression.demands import Demands
+from antdrive.sim.regression.explaining import explain
+from antdrive.sim.regression.judging import Judgement, judge, unfulfilled
+from antdrive.sim.regression.scenarios import run_command, scenario_of
+from antdrive.sim.regression.suite import SUFFIX, SuiteCase, load_suite, shown_path
+from antdrive.worlds.errors import InputError, input_error
+
+#: Which baselines are written: none, only those that are missing, or all.
+Update: TypeAlias = Literal["", "new", "all"]
+#: The outcome of a test whose planner raised an error.
+RAISED = "planner_error"
+
+
+@dataclass(frozen=True, kw_only=True)
+class CheckResult:
+    """What came out of a test.
+
+    Attributes:
+        address: the test, as commands name it
+        passed: whether nothing is wrong
+        outcome: how the run ended, such as succeeded
+        certified: whether the drive is certified collision-free
+        faults: why the test fails, a sentence each
+        gains: what is better than in the baseline, a sentence each
+        details: what explains the faults, a sentence each
+        accepted: what was done to the baseline: written, unchanged, or nothing
+        commands: how to repeat the test
+        files: what was written about it, by name
+        metrics: the drive's metrics; empty if the robot did not drive
+        wall_s: how long the test took [s]
+    """
+
+    address: str
+    passed: bool
+    outcome: str
+    certified: bool
+    faults: tuple[str, ...] = ()
+    gains: tuple[str, ...] = ()
+    details: tuple[str, ...] = ()
+    accepted: str = ""
+    commands: tuple[str, ...] = ()
+    files: dict[str, str] = field(default_factory=dict)
+    metrics: dict[str, float] = field(default_factory=dict)
+    wall_s: float = 0.0
+
+    @property
+    def message(self) -> str:
+        """Everything about a failed test, in lines."""
+        lines = [*self.faults, *self.details]
+        lines += [f"{'repeat:' if k == 0 else '       '} {command}" for k, command in enumerate(self.commands)]
+        return "\n".join([*lines, *(f"{name}: {path}" for name, path in self.files.items())])
+
+    def as_dict(self) -> dict[str, Any]:
+        """The result as plain values, for JSON."""
+        return dataclasses.asdict(self)
+
+
+def check_case(case: SuiteCase, *, update: Update = "", results: Results | None = None) -> CheckResult:
+    """Drive a suite's test and judge it.
+
+    Args:
+        case: the test
+        update: which baselines to write
+        results: where logs, pictures and films are written; None: nowhere
+
+    Raises:
+        InputError: the suite, a file that it names, or the baseline is wrong.
+    """
+    scenario = scenario_of(case)
+    commands = tuple(filter(None, (shlex.join(["antdrive", "check", case.address]), run_command(case))))
+    try:
+        run = drive(scenario)
+    except PlannerError as error:
+        return CheckResult(
+            address=case.address, passed=False, outcome=RAISED, certified=False, faults=(str(error),), commands=commands
+        )
+    path = case.baseline_path if case.entry.baseline else None
+    folder = results.of(case.suite.name.removesuffix(SUFFIX), case.id) if results else None
+    return check_run(
+        run,
+        case.demands,
+        path,
+        address=case.address,
+        name=case.id,
+        update=update,
+        commands=commands,
+        folder=folder,
+        films=results.films if results else "never",
+    )
+
+
+def check_cases(
+    cases: Sequence[SuiteCase], *, jobs: int = 1, update: Update = "", results: Results | None = None
+) -> Iterator[CheckResult]:
+    """Drive and judge many tests; the results come in the order of the tests and do not depend on `jobs`.
+
+    Args:
+        cases: the tests
+        jobs: number of processes
+        update: which baselines to write
+        results: where logs, pictures and films are written; None: nowhere
+
+    Raises:
+        InputError: a suite, a file that it names, or a baseline is wrong.
+    """
+    if jobs == 1 or len(cases) == 1:
+        for case in cases:
+            yield check_case(case, update=update, results=results)
+        return
+    import joblib
+
+    calls = (
+        joblib.delayed(_check_by_name)(str(case.suite), case.id, str(Path.cwd()), update, results) for case in cases
+    )
+    for result in joblib.Parallel(n_jobs=jobs, return_as="generator")(calls):
+        if isinstance(result, str):
+            raise InputError(result)
+        yield result
+
+
+def _check_by_name(suite: str, name: str, folder: str, update: Update, results: Results | None) -> CheckResult | str:
+    """The result of a test that another process names; a text is the message of an InputError."""
+    os.chdir(folder)
+    try:
+        return check_case(next(case for case in load_suite(suite) if case.id == name), update=update, results=results)
+    except InputError as error:
+        return str(error)
+
+
+def check_run(
+    run: Run,
+    demands: Demands,
+    path: Path | None,
+    *,
+    address: str,
+    name: str,
+    update: Update = "",
+    commands: tuple[str, ...] = (),
+    accept: str = "",
+    folder: Path | None = None,
+    films: Films = "failed",
+) -> CheckResult:
+    """Judge a run.
+
+    Args:
+        run: what was driven
+        demands: what the test demands
+        path: where its baseline is; None: it has none
+        address: the test, as commands name it
+        name: the test's name in its suite or file
+        update: which baselines to write
+        commands: how to repeat the test
+        accept: the command that writes its baseline; by default `antdrive accept`
+        folder: where to write log and pictures if the test fails; None: nowhere
+        films: when to make a film
+
+    Raises:
+        InputError: the baseline is wrong, or it or the folder cannot be written.
+    """
+    started = time.perf_counter()
+    baseline = None if path is None or update == "all" else Baseline.load(path)
+    if baseline is not None and baseline.case != name:
+        raise input_error(
+            shown_path(path or Path()), "case", f"belongs to {baseline.case}, not to {name}; accept {name} anew"
+        )
+    accepted, faults = "", list(unfulfilled(run, demands))
+    if path is not None and baseline is None:
+        if not update:
+            accept = accept or shlex.join(["antdrive", "accept", address])
+            remedy = "" if faults else f"; accept this drive with {accept}"
+            faults.append(f"baseline: {shown_path(path)} is missing{remedy}")
+        elif not faults:
+            accepted = write_baseline(Baseline.of(run, name), path)
+        else:
+            faults.append("baseline: not accepted, because the drive is not what the test expects")
+        judgement = Judgement(tuple(faults))
+    else:
+        judgement = judge(run, demands, baseline)
+    files: dict[str, str] = {}
+    if folder is not None:
+        remove_artefacts(folder)
+        if not judgement.passed or films == "always":
+            wanted = films != "never"
+            files = write_artefacts(run, folder, baseline, film=wanted, faults=judgement.faults, commands=commands)
+    details = () if judgement.passed else tuple(explain(run, dataclasses.replace(judgement, faults=()), baseline))
+    return CheckResult(
+        address=address,
+        passed=judgement.passed,
+        outcome=run.outcome.key,
+        certified=run.certificate is not None and run.certificate.certified,
+        faults=judgement.faults,
+        gains=judgement.gains,
+        details=details,
+        accepted=accepted,
+        commands=commands,
+        files=files,
+        metrics=run.metrics if run.rollout is not None else {},
+        wall_s=_wall(run) + time.perf_counter() - started,
+    )
+
+
+def write_baseline(baseline: Baseline, path: Path) -> str:
+    """Write a baseline unless the file holds the same drive already; what was done.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    if path.exists() and path.read_bytes() == baseline.to_text().encode():
+        return "unchanged"
+    existed = path.exists()
+    baseline.save(path)
+    return "renewed" if existed else "written"
+
+
+def _wall(run: Run) -> float:
+    """How long planning and driving took [s]."""
+    return run.rollout.record.times.drive_wall_s + run.plan.wall_s if run.rollout else run.plan.wall_s

@@ -1,0 +1,157 @@
+"""Judge a run by what its test demands, and against its baseline.
+
+The verdict always counts: the outcome, whether the drive is certified, and the bounds of the suite. A metric that is worse
+than in the baseline by more than its tolerance is a fault, one that is better by more than that a gain. The driven line is
+judged only where the test demands it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from antdrive.sim.log.metrics import METRICS
+from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.pipeline import Run
+from antdrive.sim.regression.baseline import WALL_CLOCK, Baseline
+from antdrive.sim.regression.demands import END, Demands
+from antdrive.sim.regression.nearest import nearest_of
+from antdrive.sim.regression.parting import end_distance, farthest
+
+#: In words, what is worse about a metric.
+_WORSE = {"m": "longer", "s": "longer"}
+_WORDS = {
+    "min_clearance_m": "nearer",
+    "mean_clearance_m": "nearer",
+    "tracking_error_max_m": "farther off",
+    "tracking_error_p95_m": "farther off",
+}
+#: The metrics that messages begin with.
+FIRST = ("contacts_driving", "min_clearance_m", "duration_s", "driven_length_m")
+_PLACED = ("min_clearance_m",)
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What is wrong with a run, and what is better than before.
+
+    Attributes:
+        faults: why the test fails, a sentence each
+        gains: what is better than in the baseline, a sentence each
+    """
+
+    faults: tuple[str, ...] = ()
+    gains: tuple[str, ...] = ()
+
+    @property
+    def passed(self) -> bool:
+        """Whether there is no fault."""
+        return not self.faults
+
+
+def judge(run: Run, demands: Demands, baseline: Baseline | None) -> Judgement:
+    """Judge a run.
+
+    Args:
+        run: the run
+        demands: what its test demands
+        baseline: the earlier drive; None: only the demands count
+    """
+    faults = list(unfulfilled(run, demands))
+    gains: list[str] = []
+    if baseline is not None:
+        verdict = _verdict(run, baseline)
+        (gains if verdict and run.succeeded else faults).extend(verdict)
+        if run.rollout is not None and baseline.line and run.outcome is baseline.outcome:
+            for name in (*FIRST, *(name for name in METRICS if name not in FIRST)):
+                _compare(name, run.rollout, baseline, demands, faults, gains)
+            faults += _line_faults(run.rollout, baseline, demands)
+    return Judgement(tuple(faults), tuple(gains))
+
+
+def unfulfilled(run: Run, demands: Demands) -> Iterator[str]:
+    """What a run does not fulfil, whatever the baseline, a sentence each.
+
+    Args:
+        run: the run
+        demands: what its test demands
+    """
+    certified = run.certificate is not None and run.certificate.certified
+    if run.outcome is not demands.outcome:
+        reason = f" ({run.reason})" if run.reason else ""
+        yield f"outcome: {run.outcome.key}, expected {demands.outcome.key}{reason}"
+    elif demands.must_be_certified and not certified:
+        problems = run.certificate.problems if run.certificate else ("the robot did not drive",)
+        yield f"certificate: not certified collision-free ({'; '.join(problems)})"
+    elif demands.certified is False and certified:
+        yield "certificate: certified collision-free, expected not to be"
+    for bound in demands.bounds:
+        if run.rollout is None:
+            yield f"{bound.metric}: the robot did not drive, expected {bound.sign} {bound.value:g}"
+        elif not bound.holds(found := METRICS[bound.metric](run.rollout)):
+            yield f"{bound.metric}: {found:.6g}, expected {bound.sign} {bound.value:g}{_place(bound.metric, run.rollout)}"
+
+
+def _verdict(run: Run, baseline: Baseline) -> list[str]:
+    """How outcome and certificate differ from the baseline's, a sentence each."""
+    if run.outcome is not baseline.outcome:
+        return [f"outcome: {run.outcome.key}, in the baseline {baseline.outcome.key}"]
+    certified = run.certificate is not None and run.certificate.certified
+    if certified == baseline.certified:
+        return []
+    words = "certified collision-free"
+    return [
+        f"certificate: {words}, in the baseline not"
+        if certified
+        else f"certificate: not {words}, in the baseline it was"
+    ]
+
+
+def _compare(
+    name: str, rollout: Rollout, baseline: Baseline, demands: Demands, faults: list[str], gains: list[str]
+) -> None:
+    """Compare one metric with the baseline's."""
+    metric, tolerance = METRICS[name], demands.tolerance(name)
+    if metric.better == "neither" or tolerance is None or name in WALL_CLOCK:
+        return
+    now, then = metric(rollout), baseline.metric(name)
+    if not (math.isfinite(now) and math.isfinite(then)):
+        return
+    worse_by = now - then if metric.better == "lower" else then - now
+    allowed = tolerance.allowed(then)
+    if abs(worse_by) <= allowed + 1e-6:  # baselines are rounded to six decimals
+        return
+    unit = "" if metric.unit == "1" else f" {metric.unit}"
+    text = f"{name}: {now:.6g}{unit}, in the baseline {then:.6g}{unit}: {abs(worse_by):.3g}{unit}"
+    if worse_by > 0:
+        words = _WORDS.get(name, _WORSE.get(metric.unit, "worse"))
+        faults.append(f"{text} {words}, tolerance {allowed:.3g}{unit}{_place(name, rollout)}")
+    else:
+        gains.append(f"{text} better")
+
+
+def _place(name: str, rollout: Rollout) -> str:
+    """Where a metric is at its worst, for those that have a place."""
+    if name not in _PLACED:
+        return ""
+    found = nearest_of(rollout)
+    return f"; nearest to {found.thing}, {found.place}"
+
+
+def _line_faults(rollout: Rollout, baseline: Baseline, demands: Demands) -> Iterator[str]:
+    """What is wrong with where the robot ended and which line it drove."""
+    ends, tolerance = end_distance(baseline, rollout), demands.tolerance(END)
+    if tolerance is not None and ends > tolerance.allowed(0.0) + 1e-3:
+        (x, y), (x0, y0) = rollout.pose[-1, :2].tolist(), baseline.xy[-1].tolist()
+        yield (
+            f"{END}: the drive ends at ({x:.2f}, {y:.2f}), in the baseline at ({x0:.2f}, {y0:.2f}): {ends:.3g} m apart, "
+            f"tolerance {tolerance.allowed(0.0):.3g} m"
+        )
+    if demands.trajectory == "exact":
+        if rollout.drive_digest != baseline.drive_digest:
+            yield "trajectory: not the baseline's, bit for bit"
+    elif demands.trajectory is not None:
+        most = farthest(baseline, rollout)
+        if most > demands.trajectory + 1e-3:
+            yield f"trajectory: up to {most:.3g} m from the baseline's line, allowed {demands.trajectory:g} m"

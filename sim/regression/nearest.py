@@ -1,0 +1,92 @@
+"""What a robot came nearest to, or touched: which thing, where and when."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+
+from antdrive.robots.placing import gaps, name_of
+from antdrive.sim.log.contacts import touches_of
+from antdrive.sim.log.rollout import Rollout
+from antdrive.worlds.world import Disc
+
+# pydantic reads this attribute of records: no guessing of types, no unknown keys, no NaN and no infinity.
+RULES = {"strict": True, "extra": "forbid", "allow_inf_nan": False}
+
+# Columns of `gaps` and indices in a log's contacts count the walls in different orders.
+_WALL_OF_CONTACT = (0, 2, 1, 3)  # left, right, lower, upper as columns after the obstacles
+
+
+@dataclass(frozen=True)
+class Encounter:
+    """The robot beside a thing.
+
+    Attributes:
+        thing: an obstacle, a mover or a wall, as messages call it
+        t: when [s]
+        x: where the robot was [m]
+        y: where the robot was [m]
+        clearance: distance between the robot's surface and the thing's [m]
+    """
+
+    __pydantic_config__ = RULES
+
+    thing: str
+    t: float
+    x: float
+    y: float
+    clearance: float
+
+    @property
+    def place(self) -> str:
+        """Where and when, in words."""
+        return f"the robot was at ({self.x:.2f}, {self.y:.2f}) at t = {self.t:.2f} s"
+
+
+def nearest_of(rollout: Rollout) -> Encounter:
+    """What the robot came nearest to."""
+    row = int(rollout.clearance.argmin())
+    world = dataclasses.replace(rollout.record.world, movers=())
+    static = gaps(world, rollout.record.robot, [rollout.pose[row]])[0]
+    index, least = int(static.argmin()), float(static.min())
+    thing = name_of(world, index, len(rollout.record.unseen))
+    movers = _mover_gaps(rollout, row)
+    if len(movers) and movers.min() < least:
+        thing = _mover(rollout, int(movers.argmin()), row)
+    return _encounter(rollout, row, thing)
+
+
+def touched_in(rollout: Rollout) -> Encounter | None:
+    """What the robot touched first; None if it touched nothing."""
+    touches = touches_of(rollout)
+    if not touches:
+        return None
+    row, index = touches[0].step, touches[0].obstacle
+    world = dataclasses.replace(rollout.record.world, movers=())
+    discs, movers = len(world.obstacles), len(rollout.record.world.movers)
+    if discs <= index < discs + movers:
+        return _encounter(rollout, row, _mover(rollout, index - discs, row))
+    column = index if index < discs else discs + _WALL_OF_CONTACT[index - discs - movers]
+    return _encounter(rollout, row, name_of(world, column, len(rollout.record.unseen)))
+
+
+def _mover_gaps(rollout: Rollout, row: int) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    """The distance from the robot to each mover at a row (M,) [m]."""
+    record = rollout.record
+    places = rollout.movers[row].tolist()
+    discs = tuple(Disc(x, y, mover.radius) for (x, y), mover in zip(places, record.world.movers, strict=True))
+    world = dataclasses.replace(record.world, obstacles=discs, movers=())
+    return np.asarray(gaps(world, record.robot, [rollout.pose[row]])[0, : len(discs)])
+
+
+def _mover(rollout: Rollout, index: int, row: int) -> str:
+    x, y = rollout.movers[row, index].tolist()
+    return f"movers[{index}] at ({x:.2f}, {y:.2f}) with radius {rollout.record.world.movers[index].radius:g}"
+
+
+def _encounter(rollout: Rollout, row: int, thing: str) -> Encounter:
+    x, y = (round(value, 3) + 0.0 for value in rollout.pose[row, :2].tolist())
+    clearance = round(float(rollout.clearance[row]), 6)
+    return Encounter(thing, round(float(rollout.t[row]), 3), x, y, clearance)

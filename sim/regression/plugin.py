@@ -1,0 +1,257 @@
+"""The pytest plugin: suites, `*.drive.yaml`, are collected, and tests have the fixture `drive`.
+
+Importing it must cost nothing: a run of pytest that collects no suite and uses no fixture imports nothing else of antdrive.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from antdrive.sim.regression.artefacts import Results
+    from antdrive.sim.regression.checking import CheckResult, Update
+    from antdrive.sim.regression.fixture import DriveFixture
+    from antdrive.sim.regression.suite import SuiteCase
+
+SUFFIX = ".drive.yaml"
+WORKER_KEY = "antdrive_unused"  # under which a process of xdist hands over the baselines that no test uses
+
+_DROVE = pytest.StashKey[list[Any]]()  # the results of a test's drives
+_UNUSED = pytest.StashKey[set[str]]()  # the baselines that no test uses
+_TOLD = pytest.StashKey[list[Any]]()  # the properties of reports that tell of drives
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the options `--drive-*`."""
+    group = parser.getgroup("antdrive", "drives (antdrive)")
+    group.addoption("--drive-update", action="store_true", help="write the baselines of drives that are as expected")
+    group.addoption("--drive-update-new", action="store_true", help="write the baselines that are missing")
+    group.addoption("--drive-strict", action="store_true", help="fail if there are baselines that belong to no test")
+    group.addoption(
+        "--drive-results",
+        metavar="FOLDER",
+        help="where logs, pictures and films of failed drives are written; by default in the user's cache",
+    )
+    group.addoption(
+        "--drive-film",
+        choices=("never", "failed", "always"),
+        default="failed",
+        help="of which drives a film is made (default: failed)",
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Begin the lists of this run."""
+    config.stash[_UNUSED], config.stash[_TOLD] = set(), []
+    config.pluginmanager.register(_Listener(config.stash[_TOLD]), "antdrive-listener")
+
+
+def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> DriveSuite | None:
+    """Collect suites."""
+    return DriveSuite.from_parent(parent, path=file_path) if file_path.name.endswith(SUFFIX) else None
+
+
+class DriveSuite(pytest.File):
+    """A suite as pytest collects it."""
+
+    def collect(self) -> Iterator[DriveItem]:
+        """One item for each scenario and seed."""
+        from antdrive.sim.regression.names import check_names
+        from antdrive.sim.regression.suite import load_suite
+        from antdrive.sim.regression.unused import unused_of_suite
+        from antdrive.worlds.errors import InputError
+
+        try:
+            cases = load_suite(self.path)
+            for case in cases:
+                check_names(case)
+        except InputError as error:
+            raise self.CollectError(str(error)) from None
+        self.config.stash[_UNUSED].update(str(path) for path in unused_of_suite(self.path, cases))
+        for case in cases:
+            # Given as text, pytest takes [0] for a parameter, as it does when it reads the id back for --lf.
+            yield DriveItem.from_parent(self, name=case.id, nodeid=f"{self.nodeid}::{case.id}", case=case)
+
+
+class DriveItem(pytest.Item):
+    """A scenario of a suite with one seed.
+
+    Attributes:
+        case: the test
+    """
+
+    def __init__(self, *, case: SuiteCase, **others: Any) -> None:
+        super().__init__(**others)
+        self.case = case
+
+    def runtest(self) -> None:
+        """Drive and judge."""
+        from antdrive.sim.regression.checking import check_case
+        from antdrive.sim.regression.fixture import DriveFailure
+
+        result = check_case(self.case, update=update_of(self.config), results=results_of(self.config))
+        note(self, result)
+        if not result.passed:
+            raise DriveFailure(result)
+
+    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
+        """The message alone, where a drive or what people wrote is wrong; else the traceback."""
+        from antdrive.sim.regression.fixture import DriveFailure
+        from antdrive.worlds.errors import InputError
+
+        if isinstance(excinfo.value, DriveFailure | InputError):
+            return str(excinfo.value)
+        return super().repr_failure(excinfo, style)
+
+    def reportinfo(self) -> tuple[Path, int | None, str]:
+        """The suite, the line of the scenario, and the test's name."""
+        line = self.case.document.lines.get(("scenarios", self.case.name))
+        return self.path, None if line is None else line - 1, self.case.id
+
+
+@pytest.fixture
+def drive(request: pytest.FixtureRequest) -> DriveFixture:
+    """Drive scenarios and compare them with their baselines: `drive("forest", planner=MyPlanner(), seed=1)`.
+
+    It fails the test unless the drive is as demanded and not worse than its baseline; `drive.run(...)` only drives.
+    """
+    from antdrive.sim.regression.fixture import DriveFixture
+
+    item = request.node
+    return DriveFixture(
+        file=item.path,
+        test=_name_in_file(item),
+        address=item.nodeid,
+        update=update_of(request.config),
+        results=results_of(request.config),
+        report=lambda result: note(item, result),
+    )
+
+
+def note(item: pytest.Item, result: CheckResult) -> None:
+    """Remember what came out of a drive, for reports.
+
+    Args:
+        item: the test that drove
+        result: what came out
+    """
+    from antdrive.sim.regression.summary import properties
+
+    item.stash.setdefault(_DROVE, []).append(result)
+    item.user_properties.extend(properties(result))
+
+
+def update_of(config: pytest.Config) -> Update:
+    """Which baselines this run of pytest writes."""
+    if config.getoption("drive_update"):
+        return "all"
+    return "new" if config.getoption("drive_update_new") else ""
+
+
+def results_of(config: pytest.Config) -> Results:
+    """Where this run of pytest writes logs, pictures and films."""
+    from antdrive.sim.regression.artefacts import Results, default_folder
+
+    given = config.getoption("drive_results")
+    folder = config.invocation_params.dir / given if given else default_folder(config.rootpath)
+    return Results(folder, config.getoption("drive_film"))
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Look for baselines of tests that are gone, in modules that were collected as a whole."""
+    if any("::" in str(word) for word in config.args):
+        return
+    modules: dict[Path, set[str]] = {}
+    for item in items:
+        if not isinstance(item, DriveItem):
+            modules.setdefault(item.path, set()).add(_name_in_file(item))
+    folders = {path: path.parent / "baselines" / path.stem for path in modules}
+    if any(folder.is_dir() for folder in folders.values()):
+        from antdrive.sim.regression.unused import unused_of_module
+
+        for path, names in modules.items():
+            config.stash[_UNUSED].update(str(found) for found in unused_of_module(path, names))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) -> Any:
+    """Add pictures to the page of pytest-html, where it is installed."""
+    report = yield
+    if call.when == "call" and _DROVE in item.stash and item.config.pluginmanager.hasplugin("html"):
+        _add_extras(report, item.stash[_DROVE])
+    return report
+
+
+def _add_extras(report: Any, results: list[CheckResult]) -> None:
+    try:
+        from pytest_html import extras
+    except ImportError:
+        return
+    import base64
+
+    found = list(getattr(report, "extras", []))
+    for result in results:
+        for name, path in result.files.items():
+            if path.endswith(".png"):
+                found.append(extras.png(base64.b64encode(Path(path).read_bytes()).decode(), name=name))
+            else:
+                found.append(extras.url(Path(path).as_uri(), name=name))
+    report.extras = found
+
+
+class _Listener:
+    """Keeps what reports tell of drives; with xdist they come from other processes."""
+
+    def __init__(self, found: list[Any]) -> None:
+        self._found = found
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        if report.when == "call" and any(name == "drive.test" for name, _ in report.user_properties):
+            self._found.append(report.user_properties)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node: Any, error: Any) -> None:
+    """Take over what a process of xdist has found."""
+    node.config.stash[_UNUSED].update(getattr(node, "workeroutput", {}).get(WORKER_KEY, ()))
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Fail for unused baselines if asked to; in a process of xdist, hand them over."""
+    config = session.config
+    found = config.stash[_UNUSED]
+    unused = sorted(found)
+    if hasattr(config, "workeroutput"):
+        config.workeroutput[WORKER_KEY] = unused
+    elif unused and config.getoption("drive_strict") and session.exitstatus == pytest.ExitCode.OK:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
+    """Say what was driven, on the terminal and in the file that GITHUB_STEP_SUMMARY names."""
+    found, told = config.stash[_UNUSED], config.stash[_TOLD]
+    unused = sorted(found)
+    if not (told or unused):
+        return
+    from antdrive.sim.regression.summary import drives_in, lines, markdown
+
+    drives = [drive for properties in told for drive in drives_in(properties)]
+    terminalreporter.section("drives")
+    for line in lines(drives, unused, config.getoption("drive_strict")):
+        terminalreporter.write_line(line)
+    page = os.environ.get("GITHUB_STEP_SUMMARY")
+    if page:
+        with open(page, "a", encoding="utf-8") as file:
+            file.write(markdown(drives, unused))
+
+
+def _name_in_file(item: pytest.Item) -> str:
+    """A test's name within its file, such as TestDoors.test_open[3]."""
+    return item.nodeid.partition("::")[2].replace("::", ".")

@@ -1,0 +1,293 @@
+"""Suites: files of scenarios, `*.drive.yaml`, each driven with one or several seeds and compared with its baseline."""
+
+from __future__ import annotations
+
+import functools
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, PlainValidator, WithJsonSchema
+
+from antdrive.sim.log.metrics import METRICS
+from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.regression.demands import END, Demands
+from antdrive.worlds.errors import FieldError, InputError, input_error
+from antdrive.worlds.files.checks import SchemaVersion, check, show
+from antdrive.worlds.files.document import Document, Location, read_document
+from antdrive.worlds.files.world_file import DiscEntry
+
+SUFFIX = ".drive.yaml"
+MAX_CASES = 100_000  # scenarios times seeds of one suite
+BASELINES = "baselines"  # the folder beside a suite
+
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")
+_SEEDS = re.compile(r"(\d{1,18})-(\d{1,18})")
+_RULES = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
+
+
+def _text_or_mapping(value: Any) -> Any:
+    if not isinstance(value, str | dict) or not value:
+        raise ValueError(f"must be a name or a mapping, got {show(value)}")
+    return value
+
+
+def _margin(value: Any) -> Any:
+    if value != "auto" and (isinstance(value, bool) or not isinstance(value, int | float)):
+        raise ValueError(f"must be a number of metres, or auto, got {show(value)}")
+    return value
+
+
+def _switch(value: Any) -> Any:
+    if not isinstance(value, bool | dict):
+        raise ValueError(f"must be true, false or a mapping of settings, got {show(value)}")
+    return value
+
+
+def _seeds(value: Any) -> Any:
+    if isinstance(value, str) and (match := _SEEDS.fullmatch(value)):
+        first, last = int(match[1]), int(match[2])
+        if first <= last < first + MAX_CASES:
+            return list(range(first, last + 1))
+    seeds = value if isinstance(value, list) else []
+    if not seeds or not all(type(seed) is int and 0 <= seed < 2**63 for seed in seeds):
+        raise ValueError(
+            f"must be whole numbers of at least 0, such as [0, 1, 2], or a range such as 0-9, got {show(value)}"
+        )
+    if len(set(seeds)) < len(seeds):
+        raise ValueError(f"must be different numbers, got {show(value)}")
+    return seeds
+
+
+def _anything(value: Any) -> Any:
+    return value
+
+
+_MAPPING: dict[str, Any] = {"type": "object"}
+_NAME_OR_MAPPING: dict[str, Any] = {"anyOf": [{"type": "string"}, _MAPPING]}
+_SWITCH_SCHEMA: dict[str, Any] = {"anyOf": [{"type": "boolean"}, _MAPPING]}
+_SEEDS_SCHEMA: dict[str, Any] = {
+    "anyOf": [
+        {"type": "array", "items": {"type": "integer", "minimum": 0}, "minItems": 1, "uniqueItems": True},
+        {"type": "string", "pattern": f"^{_SEEDS.pattern}$"},
+    ]
+}
+_MARGIN_SCHEMA: dict[str, Any] = {"anyOf": [{"type": "number", "minimum": 0}, {"const": "auto"}]}
+_TRAJECTORY_SCHEMA: dict[str, Any] = {"anyOf": [{"type": "number", "minimum": 0.002}, {"const": "exact"}]}
+
+TextOrMapping = Annotated[Any, PlainValidator(_text_or_mapping), WithJsonSchema(_NAME_OR_MAPPING)]
+Switch = Annotated[Any, PlainValidator(_switch), WithJsonSchema(_SWITCH_SCHEMA)]
+SeedList = Annotated[Any, PlainValidator(_seeds), WithJsonSchema(_SEEDS_SCHEMA)]
+MarginValue = Annotated[Any, PlainValidator(_margin), WithJsonSchema(_MARGIN_SCHEMA)]
+TrajectoryValue = Annotated[Any, PlainValidator(_anything), WithJsonSchema(_TRAJECTORY_SCHEMA)]
+
+
+class ScenarioEntry(BaseModel):
+    """A scenario of a suite, or the defaults of all of them."""
+
+    model_config = _RULES
+
+    note: str | None = Field(None, description="what the scenario is for, free text")
+    world: TextOrMapping = Field(
+        None,
+        description="a world file relative to the suite, a world of the catalogue, or {generate: forest, seed: 7} with the "
+        "generator's options",
+    )
+    start: list[float] | None = Field(
+        None, min_length=3, max_length=3, description="write [x, y, yaw] in metres and radians; by default the world's"
+    )
+    goal: list[float] | None = Field(
+        None, min_length=2, max_length=2, description="write [x, y] in metres; by default the world's"
+    )
+    robot: str = Field("turtlebot", description="a robot file relative to the suite, or a robot of the catalogue")
+    planner: TextOrMapping = Field(
+        "ants",
+        description="a planner's name; {name: aco-han, ants: 200} with options; {module: my_package.planners, name: Mine} or "
+        "{file: planners.py, name: Mine} for a planner of your own",
+    )
+    controller: dict[str, float] = Field({}, description="settings of the controller, such as {lookahead_time: 0.5}")
+    smoothing: str = Field("clearance", description="none, taut or clearance")
+    margin: MarginValue = Field(0.03, description="distance that plans keep beyond the robot's radius [m], or auto")
+    cell: float | None = Field(None, gt=0, description="grid resolution [m]; by default the world's")
+    noise: float = Field(0.0, ge=0, description="factor on the noise that the robot's file documents")
+    unseen: list[DiscEntry] = Field(
+        [], description="cylinders {x, y, radius} that neither planner nor controller knows of"
+    )
+    sees: str = Field("velocities", description="what the robot perceives of movers: KIND or KIND:METRES")
+    avoid: Switch = Field(True, description="whether the robot avoids movers, or settings such as {horizon: 2.0}")
+    replan: Switch = Field(
+        True, description="whether the robot replans around movers, or settings such as {patience: 10}"
+    )
+    time_limit: float | None = Field(None, gt=0, description="simulated time allowed [s]")
+    physics_hz: int = Field(240, ge=1, description="physics steps per simulated second")
+    control_hz: int = Field(60, ge=1, description="control periods per simulated second")
+    seeds: SeedList = Field([0], description="one test for each: [0, 1, 2], or a range such as 0-9")
+    expect: dict[str, Any] = Field(
+        {}, description='demands: {outcome: succeeded, certified: true, min_clearance_m: ">= 0.05"}'
+    )
+    tolerance: dict[str, Any] = Field(
+        {}, description="by how much a metric may be worse than in the baseline: {duration_s: 0.5, jerk_rms: any}"
+    )
+    trajectory: TrajectoryValue = Field(
+        None, description="how far from the baseline's line the robot may be at any time [m], or exact"
+    )
+    baseline: bool = Field(True, description="whether there is a baseline to compare with; false: only expect counts")
+
+
+class SuiteFile(BaseModel):
+    """A suite of scenarios, as written in a `*.drive.yaml` file."""
+
+    model_config = _RULES
+
+    schema_: SchemaVersion = Field(alias="schema", description="write schema: 1")
+    defaults: ScenarioEntry = Field(
+        default_factory=ScenarioEntry.model_construct,
+        description="keys that hold for all scenarios that do not set them",
+    )
+    scenarios: dict[str, ScenarioEntry] = Field(min_length=1, description="the scenarios by name")
+
+
+@dataclass(frozen=True, eq=False)
+class SuiteCase:
+    """One test: a scenario of a suite with one seed.
+
+    Attributes:
+        suite: the suite's file
+        name: the scenario's name
+        seed: the seed of all random numbers
+        entry: the scenario, with the suite's defaults
+        demands: what the drive must fulfil
+        document: the suite as read, for errors
+        own: the keys that the scenario sets itself; the others come from the defaults
+    """
+
+    suite: Path
+    name: str
+    seed: int
+    entry: ScenarioEntry
+    demands: Demands
+    document: Document
+    own: frozenset[str]
+
+    @property
+    def id(self) -> str:
+        """The test's name in its suite, such as aisle[0]."""
+        return f"{self.name}[{self.seed}]"
+
+    @property
+    def address(self) -> str:
+        """The test as commands name it: SUITE::aisle[0], the suite relative to the working directory where it can be."""
+        return f"{shown_path(self.suite)}::{self.id}"
+
+    @property
+    def baseline_path(self) -> Path:
+        """Where the baseline is."""
+        return baseline_folder(self.suite) / f"{self.name}-{self.seed}.json"
+
+    def error(self, key: str, problem: str) -> InputError:
+        """The error for a key of the scenario: file, line, key and problem.
+
+        Args:
+            key: the key, such as "planner.ants"; empty for the whole scenario
+            problem: what is wrong and what would be right
+        """
+        location = _place(self.document, self.name, key, self.own)
+        return self.document.error(location, problem)
+
+
+def baseline_folder(suite: Path) -> Path:
+    """The folder with the baselines of a suite, beside it."""
+    return suite.parent / BASELINES / suite.name.removesuffix(SUFFIX)
+
+
+def shown_path(path: Path) -> str:
+    """A path as messages show it: relative to the working directory if it lies below."""
+    try:
+        return str(path.relative_to(Path.cwd()))
+    except (ValueError, OSError):
+        return str(path)
+
+
+def load_suite(path: str | os.PathLike[str]) -> tuple[SuiteCase, ...]:
+    """The tests of a suite, in the order of the file. A suite is read once per process, and again when it changes.
+
+    Raises:
+        InputError: there is no such file, or something in it is wrong.
+    """
+    target = Path(path)
+    try:
+        state = target.stat()
+    except OSError as error:
+        raise input_error(os.fspath(path), f"cannot be read ({error.strerror})") from None
+    return _load(target.resolve(), os.fspath(path), state.st_mtime_ns, state.st_size)
+
+
+@functools.lru_cache(maxsize=64)
+def _load(path: Path, source: str, mtime: int, size: int) -> tuple[SuiteCase, ...]:
+    document = read_document(source)
+    suite = check(SuiteFile, document)
+    cases: list[SuiteCase] = []
+    for name, entry in suite.scenarios.items():
+        if not _NAME.fullmatch(name):
+            raise document.error(
+                ("scenarios", name), "a name has letters, digits, '-', '_' and '.' only, at most 100 of them"
+            )
+        cases += _cases(path, document, name, suite.defaults, entry)
+        if len(cases) > MAX_CASES:
+            raise document.error(("scenarios", name), f"scenarios times seeds must be at most {MAX_CASES}")
+    return tuple(cases)
+
+
+def _cases(path: Path, document: Document, name: str, defaults: ScenarioEntry, entry: ScenarioEntry) -> list[SuiteCase]:
+    """The tests of one scenario, one for each seed."""
+    own = frozenset(entry.model_fields_set)
+    values = {key: getattr(defaults, key) for key in defaults.model_fields_set}
+    values |= {key: getattr(entry, key) for key in own}
+    for key in ("expect", "tolerance"):
+        values[key] = {**getattr(defaults, key), **getattr(entry, key)}
+    merged = ScenarioEntry.model_construct(**values)
+    if merged.world is None:
+        hint = ScenarioEntry.model_fields["world"].description
+        raise document.error(("scenarios", name, "world"), f"missing; write {hint}")
+    try:
+        demands = Demands.of(merged.expect, merged.tolerance, merged.trajectory)
+    except FieldError as error:
+        raise document.error(_place(document, name, error.key, own), error.problem) from None
+    return [SuiteCase(path, name, seed, merged, demands, document, own) for seed in merged.seeds]
+
+
+def _place(document: Document, name: str, key: str, own: frozenset[str]) -> Location:
+    """Where a key of a scenario stands: in the scenario, or in the defaults."""
+    parts = tuple(key.split(".")) if key else ()
+    here: Location = ("scenarios", name, *parts)
+    there: Location = ("defaults", *parts)
+    if here in document.lines or not parts:
+        return here
+    return (
+        there if there in document.lines or (parts[0] not in own and ("defaults", parts[0]) in document.lines) else here
+    )
+
+
+def suite_schema() -> dict[str, Any]:
+    """The JSON Schema of suites, for editors."""
+    schema = SuiteFile.model_json_schema(by_alias=True)
+    entry = schema["$defs"]["ScenarioEntry"]["properties"]
+    bound = {"anyOf": [{"type": "number"}, {"type": "string", "pattern": "^\\s*(>=|<=|>|<|==)"}]}
+    allowed = {"anyOf": [{"type": "number", "minimum": 0}, {"type": "string", "pattern": "^(any|.*%)\\s*$"}]}
+    entry["expect"] |= {
+        "properties": {
+            "outcome": {"enum": [outcome.key for outcome in Outcome]},
+            "certified": {"type": "boolean"},
+            **{name: {**bound, "description": metric.definition} for name, metric in METRICS.items()},
+        },
+        "additionalProperties": False,
+    }
+    compared = {name: metric.definition for name, metric in METRICS.items() if metric.better != "neither"}
+    compared[END] = "Distance between the places where the two drives end."
+    entry["tolerance"] |= {
+        "properties": {name: {**allowed, "description": text} for name, text in compared.items()},
+        "additionalProperties": False,
+    }
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "antdrive suite"}

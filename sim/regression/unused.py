@@ -1,0 +1,45 @@
+"""Baselines that belong to no test."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from antdrive.sim.regression.suite import BASELINES, SUFFIX, SuiteCase, baseline_folder
+
+
+def unused_of_suite(suite: Path, cases: Iterable[SuiteCase]) -> Iterator[Path]:
+    """The baselines in a suite's folder that belong to none of its tests, and the folders of suites and tests that are gone.
+
+    Args:
+        suite: the suite's file
+        cases: all its tests
+    """
+    used = {case.baseline_path for case in cases if case.entry.baseline}
+    yield from (path for path in _files(baseline_folder(suite)) if path not in used)
+    for folder in sorted((suite.parent / BASELINES).glob("*/")):
+        owners = (suite.parent / f"{folder.name}{SUFFIX}", suite.parent / f"{folder.name}.py")
+        if not any(owner.exists() for owner in owners):
+            yield from _files(folder)
+
+
+def unused_of_module(module: Path, tests: Iterable[str]) -> Iterator[Path]:
+    """The baselines in the folder of a module of tests that belong to none of its tests.
+
+    Args:
+        module: the module's file
+        tests: the names of all its tests
+    """
+    names = tuple(tests)
+    for path in _files(module.parent / BASELINES / module.stem):
+        try:
+            case = str(json.loads(path.read_text(encoding="utf-8"))["case"])
+        except (OSError, ValueError, KeyError, TypeError):
+            case = ""
+        if not any(case == name or case.startswith(f"{name}-") for name in names):
+            yield path
+
+
+def _files(folder: Path) -> list[Path]:
+    return sorted(folder.glob("*.json"))
