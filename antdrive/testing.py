@@ -3,7 +3,23 @@
 The pytest plugin that comes with antdrive collects suites, `*.drive.yaml`, and has the fixture.
 """
 
-import lazy_loader
+from typing import Any
 
-# The names and their types are listed in testing.pyi; each is imported when it is first used.
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub("antdrive", __file__)
+from antdrive.sim import regression
+
+# Their types are listed in testing.pyi; each is imported when it is first used.
+_OFFERED = (
+    *("Baseline", "CheckResult", "DriveFailure", "DriveFixture", "assert_collision_free", "assert_reached_goal"),
+    *("check_case", "load_suite", "tasks", "worlds"),
+)
+__all__ = [*_OFFERED]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _OFFERED:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(regression, name)
+
+
+def __dir__() -> list[str]:
+    return list(_OFFERED)

@@ -178,22 +178,11 @@ def check_run(
         InputError: the baseline is wrong, or it or the folder cannot be written.
     """
     started = time.perf_counter()
-    baseline = None if path is None or update == "all" else Baseline.load(path)
-    if baseline is not None and baseline.case != name:
-        raise input_error(
-            shown_path(path or Path()), "case", f"belongs to {baseline.case}, not to {name}; accept {name} anew"
-        )
-    accepted, faults = "", list(unfulfilled(run, demands))
+    baseline = None if path is None or update == "all" else _own_baseline(path, name)
+    accepted = ""
     if path is not None and baseline is None:
-        if not update:
-            accept = accept or shlex.join(["antdrive", "accept", address])
-            remedy = "" if faults else f"; accept this drive with {accept}"
-            faults.append(f"baseline: {shown_path(path)} is missing{remedy}")
-        elif not faults:
-            accepted = write_baseline(Baseline.of(run, name), path)
-        else:
-            faults.append("baseline: not accepted, because the drive is not what the test expects")
-        judgement = Judgement(tuple(faults))
+        accept = accept or shlex.join(["antdrive", "accept", address])
+        judgement, accepted = _without_baseline(run, demands, path, name, accept, update)
     else:
         judgement = judge(run, demands, baseline)
     files: dict[str, str] = {}
@@ -218,6 +207,30 @@ def check_run(
         digest=run.rollout.drive_digest if run.rollout is not None else "",
         wall_s=_wall(run) + time.perf_counter() - started,
     )
+
+
+def _own_baseline(path: Path, name: str) -> Baseline | None:
+    """The baseline in a file, which must be that of the test."""
+    baseline = Baseline.load(path)
+    if baseline is not None and baseline.case != name:
+        problem = f"belongs to {baseline.case}, not to {name}; remove the file, and accept {name} anew"
+        raise input_error(shown_path(path), "case", problem)
+    return baseline
+
+
+def _without_baseline(
+    run: Run, demands: Demands, path: Path, name: str, accept: str, update: Update
+) -> tuple[Judgement, str]:
+    """Judge a run by its demands alone, and write its baseline if asked to and if it fulfils them; what was written."""
+    faults, accepted = list(unfulfilled(run, demands)), ""
+    if not update:
+        remedy = "" if faults else f"; accept this drive with {accept}"
+        faults.append(f"baseline: {shown_path(path)} is missing{remedy}")
+    elif faults:
+        faults.append("baseline: not accepted, because the drive is not what the test expects")
+    else:
+        accepted = write_baseline(Baseline.of(run, name), path)
+    return Judgement(tuple(faults)), accepted
 
 
 def write_baseline(baseline: Baseline, path: Path) -> str:

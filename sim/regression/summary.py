@@ -63,7 +63,7 @@ def lines(drives: Sequence[Mapping[str, str]], unused: Sequence[str], strict: bo
     """
     failed = sum(drive["passed"] == "false" for drive in drives)
     if drives:
-        yield f"{len(drives)} drives: {len(drives) - failed} as they should be, {failed} not"
+        yield f"{len(drives) - failed} of {len(drives)} drives passed"
     for drive in drives:
         if drive.get("baseline") in ("written", "renewed"):
             yield f"baseline {drive['baseline']}: {drive['test']}"

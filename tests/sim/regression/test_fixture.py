@@ -136,6 +136,10 @@ def test_without_hypothesis_the_message_names_what_to_install(monkeypatch: pytes
 def test_the_door_lists_what_it_offers() -> None:
     for name in antdrive.testing.__all__:
         assert getattr(antdrive.testing, name).__doc__
+    assert antdrive.worlds.__name__ == "antdrive.worlds", "the strategy of that name hides no package"
+    stub = (Path(antdrive.testing.__file__ or "").with_suffix(".pyi")).read_text()
+    assert sorted(re.findall(r" as (\w+)$", stub, flags=re.MULTILINE)) == sorted(antdrive.testing.__all__)
+    assert {name for name in dir(antdrive.testing) if not name.startswith("_")} == set(antdrive.testing.__all__)
 
 
 def test_a_robot_may_be_given_as_an_object(turtlebot: RobotSpec, drive: DriveFixture) -> None:

@@ -15,11 +15,12 @@ from hypothesis import strategies as st
 
 from antdrive import METRICS, Outcome, Run, Scenario, run
 from antdrive.sim.log.metrics import Tolerance
-from antdrive.sim.regression import Baseline, Demands, judge, parting
+from antdrive.sim.regression import Baseline, Demands, judge
 from antdrive.sim.regression.artefacts import drive_of, file_name, remove_artefacts
 from antdrive.sim.regression.baseline import MAX_BYTES
 from antdrive.sim.regression.explaining import explain
 from antdrive.sim.regression.nearest import nearest_of, touched_in
+from antdrive.sim.regression.parting import parting
 from antdrive.worlds.errors import FieldError, InputError
 
 PLAIN = Demands()
