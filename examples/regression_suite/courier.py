@@ -42,9 +42,7 @@ class WideBerth(GridPlanner):
         while path[-1] != query.start:
             path.append(before[path[-1]])
         cells = np.array(path[::-1], dtype=np.int32)
-        return PlanResult(
-            status=PlanStatus.SOLVED, cells=cells, cost=path_cost(cells, query.grid.cell), work=len(done)
-        )
+        return PlanResult(status=PlanStatus.SOLVED, cells=cells, cost=path_cost(cells, query.grid.cell), work=len(done))
 
     def _closeness(self, free: np.ndarray) -> np.ndarray:
         """1 on cells beside a blocked one, falling to 0 at `reach` cells from it."""

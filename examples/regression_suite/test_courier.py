@@ -2,11 +2,12 @@
 
 from pathlib import Path
 
+from courier import WideBerth
+from hypothesis import given, settings
+
 from antdrive import Task, load_robot, run
 from antdrive.sim import Scenario
 from antdrive.testing import DriveFixture, assert_collision_free, tasks
-from courier import WideBerth
-from hypothesis import given, settings
 
 COURIER = load_robot(Path(__file__).parent / "robots" / "courier.yaml")
 
