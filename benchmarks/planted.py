@@ -26,10 +26,9 @@ import numpy as np
 import yaml
 
 from benchmarks.planners import table
-from benchmarks.suite_runs import EXAMPLE, PLUGINS, environment, with_check, with_pytest
+from benchmarks.suite_runs import EXAMPLE, PLUGINS, Tests, environment, with_check, with_pytest
 
 Edit = Callable[[Path], None]
-Tests = dict[str, dict[str, Any]]
 
 
 @dataclass(frozen=True)

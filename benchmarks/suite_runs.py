@@ -13,7 +13,7 @@ import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import pytest
 
@@ -21,7 +21,10 @@ ROOT = Path(__file__).parent.parent
 EXAMPLE = ROOT / "examples" / "regression_suite"
 PLUGINS = ("-p", "antdrive.sim.regression.plugin", "-p", "benchmarks.suite_runs", "-p", "no:cacheprovider")
 
-_TESTS: dict[str, dict[str, Any]] = {}
+#: What came out of each test, by its name.
+Tests: TypeAlias = dict[str, dict[str, Any]]
+
+_TESTS: Tests = {}
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -58,7 +61,7 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 
 def with_pytest(
     folder: Path, *words: str, flags: Sequence[str] = (), env: Mapping[str, str] | None = None, cwd: Path | None = None
-) -> dict[str, dict[str, Any]]:
+) -> Tests:
     """What came out of each test of a folder, by name.
 
     Args:
@@ -80,7 +83,7 @@ def with_pytest(
     return found
 
 
-def with_check(folder: Path, *words: str, env: Mapping[str, str] | None = None) -> dict[str, dict[str, Any]]:
+def with_check(folder: Path, *words: str, env: Mapping[str, str] | None = None) -> Tests:
     """The same from `antdrive check`, for the suites of a folder."""
     command = [sys.executable, "-m", "antdrive", "check", ".", "--json", "--film", "never", *words]
     env = environment(None, env)
