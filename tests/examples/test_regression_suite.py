@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 import sys
+import xml.etree.ElementTree
 from pathlib import Path
 
 import pytest
@@ -42,10 +43,17 @@ def run(words: list[str], folder: Path, env: dict[str, str]) -> subprocess.Compl
 
 
 def test_its_tests_pass_and_use_every_baseline(checkout: Path, variables: dict[str, str]) -> None:
-    done = run(["pytest", "-q", "--drive-strict", "--drive-film=never"], checkout, variables)
+    done = run(["pytest", "-q", "--drive-strict", "--drive-film=never", "--junitxml=junit.xml"], checkout, variables)
     assert done.returncode == 0, done.stdout
     drives = len(list((checkout / "baselines").rglob("*.json")))
     assert f"{drives} of {drives} drives passed" in done.stdout
+    facts = [
+        {fact.get("name"): fact.get("value", "") for fact in test.iter("property")}
+        for test in xml.etree.ElementTree.parse(checkout / "junit.xml").iter("testcase")
+    ]
+    driven = [fact for fact in facts if fact.get("drive.outcome") == "succeeded"]
+    assert len(driven) == drives - 2  # two of the drives have no path
+    assert all(re.fullmatch("[0-9a-f]{64}", fact["drive.digest"]) for fact in driven)
 
 
 def test_a_fault_of_the_planner_fails_its_tests(checkout: Path, variables: dict[str, str]) -> None:
