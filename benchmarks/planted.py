@@ -383,7 +383,7 @@ def telling(failed: Tests) -> str:
         for name, test in failed.items()
         for line in test["message"].splitlines()
     ]
-    for begin in ("touched", "min_clearance_m", "outcome", "duration_s", "trajectory", ""):
+    for begin in ("touched", "outcome", "min_clearance_m", "duration_s", "trajectory", ""):
         for name, line in lines:
             if line.startswith(begin) and line:
                 return f"`{name}`: {line}".replace("|", "\\|")
