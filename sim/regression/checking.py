@@ -45,6 +45,7 @@ class CheckResult:
         commands: how to repeat the test
         files: what was written about it, by name
         metrics: the drive's metrics; empty if the robot did not drive
+        digest: `Rollout.drive_digest`; empty if the robot did not drive
         wall_s: how long the test took [s]
     """
 
@@ -59,6 +60,7 @@ class CheckResult:
     commands: tuple[str, ...] = ()
     files: dict[str, str] = field(default_factory=dict)
     metrics: dict[str, float] = field(default_factory=dict)
+    digest: str = ""
     wall_s: float = 0.0
 
     @property
@@ -202,6 +204,7 @@ def check_run(
         commands=commands,
         files=files,
         metrics=run.metrics if run.rollout is not None else {},
+        digest=run.rollout.drive_digest if run.rollout is not None else "",
         wall_s=_wall(run) + time.perf_counter() - started,
     )
 

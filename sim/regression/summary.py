@@ -25,6 +25,7 @@ def properties(result: CheckResult) -> list[tuple[str, str]]:
         "outcome": result.outcome,
         "certified": str(result.certified).lower(),
         **{name: f"{result.metrics[name]:.6g}" for name in SHOWN if name in result.metrics},
+        "digest": result.digest,
         "fault": result.faults[0] if result.faults else "",
         "gains": "; ".join(result.gains),
         "baseline": result.accepted,

@@ -10,7 +10,7 @@ import xml.etree.ElementTree
 from pathlib import Path
 
 import matplotlib.backends.backend_agg  # noqa: F401 - see below
-import numba  # noqa: F401
+import numba
 import pybullet  # noqa: F401
 import pytest
 
@@ -23,6 +23,8 @@ import antdrive.sim.view.figures.run_figures
 import antdrive.sim.view.figures.then_and_now  # noqa: F401
 from antdrive import list_robots
 
+# What the compiler loads when it first compiles must not be forgotten either: it cannot be loaded twice.
+numba.njit(lambda: 0.0)()
 pytest_plugins = ["pytester"]
 PLUGIN = ("-p", "antdrive.sim.regression.plugin", "-p", "no:cacheprovider")
 SUITE = """schema: 1

@@ -1,0 +1,107 @@
+"""Runs of a suite in other processes, as `benchmarks.planted` and `benchmarks.suites` need them.
+
+As a plugin of pytest, `-p benchmarks.suite_runs`, it writes what came out of each test into the file that ANTDRIVE_RUN names, and
+shuffles the tests with the seed in ANTDRIVE_SHUFFLE.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+EXAMPLE = ROOT / "examples" / "regression_suite"
+PLUGINS = ("-p", "antdrive.sim.regression.plugin", "-p", "benchmarks.suite_runs", "-p", "no:cacheprovider")
+
+#: What came out of each test, by its name.
+Tests: TypeAlias = dict[str, dict[str, Any]]
+
+_TESTS: Tests = {}
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    seed = os.environ.get("ANTDRIVE_SHUFFLE")
+    if seed:
+        random.Random(int(seed)).shuffle(items)
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    if report.when == "call" or report.failed:
+        facts = {name.removeprefix("drive."): value for name, value in report.user_properties}
+        _TESTS[report.nodeid.rpartition("/")[2]] = {
+            "passed": report.passed, "message": report.longreprtext, "digest": facts.get("digest", ""),
+            "outcome": facts.get("outcome", ""), "results": facts.get("results", ""),
+        }  # fmt: skip
+
+
+def pytest_collectreport(report: pytest.CollectReport) -> None:
+    if report.failed:
+        _TESTS[report.nodeid] = {
+            "passed": False,
+            "message": report.longreprtext,
+            "digest": "",
+            "outcome": "",
+            "results": "",
+        }
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    path = os.environ.get("ANTDRIVE_RUN")
+    if path and not hasattr(session.config, "workeroutput"):
+        Path(path).write_text(json.dumps(_TESTS))
+
+
+def with_pytest(
+    folder: Path, *words: str, flags: Sequence[str] = (), env: Mapping[str, str] | None = None, cwd: Path | None = None
+) -> Tests:
+    """What came out of each test of a folder, by name.
+
+    Args:
+        folder: holds the suites
+        words: further words for pytest
+        flags: for the interpreter
+        env: variables to set
+        cwd: the working directory; by default the folder
+    """
+    out = folder / "tests.json"
+    out.unlink(missing_ok=True)
+    command = [sys.executable, *flags, "-m", "pytest", "-q", *PLUGINS, "--drive-film=never", *words]
+    env = environment(out, env)
+    done = subprocess.run(command, cwd=cwd or folder, env=env, capture_output=True, text=True, check=False)
+    if not out.exists():
+        raise RuntimeError(done.stdout[-2000:] + done.stderr[-2000:])
+    found = json.loads(out.read_text())
+    assert isinstance(found, dict)
+    return found
+
+
+def with_check(folder: Path, *words: str, env: Mapping[str, str] | None = None) -> Tests:
+    """The same from `antdrive check`, for the suites of a folder."""
+    command = [sys.executable, "-m", "antdrive", "check", ".", "--json", "--film", "never", *words]
+    env = environment(None, env)
+    done = subprocess.run(command, cwd=folder, env=env, capture_output=True, text=True, check=False)
+    tests = json.loads(done.stdout)["tests"]
+    return {
+        test["address"]: {
+            "passed": test["passed"], "message": "\n".join([*test["faults"], *test["details"]]), "digest": test["digest"],
+            "outcome": test["outcome"], "results": "",
+        }
+        for test in tests
+    }  # fmt: skip
+
+
+def environment(out: Path | None, extra: Mapping[str, str] | None) -> dict[str, str]:
+    """The variables of a run: results go beside the suite, and no bytecode is written."""
+    own = {"PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": "1"}
+    env = {**os.environ, **own, **(extra or {})}
+    for name in ("GITHUB_STEP_SUMMARY", "PYTEST_ADDOPTS"):
+        env.pop(name, None)
+    return env | ({"ANTDRIVE_RUN": str(out)} if out else {})
