@@ -19,7 +19,7 @@ from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import Run, versions
-from antdrive.sim.regression.nearest import RULES, Encounter, nearest_of
+from antdrive.sim.regression.nearest import RULES, ClosestApproach, nearest_of
 from antdrive.worlds.errors import input_error
 from antdrive.worlds.files.atomic import written_whole
 from antdrive.worlds.files.reading import read_bytes
@@ -69,7 +69,7 @@ class Baseline:
     certified: bool
     bound_m: float | None
     metrics: Mapping[str, float | None]
-    nearest: Encounter | None
+    nearest: ClosestApproach | None
     hashes: Mapping[str, str]
     versions: Mapping[str, str]
     drive_digest: str

@@ -20,7 +20,7 @@ _WALL_OF_CONTACT = (0, 2, 1, 3)  # left, right, lower, upper as columns after th
 
 
 @dataclass(frozen=True)
-class Encounter:
+class ClosestApproach:
     """The robot beside a thing.
 
     Attributes:
@@ -45,7 +45,7 @@ class Encounter:
         return f"the robot was at ({self.x:.2f}, {self.y:.2f}) at t = {self.t:.2f} s"
 
 
-def nearest_of(rollout: Rollout) -> Encounter:
+def nearest_of(rollout: Rollout) -> ClosestApproach:
     """What the robot came nearest to."""
     row = int(rollout.clearance.argmin())
     world = dataclasses.replace(rollout.record.world, movers=())
@@ -58,7 +58,7 @@ def nearest_of(rollout: Rollout) -> Encounter:
     return _encounter(rollout, row, thing)
 
 
-def touched_in(rollout: Rollout) -> Encounter | None:
+def touched_in(rollout: Rollout) -> ClosestApproach | None:
     """What the robot touched first; None if it touched nothing."""
     touches = touches_of(rollout)
     if not touches:
@@ -86,7 +86,7 @@ def _mover(rollout: Rollout, index: int, row: int) -> str:
     return f"movers[{index}] at ({x:.2f}, {y:.2f}) with radius {rollout.record.world.movers[index].radius:g}"
 
 
-def _encounter(rollout: Rollout, row: int, thing: str) -> Encounter:
+def _encounter(rollout: Rollout, row: int, thing: str) -> ClosestApproach:
     x, y = (round(value, 3) + 0.0 for value in rollout.pose[row, :2].tolist())
     clearance = round(float(rollout.clearance[row]), 6)
-    return Encounter(thing, round(float(rollout.t[row]), 3), x, y, clearance)
+    return ClosestApproach(thing, round(float(rollout.t[row]), 3), x, y, clearance)
