@@ -8,12 +8,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from antdrive.robots.feasible import require_feasible
 from antdrive.robots.spec import NOISE_RANGE, ROBOT_RANGE, Footprint, Noise, RobotSpec
 from antdrive.worlds.errors import FieldError, input_error
-from antdrive.worlds.files.checks import SchemaVersion, check, suggest
+from antdrive.worlds.files.checks import OneLine, SchemaVersion, check, suggest
 from antdrive.worlds.files.document import Document, read_document
 
 _CATALOG = Path(__file__).with_name("catalog")
@@ -74,7 +74,7 @@ class RobotFile(BaseModel):
     model_config = _RULES
 
     schema_: SchemaVersion = Field(alias="schema", description="write schema: 1")
-    name: str = Field(min_length=1, max_length=200, description="name of the robot, by default that of the file")
+    name: OneLine = Field(min_length=1, max_length=200, description="name of the robot, by default that of the file")
     source: str | None = Field(None, description="where these values come from, free text")
     footprint: FootprintEntry = Field(
         description="write {radius: 0.18} for a disc or {length: 0.5, width: 0.4} for a rectangle [m]"
@@ -94,13 +94,6 @@ class RobotFile(BaseModel):
     noise: NoiseEntry = Field(
         NoiseEntry(), description="errors of pose, encoders and wheels, and delay; `--noise` multiplies them"
     )
-
-    @field_validator("name")
-    @classmethod
-    def _one_line(cls, name: str) -> str:
-        if not name.isprintable():
-            raise ValueError("must be one line of printable characters")
-        return name
 
 
 def list_robots() -> Mapping[str, Path]:

@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin
 
-from pydantic import BaseModel, BeforeValidator, ValidationError
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ValidationError
 
 from antdrive.worlds.files.document import Document, Location
 
@@ -23,7 +23,16 @@ def _exactly_one(value: Any) -> Any:
 
 
 #: The version of the file format; so far there has been one.
+
+
+def _printable(text: str) -> str:
+    if not text.isprintable():
+        raise ValueError("must be one line of printable characters")
+    return text
+
+
 SchemaVersion = Annotated[Literal[1], BeforeValidator(_exactly_one)]
+OneLine = Annotated[str, AfterValidator(_printable)]
 
 
 def check(model: type[Model], document: Document) -> Model:

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import BaseModel, ConfigDict, Field
 
 from antdrive.worlds.errors import FieldError, input_error
 from antdrive.worlds.files.atomic import written_whole
-from antdrive.worlds.files.checks import SchemaVersion, check, suggest, yaml_number
+from antdrive.worlds.files.checks import OneLine, SchemaVersion, check, suggest, yaml_number
 from antdrive.worlds.files.document import MAX_BYTES, MAX_VALUES, Document, count_values, read_document
 from antdrive.worlds.limits import MAX_CELLS, MAX_COORDINATE, MAX_PHASE, MIN_PERIOD
 from antdrive.worlds.movers import Mover, mover_from_dict, mover_to_dict
@@ -76,7 +76,7 @@ class WorldFile(BaseModel):
 
     # "schema" is also a method of BaseModel, hence the alias.
     schema_: SchemaVersion = Field(alias="schema", description="write schema: 1")
-    name: str = Field(
+    name: OneLine = Field(
         min_length=1, max_length=200, description="what people call the world; by default the file's name"
     )
     source: str | None = Field(None, description="where the world comes from, free text")
@@ -88,13 +88,6 @@ class WorldFile(BaseModel):
     obstacles: list[DiscEntry] = Field([], description="upright cylinders")
     time_limit: Size | None = Field(None, description="simulated time allowed [s]; by default ample for the route")
     movers: list[MoverEntry] = Field([], max_length=1000, description="moving cylinders")
-
-    @field_validator("name")
-    @classmethod
-    def _one_line(cls, name: str) -> str:
-        if not name.isprintable():
-            raise ValueError("must be one line of printable characters")
-        return name
 
 
 def list_worlds() -> Mapping[str, Path]:
