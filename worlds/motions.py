@@ -221,27 +221,29 @@ class _CruisingMotion(Motion):
 
     def __init__(self, mover: Cruising, bounds: Bounds) -> None:
         self.radius = mover.radius
-        self._low = np.array(bounds[:2]) + mover.radius
-        self._room = np.array(bounds[2:]) - mover.radius - self._low
-        self._velocity = np.array(mover.velocity, dtype=np.float64)
-        self._first = np.array(mover.position, dtype=np.float64) - self._low + mover.phase * self._velocity
+        # Columns (2, 1): numpy is several times faster along rows of T than along T rows of two.
+        low, high = np.array(bounds[:2])[:, None], np.array(bounds[2:])[:, None]
+        self._low = low + mover.radius
+        self._room = high - mover.radius - self._low
+        self._velocity = np.array(mover.velocity, dtype=np.float64)[:, None]
+        self._first = np.array(mover.position, dtype=np.float64)[:, None] - self._low + mover.phase * self._velocity
 
     def at(self, t: Floats) -> Floats:
         unfolded = self._unfolded(t)
-        return np.asarray(self._low + np.where(unfolded > self._room, 2 * self._room - unfolded, unfolded))
+        return np.asarray(self._low + np.where(unfolded > self._room, 2 * self._room - unfolded, unfolded)).T
 
     def velocities(self, t: Floats) -> Floats:
         unfolded = self._unfolded(t)
         # At the wall itself the mover already moves away from it.
         back = np.where(self._velocity < 0, (unfolded > self._room) | (unfolded == 0), unfolded >= self._room)
-        return np.asarray(np.where(back, -self._velocity, self._velocity))
+        return np.asarray(np.where(back, -self._velocity, self._velocity)).T
 
     def travelled(self, t: Floats) -> Floats:
-        return np.asarray(t * math.hypot(*self._velocity))
+        return np.asarray(t * math.hypot(*self._velocity[:, 0]))
 
     def _unfolded(self, t: Floats) -> Floats:
-        """The place (T, 2) in a room twice as wide: the true one and its mirror image behind the wall."""
-        return np.asarray(np.mod(self._first + t[:, None] * self._velocity, 2 * self._room))
+        """The place (2, T) in a room twice as wide: the true one and its mirror image behind the wall."""
+        return np.asarray(np.mod(self._first + t * self._velocity, 2 * self._room))
 
 
 class _WanderingMotion(Motion):

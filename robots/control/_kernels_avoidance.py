@@ -146,21 +146,47 @@ def intrusion(x: float, y: float, places: Array, k: int, radii: Array, near: Arr
 
 
 @kernel
+def least_clearance(trail: Array, obstacles: ObstacleIndex, tuning: PursuitTuning) -> float:
+    """What the robot's centre keeps to obstacles along a trail: less than usual where it is nearer at its start [m]."""
+    return min(tuning.stopping_clearance, clearance_at(trail[0, 0], trail[0, 1], obstacles) - 1e-3)
+
+
+@kernel
+def passes_within(x: float, y: float, x1: float, y1: float, required: float, obstacles: ObstacleIndex) -> bool:
+    """Whether a straight step comes closer to an obstacle than required."""
+    return bool(segment_clearance(x, y, x1, y1, nearby(x, y, obstacles), obstacles.bounds) < required)
+
+
+@kernel
+def meets_obstacle(trail: Array, obstacles: ObstacleIndex, tuning: PursuitTuning, step: float) -> bool:
+    """Whether a trail that was followed without looking comes too close to an obstacle."""
+    required = least_clearance(trail, obstacles, tuning)
+    for k in range(trail.shape[0] - 1):
+        length = 0.5 * (trail[k, 3] + trail[k + 1, 3]) * step
+        if abs(length) > 1e-6 and passes_within(
+            trail[k, 0], trail[k, 1], trail[k + 1, 0], trail[k + 1, 1], required, obstacles
+        ):
+            return True
+    return False
+
+
+@kernel
 def follow(
     x: float, y: float, yaw: float, v: float, w: float, s: float, rotating: bool, candidate: Array,
     path: PathSamples, obstacles: ObstacleIndex, limits: MotionLimits, tuning: PursuitTuning,
-    step: float, first: int, trail: Array,
+    step: float, first: int, looks: bool, trail: Array,
 ) -> Trail:  # fmt: skip
     """A candidate followed from step `first` on, for as many steps as `trail` (K + 1, 5) has rows after its first.
 
     A row of `trail` is a place [m, m], a heading [rad], a speed [m/s] and a yaw rate [rad/s]. Row 0 is the start, from
     which all obstacles are judged; row `first` is (x, y, yaw, v, w), and the rows after it are filled.
+    Without `looks` obstacles are left to `meets_obstacle`, and the trail does not end at one.
     """
     capped = MotionLimits(
         min(limits.speed, candidate[SPEED]), limits.yaw_rate, limits.acceleration, limits.yaw_acceleration,
         limits.lateral_acceleration, limits.half_track, limits.rim_speed,
     )  # fmt: skip
-    required = min(tuning.stopping_clearance, clearance_at(trail[0, 0], trail[0, 1], obstacles) - 1e-3)
+    required = least_clearance(trail, obstacles, tuning) if looks else 0.0
     cos, sin, facing, now = 1.0, 0.0, 0.0, 0.0
     for k in range(trail.shape[0] - 1):
         if k < first:
@@ -180,10 +206,8 @@ def follow(
         x1, y1 = x + length * cos, y + length * sin
         yaw1 = yaw + 0.5 * (w + w1) * step
         trail[k + 1, 0], trail[k + 1, 1], trail[k + 1, 2], trail[k + 1, 3], trail[k + 1, 4] = x1, y1, yaw1, v1, w1
-        if abs(length) > 1e-6:
-            discs = nearby(x, y, obstacles)
-            if segment_clearance(x, y, x1, y1, discs, obstacles.bounds) < required:
-                return Trail(k + 1, True)
+        if looks and abs(length) > 1e-6 and passes_within(x, y, x1, y1, required, obstacles):
+            return Trail(k + 1, True)
         x, y, yaw, v, w, now = x1, y1, yaw1, v1, w1, now + step
     return Trail(trail.shape[0] - 1, False)
 
@@ -215,7 +239,7 @@ def follow_all(
                 continue
         got = follow(
             trail[first, 0], trail[first, 1], trail[first, 2], trail[first, 3], trail[first, 4], s, rotating,
-            candidate, path, obstacles, limits, tuning, step, first, trail,
+            candidate, path, obstacles, limits, tuning, step, first, True, trail,
         )  # fmt: skip
         steps[n], blocked[n] = got.steps, got.blocked
         if candidate[KIND] == TWO_TWISTS and candidate[DURATION] == math.inf:
@@ -259,14 +283,18 @@ def relevant_movers(
     near, contact_distances = np.empty(radii.shape[0], np.int64), np.empty(radii.shape[0])
     count = 0
     for m in range(radii.shape[0]):
-        closest = math.inf
+        matters = radii[m] + weights.min_distance + weights.preferred_clearance + ROUNDING
+        meets = False
         for k in range(places.shape[0]):
             dx, dy = places[k, m, 0] - x, places[k, m, 1] - y
-            matters = closest + limits.speed * k * weights.step + ROUNDING
-            if matters > 0.0 and dx * dx + dy * dy > matters * matters:
+            driven = limits.speed * k * weights.step
+            if dx * dx + dy * dy > (matters + driven) * (matters + driven):
                 continue
-            closest = min(closest, math.hypot(dx, dy) - limits.speed * k * weights.step)
-        if closest - radii[m] - weights.min_distance > weights.preferred_clearance:
+            closest = math.hypot(dx, dy) - driven
+            if closest - radii[m] - weights.min_distance <= weights.preferred_clearance:
+                meets = True
+                break
+        if not meets:
             continue
         near[count] = m
         count += 1
@@ -425,8 +453,9 @@ def choose(
     clearance and no risk; otherwise the candidate without contact that scores best; if each has a contact,
     the one whose comes last.
 
-    Movers only lower a score. So the candidate with the highest limit is followed next, which lowers its limit to what
-    it is worth without movers, and judged among movers once it comes first again, until none can beat the best.
+    Obstacles only exclude and movers only lower a score. So the candidate with the highest limit is followed next, which
+    lowers its limit to what it is worth without either, and judged among them once it comes first again, until none can
+    beat the best.
     """
     near, contact_distances = relevant_movers(x, y, limits, tuning, weights, places, radii)
     if near.shape[0] == 0:
@@ -436,7 +465,7 @@ def choose(
     trails, steps, blocked = np.empty((count, instants, 5)), np.empty(count, np.int64), np.empty(count, np.bool_)
     trails[:, 0, 0], trails[:, 0, 1], trails[:, 0, 2], trails[:, 0, 3], trails[:, 0, 4] = x, y, yaw, v, w
     own = follow(
-        x, y, yaw, v, w, s, rotating, candidates[0], path, obstacles, limits, tuning, weights.step, 0, trails[0]
+        x, y, yaw, v, w, s, rotating, candidates[0], path, obstacles, limits, tuning, weights.step, 0, True, trails[0]
     )
     steps[0], blocked[0] = own.steps, own.blocked
     met = encounter(trails[0], own, places, radii, near, by_step, contact_distances, weights, cap)
@@ -458,14 +487,17 @@ def choose(
         if limit[n] == -math.inf or limit[n] < best_score or (limit[n] == best_score and n > best):
             break
         if not followed[n]:
-            end = follow(
-                x, y, yaw, v, w, s, rotating, candidates[n], path, obstacles, limits, tuning, weights.step, 0, trails[n]
-            )
-            followed[n], limit[n] = True, -math.inf
-            if not end.blocked:
-                limit[n] = worth(trails[n, instants - 1], s, window, path, tuning, weights)
-                if n <= 1:
-                    limit[n] += weights.persistence
+            follow(
+                x, y, yaw, v, w, s, rotating, candidates[n], path, obstacles, limits, tuning, weights.step, 0, False,
+                trails[n],
+            )  # fmt: skip
+            followed[n] = True
+            limit[n] = worth(trails[n, instants - 1], s, window, path, tuning, weights)
+            if n <= 1:
+                limit[n] += weights.persistence
+            continue
+        if meets_obstacle(trails[n], obstacles, tuning, weights.step):
+            limit[n] = -math.inf
             continue
         met = encounter(
             trails[n], Trail(instants - 1, False), places, radii, near, by_step, contact_distances, weights, cap
@@ -508,7 +540,7 @@ def best_escape(
     trails, steps, blocked = np.empty((count, soon.shape[0], 5)), np.empty(count, np.int64), np.empty(count, np.bool_)
     trails[:, 0, 0], trails[:, 0, 1], trails[:, 0, 2], trails[:, 0, 3], trails[:, 0, 4] = x, y, yaw, v, w
     own = follow(
-        x, y, yaw, v, w, s, rotating, candidates[0], path, obstacles, limits, tuning, weights.step, 0, trails[0]
+        x, y, yaw, v, w, s, rotating, candidates[0], path, obstacles, limits, tuning, weights.step, 0, True, trails[0]
     )
     steps[0], blocked[0] = own.steps, own.blocked
     follow_all(s, rotating, candidates, path, obstacles, limits, tuning, weights.step, trails, steps, blocked)

@@ -116,10 +116,9 @@ class Recorder:
         t = np.arange(len(rows)) / engine.physics_hz
         pose, twist = np.ascontiguousarray(rows[:, :3]), np.ascontiguousarray(rows[:, 3:5])
         clearance = footprint_clearance(engine.world, engine.robot.footprint, pose)
-        movers = np.empty((len(t), 0, 2))
+        movers = engine.mover_track(len(t))
         contacts = np.array(self._contacts, dtype=np.float64).reshape(-1, 4)
         if engine.trajectories:
-            movers = engine.trajectories.positions(t)
             foot = engine.robot.footprint
             shape = np.array([foot.half_length, foot.half_width, foot.rounding])
             _kernels_movers.lower_by_movers(pose, shape, movers, engine.trajectories.radii, clearance)

@@ -32,6 +32,7 @@ SETTLING_TIME = 0.1  # in which a placed robot sinks onto its wheels [s]
 TOUCHING_DISTANCE = 1e-4  # surfaces closer than this touch [m]
 MAX_JOINT_VELOCITY = 1e6  # of wheels; Bullet's default of 100 would slow down small wheels [rad/s]
 RESIDUAL = 5e-7  # where the solver stops for geared wheels; at 2e-6 speeds are 4 mm/s off [(rad/s)^2]
+OVERSPEED = 1.5  # no robot drives faster by itself than its highest speed times this
 WALL_THICKNESS = 0.1  # half of it [m]
 
 
@@ -116,19 +117,18 @@ class Engine:
         )
         self._build_ground()
         self._build_robot()
-        self._obstacles: dict[int, int] = {}  # contact index by body number
-        for disc in self.world.obstacles:
+        self._obstacles: dict[int, int] = {}  # contact index by body number, without movers
+        for i, disc in enumerate(self.world.obstacles):
             height = max(disc.height, MIN_HEIGHT)
             shape = p.createCollisionShape(
                 p.GEOM_CYLINDER, radius=disc.radius, height=height, physicsClientId=self._client
             )
-            self._build_obstacle(shape, (disc.x, disc.y, height / 2))
-        self._movers = MoverBodies(self.trajectories, self.physics_hz, self._client) if self.trajectories else None
-        for body in self._movers.bodies if self._movers else ():
-            self._obstacles[body] = len(self._obstacles)
-        for half_extents, centre in _walls(self.world, max(2 * self.robot.height, 0.2)):
+            self._build_obstacle(i, shape, (disc.x, disc.y, height / 2))
+        self._movers = self._mover_bodies(self.trajectories) if self.trajectories else None
+        standing = len(self.world.obstacles) + len(self.world.movers)
+        for i, (half_extents, centre) in enumerate(_walls(self.world, max(2 * self.robot.height, 0.2)), standing):
             shape = p.createCollisionShape(p.GEOM_BOX, halfExtents=half_extents, physicsClientId=self._client)
-            self._build_obstacle(shape, centre)
+            self._build_obstacle(i, shape, centre)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -204,19 +204,28 @@ class Engine:
         return self._steps / self.physics_hz
 
     def mover_positions(self) -> Floats:
-        """Positions of the movers' bodies (M, 2) [m]: the trajectories at `time`, apart from rounding."""
-        bodies = self._movers.bodies if self._movers else []
-        found = [self._p.getBasePositionAndOrientation(body, self._client)[0][:2] for body in bodies]
-        return np.array(found, dtype=np.float64).reshape(-1, 2)
+        """Positions of the movers (M, 2) [m]: the trajectories at `time`, apart from rounding; of bodies, where there are."""
+        return self._movers.positions(self._steps) if self._movers else np.empty((0, 2))
+
+    def mover_track(self, steps: int) -> Floats:
+        """Where the trajectories lead the movers (steps, M, 2) [m]: before each of the first steps since placing."""
+        return self._movers.track(steps) if self._movers else np.empty((steps, 0, 2))
 
     def _touching(self, points: Sequence[Any]) -> list[Contact]:
         # Bullet also lists points some millimetres apart. A pressing contact may read 0.05 mm apart, but
         # has a force.
         return [
-            Contact(self._obstacles[point[2]], point[8], point[9])
+            Contact(self._index(point[2]), point[8], point[9])
             for point in points
             if point[8] <= TOUCHING_DISTANCE or point[9] > 0
         ]
+
+    def _index(self, body: int) -> int:
+        """The contact index of a body."""
+        if body in self._obstacles:
+            return self._obstacles[body]
+        assert self._movers is not None
+        return len(self.world.obstacles) + self._movers.indices[body]
 
     def _build_ground(self) -> None:
         p = self._p
@@ -256,12 +265,20 @@ class Engine:
             group, mask = (CHASSIS, OBSTACLE) if link == -1 else (WHEELS, GROUND)
             p.setCollisionFilterGroupMask(self._robot, link, group, mask, physicsClientId=self._client)
 
-    def _build_obstacle(self, shape: int, centre: Point3) -> None:
+    def _mover_bodies(self, trajectories: Trajectories) -> MoverBodies:
+        def where() -> tuple[float, float]:
+            (x, y, _), _ = self._p.getBasePositionAndOrientation(self._robot, self._client)
+            return x, y
+
+        fast = OVERSPEED * self.robot.max_speed
+        return MoverBodies(trajectories, self.robot.radius, fast, where, self.physics_hz, self._client)
+
+    def _build_obstacle(self, index: int, shape: int, centre: Point3) -> None:
         p = self._p
         body = p.createMultiBody(0, shape, basePosition=centre, useMaximalCoordinates=1, physicsClientId=self._client)
         p.changeDynamics(body, -1, activationState=p.ACTIVATION_STATE_SLEEP, physicsClientId=self._client)
         p.setCollisionFilterGroupMask(body, -1, OBSTACLE, CHASSIS, physicsClientId=self._client)
-        self._obstacles[body] = len(self._obstacles)
+        self._obstacles[body] = index
 
 
 def _walls(world: World, height: float) -> Iterator[tuple[Point3, Point3]]:

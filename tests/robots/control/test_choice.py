@@ -37,7 +37,7 @@ def in_turn(situation: tuple[Any, ...], contact_distances: Floats, near: Floats)
         trail = np.empty((steps + 1, 5))
         trail[0] = x, y, yaw, v, w
         end = kernels.follow(
-            *situation[:7], candidate, path, obstacles, limits, tuning, weights.step, 0, trail
+            *situation[:7], candidate, path, obstacles, limits, tuning, weights.step, 0, True, trail
         )  # fmt: skip
         met = kernels.encounter(trail, end, places, radii, near, everyone, contact_distances, weights, math.inf)
         if met.contact < math.inf:
@@ -96,7 +96,7 @@ def test_the_limit_of_a_candidate_is_no_less_than_it_is_worth(tracked: TrackedPa
         for n, candidate in enumerate(TABLE):
             trail = np.empty((steps + 1, 5))
             trail[0] = here
-            motion = (tracked.samples, tracked.obstacles, tracked.limits, tuning, weights.step, 0, trail)
+            motion = (tracked.samples, tracked.obstacles, tracked.limits, tuning, weights.step, 0, True, trail)
             if not kernels.follow(*here, s, False, candidate, *motion).blocked:
                 worth = kernels.worth(trail[-1], s, window, tracked.samples, tuning, weights)
                 assert worth <= limit[n]

@@ -14,6 +14,7 @@ from antdrive.sim import Engine, Outcome, Rollout, Run, Scenario, certify, measu
 from antdrive.sim.driving.drive import drive
 from antdrive.sim.log.certificate import closed_form_clearance
 from antdrive.sim.log.contacts import Touch, touches
+from antdrive.sim.physics import movers as bodies_of_movers
 from antdrive.worlds import Cruising, Disc, Floats, Keyframed, Mover, Route, Task, Trajectories, Wandering, World
 
 OPEN = (-10.0, -10.0, 10.0, 10.0)
@@ -40,6 +41,13 @@ def built(*movers: Mover, obstacles: tuple[Disc, ...] = ()) -> tuple[World, Traj
 # Physics
 
 
+@pytest.fixture
+def bodies_everywhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every mover has a body, however far away it is."""
+    monkeypatch.setattr(bodies_of_movers, "MARGIN", math.inf)
+
+
+@pytest.mark.usefixtures("bodies_everywhere")
 def test_bodies_follow_the_trajectories_at_every_step(turtlebot: RobotSpec) -> None:
     world, trajectories = built(
         *(Keyframed(radius=0.3, keyframes=ZIGZAG, loop=loop, phase=0.3) for loop in ("pingpong", "teleport", "once")),
@@ -101,6 +109,7 @@ def test_movers_are_numbered_after_the_discs_and_before_the_walls(turtlebot: Rob
     assert set(touched) == {index}
 
 
+@pytest.mark.usefixtures("bodies_everywhere")
 def test_movers_pass_through_each_other_and_through_obstacles(turtlebot: RobotSpec) -> None:
     world, trajectories = built(
         Cruising(radius=0.5, position=(-5.0, 5.0), velocity=(2.0, 0.0)),
