@@ -93,7 +93,7 @@ class MoverBodies:
 
     def positions(self, step: int) -> Floats:
         """Where all movers are before physics step number `step` (M, 2) [m]: the places of bodies, where there are any."""
-        places = self._trajectories.positions(step / self._hz)[0]
+        places: Floats = self._trajectories.positions(step / self._hz)[0]
         for m, body in self.bodies.items():
             places[m] = self._p.getBasePositionAndOrientation(body, self._client)[0][:2]
         return places

@@ -17,6 +17,7 @@ from antdrive.planners import Progress, keep_best, load_planner, watch
 from antdrive.robots import Footprint, PurePursuit, RobotSpec, load_robot
 from antdrive.sim import Engine, Outcome, Run, Scenario, measure, plan, run
 from antdrive.sim.driving.drive import drive
+from antdrive.sim.log import certificate
 from antdrive.sim.log.record import SmoothingRecord
 from antdrive.sim.view.figures.plan_figures import plan_figure
 from antdrive.worlds import Disc, FieldError, InputError, Route, Task, World, list_worlds, load_task, save_task
@@ -290,6 +291,74 @@ def test_other_physics_and_control_rates_work(small_scenario: Scenario) -> None:
 def test_a_robot_that_brakes_hard_is_certified_at_the_slowest_rates() -> None:
     for physics, control in ((60, 60), (60, 10), (70, 70), (90, 45)):
         assert run(Scenario.of("slalom", "astar", "jackal", physics_hz=physics, control_hz=control)).succeeded
+
+
+def fast(size: float, speed: float, braking: float, across: float = 6.0, friction: float = 1.3) -> RobotSpec:
+    """A disc of this diameter [m] that drives fast and brakes hard."""
+    return RobotSpec(
+        name="fast",
+        footprint=Footprint(0.0, 0.0, size / 2),
+        height=0.6 * size,
+        mass=50 * size**3 + 0.05,
+        wheel_radius=0.15 * size,
+        track=0.7 * size,
+        max_speed=speed,
+        max_yaw_rate=min(50.0, 2 * speed / size),
+        max_acceleration=braking,
+        max_yaw_acceleration=braking / size,
+        max_lateral_acceleration=across,
+        max_wheel_speed=15 * speed / size,
+        wheel_torque=3 * (50 * size**3 + 0.05) * size,
+        wheel_friction=friction,
+    )
+
+
+def driven(robot: RobotSpec, physics_hz: int, control_hz: int) -> Run:
+    """A drive of a robot between four cylinders that are in proportion to it."""
+    long, wide = max(40 * robot.radius, 4.0), max(12 * robot.radius, 1.0)
+    places = ((0.2, 0.35), (0.4, 0.65), (0.6, 0.35), (0.8, 0.65))
+    discs = tuple(Disc(0.2 + long * x, wide * y, 0.16 * wide) for x, y in places)
+    world = World("lane", (0.0, 0.0, long + 6 * robot.radius, wide), discs)
+    goal = (long + 3 * robot.radius, wide / 2)
+    task = Task(world, (2 * robot.radius, wide / 2, 0.0), goal, cell=wide / 16, goal_tolerance=0.15)
+    return run(
+        Scenario(
+            task=task,
+            planner=load_planner("astar"),
+            planner_name="astar",
+            robot=robot,
+            physics_hz=physics_hz,
+            control_hz=control_hz,
+            margin=0.2 * robot.radius + 0.02,
+        )
+    )
+
+
+def motion_problems(found: Run) -> list[str]:
+    assert found.certificate is not None
+    return [problem for problem in found.certificate.problems if "do not follow from" in problem]
+
+
+def test_a_fast_robot_that_slides_as_physics_has_it_is_not_said_to_be_forged(monkeypatch: pytest.MonkeyPatch) -> None:
+    """While it speeds up at a low rate it slides aside; the check of its motion knows by how much."""
+    robots = ((0.5, 2.5, 8.0), (0.35, 4.0, 7.0), (0.6, 4.0, 6.0))
+    drives = [driven(fast(*numbers), 60, control) for numbers in robots for control in (10, 60)]
+    assert [motion_problems(found) for found in drives] == [[]] * len(drives)
+    assert sum(found.succeeded for found in drives) >= 4
+    monkeypatch.setattr(certificate, "SKID", 0.0)
+    monkeypatch.setattr(certificate, "SPINNING", 0.0)
+    refused = [certificate.certify(found.rollout) for found in drives if found.rollout]
+    assert sum("do not follow from" in str(found.problems) for found in refused) >= 2
+
+
+def test_a_robot_that_may_have_slid_is_said_to(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(certificate, "SKID", 0.0)
+    monkeypatch.setattr(certificate, "SPINNING", 0.0)
+    says = "the robot may have slid: 8 m/s2 along and {} m/s2 across are {} % of what a wheel friction of {} holds"
+    (held,) = motion_problems(driven(fast(0.5, 2.5, 8.0, across=4.0), 60, 10))
+    assert "slid" not in held
+    (slides,) = motion_problems(driven(fast(0.5, 2.5, 8.0, across=6.0, friction=1.0), 60, 10))
+    assert slides.endswith(says.format(6, 102, 1))
 
 
 def small_copy(robot: RobotSpec, k: float) -> RobotSpec:

@@ -1,12 +1,14 @@
 """Physics compared with closed forms."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from antdrive.robots import RobotSpec, footprint_clearance
 from antdrive.sim import Engine
+from antdrive.sim.log.certificate import SKID, SPINNING
 from antdrive.sim.physics.bullet import bullet, client
 from antdrive.worlds import Disc, World
 
@@ -117,3 +119,42 @@ def test_the_pose_is_that_of_the_axle(jackal: RobotSpec) -> None:
     with Engine(OPEN, jackal) as engine:
         engine.place((1.25, -2.5, 2.0))
         np.testing.assert_allclose(engine.state(), (1.25, -2.5, 2.0, 0, 0), atol=2e-4)
+
+
+def slide(spec: RobotSpec, acceleration: float, physics_hz: int, control_hz: int, degrees: float) -> float:
+    """How fast a robot slides aside that speeds up for half a second, on average [m/s]."""
+    yaw, period = math.radians(degrees), physics_hz // control_hz
+    with Engine(OPEN, spec, physics_hz=physics_hz) as engine:
+        engine.place((0, 0, yaw))
+        for k in range(physics_hz // 2):
+            if k % period == 0:
+                engine.command(acceleration * (k // period + 1) / control_hz, 0.0)
+            engine.step()
+        x, y = engine.state()[:2]
+    return abs(math.cos(yaw) * y - math.sin(yaw) * x) / 0.5
+
+
+@pytest.mark.parametrize("robot", ["turtlebot", "jackal"])
+@pytest.mark.parametrize(("acceleration", "physics_hz"), [(2.0, 60), (7.0, 60), (7.0, 240)])
+def test_a_robot_that_speeds_up_slides_by_a_third_of_what_it_gains_in_a_step(
+    robot: str, acceleration: float, physics_hz: int, request: pytest.FixtureRequest
+) -> None:
+    """The certificate allows for it, see SKID."""
+    spec: RobotSpec = replace(request.getfixturevalue(robot), wheel_torque=1e3)
+    slides = [slide(spec, acceleration, physics_hz, physics_hz, degrees) for degrees in range(0, 180, 10)]
+    share = max(slides) / (acceleration / physics_hz)
+    assert 0.3 < share < 0.33
+    assert share < SKID
+    assert slides[0] < 0.02 * max(slides)  # none along the world's axes
+
+
+@pytest.mark.parametrize("friction", [0.9, 1.5])
+@pytest.mark.parametrize(("physics_hz", "control_hz"), [(60, 10), (60, 20), (240, 10)])
+def test_a_robot_whose_wheels_spin_slides_by_a_share_of_what_it_gains_in_a_period(
+    jackal: RobotSpec, friction: float, physics_hz: int, control_hz: int
+) -> None:
+    """The certificate allows for it, see SPINNING."""
+    spec, acceleration = replace(jackal, wheel_friction=friction, wheel_torque=1e3), 7.0
+    most = max(slide(spec, acceleration, physics_hz, control_hz, degrees) for degrees in range(0, 180, 10))
+    spinning = min(1.0, acceleration / (friction * 9.81)) * acceleration / control_hz
+    assert 0.5 * spinning * SPINNING < most < SKID * acceleration / physics_hz + SPINNING * spinning
