@@ -10,7 +10,7 @@ shortest arc is clear.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -94,6 +94,11 @@ class TrackedPath:
     def length(self) -> float:
         """Length of the route [m]."""
         return float(self.samples.arc[-1])
+
+    @property
+    def without_turning(self) -> TrackedPath:
+        """The same path for a robot that takes every clear arc a driving robot would take, instead of turning first."""
+        return replace(self, tuning=self.tuning._replace(rotate_above_at_rest=self.tuning.rotate_above))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -25,7 +25,7 @@ from antdrive.worlds.errors import FieldError
 from antdrive.worlds.kernel_cache import sources_stamp
 from antdrive.worlds.plane import segment_lengths, wrap_angle
 
-METHOD = 2  # to be counted up when courses, statistic or search change, so that older results are not used
+METHOD = 3  # to be counted up when courses, statistic or search change, so that older results are not used
 
 
 class Loss(NamedTuple):

@@ -110,7 +110,7 @@ class Driver:
             if self._monitor.blockage.reason:
                 return Ending(Outcome.BLOCKED, self._monitor.blockage.reason)
         last, before = self.command, self.pursuit
-        self.command, self.pursuit = self._controller.step(self.tracked, pose, last, before)
+        self.command, self.pursuit = self._pursue(pose, last, before)
         speed_limit = self._keep_to_schedule(tick, last)
         if self._avoidance is not None and self._predictor is not None:
             stopping = before.limiter == AVOIDING and self._stops_at_goal(pose, last)
@@ -121,6 +121,16 @@ class Driver:
         waiting = self.pursuit.limiter == AVOIDING or speed_limit < WAITING_SPEED
         self._clock = self._clock.after(self.pursuit, waiting)
         return ending
+
+    def _pursue(self, pose: Pose, last: Twist, before: PursuitState) -> tuple[Twist, PursuitState]:
+        """What the controller commands. A robot that has turned for more than a full turn drives off as soon as it may.
+
+        Between pillars the longest lookahead whose arc is clear depends on the heading. So a robot that turns towards its
+        carrot may find the next carrot on its other side, and turn to and fro without end.
+        """
+        if self._clock.turning <= self._full_turn:
+            return self._controller.step(self.tracked, pose, last, before)
+        return self._controller.step(self.tracked.without_turning, pose, last, before._replace(turning=False))
 
     def _replan_if_triggered(self, tick: int, pose: Pose, state: State) -> None:
         """Go on along a new path, if one is due and there is one."""

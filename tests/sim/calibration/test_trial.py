@@ -12,6 +12,7 @@ from antdrive.robots import Footprint, PurePursuit, RobotSpec
 from antdrive.sim import Run, Scenario, run
 from antdrive.sim.calibration.courses import course
 from antdrive.sim.calibration.trial import Conditions, least_bound, loss_on_course
+from antdrive.sim.driving.driver import Driver
 from antdrive.worlds.errors import FieldError
 
 
@@ -54,6 +55,14 @@ def test_a_robot_that_brakes_in_a_bend_does_not_follow_it_into_a_pillar(
 ) -> None:
     """Slip brings the arc on which the robot can stop nearer to a pillar; held, it took the whole margin."""
     assert loss_on_course(conditions(jackal, smoothing=smoothing), margin, seed).disc < margin / 2
+
+
+def test_a_robot_that_turns_to_and_fro_drives_off(turtlebot: RobotSpec, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Among this course's pillars the carrot jumps from -0.29 to 0.45 rad while the robot turns to it, and back."""
+    here = conditions(turtlebot, smoothing="none")
+    assert loss_on_course(here, 0.03, 5).footprint < 0.03
+    monkeypatch.setattr(Driver, "_pursue", lambda driver, *now: driver._controller.step(driver.tracked, *now))
+    assert loss_on_course(here, 0.03, 5).footprint == math.inf
 
 
 def test_every_condition_has_a_part_in_the_key_and_labels_have_none(turtlebot: RobotSpec) -> None:
