@@ -11,4 +11,5 @@ MAX_PHASE = 1e4  # [s]
 MAX_WALK = 2e6  # steps that wanderers have behind them when a run starts, times (200 + obstacles): half a second
 MAX_LOG_WALK = 4e8  # the same for all steps that wanderers take in a log: two minutes
 MAX_DRAWS = 200_000  # of first cells for all wanderers of a world that have no start: some seconds
-MAX_LOG_DISTANCES = 2e10  # distances in a log, rows times obstacles: an hour among as many as a world file holds
+MAX_LOG_DISTANCES = 2e10  # rows times obstacles in a log: an hour among as many as a world file holds
+MAX_NEAR_DISTANCES = 4e8  # distances to those that may be the nearest, which are all computed: a minute

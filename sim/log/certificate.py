@@ -29,6 +29,8 @@ from antdrive.sim.log.contacts import STANDING_SPEED, touches_of
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import DriveRecord
 from antdrive.sim.log.rollout import Rollout
+from antdrive.worlds.errors import FieldError
+from antdrive.worlds.limits import MAX_NEAR_DISTANCES
 from antdrive.worlds.plane import segment_lengths, wrap_angle
 from antdrive.worlds.trajectories import Trajectories
 from antdrive.worlds.types import Floats
@@ -52,6 +54,7 @@ DRIFT_WINDOWS = (0.25, 1.0, 4.0)  # [s]
 SKID, SPINNING = 0.4, 0.25
 GRAVITY = 9.81  # [m/s^2]
 SAFE_GRIP = 0.75  # a robot that uses more of its grip may slide farther than that
+BLOCK = 60  # rows for which the discs that may be nearest are found at once
 NOWHERE = 0.001  # a robot that never was farther from its start went nowhere [m]
 BLOCKER_MOVED = 0.1  # a mover that blocks the robot for good has not moved farther than this [m]
 
@@ -132,7 +135,10 @@ def certify(rollout: Rollout) -> Certificate:
         movers = rollout.trajectories()
     except ValueError as error:
         return Certificate(False, touched, math.nan, math.nan, (f"record.task: {error}",))
-    still, moving = _clearances(rollout)
+    try:
+        still, moving = _clearances(rollout)
+    except FieldError as error:
+        return Certificate(False, touched, math.nan, math.nan, (str(error),))
     clearance = np.minimum(still, moving.min(axis=1, initial=math.inf))
     bound = float(_between_steps(rollout, movers, still, moving).min())
     problems = [
@@ -180,11 +186,10 @@ def _clearances(rollout: Rollout) -> tuple[Floats, Floats]:
         outside = np.linalg.norm(np.maximum(over, 0.0), axis=0)
         return np.asarray(outside + np.minimum(over.max(axis=0), 0.0) - rounding - radii)
 
-    for rows in np.array_split(np.arange(len(x)), 1 + len(x) * len(discs) // 1_000_000):
-        if not len(discs):
-            break
-        nearest = distance(rows, (discs[:, 0] + 1j * discs[:, 1])[None], discs[:, 2]).min(axis=1)
-        best[rows] = np.minimum(best[rows], nearest)
+    for block, near in _blocks(rollout.pose[:, :2], foot.radius, discs):
+        centres = (near[:, 0] + 1j * near[:, 1])[None]
+        for rows in np.array_split(block, 1 + len(block) * len(near) // 1_000_000):
+            best[rows] = np.minimum(best[rows], distance(rows, centres, near[:, 2]).min(axis=1))
     radii = np.array([mover.radius for mover in world.movers])
     moving = np.empty((len(x), len(radii)))
     for rows in np.array_split(np.arange(len(x)), 1 + moving.size // 1_000_000):
@@ -193,6 +198,36 @@ def _clearances(rollout: Rollout) -> tuple[Floats, Floats]:
         centres = rollout.movers[rows]
         moving[rows] = distance(rows, centres[..., 0] + 1j * centres[..., 1], radii)
     return np.asarray(best), moving
+
+
+def _blocks(places: Floats, radius: float, discs: Floats) -> Iterator[tuple[npt.NDArray[np.int64], Floats]]:
+    """Rows (B,), some at a time, and the discs (N, 3) one of which is the nearest to the footprint in each of them.
+
+    Args:
+        places: the axle's centre in each row (T, 2) [m]
+        radius: the footprint's circumscribed radius [m]
+        discs: x, y and radius of all discs (M, 3) [m]
+
+    Raises:
+        FieldError: more distances have to be computed than a minute is enough for.
+    """
+    if not len(discs):
+        return
+    count = 0
+    for first in range(0, len(places), BLOCK):
+        block = places[first : first + BLOCK]
+        spread = float(np.hypot(*(block - block[0]).T).max())
+        # Between the centre's distance and the footprint's lies no more than its radius.
+        away = np.hypot(discs[:, 0] - block[0, 0], discs[:, 1] - block[0, 1]) - discs[:, 2]
+        near = discs[away <= away.min() + 2 * spread + radius + SAME_CLEARANCE]
+        count += len(block) * len(near)
+        if count > MAX_NEAR_DISTANCES:
+            raise FieldError(
+                "pose",
+                f"{len(places)} rows that leap between {len(discs)} obstacles take more than {MAX_NEAR_DISTANCES:.0e} "
+                f"distances to check, by row {first}; a drive takes a few for each row",
+            )
+        yield np.arange(first, first + len(block)), near
 
 
 def _between_steps(rollout: Rollout, movers: Trajectories, still: Floats, moving: Floats) -> Floats:

@@ -21,7 +21,7 @@ from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import DriveRecord
 from antdrive.worlds.errors import FieldError
 from antdrive.worlds.files.atomic import written_whole
-from antdrive.worlds.limits import MAX_LOG_DISTANCES, MAX_LOG_WALK
+from antdrive.worlds.limits import MAX_LOG_DISTANCES, MAX_LOG_WALK, MAX_NEAR_DISTANCES
 from antdrive.worlds.movers import Wandering
 from antdrive.worlds.trajectories import Trajectories
 
@@ -198,6 +198,9 @@ class Rollout:
         if rows * things > MAX_LOG_DISTANCES:
             rows_checked = int(MAX_LOG_DISTANCES / things)
             yield f"t: must have at most {rows_checked} rows in a world of {things} obstacles and movers, found {rows}"
+        if rows * len(world.movers) > MAX_NEAR_DISTANCES:
+            rows_checked = int(MAX_NEAR_DISTANCES / len(world.movers))
+            yield f"t: must have at most {rows_checked} rows in a world of {len(world.movers)} movers, found {rows}"
         wanderers = [mover for mover in world.movers if isinstance(mover, Wandering)]
         steps = sum((mover.phase + rows / self.record.physics_hz) / mover.period for mover in wanderers)
         most = MAX_LOG_WALK / (200 + len(world.obstacles))

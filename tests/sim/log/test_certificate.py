@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from antdrive.robots import RobotSpec, footprint_clearance
 from antdrive.sim import Outcome, Rollout, Run, Scenario, certify, run
+from antdrive.sim.log import certificate
 from antdrive.sim.log.certificate import closed_form_clearance, in_metres
 from antdrive.worlds import Disc
 
@@ -46,6 +48,50 @@ def test_only_a_distance_of_0_reads_as_0() -> None:
 
 def test_the_closed_form_agrees_with_the_clearances_of_the_drive(log: Rollout) -> None:
     np.testing.assert_allclose(closed_form_clearance(log), log.clearance, atol=1e-12)
+
+
+def crowded(log: Rollout, rng: np.random.Generator) -> Rollout:
+    """A drive's rows in another world, with 300 cylinders of all sizes, many of which the robot overlaps."""
+    xmin, ymin, xmax, ymax = log.record.task.world.bounds
+    x, y, radius = rng.uniform((xmin, ymin, 0.01), (xmax, ymax, 0.4), (300, 3)).T
+    task = log.record.task
+    discs = [Disc(*disc) for disc in zip(x.tolist(), y.tolist(), radius.tolist(), strict=True)]
+    away = [d for d in discs if min(math.dist((d.x, d.y), at[:2]) for at in (task.start, task.goal)) > d.radius + 0.3]
+    world = replace(task.world, obstacles=tuple(away))
+    return replace(log, record=replace(log.record, task=replace(task, world=world)))
+
+
+@pytest.mark.parametrize("robot", ["turtlebot", "jackal"])
+@pytest.mark.parametrize("leaps", [0, 1, 40])
+def test_discs_that_are_left_out_are_never_the_nearest(
+    log: Rollout, robot: str, leaps: int, request: pytest.FixtureRequest
+) -> None:
+    rng = np.random.default_rng(leaps)
+    spec: RobotSpec = request.getfixturevalue(robot)
+    full = crowded(replace(log, record=replace(log.record, robot=spec)), rng)
+    xmin, ymin, xmax, ymax = full.record.world.bounds
+    pose = full.pose.copy()
+    pose[:, 2] = rng.uniform(-math.pi, math.pi, len(pose))
+    rows = rng.integers(0, len(pose), leaps)
+    pose[rows, :2] = rng.uniform((xmin, ymin), (xmax, ymax), (leaps, 2))
+    expected = footprint_clearance(full.record.world, spec.footprint, pose)
+    np.testing.assert_allclose(closed_form_clearance(replace(full, pose=pose)), expected, atol=1e-12)
+
+
+def test_a_log_takes_a_few_distances_for_each_row_unless_it_leaps(
+    log: Rollout, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rng = np.random.default_rng(2)
+    full = crowded(log, rng)
+    rows, count = len(full.t), len(full.record.world.obstacles)
+    monkeypatch.setattr(certificate, "MAX_NEAR_DISTANCES", rows * count // 4)
+    assert not any("take more than" in problem for problem in certify(full).problems)
+    xmin, ymin, xmax, ymax = full.record.world.bounds
+    pose = full.pose.copy()
+    pose[:, :2] = rng.uniform((xmin, ymin), (xmax, ymax), (rows, 2))
+    (problem,) = certify(replace(full, pose=pose)).problems
+    assert problem.startswith(f"pose: {rows} rows that leap between {count} obstacles take more than ")
+    assert problem.endswith("a drive takes a few for each row")
 
 
 def test_a_finer_walk_between_the_rows_never_undercuts_the_bound(log: Rollout) -> None:

@@ -150,6 +150,19 @@ def test_more_distances_than_can_be_checked_are_a_problem_of_the_log(
         Rollout.load(tmp_path / "run.npz")
 
 
+def test_more_distances_to_movers_than_can_be_checked_are_a_problem_of_the_log(
+    log: Rollout, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mover = Cruising(radius=0.1, position=(0.5, 0.5), velocity=(0.1, 0.0))
+    task = replace(log.record.task, world=replace(log.record.task.world, movers=(mover, mover)))
+    rows = len(log.t)
+    among = replace(log, record=replace(log.record, task=task), movers=np.zeros((rows, 2, 2)))
+    monkeypatch.setattr(rollout, "MAX_NEAR_DISTANCES", 2 * rows)
+    assert among.problems() == []
+    monkeypatch.setattr(rollout, "MAX_NEAR_DISTANCES", 2 * rows - 1)
+    assert among.problems() == [f"t: must have at most {rows - 1} rows in a world of 2 movers, found {rows}"]
+
+
 LONG = 10**400
 #: A place in the record, what is written there, and how the refusal goes on after the place. None: the key is left out.
 WRONG: dict[str, tuple[str, Any, str]] = {
