@@ -104,6 +104,42 @@ def arc_clearance(
 
 
 @kernel
+def turn_clearance(
+    x: float, y: float, yaw: float, turn: float, half_length: float, half_width: float, rounding: float, discs: Array,
+    bounds: Array,
+) -> float:  # fmt: skip
+    """Distance from a rounded rectangle that turns about its centre by `turn` to the nearest disc surface or wall.
+
+    Seen from the rectangle, a disc moves on a circle, and is nearest at one of its ends or in line with a corner.
+    """
+    corner = math.atan2(half_width, half_length)
+    radius = math.hypot(half_length, half_width)
+    best = math.inf
+    for j in range(discs.shape[0]):
+        dx, dy = discs[j, 0] - x, discs[j, 1] - y
+        away, angle = math.hypot(dx, dy), math.atan2(dy, dx) - yaw
+        if away - radius - rounding - discs[j, 2] > best:
+            continue
+        for end in (angle, angle - turn):
+            over_x = away * abs(math.cos(end)) - half_length
+            over_y = away * abs(math.sin(end)) - half_width
+            gap = math.hypot(max(over_x, 0.0), max(over_y, 0.0)) + min(max(over_x, over_y), 0.0)
+            best = min(best, gap - rounding - discs[j, 2])
+        for side in (corner, math.pi - corner, math.pi + corner, 2.0 * math.pi - corner):
+            if on_arc(side, angle, -turn):
+                best = min(best, away - radius - rounding - discs[j, 2])
+    for q in range(4):  # the walls, by the direction in which they are
+        room = abs(bounds[q] - (x if q % 2 == 0 else y))
+        angle = (2 + q) * 0.5 * math.pi - yaw
+        for end in (angle, angle - turn):
+            best = min(best, room - half_length * abs(math.cos(end)) - half_width * abs(math.sin(end)) - rounding)
+        for side in (corner, math.pi - corner, math.pi + corner, 2.0 * math.pi - corner):
+            if on_arc(side, angle, -turn):
+                best = min(best, room - radius - rounding)
+    return best
+
+
+@kernel
 def on_arc(angle: float, first: float, sweep: float) -> bool:
     """Whether an angle lies on the arc that starts at `first` and turns by `sweep`."""
     turn = (angle - first) % (2.0 * math.pi)

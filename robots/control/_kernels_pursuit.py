@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from antdrive.robots.control._kernels_obstacles import ObstacleIndex, arc_clearance, nearby
+from antdrive.robots.control._kernels_obstacles import ObstacleIndex, arc_clearance, nearby, turn_clearance
 from antdrive.robots.control._kernels_path import PathSamples, carrot_at, point_at, project
 from antdrive.worlds._kernels import Array, kernel, segment_clearance
 
@@ -14,6 +14,7 @@ CRUISE, CURVATURE, ROUTE, YAW_RATE, GOAL, ROTATE, CREEP, BRAKING, DONE, CLEARANC
 
 YAW_RATE_TIME = 0.2  # the yaw rate of a curve must be reachable within this time [s]
 END_LOOKAHEAD = 0.35  # near the goal, the lookahead is at most this share of the remaining route
+TURN_CLEARANCE = 0.005  # a rectangle that turns on the spot keeps this, or nearly what it has [m]
 START_TOLERANCE = 5e-4  # an arc may come this much closer to obstacles than the robot is now [m]
 
 
@@ -49,6 +50,9 @@ class PursuitTuning(NamedTuple):
         stopping_clearance: what the arc on which the robot can stop keeps between its centre and obstacles
             [m]
         robot_radius: circumscribed radius of the robot [m]
+        half_length: of the footprint, without its rounding; 0 if no turn on the spot is to be checked [m]
+        half_width: the same across [m]
+        rounding: radius of the footprint's corners [m]
         lookahead_time: the lookahead is the speed times this [s]
         lookahead_min: shortest lookahead [m]
         lookahead_max: longest lookahead [m]
@@ -68,6 +72,9 @@ class PursuitTuning(NamedTuple):
     lookahead_clearance: float
     stopping_clearance: float
     robot_radius: float
+    half_length: float
+    half_width: float
+    rounding: float
     lookahead_time: float
     lookahead_min: float
     lookahead_max: float
@@ -289,6 +296,23 @@ def speed_limit(
 
 
 @kernel
+def clear_turn(
+    x: float, y: float, yaw: float, bearing: float, distance: float, discs: Array, bounds: Array, tuning: PursuitTuning
+) -> float:
+    """By how much to turn on the spot towards a bearing; 0 where a rectangle would touch something on the way.
+
+    `distance` is that from the centre to the nearest obstacle: one that is farther than the circumscribed radius is in no
+    turn's way, and one that is nearer is in the way of the longer turn, too, which leads two corners past it.
+    """
+    hx, hy, rounding = tuning.half_length, tuning.half_width, tuning.rounding
+    if distance > tuning.robot_radius or (hx == 0.0 and hy == 0.0):
+        return bearing
+    now = turn_clearance(x, y, yaw, 0.0, hx, hy, rounding, discs, bounds)
+    least = min(TURN_CLEARANCE, now - START_TOLERANCE)
+    return bearing if turn_clearance(x, y, yaw, bearing, hx, hy, rounding, discs, bounds) >= least else 0.0
+
+
+@kernel
 def rotation(new_v: float, v: float, w: float, bearing: float, limits: MotionLimits, tuning: PursuitTuning) -> float:
     """The yaw rate of a robot that is to rotate in place.
 
@@ -361,7 +385,8 @@ def pursue(
 
     new_v = clip(target, v - limits.acceleration * period, v + limits.acceleration * period)
     if rotating and not at_goal:
-        wanted = rotation(new_v, v, w, carrot.bearing, limits, tuning)
+        bearing = clear_turn(x, y, yaw, carrot.bearing, distance, discs, bounds, tuning)
+        wanted = rotation(new_v, v, w, bearing, limits, tuning)
     else:
         wanted = curvature * new_v
     new_w = reachable_yaw_rate(wanted, w, period, limits)

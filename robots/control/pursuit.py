@@ -96,6 +96,11 @@ class TrackedPath:
         return float(self.samples.arc[-1])
 
     @property
+    def for_any_turn(self) -> TrackedPath:
+        """The same path for a robot that turns on the spot the shorter way round, whatever is in its way."""
+        return replace(self, tuning=self.tuning._replace(half_length=0.0, half_width=0.0))
+
+    @property
     def without_turning(self) -> TrackedPath:
         """The same path for a robot that takes every clear arc a driving robot would take, instead of turning first."""
         return replace(self, tuning=self.tuning._replace(rotate_above_at_rest=self.tuning.rotate_above))
@@ -238,6 +243,9 @@ class PurePursuit:
             lookahead_clearance=robot.radius + self.lookahead_margin * margin,
             stopping_clearance=robot.radius + self.stopping_margin * margin,
             robot_radius=robot.radius,
+            half_length=robot.footprint.half_length,
+            half_width=robot.footprint.half_width,
+            rounding=robot.footprint.rounding,
             lookahead_time=self.corner_lookahead_time if route.curvature is None else self.lookahead_time,
             lookahead_min=self.lookahead_min,
             lookahead_max=self.lookahead_max,

@@ -42,10 +42,11 @@ def cannot_leave(
         control_hz: control periods per second
     """
     pose, command, state = start, Twist(0.0, 0.0), PursuitState()
+    path = tracked.for_any_turn
     for _ in range(round(REHEARSED * control_hz)):
         if not is_narrow(world, robot, pose):
             return ""
-        command, state = controller.step(tracked, pose, command, state)
+        command, state = controller.step(path, pose, command, state)
         way = _way(pose, command, 1 / control_hz, robot.radius)
         touching = footprint_clearance(world, robot.footprint, way) <= 0
         if touching.any():

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from antdrive.planners import load_planner
-from antdrive.robots import Footprint, RobotSpec, overlap_at
-from antdrive.sim import Outcome, Scenario, plan, run
+from antdrive.robots import LIMITERS, Footprint, PurePursuit, RobotSpec, overlap_at
+from antdrive.sim import Engine, Outcome, Scenario, plan, run
+from antdrive.sim.driving.drive import drive
 from antdrive.sim.driving.leaving import is_narrow
-from antdrive.worlds import Disc, Pose, Task, World
+from antdrive.worlds import Disc, Pose, Route, Task, World
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +53,7 @@ def test_room_for_a_turn_and_discs_are_not_narrow(cart: RobotSpec, turtlebot: Ro
 
 
 def test_the_rehearsal_and_physics_agree(cart: RobotSpec, monkeypatch: pytest.MonkeyPatch) -> None:
-    rng, refused, left = np.random.default_rng(5), 0, 0
+    rng, refused, left, step = np.random.default_rng(5), 0, 0, PurePursuit.step
     for _ in range(60):
         yaw, side, gap, along = rng.uniform((-0.7, -1, 0.01, -0.4), (0.7, 1, 0.25, 0.4))
         across = math.copysign(0.3 + gap + 0.3, side)
@@ -64,8 +65,29 @@ def test_the_rehearsal_and_physics_agree(cart: RobotSpec, monkeypatch: pytest.Mo
         planned = plan(s)
         with monkeypatch.context() as patch:
             patch.setattr("antdrive.sim.pipeline.cannot_leave", lambda *_: "")
+            patch.setattr(PurePursuit, "step", lambda self, path, *now: step(self, path.for_any_turn, *now))
             driven = run(s)
         said = "" if planned[1].solved else planned[1].reason
         assert ("would bring" in said) == (driven.outcome is Outcome.COLLIDED), (yaw, at, said, driven.outcome)
         refused, left = refused + bool(said), left + (not said)
     assert min(refused, left) > 9
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+@pytest.mark.parametrize("gap", [0.02, 0.05, 0.08])
+def test_a_rectangle_does_not_turn_into_a_post_on_its_way(jackal: RobotSpec, side: int, gap: float) -> None:
+    """The route turns back beside a post that the rectangle passes, and that its corners would meet in a turn."""
+    post = Disc(3.0, 3.0 - side * (jackal.footprint.half_width + gap + 0.1), 0.1)
+    goal = (1.3, 3.0 + 1.5 * side)
+    task = Task(World("corner", (0, 0, 6, 6), (post,)), (1.0, 3.0, 0.0), goal, cell=0.1)
+    controller = PurePursuit()
+    route = Route(np.array([(1.0, 3.0), (3.0, 3.0), goal]))
+    tracked = controller.prepare(route, task.world, jackal, 0.03, 1 / 60)
+    ends = {}
+    for name, path in (("checked", tracked), ("any turn", tracked.for_any_turn)):
+        with Engine(task.world, jackal) as engine:
+            ends[name] = drive(engine, controller, path, task, time_limit=20)
+    assert ends["any turn"].outcome is Outcome.COLLIDED
+    assert LIMITERS[ends["any turn"].limiter[-1]] == "rotate"
+    assert ends["checked"].outcome is Outcome.STUCK
+    assert ends["checked"].clearance.min() > 0.9 * gap
