@@ -313,6 +313,24 @@ def clear_turn(
 
 
 @kernel
+def speed_off_route(
+    route_speed: float, x: float, y: float, s: float, k: int, path: PathSamples, limits: MotionLimits,
+    tuning: PursuitTuning,
+) -> float:  # fmt: skip
+    """The route's speed limit for a robot at (x, y) whose nearest point of the route, at arc length s, is far away.
+
+    The limit holds on the route, and the robot can brake on its way there; without this, a robot that avoided something
+    beside a sharp corner, where the limit is 0, would creep all the way back. Within the shortest lookahead the robot
+    counts as on the route.
+    """
+    px, py, _ = point_at(s, k, path.xy, path.arc)
+    spare = math.hypot(px - x, py - y) - tuning.lookahead_min
+    if spare <= 0.0:
+        return route_speed
+    return math.sqrt(route_speed * route_speed + 2.0 * tuning.braking * limits.acceleration * spare)
+
+
+@kernel
 def rotation(new_v: float, v: float, w: float, bearing: float, limits: MotionLimits, tuning: PursuitTuning) -> float:
     """The yaw rate of a robot that is to rotate in place.
 
@@ -378,7 +396,7 @@ def pursue(
         target, limiter = 0.0, ROTATE
     else:
         curvature = curvature_to_drive(v, s, k, i, j, carrot, path, tuning)
-        route_speed = min(path.speed[i], path.speed[j])
+        route_speed = speed_off_route(min(path.speed[i], path.speed[j]), x, y, s, k, path, limits, tuning)
         target, limiter = speed_limit(
             w, curvature, route_speed, distance - tuning.robot_radius, remaining, carrot.clear, limits, tuning
         )

@@ -91,6 +91,30 @@ def test_corners_are_cut_only_where_there_is_room(jackal: RobotSpec) -> None:
     assert point_clearance(post, guarded[:, :2]).min() > jackal.radius + 0.35 * margin
 
 
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_robot_far_from_its_route_does_not_creep_back_to_a_corner(side: float, turtlebot: RobotSpec) -> None:
+    """The route stops at its corner; the robot beside it can drive back at speed and still brake before the corner."""
+    route = Route(np.array([(0.0, 0.0), (2.0, 0.0), (0.0, -0.8 * side)]))
+    controller = PurePursuit()
+    tracked = controller.prepare(route, OPEN, turtlebot, 0.05, DT)
+    pose, command, state = (2.05, 0.8 * side, -math.pi / 2 * side), Twist(0, 0), PursuitState(arc=1.95)
+    fastest = 0.0
+    for period in range(60 * 4):
+        command, state = controller.step(tracked, pose, command, state)
+        pose = (
+            pose[0] + command.speed * math.cos(pose[2]) * DT,
+            pose[1] + command.speed * math.sin(pose[2]) * DT,
+            pose[2] + command.yaw_rate * DT,
+        )
+        fastest = max(fastest, command.speed)
+        away = math.dist(pose[:2], route.xy[1])
+        assert command.speed**2 <= 2 * turtlebot.max_acceleration * away + 0.1**2, f"too fast at period {period}"
+        if away < 0.15:
+            break
+    assert away < 0.15
+    assert fastest > 0.3
+
+
 def bends(radius: float, bulge: float = 5e-4) -> Route:
     """A straight line, half a circle to the left, half to the right and a straight line, as in smoothed routes."""
     points, curvature = [(0.0, 0.0)], [0.0]
