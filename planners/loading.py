@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import contextvars
 import dataclasses
-import functools
 from collections.abc import Iterator
 from contextvars import ContextVar
 from typing import TYPE_CHECKING, Protocol
@@ -79,7 +78,6 @@ def _rehearse(planner: Rehearsed, query: Query) -> None:
     planner.plan(query, np.random.default_rng(0))
 
 
-@functools.cache
 def tiny_query(made_of: type[Query], motions: bool, task: bool, writeable: bool = False) -> Query:
     """A query on 12 x 12 cells around a cylinder, of the same types as those of worlds.
 

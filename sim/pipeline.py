@@ -123,14 +123,12 @@ class Run:
         return self.rollout
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values, for JSON."""
-        s = self.scenario
+        """Plain values, for JSON; `docs/rollout-format.md` lists the keys."""
+        log = self.rollout
+        options = settings_of(self.plan.options) if log is None else log.record.planner.settings
         return {
-            "world": s.task.world.name,
-            "planner": s.planner_label,
-            "robot": s.robot.name,
-            "seed": s.seed,
-            "margin_m": s.margin,
+            **self.scenario.as_dict(),
+            **({"options": dict(options)} if options else {}),
             "outcome": self.outcome.key,
             "sentence": self.outcome.value,
             "reason": self.reason,
