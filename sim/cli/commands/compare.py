@@ -95,18 +95,10 @@ def compare(
     """
     entrants = entrants_of(planner, settings)
     rest = {"margin": margin, "cell": cell, "smoothing": smoothing, "noise": noise}
-    scenarios = {
-        (world, entrant): make_scenario(world, entrant.name, list(entrant.settings), robot, seed=seed, **rest)
-        for world in worlds
-        for entrant in entrants
-    }
-    names = {world: scenarios[world, entrants[0]].task.world.name for world in worlds}
-    if len(set(names.values())) < len(worlds):
-        raise InputError(f"{' '.join(worlds)}: name worlds with different names, each once")
+    scenarios = _scenarios(worlds, entrants, robot, seed, rest)
     cases = [(world, number) for world in worlds for number in range(seed, seed + seeds)]
-    marks = {f"{entrant.label} {world}": scenario for (world, entrant), scenario in scenarios.items()}
-    mark = mark_of(marks, [(names[world], number) for world, number in cases])
-    folder = out or free_folder(Path("out") / file_name(f"compare-{'-'.join(names.values())}"[:100]), MARKER, mark)
+    folder, mark = _default_folder(scenarios, cases)
+    folder = out or folder
     if video is not None:
         check_film(video)
     check_folder(folder)
@@ -130,6 +122,31 @@ def compare(
         found = "only one planner" if logs else "no planner"
         print_error(f"{found} found a path: there is nothing to compare in a figure or film")
     return SUCCEEDED if all(run.facts["succeeded"] for run in runs) else FAILED
+
+
+def _scenarios(
+    worlds: Sequence[str], entrants: Sequence[Entrant], robot: str, seed: int, rest: dict[str, Any]
+) -> "dict[tuple[str, Entrant], Scenario]":
+    """The scenario of every world, as given, and planner, with the first seed."""
+    scenarios = {
+        (world, entrant): make_scenario(world, entrant.name, list(entrant.settings), robot, seed=seed, **rest)
+        for world in worlds
+        for entrant in entrants
+    }
+    if len({scenario.task.world.name for scenario in scenarios.values()}) < len(worlds):
+        raise InputError(f"{' '.join(worlds)}: name worlds with different names, each once")
+    return scenarios
+
+
+def _default_folder(
+    scenarios: "dict[tuple[str, Entrant], Scenario]", cases: Sequence[tuple[str, int]]
+) -> tuple[Path, str]:
+    """The folder of a comparison for which none is given, and the fingerprint of the comparison."""
+    names = {world: scenario.task.world.name for (world, _), scenario in scenarios.items()}
+    marks = {f"{entrant.label} {world}": scenario for (world, entrant), scenario in scenarios.items()}
+    mark = mark_of(marks, [(names[world], number) for world, number in cases])
+    name = file_name(f"compare-{'-'.join(names.values())}"[:100])
+    return free_folder(Path("out") / name, MARKER, mark), mark
 
 
 def _drive(
