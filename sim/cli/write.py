@@ -133,7 +133,8 @@ def write_run(run: Run, folder: Path, *, vector: bool = False, figures: bool = T
         from antdrive.sim.view.figures.plan_figures import plan_figure
 
         s = run.scenario
-        files["figure"] = str(plan_figure(s.task, run.grid, run.plan, s.robot, folder / "overview.png"))
+        plan_figure(s.task, run.grid, run.plan, s.robot, folder / "overview.png")
+        files["figure"] = str(folder / "overview.png")
     return files
 
 
@@ -145,10 +146,11 @@ def _write_figures(run: Run, folder: Path, log: str, endings: Sequence[str]) -> 
     s, files = run.scenario, {"rollout": log}
     for suffix in endings:
         end = "" if suffix == endings[0] else f" {suffix[1:]}"
-        files["figure" + end] = str(overview(run.rollout, folder / f"overview{suffix}"))
+        files["figure" + end] = str(folder / f"overview{suffix}")
+        overview(run.rollout, files["figure" + end])
         if run.certificate is not None:
-            path = certificate_figure(run.rollout, run.certificate, folder / f"certificate{suffix}")
-            files["certificate" + end] = str(path)
+            files["certificate" + end] = str(folder / f"certificate{suffix}")
+            certificate_figure(run.rollout, run.certificate, files["certificate" + end])
     made = plan_figures(s.task, run.grid, run.plan, s.robot, folder, name=s.planner_name, suffixes=endings)
     return files | {name: str(path) for name, path in made.items()}
 

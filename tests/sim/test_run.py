@@ -188,7 +188,8 @@ def test_ctrl_c_while_planning_keeps_the_best_path_and_does_not_drive(small_scen
     assert result.outcome is Outcome.STOPPED
     assert result.rollout is None
     assert len(result.plan.cells)
-    assert plan_figure(s.task, result.grid, result.plan, s.robot, tmp_path / "p.png").exists()
+    plan_figure(s.task, result.grid, result.plan, s.robot, tmp_path / "p.png")
+    assert (tmp_path / "p.png").exists()
 
 
 def test_time_runs_out(small_scenario: Scenario) -> None:
