@@ -13,6 +13,7 @@ from antdrive.sim.view.figures.canvas import checked, finished, map_size, new_fi
 from antdrive.sim.view.figures.map_chart import draw_legend, draw_map
 from antdrive.sim.view.scene import Scene, contact_point
 from antdrive.sim.view.style import BAD, CONTACT, MUTED, SHELL, START, VERDICTS, hexed
+from antdrive.worlds.types import Floats
 
 THEN, NOW = hexed(START), hexed(SHELL)
 
@@ -61,26 +62,35 @@ def then_and_now(
             handles += chart.plot(*at, "X", ms=9, color=hexed(BAD), mec="white", label="contact", zorder=9, ls="none")
         draw_legend(chart, handles, scene)
         above: Any = figure.add_subplot(areas[0, 1], label="clearance")
-        above.set(title="clearance [m]")
-        above.axhline(0, color=hexed(BAD), lw=1.0)
-        for log, colour in ((then, THEN), (now, NOW)):
-            above.plot(log.t, log.clearance, color=colour, lw=1.4)
-        above.tick_params(labelbottom=False)
         below: Any = figure.add_subplot(areas[1, 1], sharex=above, label="distance")
-        below.set(title="distance between the two [m]", xlabel="time [s]")
-        moments = np.linspace(0.0, max(float(then.t[-1]), float(now.t[-1])), 600)
-        apart = [
-            np.interp(moments, now.t, now.pose[:, k]) - np.interp(moments, then.t, then.pose[:, k]) for k in (0, 1)
-        ]
-        below.plot(moments, np.hypot(apart[0], apart[1]), color=hexed(MUTED), lw=1.4)
-        below.set_ylim(0, None)
-        for axes in (above, below):
-            if parted is not None:
-                axes.axvline(parted[0], color=hexed(CONTACT), lw=1.0, ls=":")
-            axes.set_xlim(0, moments[-1])
+        _draw_over_time(above, below, then, now, None if parted is None else parted[0])
         title = f"{scene.name}   ·   {now.record.planner.name}   ·   {scene.robot.name}: baseline and now"
         figure.suptitle(title, x=0.012, ha="left", fontsize=12, weight="bold")
         return finished(figure, target, dpi)
+
+
+def _draw_over_time(above: Any, below: Any, then: Rollout, now: Rollout, parted: float | None) -> None:
+    """Draw both clearances, and the distance between the two robots; `parted` is when the drives part [s]."""
+    above.set(title="clearance [m]")
+    above.axhline(0, color=hexed(BAD), lw=1.0)
+    for log, colour in ((then, THEN), (now, NOW)):
+        above.plot(log.t, log.clearance, color=colour, lw=1.4)
+    above.tick_params(labelbottom=False)
+    below.set(title="distance between the two [m]", xlabel="time [s]")
+    moments, apart = _apart(then, now)
+    below.plot(moments, apart, color=hexed(MUTED), lw=1.4)
+    below.set_ylim(0, None)
+    for axes in (above, below):
+        if parted is not None:
+            axes.axvline(parted, color=hexed(CONTACT), lw=1.0, ls=":")
+        axes.set_xlim(0, moments[-1])
+
+
+def _apart(then: Rollout, now: Rollout) -> tuple[Floats, Floats]:
+    """Moments (N,) [s], and how far the two robots are apart then (N,) [m]."""
+    moments = np.linspace(0.0, max(float(then.t[-1]), float(now.t[-1])), 600)
+    x, y = (np.interp(moments, now.t, now.pose[:, k]) - np.interp(moments, then.t, then.pose[:, k]) for k in (0, 1))
+    return moments, np.hypot(x, y)
 
 
 def _thinned(log: Rollout) -> Any:

@@ -59,7 +59,7 @@ COLUMNS = (
     Column("time [s]", "n"),
     Column("min clearance [m]", "n"),
     Column("proved [m]", "n"),
-    Column("planning [s]", "n"),
+    Column("planning [ms]", "n"),
 )
 
 FACTS = 5  # columns before those of settings that differ
@@ -69,6 +69,7 @@ COLUMN_NOTES = (
     ("path", "length of the planned path, before smoothing"),
     ("gap", "how much longer the smoothed route is than the shortest path among the inflated obstacles"),
     ("min clearance", "smallest distance to an obstacle at any logged pose"),
+    ("planning", "wall time of the plan, with the kernels loaded"),
     ("proved", "distance that the certificate guarantees between logged poses, too"),
 )
 
@@ -263,6 +264,7 @@ class ReportedRun:
     def cells(self) -> list[tuple[str, str]]:
         """The values of the numeric columns after the seed: each as a sort key and as shown."""
         metrics, gap = self.metrics, number(self.metrics.get("gap_to_euclidean_optimum"))
+        planning = number(metrics.get("plan_s"))
         values = (
             (number(metrics.get("path_length_m")), 2),
             (number(metrics.get("driven_length_m")), 2),
@@ -270,7 +272,7 @@ class ReportedRun:
             (number(metrics.get("duration_s")), 1),
             (number(metrics.get("min_clearance_m")), 3),
             (number(self.log.certificate.bound) if self.log else None, 3),
-            (number(metrics.get("plan_s")), 3),
+            (None if planning is None else 1000 * planning, 2),
         )
         return [("", "–") if v is None else (repr(v), f"{round(v, digits) + 0.0:.{digits}f}") for v, digits in values]
 
@@ -378,7 +380,7 @@ def _option_texts(runs: Sequence[ReportedRun]) -> list[str]:
         for key, value in options.items():
             seen.setdefault(run.planner, {}).setdefault(key, set()).add(value)
     return [
-        ", ".join(f"{key} {value}" for key, value in options.items() if len(seen[run.planner][key]) > 1)
+        ", ".join(f"{key} {value}" for key, value in sorted(options.items()) if len(seen[run.planner][key]) > 1)
         for run, options in zip(runs, found, strict=True)
     ]
 
