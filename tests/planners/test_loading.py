@@ -94,7 +94,7 @@ needs_kernels = pytest.mark.skipif(
 
 def printed(script: str, *words: str) -> dict[str, list[str]]:
     """What a script prints about each of its words."""
-    done = subprocess.run([sys.executable, "-c", script, *words], capture_output=True, text=True, timeout=300)
+    done = subprocess.run([sys.executable, "-c", script, *words], capture_output=True, text=True, timeout=1800)
     assert done.returncode == 0, done.stderr
     lines = [line.split(" - ") for line in done.stdout.splitlines()]
     assert len(lines) == len(words) - 1, done.stderr
