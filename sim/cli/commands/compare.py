@@ -105,8 +105,7 @@ def compare(
     compile_once()
     with claimed(folder):
         facts = {"fingerprint": mark, "command": this_command()}
-        write_marker(folder / MARKER, facts)
-        runs, logs = _drive(scenarios, cases, folder, robot, figures)
+        runs, logs = _drive(scenarios, cases, folder, robot, figures, facts)
         files = {run.label: run.facts["folder"] for run in runs} if len(cases) == 1 else {"folder": str(folder)}
         files |= _views(logs, folder, video, speed, figures)
         told = {"differences": differences(runs), "same": same_drives(runs, smoothing)}
@@ -155,6 +154,7 @@ def _drive(
     folder: Path,
     robot: str,
     figures: bool,
+    facts: dict[str, str],
 ) -> "tuple[list[Compared], dict[str, Rollout]]":
     """Drive every case with every planner, each into its folder; the runs, and the logs of the first case by label."""
     import dataclasses
@@ -172,6 +172,8 @@ def _drive(
             check_folder(part / entrant.label)
             with planning(f"{base.task.world.name}, seed {seed}: {entrant.label}"):
                 result = drive(scenario)
+            if not runs:  # an interrupted comparison leaves the results that it has, marked as its own
+                write_marker(folder / MARKER, facts)
             written = write_run(result, part / entrant.label, figures=figures and place == 0)
             write_result(result, written, repeating(scenario, entrant, world, robot))
             kept = Compared.of(entrant.label, result)

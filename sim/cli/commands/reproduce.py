@@ -42,10 +42,9 @@ def reproduce(
     check_folder(folder)
     compile_once()
     with claimed(folder), bar("planning") as progress:
-        facts = {"fingerprint": mark, "command": this_command()}
-        write_marker(folder / MARKER, facts)
         rows, files = repeat(papers, folder, seeds=seeds, suffixes=suffixes(vector), jobs=jobs, progress=progress)
-        write_marker(folder / MARKER, {**facts, "rows": [vars(row) for row in rows], "files": files})
+        facts = {"fingerprint": mark, "command": this_command()}
+        write_marker(folder / MARKER, facts | {"rows": [vars(row) for row in rows], "files": files})
     if json:
         print_json({"rows": [vars(row) for row in rows], "files": files})
     else:
