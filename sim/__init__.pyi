@@ -23,7 +23,11 @@ from .pipeline import Run as Run
 from .pipeline import plan as plan
 from .pipeline import run as run
 from .scenario import Scenario as Scenario
+from .view.figures.canvas import panels as panels
+from .view.figures.canvas import save_figure as save_figure
 from .view.figures.plan_figures import plan_figure as plan_figure
+from .view.figures.run_figures import certificate_figure as certificate_figure
+from .view.figures.run_figures import comparison_figure as comparison_figure
 from .view.figures.run_figures import overview as overview
 from .view.film.video import FilmInfo as FilmInfo
 from .view.film.video import film as film

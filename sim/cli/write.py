@@ -62,15 +62,38 @@ def default_folder(scenario: Scenario) -> Path:
     Where the folder of that name holds a run of another scenario, the fingerprint is part of the name.
     """
     parts = (scenario.task.world.name, scenario.planner_name, scenario.robot.name, str(scenario.seed))
-    folder, own = Path("out") / "-".join(map(file_name, parts)), fingerprint(scenario)
+    return free_folder(Path("out") / "-".join(map(file_name, parts)), "result.json", fingerprint(scenario))
+
+
+def free_folder(folder: Path, marker: str, own: str) -> Path:
+    """The folder itself, unless its marker shows results of something else; then one with the fingerprint in its name.
+
+    Args:
+        folder: where results go by default
+        marker: the file in it that holds the fingerprint of what its results are of
+        own: the fingerprint of what is to be written
+    """
     try:
-        found = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+        found = json.loads((folder / marker).read_text(encoding="utf-8"))
     except FileNotFoundError:
         return folder
     except (OSError, ValueError, RecursionError):
         found = None
     same = isinstance(found, dict) and found.get("fingerprint") == own
     return folder if same else folder.with_name(f"{folder.name}-{own}")
+
+
+def write_marker(path: Path, facts: Mapping[str, Any]) -> None:
+    """Write the file that says what a folder's results are of.
+
+    Args:
+        path: the file
+        facts: what it says, with the key `fingerprint`
+    """
+    from antdrive.worlds.files.atomic import written_whole
+
+    with written_whole(path) as temporary:
+        temporary.write_text(as_json(dict(facts)) + "\n", encoding="utf-8")
 
 
 def fingerprint(scenario: Scenario) -> str:
@@ -110,7 +133,8 @@ def write_run(run: Run, folder: Path, *, vector: bool = False, figures: bool = T
         from antdrive.sim.view.figures.plan_figures import plan_figure
 
         s = run.scenario
-        files["figure"] = str(plan_figure(s.task, run.grid, run.plan, s.robot, folder / "overview.png"))
+        plan_figure(s.task, run.grid, run.plan, s.robot, folder / "overview.png")
+        files["figure"] = str(folder / "overview.png")
     return files
 
 
@@ -122,21 +146,19 @@ def _write_figures(run: Run, folder: Path, log: str, endings: Sequence[str]) -> 
     s, files = run.scenario, {"rollout": log}
     for suffix in endings:
         end = "" if suffix == endings[0] else f" {suffix[1:]}"
-        files["figure" + end] = str(overview(run.rollout, folder / f"overview{suffix}"))
+        files["figure" + end] = str(folder / f"overview{suffix}")
+        overview(run.rollout, files["figure" + end])
         if run.certificate is not None:
-            path = certificate_figure(run.rollout, run.certificate, folder / f"certificate{suffix}")
-            files["certificate" + end] = str(path)
+            files["certificate" + end] = str(folder / f"certificate{suffix}")
+            certificate_figure(run.rollout, run.certificate, files["certificate" + end])
     made = plan_figures(s.task, run.grid, run.plan, s.robot, folder, name=s.planner_name, suffixes=endings)
     return files | {name: str(path) for name, path in made.items()}
 
 
 def write_result(run: Run, files: Mapping[str, str], command: str) -> dict[str, Any]:
     """Write a run's `result.json`, at `files["result"]`; what was written."""
-    from antdrive.worlds.files.atomic import written_whole
-
     result = {**run.as_dict(), "fingerprint": fingerprint(run.scenario), "files": dict(files), "command": command}
-    with written_whole(files["result"]) as temporary:
-        temporary.write_text(as_json(result) + "\n", encoding="utf-8")
+    write_marker(Path(files["result"]), result)
     return result
 
 

@@ -231,7 +231,8 @@ def _figures(
     for suffix in suffixes:
         end = "" if suffix == suffixes[0] else f" {suffix[1:]}"
         if histories:
-            path = history_figure(histories, folder / f"{paper}-history{suffix}", unit="cells")
+            path = folder / f"{paper}-history{suffix}"
+            history_figure(histories, path, unit="cells")
             files[f"{paper} history{end}"] = str(path)
         if paper == "han2007":
             drawn = _han_figures(found, folder, seeds, suffix)
@@ -247,15 +248,16 @@ def _han_figures(
 
     with_ants = [(experiment, results) for experiment, results in found if experiment.planner == "aco-han"]
     lengths = {int(e.options["ants"]): [r.cost for r in results if r.solved] for e, results in with_ants}
-    ants = ants_figure(
+    ants, sweep = folder / f"han2007-ants{suffix}", folder / f"han2007-sweep{suffix}"
+    ants_figure(
         lengths,
-        folder / f"han2007-ants{suffix}",
+        ants,
         planner="aco-han",
         printed={int(experiment.options["ants"]): experiment.printed for experiment, _ in with_ants},
         unit="cells",
         optimum=maps.optimum(maps.han_ants()),
     )
-    sweep = sweep_figure(PC, PM, _sweep(seeds), folder / f"han2007-sweep{suffix}")
+    sweep_figure(PC, PM, _sweep(seeds), sweep)
     return {"han2007 ants": ants, "han2007 sweep": sweep}
 
 

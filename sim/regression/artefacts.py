@@ -116,10 +116,12 @@ def write_artefacts(
     rollout, files = run.rollout, {}
     if rollout is None:
         s = run.scenario
-        files["overview"] = str(plan_figure(s.task, run.grid, run.plan, s.robot, folder / "overview.png"))
+        files["overview"] = str(folder / "overview.png")
+        plan_figure(s.task, run.grid, run.plan, s.robot, files["overview"])
     else:
         files["rollout"] = str(rollout.save(folder / "rollout.npz"))
-        files["overview"] = str(overview(rollout, folder / "overview.png"))
+        files["overview"] = str(folder / "overview.png")
+        overview(rollout, files["overview"])
         files |= _comparison(rollout, baseline, folder, film)
     _write(folder / "commands.txt", "".join(f"{command}\n" for command in commands))
     result = {**run.as_dict(), "files": files, "command": commands[0] if commands else "", "faults": list(faults)}
@@ -154,7 +156,8 @@ def _comparison(rollout: Rollout, baseline: Baseline | None, folder: Path, film:
 
     then, found = drive_of(baseline, rollout), parting(baseline, rollout)
     place = None if found is None else (found.t, *found.then)
-    files = {"then and now": str(then_and_now(then, rollout, folder / "then-and-now.png", parted=place))}
+    files = {"then and now": str(folder / "then-and-now.png")}
+    then_and_now(then, rollout, files["then and now"], parted=place)
     if film:
         from antdrive.sim.view.film.compare import Mark, compare_film
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
@@ -64,12 +65,14 @@ def map_size(scene: Scene) -> tuple[float, float]:
     return float(np.clip(high / shape, 3.2, 7.0)), high
 
 
-def checked(path: str | Path) -> Path:
-    """The path of a figure, checked before any work.
+def checked(path: str | Path | None) -> Path | None:
+    """The path of a figure, checked before any work; None stays None.
 
     Raises:
         InputError: a suffix that is none of .png, .pdf, .svg.
     """
+    if path is None:
+        return None
     target = Path(path)
     if target.suffix.lower() not in SUFFIXES:
         raise InputError(f"{target}: unknown suffix {target.suffix!r}; choose one of {', '.join(SUFFIXES)}")
@@ -94,3 +97,53 @@ def write_figure(figure: Figure, target: Path, dpi: float) -> Path:
     with written_whole(target) as temporary:
         figure.savefig(temporary, format=kind, dpi=dpi, metadata=empty)
     return target
+
+
+def finished(figure: Figure, target: Path | None, dpi: float) -> Figure:
+    """A figure as functions return it, written if there is a target.
+
+    Args:
+        figure: the figure
+        target: the file to write; None: none
+        dpi: pixels per inch
+    """
+    figure.set_dpi(dpi)
+    if target is not None:
+        write_figure(figure, target, dpi)
+    return figure
+
+
+def save_figure(figure: Figure, path: str | Path, *, dpi: float | None = None) -> Path:
+    """Write a figure after it was labelled or changed: the same file, byte for byte, for the same figure.
+
+    Args:
+        figure: what a figure function returned
+        path: the file to write; its suffix chooses PNG, PDF or SVG
+        dpi: pixels per inch; None: what the figure was drawn for
+
+    Returns:
+        The file's path.
+
+    Raises:
+        InputError: a suffix that is none of .png, .pdf, .svg.
+    """
+    target = checked(path)
+    assert target is not None
+    with styled():
+        return write_figure(figure, target, figure.dpi if dpi is None else dpi)
+
+
+def panels(figure: Figure) -> dict[str, Axes]:
+    """The axes of a figure by name, such as `map` and `clearance`; colour bars have none and are left out.
+
+    Args:
+        figure: what a figure function returned
+    """
+    return {str(axes.get_label()): axes for axes in figure.axes if axes.get_label() in PANELS}
+
+
+#: The names that the axes of figures have.
+PANELS = (
+    *("map", "clearance", "speed", "limiters", "distance", "readings"),
+    *("history", "field", "lengths", "with elitism", "without elitism"),
+)

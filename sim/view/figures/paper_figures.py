@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
+from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from antdrive.sim.view.figures.canvas import checked, new_figure, styled, write_figure
+from antdrive.sim.view.figures.canvas import checked, finished, new_figure, styled
 from antdrive.sim.view.style import INK, MUTED, hexed, planner_style
 
 if TYPE_CHECKING:
@@ -22,24 +23,24 @@ Floats = npt.NDArray[np.float64]
 
 def history_figure(
     histories: Mapping[str, Sequence[History]],
-    path: str | Path,
+    path: str | Path | None = None,
     *,
     optimum: float | None = None,
     unit: str = "m",
     dpi: float = 160,
-) -> Path:
+) -> Figure:
     """Draw the best path length so far by iteration for one or more planners.
 
     Args:
         histories: by planner, the history of each seed; of several seeds the median is drawn, and the range as
             a band
-        path: the file to write; its suffix chooses PNG, PDF or SVG
+        path: the file to write; its suffix chooses PNG, PDF or SVG; None: no file
         optimum: the shortest length on the same moves, drawn as a line
         unit: of the lengths
         dpi: pixels per inch
 
     Returns:
-        The file's path.
+        The figure, which may be labelled and saved; `panels` gives its axes by name.
 
     Raises:
         InputError: a suffix that is none of .png, .pdf, .svg.
@@ -47,7 +48,7 @@ def history_figure(
     target = checked(path)
     with styled():
         figure = new_figure(6.4, 4.0)
-        axes: Any = figure.add_subplot()
+        axes: Any = figure.add_subplot(label="history")
         for name, runs in histories.items():
             colour, dash = planner_style(name)
             longest = max(len(run) for run in runs)
@@ -79,24 +80,24 @@ def history_figure(
         axes.set(xlabel="iteration", ylabel=f"best path so far [{unit}]")
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.legend(loc="upper right")
-        return write_figure(figure, target, dpi)
+        return finished(figure, target, dpi)
 
 
 def ants_figure(
     lengths: Mapping[int, Sequence[float]],
-    path: str | Path,
+    path: str | Path | None = None,
     *,
     planner: str,
     optimum: float,
     printed: Mapping[int, float] | None = None,
     unit: str = "m",
     dpi: float = 160,
-) -> Path:
+) -> Figure:
     """Draw path length by number of ants: every seed, the mean, and the values that a paper prints.
 
     Args:
         lengths: by number of ants, the path length of each seed
-        path: the file to write; its suffix chooses PNG, PDF or SVG
+        path: the file to write; its suffix chooses PNG, PDF or SVG; None: no file
         planner: its name
         optimum: the shortest length on the same moves
         printed: by number of ants, the paper's value
@@ -104,7 +105,7 @@ def ants_figure(
         dpi: pixels per inch
 
     Returns:
-        The file's path.
+        The figure, which may be labelled and saved; `panels` gives its axes by name.
 
     Raises:
         InputError: a suffix that is none of .png, .pdf, .svg.
@@ -113,7 +114,7 @@ def ants_figure(
     colour = hexed(planner_style(planner)[0])
     with styled():
         figure = new_figure(5.6, 4.0)
-        axes: Any = figure.add_subplot()
+        axes: Any = figure.add_subplot(label="lengths")
         counts = sorted(lengths)
         for count in counts:
             axes.plot([count] * len(lengths[count]), lengths[count], "o", ms=4, color=colour, alpha=0.35, mew=0)
@@ -129,17 +130,17 @@ def ants_figure(
         axes.set_xticks(counts, [str(count) for count in counts])
         axes.minorticks_off()
         axes.legend(loc="upper right")
-        return write_figure(figure, target, dpi)
+        return finished(figure, target, dpi)
 
 
 def sweep_figure(
     pc: Sequence[float],
     pm: Sequence[float],
     lengths: Mapping[bool, Floats],
-    path: str | Path,
+    path: str | Path | None = None,
     *,
     dpi: float = 160,
-) -> Path:
+) -> Figure:
     """Draw the mean path length by crossover and mutation probability, with and without elitism side by side.
 
     Args:
@@ -147,11 +148,11 @@ def sweep_figure(
         pm: mutation probabilities (M,)
         lengths: with elitism (True) and without (False), the mean lengths (P, M); nan where no seed found a
             path
-        path: the file to write; its suffix chooses PNG, PDF or SVG
+        path: the file to write; its suffix chooses PNG, PDF or SVG; None: no file
         dpi: pixels per inch
 
     Returns:
-        The file's path.
+        The figure, which may be labelled and saved; `panels` gives its axes by name.
 
     Raises:
         InputError: a suffix that is none of .png, .pdf, .svg.
@@ -162,14 +163,14 @@ def sweep_figure(
     with styled():
         figure = new_figure(9.4, 3.9)
         for k, elitism in enumerate((True, False)):
-            axes: Any = figure.add_subplot(1, 2, k + 1)
+            title = "with elitism" if elitism else "without elitism"
+            axes: Any = figure.add_subplot(1, 2, k + 1, label=title)
             values = np.asarray(lengths[elitism])
             drawn = axes.imshow(
                 values, origin="lower", cmap="cividis_r", vmin=finite.min(), vmax=finite.max(), aspect="auto"
             )
             axes.set_xticks(range(len(pm)), [f"{p:g}" for p in pm])
             axes.set_yticks(range(len(pc)), [f"{p:g}" for p in pc])
-            title = "with elitism" if elitism else "without elitism"
             axes.set(xlabel="mutation probability Pm", ylabel="crossover probability Pc", title=title)
             axes.grid(False)
             for (i, j), value in np.ndenumerate(values):
@@ -186,4 +187,4 @@ def sweep_figure(
         bar = figure.colorbar(drawn, ax=figure.axes, shrink=0.85, aspect=26)
         bar.set_label("mean path length [cells]")
         bar.outline.set_visible(False)
-        return write_figure(figure, target, dpi)
+        return finished(figure, target, dpi)

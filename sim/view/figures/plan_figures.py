@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
+from matplotlib.figure import Figure
 
-from antdrive.sim.view.figures.canvas import checked, map_size, new_figure, styled, write_figure
+from antdrive.sim.view.figures.canvas import checked, finished, map_size, new_figure, styled
 from antdrive.sim.view.figures.curves import draw_history
 from antdrive.sim.view.figures.map_chart import FIELD, draw_field, draw_legend, draw_map
 from antdrive.sim.view.figures.paper_figures import history_figure
@@ -26,13 +27,15 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
+#: The stems of the files that `plan_figures` writes, by the name of the figure.
+FILES = {"plan": "plan", "tour": "tour", "history": "history", "bars": "field-bars", "contours": "field-contours"}
 #: Bars per side. In a larger field each bar stands for several cells and is as high as the highest of them.
 MAX_BARS = 40
 
 
 def plan_figure(
-    task: Task, grid: Grid, plan: PlanResult, robot: RobotSpec, path: str | Path, *, dpi: float = 160
-) -> Path:
+    task: Task, grid: Grid, plan: PlanResult, robot: RobotSpec, path: str | Path | None = None, *, dpi: float = 160
+) -> Figure:
     """Draw a plan on the map, over the planner's field; an iterative planner gets path lengths by iteration, too.
 
     Args:
@@ -40,11 +43,11 @@ def plan_figure(
         grid: the grid that was planned on
         plan: the planner's result, with a path or the reason why there is none
         robot: the robot to draw at the start
-        path: the file to write; its suffix chooses PNG, PDF or SVG
+        path: the file to write; its suffix chooses PNG, PDF or SVG; None: no file
         dpi: pixels per inch
 
     Returns:
-        The file's path.
+        The figure, which may be labelled and saved; `panels` gives its axes by name.
 
     Raises:
         InputError: a suffix that is none of .png, .pdf, .svg.
@@ -57,7 +60,7 @@ def plan_figure(
         wide += 0.9 if plan.field is not None else 0.0
         figure = new_figure(wide + (4.6 if iterations else 0.6), high + 0.9)
         areas = figure.add_gridspec(1, 2 if iterations else 1, width_ratios=[wide, 4.2] if iterations else [1])
-        chart = figure.add_subplot(areas[0, 0])
+        chart = figure.add_subplot(areas[0, 0], label="map")
         if plan.field is not None:
             draw_field(figure, chart, grid, plan.field)
         draw_map(chart, scene, floor=plan.field is None)
@@ -70,12 +73,12 @@ def plan_figure(
             _draw_reason(chart, plan.reason or plan.status.value)
         draw_legend(chart, handles, scene)
         if iterations:
-            draw_history(figure.add_subplot(areas[0, 1]), plan.history)
+            draw_history(figure.add_subplot(areas[0, 1], label="history"), plan.history)
         length = f"{plan.cost:.2f} m" if len(plan.cells) else plan.status.value
         length += ", stopped early" if len(plan.cells) and not plan.solved else ""
         title = f"{scene.name}   ·   {length}   ·   {plan.work:,} {plan.work_unit}"
         figure.suptitle(title, x=0.012, ha="left", fontsize=12, weight="bold")
-        return write_figure(figure, target, dpi)
+        return finished(figure, target, dpi)
 
 
 def _draw_reason(axes: Any, reason: str) -> None:
@@ -116,20 +119,25 @@ def plan_figures(
         The files' paths by the name of the figure; formats after the first are named like `plan pdf`.
     """
     found: dict[str, Path] = {}
+    bare = dataclasses.replace(plan, field=None, history=type(plan.history)())
     for suffix in suffixes:
         end = "" if suffix == suffixes[0] else f" {suffix[1:]}"
-        bare = dataclasses.replace(plan, field=None, history=type(plan.history)())
-        found["plan" + end] = plan_figure(task, grid, plan, robot, folder / f"plan{suffix}")
+        files = {key: folder / f"{stem}{suffix}" for key, stem in FILES.items()}
+        plan_figure(task, grid, plan, robot, files["plan"])
+        drawn = ["plan"]
         if len(plan.history):
-            found["tour" + end] = plan_figure(task, grid, bare, robot, folder / f"tour{suffix}")
-            found["history" + end] = history_figure({name: [plan.history]}, folder / f"history{suffix}")
+            plan_figure(task, grid, bare, robot, files["tour"])
+            history_figure({name: [plan.history]}, files["history"])
+            drawn += ["tour", "history"]
         if plan.field is not None:
-            found["bars" + end] = bars_figure(grid, plan.field, folder / f"field-bars{suffix}")
-            found["contours" + end] = contours_figure(task, grid, plan, robot, folder / f"field-contours{suffix}")
+            bars_figure(grid, plan.field, files["bars"])
+            contours_figure(task, grid, plan, robot, files["contours"])
+            drawn += ["bars", "contours"]
+        found |= {key + end: files[key] for key in drawn}
     return found
 
 
-def bars_figure(grid: Grid, field: Floats, path: str | Path, *, dpi: float = 160) -> Path:
+def bars_figure(grid: Grid, field: Floats, path: str | Path | None = None, *, dpi: float = 160) -> Figure:
     """Draw a planner's field (R, C) as three-dimensional bars on the free cells."""
     target = checked(path)
     step = max(1, math.ceil(max(grid.shape) / MAX_BARS))
@@ -145,7 +153,7 @@ def bars_figure(grid: Grid, field: Floats, path: str | Path, *, dpi: float = 160
     side = step * grid.cell
     with styled():
         figure = new_figure(7.2, 5.6)
-        axes: Any = figure.add_subplot(projection="3d")
+        axes: Any = figure.add_subplot(projection="3d", label="field")
         x, y = grid.origin[0] + c * side - grid.cell / 2, grid.origin[1] + r * side - grid.cell / 2
         wide, tall = 0.92 * side, np.maximum(heights - base, 1e-12)
         axes.bar3d(x, y, base, wide, wide, tall, color=FIELD(0.25 + 0.75 * share), shade=True, lw=0)
@@ -154,12 +162,12 @@ def bars_figure(grid: Grid, field: Floats, path: str | Path, *, dpi: float = 160
         axes.set_box_aspect((cols, rows, 0.55 * max(rows, cols)))
         for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
             axis.set_pane_color((1, 1, 1, 0))
-        return write_figure(figure, target, dpi)
+        return finished(figure, target, dpi)
 
 
 def contours_figure(
-    task: Task, grid: Grid, plan: PlanResult, robot: RobotSpec, path: str | Path, *, dpi: float = 160
-) -> Path:
+    task: Task, grid: Grid, plan: PlanResult, robot: RobotSpec, path: str | Path | None = None, *, dpi: float = 160
+) -> Figure:
     """Draw a planner's field as contours on the map, with the planned path."""
     target = checked(path)
     scene = Scene.planned(task, robot, grid.inflate)
@@ -170,7 +178,7 @@ def contours_figure(
     finite = values[np.isfinite(values)]
     with styled():
         figure = new_figure(6.6, 5.9)
-        axes: Any = figure.add_subplot()
+        axes: Any = figure.add_subplot(label="map")
         if len(finite) and finite.max() > finite.min():
             levels = np.unique(np.quantile(finite, np.linspace(0.6, 0.998, 9)))
             if len(levels) > 1:
@@ -185,4 +193,4 @@ def contours_figure(
         if len(line):
             handles = axes.plot(*line.T, "-", lw=1.9, color=hexed(SHELL), label="planned path", zorder=6)
         draw_legend(axes, handles, scene)
-        return write_figure(figure, target, dpi)
+        return finished(figure, target, dpi)

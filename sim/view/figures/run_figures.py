@@ -10,11 +10,12 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.figure import Figure
 
 from antdrive.sim.log.certificate import Certificate, in_metres
 from antdrive.sim.log.metrics import tracking_error
 from antdrive.sim.log.rollout import Rollout
-from antdrive.sim.view.figures.canvas import checked, map_size, new_figure, styled, write_figure
+from antdrive.sim.view.figures.canvas import checked, finished, map_size, new_figure, styled
 from antdrive.sim.view.figures.curves import draw_clearance, draw_limiters, draw_speed
 from antdrive.sim.view.figures.map_chart import draw_driven, draw_legend, draw_map
 from antdrive.sim.view.scene import Scene
@@ -25,17 +26,19 @@ Floats = npt.NDArray[np.float64]
 ERROR = LinearSegmentedColormap.from_list("error", ["#ffd9a0", "#ff7a0e", "#7a1f00"])
 
 
-def overview(rollout: Rollout, path: str | Path, *, cells: Floats | None = None, dpi: float = 160) -> Path:
+def overview(
+    rollout: Rollout, path: str | Path | None = None, *, cells: Floats | None = None, dpi: float = 160
+) -> Figure:
     """Draw a run at a glance: the map to scale, and clearance, speed and the rule that limited it over time.
 
     Args:
         rollout: the run's log
-        path: the file to write; its suffix chooses PNG, PDF or SVG
+        path: the file to write; its suffix chooses PNG, PDF or SVG; None: no file
         cells: the centres of the planned cells (N, 2) [m], to be drawn as dots
         dpi: pixels per inch
 
     Returns:
-        The file's path.
+        The figure, which may be labelled and saved; `panels` gives its axes by name.
 
     Raises:
         InputError: a suffix that is none of .png, .pdf, .svg.
@@ -46,32 +49,34 @@ def overview(rollout: Rollout, path: str | Path, *, cells: Floats | None = None,
         wide, high = map_size(scene)
         figure = new_figure(wide + 5.6, high + 0.9)
         grid = figure.add_gridspec(3, 2, width_ratios=[wide, 5.2], height_ratios=[1.0, 1.0, 0.11])
-        chart = figure.add_subplot(grid[:, 0])
+        chart = figure.add_subplot(grid[:, 0], label="map")
         draw_map(chart, scene)
         draw_driven(figure, chart, scene, rollout, cells)
-        clearance = figure.add_subplot(grid[0, 1])
+        clearance = figure.add_subplot(grid[0, 1], label="clearance")
         draw_clearance(clearance, scene, rollout)
-        draw_speed(figure.add_subplot(grid[1, 1], sharex=clearance), scene, rollout)
-        draw_limiters(figure.add_subplot(grid[2, 1], sharex=clearance), rollout)
+        draw_speed(figure.add_subplot(grid[1, 1], sharex=clearance, label="speed"), scene, rollout)
+        draw_limiters(figure.add_subplot(grid[2, 1], sharex=clearance, label="limiters"), rollout)
         name, colour = VERDICTS[rollout.outcome]
         planner = rollout.record.planner.name
         title = f"{scene.name}   ·   {planner}   ·   {scene.robot.name}"
         figure.suptitle(title, x=0.012, ha="left", fontsize=12, weight="bold")
         figure.text(0.988, 0.993, name, ha="right", va="top", fontsize=11, weight="bold", color=hexed(colour))
-        return write_figure(figure, target, dpi)
+        return finished(figure, target, dpi)
 
 
-def certificate_figure(rollout: Rollout, certificate: Certificate, path: str | Path, *, dpi: float = 160) -> Path:
+def certificate_figure(
+    rollout: Rollout, certificate: Certificate, path: str | Path | None = None, *, dpi: float = 160
+) -> Figure:
     """Draw the driven path over the route, their distance over time, and the readings of the certificate.
 
     Args:
         rollout: the run's log
         certificate: as `certify` gives it
-        path: the file to write; its suffix chooses PNG, PDF or SVG
+        path: the file to write; its suffix chooses PNG, PDF or SVG; None: no file
         dpi: pixels per inch
 
     Returns:
-        The file's path.
+        The figure, which may be labelled and saved; `panels` gives its axes by name.
 
     Raises:
         InputError: a suffix that is none of .png, .pdf, .svg.
@@ -83,7 +88,7 @@ def certificate_figure(rollout: Rollout, certificate: Certificate, path: str | P
     with styled():
         figure = new_figure(10.6, 5.6)
         areas = figure.add_gridspec(2, 2, width_ratios=[1.0, 0.85], height_ratios=[1.0, 0.9])
-        chart: Any = figure.add_subplot(areas[:, 0])
+        chart: Any = figure.add_subplot(areas[:, 0], label="map")
         draw_map(chart, scene)
         points = rollout.pose[keep, :2]
         lines = LineCollection(list(np.stack([points[:-1], points[1:]], axis=1)), cmap=ERROR, lw=3.0, zorder=5)
@@ -94,11 +99,11 @@ def certificate_figure(rollout: Rollout, certificate: Certificate, path: str | P
         bar.set_label("driven path: distance from the route [mm]")
         bar.outline.set_visible(False)
         draw_legend(chart, handles, scene)
-        curve: Any = figure.add_subplot(areas[0, 1])
+        curve: Any = figure.add_subplot(areas[0, 1], label="distance")
         curve.plot(rollout.t[keep], 1000 * error[keep], color=hexed(SHELL), lw=1.4)
         curve.set(title="distance from the route [mm]", xlabel="time [s]", ylim=(0, None))
-        _draw_readings(figure.add_subplot(areas[1, 1]), certificate, rollout)
-        return write_figure(figure, target, dpi)
+        _draw_readings(figure.add_subplot(areas[1, 1], label="readings"), certificate, rollout)
+        return finished(figure, target, dpi)
 
 
 def _draw_readings(axes: Any, certificate: Certificate, rollout: Rollout) -> None:
@@ -122,16 +127,16 @@ def _draw_readings(axes: Any, certificate: Certificate, rollout: Rollout) -> Non
         axes.text(x=0.05, s=words, wrap=True, **place)
 
 
-def comparison_figure(rollouts: Mapping[str, Rollout], path: str | Path, *, dpi: float = 160) -> Path:
+def comparison_figure(rollouts: Mapping[str, Rollout], path: str | Path | None = None, *, dpi: float = 160) -> Figure:
     """Draw the driven paths of several planners on one map, each in its planner's colour.
 
     Args:
         rollouts: the logs of the runs, by planner
-        path: the file to write; its suffix chooses PNG, PDF or SVG
+        path: the file to write; its suffix chooses PNG, PDF or SVG; None: no file
         dpi: pixels per inch
 
     Returns:
-        The file's path.
+        The figure, which may be labelled and saved; `panels` gives its axes by name.
 
     Raises:
         InputError: a suffix that is none of .png, .pdf, .svg.
@@ -141,7 +146,7 @@ def comparison_figure(rollouts: Mapping[str, Rollout], path: str | Path, *, dpi:
     with styled():
         xmin, ymin, xmax, ymax = scene.bounds
         figure = new_figure(6.6, float(np.clip(5.6 * (ymax - ymin) / (xmax - xmin), 2.0, 9.0)) + 1.0)
-        axes: Any = figure.add_subplot()
+        axes: Any = figure.add_subplot(label="map")
         draw_map(axes, scene)
         handles: list[Any] = []
         for over, (name, rollout) in zip(reversed(range(len(rollouts))), rollouts.items(), strict=True):
@@ -152,4 +157,4 @@ def comparison_figure(rollouts: Mapping[str, Rollout], path: str | Path, *, dpi:
                 *rollout.pose[::8, :2].T, color=hexed(colour), ls=dash, lw=width, label=label, zorder=6
             )
         draw_legend(axes, handles, scene)
-        return write_figure(figure, target, dpi)
+        return finished(figure, target, dpi)

@@ -6,30 +6,37 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from antdrive.sim.log.rollout import Rollout
-from antdrive.sim.view.figures.canvas import checked, map_size, new_figure, styled, write_figure
+from antdrive.sim.view.figures.canvas import checked, finished, map_size, new_figure, styled
 from antdrive.sim.view.figures.map_chart import draw_legend, draw_map
 from antdrive.sim.view.scene import Scene, contact_point
 from antdrive.sim.view.style import BAD, CONTACT, MUTED, SHELL, START, VERDICTS, hexed
+from antdrive.worlds.types import Floats
 
 THEN, NOW = hexed(START), hexed(SHELL)
 
 
 def then_and_now(
-    then: Rollout, now: Rollout, path: str | Path, *, parted: tuple[float, float, float] | None = None, dpi: float = 130
-) -> Path:
+    then: Rollout,
+    now: Rollout,
+    path: str | Path | None = None,
+    *,
+    parted: tuple[float, float, float] | None = None,
+    dpi: float = 130,
+) -> Figure:
     """Draw two drives of the same scenario on one map, with their clearances and their distance over time.
 
     Args:
         then: the earlier drive
         now: the present drive
-        path: the file to write; its suffix chooses PNG, PDF or SVG
+        path: the file to write; its suffix chooses PNG, PDF or SVG; None: no file
         parted: when [s] and where x, y [m] the drives part; None if they do not
         dpi: pixels per inch
 
     Returns:
-        The file's path.
+        The figure, which may be labelled and saved; `panels` gives its axes by name.
 
     Raises:
         InputError: a suffix that is none of .png, .pdf, .svg.
@@ -39,7 +46,7 @@ def then_and_now(
         wide, high = map_size(scene)
         figure = new_figure(wide + 5.2, high + 0.9)
         areas = figure.add_gridspec(2, 2, width_ratios=[wide, 4.8])
-        chart: Any = figure.add_subplot(areas[:, 0])
+        chart: Any = figure.add_subplot(areas[:, 0], label="map")
         draw_map(chart, scene)
         handles: list[Any] = []
         for log, colour, name, width in ((then, THEN, "baseline", 3.6), (now, NOW, "now", 1.8)):
@@ -54,27 +61,36 @@ def then_and_now(
             at = contact_point(scene, now.pose[row], int(now.contacts[0, 1]), now.movers[row])
             handles += chart.plot(*at, "X", ms=9, color=hexed(BAD), mec="white", label="contact", zorder=9, ls="none")
         draw_legend(chart, handles, scene)
-        above: Any = figure.add_subplot(areas[0, 1])
-        above.set(title="clearance [m]")
-        above.axhline(0, color=hexed(BAD), lw=1.0)
-        for log, colour in ((then, THEN), (now, NOW)):
-            above.plot(log.t, log.clearance, color=colour, lw=1.4)
-        above.tick_params(labelbottom=False)
-        below: Any = figure.add_subplot(areas[1, 1], sharex=above)
-        below.set(title="distance between the two [m]", xlabel="time [s]")
-        moments = np.linspace(0.0, max(float(then.t[-1]), float(now.t[-1])), 600)
-        apart = [
-            np.interp(moments, now.t, now.pose[:, k]) - np.interp(moments, then.t, then.pose[:, k]) for k in (0, 1)
-        ]
-        below.plot(moments, np.hypot(apart[0], apart[1]), color=hexed(MUTED), lw=1.4)
-        below.set_ylim(0, None)
-        for axes in (above, below):
-            if parted is not None:
-                axes.axvline(parted[0], color=hexed(CONTACT), lw=1.0, ls=":")
-            axes.set_xlim(0, moments[-1])
+        above: Any = figure.add_subplot(areas[0, 1], label="clearance")
+        below: Any = figure.add_subplot(areas[1, 1], sharex=above, label="distance")
+        _draw_over_time(above, below, then, now, None if parted is None else parted[0])
         title = f"{scene.name}   ·   {now.record.planner.name}   ·   {scene.robot.name}: baseline and now"
         figure.suptitle(title, x=0.012, ha="left", fontsize=12, weight="bold")
-        return write_figure(figure, target, dpi)
+        return finished(figure, target, dpi)
+
+
+def _draw_over_time(above: Any, below: Any, then: Rollout, now: Rollout, parted: float | None) -> None:
+    """Draw both clearances, and the distance between the two robots; `parted` is when the drives part [s]."""
+    above.set(title="clearance [m]")
+    above.axhline(0, color=hexed(BAD), lw=1.0)
+    for log, colour in ((then, THEN), (now, NOW)):
+        above.plot(log.t, log.clearance, color=colour, lw=1.4)
+    above.tick_params(labelbottom=False)
+    below.set(title="distance between the two [m]", xlabel="time [s]")
+    moments, apart = _apart(then, now)
+    below.plot(moments, apart, color=hexed(MUTED), lw=1.4)
+    below.set_ylim(0, None)
+    for axes in (above, below):
+        if parted is not None:
+            axes.axvline(parted, color=hexed(CONTACT), lw=1.0, ls=":")
+        axes.set_xlim(0, moments[-1])
+
+
+def _apart(then: Rollout, now: Rollout) -> tuple[Floats, Floats]:
+    """Moments (N,) [s], and how far the two robots are apart then (N,) [m]."""
+    moments = np.linspace(0.0, max(float(then.t[-1]), float(now.t[-1])), 600)
+    x, y = (np.interp(moments, now.t, now.pose[:, k]) - np.interp(moments, then.t, then.pose[:, k]) for k in (0, 1))
+    return moments, np.hypot(x, y)
 
 
 def _thinned(log: Rollout) -> Any:

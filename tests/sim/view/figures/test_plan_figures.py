@@ -1,5 +1,6 @@
 import dataclasses
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -28,9 +29,12 @@ def searched(planned):
     return load_planner("astar").plan(Query.between(grid, task), np.random.default_rng(0))
 
 
-def pixels(path):
-    with Image.open(path) as picture:
-        return np.asarray(picture.convert("RGB")).astype(int)
+def pixels(figure):
+    """What was written, from the file, or as the figure's canvas still holds it."""
+    if isinstance(figure, Path):
+        with Image.open(figure) as picture:
+            return np.asarray(picture.convert("RGB")).astype(int)
+    return np.asarray(figure.canvas.buffer_rgba())[..., :3].astype(int)
 
 
 def near(picture, colour, within=12):
@@ -98,5 +102,5 @@ def test_an_iterative_planner_gets_its_history_and_field(planned, searched, tmp_
 def test_a_failed_plan_gives_the_reason(planned, tmp_path):
     task, grid, _ = planned
     failed = PlanResult(status=PlanStatus.NO_PATH, reason="walled in")
-    path = plan_figure(task, grid, failed, load_robot("turtlebot"), tmp_path / "failed.png", dpi=80)
-    assert near(pixels(path), (204, 32, 42), 24) > 100
+    figure = plan_figure(task, grid, failed, load_robot("turtlebot"), tmp_path / "failed.png", dpi=80)
+    assert near(pixels(figure), (204, 32, 42), 24) > 100

@@ -1,19 +1,27 @@
 import dataclasses
+import importlib
+import inspect
+import re
+import subprocess
 import sys
 import threading
+from pathlib import Path
 
 import matplotlib
 import numpy as np
 import pytest
-from PIL import Image
 
-from antdrive.planners import Query
+from antdrive.planners import History, Query
 from antdrive.planners.graph.search import AStar
 from antdrive.robots import Footprint, RobotSpec
-from antdrive.sim.log.certificate import Certificate
+from antdrive.sim.log.certificate import Certificate, certify
 from antdrive.sim.log.outcome import Outcome
-from antdrive.sim.view.figures.plan_figures import plan_figure
+from antdrive.sim.view import figures as figures_package
+from antdrive.sim.view.figures.canvas import panels, save_figure
+from antdrive.sim.view.figures.paper_figures import ants_figure, history_figure, sweep_figure
+from antdrive.sim.view.figures.plan_figures import bars_figure, contours_figure, plan_figure
 from antdrive.sim.view.figures.run_figures import certificate_figure, comparison_figure, overview
+from antdrive.sim.view.figures.then_and_now import then_and_now
 from antdrive.sim.view.style import BAD, GOOD, planner_style
 from antdrive.worlds import Disc, InputError, Keyframed, Task, Wandering, World, rasterise
 
@@ -32,9 +40,9 @@ def planned():
     return task, grid, AStar().plan(Query.between(grid, task), np.random.default_rng(0))
 
 
-def pixels(path):
-    with Image.open(path) as picture:
-        return np.asarray(picture.convert("RGB")).astype(int)
+def pixels(figure):
+    """What was written, as the figure's canvas still holds it."""
+    return np.asarray(figure.canvas.buffer_rgba())[..., :3].astype(int)
 
 
 def near(picture, colour, within=24):
@@ -44,9 +52,12 @@ def near(picture, colour, within=24):
 @pytest.mark.parametrize("suffix", [".png", ".pdf", ".svg"])
 def test_the_same_run_gives_the_same_file(made_up_drive, tmp_path, suffix):
     drive = made_up_drive()
-    one = overview(drive, tmp_path / f"one{suffix}", dpi=60).read_bytes()
-    other = overview(drive, tmp_path / f"other{suffix}", dpi=60).read_bytes()
-    assert one == other
+    files = [tmp_path / f"{name}{suffix}" for name in ("one", "other", "saved")]
+    for path in files[:2]:
+        overview(drive, path, dpi=60)
+    save_figure(overview(drive, dpi=60), files[2])
+    one, other, saved = (path.read_bytes() for path in files)
+    assert one == other == saved
     assert one[:5] in (b"\x89PNG\r", b"%PDF-", b"<?xml")
 
 
@@ -91,7 +102,8 @@ def test_movers_and_their_tracks_are_drawn(made_up_drive, planned, tmp_path):
 
 def test_a_rectangular_robot_and_planned_cells_are_drawn(made_up_drive, tmp_path):
     drive = made_up_drive(square=True)
-    assert overview(drive, tmp_path / "square.png", cells=np.array([(0.5, 1.5), (0.75, 1.5)]), dpi=60).exists()
+    overview(drive, tmp_path / "square.png", cells=np.array([(0.5, 1.5), (0.75, 1.5)]), dpi=60)
+    assert (tmp_path / "square.png").exists()
 
 
 def test_a_run_that_never_drove_has_an_overview(made_up_drive, tmp_path):
@@ -100,7 +112,8 @@ def test_a_run_that_never_drove_has_an_overview(made_up_drive, tmp_path):
         drive, t=drive.t[:0], pose=drive.pose[:0], twist=drive.twist[:0], command=drive.command[:0],
         clearance=drive.clearance[:0], limiter=drive.limiter[:0], route=np.empty((0, 2)),
     )  # fmt: skip
-    assert overview(empty, tmp_path / "empty.png", dpi=60).stat().st_size > 5000
+    overview(empty, tmp_path / "empty.png", dpi=60)
+    assert (tmp_path / "empty.png").stat().st_size > 5000
 
 
 def test_an_unknown_suffix_is_refused(made_up_drive, planned, tmp_path):
@@ -134,3 +147,54 @@ def test_several_planners_on_one_map(made_up_drive, tmp_path):
     picture = pixels(comparison_figure({"astar": one, "mmas": other}, tmp_path / "c.png", dpi=80))
     assert near(picture, planner_style("astar")[0], 12) > 50
     assert near(picture, planner_style("mmas")[0], 12) > 100
+
+
+def test_every_figure_gives_its_axes_back_to_be_labelled_and_saved(made_up_drive, planned, tmp_path):
+    drive, (task, grid, plan) = made_up_drive(), planned
+    history = History(*(np.full(5, 3.0) for _ in range(3)), arrived=np.full(5, 2))
+    learnt = dataclasses.replace(plan, field=grid.free * np.arange(grid.shape[1], dtype=float), history=history)
+    table = {True: np.ones((1, 2)), False: np.full((1, 2), 2.0)}
+    figures = [
+        (overview(drive), ["map", "clearance", "speed", "limiters"]),
+        (certificate_figure(drive, certify(drive)), ["map", "distance", "readings"]),
+        (comparison_figure({"astar": drive, "ants": drive}), ["map"]),
+        (then_and_now(drive, drive), ["map", "clearance", "distance"]),
+        (plan_figure(task, grid, learnt, ROBOT), ["map", "history"]),
+        (bars_figure(grid, learnt.field), ["field"]),
+        (contours_figure(task, grid, learnt, ROBOT), ["map"]),
+        (history_figure({"as": [history]}), ["history"]),
+        (ants_figure({10: [3.0]}, planner="aco-han", optimum=2.0), ["lengths"]),
+        (sweep_figure([0.1], [0.2, 0.3], table), ["with elitism", "without elitism"]),
+    ]
+    for figure, names in figures:
+        assert list(panels(figure)) == names
+    assert not list(tmp_path.iterdir()), "without a path nothing is written"
+    drawn, path = figures[0][0], tmp_path / "mine.svg"
+    panels(drawn)["map"].set_title("a title of my own")
+    assert save_figure(drawn, path) == path
+    assert "a title of my own" in path.read_text()
+    with pytest.raises(InputError, match="choose one of"):
+        save_figure(drawn, tmp_path / "a.bmp")
+
+
+def test_no_figure_function_is_left_out(made_up_drive):
+    """Every public function of the figures that takes a path returns a figure, and writes none without a path."""
+    folder = Path(figures_package.__path__[0])
+    found = {}
+    for path in sorted(folder.glob("[a-z]*.py")):
+        module = importlib.import_module(f"antdrive.sim.view.figures.{path.stem}")
+        for name, function in inspect.getmembers(module, inspect.isfunction):
+            if function.__module__ == module.__name__ and not name.startswith("_") and path.stem != "canvas":
+                found[name] = inspect.signature(function)
+    with_path = {name: of for name, of in found.items() if "path" in of.parameters}
+    assert len(with_path) == 10
+    assert all(of.parameters["path"].default is None and of.return_annotation == "Figure" for of in with_path.values())
+    assert all(name.startswith("draw_") for name in found.keys() - with_path.keys() - {"plan_figures"})
+
+
+def test_the_example_of_the_page_runs(tmp_path):
+    page = Path(__file__).parents[4] / "docs" / "figures.md"
+    (code,) = re.findall(r"```python\n(.*?)```", page.read_text(), flags=re.DOTALL)
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "slalom.pdf").stat().st_size > 10_000

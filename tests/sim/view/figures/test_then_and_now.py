@@ -4,17 +4,15 @@ import dataclasses
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from antdrive.sim.view.figures.then_and_now import then_and_now
 from antdrive.sim.view.style import BAD, CONTACT, SHELL, START
 from antdrive.worlds import InputError
 
 
-def count(path, colour):
-    """How many pixels have a colour."""
-    with Image.open(path) as picture:
-        pixels = np.asarray(picture.convert("RGB")).astype(int)
+def count(figure, colour):
+    """How many pixels of what was written have a colour."""
+    pixels = np.asarray(figure.canvas.buffer_rgba())[..., :3].astype(int)
     return int((np.abs(pixels - colour).max(axis=-1) < 12).sum())
 
 
