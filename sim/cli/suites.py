@@ -73,10 +73,14 @@ def drive_suites(
     """
     import os
 
-    from antdrive.sim.regression import check_cases, select
+    from antdrive.sim.cli.calibrating import with_chosen_margin
+    from antdrive.sim.regression import check_cases, scenario_of, select
 
     cases = select(suites, only)
     compile_once()
+    for case in cases:
+        if case.entry.margin == "auto":  # chosen once and with a bar, not by each process
+            scenario_of(case, with_chosen_margin)
     processes = min(jobs or os.cpu_count() or 1, len(cases))
     found = []
     with bar("driving") as progress:

@@ -156,8 +156,11 @@ def _among_movers(scenario: Scenario) -> dict[str, Any]:
     if perception.kind != "velocities" or math.isfinite(perception.range):
         reach = f":{perception.range!r}" if math.isfinite(perception.range) else ""
         plain["sees"] = perception.kind + reach
-    plain["avoid"] = scenario.avoidance is not None and (_changed(scenario.avoidance, Avoidance()) or True)
-    plain["replan"] = _changed(scenario.replanning, ReplanPolicy()) or True
+    for key, settings, usual in (
+        ("avoid", scenario.avoidance, Avoidance()),
+        ("replan", scenario.replanning, ReplanPolicy()),
+    ):
+        plain[key] = "none" if settings is None else _changed(settings, usual) or True
     return {key: value for key, value in plain.items() if value is not True}
 
 

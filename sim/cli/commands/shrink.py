@@ -74,13 +74,14 @@ def shrink(
 
 def _of_a_test(words: str) -> "Scenario":
     """The scenario of a suite's test."""
+    from antdrive.sim.cli.calibrating import with_chosen_margin
     from antdrive.sim.regression.scenarios import scenario_of
     from antdrive.sim.regression.selecting import select
 
     cases = select([words])
     if len(cases) > 1:
         raise InputError(f"{words}: name one of {', '.join(case.address for case in cases[:5])}")
-    return scenario_of(cases[0])
+    return scenario_of(cases[0], with_chosen_margin)
 
 
 def _of_a_log(words: str) -> "Scenario":
