@@ -82,13 +82,12 @@ def falsify(
 
 def _report(hunt: "Hunt", folder: Path, seconds: float, film: bool) -> "list[Reported]":
     """Shrink, repeat and write every failure that differs from the others."""
-    from antdrive.sim.falsify.report import report, write_report
+    from antdrive.sim.falsify.report import report
 
     if not hunt.findings:
         return []
     with bar("shrinking") as progress:
         reported = report(hunt, folder, seconds=seconds, progress=progress)
-    write_report(reported, folder)
     for one in reported if film else ():
         if one.run.rollout is not None:
             write_film(one.run.rollout, folder / f"{one.name}.mp4")
