@@ -98,6 +98,8 @@ def print_results(results: list[CheckResult], json: bool, words: str) -> int:
         json: print one JSON object instead of text
         words: what is said about a test that passed and changed no baseline
     """
+    from antdrive.sim.regression.summary import films_left_out
+
     failed = [result for result in results if not result.passed]
     if json:
         facts: dict[str, Any] = {"passed": not failed, "tests": [result.as_dict() for result in results]}
@@ -115,6 +117,9 @@ def print_results(results: list[CheckResult], json: bool, words: str) -> int:
     if better:
         summary.append(f"{better} better than the baseline; antdrive accept renews it")
     print_line("; ".join(summary))
+    unfilmed = sum(result.unfilmed for result in results)
+    if unfilmed:
+        print_line(films_left_out(unfilmed, "--film always"))
     return FAILED if failed else SUCCEEDED
 
 

@@ -34,6 +34,7 @@ FILES = (
     *("then-and-now.png", "then-and-now.mp4", "film.mp4"),
 )
 FILM_SIZE, FILM_FPS = (960, 540), 20.0
+MOST_FILMS = 10  # of failed tests, in one run of many; a film takes longer than most drives
 FILM_LENGTH = 12.0  # a film of a longer drive is faster than the drive [s]
 
 
@@ -44,10 +45,12 @@ class Results:
     Attributes:
         folder: of all results; each test has a folder of its own in it
         films: of which tests a film is made
+        places: a folder in which all processes of a run count the films of failed tests; None: they are not limited
     """
 
     folder: Path
     films: Films = "failed"
+    places: Path | None = None
 
     def of(self, *parts: str) -> Path:
         """The folder of one test.
@@ -56,6 +59,25 @@ class Results:
             parts: the test's file and name
         """
         return self.folder.joinpath(*map(file_name, parts))
+
+    def takes_film(self, *, failed: bool) -> bool:
+        """Whether a test gets a film. Of failed tests the first `MOST_FILMS` do, and each of them takes a place.
+
+        Args:
+            failed: whether the test failed
+        """
+        if self.films != "failed":
+            return self.films == "always"
+        return failed and (self.places is None or any(_taken(self.places / str(k)) for k in range(MOST_FILMS)))
+
+
+def _taken(place: Path) -> bool:
+    """Whether this process is the first to take a place."""
+    try:
+        place.touch(exist_ok=False)
+    except OSError:
+        return False
+    return True
 
 
 def file_name(name: str) -> str:

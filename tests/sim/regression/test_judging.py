@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from antdrive import METRICS, Outcome, Run, Scenario, run
 from antdrive.sim.log.metrics import Tolerance
 from antdrive.sim.regression import Baseline, Demands, judge
-from antdrive.sim.regression.artefacts import drive_of, file_name, remove_artefacts
+from antdrive.sim.regression.artefacts import MOST_FILMS, Results, drive_of, file_name, remove_artefacts
 from antdrive.sim.regression.baseline import MAX_BYTES
 from antdrive.sim.regression.explaining import explain
 from antdrive.sim.regression.nearest import nearest_of, touched_in
@@ -254,3 +254,15 @@ def test_only_files_that_antdrive_writes_are_removed(tmp_path: Path) -> None:
     (tmp_path / "thesis.txt").touch()
     remove_artefacts(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]
+
+
+def test_of_failed_tests_the_first_ten_are_filmed(tmp_path: Path) -> None:
+    """Each process has its own record of where results go; they share the folder in which films are counted."""
+    processes = [Results(tmp_path / "results", "failed", tmp_path) for _ in range(3)]
+    assert not processes[0].takes_film(failed=False)
+    assert [processes[k % 3].takes_film(failed=True) for k in range(13)] == [True] * MOST_FILMS + [False] * 3
+    assert MOST_FILMS == 10
+    for films in ("never", "always"):
+        results = Results(tmp_path / "results", films, tmp_path)  # type: ignore[arg-type]
+        assert {results.takes_film(failed=failed) for failed in (True, False)} == {films == "always"}
+    assert all(Results(tmp_path).takes_film(failed=True) for _ in range(12)), "without a run of many there is no limit"
