@@ -35,7 +35,7 @@ FILES = (
 )
 FILM_SIZE, FILM_FPS = (960, 540), 20.0
 MOST_FILMS = 10  # of failed tests, in one run of many; a film takes longer than most drives
-FILM_LENGTH = 12.0  # a film of a longer drive is faster than the drive [s]
+FILM_LENGTH = 12.0  # where a drive, then or now, is longer, its film is faster than the drive [s]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -164,8 +164,8 @@ def remove_artefacts(folder: Path) -> None:
 
 def _comparison(rollout: Rollout, baseline: Baseline | None, folder: Path, film: bool) -> dict[str, str]:
     """The figure of then and now, and the film; without a baseline the film of now alone."""
-    speed = max(1.0, float(rollout.t[-1]) / FILM_LENGTH)
-    options: dict[str, Any] = {"size": FILM_SIZE, "fps": FILM_FPS, "speed": speed}
+    driven = max(float(rollout.t[-1]), 0.0 if baseline is None else baseline.metric("duration_s"))
+    options: dict[str, Any] = {"size": FILM_SIZE, "fps": FILM_FPS, "speed": max(1.0, driven / FILM_LENGTH)}
     if baseline is None or len(baseline.line) < 2:
         if not film:
             return {}

@@ -327,3 +327,18 @@ def test_files_that_cannot_be_read_are_one_line(small_run, tmp_path):
     (folder / "rollout.npz").write_bytes(b"no log")
     with pytest.raises(InputError, match=r"rollout\.npz: not a rollout"):
         write_report(tmp_path / "runs", tmp_path / "report.html")
+
+
+@pytest.mark.parametrize("kind", ["html", "md"])
+def test_a_run_that_a_test_drove_says_why_the_test_failed(small_run, tmp_path, kind):
+    """The drive itself succeeded; what result.json claims is text and nothing else."""
+    folder = tmp_path / "results"
+    write_run(small_run, folder / "plain")
+    assert "test failed" not in reported(folder, tmp_path, kind)
+    slower = "duration_s: 9 s, in the baseline 5 s: 4 s longer <script>"
+    write_run(small_run, folder / "test", faults=[slower, 3, None])
+    write_run(small_run, folder / "odd", faults="oops")
+    text = reported(folder, tmp_path, kind)
+    assert text.count("test failed") == (1 if kind == "html" else 4)
+    assert "9 s, in the baseline 5 s: 4 s longer" in html.unescape(text).replace("\\", "")
+    assert "longer <script>" not in text
