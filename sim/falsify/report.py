@@ -15,6 +15,8 @@ from antdrive.sim.falsify.shrink import shrink
 from antdrive.sim.pipeline import Run, run
 from antdrive.sim.scenario import Scenario
 
+SUITE = "failures.drive.yaml"
+
 
 @dataclass(frozen=True, eq=False)
 class Reported:
@@ -50,7 +52,7 @@ def report(
 ) -> list[Reported]:
     """Shrink the different failures of a search, write them, and run what was written again in another process.
 
-    A suite, the worlds and the logs are written.
+    A suite and the worlds are written.
 
     Args:
         hunt: the search
@@ -89,13 +91,10 @@ def _repeats(finding: Finding, small: Run, found_elsewhere: str, small_elsewhere
 
 
 def _write(small: Sequence[Run], findings: Sequence[Finding], folder: Path) -> Path:
-    """Write the suite, the worlds and the logs of failures; the suite's path."""
-    handovers = []
-    for k, (done, finding) in enumerate(zip(small, findings, strict=True)):
-        if done.rollout is not None:
-            done.rollout.save(folder / f"{_name(k)}.npz")
-        handovers.append(Handover(_name(k), done, note=finding.failure.sentence))
-    return write_suite(folder / "failures.drive.yaml", handovers)
+    """Write the suite and the worlds of failures; the suite's path."""
+    pairs = enumerate(zip(small, findings, strict=True))
+    handovers = [Handover(_name(k), done, note=finding.failure.sentence) for k, (done, finding) in pairs]
+    return write_suite(folder / SUITE, handovers)
 
 
 def _named(scenario: Scenario, name: str) -> Scenario:
