@@ -5,7 +5,7 @@ With a file of results each search is a line as soon as it is over, and a later 
 
 Tables:
 
-- methods: a careless set-up (no smoothing, no margin, the robot's noise, `jackal`), guided search against random worlds
+- methods: a careless set-up (no smoothing, no margin, the robot's noise, `turtlebot`), guided search against random worlds
 - default: random worlds against the set-up that `antdrive run` has without options, and the same with noise
 """
 
@@ -32,7 +32,7 @@ from benchmarks.planners import table
 from benchmarks.resuming import append_line, current_commit, read_lines
 
 SETUPS = {
-    "careless": Scenario.of("empty", "astar", "jackal", margin=0.0, noise=1.0, smoothing="none"),
+    "careless": Scenario.of("empty", "astar", "turtlebot", margin=0.0, noise=1.0, smoothing="none"),
     "default": Scenario.of("empty"),
     "with noise 1": Scenario.of("empty", noise=1.0),
 }

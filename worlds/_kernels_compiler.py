@@ -85,7 +85,7 @@ class _Entries(IndexDataCacheFile):  # type: ignore[misc]  # numba has no types
 class _Cache(FunctionCache):  # type: ignore[misc]
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
-        entries = self._cache_file
+        entries = self._cache_file  # type: ignore[has-type]
         name = entries._index_name.removesuffix(".nbi")
         self._cache_file = _Entries(entries._cache_path, name, sources_stamp())
 

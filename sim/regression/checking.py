@@ -199,14 +199,7 @@ def check_run(
         judgement, accepted = _without_baseline(run, demands, path, name, accept, update)
     else:
         judgement = judge(run, demands, baseline)
-    files: dict[str, str] = {}
-    failed, unfilmed = not judgement.passed, False
-    if folder is not None and results is not None:
-        remove_artefacts(folder)
-        filmed = run.rollout is not None and results.takes_film(failed=failed)
-        unfilmed = run.rollout is not None and failed and results.films == "failed" and not filmed
-        if failed or results.films == "always":
-            files = write_artefacts(run, folder, baseline, film=filmed, faults=judgement.faults, commands=commands)
+    files, unfilmed = _written(run, judgement, baseline, folder, results, commands)
     details = () if judgement.passed else tuple(explain(run, dataclasses.replace(judgement, faults=()), baseline))
     return CheckResult(
         address=address,
@@ -224,6 +217,26 @@ def check_run(
         digest=run.rollout.drive_digest if run.rollout is not None else "",
         wall_s=_wall(run) + time.perf_counter() - started,
     )
+
+
+def _written(
+    run: Run,
+    judgement: Judgement,
+    baseline: Baseline | None,
+    folder: Path | None,
+    results: Results | None,
+    commands: Sequence[str],
+) -> tuple[dict[str, str], bool]:
+    """What was written about a test, by name, and whether it failed and only its film is missing."""
+    if folder is None or results is None:
+        return {}, False
+    remove_artefacts(folder)
+    failed, drove = not judgement.passed, run.rollout is not None
+    filmed = drove and results.takes_film(failed=failed)
+    if not (failed or results.films == "always"):
+        return {}, False
+    files = write_artefacts(run, folder, baseline, film=filmed, faults=judgement.faults, commands=commands)
+    return files, drove and results.films == "failed" and not filmed
 
 
 def _own_baseline(path: Path, name: str) -> Baseline | None:
