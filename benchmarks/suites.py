@@ -1,16 +1,19 @@
-"""What suites cost, and whether they flake: `python -m benchmarks.suites [--scenarios 200] [--jobs 2]`, or `--repeats N`.
+"""What suites cost, and whether they flake: `python -m benchmarks.suites [--scenarios 200] [--jobs 2]`, or
+`--repeats N [--results FILE.jsonl]`.
 
 `--scenarios` makes a suite of random worlds, accepts it, and checks it without films; collecting it is timed apart. Processor
 seconds are those of all processes, so that they can be compared between busy and quiet machines.
 
 `--repeats N` drives the tests of `examples/regression_suite` N times over, in the order of the file and shuffled, in one
 process, with `pytest -n 2` and with `antdrive check --jobs 2`, and counts tests that failed and drives that were not the first
-ones, bit for bit.
+ones, bit for bit. Each round is a line of the file of results, as soon as it is over; a later call goes on until the file has N
+rounds, and one without `--repeats` says what the file has. The exit code is 1 if a test failed or a drive was another one.
 """
 
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import itertools
 import resource
 import shutil
@@ -18,12 +21,13 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import yaml
 
 from benchmarks.planners import table
+from benchmarks.resuming import append_line, current_commit, read_lines
 from benchmarks.suite_runs import EXAMPLE, PLUGINS, Tests, environment, with_check, with_pytest
 
 
@@ -72,22 +76,60 @@ def ways() -> Iterator[tuple[str, Callable[[Path], Tests]]]:
         yield "pytest", lambda folder: with_pytest(folder)
 
 
-def repeats(times: int) -> Iterator[list[str]]:
-    """A row for each way to run the example's tests."""
-    found: dict[str, list[int]] = {}
-    first: Tests = {}
+def repeats(times: int, results: Path | None) -> list[Round]:
+    """The rounds of a file of results, and new ones until there are as many as asked for.
+
+    Args:
+        times: how many rounds
+        results: the file; None: all rounds are new, and none is kept
+    """
+    found = [Round(**line) for line in read_lines(results)]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(shutil.copytree(EXAMPLE, Path(name) / "checkout", ignore=shutil.ignore_patterns("__pycache__")))
-        for way, run in itertools.islice(ways(), times):
+        for number, (way, run) in itertools.islice(enumerate(ways()), len(found), times):
             tests = run(folder)
-            first = {**tests, **first}
-            failed = sum(not test["passed"] for test in tests.values())
-            other = sum(test["digest"] != first[name]["digest"] for name, test in tests.items())
-            counts = found.setdefault(way, [0, 0, 0])
-            counts[:] = [a + b for a, b in zip(counts, (len(tests), failed, other), strict=True)]
-            print(way, counts, file=sys.stderr)
-    for way, counts in found.items():
-        yield [f"`{way}`", *map(str, counts)]
+            digests = {name: str(test["digest"]) for name, test in tests.items()}
+            failed = {name: str(test["message"])[:2000] for name, test in tests.items() if not test["passed"]}
+            found.append(Round(number, way, digests, failed, current_commit()))
+            append_line(results, dataclasses.asdict(found[-1]))
+            print(number, way, f"{len(tests)} tests, {len(failed)} failed", file=sys.stderr)
+    return found
+
+
+@dataclasses.dataclass(frozen=True)
+class Round:
+    """One run of the example's tests.
+
+    Attributes:
+        number: counted from 0; it decides the way and the order of the tests
+        way: how the tests were run
+        digests: of each test's drive
+        failed: the messages of tests that failed, by name
+        commit: the commit of antdrive
+    """
+
+    number: int
+    way: str
+    digests: dict[str, str]
+    failed: dict[str, str]
+    commit: str
+
+
+def others(rounds: Sequence[Round]) -> list[int]:
+    """How many drives of each round are not those of the first round that has the test, bit for bit."""
+    first: dict[str, str] = {}
+    for one in rounds:
+        first = {**one.digests, **first}
+    return [sum(first[name] != digest for name, digest in one.digests.items()) for one in rounds]
+
+
+def counted(rounds: Sequence[Round]) -> Iterator[list[str]]:
+    """A row for each way to run the tests."""
+    other = dict(zip((one.number for one in rounds), others(rounds), strict=True))
+    for way in dict.fromkeys(one.way for one in rounds):
+        mine = [one for one in rounds if one.way == way]
+        tests, failed = sum(len(one.digests) for one in mine), sum(len(one.failed) for one in mine)
+        yield [f"`{way}`", *map(str, (len(mine), tests, failed, sum(other[one.number] for one in mine)))]
 
 
 def main() -> None:
@@ -95,14 +137,22 @@ def main() -> None:
     parser.add_argument("--scenarios", type=int, default=200, help="of the generated suite")
     parser.add_argument("--jobs", type=int, default=2, help="processes of accept and check")
     parser.add_argument("--repeats", type=int, default=0, help="how often to run the example's tests instead")
+    parser.add_argument("--results", type=Path, help="file with a line for each of these runs, to go on with")
     arguments = parser.parse_args()
-    if arguments.repeats:
-        found = table(["run with", "tests", "failed", "other drive"], repeats(arguments.repeats))
+    rounds: list[Round] = []
+    if arguments.repeats or arguments.results:
+        rounds = repeats(arguments.repeats, arguments.results)
+        found = table(["run with", "rounds", "tests", "failed", "other drive"], counted(rounds))
     else:
         heads = ["command", "wall time", "processor time", "says"]
         found = table(heads, speed(arguments.scenarios, arguments.jobs))
     for line in found:
         print(line)
+    for one in rounds:
+        for name, message in one.failed.items():
+            print(f"round {one.number}, {one.way}: {name}: {message.strip().splitlines()[0]}")
+    if any(one.failed for one in rounds) or any(others(rounds)):
+        sys.exit(1)
 
 
 if __name__ == "__main__":

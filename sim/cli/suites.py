@@ -73,10 +73,14 @@ def drive_suites(
     """
     import os
 
-    from antdrive.sim.regression import check_cases, select
+    from antdrive.sim.cli.calibrating import with_chosen_margin
+    from antdrive.sim.regression import check_cases, scenario_of, select
 
     cases = select(suites, only)
     compile_once()
+    for case in cases:
+        if case.entry.margin == "auto":  # chosen once and with a bar, not by each process
+            scenario_of(case, with_chosen_margin)
     processes = min(jobs or os.cpu_count() or 1, len(cases))
     found = []
     with bar("driving") as progress:
@@ -94,6 +98,8 @@ def print_results(results: list[CheckResult], json: bool, words: str) -> int:
         json: print one JSON object instead of text
         words: what is said about a test that passed and changed no baseline
     """
+    from antdrive.sim.regression.summary import films_left_out
+
     failed = [result for result in results if not result.passed]
     if json:
         facts: dict[str, Any] = {"passed": not failed, "tests": [result.as_dict() for result in results]}
@@ -111,6 +117,9 @@ def print_results(results: list[CheckResult], json: bool, words: str) -> int:
     if better:
         summary.append(f"{better} better than the baseline; antdrive accept renews it")
     print_line("; ".join(summary))
+    unfilmed = sum(result.unfilmed for result in results)
+    if unfilmed:
+        print_line(films_left_out(unfilmed, "--film always"))
     return FAILED if failed else SUCCEEDED
 
 

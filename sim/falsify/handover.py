@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,8 +18,11 @@ from antdrive.sim.driving.replanning import ReplanPolicy
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.pipeline import Run, run
 from antdrive.sim.regression.demands import Bound
+from antdrive.sim.regression.scenarios import scenario_of
+from antdrive.sim.regression.suite import load_suite
 from antdrive.sim.scenario import Scenario
 from antdrive.worlds import save_task
+from antdrive.worlds.errors import InputError
 from antdrive.worlds.files.atomic import written_whole
 
 
@@ -31,12 +35,14 @@ class Handover:
         run: the run that failed
         bound: the metric's bound that it crosses, if that is its failure
         note: what people should know about it; may be empty
+        planner: the planner in the words of the suite, such as {file: ../mine.py, name: Mine}; None: by its name
     """
 
     name: str
     run: Run
     bound: Bound | None = None
     note: str = ""
+    planner: str | Mapping[str, Any] | None = None
 
 
 def write_suite(path: Path, handovers: Sequence[Handover]) -> Path:
@@ -63,6 +69,7 @@ def write_suite(path: Path, handovers: Sequence[Handover]) -> Path:
             **({"note": handover.note} if handover.note else {}),
             "world": str(world),
             **suite_entry(scenario, _robot(scenario.robot, path.parent)),
+            **({"planner": handover.planner} if handover.planner else {}),
             "expect": expectation(handover.run, handover.bound),
             "baseline": False,
         }
@@ -123,6 +130,33 @@ def fingerprint_of(done: Run) -> str:
     return done.rollout.digest if done.rollout is not None else f"{done.outcome.key}: {done.reason}"
 
 
+def suite_elsewhere(suite: Path) -> list[str]:
+    """The fingerprints of a suite's scenarios, read from its files and run in other processes; a fault of a file stands for one.
+
+    Args:
+        suite: the suite's file
+    """
+    from joblib import Parallel, delayed
+
+    return list(Parallel(2)(delayed(_fingerprint_from)(suite.resolve(), k) for k in range(len(load_suite(suite)))))
+
+
+def _fingerprint_from(suite: Path, index: int) -> str:
+    try:
+        return _fingerprint(scenario_of(load_suite(suite)[index]))
+    except InputError as error:
+        return str(error)
+
+
+def scenario_name(text: str) -> str:
+    """A name that a suite takes for a scenario.
+
+    Args:
+        text: what it is made from, such as the name of a world
+    """
+    return re.sub(r"[^A-Za-z0-9_.-]", "_", text).lstrip("_.-")[:90] or "failure"
+
+
 def run_elsewhere(scenarios: Sequence[Scenario]) -> list[str]:
     """The fingerprints of scenarios that are run in other processes."""
     from joblib import Parallel, delayed
@@ -156,8 +190,11 @@ def _among_movers(scenario: Scenario) -> dict[str, Any]:
     if perception.kind != "velocities" or math.isfinite(perception.range):
         reach = f":{perception.range!r}" if math.isfinite(perception.range) else ""
         plain["sees"] = perception.kind + reach
-    plain["avoid"] = scenario.avoidance is not None and (_changed(scenario.avoidance, Avoidance()) or True)
-    plain["replan"] = _changed(scenario.replanning, ReplanPolicy()) or True
+    for key, settings, usual in (
+        ("avoid", scenario.avoidance, Avoidance()),
+        ("replan", scenario.replanning, ReplanPolicy()),
+    ):
+        plain[key] = "none" if settings is None else _changed(settings, usual) or True
     return {key: value for key, value in plain.items() if value is not True}
 
 

@@ -70,9 +70,12 @@ def goal(scenario: Scenario, trials: Trials) -> Scenario:
 
 
 def bounds(scenario: Scenario, trials: Trials) -> Scenario:
-    """The scenario with walls moved inwards, by whole cells, so that the grid stays where it is."""
+    """The scenario with walls moved inwards, by whole cells, so that the grid stays where it is.
+
+    Cylinders that a moved wall would cut or leave outside go.
+    """
     for side in range(4):
-        scenario = trials.first(_varied_world(scenario, bounds=b) for b in _tighter(scenario, side)) or scenario
+        scenario = trials.first(_walled(scenario, side, b) for b in _tighter(scenario, side)) or scenario
     return scenario
 
 
@@ -140,9 +143,10 @@ def with_movers(scenario: Scenario, kept: Sequence[Mover]) -> Scenario | None:
     return _varied_world(scenario, movers=tuple(kept))
 
 
-def with_unseen(scenario: Scenario, discs: Sequence[Disc]) -> Scenario | None:
-    """The scenario with other unseen obstacles; None if that is impossible."""
-    return _varied(scenario, unseen=tuple(discs))
+def with_unseen(scenario: Scenario, discs: Sequence[Disc], **world: Any) -> Scenario | None:
+    """The scenario with other unseen obstacles, and fields of its world changed; None if that is impossible."""
+    fewer = _varied(scenario, unseen=tuple(discs))
+    return fewer if fewer is None or not world else _varied_world(fewer, **world)
 
 
 def _needed(
@@ -253,6 +257,21 @@ def _tighter(scenario: Scenario, side: int) -> Iterator[Bounds]:
             limits = list(now)
             limits[side] = round(now[side] + (count if low else -count) * cell, 9)
             yield limits[0], limits[1], limits[2], limits[3]
+
+
+def _walled(scenario: Scenario, side: int, bounds: Bounds) -> Scenario | None:
+    """The scenario with other bounds, of which one side differs, and the cylinders that stand as whole as before."""
+    axis, low, before = side % 2, side < 2, scenario.task.world.bounds[side]
+
+    def stands(disc: Disc) -> bool:
+        """Whether a cylinder stays whole, or reaches into the room as one that the wall has always cut."""
+        centre = (disc.x, disc.y)[axis]
+        from_old, from_new = ((centre - wall) * (1 if low else -1) for wall in (before, bounds[side]))
+        return from_new >= (disc.radius if from_old >= disc.radius else -disc.radius)
+
+    obstacles = tuple(disc for disc in scenario.task.world.obstacles if stands(disc))
+    hidden = tuple(disc for disc in scenario.unseen if stands(disc))
+    return with_unseen(scenario, hidden, bounds=bounds, obstacles=obstacles)
 
 
 def _all_rounded(scenario: Scenario, count: int) -> Scenario | None:

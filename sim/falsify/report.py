@@ -9,11 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from antdrive.sim.falsify.failure import failure_of
-from antdrive.sim.falsify.handover import Handover, fingerprint_of, run_elsewhere, write_suite
+from antdrive.sim.falsify.handover import Handover, fingerprint_of, run_elsewhere, suite_elsewhere, write_suite
 from antdrive.sim.falsify.hunt import Finding, Hunt
 from antdrive.sim.falsify.shrink import shrink
 from antdrive.sim.pipeline import Run, run
 from antdrive.sim.scenario import Scenario
+
+SUITE = "failures.drive.yaml"
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +26,8 @@ class Reported:
         name: its name in the suite, and of its world
         finding: the failure as it was found
         run: the run of the small scenario
-        repeats: whether the found and the small scenario gave the same bits in another process
+        repeats: whether the found scenario, and the small one as it is read from its files, gave the same bits in another
+            process
     """
 
     name: str
@@ -47,45 +50,51 @@ class Reported:
 def report(
     hunt: Hunt, folder: Path, *, seconds: float = 20.0, progress: Callable[[float], None] | None = None
 ) -> list[Reported]:
-    """Shrink the different failures of a search, and run them again in another process.
+    """Shrink the different failures of a search, write them, and run what was written again in another process.
+
+    A suite and the worlds are written.
 
     Args:
         hunt: the search
-        folder: where journals go, so that a failure is not shrunk twice
+        folder: where all is written, and journals, so that a failure is not shrunk twice
         seconds: time to shrink each failure [s]; 0: they are left as they are
         progress: is called with the fraction that is done
-    """
-    reported: list[Reported] = []
-    for k, finding in enumerate(hunt.distinct):
-        name, small = f"failure-{k + 1}", finding.scenario
-        if seconds > 0:
-            small = shrink(small, seconds=seconds, journal=folder / "journals" / f"{name}.json").scenario
-        done = run(_named(small, name))
-        same = run_elsewhere([finding.scenario, done.scenario]) == [
-            fingerprint_of(run(finding.scenario)),
-            fingerprint_of(done),
-        ]
-        reported.append(Reported(name, finding, done, same and failure_of(done) == finding.failure))
-        if progress is not None:
-            progress((k + 1) / len(hunt.distinct))
-    return reported
-
-
-def write_report(reported: Sequence[Reported], folder: Path) -> Path:
-    """Write the suite, the worlds and the logs of failures; the suite's path.
-
-    Args:
-        reported: the failures
-        folder: where to write
 
     Raises:
         InputError: a file cannot be written.
     """
-    for one in reported:
-        if one.run.rollout is not None:
-            one.run.rollout.save(folder / f"{one.name}.npz")
-    handovers = [Handover(one.name, one.run, note=one.finding.failure.sentence) for one in reported]
-    return write_suite(folder / "failures.drive.yaml", handovers)
+    small: list[Run] = []
+    for k, finding in enumerate(hunt.distinct):
+        name, scenario = _name(k), finding.scenario
+        if seconds > 0:
+            scenario = shrink(scenario, seconds=seconds, journal=folder / "journals" / f"{name}.json").scenario
+        small.append(run(_named(scenario, name)))
+        if progress is not None:
+            progress((k + 1) / (len(hunt.distinct) + 1))
+    suite = _write(small, hunt.distinct, folder)
+    found, written = run_elsewhere([finding.scenario for finding in hunt.distinct]), suite_elsewhere(suite)
+    return [
+        Reported(_name(k), finding, done, _repeats(finding, done, found[k], written[k]))
+        for k, (finding, done) in enumerate(zip(hunt.distinct, small, strict=True))
+    ]
+
+
+def _name(index: int) -> str:
+    return f"failure-{index + 1}"
+
+
+def _repeats(finding: Finding, small: Run, found_elsewhere: str, small_elsewhere: str) -> bool:
+    """Whether a failure and its small scenario gave the same bits in another process, and fail in the same way."""
+    again = run(finding.scenario)
+    same = (found_elsewhere, small_elsewhere) == (fingerprint_of(again), fingerprint_of(small))
+    return same and failure_of(again) == failure_of(small) == finding.failure
+
+
+def _write(small: Sequence[Run], findings: Sequence[Finding], folder: Path) -> Path:
+    """Write the suite and the worlds of failures; the suite's path."""
+    pairs = enumerate(zip(small, findings, strict=True))
+    handovers = [Handover(_name(k), done, note=finding.failure.sentence) for k, (done, finding) in pairs]
+    return write_suite(folder / SUITE, handovers)
 
 
 def _named(scenario: Scenario, name: str) -> Scenario:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from antdrive.sim.falsify.failure import Failure, failure_of
 from antdrive.sim.falsify.passes import PASSES
-from antdrive.sim.falsify.trials import OutOfTimeError, Trials, changeable, failure_in, identity_of
+from antdrive.sim.falsify.trials import OutOfTimeError, Trials, changeable, failure_in, identity_of, room_in
 from antdrive.sim.pipeline import run
 from antdrive.sim.regression.demands import Bound
 from antdrive.sim.scenario import Scenario
@@ -65,7 +65,8 @@ def shrink(
 ) -> Shrunk:
     """Make a failing scenario small: fewer obstacles and movers, less noise, a nearer start, fewer digits.
 
-    After every accepted step the run fails as it did at first: same outcome, same kind of thing touched, same cause. When
+    After every accepted step the run fails as it did at first: same outcome, same kind of thing touched, same cause. If at
+    first a path with the claimed clearance existed, the exact shortest one says so of every accepted world, too. When
     it has come to its end, the failure vanishes with any single obstacle, mover or unseen obstacle that is left. The
     result depends on the scenario alone, unless the time is over before.
 
@@ -85,8 +86,9 @@ def shrink(
         counts = "a failure is anything but a certified success" if bound is None else f"the bound is {bound}"
         raise InputError(f"{scenario.task.world.name}: this run does not fail, so there is nothing to shrink; {counts}")
     trials = Trials(
-        failure, bound, seconds=seconds, journal=journal, identity=identity_of(scenario), jobs=jobs, progress=progress
-    )
+        failure, bound, room=room_in(scenario, failure), seconds=seconds, journal=journal,
+        identity=identity_of(scenario), jobs=jobs, progress=progress,
+    )  # fmt: skip
     try:
         small, complete = _smallest(scenario, trials)
         if trials.recalled and failure_in(small, bound) != failure:  # the journal is older than the planner's code

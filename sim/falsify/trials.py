@@ -12,11 +12,15 @@ from pathlib import Path
 from typing import Any
 
 from antdrive.planners import PlannerError
+from antdrive.planners.anyangle.passage import MOST_OBSTACLES
 from antdrive.sim.falsify.failure import Failure, failure_of
+from antdrive.sim.falsify.space import feasible
+from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import settings_of
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import ENDED_BY, Run, plan, run, versions
 from antdrive.sim.regression.demands import Bound
+from antdrive.sim.regression.names import FROM_FILE
 from antdrive.sim.scenario import Scenario
 from antdrive.worlds.errors import FieldError, InputError
 from antdrive.worlds.files.atomic import written_whole
@@ -46,8 +50,25 @@ def failure_in(scenario: Scenario, bound: Bound | None = None, *, drive: bool = 
         return None
 
 
+def room_in(scenario: Scenario, failure: Failure) -> float | None:
+    """The clearance with which a path exists in the world of a failing scenario [m]; None where none does.
+
+    That is the clearance that the scenario claims and, where the planner found no path, a cell's side more if a path exists
+    with that: then the grid is no excuse. In worlds of more than `MOST_OBSTACLES` it is not looked for.
+
+    Args:
+        scenario: the failing scenario
+        failure: how it fails
+    """
+    task, claimed = scenario.task, scenario.inflate
+    if len(task.world.obstacles) > MOST_OBSTACLES:
+        return None
+    more = [claimed + (scenario.cell or task.cell)] if failure.outcome == Outcome.NO_PATH.key else []
+    return next((clearance for clearance in (*more, claimed) if feasible(task, clearance)), None)
+
+
 class Trials:
-    """Runs candidates and says which of them fail in one given way.
+    """Runs candidates and says which of them fail in one given way, in worlds that leave as much room.
 
     The answers depend on the candidates alone, not on time, processes, or what a journal already knew.
 
@@ -62,6 +83,7 @@ class Trials:
         wanted: Failure,
         bound: Bound | None = None,
         *,
+        room: float | None = None,
         seconds: float = float("inf"),
         journal: Path | None = None,
         identity: str = "",
@@ -69,10 +91,17 @@ class Trials:
         progress: Callable[[str, int], None] | None = None,
     ) -> None:
         self.stage, self.made, self.recalled = "", 0, set[str]()
+        self._room = room
         self._wanted, self._bound, self._jobs, self._progress = wanted, bound, max(1, jobs), progress
         self._deadline = time.monotonic() + seconds
         self._journal, self._written = journal, time.monotonic()
-        header = {"failure": dataclasses.astuple(wanted), "bound": str(bound), "versions": versions(), "of": identity}
+        header = {
+            "failure": dataclasses.astuple(wanted),
+            "bound": str(bound),
+            "room": room,
+            "versions": versions(),
+            "of": identity,
+        }
         self._header = _digest(header)
         self._answers = _read(journal, self._header)
         self._known = frozenset(self._answers)
@@ -130,15 +159,19 @@ class Trials:
 
     def _run(self, candidates: list[Scenario]) -> Iterator[bool]:
         drive = self._wanted.outcome not in {outcome.key for outcome in ENDED_BY.values()}
-        if len(candidates) == 1:
-            found = [failure_in(candidates[0], self._bound, drive=drive)]
+        # A planner's class from a file is one that other processes cannot import.
+        if len(candidates) == 1 or type(candidates[0].planner).__module__.startswith(FROM_FILE):
+            found = [failure_in(candidate, self._bound, drive=drive) for candidate in candidates]
         else:
             from joblib import Parallel, delayed
 
             found = Parallel(self._jobs)(
                 delayed(failure_in)(candidate, self._bound, drive=drive) for candidate in candidates
             )
-        return (failure == self._wanted for failure in found)
+        return (
+            failure == self._wanted and (self._room is None or feasible(candidate.task, self._room))
+            for candidate, failure in zip(candidates, found, strict=True)
+        )
 
 
 def changeable(scenario: Scenario) -> Mapping[str, Any]:

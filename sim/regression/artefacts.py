@@ -34,7 +34,8 @@ FILES = (
     *("then-and-now.png", "then-and-now.mp4", "film.mp4"),
 )
 FILM_SIZE, FILM_FPS = (960, 540), 20.0
-FILM_LENGTH = 12.0  # a film of a longer drive is faster than the drive [s]
+MOST_FILMS = 10  # of failed tests, in one run of many; a film takes longer than most drives
+FILM_LENGTH = 12.0  # where a drive, then or now, is longer, its film is faster than the drive [s]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,10 +45,12 @@ class Results:
     Attributes:
         folder: of all results; each test has a folder of its own in it
         films: of which tests a film is made
+        places: a folder in which all processes of a run count the films of failed tests; None: they are not limited
     """
 
     folder: Path
     films: Films = "failed"
+    places: Path | None = None
 
     def of(self, *parts: str) -> Path:
         """The folder of one test.
@@ -56,6 +59,25 @@ class Results:
             parts: the test's file and name
         """
         return self.folder.joinpath(*map(file_name, parts))
+
+    def takes_film(self, *, failed: bool) -> bool:
+        """Whether a test gets a film. Of failed tests the first `MOST_FILMS` do, and each of them takes a place.
+
+        Args:
+            failed: whether the test failed
+        """
+        if self.films != "failed":
+            return self.films == "always"
+        return failed and (self.places is None or any(_taken(self.places / str(k)) for k in range(MOST_FILMS)))
+
+
+def _taken(place: Path) -> bool:
+    """Whether this process is the first to take a place."""
+    try:
+        place.touch(exist_ok=False)
+    except OSError:
+        return False
+    return True
 
 
 def file_name(name: str) -> str:
@@ -144,8 +166,8 @@ def remove_artefacts(folder: Path) -> None:
 
 def _comparison(rollout: Rollout, baseline: Baseline | None, folder: Path, film: bool) -> dict[str, str]:
     """The figure of then and now, and the film; without a baseline the film of now alone."""
-    speed = max(1.0, float(rollout.t[-1]) / FILM_LENGTH)
-    options: dict[str, Any] = {"size": FILM_SIZE, "fps": FILM_FPS, "speed": speed}
+    driven = max(float(rollout.t[-1]), 0.0 if baseline is None else baseline.metric("duration_s"))
+    options: dict[str, Any] = {"size": FILM_SIZE, "fps": FILM_FPS, "speed": max(1.0, driven / FILM_LENGTH)}
     if baseline is None or len(baseline.line) < 2:
         if not film:
             return {}

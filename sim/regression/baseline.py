@@ -48,6 +48,7 @@ class Baseline:
         outcome: how the run ended
         reason: details of the outcome, in words; may be empty
         certified: whether the drive was certified collision-free
+        margin_m: the margin that was chosen for `margin: auto` [m]; None: it was given
         bound_m: the clearance that the certificate proved [m]; None without one
         metrics: every metric but wall-clock times; empty if the robot did not drive
         nearest: what the robot came nearest to; None if it did not drive
@@ -76,6 +77,7 @@ class Baseline:
     limiters: tuple[str, ...]
     line_hz: float
     line: tuple[tuple[float, float, float, int], ...]
+    margin_m: float | None = None
 
     @property
     def times(self) -> Floats:
@@ -122,6 +124,7 @@ class Baseline:
             limiters=rollout.record.limiters if rollout else (),
             line_hz=LINE_HZ,
             line=_line(rollout, LINE_HZ) if rollout else (),
+            margin_m=_chosen_margin(run),
         )
         while rollout and len(baseline.to_text()) > MAX_BYTES and baseline.line_hz > LEAST_HZ:
             hz = baseline.line_hz / 2
@@ -131,6 +134,8 @@ class Baseline:
     def to_text(self) -> str:
         """The baseline as JSON with one value, or one sample of the line, on each line."""
         values = _ADAPTER.dump_python(self, mode="python")
+        if self.margin_m is None:
+            del values["margin_m"]
         line = [json.dumps(sample) for sample in values.pop("line")]
         values["outcome"] = self.outcome.key
         values["nearest"] = None if self.nearest is None else dataclasses.asdict(self.nearest)
@@ -189,6 +194,10 @@ def conditions(run: Run) -> dict[str, str]:
     given = dataclasses.replace(record, time_limit=scenario.time_limit or scenario.task.time_limit or 1.0)
     unseen = json.dumps([dataclasses.asdict(disc) for disc in record.unseen], sort_keys=True)
     return {**hashes_of(given), "unseen obstacles": hashlib.sha256(unseen.encode()).hexdigest()}
+
+
+def _chosen_margin(run: Run) -> float | None:
+    return run.scenario.margin if run.scenario.chosen is not None else None
 
 
 def _rounded(value: float) -> float | None:

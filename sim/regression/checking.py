@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import shlex
+import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -14,7 +15,7 @@ from typing import Any, Literal, TypeAlias
 from antdrive.planners import PlannerError
 from antdrive.sim.pipeline import Run
 from antdrive.sim.pipeline import run as drive
-from antdrive.sim.regression.artefacts import Films, Results, remove_artefacts, write_artefacts
+from antdrive.sim.regression.artefacts import MOST_FILMS, Results, remove_artefacts, write_artefacts
 from antdrive.sim.regression.baseline import Baseline
 from antdrive.sim.regression.demands import Demands
 from antdrive.sim.regression.explaining import explain
@@ -44,6 +45,7 @@ class CheckResult:
         accepted: what was done to the baseline: written, unchanged, or nothing
         commands: how to repeat the test
         files: what was written about it, by name
+        unfilmed: whether it failed and has no film, because the run has made `MOST_FILMS` already
         metrics: the drive's metrics; empty if the robot did not drive
         digest: `Rollout.drive_digest`; empty if the robot did not drive
         wall_s: how long the test took [s]
@@ -59,6 +61,7 @@ class CheckResult:
     accepted: str = ""
     commands: tuple[str, ...] = ()
     files: dict[str, str] = field(default_factory=dict)
+    unfilmed: bool = False
     metrics: dict[str, float] = field(default_factory=dict)
     digest: str = ""
     wall_s: float = 0.0
@@ -68,7 +71,10 @@ class CheckResult:
         """Everything about a failed test, in lines."""
         lines = [*self.faults, *self.details]
         lines += [f"{'repeat:' if k == 0 else '       '} {command}" for k, command in enumerate(self.commands)]
-        return "\n".join([*lines, *(f"{name}: {path}" for name, path in self.files.items())])
+        lines += [f"{name}: {path}" for name, path in self.files.items()]
+        if self.unfilmed:
+            lines.append(f"film: none, because this run has made {MOST_FILMS}; {self.commands[0]} makes it")
+        return "\n".join(lines)
 
     def as_dict(self) -> dict[str, Any]:
         """The result as plain values, for JSON."""
@@ -105,7 +111,7 @@ def check_case(case: SuiteCase, *, update: Update = "", results: Results | None 
         update=update,
         commands=commands,
         folder=folder,
-        films=results.films if results else "never",
+        results=results,
     )
 
 
@@ -123,6 +129,14 @@ def check_cases(
     Raises:
         InputError: a suite, a file that it names, or a baseline is wrong.
     """
+    with tempfile.TemporaryDirectory(prefix="antdrive-films-") as places:
+        limited = results and dataclasses.replace(results, places=Path(places))
+        yield from _check_in_turn(cases, jobs, update, limited)
+
+
+def _check_in_turn(
+    cases: Sequence[SuiteCase], jobs: int, update: Update, results: Results | None
+) -> Iterator[CheckResult]:
     if jobs == 1 or len(cases) == 1:
         for case in cases:
             yield check_case(case, update=update, results=results)
@@ -158,7 +172,7 @@ def check_run(
     commands: tuple[str, ...] = (),
     accept: str = "",
     folder: Path | None = None,
-    films: Films = "failed",
+    results: Results | None = None,
 ) -> CheckResult:
     """Judge a run.
 
@@ -172,7 +186,7 @@ def check_run(
         commands: how to repeat the test
         accept: the command that writes its baseline; by default `antdrive accept`
         folder: where to write log and pictures if the test fails; None: nowhere
-        films: when to make a film
+        results: of which tests a film is made; None: nothing is written
 
     Raises:
         InputError: the baseline is wrong, or it or the folder cannot be written.
@@ -185,12 +199,7 @@ def check_run(
         judgement, accepted = _without_baseline(run, demands, path, name, accept, update)
     else:
         judgement = judge(run, demands, baseline)
-    files: dict[str, str] = {}
-    if folder is not None:
-        remove_artefacts(folder)
-        if not judgement.passed or films == "always":
-            wanted = films != "never"
-            files = write_artefacts(run, folder, baseline, film=wanted, faults=judgement.faults, commands=commands)
+    files, unfilmed = _written(run, judgement, baseline, folder, results, commands)
     details = () if judgement.passed else tuple(explain(run, dataclasses.replace(judgement, faults=()), baseline))
     return CheckResult(
         address=address,
@@ -203,10 +212,31 @@ def check_run(
         accepted=accepted,
         commands=commands,
         files=files,
+        unfilmed=unfilmed,
         metrics=run.metrics if run.rollout is not None else {},
         digest=run.rollout.drive_digest if run.rollout is not None else "",
         wall_s=_wall(run) + time.perf_counter() - started,
     )
+
+
+def _written(
+    run: Run,
+    judgement: Judgement,
+    baseline: Baseline | None,
+    folder: Path | None,
+    results: Results | None,
+    commands: Sequence[str],
+) -> tuple[dict[str, str], bool]:
+    """What was written about a test, by name, and whether it failed and only its film is missing."""
+    if folder is None or results is None:
+        return {}, False
+    remove_artefacts(folder)
+    failed, drove = not judgement.passed, run.rollout is not None
+    filmed = drove and results.takes_film(failed=failed)
+    if not (failed or results.films == "always"):
+        return {}, False
+    files = write_artefacts(run, folder, baseline, film=filmed, faults=judgement.faults, commands=commands)
+    return files, drove and results.films == "failed" and not filmed
 
 
 def _own_baseline(path: Path, name: str) -> Baseline | None:

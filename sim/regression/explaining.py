@@ -58,6 +58,9 @@ def changes(run: Run, baseline: Baseline) -> Iterator[str]:
     if hashes and baseline.hashes:
         changed = [name for name in hashes if hashes[name] != baseline.hashes.get(name)]
         yield f"changed since the baseline: {', '.join(changed)}" if changed else UNCHANGED
+    chosen = run.scenario.chosen
+    if chosen is not None and baseline.margin_m is not None and chosen.margin != baseline.margin_m:
+        yield f"margin: auto chose {chosen.margin:g} m, for the baseline {baseline.margin_m:g} m"
     present: Mapping[str, str] = run.rollout.record.versions if run.rollout else versions()
     others = [
         f"{name} {baseline.versions.get(name, 'none')} -> {version}"

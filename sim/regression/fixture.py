@@ -115,7 +115,7 @@ class DriveFixture:
             commands=(shlex.join(["pytest", self._address]),),
             accept=shlex.join(["pytest", self._address, "--drive-update"]),
             folder=self._results.of(self._file.stem, whole) if self._results else None,
-            films=self._results.films if self._results else "never",
+            results=self._results,
         )
         self._report(result)
         if not result.passed:

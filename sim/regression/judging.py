@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from antdrive.sim.log.metrics import METRICS
+from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import Run
 from antdrive.sim.regression.baseline import WALL_CLOCK, Baseline
@@ -62,7 +63,10 @@ def judge(run: Run, demands: Demands, baseline: Baseline | None) -> Judgement:
     gains: list[str] = []
     if baseline is not None:
         verdict = _verdict(run, baseline)
-        (gains if verdict and run.succeeded else faults).extend(verdict)
+        if run.succeeded:
+            gains.extend(verdict)
+        elif not _was_as_demanded(demands, baseline) or _as_demanded(run, demands):  # else it is among the faults
+            faults.extend(verdict)
         if run.rollout is not None and baseline.line and run.outcome is baseline.outcome:
             for name in (*FIRST, *(name for name in METRICS if name not in FIRST)):
                 _compare(name, run.rollout, baseline, demands, faults, gains)
@@ -106,6 +110,22 @@ def _verdict(run: Run, baseline: Baseline) -> list[str]:
         if certified
         else f"certificate: not {words}, in the baseline it was"
     ]
+
+
+def _as_demanded(run: Run, demands: Demands) -> bool:
+    """Whether outcome and certificate of a run are those that its test demands."""
+    certified = run.certificate is not None and run.certificate.certified
+    return _demanded(run.outcome, certified, demands)
+
+
+def _was_as_demanded(demands: Demands, baseline: Baseline) -> bool:
+    """Whether outcome and certificate of the earlier drive are those that the test demands now."""
+    return _demanded(baseline.outcome, baseline.certified, demands)
+
+
+def _demanded(outcome: Outcome, certified: bool, demands: Demands) -> bool:
+    wanted = True if demands.must_be_certified else demands.certified
+    return outcome is demands.outcome and wanted in (None, certified)
 
 
 def _compare(

@@ -22,6 +22,8 @@ from antdrive.worlds.files.world_file import list_worlds
 
 #: Where a planner comes from: a key of the mapping, beside its options.
 SOURCES = ("module", "file")
+#: What the names of modules begin with that were loaded from a file.
+FROM_FILE = "_antdrive_suite_"
 
 
 def check_names(case: SuiteCase) -> None:
@@ -135,7 +137,7 @@ def _from_file(case: SuiteCase, source: str) -> ModuleType:
 
 @functools.lru_cache(maxsize=64)
 def _loaded(path: Path, mtime: int) -> ModuleType:
-    name = f"_antdrive_suite_{path.stem}_{abs(hash(path)):x}"
+    name = f"{FROM_FILE}{path.stem}_{abs(hash(path)):x}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
         raise ImportError("is not a Python file")

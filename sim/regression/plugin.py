@@ -22,6 +22,8 @@ SUFFIX = ".drive.yaml"
 WORKER_KEY = "antdrive_unused"  # under which a process of xdist hands over the baselines that no test uses
 
 _DROVE = pytest.StashKey[list[Any]]()  # the results of a test's drives
+FILMS_KEY = "antdrive_films"  # under which a process of xdist is told where films are counted
+_PLACES = pytest.StashKey[str]()  # the folder in which films of failed drives are counted
 _UNUSED = pytest.StashKey[set[str]]()  # the baselines that no test uses
 _TOLD = pytest.StashKey[list[Any]]()  # the properties of reports that tell of drives
 
@@ -159,7 +161,31 @@ def results_of(config: pytest.Config) -> Results:
 
     given = config.getoption("drive_results")
     folder = config.invocation_params.dir / given if given else default_folder(config.rootpath)
-    return Results(folder, config.getoption("drive_film"))
+    return Results(folder, config.getoption("drive_film"), Path(places_of(config)))
+
+
+def places_of(config: pytest.Config) -> str:
+    """The folder in which all processes of this run of pytest count the films of failed drives."""
+    if _PLACES not in config.stash:
+        import tempfile
+
+        told = getattr(config, "workerinput", {}).get(FILMS_KEY)
+        config.stash[_PLACES] = told or tempfile.mkdtemp(prefix="antdrive-films-")
+    return config.stash[_PLACES]
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_configure_node(node: Any) -> None:
+    """Tell a process of xdist where films are counted."""
+    node.workerinput[FILMS_KEY] = places_of(node.config)
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Remove the folder in which films were counted."""
+    if _PLACES in config.stash and not hasattr(config, "workerinput"):
+        import shutil
+
+        shutil.rmtree(config.stash[_PLACES], ignore_errors=True)
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import math
 import shlex
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, get_args
 
@@ -21,15 +21,19 @@ from antdrive.worlds.errors import FieldError, InputError
 from antdrive.worlds.files.checks import show, suggest
 
 
-def scenario_of(case: SuiteCase) -> Scenario:
+def scenario_of(case: SuiteCase, choose: Callable[[Scenario], Scenario] = Scenario.with_chosen_margin) -> Scenario:
     """The scenario of a suite's test.
 
     Worlds and robots are read once per process.
 
+    Args:
+        case: the test
+        choose: chooses the margin where the suite says auto
+
     Raises:
         InputError: something that the suite names is missing or wrong; the message has the suite's file, line and key.
     """
-    entry = case.entry
+    entry, auto = case.entry, case.entry.margin == "auto"
     planner, name = planner_of(case)
     task = _with_ends(case, task_of(case))
     try:
@@ -37,23 +41,23 @@ def scenario_of(case: SuiteCase) -> Scenario:
             task,
             planner,
             robot_of(case),
-            margin=entry.margin,
+            margin=0.0 if auto else entry.margin,
             cell=entry.cell,
             smoothing=entry.smoothing,
             seed=case.seed,
             controller=_settings(case, "controller", PurePursuit(), entry.controller),
             noise=entry.noise,
             perception=_perception(case),
-            avoidance=None if entry.avoid is False else _settings(case, "avoid", Avoidance(), entry.avoid),
+            avoidance=None if entry.avoid in (False, "none") else _settings(case, "avoid", Avoidance(), entry.avoid),
             replanning=_replanning(case),
             unseen=tuple(Disc(disc.x, disc.y, disc.radius, disc.height) for disc in entry.unseen),
             time_limit=entry.time_limit,
             physics_hz=entry.physics_hz,
             control_hz=entry.control_hz,
         )
+        return dataclasses.replace(choose(scenario) if auto else scenario, planner_name=name)
     except FieldError as error:
         raise case.error(error.key, error.problem) from None
-    return dataclasses.replace(scenario, planner_name=name)
 
 
 def task_of(case: SuiteCase) -> Task:
@@ -91,7 +95,7 @@ def robot_of(case: SuiteCase) -> RobotSpec:
 def run_command(case: SuiteCase) -> str | None:
     """The `antdrive run` command that drives a test's scenario alone; None where only `antdrive check` can."""
     entry = case.entry
-    plain = all(isinstance(value, bool) for value in (entry.avoid, entry.replan))
+    plain = isinstance(entry.replan, bool) and not isinstance(entry.avoid, dict)
     planner = {"name": entry.planner} if isinstance(entry.planner, str) else dict(entry.planner)
     usual = entry.physics_hz == 240 and entry.control_hz == 60 and entry.start is None and entry.goal is None
     flat = all(disc.height == 1.0 for disc in entry.unseen)
@@ -106,7 +110,7 @@ def run_command(case: SuiteCase) -> str | None:
         if key in entry.model_fields_set and getattr(entry, key) is not None:
             words += [f"--{key.replace('_', '-')}", _option_text(getattr(entry, key))]
     words += [word for disc in entry.unseen for word in ("--unseen", f"{disc.x},{disc.y},{disc.radius}")]
-    words += [f"--no-{key}" for key in ("avoid", "replan") if getattr(entry, key) is False]
+    words += [f"--no-{key}" for key in ("avoid", "replan") if getattr(entry, key) in (False, "none")]
     return before + shlex.join(words)
 
 
@@ -181,8 +185,10 @@ def _settings(case: SuiteCase, key: str, default: Any, values: Any) -> Any:
         raise case.error(f"{key}.{wrong}" if wrong else key, "must be a number") from None
 
 
-def _replanning(case: SuiteCase) -> ReplanPolicy:
+def _replanning(case: SuiteCase) -> ReplanPolicy | None:
     replan = case.entry.replan
+    if replan == "none":
+        return None
     policy: ReplanPolicy = _settings(case, "replan", ReplanPolicy(), replan)
     return dataclasses.replace(policy, around_movers=False) if replan is False else policy
 

@@ -7,6 +7,7 @@ import os
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, PlainValidator, WithJsonSchema
@@ -23,6 +24,10 @@ SUFFIX = ".drive.yaml"
 MAX_CASES = 100_000  # scenarios times seeds of one suite
 BASELINES = "baselines"  # the folder beside a suite
 
+#: What Python calls some keys, and what people may take for one.
+_SYNONYMS = MappingProxyType(
+    {"avoidance": "avoid", "replanning": "replan", "perception": "sees", "seed": "seeds", "options": "planner"}
+)
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")
 _SEEDS = re.compile(r"(\d{1,18})-(\d{1,18})")
 _RULES = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
@@ -41,8 +46,8 @@ def _margin(value: Any) -> Any:
 
 
 def _switch(value: Any) -> Any:
-    if not isinstance(value, bool | dict):
-        raise ValueError(f"must be true, false or a mapping of settings, got {show(value)}")
+    if not isinstance(value, bool | dict) and value != "none":
+        raise ValueError(f"must be true, false, none or a mapping of settings, got {show(value)}")
     return value
 
 
@@ -67,7 +72,7 @@ def _anything(value: Any) -> Any:
 
 _MAPPING: dict[str, Any] = {"type": "object"}
 _NAME_OR_MAPPING: dict[str, Any] = {"anyOf": [{"type": "string"}, _MAPPING]}
-_SWITCH_SCHEMA: dict[str, Any] = {"anyOf": [{"type": "boolean"}, _MAPPING]}
+_SWITCH_SCHEMA: dict[str, Any] = {"anyOf": [{"type": "boolean"}, {"const": "none"}, _MAPPING]}
 _SEEDS_SCHEMA: dict[str, Any] = {
     "anyOf": [
         {"type": "array", "items": {"type": "integer", "minimum": 0}, "minItems": 1, "uniqueItems": True},
@@ -109,16 +114,25 @@ class ScenarioEntry(BaseModel):
     )
     controller: dict[str, float] = Field({}, description="settings of the controller, such as {lookahead_time: 0.5}")
     smoothing: str = Field("clearance", description="none, taut or clearance")
-    margin: MarginValue = Field(0.03, description="distance that plans keep beyond the robot's radius [m], or auto")
+    margin: MarginValue = Field(
+        0.03,
+        description="distance that plans keep beyond the robot's radius [m], or auto: the least that robot, noise and "
+        "smoothing are predicted to need",
+    )
     cell: float | None = Field(None, gt=0, description="grid resolution [m]; by default the world's")
     noise: float = Field(0.0, ge=0, description="factor on the noise that the robot's file documents")
     unseen: list[DiscEntry] = Field(
         [], description="cylinders {x, y, radius} that neither planner nor controller knows of"
     )
     sees: str = Field("velocities", description="what the robot perceives of movers: KIND or KIND:METRES")
-    avoid: Switch = Field(True, description="whether the robot avoids movers, or settings such as {horizon: 2.0}")
+    avoid: Switch = Field(
+        True,
+        description="how the robot avoids movers: true, false or none (not at all), or settings such as {horizon: 2.0}",
+    )
     replan: Switch = Field(
-        True, description="whether the robot replans around movers, or settings such as {patience: 10}"
+        True,
+        description="when the robot replans among movers: true, false (only after it has strayed from its route), none "
+        "(never), or settings such as {patience: 10}",
     )
     time_limit: float | None = Field(None, gt=0, description="simulated time allowed [s]")
     physics_hz: int = Field(240, ge=1, description="physics steps per simulated second")
@@ -227,6 +241,7 @@ def load_suite(path: str | os.PathLike[str]) -> tuple[SuiteCase, ...]:
 @functools.lru_cache(maxsize=64)
 def _load(path: Path, source: str, mtime: int, size: int) -> tuple[SuiteCase, ...]:
     document = read_document(source)
+    _refuse_synonyms(document)
     suite = check(SuiteFile, document)
     cases: list[SuiteCase] = []
     for name, entry in suite.scenarios.items():
@@ -238,6 +253,16 @@ def _load(path: Path, source: str, mtime: int, size: int) -> tuple[SuiteCase, ..
         if len(cases) > MAX_CASES:
             raise document.error(("scenarios", name), f"scenarios times seeds must be at most {MAX_CASES}")
     return tuple(cases)
+
+
+def _refuse_synonyms(document: Document) -> None:
+    """Refuse keys that are called otherwise in a suite, where the likeness of the words would not tell which is meant."""
+    for location in document.lines:
+        scenario = location[:1] == ("defaults",) and len(location) == 2
+        if (scenario or (location[:1] == ("scenarios",) and len(location) == 3)) and location[-1] in _SYNONYMS:
+            key = _SYNONYMS[str(location[-1])]
+            hint = ScenarioEntry.model_fields[key].description
+            raise document.error(location, f"unknown key; write {key}: {hint}")
 
 
 def _cases(path: Path, document: Document, name: str, defaults: ScenarioEntry, entry: ScenarioEntry) -> list[SuiteCase]:

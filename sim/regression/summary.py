@@ -31,6 +31,7 @@ def properties(result: CheckResult) -> list[tuple[str, str]]:
         "baseline": result.accepted,
         "results": str(Path(next(iter(result.files.values()))).parent) if result.files else "",
         "command": result.commands[0] if result.commands else "",
+        "film": "none" if result.unfilmed else "",
     }
     return [(f"drive.{key}", text) for key, text in facts.items() if text]
 
@@ -71,8 +72,21 @@ def lines(drives: Sequence[Mapping[str, str]], unused: Sequence[str], strict: bo
             yield f"better than its baseline: {drive['test']} ({drive['gains']}); --drive-update renews it"
         if drive.get("results") and drive["passed"] == "false":
             yield f"results: {drive['results']}"
+    unfilmed = sum(drive.get("film") == "none" for drive in drives)
+    if unfilmed:
+        yield films_left_out(unfilmed, "--drive-film always")
     for path in unused:
         yield f"{'FAILED: ' if strict else ''}unused baseline: {path}; remove it"
+
+
+def films_left_out(count: int, option: str) -> str:
+    """That failed drives have no film, because a run makes no more than a few, and what makes them.
+
+    Args:
+        count: of failed drives without a film
+        option: that films all
+    """
+    return f"{count} more failed drives have no film; the command that repeats a drive makes it, {option} makes all"
 
 
 def markdown(drives: Sequence[Mapping[str, str]], unused: Sequence[str]) -> str:

@@ -1,14 +1,19 @@
 """Machine code of kernels is kept where it can be, and damaged entries are compiled again."""
 
+import contextlib
+import itertools
 import os
 import shutil
 import subprocess
 import sys
+import threading
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from antdrive.worlds import kernel_cache
+from antdrive.worlds._kernels_compiler import _Entries
 
 MEASURE = (
     "from antdrive.worlds import Disc, World, point_clearance\n"
@@ -34,11 +39,10 @@ def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize(
     "damage", [b"", b"\x80", b"nonsense", None], ids=["empty", "cut short", "nonsense", "another class"]
 )
-@pytest.mark.parametrize("suffix", ["*.nbi", "*.nbc"])
-def test_a_damaged_entry_is_compiled_again(filled: Path, tmp_path: Path, suffix: str, damage: bytes | None) -> None:
+def test_a_damaged_entry_is_compiled_again(filled: Path, tmp_path: Path, damage: bytes | None) -> None:
     shutil.copytree(filled, tmp_path, dirs_exist_ok=True)
     first = measure()
-    entries = list(tmp_path.rglob(suffix))
+    entries = list(tmp_path.rglob("*.nbc"))
     assert first.returncode == 0, first.stderr
     assert entries
     for entry in entries:
@@ -53,6 +57,78 @@ def test_an_entry_is_used_again(tmp_path: Path) -> None:
     measure(NUMBA_CACHE_DIR=str(tmp_path))
     assert before
     assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.nb*")} == before
+
+
+def entries(folder: Path, stamp: str) -> _Entries:
+    return _Entries(str(folder), "_kernels.f-1.py311", stamp)
+
+
+def test_an_entry_is_that_of_its_types_and_sources_whatever_is_interrupted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two processes write, and each of them is killed before each of its renames in turn: no entry stands for another one."""
+    replace = os.replace
+    written = [("old", "int", 1), ("new", "float", 2), ("new", "int", 3), ("newer", "int", 4)]
+    for killed in range(len(written) + 1):
+        folder = tmp_path / str(killed)
+        folder.mkdir()
+        count = iter(range(100))
+
+        def renamed(source: str, target: str, count: Iterator[int] = count, killed: int = killed) -> None:
+            if next(count) == killed:
+                raise KeyboardInterrupt
+            replace(source, target)
+
+        monkeypatch.setattr(os, "replace", renamed)
+        for stamp, types, code in written:
+            with contextlib.suppress(KeyboardInterrupt):
+                entries(folder, stamp).save(types, code)
+            for other, key, right in written:
+                assert entries(folder, other).load(key) in (None, right)
+        assert entries(folder, "newer").load("int") == (None if killed == 3 else 4)
+        if killed == 4:
+            assert [entries(folder, stamp).load(types) for stamp, types, _ in written[:3]] == [None] * 3, (
+                "older sources"
+            )
+
+
+@pytest.mark.parametrize("order", sorted(set(itertools.permutations(["int", "int", "float", "float"]))))
+def test_two_processes_that_compile_at_once_keep_both_entries(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, order: tuple[str, ...]
+) -> None:
+    """Both have looked into the folder before either writes; then they rename their files in every order.
+
+    Threads stand for the processes.
+    """
+    codes, replace = {"int": 1, "float": 2}, os.replace
+    turns, changed, begun = list(order), threading.Condition(), threading.Barrier(2, timeout=60)
+    begins = threading.local()
+
+    def renamed(source: str, target: str) -> None:
+        name = threading.current_thread().name
+        if not hasattr(begins, "once"):
+            begins.once = begun.wait()
+        with changed:
+            assert changed.wait_for(lambda: turns[0] == name, timeout=60)
+            replace(source, target)
+            turns.pop(0)
+            changed.notify_all()
+
+    def save(types: str) -> None:
+        entries(tmp_path, "s").save(types, codes[types])
+        with changed:
+            turns[:] = [turn for turn in turns if turn != types]
+            changed.notify_all()
+
+    monkeypatch.setattr(os, "replace", renamed)
+    threads = [threading.Thread(target=save, args=(types,), name=types) for types in codes]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert {types: entries(tmp_path, "s").load(types) for types in codes} == codes
+    entries(tmp_path, "s").flush()
+    assert {entries(tmp_path, "s").load(types) for types in codes} == {None}
 
 
 def test_the_first_folder_that_can_be_written_is_chosen(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -1,5 +1,7 @@
 """`antdrive falsify`."""
 
+import contextlib
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,7 +12,7 @@ from antdrive.sim.cli.compiling import compile_once
 from antdrive.sim.cli.console import bar, print_json, print_line, print_table
 from antdrive.sim.cli.exits import FAILED, SUCCEEDED
 from antdrive.sim.cli.scenario import make_scenario
-from antdrive.sim.cli.write import check_folder, write_film
+from antdrive.sim.cli.write import RUN_FILES, check_folder, write_film, write_result, write_run
 
 if TYPE_CHECKING:
     from antdrive.sim.falsify.hunt import Hunt
@@ -26,7 +28,7 @@ Seconds = Annotated[
     float,
     typer.Option("--shrink", min=0.0, max=1e6, metavar="SECONDS", help="Time to shrink each failure [s]; 0: none."),
 ]
-Film = Annotated[bool, typer.Option("--film/--no-film", help="Film each failure.")]
+Film = Annotated[bool, typer.Option("--film/--no-film", help="Film and draw each failure.")]
 Seed = Annotated[
     int,
     typer.Option(
@@ -76,23 +78,34 @@ def falsify(
     if json:
         print_json(_facts(setup, hunt, reported, {"budget": budget, "seed": seed, "method": method}, folder))
     else:
-        _print(hunt, reported, folder)
+        _print(hunt, reported, folder, film)
     return FAILED if hunt.findings else SUCCEEDED
 
 
 def _report(hunt: "Hunt", folder: Path, seconds: float, film: bool) -> "list[Reported]":
     """Shrink, repeat and write every failure that differs from the others."""
-    from antdrive.sim.falsify.report import report, write_report
+    from antdrive.sim.falsify.report import SUITE, report
 
     if not hunt.findings:
         return []
     with bar("shrinking") as progress:
         reported = report(hunt, folder, seconds=seconds, progress=progress)
-    write_report(reported, folder)
-    for one in reported if film else ():
-        if one.run.rollout is not None:
-            write_film(one.run.rollout, folder / f"{one.name}.mp4")
+    _forget(folder)
+    for one in reported:
+        files = write_run(one.run, folder / one.name, figures=film)
+        if film and one.run.rollout is not None:
+            files["film"] = write_film(one.run.rollout, folder / one.name / "film.mp4")["file"]
+        write_result(one.run, files, shlex.join(["antdrive", "check", f"{folder / SUITE}::{one.name}"]))
     return reported
+
+
+def _forget(folder: Path) -> None:
+    """Remove what an earlier search left in a folder, which would contradict this one."""
+    for place in folder.glob("failure-*/"):
+        for name in (*RUN_FILES, "film.mp4"):
+            (place / name).unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # it holds something else
+            place.rmdir()
 
 
 def _facts(
@@ -111,7 +124,9 @@ def _facts(
     }
 
 
-def _print(hunt: "Hunt", reported: "list[Reported]", folder: Path) -> None:
+def _print(hunt: "Hunt", reported: "list[Reported]", folder: Path, filmed: bool) -> None:
+    from antdrive.sim.falsify.report import SUITE
+
     ended = "interrupted after" if hunt.interrupted else "after"
     print_line(f"{ended} {hunt.runs} runs: {len(hunt.findings)} failures, {len(hunt.distinct)} of them different")
     if reported:
@@ -128,4 +143,7 @@ def _print(hunt: "Hunt", reported: "list[Reported]", folder: Path) -> None:
                 for one in reported
             ),
         )
-        print_line(f"the failures as a suite, with worlds and films: {folder}")
+        words = "with worlds, logs and films" if filmed else "with worlds and logs"
+        print_line(f"the failures as a suite, {words}: {folder}")
+        print_line(f"repeat: {shlex.join(['antdrive', 'check', str(folder / SUITE)])}")
+        print_line(f"a page: {shlex.join(['antdrive', 'report', str(folder), '-o', str(folder / 'report.html')])}")

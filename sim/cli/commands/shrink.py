@@ -10,12 +10,13 @@ from antdrive.sim.cli import options
 from antdrive.sim.cli.compiling import compile_once
 from antdrive.sim.cli.console import print_files, print_json, print_line, working
 from antdrive.sim.cli.exits import FAILED, SUCCEEDED
-from antdrive.sim.cli.write import check_folder, file_name, this_command, write_film, write_result, write_run
+from antdrive.sim.cli.write import check_folder, this_command, write_film, write_result, write_run
 from antdrive.worlds.errors import InputError
 
 if TYPE_CHECKING:
+    from antdrive.sim.falsify.handover import Handover
     from antdrive.sim.falsify.shrink import Shrunk
-    from antdrive.sim.regression.demands import Bound
+    from antdrive.sim.regression.suite import SuiteCase
     from antdrive.sim.scenario import Scenario
 
 While = Annotated[
@@ -53,18 +54,23 @@ def shrink(
     a film. Exit code 0: the result fails in the same way, in another process too.
     """
     from antdrive.sim.falsify.failure import parse_bound
+    from antdrive.sim.falsify.handover import Handover, scenario_name
     from antdrive.sim.falsify.shrink import shrink as make_small
+    from antdrive.sim.pipeline import run
 
     crossed = None if bound is None else parse_bound(bound)
-    scenario = _of_a_test(failure) if "::" in failure else _of_a_log(failure)
-    name = f"{file_name(scenario.task.world.name)}-small"
+    scenario, case = _of_a_test(failure) if "::" in failure else (_of_a_log(failure), None)
+    name = f"{scenario_name(scenario.task.world.name)}-small"
     folder = out or Path("out") / name
     check_folder(folder)
     compile_once()
     with working("shrinking") as progress:
         journal = folder / "journal.json"
         shrunk = make_small(scenario, bound=crossed, seconds=seconds, journal=journal, jobs=jobs, progress=progress)
-    report, repeats = _write(shrunk, crossed, name, folder, film, figures)
+    note = f"shrunk from {scenario.task.world.name}: {shrunk.summary}"
+    small = run(named(shrunk.scenario, name, note))
+    handover = Handover(name, small, crossed, shrunk.failure.sentence, _planner_beside(case, folder))
+    report, repeats = _write(shrunk, handover, folder, film, figures)
     if json:
         print_json(report)
     else:
@@ -72,15 +78,16 @@ def shrink(
     return SUCCEEDED if repeats else FAILED
 
 
-def _of_a_test(words: str) -> "Scenario":
-    """The scenario of a suite's test."""
+def _of_a_test(words: str) -> "tuple[Scenario, SuiteCase]":
+    """A suite's test and its scenario."""
+    from antdrive.sim.cli.calibrating import with_chosen_margin
     from antdrive.sim.regression.scenarios import scenario_of
     from antdrive.sim.regression.selecting import select
 
     cases = select([words])
     if len(cases) > 1:
         raise InputError(f"{words}: name one of {', '.join(case.address for case in cases[:5])}")
-    return scenario_of(cases[0])
+    return scenario_of(cases[0], with_chosen_margin), cases[0]
 
 
 def _of_a_log(words: str) -> "Scenario":
@@ -95,20 +102,31 @@ def _of_a_log(words: str) -> "Scenario":
         raise error if str(error).startswith(words) else input_error(words, str(error)) from None
 
 
-def _write(
-    shrunk: "Shrunk", bound: "Bound | None", name: str, folder: Path, film: bool, figures: bool
-) -> tuple[dict[str, Any], bool]:
-    """Write everything about a small failure; the report, and whether another process gives the same run."""
-    from antdrive.sim.falsify.failure import failure_of
-    from antdrive.sim.falsify.handover import Handover, fingerprint_of, run_elsewhere, write_suite
-    from antdrive.sim.pipeline import run
+def _planner_beside(case: "SuiteCase | None", folder: Path) -> dict[str, Any] | None:
+    """A test's planner that is not registered, in the words of a suite in another folder; None for all others."""
+    import os
 
-    note = f"shrunk from {shrunk.original.task.world.name}: {shrunk.summary}"
-    small = named(shrunk.scenario, name, note)
-    result = run(small)
-    repeats = failure_of(result, bound) == shrunk.failure and run_elsewhere([small]) == [fingerprint_of(result)]
+    given = case.entry.planner if case is not None else None
+    if case is None or not isinstance(given, dict) or not {"file", "module"} & given.keys():
+        return None
+    if "file" not in given:
+        return given
+    return {**given, "file": os.path.relpath(case.suite.parent / given["file"], folder)}
+
+
+def _write(
+    shrunk: "Shrunk", handover: "Handover", folder: Path, film: bool, figures: bool
+) -> tuple[dict[str, Any], bool]:
+    """Write everything about a small failure; the report, and whether the written suite gives the same run elsewhere."""
+    from antdrive.sim.falsify.failure import failure_of
+    from antdrive.sim.falsify.handover import fingerprint_of, suite_elsewhere, write_suite
+
+    name, result = handover.name, handover.run
     files = write_run(result, folder, figures=figures)
-    suite = write_suite(folder / f"{name}.drive.yaml", [Handover(name, result, bound, shrunk.failure.sentence)])
+    suite = write_suite(folder / f"{name}.drive.yaml", [handover])
+    repeats = failure_of(result, handover.bound) == shrunk.failure and suite_elsewhere(suite) == [
+        fingerprint_of(result)
+    ]
     files |= {"suite": str(suite), "world": str(folder / "worlds" / f"{name}.yaml")}
     if film and result.rollout is not None:
         files["film"] = write_film(result.rollout, folder / f"{name}.mp4")["file"]

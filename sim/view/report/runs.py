@@ -242,6 +242,12 @@ class ReportedRun:
         return self.log.settings if self.log else self.result
 
     @property
+    def faults(self) -> list[str]:
+        """Why the test failed that drove the run, as result.json claims it, a sentence each; empty where no test did."""
+        claimed = self.result.get("faults")
+        return [shown(text, LONGEST_COMMAND) for text in claimed] if isinstance(claimed, list) else []
+
+    @property
     def verdict(self) -> str:
         """The certificate as a sentence."""
         if self.log is None:

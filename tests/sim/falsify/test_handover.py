@@ -10,7 +10,15 @@ import yaml
 from antdrive.planners import load_planner
 from antdrive.robots import Avoidance, PurePursuit
 from antdrive.sim import Certificate, Perception, ReplanPolicy, Run, Scenario
-from antdrive.sim.falsify.handover import Handover, expectation, fingerprint_of, run_elsewhere, write_suite
+from antdrive.sim.falsify.handover import (
+    Handover,
+    expectation,
+    fingerprint_of,
+    run_elsewhere,
+    scenario_name,
+    suite_elsewhere,
+    write_suite,
+)
 from antdrive.sim.regression.checking import check_case
 from antdrive.sim.regression.demands import Bound
 from antdrive.sim.regression.scenarios import scenario_of
@@ -27,6 +35,7 @@ SCENARIOS: dict[str, dict[str, Any]] = {
 MOVERS: dict[str, dict[str, Any]] = {
     "sees": {"perception": Perception(kind="positions", range=1 / 3)},
     "blind": {"avoidance": None, "replanning": ReplanPolicy(around_movers=False)},
+    "steadfast": {"replanning": None},
     "careful": {"avoidance": Avoidance(horizon=2.0), "replanning": ReplanPolicy(patience=5.0)},
 }
 
@@ -55,14 +64,13 @@ def test_a_robot_of_ones_own_is_written_beside_the_suite(
 def test_the_suite_holds_as_long_as_the_failure_repeats(collided_run: Run, tmp_path: Path) -> None:
     suite = write_suite(tmp_path / "s.drive.yaml", [Handover("hit", collided_run, note="as it was")])
     (case,) = load_suite(suite)
-    assert check_case(case).passed
+    assert check_case(case).faults == ()
     mended = yaml.safe_load(suite.read_text())
     del mended["scenarios"]["hit"]["unseen"]
     suite.write_text(yaml.safe_dump(mended))
     (case,) = load_suite(suite)
     result = check_case(case)
-    assert not result.passed
-    assert "collided" in result.message
+    assert result.faults == ("outcome: succeeded, expected collided",), "and nothing about a missing baseline"
 
 
 def test_what_is_expected_of_a_success_that_fails_otherwise(small_run: Run) -> None:
@@ -80,3 +88,23 @@ def test_another_process_gives_the_same_bits(small_run: Run) -> None:
     assert run_elsewhere([small_run.scenario]) == [fingerprint_of(small_run)]
     changed = replace(small_run.scenario, margin=0.031)
     assert run_elsewhere([changed]) != [fingerprint_of(small_run)]
+
+
+def test_what_was_written_is_what_another_process_runs(small_run: Run, tmp_path: Path) -> None:
+    suite = write_suite(tmp_path / "s.drive.yaml", [Handover("one", small_run), Handover("two", small_run)])
+    assert suite_elsewhere(suite) == [fingerprint_of(small_run)] * 2
+    world = tmp_path / "worlds" / "two.yaml"
+    world.write_text(world.read_text().replace("radius: 0.3", "radius: 0.31"))
+    one, two = suite_elsewhere(suite)
+    assert one == fingerprint_of(small_run) != two
+    world.unlink()
+    assert "scenarios.two.world: worlds/two.yaml: no such file" in suite_elsewhere(suite)[1]
+
+
+@pytest.mark.parametrize(
+    ("text", "name"), [("a b", "a_b"), ("__hidden", "hidden"), ("ä/é", "failure"), ("x" * 200, "x" * 90)]
+)
+def test_a_scenario_has_a_name_that_suites_take(small_run: Run, tmp_path: Path, text: str, name: str) -> None:
+    assert scenario_name(text) == name
+    suite = write_suite(tmp_path / "s.drive.yaml", [Handover(f"{scenario_name(text)}-small", small_run)])
+    assert [case.name for case in load_suite(suite)] == [f"{name}-small"]

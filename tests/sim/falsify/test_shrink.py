@@ -11,7 +11,8 @@ from antdrive.sim import Scenario, run
 from antdrive.sim.falsify import passes
 from antdrive.sim.falsify.failure import Failure, failure_of, parse_bound
 from antdrive.sim.falsify.shrink import Shrunk, shrink
-from antdrive.sim.falsify.trials import Trials, changeable
+from antdrive.sim.falsify.space import feasible
+from antdrive.sim.falsify.trials import Trials, changeable, room_in
 from antdrive.worlds import Cruising, Disc, InputError, Task, World
 
 SIDE = 6.0
@@ -83,6 +84,7 @@ def test_a_contact_with_an_unseen_cylinder_keeps_that_cylinder_alone(struck: Sce
     small = shrunk.scenario
     assert (len(small.unseen), len(small.task.world.obstacles), small.noise, small.seed) == (1, 0, 0.0, 0)
     assert small.task.start[0] > struck.task.start[0]
+    assert feasible(small.task, small.inflate)
 
 
 def test_the_mover_that_was_touched_is_kept_alone(small_scenario: Scenario) -> None:
@@ -187,3 +189,51 @@ def test_every_accepted_step_fails_in_the_same_way(struck: Scenario, monkeypatch
     shrunk = shrink(struck)
     assert len(accepted) > 3
     assert {failure_of(run(step)) for step in accepted} == {shrunk.failure}
+
+
+def test_a_moved_wall_cuts_no_cylinder_that_was_whole(small_scenario: Scenario) -> None:
+    """Each wall is moved to everywhere from outside a cylinder to beyond it; another one was cut from the start."""
+    whole, cut = Disc(3.0, 3.0, 0.5), Disc(0.1, 3.0, 0.3)
+    task = Task(World("w", (0.0, 0.0, 6.0, 6.0), (whole, cut)), (1.0, 1.0, 0.0), (5.0, 5.0), cell=0.25)
+    hidden = Disc(3.0, 4.5, 0.5)
+    scenario = replace(small_scenario, task=task, unseen=(hidden,))
+    for side, sign in ((0, 1), (1, 1), (2, -1), (3, -1)):
+        for moved in np.arange(0.03, 5.0, 0.05):
+            limits = list(task.world.bounds)
+            limits[side] = round(limits[side] + sign * float(moved), 9)
+            bounds = (limits[0], limits[1], limits[2], limits[3])
+            smaller = passes._walled(scenario, side, bounds)
+            if smaller is None:  # a wall has passed the start or the goal, or the robot's footprint there
+                continue
+            xmin, ymin, xmax, ymax = smaller.task.world.bounds
+            for disc in (whole, hidden):
+                room = min(disc.x - xmin, xmax - disc.x, disc.y - ymin, ymax - disc.y)
+                assert (disc in smaller.task.world.obstacles + smaller.unseen) == (room >= disc.radius)
+            assert (cut in smaller.task.world.obstacles) == (cut.x + cut.radius >= xmin)
+
+
+def test_the_touched_cylinder_stays_whole_within_the_walls(small_scenario: Scenario) -> None:
+    """A contact beside the straight way to the goal, with a cylinder that reaches far aside."""
+    blind = Disc(3.0, 3.7, 0.75)
+    small = shrink(replace(small_scenario, task=task_with(), unseen=(blind,))).scenario
+    xmin, ymin, xmax, ymax = small.task.world.bounds
+    (disc,) = small.unseen
+    assert min(disc.x - xmin, xmax - disc.x, disc.y - ymin, ymax - disc.y) >= disc.radius
+    assert ymax < SIDE
+
+
+def test_a_world_that_has_a_path_keeps_one(struck: Scenario, fenced: Scenario) -> None:
+    """A cylinder beside the start is farther than the footprint reaches, and nearer than the clearance that is claimed."""
+    failure = Failure("collided", "unseen cylinder", "")
+    room = room_in(struck, failure)
+    assert room == struck.inflate
+    x, y, _ = struck.task.start
+    near = passes.with_obstacles(struck, [Disc(x, y + 0.5 + struck.inflate - 0.01, 0.5)])
+    assert near is not None
+    assert failure_of(run(near)) == failure
+    assert not feasible(near.task, struck.inflate)
+    assert Trials(failure).first([near]) is near
+    assert Trials(failure, room=room).first([near]) is None
+    no_path = Failure("no_path", "nothing", "")
+    assert room_in(fenced, no_path) is None
+    assert room_in(struck, no_path) == struck.inflate + struck.task.cell

@@ -6,8 +6,10 @@ import os
 import re
 import subprocess
 import sys
+import tempfile
 import xml.etree.ElementTree
 from pathlib import Path
+from types import SimpleNamespace
 
 import matplotlib.backends.backend_agg  # noqa: F401 - see below
 import numba
@@ -268,3 +270,29 @@ def test_collecting_loads_no_physics_and_no_compiler(project: pytest.Pytester) -
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_the_summary_says_which_failed_drives_have_no_film(
+    project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One film is allowed, and a file stands for it; the suite fails three times, for want of baselines."""
+
+    def film(rollout: object, path: Path, **_: object) -> SimpleNamespace:
+        path.write_text("a film")
+        return SimpleNamespace(path=path)
+
+    monkeypatch.setattr("antdrive.sim.view.film.video.film", film)
+    monkeypatch.setattr("antdrive.sim.regression.artefacts.MOST_FILMS", 1)
+    monkeypatch.setenv("PYTEST_ADDOPTS", "")
+    project.makefile(".drive.yaml", a=SUITE.replace("clear: {}", "clear: {seeds: [0, 1, 2]}"))
+    (project.path / "temporary").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(project.path / "temporary"))
+    done = project.runpytest(*PLUGIN, "--drive-results", "results", "-k", "clear")
+    done.assert_outcomes(failed=3, deselected=1)
+    assert [path.parent.name for path in (project.path / "results").rglob("film.mp4")] == ["clear-0"]
+    done.stdout.fnmatch_lines([
+        "film: */results/a/clear-0/film.mp4",
+        "film: none, because this run has made 10; antdrive check 'a.drive.yaml::clear[[]1[]]' makes it",
+        "2 more failed drives have no film; the command that repeats a drive makes it, --drive-film always makes all",
+    ])  # fmt: skip
+    assert not list((project.path / "temporary").glob("antdrive-films-*"))

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import inspect
+import json
 import re
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
 
 from antdrive import Disc, Outcome, Scenario
-from antdrive.sim.regression import SuiteCase, load_suite, scenario_of, select
+from antdrive.sim.calibration.prediction import Calibration
+from antdrive.sim.calibration.trial import Conditions
+from antdrive.sim.cli.commands.run import run as command
+from antdrive.sim.regression import Baseline, SuiteCase, check_case, load_suite, scenario_of, select
 from antdrive.sim.regression.scenarios import run_command
+from antdrive.sim.regression.suite import ScenarioEntry
 from antdrive.worlds.errors import InputError
 
 PLAIN = """schema: 1
@@ -61,6 +68,59 @@ def test_switches_turn_avoidance_and_replanning_off(tmp_path: Path) -> None:
     assert made.avoidance is None
     assert made.replanning is not None
     assert not made.replanning.around_movers
+    never = scenario_of(only(tmp_path, "world: empty, avoid: none, replan: none"))
+    assert (never.avoidance, never.replanning) == (None, None)
+
+
+def test_a_suite_can_express_every_setting_of_a_scenario() -> None:
+    """Each field of Scenario is that of a key; so is each option of `antdrive run` that is about the drive."""
+    keys = {
+        **{name: name for name in ScenarioEntry.model_fields},
+        "task": "world",
+        "avoidance": "avoid",
+        "replanning": "replan",
+        "perception": "sees",
+        "seed": "seeds",
+        "planner_name": "planner",
+        "calibration": "margin",
+    }
+    assert all(keys[field.name] in ScenarioEntry.model_fields for field in fields(Scenario))
+    about_files = {"settings", "out", "video", "prelude", "vector", "figures", "gui", "json"}
+    asked = set(inspect.signature(command).parameters) - about_files
+    assert {keys[name] for name in asked} <= set(ScenarioEntry.model_fields)
+
+
+def test_a_margin_is_chosen_once_and_named_by_the_baseline(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The calibration itself is put in place of its drives: what a suite does with it is the claim here."""
+    margins = iter((0.021, 0.034))
+
+    def choose(conditions: Conditions, **_: object) -> Calibration:
+        chosen.append(conditions)
+        margin = next(margins)
+        return Calibration(
+            margin=margin,
+            loss=margin - 0.01,
+            largest=0.01,
+            reserve=0.01,
+            probability=0.001,
+            drives=80,
+            key=conditions.key,
+        )
+
+    chosen: list[Conditions] = []
+    monkeypatch.setattr("antdrive.sim.scenario.choose_margin", choose)
+    case = only(tmp_path, "world: empty, planner: astar, noise: 0.5, smoothing: taut, margin: auto")
+    assert check_case(case, update="new").accepted == "written"
+    assert (chosen[0].noise, chosen[0].smoothing) == (0.5, "taut")
+    written = json.loads(case.baseline_path.read_text())
+    assert written["margin_m"] == 0.021
+    baseline = Baseline.load(case.baseline_path)
+    assert baseline is not None
+    assert baseline.to_text() == case.baseline_path.read_text()
+    again = check_case(
+        only(tmp_path, "world: empty, planner: astar, noise: 0.5, margin: auto, expect: {duration_s: '< 1'}")
+    )
+    assert "margin: auto chose 0.034 m, for the baseline 0.021 m" in again.details
 
 
 def test_scenarios_override_defaults_and_add_to_what_is_expected(tmp_path: Path) -> None:
@@ -135,7 +195,11 @@ def test_a_planner_of_ones_own_comes_from_a_file_or_a_module(tmp_path: Path, mon
         ("world: empty, smoothing: round", 3, "scenarios.one.smoothing: unknown 'round'; choose from none"),
         ("world: empty, sees: all", 3, "scenarios.one.sees: unknown kind 'all'; choose from positions"),
         ("world: empty, sees: 'positions:x'", 3, "scenarios.one.sees: write KIND or KIND:METRES"),
-        ("world: empty, avoid: 1", 3, "scenarios.one.avoid: must be true, false or a mapping of settings, got 1"),
+        ("world: empty, avoid: 1", 3, "scenarios.one.avoid: must be true, false, none or a mapping of settings, got 1"),
+        ("world: empty, replan: never", 3, 'scenarios.one.replan: must be true, false, none or a mapping of settings, got "n'),
+        ("world: empty, replanning: none", 3, "scenarios.one.replanning: unknown key; write replan: when the robot replans"),
+        ("world: empty, perception: positions", 3, "scenarios.one.perception: unknown key; write sees: what the robot"),
+        ("world: empty, seed: 3", 3, "scenarios.one.seed: unknown key; write seeds: one test for each"),
         ("world: empty, avoid: {horizn: 1}", 3, "scenarios.one.avoid.horizn: unknown setting; did you mean horizon?"),
         ("world: empty, replan: {patience: x}", 3, "scenarios.one.replan.patience: must be"),
         ("world: empty, controller: {speed: 1}", 3, "scenarios.one.controller.speed: unknown setting"),

@@ -14,6 +14,10 @@ CARELESS = ["-p", "astar", "-r", "jackal", "--margin", "0", "--noise", "6", "--s
 
 def test_failures_are_handed_over_as_a_suite(antdrive: Call) -> None:
     words = ["falsify", *CARELESS, "--budget", "2", "--seed", "3", "--method", "random", "--shrink", "0", "--no-film"]
+    for name in ("failure-9/result.json", "failure-9/film.mp4", "failure-8/mine.txt"):
+        path = Path("found") / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
     code, out, err = antdrive(*words, "--json", "--out", "found")
     assert (code, err) == (1, "")
     facts = json.loads(out)
@@ -22,7 +26,16 @@ def test_failures_are_handed_over_as_a_suite(antdrive: Call) -> None:
     cases = load_suite(Path("found") / "failures.drive.yaml")
     assert len(cases) == facts["distinct"] == len(facts["reported"])
     assert {scenario_of(case).noise for case in cases} == {6.0}
-    assert len(list(Path("found").glob("failure-*.npz"))) == len(cases)
+    assert not Path("found/failure-9").exists(), "of an earlier search"
+    assert Path("found/failure-8/mine.txt").exists()
+    logs = sorted(Path("found").glob("failure-*/rollout.npz"))
+    assert [log.parent.name for log in logs] == [case.name for case in cases]
+    result = json.loads((logs[0].parent / "result.json").read_text())
+    assert (result["outcome"], result["command"]) == (
+        facts["reported"][0]["outcome"],
+        "antdrive check found/failures.drive.yaml::failure-1",
+    )
+    assert antdrive("report", "found", "-o", "page.html")[0] == 0
 
 
 def test_a_set_up_without_failures_is_exit_code_0(antdrive: Call) -> None:
@@ -48,5 +61,6 @@ def test_failures_are_shrunk_and_filmed(antdrive: Call) -> None:
     )
     assert code == 1
     assert "failure-1  " in out
-    assert Path("found/failure-1.mp4").stat().st_size > 10_000
+    assert Path("found/failure-1/film.mp4").stat().st_size > 10_000
+    assert "repeat: antdrive check found/failures.drive.yaml" in out
     assert antdrive("check", "found/failures.drive.yaml", "--jobs", "1")[0] == 0

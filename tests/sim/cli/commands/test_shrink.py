@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from antdrive.sim import Run, run
+from antdrive.sim.regression import load_suite
 from antdrive.worlds import Disc, load_task
 from tests.sim.cli.calling import Call, Refused
 
@@ -61,3 +62,18 @@ def test_what_cannot_be_shrunk_is_one_line(refused: Refused, small_run: Run, col
     assert rollout is not None
     mine = rollout.save(tmp_path / "mine.npz")
     assert f"{mine}: record.planner.name: 'mine' is not registered" in refused("shrink", mine)
+
+
+def test_a_planner_from_a_file_goes_with_the_suite(antdrive: Call, tmp_path: Path) -> None:
+    """The planner of the test has its file beside the first suite; the suite of the small failure finds it there."""
+    (tmp_path / "own.py").write_text("from antdrive.planners.graph.search import AStar\nclass Mine(AStar):\n    pass\n")
+    (tmp_path / "a.drive.yaml").write_text(
+        "schema: 1\nscenarios:\n  hit: {world: empty, planner: {file: own.py, name: Mine}, unseen: [{x: 3, y: 3, radius: 0.2}]}\n"
+    )
+    code, out, err = antdrive(
+        "shrink", "a.drive.yaml::hit", "--out", "deep/small", "--no-film", "--no-figures", "--jobs", "2", "--json"
+    )
+    assert (code, err) == (0, "")
+    assert json.loads(out)["repeats"]
+    (case,) = load_suite(tmp_path / "deep" / "small" / "empty-small.drive.yaml")
+    assert case.entry.planner == {"file": "../../own.py", "name": "Mine"}

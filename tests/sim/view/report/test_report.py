@@ -424,3 +424,18 @@ def test_a_run_that_was_edited_is_certified_anew(small_run, tmp_path):
     shifted = replace(small_run.rollout, pose=small_run.rollout.pose + (0.0, 0.2, 0.0))
     write_report(replace(small_run, rollout=shifted), tmp_path / "page.html", figures=False)
     assert "0 / 1" in (tmp_path / "page.html").read_text()
+
+
+@pytest.mark.parametrize("kind", ["html", "md"])
+def test_a_run_that_a_test_drove_says_why_the_test_failed(small_run, tmp_path, kind):
+    """The drive itself succeeded; what result.json claims is text and nothing else."""
+    folder = tmp_path / "results"
+    write_run(small_run, folder / "plain")
+    assert "test failed" not in reported(folder, tmp_path, kind)
+    slower = "duration_s: 9 s, in the baseline 5 s: 4 s longer <script>"
+    write_run(small_run, folder / "test", faults=[slower, 3, None])
+    write_run(small_run, folder / "odd", faults="oops")
+    text = reported(folder, tmp_path, kind)
+    assert text.count("test failed") == (1 if kind == "html" else 4)
+    assert "9 s, in the baseline 5 s: 4 s longer" in html.unescape(text).replace("\\", "")
+    assert "longer <script>" not in text

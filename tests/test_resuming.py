@@ -1,0 +1,57 @@
+"""Benchmarks in pieces: what is in the file is not done again, and what is done is in the file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from benchmarks import suites
+from benchmarks.resuming import append_line, read_lines
+from benchmarks.suite_runs import Tests
+
+
+def test_a_file_holds_whole_lines(tmp_path: Path) -> None:
+    path = tmp_path / "new" / "results.jsonl"
+    assert read_lines(path) == read_lines(None) == []
+    for number in range(3):
+        append_line(path, {"number": number, "text": "a\nb"})
+    whole = read_lines(path)
+    assert [line["number"] for line in whole] == [0, 1, 2]
+    path.write_text(path.read_text()[:-5])
+    assert read_lines(path) == whole[:2]
+    append_line(path, whole[2])
+    assert read_lines(path) == whole
+
+
+def test_repeats_go_on_and_a_flake_is_exit_code_1(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Runs of pytest are put in place; the sixth drives otherwise, the seventh fails."""
+    calls: list[int] = []
+
+    def run(folder: Path, *words: str, **_: object) -> Tests:
+        calls.append(len(calls))
+        digest, passed = ("x" if calls[-1] == 5 else "y"), calls[-1] != 6
+        return {"a": {"passed": passed, "message": "it broke\nhere", "digest": digest, "outcome": "", "results": ""}}
+
+    monkeypatch.setattr(suites, "with_check", run)
+    monkeypatch.setattr(suites, "with_pytest", run)
+
+    def main(*words: str) -> int:
+        monkeypatch.setattr("sys.argv", ["suites", *words, "--results", str(tmp_path / "r.jsonl")])
+        try:
+            suites.main()
+        except SystemExit as stopped:
+            return int(stopped.code or 0)
+        return 0
+
+    assert (main("--repeats", "4"), len(calls)) == (0, 4)
+    assert (main("--repeats", "5"), len(calls)) == (0, 5)
+    assert (main("--repeats", "6"), len(calls)) == (1, 6), "another drive"
+    assert (main("--repeats", "7"), len(calls)) == (1, 7)
+    capsys.readouterr()
+    assert (main(), len(calls)) == (1, 7), "says what the file has"
+    out = capsys.readouterr().out
+    assert "| `pytest, shuffled` | 2 | 2 | 0 | 1 |" in out
+    assert "round 6, pytest -n 2: a: it broke" in out
