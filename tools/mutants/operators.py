@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import contextlib
-import difflib
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -104,11 +103,12 @@ def mutants_of(file: str, source: str) -> list[Mutant]:
 def described(file: str, operator: str, function: str, source: str, text: str) -> Mutant:
     """The mutant that turns `source` into `text`, with the lines that differ."""
     before, after = source.splitlines(), text.splitlines()
-    blocks = [b for b in difflib.SequenceMatcher(None, before, after, False).get_opcodes() if b[0] != "equal"]
-    first, last = blocks[0], blocks[-1]
-    was = " ".join(line.strip() for line in before[first[1] : last[2]])
-    now = " ".join(line.strip() for line in after[first[3] : last[4]])
-    return Mutant(file, operator, function, first[1] + 1, was, now, text)
+    shorter = min(len(before), len(after))
+    first = next((i for i in range(shorter) if before[i] != after[i]), shorter)
+    last = next((i for i in range(shorter - first) if before[-1 - i] != after[-1 - i]), shorter - first)
+    was = " ".join(line.strip() for line in before[first : len(before) - last])
+    now = " ".join(line.strip() for line in after[first : len(after) - last])
+    return Mutant(file, operator, function, first + 1, was, now, text)
 
 
 class _Finder(ast.NodeVisitor):

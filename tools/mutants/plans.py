@@ -153,7 +153,7 @@ def check_tables(root: Path = ROOT) -> None:
         StaleTable: one does not.
     """
     for file, plan in PLANS.items():
-        for name in (file, *(test for test in plan.tests if test.startswith("tests/"))):
+        for name in (file, *plan.files):
             if not (root / name).is_file():
                 raise StaleTable(f"tools/mutants/plans.py: {name} does not exist")
     for mutant in named_mutants(root):
