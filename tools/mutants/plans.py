@@ -18,7 +18,7 @@ SEED = 1
 
 _LOG, _DRIVING, _CONTROL = "tests/sim/log/", "tests/sim/driving/", "tests/robots/control/"
 _COLONIES, _GRAPH, _LINES = "tests/planners/colonies/", "tests/planners/graph/", "tests/planners/anyangle/"
-_CERTIFY = (f"{_LOG}test_certificate_faults.py", f"{_LOG}test_certificate_mutants.py", f"{_LOG}test_certificate.py")
+_CERTIFY = tuple(f"{_LOG}test_certificate{part}.py" for part in ("_faults", "_edges", "_mutants", ""))
 _PURSUE = (f"{_CONTROL}test_kernel_faults.py", f"{_CONTROL}test_rules.py", f"{_CONTROL}test_pursuit.py")
 _DRIVE = (f"{_DRIVING}test_drive_faults.py", f"{_DRIVING}test_driver.py", f"{_DRIVING}test_moving.py")
 
