@@ -22,6 +22,7 @@ _CERTIFY = tuple(f"{_LOG}test_certificate{part}.py" for part in ("_faults", "_ed
 _PARTS = f"{_CONTROL}test_kernel_mutants.py"
 _PURSUE = (_PARTS, *(f"{_CONTROL}test_{name}.py" for name in ("kernel_faults", "rules", "pursuit")))
 _DRIVE = tuple(f"{_DRIVING}test_{name}.py" for name in ("drive_mutants", "drive_faults", "driver", "moving"))
+_PLANNERS = "tests/planners/test_kernel_mutants.py"
 _WORLDS = "tests/worlds/test_kernel_mutants.py"
 
 #: The files in the order of the report.
@@ -46,16 +47,16 @@ PLANS: dict[str, Plan] = {
     "robots/control/profile.py": Plan((_PARTS, f"{_CONTROL}test_profile.py"), 6, plain=True),
     "planners/graph/_kernels_search.py": Plan((f"{_GRAPH}test_search.py",), 4),
     "planners/graph/_kernels_apf.py": Plan((f"{_GRAPH}test_apf.py",), 5, plain=True),
-    "planners/graph/_kernels_dstar.py": Plan((f"{_GRAPH}test_dstar.py",), 5, plain=True),
-    "planners/graph/_kernels_dstar_lite.py": Plan((f"{_GRAPH}test_dstar_lite.py",), 5, plain=True),
+    "planners/graph/_kernels_dstar.py": Plan((_PLANNERS, f"{_GRAPH}test_dstar.py"), 5, plain=True),
+    "planners/graph/_kernels_dstar_lite.py": Plan((_PLANNERS, f"{_GRAPH}test_dstar_lite.py"), 5, plain=True),
     "planners/graph/_kernels_incremental.py": Plan((f"{_GRAPH}test_incremental.py",), 4),
     "planners/graph/_kernels_sipp.py": Plan((f"{_GRAPH}test_sipp.py",), 4),
     "planners/colonies/_kernels_colony.py": Plan((f"{_COLONIES}test_colony.py", f"{_COLONIES}test_aco_han.py"), 5),
     "planners/colonies/_kernels_pfaco.py": Plan((f"{_COLONIES}test_pfaco.py",), 5),
-    "planners/colonies/_kernels_mmas_dstar.py": Plan((f"{_COLONIES}test_mmas_dstar.py",), 5, plain=True),
+    "planners/colonies/_kernels_mmas_dstar.py": Plan((_PLANNERS, f"{_COLONIES}test_mmas_dstar.py"), 5, plain=True),
     "planners/colonies/ant_system.py": Plan((f"{_COLONIES}test_sharing.py", f"{_COLONIES}test_colony.py"), 0),
     "planners/colonies/pfaco.py": Plan((f"{_COLONIES}test_sharing.py", f"{_COLONIES}test_pfaco.py"), 0),
-    "planners/anyangle/_kernels_lines.py": Plan((f"{_LINES}test_lines.py",), 5, plain=True),
+    "planners/anyangle/_kernels_lines.py": Plan((_PLANNERS, f"{_LINES}test_lines.py"), 5, plain=True),
     "planners/anyangle/_kernels_ga.py": Plan((f"{_LINES}test_ga_han.py",), 4),
     "planners/anyangle/_kernels_tangent.py": Plan((f"{_LINES}test_tangent.py",), 4),
     "planners/smoothing/_kernels_smooth.py": Plan(("tests/planners/smoothing/test_smooth.py",), 4),
