@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import bisect
 import contextlib
 import re
 from collections.abc import Iterable, Iterator
@@ -89,13 +90,16 @@ def mutants_of(file: str, source: str) -> list[Mutant]:
     finder = _Finder(source)
     finder.visit(tree)
     data = source.encode()
+    ends = [finder.end(statement) for statement in tree.body]
+    begins = [0, *ends]
     found: dict[str, Mutant] = {}
     for function, edit in finder.found:
         text = (data[: edit.start] + edit.text.encode() + data[edit.end :]).decode()
         if text == source or text in found:
             continue
+        at = bisect.bisect_left(ends, edit.end)  # only this statement of the file changes
         with contextlib.suppress(SyntaxError):
-            ast.parse(text)
+            ast.parse(data[begins[at] : edit.start] + edit.text.encode() + data[edit.end : ends[at]])
             found[text] = described(file, edit.operator, function, source, text)
     return list(found.values())
 
@@ -121,6 +125,10 @@ class _Finder(ast.NodeVisitor):
         for line in self._data.splitlines(keepends=True):
             self._lines.append(self._lines[-1] + len(line))
         self._scope: list[str] = []
+
+    def end(self, statement: ast.stmt) -> int:
+        """The byte after a statement."""
+        return self._place(statement)[1]
 
     def visit(self, node: ast.AST) -> None:
         if isinstance(node, ast.JoinedStr | ast.Assert | ast.Import | ast.ImportFrom | ast.arg):

@@ -9,8 +9,10 @@ from antdrive.robots import Footprint, PurePursuit, RobotSpec, footprint_clearan
 from antdrive.robots.control._kernels_avoidance import AvoidanceWeights, Encounter, among_movers, progress_by_distance
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex, arc_clearance, index_discs
 from antdrive.robots.control._kernels_path import PathSamples, clear_lookaheads, project
+from antdrive.robots.control._kernels_pursuit import rotation, slow_for_curvature
 from antdrive.robots.control.profile import speed_profile
 from antdrive.worlds import Disc, Floats, Route, World
+from tests.robots.control.test_rules import LIMITS, TUNING
 
 WIDE = np.array([-50.0, -50.0, 50.0, 50.0])
 STRAIGHT = np.array([(0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (3.0, 0.0)])
@@ -123,3 +125,19 @@ def test_a_centre_within_a_rectangle_is_as_deep_as_its_nearest_side() -> None:
     for dx, dy, depth in ((0.0, 0.0, 0.3), (0.4, 0.1, 0.1), (-0.1, -0.25, 0.05)):
         world = World("w", (-50.0, -50.0, 50.0, 50.0), (Disc(dx, dy, 0.1),))
         assert footprint_clearance(world, foot, [(0.0, 0.0, 0.0)])[0] == pytest.approx(-depth - 0.1)
+
+
+def test_a_bend_to_the_right_slows_like_one_to_the_left() -> None:
+    for lateral, yaw_rate, speed in ((1.0, 9.0, 0.5**0.5), (9.0, 1.0, 0.5)):
+        assert slow_for_curvature(2.0, lateral, yaw_rate) == pytest.approx(speed)
+        assert slow_for_curvature(-2.0, lateral, yaw_rate) == pytest.approx(speed)
+
+
+def test_before_it_rotates_a_robot_brakes_on_its_curve() -> None:
+    fast = TUNING.creep_speed * 2
+    assert rotation(fast, 2 * fast, 0.6, 1.0, LIMITS, TUNING) == pytest.approx(0.3)
+    assert rotation(fast, 2 * fast, -0.6, 1.0, LIMITS, TUNING) == pytest.approx(-0.3)
+    assert rotation(fast, 0.0, 0.6, 1.0, LIMITS, TUNING) == rotation(-fast, -2 * fast, 0.6, 1.0, LIMITS, TUNING) == 0.0
+    full = min(LIMITS.yaw_rate, (LIMITS.yaw_acceleration * 2.0) ** 0.5)
+    assert rotation(0.0, 0.0, 0.0, 2.0, LIMITS, TUNING) == pytest.approx(full)
+    assert rotation(0.0, 0.0, 0.0, -2.0, LIMITS, TUNING) == pytest.approx(-full)

@@ -67,6 +67,24 @@ def test_walls_are_as_far_as_the_nearest_corner(yaw: float) -> None:
         assert clearance == pytest.approx(min(walls) - 0.05, abs=1e-12)
 
 
+@pytest.mark.parametrize("wall", [1, 2, 3, 4])
+@pytest.mark.parametrize("yaw", [0.0, 0.6, 1.9, math.pi - 0.3, -0.6, -2.5])
+def test_a_contact_with_a_wall_is_where_a_corner_is_near_it(wall: int, yaw: float) -> None:
+    foot = Footprint(half_length=0.4, half_width=0.15, rounding=0.05)
+    corners = [complex(a * 0.4, b * 0.15) * complex(math.cos(yaw), math.sin(yaw)) for a in (-1, 1) for b in (-1, 1)]
+    reach = max(abs(c.real if wall <= 2 else c.imag) for c in corners) + 0.05
+
+    def beside(gap: float) -> Rollout:
+        away = reach + gap
+        x, y = {1: (away, 1.0), 2: (6.0 - away, 1.0), 3: (1.5, away), 4: (1.5, 4.0 - away)}[wall]
+        log = with_record(drive(outcome=Outcome.COLLIDED), robot=replace(ROBOT, footprint=foot))
+        pose = np.tile((3.0, 1.0, yaw), (ROWS, 1))
+        pose[400] = x, y, yaw
+        return replace(log, pose=pose, contacts=np.array([[400.0, wall, -0.001, 5.0]]))
+
+    only_beyond(0.012, beside, f"physics reports a contact with obstacle {wall} at row 400")
+
+
 def off_target(column: int, speed: float, seconds: float) -> Rollout:
     """A robot that is told to stand, drives for so long, and then back until the end."""
     rows, twist = round(seconds * HZ), np.zeros((ROWS, 2))
@@ -123,6 +141,11 @@ def test_a_drive_ends_half_a_second_and_two_periods_after_its_first_contact() ->
     text = "the first contact ends a drive, but the log goes on for"
     for before, late in ((120, False), (127, False), (129, True), (400, True)):
         assert says(touched(0.001, row=ROWS - 1 - before), text) is late
+
+
+def test_an_inflation_that_is_off_by_a_micrometre_fits() -> None:
+    assert not says(with_record(drive(), margin=1e-6, inflate=ROBOT.radius), "record.inflate")
+    assert says(with_record(drive(), margin=1.1e-6, inflate=ROBOT.radius), "record.inflate")
 
 
 def test_rates_that_contradict_each_other_are_a_problem_and_no_error() -> None:
