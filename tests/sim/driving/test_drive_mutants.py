@@ -13,7 +13,7 @@ from antdrive.robots import AvoidanceState, Footprint, PurePursuit, PursuitState
 from antdrive.sim import Outcome
 from antdrive.sim.driving.drive import drive
 from antdrive.sim.driving.driver import AVOIDING, STUCK_TIME, WAITING_SPEED, Driver, StuckClock
-from antdrive.sim.driving.leaving import is_narrow
+from antdrive.sim.driving.leaving import cannot_leave, is_narrow
 from antdrive.sim.driving.recorder import Ending, Recorder
 from antdrive.sim.physics.engine import Engine, State
 from antdrive.worlds import World
@@ -136,3 +136,18 @@ def test_room_for_exactly_the_radius_is_narrow(turtlebot: RobotSpec) -> None:
     assert cart.radius == 0.5
     assert is_narrow(world, cart, (0.5, 2.0, 0.0))
     assert not is_narrow(world, cart, (0.501, 2.0, 0.0))
+
+
+def test_the_first_motion_is_rehearsed_for_a_minute(turtlebot: RobotSpec) -> None:
+    """A controller that stays in a narrow place is left to the drive."""
+    steps: list[int] = []
+
+    def step(*_: Any) -> tuple[Twist, PursuitState]:
+        steps.append(1)
+        return Twist(0.0, 0.0), PursuitState()
+
+    cart = replace(turtlebot, footprint=Footprint.rectangle(0.6, 0.8))
+    world = World("w", (0.0, 0.0, 6.0, 4.0))
+    stays: Any = SimpleNamespace(step=step)
+    assert cannot_leave(driver(turtlebot).tracked, stays, world, cart, (0.45, 2.0, 0.0), 2) == ""
+    assert len(steps) == 2 * 60
