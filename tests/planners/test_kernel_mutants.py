@@ -6,7 +6,9 @@ import itertools
 
 import numpy as np
 
+from antdrive.planners.anyangle._kernels_ga import tighten_all
 from antdrive.planners.anyangle._kernels_lines import Terrain, clear_cells, clear_line, corridor_moves, pull
+from antdrive.planners.colonies._kernels_colony import goal_pull, next_random
 from antdrive.planners.colonies._kernels_mmas_dstar import close_gates
 from antdrive.planners.graph._kernels_dstar_lite import update_vertex
 from antdrive.planners.graph._kernels_incremental import COST, DIAGONAL, STRAIGHT, put
@@ -103,3 +105,38 @@ def test_the_corridor_holds_the_cells_within_its_width() -> None:
             if moves[r, c] >> k & 1 and inside[r, c] and inside[to]:
                 expected[r, c] |= 1 << k
         np.testing.assert_array_equal(corridor_moves(moves, line, width), expected)
+
+
+def test_random_numbers_are_those_of_xorshift64() -> None:
+    state = 88172645463325252
+    for _ in range(50):
+        found = int(next_random(np.uint64(state)))
+        for shift, left in ((13, True), (7, False), (17, True)):
+            state ^= (state << shift if left else state >> shift) & (1 << 64) - 1
+        assert found == state
+
+
+def test_the_goal_pulls_along_the_moves_that_lead_to_it() -> None:
+    """The cosine of the angle between a move and the way to the goal; 0 for moves away from it or not allowed."""
+    grid = Grid.from_free(np.random.default_rng(6).random((6, 7)) >= 0.1)
+    found = np.full((42, 8), np.nan)
+    goal_pull(grid.moves.ravel(), 7, 2, 4, found)
+    for (r, c), k in itertools.product(np.ndindex(6, 7), range(8)):
+        to, step = np.array([2.0 - r, 4.0 - c]), np.array(DIRECTIONS[k], dtype=float)
+        allowed = grid.moves[r, c] >> k & 1 and to.any()
+        cosine = to @ step / np.hypot(*to) / np.hypot(*step) if allowed else 0.0
+        np.testing.assert_allclose(found[r * 7 + c, k], max(0.0, cosine), atol=1e-12)
+
+
+def test_via_points_without_obstacles_go_to_the_line_between_their_neighbours() -> None:
+    land = Terrain(NO_DISCS, NO_WALLS, 0.0, np.ones((30, 30), np.bool_), 0.0, 0.0, 1.0, True)
+    rng, ends = np.random.default_rng(7), np.array([(2.0, 3.0), (25.0, 20.0)])
+    for count in (1, 3, 5):
+        via = rng.uniform(1, 28, (count, 2))
+        expected = np.concatenate([ends[:1], via, ends[1:]])
+        for _, k in itertools.product(range(2), range(1, count + 1)):
+            a, b = expected[k - 1], expected[k + 1]
+            expected[k] = a + np.clip((expected[k] - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0) * (b - a)
+        length = tighten_all(via, ends, land, 2)
+        np.testing.assert_allclose(via, expected[1:-1], atol=1e-9)
+        np.testing.assert_allclose(length, np.hypot(*np.diff(expected, axis=0).T).sum())

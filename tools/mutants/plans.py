@@ -51,13 +51,15 @@ PLANS: dict[str, Plan] = {
     "planners/graph/_kernels_dstar_lite.py": Plan((_PLANNERS, f"{_GRAPH}test_dstar_lite.py"), 5, plain=True),
     "planners/graph/_kernels_incremental.py": Plan((f"{_GRAPH}test_incremental.py",), 4),
     "planners/graph/_kernels_sipp.py": Plan((f"{_GRAPH}test_sipp.py",), 4),
-    "planners/colonies/_kernels_colony.py": Plan((f"{_COLONIES}test_colony.py", f"{_COLONIES}test_aco_han.py"), 5),
+    "planners/colonies/_kernels_colony.py": Plan(
+        (_PLANNERS, f"{_COLONIES}test_colony.py", f"{_COLONIES}test_aco_han.py"), 5
+    ),
     "planners/colonies/_kernels_pfaco.py": Plan((f"{_COLONIES}test_pfaco.py",), 5),
     "planners/colonies/_kernels_mmas_dstar.py": Plan((_PLANNERS, f"{_COLONIES}test_mmas_dstar.py"), 5, plain=True),
     "planners/colonies/ant_system.py": Plan((f"{_COLONIES}test_sharing.py", f"{_COLONIES}test_colony.py"), 0),
     "planners/colonies/pfaco.py": Plan((f"{_COLONIES}test_sharing.py", f"{_COLONIES}test_pfaco.py"), 0),
     "planners/anyangle/_kernels_lines.py": Plan((_PLANNERS, f"{_LINES}test_lines.py"), 5, plain=True),
-    "planners/anyangle/_kernels_ga.py": Plan((f"{_LINES}test_ga_han.py",), 4),
+    "planners/anyangle/_kernels_ga.py": Plan((_PLANNERS, f"{_LINES}test_ga_han.py"), 4),
     "planners/anyangle/_kernels_tangent.py": Plan((f"{_LINES}test_tangent.py",), 4),
     "planners/smoothing/_kernels_smooth.py": Plan(("tests/planners/smoothing/test_smooth.py",), 4),
     "planners/smoothing/smooth.py": Plan(
