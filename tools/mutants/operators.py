@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import ast
+import bisect
 import contextlib
-import difflib
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -90,13 +90,16 @@ def mutants_of(file: str, source: str) -> list[Mutant]:
     finder = _Finder(source)
     finder.visit(tree)
     data = source.encode()
+    ends = [finder.end(statement) for statement in tree.body]
+    begins = [0, *ends]
     found: dict[str, Mutant] = {}
     for function, edit in finder.found:
         text = (data[: edit.start] + edit.text.encode() + data[edit.end :]).decode()
         if text == source or text in found:
             continue
+        at = bisect.bisect_left(ends, edit.end)  # only this statement of the file changes
         with contextlib.suppress(SyntaxError):
-            ast.parse(text)
+            ast.parse(data[begins[at] : edit.start] + edit.text.encode() + data[edit.end : ends[at]])
             found[text] = described(file, edit.operator, function, source, text)
     return list(found.values())
 
@@ -104,11 +107,12 @@ def mutants_of(file: str, source: str) -> list[Mutant]:
 def described(file: str, operator: str, function: str, source: str, text: str) -> Mutant:
     """The mutant that turns `source` into `text`, with the lines that differ."""
     before, after = source.splitlines(), text.splitlines()
-    blocks = [b for b in difflib.SequenceMatcher(None, before, after, False).get_opcodes() if b[0] != "equal"]
-    first, last = blocks[0], blocks[-1]
-    was = " ".join(line.strip() for line in before[first[1] : last[2]])
-    now = " ".join(line.strip() for line in after[first[3] : last[4]])
-    return Mutant(file, operator, function, first[1] + 1, was, now, text)
+    shorter = min(len(before), len(after))
+    first = next((i for i in range(shorter) if before[i] != after[i]), shorter)
+    last = next((i for i in range(shorter - first) if before[-1 - i] != after[-1 - i]), shorter - first)
+    was = " ".join(line.strip() for line in before[first : len(before) - last])
+    now = " ".join(line.strip() for line in after[first : len(after) - last])
+    return Mutant(file, operator, function, first + 1, was, now, text)
 
 
 class _Finder(ast.NodeVisitor):
@@ -121,6 +125,10 @@ class _Finder(ast.NodeVisitor):
         for line in self._data.splitlines(keepends=True):
             self._lines.append(self._lines[-1] + len(line))
         self._scope: list[str] = []
+
+    def end(self, statement: ast.stmt) -> int:
+        """The byte after a statement."""
+        return self._place(statement)[1]
 
     def visit(self, node: ast.AST) -> None:
         if isinstance(node, ast.JoinedStr | ast.Assert | ast.Import | ast.ImportFrom | ast.arg):

@@ -18,9 +18,12 @@ SEED = 1
 
 _LOG, _DRIVING, _CONTROL = "tests/sim/log/", "tests/sim/driving/", "tests/robots/control/"
 _COLONIES, _GRAPH, _LINES = "tests/planners/colonies/", "tests/planners/graph/", "tests/planners/anyangle/"
-_CERTIFY = (f"{_LOG}test_certificate_faults.py", f"{_LOG}test_certificate_mutants.py", f"{_LOG}test_certificate.py")
-_PURSUE = (f"{_CONTROL}test_kernel_faults.py", f"{_CONTROL}test_rules.py", f"{_CONTROL}test_pursuit.py")
-_DRIVE = (f"{_DRIVING}test_drive_faults.py", f"{_DRIVING}test_driver.py", f"{_DRIVING}test_moving.py")
+_CERTIFY = tuple(f"{_LOG}test_certificate{part}.py" for part in ("_faults", "_edges", "_mutants", ""))
+_PARTS = f"{_CONTROL}test_kernel_mutants.py"
+_PURSUE = (_PARTS, *(f"{_CONTROL}test_{name}.py" for name in ("kernel_faults", "rules", "pursuit")))
+_DRIVE = tuple(f"{_DRIVING}test_{name}.py" for name in ("drive_mutants", "drive_faults", "driver", "moving"))
+_PLANNERS = "tests/planners/test_kernel_mutants.py"
+_WORLDS = "tests/worlds/test_kernel_mutants.py"
 
 #: The files in the order of the report.
 PLANS: dict[str, Plan] = {
@@ -31,38 +34,40 @@ PLANS: dict[str, Plan] = {
     "sim/driving/drive.py": Plan(_DRIVE, 8),
     "sim/driving/driver.py": Plan(_DRIVE, 8),
     "sim/driving/recorder.py": Plan(_DRIVE, 8),
-    "sim/driving/leaving.py": Plan((f"{_DRIVING}test_leaving.py",), 8),
+    "sim/driving/leaving.py": Plan((f"{_DRIVING}test_drive_mutants.py", f"{_DRIVING}test_leaving.py"), 8),
     "sim/driving/blocking.py": Plan((f"{_DRIVING}test_driver.py",), 0),
     "sim/view/film/replay.py": Plan(("tests/sim/view/film/test_replay.py",), 0),
-    "robots/_kernels_footprint.py": Plan(("tests/robots/test_footprint.py",), 4, plain=True),
+    "robots/_kernels_footprint.py": Plan((_PARTS, "tests/robots/test_footprint.py"), 4, plain=True),
     "robots/control/_kernels_obstacles.py": Plan(_PURSUE, 8, plain=True),
     "robots/control/_kernels_path.py": Plan(_PURSUE, 8, plain=True),
     "robots/control/_kernels_pursuit.py": Plan(_PURSUE, 10, plain=True),
-    "robots/control/_kernels_profile.py": Plan((f"{_CONTROL}test_profile.py",), 6, plain=True),
-    "robots/control/_kernels_avoidance.py": Plan((f"{_CONTROL}test_avoidance_rules.py",), 6, plain=True),
+    "robots/control/_kernels_profile.py": Plan((_PARTS, f"{_CONTROL}test_profile.py"), 6, plain=True),
+    "robots/control/_kernels_avoidance.py": Plan((_PARTS, f"{_CONTROL}test_avoidance_rules.py"), 6, plain=True),
     "robots/control/pursuit.py": Plan(_PURSUE, 6, plain=True),
-    "robots/control/profile.py": Plan((f"{_CONTROL}test_profile.py",), 6, plain=True),
+    "robots/control/profile.py": Plan((_PARTS, f"{_CONTROL}test_profile.py"), 6, plain=True),
     "planners/graph/_kernels_search.py": Plan((f"{_GRAPH}test_search.py",), 4),
     "planners/graph/_kernels_apf.py": Plan((f"{_GRAPH}test_apf.py",), 5, plain=True),
-    "planners/graph/_kernels_dstar.py": Plan((f"{_GRAPH}test_dstar.py",), 5, plain=True),
-    "planners/graph/_kernels_dstar_lite.py": Plan((f"{_GRAPH}test_dstar_lite.py",), 5, plain=True),
+    "planners/graph/_kernels_dstar.py": Plan((_PLANNERS, f"{_GRAPH}test_dstar.py"), 5, plain=True),
+    "planners/graph/_kernels_dstar_lite.py": Plan((_PLANNERS, f"{_GRAPH}test_dstar_lite.py"), 5, plain=True),
     "planners/graph/_kernels_incremental.py": Plan((f"{_GRAPH}test_incremental.py",), 4),
     "planners/graph/_kernels_sipp.py": Plan((f"{_GRAPH}test_sipp.py",), 4),
-    "planners/colonies/_kernels_colony.py": Plan((f"{_COLONIES}test_colony.py", f"{_COLONIES}test_aco_han.py"), 5),
+    "planners/colonies/_kernels_colony.py": Plan(
+        (_PLANNERS, f"{_COLONIES}test_colony.py", f"{_COLONIES}test_aco_han.py"), 5
+    ),
     "planners/colonies/_kernels_pfaco.py": Plan((f"{_COLONIES}test_pfaco.py",), 5),
-    "planners/colonies/_kernels_mmas_dstar.py": Plan((f"{_COLONIES}test_mmas_dstar.py",), 5, plain=True),
+    "planners/colonies/_kernels_mmas_dstar.py": Plan((_PLANNERS, f"{_COLONIES}test_mmas_dstar.py"), 5, plain=True),
     "planners/colonies/ant_system.py": Plan((f"{_COLONIES}test_sharing.py", f"{_COLONIES}test_colony.py"), 0),
     "planners/colonies/pfaco.py": Plan((f"{_COLONIES}test_sharing.py", f"{_COLONIES}test_pfaco.py"), 0),
-    "planners/anyangle/_kernels_lines.py": Plan((f"{_LINES}test_lines.py",), 5, plain=True),
-    "planners/anyangle/_kernels_ga.py": Plan((f"{_LINES}test_ga_han.py",), 4),
+    "planners/anyangle/_kernels_lines.py": Plan((_PLANNERS, f"{_LINES}test_lines.py"), 5, plain=True),
+    "planners/anyangle/_kernels_ga.py": Plan((_PLANNERS, f"{_LINES}test_ga_han.py"), 4),
     "planners/anyangle/_kernels_tangent.py": Plan((f"{_LINES}test_tangent.py",), 4),
     "planners/smoothing/_kernels_smooth.py": Plan(("tests/planners/smoothing/test_smooth.py",), 4),
     "planners/smoothing/smooth.py": Plan(
         ("tests/planners/smoothing/test_safety_nets.py", "tests/planners/smoothing/test_smooth.py"), 6
     ),
-    "worlds/_kernels.py": Plan(("tests/worlds/test_grid.py", "tests/worlds/test_geometry.py"), 8, plain=True),
+    "worlds/_kernels.py": Plan((_WORLDS, "tests/worlds/test_grid.py", "tests/worlds/test_geometry.py"), 8, plain=True),
     "worlds/geometry.py": Plan(("tests/worlds/test_geometry.py",), 6, plain=True),
-    "worlds/grid.py": Plan(("tests/worlds/test_grid.py",), 6, plain=True),
+    "worlds/grid.py": Plan((_WORLDS, "tests/worlds/test_grid.py"), 6, plain=True),
 }
 
 
@@ -153,7 +158,7 @@ def check_tables(root: Path = ROOT) -> None:
         StaleTable: one does not.
     """
     for file, plan in PLANS.items():
-        for name in (file, *(test for test in plan.tests if test.startswith("tests/"))):
+        for name in (file, *plan.files):
             if not (root / name).is_file():
                 raise StaleTable(f"tools/mutants/plans.py: {name} does not exist")
     for mutant in named_mutants(root):

@@ -10,6 +10,7 @@ from __future__ import annotations
 import ast
 import contextlib
 import json
+import math
 import os
 import select
 import shutil
@@ -17,7 +18,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -30,13 +30,41 @@ LEFT_OUT = (".*", "out", "examples", "benchmarks", "docs")
 LOADED = ("worlds/*.py", "worlds/files/*.py", "planners/**/*.py", "robots/**/*.py", "sim/log/*.py", "sim/physics/*.py",
           "sim/driving/*.py", "sim/pipeline.py")  # fmt: skip
 LIBRARIES = ["pytest", "numpy", "yaml", "pydantic", "joblib", "pybullet", "numba"]
-PASSED, USAGE, NO_TESTS = 0, 4, 5  # pytest's exit codes
-# The time limit of a mutant: at least [s], times the time without a fault, and for compiling kernels [s].
-LEAST_TIME, MORE_TIME, COMPILING = 30.0, 6.0, 120.0
+PASSED, FAILED, FAULTY, USAGE, NO_TESTS = 0, 1, 3, 4, 5  # pytest's exit codes; 3: pytest itself has failed
+# The limit of a mutant's processor time: at least [s], times the time without a fault, and for compiling kernels [s].
+LEAST_TIME, MORE_TIME, COMPILING = 10.0, 5.0, 60.0
+BASELINE_TIME = 600.0  # limit of the tests on the unchanged code [s]
+WAITING = 10.0  # a run that waits for ever uses no processor time, and may take so many times its limit by the clock
 
 
-class TestsUnfit(Exception):
+class BaselineUnfit(Exception):
     """The tests of a file do not pass on the original, or there are none, so they can judge no mutant of it."""
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a run of tests ended.
+
+    Attributes:
+        code: pytest's exit code, negative if a signal ended it; None if its time limit passed
+        seconds: its processor time [s], infinite if the time limit passed
+        output: what it printed
+    """
+
+    code: int | None
+    seconds: float
+    output: str
+
+    @property
+    def reason(self) -> str:
+        """Why the tests did not pass, as a clause."""
+        if self.code is None:
+            return "do not end within their time limit"
+        if self.code == FAILED:
+            failed = [line.split(" ")[1] for line in self.output.splitlines() if line.startswith(("FAILED ", "ERROR "))]
+            return f"fail: {', '.join(failed) or 'pytest names none'}"
+        reasons = {FAULTY: "end with a fault of pytest", USAGE: "are not found by pytest", NO_TESTS: "hold no test"}
+        return reasons.get(self.code, f"end with signal {-self.code}" if self.code < 0 else f"end with {self.code}")
 
 
 @dataclass(frozen=True)
@@ -52,6 +80,11 @@ class Plan:
     tests: tuple[str, ...]
     count: int
     plain: bool = False
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """The files that hold the tests."""
+        return tuple(dict.fromkeys(test.split("::")[0] for test in self.tests if test.startswith("tests/")))
 
 
 @dataclass
@@ -128,32 +161,33 @@ class Copy:
             plan: the tests that should notice them
 
         Raises:
-            TestsUnfit: the tests fail on the unchanged file, or there are none.
+            BaselineUnfit: the tests fail on the unchanged file, or there are none.
         """
         file = mutants[0].file
         dependent = dependents(self._original, file)
         kernels = (
             [] if plan.plain else [self.root / name for name in dependent if Path(name).name.startswith("_kernels")]
         )
-        server = Server(self.root, self._processes, file, dependent, plan.plain)
+        server = self.server(file, dependent, plan.plain)
         try:
-            begin = time.monotonic()
-            code = server.run(plan.tests, 900.0)
-            if code != PASSED:
-                said = "\n".join(server.output.splitlines()[-15:])
-                raise TestsUnfit(f"{file}: its tests do not pass on the unchanged code (exit {code})\n{said}")
-            limit = max(LEAST_TIME, MORE_TIME * (time.monotonic() - begin)) + (COMPILING if kernels else 0.0)
+            first = server.run(plan.tests, BASELINE_TIME)
+            if first.code != PASSED:
+                said = "\n".join(first.output.splitlines()[-15:])
+                raise BaselineUnfit(f"{file}: on the unchanged code its tests {first.reason}\n{said}")
+            limit = max(LEAST_TIME, MORE_TIME * first.seconds) + (COMPILING if kernels else 0.0)
             for mutant in mutants:
                 _forget(kernels)
                 _write(self.root / file, mutant.source)
-                code = server.run(plan.tests, limit)
-                if code in (USAGE, NO_TESTS):
-                    raise TestsUnfit(f"{file}: pytest ran no test (exit {code})\n{server.output[-2000:]}")
-                yield mutant, "timeout" if code is None else "alive" if code == PASSED else "killed"
+                run = server.run(plan.tests, limit)
+                yield mutant, "timeout" if run.code is None else "alive" if run.code == PASSED else "killed"
         finally:
             server.end()
             _write(self.root / file, (self._original / file).read_text())
             self._restore(kernels)
+
+    def server(self, file: str, dependent: set[str], plain: bool) -> Server:
+        """A process that judges mutants of a file."""
+        return Server(self.root, self._processes, file, dependent, plain)
 
     def _restore(self, kernels: list[Path]) -> None:
         """Bring back the machine code that mutants have replaced by their own."""
@@ -167,38 +201,45 @@ class Copy:
 class Server:
     """A process that runs pytest in forks of itself, as `server.py` says.
 
-    Attributes:
-        output: what the last run printed
+    pytest loads no plugins by itself: antdrive is one, and pytest warns, which is an error here, that it is loaded already.
     """
 
     def __init__(self, root: Path, processes: Processes, file: str, dependent: set[str], plain: bool) -> None:
-        self.output = ""
         self._root, self._processes, self._plain = root, processes, plain
         free = sorted({str(p.relative_to(root)) for pattern in LOADED for p in root.glob(pattern)} - dependent)
         names = [f"antdrive.{_module(name)}" for name in free if not name.endswith("__init__.py")]
         self._first = {"modules": LIBRARIES + names, "changing": f"antdrive.{_module(file)}"}
         self._start()
 
-    def run(self, tests: tuple[str, ...], limit: float) -> int | None:
-        """Pytest's exit code, None if the time limit passed [s]."""
-        arguments = ["-x", "--tb=line", "--no-header", "-p", "no:cacheprovider", *tests]
+    def run(self, tests: tuple[str, ...], limit: float) -> Ended:
+        """Run tests.
+
+        Args:
+            tests: arguments for pytest
+            limit: the processor time that they may take [s]
+        """
+        arguments = ["-x", "--tb=line", "--no-header", "-rfE", "--timeout=0", "-p", "no:cacheprovider", *tests]
         if self._plain:
             arguments += ["-W", "ignore"]  # numpy's numbers warn where compiled ones wrap around
         output = self._root.parent / "output.txt"
-        self._tell({"arguments": arguments, "output": str(output)})
+        output.unlink(missing_ok=True)
+        self._tell({"arguments": arguments, "output": str(output), "limit": limit})
         answer = _open(self._process.stdout)
-        ready, _, _ = select.select([answer], [], [], limit)
+        ready, _, _ = select.select([answer], [], [], WAITING * limit)
+        said = output.read_text(errors="replace") if output.exists() else ""
         if not ready:
             self.end()
             self._start()
-            return None
+            return Ended(None, math.inf, said)
         line = answer.readline()
         if not line:
             if self._processes.stopped:
                 raise KeyboardInterrupt
-            raise TestsUnfit(f"{self._first['changing']}: the process that runs its tests has ended")
-        self.output = output.read_text(errors="replace") if output.exists() else ""
-        return int(line)
+            raise BaselineUnfit(f"{self._first['changing']}: the process that runs its tests has ended")
+        found = json.loads(line)
+        if found["code"] in (-signal.SIGXCPU, -signal.SIGKILL):
+            return Ended(None, math.inf, said)
+        return Ended(found["code"], found["seconds"], said)
 
     def end(self) -> None:
         """End the process."""
@@ -206,7 +247,7 @@ class Server:
 
     def _start(self) -> None:
         environment = {key: value for key, value in os.environ.items() if not key.startswith(("NUMBA_", "PYTEST_"))}
-        environment |= {"PYTHONPATH": str(self._root), "PYTHONDONTWRITEBYTECODE": "1"}
+        environment |= {"PYTHONPATH": str(self._root), "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
         environment |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
         if self._plain:
             environment |= {"NUMBA_DISABLE_JIT": "1", "PYTHONWARNINGS": "ignore"}

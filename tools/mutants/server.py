@@ -1,16 +1,25 @@
 """Runs pytest again and again, each time in a fork that has the libraries and the unchanged modules loaded already.
 
 Loading them takes longer than most tests. The first line of the standard input says which modules to load and which must not be
-loaded, as it will be changed; each further line is a run. The answer to a run is pytest's exit code on a line of its own.
+loaded, as it will be changed; each further line is a run. The answer to a run is a line: pytest's exit code, or the negative
+number of the signal that ended the run, and the processor time that it took [s].
+
+A run is limited by its processor time: a fault that never ends uses it up, and a machine that is busy with other work does not.
 """
 
 from __future__ import annotations
 
 import importlib
 import json
+import math
 import os
+import resource
 import sys
+import traceback
 from pathlib import Path
+
+#: pytest looks for no plugins (see `Server`); the settings in pyproject.toml need these.
+PLUGINS = ("pytest_timeout",)
 
 
 def serve() -> None:
@@ -21,7 +30,7 @@ def serve() -> None:
     os.dup2(nowhere, 1)
     os.dup2(nowhere, 2)  # PyBullet prints when it is loaded
     first = json.loads(sys.stdin.readline())
-    for name in first["modules"]:
+    for name in (*first["modules"], *PLUGINS):
         importlib.import_module(name)
     os.dup2(spoken, 2)
     if first["changing"] in sys.modules:
@@ -30,24 +39,29 @@ def serve() -> None:
         run = json.loads(line)
         child = os.fork()
         if child == 0:
-            _run(run["arguments"], Path(run["output"]))
-        _, status = os.waitpid(child, 0)
-        print(os.waitstatus_to_exitcode(status), file=answers, flush=True)
+            _run(run["arguments"], Path(run["output"]), run["limit"])
+        _, status, used = os.wait4(child, 0)
+        answer = {"code": os.waitstatus_to_exitcode(status), "seconds": used.ru_utime + used.ru_stime}
+        print(json.dumps(answer), file=answers, flush=True)
 
 
-def _run(arguments: list[str], output: Path) -> None:
+def _run(arguments: list[str], output: Path, limit: float) -> None:
     code = 3
     try:
         import pytest
 
+        resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(limit), math.ceil(limit) + 5))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         written = os.open(output, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
         os.dup2(written, 1)
         os.dup2(written, 2)
         os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
-        code = int(pytest.main(arguments))
+        code = int(pytest.main(arguments, plugins=[sys.modules[name] for name in PLUGINS]))
+    except BaseException:  # pytest has failed, or a fault has ended it; whoever reads the output wants to know how
+        traceback.print_exc()
+    finally:
         sys.stdout.flush()
         sys.stderr.flush()
-    finally:
         os._exit(code)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from antdrive.sim import METRICS, Outcome
-from antdrive.sim.log.metrics import Metric, nearest_on_route
+from antdrive.sim.log.metrics import Metric, Tolerance, nearest_on_route
 from tests.sim.log.test_metrics import straight, with_record
 
 
@@ -80,3 +80,34 @@ def test_touches_are_counted_by_who_caused_them() -> None:
 
 def test_a_metric_without_a_docstring_has_no_definition() -> None:
     assert Metric("1", lambda log: 0.0).definition == ""
+
+
+#: How much worse each metric may become: in its unit, and as a share. Metrics that the table leaves out are not compared.
+ALLOWED = {
+    "path_length_m": (0.01, 0.01), "route_length_m": (0.01, 0.01), "driven_length_m": (0.02, 0.01),
+    "gap_to_grid_optimum": (0.01, 0), "gap_to_euclidean_optimum": (0.01, 0), "spl": (0.01, 0), "barn": (0.01, 0),
+    "min_clearance_m": (0.005, 0), "mean_clearance_m": (0.01, 0.02), "tracking_error_max_m": (0.005, 0.05),
+    "tracking_error_p95_m": (0.005, 0.05), "duration_s": (0.1, 0.01), "arrival_s": (0.1, 0.01),
+    "turning_rad_per_m": (0.02, 0.05), "jerk_rms": (0.1, 0.1), "contacts_driving": (0, 0), "contacts_standing": (0, 0),
+    "contacts_teleported": (0, 0),
+}  # fmt: skip
+
+
+def test_metrics_may_become_worse_by_so_much() -> None:
+    compared = {name: metric.tolerance for name, metric in METRICS.items() if metric.tolerance is not None}
+    assert {name: (t.absolute, t.relative) for name, t in compared.items()} == ALLOWED
+    better_when_high = {name for name, metric in METRICS.items() if metric.better == "higher"}
+    assert better_when_high == {"spl", "barn", "min_clearance_m", "mean_clearance_m"}
+
+
+def test_allowances_add_up() -> None:
+    assert Tolerance().allowed(7.0) == 0.0
+    assert Tolerance(0.5).allowed(7.0) == 0.5
+    assert Tolerance(0.5, 0.1).allowed(20.0) == Tolerance(0.5, 0.1).allowed(-20.0) == 2.5
+
+
+def test_the_nearest_points_of_long_logs_and_routes_are_found_part_by_part() -> None:
+    """More than a million pairs of a point and a segment."""
+    route = np.stack([np.linspace(0, 10, 501), np.zeros(501)], axis=1)
+    points = np.stack([np.linspace(0, 10, 4100), np.linspace(-1, 1, 4100)], axis=1)
+    np.testing.assert_allclose(nearest_on_route(points, route), points * (1, 0), atol=1e-9)
