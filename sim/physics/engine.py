@@ -7,6 +7,7 @@ Collision groups let the chassis meet obstacles, movers and walls only; the whee
 from __future__ import annotations
 
 import contextlib
+import itertools
 import math
 import os
 import tempfile
@@ -17,13 +18,13 @@ import numpy as np
 
 from antdrive.robots.footprint import footprint_clearance
 from antdrive.robots.spec import RobotSpec
-from antdrive.sim.physics.bullet import CHASSIS, GROUND, OBSTACLE, WHEELS, bullet, client
+from antdrive.sim.physics.bullet import CHASSIS, GROUND, OBSTACLE, WHEELS, bullet, client, drawn_as
 from antdrive.sim.physics.movers import MoverBodies
 from antdrive.sim.physics.urdf import CASTER_GAP, robot_urdf, rolling_radius
 from antdrive.worlds.errors import FieldError
 from antdrive.worlds.trajectories import Trajectories
 from antdrive.worlds.types import Floats, Pose
-from antdrive.worlds.world import World
+from antdrive.worlds.world import Disc, World
 
 Point3: TypeAlias = tuple[float, float, float]  # [m]
 
@@ -32,6 +33,7 @@ SETTLING_TIME = 0.1  # in which a placed robot sinks onto its wheels [s]
 TOUCHING_DISTANCE = 1e-4  # surfaces closer than this touch [m]
 MAX_JOINT_VELOCITY = 1e6  # of wheels; Bullet's default of 100 would slow down small wheels [rad/s]
 RESIDUAL = 5e-7  # where the solver stops for geared wheels; at 2e-6 speeds are 4 mm/s off [(rad/s)^2]
+BATCH = 5000  # bodies that are built in one call at most
 WALL_THICKNESS = 0.1  # half of it [m]
 
 
@@ -114,21 +116,20 @@ class Engine:
             deterministicOverlappingPairs=0,
             physicsClientId=self._client,
         )
+        self._drawn = drawn_as(self._client)
         self._build_ground()
         self._build_robot()
         self._obstacles: dict[int, int] = {}  # contact index by body number
-        for disc in self.world.obstacles:
-            height = max(disc.height, MIN_HEIGHT)
-            shape = p.createCollisionShape(
-                p.GEOM_CYLINDER, radius=disc.radius, height=height, physicsClientId=self._client
-            )
-            self._build_obstacle(shape, (disc.x, disc.y, height / 2))
+        # Bullet's search tree, and with it the order of contacts, follows the order in which bodies are made.
+        for (radius, height), alike in itertools.groupby(self.world.obstacles, _size):
+            shape = p.createCollisionShape(p.GEOM_CYLINDER, radius=radius, height=height, physicsClientId=self._client)
+            self._build_obstacles(shape, [(disc.x, disc.y, height / 2) for disc in alike])
         self._movers = MoverBodies(self.trajectories, self.physics_hz, self._client) if self.trajectories else None
         for body in self._movers.bodies if self._movers else ():
             self._obstacles[body] = len(self._obstacles)
         for half_extents, centre in _walls(self.world, max(2 * self.robot.height, 0.2)):
             shape = p.createCollisionShape(p.GEOM_BOX, halfExtents=half_extents, physicsClientId=self._client)
-            self._build_obstacle(shape, centre)
+            self._build_obstacles(shape, [centre])
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -221,7 +222,7 @@ class Engine:
     def _build_ground(self) -> None:
         p = self._p
         plane = p.createCollisionShape(p.GEOM_PLANE, physicsClientId=self._client)
-        ground = p.createMultiBody(0, plane, useMaximalCoordinates=1, physicsClientId=self._client)
+        ground = p.createMultiBody(0, plane, self._drawn, useMaximalCoordinates=1, physicsClientId=self._client)
         p.changeDynamics(
             ground, -1, lateralFriction=1, rollingFriction=0, spinningFriction=0, physicsClientId=self._client
         )
@@ -256,12 +257,30 @@ class Engine:
             group, mask = (CHASSIS, OBSTACLE) if link == -1 else (WHEELS, GROUND)
             p.setCollisionFilterGroupMask(self._robot, link, group, mask, physicsClientId=self._client)
 
-    def _build_obstacle(self, shape: int, centre: Point3) -> None:
+    def _build_obstacles(self, shape: int, centres: list[Point3]) -> None:
+        """Build bodies of one shape; many in one call take a tenth of the time of as many calls."""
         p = self._p
-        body = p.createMultiBody(0, shape, basePosition=centre, useMaximalCoordinates=1, physicsClientId=self._client)
-        p.changeDynamics(body, -1, activationState=p.ACTIVATION_STATE_SLEEP, physicsClientId=self._client)
-        p.setCollisionFilterGroupMask(body, -1, OBSTACLE, CHASSIS, physicsClientId=self._client)
-        self._obstacles[body] = len(self._obstacles)
+        bodies = [
+            body
+            for i in range(0, len(centres), BATCH)
+            for body in p.createMultiBody(
+                0,
+                shape,
+                self._drawn,
+                batchPositions=centres[i : i + BATCH],
+                useMaximalCoordinates=1,
+                physicsClientId=self._client,
+            )
+        ]
+        for body in bodies:
+            p.changeDynamics(body, -1, activationState=p.ACTIVATION_STATE_SLEEP, physicsClientId=self._client)
+            p.setCollisionFilterGroupMask(body, -1, OBSTACLE, CHASSIS, physicsClientId=self._client)
+            self._obstacles[body] = len(self._obstacles)
+
+
+def _size(disc: Disc) -> tuple[float, float]:
+    """Radius and height of a cylinder as it is built [m]."""
+    return disc.radius, max(disc.height, MIN_HEIGHT)
 
 
 def _walls(world: World, height: float) -> Iterator[tuple[Point3, Point3]]:

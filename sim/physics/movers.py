@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from antdrive.sim.physics.bullet import CHASSIS, OBSTACLE, bullet
+from antdrive.sim.physics.bullet import CHASSIS, OBSTACLE, bullet, drawn_as
 from antdrive.worlds.trajectories import Trajectories
 
 SAME_VELOCITY = 1e-10  # velocities closer than this differ by rounding only [m/s]
@@ -34,12 +34,13 @@ class MoverBodies:
         self._half_heights = [max(height, 0.05) / 2 for height in trajectories.heights.tolist()]
         self._chunk = _Chunk.of(trajectories, hz, 0)
         self.bodies: list[int] = []
+        drawn = drawn_as(client)
         for radius, half, (x, y) in zip(
             trajectories.radii.tolist(), self._half_heights, self._chunk.positions, strict=True
         ):
             shape = p.createCollisionShape(p.GEOM_CYLINDER, radius=radius, height=2 * half, physicsClientId=client)
             # Unlike an obstacle, a mover must be awake, and it would not move with maximal coordinates.
-            body = p.createMultiBody(0, shape, basePosition=(x, y, half), physicsClientId=client)
+            body = p.createMultiBody(0, shape, drawn, basePosition=(x, y, half), physicsClientId=client)
             p.setCollisionFilterGroupMask(body, -1, OBSTACLE, CHASSIS, physicsClientId=client)
             self.bodies.append(body)
 
