@@ -10,9 +10,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from antdrive.sim import Outcome, Rollout, Run, Scenario, certify, run
-from antdrive.sim.log.certificate import closed_form_clearance, in_metres
+from antdrive.sim.log.certificate import _near, closed_form_clearance, in_metres
 from antdrive.worlds import Disc
 
 
@@ -272,3 +274,23 @@ def test_a_noisy_log_whose_targets_or_estimates_are_made_up_is_not_certified(sma
     assert any("more than the robot's noise allows" in problem for problem in elsewhere.problems)
     without = certify(replace(log, actuated=log.actuated[:0]))
     assert any("actuated: must have" in problem for problem in without.problems)
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(0, 3), st.integers(1, 60), st.floats(0.01, 10))
+def test_discs_that_are_left_out_are_never_the_nearest(seed: int, step: float, count: int, size: float) -> None:
+    """Whatever the path: the nearest of all discs, by plain distances of points, is among those looked at."""
+    rng = np.random.default_rng(seed)
+    discs = np.column_stack([rng.uniform(-size, size, (count, 2)), rng.uniform(0, size / 2, count)])
+    x, y = np.cumsum(rng.normal(0, step, (2, 12)), axis=1)
+    radius = rng.uniform(0, size / 2)
+    near = {tuple(disc) for disc in _near(discs, x, y, radius).tolist()}
+    # A footprint of this radius reaches between 0 and `radius` towards a disc: the nearest one is that for some reach.
+    for px, py in zip(x, y, strict=True):
+        apart = np.hypot(discs[:, 0] - px, discs[:, 1] - py) - discs[:, 2]
+        reaches = rng.uniform(0, radius, (40, count))
+        assert {tuple(discs[k]) for k in (apart - reaches).argmin(axis=1)} <= near
+
+
+def test_most_discs_of_a_world_are_left_out() -> None:
+    discs = np.array([(x, y, 0.1) for x in range(20) for y in range(20)], dtype=np.float64)
+    assert len(_near(discs, np.array([5.2, 5.4]), np.array([5.5, 5.5]), 0.2)) <= 9
