@@ -29,17 +29,18 @@ from pathlib import Path
 from typing import Any
 
 HERE = Path(__file__).parent.parent
+BARN = HERE.parent / "shared" / "data" / "barn" / "barn50.tar.xz"
 SIZES = ((640, 480), (1280, 720))
 MOVERS = (0, 6, 24)
 PLANNER, ROBOT = "astar", "jackal"
 
 
-def write_barn(folder: Path) -> None:
+def write_barn(source: Path, folder: Path) -> None:
     """Write BARN's worlds to a folder as world files."""
     from antdrive.worlds import save_task
-    from benchmarks.drives import BARN, barn_tasks
+    from benchmarks.drives import barn_tasks
 
-    for name, task in barn_tasks(BARN).items():
+    for name, task in barn_tasks(source).items():
         save_task(task, folder / f"{name}.yaml")
 
 
@@ -174,6 +175,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--against", type=Path, help="root of another checkout of antdrive")
     parser.add_argument("--worlds", type=Path, help="folder of world files; default: BARN's worlds")
+    parser.add_argument("--barn", type=Path, default=BARN, help="folder or archive of BARN's world_*.world files")
     parser.add_argument("--count", type=int, default=50, help="how many of the worlds; 0: no drives")
     parser.add_argument("--seconds", type=float, default=10.0, help="length of each film; 0: no films [s]")
     parser.add_argument("--rounds", type=int, default=3, help="films of each kind")
@@ -186,14 +188,17 @@ def main() -> None:
     with contextlib.ExitStack() as stack:
         folder = options.worlds or Path(stack.enter_context(tempfile.TemporaryDirectory()))
         if options.worlds is None:
-            write_barn(folder)
+            write_barn(options.barn, folder)
+        worlds = sorted(folder.glob("*.yaml"))[: options.count]
+        if options.count and not worlds:
+            raise SystemExit(f"no worlds in {options.worlds or options.barn}; give --worlds or --barn")
         roots = {"here": HERE} | ({"there": options.against.resolve()} if options.against else {})
         checkouts = {}
         for name, root in roots.items():
             checkouts[name] = Checkout(root, options.python)
             stack.callback(checkouts[name].close)
         if options.count:
-            for line in drives_table(checkouts, sorted(folder.glob("*.yaml"))[: options.count]):
+            for line in drives_table(checkouts, worlds):
                 print(line, flush=True)
         if options.seconds:
             for line in films_table(checkouts, options.seconds, options.rounds):
