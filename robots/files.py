@@ -14,7 +14,8 @@ from antdrive.robots.feasible import require_feasible
 from antdrive.robots.spec import NOISE_RANGE, ROBOT_RANGE, Footprint, Noise, RobotSpec
 from antdrive.worlds.errors import FieldError, input_error
 from antdrive.worlds.files.checks import OneLine, SchemaVersion, check, suggest
-from antdrive.worlds.files.document import Document, read_document
+from antdrive.worlds.files.document import Document, parse_document, read_yaml
+from antdrive.worlds.reuse import reused
 
 _CATALOG = Path(__file__).with_name("catalog")
 _RULES = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
@@ -115,9 +116,15 @@ def load_robot(robot: str | os.PathLike[str]) -> RobotSpec:
     if not os.path.lexists(path):
         hint = suggest(path.stem, known)
         raise input_error(os.fspath(robot), f"no such file and no such robot in the catalogue; {hint}")
-    document = read_document(path)
+    return _robot_in(read_yaml(path), os.fspath(path), path.stem)
+
+
+@reused(16)
+def _robot_in(text: str, source: str, stem: str) -> RobotSpec:
+    """The robot in the text of a robot file."""
+    document = parse_document(text, source)
     if isinstance(document.data, dict):
-        document.data.setdefault("name", "".join(filter(str.isprintable, path.stem))[:200] or "robot")
+        document.data.setdefault("name", "".join(filter(str.isprintable, stem))[:200] or "robot")
     entry = check(RobotFile, document)
     return _to_spec(entry, document)
 

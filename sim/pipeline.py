@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import functools
 import platform
 import time
 from collections.abc import Callable
@@ -46,12 +47,14 @@ from antdrive.sim.log.record import (
     settings_of,
 )
 from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.log.streams import random_stream
 from antdrive.sim.physics.engine import Engine
 from antdrive.sim.reasons import no_path_reason
 from antdrive.sim.scenario import Scenario
 from antdrive.worlds import Cruising, Disc, Grid, Route, Task, World, rasterise
 from antdrive.worlds.drawing import LINE, card, world_svg
 from antdrive.worlds.errors import FieldError
+from antdrive.worlds.reuse import Keyed, bits, by_geometry, reused
 
 ROUTE_COLOUR = "#182242"  # of routes in notebooks
 ENDED_BY = {
@@ -167,12 +170,17 @@ def plan(s: Scenario) -> tuple[Grid, PlanResult]:
     Raises:
         PlannerError: the planner raised something, or returned something that is no `PlanResult`.
     """
-    grid = rasterise(s.task.world, s.cell or s.task.cell, s.inflate)
+    grid = _grid(by_geometry(s.task.world), s.cell or s.task.cell, s.inflate)
     query = _query(s, grid)
     answer = checked(query, ask(s.planner, query, s.rng("planner"), s.planner_label))
     if answer.status is PlanStatus.NO_PATH:
         return grid, dataclasses.replace(answer, reason=no_path_reason(s, grid, answer.reason))
     return grid, _drivable(s, grid, answer)
+
+
+@reused(16)
+def _grid(world: Keyed[World], cell: float, inflate: float) -> Grid:
+    return rasterise(world.value, cell, inflate)
 
 
 def _drivable(s: Scenario, grid: Grid, answer: PlanResult) -> PlanResult:
@@ -367,15 +375,30 @@ def _record(
 
 
 def _plan_record(s: Scenario, grid: Grid, answer: PlanResult) -> PlanRecord:
-    query = Query.between(grid, s.task)
+    grid_optimum, euclidean_optimum = _optima(_by_contents(grid, s.task))
     return PlanRecord(
         cost_m=finite_or_none(answer.cost),
         length_m=answer.line_length,
-        grid_optimum_m=finite_or_none(PLANNERS["astar"].plan(query, s.rng("optimum")).cost),
-        euclidean_optimum_m=finite_or_none(PLANNERS["tangent"].plan(query, s.rng("optimum")).line_length),
+        grid_optimum_m=grid_optimum,
+        euclidean_optimum_m=euclidean_optimum,
         work=answer.work,
         work_unit=answer.work_unit,
     )
+
+
+def _by_contents(grid: Grid, task: Task) -> Keyed[tuple[Grid, Task]]:
+    """A grid and a task, equal to others whose cells, numbers, walls and standing cylinders have the same bits."""
+    numbers = bits(grid.cell, *grid.origin, grid.inflate, *task.start, *task.goal, task.goal_tolerance)
+    cells = grid.shape, grid.free.tobytes(), grid.moves.tobytes()
+    return Keyed((grid, task), (numbers, cells, by_geometry(task.world)))
+
+
+@reused(64)
+def _optima(asked: Keyed[tuple[Grid, Task]]) -> tuple[float | None, float | None]:
+    """The lengths of the shortest path on the grid and of that among the inflated discs [m]; both searches draw nothing."""
+    query, rng = Query.between(*asked.value), random_stream(0, "optimum")
+    on_grid, free = PLANNERS["astar"].plan(query, rng), PLANNERS["tangent"].plan(query, rng)
+    return finite_or_none(on_grid.cost), finite_or_none(free.line_length)
 
 
 def _margin_record(s: Scenario) -> MarginRecord | None:
@@ -400,5 +423,10 @@ def _replan_record(replan: Replan) -> ReplanRecord:
 
 def versions() -> dict[str, str]:
     """The versions of Python and of the packages that a run depends on."""
+    return dict(_versions())
+
+
+@functools.cache
+def _versions() -> dict[str, str]:
     packages = ("antdrive", "numpy", "pybullet", "numba")
     return {"python": platform.python_version(), **{name: metadata.version(name) for name in packages}}

@@ -281,7 +281,8 @@ class Scenario:
     @property
     def driven_world(self) -> World:
         """The world that the robot drives in: the task's world with the unseen obstacles."""
-        return dataclasses.replace(self.task.world, obstacles=self.task.world.obstacles + self.unseen)
+        world = self.task.world
+        return dataclasses.replace(world, obstacles=world.obstacles + self.unseen) if self.unseen else world
 
     @property
     def trajectories(self) -> Trajectories:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from dataclasses import dataclass
 
@@ -116,7 +117,11 @@ class World:
 
     @property
     def discs(self) -> Floats:
-        """The obstacles as an array (N, 3): x, y, radius [m]."""
+        """The obstacles as a new array (N, 3): x, y, radius [m]."""
+        return self._discs.copy()
+
+    @functools.cached_property
+    def _discs(self) -> Floats:
         return np.array([(d.x, d.y, d.radius) for d in self.obstacles], dtype=np.float64).reshape(-1, 3)
 
     @property

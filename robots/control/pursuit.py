@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from antdrive.robots.control import _kernels_obstacles, _kernels_path, _kernels_pursuit
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex
@@ -23,6 +24,7 @@ from antdrive.robots.control.profile import SpeedProfile, speed_profile
 from antdrive.robots.spec import RobotSpec
 from antdrive.worlds import Floats, Pose, Route, World, point_clearance
 from antdrive.worlds.errors import FieldError
+from antdrive.worlds.reuse import Keyed, by_geometry, reused
 
 SPACING = 0.02  # distance between the samples along a route [m]
 SQUARE = 0.5  # least side of the squares that the obstacles are sorted into [m]
@@ -265,7 +267,7 @@ class PurePursuit:
         bounds = np.asarray(world.bounds, dtype=np.float64)
         side = max(SQUARE, math.sqrt(math.prod(world.size) / MAX_SQUARES))
         distance = self.lookahead_max + clearance + side
-        discs, starts = _kernels_obstacles.index_discs(world.discs, bounds, side, distance)
+        discs, starts = _discs_by_square(by_geometry(world), side, distance)
         return ObstacleIndex(discs, starts, bounds, side)
 
     def _speed_limits(
@@ -282,6 +284,12 @@ class PurePursuit:
             speed[int(stop / SPACING) : int(stop / SPACING) + 2] = 0.0
         _kernels_path.brake_backwards(speed, SPACING, self.braking * robot.max_acceleration)
         return speed
+
+
+@reused(16)
+def _discs_by_square(world: Keyed[World], side: float, distance: float) -> tuple[Floats, npt.NDArray[np.int64]]:
+    bounds = np.asarray(world.value.bounds, dtype=np.float64)
+    return _kernels_obstacles.index_discs(world.value.discs, bounds, side, distance)
 
 
 _POSITIVE = (

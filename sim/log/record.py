@@ -283,7 +283,8 @@ class DriveRecord:
     @property
     def world(self) -> World:
         """The world as it was driven in: the task's, with the unseen cylinders after the known ones."""
-        return dataclasses.replace(self.task.world, obstacles=self.task.world.obstacles + self.unseen)
+        world = self.task.world
+        return dataclasses.replace(world, obstacles=world.obstacles + self.unseen) if self.unseen else world
 
     def as_dict(self) -> dict[str, Any]:
         """The record as plain values, for JSON."""

@@ -87,3 +87,20 @@ def client() -> Iterator[int]:
             p.disconnect(number)
     finally:
         stdout.release()
+
+
+def drawn_as(number: int) -> int:
+    """A visual shape of one triangle in client `number`, for bodies that are never drawn.
+
+    For a body without a visual shape Bullet makes one from the collision shape. For a cylinder, a sphere or a plane that
+    takes longer than all the rest of the body: 0.2 ms, 0.2 ms and 2 ms.
+    """
+    p = bullet()
+    shape: int = p.createVisualShape(
+        p.GEOM_MESH,
+        vertices=((0, 0, 0), (1, 0, 0), (0, 1, 0)),
+        indices=(0, 1, 2),
+        normals=((0, 0, 1),) * 3,
+        physicsClientId=number,
+    )
+    return shape

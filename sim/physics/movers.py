@@ -14,7 +14,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.sim.physics.bullet import CHASSIS, OBSTACLE, bullet
+from antdrive.sim.physics.bullet import CHASSIS, OBSTACLE, bullet, drawn_as
 from antdrive.worlds.trajectories import Trajectories
 from antdrive.worlds.types import Floats
 
@@ -63,6 +63,7 @@ class MoverBodies:
         ]
         self._chunk = _Chunk.of(trajectories, hz, 0)
         self._past = [self._chunk.positions]
+        self._drawn = drawn_as(client)
         self.bodies: dict[int, int] = {}
         self.indices: dict[int, int] = {}
 
@@ -124,7 +125,7 @@ class MoverBodies:
         p, (position, velocity) = self._p, self._chunk.state(m, step)
         place = (*position, self._half_heights[m])
         # Unlike an obstacle, a mover must be awake, and it would not move with maximal coordinates.
-        body = p.createMultiBody(0, self._shapes[m], basePosition=place, physicsClientId=self._client)
+        body = p.createMultiBody(0, self._shapes[m], self._drawn, basePosition=place, physicsClientId=self._client)
         p.setCollisionFilterGroupMask(body, -1, OBSTACLE, CHASSIS, physicsClientId=self._client)
         self.bodies[m], self.indices[body] = body, m
         self._set_velocity(m, *velocity)

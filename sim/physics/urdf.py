@@ -17,6 +17,8 @@ from antdrive.worlds.errors import FieldError
 
 GROUND_CLEARANCE = 0.005  # height of the chassis above the floor [m]
 CASTER_GAP = 5e-4  # height of wheels and casters above the floor when the robot is placed [m]
+# For a link that is not to be drawn Bullet makes a visual shape from the collision shape, which takes 0.2 ms for a sphere.
+DRAWN = '<visual><geometry><box size="0.01 0.01 0.01"/></geometry></visual>'
 INSIDE = 0.99  # the share of the room up to the footprint's edge that wheels and casters fill at most
 
 
@@ -87,6 +89,7 @@ def _chassis(robot: RobotSpec, com_drop: float) -> list[str]:
         f'<inertial><origin xyz="0 0 {-com_drop!r}"/><mass value="{robot.mass * 0.92!r}"/>',
         f'<inertia ixx="{inertia_x!r}" iyy="{inertia_y!r}" izz="{inertia_z!r}" ixy="0" ixz="0" iyz="0"/></inertial>',
         f'<collision><origin xyz="0 0 {bottom + robot.height / 2!r}"/><geometry>{shape}</geometry></collision>',
+        DRAWN,
         '<contact><lateral_friction value="0.3"/></contact>',
         "</link>",
     ]
@@ -100,6 +103,7 @@ def _link(ball: _Ball, mass: float) -> list[str]:
         f'<inertial><mass value="{mass!r}"/>',
         f'<inertia ixx="{inertia!r}" iyy="{inertia!r}" izz="{inertia!r}" ixy="0" ixz="0" iyz="0"/></inertial>',
         f'<collision><geometry><sphere radius="{ball.radius!r}"/></geometry></collision>',
+        DRAWN,
         f'<contact><lateral_friction value="{ball.friction!r}"/><rolling_friction value="0"/>',
         '<spinning_friction value="0"/></contact>',
         "</link>",

@@ -204,7 +204,7 @@ def test_time_runs_out(small_scenario: Scenario) -> None:
 
 
 def test_a_robot_that_cannot_move_is_stuck(small_scenario: Scenario) -> None:
-    powerless = replace(small_scenario.robot, wheel_torque=1e-4)
+    powerless = replace(small_scenario.robot, wheel_torque=1e-6)
     result = run(replace(small_scenario, robot=powerless))
     assert result.outcome is Outcome.STUCK
     assert result.rollout is not None

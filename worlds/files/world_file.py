@@ -13,9 +13,10 @@ from pydantic import BaseModel, ConfigDict, Field
 from antdrive.worlds.errors import FieldError, input_error
 from antdrive.worlds.files.atomic import written_whole
 from antdrive.worlds.files.checks import OneLine, SchemaVersion, check, suggest, yaml_number
-from antdrive.worlds.files.document import MAX_BYTES, MAX_VALUES, Document, count_values, read_document
+from antdrive.worlds.files.document import MAX_BYTES, MAX_VALUES, Document, count_values, parse_document, read_yaml
 from antdrive.worlds.limits import MAX_CELLS, MAX_COORDINATE, MAX_PHASE, MIN_PERIOD
 from antdrive.worlds.movers import Mover, mover_from_dict, mover_to_dict
+from antdrive.worlds.reuse import reused
 from antdrive.worlds.world import Disc, Task, World
 
 Coordinate = Annotated[float, Field(ge=-MAX_COORDINATE, le=MAX_COORDINATE)]
@@ -109,9 +110,15 @@ def load_task(world: str | os.PathLike[str]) -> Task:
     if not os.path.lexists(path):
         hint = suggest(path.stem, known)
         raise input_error(os.fspath(world), f"no such file, nor a world of the catalogue; {hint}")
-    document = read_document(path)
+    return _task_in(read_yaml(path), os.fspath(path), path.stem)
+
+
+@reused(16)
+def _task_in(text: str, source: str, stem: str) -> Task:
+    """The task in the text of a world file."""
+    document = parse_document(text, source)
     if isinstance(document.data, dict):
-        document.data.setdefault("name", "".join(filter(str.isprintable, path.stem))[:200] or "world")
+        document.data.setdefault("name", "".join(filter(str.isprintable, stem))[:200] or "world")
     return _to_task(document)
 
 

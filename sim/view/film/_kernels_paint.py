@@ -362,6 +362,8 @@ def shade_body(
     height, width = visible.shape
     cx, cy, yaw = pose[0], pose[1], pose[2]
     cosine, sine = math.cos(yaw), math.sin(yaw)
+    places = 5 if sun[0] != 0.0 or sun[1] != 0.0 else 1  # along the shadow
+    unlit2 = (shape[2] + 0.5 * soft) ** 2 * (1.0 + 1e-9)  # the squared distance from which nothing is darkened
     reach = math.hypot(shape[0], shape[1]) + shape[2] + soft
     left, top, right, bottom = pixel_box(
         fwd,
@@ -378,12 +380,15 @@ def shade_body(
             if visible[row, col] <= 0.0:
                 continue
             x, y, _ = _at(inv, col + 0.5, row + 0.5)
-            gap = 1e30
-            for i in range(5):
+            apart2 = 1e30
+            for i in range(places):
                 ex, ey = x - cx - sun[0] * i / 4, y - cy - sun[1] * i / 4
                 across = max(abs(ex * cosine + ey * sine) - shape[0], 0.0)
                 aside = max(abs(ey * cosine - ex * sine) - shape[1], 0.0)
-                gap = min(gap, math.sqrt(across * across + aside * aside) - shape[2])
+                apart2 = min(apart2, across * across + aside * aside)
+            if apart2 >= unlit2:
+                continue
+            gap = math.sqrt(apart2) - shape[2]
             dark = strength * _ramp(0.5 - gap / soft) * visible[row, col]
             for k in range(3):
                 tone = dark * (1.0 - 0.1 * k)

@@ -1,7 +1,7 @@
 """Compose the pictures of a film: everything that stands still is rendered once; each frame adds robot and movers.
 
-PyBullet's TinyRenderer draws the bodies. The backdrop of standing bodies keeps its depth, so a frame costs only the
-pixels around the robot and the movers: these are rendered through a crop of the same camera and blended in where they
+PyBullet's TinyRenderer draws the bodies that stand still. This backdrop keeps its depth, so a frame costs only the
+pixels around the robot and the movers: a kernel draws these as TinyRenderer would, and they are blended in where they
 are nearer than the backdrop. A camera that moves needs a new backdrop in every frame; ray casting draws it faster
 than TinyRenderer.
 """
@@ -23,7 +23,8 @@ from antdrive.sim.view.film.ground import dashes, kerb_width, paint_ground
 from antdrive.sim.view.film.meshes import Mesh, Part, cylinder, join, kerb, robot_height, robot_parts
 from antdrive.sim.view.film.raycast import Solids
 from antdrive.sim.view.film.text import glow
-from antdrive.sim.view.film.tiny_renderer import Box, add_mesh, merged, render
+from antdrive.sim.view.film.tiny_renderer import Box, add_mesh, merged, overlap, render
+from antdrive.sim.view.film.triangles import Solid, draw_solids, placed
 from antdrive.sim.view.scene import Scene
 from antdrive.sim.view.style import (
     KERB,
@@ -98,7 +99,6 @@ class Compositor:
 
     def __enter__(self) -> Compositor:
         self._still = self._open.enter_context(client())
-        self._moving = self._open.enter_context(client())
         self._meshes = still_meshes(self.scene, self.tall)
         self._solids = still_solids(self._meshes, self.scene, self.tall)
         balls = [mesh.ball for mesh, _ in self._meshes]
@@ -106,9 +106,8 @@ class Compositor:
         self._radii = np.array([radius for _, radius in balls])
         self._loaded = np.zeros(len(balls), dtype=np.bool_)
         self._parts = robot_parts(self.scene.robot)
-        self._bodies = [add_mesh(self._moving, part.mesh, part.colour) for part in self._parts]
         tall = drawn_height(self.scene)
-        self._movers = [add_mesh(self._moving, cylinder(radius, 0.0, tall), MOVER) for radius in self.scene.mover_radii]
+        self._mover_meshes = [cylinder(radius, 0.0, tall) for radius in self.scene.mover_radii]
         self.set_camera(self.camera)
         return self
 
@@ -176,9 +175,11 @@ class Compositor:
         if velocities is not None:
             self._draw_forecast(frame, places, np.asarray(velocities, dtype=np.float64).reshape(-1, 2))
         self._draw_shadows(frame, np.array([x, y, yaw]), places)
-        self._place_bodies(x, y, yaw, wheels, places)
-        for box in merged(self._boxes(x, y, places)):
-            self._put_bodies(frame, box)
+        boxes = self._boxes(x, y, places)
+        bodies = [self._robot_at(x, y, yaw, wheels), *self._movers_at(places)]
+        for box in merged([b for b in boxes if b is not None]):
+            inside = [body for body, b in zip(bodies, boxes, strict=True) if b is not None and overlap(b, box)]
+            self._put_bodies(frame, box, [solid for body in inside for solid in body])
         return frame
 
     def field_frame(self, grid: Grid, levels: Floats, path: Floats) -> Picture:
@@ -311,34 +312,38 @@ class Compositor:
                 strength,
             )
 
-    def _place_bodies(self, x: float, y: float, yaw: float, wheels: tuple[float, float], movers: Floats) -> None:
-        p = bullet()
-        for part, body in zip(self._parts, self._bodies, strict=True):
-            at, quaternion = part_pose(part, x, y, yaw, wheels)
-            p.resetBasePositionAndOrientation(body, at, quaternion, physicsClientId=self._moving)
-        for (mx, my), body in zip(movers, self._movers, strict=True):
-            p.resetBasePositionAndOrientation(body, (mx, my, 0.0), (0, 0, 0, 1), physicsClientId=self._moving)
+    def _robot_at(self, x: float, y: float, yaw: float, wheels: tuple[float, float]) -> list[Solid]:
+        poses = [(part, part_pose(part, x, y, yaw, wheels)) for part in self._parts]
+        return [Solid(part.mesh, part.colour, placed(*pose)) for part, pose in poses]
 
-    def _boxes(self, x: float, y: float, movers: Floats) -> list[Box]:
-        """The pixels that robot and movers may cover, a box for each that is in sight."""
+    def _movers_at(self, places: Floats) -> list[list[Solid]]:
+        turn = (0.0, 0.0, 0.0, 1.0)
+        return [
+            [Solid(mesh, MOVER, placed((x, y, 0.0), turn))]
+            for mesh, (x, y) in zip(self._mover_meshes, places.tolist(), strict=True)
+        ]
+
+    def _boxes(self, x: float, y: float, movers: Floats) -> list[Box | None]:
+        """The pixels that the robot and each mover may cover; None for one that is out of sight."""
         tall = drawn_height(self.scene)
         robot = self.scene.robot
         bodies = [(x, y, 1.05 * robot.footprint.radius, 1.2 * max(robot_height(robot), 2.2 * robot.wheel_radius))]
         bodies += [(mx, my, r, tall) for (mx, my), r in zip(movers, self.scene.mover_radii, strict=True)]
-        width, height = self.camera.size
-        boxes = []
-        for bx, by, radius, top in bodies:
-            corners = [(bx + i * radius, by + j * radius, z) for i in (-1, 1) for j in (-1, 1) for z in (0.0, top)]
-            at = self.camera.pixels(corners)
-            x0, y0 = np.maximum(np.floor(at.min(axis=0)).astype(int) - 1, 0)
-            x1, y1 = np.minimum(np.ceil(at.max(axis=0)).astype(int) + 1, (width, height))
-            if x0 < x1 and y0 < y1:
-                boxes.append((int(x0), int(y0), int(x1), int(y1)))
-        return boxes
+        corners = [
+            (bx + i * radius, by + j * radius, z)
+            for bx, by, radius, top in bodies
+            for i in (-1, 1)
+            for j in (-1, 1)
+            for z in (0.0, top)
+        ]
+        at = self.camera.pixels(corners).reshape(-1, 8, 2)
+        low = np.maximum(np.floor(at.min(axis=1)).astype(int) - 1, 0).tolist()
+        high = np.minimum(np.ceil(at.max(axis=1)).astype(int) + 1, self.camera.size).tolist()
+        return [(x0, y0, x1, y1) if x0 < x1 and y0 < y1 else None for (x0, y0), (x1, y1) in zip(low, high, strict=True)]
 
-    def _put_bodies(self, frame: Picture, box: Box) -> None:
-        """Render robot and movers within a box and blend them into the frame."""
-        image, depth, seg = render(self._moving, self.camera, box, self.fine, self._light)
+    def _put_bodies(self, frame: Picture, box: Box, solids: list[Solid]) -> None:
+        """Draw bodies within a box and blend them into the frame."""
+        image, depth, seg = draw_solids(solids, self.camera, box, self.fine, self._light)
         kernels.put_bodies(frame, image, depth, seg, self.backdrop.depth, box[0], box[1], self.fine, HIDDEN_OPACITY)
 
 

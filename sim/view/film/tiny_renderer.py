@@ -68,12 +68,17 @@ def render(
     )
 
 
+def overlap(a: Box, b: Box) -> bool:
+    """Whether two boxes share a pixel."""
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
+
+
 def merged(boxes: list[Box]) -> list[Box]:
-    """The boxes, overlapping ones joined: each crop shows all moving bodies, so no pixel may be in two crops."""
+    """The boxes, overlapping ones joined: bodies that may hide each other are drawn together, and no pixel twice."""
     done: list[Box] = []
     for box in boxes:
         while True:
-            hit = next((b for b in done if b[0] < box[2] and box[0] < b[2] and b[1] < box[3] and box[1] < b[3]), None)
+            hit = next((b for b in done if overlap(b, box)), None)
             if hit is None:
                 break
             done.remove(hit)

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from antdrive.robots import RobotSpec, footprint_clearance
 from antdrive.sim import Outcome, Rollout, Run, Scenario, certify, run
@@ -318,3 +320,27 @@ def test_a_noisy_log_whose_targets_or_estimates_are_made_up_is_not_certified(sma
     assert any("more than the robot's noise allows" in problem for problem in elsewhere.problems)
     without = certify(replace(log, actuated=log.actuated[:0]))
     assert any("actuated: must have" in problem for problem in without.problems)
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(0, 3), st.integers(1, 60), st.floats(0.01, 10))
+def test_no_disc_that_is_left_out_is_the_nearest_to_a_footprint(
+    seed: int, step: float, count: int, size: float
+) -> None:
+    """Whatever the path: the nearest of all discs, by plain distances of points, is among those looked at."""
+    rng = np.random.default_rng(seed)
+    discs = np.column_stack([rng.uniform(-size, size, (count, 2)), rng.uniform(0, size / 2, count)])
+    x, y = np.cumsum(rng.normal(0, step, (2, 12)), axis=1)
+    radius = rng.uniform(0, size / 2)
+    ((_, looked_at),) = certificate._blocks(np.column_stack([x, y]), radius, discs)
+    near = {tuple(disc) for disc in looked_at.tolist()}
+    # A footprint of this radius reaches between 0 and `radius` towards a disc: the nearest one is that for some reach.
+    for px, py in zip(x, y, strict=True):
+        apart = np.hypot(discs[:, 0] - px, discs[:, 1] - py) - discs[:, 2]
+        reaches = rng.uniform(0, radius, (40, count))
+        assert {tuple(discs[k]) for k in (apart - reaches).argmin(axis=1)} <= near
+
+
+def test_most_discs_of_a_world_are_left_out() -> None:
+    discs = np.array([(x, y, 0.1) for x in range(20) for y in range(20)], dtype=np.float64)
+    ((_, near),) = certificate._blocks(np.array([[5.2, 5.5], [5.4, 5.5]]), 0.2, discs)
+    assert len(near) <= 9

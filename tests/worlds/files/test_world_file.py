@@ -26,6 +26,7 @@ from antdrive.worlds import (
     task_to_dict,
 )
 from antdrive.worlds.files.document import parse_document
+from antdrive.worlds.reuse import forget
 from tests.worlds.malformed import GOOD, MALFORMED
 
 TASK = Task(
@@ -297,6 +298,7 @@ def test_the_largest_world_that_is_written_reads_back(tmp_path: Path, monkeypatc
             with pytest.raises(InputError, match="not written"):
                 save_task(TASK, tmp_path / "one.yaml")
     monkeypatch.setattr(document, "MAX_VALUES", values - 1)
+    forget()
     with pytest.raises(InputError):
         load_task(tmp_path / "one.yaml")
 

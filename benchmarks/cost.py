@@ -1,0 +1,209 @@
+"""Measure what a certified drive and a frame of a film cost, here and in another checkout: `python -m benchmarks.cost`.
+
+With `--against PATH` the same drives are run by the antdrive of another checkout, in a process of its own, world by world in
+turn with those of this one; the table shows the medians and the median ratio within a pair, and every pair of drives must agree
+bit for bit. Drives are timed in processor time of the process, films on the clock and in processor time without the encoder's;
+ratios are those of processor times.
+
+- first: a world that the process meets for the first time, read from its YAML file
+- again: the same file with the next seed, in the same process
+- film: ten seconds among movers, from a fixed camera, rendered and encoded
+
+The worlds are BARN's, written to a temporary folder as YAML, or all YAML files of a folder (`--worlds`).
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import dataclasses
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).parent.parent
+BARN = HERE.parent / "shared" / "data" / "barn" / "barn50.tar.xz"
+SIZES = ((640, 480), (1280, 720))
+MOVERS = (0, 6, 24)
+PLANNER, ROBOT = "astar", "jackal"
+
+
+def write_barn(source: Path, folder: Path) -> None:
+    """Write BARN's worlds to a folder as world files."""
+    from antdrive.worlds import save_task
+    from benchmarks.drives import barn_tasks
+
+    for name, task in barn_tasks(source).items():
+        save_task(task, folder / f"{name}.yaml")
+
+
+def drive(path: str, seed: int) -> dict[str, Any]:
+    """Drive a world file; what it cost [s], and the digest of the drive."""
+    from antdrive.sim import Scenario, run
+
+    started = time.process_time()
+    done = run(Scenario.of(path, PLANNER, ROBOT, seed=seed))
+    cost = time.process_time() - started
+    assert done.rollout is not None
+    return {"cost": cost, "certified": done.succeeded, "digest": done.rollout.drive_digest}
+
+
+def film_rate(movers: int, size: tuple[int, int], seconds: float) -> dict[str, Any]:
+    """Film a drive through a hall with movers; frames per second."""
+    import numpy as np
+
+    from antdrive.sim import Scenario, run
+    from antdrive.sim.view.film.video import film
+    from antdrive.worlds import Cruising, Task, World
+
+    rng, found = np.random.default_rng(1), list[Any]()
+    while len(found) < movers:
+        x, y = rng.uniform(0.5, 19.5, 2).tolist()
+        angle, speed = rng.uniform(0, 2 * np.pi), rng.uniform(0.2, 0.7)
+        if abs(y - 10) > 2:
+            found.append(
+                Cruising(
+                    radius=0.3, position=(x, y), velocity=(speed * float(np.cos(angle)), speed * float(np.sin(angle)))
+                )
+            )
+    task = Task(World("hall", (0, 0, 20, 20), movers=tuple(found)), (1, 10, 0), (19, 10))
+    log = run(Scenario.of(task, "astar", avoidance=None, replanning=None)).rollout
+    assert log is not None
+    rows = np.arange(round(seconds * 240) + 1) % len(log.t)
+    arrays = {name: getattr(log, name)[rows] for name in ("pose", "twist", "command", "clearance", "limiter", "movers")}
+    part = dataclasses.replace(log, t=np.arange(len(rows)) / 240, contacts=np.empty((0, 4)), **arrays)
+    with tempfile.TemporaryDirectory() as folder:
+        started = time.process_time()
+        info = film(part, Path(folder) / "a.mp4", size=size, jobs=1)
+        cost = time.process_time() - started
+    return {"rate": info.frames / info.wall_s, "cost": cost / info.frames}
+
+
+def serve() -> None:
+    """Answer requests, a line of JSON each, until the input ends."""
+    for line in sys.stdin:
+        kind, *rest = json.loads(line)
+        answer = drive(*rest) if kind == "drive" else film_rate(rest[0], tuple(rest[1]), rest[2])
+        print(json.dumps(answer), flush=True)
+
+
+class Checkout:
+    """A process that runs the antdrive of a checkout."""
+
+    def __init__(self, root: Path, python: str) -> None:
+        environment = {**os.environ, "PYTHONPATH": str(root), "OPENBLAS_NUM_THREADS": "1"}
+        command = [python, str(Path(__file__).resolve()), "--serve"]
+        self._process = subprocess.Popen(
+            command, cwd=root, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+
+    def ask(self, *request: Any) -> dict[str, Any]:
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        print(json.dumps(request), file=self._process.stdin, flush=True)
+        line = self._process.stdout.readline()
+        if not line:
+            raise SystemExit(f"the process of a checkout ended with {self._process.wait()}")
+        answer: dict[str, Any] = json.loads(line)
+        return answer
+
+    def close(self) -> None:
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+        self._process.wait()
+
+
+def drives_table(checkouts: dict[str, Checkout], worlds: list[Path]) -> Iterator[str]:
+    """The costs of first and further drives, world by world in turn."""
+    for checkout in checkouts.values():  # loads kernels, and meets no world of the table
+        checkout.ask("drive", "slalom", 0)
+    costs: dict[tuple[str, str], list[float]] = {}
+    certified = 0
+    for k, world in enumerate(worlds):
+        for kind, seed in (("first", 0), ("again", 1)):
+            # Who goes first changes with each world, so that a slow moment of the machine hits both alike.
+            order = list(checkouts) if k % 2 else list(checkouts)[::-1]
+            found = {name: checkouts[name].ask("drive", str(world), seed) for name in order}
+            assert len({answer["digest"] for answer in found.values()}) == 1, f"{world}: the drives differ"
+            certified += all(answer["certified"] for answer in found.values())
+            for name, answer in found.items():
+                costs.setdefault((kind, name), []).append(answer["cost"])
+    yield f"{len(worlds)} worlds, {PLANNER} with {ROBOT}; {certified} of {2 * len(worlds)} drives certified; all pairs alike"
+    yield "| drive | " + " | ".join(f"{name} [ms] | {name} [drives/s]" for name in checkouts) + " | ratio |"
+    yield "|---|" + "---|" * (2 * len(checkouts) + 1)
+    reference = list(checkouts)[-1]
+    for kind in ("first", "again"):
+        cells = [
+            f"{1e3 * statistics.median(costs[kind, name]):.0f} | {len(worlds) / sum(costs[kind, name]):.1f}"
+            for name in checkouts
+        ]
+        ratio = statistics.median(b / a for a, b in zip(costs[kind, "here"], costs[kind, reference], strict=True))
+        yield f"| {kind} | {' | '.join(cells)} | {ratio:.2f} |"
+
+
+def films_table(checkouts: dict[str, Checkout], seconds: float, rounds: int) -> Iterator[str]:
+    """Frames per second among movers, in turn, and the processor time of a frame without its encoding."""
+    yield f"\n{seconds:g} s of film, camera oblique, rendered and encoded; median of {rounds}"
+    yield "| movers | size | " + " | ".join(f"{name} [frames/s] | {name} [ms]" for name in checkouts) + " | ratio |"
+    yield "|---|---|" + "---|" * (2 * len(checkouts) + 1)
+    reference = list(checkouts)[-1]
+    for checkout in checkouts.values():
+        checkout.ask("film", 1, (160, 160), 0.1)
+    for movers in MOVERS:
+        for size in SIZES:
+            found: dict[str, list[dict[str, Any]]] = {name: [] for name in checkouts}
+            for _ in range(rounds):
+                for name, checkout in checkouts.items():
+                    found[name].append(checkout.ask("film", movers, size, seconds))
+            cells = [
+                f"{statistics.median(a['rate'] for a in answers):.0f} | {1e3 * statistics.median(a['cost'] for a in answers):.1f}"
+                for answers in found.values()
+            ]
+            pairs = zip(found["here"], found[reference], strict=True)
+            ratio = statistics.median(b["cost"] / a["cost"] for a, b in pairs)
+            yield f"| {movers} | {size[0]}x{size[1]} | {' | '.join(cells)} | {ratio:.1f} |"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--against", type=Path, help="root of another checkout of antdrive")
+    parser.add_argument("--worlds", type=Path, help="folder of world files; default: BARN's worlds")
+    parser.add_argument("--barn", type=Path, default=BARN, help="folder or archive of BARN's world_*.world files")
+    parser.add_argument("--count", type=int, default=50, help="how many of the worlds; 0: no drives")
+    parser.add_argument("--seconds", type=float, default=10.0, help="length of each film; 0: no films [s]")
+    parser.add_argument("--rounds", type=int, default=3, help="films of each kind")
+    parser.add_argument("--python", default=sys.executable, help="the interpreter that runs both checkouts")
+    parser.add_argument("--serve", action="store_true", help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.serve:
+        serve()
+        return
+    with contextlib.ExitStack() as stack:
+        folder = options.worlds or Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        if options.worlds is None:
+            write_barn(options.barn, folder)
+        worlds = sorted(folder.glob("*.yaml"))[: options.count]
+        if options.count and not worlds:
+            raise SystemExit(f"no worlds in {options.worlds or options.barn}; give --worlds or --barn")
+        roots = {"here": HERE} | ({"there": options.against.resolve()} if options.against else {})
+        checkouts = {}
+        for name, root in roots.items():
+            checkouts[name] = Checkout(root, options.python)
+            stack.callback(checkouts[name].close)
+        if options.count:
+            for line in drives_table(checkouts, worlds):
+                print(line, flush=True)
+        if options.seconds:
+            for line in films_table(checkouts, options.seconds, options.rounds):
+                print(line, flush=True)
+
+
+if __name__ == "__main__":
+    main()
