@@ -56,6 +56,7 @@ class Store:
             manifest: the campaign and facts about it, as plain data
             grid: a row for each run
         """
+        (self.folder / TABLE).unlink(missing_ok=True)  # of the campaign as it was
         write_table(grid, self.folder / GRID_FILE)
         text = json.dumps(manifest, indent=1, ensure_ascii=False)
         with written_whole(self.folder / MANIFEST) as part:
@@ -65,12 +66,16 @@ class Store:
         """The keys of all runs that were ever made here."""
         return set(_results(self.folder)["key"].to_pylist())
 
-    def add(self, row: Mapping[str, Any]) -> None:
+    def add(self, row: Mapping[str, Any], log: bytes | None = None) -> None:
         """Keep what came out of a run; it is on the disk after `FLUSH_EVERY` seconds at most, if runs go on ending.
 
         Args:
             row: as `run_row` and `fault_row` return it
+            log: the run's log, if it is to be written where the row says
         """
+        if log is not None:
+            with written_whole(self.folder / row["rollout"]) as part:
+                part.write_bytes(log)
         self._rows.append(row)
         if time.monotonic() - self._written > FLUSH_EVERY:
             self.flush()
