@@ -62,10 +62,6 @@ class Store:
         with written_whole(self.folder / MANIFEST) as part:
             part.write_text(text + "\n", encoding="utf-8")
 
-    def done(self) -> set[str]:
-        """The keys of all runs that were ever made here."""
-        return set(_results(self.folder)["key"].to_pylist())
-
     def add(self, row: Mapping[str, Any], log: bytes | None = None) -> None:
         """Keep what came out of a run; it is on the disk after `FLUSH_EVERY` seconds at most, if runs go on ending.
 
@@ -123,6 +119,15 @@ def opened(folder: str | os.PathLike[str]) -> Iterator[Store]:
         for left in (*path.glob(f"{UNFINISHED}*"), *(path / PARTS).glob(f"{UNFINISHED}*")):
             left.unlink(missing_ok=True)  # of a process that was killed
         yield Store(path)
+
+
+def done_in(folder: Path) -> set[str]:
+    """The keys of all runs that were ever made in a folder, also of campaigns that have changed since.
+
+    Args:
+        folder: a campaign's folder, or one that does not exist yet
+    """
+    return set(_results(folder)["key"].to_pylist())
 
 
 def read_manifest(folder: str | Path) -> dict[str, Any]:

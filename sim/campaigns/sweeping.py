@@ -21,7 +21,7 @@ from antdrive.sim.campaigns.local import run_here, run_locally
 from antdrive.sim.campaigns.results import SweepResults
 from antdrive.sim.campaigns.rows import grid_table
 from antdrive.sim.campaigns.running import Driving, Finished, Keep, Work
-from antdrive.sim.campaigns.store import Store, opened
+from antdrive.sim.campaigns.store import Store, done_in, opened
 from antdrive.sim.pipeline import versions
 from antdrive.worlds import save_task
 from antdrive.worlds.files.atomic import written_whole
@@ -84,7 +84,7 @@ def run_expansion(
     with opened(folder) as store:
         all_jobs = calibrated(expansion.jobs)
         _begin(store, campaign, expansion, all_jobs)
-        done = store.done()
+        done = done_in(store.folder)
         todo = [job for job in all_jobs if job.key not in done]
         made, before, size = 0, len(all_jobs) - len(todo), len(all_jobs)
         report(before, size)
