@@ -101,7 +101,10 @@ def _client(distributed: Any, address: str) -> Iterator[Any]:
             stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": 1}))
             target = stack.enter_context(
                 distributed.LocalCluster(
-                    n_workers=max(1, int(match[1])), threads_per_worker=1, memory_limit=0, dashboard_address=None
+                    n_workers=max(1, int(match[1])),
+                    threads_per_worker=1,
+                    memory_limit=0,
+                    dashboard_address="127.0.0.1:0",
                 )
             )
         try:

@@ -158,7 +158,7 @@ def joined(folder: Path) -> pyarrow.Table:
     places = {key: i for i, key in enumerate(results["key"].to_pylist())}
     keys = grid["key"].to_pylist()
     rows = [i for i, key in enumerate(keys) if key in places]
-    left, right = grid.take(rows), results.take([places[keys[i]] for i in rows])
+    left, right = _rows(grid, rows), _rows(results, [places[keys[i]] for i in rows])
     command = left.schema.get_field_index("command")
     for name in right.column_names:
         if name != "key" and name not in left.column_names:
@@ -166,6 +166,12 @@ def joined(folder: Path) -> pyarrow.Table:
     order = [name for name in left.column_names if name not in ("command", *NOT_CANONICAL)]
     order.insert(_after(order, "rollout"), left.column_names[command])
     return left.select([*order, *NOT_CANONICAL]).combine_chunks()
+
+
+def _rows(table: pyarrow.Table, numbers: list[int]) -> pyarrow.Table:
+    """Some rows of a table, in this order; none where there are none."""
+    arrow = parquet_library()
+    return table.take(arrow.array(numbers, type=arrow.int64()))
 
 
 def _after(names: Sequence[str], name: str) -> int:
@@ -220,7 +226,7 @@ def _results(folder: Path) -> pyarrow.Table:
     for i, key in enumerate(table["key"].to_pylist()):
         if key not in places or (outcomes[places[key]] == CRASHED != outcomes[i]):
             places[key] = i
-    return table if len(places) == len(table) else table.take(sorted(places.values()))
+    return table if len(places) == len(table) else _rows(table, sorted(places.values()))
 
 
 def _cast(table: pyarrow.Table, schema: pyarrow.Schema) -> pyarrow.Table:
