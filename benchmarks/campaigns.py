@@ -48,7 +48,8 @@ class Sleeping:
     seconds: float = 0.0
 
     def __call__(self, job: Job) -> Finished:
-        time.sleep(self.seconds)
+        if self.seconds:  # even no sleep at all gives the processor away
+            time.sleep(self.seconds)
         return Finished(fault_row(job.key, "succeeded", hashlib.sha256(job.key.encode()).hexdigest()))
 
 
