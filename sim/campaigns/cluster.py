@@ -135,7 +135,7 @@ def _workers(client: Any, address: str) -> int:
     """How many workers a cluster has; 1 if it has none yet."""
     _require_scheduler(client, address)
     try:
-        return max(1, len(client.scheduler_info()["workers"]))
+        return max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
     except (OSError, RuntimeError):
         _require_scheduler(client, address)
         return 1

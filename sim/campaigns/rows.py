@@ -25,6 +25,7 @@ WALL_TIMES = ("plan_s", "drive_wall_s")  # metrics that differ between repetitio
 #: The columns that differ between repetitions of the same run; the canonical table is without them.
 NOT_CANONICAL = (*WALL_TIMES, "attempts")
 VERSIONS = ("antdrive", "numpy", "pybullet", "numba")
+BATCH = 50_000  # rows that are plain Python at a time
 OPTION = "option."  # what the names of columns with a planner's option begin with
 #: What a run is, besides its options: the column's name and its type.
 GRID: Mapping[str, str] = {
@@ -154,8 +155,10 @@ def grid_table(jobs: Sequence[Job]) -> pyarrow.Table:
     Args:
         jobs: the runs
     """
-    arrow = parquet_library()
-    table = arrow.Table.from_pylist([grid_row(job) for job in jobs], schema=_schema(GRID))
+    arrow, schema = parquet_library(), _schema(GRID)
+    batches = (jobs[first : first + BATCH] for first in range(0, len(jobs), BATCH))
+    tables = [arrow.Table.from_pylist([grid_row(job) for job in batch], schema=schema) for batch in batches]
+    table = arrow.concat_tables([schema.empty_table(), *tables]).combine_chunks()
     place = table.schema.get_field_index("options") + 1
     for name in sorted({option for job in jobs for option in job.case.given}):
         values = [job.case.options.get(name) for job in jobs]

@@ -121,13 +121,16 @@ def opened(folder: str | os.PathLike[str]) -> Iterator[Store]:
         yield Store(path)
 
 
-def done_in(folder: Path) -> set[str]:
+def done_in(folder: Path, *, crashed: bool = True) -> set[str]:
     """The keys of all runs that were ever made in a folder, also of campaigns that have changed since.
 
     Args:
         folder: a campaign's folder, or one that does not exist yet
+        crashed: whether runs count that crashed
     """
-    return set(_results(folder)["key"].to_pylist())
+    results = _results(folder)
+    rows = zip(results["key"].to_pylist(), results["outcome"].to_pylist(), strict=True)
+    return {key for key, outcome in rows if crashed or outcome != CRASHED}
 
 
 def read_manifest(folder: str | Path) -> dict[str, Any]:

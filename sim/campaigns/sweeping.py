@@ -34,6 +34,7 @@ def sweep(
     jobs: int | None = None,
     dask: str | None = None,
     keep: Keep | None = None,
+    retry_crashed: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> SweepResults:
     """Make all runs of a campaign that its folder does not hold yet. Whatever ends it, the same call goes on later.
@@ -44,13 +45,16 @@ def sweep(
         jobs: number of processes; None: one per core; 0: this process, which a run that crashes then ends
         dask: the cluster that makes the runs instead: "local:N", or the address of a scheduler, "tcp://HOST:PORT"
         keep: which runs' logs are kept: none, failed or all; None: as the campaign says
+        retry_crashed: whether runs are made again whose processes died
         progress: is called at first and after each run with the numbers of runs that are done and of all
 
     Raises:
         InputError: something in the campaign is wrong, another process writes into the folder, or the scheduler is gone.
     """
     asked = campaign_of(campaign)
-    return run_expansion(asked, expand(asked), folder, jobs=jobs, dask=dask, keep=keep, progress=progress)
+    return run_expansion(
+        asked, expand(asked), folder, jobs=jobs, dask=dask, keep=keep, retry_crashed=retry_crashed, progress=progress
+    )
 
 
 def run_expansion(
@@ -61,6 +65,7 @@ def run_expansion(
     jobs: int | None = None,
     dask: str | None = None,
     keep: Keep | None = None,
+    retry_crashed: bool = False,
     progress: Callable[[int, int], None] | None = None,
     work: Work | None = None,
 ) -> SweepResults:
@@ -73,6 +78,7 @@ def run_expansion(
         jobs: number of processes; None: one per core; 0: this process
         dask: the cluster that makes the runs instead
         keep: which runs' logs are kept; None: as the campaign says
+        retry_crashed: whether runs are made again whose processes died
         progress: is called at first and after each run with the numbers of runs that are done and of all
         work: what is done with a run; None: it is driven
 
@@ -84,7 +90,7 @@ def run_expansion(
     with opened(folder) as store:
         all_jobs = calibrated(expansion.jobs)
         _begin(store, campaign, expansion, all_jobs)
-        done = done_in(store.folder)
+        done = done_in(store.folder, crashed=not retry_crashed)
         todo = [job for job in all_jobs if job.key not in done]
         made, before, size = 0, len(all_jobs) - len(todo), len(all_jobs)
         report(before, size)

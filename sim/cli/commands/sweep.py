@@ -15,7 +15,6 @@ from antdrive.sim.cli.exits import SUCCEEDED
 from antdrive.worlds.errors import InputError
 
 if TYPE_CHECKING:
-    from antdrive.sim.campaigns.campaign import Campaign
     from antdrive.sim.campaigns.expanding import Expansion
     from antdrive.sim.campaigns.results import SweepResults
     from antdrive.sim.campaigns.running import Keep
@@ -76,8 +75,10 @@ Dask = Annotated[
     ),
 ]
 Rollouts = Annotated[
-    str | None, typer.Option("--keep", metavar="WHICH", help="Logs to keep: none, failed or all.  [default: none]")
+    str | None,
+    typer.Option("--keep", metavar="WHICH", help="Logs to keep: none, failed or all.  [default: as the campaign says]"),
 ]
+Retry = Annotated[bool, typer.Option("--retry-crashed", help="Make runs again whose processes died.")]
 DryRun = Annotated[
     bool, typer.Option("--dry-run", help="Say how many runs there are and how many are missing; run nothing.")
 ]
@@ -99,6 +100,7 @@ def sweep(
     jobs: Jobs = None,
     dask: Dask = None,
     keep: Rollouts = None,
+    retry_crashed: Retry = False,
     dry_run: DryRun = False,
     json: Json = False,
 ) -> int:
@@ -110,6 +112,7 @@ def sweep(
     """
     from antdrive.sim.campaigns.expanding import expand
     from antdrive.sim.campaigns.running import Keep as Kinds
+    from antdrive.sim.campaigns.sweeping import run_expansion
     from antdrive.sim.cli.campaigns import campaign_from
 
     if out is None and not dry_run:
@@ -132,22 +135,23 @@ def sweep(
     if dry_run:
         return _say_size(expansion, out, json)
     assert out is not None
-    results = _run(asked, expansion, out, jobs, dask, cast("Keep | None", keep))
+    compile_once()
+    with _resumable(out), campaign_bar("driving") as progress:
+        results = run_expansion(
+            asked,
+            expansion,
+            out,
+            jobs=jobs,
+            dask=dask,
+            keep=cast("Keep | None", keep),
+            retry_crashed=retry_crashed,
+            progress=progress,
+        )
     if json:
         print_json(_facts(results))
     else:
         _print(results)
     return SUCCEEDED
-
-
-def _run(
-    asked: "Campaign", expansion: "Expansion", out: Path, jobs: int | None, dask: str | None, keep: "Keep | None"
-) -> "SweepResults":
-    from antdrive.sim.campaigns.sweeping import run_expansion
-
-    compile_once()
-    with _resumable(out), campaign_bar("driving") as progress:
-        return run_expansion(asked, expansion, out, jobs=jobs, dask=dask, keep=keep, progress=progress)
 
 
 @contextmanager

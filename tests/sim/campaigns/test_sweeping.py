@@ -7,8 +7,10 @@ from pathlib import Path
 import pytest
 
 from antdrive import Scenario, run
-from antdrive.sim.campaigns import canonical_bytes, read_results, sweep
+from antdrive.sim.campaigns import canonical_bytes, expand, make_campaign, read_results, sweep
+from antdrive.sim.campaigns.sweeping import run_expansion
 from antdrive.worlds import Disc, Task, World, save_task
+from tests.sim.campaigns.works import Deadly
 
 TWO_BY_TWO = {"worlds": ["small.yaml", "other.yaml"], "planners": ["astar", {"name": "aco-han", "ants": 10}]}
 
@@ -44,3 +46,22 @@ def test_what_is_there_is_not_run_again(worlds: Path) -> None:
     again = sweep(TWO_BY_TWO, "out")
     assert (first.made, again.made, again.complete) == (4, 0, True)
     assert canonical_bytes("out") == before
+
+
+def test_runs_that_crashed_are_made_again_only_if_asked(tmp_path: Path) -> None:
+    campaign = make_campaign({"worlds": "empty", "planners": "astar", "seeds": 4})
+    expansion = expand(campaign)
+    first = run_expansion(campaign, expansion, tmp_path, jobs=1, work=Deadly((2,)))
+    assert first.outcomes == {"succeeded": 3, "crashed": 1}
+    assert run_expansion(campaign, expansion, tmp_path, jobs=0, work=Deadly()).made == 0
+    again = run_expansion(campaign, expansion, tmp_path, jobs=0, work=Deadly(), retry_crashed=True)
+    assert (again.made, again.outcomes) == (1, {"succeeded": 4})
+
+
+def test_processes_and_order_do_not_show_in_the_table(worlds: Path) -> None:
+    sweep(TWO_BY_TWO, "here", jobs=0)
+    sweep(TWO_BY_TWO, "two", jobs=2)
+    assert canonical_bytes("here") == canonical_bytes("two")
+    back = {"worlds": TWO_BY_TWO["worlds"][::-1], "planners": TWO_BY_TWO["planners"][::-1]}
+    sweep(back, "back", jobs=1)
+    assert canonical_bytes("here") == canonical_bytes("back")
