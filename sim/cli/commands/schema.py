@@ -14,7 +14,7 @@ def schema(
         str, typer.Argument(metavar="KIND", help="Kind of file: world, robot, suite or campaign.")
     ] = "world",
 ) -> int:
-    """Print the JSON Schema of world, robot, suite or campaign files.
+    """Print the JSON Schema of a kind of file.
 
     An editor that knows it completes keys and marks mistakes.
     """

@@ -104,7 +104,7 @@ def sweep(
     dry_run: DryRun = False,
     json: Json = False,
 ) -> int:
-    """Run a campaign: worlds x planners x robots x settings x seeds.
+    """Drive every combination of a campaign.
 
     The folder holds a row for each run as Parquet. The same command goes on after an interruption, and runs what is new after
     a change. Options that name worlds, planners and so on take the place of what the file says. Exit code 0: all runs are
