@@ -137,7 +137,8 @@ class Cluster:
 def children(process: int, word: str) -> list[int]:
     """The children of a process whose command line holds a word."""
     with contextlib.suppress(OSError):
-        found = Path(f"/proc/{process}/task/{process}/children").read_text().split()
+        threads = Path(f"/proc/{process}/task").glob("*/children")  # each thread has children of its own
+        found = " ".join(path.read_text() for path in threads).split()
         return [int(pid) for pid in found if word in Path(f"/proc/{pid}/cmdline").read_text()]
     return []
 

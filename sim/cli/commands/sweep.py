@@ -15,6 +15,7 @@ from antdrive.sim.cli.exits import SUCCEEDED
 from antdrive.worlds.errors import InputError
 
 if TYPE_CHECKING:
+    from antdrive.sim.campaigns.campaign import Campaign
     from antdrive.sim.campaigns.expanding import Expansion
     from antdrive.sim.campaigns.results import SweepResults
     from antdrive.sim.campaigns.running import Keep
@@ -112,7 +113,6 @@ def sweep(
     """
     from antdrive.sim.campaigns.expanding import expand
     from antdrive.sim.campaigns.running import Keep as Kinds
-    from antdrive.sim.campaigns.sweeping import run_expansion
     from antdrive.sim.cli.campaigns import campaign_from
 
     if out is None and not dry_run:
@@ -135,23 +135,22 @@ def sweep(
     if dry_run:
         return _say_size(expansion, out, json)
     assert out is not None
-    compile_once()
-    with _resumable(out), campaign_bar("driving") as progress:
-        results = run_expansion(
-            asked,
-            expansion,
-            out,
-            jobs=jobs,
-            dask=dask,
-            keep=cast("Keep | None", keep),
-            retry_crashed=retry_crashed,
-            progress=progress,
-        )
+    kept = cast("Keep | None", keep)
+    results = _run(asked, expansion, out, jobs=jobs, dask=dask, keep=kept, retry_crashed=retry_crashed)
     if json:
         print_json(_facts(results))
     else:
         _print(results)
     return SUCCEEDED
+
+
+def _run(asked: "Campaign", expansion: "Expansion", out: Path, **options: Any) -> "SweepResults":
+    """Make the runs, with a progress bar."""
+    from antdrive.sim.campaigns.sweeping import run_expansion
+
+    compile_once()
+    with _resumable(out), campaign_bar("driving") as progress:
+        return run_expansion(asked, expansion, out, progress=progress, **options)
 
 
 @contextmanager
