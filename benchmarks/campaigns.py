@@ -1,0 +1,276 @@
+"""What campaigns survive and cost: `python -m benchmarks.campaigns [kill] [efficiency] [overhead] [--small] [--drive]`.
+
+- kill: 2,000 short runs with 20 `kill -9` at random moments: of workers, of the parent, of dask's workers and of its
+  scheduler, five each. After resuming, the canonical table must be that of an undisturbed campaign, byte for byte.
+- efficiency: runs that compute for 0.2 s on one and on two processes, local and dask: T1 / (2 T2), without the start.
+- overhead: 100,000 runs that do nothing: what the engines, the folder and the expansion cost for each.
+
+`--small` takes a twentieth of the runs. `--drive` kills campaigns of real drives instead of runs that sleep. Each result is kept
+in out/campaigns and not measured again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import hashlib
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from antdrive.sim.campaigns import canonical_bytes, expand, make_campaign, read_results
+from antdrive.sim.campaigns.job import Job
+from antdrive.sim.campaigns.rows import fault_row
+from antdrive.sim.campaigns.running import Finished
+from antdrive.sim.campaigns.store import parts_in
+from antdrive.sim.campaigns.sweeping import run_expansion
+from benchmarks.planners import table
+
+OUT = Path(__file__).parent.parent / "out" / "campaigns"
+SHORT = 0.02  # how long a run sleeps in a campaign that is killed [s]
+LONG = 0.2  # how long a run computes where efficiency is measured [s]
+VICTIMS = ("worker", "parent", "dask worker", "dask scheduler")
+
+
+@dataclass(frozen=True)
+class Sleeping:
+    """A run that sleeps; its result follows from its key."""
+
+    seconds: float = 0.0
+
+    def __call__(self, job: Job) -> Finished:
+        if self.seconds:  # even no sleep at all gives the processor away
+            time.sleep(self.seconds)
+        return Finished(fault_row(job.key, "succeeded", hashlib.sha256(job.key.encode()).hexdigest()))
+
+
+@dataclass(frozen=True)
+class Computing:
+    """A run that computes: so many rounds of a hash."""
+
+    rounds: int
+
+    def __call__(self, job: Job) -> Finished:
+        digest = job.key.encode()
+        for _ in range(self.rounds):
+            digest = hashlib.sha256(digest).digest()
+        return Finished(fault_row(job.key, "succeeded", digest.hex()))
+
+
+def campaign(runs: int) -> dict[str, Any]:
+    """A campaign of so many runs in four worlds."""
+    return {"worlds": ["empty", "gate", "slalom", "u-trap"], "planners": ["astar"], "seeds": max(1, runs // 4)}
+
+
+def go(folder: Path, runs: int, work: Any, **options: Any) -> float:
+    """Run a campaign, or what is left of it; the time from its first result to its last [s]."""
+    asked, times = make_campaign(campaign(runs)), list[float]()
+
+    def note(done: int, size: int) -> None:
+        times.append(time.perf_counter())
+
+    run_expansion(asked, expand(asked), folder, work=work, progress=note, **options)
+    return times[-1] - times[min(1, len(times) - 1)]
+
+
+def kept(name: str, measure: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    """A result from out/campaigns, or measured now and kept there."""
+    path = OUT / f"{name}.json"
+    if not path.exists():
+        found = measure()
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(found, indent=1) + "\n")
+    return dict(json.loads(path.read_text()))
+
+
+def started(*words: str) -> subprocess.Popen[bytes]:
+    return subprocess.Popen([sys.executable, "-m", *words], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+class Cluster:
+    """A scheduler and two workers in processes of their own, which are killed and replaced."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.number = folder, 0
+        self.scheduler, self.workers = self._start()
+
+    def _start(self) -> tuple[subprocess.Popen[bytes], subprocess.Popen[bytes]]:
+        self.number += 1
+        file = self.folder / f"scheduler-{self.number}.json"
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.unlink(missing_ok=True)
+        here = ("--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--no-show", "--scheduler-file", str(file))
+        scheduler = started("distributed.cli.dask_scheduler", *here)
+        while not (file.exists() and file.stat().st_size):
+            time.sleep(0.05)
+        self.address = str(json.loads(file.read_text())["address"])
+        threads = ("--nworkers", "2", "--nthreads", "1", "--no-dashboard", "--death-timeout", "5")
+        return scheduler, started("distributed.cli.dask_worker", self.address, *threads)
+
+    def kill_scheduler(self) -> None:
+        self.scheduler.kill()
+        self.stop()
+        self.scheduler, self.workers = self._start()
+
+    def kill_worker(self, rng: random.Random) -> bool:
+        return kill_one(children(self.workers.pid, "multiprocessing.spawn"), rng)
+
+    def stop(self) -> None:
+        for process in (self.workers, self.scheduler):
+            process.terminate()
+            try:
+                process.wait(15)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+
+
+def children(process: int, word: str) -> list[int]:
+    """The children of a process whose command line holds a word."""
+    with contextlib.suppress(OSError):
+        threads = Path(f"/proc/{process}/task").glob("*/children")  # each thread has children of its own
+        found = " ".join(path.read_text() for path in threads).split()
+        return [int(pid) for pid in found if word in Path(f"/proc/{pid}/cmdline").read_text()]
+    return []
+
+
+def kill_one(processes: list[int], rng: random.Random) -> bool:
+    if not processes:
+        return False
+    with contextlib.suppress(ProcessLookupError):
+        os.kill(rng.choice(processes), signal.SIGKILL)
+        return True
+    return False
+
+
+def kill(victim: str, kills: int, runs: int, drive: bool) -> dict[str, Any]:
+    """Kill one kind of process so many times in a campaign, which is resumed until it is complete."""
+    rng, folder = random.Random(VICTIMS.index(victim)), OUT / "folders" / f"{victim.replace(' ', '-')}-{runs}-{drive}"
+    calm = OUT / "folders" / f"calm-{runs}-{drive}"
+    shutil.rmtree(folder, ignore_errors=True)
+    go(calm, runs, None if drive else Sleeping(), jobs=2)
+    cluster = Cluster(OUT / "folders" / "cluster") if "dask" in victim else None
+    left, resumed, begun = kills, 0, time.monotonic()
+    try:
+        while not (folder.exists() and (folder / "runs.parquet").exists() and read_results(folder).complete):
+            address = [cluster.address] if cluster else []
+            parent = started("benchmarks.campaigns", "_go", str(folder), str(runs), str(int(drive)), *address)
+            resumed += 1
+            before = len(parts_in(folder)) if folder.exists() else 0
+            while parent.poll() is None:
+                # Kills are spread over the campaign, and come when something new has been written since the last one.
+                time.sleep(rng.uniform(0.2, 0.8) * runs * SHORT / 2 / (kills + 2))
+                if not left or not folder.exists() or len(parts_in(folder)) <= before:
+                    continue
+                before, killed = len(parts_in(folder)), True
+                if victim == "worker":
+                    killed = kill_one(children(parent.pid, "popen_loky"), rng)
+                elif victim == "parent":
+                    parent.kill()
+                elif cluster and victim == "dask worker":
+                    killed = cluster.kill_worker(rng)
+                elif cluster:
+                    cluster.kill_scheduler()
+                left -= killed
+            parent.wait()
+    finally:
+        if cluster:
+            cluster.stop()
+    keys = read_results(folder).table["key"].to_pylist()
+    return {
+        "victim": victim,
+        "kills": kills - left,
+        "commands": resumed,
+        "lost": read_results(folder).size - len(set(keys)),
+        "double": len(keys) - len(set(keys)),
+        "same": canonical_bytes(folder) == canonical_bytes(calm),
+        "seconds": round(time.monotonic() - begun, 1),
+    }
+
+
+def efficiency(runs: int) -> dict[str, Any]:
+    """T1 / (2 T2) of runs that compute for 0.2 s, in turns."""
+    trial, started_at = Computing(100_000), time.perf_counter()
+    (job,) = expand(make_campaign({"worlds": ["empty"], "planners": ["astar"]})).jobs
+    trial(job)
+    work = Computing(int(100_000 * LONG / (time.perf_counter() - started_at)))
+    engines: dict[str, dict[str, Any]] = {
+        "local 1": {"jobs": 1}, "local 2": {"jobs": 2}, "dask 1": {"dask": "local:1"}, "dask 2": {"dask": "local:2"}
+    }  # fmt: skip
+    times = {}
+    for name, options in engines.items():
+        folder = OUT / "folders" / f"efficiency-{name.replace(' ', '-')}"
+        shutil.rmtree(folder, ignore_errors=True)
+        times[name] = go(folder, runs, work, **options)
+    here = time.perf_counter()
+    for _ in range(10):
+        work(job)
+    alone = (time.perf_counter() - here) / 10
+    return {
+        "runs": runs, "run_s": alone, **times,
+        "local": times["local 1"] / times["local 2"] / 2, "dask": times["dask 1"] / times["dask 2"] / 2,
+    }  # fmt: skip
+
+
+def overhead(runs: int) -> dict[str, Any]:
+    """What a run costs that does nothing [ms]."""
+    begun = time.perf_counter()
+    expand(make_campaign(campaign(runs)))
+    found: dict[str, Any] = {"runs": runs, "expand_ms": (time.perf_counter() - begun) / runs * 1e3}
+    engines: dict[str, dict[str, Any]] = {"here": {"jobs": 0}, "local": {"jobs": 2}, "dask": {"dask": "local:2"}}
+    for name, options in engines.items():
+        folder = OUT / "folders" / f"overhead-{name}"
+        shutil.rmtree(folder, ignore_errors=True)
+        begun = time.perf_counter()
+        found[f"{name}_ms"] = go(folder, runs, Sleeping(), **options) / runs * 1e3
+        found[f"{name}_all_ms"] = (time.perf_counter() - begun) / runs * 1e3
+        found["bytes"] = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()) / runs
+    begun = time.perf_counter()
+    go(OUT / "folders" / "overhead-local", runs, Sleeping(), jobs=2)
+    return found | {"resume_ms": (time.perf_counter() - begun) / runs * 1e3}
+
+
+def print_parts(parts: list[str], share: float, drive: bool) -> Iterator[str]:
+    """The tables of the wanted parts."""
+    if "kill" in parts:
+        runs, kills = int(2000 * share), max(1, int(5 * share**0.5))
+        rows = [
+            kept(f"kill-{v.replace(' ', '-')}-{runs}-{drive}", lambda v=v: kill(v, kills, runs, drive))  # type: ignore[misc]
+            for v in VICTIMS
+        ]
+        heads = ("killed", "kills", "commands", "lost", "double", "same table", "s")
+        yield "\n".join(table(heads, [tuple(map(str, row.values())) for row in rows]))
+    for name, measure, runs in (("efficiency", efficiency, 1000), ("overhead", overhead, 100_000)):
+        if name in parts:
+            found = kept(f"{name}-{int(runs * share)}", lambda m=measure, n=int(runs * share): m(n))  # type: ignore[misc]
+            yield "\n".join(table((name, "value"), [(key, f"{value:.4g}") for key, value in found.items()]))
+
+
+def main() -> None:
+    if sys.argv[1:2] == ["_go"]:
+        folder, runs, drive, *dask = sys.argv[2:]
+        work = None if drive == "1" else Sleeping(SHORT)
+        go(Path(folder), int(runs), work, jobs=2, dask=dask[0] if dask else None)
+        return
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("parts", nargs="*", default=[], metavar="PART")
+    parser.add_argument("--small", action="store_true")
+    parser.add_argument("--drive", action="store_true")
+    asked = parser.parse_args()
+    for text in print_parts(
+        asked.parts or ["kill", "efficiency", "overhead"], 0.05 if asked.small else 1.0, asked.drive
+    ):
+        print(text, flush=True)
+
+
+if __name__ == "__main__":
+    main()
