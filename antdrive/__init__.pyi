@@ -15,6 +15,7 @@ from .robots.control.pursuit import PurePursuit as PurePursuit
 from .robots.files import list_robots as list_robots
 from .robots.files import load_robot as load_robot
 from .robots.spec import RobotSpec as RobotSpec
+from .sim.campaigns.sweeping import sweep as sweep
 from .sim.log.certificate import Certificate as Certificate
 from .sim.log.certificate import certify as certify
 from .sim.log.metrics import METRICS as METRICS

@@ -26,6 +26,8 @@ SIM_RANKS = {
     "statistics": 0,
     "driving": 1,
     "calibration": 1.5,
+    "entries": 1,
+    "settings": 2,
     "scenario": 2,
     "reasons": 2,
     "pipeline": 3,
@@ -33,6 +35,7 @@ SIM_RANKS = {
     "papers": 5,
     "warm": 5,
     "regression": 5,
+    "campaigns": 5,
     "falsify": 6,
     "cli": 7,
 }

@@ -43,7 +43,16 @@ def hashes_of(record: DriveRecord) -> dict[str, str]:
         "robot": _meaning(record.robot),
         "settings": {**{key: values[key] for key in SETTINGS}, "smoothing": record.smoothing.asked},
     }
-    return {name: hashlib.sha256(json.dumps(part, sort_keys=True).encode()).hexdigest() for name, part in parts.items()}
+    return {name: _sha256(part) for name, part in parts.items()}
+
+
+def canonical_hash(value: Task | RobotSpec) -> str:
+    """The SHA-256 of a world with start and goal, or of a robot: the one that `hashes_of` finds in the log of its drives.
+
+    Args:
+        value: the task or the robot
+    """
+    return _sha256(_meaning(value))
 
 
 def differences(record: DriveRecord, *, task: Task | None = None, robot: RobotSpec | None = None) -> Iterator[str]:
@@ -61,6 +70,10 @@ def differences(record: DriveRecord, *, task: Task | None = None, robot: RobotSp
         keys = [key for key in sorted({*logged, *given}) if logged.get(key) != given.get(key)]
         if keys:
             yield f"{name}: the log is about another one; its {', '.join(keys)} {'differ' if keys[1:] else 'differs'}"
+
+
+def _sha256(value: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()
 
 
 def _meaning(value: Task | RobotSpec) -> Mapping[str, Any]:

@@ -9,85 +9,36 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, PlainValidator, WithJsonSchema
+from pydantic import BaseModel, Field, PlainValidator, WithJsonSchema
 
+from antdrive.sim.entries import RULES, MarginValue, SeedList, SettingsEntry, TextOrMapping
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.regression.demands import END, Demands
 from antdrive.worlds.errors import FieldError, InputError, input_error
-from antdrive.worlds.files.checks import SchemaVersion, check, show
+from antdrive.worlds.files.checks import SchemaVersion, check
 from antdrive.worlds.files.document import Document, Location, read_document
-from antdrive.worlds.files.world_file import DiscEntry
 
 SUFFIX = ".drive.yaml"
 MAX_CASES = 100_000  # scenarios times seeds of one suite
 BASELINES = "baselines"  # the folder beside a suite
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")
-_SEEDS = re.compile(r"(\d{1,18})-(\d{1,18})")
-_RULES = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
-
-
-def _text_or_mapping(value: Any) -> Any:
-    if not isinstance(value, str | dict) or not value:
-        raise ValueError(f"must be a name or a mapping, got {show(value)}")
-    return value
-
-
-def _margin(value: Any) -> Any:
-    if value != "auto" and (isinstance(value, bool) or not isinstance(value, int | float)):
-        raise ValueError(f"must be a number of metres, or auto, got {show(value)}")
-    return value
-
-
-def _switch(value: Any) -> Any:
-    if not isinstance(value, bool | dict):
-        raise ValueError(f"must be true, false or a mapping of settings, got {show(value)}")
-    return value
-
-
-def _seeds(value: Any) -> Any:
-    if isinstance(value, str) and (match := _SEEDS.fullmatch(value)):
-        first, last = int(match[1]), int(match[2])
-        if first <= last < first + MAX_CASES:
-            return list(range(first, last + 1))
-    seeds = value if isinstance(value, list) else []
-    if not seeds or not all(type(seed) is int and 0 <= seed < 2**63 for seed in seeds):
-        raise ValueError(
-            f"must be whole numbers of at least 0, such as [0, 1, 2], or a range such as 0-9, got {show(value)}"
-        )
-    if len(set(seeds)) < len(seeds):
-        raise ValueError(f"must be different numbers, got {show(value)}")
-    return seeds
 
 
 def _anything(value: Any) -> Any:
     return value
 
 
-_MAPPING: dict[str, Any] = {"type": "object"}
-_NAME_OR_MAPPING: dict[str, Any] = {"anyOf": [{"type": "string"}, _MAPPING]}
-_SWITCH_SCHEMA: dict[str, Any] = {"anyOf": [{"type": "boolean"}, _MAPPING]}
-_SEEDS_SCHEMA: dict[str, Any] = {
-    "anyOf": [
-        {"type": "array", "items": {"type": "integer", "minimum": 0}, "minItems": 1, "uniqueItems": True},
-        {"type": "string", "pattern": f"^{_SEEDS.pattern}$"},
-    ]
-}
-_MARGIN_SCHEMA: dict[str, Any] = {"anyOf": [{"type": "number", "minimum": 0}, {"const": "auto"}]}
 _TRAJECTORY_SCHEMA: dict[str, Any] = {"anyOf": [{"type": "number", "minimum": 0.002}, {"const": "exact"}]}
 
-TextOrMapping = Annotated[Any, PlainValidator(_text_or_mapping), WithJsonSchema(_NAME_OR_MAPPING)]
-Switch = Annotated[Any, PlainValidator(_switch), WithJsonSchema(_SWITCH_SCHEMA)]
-SeedList = Annotated[Any, PlainValidator(_seeds), WithJsonSchema(_SEEDS_SCHEMA)]
-MarginValue = Annotated[Any, PlainValidator(_margin), WithJsonSchema(_MARGIN_SCHEMA)]
 TrajectoryValue = Annotated[Any, PlainValidator(_anything), WithJsonSchema(_TRAJECTORY_SCHEMA)]
 
 
-class ScenarioEntry(BaseModel):
+class ScenarioEntry(SettingsEntry):
     """A scenario of a suite, or the defaults of all of them."""
 
-    model_config = _RULES
+    model_config = RULES
 
     note: str | None = Field(None, description="what the scenario is for, free text")
     world: TextOrMapping = Field(
@@ -107,22 +58,9 @@ class ScenarioEntry(BaseModel):
         description="a planner's name; {name: aco-han, ants: 200} with options; {module: my_package.planners, name: Mine} or "
         "{file: planners.py, name: Mine} for a planner of your own",
     )
-    controller: dict[str, float] = Field({}, description="settings of the controller, such as {lookahead_time: 0.5}")
     smoothing: str = Field("clearance", description="none, taut or clearance")
     margin: MarginValue = Field(0.03, description="distance that plans keep beyond the robot's radius [m], or auto")
-    cell: float | None = Field(None, gt=0, description="grid resolution [m]; by default the world's")
     noise: float = Field(0.0, ge=0, description="factor on the noise that the robot's file documents")
-    unseen: list[DiscEntry] = Field(
-        [], description="cylinders {x, y, radius} that neither planner nor controller knows of"
-    )
-    sees: str = Field("velocities", description="what the robot perceives of movers: KIND or KIND:METRES")
-    avoid: Switch = Field(True, description="whether the robot avoids movers, or settings such as {horizon: 2.0}")
-    replan: Switch = Field(
-        True, description="whether the robot replans around movers, or settings such as {patience: 10}"
-    )
-    time_limit: float | None = Field(None, gt=0, description="simulated time allowed [s]")
-    physics_hz: int = Field(240, ge=1, description="physics steps per simulated second")
-    control_hz: int = Field(60, ge=1, description="control periods per simulated second")
     seeds: SeedList = Field([0], description="one test for each: [0, 1, 2], or a range such as 0-9")
     expect: dict[str, Any] = Field(
         {}, description='demands: {outcome: succeeded, certified: true, min_clearance_m: ">= 0.05"}'
@@ -139,7 +77,7 @@ class ScenarioEntry(BaseModel):
 class SuiteFile(BaseModel):
     """A suite of scenarios, as written in a `*.drive.yaml` file."""
 
-    model_config = _RULES
+    model_config = RULES
 
     schema_: SchemaVersion = Field(alias="schema", description="write schema: 1")
     defaults: ScenarioEntry = Field(

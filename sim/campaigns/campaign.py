@@ -1,0 +1,210 @@
+"""Campaign files: the grid of worlds, tasks, planners with options, robots, settings and seeds that `antdrive sweep` runs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, Field, PlainValidator, WithJsonSchema
+
+from antdrive.sim.entries import RULES, SEEDS_SCHEMA, MarginValue, SettingsEntry, TextOrMapping, seed_list
+from antdrive.worlds.errors import InputError
+from antdrive.worlds.files.checks import SchemaVersion, check, show
+from antdrive.worlds.files.document import Document, Location, read_document
+
+MOST_SEEDS = 1_000_000  # given as a number
+
+
+def _listed(value: Any) -> Any:
+    """One value stands for a list of it."""
+    return value if isinstance(value, list) else [value]
+
+
+def seeds_of(value: Any) -> list[int]:
+    """The seeds that people write as a number of them, as [3, 7] or as 0-9.
+
+    Args:
+        value: plain data
+
+    Raises:
+        ValueError: it is none of these; the text says what would be right.
+    """
+    if type(value) is int:
+        if not 1 <= value <= MOST_SEEDS:
+            raise ValueError(f"must be from 1 to {MOST_SEEDS} seeds, or a list such as [{value}], got {value}")
+        return list(range(value))
+    try:
+        return seed_list(value)
+    except ValueError as error:
+        raise ValueError(f"{error}; a number such as 20 means the seeds 0 to 19") from None
+
+
+_COUNT_OR_SEEDS: dict[str, Any] = {"anyOf": [{"type": "integer", "minimum": 1}, *SEEDS_SCHEMA["anyOf"]]}
+Seeds = Annotated[Any, PlainValidator(seeds_of), WithJsonSchema(_COUNT_OR_SEEDS)]
+
+
+def _of(item: dict[str, Any]) -> dict[str, Any]:
+    return {"anyOf": [item, {"type": "array", "items": item, "minItems": 1}]}
+
+
+Names = Annotated[list[str], Field(min_length=1), BeforeValidator(_listed), WithJsonSchema(_of({"type": "string"}))]
+Factors = Annotated[
+    list[Annotated[float, Field(ge=0)]],
+    Field(min_length=1),
+    BeforeValidator(_listed),
+    WithJsonSchema(_of({"type": "number", "minimum": 0})),
+]
+Margins = Annotated[list[MarginValue], Field(min_length=1), BeforeValidator(_listed)]
+NamesOrMappings = Annotated[list[TextOrMapping], Field(min_length=1), BeforeValidator(_listed)]
+
+
+class TaskEntry(BaseModel):
+    """A start and a goal that every world of the campaign is driven with."""
+
+    model_config = RULES
+
+    name: str | None = Field(None, min_length=1, max_length=100, description="what tables call the task")
+    start: list[float] = Field(min_length=3, max_length=3, description="write [x, y, yaw] in metres and radians")
+    goal: list[float] = Field(min_length=2, max_length=2, description="write [x, y] in metres")
+
+
+class RandomTasks(BaseModel):
+    """Starts and goals drawn in each world: free cells for the largest robot, with a path between them."""
+
+    model_config = RULES
+
+    random: int = Field(ge=1, le=100_000, description="tasks in each world")
+    seed: int = Field(0, ge=0, lt=2**63, description="seed of the draws")
+    min_distance: float = Field(0.0, ge=0, description="distance from start to goal as the crow flies, at least [m]")
+
+
+def _tasks(value: Any) -> Any:
+    listed = isinstance(value, list) and value and all(isinstance(one, dict) for one in value)
+    if value != "own" and not isinstance(value, dict) and not listed:
+        raise ValueError(
+            f"must be own, {{random: 30, min_distance: 5}} or a list of {{start, goal}}, got {show(value)}"
+        )
+    return value
+
+
+_TASKS_SCHEMA: dict[str, Any] = {
+    "anyOf": [
+        {"const": "own"},
+        RandomTasks.model_json_schema(),
+        {"type": "array", "items": TaskEntry.model_json_schema()},
+    ]
+}
+
+
+class CampaignFile(BaseModel):
+    """A campaign, as written in a file: each combination of its lists is a run."""
+
+    model_config = RULES
+
+    schema_: SchemaVersion = Field(alias="schema", description="write schema: 1")
+    note: str | None = Field(None, description="what the campaign is for, free text")
+    worlds: NamesOrMappings = Field(
+        description="a list of files or patterns such as worlds/*.yaml, names of the catalogue, "
+        "{generate: forest, seeds: 20} with the generator's options, or {import: barn/*.world, barn: true}"
+    )
+    planners: NamesOrMappings = Field(
+        description="a list of names, or {name: aco-han, ants: [10, 50]}; a list, or {from: 10, to: 50, step: 10}, "
+        "stands for several values"
+    )
+    robots: Names = Field(["turtlebot"], description="names of the catalogue, or files")
+    routes: Names = Field(["clearance"], description="how plans become routes: none, taut, clearance")
+    noise: Factors = Field([0.0], description="factors on the noise that the robot's file documents")
+    margin: Margins = Field([0.03], description="distances that plans keep beyond the robot's radius [m], or auto")
+    seeds: Seeds = Field([0], description="how many seeds, or a list such as [3, 7], or a range such as 0-9")
+    tasks: Annotated[Any, PlainValidator(_tasks), WithJsonSchema(_TASKS_SCHEMA)] = Field(
+        "own",
+        description="own: the worlds' own starts and goals; {random: 30, seed: 1, min_distance: 5}; or a list of "
+        "{start: [x, y, yaw], goal: [x, y]}",
+    )
+    settings: SettingsEntry = Field(
+        default_factory=SettingsEntry.model_construct, description="settings that all runs share, such as {cell: 0.1, time_limit: 60}"
+    )
+    rollouts: Literal["none", "failed", "all"] = Field("none", description="which runs' logs are kept")
+
+
+@dataclass(frozen=True, eq=False)
+class Campaign:
+    """A campaign as read.
+
+    Attributes:
+        source: its file, or what messages call it
+        folder: where relative paths begin
+        document: its data, with the line of each value
+        entry: its data, checked
+        tasks: the tasks in each world; empty: the worlds' own
+    """
+
+    source: str
+    folder: Path
+    document: Document
+    entry: CampaignFile
+    tasks: RandomTasks | tuple[TaskEntry, ...]
+
+    def error(self, location: Location, problem: str) -> InputError:
+        """The error for a value: file, line, key and problem.
+
+        Args:
+            location: the path to the value
+            problem: what is wrong and what would be right
+        """
+        return self.document.error(location, problem)
+
+
+def load_campaign(path: str | os.PathLike[str]) -> Campaign:
+    """The campaign in a file.
+
+    Raises:
+        InputError: there is no such file, or something in it is wrong.
+    """
+    return _checked(read_document(path), Path(path).parent)
+
+
+def make_campaign(data: Mapping[str, Any], folder: str | os.PathLike[str] = ".", source: str = "campaign") -> Campaign:
+    """A campaign from plain data with the keys of a campaign file; `schema` may be left out.
+
+    Args:
+        data: mappings, lists, numbers and texts
+        folder: where relative paths begin
+        source: what messages call the data
+
+    Raises:
+        InputError: something in the data is wrong.
+    """
+    return _checked(Document(source, {"schema": 1, **data}), Path(folder))
+
+
+def _checked(document: Document, folder: Path) -> Campaign:
+    entry = check(CampaignFile, document)
+    if isinstance(entry.tasks, dict):
+        return Campaign(document.source, folder, document, entry, check(RandomTasks, _part(document, "tasks")))
+    tasks = entry.tasks if isinstance(entry.tasks, list) else []
+    checked = tuple(check(TaskEntry, _part(document, "tasks", i)) for i in range(len(tasks)))
+    names = [task.name or str(i) for i, task in enumerate(checked)]
+    for i, name in enumerate(names):
+        if name in names[:i]:
+            raise document.error(("tasks", i, "name"), f"{name!r} is the name of another task, too")
+    return Campaign(document.source, folder, document, entry, checked)
+
+
+def _part(document: Document, *place: str | int) -> Document:
+    """The part of a document at a place, as a document of its own with the same lines."""
+    data = document.data
+    for step in place:
+        data = data[step]
+    depth = len(place)
+    lines = {where[depth:]: line for where, line in document.lines.items() if where[:depth] == place}
+    return Document(document.source, data, lines)
+
+
+def campaign_schema() -> dict[str, Any]:
+    """The JSON Schema of campaign files, for editors."""
+    schema = CampaignFile.model_json_schema(by_alias=True)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "antdrive campaign"}

@@ -1,0 +1,137 @@
+"""The worlds of a campaign: of the catalogue, in files, imported, generated; and the tasks in each of them."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import glob
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from antdrive.sim.campaigns.campaign import Campaign, seeds_of
+from antdrive.sim.entries import option_text
+from antdrive.sim.settings import generated, read_task
+from antdrive.worlds import Task, list_worlds
+from antdrive.worlds.errors import FieldError, InputError
+from antdrive.worlds.files.checks import show, suggest
+from antdrive.worlds.files.document import Location
+from antdrive.worlds.formats.importing import import_file
+
+OWN = "own"  # the name of the task that a world brings
+
+
+@dataclass(frozen=True, eq=False)
+class NamedTask:
+    """A world with start and goal, as a campaign calls it.
+
+    Attributes:
+        world: what the campaign calls the world
+        name: what the campaign calls start and goal
+        task: the task
+        catalogue: the world's name in the catalogue, if the task is the one of the catalogue
+        place: where the campaign names the world
+    """
+
+    world: str
+    name: str
+    task: Task
+    catalogue: str | None
+    place: Location
+
+
+def campaign_worlds(campaign: Campaign) -> list[NamedTask]:
+    """The worlds of a campaign with their own tasks, in its order; files of a pattern by name.
+
+    Worlds that share a name have their path or options in what the campaign calls them, so that no two are called the same.
+
+    Raises:
+        InputError: there is no such world, or a file is wrong.
+    """
+    found: list[tuple[NamedTask, str]] = []
+    for i, entry in enumerate(campaign.entry.worlds):
+        place: Location = ("worlds", i)
+        if isinstance(entry, str):
+            found += _named(campaign, place, entry)
+        elif "generate" in entry:
+            found += _random(campaign, place, dict(entry))
+        elif "import" in entry:
+            found += _imported(campaign, place, dict(entry))
+        else:
+            raise campaign.error(place, "write a name, a file, {generate: forest, seeds: 20} or {import: FILES}")
+    return _distinct(found)
+
+
+def _distinct(found: list[tuple[NamedTask, str]]) -> list[NamedTask]:
+    """The worlds, each once; those with a name of others are called by their second name."""
+    first: dict[str, Task] = {}
+    worlds: dict[str, NamedTask] = {}
+    for one, second in found:
+        taken = first.setdefault(one.world, one.task)
+        name = one.world if taken == one.task else second
+        worlds.setdefault(name, dataclasses.replace(one, world=name))
+    return list(worlds.values())
+
+
+def _named(campaign: Campaign, place: Location, name: str) -> Iterator[tuple[NamedTask, str]]:
+    known = list_worlds()
+    if name in known:
+        yield NamedTask(name, OWN, read_task(known[name]), name, place), name
+        return
+    for path in _files(campaign, place, name, f"nor a world of the catalogue; {suggest(Path(name).stem, known)}"):
+        task = read_task(path)
+        yield NamedTask(task.world.name, OWN, task, None, place), os.path.relpath(path, campaign.folder)
+
+
+def _files(campaign: Campaign, place: Location, pattern: str, otherwise: str) -> list[Path]:
+    """The files that a pattern or a path names, in the order of their names."""
+    paths = sorted(glob.glob(str(campaign.folder / pattern), recursive=True))
+    if not paths:
+        raise campaign.error(place, f"{pattern}: no such file{' here, ' + otherwise if otherwise else ''}")
+    return [Path(path) for path in paths]
+
+
+def _random(campaign: Campaign, place: Location, entry: dict[str, Any]) -> Iterator[tuple[NamedTask, str]]:
+    kind = entry.pop("generate")
+    if not isinstance(kind, str):
+        raise campaign.error((*place, "generate"), f"must be the name of a generator, got {show(kind)}")
+    if "seed" in entry and "seeds" in entry:
+        raise campaign.error((*place, "seed"), "keep one of seed and seeds")
+    key = "seed" if "seed" in entry else "seeds"
+    given = entry.pop(key, 1)
+    try:
+        seeds = seeds_of([given] if key == "seed" else given)
+    except ValueError as error:
+        raise campaign.error((*place, key), str(error)) from None
+    options = tuple((name, option_text(value)) for name, value in entry.items())
+    suffix = "".join(f" {name}={text}" for name, text in options)
+    for seed in seeds:
+        try:
+            task = generated(kind, seed, options)
+        except InputError as error:
+            raise campaign.error(place, str(error)) from None
+        yield NamedTask(f"{kind}-{seed}{suffix}", OWN, task, None, place), f"{kind}-{seed}{suffix} ({place[1]})"
+
+
+def _imported(campaign: Campaign, place: Location, entry: dict[str, Any]) -> Iterator[tuple[NamedTask, str]]:
+    pattern, barn = entry.pop("import"), entry.pop("barn", False)
+    if not isinstance(pattern, str) or not isinstance(barn, bool):
+        raise campaign.error(place, "write {import: FILES, barn: true} with the options of antdrive worlds import")
+    options = tuple((key, tuple(value) if isinstance(value, list) else value) for key, value in entry.items())
+    for path in _files(campaign, (*place, "import"), pattern, ""):
+        try:
+            tasks = _read_foreign(str(path), path.stat().st_mtime_ns, barn, options)
+        except FieldError as error:
+            raise campaign.error((*place, error.key), error.problem) from None
+        except TypeError:
+            raise campaign.error(place, "an option has a value of the wrong type") from None
+        for task in tasks:
+            second = f"{os.path.relpath(path, campaign.folder)}#{task.world.name}"
+            yield NamedTask(task.world.name, OWN, task, None, place), second
+
+
+@functools.lru_cache(maxsize=1024)
+def _read_foreign(path: str, mtime: int, barn: bool, options: tuple[tuple[str, Any], ...]) -> list[Task]:
+    return import_file(path, barn=barn, **dict(options))

@@ -1,0 +1,121 @@
+"""From what people write about scenarios to the objects that it stands for: tasks, robots, fields of a scenario."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeAlias, get_args
+
+from antdrive.robots import Avoidance, PurePursuit, RobotSpec, load_robot
+from antdrive.sim.driving.perception import Perception, PerceptionKind
+from antdrive.sim.driving.replanning import ReplanPolicy
+from antdrive.sim.entries import SettingsEntry
+from antdrive.worlds import Disc, Task, generate, load_task
+from antdrive.worlds.errors import FieldError, InputError
+from antdrive.worlds.files.checks import suggest
+
+#: The error for a key, such as "planner.ants", and what is wrong with its value: file, line, key and problem.
+Fail: TypeAlias = Callable[[str, str], InputError]
+
+
+def scenario_fields(entry: SettingsEntry, fail: Fail) -> dict[str, Any]:
+    """The fields of a scenario that an entry's settings stand for, by name.
+
+    Args:
+        entry: the settings
+        fail: makes the error for a key of the entry
+
+    Raises:
+        InputError: an unknown setting, or a value that it cannot have.
+    """
+    avoiding = None if entry.avoid is False else _record(fail, "avoid", Avoidance(), entry.avoid)
+    policy: ReplanPolicy = _record(fail, "replan", ReplanPolicy(), entry.replan)
+    return {
+        "cell": entry.cell,
+        "controller": _record(fail, "controller", PurePursuit(), entry.controller),
+        "perception": _perception(fail, entry.sees),
+        "avoidance": avoiding,
+        "replanning": dataclasses.replace(policy, around_movers=False) if entry.replan is False else policy,
+        "unseen": tuple(Disc(disc.x, disc.y, disc.radius, disc.height) for disc in entry.unseen),
+        "time_limit": entry.time_limit,
+        "physics_hz": entry.physics_hz,
+        "control_hz": entry.control_hz,
+    }
+
+
+def read_task(path: Path) -> Task:
+    """The task in a world file, read once per process and version of the file.
+
+    Args:
+        path: the file
+    """
+    return _read_task(str(path), path.stat().st_mtime_ns)
+
+
+def read_robot(path: Path) -> RobotSpec:
+    """The robot in a file, read once per process and version of the file.
+
+    Args:
+        path: the file
+    """
+    return _read_robot(str(path), path.stat().st_mtime_ns)
+
+
+@functools.lru_cache(maxsize=1024)
+def _read_task(path: str, mtime: int) -> Task:
+    return load_task(Path(path))
+
+
+@functools.lru_cache(maxsize=1024)
+def _read_robot(path: str, mtime: int) -> RobotSpec:
+    return load_robot(Path(path))
+
+
+@functools.lru_cache(maxsize=1024)
+def generated(kind: str, seed: int, options: tuple[tuple[str, str], ...]) -> Task:
+    """The random world that {generate: KIND, seed: SEED} with options stands for.
+
+    Args:
+        kind: a generator's name
+        seed: the seed
+        options: the generator's options by name, as text
+
+    Raises:
+        InputError: an unknown kind or option, a wrong value, or no such world was found.
+    """
+    import numpy as np
+
+    return generate(kind, np.random.default_rng(seed), dict(options), name=f"{kind}-{seed}", note=f"seed {seed}")
+
+
+def _record(fail: Fail, key: str, default: Any, values: Any) -> Any:
+    """A record of settings with some of them replaced."""
+    if not isinstance(values, dict):
+        return default
+    known = [field.name for field in dataclasses.fields(default)]
+    for name in values:
+        if name not in known:
+            raise fail(f"{key}.{name}", f"unknown setting; {suggest(name, known)}")
+    try:
+        return dataclasses.replace(default, **values)
+    except FieldError as error:
+        raise fail(f"{key}.{error.key}", error.problem) from None
+    except TypeError:
+        wrong = next((name for name, value in values.items() if not isinstance(value, int | float)), "")
+        raise fail(f"{key}.{wrong}" if wrong else key, "must be a number") from None
+
+
+def _perception(fail: Fail, sees: str) -> Perception:
+    kind, mark, metres = sees.partition(":")
+    if kind not in get_args(PerceptionKind):
+        raise fail("sees", f"unknown kind {kind!r}; choose from {', '.join(get_args(PerceptionKind))}")
+    try:
+        reach = float(metres) if mark else math.inf
+    except ValueError:
+        reach = math.nan
+    if not reach > 0:
+        raise fail("sees", "write KIND or KIND:METRES with a range greater than 0, such as positions:3")
+    return Perception(kind=kind, range=reach)  # type: ignore[arg-type]
