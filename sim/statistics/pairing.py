@@ -16,8 +16,7 @@ Floats: TypeAlias = npt.NDArray[np.float64]
 Flags: TypeAlias = npt.NDArray[np.bool_]
 Ints: TypeAlias = npt.NDArray[np.int64]
 
-WORLD = ("world", "world_hash")
-CELL = (*WORLD, "task", "robot", "smoothing", "noise", "margin", "cell")
+CELL = ("world", "world_hash", "task", "robot", "smoothing", "noise", "margin", "cell")
 INSTANCE = (*CELL, "seed")
 
 
@@ -96,11 +95,11 @@ class PairedRuns:
             planners: their indices
         """
         chosen = list(planners)
-        both = self.present[:, chosen].all(axis=1)
+        both: Flags = np.asarray(self.present[:, chosen].all(axis=1))
         if self.seeded[chosen].any():
-            return np.asarray(both)
+            return both
         places = np.flatnonzero(both)
-        once = np.zeros(len(both), dtype=bool)
+        once = np.zeros(len(both), dtype=np.bool_)
         once[places[np.unique(self.cell[places], return_index=True)[1]]] = True
         return once
 
@@ -150,19 +149,14 @@ def _seeds(table: RunTable) -> Ints:
 
 
 def _worlds(table: RunTable) -> tuple[tuple[str, ...], Ints]:
-    """Names of the worlds and each run's index; worlds of one name are told apart by their hash."""
-    codes = _joint(table, WORLD)
-    first = np.unique(codes, return_index=True)[1]
-    names, hashes = table.texts("world"), table.texts("world_hash")
-    plain = [names[k] for k in first]
-    return tuple(
-        name if plain.count(name) == 1 else f"{name} {hashes[k][:6]}" for name, k in zip(plain, first, strict=True)
-    ), codes
+    """Names of the worlds, and the index of each run's. Several tasks in one world are no other worlds."""
+    names, codes = np.unique(np.array(table.texts("world"), dtype=object), return_inverse=True)
+    return tuple(names), codes.astype(np.int64)
 
 
 def _seeded(table: RunTable, row: Ints, cell: Ints) -> Flags:
     """Whether runs of a planner that differ in the seed alone differ in their drives, (P,)."""
-    seeded = np.ones(row.shape[1], dtype=bool)
+    seeded = np.ones(row.shape[1], dtype=np.bool_)
     if "drive_digest" not in table:
         return seeded
     marks = np.array([f"{a} {b}" for a, b in zip(table.texts("outcome"), table.texts("drive_digest"), strict=True)])

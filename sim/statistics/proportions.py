@@ -58,7 +58,7 @@ def paired_difference(both: int, first: int, second: int, neither: int, confiden
     p1, p2 = (both + first) / n, (both + second) / n
     one, two = wilson(both + first, n, confidence), wilson(both + second, n, confidence)
     margins = (both + first) * (second + neither) * (both + second) * (first + neither)
-    cross = both * neither - first * second
+    cross = float(both * neither - first * second)
     if cross > 0:  # Newcombe's continuity correction of a positive correlation
         cross = max(0.0, cross - n / 2)
     phi = cross / math.sqrt(margins) if margins else 0.0

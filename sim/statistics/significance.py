@@ -97,14 +97,15 @@ def flips_by_world(sums: Floats) -> Floats:
 
 def _all_signs(worlds: int) -> Iterator[Floats]:
     codes = np.arange(2**worlds)
-    yield 1.0 - 2.0 * ((codes[:, None] >> np.arange(worlds)) & 1)
+    yield np.asarray(1.0 - 2.0 * ((codes[:, None] >> np.arange(worlds)) & 1))
 
 
 def _random_signs(worlds: int) -> Iterator[Floats]:
     rng = np.random.default_rng(SEED)
     size = max(1, BLOCK // worlds)
     for start in range(0, FLIPS, size):
-        yield 1.0 - 2.0 * rng.integers(0, 2, (min(size, FLIPS - start), worlds), dtype=np.int8)
+        coins = rng.integers(0, 2, (min(size, FLIPS - start), worlds), dtype=np.int8)
+        yield np.asarray(1.0 - 2.0 * coins)
 
 
 def sums_by_world(values: Floats, world: Ints, worlds: int) -> Floats:
