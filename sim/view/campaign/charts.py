@@ -15,7 +15,6 @@ import numpy.typing as npt
 from matplotlib.cbook import boxplot_stats
 from matplotlib.figure import Figure
 
-from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.statistics.pairing import PairedRuns
 from antdrive.sim.statistics.profiles import StepCurve, distributions, performance_profiles
 from antdrive.sim.view.campaign.colours import LabelStyle
@@ -71,7 +70,7 @@ def campaign_charts(summary: CampaignSummary, styles: Sequence[LabelStyle]) -> l
     if whole.any():
         for name in known_metrics(paired, DISTRIBUTED):
             charts.append(_distribution(name, distributions(paired.values(name)[whole]), int(whole.sum()), styles))
-    common = paired.success.all(axis=1)
+    common = np.asarray(paired.success.all(axis=1))
     if common.any():
         charts += [
             chart for name in known_metrics(paired, BOXED) for chart in _size_boxes(paired, name, common, styles)

@@ -57,7 +57,7 @@ def _column(name: str, values: Sequence[Any]) -> dict[str, Any] | None:
     """A column by its kind: numbers, or texts as places in a list of different ones; None if it is empty."""
     if all(value is None for value in values):
         return None
-    if all(value is None or isinstance(value, int | float) and not isinstance(value, bool) for value in values):
+    if all(value is None or (isinstance(value, int | float) and not isinstance(value, bool)) for value in values):
         return {"name": name, "numbers": [_number(value) for value in values]}
     return {"name": name, **_texts([None if value is None else str(value) for value in values])}
 
