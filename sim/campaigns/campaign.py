@@ -125,7 +125,8 @@ class CampaignFile(BaseModel):
         "{start: [x, y, yaw], goal: [x, y]}",
     )
     settings: SettingsEntry = Field(
-        default_factory=SettingsEntry.model_construct, description="settings that all runs share, such as {cell: 0.1, time_limit: 60}"
+        default_factory=SettingsEntry.model_construct,
+        description="settings that all runs share, such as {cell: 0.1, time_limit: 60}",
     )
     rollouts: Literal["none", "failed", "all"] = Field("none", description="which runs' logs are kept")
 

@@ -149,9 +149,9 @@ def _check(
     for robot in robots:
         for n, task in enumerate(tasks):
             for fields in settings if n == 0 else settings[:1]:
-                plain = {**fields, "margin": 0.0} if fields["margin"] == "auto" else fields
+                margin = 0.0 if fields["margin"] == "auto" else None
                 try:
-                    _case(task, robot, plain, planner, None).scenario(0)
+                    _case(task, robot, fields, planner, None).scenario(0, margin)
                 except FieldError as error:
                     place = _PLACES.get(error.key, ("settings", error.key))
                     where = task.place if error.key == "start" and not campaign.tasks else place

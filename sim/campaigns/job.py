@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 import json
 from collections.abc import Mapping
@@ -53,30 +52,29 @@ class SweepCase:
     words: str | None
     calibration: Calibration | None = None
 
-    def scenario(self, seed: int) -> Scenario:
+    def scenario(self, seed: int, margin: float | None = None) -> Scenario:
         """The scenario of a run.
 
         Args:
             seed: the run's seed
+            margin: a margin instead of the campaign's [m]
 
         Raises:
             InputError: there is no such planner or option here, such as one of a package that is not installed.
             FieldError: a setting is out of range, or the robot does not fit at the start.
         """
-        fields = {**self.fields, "margin": 0.0} if self.fields["margin"] == "auto" else dict(self.fields)
+        choose = self.fields["margin"] == "auto" and margin is None
+        chosen = self.calibration.margin if self.calibration else 0.0
         scenario = Scenario(
             task=self.task,
             planner=load_planner(self.planner_name, **self.given),
             planner_name=self.planner_name,
             robot=self.robot,
             seed=seed,
-            **fields,
+            calibration=self.calibration,
+            **{**self.fields, "margin": chosen if choose else self.fields["margin"] if margin is None else margin},
         )
-        if self.fields["margin"] != "auto":
-            return scenario
-        if self.calibration is None:
-            return scenario.with_chosen_margin()
-        return dataclasses.replace(scenario, margin=self.calibration.margin, calibration=self.calibration)
+        return scenario.with_chosen_margin() if choose and self.calibration is None else scenario
 
     @property
     def identity(self) -> str:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from antdrive.sim.campaigns.extras import parquet_library
 from antdrive.sim.campaigns.rows import NOT_CANONICAL
-from antdrive.sim.campaigns.store import joined, read_manifest
+from antdrive.sim.campaigns.store import TABLE, joined, read_manifest
 
 if TYPE_CHECKING:
     import pyarrow
@@ -34,6 +35,21 @@ class SweepResults:
     def complete(self) -> bool:
         """Whether all runs of the campaign are done."""
         return len(self.table) == self.size
+
+    @property
+    def path(self) -> Path:
+        """The table's file."""
+        return self.folder / TABLE
+
+    @property
+    def succeeded(self) -> int:
+        """How many runs stopped at the goal, certified."""
+        return sum(self.table["succeeded"].to_pylist())
+
+    @property
+    def outcomes(self) -> dict[str, int]:
+        """How many runs ended in which way, the most frequent first."""
+        return dict(Counter(self.table["outcome"].to_pylist()).most_common())
 
     def pandas(self) -> Any:
         """The table as a pandas DataFrame; needs pandas."""

@@ -6,6 +6,7 @@ present campaign. What came out of it is written once, when it ends (`run_row`, 
 
 from __future__ import annotations
 
+import functools
 import json
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -129,9 +130,13 @@ def fault_row(key: str, outcome: str, reason: str) -> dict[str, Any]:
 
 
 def _empty(key: str) -> dict[str, Any]:
+    return {**dict.fromkeys(RESULT), "key": key, **_version_columns(), "attempts": 1}
+
+
+@functools.cache  # looking versions up takes milliseconds
+def _version_columns() -> dict[str, str]:
     found = versions()
-    numbers = {f"version.{name}": found[name] for name in VERSIONS}
-    return {**dict.fromkeys(RESULT), "key": key, **numbers, "attempts": 1}
+    return {f"version.{name}": found[name] for name in VERSIONS}
 
 
 def result_table(rows: Sequence[Mapping[str, Any]]) -> pyarrow.Table:

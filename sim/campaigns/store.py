@@ -56,21 +56,22 @@ class Store:
             manifest: the campaign and facts about it, as plain data
             grid: a row for each run
         """
+        (self.folder / TABLE).unlink(missing_ok=True)  # of the campaign as it was
         write_table(grid, self.folder / GRID_FILE)
         text = json.dumps(manifest, indent=1, ensure_ascii=False)
         with written_whole(self.folder / MANIFEST) as part:
             part.write_text(text + "\n", encoding="utf-8")
 
-    def done(self) -> set[str]:
-        """The keys of all runs that were ever made here."""
-        return set(_results(self.folder)["key"].to_pylist())
-
-    def add(self, row: Mapping[str, Any]) -> None:
+    def add(self, row: Mapping[str, Any], log: bytes | None = None) -> None:
         """Keep what came out of a run; it is on the disk after `FLUSH_EVERY` seconds at most, if runs go on ending.
 
         Args:
             row: as `run_row` and `fault_row` return it
+            log: the run's log, if it is to be written where the row says
         """
+        if log is not None:
+            with written_whole(self.folder / row["rollout"]) as part:
+                part.write_bytes(log)
         self._rows.append(row)
         if time.monotonic() - self._written > FLUSH_EVERY:
             self.flush()
@@ -120,6 +121,15 @@ def opened(folder: str | os.PathLike[str]) -> Iterator[Store]:
         yield Store(path)
 
 
+def done_in(folder: Path) -> set[str]:
+    """The keys of all runs that were ever made in a folder, also of campaigns that have changed since.
+
+    Args:
+        folder: a campaign's folder, or one that does not exist yet
+    """
+    return set(_results(folder)["key"].to_pylist())
+
+
 def read_manifest(folder: str | Path) -> dict[str, Any]:
     """The manifest of a campaign's folder.
 
@@ -148,7 +158,7 @@ def joined(folder: Path) -> pyarrow.Table:
     places = {key: i for i, key in enumerate(results["key"].to_pylist())}
     keys = grid["key"].to_pylist()
     rows = [i for i, key in enumerate(keys) if key in places]
-    left, right = grid.take(rows), results.take([places[keys[i]] for i in rows])
+    left, right = _rows(grid, rows), _rows(results, [places[keys[i]] for i in rows])
     command = left.schema.get_field_index("command")
     for name in right.column_names:
         if name != "key" and name not in left.column_names:
@@ -156,6 +166,12 @@ def joined(folder: Path) -> pyarrow.Table:
     order = [name for name in left.column_names if name not in ("command", *NOT_CANONICAL)]
     order.insert(_after(order, "rollout"), left.column_names[command])
     return left.select([*order, *NOT_CANONICAL]).combine_chunks()
+
+
+def _rows(table: pyarrow.Table, numbers: list[int]) -> pyarrow.Table:
+    """Some rows of a table, in this order; none where there are none."""
+    arrow = parquet_library()
+    return table.take(arrow.array(numbers, type=arrow.int64()))
 
 
 def _after(names: Sequence[str], name: str) -> int:
@@ -210,7 +226,7 @@ def _results(folder: Path) -> pyarrow.Table:
     for i, key in enumerate(table["key"].to_pylist()):
         if key not in places or (outcomes[places[key]] == CRASHED != outcomes[i]):
             places[key] = i
-    return table if len(places) == len(table) else table.take(sorted(places.values()))
+    return table if len(places) == len(table) else _rows(table, sorted(places.values()))
 
 
 def _cast(table: pyarrow.Table, schema: pyarrow.Schema) -> pyarrow.Table:

@@ -3,61 +3,136 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
+import hashlib
 import os
 import shutil
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
+from antdrive.sim.calibration.choice import choose_margin
+from antdrive.sim.calibration.prediction import Calibration
 from antdrive.sim.campaigns.campaign import Campaign, load_campaign, make_campaign
 from antdrive.sim.campaigns.expanding import Expansion, expand
-from antdrive.sim.campaigns.job import Job
+from antdrive.sim.campaigns.extras import parquet_library
+from antdrive.sim.campaigns.job import Job, SweepCase
+from antdrive.sim.campaigns.local import run_here, run_locally
 from antdrive.sim.campaigns.results import SweepResults
 from antdrive.sim.campaigns.rows import grid_table
-from antdrive.sim.campaigns.running import Driving, Finished, Keep
-from antdrive.sim.campaigns.store import Store, opened
+from antdrive.sim.campaigns.running import Driving, Finished, Keep, Work
+from antdrive.sim.campaigns.store import Store, done_in, opened
 from antdrive.sim.pipeline import versions
 from antdrive.worlds import save_task
+from antdrive.worlds.files.atomic import written_whole
 
 
 def sweep(
-    campaign: Campaign | str | os.PathLike[str] | dict[str, object],
+    campaign: Campaign | str | os.PathLike[str] | Mapping[str, Any],
     folder: str | os.PathLike[str],
     *,
-    jobs: int = 1,
+    jobs: int | None = None,
+    dask: str | None = None,
     keep: Keep | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> SweepResults:
-    """Make all runs of a campaign that its folder does not hold yet.
+    """Make all runs of a campaign that its folder does not hold yet. Whatever ends it, the same call goes on later.
 
     Args:
         campaign: a campaign, its file, or plain data with the keys of such a file
         folder: where results are kept
-        jobs: number of processes
+        jobs: number of processes; None: one per core; 0: this process, which a run that crashes then ends
+        dask: the cluster that makes the runs instead: "local:N", or the address of a scheduler, "tcp://HOST:PORT"
         keep: which runs' logs are kept: none, failed or all; None: as the campaign says
-        progress: is called after each run with the numbers of runs done and of all
+        progress: is called at first and after each run with the numbers of runs that are done and of all
 
     Raises:
-        InputError: something in the campaign is wrong, or another process writes into the folder.
+        InputError: something in the campaign is wrong, another process writes into the folder, or the scheduler is gone.
     """
     asked = campaign_of(campaign)
-    expansion = expand(asked)
+    return run_expansion(asked, expand(asked), folder, jobs=jobs, dask=dask, keep=keep, progress=progress)
+
+
+def run_expansion(
+    campaign: Campaign,
+    expansion: Expansion,
+    folder: str | os.PathLike[str],
+    *,
+    jobs: int | None = None,
+    dask: str | None = None,
+    keep: Keep | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    work: Work | None = None,
+) -> SweepResults:
+    """Make those runs of an expanded campaign that its folder does not hold yet.
+
+    Args:
+        campaign: the campaign
+        expansion: its runs
+        folder: where results are kept
+        jobs: number of processes; None: one per core; 0: this process
+        dask: the cluster that makes the runs instead
+        keep: which runs' logs are kept; None: as the campaign says
+        progress: is called at first and after each run with the numbers of runs that are done and of all
+        work: what is done with a run; None: it is driven
+
+    Raises:
+        InputError: another process writes into the folder, or the scheduler is gone.
+    """
+    parquet_library()
+    report = progress or (lambda done, size: None)
     with opened(folder) as store:
-        begin(store, asked, expansion)
-        done = store.done()
-        todo = [job for job in expansion.jobs if job.key not in done]
-        work = Driving(keep or asked.entry.rollouts, str(store.folder.resolve()))
-        made, before = 0, len(expansion.jobs) - len(todo)
-        with contextlib.closing(_here(todo, work)) as finished:
-            for one in finished:
-                store.add(one.row)
-                made += 1
-                if progress is not None:
-                    progress(before + made, len(expansion.jobs))
-        table = store.finish()
-    return SweepResults(Path(folder), table, len(expansion.jobs), made)
+        all_jobs = calibrated(expansion.jobs)
+        _begin(store, campaign, expansion, all_jobs)
+        done = done_in(store.folder)
+        todo = [job for job in all_jobs if job.key not in done]
+        made, before, size = 0, len(all_jobs) - len(todo), len(all_jobs)
+        report(before, size)
+        # Workers of another machine hand logs back; those of this one write them.
+        shared = None if dask is not None and not dask.startswith("local:") else str(store.folder.resolve())
+        driving = Driving(keep or campaign.entry.rollouts, shared)
+        try:
+            with contextlib.closing(_engine(todo, work or driving, jobs, dask)) as finished:
+                for one in finished:
+                    store.add(one.row, one.log)
+                    made += 1
+                    report(before + made, size)
+        finally:
+            table = store.finish()
+    return SweepResults(Path(folder), table, size, made)
 
 
-def campaign_of(campaign: Campaign | str | os.PathLike[str] | dict[str, object]) -> Campaign:
+def _engine(todo: list[Job], work: Work, jobs: int | None, dask: str | None) -> Generator[Finished, None, None]:
+    if dask is not None:
+        from antdrive.sim.campaigns.cluster import run_on_cluster
+
+        return run_on_cluster(todo, work, dask)
+    if jobs == 0:
+        return run_here(todo, work)
+    return run_locally(todo, work, min(jobs or os.cpu_count() or 1, max(1, len(todo))))
+
+
+def calibrated(jobs: Iterable[Job]) -> list[Job]:
+    """The runs, with a margin for those that leave it to be chosen; each robot and its settings are calibrated once.
+
+    Args:
+        jobs: the runs
+
+    Raises:
+        FieldError: no margin leaves the reserve.
+    """
+    chosen: dict[str, Calibration] = {}
+    cases: dict[int, SweepCase] = {}
+    for job in jobs:
+        if job.case.fields["margin"] == "auto" and id(job.case) not in cases:
+            conditions = dataclasses.replace(job.case, calibration=None).scenario(job.seed, margin=0.0).conditions
+            if conditions.key not in chosen:
+                chosen[conditions.key] = choose_margin(conditions)
+            cases[id(job.case)] = dataclasses.replace(job.case, calibration=chosen[conditions.key])
+    return [job._replace(case=cases[id(job.case)]) if id(job.case) in cases else job for job in jobs]
+
+
+def campaign_of(campaign: Campaign | str | os.PathLike[str] | Mapping[str, Any]) -> Campaign:
     """A campaign from whatever stands for it.
 
     Args:
@@ -65,38 +140,26 @@ def campaign_of(campaign: Campaign | str | os.PathLike[str] | dict[str, object])
     """
     if isinstance(campaign, Campaign):
         return campaign
-    return make_campaign(campaign) if isinstance(campaign, dict) else load_campaign(campaign)
+    return make_campaign(campaign) if isinstance(campaign, Mapping) else load_campaign(campaign)
 
 
-def begin(store: Store, campaign: Campaign, expansion: Expansion) -> None:
-    """Write what is to be run: the manifest, the grid, and the worlds and robots that commands name.
-
-    Args:
-        store: the campaign's folder
-        campaign: the campaign
-        expansion: its runs
-    """
-    import hashlib
-
-    keys = "\n".join(sorted(job.key for job in expansion.jobs))
+def _begin(store: Store, campaign: Campaign, expansion: Expansion, jobs: Sequence[Job]) -> None:
+    """Write what is to be run: the manifest, the grid, and the worlds and robots that commands name."""
+    keys = "\n".join(sorted(job.key for job in jobs))
     manifest = {
         "schema": 1,
         "source": Path(campaign.source).name,
         "campaign": campaign.document.data,
-        "size": len(expansion.jobs),
+        "size": len(jobs),
         "hash": hashlib.sha256(keys.encode()).hexdigest(),
         "counts": expansion.counts,
+        "duplicates": expansion.duplicates,
         "versions": versions(),
     }
     for path, task in expansion.worlds.items():
         if not (store.folder / path).exists():
             save_task(task, store.folder / path)
     for path, source in expansion.robots.items():
-        (store.folder / path).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(source, store.folder / path)
-    store.begin(manifest, grid_table(expansion.jobs))
-
-
-def _here(jobs: Iterable[Job], work: Driving) -> Generator[Finished, None, None]:
-    for job in jobs:
-        yield work(job)
+        with written_whole(store.folder / path) as part:
+            shutil.copyfile(source, part)
+    store.begin(manifest, grid_table(jobs))

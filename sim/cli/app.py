@@ -26,6 +26,7 @@ from antdrive.sim.cli.commands.robots import robots
 from antdrive.sim.cli.commands.run import run
 from antdrive.sim.cli.commands.schema import schema
 from antdrive.sim.cli.commands.shrink import shrink
+from antdrive.sim.cli.commands.sweep import sweep
 from antdrive.sim.cli.commands.verify import verify
 from antdrive.sim.cli.commands.warm import warm
 from antdrive.sim.cli.commands.worlds.export import export_world
@@ -43,6 +44,7 @@ COMMANDS: Mapping[str, Callable[..., int]] = MappingProxyType(
         "run": run,
         "plan": plan,
         "compare": compare,
+        "sweep": sweep,
         "render": render,
         "report": report,
         "verify": verify,

@@ -6,6 +6,7 @@ import json
 import math
 import shutil
 import sys
+import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -52,6 +53,51 @@ def working(label: str) -> Iterator[Callable[[str, int], None]]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task(label, total=None, at="")
         yield lambda stage, done: progress.update(task, at=f"{stage}, {done} runs")
+
+
+@contextmanager
+def campaign_bar(label: str) -> Iterator[Callable[[int, int], None]]:
+    """A bar on stderr for many runs, with their rate and the time left; where stderr is no terminal it shows nothing.
+
+    Yields a function that the block calls with the numbers of runs that are done and of all. What is done at the first call
+    does not count for the rate.
+    """
+    if not sys.stderr.isatty():
+        yield lambda done, size: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[pace]}"),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True, refresh_per_second=4) as progress:
+        task = progress.add_task(label, total=None, pace="")
+        first: list[float] = []
+
+        def update(done: int, size: int) -> None:
+            now = time.monotonic()
+            first[:] = first or [done, now]
+            made, seconds = done - first[0], now - first[1]
+            pace = f"{made / seconds:.1f} runs/s, {duration((size - done) * seconds / made)} left" if made > 0 else ""
+            progress.update(task, completed=done, total=size, pace=pace)
+
+        yield update
+
+
+def duration(seconds: float) -> str:
+    """A time in words of a length that suits it: 45 s, 12 min, 3 h 20 min, 2 d 4 h."""
+    minutes = round(seconds / 60)
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    if minutes < 90:
+        return f"{minutes} min"
+    hours = minutes // 60
+    return f"{hours} h {minutes % 60} min" if hours < 48 else f"{hours // 24} d {hours % 24} h"
 
 
 @contextmanager

@@ -10,17 +10,20 @@ from antdrive.worlds.errors import InputError
 
 
 def schema(
-    kind: Annotated[str, typer.Argument(metavar="KIND", help="Kind of file: world, robot or suite.")] = "world",
+    kind: Annotated[
+        str, typer.Argument(metavar="KIND", help="Kind of file: world, robot, suite or campaign.")
+    ] = "world",
 ) -> int:
-    """Print the JSON Schema of world, robot or suite files.
+    """Print the JSON Schema of world, robot, suite or campaign files.
 
     An editor that knows it completes keys and marks mistakes.
     """
     from antdrive.robots import robot_schema
+    from antdrive.sim.campaigns import campaign_schema
     from antdrive.sim.regression import suite_schema
     from antdrive.worlds import task_schema
 
-    schemas = {"world": task_schema, "robot": robot_schema, "suite": suite_schema}
+    schemas = {"world": task_schema, "robot": robot_schema, "suite": suite_schema, "campaign": campaign_schema}
     if kind not in schemas:
         raise InputError(f"schema: unknown kind {kind!r}; choose from {', '.join(schemas)}")
     print_json(schemas[kind]())

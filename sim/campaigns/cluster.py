@@ -1,0 +1,137 @@
+"""Workers on this or other machines through dask's `distributed`, in chunks of runs that may safely be made twice."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import math
+import re
+import time
+from collections.abc import Generator, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from antdrive.sim.campaigns.extras import cluster_library
+from antdrive.sim.campaigns.job import Job
+from antdrive.sim.campaigns.local import ATTEMPTS
+from antdrive.sim.campaigns.rows import CRASHED, fault_row
+from antdrive.sim.campaigns.running import Finished, Work, again
+from antdrive.sim.campaigns.waiting import Waiting
+from antdrive.worlds.errors import input_error
+
+CHUNKS_EACH = 3  # chunks that are at a worker or on their way to it
+PATIENCE = 10.0  # how long a scheduler may be away before the campaign ends [s]
+WORKERS_EVERY = 2.0  # how often the number of workers is asked for [s]
+TICK = 0.005  # between looks at the tasks [s]
+_LOCAL = re.compile(r"local:(\d{1,4})")
+
+
+def run_on_cluster(jobs: Iterable[Job], work: Work, address: str) -> Generator[Finished, None, None]:
+    """Make runs on a cluster; the results come in any order.
+
+    Args:
+        jobs: the runs
+        work: what to do with each
+        address: tcp://HOST:PORT of a scheduler, or local:N for N processes on this machine
+
+    Raises:
+        InputError: the address is wrong, or the scheduler cannot be reached or is gone.
+    """
+    distributed = cluster_library()
+    with _client(distributed, address) as client:
+        waiting, at_work, asked = Waiting(jobs, 1), dict[Any, list[Job]](), -math.inf
+        while waiting or at_work:
+            if time.monotonic() - asked > WORKERS_EVERY:
+                waiting.processes, asked = _workers(client, address), time.monotonic()
+            while waiting and len(at_work) < CHUNKS_EACH * waiting.processes:
+                chunk = waiting.chunk(None)
+                # As part of the function the runs are not searched for results of other tasks, which takes long.
+                at_work[client.submit(functools.partial(run_chunk, work, chunk), pure=False)] = chunk
+            ended = [future for future in at_work if future.done()]
+            if not ended:
+                time.sleep(TICK)
+            if any(future.cancelled() for future in ended):
+                _require_scheduler(client, address)
+            for future in ended:
+                yield from _received(future, at_work.pop(future), waiting)
+
+
+def run_chunk(work: Work, jobs: Sequence[Job]) -> tuple[list[Finished], float]:
+    """Make runs one after the other; their results, and the time that they took [s].
+
+    Args:
+        work: what to do with a run
+        jobs: the runs
+    """
+    started = time.monotonic()
+    return [work(job) for job in jobs], time.monotonic() - started
+
+
+def _received(future: Any, jobs: list[Job], waiting: Waiting) -> Generator[Finished, None, None]:
+    """The results of a chunk. One that killed its workers is taken apart; of a single run this is the result."""
+    if future.status == "finished":
+        finished, seconds = future.result()
+        waiting.measured(seconds, len(jobs))
+        yield from finished
+    elif future.status != "error" or (_killed(future) and len(jobs) > 1):
+        waiting.put_back(jobs)  # not made: the connection was lost for a while, or the workers died
+    elif _killed(future):
+        yield again(Finished(fault_row(jobs[0].key, CRASHED, "the processes that made it ended")), ATTEMPTS)
+    else:
+        raise future.exception()
+
+
+def _killed(future: Any) -> bool:
+    return type(future.exception()).__name__ == "KilledWorker"
+
+
+@contextmanager
+def _client(distributed: Any, address: str) -> Iterator[Any]:
+    """A context with a client of the cluster at an address."""
+    match = _LOCAL.fullmatch(address)
+    if match is None and not re.match(r"(tcp|tls|ucx|ws|wss)://.", address):
+        raise input_error(
+            "--dask", address, "write local:N with a number of processes, or tcp://HOST:PORT of a scheduler"
+        )
+    with contextlib.ExitStack() as stack:
+        target: Any = address
+        if match:
+            import dask
+
+            stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": 1}))
+            target = stack.enter_context(
+                distributed.LocalCluster(
+                    n_workers=max(1, int(match[1])),
+                    threads_per_worker=1,
+                    memory_limit=0,
+                    dashboard_address="127.0.0.1:0",
+                )
+            )
+        try:
+            client = stack.enter_context(distributed.Client(target, timeout=PATIENCE))
+        except OSError as error:
+            raise input_error("--dask", address, f"no scheduler answers ({error})") from None
+        yield client
+
+
+def _workers(client: Any, address: str) -> int:
+    """How many workers a cluster has; 1 if it has none yet."""
+    _require_scheduler(client, address)
+    try:
+        return max(1, len(client.scheduler_info()["workers"]))
+    except (OSError, RuntimeError):
+        _require_scheduler(client, address)
+        return 1
+
+
+def _require_scheduler(client: Any, address: str) -> None:
+    """Wait for a connection that was lost.
+
+    Raises:
+        InputError: it does not come back.
+    """
+    deadline = time.monotonic() + PATIENCE
+    while client.status == "connecting" and time.monotonic() < deadline:
+        time.sleep(TICK)
+    if client.status != "running":
+        raise input_error("--dask", address, "the scheduler is gone; the same command goes on with what is missing")

@@ -1,0 +1,111 @@
+"""From the words of `antdrive sweep` to a campaign."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from antdrive.worlds.errors import InputError
+
+if TYPE_CHECKING:
+    from antdrive.sim.campaigns.campaign import Campaign
+
+SOURCE = "the options"  # what errors call a campaign that no file describes
+
+
+def campaign_from(path: Path | None, **words: Any) -> Campaign:
+    """The campaign in a file, with the keys that options give in place of the file's.
+
+    Args:
+        path: the file; None: the options say everything
+        words: what the options hold, by the campaign's keys and `generate`; None: not given
+
+    Raises:
+        InputError: something is wrong; the message names the file and the key, or the option.
+    """
+    from antdrive.sim.campaigns.campaign import load_campaign, make_campaign
+
+    given = _keys(words)
+    if path is not None and not given:
+        return load_campaign(path)
+    if path is None:
+        for key, option in (("worlds", "--world"), ("planners", "--planner")):
+            if key not in given:
+                raise InputError(f"{option}: missing; name a campaign file, or at least one world and one planner")
+        return make_campaign(given, ".", SOURCE)
+    file = load_campaign(path)
+    # Paths in options begin where the command runs, those in the file beside the file.
+    for key in ("worlds", "robots"):
+        given[key] = _absolute(given[key]) if key in given else file.document.data.get(key)
+    merged = {**file.document.data, **{key: value for key, value in given.items() if value is not None}}
+    return make_campaign(merged, file.folder, str(path))
+
+
+def _keys(words: dict[str, Any]) -> dict[str, Any]:
+    """The campaign's keys that options give."""
+    found = {key: words[key] for key in ("robots", "routes", "noise") if words[key]}
+    worlds = [*(words["worlds"] or ()), *(_generated(text) for text in words["generate"] or ())]
+    if worlds:
+        found["worlds"] = worlds
+    if words["planners"]:
+        found["planners"] = [_planner(text) for text in words["planners"]]
+    if words["margin"]:
+        found["margin"] = [text if text == "auto" else _number("--margin", text) for text in words["margin"]]
+    if words["seeds"] is not None:
+        found["seeds"] = _seeds(words["seeds"])
+    if words["tasks"] is not None:
+        found["tasks"] = {"random": words["tasks"]}
+    return found
+
+
+def _absolute(worlds: list[Any]) -> list[Any]:
+    from antdrive.robots import list_robots
+    from antdrive.worlds import list_worlds
+
+    known = {*list_worlds(), *list_robots()}
+    return [str(Path(one).absolute()) if isinstance(one, str) and one not in known else one for one in worlds]
+
+
+def _seeds(text: str) -> Any:
+    """The value of a campaign's key `seeds`."""
+    if text.isascii() and text.isdigit():
+        return int(text)
+    if "-" in text:
+        return text
+    return [_whole("--seeds", word) for word in text.split(",")]
+
+
+def _generated(text: str) -> dict[str, Any]:
+    """{generate: KIND, seeds: SEEDS} from KIND:SEEDS."""
+    kind, _, seeds = text.partition(":")
+    return {"generate": kind, "seeds": _seeds(seeds) if seeds else 1}
+
+
+def _planner(text: str) -> Any:
+    """A planner from NAME or NAME:KEY=VALUES:KEY=VALUES, where VALUES are 10,50 or 10..50..20."""
+    name, *options = text.split(":")
+    entry: dict[str, Any] = {"name": name}
+    for option in options:
+        key, mark, values = option.partition("=")
+        if not mark or not key:
+            raise InputError(f"--planner {text}: write NAME:KEY=VALUE, such as aco-han:ants=10,50")
+        ends = values.split("..")
+        if len(ends) == 3:
+            entry[key] = dict(zip(("from", "to", "step"), (_number("--planner", end) for end in ends), strict=True))
+        else:
+            entry[key] = values.split(",") if "," in values else values
+    return entry if options else name
+
+
+def _whole(option: str, text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise InputError(f"{option} {text}: must be a whole number") from None
+
+
+def _number(option: str, text: str) -> float | int:
+    try:
+        return int(text) if text.lstrip("+-").isdigit() else float(text)
+    except ValueError:
+        raise InputError(f"{option} {text}: must be a number") from None

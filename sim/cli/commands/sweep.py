@@ -1,0 +1,199 @@
+"""`antdrive sweep`."""
+
+import shlex
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, cast, get_args
+
+import typer
+
+from antdrive.sim.cli.compiling import compile_once
+from antdrive.sim.cli.console import campaign_bar, print_error, print_json, print_line, print_table
+from antdrive.sim.cli.exits import SUCCEEDED
+from antdrive.worlds.errors import InputError
+
+if TYPE_CHECKING:
+    from antdrive.sim.campaigns.campaign import Campaign
+    from antdrive.sim.campaigns.expanding import Expansion
+    from antdrive.sim.campaigns.results import SweepResults
+    from antdrive.sim.campaigns.running import Keep
+
+File = Annotated[
+    Path | None, typer.Argument(metavar="CAMPAIGN", help="Campaign file; may be left out where the options name all.")
+]
+Folder = Annotated[
+    Path | None, typer.Option("--out", "-o", metavar="FOLDER", help="Folder for the results; a campaign there goes on.")
+]
+Worlds = Annotated[
+    list[str] | None,
+    typer.Option("--world", "-w", metavar="NAME", help="World of the catalogue, file, or pattern. May be repeated."),
+]
+Generate = Annotated[
+    list[str] | None,
+    typer.Option(metavar="KIND:SEEDS", help="Random worlds, such as forest:20 or barn:0-9. May be repeated."),
+]
+Planners = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--planner",
+        "-p",
+        metavar="NAME",
+        help="Planner, with options such as aco-han:ants=10,50 or aco-han:ants=10..50..20. May be repeated.",
+    ),
+]
+Robots = Annotated[
+    list[str] | None,
+    typer.Option("--robot", "-r", metavar="NAME", help="Robot of the catalogue, or file. May be repeated."),
+]
+Seeds = Annotated[
+    str | None, typer.Option(metavar="SEEDS", help="How many seeds, such as 10, or which, such as 0-9 or 3,7.")
+]
+Routes = Annotated[
+    list[str] | None, typer.Option("--smoothing", metavar="KIND", help="none, taut or clearance. May be repeated.")
+]
+Noise = Annotated[
+    list[float] | None,
+    typer.Option("--noise", min=0.0, metavar="FACTOR", help="Factor on the robot's noise. May be repeated."),
+]
+Margins = Annotated[
+    list[str] | None, typer.Option("--margin", metavar="METRES|auto", help="Margin [m]. May be repeated.")
+]
+Tasks = Annotated[
+    int | None, typer.Option(min=1, metavar="NUMBER", help="Random starts and goals in each world.  [default: its own]")
+]
+Jobs = Annotated[
+    int | None,
+    typer.Option("--jobs", "-j", min=1, max=256, metavar="NUMBER", help="Processes.  [default: one per core]"),
+]
+Dask = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ADDRESS",
+        help="Make the runs on a cluster: tcp://HOST:PORT of a dask scheduler, or local:N. Whoever reaches a scheduler can "
+        "run code on its machines: use it in trusted networks only.",
+    ),
+]
+Rollouts = Annotated[
+    str | None, typer.Option("--keep", metavar="WHICH", help="Logs to keep: none, failed or all.  [default: none]")
+]
+DryRun = Annotated[
+    bool, typer.Option("--dry-run", help="Say how many runs there are and how many are missing; run nothing.")
+]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else.")]
+
+
+def sweep(
+    campaign: File = None,
+    out: Folder = None,
+    world: Worlds = None,
+    generate: Generate = None,
+    planner: Planners = None,
+    robot: Robots = None,
+    seeds: Seeds = None,
+    smoothing: Routes = None,
+    noise: Noise = None,
+    margin: Margins = None,
+    tasks: Tasks = None,
+    jobs: Jobs = None,
+    dask: Dask = None,
+    keep: Rollouts = None,
+    dry_run: DryRun = False,
+    json: Json = False,
+) -> int:
+    """Run a campaign: worlds x planners x robots x settings x seeds.
+
+    The folder holds a row for each run as Parquet. The same command goes on after an interruption, and runs what is new after
+    a change. Options that name worlds, planners and so on take the place of what the file says. Exit code 0: all runs are
+    done, whatever came out of them.
+    """
+    from antdrive.sim.campaigns.expanding import expand
+    from antdrive.sim.campaigns.running import Keep as Kinds
+    from antdrive.sim.cli.campaigns import campaign_from
+
+    if out is None and not dry_run:
+        raise InputError("--out: missing; name the folder for the results")
+    if keep is not None and keep not in get_args(Kinds):
+        raise InputError(f"--keep {keep}: unknown; choose from {', '.join(get_args(Kinds))}")
+    asked = campaign_from(
+        campaign,
+        worlds=world,
+        generate=generate,
+        planners=planner,
+        robots=robot,
+        seeds=seeds,
+        routes=smoothing,
+        noise=noise,
+        margin=margin,
+        tasks=tasks,
+    )
+    expansion = expand(asked)
+    if dry_run:
+        return _say_size(expansion, out, json)
+    assert out is not None
+    results = _run(asked, expansion, out, jobs, dask, cast("Keep | None", keep))
+    if json:
+        print_json(_facts(results))
+    else:
+        _print(results)
+    return SUCCEEDED
+
+
+def _run(
+    asked: "Campaign", expansion: "Expansion", out: Path, jobs: int | None, dask: str | None, keep: "Keep | None"
+) -> "SweepResults":
+    from antdrive.sim.campaigns.sweeping import run_expansion
+
+    compile_once()
+    with _resumable(out), campaign_bar("driving") as progress:
+        return run_expansion(asked, expansion, out, jobs=jobs, dask=dask, keep=keep, progress=progress)
+
+
+@contextmanager
+def _resumable(folder: Path) -> Iterator[None]:
+    """A context that says, when it is interrupted, how the campaign goes on."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        command = shlex.join(["antdrive", *sys.argv[1:]])
+        print_error(f"{folder}: what is done is kept; go on with: {command}")
+        raise
+
+
+def _say_size(expansion: "Expansion", out: Path | None, json: bool) -> int:
+    from antdrive.sim.campaigns.store import done_in
+
+    done = done_in(out) if out is not None else set()
+    missing = sum(job.key not in done for job in expansion.jobs)
+    facts: dict[str, Any] = {
+        "runs": len(expansion.jobs), "missing": missing, "duplicates": expansion.duplicates, "counts": expansion.counts
+    }  # fmt: skip
+    if json:
+        print_json(facts)
+        return SUCCEEDED
+    print_line(" x ".join(f"{count} {name}" for name, count in expansion.counts.items()))
+    more = (
+        f"; {expansion.duplicates} combinations that mean the same as others are left out"
+        if expansion.duplicates
+        else ""
+    )
+    print_line(f"{len(expansion.jobs)} runs, {missing} of them missing{more}")
+    return SUCCEEDED
+
+
+def _facts(results: "SweepResults") -> dict[str, Any]:
+    return {
+        "folder": str(results.folder),
+        "table": str(results.path),
+        "runs": results.size,
+        "made": results.made,
+        "succeeded": results.succeeded,
+        "outcomes": results.outcomes,
+    }
+
+
+def _print(results: "SweepResults") -> None:
+    print_line(f"{results.size} runs, {results.made} of them made now; {results.succeeded} succeeded, certified")
+    print_table(("outcome", "runs"), ((name, str(count)) for name, count in results.outcomes.items()))
+    print_line(f"  {results.path}")

@@ -1,0 +1,22 @@
+"""A campaign of runs that take no time to speak of, in a process that tests kill: python -m tests.sim.campaigns.parent DIR."""
+
+from __future__ import annotations
+
+import sys
+
+from antdrive.sim.campaigns import expand, make_campaign, store
+from antdrive.sim.campaigns.sweeping import run_expansion
+from tests.sim.campaigns.works import Deadly
+
+CAMPAIGN = {"worlds": ["empty", "gate"], "planners": ["astar"], "seeds": 150}
+
+
+def go(folder: str, seconds: float, jobs: int) -> None:
+    """Run the campaign, or what is left of it."""
+    store.FLUSH_EVERY = 0.05
+    campaign = make_campaign(CAMPAIGN)
+    run_expansion(campaign, expand(campaign), folder, jobs=jobs, work=Deadly(seconds=seconds))
+
+
+if __name__ == "__main__":
+    go(sys.argv[1], 0.02, 2)

@@ -1,0 +1,100 @@
+"""Runs on a dask cluster: the same table, a run that kills its workers is recorded, a scheduler that is gone is named."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("distributed")
+
+from antdrive.sim.campaigns import canonical_bytes, make_campaign, read_results
+from antdrive.sim.campaigns.cluster import run_on_cluster
+from antdrive.sim.campaigns.expanding import expand
+from antdrive.sim.campaigns.running import log_path
+from antdrive.sim.campaigns.sweeping import run_expansion, sweep
+from antdrive.worlds.errors import InputError
+from tests.sim.campaigns.works import Deadly
+
+pytestmark = [
+    pytest.mark.slow,  # starting a cluster takes seconds
+    pytest.mark.filterwarnings("ignore:unclosed:ResourceWarning"),  # of distributed's own sockets
+]
+CAMPAIGN = {"worlds": ["empty", "gate"], "planners": ["astar"], "seeds": 12, "rollouts": "none"}
+
+
+@pytest.fixture
+def scheduler() -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """A scheduler with two workers, in processes of their own: the scheduler's process and its address."""
+    here = [sys.executable, "-m", "distributed.cli.dask_scheduler"]
+    words = ["--port", "0", "--host", "127.0.0.1", "--no-dashboard", "--no-show"]
+    process = subprocess.Popen([*here, *words], stderr=subprocess.PIPE, text=True)
+    assert process.stderr is not None
+    address = next(line for line in process.stderr if "Scheduler at:" in line).split()[-1]
+    worker = [sys.executable, "-m", "distributed.cli.dask_worker", address, "--nworkers", "2", "--nthreads", "1"]
+    workers = subprocess.Popen([*worker, "--no-dashboard", "--death-timeout", "2"], stderr=subprocess.DEVNULL)
+    yield process, address
+    for one in (workers, process):
+        one.send_signal(signal.SIGTERM)
+    workers.wait(30)
+    process.wait(30)
+    process.stderr.close()
+
+
+def test_a_cluster_makes_the_same_table_as_processes_and_hands_logs_back(
+    tmp_path: Path, scheduler: tuple[subprocess.Popen[str], str]
+) -> None:
+    _, address = scheduler
+    few = {**CAMPAIGN, "seeds": 2}
+    for name, dask in (("local", None), ("dask", "local:2"), ("tcp", address)):
+        sweep(few, tmp_path / name, jobs=2, dask=dask, keep="all")
+    assert (
+        canonical_bytes(tmp_path / "local") == canonical_bytes(tmp_path / "dask") == canonical_bytes(tmp_path / "tcp")
+    )
+    for name in ("dask", "tcp"):
+        keys = read_results(tmp_path / name).table["key"].to_pylist()
+        assert all((tmp_path / name / log_path(key)).exists() for key in keys)
+
+
+def test_a_run_that_kills_its_workers_is_recorded_and_no_other_is_lost() -> None:
+    jobs = expand(make_campaign(CAMPAIGN)).jobs
+    rows = [finished.row for finished in run_on_cluster(jobs, Deadly((3,)), "local:2")]
+    assert Counter(row["key"] for row in rows) == Counter(job.key for job in jobs)
+    assert {row["key"] for row in rows if row["outcome"] == "crashed"} == {job.key for job in jobs if job.seed == 3}
+
+
+def test_a_scheduler_that_is_gone_ends_the_campaign_which_goes_on_elsewhere(
+    tmp_path: Path, scheduler: tuple[subprocess.Popen[str], str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("antdrive.sim.campaigns.cluster.PATIENCE", 1.0)
+    process, address = scheduler
+    campaign = make_campaign(CAMPAIGN)
+    expansion = expand(campaign)
+
+    def kill(done: int, size: int) -> None:
+        if done == 3:
+            process.kill()
+
+    with pytest.raises(InputError, match=r"^--dask: tcp://.*: the scheduler is gone; the same command goes on"):
+        run_expansion(campaign, expansion, tmp_path / "killed", dask=address, work=Deadly(seconds=0.2), progress=kill)
+    assert 3 <= len(read_results(tmp_path / "killed").table) < len(expansion.jobs)
+    run_expansion(campaign, expansion, tmp_path / "killed", jobs=0, work=Deadly())
+    run_expansion(campaign, expansion, tmp_path / "calm", jobs=0, work=Deadly())
+    assert canonical_bytes(tmp_path / "killed") == canonical_bytes(tmp_path / "calm")
+
+
+@pytest.mark.parametrize("address", ["local:", "local:x", "localhost:8786", "tcp://"])
+def test_a_wrong_address_is_refused(address: str) -> None:
+    with pytest.raises(InputError, match="write local:N with a number of processes, or tcp://HOST:PORT"):
+        next(run_on_cluster([], Deadly(), address))
+
+
+def test_a_scheduler_that_does_not_answer_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("antdrive.sim.campaigns.cluster.PATIENCE", 0.5)
+    with pytest.raises(InputError, match=r"^--dask: tcp://127\.0\.0\.1:1: no scheduler answers"):
+        next(run_on_cluster([], Deadly(), "tcp://127.0.0.1:1"))

@@ -1,0 +1,54 @@
+"""What workers do in tests instead of driving: nothing, or something terrible."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from antdrive.sim.campaigns.job import Job
+from antdrive.sim.campaigns.rows import fault_row
+from antdrive.sim.campaigns.running import Finished
+
+
+@dataclass(frozen=True)
+class Deadly:
+    """A run whose seed is among `seeds` kills its process; with `marks`, a folder, only the first time."""
+
+    seeds: tuple[int, ...] = ()
+    marks: str = ""
+    seconds: float = 0.0
+
+    def __call__(self, job: Job) -> Finished:
+        time.sleep(self.seconds)
+        mark = Path(self.marks) / job.key
+        if job.seed in self.seeds and not (self.marks and mark.exists()):
+            if self.marks:
+                mark.touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return Finished(fault_row(job.key, "succeeded", f"seed {job.seed}"))
+
+
+@dataclass(frozen=True)
+class Listing:
+    """Every run adds a line to a file: the world that its process is in."""
+
+    path: str
+
+    def __call__(self, job: Job) -> Finished:
+        time.sleep(0.01)
+        with Path(self.path).open("a") as stream:
+            stream.write(f"{os.getpid()} {job.case.world}\n")
+        return Finished(fault_row(job.key, "succeeded", ""))
+
+
+class Unloadable:
+    """Work that ends the process that unpickles it."""
+
+    def __reduce__(self) -> tuple[object, tuple[int, ...]]:
+        return os._exit, (7,)
+
+    def __call__(self, job: Job) -> Finished:
+        raise AssertionError
