@@ -65,6 +65,11 @@ class PlannerSuccess:
         """The share of the counted runs that succeeded."""
         return self.successes / self.counted
 
+    def as_dict(self) -> dict[str, Any]:
+        """All fields as plain values, and the share."""
+        fields = dataclasses.asdict(self)
+        return {**fields, "share": self.share, "interval": list(self.interval), "over_worlds": list(self.over_worlds)}
+
 
 @dataclass(frozen=True)
 class PairedComparison:

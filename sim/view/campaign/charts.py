@@ -135,7 +135,8 @@ def _size_boxes(
 ) -> list[Chart]:
     """Boxes over groups of worlds of like size, a panel for each planner, on instances that all planners solved."""
     column = AREA if AREA in paired.table else OPTIMUM
-    sizes = np.nanmax(np.where(paired.row >= 0, paired.table.numbers(column)[paired.row], -np.inf), axis=1)
+    known = np.nan_to_num(paired.table.numbers(column), nan=-np.inf)
+    sizes = np.where(paired.row >= 0, known[paired.row], -np.inf).max(axis=1)
     common = common & np.isfinite(sizes)
     if not common.any():
         return []

@@ -37,10 +37,21 @@ def write_campaign_report(summary: CampaignSummary, folder: Path, out: Path) -> 
     Raises:
         InputError: another suffix, or the file cannot be written.
     """
-    kind = out.suffix.lower()
-    if kind not in WRITERS:
+    check_suffix(out)
+    return WRITERS[out.suffix.lower()](summary, folder, out)
+
+
+def check_suffix(out: Path) -> None:
+    """Refuse a file of a kind that is not written, before any work.
+
+    Args:
+        out: the file
+
+    Raises:
+        InputError: an unknown suffix.
+    """
+    if out.suffix.lower() not in WRITERS:
         raise InputError(f"{out}: unknown suffix {out.suffix!r}; choose one of {', '.join(WRITERS)}")
-    return WRITERS[kind](summary, folder, out)
 
 
 def _tables(summary: CampaignSummary) -> list[TextTable]:
