@@ -31,6 +31,8 @@ from antdrive.planners.plan import (
 from antdrive.worlds import Floats
 from antdrive.worlds.errors import FieldError
 
+REHEARSED = 2  # iterations in which kernels are loaded: the second evaporates and reuses what the first left
+
 
 class Iteration(NamedTuple):
     """The state of a planner after an iteration. Lengths are in metres; infinite means no path.
@@ -128,6 +130,10 @@ class IterativePlanner(GridPlanner):
     def capabilities(self) -> Capabilities:
         """What this planner can do and what it needs."""
         return Capabilities(iterative=True)
+
+    def rehearsal(self) -> IterativePlanner:
+        """This planner with few iterations, which call the same kernels."""
+        return dataclasses.replace(self, iterations=min(self.iterations, REHEARSED), time_budget=None)
 
     @abc.abstractmethod
     def iterate(self, query: Query, rng: np.random.Generator) -> Iterator[Iteration]:

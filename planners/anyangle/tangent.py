@@ -8,9 +8,7 @@ tangent graph for mobile robots among polygonal and curved obstacles*, IJRR 11, 
 
 from __future__ import annotations
 
-import dataclasses
 import math
-import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -169,12 +167,8 @@ class Tangent(GridPlanner):
     def __post_init__(self) -> None:
         require("bulge", self.bulge, above=0)
 
-    def plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
-        """Find the shortest path from the exact start to the exact goal."""
-        started = time.perf_counter()
-        result = self._plan(query, rng)  # the cells of the ends need not be free
-        options = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
-        return dataclasses.replace(result, options=options, wall_s=time.perf_counter() - started)
+    def _answer(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        return self._plan(query, rng)  # the cells of the ends need not be free
 
     def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
         if query.task is None:

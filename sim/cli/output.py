@@ -47,15 +47,6 @@ def in_brackets(reason: str) -> str:
     return f" ({reason})" if reason else ""
 
 
-def comparison_cells(run: Run) -> tuple[str, ...]:
-    """Planned and driven length [m], duration [s] and least clearance [m], for a row of a table."""
-    if run.rollout is None:
-        return ("-",) * 4
-    facts = run.as_dict()["metrics"]
-    names = ("path_length_m", "driven_length_m", "duration_s", "min_clearance_m")
-    return tuple(f"{facts[name]:.3f}" for name in names)
-
-
 def task_facts(task: Task) -> dict[str, Any]:
     """A task in short, as plain values."""
     return {

@@ -62,15 +62,38 @@ def default_folder(scenario: Scenario) -> Path:
     Where the folder of that name holds a run of another scenario, the fingerprint is part of the name.
     """
     parts = (scenario.task.world.name, scenario.planner_name, scenario.robot.name, str(scenario.seed))
-    folder, own = Path("out") / "-".join(map(file_name, parts)), fingerprint(scenario)
+    return free_folder(Path("out") / "-".join(map(file_name, parts)), "result.json", fingerprint(scenario))
+
+
+def free_folder(folder: Path, marker: str, own: str) -> Path:
+    """The folder itself, unless its marker shows results of something else; then one with the fingerprint in its name.
+
+    Args:
+        folder: where results go by default
+        marker: the file in it that holds the fingerprint of what its results are of
+        own: the fingerprint of what is to be written
+    """
     try:
-        found = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+        found = json.loads((folder / marker).read_text(encoding="utf-8"))
     except FileNotFoundError:
         return folder
     except (OSError, ValueError, RecursionError):
         found = None
     same = isinstance(found, dict) and found.get("fingerprint") == own
     return folder if same else folder.with_name(f"{folder.name}-{own}")
+
+
+def write_marker(path: Path, facts: Mapping[str, Any]) -> None:
+    """Write the file that says what a folder's results are of.
+
+    Args:
+        path: the file
+        facts: what it says, with the key `fingerprint`
+    """
+    from antdrive.worlds.files.atomic import written_whole
+
+    with written_whole(path) as temporary:
+        temporary.write_text(as_json(dict(facts)) + "\n", encoding="utf-8")
 
 
 def fingerprint(scenario: Scenario) -> str:
@@ -132,11 +155,8 @@ def _write_figures(run: Run, folder: Path, log: str, endings: Sequence[str]) -> 
 
 def write_result(run: Run, files: Mapping[str, str], command: str) -> dict[str, Any]:
     """Write a run's `result.json`, at `files["result"]`; what was written."""
-    from antdrive.worlds.files.atomic import written_whole
-
     result = {**run.as_dict(), "fingerprint": fingerprint(run.scenario), "files": dict(files), "command": command}
-    with written_whole(files["result"]) as temporary:
-        temporary.write_text(as_json(result) + "\n", encoding="utf-8")
+    write_marker(Path(files["result"]), result)
     return result
 
 

@@ -4,6 +4,7 @@ import dataclasses
 import inspect
 import json
 import math
+import re
 import subprocess
 import sys
 from dataclasses import MISSING, fields, replace
@@ -448,3 +449,33 @@ def test_the_planner_does_not_know_unseen_obstacles(small_run: Run, collided_run
 
 def test_scenarios_use_the_catalogue() -> None:
     assert Scenario.of("empty").task == load_task("empty")
+
+
+def test_a_result_tells_every_setting_and_the_page_documents_every_key(
+    small_scenario: Scenario, tmp_path: Path
+) -> None:
+    odd = replace(
+        small_scenario,
+        planner=load_planner("as", ants=7),
+        planner_name="as",
+        smoothing="taut",
+        noise=0.5,
+        margin=0.05,
+        controller=PurePursuit(lookahead_time=0.7),
+        avoidance=None,
+        unseen=(Disc(3.9, 2.9, 0.05),),
+        control_hz=30,
+    )
+    facts = json.loads(json.dumps(odd.as_dict(), allow_nan=False))
+    assert (facts["options"]["ants"], facts["smoothing"], facts["noise"], facts["margin_m"]) == (7, "taut", 0.5, 0.05)
+    assert (facts["margin_auto"], facts["cell_m"], facts["control_hz"]) == (False, 0.2, 30)
+    assert facts["task"] == {"start": [0.6, 1.4, 0.0], "goal": [3.4, 1.6], "goal_tolerance_m": odd.task.goal_tolerance}
+    assert facts["settings"] == {
+        "controller": {"lookahead_time": 0.7}, "avoidance": None, "unseen": [[3.9, 2.9, 0.05]],
+    }  # fmt: skip
+    assert small_scenario.as_dict()["settings"] == {}
+    page = (Path(__file__).parents[2] / "docs" / "rollout-format.md").read_text().partition("## result.json")[2]
+    documented = set(
+        re.findall(r"`(\w+)`", " ".join(row.split("|")[1] for row in page.splitlines() if row.startswith("| `")))
+    )
+    assert documented == set(run(small_scenario).as_dict()) | {"fingerprint", "files", "command"}

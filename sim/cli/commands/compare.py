@@ -1,32 +1,81 @@
 """`antdrive compare`."""
 
-import shlex
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from antdrive.sim.cli import options
+from antdrive.sim.cli.comparing import (
+    COMPARED,
+    Compared,
+    Entrant,
+    difference_cells,
+    differences,
+    entrants_of,
+    mark_of,
+    repeating,
+    same_drives,
+)
 from antdrive.sim.cli.compiling import compile_once
-from antdrive.sim.cli.console import planning, print_error, print_files, print_json, print_table
+from antdrive.sim.cli.console import planning, print_error, print_files, print_json, print_line, print_table
 from antdrive.sim.cli.exits import FAILED, SUCCEEDED
-from antdrive.sim.cli.output import comparison_cells
 from antdrive.sim.cli.scenario import make_scenario
-from antdrive.sim.cli.write import check_film, check_folder, write_comparison_film, write_result, write_run
+from antdrive.sim.cli.write import (
+    check_film,
+    check_folder,
+    file_name,
+    free_folder,
+    this_command,
+    write_comparison_film,
+    write_marker,
+    write_result,
+    write_run,
+)
 from antdrive.worlds.errors import InputError
+from antdrive.worlds.files.atomic import claimed
 
 if TYPE_CHECKING:
-    from antdrive.sim.pipeline import Run
+    from antdrive.sim.log.rollout import Rollout
     from antdrive.sim.scenario import Scenario
+
+MARKER = "comparison.json"
+Worlds = Annotated[
+    list[str], typer.Argument(metavar="WORLD...", help="Names of worlds in the catalogue, or world files.")
+]
+Planners = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--planner",
+        "-p",
+        metavar="NAME",
+        help="Planner; repeat it for two to six of them. LABEL=NAME gives it a label, so that one planner can be "
+        "compared with other options of its own.",
+    ),
+]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        "-s",
+        metavar="GROUP.KEY=VALUE",
+        help="Set an option: of one planner by its name or label, such as aco-han.ants=50; of all with planner.ants=50; "
+        "or of the controller, such as controller.lookahead_time=0.5. May be repeated.",
+    ),
+]
+Seeds = Annotated[
+    int, typer.Option(min=1, max=10_000, metavar="NUMBER", help="Number of seeds for each world, from --seed on.")
+]
 
 
 def compare(
-    world: options.World,
-    planner: Annotated[
-        list[str], typer.Option("--planner", "-p", metavar="NAME", help="Planner; repeat it for two to six of them.")
-    ],
+    worlds: Worlds,
+    planner: Planners = None,
+    settings: Settings = None,
     robot: options.Robot = "turtlebot",
     seed: options.Seed = 0,
+    seeds: Seeds = 1,
     margin: options.Margin = 0.03,
     cell: options.CellSize = None,
     smoothing: options.Smoothing = "clearance",
@@ -34,72 +83,129 @@ def compare(
     out: options.Out = None,
     figures: options.Figures = True,
     video: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Film the drives side by side: .mp4, .gif or .webp.")
+        Path | None,
+        typer.Option(metavar="FILE", help="Film the first world's drives side by side: .mp4, .gif or .webp."),
     ] = None,
     speed: options.Speed = 1.0,
     json: options.Json = False,
 ) -> int:
-    """Drive one world with several planners.
+    """Drive worlds with several planners.
 
-    Exit code 0: every run succeeded.
+    The planners are paired by world and seed. Figures and film show the first of them. Exit code 0: every run succeeded.
     """
-    from antdrive.sim.pipeline import run as drive
-
-    scenarios = {
-        name: make_scenario(
-            world, name, None, robot, seed=seed, margin=margin, cell=cell, smoothing=smoothing, noise=noise
-        )
-        for name in planner
-    }
-    folder = out or Path("out") / f"compare-{scenarios[planner[0]].task.world.name}"
-    if len(scenarios) < len(planner) or not 2 <= len(planner) <= 6:
-        raise InputError(f"--planner {' '.join(planner)}: name two to six different planners")
+    entrants = entrants_of(planner, settings)
+    rest = {"margin": margin, "cell": cell, "smoothing": smoothing, "noise": noise}
+    scenarios = _scenarios(worlds, entrants, robot, seed, rest)
+    cases = [(world, number) for world in worlds for number in range(seed, seed + seeds)]
+    folder, mark = _default_folder(scenarios, cases)
+    folder = out or folder
     if video is not None:
         check_film(video)
+    check_folder(folder)
     compile_once()
-    results = {}
-    for name, scenario in scenarios.items():
-        check_folder(folder / name)
-        with planning(f"planning and driving with {name}"):
-            results[name] = drive(scenario)
-        written = write_run(results[name], folder / name, figures=figures)
-        write_result(results[name], written, _command(scenario, world, robot))
-    logs = {name: result.rollout for name, result in results.items() if result.rollout is not None}
-    files = {name: str(folder / name) for name in results}
-    if len(logs) > 1 and figures:
-        from antdrive.sim.view.figures.run_figures import comparison_figure
-
-        files["figure"] = str(comparison_figure(logs, folder / "comparison.png"))
-    if len(logs) > 1 and video is not None:
-        files["film"] = write_comparison_film(list(logs.values()), video, speed=speed)["file"]
-    _print(results, files, json)
+    with claimed(folder):
+        facts = {"fingerprint": mark, "command": this_command()}
+        write_marker(folder / MARKER, facts)
+        runs, logs = _drive(scenarios, cases, folder, robot, figures)
+        files = {run.label: run.facts["folder"] for run in runs} if len(cases) == 1 else {"folder": str(folder)}
+        files |= _views(logs, folder, video, speed, figures)
+        told = {"differences": differences(runs), "same": same_drives(runs, smoothing)}
+        drives = [{"label": run.label, **run.facts} for run in runs]
+        write_marker(folder / MARKER, {**facts, "drives": drives, **told})
+    if json:
+        print_json(
+            {"runs": {run.label: run.facts for run in runs[: len(entrants)]}, "drives": drives, **told, "files": files}
+        )
+    else:
+        _print(runs, len(cases), told, files)
     if len(logs) < 2:
         found = "only one planner" if logs else "no planner"
         print_error(f"{found} found a path: there is nothing to compare in a figure or film")
-    return SUCCEEDED if all(result.succeeded for result in results.values()) else FAILED
+    return SUCCEEDED if all(run.facts["succeeded"] for run in runs) else FAILED
 
 
-def _print(results: "dict[str, Run]", files: dict[str, str], json: bool) -> None:
-    if json:
-        print_json({"runs": {name: result.as_dict() for name, result in results.items()}, "files": files})
-        return
-    print_table(
-        ("planner", "planned m", "driven m", "s", "least clearance m", "outcome"),
-        ((name, *comparison_cells(result), result.outcome.value) for name, result in results.items()),
-    )
-    print_files(files)
-
-
-def _command(scenario: "Scenario", world: str, robot: str) -> str:
-    """The `antdrive run` that repeats one of the compared runs."""
-    given = {
-        "--planner": scenario.planner_name,
-        "--robot": robot,
-        "--seed": scenario.seed,
-        "--margin": "auto" if scenario.chosen else scenario.margin,
-        "--smoothing": scenario.smoothing,
-        "--noise": scenario.noise,
+def _scenarios(
+    worlds: Sequence[str], entrants: Sequence[Entrant], robot: str, seed: int, rest: dict[str, Any]
+) -> "dict[tuple[str, Entrant], Scenario]":
+    """The scenario of every world, as given, and planner, with the first seed."""
+    scenarios = {
+        (world, entrant): make_scenario(world, entrant.name, list(entrant.settings), robot, seed=seed, **rest)
+        for world in worlds
+        for entrant in entrants
     }
-    words = [str(word) for option in given.items() for word in option]
-    cell = [] if scenario.cell is None else ["--cell", str(scenario.cell)]
-    return shlex.join(["antdrive", "run", world, *words, *cell])
+    if len({scenario.task.world.name for scenario in scenarios.values()}) < len(worlds):
+        raise InputError(f"{' '.join(worlds)}: name worlds with different names, each once")
+    return scenarios
+
+
+def _default_folder(
+    scenarios: "dict[tuple[str, Entrant], Scenario]", cases: Sequence[tuple[str, int]]
+) -> tuple[Path, str]:
+    """The folder of a comparison for which none is given, and the fingerprint of the comparison."""
+    names = {world: scenario.task.world.name for (world, _), scenario in scenarios.items()}
+    marks = {f"{entrant.label} {world}": scenario for (world, entrant), scenario in scenarios.items()}
+    mark = mark_of(marks, [(names[world], number) for world, number in cases])
+    name = file_name(f"compare-{'-'.join(names.values())}"[:100])
+    return free_folder(Path("out") / name, MARKER, mark), mark
+
+
+def _drive(
+    scenarios: "dict[tuple[str, Entrant], Scenario]",
+    cases: Sequence[tuple[str, int]],
+    folder: Path,
+    robot: str,
+    figures: bool,
+) -> "tuple[list[Compared], dict[str, Rollout]]":
+    """Drive every case with every planner, each into its folder; the runs, and the logs of the first case by label."""
+    import dataclasses
+
+    from antdrive.sim.pipeline import run as drive
+
+    runs: list[Compared] = []
+    logs: dict[str, Rollout] = {}
+    for place, (world, seed) in enumerate(cases):
+        for (of, entrant), base in scenarios.items():
+            if of != world:
+                continue
+            scenario = dataclasses.replace(base, seed=seed)
+            part = folder if len(cases) == 1 else folder / file_name(f"{base.task.world.name}-{seed}")
+            check_folder(part / entrant.label)
+            with planning(f"{base.task.world.name}, seed {seed}: {entrant.label}"):
+                result = drive(scenario)
+            written = write_run(result, part / entrant.label, figures=figures and place == 0)
+            write_result(result, written, repeating(scenario, entrant, world, robot))
+            kept = Compared.of(entrant.label, result)
+            runs.append(dataclasses.replace(kept, facts={**kept.facts, "folder": str(part / entrant.label)}))
+            if place == 0 and result.rollout is not None:
+                logs[entrant.label] = result.rollout
+    return runs, logs
+
+
+def _views(logs: "dict[str, Rollout]", folder: Path, video: Path | None, speed: float, figures: bool) -> dict[str, str]:
+    """The figure and the film of the first world and seed."""
+    files: dict[str, str] = {}
+    if len(logs) > 1 and figures:
+        from antdrive.sim.view.figures.run_figures import comparison_figure
+
+        comparison_figure(logs, folder / "comparison.png")
+        files["figure"] = str(folder / "comparison.png")
+    if len(logs) > 1 and video is not None:
+        files["film"] = write_comparison_film(list(logs.values()), video, speed=speed, titles=list(logs))["file"]
+    return files
+
+
+def _print(runs: list[Compared], cases: int, told: dict[str, Any], files: dict[str, str]) -> None:
+    many = cases > 1
+    print_table(
+        (*(("world", "seed") if many else ()), "planner", *COMPARED.values(), "outcome"),
+        (
+            (*((run.world, str(run.seed)) if many else ()), run.label, *run.cells, str(run.facts["sentence"]))
+            for run in runs
+        ),
+    )
+    if many:
+        print_line(f"differences from {runs[0].label}, of the pairs in which both succeeded: median (least to most)")
+        print_table(("planner", "succeeded", "pairs", *COMPARED.values()), map(difference_cells, told["differences"]))
+    for sentence in told["same"]:
+        print_line(sentence)
+    print_files(files)

@@ -12,6 +12,7 @@ from antdrive.sim.cli.exits import FAILED, SUCCEEDED
 from antdrive.sim.cli.output import chosen_margin, in_brackets, plain
 from antdrive.sim.cli.scenario import make_scenario
 from antdrive.sim.cli.write import suffixes
+from antdrive.worlds.files.atomic import claimed
 
 if TYPE_CHECKING:
     from antdrive.planners import PlanResult
@@ -48,7 +49,10 @@ def plan(
     if out is not None:
         from antdrive.sim.view.figures.plan_figures import plan_figures
 
-        made = plan_figures(scenario.task, grid, answer, scenario.robot, out, name=planner, suffixes=suffixes(vector))
+        with claimed(out):
+            made = plan_figures(
+                scenario.task, grid, answer, scenario.robot, out, name=planner, suffixes=suffixes(vector)
+            )
         files = {name: str(path) for name, path in made.items()}
     if json:
         print_json({**_facts(scenario, grid, answer), "files": files})

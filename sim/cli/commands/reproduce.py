@@ -9,7 +9,10 @@ from antdrive.sim.cli import options
 from antdrive.sim.cli.compiling import compile_once
 from antdrive.sim.cli.console import bar, print_files, print_json, print_table
 from antdrive.sim.cli.exits import SUCCEEDED
-from antdrive.sim.cli.write import check_folder, suffixes
+from antdrive.sim.cli.write import check_folder, free_folder, suffixes, this_command, write_marker
+from antdrive.worlds.files.atomic import claimed
+
+MARKER = "reproduce.json"
 
 
 def reproduce(
@@ -32,13 +35,17 @@ def reproduce(
     from antdrive.sim.papers.reproduce import HEADS, check_papers, row_cells
     from antdrive.sim.papers.reproduce import reproduce as repeat
 
-    folder = out or Path("out") / f"reproduce-{paper}"
     papers = list(PAPERS) if paper == "all" else [paper]
     check_papers(papers)
+    mark = f"{seeds}-seeds"
+    folder = out or free_folder(Path("out") / f"reproduce-{paper}", MARKER, mark)
     check_folder(folder)
     compile_once()
-    with bar("planning") as progress:
+    with claimed(folder), bar("planning") as progress:
+        facts = {"fingerprint": mark, "command": this_command()}
+        write_marker(folder / MARKER, facts)
         rows, files = repeat(papers, folder, seeds=seeds, suffixes=suffixes(vector), jobs=jobs, progress=progress)
+        write_marker(folder / MARKER, {**facts, "rows": [vars(row) for row in rows], "files": files})
     if json:
         print_json({"rows": [vars(row) for row in rows], "files": files})
     else:

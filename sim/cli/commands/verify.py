@@ -36,10 +36,11 @@ def verify(
 ) -> int:
     """Certify drives again, from their logs alone.
 
-    With --world and --robot, a log must also be about these. Exit code 0: every log proves that the robot touched nothing.
+    With --world and --robot, a log must also be about these. In the folder of a run, result.json must agree with the log.
+    Exit code 0: every log proves that the robot touched nothing.
     """
     task, spec = _expected(world, robot)
-    checked = {str(path): _checked(path, task, spec, replay) for path in map(log_at, rollouts)}
+    checked = {str(log_at(path)): _checked(path, task, spec, replay) for path in rollouts}
     all_certified = all(found["certified"] for found in checked.values())
     if json:
         print_json({"certified": all_certified, "rollouts": checked})
@@ -62,15 +63,18 @@ def _expected(world: str | None, robot: str | None) -> tuple[Task | None, RobotS
 
 
 def _checked(path: Path, task: Task | None, robot: RobotSpec | None, again: bool) -> dict[str, Any]:
-    """Everything that is found out about one log, ready for JSON."""
+    """Everything that is found out about one log or folder of a run, ready for JSON."""
     from antdrive.sim.log.binding import differences, hashes_of
     from antdrive.sim.log.certificate import certify
+    from antdrive.sim.log.claims import false_claims, read_result
     from antdrive.sim.log.rollout import Rollout
 
-    rollout = Rollout.load(path)
+    rollout, result = Rollout.load(log_at(path)), path / "result.json"
     certificate = certify(rollout)
     found = certificate.as_dict()
     problems = [*certificate.problems, *differences(rollout.record, task=task, robot=robot)]
+    if path.is_dir() and result.exists():
+        problems += false_claims(read_result(result), rollout, rollout.digest)
     sentence = certificate.sentence
     if again:
         from antdrive.sim.driving.replay import replay

@@ -2,24 +2,36 @@
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from antdrive.sim.log.certificate import Certificate, certify
+from antdrive.sim.log.claims import false_claims, logged_settings, read_result
 from antdrive.sim.log.metrics import measure
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import DriveRecord
 from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.pipeline import Run
 from antdrive.sim.view.style import hexed, planner_style
 from antdrive.worlds.errors import InputError, input_error
 
-MAX_RESULT_BYTES = 10_000_000  # of a result.json
 LONGEST, LONGEST_COMMAND = 200, 4000  # characters of a text, of a command
 UNDRIVEN = (Outcome.NO_PATH.key, Outcome.STOPPED.key)  # outcomes of runs that have no log
+CLAIMED = (
+    "smoothing",
+    "noise",
+    "margin_m",
+    "margin_auto",
+    "cell_m",
+    "physics_hz",
+    "control_hz",
+    "time_limit_s",
+    "settings",
+)
 REQUIRED = ("world", "planner", "robot", "seed", "outcome")  # keys of result.json
 
 
@@ -50,12 +62,28 @@ COLUMNS = (
     Column("planning [s]", "n"),
 )
 
+FACTS = 5  # columns before those of settings that differ
+
 #: What the less obvious columns mean.
 COLUMN_NOTES = (
     ("path", "length of the planned path, before smoothing"),
     ("gap", "how much longer the smoothed route is than the shortest path among the inflated obstacles"),
     ("min clearance", "smallest distance to an obstacle at any logged pose"),
     ("proved", "distance that the certificate guarantees between logged poses, too"),
+)
+
+
+#: Settings that get a column where they differ between the runs, by their keys in result.json.
+SETTING_COLUMNS: Mapping[str, Column] = MappingProxyType(
+    {
+        "options": Column("options", "t"),
+        "smoothing": Column("route", "t"),
+        "noise": Column("noise", "n"),
+        "margin_m": Column("margin [m]", "n"),
+        "cell_m": Column("cell [m]", "n"),
+        "control_hz": Column("control [Hz]", "n"),
+        "physics_hz": Column("physics [Hz]", "n"),
+    }
 )
 
 
@@ -89,12 +117,16 @@ class LogFacts:
         certificate: the log's, computed for the report
         metrics: the log's metrics by name
         digest: of the log's content
+        settings: the log's settings by the keys of result.json
+        contradictions: what result.json says otherwise, a sentence each
     """
 
     record: DriveRecord
     certificate: Certificate
     metrics: Mapping[str, float]
     digest: str
+    settings: Mapping[str, Any]
+    contradictions: tuple[str, ...]
 
 
 @dataclass
@@ -102,7 +134,7 @@ class ReportedRun:
     """A run as the report's templates show it: from its log alone, and as a claim of result.json where there is none.
 
     Attributes:
-        folder: where the run's files are
+        folder: where the run's files are; None for a run made in Python
         result: the content of result.json
         log: what the log says; None if there is none
         number: its place among the runs of the report
@@ -110,9 +142,10 @@ class ReportedRun:
         films: films, embedded or linked
         links: files beside the page
         pictures: figures beside the page, for the Markdown report
+        differing: settings that differ between the runs, as shown, by the keys of `SETTING_COLUMNS`
     """
 
-    folder: Path
+    folder: Path | None
     result: Mapping[str, Any]
     log: LogFacts | None
     number: int
@@ -120,6 +153,7 @@ class ReportedRun:
     films: list[Attachment] = field(default_factory=list)
     links: list[Attachment] = field(default_factory=list)
     pictures: list[Attachment] = field(default_factory=list)
+    differing: dict[str, str] = field(default_factory=dict)
 
     @property
     def world(self) -> str:
@@ -199,10 +233,12 @@ class ReportedRun:
     @property
     def problems(self) -> list[str]:
         """Why the drive is not certified, and where result.json contradicts the log, a sentence each."""
-        if self.log is None:
-            return []
-        other = self.result.get("digest") != self.log.digest
-        return [*self.log.certificate.problems, *(["result.json is about another log: its digest differs"] * other)]
+        return [*self.log.certificate.problems, *self.log.contradictions] if self.log else []
+
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """The log's settings by the keys of result.json, or those that result.json claims."""
+        return self.log.settings if self.log else self.result
 
     @property
     def verdict(self) -> str:
@@ -242,9 +278,15 @@ class ReportedRun:
     def details(self) -> list[tuple[str, list[tuple[str, str]]]]:
         """Lists of names and values, each with its heading."""
         if self.log is None:
-            return [("Claimed metrics", _pairs(self.metrics)), ("Run", _pairs({"digest": self.result.get("digest")}))]
+            claimed = {key: self.result.get(key) for key in CLAIMED if key in self.result}
+            return [
+                ("Claimed metrics", _pairs(self.metrics)),
+                ("Claimed planner", _pairs(self.result.get("options"))),
+                ("Claimed run", _pairs({**claimed, "digest": self.result.get("digest")})),
+            ]
         record = self.log.record.as_dict()
-        settings = {key: record[key] for key in ("margin", "inflate", "cell", "physics_hz", "control_hz", "time_limit")}
+        keys = ("noise", "margin", "inflate", "cell", "physics_hz", "control_hz", "time_limit")
+        settings = {"route": record["smoothing"]["made"], **{key: record[key] for key in keys}}
         certificate = {k: v for k, v in self.log.certificate.as_dict().items() if k != "problems"}
         return [
             ("Metrics", _pairs(self.metrics)),
@@ -265,34 +307,80 @@ def find_runs(folder: Path) -> Iterator[ReportedRun]:
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder")
     for place, path in enumerate(sorted(folder.rglob("result.json"))):
-        result = _result(path)
+        result = read_result(path)
         missing = [key for key in REQUIRED if key not in result]
         if missing:
             raise InputError(f"{path}: {missing[0]}: missing; `antdrive run` writes it")
         log = path.parent / "rollout.npz"
-        yield ReportedRun(path.parent, result, _facts(log) if log.exists() else None, place)
+        facts = facts_of(Rollout.load(log), result, str(log)) if log.exists() else None
+        yield ReportedRun(path.parent, result, facts, place)
 
 
-def _result(path: Path) -> Mapping[str, Any]:
-    """The content of a result.json; empty if it is no object."""
-    if not path.is_file():
-        raise input_error(str(path), "cannot be read (no regular file)")
-    if path.stat().st_size > MAX_RESULT_BYTES:
-        raise input_error(str(path), f"cannot be read (larger than {MAX_RESULT_BYTES // 1_000_000} MB)")
+def facts_of(rollout: Rollout, result: Mapping[str, Any], name: str) -> LogFacts:
+    """What a log says, computed from the log alone, and what the result beside it says otherwise.
+
+    Args:
+        rollout: the log
+        result: the content of result.json
+        name: of the log, for messages
+
+    Raises:
+        InputError: the record is of no drive.
+    """
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise input_error(str(path), f"cannot be read ({error})") from None
-    return content if isinstance(content, dict) else {}
-
-
-def _facts(path: Path) -> LogFacts:
-    """What a log says, computed from the log alone."""
-    rollout = Rollout.load(path)
-    try:
-        return LogFacts(rollout.record, certify(rollout), measure(rollout), rollout.digest)
+        certificate, metrics, digest = certify(rollout), measure(rollout), rollout.digest
     except ValueError as error:
-        raise input_error(str(path), str(error)) from None
+        raise input_error(name, str(error)) from None
+    claims = tuple(shown(claim) for claim in false_claims(result, rollout, digest))
+    return LogFacts(rollout.record, certificate, metrics, digest, logged_settings(rollout), claims)
+
+
+def made_run(run: Run) -> ReportedRun:
+    """A run made in Python, as reports show it. Its log is certified again.
+
+    Args:
+        run: what `antdrive.run` returned
+    """
+    result, name = run.as_dict(), run.scenario.task.world.name
+    return ReportedRun(None, result, None if run.rollout is None else facts_of(run.rollout, result, name), 0)
+
+
+def note_differences(runs: Sequence[ReportedRun]) -> list[Column]:
+    """Fill `differing` of every run; the columns that are needed for it.
+
+    Options are compared between the runs of one planner: those of different planners differ anyway.
+
+    Args:
+        runs: all runs of the report
+    """
+    columns = []
+    for key, column in SETTING_COLUMNS.items():
+        texts = _option_texts(runs) if key == "options" else [_setting_text(run.settings.get(key)) for run in runs]
+        if len(set(texts)) > 1:
+            columns.append(column)
+            for run, text in zip(runs, texts, strict=True):
+                run.differing[key] = text
+    return columns
+
+
+def _setting_text(value: Any) -> str:
+    return "" if value is None else shown(value, 40)
+
+
+def _option_texts(runs: Sequence[ReportedRun]) -> list[str]:
+    """For each run its options that differ between the runs of its planner, such as "ants 50"."""
+    seen: dict[str, dict[str, set[str]]] = {}
+    found = []
+    for run in runs:
+        claimed = run.settings.get("options")
+        options = {shown(k, 40): shown(v, 40) for k, v in claimed.items()} if isinstance(claimed, Mapping) else {}
+        found.append(options)
+        for key, value in options.items():
+            seen.setdefault(run.planner, {}).setdefault(key, set()).add(value)
+    return [
+        ", ".join(f"{key} {value}" for key, value in options.items() if len(seen[run.planner][key]) > 1)
+        for run, options in zip(runs, found, strict=True)
+    ]
 
 
 def number(value: Any) -> float | None:

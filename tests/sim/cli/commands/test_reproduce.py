@@ -1,8 +1,10 @@
 """`antdrive reproduce`."""
 
+from pathlib import Path
+
 import pytest
 
-from tests.sim.cli.calling import Refused
+from tests.sim.cli.calling import Call, Refused
 
 
 @pytest.mark.parametrize(
@@ -15,3 +17,9 @@ from tests.sim.cli.calling import Refused
 )
 def test_wrong_input_is_one_line_and_exit_code_2(refused: Refused, words: list[str], says: str) -> None:
     assert says in refused(*words)
+
+
+def test_the_default_folder_is_never_that_of_another_repetition(antdrive: Call) -> None:
+    for seeds in ("1", "2", "1"):
+        assert antdrive("reproduce", "hasan", "--seeds", seeds)[0] == 0
+    assert sorted(path.name for path in Path("out").iterdir()) == ["reproduce-hasan", "reproduce-hasan-2-seeds"]

@@ -99,3 +99,15 @@ def test_the_folder_of_a_run_stands_for_its_log(antdrive: Call, refused: Refused
     for command in (["verify"], ["margin"], ["render", "-o", "x.mp4"]):
         line = refused(command[0], tmp_path, *command[1:])
         assert f"{tmp_path}: no rollout.npz in this folder; the run there ended before the robot drove" in line
+
+
+def test_the_folder_of_a_run_is_verified_with_its_result(antdrive: Call, small_run: Run, tmp_path: Path) -> None:
+    assert small_run.rollout is not None
+    folder = tmp_path / "r"
+    folder.mkdir()
+    small_run.rollout.save(folder / "rollout.npz")
+    for noise, code in ((0.0, 0), (0.5, 1)):
+        (folder / "result.json").write_text(json.dumps({**small_run.as_dict(), "noise": noise}))
+        assert antdrive("verify", folder)[0] == code
+    assert "result.json: noise: differs from the log, which says 0.0" in antdrive("verify", folder)[1]
+    assert antdrive("verify", folder / "rollout.npz")[0] == 0, "the log alone is genuine"

@@ -327,3 +327,100 @@ def test_files_that_cannot_be_read_are_one_line(small_run, tmp_path):
     (folder / "rollout.npz").write_bytes(b"no log")
     with pytest.raises(InputError, match=r"rollout\.npz: not a rollout"):
         write_report(tmp_path / "runs", tmp_path / "report.html")
+
+
+def test_settings_that_differ_between_runs_get_columns(small_scenario, tmp_path):
+    from antdrive.planners import load_planner
+    from antdrive.sim import run
+
+    write_run(run(small_scenario), tmp_path / "runs" / "a")
+    same = reported(tmp_path / "runs", tmp_path)
+    assert '<button type="button">route</button>' not in same
+    write_run(run(replace(small_scenario, smoothing="none", noise=0.5)), tmp_path / "runs" / "b")
+    for name, ants in (("c", 20), ("d", 30)):
+        planner = load_planner("as", ants=ants, iterations=3)
+        write_run(run(replace(small_scenario, planner=planner, planner_name="as")), tmp_path / "runs" / name)
+    (tmp_path / "runs" / "d" / "rollout.npz").unlink()  # a claim shows its settings, too
+    text = reported(tmp_path / "runs", tmp_path)
+    for title in ("options", "route", "noise"):
+        assert f'<button type="button">{title}</button>' in text
+    assert '<button type="button">cell [m]</button>' not in text, "it is the same in all runs"
+    rows = [line for line in text.splitlines() if line.startswith("<tr data-outcome")]
+    cells = [re.findall(r"<td[^>]*>(?:<(?!/td)[^>]*>)*([^<]*)", row) for row in rows]
+    assert [row[5:8] for row in cells] == [
+        ["", "clearance", "0"], ["", "none", "0.5"], ["ants 20", "clearance", "0"], ["ants 30", "clearance", "0"],
+    ]  # fmt: skip
+    lines = [line for line in reported(tmp_path / "runs", tmp_path, "md").splitlines() if line.startswith("|")]
+    assert len({line.count("|") for line in lines}) == 1
+
+
+@pytest.mark.parametrize(
+    ("key", "value"), [("noise", 0.25), ("smoothing", "taut"), ("options", {"ants": 3}), ("seed", 9)]
+)
+def test_a_setting_that_the_log_contradicts_is_told(small_run, tmp_path, key, value):
+    write_run(small_run, tmp_path / "runs" / "a", **{key: value})
+    assert f"result.json: {key}: differs from the log, which says" in reported(tmp_path / "runs", tmp_path)
+
+
+def fake_run(folder, *, outcome="succeeded", **more):
+    """The result.json of a run that is claimed, with a film beside it."""
+    folder.mkdir(parents=True)
+    facts = {
+        "world": "w",
+        "planner": "astar",
+        "robot": "turtlebot",
+        "seed": 0,
+        "outcome": outcome,
+        "command": "antdrive run w",
+    }
+    (folder / "result.json").write_text(json.dumps({**facts, **more}))
+    (folder / "a film.mp4").write_bytes(b"film")
+
+
+def test_the_markdown_of_2000_runs_is_short_with_failures_first(tmp_path):
+    for k in range(2000):
+        long = {"reason": "*" * 190, "command": "`" * 3500} if k % 2 else {}
+        fake_run(tmp_path / "runs" / f"{k:04}", outcome="no_path" if k % 50 == 7 else "timed_out", seed=k, **long)
+    write_report(tmp_path / "runs", tmp_path / "report.md")
+    content = (tmp_path / "report.md").read_bytes()
+    assert 10_000 < len(content) < 60_000
+    text = content.decode()
+    rows = [line for line in text.splitlines() if line.startswith("| w |")]
+    told = re.search(r"Not in the table: (.*)\.", text).group(1)
+    assert len(rows) + sum(int(n.replace(",", "")) for n in re.findall(r"(\d[\d,]*) \w", told)) == 2000
+
+
+def test_markdown_puts_failures_first_and_links_films(small_run, collided_run, tmp_path):
+    folder = write_run(small_run, tmp_path / "runs" / "a")
+    (folder / "a film.mp4").write_bytes(b"film")
+    write_run(collided_run, tmp_path / "runs" / "b")
+    text = reported(tmp_path / "runs", tmp_path, "md")
+    rows = [line for line in text.splitlines() if line.startswith("| small")]
+    assert ["❌" in row for row in rows] == [True, False]
+    assert "Film: [a film.mp4](runs/a/a%20film.mp4)" in text
+    assert "Not in the table" not in text
+
+
+def test_runs_made_in_python_become_a_report_together_with_folders(small_run, collided_run, tmp_path):
+    import antdrive
+
+    write_run(small_run, tmp_path / "runs" / "a")
+    page = tmp_path / "page.html"
+    assert antdrive.write_report([small_run, collided_run, tmp_path / "runs"], str(page), title="mine") == 3
+    text = page.read_text()
+    assert "2 / 3" in text
+    assert text.count("data:image/webp") == 2
+    assert len(set(re.findall(r'<section id="(run-\d)"', text))) == 3
+    assert antdrive.write_report(small_run, page, figures=False, films=True) == 1
+    assert "data:image" not in page.read_text()
+    assert page.read_text().count("data:video/mp4") == 1
+    assert antdrive.write_report(small_run, tmp_path / "page.md") == 1
+    assert "1 / 1" in (tmp_path / "page.md").read_text()
+    with pytest.raises(InputError, match="no runs"):
+        antdrive.write_report([], page)
+
+
+def test_a_run_that_was_edited_is_certified_anew(small_run, tmp_path):
+    shifted = replace(small_run.rollout, pose=small_run.rollout.pose + (0.0, 0.2, 0.0))
+    write_report(replace(small_run, rollout=shifted), tmp_path / "page.html", figures=False)
+    assert "0 / 1" in (tmp_path / "page.html").read_text()
