@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from antdrive.sim.campaigns.results import read_results
@@ -21,6 +22,7 @@ def summarise_campaign(
     metrics: Sequence[str] | None = None,
     against: str | None = None,
     planners: Sequence[str] = (),
+    where: Mapping[str, str] = MappingProxyType({}),
     strict: bool = False,
 ) -> CampaignSummary:
     """Success of each planner and paired comparisons, from the runs that are done so far.
@@ -31,6 +33,7 @@ def summarise_campaign(
         metrics: to compare besides success; driven length, duration and planning time without
         against: label of the planner that each other one is compared with; every pair without
         planners: labels of those to look at; all without
+        where: take only runs with these values, by column, such as {"noise": "1"}
         strict: refuse where no two planners can be compared, instead of saying so in the report
 
     Raises:
@@ -40,10 +43,13 @@ def summarise_campaign(
 
     results = read_results(folder)
     try:
+        table = RunTable(results.table.to_pydict())
+        for column, value in where.items():
+            table = table.where(column, value)
         return summarise(
-            RunTable(results.table.to_pydict()),
+            table,
             title=title or Path(folder).resolve().name,
-            size=results.size,
+            size=None if where else results.size,
             metrics=metrics,
             against=against,
             planners=planners,
@@ -60,6 +66,7 @@ def report_campaign(
     title: str | None = None,
     metrics: Sequence[str] | None = None,
     planners: Sequence[str] = (),
+    where: Mapping[str, str] = MappingProxyType({}),
 ) -> list[Path]:
     """Write a report about a campaign: a page, or its tables.
 
@@ -69,6 +76,7 @@ def report_campaign(
         title: of the report; the folder's name without
         metrics: to compare besides success; driven length, duration and planning time without
         planners: labels of those to report about; all without
+        where: take only runs with these values, by column, such as {"noise": "1"}
 
     Returns:
         The files written; for .csv the second holds the pairs.
@@ -80,5 +88,5 @@ def report_campaign(
 
     target = Path(out)
     check_suffix(target)
-    summary = summarise_campaign(folder, title=title, metrics=metrics, planners=planners)
+    summary = summarise_campaign(folder, title=title, metrics=metrics, planners=planners, where=where)
     return write_campaign_report(summary, Path(folder), target)

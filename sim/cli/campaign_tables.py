@@ -27,7 +27,14 @@ Against = Annotated[
     typer.Option(metavar="PLANNER", help="Compare this planner with each other one only, for a campaign's folder."),
 ]
 
-COMPARE_OPTIONS = ("worlds", "planner", "metric", "against", "json", "context")
+Where = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="COLUMN=VALUE", help="Take only some runs of a campaign's folder, such as noise=1. May be repeated."
+    ),
+]
+
+COMPARE_OPTIONS = ("worlds", "planner", "metric", "against", "where", "json")
 
 
 #: Files of a campaign's folder, as `sim/campaigns/store` names them; that module would load much more.
@@ -56,7 +63,7 @@ def campaign_of_words(words: Sequence[str], context: typer.Context) -> Path | No
     folders = [word for word in words if is_campaign(Path(word))]
     given = {name for name in context.params if _is_given(context, name)}
     if not folders:
-        for name in sorted(given & {"metric", "against"}):
+        for name in sorted(given & {"metric", "against", "where"}):
             raise InputError(f"--{name}: is for the folder of a campaign; {words[0]} is none")
         return None
     if len(words) > 1:
@@ -64,7 +71,7 @@ def campaign_of_words(words: Sequence[str], context: typer.Context) -> Path | No
     for name in sorted(given - set(COMPARE_OPTIONS)):
         option = name.replace("_", "-")
         raise InputError(
-            f"--{option}: is for drives; a campaign's folder takes --planner, --metric, --against and --json"
+            f"--{option}: is for drives; a campaign's folder takes --planner, --metric, --against, --where and --json"
         )
     return Path(folders[0])
 
@@ -75,7 +82,12 @@ def _is_given(context: typer.Context, name: str) -> bool:
 
 
 def compare_campaign(
-    folder: Path, planners: Sequence[str], metrics: Sequence[str] | None, against: str | None, json: bool
+    folder: Path,
+    planners: Sequence[str],
+    metrics: Sequence[str] | None,
+    against: str | None,
+    where: Sequence[str] | None,
+    json: bool,
 ) -> int:
     """Print success of each planner and the comparison of each pair.
 
@@ -84,12 +96,15 @@ def compare_campaign(
         planners: labels of those to compare; all without
         metrics: to compare besides success
         against: label of the planner that each other one is compared with
+        where: COLUMN=VALUE of the runs to take
         json: print one JSON object
     """
     from antdrive.sim.campaigns.reporting import summarise_campaign
 
     chosen = tuple(metrics or ("duration_s",))
-    summary = summarise_campaign(folder, metrics=chosen, against=against, planners=planners, strict=True)
+    summary = summarise_campaign(
+        folder, metrics=chosen, against=against, planners=planners, where=_conditions(where), strict=True
+    )
     if json:
         print_json(_plain(summary))
         return SUCCEEDED
@@ -105,18 +120,19 @@ def compare_campaign(
     return SUCCEEDED
 
 
-def report_campaign_folder(folder: Path, out: Path, title: str | None, json: bool) -> int:
+def report_campaign_folder(folder: Path, out: Path, title: str | None, where: Sequence[str] | None, json: bool) -> int:
     """Write the report of a campaign.
 
     Args:
         folder: the campaign's folder
         out: the file to write
         title: of the report
+        where: COLUMN=VALUE of the runs to take
         json: print one JSON object
     """
     from antdrive.sim.campaigns.reporting import report_campaign
 
-    files = report_campaign(folder, out, title=title)
+    files = report_campaign(folder, out, title=title, where=_conditions(where))
     size = sum(path.stat().st_size for path in files)
     if json:
         print_json({"file": str(files[0]), "files": [str(path) for path in files], "bytes": size})
@@ -124,6 +140,14 @@ def report_campaign_folder(folder: Path, out: Path, title: str | None, json: boo
         print_line(f"{size / 1e6:.2f} MB")
         print_files(dict(zip(("report", "pairs"), map(str, files), strict=False)))
     return SUCCEEDED
+
+
+def _conditions(where: Sequence[str] | None) -> dict[str, str]:
+    """What `--where` says, by column."""
+    for text in where or ():
+        if "=" not in text:
+            raise InputError(f"--where {text}: must be COLUMN=VALUE, such as noise=1")
+    return {text.partition("=")[0]: text.partition("=")[2] for text in where or ()}
 
 
 def _print_table(table: "TextTable") -> None:

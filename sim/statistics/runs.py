@@ -65,6 +65,26 @@ class RunTable:
             done &= np.array([value is not False for value in self.columns["certified"]])
         return done
 
+    def where(self, column: str, value: str) -> RunTable:
+        """The runs with one value in a column.
+
+        Args:
+            column: its name; "ants" stands for "option.ants", too
+            value: as text; numbers are compared as numbers
+
+        Raises:
+            FieldError: no such column, or no run with this value.
+        """
+        name = column if column in self.columns or f"option.{column}" not in self.columns else f"option.{column}"
+        if name not in self.columns:
+            raise FieldError(column, f"no such column; choose from {', '.join(self.columns)}")
+        texts = self.texts(name)
+        kept = [k for k, text in enumerate(texts) if text == value or _same_number(text, value)]
+        if not kept:
+            known = ", ".join(list(dict.fromkeys(texts))[:20])
+            raise FieldError(column, f"no run with {value!r}; the campaign has {known}")
+        return RunTable({key: [values[k] for k in kept] for key, values in self.columns.items()})
+
     def codes(self, name: str) -> npt.NDArray[np.int64]:
         """Equal numbers for runs with equal texts in a column, (N,).
 
@@ -72,3 +92,10 @@ class RunTable:
             name: the column
         """
         return np.unique(np.array(self.texts(name), dtype=object), return_inverse=True)[1].astype(np.int64)
+
+
+def _same_number(text: str, value: str) -> bool:
+    try:
+        return float(text) == float(value)
+    except ValueError:
+        return False

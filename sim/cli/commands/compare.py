@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from antdrive.sim.cli import options
-from antdrive.sim.cli.campaign_tables import Against, Metrics, campaign_of_words, compare_campaign
+from antdrive.sim.cli.campaign_tables import Against, Metrics, Where, campaign_of_words, compare_campaign
 from antdrive.sim.cli.comparing import (
     COMPARED,
     Compared,
@@ -94,6 +94,7 @@ def compare(
     speed: options.Speed = 1.0,
     metric: Metrics = None,
     against: Against = None,
+    where: Where = None,
     json: options.Json = False,
 ) -> int:
     """Drive worlds with several planners, or compare the planners of a campaign's folder.
@@ -102,7 +103,7 @@ def compare(
     A campaign's folder, made by `antdrive sweep`: success with intervals, and tests of every pair.
     """
     if (campaign := campaign_of_words(worlds, context)) is not None:
-        return compare_campaign(campaign, planner or (), metric, against, json)
+        return compare_campaign(campaign, planner or (), metric, against, where, json)
     entrants = entrants_of(planner, settings)
     rest = {"margin": margin, "cell": cell, "smoothing": smoothing, "noise": noise}
     scenarios = _scenarios(worlds, entrants, robot, seed, rest)

@@ -6,9 +6,10 @@ from typing import Annotated
 import typer
 
 from antdrive.sim.cli import options
-from antdrive.sim.cli.campaign_tables import is_campaign, report_campaign_folder
+from antdrive.sim.cli.campaign_tables import Where, is_campaign, report_campaign_folder
 from antdrive.sim.cli.console import print_files, print_json, print_line
 from antdrive.sim.cli.exits import SUCCEEDED
+from antdrive.worlds.errors import InputError
 
 
 def report(
@@ -30,6 +31,7 @@ def report(
     embed_films: Annotated[
         bool, typer.Option("--embed-films", help="Put films into the page instead of linking to them.")
     ] = False,
+    where: Where = None,
     json: options.Json = False,
 ) -> int:
     """Write one page about many runs.
@@ -38,7 +40,9 @@ def report(
     its planners, charts, and all runs.
     """
     if is_campaign(folder):
-        return report_campaign_folder(folder, out, title, json)
+        return report_campaign_folder(folder, out, title, where, json)
+    if where:
+        raise InputError(f"--where: is for the folder of a campaign; {folder} is none")
     from antdrive.sim.view.report.report import write_report
 
     count = write_report(folder, out, title=title, embed_films=embed_films)

@@ -25,6 +25,7 @@ from antdrive.worlds.errors import FieldError
 
 DEFAULT_METRICS = ("driven_length_m", "duration_s", "plan_s")
 TITLES = {"plan_s": "planning time", "drive_wall_s": "wall time of the drive", "path_length_m": "planned length"}
+SETTINGS = ("robot", "smoothing", "noise", "margin", "cell")  # over which shares are taken, if there are several
 UNITS = ("_rad_per_m", "_m", "_s")  # that the names of metrics end with
 
 
@@ -64,6 +65,13 @@ class CampaignSummary:
         worlds, found = len(self.paired.worlds), []
         if len(self.table) < self.size:
             found.append(f"{self.size - len(self.table)} of {self.size} runs are not done yet.")
+        for name in SETTINGS:
+            values = list(dict.fromkeys(self.table.texts(name)))
+            if len(values) > 1:
+                some = ", ".join(values[:5]) + (", …" if len(values) > 5 else "")
+                found.append(
+                    f"Shares and medians are over several values of {name} ({some}); --where {name}={values[0]} takes one."
+                )
         if still:
             found.append(
                 f"The seed changes no drive of {', '.join(still)}. Repetitions count once, except in pairs with a planner "

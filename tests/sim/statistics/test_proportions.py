@@ -5,7 +5,7 @@ import itertools
 import hypothesis.strategies as st
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 
 from antdrive.sim.statistics.proportions import paired_difference, wilson
 from antdrive.worlds import FieldError
@@ -46,6 +46,32 @@ def test_the_paired_interval_holds_the_difference_and_is_mirrored(cells: tuple[i
     assert difference - 1e-9 <= found.high <= 1 + 1e-9
     mirrored = paired_difference(both, second, first, neither)
     assert mirrored == pytest.approx((-found.high, -found.low), abs=1e-9)
+
+
+@given(st.integers(0, 8), st.integers(0, 8), st.integers(0, 8), st.integers(0, 8))
+def test_without_correlation_the_paired_interval_is_that_of_independent_proportions(
+    a: int, b: int, c: int, d: int
+) -> None:
+    from statsmodels.stats.proportion import confint_proportions_2indep
+
+    both, first, second, neither = a * c, a * d, b * c, b * d  # a product of margins: no correlation
+    n = both + first + second + neither
+    assume(n > 0)
+    independent = confint_proportions_2indep(both + first, n, both + second, n, method="newcomb", compare="diff")
+    assert paired_difference(both, first, second, neither) == pytest.approx(independent, abs=1e-9)
+
+
+def test_the_paired_interval_by_hand() -> None:
+    # 40 both, 10 and 4 alone, 46 neither: shares 0.50 and 0.44; Wilson 0.40383 to 0.59617 and 0.34670 to 0.53769;
+    # phi = (40 * 46 - 10 * 4 - 50) / sqrt(50 * 50 * 44 * 56) = 0.705104.
+    below = 0.09617**2 - 2 * 0.705104 * 0.09617 * 0.09769 + 0.09769**2
+    above = 0.09617**2 - 2 * 0.705104 * 0.09617 * 0.09330 + 0.09330**2
+    found = paired_difference(40, 10, 4, 46)
+    assert found == pytest.approx((0.06 - below**0.5, 0.06 + above**0.5), abs=2e-5)
+    # A negative correlation, 10 * 10 - 40 * 40, is not corrected for continuity and widens the interval.
+    wide = paired_difference(10, 40, 40, 10)
+    end = wilson(50, 100).high - 0.5
+    assert wide == pytest.approx((-end * 3.2**0.5, end * 3.2**0.5), abs=1e-9)
 
 
 def coverage(cells: tuple[float, float, float, float], n: int) -> float:

@@ -55,6 +55,15 @@ def test_compare_as_json(antdrive: Call, campaign: Path) -> None:
     assert row["interval"][0] <= row["difference"] <= row["interval"][1]
 
 
+def test_some_runs_are_taken(antdrive: Call, campaign: Path, tmp_path: Path) -> None:
+    code, out, _ = antdrive("compare", campaign, "--where", "world=world-003", "--where", "noise=0", "--json")
+    facts = json.loads(out)
+    assert (code, facts["runs"], facts["size"]) == (0, 10, 10)
+    assert any("one world" in note for note in facts["notes"])
+    assert antdrive("report", campaign, "-o", tmp_path / "r.md", "--where", "ants=10")[0] == 0
+    assert "astar" not in (tmp_path / "r.md").read_text()
+
+
 @pytest.mark.parametrize("kind", ["html", "md", "tex", "csv"])
 def test_report_writes_every_kind(antdrive: Call, campaign: Path, tmp_path: Path, kind: str) -> None:
     code, out, err = antdrive("report", campaign, "-o", tmp_path / f"r.{kind}", "--title", "My title", "--json")
@@ -75,6 +84,10 @@ def test_report_writes_every_kind(antdrive: Call, campaign: Path, tmp_path: Path
         (["compare", "camp", "-p", "astar"], "camp: planners: astar alone; two are needed"),
         (["compare", "camp", "-p", "astar", "-p", "mmas"], "camp: planner: unknown 'mmas'"),
         (["compare", "camp", "--seed", "3"], "--seed: is for drives; a campaign's folder takes"),
+        (["compare", "camp", "--where", "noise"], "--where noise: must be COLUMN=VALUE, such as noise=1"),
+        (["compare", "camp", "--where", "noise=2"], "camp: noise: no run with '2'; the campaign has 0.0"),
+        (["report", "camp", "-o", "r.md", "--where", "x=2"], "camp: x: no such column; choose from key, world"),
+        (["report", ".", "-o", "r.md", "--where", "x=2"], "--where: is for the folder of a campaign"),
         (["compare", "camp", "forest"], "camp forest: name one campaign's folder, or worlds"),
         (["compare", "forest", "-p", "astar", "-p", "ants", "--metric", "spl"], "--metric: is for the folder"),
     ],
