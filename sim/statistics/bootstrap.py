@@ -1,7 +1,7 @@
 """Bootstrap intervals that resample worlds and then the runs within each world.
 
 Runs in one world resemble each other, so that resampling single runs gives intervals that are too narrow for statements
-about other worlds (Field and Welsh 2007; Ren et al. 2010). All columns see the same resampled runs: paired stays paired.
+about other worlds (Field and Welsh 2007). All columns see the same resampled runs: paired stays paired.
 """
 
 from __future__ import annotations
