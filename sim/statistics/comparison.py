@@ -281,9 +281,7 @@ def common_medians(paired: PairedRuns, metrics: Sequence[str]) -> tuple[int, dic
     Returns:
         The number of those instances, and for each metric the medians of the planners with 95 % bootstrap intervals.
     """
-    common = paired.success.all(axis=1)
-    if not paired.seeded.any():
-        common &= paired.counted(*range(len(paired.planners)))
+    common = paired.success.all(axis=1) & paired.counted(*range(len(paired.planners)))
     found = {}
     for metric in metrics:
         values = paired.values(metric)[common]

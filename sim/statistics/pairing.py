@@ -18,6 +18,7 @@ Ints: TypeAlias = npt.NDArray[np.int64]
 
 CELL = ("world", "world_hash", "task", "robot", "smoothing", "noise", "margin", "cell")
 INSTANCE = (*CELL, "seed")
+SETTINGS = ("robot", "smoothing", "noise", "margin")  # under which a seed may or may not change drives
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +33,7 @@ class PairedRuns:
         cell: a number for each instance that is the same where only the seed differs, (N,)
         row: the row of each instance and planner in the table, (N, P); -1 where there is none
         success: whether that run succeeded, (N, P)
-        seeded: whether the seed changes any drive of each planner, (P,)
+        seeded: whether the seed changes any drive of each planner under the settings of each instance, (N, P)
     """
 
     table: RunTable
@@ -71,7 +72,8 @@ class PairedRuns:
         names, world = _worlds(table)
         success = (row >= 0) & table.success[row]
         cell = _joint(table, CELL)[first]
-        return cls(table, planners, names, world[first], cell, row, success, _seeded(table, row, cell))
+        seeded = _seeded(table, row, cell, _joint(table, SETTINGS)[first])
+        return cls(table, planners, names, world[first], cell, row, success, seeded)
 
     @property
     def present(self) -> Flags:
@@ -89,19 +91,19 @@ class PairedRuns:
     def counted(self, *planners: int) -> Flags:
         """The instances that all of these planners ran, each different drive once, (N,).
 
-        Where the seed changes no drive of any of them, the first seed stands for all: repetitions are no evidence.
+        Under settings where the seed changes no drive of any of them, the first seed stands for all: repetitions are no
+        evidence.
 
         Args:
             planners: their indices
         """
         chosen = list(planners)
         both: Flags = np.asarray(self.present[:, chosen].all(axis=1))
-        if self.seeded[chosen].any():
-            return both
-        places = np.flatnonzero(both)
-        once = np.zeros(len(both), dtype=np.bool_)
-        once[places[np.unique(self.cell[places], return_index=True)[1]]] = True
-        return once
+        places = np.flatnonzero(both & ~self.seeded[:, chosen].any(axis=1))
+        repeated = np.ones(len(places), dtype=np.bool_)
+        repeated[np.unique(self.cell[places], return_index=True)[1]] = False
+        both[places[repeated]] = False
+        return both
 
     def select(self, planners: Sequence[str]) -> PairedRuns:
         """The runs of some planners only.
@@ -125,7 +127,7 @@ class PairedRuns:
             self.cell[here],
             self.row[here][:, chosen],
             self.success[here][:, chosen],
-            self.seeded[chosen],
+            self.seeded[here][:, chosen],
         )
 
 
@@ -154,16 +156,17 @@ def _worlds(table: RunTable) -> tuple[tuple[str, ...], Ints]:
     return tuple(names), codes.astype(np.int64)
 
 
-def _seeded(table: RunTable, row: Ints, cell: Ints) -> Flags:
-    """Whether runs of a planner that differ in the seed alone differ in their drives, (P,)."""
-    seeded = np.ones(row.shape[1], dtype=np.bool_)
+def _seeded(table: RunTable, row: Ints, cell: Ints, setting: Ints) -> Flags:
+    """Whether runs of a planner under one setting that differ in the seed alone differ in their drives, (N, P)."""
+    seeded = np.ones(row.shape, dtype=np.bool_)
     if "drive_digest" not in table:
         return seeded
     marks = np.array([f"{a} {b}" for a, b in zip(table.texts("outcome"), table.texts("drive_digest"), strict=True)])
     marks = np.unique(marks, return_inverse=True)[1]
     for k, rows in enumerate(row.T):
-        here = rows >= 0
-        cells = np.unique(cell[here])
-        different = np.unique(np.stack([cell[here], marks[rows[here]]]), axis=1).shape[1]
-        seeded[k] = different > len(cells) or here.sum() == len(cells)
+        for one in np.unique(setting):
+            here = (rows >= 0) & (setting == one)
+            cells = len(np.unique(cell[here]))
+            different = np.unique(np.stack([cell[here], marks[rows[here]]]), axis=1).shape[1]
+            seeded[here, k] = different > cells or here.sum() == cells
     return seeded

@@ -24,6 +24,7 @@ from antdrive.sim.view.style import INK, MUTED, hexed
 
 Floats: TypeAlias = npt.NDArray[np.float64]
 
+WORST = 10_000.0  # times the best value: the right end of a profile
 WIDTH, HEIGHT = 4.7, 3.1  # of a chart [inches]
 FEWEST = 3  # values that a box is drawn for
 MOST_PANELS = 24  # planners that boxes are drawn for
@@ -33,7 +34,7 @@ CURVE_POINTS = 400  # of a curve, at most
 PROFILED = ("driven_length_m", "plan_s")
 DISTRIBUTED = ("duration_s", "plan_s")
 BOXED = ("plan_s", "gap_to_grid_optimum")
-AREA, OPTIMUM = "area_m2", "grid_optimum_m"  # columns that tell a world's size, the first that is there
+AREA, OPTIMUM = "area_m2", "grid_optimum_m"  # columns that tell a world's size; the second where areas do not differ
 #: Colours of the canvas's style, and the page's own by which they are replaced.
 PAGE_COLOURS = {hexed(INK): "--ink", hexed(MUTED): "--muted", "#aab2bf": "--axis", "#e6e9ee": "--line"}
 
@@ -81,7 +82,7 @@ def campaign_charts(summary: CampaignSummary, styles: Sequence[LabelStyle]) -> l
 def _profile(name: str, curves: Sequence[StepCurve], count: int, styles: Sequence[LabelStyle]) -> Chart:
     def draw(axes: Any) -> None:
         largest = max((float(curve.x[-1]) for curve in curves if len(curve.x)), default=1.0)
-        top = min(max(largest * 1.05, 1.1), 100.0)
+        top = min(max(largest * 1.05, 1.1), WORST)
         _steps(axes, curves, styles, 1.0, top, log=top > 4)
         axes.set(xlabel=f"{_plain(name)}: times the best planner's", ylabel="share of instances")
 
@@ -134,15 +135,15 @@ def _size_boxes(
     paired: PairedRuns, name: str, common: npt.NDArray[np.bool_], styles: Sequence[LabelStyle]
 ) -> list[Chart]:
     """Boxes over groups of worlds of like size, a panel for each planner, on instances that all planners solved."""
-    column = AREA if AREA in paired.table else OPTIMUM
-    known = np.nan_to_num(paired.table.numbers(column), nan=-np.inf)
-    sizes = np.where(paired.row >= 0, known[paired.row], -np.inf).max(axis=1)
+    for column in (AREA, OPTIMUM):
+        known = np.nan_to_num(paired.table.numbers(column), nan=-np.inf)
+        sizes = np.where(paired.row >= 0, known[paired.row], -np.inf).max(axis=1)
+        edges = _edges(sizes[common & np.isfinite(sizes)])
+        if len(edges) > 2:
+            break
+    else:
+        return []
     common = common & np.isfinite(sizes)
-    if not common.any():
-        return []
-    edges = _edges(sizes[common])
-    if len(edges) < 3:
-        return []
     group = np.clip(np.searchsorted(edges, sizes, side="right") - 1, 0, len(edges) - 2)
     values = paired.values(name)
     groups = [[values[common & (group == g), k] for g in range(len(edges) - 1)] for k in range(len(paired.planners))]
@@ -160,6 +161,8 @@ def _size_boxes(
 def _edges(sizes: Floats) -> Floats:
     """Edges of up to `BINS` groups of like number, the last beyond the largest size."""
     distinct = np.unique(sizes)
+    if len(distinct) < 2:
+        return distinct
     if len(distinct) <= BINS:
         return np.append(distinct, distinct[-1])  # a group for each size
     inner = np.unique(np.quantile(sizes, np.linspace(0, 1, BINS + 1)))

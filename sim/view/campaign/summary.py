@@ -61,21 +61,25 @@ class CampaignSummary:
     @property
     def notes(self) -> list[str]:
         """What a reader of the tables must know about this campaign, a sentence each."""
-        still = [p for p, seeded in zip(self.paired.planners, self.paired.seeded, strict=True) if not seeded]
-        worlds, found = len(self.paired.worlds), []
+        still = [p for p, row in zip(self.paired.planners, self.success, strict=True) if row.counted < row.runs]
+        worlds = len(self.paired.worlds)
+        found: list[str] = []
         if len(self.table) < self.size:
             found.append(f"{self.size - len(self.table)} of {self.size} runs are not done yet.")
+        worlds_of = self.table.texts("world")
         for name in SETTINGS:
-            values = list(dict.fromkeys(self.table.texts(name)))
-            if len(values) > 1:
+            values = list(
+                dict.fromkeys(f"{v:g}" if isinstance(v, float) else str(v) for v in self.table.columns.get(name, ()))
+            )
+            if len(set(zip(worlds_of, self.table.texts(name), strict=True))) > worlds:  # not only from world to world
                 some = ", ".join(values[:5]) + (", …" if len(values) > 5 else "")
                 found.append(
                     f"Shares and medians are over several values of {name} ({some}); --where {name}={values[0]} takes one."
                 )
         if still:
             found.append(
-                f"The seed changes no drive of {', '.join(still)}. Repetitions count once, except in pairs with a planner "
-                "whose drives the seed does change."
+                f"Drives of {', '.join(still)} repeat with other seeds. Repetitions count once, except in pairs with a "
+                "planner whose drives the seed changes."
             )
         if worlds == 1:
             found.append("There is one world: the intervals and tests say nothing about other worlds.")

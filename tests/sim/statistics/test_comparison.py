@@ -128,13 +128,22 @@ def test_one_planner_alone_and_two_runs_of_one_instance_are_refused() -> None:
 def test_seeds_that_change_no_drive_are_no_evidence() -> None:
     planners = {"astar": Skill(0.8, seeded=False), "dijkstra": Skill(0.8, seeded=False), "ants": Skill(0.8)}
     paired = PairedRuns.of(made_up_runs(planners, worlds=30, seeds=10))
-    assert paired.seeded.tolist() == [False, False, True]
+    assert paired.seeded.all(axis=0).tolist() == paired.seeded.any(axis=0).tolist() == [False, False, True]
     rows = success_table(paired)
     assert [(row.runs, row.counted) for row in rows] == [(300, 30), (300, 30), (300, 300)]
     once = success_table(PairedRuns.of(made_up_runs(planners, worlds=30, seeds=1)))[0]
     assert rows[0].counted == once.counted
     assert [row.pairs for row in compare_success(paired, pairs_of(paired))] == [30, 300, 300]
     assert compare_metric(paired, [(0, 1)], "duration_s", "lower")[0].pairs <= 30
+
+
+def test_seeds_that_change_drives_under_some_settings_count_there() -> None:
+    quiet = made_up_columns({"a": Skill(0.8, seeded=False), "b": Skill(0.9, seeded=False)}, worlds=6, seeds=5)
+    noisy = made_up_columns({"a": Skill(0.8), "b": Skill(0.9)}, worlds=6, seeds=5)
+    noisy["noise"] = [1.0] * 60
+    paired = PairedRuns.of(RunTable({name: [*quiet[name], *noisy[name]] for name in quiet}))
+    assert [row.counted for row in success_table(paired)] == [6 + 30, 6 + 30]
+    assert compare_success(paired, [(0, 1)])[0].pairs == 36
 
 
 def test_a_world_that_decides_alone_is_no_evidence_for_other_worlds() -> None:

@@ -90,7 +90,17 @@ def test_what_is_not_known_is_said(tmp_path: Path) -> None:
         assert len(write_campaign_report(alone, tmp_path, tmp_path / f"t.{kind}")) == 1
     few = summarise(made_up_runs({"a": Skill(), "b": Skill(seeded=False)}, worlds=3, seeds=3), title="t")
     assert any("3 worlds are too few" in note for note in few.notes)
-    assert any("The seed changes no drive of b." in note for note in few.notes)
+    assert any("Drives of b repeat with other seeds." in note for note in few.notes)
+
+
+def test_settings_that_are_mixed_are_named_and_those_of_worlds_are_not() -> None:
+    columns = made_up_columns(PLANNERS, worlds=6, seeds=4)
+    columns["cell"] = [0.1 if world == "world-000" else 0.2 for world in columns["world"]]
+    assert summarise(RunTable(columns), title="t", metrics=[]).notes == []
+    columns["noise"] = [float(seed % 2) for seed in columns["seed"]]
+    assert summarise(RunTable(columns), title="t", metrics=[]).notes == [
+        "Shares and medians are over several values of noise (0, 1); --where noise=0 takes one."
+    ]
 
 
 def test_what_cannot_be_compared_is_refused_if_asked_for() -> None:
