@@ -195,14 +195,24 @@ def _checked(document: Document, folder: Path) -> Campaign:
     return Campaign(document.source, folder, document, entry, checked)
 
 
+@dataclass(frozen=True, eq=False)
+class _Part(Document):
+    """A part of a document, whose errors are those of the whole."""
+
+    whole: Document | None = None
+    place: Location = ()
+
+    def error(self, location: Location, problem: str) -> InputError:
+        assert self.whole is not None
+        return self.whole.error((*self.place, *location), problem)
+
+
 def _part(document: Document, *place: str | int) -> Document:
-    """The part of a document at a place, as a document of its own with the same lines."""
+    """The part of a document at a place."""
     data = document.data
     for step in place:
         data = data[step]
-    depth = len(place)
-    lines = {where[depth:]: line for where, line in document.lines.items() if where[:depth] == place}
-    return Document(document.source, data, lines)
+    return _Part(document.source, data, whole=document, place=place)
 
 
 def campaign_schema() -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import logging
 import math
 import re
 import time
@@ -40,20 +41,33 @@ def run_on_cluster(jobs: Iterable[Job], work: Work, address: str) -> Generator[F
     distributed = cluster_library()
     with _client(distributed, address) as client:
         waiting, at_work, asked = Waiting(jobs, 1), dict[Any, list[Job]](), -math.inf
-        while waiting or at_work:
+        suspects: list[Job] = []
+        tried: Job | None = None
+        while waiting or at_work or suspects:
             if time.monotonic() - asked > WORKERS_EVERY:
                 waiting.processes, asked = _workers(client, address), time.monotonic()
             while waiting and len(at_work) < CHUNKS_EACH * waiting.processes:
-                chunk = waiting.chunk(None)
-                # As part of the function the runs are not searched for results of other tasks, which takes long.
-                at_work[client.submit(functools.partial(run_chunk, work, chunk), pure=False)] = chunk
+                _submit(client, work, waiting.chunk(None), at_work)
+            # Workers that die are held against all runs that they were handed: each is tried with nothing beside it.
+            if not at_work:
+                tried = suspects.pop()
+                _submit(client, work, [tried], at_work)
             ended = [future for future in at_work if future.done()]
             if not ended:
                 time.sleep(TICK)
             if any(future.cancelled() for future in ended):
                 _require_scheduler(client, address)
             for future in ended:
-                yield from _received(future, at_work.pop(future), waiting)
+                chunk = at_work.pop(future)
+                if _killed(future) and chunk != [tried]:
+                    suspects += chunk
+                else:
+                    yield from _received(future, chunk, waiting)
+
+
+def _submit(client: Any, work: Work, chunk: list[Job], at_work: dict[Any, list[Job]]) -> None:
+    # As part of the function the runs are not searched for results of other tasks, which takes long.
+    at_work[client.submit(functools.partial(run_chunk, work, chunk), pure=False)] = chunk
 
 
 def run_chunk(work: Work, jobs: Sequence[Job]) -> tuple[list[Finished], float]:
@@ -67,22 +81,24 @@ def run_chunk(work: Work, jobs: Sequence[Job]) -> tuple[list[Finished], float]:
     return [work(job) for job in jobs], time.monotonic() - started
 
 
-def _received(future: Any, jobs: list[Job], waiting: Waiting) -> Generator[Finished, None, None]:
-    """The results of a chunk. One that killed its workers is taken apart; of a single run this is the result."""
+def _received(future: Any, chunk: list[Job], waiting: Waiting) -> Generator[Finished, None, None]:
+    """The results of a chunk; those of a chunk that killed its workers while it was alone on the cluster."""
     if future.status == "finished":
         finished, seconds = future.result()
-        waiting.measured(seconds, len(jobs))
+        waiting.measured(seconds, len(chunk))
         yield from finished
-    elif future.status != "error" or (_killed(future) and len(jobs) > 1):
-        waiting.put_back(jobs)  # not made: the connection was lost for a while, or the workers died
     elif _killed(future):
-        yield again(Finished(fault_row(jobs[0].key, CRASHED, "the processes that made it ended")), ATTEMPTS)
-    else:
+        for job in chunk:
+            yield again(Finished(fault_row(job.key, CRASHED, "the processes that made it ended")), ATTEMPTS)
+    elif future.status == "error":
         raise future.exception()
+    else:  # cancelled: the connection was lost for a while
+        waiting.put_back(chunk)
 
 
 def _killed(future: Any) -> bool:
-    return type(future.exception()).__name__ == "KilledWorker"
+    """Whether a task ended because the workers died that it was handed to."""
+    return future.status == "error" and type(future.exception()).__name__ == "KilledWorker"
 
 
 @contextmanager
@@ -105,6 +121,7 @@ def _client(distributed: Any, address: str) -> Iterator[Any]:
                     threads_per_worker=1,
                     memory_limit=0,
                     dashboard_address="127.0.0.1:0",
+                    silence_logs=logging.CRITICAL,
                 )
             )
         try:

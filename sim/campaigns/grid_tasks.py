@@ -78,12 +78,12 @@ def _draw(
 ) -> Task | None:
     """A task with the start and the goal in free cells, the robot facing the goal; None if none was found."""
     for _ in range(TRIES):
-        (x, y), (goal_x, goal_y) = (grid.xy(cell) for cell in free[rng.integers(len(free), size=2)])
+        (x, y), (goal_x, goal_y) = grid.xy(free[rng.integers(len(free), size=2)]).tolist()
         if math.hypot(goal_x - x, goal_y - y) < max(distance, own.goal_tolerance):
             continue
-        start = float(x), float(y), math.atan2(goal_y - y, goal_x - x)
+        start = x, y, math.atan2(goal_y - y, goal_x - x)
         try:
-            task = dataclasses.replace(own, start=start, goal=(float(goal_x), float(goal_y)))
+            task = dataclasses.replace(own, start=start, goal=(goal_x, goal_y))
         except FieldError:
             continue
         fits = not any(overlap_at(task.world, robot, start) for robot in robots)

@@ -11,7 +11,8 @@ import os
 import signal
 import time
 from collections import Counter, deque
-from collections.abc import Generator, Iterable
+from collections.abc import Generator, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from typing import Any
@@ -141,9 +142,26 @@ def _start(work: Work) -> _Worker:
     context = get_context("loky")
     here, there = context.Pipe()
     process = context.Process(target=serve, args=(there, work), daemon=False)
-    process.start()
+    with _undisturbed():
+        process.start()
     there.close()
     return _Worker(process, here)
+
+
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """A context in which processes start that Ctrl-C does not reach; for this process it is only put off.
+
+    A terminal sends Ctrl-C to every process. What becomes of the workers is for the parent to decide.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _stop(workers: Iterable[_Worker]) -> None:
@@ -166,7 +184,7 @@ def serve(pipe: Connection, work: Work) -> None:
         pipe: brings lists of runs, and takes each result
         work: what to do with a run
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches every process of a terminal; the parent decides
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # where it could not be blocked
     with contextlib.suppress(EOFError, OSError):  # the parent has closed the pipe, or is dead
         pipe.send(None)
         while True:

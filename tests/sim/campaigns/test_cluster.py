@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import signal
+import json
 import subprocess
 import sys
+import time
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -23,31 +24,41 @@ from tests.sim.campaigns.works import Deadly
 
 pytestmark = [
     pytest.mark.slow,  # starting a cluster takes seconds
+    pytest.mark.timeout(120),
     pytest.mark.filterwarnings("ignore:unclosed:ResourceWarning"),  # of distributed's own sockets
 ]
 CAMPAIGN = {"worlds": ["empty", "gate"], "planners": ["astar"], "seeds": 12, "rollouts": "none"}
 
 
 @pytest.fixture
-def scheduler() -> Iterator[tuple[subprocess.Popen[str], str]]:
+def scheduler(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[bytes], str]]:
     """A scheduler with two workers, in processes of their own: the scheduler's process and its address."""
-    here = [sys.executable, "-m", "distributed.cli.dask_scheduler"]
-    words = ["--port", "0", "--host", "127.0.0.1", "--no-dashboard", "--no-show"]
-    process = subprocess.Popen([*here, *words], stderr=subprocess.PIPE, text=True)
-    assert process.stderr is not None
-    address = next(line for line in process.stderr if "Scheduler at:" in line).split()[-1]
-    worker = [sys.executable, "-m", "distributed.cli.dask_worker", address, "--nworkers", "2", "--nthreads", "1"]
-    workers = subprocess.Popen([*worker, "--no-dashboard", "--death-timeout", "2"], stderr=subprocess.DEVNULL)
+    file = tmp_path / "scheduler.json"
+    words = ["--port", "0", "--host", "127.0.0.1", "--no-dashboard", "--no-show", "--scheduler-file", str(file)]
+    process = started("dask_scheduler", *words)
+    for _ in range(600):
+        if file.exists() and file.stat().st_size:
+            break
+        time.sleep(0.1)
+    address = str(json.loads(file.read_text())["address"])
+    workers = started("dask_worker", address, "--nworkers", "2", "--nthreads", "1", "--no-dashboard")
     yield process, address
     for one in (workers, process):
-        one.send_signal(signal.SIGTERM)
-    workers.wait(30)
-    process.wait(30)
-    process.stderr.close()
+        one.terminate()
+        try:
+            one.wait(10)
+        except subprocess.TimeoutExpired:
+            one.kill()
+            one.wait()
+
+
+def started(module: str, *words: str) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", f"distributed.cli.{module}", *words]
+    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
 def test_a_cluster_makes_the_same_table_as_processes_and_hands_logs_back(
-    tmp_path: Path, scheduler: tuple[subprocess.Popen[str], str]
+    tmp_path: Path, scheduler: tuple[subprocess.Popen[bytes], str]
 ) -> None:
     _, address = scheduler
     few = {**CAMPAIGN, "seeds": 2}
@@ -69,7 +80,7 @@ def test_a_run_that_kills_its_workers_is_recorded_and_no_other_is_lost() -> None
 
 
 def test_a_scheduler_that_is_gone_ends_the_campaign_which_goes_on_elsewhere(
-    tmp_path: Path, scheduler: tuple[subprocess.Popen[str], str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, scheduler: tuple[subprocess.Popen[bytes], str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("antdrive.sim.campaigns.cluster.PATIENCE", 1.0)
     process, address = scheduler

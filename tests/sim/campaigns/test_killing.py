@@ -25,8 +25,9 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 
 def begun(folder: Path) -> subprocess.Popen[bytes]:
-    """A campaign that has written its first rows and is far from its end."""
-    process = subprocess.Popen([sys.executable, "-m", "tests.sim.campaigns.parent", str(folder)])
+    """A campaign that has written its first rows and is far from its end; Ctrl-C reaches all its processes."""
+    words = [sys.executable, "-m", "tests.sim.campaigns.parent", str(folder)]
+    process = subprocess.Popen(words, stderr=subprocess.PIPE, start_new_session=True)
     deadline = time.monotonic() + 60
     while not (folder.exists() and parts_in(folder)) and process.poll() is None and time.monotonic() < deadline:
         time.sleep(0.01)
@@ -50,7 +51,7 @@ def test_a_killed_worker_and_a_killed_parent_change_nothing(tmp_path: Path, undi
     while len(parts_in(tmp_path)) < before + 2 and process.poll() is None:
         time.sleep(0.01)
     process.kill()
-    process.wait()
+    process.communicate()
     so_far = read_results(tmp_path)
     assert 0 < len(so_far.table) < so_far.size, "it was killed in the middle"
     assert not so_far.path.exists()
@@ -63,8 +64,10 @@ def test_ctrl_c_keeps_what_is_done_and_the_rest_follows(tmp_path: Path, undistur
     process = begun(tmp_path)
     with pytest.raises(InputError, match=r"another run \(process \d+\) is writing into this folder"):
         go(str(tmp_path), 0.0, 0)
-    process.send_signal(signal.SIGINT)
-    assert process.wait(30) != 0
+    os.killpg(process.pid, signal.SIGINT)
+    _, err = process.communicate(timeout=30)
+    assert process.returncode != 0
+    assert err.count(b"Traceback") == 1, "that of the parent, which is no command; its workers print nothing"
     so_far = read_results(tmp_path)
     assert 0 < len(so_far.table) < so_far.size
     assert so_far.path.exists(), "the table of what is done was written"

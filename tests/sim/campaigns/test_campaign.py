@@ -1,0 +1,189 @@
+"""What is wrong in a campaign is said in one line; what is right expands to every combination, each with a key of its own."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import json
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from antdrive import load_task
+from antdrive.planners import PLANNERS
+from antdrive.sim.campaigns import campaign_schema, expand, load_campaign, make_campaign
+from antdrive.sim.campaigns.grid_planners import values_of
+from antdrive.sim.log.binding import hashes_of
+from antdrive.sim.pipeline import run
+from antdrive.worlds import Disc, Task, World, save_task
+from antdrive.worlds.errors import InputError
+
+HEAD = "schema: 1\nworlds: [empty]\nplanners: [astar]\n"
+
+
+def expanded(text: str, folder: Path) -> list[tuple[str, str, str, int]]:
+    (folder / "c.yaml").write_text(text)
+    jobs = expand(load_campaign(folder / "c.yaml")).jobs
+    return [(job.case.world, job.case.task_name, job.case.planner, job.seed) for job in jobs]
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("schema: 1\nplanners: [astar]\n", "worlds: missing; a list of files or patterns"),
+        ("schema: 1\nworlds: []\nplanners: [astar]\n", "2: worlds: must have 1 entries, got 0"),
+        ("schema: 1\nworlds: [emty]\nplanners: [astar]\n", "2: worlds[0]: emty: no such file here, nor a world"),
+        ("schema: 1\nworlds: [empty]\nplanners: [astr]\n", "3: planners[0]: no planner is called 'astr'; did you mean"),
+        (HEAD + "planers: [astar]\n", "4: planers: unknown key; did you mean planners?"),
+        (HEAD + "seeds: 0\n", "4: seeds: must be from 1 to 1000000 seeds"),
+        (HEAD + "seeds: [1, 1]\n", "4: seeds: must be different numbers"),
+        (HEAD + "seeds: many\n", "4: seeds: must be whole numbers of at least 0"),
+        (HEAD + "routes: [tout]\n", "4: routes[0]: unknown 'tout'; did you mean taut?"),
+        (HEAD + "noise: [-1]\n", "4: noise[0]: must be at least 0, got -1"),
+        (HEAD + "noise: 1000\n", "4: noise: empty with turtlebot: 1000 times the robot's own is too much"),
+        (HEAD + "margin: wide\n", "4: margin[0]: must be a number of metres, or auto"),
+        (
+            HEAD + "robots: jakal\n",
+            "4: robots[0]: jakal: no such file, nor a robot of the catalogue; did you mean jackal?",
+        ),
+        (HEAD + "rollouts: some\n", "4: rollouts: must be 'none', 'failed' or 'all', got \"some\""),
+        (HEAD + "tasks: twice\n", "4: tasks: must be own, {random: 30, min_distance: 5} or a list of {start, goal}"),
+        (HEAD + "tasks:\n  random: 0\n", "5: tasks.random: must be at least 1, got 0"),
+        (HEAD + "tasks: {random: 2, min_distance: 99}\n", "4: tasks: no start and goal 99 m apart"),
+        (HEAD + "tasks:\n  - {start: [1, 1, 0]}\n", "5: tasks[0].goal: missing; write [x, y] in metres"),
+        (HEAD + "tasks:\n  - {start: [1, 1, 0], goal: [99, 1]}\n", "5: tasks[0].goal: in world empty: "),
+        (HEAD + "settings: {physics_hz: 20}\n", "4: settings.physics_hz: empty with turtlebot: must be between 60"),
+        (HEAD + "settings: {controller: {lokahead: 1.0}}\n", "4: settings.controller.lokahead: unknown setting"),
+        (
+            "schema: 1\nworlds:\n  - {generate: forst, seeds: 2}\nplanners: [astar]\n",
+            "3: worlds[0]: generate: unknown kind 'forst'",
+        ),
+        (
+            "schema: 1\nworlds: [empty]\nplanners:\n  - {name: as, ants: [10, many]}\n",
+            "4: planners[0].ants: must be a whole number, got 'many'",
+        ),
+        (
+            "schema: 1\nworlds: [empty]\nplanners:\n  - {name: as, ants: {from: 10, to: 50}}\n",
+            "4: planners[0].ants: a range is written {from: 10, to: 50, step: 10}",
+        ),
+        (
+            "schema: 1\nworlds: [empty]\nplanners:\n  - {ants: 10}\n",
+            "4: planners[0].name: missing; write the planner's",
+        ),
+    ],
+)
+def test_a_fault_is_one_line_with_file_line_key_and_remedy(text: str, line: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError) as refused:
+        expanded(text, tmp_path)
+    message = str(refused.value)
+    assert message.startswith(str(tmp_path / "c.yaml"))
+    assert line in message
+    assert "\n" not in message
+
+
+def test_lists_and_ranges_of_options_are_multiplied_in_the_order_of_the_file(tmp_path: Path) -> None:
+    text = (
+        "schema: 1\nworlds: [gate, empty]\nseeds: [3, 1]\nplanners:\n"
+        "  - astar\n  - {name: as, ants: {from: 10, to: 30, step: 10}, beta: [1.0, 2.0]}\n"
+    )
+    planners = ["astar", *(f"as ants={n} beta={b}" for n, b in itertools.product((10, 20, 30), (1.0, 2.0)))]
+    assert expanded(text, tmp_path) == [
+        (world, "own", planner, seed) for world in ("gate", "empty") for planner in planners for seed in (3, 1)
+    ]
+
+
+def test_combinations_that_mean_the_same_are_run_once() -> None:
+    same = PLANNERS["as"].ants  # type: ignore[attr-defined]
+    expansion = expand(make_campaign({"worlds": ["empty"], "planners": ["as", {"name": "as", "ants": same}]}))
+    assert [job.case.planner for job in expansion.jobs] == ["as"]
+    assert expansion.duplicates == 1
+
+
+@given(st.integers(-50, 50), st.integers(0, 300), st.integers(1, 20))
+def test_a_range_goes_from_its_first_number_to_its_last(first: int, width: int, step: int) -> None:
+    campaign = make_campaign({"worlds": ["empty"], "planners": ["astar"]})
+    whole = values_of(campaign, (), {"from": first, "to": first + width, "step": step})
+    assert whole == list(range(first, first + width + 1, step))
+    tenths = values_of(campaign, (), {"from": first / 10, "to": (first + width) / 10, "step": step / 10})
+    assert [round(10 * value) for value in tenths] == whole
+
+
+def test_everything_that_a_run_depends_on_changes_its_key_and_names_do_not(tmp_path: Path) -> None:
+    world = World("small", (0.0, 0.0, 4.0, 3.0), (Disc(2.0, 1.5, 0.3),))
+    task = Task(world, (0.6, 1.4, 0.0), (3.4, 1.6), cell=0.2)
+    for name, one in {
+        "a": task,
+        "renamed": dataclasses.replace(task, world=dataclasses.replace(world, name="b", source="elsewhere")),
+        "nudged": dataclasses.replace(task, goal=(3.4, 1.6000001)),
+    }.items():
+        save_task(one, tmp_path / f"{name}.yaml")
+    base = {"worlds": "a.yaml", "planners": {"name": "as", "ants": 10}}
+    changes = [
+        {"worlds": "nudged.yaml"}, {"planners": {"name": "as", "ants": 11}}, {"planners": "mmas"}, {"robots": "jackal"},
+        {"seeds": [1]}, {"margin": 0.04}, {"margin": "auto"}, {"noise": 1}, {"routes": "taut"},
+        {"settings": {"cell": 0.1}}, {"settings": {"controller": {"lookahead_time": 0.4}}},
+        {"tasks": [{"start": [0.6, 1.4, 0.1], "goal": [3.4, 1.6]}]},
+    ]  # fmt: skip
+
+    def key(**changed: object) -> str:
+        (job,) = expand(make_campaign({**base, **changed}, tmp_path)).jobs
+        return job.key
+
+    keys = [key(), *(key(**change) for change in changes)]
+    assert len(set(keys)) == len(keys)
+    assert all(len(one) == 32 for one in keys)
+    assert key(worlds="renamed.yaml") == keys[0]
+
+
+def test_the_key_of_a_run_is_the_same_tomorrow() -> None:
+    (job,) = expand(make_campaign({"worlds": ["empty"], "planners": ["astar"]})).jobs
+    assert "0x" not in job.case.identity, "an address would be another one in the next process"
+    for name in PLANNERS:
+        (job,) = expand(make_campaign({"worlds": ["empty"], "planners": [name]})).jobs
+        assert "0x" not in job.case.identity
+        json.loads(job.case.identity)
+
+
+def test_the_hash_of_a_world_is_the_one_that_logs_are_bound_to() -> None:
+    (job,) = expand(make_campaign({"worlds": ["empty"], "planners": ["astar"]})).jobs
+    log = run(job.case.scenario(job.seed)).rollout
+    assert log is not None
+    assert job.case.world_hash == hashes_of(log.record)["world"]
+    assert job.case.robot_hash == hashes_of(log.record)["robot"]
+
+
+def test_random_tasks_are_apart_the_same_in_any_campaign_and_named() -> None:
+    tasks = {"random": 4, "seed": 5, "min_distance": 6.0}
+    alone = expand(make_campaign({"worlds": ["slalom"], "planners": ["astar"], "tasks": tasks})).jobs
+    among = expand(make_campaign({"worlds": ["empty", "slalom"], "planners": ["astar"], "tasks": tasks})).jobs
+    assert [job.key for job in among[4:]] == [job.key for job in alone]
+    assert [job.case.task_name for job in alone] == [f"random-5-{n}" for n in range(4)]
+    for job in alone:
+        task = job.case.task
+        assert ((task.start[0] - task.goal[0]) ** 2 + (task.start[1] - task.goal[1]) ** 2) ** 0.5 >= 6.0
+    assert len({job.case.task.start for job in alone}) == 4
+
+
+def test_worlds_of_one_name_are_called_by_their_files(tmp_path: Path) -> None:
+    for folder in ("a", "b"):
+        task = dataclasses.replace(load_task("empty"), start=(1.0, 1.0 + (folder == "b"), 0.0))
+        save_task(task, tmp_path / folder / "w.yaml")
+    campaign = make_campaign({"worlds": ["*/w.yaml", "a/w.yaml"], "planners": ["astar"]}, tmp_path)
+    assert [job.case.world for job in expand(campaign).jobs] == ["empty", "b/w.yaml"]
+
+
+def test_the_schema_names_every_key() -> None:
+    schema = campaign_schema()
+    assert set(schema["properties"]) >= {
+        "schema",
+        "worlds",
+        "planners",
+        "robots",
+        "seeds",
+        "tasks",
+        "settings",
+        "rollouts",
+    }
+    assert schema["required"] == ["schema", "worlds", "planners"]

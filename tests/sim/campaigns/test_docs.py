@@ -1,0 +1,38 @@
+"""What docs/campaigns.md shows is right: the file, the columns, the line that reads the table."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from antdrive.sim.campaigns import make_campaign, sweep
+from antdrive.sim.campaigns.campaign import CampaignFile
+from antdrive.sim.campaigns.rows import GRID, RESULT
+from antdrive.sim.log.metrics import METRICS
+from antdrive.worlds.files.document import parse_document
+
+TEXT = (Path(__file__).parent.parent.parent.parent / "docs" / "campaigns.md").read_text()
+
+
+def test_the_file_that_the_page_shows_has_every_key_and_is_right() -> None:
+    (block,) = re.findall(r"```yaml\n(.*?)```", TEXT, flags=re.DOTALL)
+    data = parse_document(block, "docs/campaigns.md").data
+    assert make_campaign(data).entry.rollouts == "failed"
+    assert set(data) == {info.alias or name for name, info in CampaignFile.model_fields.items()}
+
+
+def test_the_page_names_every_column() -> None:
+    names = {*GRID, *RESULT} - set(METRICS) | {"plan_s", "drive_wall_s"}
+    assert [name for name in names if f"`{name}`" not in TEXT and not name.startswith("version.")] == []
+
+
+def test_the_line_for_pandas_reads_the_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("pandas")
+    monkeypatch.chdir(tmp_path)
+    results = sweep({"worlds": "empty", "planners": "astar"}, "out/first", jobs=0)
+    (line,) = re.findall(r"^import pandas; .*$", TEXT, flags=re.MULTILINE)
+    found: dict[str, object] = {}
+    exec(line, found)
+    assert results.pandas().equals(found["runs"])
