@@ -168,5 +168,5 @@ def _seeded(table: RunTable, row: Ints, cell: Ints, setting: Ints) -> Flags:
             here = (rows >= 0) & (setting == one)
             cells = len(np.unique(cell[here]))
             different = np.unique(np.stack([cell[here], marks[rows[here]]]), axis=1).shape[1]
-            seeded[here, k] = different > cells or here.sum() == cells
+            seeded[here, k] = different > cells
     return seeded
