@@ -308,7 +308,7 @@ def _corrected(
     sums = np.stack(
         [sums_by_world(np.nan_to_num(column), paired.world, len(paired.worlds)) for column in scores.T], axis=1
     )
-    flipped = flips_by_world(sums[(sums != 0).any(axis=1)] if (sums != 0).any() else sums[:1])
+    flipped = flips_by_world(sums[(sums != 0).any(axis=1)])  # other worlds add nothing
     over = np.array([p if _clustered(paired, mask) else math.nan for p, mask in zip(flipped, masks, strict=True)])
     single, worlds = holm(np.array([row.p for row in rows])), holm(over)
     return [

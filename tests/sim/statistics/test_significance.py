@@ -104,6 +104,10 @@ def test_random_flips_agree_with_scipys_permutation_test(monkeypatch: pytest.Mon
     assert flips_by_world(scores[:, None])[0] == flips_by_world(scores[:, None])[0]
 
 
+def test_where_no_world_differs_nothing_is_shown() -> None:
+    assert flips_by_world(np.zeros((0, 2))).tolist() == [1, 1]
+
+
 def test_random_flips_never_give_0() -> None:
     assert flips_by_world(np.ones((60, 1)))[0] == pytest.approx(1 / (significance.FLIPS + 1))
 
