@@ -135,6 +135,8 @@ def test_seeds_that_change_no_drive_are_no_evidence() -> None:
     assert rows[0].counted == once.counted
     assert [row.pairs for row in compare_success(paired, pairs_of(paired))] == [30, 300, 300]
     assert compare_metric(paired, [(0, 1)], "duration_s", "lower")[0].pairs <= 30
+    still = paired.select(["astar", "dijkstra"])
+    assert common_medians(still, ["duration_s"])[0] == still.success.all(axis=1).sum() / 10
 
 
 def test_seeds_that_change_drives_under_some_settings_count_there() -> None:
