@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import itertools
 import math
 import re
 from collections.abc import Sequence
@@ -147,7 +146,8 @@ def _size_boxes(
     group = np.clip(np.searchsorted(edges, sizes, side="right") - 1, 0, len(edges) - 2)
     values = paired.values(name)
     groups = [[values[common & (group == g), k] for g in range(len(edges) - 1)] for k in range(len(paired.planners))]
-    labels = [f"{_round(a)}–{_round(b)}" for a, b in itertools.pairwise(edges)]
+    exact = edges[-1] == edges[-2]
+    labels = [_round(edge) for edge in edges[:-1]] if exact else [f"≤{_round(edge)}" for edge in edges[1:]]
     counts = ", ".join(str(int((common & (group == g)).sum())) for g in range(len(labels)))
     size = "area of the world [m²]" if column == AREA else "shortest path on the grid [m]"
     note = (
@@ -225,7 +225,7 @@ def _panels(
     columns = min(3, shown)
     rows = math.ceil(shown / columns)
     with styled(), matplotlib.rc_context({"svg.fonttype": "none", "font.size": 7.5}):
-        figure = new_figure(WIDTH, 0.7 + 1.05 * rows)
+        figure = new_figure(WIDTH, 0.6 + 1.15 * rows)
         figure.set_facecolor("none")
         grid: Any = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
         for k, axes in enumerate(grid.flat):
@@ -239,7 +239,7 @@ def _panels(
         _value_scale(grid.flat[0], found, steps=(1, 3))
         for k, axes in enumerate(grid.flat[:shown]):
             axes.set_xticks(range(1, len(labels) + 1), labels)
-            axes.tick_params(axis="x", labelrotation=90, labelsize=6.5, labelbottom=k + columns >= shown)
+            axes.tick_params(axis="x", labelsize=6, labelbottom=k + columns >= shown)
         figure.supxlabel(size, fontsize=8)
         figure.supylabel(measure_title(name), fontsize=8)
         return _svg(figure, styles)

@@ -1,5 +1,6 @@
 """The two tables: known differences are found, equal planners are not told apart, nothing unpaired is compared."""
 
+import itertools
 import math
 
 import numpy as np
@@ -95,6 +96,8 @@ def test_runs_without_a_partner_are_counted_and_left_out() -> None:
     table = rows_of(columns, lambda row: row["planner"] != "good" or row["seed"] > 0)
     row = compare_success(PairedRuns.of(table), [(0, 1)])[0]
     assert (row.pairs, row.unpaired) == (12, 6)
+    metric = compare_metric(PairedRuns.of(table), [(0, 1)], "duration_s", "lower")[0]
+    assert metric.pairs + metric.dropped == 12
 
 
 @pytest.mark.parametrize(
@@ -158,6 +161,22 @@ def test_a_world_that_decides_alone_is_no_evidence_for_other_worlds() -> None:
     assert row.p_worlds == 1, "but one world says nothing about others"
     assert row.better == ""
     assert row.interval.low <= 0
+
+
+def test_the_test_over_worlds_counts_all_flips_of_whole_worlds() -> None:
+    paired = PairedRuns.of(made_up_runs({"a": Skill(0.9, 1.1), "b": Skill(0.6, 1.105)}, worlds=7, seeds=5))
+    times = paired.values("plan_s")
+    gap = times[:, 0] - times[:, 1]
+    sizes = sorted(np.abs(gap[~np.isnan(gap)]))
+    rank = [0.0 if np.isnan(x) else math.copysign(1 + sizes.index(abs(x)), x) for x in gap]
+    for row, scores in (
+        (compare_success(paired, [(0, 1)])[0], paired.success[:, 0].astype(float) - paired.success[:, 1]),
+        (compare_metric(paired, [(0, 1)], "plan_s", "lower")[0], np.array(rank)),
+    ):
+        sums = [float(scores[paired.world == w].sum()) for w in range(7)]
+        flips = [abs(np.dot(signs, sums)) for signs in itertools.product((1, -1), repeat=7)]
+        assert row.p_worlds == pytest.approx(np.mean(np.array(flips) >= abs(sum(sums)) - 1e-9))
+        assert 0.01 < row.p_worlds < 1
 
 
 def test_where_each_world_has_one_pair_the_test_over_worlds_is_left_out() -> None:
