@@ -23,6 +23,7 @@ MODULES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob
 SIM_RANKS = {
     "physics": 0,
     "log": 0,
+    "statistics": 0,
     "driving": 1,
     "calibration": 1.5,
     "entries": 1,

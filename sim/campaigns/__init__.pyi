@@ -5,6 +5,8 @@ from .campaign import make_campaign as make_campaign
 from .expanding import expand as expand
 from .job import Job as Job
 from .job import SweepCase as SweepCase
+from .reporting import report_campaign as report_campaign
+from .reporting import summarise_campaign as summarise_campaign
 from .results import SweepResults as SweepResults
 from .results import canonical_bytes as canonical_bytes
 from .results import canonical_table as canonical_table

@@ -32,6 +32,7 @@ GRID: Mapping[str, str] = {
     "key": "string",
     "world": "string",
     "world_hash": "string",
+    "area_m2": "double",
     "task": "string",
     "planner": "string",
     "planner_name": "string",
@@ -71,11 +72,13 @@ def grid_row(job: Job) -> dict[str, Any]:
         job: the run
     """
     case, fields = job.case, job.case.fields
+    x0, y0, x1, y1 = case.task.world.bounds
     margin = case.calibration.margin if case.calibration else fields["margin"]
     return {
         "key": job.key,
         "world": case.world,
         "world_hash": case.world_hash,
+        "area_m2": (x1 - x0) * (y1 - y0),
         "task": case.task_name,
         "planner": case.planner,
         "planner_name": case.planner_name,

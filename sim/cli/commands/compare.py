@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from antdrive.sim.cli import options
+from antdrive.sim.cli.campaign_tables import Against, Metrics, Where, campaign_of_words, compare_campaign
 from antdrive.sim.cli.comparing import (
     COMPARED,
     Compared,
@@ -42,7 +43,10 @@ if TYPE_CHECKING:
 
 MARKER = "comparison.json"
 Worlds = Annotated[
-    list[str], typer.Argument(metavar="WORLD...", help="Names of worlds in the catalogue, or world files.")
+    list[str],
+    typer.Argument(
+        metavar="WORLD...", help="Names of worlds in the catalogue, or world files; or a campaign's folder."
+    ),
 ]
 Planners = Annotated[
     list[str] | None,
@@ -70,6 +74,7 @@ Seeds = Annotated[
 
 
 def compare(
+    context: typer.Context,
     worlds: Worlds,
     planner: Planners = None,
     settings: Settings = None,
@@ -87,12 +92,18 @@ def compare(
         typer.Option(metavar="FILE", help="Film the first world's drives side by side: .mp4, .gif or .webp."),
     ] = None,
     speed: options.Speed = 1.0,
+    metric: Metrics = None,
+    against: Against = None,
+    where: Where = None,
     json: options.Json = False,
 ) -> int:
-    """Drive worlds with several planners.
+    """Drive worlds with several planners, or compare the planners of a campaign's folder.
 
     The planners are paired by world and seed. Figures and film show the first of them. Exit code 0: every run succeeded.
+    A campaign's folder, made by `antdrive sweep`: success with intervals, and tests of every pair.
     """
+    if (campaign := campaign_of_words(worlds, context)) is not None:
+        return compare_campaign(campaign, planner or (), metric, against, where, json)
     entrants = entrants_of(planner, settings)
     rest = {"margin": margin, "cell": cell, "smoothing": smoothing, "noise": noise}
     scenarios = _scenarios(worlds, entrants, robot, seed, rest)

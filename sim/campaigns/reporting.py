@@ -1,0 +1,92 @@
+"""Reports and comparisons of a campaign's folder."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from antdrive.sim.campaigns.results import read_results
+from antdrive.sim.statistics.runs import RunTable
+from antdrive.worlds.errors import FieldError, input_error
+
+if TYPE_CHECKING:
+    from antdrive.sim.view.campaign.summary import CampaignSummary
+
+
+def summarise_campaign(
+    folder: str | Path,
+    *,
+    title: str | None = None,
+    metrics: Sequence[str] | None = None,
+    against: str | None = None,
+    planners: Sequence[str] = (),
+    where: Mapping[str, str] = MappingProxyType({}),
+    strict: bool = False,
+) -> CampaignSummary:
+    """Success of each planner and paired comparisons, from the runs that are done so far.
+
+    Args:
+        folder: the campaign's folder
+        title: of the report; the folder's name without
+        metrics: to compare besides success; driven length, duration and planning time without
+        against: label of the planner that each other one is compared with; every pair without
+        planners: labels of those to look at; all without
+        where: take only runs with these values, by column, such as {"noise": "1"}
+        strict: refuse where no two planners can be compared, instead of saying so in the report
+
+    Raises:
+        InputError: the folder holds no campaign, no finished run, or no such planner or metric.
+    """
+    from antdrive.sim.view.campaign.summary import summarise
+
+    results = read_results(folder)
+    try:
+        table = RunTable(results.table.to_pydict())
+        for column, value in where.items():
+            table = table.where(column, value)
+        return summarise(
+            table,
+            title=title or Path(folder).resolve().name,
+            size=None if where else results.size,
+            metrics=metrics,
+            against=against,
+            planners=planners,
+            strict=strict,
+        )
+    except FieldError as error:
+        raise input_error(str(folder), str(error)) from None
+
+
+def report_campaign(
+    folder: str | Path,
+    out: str | Path,
+    *,
+    title: str | None = None,
+    metrics: Sequence[str] | None = None,
+    planners: Sequence[str] = (),
+    where: Mapping[str, str] = MappingProxyType({}),
+) -> list[Path]:
+    """Write a report about a campaign: a page, or its tables.
+
+    Args:
+        folder: the campaign's folder
+        out: the file to write: .html, .md, .tex or .csv
+        title: of the report; the folder's name without
+        metrics: to compare besides success; driven length, duration and planning time without
+        planners: labels of those to report about; all without
+        where: take only runs with these values, by column, such as {"noise": "1"}
+
+    Returns:
+        The files written; for .csv the second holds the pairs.
+
+    Raises:
+        InputError: the folder holds no campaign, no finished run, or no such planner or metric; another suffix.
+    """
+    from antdrive.sim.view.campaign.page import check_suffix, write_campaign_report
+
+    target = Path(out)
+    check_suffix(target)
+    summary = summarise_campaign(folder, title=title, metrics=metrics, planners=planners, where=where)
+    return write_campaign_report(summary, Path(folder), target)

@@ -1,0 +1,1 @@
+"""Statistics over many runs: intervals, paired comparisons, profiles. Pure functions of arrays."""

@@ -1,0 +1,317 @@
+"""The two tables of a campaign: how often each planner succeeds, and each pair of planners on the runs they share."""
+
+from __future__ import annotations
+
+import collections
+import dataclasses
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.sim.statistics.bootstrap import means_by_world, medians_by_world
+from antdrive.sim.statistics.pairing import PairedRuns
+from antdrive.sim.statistics.proportions import Interval, paired_difference, wilson
+from antdrive.sim.statistics.significance import (
+    differences,
+    flips_by_world,
+    holm,
+    mcnemar,
+    rank_biserial,
+    signed_ranks,
+    sums_by_world,
+    wilcoxon,
+)
+from antdrive.worlds.errors import FieldError
+
+Floats: TypeAlias = npt.NDArray[np.float64]
+Flags: TypeAlias = npt.NDArray[np.bool_]
+Pairs: TypeAlias = Sequence[tuple[int, int]]
+Direction: TypeAlias = Literal["lower", "higher", "neither"]
+
+SUCCESS = "success"
+ALPHA = 0.05
+NOWHERE = Interval(math.nan, math.nan)
+
+
+@dataclass(frozen=True)
+class PlannerSuccess:
+    """How often a planner succeeds.
+
+    Attributes:
+        planner: its label
+        runs: number of its runs
+        counted: number of different runs: where the seed changes no drive, one run stands for all seeds
+        successes: how many of the counted runs succeeded
+        interval: Wilson's 95 % interval for the share
+        over_worlds: 95 % bootstrap interval over worlds; nan where no world has two counted runs, or there is one world
+        outcomes: number of all runs by outcome
+    """
+
+    planner: str
+    runs: int
+    counted: int
+    successes: int
+    interval: Interval
+    over_worlds: Interval
+    outcomes: Mapping[str, int]
+
+    @property
+    def share(self) -> float:
+        """The share of the counted runs that succeeded."""
+        return self.successes / self.counted
+
+    def as_dict(self) -> dict[str, Any]:
+        """All fields as plain values, and the share."""
+        fields = dataclasses.asdict(self)
+        return {**fields, "share": self.share, "interval": list(self.interval), "over_worlds": list(self.over_worlds)}
+
+
+@dataclass(frozen=True)
+class PairedComparison:
+    """Two planners on the runs that they share.
+
+    Attributes:
+        measure: "success" or the name of a metric
+        first: label of the first planner
+        second: label of the second planner
+        pairs: number of pairs that the numbers rest on
+        dropped: pairs left out because not both succeeded; 0 for success
+        unpaired: runs of either planner without a partner
+        first_wins: pairs in which the first planner's value is better; where no direction is, those in which it is lower
+        second_wins: pairs in which the second planner's value is better, or lower
+        ties: pairs with equal values
+        difference: first minus second: of success shares, or the median of the paired differences
+        interval: 95 % interval of the difference
+        effect: matched-pairs rank biserial correlation, -1 to 1; above 0 if the first planner wins
+        p: exact McNemar or Wilcoxon signed rank, over pairs; nan without pairs
+        p_worlds: signs flipped by world; nan where no world has two pairs, or there is one world
+        p_holm: `p` with Holm's correction over all comparisons of this measure
+        p_worlds_holm: `p_worlds` with Holm's correction
+    """
+
+    measure: str
+    first: str
+    second: str
+    pairs: int
+    dropped: int
+    unpaired: int
+    first_wins: int
+    second_wins: int
+    ties: int
+    difference: float
+    interval: Interval
+    effect: float
+    p: float
+    p_worlds: float
+    p_holm: float = math.nan
+    p_worlds_holm: float = math.nan
+
+    @property
+    def decisive_p(self) -> float:
+        """The larger of the two corrected p-values; nan without pairs."""
+        return max((p for p in (self.p_holm, self.p_worlds_holm) if not math.isnan(p)), default=math.nan)
+
+    @property
+    def better(self) -> str:
+        """The planner that is better, if both corrected p-values are below 0.05; else empty."""
+        if not self.decisive_p < ALPHA or self.effect == 0:
+            return ""
+        return self.first if self.effect > 0 else self.second
+
+    def as_dict(self) -> dict[str, Any]:
+        """All fields as plain values, and which planner is better."""
+        return {**dataclasses.asdict(self), "interval": list(self.interval), "better": self.better}
+
+
+def success_table(paired: PairedRuns) -> list[PlannerSuccess]:
+    """A row for each planner, in the order of the runs."""
+    outcomes = paired.table.texts("outcome")
+    masks = [paired.counted(k) for k in range(len(paired.planners))]
+    shares = np.where(np.stack(masks, axis=1), paired.success, np.nan)
+    over = means_by_world(shares, paired.world)
+    rows = []
+    for k, (planner, mask) in enumerate(zip(paired.planners, masks, strict=True)):
+        here = paired.row[paired.present[:, k], k]
+        successes = int(paired.success[mask, k].sum())
+        rows.append(
+            PlannerSuccess(
+                planner=planner,
+                runs=len(here),
+                counted=int(mask.sum()),
+                successes=successes,
+                interval=wilson(successes, int(mask.sum())),
+                over_worlds=over[k] if _clustered(paired, mask) else NOWHERE,
+                outcomes=dict(sorted(collections.Counter(outcomes[row] for row in here).items())),
+            )
+        )
+    return rows
+
+
+def pairs_of(paired: PairedRuns, against: str | None = None) -> list[tuple[int, int]]:
+    """The pairs of planners to compare, as indices.
+
+    Args:
+        paired: the runs
+        against: the label of a planner that is compared with each other one; every pair without
+
+    Raises:
+        FieldError: fewer than two planners, an unknown one, or no two with a run in common.
+    """
+    labels = paired.planners
+    if len(labels) < 2:
+        raise FieldError("planners", f"{labels[0]} alone; two are needed for a comparison")
+    if against is not None and against not in labels:
+        raise FieldError("against", f"unknown planner {against!r}; choose from {', '.join(labels)}")
+    chosen = [
+        (i, j)
+        for i, j in itertools.combinations(range(len(labels)), 2)
+        if against is None or against in (labels[i], labels[j])
+    ]
+    if not any((paired.present[:, i] & paired.present[:, j]).any() for i, j in chosen):
+        raise FieldError(
+            "planners", "no two have a run in the same world, task, settings and seed; only paired runs are compared"
+        )
+    return chosen
+
+
+def compare_success(paired: PairedRuns, pairs: Pairs) -> list[PairedComparison]:
+    """Compare success: exact McNemar, Newcombe's interval, and both again over whole worlds.
+
+    Args:
+        paired: the runs
+        pairs: indices of the planners to compare
+    """
+    masks = [paired.counted(i, j) for i, j in pairs]
+    raw = [paired.success[:, i].astype(float) - paired.success[:, j] for i, j in pairs]
+    gaps = np.stack([np.where(mask, gap, np.nan) for mask, gap in zip(masks, raw, strict=True)], axis=1)
+    by_world = means_by_world(gaps, paired.world)
+    rows = []
+    for k, (i, j) in enumerate(pairs):
+        mask, gap = masks[k], gaps[masks[k], k]
+        first, second = int((gap > 0).sum()), int((gap < 0).sum())
+        both = int((paired.success[mask, i] & paired.success[mask, j]).sum())
+        n = int(mask.sum())
+        interval = paired_difference(both, first, second, n - both - first - second) if n else NOWHERE
+        if _clustered(paired, mask):
+            interval = Interval(min(interval.low, by_world[k].low), max(interval.high, by_world[k].high))
+        rows.append(
+            PairedComparison(
+                measure=SUCCESS,
+                first=paired.planners[i],
+                second=paired.planners[j],
+                pairs=n,
+                dropped=0,
+                unpaired=_unpaired(paired, i, j),
+                first_wins=first,
+                second_wins=second,
+                ties=n - first - second,
+                difference=(first - second) / n if n else math.nan,
+                interval=interval,
+                effect=(first - second) / (first + second) if first + second else 0.0,
+                p=mcnemar(first, second) if n else math.nan,
+                p_worlds=math.nan,
+            )
+        )
+    return _corrected(paired, rows, masks, gaps)
+
+
+def compare_metric(paired: PairedRuns, pairs: Pairs, metric: str, better: Direction) -> list[PairedComparison]:
+    """Compare a metric on the pairs in which both planners succeeded: Wilcoxon, median difference, rank biserial.
+
+    Args:
+        paired: the runs
+        pairs: indices of the planners to compare
+        metric: the column
+        better: whether lower or higher values are better
+
+    Raises:
+        FieldError: no run has a value of this metric.
+    """
+    values = paired.values(metric)
+    if not np.isfinite(values).any():
+        raise FieldError("metric", f"{metric}: no successful run has a value of it")
+    masks, gaps, ranks, shared = [], [], [], []
+    for i, j in pairs:
+        shared.append(paired.counted(i, j))
+        masks.append(shared[-1] & np.isfinite(values[:, i]) & np.isfinite(values[:, j]))
+        gap, rank = np.full(len(values), np.nan), np.full(len(values), np.nan)
+        gap[masks[-1]] = differences(values[masks[-1], i], values[masks[-1], j])
+        rank[masks[-1]] = signed_ranks(gap[masks[-1]])
+        gaps.append(gap)
+        ranks.append(rank)
+    intervals = medians_by_world(np.stack(gaps, axis=1), paired.world)
+    sign = 1 if better == "higher" else -1
+    rows = []
+    for k, (i, j) in enumerate(pairs):
+        gap = gaps[k][masks[k]]
+        lower, higher = int((gap < 0).sum()), int((gap > 0).sum())
+        rows.append(
+            PairedComparison(
+                measure=metric,
+                first=paired.planners[i],
+                second=paired.planners[j],
+                pairs=len(gap),
+                dropped=int((shared[k] & ~masks[k]).sum()),
+                unpaired=_unpaired(paired, i, j),
+                first_wins=higher if sign > 0 else lower,
+                second_wins=lower if sign > 0 else higher,
+                ties=len(gap) - lower - higher,
+                difference=float(np.median(gap)) if len(gap) else math.nan,
+                interval=intervals[k],
+                effect=sign * rank_biserial(gap),
+                p=wilcoxon(gap) if len(gap) else math.nan,
+                p_worlds=math.nan,
+            )
+        )
+    return _corrected(paired, rows, masks, np.stack(ranks, axis=1))
+
+
+def common_medians(paired: PairedRuns, metrics: Sequence[str]) -> tuple[int, dict[str, list[tuple[float, Interval]]]]:
+    """The median of each metric and planner over the instances in which every planner succeeded.
+
+    Args:
+        paired: the runs
+        metrics: columns
+
+    Returns:
+        The number of those instances, and for each metric the medians of the planners with 95 % bootstrap intervals.
+    """
+    common = paired.success.all(axis=1) & paired.counted(*range(len(paired.planners)))
+    found = {}
+    for metric in metrics:
+        values = paired.values(metric)[common]
+        if len(values) and np.isfinite(values).all():
+            intervals = medians_by_world(values, paired.world[common])
+            found[metric] = list(zip(np.median(values, axis=0).tolist(), intervals, strict=True))
+    return int(common.sum()), found
+
+
+def _clustered(paired: PairedRuns, mask: Flags) -> bool:
+    """Whether there are several worlds, and several instances in one of them."""
+    sizes = np.bincount(paired.world[mask])
+    return bool((sizes > 0).sum() > 1 and sizes.max() > 1)
+
+
+def _unpaired(paired: PairedRuns, i: int, j: int) -> int:
+    return int((paired.present[:, i] != paired.present[:, j]).sum())
+
+
+def _corrected(
+    paired: PairedRuns, rows: list[PairedComparison], masks: Sequence[Flags], scores: Floats
+) -> list[PairedComparison]:
+    """The rows with the test over worlds and with Holm's correction; scores (N, K) are nan outside the masks."""
+    sums = np.stack(
+        [sums_by_world(np.nan_to_num(column), paired.world, len(paired.worlds)) for column in scores.T], axis=1
+    )
+    flipped = flips_by_world(sums[(sums != 0).any(axis=1)])  # other worlds add nothing
+    over = np.array([p if _clustered(paired, mask) else math.nan for p, mask in zip(flipped, masks, strict=True)])
+    single, worlds = holm(np.array([row.p for row in rows])), holm(over)
+    return [
+        dataclasses.replace(row, p_worlds=float(over[k]), p_holm=float(single[k]), p_worlds_holm=float(worlds[k]))
+        for k, row in enumerate(rows)
+    ]

@@ -1,0 +1,162 @@
+"""What is said about a campaign, computed once for pages, tables and the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from antdrive.sim.log.metrics import METRICS
+from antdrive.sim.statistics.comparison import (
+    SUCCESS,
+    PairedComparison,
+    PlannerSuccess,
+    common_medians,
+    compare_metric,
+    compare_success,
+    pairs_of,
+    success_table,
+)
+from antdrive.sim.statistics.pairing import PairedRuns
+from antdrive.sim.statistics.proportions import Interval
+from antdrive.sim.statistics.runs import RunTable
+from antdrive.worlds.errors import FieldError
+
+DEFAULT_METRICS = ("driven_length_m", "duration_s", "plan_s")
+TITLES = {"plan_s": "planning time", "drive_wall_s": "wall time of the drive", "path_length_m": "planned length"}
+SETTINGS = ("robot", "smoothing", "noise", "margin", "cell")  # over which shares are taken, if there are several
+UNITS = ("_rad_per_m", "_m", "_s")  # that the names of metrics end with
+
+
+@dataclass(frozen=True, eq=False)
+class CampaignSummary:
+    """A campaign's runs and its two tables.
+
+    Attributes:
+        title: of the page
+        paired: the runs, by instance and planner
+        size: how many runs the campaign has; fewer may be done
+        success: a row for each planner
+        comparisons: by measure, "success" first, a row for each pair of planners; empty with one planner
+        common: number of instances in which every planner succeeded
+        medians: by metric, the median of each planner over those instances, with its interval
+        refusal: why planners are not compared; empty where they are
+    """
+
+    title: str
+    paired: PairedRuns
+    size: int
+    success: Sequence[PlannerSuccess]
+    comparisons: Mapping[str, Sequence[PairedComparison]]
+    common: int
+    medians: Mapping[str, Sequence[tuple[float, Interval]]]
+    refusal: str = ""
+
+    @property
+    def table(self) -> RunTable:
+        """The runs."""
+        return self.paired.table
+
+    @property
+    def notes(self) -> list[str]:
+        """What a reader of the tables must know about this campaign, a sentence each."""
+        still = [p for p, row in zip(self.paired.planners, self.success, strict=True) if row.counted < row.runs]
+        worlds = len(self.paired.worlds)
+        found: list[str] = []
+        if len(self.table) < self.size:
+            found.append(f"{self.size - len(self.table)} of {self.size} runs are not done yet.")
+        worlds_of = self.table.texts("world")
+        for name in SETTINGS:
+            values = list(
+                dict.fromkeys(f"{v:g}" if isinstance(v, float) else str(v) for v in self.table.columns.get(name, ()))
+            )
+            if len(set(zip(worlds_of, self.table.texts(name), strict=True))) > worlds:  # not only from world to world
+                some = ", ".join(values[:5]) + (", …" if len(values) > 5 else "")
+                found.append(
+                    f"Shares and medians are over several values of {name} ({some}); --where {name}={values[0]} takes one."
+                )
+        if still:
+            found.append(
+                f"Drives of {', '.join(still)} repeat with other seeds. Repetitions count once, except in pairs with a "
+                "planner whose drives the seed changes."
+            )
+        if worlds == 1:
+            found.append("There is one world: the intervals and tests say nothing about other worlds.")
+        elif worlds < 6:
+            found.append(f"{worlds} worlds are too few for a test over worlds: its p-value cannot be below 0.05.")
+        if self.refusal:
+            found.append(f"Planners are not compared: {self.refusal}.")
+        return found
+
+
+def summarise(
+    table: RunTable,
+    *,
+    title: str,
+    size: int | None = None,
+    metrics: Sequence[str] | None = None,
+    against: str | None = None,
+    planners: Sequence[str] = (),
+    strict: bool = False,
+) -> CampaignSummary:
+    """Compute a campaign's tables.
+
+    Args:
+        table: the runs that are done
+        title: of the page
+        size: how many runs the campaign has
+        metrics: to compare besides success; `DEFAULT_METRICS` without
+        against: the planner that each other one is compared with; every pair without
+        planners: labels of those to look at; all without
+        strict: refuse where no two planners can be compared, instead of saying so in the summary
+
+    Raises:
+        FieldError: an unknown planner or metric, no runs, or nothing to compare.
+    """
+    paired = PairedRuns.of(table)
+    if planners:
+        paired = paired.select(planners)
+    chosen = list(metrics) if metrics is not None else known_metrics(paired, DEFAULT_METRICS)
+    for name in chosen:
+        if name not in METRICS:
+            raise FieldError("metric", f"unknown {name!r}; choose from {', '.join(METRICS)}")
+    comparisons: dict[str, Sequence[PairedComparison]] = {}
+    refusal = ""
+    try:
+        pairs = pairs_of(paired, against)
+    except FieldError as error:
+        if strict or against is not None:
+            raise
+        refusal = error.problem
+    else:
+        comparisons[SUCCESS] = compare_success(paired, pairs)
+        for name in chosen:
+            comparisons[name] = compare_metric(paired, pairs, name, METRICS[name].better)
+    common, medians = common_medians(paired, chosen)
+    rows = success_table(paired)
+    return CampaignSummary(title, paired, size or len(table), rows, comparisons, common, medians, refusal)
+
+
+def known_metrics(paired: PairedRuns, names: Sequence[str]) -> list[str]:
+    """Those of the metrics that some successful run has.
+
+    Args:
+        paired: the runs
+        names: of metrics
+    """
+    return [name for name in names if np.isfinite(paired.values(name)).any()]
+
+
+def measure_title(name: str) -> str:
+    """What a measure is called in headings, with its unit.
+
+    Args:
+        name: "success" or the name of a metric
+    """
+    if name not in METRICS:
+        return name.replace("_", " ")
+    unit = METRICS[name].unit
+    short = next((name.removesuffix(suffix) for suffix in UNITS if name.endswith(suffix)), name)
+    plain = TITLES.get(name, short.replace("_", " "))
+    return plain if unit == "1" else f"{plain} [{unit}]"
