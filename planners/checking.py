@@ -16,6 +16,7 @@ import numpy as np
 from antdrive.planners.graph.sipp import TimedPlan
 from antdrive.planners.plan import Planner, PlanResult, PlanStatus, Query, path_cost
 from antdrive.worlds import Floats
+from antdrive.worlds.ends import end_reach, longest_line
 from antdrive.worlds.errors import InputError, input_error
 from antdrive.worlds.plane import polyline_length, segment_lengths, wrap_angle
 
@@ -91,9 +92,10 @@ def check_plan(query: Query, result: PlanResult) -> str:
     """What is wrong with an answer first, with the first wrong step; empty if the answer is right.
 
     Cells run from the query's start to its goal along allowed moves, and cost what `path_cost` says. Waypoints join the
-    same ends, keep the clearance, and have the length of a curve that rounds their corners. With waypoints, the cost may be
-    infinite: then the grid has no path, and the cells are merely those that the line passes. The times of a `TimedPlan`
-    increase. A path that was found when planning stopped early is checked, too.
+    same ends, keep the clearance, and have the length of a curve that rounds their corners; a start that has less room
+    than that is left by a first leg that comes no closer, within `end_reach`. They are no longer than their cells but for
+    `DETOUR`. With waypoints, the cost may be infinite: then the grid has no path, and the cells are merely those that the
+    line passes. The times of a `TimedPlan` increase. A path that was found when planning stopped early is checked, too.
 
     Args:
         query: what the planner was asked
@@ -115,7 +117,7 @@ def check_plan(query: Query, result: PlanResult) -> str:
         return f"cells: there are some, but {query.blocked_end}"
     problem = _cells(query, result, off_grid)
     if not problem and result.waypoints is not None:
-        problem = _waypoints(query, query.grid.xy(result.waypoints), result.length)
+        problem = _waypoints(query, result, query.grid.xy(result.waypoints))
     elif not problem and result.length is not None and not _same(result.length, result.cost):
         problem = f"length: {result.length:.9g} m, but the cells are {result.cost:.9g} m long"
     if not problem and isinstance(result, TimedPlan):
@@ -211,8 +213,9 @@ def _cell(cell: Any) -> str:
     return f"({int(cell[0])}, {int(cell[1])})"
 
 
-def _waypoints(query: Query, xy: Floats, length: float | None) -> str:
-    """What is wrong with a line (M, 2) [m] of this length: its ends, its clearance or the length; or empty."""
+def _waypoints(query: Query, result: PlanResult, xy: Floats) -> str:
+    """What is wrong with a plan's line (M, 2) [m]: its ends, its clearance or its length; or empty."""
+    length = result.length
     assert length is not None
     for k, key, ends in zip((0, -1), ("start", "goal"), _ends(query), strict=True):
         if min(math.dist(xy[k], end) for end in ends) > NEAR:
@@ -228,7 +231,17 @@ def _waypoints(query: Query, xy: Floats, length: float | None) -> str:
     slack = RELATIVE * drawn + NEAR
     if not drawn - _rounded_off(xy) - slack <= length <= drawn + slack:
         return f"length: {length:.9g} m, but the waypoints are {drawn:.9g} m long"
+    if length > longest_line(result.cost, _leads(query, result), query.grid.cell) + slack:
+        return f"waypoints: they are {length:.9g} m long, but the cells that they should follow {result.cost:.9g} m"
     return ""
+
+
+def _leads(query: Query, result: PlanResult) -> float:
+    """The distances of the first cell from the exact start and of the last from the exact goal, together [m]."""
+    if query.task is None:
+        return 0.0
+    first, last = query.grid.xy(result.cells[[0, -1]])
+    return math.dist(first, query.task.start[:2]) + math.dist(last, query.task.goal)
 
 
 def _ends(query: Query) -> list[list[tuple[float, float]]]:
@@ -252,9 +265,14 @@ def _too_close(query: Query, xy: Floats) -> Any:
     from antdrive.worlds.geometry import point_clearance, segment_clearance  # imports the compiler
 
     keep = np.full(len(xy) - 1, inflate)
-    # A robot that stands closer than the clearance leaves, but must not come closer still.
+    # A robot that stands closer than the clearance leaves to a free cell nearby, but must not come closer still.
     keep[0] = min(inflate, float(point_clearance(task.world, xy[:1])[0]))
-    return segment_clearance(task.world, xy[:-1], xy[1:]) < keep - NEAR
+    close = segment_clearance(task.world, xy[:-1], xy[1:]) < keep - NEAR
+    share = end_reach(inflate, query.grid.cell) / max(math.dist(xy[0], xy[1]), 1e-9)
+    if share < 1:
+        away = xy[:1] + share * (xy[1:2] - xy[:1])
+        close[0] |= segment_clearance(task.world, away, xy[1:2])[0] < inflate - NEAR
+    return close
 
 
 def _rounded_off(xy: Floats) -> float:

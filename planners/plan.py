@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.worlds import Floats, MoverMotion, Point, Task
+from antdrive.worlds.ends import cells_beside
 from antdrive.worlds.errors import FieldError
 
 if TYPE_CHECKING:  # importing a grid loads the compiler, which naming a planner should not
@@ -105,8 +106,7 @@ def _entrance(grid: Grid, task: Task, point: Point, within: float) -> tuple[Cell
 
     row, col = grid.cell_at(*point)
     rows, cols = grid.shape
-    # Only cells close by are considered: getting to farther ones would take a plan of its own.
-    reach = max(3, math.ceil(grid.inflate / grid.cell) + 1)
+    reach = cells_beside(grid.inflate, grid.cell)
     near = [
         (r, c)
         for r in range(max(0, row - reach), min(rows, row + reach + 1))
