@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from antdrive.worlds import Floats, MoverMotion, Point, Task
 from antdrive.worlds.ends import cells_beside
-from antdrive.worlds.errors import FieldError
+from antdrive.worlds.errors import FieldError, input_error
 
 if TYPE_CHECKING:  # importing a grid loads the compiler, which naming a planner should not
     from antdrive.worlds import Grid
@@ -236,6 +236,23 @@ class Capabilities:
     cell_by_cell: bool = False
 
 
+class PlannerError(RuntimeError):
+    """A planner raised something, or returned something that is not what was asked for; the message is one line.
+
+    Attributes:
+        planner: the planner's name
+        problem: what it did
+    """
+
+    def __init__(self, planner: str, problem: str) -> None:
+        super().__init__(str(input_error(f"planner {planner} {problem}")))
+        self.planner, self.problem = planner, problem
+
+    def __reduce__(self) -> tuple[type[PlannerError], tuple[str, str]]:
+        """Another process makes it anew from the two parts."""
+        return type(self), (self.planner, self.problem)
+
+
 @runtime_checkable
 class Planner(Protocol):
     """Anything that answers a query. All randomness comes from `rng`: the same seed gives the same plan.
@@ -249,8 +266,14 @@ class Planner(Protocol):
 
 
 def capabilities_of(planner: Planner) -> Capabilities:
-    """What a planner declares; the defaults if it declares nothing, as other people's planners may."""
-    declared: Capabilities = getattr(planner, "capabilities", Capabilities())
+    """What a planner declares; the defaults if it declares nothing, as other people's planners may.
+
+    Raises:
+        PlannerError: what it declares are no `Capabilities`.
+    """
+    declared: Any = getattr(planner, "capabilities", Capabilities())
+    if not isinstance(declared, Capabilities):
+        raise PlannerError(type(planner).__name__, f"declares {declared!r:.40} where Capabilities are due")
     return declared
 
 
