@@ -178,10 +178,11 @@ def _types(result: PlanResult) -> str:
 def _pictures(query: Query, result: PlanResult) -> str:
     """What is wrong with what figures draw: the field, and the history of an iterative planner; or empty."""
     field, history = result.field, result.history
+    made: Any = history  # by other people's code
     if field is not None and not (_floats(field) and field.shape == query.grid.shape):
         return f"field: must be an array of numbers {query.grid.shape}, got {_kind(field)}"
-    if not isinstance(history, History):
-        return f"history: must be a History, got {history!r:.40}"
+    if not isinstance(made, History):
+        return f"history: must be a History, got {made!r:.40}"
     count = len(history.best) if _floats(history.best) and history.best.ndim == 1 else 0
     for key in ("best", "iteration_best", "iteration_mean", "arrived"):
         values = getattr(history, key)

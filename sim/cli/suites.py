@@ -71,13 +71,13 @@ def drive_suites(
     Raises:
         InputError: there is no such suite or test, or something in a suite is wrong.
     """
-    import os
+    import joblib
 
     from antdrive.sim.regression import check_cases, select
 
     cases = select(suites, only)
     compile_once()
-    processes = min(jobs or os.cpu_count() or 1, len(cases))
+    processes = min(jobs or int(joblib.cpu_count()), len(cases))  # of a container, not of its host
     found = []
     with bar("driving") as progress:
         for result in check_cases(cases, jobs=processes, update=update, results=results):

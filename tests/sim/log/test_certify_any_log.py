@@ -21,7 +21,9 @@ ARRAYS = ("t", "pose", "twist", "command", "clearance", "limiter", "movers", "co
 def among_movers(log: Rollout, *replans: ReplanRecord) -> Rollout:
     mover = Cruising(radius=0.2, position=(3.0, 3.0), velocity=(0.1, -0.3))
     moving = with_task(log, world=replace(log.record.task.world, movers=(mover,)))
-    moving = with_record(moving, perception=PerceptionRecord(kind="velocities", range_m=None), replanning={}, replans=replans)
+    moving = with_record(
+        moving, perception=PerceptionRecord(kind="velocities", range_m=None), replanning={}, replans=replans
+    )
     return replace(moving, movers=moving.trajectories().positions(np.arange(len(log.t)) / log.record.physics_hz))
 
 
