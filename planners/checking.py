@@ -109,8 +109,9 @@ def check_plan(query: Query, result: PlanResult) -> str:
 
     Cells run from the query's start to its goal along allowed moves, and cost what `path_cost` says. Waypoints join the
     same ends, keep the clearance, and have the length of a curve that rounds their corners; a start that has less room
-    than that is left by a first leg that comes no closer, within `end_reach`. With waypoints, the cost may be infinite: then the grid has no path, and the cells are merely those that the
-    line passes. The times of a `TimedPlan` increase. A path that was found when planning stopped early is checked, too.
+    than that is left by a first leg that comes no closer, within `end_reach`. With waypoints, the cost may be infinite: then
+    the grid has no path, and the cells are merely those that the line passes. The times of a `TimedPlan` increase. A path
+    that was found when planning stopped early is checked, too.
 
     Args:
         query: what the planner was asked

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import math
 
-DETOUR = 3.0  # cells by which the line of a planner that is not bound to the grid may be longer than its cells
-
 
 def cells_beside(inflate: float, cell: float) -> int:
     """How many rows and columns away from its own cell an end may be joined to the grid.
@@ -32,14 +30,3 @@ def end_reach(inflate: float, cell: float) -> float:
         cell: side of a cell [m]
     """
     return math.sqrt(2.0) * (cells_beside(inflate, cell) + 0.5) * cell
-
-
-def longest_line(cost: float, leads: float, cell: float) -> float:
-    """The greatest length of a line that a planner may give for a path of cells [m].
-
-    Args:
-        cost: length of the cells [m]
-        leads: the distances of the first cell from the start and of the last from the goal, together [m]
-        cell: side of a cell [m]
-    """
-    return cost + leads + DETOUR * cell
