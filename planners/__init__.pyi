@@ -2,9 +2,11 @@ from .anyangle.ga_han import GaHan as GaHan
 from .anyangle.hybrid import Hybrid as Hybrid
 from .anyangle.tangent import Tangent as Tangent
 from .anyangle.tangent import TangentPath as TangentPath
-from .checking import PlannerError as PlannerError
+from .checking import answered as answered
 from .checking import ask as ask
+from .checking import blaming as blaming
 from .checking import check_plan as check_plan
+from .checking import check_step as check_step
 from .checking import checked as checked
 from .colonies.aco_han import AcoHan as AcoHan
 from .colonies.ant_system import AgeingAnts as AgeingAnts
@@ -40,6 +42,7 @@ from .plan import Cells as Cells
 from .plan import GridPlanner as GridPlanner
 from .plan import History as History
 from .plan import Planner as Planner
+from .plan import PlannerError as PlannerError
 from .plan import PlanResult as PlanResult
 from .plan import PlanStatus as PlanStatus
 from .plan import Query as Query

@@ -2,37 +2,27 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
 import numbers
 import sys
 import traceback
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from antdrive.planners.graph.sipp import TimedPlan
-from antdrive.planners.plan import Planner, PlanResult, PlanStatus, Query, path_cost
+from antdrive.planners.plan import Cell, History, Planner, PlannerError, PlanResult, PlanStatus, Query, path_cost
 from antdrive.worlds import Floats
-from antdrive.worlds.errors import InputError, input_error
+from antdrive.worlds.ends import end_reach
+from antdrive.worlds.errors import InputError
 from antdrive.worlds.plane import polyline_length, segment_lengths, wrap_angle
 
 RELATIVE = 1e-9  # how far a cost may be off, as a fraction
 NEAR = 1e-6  # m: how far a waypoint may be off, and how much a line may come too close
-
-
-class PlannerError(RuntimeError):
-    """A planner raised something, or returned something that is no `PlanResult`; the message is one line.
-
-    Attributes:
-        planner: the planner's name
-    """
-
-    def __init__(self, planner: str, problem: str) -> None:
-        super().__init__(str(input_error(f"planner {planner} {problem}")))
-        self.planner = planner
 
 
 def ask(planner: Planner, query: Query, rng: np.random.Generator, name: str = "") -> PlanResult:
@@ -48,26 +38,53 @@ def ask(planner: Planner, query: Query, rng: np.random.Generator, name: str = ""
         InputError: the planner says that the query is wrong.
         PlannerError: the planner raised anything else, or its answer is no `PlanResult`.
     """
-    called = name or type(planner).__name__
-    try:
+    with blaming(planner, name):
         answer: Any = planner.plan(query, rng)
-    except InputError:
+    return answered(planner, answer, name)
+
+
+@contextlib.contextmanager
+def blaming(planner: Planner, name: str = "") -> Iterator[None]:
+    """Whatever is raised within becomes a `PlannerError`, but for `InputError` and Ctrl-C.
+
+    Args:
+        planner: whose code runs within
+        name: what errors call the planner; empty: its class
+    """
+    try:
+        yield
+    except (InputError, PlannerError):
         raise
-    except Exception as error:  # another package's planner may raise anything
+    except (Exception, SystemExit) as error:  # another package's planner may raise anything, and call exit()
         says = f"{type(error).__name__}: {error}".strip().removesuffix(":")
-        raise PlannerError(called, f"raised {says} ({_place(planner, error)})") from error
-    if not isinstance(answer, PlanResult):
-        raise PlannerError(called, f"returned {answer!r:.60} where a PlanResult is due ({_place(planner)})")
-    return answer
+        raise PlannerError(name or type(planner).__name__, f"raised {says} ({_place(planner, error)})") from error
+
+
+def answered(planner: Planner, answer: Any, name: str = "") -> PlanResult:
+    """The answer of a planner, or of what it made, if it is a `PlanResult`.
+
+    Args:
+        planner: whose answer it is
+        answer: what was returned
+        name: what errors call the planner; empty: its class
+
+    Raises:
+        PlannerError: the answer is something else.
+    """
+    if isinstance(answer, PlanResult):
+        return answer
+    called = name or type(planner).__name__
+    raise PlannerError(called, f"returned {answer!r:.60} where a PlanResult is due ({_place(planner)})")
 
 
 def _place(planner: Planner, error: BaseException | None = None) -> str:
     """The file and line of the planner's module where an error arose; without one, of its method `plan`."""
     home = getattr(sys.modules.get(type(planner).__module__), "__file__", None)
-    frames = traceback.extract_tb(error.__traceback__)[1:] if error is not None else []
+    frames = traceback.extract_tb(error.__traceback__) if error is not None else []
+    frames = [frame for frame in frames if frame.filename != __file__]
     for frame in [*(f for f in reversed(frames) if f.filename == home), *reversed(frames)]:
         return f"{Path(frame.filename).name}:{frame.lineno}"
-    code = getattr(planner.plan, "__code__", None)
+    code = getattr(getattr(planner, "plan", None), "__code__", None)
     return f"{Path(code.co_filename).name}:{code.co_firstlineno}" if code else type(planner).__module__
 
 
@@ -91,15 +108,16 @@ def check_plan(query: Query, result: PlanResult) -> str:
     """What is wrong with an answer first, with the first wrong step; empty if the answer is right.
 
     Cells run from the query's start to its goal along allowed moves, and cost what `path_cost` says. Waypoints join the
-    same ends, keep the clearance, and have the length of a curve that rounds their corners. With waypoints, the cost may be
-    infinite: then the grid has no path, and the cells are merely those that the line passes. The times of a `TimedPlan`
-    increase. A path that was found when planning stopped early is checked, too.
+    same ends, keep the clearance, and have the length of a curve that rounds their corners; a start that has less room
+    than that is left by a first leg that comes no closer, within `end_reach`. With waypoints, the cost may be infinite: then
+    the grid has no path, and the cells are merely those that the line passes. The times of a `TimedPlan` increase. A path
+    that was found when planning stopped early is checked, too.
 
     Args:
         query: what the planner was asked
         result: what it answered
     """
-    problem = _types(result)
+    problem = _types(result) or _pictures(query, result)
     if problem:
         return problem
     if not len(result.cells):
@@ -115,7 +133,7 @@ def check_plan(query: Query, result: PlanResult) -> str:
         return f"cells: there are some, but {query.blocked_end}"
     problem = _cells(query, result, off_grid)
     if not problem and result.waypoints is not None:
-        problem = _waypoints(query, query.grid.xy(result.waypoints), result.length)
+        problem = _waypoints(query, result, query.grid.xy(result.waypoints))
     elif not problem and result.length is not None and not _same(result.length, result.cost):
         problem = f"length: {result.length:.9g} m, but the cells are {result.cost:.9g} m long"
     if not problem and isinstance(result, TimedPlan):
@@ -154,8 +172,22 @@ def _types(result: PlanResult) -> str:
     options: Any = result.options
     if not isinstance(options, Mapping):
         return f"options: must be a mapping, got {options!r:.40}"
-    if result.field is not None and not _floats(result.field):
-        return f"field: must be an array of numbers, got {_kind(result.field)}"
+    return ""
+
+
+def _pictures(query: Query, result: PlanResult) -> str:
+    """What is wrong with what figures draw: the field, and the history of an iterative planner; or empty."""
+    field, history = result.field, result.history
+    made: Any = history  # by other people's code
+    if field is not None and not (_floats(field) and field.shape == query.grid.shape):
+        return f"field: must be an array of numbers {query.grid.shape}, got {_kind(field)}"
+    if not isinstance(made, History):
+        return f"history: must be a History, got {made!r:.40}"
+    count = len(history.best) if _floats(history.best) and history.best.ndim == 1 else 0
+    for key in ("best", "iteration_best", "iteration_mean", "arrived"):
+        values = getattr(history, key)
+        if not (_floats(values) and values.shape == (count,)):
+            return f"history: {key} must be an array of numbers ({count},), got {_kind(values)}"
     return ""
 
 
@@ -197,6 +229,25 @@ def _cells(query: Query, result: PlanResult, off_grid: bool) -> str:
     return ""
 
 
+def check_step(query: Query, cell: Cell, to: Any) -> str:
+    """What is wrong with the step of a planner that decides cell by cell; empty if it is an allowed move, or to wait.
+
+    Args:
+        query: what the planner was asked
+        cell: where the robot is
+        to: the next cell, or None to wait
+    """
+    if to is None:
+        return ""
+    if not (isinstance(to, tuple) and len(to) == 2 and all(isinstance(k, numbers.Integral) for k in to)):
+        return f"step: must be a cell (row, col) or None, got {to!r:.40}"
+    grid, step = query.grid, (int(to[0]) - cell[0], int(to[1]) - cell[1])
+    bit = 8 if max(map(abs, step)) > 1 else int(_bits()[step[0] + 1, step[1] + 1])
+    if bit == 8 or not int(grid.moves[cell]) >> bit & 1:
+        return f"step: from {_cell(cell)} to {_cell(to)} is no allowed move"
+    return ""
+
+
 def _bits() -> Any:
     """The bit of `Grid.moves` by row and column step, each + 1 (3, 3); 8 is no bit, because it is no step."""
     from antdrive.worlds import DIRECTIONS  # imports the compiler
@@ -211,8 +262,9 @@ def _cell(cell: Any) -> str:
     return f"({int(cell[0])}, {int(cell[1])})"
 
 
-def _waypoints(query: Query, xy: Floats, length: float | None) -> str:
-    """What is wrong with a line (M, 2) [m] of this length: its ends, its clearance or the length; or empty."""
+def _waypoints(query: Query, result: PlanResult, xy: Floats) -> str:
+    """What is wrong with a plan's line (M, 2) [m]: its ends, its clearance or its length; or empty."""
+    length = result.length
     assert length is not None
     for k, key, ends in zip((0, -1), ("start", "goal"), _ends(query), strict=True):
         if min(math.dist(xy[k], end) for end in ends) > NEAR:
@@ -252,9 +304,14 @@ def _too_close(query: Query, xy: Floats) -> Any:
     from antdrive.worlds.geometry import point_clearance, segment_clearance  # imports the compiler
 
     keep = np.full(len(xy) - 1, inflate)
-    # A robot that stands closer than the clearance leaves, but must not come closer still.
+    # A robot that stands closer than the clearance leaves to a free cell nearby, but must not come closer still.
     keep[0] = min(inflate, float(point_clearance(task.world, xy[:1])[0]))
-    return segment_clearance(task.world, xy[:-1], xy[1:]) < keep - NEAR
+    close = segment_clearance(task.world, xy[:-1], xy[1:]) < keep - NEAR
+    share = end_reach(inflate, query.grid.cell) / max(math.dist(xy[0], xy[1]), 1e-9)
+    if share < 1:
+        away = xy[:1] + share * (xy[1:2] - xy[:1])
+        close[0] |= segment_clearance(task.world, away, xy[1:2])[0] < inflate - NEAR
+    return close
 
 
 def _rounded_off(xy: Floats) -> float:

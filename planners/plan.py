@@ -16,7 +16,8 @@ import numpy.typing as npt
 
 from antdrive.planners.loading import kernels_loaded
 from antdrive.worlds import Floats, MoverMotion, Point, Task
-from antdrive.worlds.errors import FieldError
+from antdrive.worlds.ends import cells_beside
+from antdrive.worlds.errors import FieldError, input_error
 
 if TYPE_CHECKING:  # importing a grid loads the compiler, which naming a planner should not
     from antdrive.worlds import Grid
@@ -106,8 +107,7 @@ def _entrance(grid: Grid, task: Task, point: Point, within: float) -> tuple[Cell
 
     row, col = grid.cell_at(*point)
     rows, cols = grid.shape
-    # Only cells close by are considered: getting to farther ones would take a plan of its own.
-    reach = max(3, math.ceil(grid.inflate / grid.cell) + 1)
+    reach = cells_beside(grid.inflate, grid.cell)
     near = [
         (r, c)
         for r in range(max(0, row - reach), min(rows, row + reach + 1))
@@ -237,6 +237,23 @@ class Capabilities:
     cell_by_cell: bool = False
 
 
+class PlannerError(RuntimeError):
+    """A planner raised something, or returned something that is not what was asked for; the message is one line.
+
+    Attributes:
+        planner: the planner's name
+        problem: what it did
+    """
+
+    def __init__(self, planner: str, problem: str) -> None:
+        super().__init__(str(input_error(f"planner {planner} {problem}")))
+        self.planner, self.problem = planner, problem
+
+    def __reduce__(self) -> tuple[type[PlannerError], tuple[str, str]]:
+        """Another process makes it anew from the two parts."""
+        return type(self), (self.planner, self.problem)
+
+
 @runtime_checkable
 class Planner(Protocol):
     """Anything that answers a query. All randomness comes from `rng`: the same seed gives the same plan.
@@ -250,8 +267,14 @@ class Planner(Protocol):
 
 
 def capabilities_of(planner: Planner) -> Capabilities:
-    """What a planner declares; the defaults if it declares nothing, as other people's planners may."""
-    declared: Capabilities = getattr(planner, "capabilities", Capabilities())
+    """What a planner declares; the defaults if it declares nothing, as other people's planners may.
+
+    Raises:
+        PlannerError: what it declares are no `Capabilities`.
+    """
+    declared: Any = getattr(planner, "capabilities", Capabilities())
+    if not isinstance(declared, Capabilities):
+        raise PlannerError(type(planner).__name__, f"declares {declared!r:.40} where Capabilities are due")
     return declared
 
 

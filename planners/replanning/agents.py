@@ -11,6 +11,7 @@ from typing import Protocol, cast, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
+from antdrive.planners.checking import blaming
 from antdrive.planners.graph.incremental import Replanner
 from antdrive.planners.plan import Cell, Planner, Query, capabilities_of
 from antdrive.planners.replanning.replanners import replanner_for
@@ -92,9 +93,11 @@ def agent_for(planner: Planner, query: Query, rng: np.random.Generator) -> Onlin
 
     Raises:
         ValueError: the planner does not plan on cells alone.
+        PlannerError: the planner raised something.
     """
     if capabilities_of(planner).cell_by_cell:
-        return cast(CellByCellPlanner, planner).agent(query, rng)
+        with blaming(planner):
+            return cast(CellByCellPlanner, planner).agent(query, rng)
     return ReplanningAgent(replanner_for(planner, query, rng))
 
 

@@ -10,7 +10,7 @@ from typing import cast
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.planners.checking import ask
+from antdrive.planners.checking import ask, blaming
 from antdrive.planners.graph.incremental import EditableQuery, Replanner, ReplanningPlanner
 from antdrive.planners.plan import Planner, PlanResult, PlanStatus, Query, capabilities_of, path_cost
 from antdrive.worlds.errors import FieldError
@@ -24,6 +24,7 @@ def replanner_for(planner: Planner, query: Query, rng: np.random.Generator) -> R
 
     Raises:
         ValueError: the planner does not plan on cells alone.
+        PlannerError: the planner raised something.
     """
     can = capabilities_of(planner)
     for needed, what in ((can.needs_world, "the world's discs"), (can.needs_motions, "known motions")):
@@ -32,7 +33,8 @@ def replanner_for(planner: Planner, query: Query, rng: np.random.Generator) -> R
                 "planner", f"{type(planner).__name__} plans among {what}; it cannot replan by blocked cells"
             )
     if can.own_replanner:
-        return cast(ReplanningPlanner, planner).replanner(query, rng)
+        with blaming(planner):
+            return cast(ReplanningPlanner, planner).replanner(query, rng)
     return ReplanFromScratch(planner, query, rng)
 
 

@@ -118,9 +118,12 @@ def least_margin(
             break
         margin = _next_margin(unsafe, safe, most)
     if found is None:
-        raise FieldError(
-            "margin", f"auto: no margin up to {most:g} m leaves {reserve:g} m; lower the noise, or give a number"
+        tried = (
+            f"none of the {ROUNDS} margins tried, up to {unsafe[0]:g} m,"
+            if unsafe[0] < most
+            else f"no margin up to {most:g} m"
         )
+        raise FieldError("margin", f"auto: {tried} leaves {reserve:g} m; lower the noise, or give a number")
     return found
 
 

@@ -71,7 +71,7 @@ def drive_suites(
     Raises:
         InputError: there is no such suite or test, or something in a suite is wrong.
     """
-    import os
+    import joblib
 
     from antdrive.sim.cli.calibrating import with_chosen_margin
     from antdrive.sim.regression import check_cases, scenario_of, select
@@ -81,7 +81,7 @@ def drive_suites(
     for case in cases:
         if case.entry.margin == "auto":  # chosen once and with a bar, not by each process
             scenario_of(case, with_chosen_margin)
-    processes = min(jobs or os.cpu_count() or 1, len(cases))
+    processes = min(jobs or int(joblib.cpu_count()), len(cases))  # of a container, not of its host
     found = []
     with bar("driving") as progress:
         for result in check_cases(cases, jobs=processes, update=update, results=results):

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from antdrive.planners import PLANNERS, Planner, Query, agent_for, capabilities_of, smooth
+from antdrive.planners import PLANNERS, Planner, Query, agent_for, blaming, capabilities_of, check_step, smooth
 from antdrive.robots import TrackedPath
 from antdrive.sim.driving.blocking import blocked_cells, covered_discs
 from antdrive.sim.driving.replanning import MISSED, Replan, ReplanMonitor, ReplanPolicy
@@ -28,9 +28,9 @@ class CellwiseMonitor(ReplanMonitor):
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        query = Query.between(self._grid, self._task)
-        self._online = agent_for(self._planner, query, self._rng)
-        self._goal = query.goal
+        self._query = Query.between(self._grid, self._task)
+        self._online = agent_for(self._planner, self._query, self._rng)
+        self._goal = self._query.goal
         self._noted_at = -math.inf
 
     @property
@@ -57,9 +57,14 @@ class CellwiseMonitor(ReplanMonitor):
             return super().replan(tick, pose, trigger) if self._online.arrived else None
         now, started = tick / self._hz, time.perf_counter()
         self._replanned_at = now
-        here, propagated = self._online.cell, self._online.stats.propagated
         covered = covered_discs(self._predictor, tick, np.array([pose[:2]]), 0.0, self._grid)
-        to = self._online.step(np.argwhere(blocked_cells(self._grid, covered)))
+        with blaming(self._planner):
+            here, propagated = self._online.cell, self._online.stats.propagated
+            to = self._online.step(np.argwhere(blocked_cells(self._grid, covered)))
+        self.wrong = self.wrong or check_step(self._query, here, to)
+        if self.wrong:
+            self.log.append(Replan(now, trigger, False, math.inf, 0, np.empty((0, 2)), 0.0))
+            return None
         xy = self._line(pose, here, to, tick)
         if to is not None:
             self.blockage.found()

@@ -107,6 +107,8 @@ class Driver:
         """
         if self._monitor is not None:
             self._replan_if_triggered(tick, pose, state)
+            if self._monitor.wrong:
+                return self._wrong_plan(tick)
             if self._monitor.blockage.reason:
                 return Ending(Outcome.BLOCKED, self._monitor.blockage.reason)
         last, before = self.command, self.pursuit
@@ -199,7 +201,12 @@ class Driver:
             return ending
         if self._follow(monitor.replan(tick, pose, MISSED)) or monitor.may_wait:
             return None
-        return ending
+        return self._wrong_plan(tick) if monitor.wrong else ending
+
+    def _wrong_plan(self, tick: int) -> Ending:
+        """The ending of a drive on which the planner has given a wrong plan."""
+        assert self._monitor is not None
+        return Ending(Outcome.INVALID_PLAN, f"on the way, at t = {tick / self._hz:g} s: {self._monitor.wrong}")
 
     def _arrival(self, state: State) -> Ending:
         """How the drive ends if the robot stops here without a contact."""

@@ -22,9 +22,12 @@ import numpy as np
 from antdrive.planners import (
     Planner,
     PlanResult,
+    PlanStatus,
     Query,
     TimedPlan,
+    answered,
     ask,
+    blaming,
     capabilities_of,
     checked,
     replanner_for,
@@ -126,6 +129,7 @@ class ReplanMonitor:
         schedule: where the robot should be at each time; None unless the route comes from a plan in space
             and time
         blockage: whether movers that stand still close every way
+        wrong: what is wrong with a plan that the planner has given on the way; empty if none was. The drive then ends
 
     Args:
         margin: distance kept free around the robot, on top of its radius [m]
@@ -150,7 +154,7 @@ class ReplanMonitor:
         hz: int,
         keeps: float = 0.0,
     ) -> None:
-        self.policy, self.log = policy, list[Replan]()
+        self.policy, self.log, self.wrong = policy, list[Replan](), ""
         self.schedule: Schedule | None = None
         self._planner, self._grid, self._rng, self._predictor, self._hz = planner, grid, rng, predictor, hz
         self._task = dataclasses.replace(task, world=dataclasses.replace(task.world, movers=()))
@@ -234,7 +238,7 @@ class ReplanMonitor:
             discs = self._discs(tick, pose)
             plan = self._plan(task, discs)
         route = None
-        if plan.solved and len(plan.cells):
+        if plan.solved and len(plan.cells) and not self.wrong:
             # A timed plan's times are those of its cells, so its route must follow the cells.
             smoothing = "none" if self._timed else self._smoothing
             route = smooth(plan, self._grid, with_obstacles(task, discs), kind=smoothing)
@@ -255,7 +259,14 @@ class ReplanMonitor:
     def _plan_in_time(self, task: Task, now: float) -> PlanResult:
         query = Query.between(self._grid, task)
         query = dataclasses.replace(query, motions=self._predictor.trajectories.motions, start_time=now)
-        return checked(query, ask(self._planner, query, self._rng))
+        return self._checked(query, ask(self._planner, query, self._rng))
+
+    def _checked(self, query: Query, answer: PlanResult) -> PlanResult:
+        """The answer, if it is right; else note what is wrong with it."""
+        plan = checked(query, answer)
+        if plan.status is PlanStatus.INVALID:
+            self.wrong = self.wrong or plan.reason
+        return plan
 
     def _plan_around(self, task: Task, discs: list[Disc], zones: list[Zone]) -> tuple[PlanResult, list[Disc]]:
         """A plan around the first zone where it is not too long, else around discs; and what it goes around."""
@@ -274,7 +285,7 @@ class ReplanMonitor:
             around = with_obstacles(task, discs + zone.discs if zone is not None else discs)
             grid = rasterise(around.world, self._grid.cell, self._grid.inflate)
             query = Query.between(grid, around)
-            return checked(query, ask(self._planner, query, self._rng))
+            return self._checked(query, ask(self._planner, query, self._rng))
         query = Query.between(self._grid, task)
         if self._replanner is None:
             self._replanner = replanner_for(self._planner, query, self._rng)
@@ -282,11 +293,16 @@ class ReplanMonitor:
         if zone is not None:
             blocked |= zone.blocked
         blocked[query.start] = blocked[query.goal] = False
-        self._replanner.clear(np.argwhere(self._blocked & ~blocked))
-        self._replanner.block(np.argwhere(blocked & ~self._blocked))
-        self._blocked = blocked
-        self._replanner.move(query.start)
-        return checked(query, self._replanner.result())
+        with blaming(self._planner):
+            self._replanner.clear(np.argwhere(self._blocked & ~blocked))
+            self._replanner.block(np.argwhere(blocked & ~self._blocked))
+            self._blocked = blocked
+            self._replanner.move(query.start)
+            answer = self._replanner.result()
+        answer = answered(self._planner, answer)
+        if query.unreachable:  # a replanner knows cells only, not that the robot cannot get to the first of them
+            return PlanResult(status=PlanStatus.NO_PATH, reason=query.unreachable)
+        return self._checked(query, answer)
 
     def _discs(self, tick: int, pose: Pose) -> list[Disc]:
         """What movers will cover soon; they close neither the robot's position nor the goal."""

@@ -15,7 +15,7 @@ class Outcome(enum.Enum):
     not blamed for `HIT_WHILE_STANDING` and `HIT_BY_TELEPORT`, but neither is a success, and no drive with a contact is
     certified. `BLOCKED` means that movers closed every way and stood still until the robot's patience was over
     (`ReplanPolicy.patience`). `NO_PATH`, `STOPPED` and `INVALID_PLAN` end a run before the robot drives, so that there is
-    no rollout.
+    no rollout; but a wrong plan on the way ends the drive, as `INVALID_PLAN` too, and its log has the rows until then.
 
     `antdrive run` exits with 0 if the run ended with `SUCCEEDED` and the drive is certified, else with 1.
     """

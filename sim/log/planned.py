@@ -13,13 +13,15 @@ import numpy as np
 
 from antdrive.sim.log.record import DECISION
 from antdrive.sim.log.rollout import Rollout
+from antdrive.worlds.ends import end_reach
 from antdrive.worlds.plane import arc_lengths, polyline_length
 from antdrive.worlds.types import Floats
 
-NEAR = 1.5  # cells between a route's end and the point that it belongs to, at most
+NEAR = 1.5  # cells between a route's end and a point that has room, at most
+JUST_ROOM = 1e-6  # a goal with no more room than the inflation and this may count as one with too little [m]
 ROUTE_SLACK = 0.012  # smoothing keeps the inflation to a centimetre, and replans are rounded to 0.1 mm [m]
 SAME_LENGTH = 1e-6  # lengths that are computed twice agree to this share
-DETOUR = 3.0  # cells by which an any-angle planner's line may be longer than its cells
+DETOUR = 3.0  # cells by which an any-angle planner's line may be longer than its cells and what leads to them
 AWAY_TIME = 0.5  # a robot is no farther off its route than its radius and what it drives in this time [s]
 POINT_SPACING = 0.05  # of the points of a route whose clearance is looked at [m]
 
@@ -52,7 +54,7 @@ def _check_routes(rollout: Rollout) -> Iterator[str]:
         return
     if math.dist(route[0], task.start[:2]) > near:
         yield f"route: begins {math.dist(route[0], task.start[:2]):.3g} m from the task's start"
-    if not _by_cells(rollout) and math.dist(route[-1], task.goal) > near:
+    if not _by_cells(rollout) and math.dist(route[-1], task.goal) > _short_of_goal(rollout):
         yield f"route: ends {math.dist(route[-1], task.goal):.3g} m from the task's goal"
     routes = [("route", route)]
     routes += [(f"record.replans[{i}].route", np.array(r.route)) for i, r in enumerate(record.replans) if r.solved]
@@ -61,39 +63,74 @@ def _check_routes(rollout: Rollout) -> Iterator[str]:
         if (points < (xmin, ymin)).any() or (points > (xmax, ymax)).any():
             yield f"{name}: leaves the world's bounds"
             continue
-        least = _room_on(rollout, points)
-        if not least >= record.inflate - ROUTE_SLACK:
-            yield f"{name}: leads {least:.3g} m past an obstacle; the plan's inflation is {record.inflate:.3g} m"
+        yield from _check_room(rollout, name, points)
 
 
-def _room_on(rollout: Rollout, route: Floats) -> float:
-    """The least distance of a route's points from what stands still and was known, but for its ends [m]."""
+def _short_of_goal(rollout: Rollout) -> float:
+    """How far from the goal the route may end [m]: a goal with too little room is not reached itself."""
     task, near = rollout.record.task, NEAR * rollout.record.cell
+    room = float(_room(rollout, np.array([task.goal]))[0])
+    return max(near, task.goal_tolerance) if room < rollout.record.inflate + JUST_ROOM else near
+
+
+def _check_room(rollout: Rollout, name: str, route: Floats) -> Iterator[str]:
+    """A route keeps the inflation from what stands still; on leaving a tight start, only what the start itself has.
+
+    A replan begins wherever the robot is, also beside a mover, and its first leg need not keep more from other obstacles.
+    """
+    record = rollout.record
     arc = arc_lengths(route)
     along = np.linspace(0.0, arc[-1], min(100_000, 2 + math.ceil(float(arc[-1]) / POINT_SPACING)))
     points = np.stack([np.interp(along, arc, route[:, k]) for k in (0, 1)], axis=1)
-    away = np.minimum(*(np.hypot(*(points - end).T) for end in (route[0], np.array(task.goal))))
-    points = points[away > near]
-    if not len(points):
-        return math.inf
-    xmin, ymin, xmax, ymax = task.world.bounds
-    least = float(np.minimum(points - (xmin, ymin), (xmax, ymax) - points).min())
-    discs = task.world.discs
-    for some in np.array_split(points, 1 + len(points) * len(discs) // 1_000_000):
+    own = min(record.inflate, float(_room(rollout, route[:1])[0])) if name == "route" else -math.inf
+    leaving = np.hypot(*(points - route[0]).T) <= end_reach(record.inflate, record.cell)
+    needed = np.where(leaving, own, record.inflate)
+    room = _room(rollout, points)
+    worst = int((room - needed).argmin())
+    if not room[worst] >= needed[worst] - ROUTE_SLACK:
+        start = f", its start has {own:.3g} m" if leaving[worst] and own < record.inflate else ""
+        yield (
+            f"{name}: leads {room[worst]:.3g} m past an obstacle; the plan's inflation is {record.inflate:.3g} m{start}"
+        )
+
+
+def _room(rollout: Rollout, points: Floats) -> Floats:
+    """The distances of points (N, 2) [m] from what stands still and was known (N,) [m]."""
+    world = rollout.record.task.world
+    xmin, ymin, xmax, ymax = world.bounds
+    room = np.minimum(points - (xmin, ymin), (xmax, ymax) - points).min(axis=1)
+    discs = world.discs
+    for rows in np.array_split(np.arange(len(points)), 1 + len(points) * len(discs) // 1_000_000):
+        some = points[rows]
         gaps = np.hypot(some[:, :1] - discs[:, 0], some[:, 1:] - discs[:, 1]) - discs[:, 2]
-        least = min(least, float(gaps.min(initial=math.inf)))
-    return least
+        room[rows] = np.minimum(room[rows], gaps.min(axis=1, initial=math.inf))
+    return np.asarray(room)
 
 
 def _check_cells(rollout: Rollout) -> Iterator[str]:
-    """Cells must be neighbours on the grid."""
+    """Cells must be neighbours on the grid, and lead from near the start to near the goal."""
     record, cells = rollout.record, rollout.cells
     xmin, ymin, xmax, ymax = record.world.bounds
     rows, cols = math.ceil((ymax - ymin) / record.cell) + 1, math.ceil((xmax - xmin) / record.cell) + 1
     if (cells < 0).any() or (cells >= (rows, cols)).any():
         yield f"cells: must lie on the grid of {record.cell:g} m"
-    elif (np.abs(np.diff(cells, axis=0)) > 1).any():
+        return
+    if (np.abs(np.diff(cells, axis=0)) > 1).any():
         yield "cells: must be neighbours on the grid"
+    reach = end_reach(record.inflate, record.cell) + SAME_LENGTH
+    for lead, does, end in zip(_leads(rollout), ("begin", "end"), ("start", "goal"), strict=True):
+        if lead > reach:
+            yield f"cells: {does} {lead:.3g} m from the task's {end}"
+
+
+def _leads(rollout: Rollout) -> tuple[float, float]:
+    """The distances of the first cell from the start and of the last from the goal [m]; 0 without cells."""
+    record, cells = rollout.record, rollout.cells
+    if not len(cells):
+        return 0.0, 0.0
+    xmin, ymin, _, _ = record.world.bounds
+    first, last = (cells[[0, -1], ::-1] + 0.5) * record.cell + (xmin, ymin)
+    return math.dist(first, record.task.start[:2]), math.dist(last, record.task.goal)
 
 
 def _check_lengths(rollout: Rollout) -> Iterator[str]:
@@ -108,12 +145,13 @@ def _check_lengths(rollout: Rollout) -> Iterator[str]:
         yield f"record.plan.cost_m: {plan.cost_m:.6g} m, but the cells are {length:.6g} m long"
     elif plan.grid_optimum_m is not None and plan.grid_optimum_m > plan.cost_m + slack:
         yield f"record.plan.grid_optimum_m: {plan.grid_optimum_m:.6g} m is longer than the plan's {plan.cost_m:.6g} m"
-    straight = math.dist(task.start[:2], task.goal) - 2 * NEAR * cell
+    leads = sum(_leads(rollout))
+    straight = math.dist(task.start[:2], task.goal) - max(leads, 2 * NEAR * cell)
     for key in ("length_m", "euclidean_optimum_m", "grid_optimum_m"):
         value = getattr(plan, key)
         if value is not None and not _by_cells(rollout) and value < straight:
             yield f"record.plan.{key}: {value:.6g} m, but start and goal are farther apart"
-    if plan.cost_m is not None and plan.length_m > plan.cost_m + DETOUR * cell:
+    if plan.cost_m is not None and plan.length_m > plan.cost_m + leads + DETOUR * cell:
         yield f"record.plan.length_m: {plan.length_m:.6g} m, but the cells are {plan.cost_m:.6g} m long"
 
 

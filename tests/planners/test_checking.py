@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import pickle
 import re
 from typing import Any
 
@@ -13,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from antdrive.planners import (
+    History,
     PlannerError,
     PlanResult,
     PlanStatus,
@@ -141,6 +143,11 @@ def test_a_negative_cell_is_outside_and_not_the_last_one() -> None:
         ({"reason": None}, "reason: must be text"),
         ({"options": None}, "options: must be a mapping"),
         ({"field": "none"}, "field: must be an array"),
+        ({"field": np.zeros(3)}, "field: must be an array"),
+        ({"history": None}, "history: must be a History"),
+        ({"history": History(best=None)}, "history: best must be an array"),  # type: ignore[arg-type]
+        ({"history": History(best=np.ones((2, 2)))}, "history: best must be an array"),
+        ({"history": History(best=np.ones(3))}, "history: iteration_best must be an array of numbers (3,)"),
     ],
     ids=lambda value: str(value)[:24],
 )
@@ -235,6 +242,18 @@ def test_the_place_is_in_the_planners_module_and_not_in_what_it_calls() -> None:
 def test_an_answer_that_is_no_plan_result_is_a_planner_error(answer: Any) -> None:
     with pytest.raises(PlannerError, match=r"planner Broken returned .* where a PlanResult is due \(test_checking.py:"):
         ask(Broken(answer), QUERY, RNG(0))
+
+
+def test_a_planner_that_exits_is_its_error_and_no_success() -> None:
+    with pytest.raises(PlannerError, match=r"planner Broken raised SystemExit: 0 \(test_checking.py:"):
+        ask(Broken(SystemExit(0)), QUERY, RNG(0))
+
+
+def test_a_planner_error_gets_to_another_process() -> None:
+    with pytest.raises(PlannerError) as found:
+        ask(Broken(KeyError("row\n2")), QUERY, RNG(0), "mine")
+    copy = pickle.loads(pickle.dumps(found.value))
+    assert (str(copy), copy.planner, copy.problem) == (str(found.value), "mine", found.value.problem)
 
 
 def test_what_is_wrong_with_the_query_and_ctrl_c_pass() -> None:

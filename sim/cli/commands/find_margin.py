@@ -118,4 +118,8 @@ def _print(base: "Scenario", trials: "Sequence[MarginTrial]", smallest: float | 
         ),
     )
     found = "none up to 0.2 m" if smallest is None else f"{smallest:.3f} m"
+    rests = [trial for trial in trials if trial.margin == smallest]
+    for trial in rests[:1]:
+        closed = f"; the margin closes {trial.impassable} more worlds, which are left out" if trial.impassable else ""
+        found += f", from {trial.drives} drive{'' if trial.drives == 1 else 's'}{closed}"
     print_line(f"smallest safe margin for {base.robot.name} at up to {base.robot.max_speed:g} m/s: {found}")

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from antdrive.sim.cli import options
-from antdrive.sim.cli.console import print_json, print_line
-from antdrive.sim.cli.exits import FAILED, SUCCEEDED
+from antdrive.sim.cli.console import print_error, print_json, print_line
+from antdrive.sim.cli.exits import FAILED, SUCCEEDED, WRONG_INPUT
 from antdrive.sim.cli.parse import log_at
+from antdrive.worlds.errors import InputError
 
 if TYPE_CHECKING:
     from antdrive.robots.spec import RobotSpec
@@ -38,18 +39,28 @@ def verify(
 
     With --world and --robot, a log must also be about these. In the folder of a run, result.json must agree with the log.
     Exit code 0: every log proves that the robot touched nothing.
+    Exit code 2: one cannot be read; the others are certified all the same.
     """
     task, spec = _expected(world, robot)
-    checked = {str(log_at(path)): _checked(path, task, spec, replay) for path in rollouts}
+    checked: dict[str, dict[str, Any]] = {}
+    for given in rollouts:
+        path = str(given)
+        try:
+            path = str(log_at(given))
+            checked[path] = _checked(given, task, spec, replay)
+        except InputError as error:
+            print_error(str(error))
+            checked[path] = {"certified": False, "problems": [str(error)], "readable": False}
+        else:
+            if not json:
+                print_line(f"{path}: {'; '.join(_sentences(checked[path], world, robot))}")
+                for problem in checked[path]["problems"]:
+                    print_line(f"  {problem}")
     all_certified = all(found["certified"] for found in checked.values())
-    if json:
+    readable = all(found["readable"] for found in checked.values())
+    if json and (readable or len(checked) > 1):
         print_json({"certified": all_certified, "rollouts": checked})
-    else:
-        for path, found in checked.items():
-            print_line(f"{path}: {'; '.join(_sentences(found, world, robot))}")
-            for problem in found["problems"]:
-                print_line(f"  {problem}")
-    return SUCCEEDED if all_certified else FAILED
+    return WRONG_INPUT if not readable else SUCCEEDED if all_certified else FAILED
 
 
 def _expected(world: str | None, robot: str | None) -> tuple[Task | None, RobotSpec | None]:
@@ -91,6 +102,7 @@ def _checked(path: Path, task: Task | None, robot: RobotSpec | None, again: bool
         sentence = f"NOT verified; the log alone is {sentence}"
     return {
         **found,
+        "readable": True,
         "certified": not problems,
         "problems": problems,
         "hashes": hashes_of(rollout.record),

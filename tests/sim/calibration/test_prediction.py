@@ -88,10 +88,26 @@ def test_the_least_margin_is_found_where_the_loss_grows_with_it(base: float, gro
 
 
 def test_where_no_margin_is_enough_the_error_says_so() -> None:
-    with pytest.raises(FieldError, match=r"margin: auto: no margin up to 0.5 m leaves 0.01 m; lower the noise"):
+    with pytest.raises(
+        FieldError, match=r"margin: auto: none of the 12 margins tried, up to 0.25 m, leaves 0.01 m; lower"
+    ):
         least_margin(lambda margin: spread(margin), "k", 0.2)
     with pytest.raises(FieldError, match=r"no margin up to 4 m"):
         least_margin(lambda margin: spread(math.inf), "k", 2.0)
+
+
+def test_the_error_names_no_margin_that_was_not_tried() -> None:
+    """Each try lacks a millimetre only, so that the next is little more, and the rounds are over long before 0.5 m."""
+    tried: list[float] = []
+
+    def losses_with(margin: float) -> Sequence[Loss]:
+        tried.append(margin)
+        return [Loss(margin - RESERVE + 0.001, margin - RESERVE + 0.001)] * 80
+
+    with pytest.raises(FieldError, match=r"none of the 12 margins tried, up to 0\.\d+ m, leaves 0.01 m") as found:
+        least_margin(losses_with, "k", 0.2)
+    assert f"up to {max(tried):g} m" in str(found.value)
+    assert max(tried) < 0.2
 
 
 def test_a_larger_robot_may_get_a_larger_margin() -> None:

@@ -125,4 +125,6 @@ def test_where_no_margin_is_enough_the_option_is_named(
 ) -> None:
     monkeypatch.setattr(choice, "_driving", lambda *_: lambda margin: [Loss(margin, margin)] * choice.DRIVES)
     monkeypatch.setattr("antdrive.sim.cli.calibrating.print_error", lambda text: None)
-    assert "--margin: auto: no margin up to 0.5 m leaves 0.01 m" in refused("plan", small, "--margin", "auto")
+    assert "--margin: auto: none of the 12 margins tried, up to 0.25 m, leaves 0.01 m" in refused(
+        "plan", small, "--margin", "auto"
+    )

@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 
 from antdrive.planners import (
     PLANNERS,
+    AgentStats,
+    Capabilities,
     PlannerError,
     PlanResult,
     PlanStatus,
@@ -338,16 +340,80 @@ class WrongLater:
         return dataclasses.replace(right, cells=np.delete(right.cells, 2, axis=0))
 
 
-def test_a_wrong_plan_on_the_way_is_no_new_route() -> None:
-    planner = WrongLater(raises=False)
-    task = dataclasses.replace(TASK, world=dataclasses.replace(HALL, movers=(PLUG,)))
-    result = run(Scenario.of(task, planner, time_limit=10.0))
+MOVING = dataclasses.replace(TASK, world=dataclasses.replace(HALL, movers=(PLUG,)))
+
+
+def ends_as_wrong(result: Run, words: str) -> bool:
+    """Whether a drive ends with a wrong plan on the way, which its log tells and whose rows contradict nothing."""
     assert result.rollout is not None
-    assert planner.calls > 1
-    assert not any(replan.solved for replan in result.rollout.record.replans)
+    assert result.certificate is not None
+    assert result.certificate.problems == ()
+    last = result.rollout.record.replans[-1]
+    assert not last.solved
+    assert last.t == pytest.approx(result.rollout.t[-1], abs=1 / 60)
+    return result.outcome is Outcome.INVALID_PLAN and words in result.reason
+
+
+def test_a_wrong_plan_on_the_way_ends_the_drive() -> None:
+    planner = WrongLater(raises=False)
+    result = run(Scenario.of(MOVING, planner, time_limit=10.0))
+    assert planner.calls == 2
+    assert ends_as_wrong(result, "on the way, at t = ")
+    assert "cells: step 1 from" in result.reason
+    assert result.rollout is not None
+    before = dataclasses.replace(result.rollout, record=dataclasses.replace(result.rollout.record, replans=()))
+    assert any("ends a run before the robot drives" in problem for problem in certify(before).problems)
+
+
+class Deciding:
+    """A planner that decides cell by cell, or replans by itself, and does it wrong."""
+
+    def __init__(self, what: Any, *, cell_by_cell: bool) -> None:
+        self.capabilities = Capabilities(cell_by_cell=cell_by_cell, own_replanner=not cell_by_cell)
+        self.what, self.stats, self.cell, self.arrived, self.note = what, AgentStats(), (0, 0), False, ""
+
+    def plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        self.cell = query.start
+        return PLANNERS["astar"].plan(query, rng)
+
+    def agent(self, query: Query, rng: np.random.Generator) -> "Deciding":
+        return self
+
+    replanner = agent
+
+    def step(self, blocked: Any) -> Any:
+        if isinstance(self.what, BaseException):
+            raise self.what
+        return self.what
+
+    result = block = clear = move = lambda self, cells=None: self.step(cells)
+
+
+@pytest.mark.parametrize("step", [(0, 0), (3, 999), 5, ("a", 1)], ids=str)
+def test_a_step_that_is_no_allowed_move_ends_the_drive(step: Any) -> None:
+    assert ends_as_wrong(run(Scenario.of(MOVING, Deciding(step, cell_by_cell=True), time_limit=10.0)), "step: ")
+
+
+@pytest.mark.parametrize("cell_by_cell", [True, False], ids=["agent", "replanner"])
+@pytest.mark.parametrize("error", [IndexError("mine"), SystemExit(0)], ids=["raises", "exits"])
+def test_what_a_planners_own_replanner_raises_is_its_error(error: BaseException, cell_by_cell: bool) -> None:
+    scenario = Scenario.of(MOVING, Deciding(error, cell_by_cell=cell_by_cell), time_limit=10.0)
+    with pytest.raises(PlannerError, match=rf"planner Deciding raised {type(error).__name__}.*\(test_replanning.py:"):
+        run(scenario)
+
+
+def test_an_answer_of_its_own_replanner_that_is_none_is_its_error() -> None:
+    with pytest.raises(PlannerError, match="planner Deciding returned 5 where a PlanResult is due"):
+        run(Scenario.of(MOVING, Deciding(5, cell_by_cell=False), time_limit=10.0))
+
+
+def test_capabilities_of_another_type_are_the_planners_error() -> None:
+    planner = Deciding(None, cell_by_cell=True)
+    planner.capabilities = "all"  # type: ignore[assignment]
+    with pytest.raises(PlannerError, match="planner Deciding declares 'all' where Capabilities are due"):
+        run(Scenario.of(MOVING, planner))
 
 
 def test_a_planner_that_raises_on_the_way_is_named() -> None:
-    task = dataclasses.replace(TASK, world=dataclasses.replace(HALL, movers=(PLUG,)))
     with pytest.raises(PlannerError, match=r"planner WrongLater raised KeyError: 'later' \(test_replanning.py:"):
-        run(Scenario.of(task, WrongLater(raises=True)))
+        run(Scenario.of(MOVING, WrongLater(raises=True)))

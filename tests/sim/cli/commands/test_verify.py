@@ -111,3 +111,21 @@ def test_the_folder_of_a_run_is_verified_with_its_result(antdrive: Call, small_r
         assert antdrive("verify", folder)[0] == code
     assert "result.json: noise: differs from the log, which says 0.0" in antdrive("verify", folder)[1]
     assert antdrive("verify", folder / "rollout.npz")[0] == 0, "the log alone is genuine"
+
+
+def test_a_log_that_cannot_be_read_hides_no_other_verdict(antdrive: Call, log: Path, tmp_path: Path) -> None:
+    (tmp_path / "broken.npz").write_text("no log")
+    words = ("verify", "missing.npz", log, tmp_path / "broken.npz", log.parent / "rollout.npz")
+    code, out, err = antdrive(*words)
+    assert code == 2
+    assert f"{log}: certified collision-free" in out
+    assert [line.split(":")[0] for line in err.splitlines()] == ["antdrive", "antdrive"]
+    assert "missing.npz: no such file" in err
+    code, out, _ = antdrive(*words, "--json")
+    told = json.loads(out)
+    assert (code, told["certified"]) == (2, False)
+    assert {Path(path).name: found["certified"] for path, found in told["rollouts"].items()} == {
+        "missing.npz": False,
+        "rollout.npz": True,
+        "broken.npz": False,
+    }

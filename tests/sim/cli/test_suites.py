@@ -1,0 +1,26 @@
+"""What `antdrive check` and `antdrive accept` share."""
+
+from typing import Any
+
+import pytest
+
+from antdrive.sim.cli import suites
+
+
+@pytest.mark.parametrize(("cores", "asked", "started"), [(3, None, 3), (3, 2, 2), (64, None, 10)])
+def test_a_process_for_each_core_that_may_be_used(
+    cores: int, asked: int | None, started: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """joblib counts those of a container; the operating system says how many its host has."""
+    found: list[int] = []
+
+    def check_cases(cases: list[int], *, jobs: int, **others: Any) -> list[Any]:
+        found.append(jobs)
+        return []
+
+    monkeypatch.setattr("joblib.cpu_count", lambda: cores)
+    monkeypatch.setattr("antdrive.sim.regression.select", lambda words, only: list(range(10)))
+    monkeypatch.setattr("antdrive.sim.regression.check_cases", check_cases)
+    monkeypatch.setattr(suites, "compile_once", lambda: None)
+    assert suites.drive_suites(["a"], None, asked, update="nothing", results=None) == []  # type: ignore[arg-type]
+    assert found == [started]
