@@ -196,7 +196,7 @@ def _legs(mover: MoverMotion, start: float, end: float, inflate: float) -> Float
     from antdrive.planners.graph import _kernels_sipp as kernels
 
     t, xy, jump = _samples(mover, start, end)
-    first, last, count = kernels.legs_within(t, xy, jump, TOLERANCE)
+    first, last, count = kernels.legs_within(t, np.ascontiguousarray(xy), jump, TOLERANCE)
     first, last = first[:count], last[:count]
     span = t[last] - t[first]
     velocity = (xy[last] - xy[first]) / span[:, np.newaxis]

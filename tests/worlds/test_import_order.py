@@ -8,7 +8,7 @@ import pytest
 WORLDS = Path(__file__).parents[2] / "worlds"
 ORDER = [
     "errors", "types", "limits", "plane", "drawing", "kernel_cache", "_kernels_compiler", "_kernels",
-    "movers", "motions", "world", "geometry", "grid", "route", "trajectories",
+    "movers", "motions", "world", "reuse", "geometry", "grid", "ends", "route", "trajectories",
     "files.atomic", "files.reading", "files.document", "files.checks", "files.world_file",
     "formats._kernels_cover", "formats.checks", "formats.cellmap", "formats.xml", "formats.sdf_models", "formats.sdf",
     "formats.barn", "formats.dynabarn", "formats.movingai", "formats.map_server", "formats.importing",

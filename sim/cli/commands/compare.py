@@ -97,7 +97,7 @@ def compare(
     where: Where = None,
     json: options.Json = False,
 ) -> int:
-    """Drive worlds with several planners, or compare the planners of a campaign's folder.
+    """Compare planners: drive worlds with each, or read a campaign.
 
     The planners are paired by world and seed. Figures and film show the first of them. Exit code 0: every run succeeded.
     A campaign's folder, made by `antdrive sweep`: success with intervals, and tests of every pair.
