@@ -13,7 +13,7 @@ from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import Run
-from antdrive.sim.regression.demands import Bound
+from antdrive.sim.regression.demands import WALL_CLOCK, Bound
 from antdrive.worlds.errors import FieldError
 from antdrive.worlds.files.checks import suggest
 
@@ -38,6 +38,8 @@ def parse_bound(text: str) -> Bound:
         raise FieldError("--while", f"write METRIC < NUMBER, with <, <=, >, >= or ==; got {text!r:.60}")
     if found[1] not in METRICS:
         raise FieldError("--while", f"unknown metric {found[1]!r:.60}; {suggest(found[1], METRICS)}")
+    if found[1] in WALL_CLOCK:
+        raise FieldError("--while", f"{found[1]} depends on the machine and its load; a bound on it does not repeat")
     return Bound(found[1], found[2], float(found[3]))
 
 
