@@ -122,7 +122,7 @@ class DriveFixture:
             update=self._update,
             commands=(shlex.join(["pytest", self._address]),),
             accept=shlex.join(["pytest", self._address, "--drive-update"]),
-            folder=self._results.of(self._file.stem, whole) if self._results else None,
+            folder=self._results.of(self._file, whole) if self._results else None,
             results=self._results,
         )
         self._report(result)
