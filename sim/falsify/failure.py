@@ -7,12 +7,14 @@ import math
 import re
 from dataclasses import dataclass
 
+from antdrive.planners import PlannerError
 from antdrive.sim.log.contacts import touches_of
 from antdrive.sim.log.margin import budget
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import Run
+from antdrive.sim.regression.checking import RAISED
 from antdrive.sim.regression.demands import WALL_CLOCK, Bound
 from antdrive.worlds.errors import FieldError
 from antdrive.worlds.files.checks import suggest
@@ -49,7 +51,7 @@ class Failure:
 
     Attributes:
         outcome: the key of the run's outcome, such as collided; succeeded for a drive that ends at the goal but is
-            not certified or crosses a bound
+            not certified or crosses a bound; planner_error where the planner raised something
         touched: what was touched first: cylinder, unseen cylinder, mover, wall, or nothing
         cause: for contacts with cylinders that the planner knew of and with walls, the cause that took most of the
             margin until then (a key of `antdrive.sim.log.margin.CAUSES`); else what the run's reason says, without its
@@ -90,6 +92,11 @@ def failure_of(run: Run, bound: Bound | None = None) -> Failure | None:
     if rollout is not None and touched in (CYLINDER, WALL):
         return Failure(run.outcome.key, touched, _cause_of_contact(rollout))
     return Failure(run.outcome.key, touched, "" if touched != NOTHING else without_numbers(run.reason))
+
+
+def failure_of_planner(error: PlannerError) -> Failure:
+    """The failure of a run that ended because the planner raised something."""
+    return Failure(RAISED, NOTHING, without_numbers(str(error)))
 
 
 def touched_first(rollout: Rollout) -> str:

@@ -13,7 +13,7 @@ from typing import Any
 
 from antdrive.planners import PlannerError
 from antdrive.planners.anyangle.passage import MOST_OBSTACLES
-from antdrive.sim.falsify.failure import Failure, failure_of
+from antdrive.sim.falsify.failure import Failure, failure_of, failure_of_planner
 from antdrive.sim.falsify.space import feasible
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import settings_of
@@ -46,7 +46,9 @@ def failure_in(scenario: Scenario, bound: Bound | None = None, *, drive: bool = 
             return failure_of(run(scenario), bound)
         grid, answer = plan(scenario)
         return None if answer.solved else failure_of(Run(scenario, grid, answer), bound)
-    except (FieldError, InputError, PlannerError):  # such as a wanderer without a free cell in a smaller world
+    except PlannerError as error:
+        return None if bound is not None else failure_of_planner(error)
+    except (FieldError, InputError):  # such as a wanderer without a free cell in a smaller world
         return None
 
 
@@ -126,7 +128,10 @@ class Trials:
         """The drive of a scenario that is known to fail; None if it fails before it drives."""
         key = _digest(changeable(scenario))
         if self._latest is None or self._latest[0] != key:
-            self._latest = key, run(scenario).rollout
+            try:
+                self._latest = key, run(scenario).rollout
+            except PlannerError:  # the failure itself
+                self._latest = key, None
         return self._latest[1]
 
     def forget(self) -> None:
