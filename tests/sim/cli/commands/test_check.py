@@ -194,6 +194,10 @@ def test_ci_gets_junit_a_summary_and_unused_baselines(
     [
         (["check", "b.drive.yaml"], "b.drive.yaml: cannot be read (No such file or directory)"),
         (["check", "a.drive.yaml::x"], "a.drive.yaml: no test 'x'; choose from clear[0], clear[1], closed[0]"),
+        (
+            ["check", "a.drive.yaml::"],
+            "a.drive.yaml::: names no test; write a.drive.yaml for all, or a.drive.yaml::SCENARIO",
+        ),
         (["check", "a.drive.yaml", "--film", "often"], "--film often: unknown; choose from never, failed, always"),
         (["check", "small.yaml"], "small.yaml: is no suite; the name of a suite ends in .drive.yaml"),
     ],
