@@ -257,17 +257,8 @@ def check_run(
     else:
         judgement = judge(run, demands, baseline)
     details = () if judgement.passed else tuple(explain(run, dataclasses.replace(judgement, faults=()), baseline))
-    files: dict[str, str] = {}
-    unfilmed = False
-    try:
-        files, unfilmed = _written(run, judgement, baseline, folder, results, commands)
-    except (
-        Exception
-    ) as error:  # a picture of a planner's odd answer may fail in many ways, and must not hide the faults
-        if judgement.passed:
-            raise
-        said = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
-        details = (*details, f"results: {said}")
+    files, unfilmed, problem = _written_or_why(run, judgement, baseline, folder, results, commands)
+    details = (*details, *filter(None, [problem]))
     return CheckResult(
         address=address,
         passed=judgement.passed,
@@ -284,6 +275,24 @@ def check_run(
         digest=run.rollout.drive_digest if run.rollout is not None else "",
         wall_s=_wall(run) + time.perf_counter() - started,
     )
+
+
+def _written_or_why(
+    run: Run,
+    judgement: Judgement,
+    baseline: Baseline | None,
+    folder: Path | None,
+    results: Results | None,
+    commands: Sequence[str],
+) -> tuple[dict[str, str], bool, str]:
+    """What `_written` says, and why nothing could be written about a failed test, which must not hide its faults."""
+    try:
+        return *_written(run, judgement, baseline, folder, results, commands), ""
+    except Exception as error:  # a picture of a planner's odd answer may fail in many ways
+        if judgement.passed:
+            raise
+        said = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
+        return {}, False, f"results: {said}"
 
 
 def _written(
