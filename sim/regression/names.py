@@ -97,6 +97,12 @@ def planner_of(case: SuiteCase) -> tuple[Planner, str]:
         raise (error if text.startswith(case.document.source) else _at_planner(case, text)) from None
 
 
+def is_importable_elsewhere(planner: Planner) -> bool:
+    """Whether other processes can import a planner's class; those of files and modules beside a suite only this one can."""
+    home = type(planner).__module__
+    return not home.startswith(FROM_FILE) and home not in _OWNERS
+
+
 def _path(case: SuiteCase, key: str, name: str, known: Mapping[str, Path]) -> Path:
     """A file of the catalogue, or one relative to the suite; the catalogue's names come first."""
     if name in known:

@@ -15,6 +15,7 @@ from antdrive.sim.calibration.prediction import Calibration
 from antdrive.sim.calibration.trial import Conditions
 from antdrive.sim.cli.commands.run import run as command
 from antdrive.sim.regression import Baseline, SuiteCase, check_case, load_suite, scenario_of, select
+from antdrive.sim.regression.names import is_importable_elsewhere
 from antdrive.sim.regression.scenarios import run_command
 from antdrive.sim.regression.suite import ScenarioEntry
 from antdrive.worlds.errors import InputError
@@ -300,6 +301,15 @@ def test_suites_of_different_folders_have_modules_of_their_own(tmp_path: Path) -
             planner = scenario_of(only(place, f"world: empty, planner: {{{source}, name: Mine}}")).planner
             assert planner.of == folder  # type: ignore[attr-defined]
             assert made.setdefault((folder, source), type(planner)) is type(planner)
+
+
+def test_planners_beside_a_suite_stay_in_their_process(tmp_path: Path) -> None:
+    (tmp_path / "beside_it.py").write_text(
+        "from antdrive.planners.graph.search import AStar\nclass Mine(AStar):\n    pass\n"
+    )
+    for words in ("{module: beside_it, name: Mine}", "{file: beside_it.py, name: Mine}"):
+        assert not is_importable_elsewhere(scenario_of(only(tmp_path, f"world: empty, planner: {words}")).planner)
+    assert is_importable_elsewhere(scenario_of(only(tmp_path, "world: empty, planner: astar")).planner)
 
 
 def test_a_module_that_is_taken_from_elsewhere_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
