@@ -91,7 +91,7 @@ def drive_suites(
         if case.entry.margin == "auto":  # chosen once and with a bar, not by each process
             with suppress(InputError, FieldError):  # is told as the fault of the test
                 scenario_of(case, with_chosen_margin)
-    processes = min(jobs or joblib.cpu_count(), len(cases))
+    processes = min(jobs or int(joblib.cpu_count()), len(cases))  # of a container, not of its host
     found = []
     with bar("driving") as progress:
         for result in check_cases(cases, jobs=processes, update=update, results=results):
