@@ -168,3 +168,14 @@ def test_the_door_lists_what_it_offers() -> None:
 
 def test_a_robot_may_be_given_as_an_object(turtlebot: RobotSpec, drive: DriveFixture) -> None:
     assert drive.run("empty", load_planner("astar"), turtlebot).succeeded
+
+
+@given(worlds(obstacles=2, radius=(0.004, 0.1)))
+@settings(max_examples=30)
+def test_radii_keep_to_their_range_in_whole_centimetres(world: World) -> None:
+    assert all(0.01 <= disc.radius <= 0.1 for disc in world.obstacles)
+
+
+def test_a_range_without_a_whole_centimetre_is_refused() -> None:
+    with pytest.raises(InputError, match=r"no whole centimetre lies between 0\.004 m and 0\.006 m"):
+        worlds(radius=(0.004, 0.006))
