@@ -100,6 +100,11 @@ def main() -> None:
     except _USAGE_ERROR as error:
         _print_usage_error(error)
         code = WRONG_INPUT
+    except SystemExit as error:
+        if error.code == TERMINATED:
+            raise
+        print_error("internal error: what was called ended the program; a planner must not call exit()")
+        code = FAULT
     except Exception as error:
         _print_fault(error, debug=DEBUG in sys.argv[1:])
         code = FAULT

@@ -32,7 +32,8 @@ def bar(label: str) -> Iterator[Callable[[float], None]]:
         TextColumn("{task.percentage:>3.0f} %"),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+    on_top = sys.stdout.isatty()  # else what is printed meanwhile would not reach the file that stdout is
+    with Progress(*columns, console=Console(stderr=True), transient=True, redirect_stdout=on_top) as progress:
         task = progress.add_task(label, total=1.0)
         yield lambda fraction: progress.update(task, completed=fraction)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast, get_args
 
@@ -9,8 +11,8 @@ import typer
 
 from antdrive.sim.cli.compiling import compile_once
 from antdrive.sim.cli.console import bar, print_json, print_line
-from antdrive.sim.cli.exits import FAILED, SUCCEEDED
-from antdrive.worlds.errors import InputError
+from antdrive.sim.cli.exits import FAILED, FAULT, SUCCEEDED, WRONG_INPUT
+from antdrive.worlds.errors import FieldError, InputError
 
 if TYPE_CHECKING:
     from antdrive.sim.regression.artefacts import Films, Results
@@ -57,7 +59,13 @@ def results_in(folder: Path | None, film: str) -> Results:
 
 
 def drive_suites(
-    suites: list[str], only: str | None, jobs: int | None, *, update: Update, results: Results | None
+    suites: list[str],
+    only: str | None,
+    jobs: int | None,
+    *,
+    update: Update,
+    results: Results | None,
+    show: Callable[[CheckResult], None] = lambda result: None,
 ) -> list[CheckResult]:
     """Drive and judge all tests that the words name, with a progress bar.
 
@@ -67,6 +75,7 @@ def drive_suites(
         jobs: number of processes; None: one per core
         update: which baselines to write
         results: where logs, pictures and films are written; None: nowhere
+        show: is called with each result as soon as it is there, in the order of the tests
 
     Raises:
         InputError: there is no such suite or test, or something in a suite is wrong.
@@ -80,47 +89,80 @@ def drive_suites(
     compile_once()
     for case in cases:
         if case.entry.margin == "auto":  # chosen once and with a bar, not by each process
-            scenario_of(case, with_chosen_margin)
+            with suppress(InputError, FieldError):  # is told as the fault of the test
+                scenario_of(case, with_chosen_margin)
     processes = min(jobs or int(joblib.cpu_count()), len(cases))  # of a container, not of its host
     found = []
     with bar("driving") as progress:
         for result in check_cases(cases, jobs=processes, update=update, results=results):
             found.append(result)
+            show(result)
             progress(len(found) / len(cases))
     return found
 
 
-def print_results(results: list[CheckResult], json: bool, words: str) -> int:
-    """Print what came out; the exit code.
+def print_result(result: CheckResult, words: str) -> None:
+    """Print what came out of one test.
+
+    Args:
+        result: what came out
+        words: what is said about a test that passed and changed no baseline
+    """
+    if result.passed:
+        print_line(f"{result.address}: {result.accepted or words}")
+        _print_lines(result.gains)
+    else:
+        print_line(f"{result.address}: FAILED")
+        _print_lines(result.message.splitlines())
+
+
+def unused_baselines(suites: list[str]) -> list[str]:
+    """The baselines beside the suites that words name which belong to no test.
+
+    Args:
+        suites: the words
+    """
+    from antdrive.sim.regression import load_suite, select
+    from antdrive.sim.regression.suite import shown_path
+    from antdrive.sim.regression.unused import unused_of_suite
+
+    files = dict.fromkeys(case.suite for case in select(suites))
+    return sorted({shown_path(path) for suite in files for path in unused_of_suite(suite, load_suite(suite))})
+
+
+def print_summary(results: list[CheckResult], json: bool, unused: Sequence[str] = (), *, strict: bool = False) -> int:
+    """Print how many tests passed, and unused baselines; the exit code, which is that of the worst test.
 
     Args:
         results: one for each test
         json: print one JSON object instead of text
-        words: what is said about a test that passed and changed no baseline
+        unused: baselines that belong to no test
+        strict: whether these are a failure
     """
+    from antdrive.sim.regression.checking import FAULT as INTERNAL
+    from antdrive.sim.regression.checking import WRONG_INPUT as WRONG
     from antdrive.sim.regression.summary import films_left_out
 
     failed = [result for result in results if not result.passed]
+    worst = {WRONG: WRONG_INPUT, INTERNAL: FAULT}
+    code = max((worst.get(result.outcome, FAILED) for result in failed), default=SUCCEEDED)
+    if strict and unused:
+        code = max(code, FAILED)
     if json:
-        facts: dict[str, Any] = {"passed": not failed, "tests": [result.as_dict() for result in results]}
-        print_json(facts)
-        return FAILED if failed else SUCCEEDED
-    for result in results:
-        if result.passed:
-            print_line(f"{result.address}: {result.accepted or words}")
-            _print_lines(result.gains)
-        else:
-            print_line(f"{result.address}: FAILED")
-            _print_lines(result.message.splitlines())
+        facts: dict[str, Any] = {"passed": code == SUCCEEDED, "tests": [result.as_dict() for result in results]}
+        print_json({**facts, "unused": list(unused)})
+        return code
     better = sum(bool(result.gains) and result.passed for result in results)
     summary = [f"{len(results) - len(failed)} of {len(results)} passed"]
     if better:
         summary.append(f"{better} better than the baseline; antdrive accept renews it")
+    for path in unused:
+        print_line(f"{'FAILED: ' if strict else ''}unused baseline: {path}; remove it")
     print_line("; ".join(summary))
     unfilmed = sum(result.unfilmed for result in results)
     if unfilmed:
         print_line(films_left_out(unfilmed, "--film always"))
-    return FAILED if failed else SUCCEEDED
+    return code
 
 
 def _print_lines(lines: Any) -> None:

@@ -7,13 +7,15 @@ import math
 import re
 from dataclasses import dataclass
 
+from antdrive.planners import PlannerError
 from antdrive.sim.log.contacts import touches_of
 from antdrive.sim.log.margin import budget
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import Run
-from antdrive.sim.regression.demands import Bound
+from antdrive.sim.regression.checking import RAISED
+from antdrive.sim.regression.demands import WALL_CLOCK, Bound
 from antdrive.worlds.errors import FieldError
 from antdrive.worlds.files.checks import suggest
 
@@ -38,6 +40,8 @@ def parse_bound(text: str) -> Bound:
         raise FieldError("--while", f"write METRIC < NUMBER, with <, <=, >, >= or ==; got {text!r:.60}")
     if found[1] not in METRICS:
         raise FieldError("--while", f"unknown metric {found[1]!r:.60}; {suggest(found[1], METRICS)}")
+    if found[1] in WALL_CLOCK:
+        raise FieldError("--while", f"{found[1]} depends on the machine and its load; a bound on it does not repeat")
     return Bound(found[1], found[2], float(found[3]))
 
 
@@ -47,7 +51,7 @@ class Failure:
 
     Attributes:
         outcome: the key of the run's outcome, such as collided; succeeded for a drive that ends at the goal but is
-            not certified or crosses a bound
+            not certified or crosses a bound; planner_error where the planner raised something
         touched: what was touched first: cylinder, unseen cylinder, mover, wall, or nothing
         cause: for contacts with cylinders that the planner knew of and with walls, the cause that took most of the
             margin until then (a key of `antdrive.sim.log.margin.CAUSES`); else what the run's reason says, without its
@@ -88,6 +92,11 @@ def failure_of(run: Run, bound: Bound | None = None) -> Failure | None:
     if rollout is not None and touched in (CYLINDER, WALL):
         return Failure(run.outcome.key, touched, _cause_of_contact(rollout))
     return Failure(run.outcome.key, touched, "" if touched != NOTHING else without_numbers(run.reason))
+
+
+def failure_of_planner(error: PlannerError) -> Failure:
+    """The failure of a run that ended because the planner raised something."""
+    return Failure(RAISED, NOTHING, without_numbers(str(error)))
 
 
 def touched_first(rollout: Rollout) -> str:

@@ -12,7 +12,7 @@ from typing import Any
 
 import yaml
 
-from antdrive.planners import list_planners
+from antdrive.planners import PlannerError, list_planners
 from antdrive.robots import Avoidance, PurePursuit, RobotSpec, list_robots, load_robot
 from antdrive.sim.driving.replanning import ReplanPolicy
 from antdrive.sim.log.outcome import Outcome
@@ -32,14 +32,14 @@ class Handover:
 
     Attributes:
         name: the scenario's name in the suite, and that of its world file
-        run: the run that failed
+        run: the run that failed; the scenario alone where the planner raised something
         bound: the metric's bound that it crosses, if that is its failure
         note: what people should know about it; may be empty
         planner: the planner in the words of the suite, such as {file: ../mine.py, name: Mine}; None: by its name
     """
 
     name: str
-    run: Run
+    run: Run | Scenario
     bound: Bound | None = None
     note: str = ""
     planner: str | Mapping[str, Any] | None = None
@@ -48,7 +48,8 @@ class Handover:
 def write_suite(path: Path, handovers: Sequence[Handover]) -> Path:
     """Write a suite, and beside it the worlds, and the robots that are not in the catalogue.
 
-    The suite has no baselines: it holds as long as the scenarios fail as they did.
+    The suite has no baselines: it holds as long as the scenarios fail as they did. A scenario whose planner raises something
+    is expected to succeed, because no outcome says so; its test fails until the planner is mended.
 
     Args:
         path: the suite's file; its name ends in .drive.yaml
@@ -62,7 +63,8 @@ def write_suite(path: Path, handovers: Sequence[Handover]) -> Path:
     """
     entries = {}
     for handover in handovers:
-        scenario = handover.run.scenario
+        failed = handover.run
+        scenario = failed.scenario if isinstance(failed, Run) else failed
         world = Path("worlds") / f"{handover.name}.yaml"
         save_task(scenario.task, path.parent / world)
         entries[handover.name] = {
@@ -70,7 +72,7 @@ def write_suite(path: Path, handovers: Sequence[Handover]) -> Path:
             "world": str(world),
             **suite_entry(scenario, _robot(scenario.robot, path.parent)),
             **({"planner": handover.planner} if handover.planner else {}),
-            "expect": expectation(handover.run, handover.bound),
+            **({"expect": expectation(failed, handover.bound)} if isinstance(failed, Run) else {}),
             "baseline": False,
         }
     with written_whole(path) as part:
@@ -165,7 +167,16 @@ def run_elsewhere(scenarios: Sequence[Scenario]) -> list[str]:
 
 
 def _fingerprint(scenario: Scenario) -> str:
-    return fingerprint_of(run(scenario))
+    done = run_if_planned(scenario)
+    return done if isinstance(done, str) else fingerprint_of(done)
+
+
+def run_if_planned(scenario: Scenario) -> Run | str:
+    """A scenario's run; where the planner raises something, what it raises."""
+    try:
+        return run(scenario)
+    except PlannerError as error:
+        return str(error)
 
 
 def _planner(scenario: Scenario) -> str | dict[str, Any]:

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from antdrive.planners import PlannerError
 from antdrive.sim.falsify.diversity import driven_line, is_new
-from antdrive.sim.falsify.failure import Failure, failure_of
+from antdrive.sim.falsify.failure import Failure, failure_of, failure_of_planner
 from antdrive.sim.falsify.search import METHODS
 from antdrive.sim.falsify.space import WorldSpace, feasible
 from antdrive.sim.log.outcome import Outcome
@@ -73,7 +74,7 @@ def find_failures(
 
     Only worlds are tried in which the exact shortest path keeps the clearance that the set-up claims: the robot's radius and
     the margin. A run that finds no path on its grid counts as a failure only if a path exists with a cell's side more
-    clearance than that.
+    clearance than that. A planner that raises something has failed, too.
 
     Args:
         setup: planner, robot and settings; its own world does not matter
@@ -85,7 +86,6 @@ def find_failures(
 
     Raises:
         FieldError: an unknown method, or a number of cylinders or runs that is out of range.
-        PlannerError: the planner raised something.
     """
     if method not in METHODS:
         raise FieldError("method", f"unknown {method!r:.40}; choose from {', '.join(METHODS)}")
@@ -97,10 +97,15 @@ def find_failures(
     try:
         for number in range(1, budget + 1):
             numbered = dataclasses.replace(setup, seed=number)
-            done = run(_next_world(space, rng, method, numbered, f"falsify-{seed}-{number}"))
-            failure = _failure(done)
-            if failure is not None:
-                findings.append(_finding(done, failure, number, findings))
+            tried = _next_world(space, rng, method, numbered, f"falsify-{seed}-{number}")
+            try:
+                done = run(tried)
+            except PlannerError as error:
+                findings.append(_undriven(tried, failure_of_planner(error), number, findings))
+            else:
+                failure = _failure(done)
+                if failure is not None:
+                    findings.append(_finding(done, failure, number, findings))
             if progress is not None:
                 progress(number, sum(finding.is_new for finding in findings))
     except KeyboardInterrupt:
@@ -139,9 +144,14 @@ def _failure(done: Run) -> Failure | None:
     return failure if feasible(scenario.task, scenario.inflate + cell) else None
 
 
+def _undriven(scenario: Scenario, failure: Failure, number: int, known: list[Finding]) -> Finding:
+    is_known = any(finding.failure == failure for finding in known)
+    return Finding(scenario, failure, np.empty((0, 2)), number, not is_known)
+
+
 def _finding(done: Run, failure: Failure, number: int, known: list[Finding]) -> Finding:
     line = np.empty((0, 2)) if done.rollout is None else driven_line(done.rollout)
-    alike = [finding.line for finding in known if finding.failure == failure]
     if not len(line):
-        return Finding(done.scenario, failure, line, number, not alike)
+        return _undriven(done.scenario, failure, number, known)
+    alike = [finding.line for finding in known if finding.failure == failure]
     return Finding(done.scenario, failure, line, number, is_new(line, alike, done.scenario.robot.radius))

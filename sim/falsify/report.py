@@ -8,11 +8,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from antdrive.sim.falsify.failure import failure_of
-from antdrive.sim.falsify.handover import Handover, fingerprint_of, run_elsewhere, suite_elsewhere, write_suite
+from antdrive.sim.falsify.failure import failure_of, without_numbers
+from antdrive.sim.falsify.handover import (
+    Handover,
+    fingerprint_of,
+    run_elsewhere,
+    run_if_planned,
+    suite_elsewhere,
+    write_suite,
+)
 from antdrive.sim.falsify.hunt import Finding, Hunt
 from antdrive.sim.falsify.shrink import shrink
-from antdrive.sim.pipeline import Run, run
+from antdrive.sim.pipeline import Run
 from antdrive.sim.scenario import Scenario
 
 SUITE = "failures.drive.yaml"
@@ -25,15 +32,20 @@ class Reported:
     Attributes:
         name: its name in the suite, and of its world
         finding: the failure as it was found
-        run: the run of the small scenario
+        run: the run of the small scenario; that scenario alone where the planner raised something
         repeats: whether the found scenario, and the small one as it is read from its files, gave the same bits in another
             process
     """
 
     name: str
     finding: Finding
-    run: Run
+    run: Run | Scenario
     repeats: bool
+
+    @property
+    def scenario(self) -> Scenario:
+        """The small scenario."""
+        return self.run.scenario if isinstance(self.run, Run) else self.run
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values, for JSON."""
@@ -43,7 +55,7 @@ class Reported:
             **dataclasses.asdict(self.finding.failure),
             "repeats": self.repeats,
             "obstacles_found": len(self.finding.scenario.task.world.obstacles),
-            "obstacles": len(self.run.scenario.task.world.obstacles),
+            "obstacles": len(self.scenario.task.world.obstacles),
         }
 
 
@@ -52,7 +64,7 @@ def report(
 ) -> list[Reported]:
     """Shrink the different failures of a search, write them, and run what was written again in another process.
 
-    A suite and the worlds are written.
+    A suite and the worlds are written. Ctrl-C ends the shrinking; what is not shrunk by then is handed over as it was found.
 
     Args:
         hunt: the search
@@ -63,12 +75,17 @@ def report(
     Raises:
         InputError: a file cannot be written.
     """
-    small: list[Run] = []
+    small: list[Run | Scenario] = []
     for k, finding in enumerate(hunt.distinct):
         name, scenario = _name(k), finding.scenario
         if seconds > 0:
-            scenario = shrink(scenario, seconds=seconds, journal=folder / "journals" / f"{name}.json").scenario
-        small.append(run(_named(scenario, name)))
+            try:
+                scenario = shrink(scenario, seconds=seconds, journal=folder / "journals" / f"{name}.json").scenario
+            except KeyboardInterrupt:
+                seconds = 0.0
+        named = _named(scenario, name)
+        done = run_if_planned(named)
+        small.append(named if isinstance(done, str) else done)
         if progress is not None:
             progress((k + 1) / (len(hunt.distinct) + 1))
     suite = _write(small, hunt.distinct, folder)
@@ -83,14 +100,17 @@ def _name(index: int) -> str:
     return f"failure-{index + 1}"
 
 
-def _repeats(finding: Finding, small: Run, found_elsewhere: str, small_elsewhere: str) -> bool:
+def _repeats(finding: Finding, small: Run | Scenario, found_elsewhere: str, small_elsewhere: str) -> bool:
     """Whether a failure and its small scenario gave the same bits in another process, and fail in the same way."""
-    again = run(finding.scenario)
+    again = run_if_planned(finding.scenario)
+    if isinstance(small, Scenario) or isinstance(again, str):  # the planner raised something
+        masked = {without_numbers(text) for text in (str(again), found_elsewhere, small_elsewhere)}
+        return masked == {finding.failure.cause}
     same = (found_elsewhere, small_elsewhere) == (fingerprint_of(again), fingerprint_of(small))
     return same and failure_of(again) == failure_of(small) == finding.failure
 
 
-def _write(small: Sequence[Run], findings: Sequence[Finding], folder: Path) -> Path:
+def _write(small: Sequence[Run | Scenario], findings: Sequence[Finding], folder: Path) -> Path:
     """Write the suite and the worlds of failures; the suite's path."""
     pairs = enumerate(zip(small, findings, strict=True))
     handovers = [Handover(_name(k), done, note=finding.failure.sentence) for k, (done, finding) in pairs]

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import TypeAlias
 
-from antdrive.planners import smooth
+from antdrive.planners import PlannerError, smooth
 from antdrive.robots import NoiseModel, PursuitState, Twist, footprint_clearance
 from antdrive.sim.pipeline import plan
 from antdrive.sim.scenario import Scenario
@@ -53,12 +53,16 @@ METHODS: Mapping[str, Callable[[Draw], Scenario | None]] = MappingProxyType(
 def rehearsed_clearance(s: Scenario) -> float:
     """The least clearance of a scenario's drive if its wheels did exactly as told, without movers [m].
 
-    The noise is that of the real run; infinite where no path is planned.
+    The noise is that of the real run; infinite where no path is planned, minus infinity where the planner raises
+    something: that is a failure as well.
 
     Args:
         s: the scenario
     """
-    grid, answer = plan(s)
+    try:
+        grid, answer = plan(s)
+    except PlannerError:
+        return -math.inf
     if not answer.solved:
         return math.inf
     world, period = s.task.world, 1 / s.control_hz

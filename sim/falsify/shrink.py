@@ -6,7 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from antdrive.sim.falsify.failure import Failure, failure_of
+from antdrive.planners import PlannerError
+from antdrive.sim.falsify.failure import Failure, failure_of, failure_of_planner
 from antdrive.sim.falsify.passes import PASSES
 from antdrive.sim.falsify.trials import OutOfTimeError, Trials, changeable, failure_in, identity_of, room_in
 from antdrive.sim.pipeline import run
@@ -36,6 +37,11 @@ class Shrunk:
     complete: bool
     trials: int
     recalled: int
+
+    @property
+    def smaller(self) -> bool:
+        """Whether anything was changed."""
+        return changeable(self.original) != changeable(self.scenario)
 
     @property
     def summary(self) -> str:
@@ -80,8 +86,14 @@ def shrink(
 
     Raises:
         InputError: the scenario does not fail.
+        PlannerError: the planner raised something, and a bound is what counts.
     """
-    failure = failure_of(run(scenario), bound)
+    try:
+        failure = failure_of(run(scenario), bound)
+    except PlannerError as error:
+        if bound is not None:
+            raise
+        failure = failure_of_planner(error)
     if failure is None:
         counts = "a failure is anything but a certified success" if bound is None else f"the bound is {bound}"
         raise InputError(f"{scenario.task.world.name}: this run does not fail, so there is nothing to shrink; {counts}")

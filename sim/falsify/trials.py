@@ -11,16 +11,16 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from antdrive.planners import PlannerError
+from antdrive.planners import Planner, PlannerError
 from antdrive.planners.anyangle.passage import MOST_OBSTACLES
-from antdrive.sim.falsify.failure import Failure, failure_of
+from antdrive.sim.falsify.failure import Failure, failure_of, failure_of_planner
 from antdrive.sim.falsify.space import feasible
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import settings_of
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import ENDED_BY, Run, plan, run, versions
 from antdrive.sim.regression.demands import Bound
-from antdrive.sim.regression.names import FROM_FILE
+from antdrive.sim.regression.names import is_importable_elsewhere
 from antdrive.sim.scenario import Scenario
 from antdrive.worlds.errors import FieldError, InputError
 from antdrive.worlds.files.atomic import written_whole
@@ -46,7 +46,9 @@ def failure_in(scenario: Scenario, bound: Bound | None = None, *, drive: bool = 
             return failure_of(run(scenario), bound)
         grid, answer = plan(scenario)
         return None if answer.solved else failure_of(Run(scenario, grid, answer), bound)
-    except (FieldError, InputError, PlannerError):  # such as a wanderer without a free cell in a smaller world
+    except PlannerError as error:
+        return None if bound is not None else failure_of_planner(error)
+    except (FieldError, InputError):  # such as a wanderer without a free cell in a smaller world
         return None
 
 
@@ -126,7 +128,10 @@ class Trials:
         """The drive of a scenario that is known to fail; None if it fails before it drives."""
         key = _digest(changeable(scenario))
         if self._latest is None or self._latest[0] != key:
-            self._latest = key, run(scenario).rollout
+            try:
+                self._latest = key, run(scenario).rollout
+            except PlannerError:  # the failure itself
+                self._latest = key, None
         return self._latest[1]
 
     def forget(self) -> None:
@@ -159,8 +164,7 @@ class Trials:
 
     def _run(self, candidates: list[Scenario]) -> Iterator[bool]:
         drive = self._wanted.outcome not in {outcome.key for outcome in ENDED_BY.values()}
-        # A planner's class from a file is one that other processes cannot import.
-        if len(candidates) == 1 or type(candidates[0].planner).__module__.startswith(FROM_FILE):
+        if len(candidates) == 1 or not is_importable_elsewhere(candidates[0].planner):
             found = [failure_in(candidate, self._bound, drive=drive) for candidate in candidates]
         else:
             from joblib import Parallel, delayed
@@ -188,7 +192,15 @@ def changeable(scenario: Scenario) -> Mapping[str, Any]:
 def identity_of(scenario: Scenario) -> str:
     """A text that is the same for scenarios that agree in everything."""
     fields = {field.name: getattr(scenario, field.name) for field in dataclasses.fields(scenario)}
-    return _digest(settings_of({**fields, "planner": repr(scenario.planner)}))
+    return _digest(settings_of({**fields, "planner": _text_of(scenario.planner)}))
+
+
+def _text_of(planner: Planner) -> str:
+    """A planner as text; one whose class has no text of its own would be told by its address, which no other process repeats."""
+    kind = type(planner)
+    if kind.__repr__ is not object.__repr__:
+        return repr(planner)
+    return f"{kind.__module__}.{kind.__qualname__}({sorted(vars(planner).items()) if hasattr(planner, '__dict__') else ''})"
 
 
 def _digest(value: Any) -> str:

@@ -9,6 +9,7 @@ import math
 import os
 import re
 import tempfile
+import traceback
 import zlib
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,6 +22,7 @@ from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import Run
 from antdrive.sim.regression.baseline import Baseline
 from antdrive.sim.regression.parting import parting
+from antdrive.sim.regression.suite import SUFFIX
 from antdrive.worlds.files.atomic import written_whole
 from antdrive.worlds.types import Floats
 from antdrive.worlds.world import Disc
@@ -31,7 +33,7 @@ Films: TypeAlias = Literal["never", "failed", "always"]
 #: Every file that may be written about a test.
 FILES = (
     *("result.json", "commands.txt", "rollout.npz", "overview.png"),
-    *("then-and-now.png", "then-and-now.mp4", "film.mp4"),
+    *("then-and-now.png", "then-and-now.mp4", "film.mp4", "traceback.txt"),
 )
 FILM_SIZE, FILM_FPS = (960, 540), 20.0
 MOST_FILMS = 10  # of failed tests, in one run of many; a film takes longer than most drives
@@ -46,19 +48,28 @@ class Results:
         folder: of all results; each test has a folder of its own in it
         films: of which tests a film is made
         places: a folder in which all processes of a run count the films of failed tests; None: they are not limited
+        root: the project's folder; what lies in its folders gets results in folders of the same names
     """
 
     folder: Path
     films: Films = "failed"
     places: Path | None = None
+    root: Path = dataclasses.field(default_factory=Path.cwd)
 
-    def of(self, *parts: str) -> Path:
+    def of(self, file: Path, name: str) -> Path:
         """The folder of one test.
 
         Args:
-            parts: the test's file and name
+            file: the test's file
+            name: the test's name in it
         """
-        return self.folder.joinpath(*map(file_name, parts))
+        home = file.resolve().parent
+        try:
+            parts = home.relative_to(self.root.resolve()).parts
+        except ValueError:  # outside of the project
+            parts = (f"{file_name(home.name or 'root')}-{zlib.crc32(os.fsencode(home)):08x}",)
+        stem = file.name.removesuffix(SUFFIX) if file.name.endswith(SUFFIX) else file.stem
+        return self.folder.joinpath(*map(file_name, (*parts, stem, name)))
 
     def takes_film(self, *, failed: bool) -> bool:
         """Whether a test gets a film. Of failed tests the first `MOST_FILMS` do, and each of them takes a place.
@@ -81,7 +92,10 @@ def _taken(place: Path) -> bool:
 
 
 def file_name(name: str) -> str:
-    """A name that every file system takes, such as aisle-0 for aisle[0]; different names stay different.
+    """A name that every file system takes, such as aisle-0 for aisle[0].
+
+    Different names stay different, except for aisle[0] and aisle-0; a baseline holds the name of its test, so it is not taken
+    for the other's.
 
     Args:
         name: a test's name
@@ -149,6 +163,23 @@ def write_artefacts(
     result = {**run.as_dict(), "files": files, "command": commands[0] if commands else "", "faults": list(faults)}
     _write(folder / "result.json", json.dumps(_finite(result), indent=2, allow_nan=False) + "\n")
     return files
+
+
+def write_traceback(folder: Path, error: BaseException, commands: Sequence[str]) -> dict[str, str]:
+    """Write where an error arose, in place of what an earlier run wrote about the test; the files by what they are.
+
+    Args:
+        folder: of this test alone
+        error: what ended the test
+        commands: how to repeat the test
+
+    Raises:
+        InputError: the folder cannot be written to.
+    """
+    remove_artefacts(folder)
+    _write(folder / "traceback.txt", "".join(traceback.format_exception(error)))
+    _write(folder / "commands.txt", "".join(f"{command}\n" for command in commands))
+    return {"traceback": str(folder / "traceback.txt")}
 
 
 def remove_artefacts(folder: Path) -> None:

@@ -6,7 +6,7 @@ import dataclasses
 import hashlib
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -18,7 +18,8 @@ from antdrive.sim.log.binding import hashes_of
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
-from antdrive.sim.pipeline import Run, versions
+from antdrive.sim.pipeline import ENDED_BY, Run, versions
+from antdrive.sim.regression.demands import WALL_CLOCK
 from antdrive.sim.regression.nearest import RULES, ClosestApproach, nearest_of
 from antdrive.worlds.errors import input_error
 from antdrive.worlds.files.atomic import written_whole
@@ -30,8 +31,6 @@ SCHEMA = 1
 MAX_BYTES = 20_000  # of a baseline
 LINE_HZ = 10.0  # rate of the driven line, halved until the file is small enough [Hz]
 LEAST_HZ = 1e-3
-#: Metrics that no repetition reproduces.
-WALL_CLOCK = ("plan_s", "drive_wall_s")
 
 
 def _to_outcome(value: Any) -> Outcome:
@@ -172,12 +171,35 @@ class Baseline:
         if not isinstance(found, dict) or found.get("schema") != SCHEMA:
             raise input_error(str(path), f"schema: must be {SCHEMA}; {again}")
         try:
-            return _ADAPTER.validate_json(text)
+            baseline = _ADAPTER.validate_json(text)
         except ValidationError as error:
             fault = error.errors(include_url=False)[0]
             key = ".".join(map(str, fault["loc"]))
             problem = f"{fault['msg'][0].lower()}{fault['msg'][1:]}"
             raise input_error(str(path), *filter(None, [key]), f"{problem}; restore it, or {again}") from None
+        for key, problem in baseline.gaps():
+            raise input_error(str(path), key, f"{problem}; restore it, or {again}")
+        return baseline
+
+    def gaps(self) -> Iterator[tuple[str, str]]:
+        """What is missing or too much, as key and problem: with less than this a comparison would say nothing."""
+        parts = {name: getattr(self, name) for name in ("metrics", "nearest", "hashes", "drive_digest", "line")}
+        if self.outcome in ENDED_BY.values() and not any(parts.values()):
+            return
+        known = [name for name in METRICS if name not in WALL_CLOCK]
+        missing = [name for name in known if name not in self.metrics]
+        if missing:
+            yield "metrics", f"{', '.join(missing[:3])}{' and others' if len(missing) > 3 else ''} missing"
+        for name in self.metrics:
+            if name not in known:
+                yield f"metrics.{name}", "no such metric"
+        for name, part in parts.items():
+            if not part:
+                yield name, "missing, though the robot drove"
+        if not (math.isfinite(self.line_hz) and self.line_hz > 0):
+            yield "line_hz", "must be greater than 0"
+        if not math.isfinite(self.metric("duration_s")):
+            yield "metrics.duration_s", "must be a number"
 
 
 _ADAPTER = TypeAdapter(Baseline)
@@ -213,10 +235,11 @@ def _line(rollout: Rollout, hz: float) -> tuple[tuple[float, float, float, int],
     end = float(rollout.t[-1])
     moments = np.append(np.arange(0.0, max(end - 0.5 / hz, 0.0), 1 / hz), end) if end > 0 else np.zeros(1)
     rows = np.clip(np.round(moments * rollout.record.physics_hz).astype(int), 0, len(rollout.t) - 1)
-    yaw = wrap_angle(rollout.pose[rows, 2])
+    # Between rows, because a rate of physics that the line's does not divide has no row at most of the moments.
+    turned = np.column_stack([rollout.pose[:, :2], np.unwrap(rollout.pose[:, 2])])
+    x, y, yaw = (np.interp(moments, rollout.t, turned[:, axis]) for axis in range(3))
+    samples = np.column_stack([x, y, wrap_angle(yaw)]).tolist()
     return tuple(
         (round(x, 3) + 0.0, round(y, 3) + 0.0, round(a, 3) + 0.0, int(rule))
-        for (x, y, _), a, rule in zip(
-            rollout.pose[rows].tolist(), yaw.tolist(), rollout.limiter[rows].tolist(), strict=True
-        )
+        for (x, y, a), rule in zip(samples, rollout.limiter[rows].tolist(), strict=True)
     )

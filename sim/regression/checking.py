@@ -15,19 +15,27 @@ from typing import Any, Literal, TypeAlias
 from antdrive.planners import PlannerError
 from antdrive.sim.pipeline import Run
 from antdrive.sim.pipeline import run as drive
-from antdrive.sim.regression.artefacts import MOST_FILMS, Results, remove_artefacts, write_artefacts
+from antdrive.sim.regression.artefacts import (
+    MOST_FILMS,
+    Results,
+    remove_artefacts,
+    write_artefacts,
+    write_traceback,
+)
 from antdrive.sim.regression.baseline import Baseline
 from antdrive.sim.regression.demands import Demands
 from antdrive.sim.regression.explaining import explain
 from antdrive.sim.regression.judging import Judgement, judge, unfulfilled
 from antdrive.sim.regression.scenarios import run_command, scenario_of
-from antdrive.sim.regression.suite import SUFFIX, SuiteCase, load_suite, shown_path
-from antdrive.worlds.errors import InputError, input_error
+from antdrive.sim.regression.suite import ScenarioEntry, SuiteCase, load_suite, shown_path
+from antdrive.worlds.errors import FieldError, InputError, input_error
 
 #: Which baselines are written: none, only those that are missing, or all.
 Update: TypeAlias = Literal["", "new", "all"]
 #: The outcome of a test whose planner raised an error.
 RAISED = "planner_error"
+#: The outcomes of a test that could not be judged: what people wrote is wrong, or antdrive is.
+WRONG_INPUT, FAULT = "wrong_input", "internal_error"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +50,7 @@ class CheckResult:
         faults: why the test fails, a sentence each
         gains: what is better than in the baseline, a sentence each
         details: what explains the faults, a sentence each
-        accepted: what was done to the baseline: written, unchanged, or nothing
+        accepted: what was done to the baseline: written, renewed, unchanged, or nothing
         commands: how to repeat the test
         files: what was written about it, by name
         unfilmed: whether it failed and has no film, because the run has made `MOST_FILMS` already
@@ -97,11 +105,9 @@ def check_case(case: SuiteCase, *, update: Update = "", results: Results | None 
     try:
         run = drive(scenario)
     except PlannerError as error:
-        return CheckResult(
-            address=case.address, passed=False, outcome=RAISED, certified=False, faults=(str(error),), commands=commands
-        )
+        return _unjudged(case, RAISED, str(error), error, results, commands)
     path = case.baseline_path if case.entry.baseline else None
-    folder = results.of(case.suite.name.removesuffix(SUFFIX), case.id) if results else None
+    folder = results.of(case.suite, case.id) if results else None
     return check_run(
         run,
         case.demands,
@@ -115,19 +121,67 @@ def check_case(case: SuiteCase, *, update: Update = "", results: Results | None 
     )
 
 
+def _unjudged(
+    case: SuiteCase,
+    outcome: str,
+    fault: str,
+    error: BaseException,
+    results: Results | None,
+    commands: tuple[str, ...] = (),
+) -> CheckResult:
+    """The result of a test that an error ended; its results are where the error arose, unless the input was wrong."""
+    files: dict[str, str] = {}
+    details: tuple[str, ...] = ()
+    commands = commands or (shlex.join(["antdrive", "check", case.address]),)
+    if results is not None:
+        try:
+            folder = results.of(case.suite, case.id)
+            if outcome == WRONG_INPUT:
+                remove_artefacts(folder)
+            else:
+                files = write_traceback(folder, error, commands)
+        except (InputError, OSError) as problem:
+            details = (f"results: {problem}",)
+    return CheckResult(
+        address=case.address,
+        passed=False,
+        outcome=outcome,
+        certified=False,
+        faults=(fault,),
+        details=details,
+        commands=commands,
+        files=files,
+    )
+
+
+def _check_whatever_comes(case: SuiteCase, update: Update, results: Results | None) -> CheckResult:
+    """The result of a test; it fails where it cannot be judged, so that one broken test hides no other."""
+    try:
+        return check_case(case, update=update, results=results)
+    except FieldError as error:
+        problem = str(case.error(error.key, error.problem))
+        return _unjudged(case, WRONG_INPUT, problem, error, results)
+    except InputError as error:
+        key, mark, problem = str(error).partition(": ")
+        of_the_suite = mark and key in ScenarioEntry.model_fields  # found only in the run, such as too small a cell
+        said = str(case.error(key, problem)) if of_the_suite else str(error)
+        return _unjudged(case, WRONG_INPUT, said, error, results)
+    except Exception as error:  # people's planners and robots are code too
+        return _unjudged(case, FAULT, f"internal error: {type(error).__name__}: {error}", error, results)
+
+
 def check_cases(
     cases: Sequence[SuiteCase], *, jobs: int = 1, update: Update = "", results: Results | None = None
 ) -> Iterator[CheckResult]:
-    """Drive and judge many tests; the results come in the order of the tests and do not depend on `jobs`.
+    """Drive and judge many tests; the results come as they are made, in the order of the tests, and do not depend on `jobs`.
+
+    A test that cannot be judged, because its suite, a file or its baseline is wrong, fails with that as its fault.
 
     Args:
         cases: the tests
         jobs: number of processes
         update: which baselines to write
         results: where logs, pictures and films are written; None: nowhere
-
-    Raises:
-        InputError: a suite, a file that it names, or a baseline is wrong.
     """
     with tempfile.TemporaryDirectory(prefix="antdrive-films-") as places:
         limited = results and dataclasses.replace(results, places=Path(places))
@@ -139,26 +193,29 @@ def _check_in_turn(
 ) -> Iterator[CheckResult]:
     if jobs == 1 or len(cases) == 1:
         for case in cases:
-            yield check_case(case, update=update, results=results)
+            yield _check_whatever_comes(case, update, results)
         return
     import joblib
 
     calls = (
         joblib.delayed(_check_by_name)(str(case.suite), case.id, str(Path.cwd()), update, results) for case in cases
     )
-    for result in joblib.Parallel(n_jobs=jobs, return_as="generator")(calls):
-        if isinstance(result, str):
-            raise InputError(result)
-        yield result
+    made = joblib.Parallel(n_jobs=jobs, return_as="generator")(calls)
+    for case, result in zip(cases, made, strict=True):
+        # The suite has changed since it was read.
+        yield _unjudged(case, WRONG_INPUT, result, InputError(result), results) if isinstance(result, str) else result
 
 
 def _check_by_name(suite: str, name: str, folder: str, update: Update, results: Results | None) -> CheckResult | str:
-    """The result of a test that another process names; a text is the message of an InputError."""
+    """The result of a test that another process names; a text says why there is no such test any more."""
     os.chdir(folder)
     try:
-        return check_case(next(case for case in load_suite(suite) if case.id == name), update=update, results=results)
+        found = next((case for case in load_suite(suite) if case.id == name), None)
     except InputError as error:
         return str(error)
+    if found is None:
+        return f"{suite}: has no test {name} any more"
+    return _check_whatever_comes(found, update, results)
 
 
 def check_run(
@@ -199,8 +256,9 @@ def check_run(
         judgement, accepted = _without_baseline(run, demands, path, name, accept, update)
     else:
         judgement = judge(run, demands, baseline)
-    files, unfilmed = _written(run, judgement, baseline, folder, results, commands)
     details = () if judgement.passed else tuple(explain(run, dataclasses.replace(judgement, faults=()), baseline))
+    files, unfilmed, problem = _written_or_why(run, judgement, baseline, folder, results, commands)
+    details = (*details, *filter(None, [problem]))
     return CheckResult(
         address=address,
         passed=judgement.passed,
@@ -217,6 +275,24 @@ def check_run(
         digest=run.rollout.drive_digest if run.rollout is not None else "",
         wall_s=_wall(run) + time.perf_counter() - started,
     )
+
+
+def _written_or_why(
+    run: Run,
+    judgement: Judgement,
+    baseline: Baseline | None,
+    folder: Path | None,
+    results: Results | None,
+    commands: Sequence[str],
+) -> tuple[dict[str, str], bool, str]:
+    """What `_written` says, and why nothing could be written about a failed test, which must not hide its faults."""
+    try:
+        return *_written(run, judgement, baseline, folder, results, commands), ""
+    except Exception as error:  # a picture of a planner's odd answer may fail in many ways
+        if judgement.passed:
+            raise
+        said = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
+        return {}, False, f"results: {said}"
 
 
 def _written(

@@ -10,7 +10,7 @@ from antdrive.sim.regression.judging import Judgement
 from antdrive.sim.regression.nearest import touched_in
 from antdrive.sim.regression.parting import distances, parting
 
-UNCHANGED = "world, robot and settings are those of the baseline; so the code is what changed"
+SAME = "world, robot and settings are those of the baseline"
 
 
 def explain(run: Run, judgement: Judgement, baseline: Baseline | None) -> Iterator[str]:
@@ -54,18 +54,25 @@ def changes(run: Run, baseline: Baseline) -> Iterator[str]:
         run: the present run
         baseline: the earlier drive
     """
-    hashes = conditions(run)
-    if hashes and baseline.hashes:
-        changed = [name for name in hashes if hashes[name] != baseline.hashes.get(name)]
-        yield f"changed since the baseline: {', '.join(changed)}" if changed else UNCHANGED
-    chosen = run.scenario.chosen
-    if chosen is not None and baseline.margin_m is not None and chosen.margin != baseline.margin_m:
-        yield f"margin: auto chose {chosen.margin:g} m, for the baseline {baseline.margin_m:g} m"
     present: Mapping[str, str] = run.rollout.record.versions if run.rollout else versions()
     others = [
         f"{name} {baseline.versions.get(name, 'none')} -> {version}"
         for name, version in present.items()
         if baseline.versions.get(name) != version
     ]
+    hashes = conditions(run)
+    if hashes and baseline.hashes:
+        changed = [name for name in hashes if hashes[name] != baseline.hashes.get(name)]
+        if changed:
+            yield f"changed since the baseline: {', '.join(changed)}"
+        elif others:
+            yield SAME
+        elif (
+            run.rollout is None or run.rollout.drive_digest != baseline.drive_digest
+        ):  # else the demands are what changed
+            yield f"{SAME}; so the code is what changed"
+    chosen = run.scenario.chosen
+    if chosen is not None and baseline.margin_m is not None and chosen.margin != baseline.margin_m:
+        yield f"margin: auto chose {chosen.margin:g} m, for the baseline {baseline.margin_m:g} m"
     if others:
         yield f"versions since the baseline: {', '.join(others)}"

@@ -35,6 +35,9 @@ class DriveFailure(AssertionError):
         super().__init__(result.message)
         self.result = result
 
+    def __reduce__(self) -> tuple[type[DriveFailure], tuple[CheckResult]]:
+        return type(self), (self.result,)  # by default it would be made again from its message alone
+
 
 class DriveFixture:
     """What the fixture `drive` gives to a test: call it to drive a scenario and compare it with its baseline.
@@ -70,8 +73,8 @@ class DriveFixture:
     def __call__(
         self,
         world: str | Path | Task | Scenario,
-        planner: str | Planner = "ants",
-        robot: str | Path | RobotSpec = "turtlebot",
+        planner: str | Planner | None = None,
+        robot: str | Path | RobotSpec | None = None,
         *,
         name: str = "",
         expect: Mapping[str, Any] | None = None,
@@ -83,9 +86,10 @@ class DriveFixture:
         """Drive, and compare with the demands and the baseline.
 
         Args:
-            world: a scenario, a task, a world of the catalogue, or a world file relative to the test's file
-            planner: a planner's name, or a planner
-            robot: a robot, a robot of the catalogue, or a robot file relative to the test's file
+            world: a scenario (then all settings are its own), a task, a world of the catalogue, or a world file relative to
+                the test's file
+            planner: a planner's name, or a planner; by default ants
+            robot: a robot, a robot of the catalogue, or a robot file relative to the test's file; by default turtlebot
             name: of the drive, where a test drives more than once
             expect: outcome, certified, and bounds such as {"min_clearance_m": ">= 0.05"}
             tolerance: by how much metrics may be worse than in the baseline
@@ -100,6 +104,10 @@ class DriveFixture:
         """
         __tracebackhide__ = True
         demands = Demands.of(expect or {}, tolerance or {}, trajectory)
+        if not baseline:
+            for key, value in (("tolerance", tolerance), ("trajectory", trajectory)):
+                if value:
+                    raise FieldError(key, "there is no baseline to compare with; leave it out, or baseline=False")
         if name in self._names:
             raise FieldError("name", f"this test has already driven {name!r}; give each of its drives a name")
         self._names.add(name)
@@ -114,7 +122,7 @@ class DriveFixture:
             update=self._update,
             commands=(shlex.join(["pytest", self._address]),),
             accept=shlex.join(["pytest", self._address, "--drive-update"]),
-            folder=self._results.of(self._file.stem, whole) if self._results else None,
+            folder=self._results.of(self._file, whole) if self._results else None,
             results=self._results,
         )
         self._report(result)
@@ -125,16 +133,17 @@ class DriveFixture:
     def run(
         self,
         world: str | Path | Task | Scenario,
-        planner: str | Planner = "ants",
-        robot: str | Path | RobotSpec = "turtlebot",
+        planner: str | Planner | None = None,
+        robot: str | Path | RobotSpec | None = None,
         **settings: Any,
     ) -> Run:
         """Drive, without judging.
 
         Args:
-            world: a scenario, a task, a world of the catalogue, or a world file relative to the test's file
-            planner: a planner's name, or a planner
-            robot: a robot, a robot of the catalogue, or a robot file relative to the test's file
+            world: a scenario (then all settings are its own), a task, a world of the catalogue, or a world file relative to
+                the test's file
+            planner: a planner's name, or a planner; by default ants
+            robot: a robot, a robot of the catalogue, or a robot file relative to the test's file; by default turtlebot
             settings: further settings of `Scenario.of`, such as seed, noise and margin
 
         Raises:
@@ -142,7 +151,13 @@ class DriveFixture:
             FieldError: a setting is wrong.
         """
         if isinstance(world, Scenario):
+            beside = {"planner": planner, "robot": robot, **settings}
+            given = [key for key, value in beside.items() if key in settings or value is not None]
+            if given:
+                raise FieldError(given[0], "a scenario has its own; change it with dataclasses.replace")
             return drive_scenario(world)
+        planner = "ants" if planner is None else planner
+        robot = "turtlebot" if robot is None else robot
         place = world if isinstance(world, Task) else self._beside(world, list_worlds())
         body = robot if isinstance(robot, RobotSpec) else self._beside(robot, list_robots())
         return drive_scenario(Scenario.of(place, planner, body, **settings))

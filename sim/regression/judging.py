@@ -15,8 +15,8 @@ from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import Run
-from antdrive.sim.regression.baseline import WALL_CLOCK, Baseline
-from antdrive.sim.regression.demands import END, Demands
+from antdrive.sim.regression.baseline import Baseline
+from antdrive.sim.regression.demands import END, WALL_CLOCK, Demands
 from antdrive.sim.regression.nearest import nearest_of
 from antdrive.sim.regression.parting import end_distance, farthest
 
@@ -136,13 +136,16 @@ def _compare(
     if metric.better == "neither" or tolerance is None or name in WALL_CLOCK:
         return
     now, then = metric(rollout), baseline.metric(name)
-    if not (math.isfinite(now) and math.isfinite(then)):
+    unit = "" if metric.unit == "1" else f" {metric.unit}"
+    if not math.isfinite(then):
+        return
+    if not math.isfinite(now):
+        faults.append(f"{name}: {now:g}, in the baseline {then:.6g}{unit}")
         return
     worse_by = now - then if metric.better == "lower" else then - now
     allowed = tolerance.allowed(then)
     if abs(worse_by) <= allowed + 1e-6:  # baselines are rounded to six decimals
         return
-    unit = "" if metric.unit == "1" else f" {metric.unit}"
     text = f"{name}: {now:.6g}{unit}, in the baseline {then:.6g}{unit}: {abs(worse_by):.3g}{unit}"
     if worse_by > 0:
         words = _WORDS.get(name, _WORSE.get(metric.unit, "worse"))

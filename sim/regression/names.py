@@ -8,6 +8,7 @@ import importlib
 import importlib.util
 import sys
 from collections.abc import Iterator, Mapping
+from importlib.machinery import PathFinder
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -24,6 +25,11 @@ from antdrive.worlds.files.world_file import list_worlds
 SOURCES = ("module", "file")
 #: What the names of modules begin with that were loaded from a file.
 FROM_FILE = "_antdrive_suite_"
+
+_OWNERS: dict[
+    str, Path
+] = {}  # the folder of suites that each module was imported for and lies in, by the module's name
+_ASIDE: dict[Path, dict[str, ModuleType]] = {}  # modules whose names another folder's modules have at present
 
 
 def check_names(case: SuiteCase) -> None:
@@ -91,6 +97,12 @@ def planner_of(case: SuiteCase) -> tuple[Planner, str]:
         raise (error if text.startswith(case.document.source) else _at_planner(case, text)) from None
 
 
+def is_importable_elsewhere(planner: Planner) -> bool:
+    """Whether other processes can import a planner's class; those of files and modules beside a suite only this one can."""
+    home = type(planner).__module__
+    return not home.startswith(FROM_FILE) and home not in _OWNERS
+
+
 def _path(case: SuiteCase, key: str, name: str, known: Mapping[str, Path]) -> Path:
     """A file of the catalogue, or one relative to the suite; the catalogue's names come first."""
     if name in known:
@@ -112,6 +124,9 @@ def _attribute(case: SuiteCase, key: str, source: str, name: str) -> Any:
         module = _from_file(case, source) if key == "file" else _from_module(case, source)
     except InputError:
         raise
+    except SystemExit as error:
+        problem = f"{source}: ends the program while it is imported (exit code {error.code}); guard what it runs"
+        raise case.error(f"planner.{key}", f'{problem} with if __name__ == "__main__"') from error
     except Exception as error:  # people's own code may raise anything while it is imported
         raise case.error(f"planner.{key}", f"{source}: cannot be imported ({type(error).__name__}: {error})") from error
     if not hasattr(module, name):
@@ -123,8 +138,15 @@ def _attribute(case: SuiteCase, key: str, source: str, name: str) -> Any:
 
 
 def _from_module(case: SuiteCase, source: str) -> ModuleType:
-    with _importing_from(Path.cwd(), case.suite.parent):
-        return importlib.import_module(source)
+    """A module that can be imported, or one in the suite's folder."""
+    folder, top = case.suite.parent, source.partition(".")[0]
+    with _importing_for(folder):
+        module = importlib.import_module(source)
+    own, taken = _module_in(folder, top), getattr(sys.modules[top], "__file__", None)
+    if own is not None and taken is not None and Path(taken).resolve() != own:
+        problem = f"{top} is imported from {taken}, and there is one beside the suite"
+        raise case.error("planner.module", f"{problem}; give it another name, or write file: and the path")
+    return module
 
 
 def _from_file(case: SuiteCase, source: str) -> ModuleType:
@@ -144,7 +166,8 @@ def _loaded(path: Path, mtime: int) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module  # dataclasses look their module up
     try:
-        spec.loader.exec_module(module)
+        with _importing_for(path.parent):
+            spec.loader.exec_module(module)
     except BaseException:
         del sys.modules[name]
         raise
@@ -152,7 +175,37 @@ def _loaded(path: Path, mtime: int) -> ModuleType:
 
 
 @contextlib.contextmanager
-def _importing_from(*folders: Path) -> Iterator[None]:
+def _importing_for(folder: Path) -> Iterator[None]:
+    """A context in which modules are also looked for in the working directory and a suite's folder, after all others.
+
+    Modules of other suites' folders are set aside where this folder has one of the same name.
+    """
+    for name, owner in list(_OWNERS.items()):
+        if owner != folder and _module_in(folder, name.partition(".")[0]) is not None:
+            del _OWNERS[name]
+            if name in sys.modules:
+                _ASIDE.setdefault(owner, {})[name] = sys.modules.pop(name)
+    for name, module in _ASIDE.pop(folder, {}).items():
+        sys.modules[name], _OWNERS[name] = module, folder
+    before = set(sys.modules)
+    try:
+        with _looking_in(Path.cwd(), folder):
+            yield
+    finally:
+        for name in set(sys.modules) - before:
+            file = getattr(sys.modules[name], "__file__", None)
+            if file is not None and not name.startswith(FROM_FILE) and Path(file).resolve().is_relative_to(folder):
+                _OWNERS[name] = folder
+
+
+def _module_in(folder: Path, name: str) -> Path | None:
+    """The file of a module or package in a folder; None if there is none."""
+    found = PathFinder.find_spec(name, [str(folder)])
+    return Path(found.origin).resolve() if found is not None and found.origin is not None else None
+
+
+@contextlib.contextmanager
+def _looking_in(*folders: Path) -> Iterator[None]:
     """A context in which modules are also looked for in some folders, after all others."""
     added = [str(folder) for folder in folders if str(folder) not in sys.path]
     sys.path.extend(added)

@@ -161,7 +161,7 @@ def results_of(config: pytest.Config) -> Results:
 
     given = config.getoption("drive_results")
     folder = config.invocation_params.dir / given if given else default_folder(config.rootpath)
-    return Results(folder, config.getoption("drive_film"), Path(places_of(config)))
+    return Results(folder, config.getoption("drive_film"), Path(places_of(config)), config.rootpath)
 
 
 def places_of(config: pytest.Config) -> str:
@@ -191,8 +191,8 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Look for baselines of tests that are gone, in modules that were collected as a whole."""
-    if any("::" in str(word) for word in config.args):
-        return
+    if any("::" in str(word) for word in config.args) or config.getoption("lf", False):
+        return  # not all tests of a module are among the items
     modules: dict[Path, set[str]] = {}
     for item in items:
         if not isinstance(item, DriveItem):
@@ -266,7 +266,7 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
     unused = sorted(found)
     if not (told or unused):
         return
-    from antdrive.sim.regression.summary import drives_in, lines, markdown
+    from antdrive.sim.regression.summary import add_to_page, drives_in, lines
 
     drives = [drive for properties in told for drive in drives_in(properties)]
     terminalreporter.section("drives")
@@ -274,8 +274,9 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
         terminalreporter.write_line(line)
     page = os.environ.get("GITHUB_STEP_SUMMARY")
     if page:
-        with open(page, "a", encoding="utf-8") as file:
-            file.write(markdown(drives, unused))
+        problem = add_to_page(page, drives, unused)
+        if problem:
+            terminalreporter.write_line(problem)
 
 
 def _name_in_file(item: pytest.Item) -> str:

@@ -36,7 +36,9 @@ def select(words: Sequence[str], only: str | None = None) -> list[SuiteCase]:
 
 def _named(word: str) -> Iterator[SuiteCase]:
     """The tests that one word names."""
-    place, _, wanted = word.partition("::")
+    place, mark, wanted = word.partition("::")
+    if mark and not wanted:
+        raise input_error(word, f"names no test; write {place} for all, or {place}::SCENARIO")
     path = Path(place)
     if path.is_dir() and not wanted:
         suites = sorted(path.rglob(f"*{SUFFIX}"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import TYPE_CHECKING, Any
 
 from antdrive.planners import PLANNERS, Query
@@ -27,13 +28,13 @@ def worlds(
         radius: the least and the largest radius of a cylinder [m]
 
     Raises:
-        InputError: hypothesis is not installed.
+        InputError: hypothesis is not installed, or no whole centimetre lies within a range.
     """
     st = _strategies()
-    sides = st.tuples(_metres(st, *size), _metres(st, *size))
+    sides, radii = st.tuples(_metres(st, *size), _metres(st, *size)), _metres(st, *radius)
 
     def filled(side: tuple[float, float]) -> SearchStrategy[World]:
-        disc = st.builds(Disc, x=_metres(st, 0.0, side[0]), y=_metres(st, 0.0, side[1]), radius=_metres(st, *radius))
+        disc = st.builds(Disc, x=_metres(st, 0.0, side[0]), y=_metres(st, 0.0, side[1]), radius=radii)
         return st.lists(disc, max_size=obstacles).map(lambda discs: World("generated", (0.0, 0.0, *side), tuple(discs)))  # type: ignore[no-any-return]
 
     return sides.flatmap(filled)  # type: ignore[no-any-return]
@@ -97,8 +98,13 @@ def _solved(task: Task, reach: float) -> bool:
 
 
 def _metres(st: Any, least: float, most: float) -> Any:
-    """Lengths in whole centimetres [m]."""
-    return st.integers(round(100 * least), round(100 * most)).map(lambda centimetres: centimetres / 100)
+    """Lengths in whole centimetres between two bounds [m]."""
+    first, last = math.ceil(100 * least - 1e-9), math.floor(100 * most + 1e-9)
+    if first > last:
+        raise InputError(
+            f"antdrive.testing: no whole centimetre lies between {least:g} m and {most:g} m; widen the range"
+        )
+    return st.integers(first, last).map(lambda centimetres: centimetres / 100)
 
 
 def _strategies() -> Any:

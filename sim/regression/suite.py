@@ -93,7 +93,9 @@ class SuiteFile(BaseModel):
         default_factory=ScenarioEntry.model_construct,
         description="keys that hold for all scenarios that do not set them",
     )
-    scenarios: dict[str, ScenarioEntry] = Field(min_length=1, description="the scenarios by name")
+    scenarios: dict[str, ScenarioEntry] = Field(
+        description="the scenarios by name", json_schema_extra={"minProperties": 1}
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,6 +178,8 @@ def _load(path: Path, source: str, mtime: int, size: int) -> tuple[SuiteCase, ..
     document = read_document(source)
     _refuse_synonyms(document)
     suite = check(SuiteFile, document)
+    if not suite.scenarios:
+        raise document.error(("scenarios",), "holds none; write at least one, such as one: {world: empty}")
     cases: list[SuiteCase] = []
     for name, entry in suite.scenarios.items():
         if not _NAME.fullmatch(name):
@@ -213,6 +217,10 @@ def _cases(path: Path, document: Document, name: str, defaults: ScenarioEntry, e
         demands = Demands.of(merged.expect, merged.tolerance, merged.trajectory)
     except FieldError as error:
         raise document.error(_place(document, name, error.key, own), error.problem) from None
+    for key in ("tolerance", "trajectory"):
+        if not merged.baseline and key in own and getattr(entry, key):
+            problem = "there is no baseline to compare with; leave it out, or baseline: false"
+            raise document.error(_place(document, name, key, own), problem)
     return [SuiteCase(path, name, seed, merged, demands, document, own) for seed in merged.seeds]
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from antdrive.sim.regression.checking import CheckResult
+from antdrive.worlds.files.atomic import written_whole
 
 #: The metrics that a test report gets.
 SHOWN = ("min_clearance_m", "duration_s", "driven_length_m")
@@ -118,6 +119,53 @@ def markdown(drives: Sequence[Mapping[str, str]], unused: Sequence[str]) -> str:
     if unused:
         text += ["Unused baselines: " + ", ".join(_cell(path) for path in unused), ""]
     return "\n".join(text) + "\n"
+
+
+def save_junit(results: Sequence[CheckResult], path: Path) -> None:
+    """Write the results of suites as JUnit XML, with the same properties as pytest's.
+
+    Args:
+        results: one for each test
+        path: the file
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    import xml.etree.ElementTree as ET
+
+    failed = sum(not result.passed for result in results)
+    whole = sum(result.wall_s for result in results)
+    counts = {"tests": str(len(results)), "failures": str(failed), "errors": "0", "time": f"{whole:.3f}"}
+    tree = ET.Element("testsuites")
+    suite = ET.SubElement(tree, "testsuite", {"name": "antdrive", **counts})
+    for result in results:
+        file, _, name = result.address.rpartition("::")
+        words = {"classname": file.replace("/", "."), "name": name, "time": f"{result.wall_s:.3f}"}
+        test = ET.SubElement(suite, "testcase", words)
+        told = ET.SubElement(test, "properties")
+        for key, value in properties(result):
+            ET.SubElement(told, "property", {"name": key, "value": _plain(value)})
+        if not result.passed:
+            failure = ET.SubElement(test, "failure", {"message": _plain(result.faults[0])})
+            failure.text = "\n".join(map(_plain, result.message.splitlines()))
+    with written_whole(path) as part:
+        ET.ElementTree(tree).write(part, encoding="utf-8", xml_declaration=True)
+
+
+def add_to_page(page: str, drives: Sequence[Mapping[str, str]], unused: Sequence[str]) -> str:
+    """Add a summary to the page of a CI run, the file that GITHUB_STEP_SUMMARY names; what is wrong with the file, if it is.
+
+    Args:
+        page: the file
+        drives: all drives of the run
+        unused: baselines that belong to no test
+    """
+    try:
+        with open(page, "a", encoding="utf-8") as file:
+            file.write(markdown(drives, unused))
+    except (OSError, ValueError) as error:
+        return f"GITHUB_STEP_SUMMARY: {page}: cannot be written ({getattr(error, 'strerror', None) or error})"
+    return ""
 
 
 def _plain(text: str) -> str:

@@ -6,18 +6,23 @@ import json
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from antdrive.sim.regression.suite import BASELINES, SUFFIX, SuiteCase, baseline_folder
+from antdrive.sim.regression.suite import BASELINES, SUFFIX, SuiteCase, baseline_folder, load_suite
+from antdrive.worlds.errors import InputError
 
 
 def unused_of_suite(suite: Path, cases: Iterable[SuiteCase]) -> Iterator[Path]:
-    """The baselines in a suite's folder that belong to none of its tests, and the folders of suites and tests that are gone.
+    """The baselines in a suite's folder that belong to none of its tests, and those of suites and modules that are gone.
 
     Args:
         suite: the suite's file
         cases: all its tests
     """
+    suite = suite.resolve()  # as the tests' own paths are
     used = {case.baseline_path for case in cases if case.entry.baseline}
-    yield from (path for path in _files(baseline_folder(suite)) if path not in used)
+    if not suite.with_name(
+        suite.name.removesuffix(SUFFIX) + ".py"
+    ).exists():  # else they share it: see unused_of_module
+        yield from (path for path in _files(baseline_folder(suite)) if path not in used)
     for folder in sorted((suite.parent / BASELINES).glob("*/")):
         owners = (suite.parent / f"{folder.name}{SUFFIX}", suite.parent / f"{folder.name}.py")
         if not any(owner.exists() for owner in owners):
@@ -32,7 +37,16 @@ def unused_of_module(module: Path, tests: Iterable[str]) -> Iterator[Path]:
         tests: the names of all its tests
     """
     names = tuple(tests)
+    beside = module.resolve().with_suffix(SUFFIX)
+    used: set[Path] = set()
+    if beside.exists():
+        try:
+            used = {case.baseline_path for case in load_suite(beside)}
+        except InputError:  # is told where the suite is collected
+            return
     for path in _files(module.parent / BASELINES / module.stem):
+        if path.resolve() in used:
+            continue
         try:
             case = str(json.loads(path.read_text(encoding="utf-8"))["case"])
         except (OSError, ValueError, KeyError, TypeError):

@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from antdrive.sim.cli import options, suites
-from antdrive.sim.cli.suites import drive_suites, print_results
+from antdrive.sim.cli.suites import drive_suites, print_result, print_summary, unused_baselines
 
 
 def accept(
@@ -19,4 +19,12 @@ def accept(
 
     A drive that is not as its suite expects is not accepted. Exit code 0: every drive was accepted.
     """
-    return print_results(drive_suites(tests, only, jobs, update="new" if new else "all", results=None), json, "passed")
+    found = drive_suites(
+        tests,
+        only,
+        jobs,
+        update="new" if new else "all",
+        results=None,
+        show=lambda result: None if json else print_result(result, "passed"),
+    )
+    return print_summary(found, json, unused_baselines(tests))

@@ -85,13 +85,18 @@ def falsify(
 def _report(hunt: "Hunt", folder: Path, seconds: float, film: bool) -> "list[Reported]":
     """Shrink, repeat and write every failure that differs from the others."""
     from antdrive.sim.falsify.report import SUITE, report
+    from antdrive.sim.pipeline import Run
 
     if not hunt.findings:
+        _forget(folder)
+        (folder / SUITE).unlink(missing_ok=True)
         return []
     with bar("shrinking") as progress:
         reported = report(hunt, folder, seconds=seconds, progress=progress)
     _forget(folder)
     for one in reported:
+        if not isinstance(one.run, Run):  # nothing was planned; the suite has the world
+            continue
         files = write_run(one.run, folder / one.name, figures=film)
         if film and one.run.rollout is not None:
             files["film"] = write_film(one.run.rollout, folder / one.name / "film.mp4")["file"]
@@ -137,7 +142,7 @@ def _print(hunt: "Hunt", reported: "list[Reported]", folder: Path, filmed: bool)
                     one.name,
                     str(one.finding.number),
                     "yes" if one.repeats else "NO",
-                    f"{len(one.finding.scenario.task.world.obstacles)} -> {len(one.run.scenario.task.world.obstacles)}",
+                    f"{len(one.finding.scenario.task.world.obstacles)} -> {len(one.scenario.task.world.obstacles)}",
                     one.finding.failure.sentence,
                 )
                 for one in reported

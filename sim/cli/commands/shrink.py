@@ -57,6 +57,7 @@ def shrink(
     from antdrive.sim.falsify.handover import Handover, scenario_name
     from antdrive.sim.falsify.shrink import shrink as make_small
     from antdrive.sim.pipeline import run
+    from antdrive.sim.regression.checking import RAISED
 
     crossed = None if bound is None else parse_bound(bound)
     scenario, case = _of_a_test(failure) if "::" in failure else (_of_a_log(failure), None)
@@ -68,7 +69,8 @@ def shrink(
         journal = folder / "journal.json"
         shrunk = make_small(scenario, bound=crossed, seconds=seconds, journal=journal, jobs=jobs, progress=progress)
     note = f"shrunk from {scenario.task.world.name}: {shrunk.summary}"
-    small = run(named(shrunk.scenario, name, note))
+    least = named(shrunk.scenario, name, note)
+    small = least if shrunk.failure.outcome == RAISED else run(least)
     handover = Handover(name, small, crossed, shrunk.failure.sentence, _planner_beside(case, folder))
     report, repeats = _write(shrunk, handover, folder, film, figures)
     if json:
@@ -118,19 +120,26 @@ def _write(
     shrunk: "Shrunk", handover: "Handover", folder: Path, film: bool, figures: bool
 ) -> tuple[dict[str, Any], bool]:
     """Write everything about a small failure; the report, and whether the written suite gives the same run elsewhere."""
-    from antdrive.sim.falsify.failure import failure_of
+    from antdrive.sim.falsify.failure import failure_of, without_numbers
     from antdrive.sim.falsify.handover import fingerprint_of, suite_elsewhere, write_suite
+    from antdrive.sim.pipeline import Run
 
     name, result = handover.name, handover.run
-    files = write_run(result, folder, figures=figures)
     suite = write_suite(folder / f"{name}.drive.yaml", [handover])
-    repeats = failure_of(result, handover.bound) == shrunk.failure and suite_elsewhere(suite) == [
-        fingerprint_of(result)
-    ]
-    files |= {"suite": str(suite), "world": str(folder / "worlds" / f"{name}.yaml")}
+    files = {"suite": str(suite), "world": str(folder / "worlds" / f"{name}.yaml")}
+    elsewhere = suite_elsewhere(suite)
+    if not isinstance(result, Run):  # the planner raises something
+        repeats = [without_numbers(text) for text in elsewhere] == [shrunk.failure.cause]
+        return {"files": files, **_facts(shrunk, repeats)}, repeats
+    repeats = failure_of(result, handover.bound) == shrunk.failure and elsewhere == [fingerprint_of(result)]
+    files = {**write_run(result, folder, figures=figures), **files}
     if film and result.rollout is not None:
         files["film"] = write_film(result.rollout, folder / f"{name}.mp4")["file"]
-    facts = {
+    return {**write_result(result, files, this_command()), **_facts(shrunk, repeats)}, repeats
+
+
+def _facts(shrunk: "Shrunk", repeats: bool) -> dict[str, Any]:
+    return {
         "failure": dataclasses.asdict(shrunk.failure),
         "summary": shrunk.summary,
         "complete": shrunk.complete,
@@ -138,7 +147,6 @@ def _write(
         "trials": shrunk.trials,
         "recalled": shrunk.recalled,
     }
-    return {**write_result(result, files, this_command()), **facts}, repeats
 
 
 def named(scenario: "Scenario", name: str, note: str) -> "Scenario":
@@ -151,7 +159,8 @@ def named(scenario: "Scenario", name: str, note: str) -> "Scenario":
 
 def _print(shrunk: "Shrunk", report: dict[str, Any], repeats: bool) -> None:
     print_line(f"{shrunk.original.task.world.name}: {shrunk.failure.sentence}")
-    print_line(f"smaller after {shrunk.trials} runs: {shrunk.summary}")
+    smaller = "smaller" if shrunk.smaller else "no smaller"
+    print_line(f"{smaller} after {shrunk.trials} runs: {shrunk.summary}")
     if not shrunk.complete:
         print_line("the time was over: the same command goes on from here, --seconds gives it longer")
     if not repeats:

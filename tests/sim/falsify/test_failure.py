@@ -51,6 +51,7 @@ def test_a_bound_replaces_the_verdict(small_run: Run, text: str, holds: bool) ->
     ("text", "says"),
     [
         ("clearance < 1", "unknown metric 'clearance'; did you mean min_clearance_m"),
+        ("plan_s < 1", "plan_s depends on the machine"),
         ("spl = 1", "write METRIC < NUMBER"),
         ("spl < much", "write METRIC < NUMBER"),
         ("spl < 1.2.3", "write METRIC < NUMBER"),

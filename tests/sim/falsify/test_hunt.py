@@ -1,6 +1,7 @@
 """A search finds worlds in which a careless set-up fails, and says the same again with the same seed."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -8,15 +9,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from antdrive.planners import Query, load_planner
+from antdrive.planners import AStar, PlanResult, Query, load_planner
 from antdrive.robots import RobotSpec
 from antdrive.sim import Outcome, Run, Scenario, run
 from antdrive.sim.falsify import hunt as hunting
+from antdrive.sim.falsify import report as reporting
 from antdrive.sim.falsify import search
 from antdrive.sim.falsify.failure import failure_of
 from antdrive.sim.falsify.hunt import Hunt, find_failures
+from antdrive.sim.falsify.report import report
 from antdrive.sim.falsify.search import METHODS, REHEARSED, guided_world, rehearsed_clearance
+from antdrive.sim.falsify.shrink import shrink
 from antdrive.sim.falsify.space import WorldSpace, feasible
+from antdrive.sim.regression.scenarios import task_of as scenario_task
+from antdrive.sim.regression.suite import load_suite
 from antdrive.worlds import Disc, FieldError, World, rasterise
 
 CARELESS: dict[str, Any] = {"margin": 0.0, "noise": 6.0, "smoothing": "none"}
@@ -72,6 +78,42 @@ def test_ctrl_c_keeps_what_was_found(careless: Scenario, monkeypatch: pytest.Mon
     stopped = find_failures(careless, budget=50, method=method)
     assert (stopped.runs, stopped.interrupted) == (2, True)
     assert len(stopped.findings) == sum(failure_of(done) is not None for done in runs)
+
+
+class Crashes(AStar):
+    """A planner that raises something in about every second world."""
+
+    def plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        if query.task is not None and int(1000 * query.task.world.obstacles[-1].y) % 2 == 0:
+            raise IndexError("pop from empty list")
+        return super().plan(query, rng)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_planner_that_raises_is_a_finding(jackal: RobotSpec, tmp_path: Path, method: str) -> None:
+    setup = Scenario.of("empty", Crashes(), jackal, **CARELESS)
+    hunt = find_failures(setup, budget=4, seed=3, method=method, obstacles=2)
+    raised = [finding for finding in hunt.findings if finding.failure.outcome == "planner_error"]
+    assert hunt.runs == 4
+    assert raised
+    assert sum(finding.is_new for finding in raised) == 1
+    assert "IndexError: pop from empty list" in raised[0].failure.cause
+    small = shrink(raised[0].scenario, seconds=5)
+    assert small.failure == raised[0].failure
+    (handed,) = report(Hunt((raised[0],), 4), tmp_path, seconds=0)
+    (case,) = load_suite(tmp_path / "failures.drive.yaml")
+    assert handed.scenario.task.world.obstacles == scenario_task(case).world.obstacles
+
+
+def test_ctrl_c_while_shrinking_hands_over_what_was_found(
+    found: Hunt, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(reporting, "shrink", interrupted)
+    reported = report(Hunt(found.distinct[:1], 1), tmp_path)
+    assert [one.repeats for one in reported] == [True]
 
 
 def test_no_path_counts_only_where_the_grid_has_no_excuse(small_scenario: Scenario) -> None:

@@ -12,7 +12,7 @@ from antdrive.sim.falsify import passes
 from antdrive.sim.falsify.failure import Failure, failure_of, parse_bound
 from antdrive.sim.falsify.shrink import Shrunk, shrink
 from antdrive.sim.falsify.space import feasible
-from antdrive.sim.falsify.trials import Trials, changeable, room_in
+from antdrive.sim.falsify.trials import Trials, changeable, identity_of, room_in
 from antdrive.worlds import Cruising, Disc, InputError, Task, World
 
 SIDE = 6.0
@@ -237,3 +237,19 @@ def test_a_world_that_has_a_path_keeps_one(struck: Scenario, fenced: Scenario) -
     no_path = Failure("no_path", "nothing", "")
     assert room_in(fenced, no_path) is None
     assert room_in(struck, no_path) == struck.inflate + struck.task.cell
+
+
+class Textless:
+    """A planner whose class has no text of its own."""
+
+    def __init__(self, ants: int) -> None:
+        self.ants = ants
+
+    def plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        raise NotImplementedError
+
+
+def test_a_journal_knows_a_planner_again_without_a_text_of_its_own(small_scenario: Scenario) -> None:
+    first, again, other = (identity_of(replace(small_scenario, planner=Textless(ants))) for ants in (3, 3, 4))
+    assert first == again
+    assert first != other

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import pickle
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -50,6 +52,28 @@ def test_each_drive_of_a_test_has_a_name(drive: DriveFixture, small_task: Task) 
     drive(small_task, "astar", name="second", baseline=False, expect={"duration_s": "< 60"})
     with pytest.raises(FieldError, match="give each of its drives a name"):
         drive(small_task, "astar", name="second", baseline=False)
+
+
+@pytest.mark.parametrize("beside", [{"planner": "aco-han"}, {"robot": "jackal"}, {"seed": 1}, {"nonsense": 3}])
+def test_a_scenario_takes_no_settings_beside_it(drive: DriveFixture, small_task: Task, beside: dict[str, Any]) -> None:
+    (key,) = beside
+    with pytest.raises(FieldError, match=f"{key}: a scenario has its own; change it with"):
+        drive(Scenario.of(small_task, "astar"), baseline=False, **beside)
+
+
+@pytest.mark.parametrize("demand", [{"tolerance": {"duration_s": 1}}, {"trajectory": "exact"}])
+def test_what_needs_a_baseline_is_refused_without_one(
+    drive: DriveFixture, small_task: Task, demand: dict[str, Any]
+) -> None:
+    with pytest.raises(FieldError, match=f"{next(iter(demand))}: there is no baseline to compare with"):
+        drive(small_task, "astar", baseline=False, **demand)
+
+
+def test_a_failed_drive_reaches_other_processes(drive: DriveFixture, small_task: Task) -> None:
+    with pytest.raises(DriveFailure) as caught:
+        drive(small_task, "astar", baseline=False, expect={"duration_s": "< 1"})
+    again = pickle.loads(pickle.dumps(caught.value))
+    assert (str(again), again.result) == (str(caught.value), caught.value.result)
 
 
 def test_files_lie_beside_the_tests_file(drive: DriveFixture, tmp_path: Path) -> None:
@@ -144,3 +168,14 @@ def test_the_door_lists_what_it_offers() -> None:
 
 def test_a_robot_may_be_given_as_an_object(turtlebot: RobotSpec, drive: DriveFixture) -> None:
     assert drive.run("empty", load_planner("astar"), turtlebot).succeeded
+
+
+@given(worlds(obstacles=2, radius=(0.004, 0.1)))
+@settings(max_examples=30)
+def test_radii_keep_to_their_range_in_whole_centimetres(world: World) -> None:
+    assert all(0.01 <= disc.radius <= 0.1 for disc in world.obstacles)
+
+
+def test_a_range_without_a_whole_centimetre_is_refused() -> None:
+    with pytest.raises(InputError, match=r"no whole centimetre lies between 0\.004 m and 0\.006 m"):
+        worlds(radius=(0.004, 0.006))

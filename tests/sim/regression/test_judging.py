@@ -15,12 +15,12 @@ from hypothesis import strategies as st
 
 from antdrive import METRICS, Outcome, Run, Scenario, run
 from antdrive.sim.log.metrics import Tolerance
-from antdrive.sim.regression import Baseline, Demands, judge
+from antdrive.sim.regression import Baseline, Demands, judge, judging
 from antdrive.sim.regression.artefacts import MOST_FILMS, Results, drive_of, file_name, remove_artefacts
 from antdrive.sim.regression.baseline import MAX_BYTES
 from antdrive.sim.regression.explaining import explain
 from antdrive.sim.regression.nearest import nearest_of, touched_in
-from antdrive.sim.regression.parting import parting
+from antdrive.sim.regression.parting import distances, parting
 from antdrive.worlds.errors import FieldError, InputError
 
 PLAIN = Demands()
@@ -102,6 +102,54 @@ def test_a_broken_baseline_is_one_line(tmp_path: Path, text: str, message: str) 
     with pytest.raises(InputError) as caught:
         Baseline.load(path)
     assert str(caught.value).startswith(f"{path}: {message}"), caught.value
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"line": []}, "line: missing, though the robot drove; restore it"),
+        ({"metrics": {"nonsense": 1.0}}, "metrics: path_length_m, route_length_m, driven_length_m and others missing"),
+        ({"metrics": None}, "metrics: "),
+        ({"drive_digest": ""}, "drive_digest: missing"),
+        ({"hashes": {}}, "hashes: missing"),
+        ({"line_hz": 0.0}, "line_hz: must be greater than 0"),
+    ],
+)
+def test_a_baseline_that_nothing_could_be_compared_with_is_refused(
+    baseline: Baseline, tmp_path: Path, changes: dict[str, Any], message: str
+) -> None:
+    path = tmp_path / "b.json"
+    path.write_text(json.dumps({**json.loads(baseline.to_text()), **changes}))
+    with pytest.raises(InputError) as caught:
+        Baseline.load(path)
+    assert str(caught.value).startswith(f"{path}: {message}"), caught.value
+
+
+def test_metrics_of_a_baseline_are_those_that_are_compared(baseline: Baseline, tmp_path: Path) -> None:
+    changed(baseline, nonsense=1.0).save(tmp_path / "b.json")
+    with pytest.raises(InputError, match=r"metrics\.nonsense: no such metric"):
+        Baseline.load(tmp_path / "b.json")
+    changed(baseline, duration_s=None).save(tmp_path / "b.json")
+    with pytest.raises(InputError, match=r"metrics\.duration_s: must be a number"):
+        Baseline.load(tmp_path / "b.json")
+
+
+def test_a_metric_that_is_no_number_any_more_is_a_fault(
+    small_run: Run, baseline: Baseline, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    broken = dataclasses.replace(METRICS["spl"], function=lambda rollout: math.nan)
+    monkeypatch.setattr(judging, "METRICS", {**METRICS, "spl": broken})
+    assert [text.split(",")[0] for text in judge(small_run, PLAIN, baseline).faults] == ["spl: nan"]
+
+
+@pytest.mark.parametrize("hz", [125, 77])
+def test_a_drive_is_on_its_own_line_at_any_rate_of_physics(small_scenario: Scenario, hz: int) -> None:
+    """The rows of these rates are not at the moments of the line."""
+    odd = run(dataclasses.replace(small_scenario, physics_hz=hz, control_hz=hz))
+    baseline = Baseline.of(odd, "odd[0]")
+    assert judge(odd, dataclasses.replace(PLAIN, trajectory=0.002), baseline).passed
+    assert odd.rollout is not None
+    assert distances(baseline, odd.rollout).max() < 1e-3, "whole millimetres"
 
 
 @pytest.mark.parametrize("name", [name for name, metric in METRICS.items() if metric.tolerance is not None])
@@ -188,7 +236,11 @@ def test_messages_name_what_changed_since_the_baseline(small_run: Run, baseline:
     def text(**changes: Any) -> str:
         return "\n".join(explain(small_run, judgement, dataclasses.replace(baseline, **changes)))
 
-    assert "so the code is what changed" in text()
+    assert "what changed" not in text(), "it is the baseline's drive, so the demands are what changed"
+    assert "so the code is what changed" in text(drive_digest="0")
+    older = text(versions={**baseline.versions, "numpy": "1.0"}, drive_digest="0")
+    assert "settings are those of the baseline\n" in older
+    assert "so the code" not in older
     assert "changed since the baseline: robot" in text(hashes={**baseline.hashes, "robot": "0"})
     assert "versions since the baseline: numpy 1.0 -> " in text(versions={**baseline.versions, "numpy": "1.0"})
 
@@ -226,12 +278,19 @@ def test_each_wall_has_its_name(small_run: Run, start: tuple[float, float, float
 @pytest.mark.parametrize(
     ("expect", "tolerance", "trajectory", "key"),
     [({"x": 1}, {}, None, "expect.x"), ({}, {"x": 1}, None, "tolerance.x"), ({}, {}, "near", "trajectory"),
-     ({}, {"duration_s": True}, None, "tolerance.duration_s"), ({"duration_s": True}, {}, None, "expect.duration_s")],
+     ({}, {"duration_s": True}, None, "tolerance.duration_s"), ({"duration_s": True}, {}, None, "expect.duration_s"),
+     ({"plan_s": "< 1"}, {}, None, "expect.plan_s"), ({"drive_wall_s": "< 1"}, {}, None, "expect.drive_wall_s"),
+     ({}, {"end_m": "10 %"}, None, "tolerance.end_m"), ({"min_clearance_m": 0.05}, {}, None, "expect.min_clearance_m")],
 )  # fmt: skip
 def test_wrong_demands_name_their_key(expect: Any, tolerance: Any, trajectory: Any, key: str) -> None:
     with pytest.raises(FieldError) as caught:
         Demands.of(expect, tolerance, trajectory)
     assert caught.value.key == key
+
+
+def test_a_plain_number_bounds_a_count(small_run: Run) -> None:
+    assert judge(small_run, Demands.of({"contacts_driving": 0}), None).passed
+    assert not judge(small_run, Demands.of({"contacts_driving": 1}), None).passed
 
 
 def test_an_accepted_drive_of_movers_has_movers_in_its_picture(baseline: Baseline, small_run: Run) -> None:

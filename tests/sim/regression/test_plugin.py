@@ -177,6 +177,48 @@ def test_unused_baselines_are_told_and_fail_if_asked_to(accepted: pytest.Pyteste
     assert accepted.runpytest(*chosen, "--drive-strict").ret == 1
 
 
+def test_a_suite_that_is_reached_through_a_link_uses_its_baselines(accepted: pytest.Pytester) -> None:
+    link = accepted.path.parent / f"{accepted.path.name}-link"
+    link.symlink_to(accepted.path, target_is_directory=True)
+    found = accepted.runpytest(
+        *PLUGIN, "--rootdir", str(link), str(link / "a.drive.yaml"), "-k", "closed", "--drive-strict"
+    )
+    assert found.ret == 0
+    found.stdout.no_fnmatch_line("*unused baseline*")
+
+
+def test_a_suite_and_a_module_of_one_name_use_their_own_baselines(accepted: pytest.Pytester) -> None:
+    accepted.makepyfile(a="def test_one(drive): drive('small.yaml', 'astar')\n")
+    accepted.runpytest(*PLUGIN, "a.py", "--drive-update-new").assert_outcomes(passed=1)
+    folder = accepted.path / "baselines" / "a"
+    assert len(list(folder.iterdir())) == 3
+    chosen = (*PLUGIN, "a.drive.yaml", "a.py", "-k", "closed", "--drive-strict")
+    assert accepted.runpytest(*chosen).ret == 0
+    (folder / "gone-0.json").write_text("{}")
+    assert accepted.runpytest(*chosen).ret == 1
+
+
+def test_last_failed_calls_no_baseline_unused(accepted: pytest.Pytester) -> None:
+    """pytest leaves out the tests that passed before it says which tests there are."""
+    accepted.makepyfile(
+        test_m="def test_one(drive): drive('small.yaml', 'astar')\n"
+        "def test_two(drive): drive('small.yaml', 'astar', baseline=False); assert not drive\n"
+    )
+    accepted.runpytest(*PLUGIN[:2], "test_m.py", "--drive-update-new").assert_outcomes(passed=1, failed=1)
+    again = accepted.runpytest(*PLUGIN[:2], "test_m.py", "--lf", "--collect-only")
+    again.stdout.no_fnmatch_line("*unused baseline*")
+    again.stdout.no_fnmatch_line("*test_one*")
+
+
+def test_a_page_of_a_ci_run_that_cannot_be_written_is_one_line(
+    accepted: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(accepted.path / "none" / "page.md"))
+    found = accepted.runpytest(*PLUGIN, "-k", "closed")
+    assert found.ret == 0
+    found.stdout.fnmatch_lines(["GITHUB_STEP_SUMMARY: *page.md: cannot be written (No such file or directory)"])
+
+
 @pytest.mark.slow
 def test_it_works_with_xdist_and_in_any_order(accepted: pytest.Pytester) -> None:
     add_collision(accepted)

@@ -15,6 +15,7 @@ from antdrive.sim.calibration.prediction import Calibration
 from antdrive.sim.calibration.trial import Conditions
 from antdrive.sim.cli.commands.run import run as command
 from antdrive.sim.regression import Baseline, SuiteCase, check_case, load_suite, scenario_of, select
+from antdrive.sim.regression.names import is_importable_elsewhere
 from antdrive.sim.regression.scenarios import run_command
 from antdrive.sim.regression.suite import ScenarioEntry
 from antdrive.worlds.errors import InputError
@@ -213,6 +214,11 @@ def test_a_planner_of_ones_own_comes_from_a_file_or_a_module(tmp_path: Path, mon
         ("world: empty, expect: {duration_s: short}", 3, 'scenarios.one.expect.duration_s: must be a bound such as'),
         ("world: empty, expect: {certified: maybe}", 3, "scenarios.one.expect.certified: must be true or false"),
         ("world: empty, tolerance: {duration_s: -1}", 3, "scenarios.one.tolerance.duration_s: must be a number of at least"),
+        ("world: empty, tolerance: {end_m: 10 %}", 3, "scenarios.one.tolerance.end_m: must be a distance in metres"),
+        ("world: empty, expect: {plan_s: < 1}", 3, "scenarios.one.expect.plan_s: depends on the machine and its load"),
+        ("world: empty, expect: {min_clearance_m: 0.05}", 3, 'scenarios.one.expect.min_clearance_m: no drive has exactly'),
+        ("world: empty, baseline: false, trajectory: exact", 3, "scenarios.one.trajectory: there is no baseline to compare"),
+        ("world: empty, baseline: false, tolerance: {spl: 1}", 3, "scenarios.one.tolerance: there is no baseline to compare"),
         ("world: empty, tolerance: {replans: 1}", 3, "scenarios.one.tolerance.replans: neither more nor less of it is better"),
         ("world: empty, trajectory: 0", 3, "scenarios.one.trajectory: must be exact, or a distance of at least 0.002 m"),
         ("world: empty, unseen: [{x: 1, y: 1}]", 3, "scenarios.one.unseen[0].radius: missing; the radius as built"),
@@ -231,7 +237,7 @@ def test_what_is_wrong_is_one_line_with_line_key_and_remedy(tmp_path: Path, keys
     [
         ("scenarios:\n  a: {world: empty}\n", "s.drive.yaml: schema: missing; write schema: 1"),
         ("schema: 2\nscenarios:\n  a: {world: empty}\n", "s.drive.yaml:1: schema: must be 1"),
-        ("schema: 1\nscenarios: {}\n", "s.drive.yaml:2: scenarios: "),
+        ("schema: 1\nscenarios: {}\n", "s.drive.yaml:2: scenarios: holds none; write at least one"),
         ("schema: 1\nscenarios:\n  a/b: {world: empty}\n", "s.drive.yaml:3: scenarios.a/b: a name has letters, digits"),
         ("schema: 1\nscenarios:\n  a: {world: empty}\n  a: {world: empty}\n", "s.drive.yaml:4: scenarios.a: is given twice"),
         ("schema: 1\nscenarios:\n  a: empty\n", "s.drive.yaml:3: scenarios.a: must be a mapping"),
@@ -270,3 +276,47 @@ def test_words_select_tests(tmp_path: Path) -> None:
     ):
         with pytest.raises(InputError, match=re.escape(message)):
             select(words, pattern)
+
+
+def test_a_file_that_ends_the_program_is_a_wrong_suite(tmp_path: Path) -> None:
+    (tmp_path / "script.py").write_text("import sys\nsys.exit(0)\n")
+    for key, source in (("file", "script.py"), ("module", "script")):
+        with pytest.raises(InputError, match=rf"planner\.{key}: script.*ends the program .* \(exit code 0\); guard"):
+            scenario_of(only(tmp_path, f"world: empty, planner: {{{key}: {source}, name: Mine}}"))
+
+
+def test_suites_of_different_folders_have_modules_of_their_own(tmp_path: Path) -> None:
+    """The same names of modules, and of what they import, in two folders; each stays the same class when asked again."""
+    mine = (
+        "from antdrive.planners.graph.search import AStar\nimport besides\nclass Mine(AStar):\n    of = besides.WHO\n"
+    )
+    made: dict[tuple[str, str], type] = {}
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "besides.py").write_text(f"WHO = {folder!r}\n")
+        (tmp_path / folder / "same_name.py").write_text(mine)
+    for folder in ("a", "b", "a", "b"):
+        place = tmp_path / folder
+        for source in ("module: same_name", "file: same_name.py"):
+            planner = scenario_of(only(place, f"world: empty, planner: {{{source}, name: Mine}}")).planner
+            assert planner.of == folder  # type: ignore[attr-defined]
+            assert made.setdefault((folder, source), type(planner)) is type(planner)
+
+
+def test_planners_beside_a_suite_stay_in_their_process(tmp_path: Path) -> None:
+    (tmp_path / "beside_it.py").write_text(
+        "from antdrive.planners.graph.search import AStar\nclass Mine(AStar):\n    pass\n"
+    )
+    for words in ("{module: beside_it, name: Mine}", "{file: beside_it.py, name: Mine}"):
+        assert not is_importable_elsewhere(scenario_of(only(tmp_path, f"world: empty, planner: {words}")).planner)
+    assert is_importable_elsewhere(scenario_of(only(tmp_path, "world: empty, planner: astar")).planner)
+
+
+def test_a_module_that_is_taken_from_elsewhere_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    for place in (elsewhere, tmp_path):
+        (place / "taken_name.py").write_text("from antdrive.planners.graph.search import AStar as Mine\n")
+    monkeypatch.syspath_prepend(str(elsewhere))
+    with pytest.raises(InputError, match=r"planner\.module: taken_name is imported from .*elsewhere.*beside the suite"):
+        scenario_of(only(tmp_path, "world: empty, planner: {module: taken_name, name: Mine}"))

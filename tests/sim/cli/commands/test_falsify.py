@@ -45,6 +45,14 @@ def test_a_set_up_without_failures_is_exit_code_0(antdrive: Call) -> None:
     assert list(Path("none").iterdir()) == []
 
 
+def test_nothing_of_an_earlier_search_is_left(antdrive: Call) -> None:
+    Path("none/failure-1").mkdir(parents=True)
+    for name in ("failures.drive.yaml", "failure-1/rollout.npz"):
+        (Path("none") / name).touch()
+    assert antdrive("falsify", "-p", "astar", "--budget", "1", "--out", "none")[0] == 0
+    assert list(Path("none").iterdir()) == []
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [(["--method", "wise"], "choose from guided, random"), (["-p", "nobody"], "no planner is called 'nobody'")],
