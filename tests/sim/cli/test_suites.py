@@ -1,5 +1,6 @@
 """What `antdrive check` and `antdrive accept` share."""
 
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -13,13 +14,14 @@ def test_a_process_for_each_core_that_may_be_used(
 ) -> None:
     """joblib counts those of a container; the operating system says how many its host has."""
     found: list[int] = []
+    case = SimpleNamespace(entry=SimpleNamespace(margin=0.03))
 
-    def check_cases(cases: list[int], *, jobs: int, **others: Any) -> list[Any]:
+    def check_cases(cases: list[Any], *, jobs: int, **others: Any) -> list[Any]:
         found.append(jobs)
         return []
 
     monkeypatch.setattr("joblib.cpu_count", lambda: cores)
-    monkeypatch.setattr("antdrive.sim.regression.select", lambda words, only: list(range(10)))
+    monkeypatch.setattr("antdrive.sim.regression.select", lambda words, only: [case] * 10)
     monkeypatch.setattr("antdrive.sim.regression.check_cases", check_cases)
     monkeypatch.setattr(suites, "compile_once", lambda: None)
     assert suites.drive_suites(["a"], None, asked, update="nothing", results=None) == []  # type: ignore[arg-type]
