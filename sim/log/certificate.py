@@ -39,9 +39,8 @@ SAME_CLEARANCE = 1e-9  # closed-form distances, computed twice, agree to this [m
 # Contact points describe the pose before a step, and a robot pushes some millimetres into what it hits. Physics and
 # closed form disagree if a contact is reported with more clearance than this [m].
 CONTACT_SLACK = 0.012
-TOUCHING = (
-    2e-4  # physics reports surfaces that are no farther apart, rounded up from 0.1 mm, and those with a force [m]
-)
+# Physics reports surfaces that are no farther apart than 0.1 mm, rounded up here, and those with a force [m].
+TOUCHING = 2e-4
 START_SLACK, START_TURN_SLACK = 0.005, 0.01  # between the first row and the task's start [m], [rad]
 # How far poses may differ from where measured speeds lead: in one step, and over some seconds, where errors would add up
 # but rounding does not. Genuine drives stay below 0.07 mm in a step and below 0.6 mm plus 1 % of the way in any window.

@@ -19,4 +19,4 @@ def go(folder: str, seconds: float, jobs: int) -> None:
 
 
 if __name__ == "__main__":
-    go(sys.argv[1], 0.02, 2)
+    go(sys.argv[1], 0.2, 2)  # half a minute, so that a test on a busy machine disturbs it in the middle

@@ -56,6 +56,7 @@ class Watcher:
     schedule = None
     blockage = SimpleNamespace(reason="")
     may_wait = True
+    wrong = ""
 
     def __init__(self) -> None:
         self.waiting: list[bool] = []

@@ -107,6 +107,7 @@ class OneReplan:
     schedule = None
     blockage = SimpleNamespace(reason="")
     may_wait = False
+    wrong = ""
 
     def __init__(self) -> None:
         self.tracked: Any = None

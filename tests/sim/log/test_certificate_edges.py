@@ -37,9 +37,9 @@ def test_the_outcome_is_that_of_the_first_contact() -> None:
     assert says(standing, "outcome: hit_while_standing, but the first contact was collided")
 
 
-def test_physics_reports_no_gap_and_no_pull() -> None:
+def test_physics_reports_no_gap_without_a_force_and_no_pull() -> None:
     for column, value, possible in ((2, 2e-4, True), (2, 2.1e-4, False), (3, 0.0, True), (3, -1e-6, False)):
-        contact = np.array([[400, 0, -0.001, 5.0], [401, 0, -0.001, 5.0]])
+        contact = np.array([[400, 0, -0.001, 0.0], [401, 0, -0.001, 0.0]])
         contact[1, column] = value
         told = says(replace(touched(0.001), contacts=contact), "contacts: physics reports surfaces no farther")
         assert told is not possible
