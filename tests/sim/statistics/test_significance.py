@@ -118,7 +118,7 @@ def test_holm_by_hand() -> None:
     assert holm(np.array([np.nan, 0.04]))[1] == pytest.approx(0.04)
 
 
-@settings(max_examples=20)  # statsmodels collects garbage at every call
+@settings(max_examples=8)  # statsmodels collects garbage at every call
 @given(st.lists(st.floats(0, 1), min_size=1, max_size=10))
 def test_holm_keeps_the_order_and_never_lowers(values: list[float]) -> None:
     given_p, adjusted = np.array(values), holm(np.array(values))
