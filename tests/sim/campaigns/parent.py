@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 
 from antdrive.sim.campaigns import expand, make_campaign, store
@@ -19,4 +20,5 @@ def go(folder: str, seconds: float, jobs: int) -> None:
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in what a shell starts in the background
     go(sys.argv[1], 0.2, 2)  # half a minute, so that a test on a busy machine disturbs it in the middle
