@@ -6,14 +6,13 @@ import dataclasses
 import functools
 import math
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, TypeAlias, get_args
 
-from antdrive.robots import Avoidance, PurePursuit, RobotSpec, load_robot
+from antdrive.robots import Avoidance, PurePursuit
 from antdrive.sim.driving.perception import Perception, PerceptionKind
 from antdrive.sim.driving.replanning import ReplanPolicy
 from antdrive.sim.entries import SettingsEntry
-from antdrive.worlds import Disc, Task, generate, load_task
+from antdrive.worlds import Disc, Task, generate
 from antdrive.worlds.errors import FieldError, InputError
 from antdrive.worlds.files.checks import suggest
 
@@ -43,34 +42,6 @@ def scenario_fields(entry: SettingsEntry, fail: Fail) -> dict[str, Any]:
         "physics_hz": entry.physics_hz,
         "control_hz": entry.control_hz,
     }
-
-
-def read_task(path: Path) -> Task:
-    """The task in a world file, read once per process and version of the file.
-
-    Args:
-        path: the file
-    """
-    return _read_task(str(path), path.stat().st_mtime_ns)
-
-
-def read_robot(path: Path) -> RobotSpec:
-    """The robot in a file, read once per process and version of the file.
-
-    Args:
-        path: the file
-    """
-    return _read_robot(str(path), path.stat().st_mtime_ns)
-
-
-@functools.lru_cache(maxsize=1024)
-def _read_task(path: str, mtime: int) -> Task:
-    return load_task(Path(path))
-
-
-@functools.lru_cache(maxsize=1024)
-def _read_robot(path: str, mtime: int) -> RobotSpec:
-    return load_robot(Path(path))
 
 
 @functools.lru_cache(maxsize=1024)

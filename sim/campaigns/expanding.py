@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from antdrive.planners import SMOOTHINGS
-from antdrive.robots import RobotSpec, list_robots
+from antdrive.robots import RobotSpec, list_robots, load_robot
 from antdrive.sim.campaigns.campaign import Campaign
 from antdrive.sim.campaigns.grid_planners import PlannerVariant, planner_variants
 from antdrive.sim.campaigns.grid_tasks import campaign_tasks
@@ -18,7 +18,7 @@ from antdrive.sim.campaigns.grid_worlds import NamedTask, campaign_worlds
 from antdrive.sim.campaigns.job import Job, SweepCase, key_of
 from antdrive.sim.entries import has_flags, option_text, setting_words
 from antdrive.sim.log.binding import canonical_hash
-from antdrive.sim.settings import read_robot, scenario_fields
+from antdrive.sim.settings import scenario_fields
 from antdrive.worlds import Task
 from antdrive.worlds.errors import FieldError, InputError
 from antdrive.worlds.files.checks import suggest
@@ -104,7 +104,7 @@ def _robots(campaign: Campaign) -> list[NamedRobot]:
             raise campaign.error(
                 ("robots", i), f"{name}: no such file, nor a robot of the catalogue; {suggest(name, known)}"
             )
-        robot = read_robot(path)
+        robot = load_robot(path)
         content = canonical_hash(robot)
         word = name if name in known else f"{ROBOTS}/{content[:8]}/{path.name}"
         found.setdefault(content, NamedRobot(robot, content, word, None if name in known else path))

@@ -13,8 +13,8 @@ from typing import Any
 
 from antdrive.sim.campaigns.campaign import Campaign, seeds_of
 from antdrive.sim.entries import option_text
-from antdrive.sim.settings import generated, read_task
-from antdrive.worlds import Task, list_worlds
+from antdrive.sim.settings import generated
+from antdrive.worlds import Task, list_worlds, load_task
 from antdrive.worlds.errors import FieldError, InputError
 from antdrive.worlds.files.checks import show, suggest
 from antdrive.worlds.files.document import Location
@@ -78,10 +78,10 @@ def _distinct(found: list[tuple[NamedTask, str]]) -> list[NamedTask]:
 def _named(campaign: Campaign, place: Location, name: str) -> Iterator[tuple[NamedTask, str]]:
     known = list_worlds()
     if name in known:
-        yield NamedTask(name, OWN, read_task(known[name]), name, place), name
+        yield NamedTask(name, OWN, load_task(known[name]), name, place), name
         return
     for path in _files(campaign, place, name, f"nor a world of the catalogue; {suggest(Path(name).stem, known)}"):
-        task = read_task(path)
+        task = load_task(path)
         yield NamedTask(task.world.name, OWN, task, None, place), os.path.relpath(path, campaign.folder)
 
 

@@ -115,7 +115,10 @@ def _engine(todo: list[Job], work: Work, jobs: int | None, dask: str | None) -> 
         return run_on_cluster(todo, work, dask)
     if jobs == 0:
         return run_here(todo, work)
-    return run_locally(todo, work, min(jobs or os.cpu_count() or 1, max(1, len(todo))))
+    import joblib
+
+    cores = int(joblib.cpu_count())  # of a container, not of its host
+    return run_locally(todo, work, min(jobs or cores, max(1, len(todo))))
 
 
 def calibrated(jobs: Iterable[Job]) -> list[Job]:

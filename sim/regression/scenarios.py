@@ -7,13 +7,13 @@ import shlex
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from antdrive.robots import RobotSpec, list_robots
+from antdrive.robots import RobotSpec, list_robots, load_robot
 from antdrive.sim.entries import has_flags, option_text, setting_words
 from antdrive.sim.regression.names import SOURCES, planner_of, robot_path, world_path
 from antdrive.sim.regression.suite import SuiteCase, shown_path
 from antdrive.sim.scenario import Scenario
-from antdrive.sim.settings import generated, read_robot, read_task, scenario_fields
-from antdrive.worlds import Task, list_worlds
+from antdrive.sim.settings import generated, scenario_fields
+from antdrive.worlds import Task, list_worlds, load_task
 from antdrive.worlds.errors import FieldError, InputError
 from antdrive.worlds.files.checks import show
 
@@ -21,7 +21,7 @@ from antdrive.worlds.files.checks import show
 def scenario_of(case: SuiteCase, choose: Callable[[Scenario], Scenario] = Scenario.with_chosen_margin) -> Scenario:
     """The scenario of a suite's test.
 
-    Worlds and robots are read once per process.
+    Files of worlds and robots that were read last are kept, by their text.
 
     Args:
         case: the test
@@ -58,7 +58,7 @@ def task_of(case: SuiteCase) -> Task:
     world = case.entry.world
     if isinstance(world, str):
         path = world_path(case, world)
-        return read_task(path)
+        return load_task(path)
     options = dict(world)
     kind, seed = options.pop("generate", None), options.pop("seed", 0)
     if not isinstance(kind, str):
@@ -78,7 +78,7 @@ def robot_of(case: SuiteCase) -> RobotSpec:
         InputError: there is no such robot, or something in its file is wrong.
     """
     path = robot_path(case)
-    return read_robot(path)
+    return load_robot(path)
 
 
 def run_command(case: SuiteCase) -> str | None:
