@@ -12,6 +12,7 @@ import math
 import os
 import tempfile
 from collections.abc import Iterator, Sequence
+from types import TracebackType
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -33,6 +34,7 @@ SETTLING_TIME = 0.1  # in which a placed robot sinks onto its wheels [s]
 TOUCHING_DISTANCE = 1e-4  # surfaces closer than this touch [m]
 MAX_JOINT_VELOCITY = 1e6  # of wheels; Bullet's default of 100 would slow down small wheels [rad/s]
 RESIDUAL = 5e-7  # where the solver stops for geared wheels; at 2e-6 speeds are 4 mm/s off [(rad/s)^2]
+USUAL_RESIDUAL = 1e-7  # the same of all other wheels, which is Bullet's default [(rad/s)^2]
 OVERSPEED = 1.5  # no robot drives faster by itself than its highest speed times this
 # Any other body, the robot's link -1, any link of the other: naming these costs 0.4 us a step.
 CHASSIS_AND_ANY = (-1, -1, -2)
@@ -135,8 +137,10 @@ class Engine:
             self._build_obstacles(i, shape, [centre])
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self._open.close()
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._open.__exit__(kind, error, traceback)
 
     def place(self, pose: Pose) -> None:
         """Put the robot at a pose, at rest on its wheels, and restart the movers at time 0.
@@ -247,8 +251,9 @@ class Engine:
         torque = self.robot.wheel_torque * (self._rolling / self.robot.wheel_radius)
         self._torques = torque, torque
         gear = self.robot.wheel_radius / self._rolling
-        if gear > 1:  # the solver measures in rad/s, and smaller spheres turn faster
-            p.setPhysicsEngineParameter(solverResidualThreshold=RESIDUAL * gear**2, physicsClientId=self._client)
+        # The solver measures in rad/s, and smaller spheres turn faster. The client may have simulated another robot before.
+        residual = RESIDUAL * gear**2 if gear > 1 else USUAL_RESIDUAL
+        p.setPhysicsEngineParameter(solverResidualThreshold=residual, physicsClientId=self._client)
         text = robot_urdf(self.robot, self._com_drop)
         with tempfile.TemporaryDirectory() as folder:
             path = os.path.join(folder, "robot.urdf")
