@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from antdrive.sim.statistics.columns import ASKED, DRIVEN, SETTINGS
 from antdrive.worlds.errors import FieldError
 
 Floats: TypeAlias = npt.NDArray[np.float64]
@@ -39,6 +40,13 @@ class RunTable:
 
     def __contains__(self, name: str) -> bool:
         return name in self.columns
+
+    @property
+    def settings(self) -> tuple[str, ...]:
+        """The columns that say what a run is, besides place, planner and seed: of two margins the one that was asked for."""
+        return tuple(
+            name for name in SETTINGS if name in self.columns and not (name == DRIVEN and ASKED in self.columns)
+        )
 
     def texts(self, name: str) -> list[str]:
         """A column as text; empty where there is no value.

@@ -6,8 +6,9 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from antdrive.sim.statistics.comparison import SUCCESS, PairedComparison, PlannerSuccess
+from antdrive.sim.statistics.comparison import SUCCESS, PairedComparison
 from antdrive.sim.statistics.proportions import Interval
+from antdrive.sim.statistics.success import PlannerSuccess
 from antdrive.sim.view.campaign.summary import CampaignSummary, measure_title
 
 NONE = "–"

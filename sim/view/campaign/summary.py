@@ -8,19 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from antdrive.sim.log.metrics import METRICS
-from antdrive.sim.statistics.comparison import (
-    SUCCESS,
-    PairedComparison,
-    PlannerSuccess,
-    common_medians,
-    compare_metric,
-    compare_success,
-    pairs_of,
-    success_table,
-)
+from antdrive.sim.statistics.comparison import SUCCESS, PairedComparison, compare_metric, compare_success, pairs_of
 from antdrive.sim.statistics.pairing import PairedRuns
 from antdrive.sim.statistics.proportions import Interval
 from antdrive.sim.statistics.runs import RunTable
+from antdrive.sim.statistics.success import PlannerSuccess, common_medians, success_table
 from antdrive.worlds.errors import FieldError
 
 DEFAULT_METRICS = ("driven_length_m", "duration_s", "plan_s")
