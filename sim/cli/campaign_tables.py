@@ -19,7 +19,8 @@ Metrics = Annotated[
     typer.Option(
         "--metric",
         metavar="NAME",
-        help="Metric to compare besides success, for a campaign's folder. May be repeated.  [default: duration_s]",
+        help="Metric to compare besides success, for a campaign's folder. May be repeated.  "
+        "[default: driven_length_m, duration_s, plan_s]",
     ),
 ]
 Against = Annotated[
@@ -101,20 +102,17 @@ def compare_campaign(
     """
     from antdrive.sim.campaigns.reporting import summarise_campaign
 
-    chosen = tuple(metrics or ("duration_s",))
     summary = summarise_campaign(
-        folder, metrics=chosen, against=against, planners=planners, where=_conditions(where), strict=True
+        folder, metrics=metrics or None, against=against, planners=planners, where=_conditions(where), strict=True
     )
     if json:
         print_json(_plain(summary))
         return SUCCEEDED
-    from antdrive.sim.view.campaign.cells import pair_cells, success_cells
+    from antdrive.sim.view.campaign.cells import all_cells
 
-    _print_table(success_cells(summary))
-    for name, rows in summary.comparisons.items():
+    for table in all_cells(summary):
+        _print_table(table)
         print_line()
-        _print_table(pair_cells(name, rows))
-    print_line()
     for note in (*summary.notes, f"Medians are over the {summary.common} instances that every planner solved."):
         print_line(note)
     return SUCCEEDED

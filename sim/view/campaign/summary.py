@@ -13,11 +13,11 @@ from antdrive.sim.statistics.pairing import PairedRuns
 from antdrive.sim.statistics.proportions import Interval
 from antdrive.sim.statistics.runs import RunTable
 from antdrive.sim.statistics.success import PlannerSuccess, common_medians, success_table
+from antdrive.sim.view.campaign.headline import notes_on
 from antdrive.worlds.errors import FieldError
 
 DEFAULT_METRICS = ("driven_length_m", "duration_s", "plan_s")
 TITLES = {"plan_s": "planning time", "drive_wall_s": "wall time of the drive", "path_length_m": "planned length"}
-SETTINGS = ("robot", "smoothing", "noise", "margin", "cell")  # over which shares are taken, if there are several
 UNITS = ("_rad_per_m", "_m", "_s")  # that the names of metrics end with
 
 
@@ -53,33 +53,7 @@ class CampaignSummary:
     @property
     def notes(self) -> list[str]:
         """What a reader of the tables must know about this campaign, a sentence each."""
-        still = [p for p, row in zip(self.paired.planners, self.success, strict=True) if row.counted < row.runs]
-        worlds = len(self.paired.worlds)
-        found: list[str] = []
-        if len(self.table) < self.size:
-            found.append(f"{self.size - len(self.table)} of {self.size} runs are not done yet.")
-        worlds_of = self.table.texts("world")
-        for name in SETTINGS:
-            values = list(
-                dict.fromkeys(f"{v:g}" if isinstance(v, float) else str(v) for v in self.table.columns.get(name, ()))
-            )
-            if len(set(zip(worlds_of, self.table.texts(name), strict=True))) > worlds:  # not only from world to world
-                some = ", ".join(values[:5]) + (", …" if len(values) > 5 else "")
-                found.append(
-                    f"Shares and medians are over several values of {name} ({some}); --where {name}={values[0]} takes one."
-                )
-        if still:
-            found.append(
-                f"Drives of {', '.join(still)} repeat with other seeds. Repetitions count once, except in pairs with a "
-                "planner whose drives the seed changes."
-            )
-        if worlds == 1:
-            found.append("There is one world: the intervals and tests say nothing about other worlds.")
-        elif worlds < 6:
-            found.append(f"{worlds} worlds are too few for a test over worlds: its p-value cannot be below 0.05.")
-        if self.refusal:
-            found.append(f"Planners are not compared: {self.refusal}.")
-        return found
+        return notes_on(self)
 
 
 def summarise(

@@ -36,10 +36,11 @@ def campaign(tmp_path: Path) -> Path:
 def test_compare_prints_both_tables(antdrive: Call, campaign: Path) -> None:
     code, out, err = antdrive("compare", campaign)
     assert (code, err) == (0, "")
-    success, pairs, duration = out.split("\n\n")[:3]
+    success, outcomes, pairs, length = out.split("\n\n")[:4]
     assert re.search(r"^astar +\d+\.\d +\d+\.\d to \d+\.\d ", success, re.M)
     assert re.search(r"^astar +ants ants=10 +astar ", pairs, re.M)
-    assert duration.startswith("duration [s]\n")
+    assert re.search(r"^ants ants=10 +\d+ +\d+ +50$", outcomes, re.M)
+    assert length.startswith("driven length [m]\n")
     assert "20 of 120 runs are not done yet." in out
 
 
