@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -19,19 +19,20 @@ Metrics = Annotated[
     typer.Option(
         "--metric",
         metavar="NAME",
-        help="Metric to compare besides success, for a campaign's folder. May be repeated.  "
+        help="Metric to compare besides success, of a campaign. May be repeated.  "
         "[default: driven_length_m, duration_s, plan_s]",
     ),
 ]
 Against = Annotated[
     str | None,
-    typer.Option(metavar="PLANNER", help="Compare this planner with each other one only, for a campaign's folder."),
+    typer.Option(metavar="PLANNER", help="Compare this planner with each other one only, of a campaign."),
 ]
 
 Where = Annotated[
     list[str] | None,
     typer.Option(
-        metavar="COLUMN=VALUE", help="Take only some runs of a campaign's folder, such as noise=1. May be repeated."
+        metavar="COLUMN=VALUE",
+        help="Take only some runs of a campaign, such as noise=1, noise=0,1 or duration_s=10..20. May be repeated.",
     ),
 ]
 
@@ -51,8 +52,8 @@ def is_campaign(folder: Path) -> bool:
     return all((folder / name).is_file() for name in MARKS)
 
 
-def campaign_of_words(words: Sequence[str], context: typer.Context) -> Path | None:
-    """The campaign's folder that `antdrive compare` was given, if it is one.
+def campaigns_of_words(words: Sequence[str], context: typer.Context) -> list[Path]:
+    """The campaigns' folders that `antdrive compare` was given, if they are.
 
     Args:
         words: the worlds named
@@ -64,17 +65,29 @@ def campaign_of_words(words: Sequence[str], context: typer.Context) -> Path | No
     folders = [word for word in words if is_campaign(Path(word))]
     given = {name for name in context.params if _is_given(context, name)}
     if not folders:
-        for name in sorted(given & {"metric", "against", "where"}):
-            raise InputError(f"--{name}: is for the folder of a campaign; {words[0]} is none")
-        return None
-    if len(words) > 1:
-        raise InputError(f"{' '.join(words)}: name one campaign's folder, or worlds")
+        _check_worlds(words, given)
+        return []
+    if len(folders) < len(words):
+        raise InputError(f"{' '.join(words)}: name folders of campaigns, or worlds")
     for name in sorted(given - set(COMPARE_OPTIONS)):
         option = name.replace("_", "-")
         raise InputError(
             f"--{option}: is for drives; a campaign's folder takes --planner, --metric, --against, --where and --json"
         )
-    return Path(folders[0])
+    return [Path(folder) for folder in folders]
+
+
+def _check_worlds(words: Sequence[str], given: set[str]) -> None:
+    """Refuse what is neither a campaign nor a world, and options that worlds do not take."""
+    from antdrive.worlds.files.world_file import list_worlds
+
+    for word in words:
+        if Path(word).is_dir():
+            raise InputError(f"{word}: is no campaign's folder; antdrive sweep writes {MARKS[0]} into one")
+        if "planner" not in given and not Path(word).exists() and word not in list_worlds():
+            raise InputError(f"{word}: no such folder of a campaign, world file, or world of the catalogue")
+    for name in sorted(given & {"metric", "against", "where"}):
+        raise InputError(f"--{name}: is for the folder of a campaign; {words[0]} is none")
 
 
 def _is_given(context: typer.Context, name: str) -> bool:
@@ -82,8 +95,8 @@ def _is_given(context: typer.Context, name: str) -> bool:
     return source is not None and source.name == "COMMANDLINE"
 
 
-def compare_campaign(
-    folder: Path,
+def compare_campaigns(
+    folders: Sequence[Path],
     planners: Sequence[str],
     metrics: Sequence[str] | None,
     against: str | None,
@@ -93,7 +106,7 @@ def compare_campaign(
     """Print success of each planner and the comparison of each pair.
 
     Args:
-        folder: the campaign's folder
+        folders: of the campaigns
         planners: labels of those to compare; all without
         metrics: to compare besides success
         against: label of the planner that each other one is compared with
@@ -103,7 +116,7 @@ def compare_campaign(
     from antdrive.sim.campaigns.reporting import summarise_campaign
 
     summary = summarise_campaign(
-        folder, metrics=metrics or None, against=against, planners=planners, where=_conditions(where), strict=True
+        folders, metrics=metrics or None, against=against, planners=planners, where=_conditions(where), strict=True
     )
     if json:
         print_json(_plain(summary))
@@ -118,19 +131,19 @@ def compare_campaign(
     return SUCCEEDED
 
 
-def report_campaign_folder(folder: Path, out: Path, title: str | None, where: Sequence[str] | None, json: bool) -> int:
-    """Write the report of a campaign.
+def report_campaigns(folders: Sequence[Path], out: Path, json: bool, where: Sequence[str] | None, **words: Any) -> int:
+    """Write the report of a campaign, or of several.
 
     Args:
-        folder: the campaign's folder
+        folders: of the campaigns
         out: the file to write
-        title: of the report
-        where: COLUMN=VALUE of the runs to take
         json: print one JSON object
+        where: COLUMN=VALUE of the runs to take
+        words: the rest of what `report_campaign` takes
     """
     from antdrive.sim.campaigns.reporting import report_campaign
 
-    files = report_campaign(folder, out, title=title, where=_conditions(where))
+    files = report_campaign(folders, out, where=_conditions(where), **words)
     size = sum(path.stat().st_size for path in files)
     if json:
         print_json({"file": str(files[0]), "files": [str(path) for path in files], "bytes": size})
@@ -141,11 +154,14 @@ def report_campaign_folder(folder: Path, out: Path, title: str | None, where: Se
 
 
 def _conditions(where: Sequence[str] | None) -> dict[str, str]:
-    """What `--where` says, by column."""
+    """What `--where` says, by column: a run has one of the values named for it."""
     for text in where or ():
         if "=" not in text:
             raise InputError(f"--where {text}: must be COLUMN=VALUE, such as noise=1")
-    return {text.partition("=")[0]: text.partition("=")[2] for text in where or ()}
+    found: dict[str, str] = {}
+    for column, _, value in (text.partition("=") for text in where or ()):
+        found[column] = f"{found[column]},{value}" if column in found else value
+    return found
 
 
 def _print_table(table: "TextTable") -> None:

@@ -29,7 +29,7 @@ def headline(summary: CampaignSummary) -> list[tuple[str, str]]:
     """
     table, paired, rows = summary.table, summary.paired, summary.success
     runs, good = sum(row.runs for row in rows), int(paired.success.sum())
-    done = f"{runs:,}" if len(table) >= summary.size or runs < len(table) else f"{runs:,} of {summary.size:,}"
+    done = f"{runs:,}" if runs >= summary.size else f"{runs:,} of {summary.size:,}"
     died = sum(row.outcomes.get("crashed", 0) + row.outcomes.get("planner_fault", 0) for row in rows)
     return [
         (done, "run" if done == "1" else "runs"),

@@ -156,7 +156,6 @@ def _write_page(summary: CampaignSummary, folder: Path, out: Path) -> list[Path]
     planners = summary.paired.planners
     styles = label_styles(planners, [names[label] or label for label in planners])
     base = quote(Path(os.path.relpath(folder.resolve(), out.resolve().parent)).as_posix()) + "/"
-    rows = summary.paired.row[summary.paired.row >= 0]
     text = (
         _environment()
         .get_template("campaign.html.j2")
@@ -172,19 +171,10 @@ def _write_page(summary: CampaignSummary, folder: Path, out: Path) -> list[Path]
             measure_title=measure_title,
             words=WORDS,
             charts=campaign_charts(summary, styles),
-            data=page_data(_taken(summary, rows.tolist()), planners, base),
+            data=page_data(summary.table, planners, base),
         )
     )
     return _written(out, text)
-
-
-def _taken(summary: CampaignSummary, rows: Sequence[int]) -> Any:
-    """The runs of the planners that are looked at, in the order of the table."""
-    table = summary.table
-    if len(rows) == len(table):
-        return table
-    order = sorted(rows)
-    return type(table)({name: [values[k] for k in order] for name, values in table.columns.items()})
 
 
 def _common(summary: CampaignSummary) -> dict[str, Any]:

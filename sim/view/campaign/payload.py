@@ -20,6 +20,7 @@ SENTENCES = {
     **{outcome.key: outcome.value for outcome in Outcome},
     "crashed": "the process of the run died",
     "planner_fault": "the planner raised an error",
+    "too_slow": "the run took longer than the campaign allows",
 }
 SIGNIFICANT = 6  # digits of numbers in the page
 

@@ -28,7 +28,7 @@ class CampaignSummary:
     Attributes:
         title: of the page
         paired: the runs, by instance and planner
-        size: how many runs the campaign has; fewer may be done
+        size: how many runs of these planners the campaign has; fewer may be done
         success: a row for each planner
         comparisons: by measure, "success" first, a row for each pair of planners; empty with one planner
         common: number of instances in which every planner succeeded
@@ -71,7 +71,7 @@ def summarise(
     Args:
         table: the runs that are done
         title: of the page
-        size: how many runs the campaign has
+        size: how many runs of these planners the campaign has; as many as are done without
         metrics: to compare besides success; `DEFAULT_METRICS` without
         against: the planner that each other one is compared with; every pair without
         planners: labels of those to look at; all without
@@ -80,9 +80,10 @@ def summarise(
     Raises:
         FieldError: an unknown planner or metric, no runs, or nothing to compare.
     """
-    paired = PairedRuns.of(table)
+    paired = PairedRuns.of(table.of_planners(planners) if planners else table)
     if planners:
         paired = paired.select(planners)
+    table = paired.table
     chosen = list(metrics) if metrics is not None else known_metrics(paired, DEFAULT_METRICS)
     for name in chosen:
         if name not in METRICS:
