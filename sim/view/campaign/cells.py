@@ -52,7 +52,7 @@ def success_cells(summary: CampaignSummary) -> TextTable:
                 row.planner,
                 percent(row.share),
                 percents(row.interval),
-                *([percents(row.over_worlds)] if over else []),
+                *([percents(row.across_worlds)] if over else []),
                 *(str(row.successes), str(row.counted), str(row.runs)),
                 *([str(row.elsewhere)] if elsewhere else []),
                 *(with_interval(*summary.medians[name][k]) for name in names),

@@ -29,13 +29,13 @@ def headline(summary: CampaignSummary) -> list[tuple[str, str]]:
     """
     table, paired, rows = summary.table, summary.paired, summary.success
     runs, good = sum(row.runs for row in rows), int(paired.success.sum())
-    done = f"{runs:,}" if runs >= summary.size else f"{runs:,} of {summary.size:,}"
+    done = ("run" if runs == 1 else "runs") if runs >= summary.size else f"of {summary.size:,} runs done"
     died = sum(row.outcomes.get("crashed", 0) + row.outcomes.get("planner_fault", 0) for row in rows)
     return [
-        (done, "run" if done == "1" else "runs"),
+        (f"{runs:,}", done),
+        (f"{good:,}", "runs succeeded, of all planners" if len(rows) > 1 else "runs succeeded"),
         *(_counted(len(paired.planners), "planner"), _counted(len(paired.worlds), "world")),
         _counted(len(set(table.texts("seed"))), "seed"),
-        (f"{good:,}", "runs succeeded, of all planners" if len(rows) > 1 else "runs succeeded"),
         *([_best(rows, paired)] if paired.shared.any() else []),
         *([(str(died), "ended by a crash or a planner's error")] if died else []),
     ]

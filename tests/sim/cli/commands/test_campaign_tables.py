@@ -85,7 +85,7 @@ def test_a_report_takes_planners_metrics_and_one_to_compare_with(
     assert antdrive("report", campaign, "-o", tmp_path / "r.md", "-p", "astar")[0] == 0
     text = (tmp_path / "r.md").read_text()
     assert "ants" not in text
-    assert "**50 of 60** runs" in text
+    assert "**50** of 60 runs done" in text
 
 
 def test_several_campaigns_are_compared(antdrive: Call, tmp_path: Path, campaign: Path) -> None:
