@@ -31,10 +31,11 @@ def read_runs(folders: Sequence[Path], where: Mapping[str, str], planners: Seque
         FieldError: no finished run, no such planner, or no run with these values.
     """
     base, names = common_folder(folders), _names(folders)
-    tables, missing = {}, {}
+    tables: dict[str, RunTable] = {}
+    missing: dict[str, Columns] = {}
     for name, folder in zip(names, folders, strict=True):
-        table, missing[name] = _of_one(folder, base)
-        tables[name] = RunTable(table)
+        done, missing[name] = _of_one(folder, base)
+        tables[name] = RunTable(done)
     table = merged(tables)
     if not len(table):
         raise FieldError("runs", "none; the campaign has no finished run")
@@ -80,7 +81,9 @@ def _chosen(
     table: RunTable, missing: Mapping[str, Columns], where: Mapping[str, str]
 ) -> tuple[RunTable, dict[str, Columns]]:
     """The runs with the wanted values, and the missing ones that may have them: only what a run is can be known of these."""
-    left = {folder: {**columns, FOLDER: [folder] * len(columns["key"])} for folder, columns in missing.items()}
+    left: dict[str, Columns] = {
+        folder: {**columns, FOLDER: [folder] * len(columns["key"])} for folder, columns in missing.items()
+    }
     for column, value in where.items():
         name = column_named(table.columns, column)
         table = table.take(places_of(column, table.columns[name], value))
