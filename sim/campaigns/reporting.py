@@ -21,6 +21,7 @@ def summarise_campaign(
     metrics: Sequence[str] | None = None,
     against: str | None = None,
     planners: Sequence[str] = (),
+    allow: Mapping[str, float] = MappingProxyType({}),
     where: Mapping[str, str] = MappingProxyType({}),
     strict: bool = False,
 ) -> CampaignSummary:
@@ -33,6 +34,7 @@ def summarise_campaign(
         metrics: to compare besides success; driven length, duration and planning time without
         against: label of the planner that each other one is compared with; every pair without
         planners: labels of those to look at; all without
+        allow: by how much a planner may be worse than `against` and still count as not worse, such as {"success": 0.02}
         where: take only runs with these values, by column, such as {"noise": "1"}; also "0,1" and, for numbers, "10..20"
         strict: refuse where no two planners can be compared, instead of saying so in the report
 
@@ -51,6 +53,7 @@ def summarise_campaign(
             metrics=metrics,
             against=against,
             planners=planners,
+            allow=allow,
             strict=strict,
         )
     except FieldError as error:
@@ -69,6 +72,7 @@ def report_campaign(
     metrics: Sequence[str] | None = None,
     against: str | None = None,
     planners: Sequence[str] = (),
+    allow: Mapping[str, float] = MappingProxyType({}),
     where: Mapping[str, str] = MappingProxyType({}),
 ) -> list[Path]:
     """Write a report about a campaign: a page, or its tables.
@@ -81,6 +85,7 @@ def report_campaign(
         metrics: to compare besides success; driven length, duration and planning time without
         against: label of the planner that each other one is compared with; every pair without
         planners: labels of those to report about; all without
+        allow: by how much a planner may be worse than `against` and still count as not worse, such as {"success": 0.02}
         where: take only runs with these values, by column, such as {"noise": "1"}; also "0,1" and, for numbers, "10..20"
 
     Returns:
@@ -93,5 +98,7 @@ def report_campaign(
 
     target = Path(out)
     check_suffix(target)
-    summary = summarise_campaign(folder, title=title, metrics=metrics, against=against, planners=planners, where=where)
+    summary = summarise_campaign(
+        folder, title=title, metrics=metrics, against=against, planners=planners, allow=allow, where=where
+    )
     return write_campaign_report(summary, common_folder(_folders(folder)), target)

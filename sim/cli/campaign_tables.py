@@ -36,7 +36,16 @@ Where = Annotated[
     ),
 ]
 
-COMPARE_OPTIONS = ("worlds", "planner", "metric", "against", "where", "json")
+Allow = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="MEASURE=DIFFERENCE",
+        help="By how much a planner may be worse than --against and still count as not worse, such as success=0.02 or "
+        "duration_s=1, of a campaign. May be repeated.",
+    ),
+]
+
+COMPARE_OPTIONS = ("worlds", "planner", "metric", "against", "allow", "where", "json")
 
 
 #: Files of a campaign's folder, as `sim/campaigns/store` names them; that module would load much more.
@@ -72,7 +81,7 @@ def campaigns_of_words(words: Sequence[str], context: typer.Context) -> list[Pat
     for name in sorted(given - set(COMPARE_OPTIONS)):
         option = name.replace("_", "-")
         raise InputError(
-            f"--{option}: is for drives; a campaign's folder takes --planner, --metric, --against, --where and --json"
+            f"--{option}: is for drives; a campaign's folder takes --planner, --metric, --against, --allow, --where and --json"
         )
     return [Path(folder) for folder in folders]
 
@@ -86,7 +95,7 @@ def _check_worlds(words: Sequence[str], given: set[str]) -> None:
             raise InputError(f"{word}: is no campaign's folder; antdrive sweep writes {MARKS[0]} into one")
         if "planner" not in given and not Path(word).exists() and word not in list_worlds():
             raise InputError(f"{word}: no such folder of a campaign, world file, or world of the catalogue")
-    for name in sorted(given & {"metric", "against", "where"}):
+    for name in sorted(given & {"metric", "against", "allow", "where"}):
         raise InputError(f"--{name}: is for the folder of a campaign; {words[0]} is none")
 
 
@@ -100,6 +109,7 @@ def compare_campaigns(
     planners: Sequence[str],
     metrics: Sequence[str] | None,
     against: str | None,
+    allow: Sequence[str] | None,
     where: Sequence[str] | None,
     json: bool,
 ) -> int:
@@ -110,14 +120,14 @@ def compare_campaigns(
         planners: labels of those to compare; all without
         metrics: to compare besides success
         against: label of the planner that each other one is compared with
+        allow: MEASURE=DIFFERENCE by which a planner may be worse than that one
         where: COLUMN=VALUE of the runs to take
         json: print one JSON object
     """
     from antdrive.sim.campaigns.reporting import summarise_campaign
 
-    summary = summarise_campaign(
-        folders, metrics=metrics or None, against=against, planners=planners, where=_conditions(where), strict=True
-    )
+    words: dict[str, Any] = {"allow": _allowed(allow, against), "where": _conditions(where), "strict": True}
+    summary = summarise_campaign(folders, metrics=metrics or None, against=against, planners=planners, **words)
     if json:
         print_json(_plain(summary))
         return SUCCEEDED
@@ -131,19 +141,30 @@ def compare_campaigns(
     return SUCCEEDED
 
 
-def report_campaigns(folders: Sequence[Path], out: Path, json: bool, where: Sequence[str] | None, **words: Any) -> int:
+def report_campaigns(
+    folders: Sequence[Path],
+    out: Path,
+    json: bool,
+    allow: Sequence[str] | None,
+    where: Sequence[str] | None,
+    against: str | None,
+    **words: Any,
+) -> int:
     """Write the report of a campaign, or of several.
 
     Args:
         folders: of the campaigns
         out: the file to write
         json: print one JSON object
+        allow: MEASURE=DIFFERENCE by which a planner may be worse than `against`
         where: COLUMN=VALUE of the runs to take
+        against: label of the planner that each other one is compared with
         words: the rest of what `report_campaign` takes
     """
     from antdrive.sim.campaigns.reporting import report_campaign
 
-    files = report_campaign(folders, out, where=_conditions(where), **words)
+    words |= {"allow": _allowed(allow, against), "where": _conditions(where), "against": against}
+    files = report_campaign(folders, out, **words)
     size = sum(path.stat().st_size for path in files)
     if json:
         print_json({"file": str(files[0]), "files": [str(path) for path in files], "bytes": size})
@@ -151,6 +172,20 @@ def report_campaigns(folders: Sequence[Path], out: Path, json: bool, where: Sequ
         print_line(f"{size / 1e6:.2f} MB")
         print_files(dict(zip(("report", "pairs"), map(str, files), strict=False)))
     return SUCCEEDED
+
+
+def _allowed(allow: Sequence[str] | None, against: str | None) -> dict[str, float]:
+    """What `--allow` says, by measure."""
+    found = {}
+    for text in allow or ():
+        if against is None:
+            raise InputError(f"--allow {text}: needs --against PLANNER, the one that others may not be worse than")
+        measure, _, value = text.partition("=")
+        try:
+            found[measure] = float(value)
+        except ValueError:
+            raise InputError(f"--allow {text}: must be MEASURE=DIFFERENCE, such as success=0.02") from None
+    return found
 
 
 def _conditions(where: Sequence[str] | None) -> dict[str, str]:
@@ -175,6 +210,7 @@ def _plain(summary: "CampaignSummary") -> dict[str, object]:
         "size": summary.size,
         "planners": [row.as_dict() for row in summary.success],
         "comparisons": {name: [row.as_dict() for row in rows] for name, rows in summary.comparisons.items()},
+        "not_worse": [row.as_dict() for row in summary.allowances],
         "common": summary.common,
         "medians": {
             name: [

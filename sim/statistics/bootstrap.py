@@ -46,7 +46,12 @@ def resampled(world: Ints, resamples: int = RESAMPLES, seed: int = SEED) -> Iter
 
 
 def medians_by_world(
-    values: Floats, world: Ints, resamples: int = RESAMPLES, *, counted: Flags | None = None
+    values: Floats,
+    world: Ints,
+    resamples: int = RESAMPLES,
+    *,
+    counted: Flags | None = None,
+    confidence: float = CONFIDENCE,
 ) -> list[Interval]:
     """Percentile intervals for the median of each column of values (N, K), nan left out.
 
@@ -56,6 +61,7 @@ def medians_by_world(
         resamples: number of samples
         counted: the rows that each column's samples are drawn from, (N, K); all without. A row that is counted and nan is
             drawn and left out; one that is not counted has no part in the sample.
+        confidence: the share of such intervals that hold the truth
     """
     found = np.full((resamples, values.shape[1]), np.nan)
     for rows, columns in _columns_alike(values, counted):
@@ -65,11 +71,16 @@ def medians_by_world(
             for k, column in zip(columns, chosen, strict=True):
                 found[first : first + len(weights), k] = column.medians(weights)
             first += len(weights)
-    return [_percentiles(found[:, k]) for k in range(values.shape[1])]
+    return [_percentiles(found[:, k], confidence) for k in range(values.shape[1])]
 
 
 def means_by_world(
-    values: Floats, world: Ints, resamples: int = RESAMPLES, *, counted: Flags | None = None
+    values: Floats,
+    world: Ints,
+    resamples: int = RESAMPLES,
+    *,
+    counted: Flags | None = None,
+    confidence: float = CONFIDENCE,
 ) -> list[Interval]:
     """Percentile intervals for the mean of each column of values (N, K), nan left out.
 
@@ -78,6 +89,7 @@ def means_by_world(
         world: the index of each row's world, (N,)
         resamples: number of samples
         counted: the rows that each column's samples are drawn from, (N, K); all without
+        confidence: the share of such intervals that hold the truth
     """
     found = np.full((resamples, values.shape[1]), np.nan)
     for rows, columns in _columns_alike(values, counted):
@@ -89,7 +101,7 @@ def means_by_world(
             with np.errstate(invalid="ignore"):
                 found[first : first + len(weights), columns] = (weights @ filled) / np.where(totals > 0, totals, np.nan)
             first += len(weights)
-    return [_percentiles(found[:, k]) for k in range(values.shape[1])]
+    return [_percentiles(found[:, k], confidence) for k in range(values.shape[1])]
 
 
 def _columns_alike(values: Floats, counted: Flags | None) -> Iterator[tuple[Ints, Ints]]:
@@ -125,10 +137,10 @@ class _Sorted:
         return np.where(total[:, 0] > 0, (self.values[lower] + self.values[upper]) / 2, np.nan)
 
 
-def _percentiles(statistics: Floats) -> Interval:
+def _percentiles(statistics: Floats, confidence: float) -> Interval:
     known = statistics[~np.isnan(statistics)]
     if not len(known):
         return Interval(np.nan, np.nan)
-    tail = (1 - CONFIDENCE) / 2
+    tail = (1 - confidence) / 2
     low, high = np.quantile(known, [tail, 1 - tail])
     return Interval(float(low), float(high))

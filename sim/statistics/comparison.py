@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from antdrive.sim.statistics.bootstrap import means_by_world, medians_by_world
 from antdrive.sim.statistics.pairing import PairedRuns
-from antdrive.sim.statistics.proportions import Interval, paired_difference
+from antdrive.sim.statistics.proportions import CONFIDENCE, Interval, paired_difference
 from antdrive.sim.statistics.significance import (
     differences,
     flips_by_world,
@@ -152,12 +152,8 @@ def compare_success(paired: PairedRuns, pairs: Pairs) -> list[PairedComparison]:
     for k, (i, j) in enumerate(pairs):
         mask, gap = masks[k], gaps[masks[k], k]
         first, second = int((gap > 0).sum()), int((gap < 0).sum())
-        both = int((paired.success[mask, i] & paired.success[mask, j]).sum())
         n, worlds = int(mask.sum()), paired.worlds_in(mask)
-        interval = paired_difference(both, first, second, n - both - first - second) if n else NOWHERE
-        if paired.several_in_worlds(mask):
-            wide = _whole_worlds(worlds, both / n, gap) if (gap == gap[0]).all() else by_world[k]
-            interval = Interval(min(interval.low, wide.low), max(interval.high, wide.high))
+        interval = success_interval(paired, mask, i, j, by_world[k]) if n else NOWHERE
         rows.append(
             PairedComparison(
                 measure=SUCCESS,
@@ -181,17 +177,29 @@ def compare_success(paired: PairedRuns, pairs: Pairs) -> list[PairedComparison]:
     return _corrected(paired, rows, masks, gaps)
 
 
-def _whole_worlds(worlds: int, both: float, gap: Floats) -> Interval:
-    """The interval of a difference that is the same in all pairs, where no resample differs: a world counts as one pair.
+def success_interval(
+    paired: PairedRuns, mask: Flags, i: int, j: int, resampled: Interval, confidence: float = CONFIDENCE
+) -> Interval:
+    """An interval for the difference of two planners' success that holds over runs and over worlds.
 
     Args:
-        worlds: how many there are
-        both: the share of pairs in which both planners succeeded
-        gap: the difference of each pair
+        paired: the runs
+        mask: the instances that count, at least one, (N,)
+        i: index of the first planner
+        j: index of the second planner
+        resampled: the bootstrap interval over worlds
+        confidence: the share of such intervals that hold the true difference
     """
-    first, second = (worlds if gap[0] == sign else 0 for sign in (1, -1))
-    alike = round(both * worlds)
-    return paired_difference(alike, first, second, worlds - alike - first - second)
+    first, second = paired.success[mask, i], paired.success[mask, j]
+    both, one, other = (int(found.sum()) for found in (first & second, first & ~second, ~first & second))
+    interval = paired_difference(both, one, other, len(first) - both - one - other, confidence)
+    if not paired.several_in_worlds(mask):
+        return interval
+    if len(np.unique(first.astype(int) - second)) == 1:  # no resample differs: a world counts as one pair
+        worlds = paired.worlds_in(mask)
+        both, one, other = (round(worlds * count / len(first)) for count in (both, one, other))
+        resampled = paired_difference(both, one, other, worlds - both - one - other, confidence)
+    return Interval(min(interval.low, resampled.low), max(interval.high, resampled.high))
 
 
 def compare_metric(paired: PairedRuns, pairs: Pairs, metric: str, better: Direction) -> list[PairedComparison]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from antdrive.sim.cli import options
-from antdrive.sim.cli.campaign_tables import Against, Metrics, Where, campaigns_of_words, compare_campaigns
+from antdrive.sim.cli.campaign_tables import Against, Allow, Metrics, Where, campaigns_of_words, compare_campaigns
 from antdrive.sim.cli.comparing import (
     COMPARED,
     Compared,
@@ -92,6 +92,7 @@ def compare(
     speed: options.Speed = 1.0,
     metric: Metrics = None,
     against: Against = None,
+    allow: Allow = None,
     where: Where = None,
     json: options.Json = False,
 ) -> int:
@@ -101,7 +102,7 @@ def compare(
     Folders of campaigns, made by `antdrive sweep`: success with intervals, outcomes, and tests of every pair.
     """
     if campaigns := campaigns_of_words(worlds, context):
-        return compare_campaigns(campaigns, planner or (), metric, against, where, json)
+        return compare_campaigns(campaigns, planner or (), metric, against, allow, where, json)
     entrants = entrants_of(planner, settings)
     rest = {"margin": margin, "cell": cell, "smoothing": smoothing, "noise": noise}
     scenarios = _scenarios(worlds, entrants, robot, seed, rest)

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from antdrive.sim.cli import options
-from antdrive.sim.cli.campaign_tables import Against, Metrics, Where, is_campaign, report_campaigns
+from antdrive.sim.cli.campaign_tables import Against, Allow, Metrics, Where, is_campaign, report_campaigns
 from antdrive.sim.cli.console import print_files, print_json, print_line
 from antdrive.sim.cli.exits import SUCCEEDED
 from antdrive.worlds.errors import InputError
@@ -40,6 +40,7 @@ def report(
     ] = None,
     metric: Metrics = None,
     against: Against = None,
+    allow: Allow = None,
     where: Where = None,
     json: options.Json = False,
 ) -> int:
@@ -50,12 +51,13 @@ def report(
     """
     campaigns = [folder for folder in folders if is_campaign(folder)]
     if campaigns and len(campaigns) == len(folders):
-        words = {"title": title, "metrics": metric or None, "against": against, "planners": planner or ()}
-        return report_campaigns(folders, out, json, where, **words)
+        words = {"title": title, "metrics": metric or None, "planners": planner or ()}
+        return report_campaigns(folders, out, json, allow, where, against, **words)
     other = next(folder for folder in folders if folder not in campaigns)
     if campaigns:
         raise InputError(f"{other}: is no campaign's folder, as {campaigns[0]} is; report about them apart")
-    for name, given in {"planner": planner, "metric": metric, "against": against, "where": where}.items():
+    campaigns_only = {"planner": planner, "metric": metric, "against": against, "allow": allow, "where": where}
+    for name, given in campaigns_only.items():
         if given:
             raise InputError(f"--{name}: is for the folder of a campaign; {other} is none")
     from antdrive.sim.view.report.report import write_report

@@ -13,7 +13,7 @@ from antdrive.sim.view.campaign.numbers import NONE, percent, percents, probabil
 from antdrive.sim.view.campaign.summary import CampaignSummary, measure_title
 
 #: Headings of columns that hold words.
-WORDS = ("planner", "first", "second", "better", "lower")
+WORDS = ("planner", "first", "second", "better", "lower", "against", "measure", "not worse")
 
 
 class TextTable(NamedTuple):
@@ -126,7 +126,28 @@ def all_cells(summary: CampaignSummary) -> list[TextTable]:
         summary: of the campaign
     """
     pairs = (pair_cells(name, rows) for name, rows in summary.comparisons.items())
-    return [success_cells(summary), outcome_cells(summary), *pairs]
+    allowed = [allowance_cells(summary)] if summary.allowances else []
+    return [success_cells(summary), outcome_cells(summary), *pairs, *allowed]
+
+
+def allowance_cells(summary: CampaignSummary) -> TextTable:
+    """Which planners are not worse than another by more than was allowed.
+
+    Args:
+        summary: of the campaign
+    """
+    headings = ("planner", "against", "measure", "not worse", "allowed", "advantage", "95 % of all", "worlds", "needed")
+    rows: list[tuple[str, ...]] = []
+    for row in summary.allowances:
+        shown = percent if row.measure == SUCCESS else short
+        title = "success [%]" if row.measure == SUCCESS else measure_title(row.measure)
+        verdict = "yes" if row.not_worse else NONE
+        ends = f"{shown(row.interval.low)} to {shown(row.interval.high)}"
+        counts = (str(row.worlds), str(row.needed))
+        rows.append(
+            (row.planner, row.reference, title, verdict, shown(row.allowed), shown(row.advantage), ends, *counts)
+        )
+    return TextTable("Not worse by more than allowed", headings, rows)
 
 
 def success_note(row: PlannerSuccess) -> str:

@@ -13,7 +13,15 @@ from typing import Any
 from urllib.parse import quote
 
 from antdrive.sim.log.metrics import METRICS
-from antdrive.sim.view.campaign.cells import WORDS, TextTable, all_cells, pair_cells, success_cells, success_note
+from antdrive.sim.view.campaign.cells import (
+    WORDS,
+    TextTable,
+    all_cells,
+    allowance_cells,
+    pair_cells,
+    success_cells,
+    success_note,
+)
 from antdrive.sim.view.campaign.headline import headline
 from antdrive.sim.view.campaign.summary import CampaignSummary, measure_title
 from antdrive.worlds.errors import InputError
@@ -168,6 +176,7 @@ def _write_page(summary: CampaignSummary, folder: Path, out: Path) -> list[Path]
             success_headings=success_cells(summary).headings,
             success_note=success_note,
             pairs=[(name, pair_cells(name, found)) for name, found in summary.comparisons.items()],
+            allowances=allowance_cells(summary) if summary.allowances else None,
             measure_title=measure_title,
             words=WORDS,
             charts=campaign_charts(summary, styles),

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.statistics.comparison import SUCCESS, PairedComparison, compare_metric, compare_success, pairs_of
+from antdrive.sim.statistics.noninferiority import NonInferiority, not_worse
 from antdrive.sim.statistics.pairing import PairedRuns
 from antdrive.sim.statistics.proportions import Interval
 from antdrive.sim.statistics.runs import RunTable
@@ -34,6 +36,7 @@ class CampaignSummary:
         common: number of instances in which every planner succeeded
         medians: by metric, the median of each planner over those instances, with its interval
         refusal: why planners are not compared; empty where they are
+        allowances: whether planners are not worse than one of them by more than was allowed; empty where that is not asked
     """
 
     title: str
@@ -44,6 +47,7 @@ class CampaignSummary:
     common: int
     medians: Mapping[str, Sequence[tuple[float, Interval]]]
     refusal: str = ""
+    allowances: Sequence[NonInferiority] = ()
 
     @property
     def table(self) -> RunTable:
@@ -64,6 +68,7 @@ def summarise(
     metrics: Sequence[str] | None = None,
     against: str | None = None,
     planners: Sequence[str] = (),
+    allow: Mapping[str, float] = MappingProxyType({}),
     strict: bool = False,
 ) -> CampaignSummary:
     """Compute a campaign's tables.
@@ -75,6 +80,7 @@ def summarise(
         metrics: to compare besides success; `DEFAULT_METRICS` without
         against: the planner that each other one is compared with; every pair without
         planners: labels of those to look at; all without
+        allow: by how much a planner may be worse than `against` and still count as not worse, by measure
         strict: refuse where no two planners can be compared, instead of saying so in the summary
 
     Raises:
@@ -102,7 +108,20 @@ def summarise(
             comparisons[name] = compare_metric(paired, pairs, name, METRICS[name].better)
     common, medians = common_medians(paired, chosen)
     rows = success_table(paired)
-    return CampaignSummary(title, paired, size or len(table), rows, comparisons, common, medians, refusal)
+    allowances = _allowances(paired, against, allow)
+    return CampaignSummary(title, paired, size or len(table), rows, comparisons, common, medians, refusal, allowances)
+
+
+def _allowances(paired: PairedRuns, against: str | None, allow: Mapping[str, float]) -> list[NonInferiority]:
+    if allow and against is None:
+        raise FieldError("allow", "needs a planner to compare with (against)")
+    found = []
+    for name, allowed in allow.items():
+        if name != SUCCESS and name not in METRICS:
+            raise FieldError("allow", f"unknown {name!r}; choose from {', '.join([SUCCESS, *METRICS])}")
+        better = "higher" if name == SUCCESS else METRICS[name].better
+        found += not_worse(paired, against or "", name, allowed, better)
+    return found
 
 
 def known_metrics(paired: PairedRuns, names: Sequence[str]) -> list[str]:

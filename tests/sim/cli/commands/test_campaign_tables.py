@@ -49,11 +49,12 @@ def test_compare_prints_both_tables(antdrive: Call, campaign: Path) -> None:
 
 
 def test_compare_as_json(antdrive: Call, campaign: Path) -> None:
-    words = ("--metric", "plan_s", "--metric", "spl", "--against", "astar", "--json")
+    words = ("--metric", "plan_s", "--metric", "spl", "--against", "astar", "--allow", "success=0.02", "--json")
     code, out, _ = antdrive("compare", campaign, *words)
     facts = json.loads(out)
     assert code == 0
     assert (facts["runs"], facts["size"]) == (100, 120)
+    assert [(row["planner"], row["not_worse"]) for row in facts["not_worse"]] == [("ants ants=10", False)]
     assert list(facts["comparisons"]) == ["success", "plan_s", "spl"]
     row = facts["comparisons"]["success"][0]
     assert (row["pairs"], row["better"]) == (50, "astar")
@@ -77,10 +78,11 @@ def test_some_runs_are_taken(antdrive: Call, campaign: Path, tmp_path: Path) -> 
 def test_a_report_takes_planners_metrics_and_one_to_compare_with(
     antdrive: Call, tmp_path: Path, campaign: Path
 ) -> None:
-    words = ("--metric", "spl", "--against", "astar", "-p", "astar", "-p", "ants ants=10")
+    words = ("--metric", "spl", "--against", "astar", "-p", "astar", "-p", "ants ants=10", "--allow", "success=0.1")
     assert antdrive("report", campaign, "-o", tmp_path / "r.tex", *words)[0] == 0
     text = (tmp_path / "r.tex").read_text()
     assert "% spl" in text
+    assert "% Not worse by more than allowed" in text
     assert "% duration" not in text
     assert antdrive("report", campaign, "-o", tmp_path / "r.md", "-p", "astar")[0] == 0
     text = (tmp_path / "r.md").read_text()
@@ -130,6 +132,15 @@ def test_report_writes_every_kind(antdrive: Call, campaign: Path, tmp_path: Path
         (["report", ".", "-o", "r.md", "--where", "x=2"], "--where: is for the folder of a campaign"),
         (["compare", "camp", "forest"], "camp forest: name folders of campaigns, or worlds"),
         (["compare", "camp", "./camp"], "camp: name each folder once"),
+        (["compare", "camp", "--allow", "success=0.1"], "--allow success=0.1: needs --against PLANNER"),
+        (
+            ["compare", "camp", "--against", "astar", "--allow", "success"],
+            "--allow success: must be MEASURE=DIFFERENCE",
+        ),
+        (
+            ["compare", "camp", "--against", "astar", "--allow", "fun=1"],
+            "camp: allow: unknown 'fun'; choose from success",
+        ),
         (["compare", "kamp"], "kamp: no such folder of a campaign, world file, or world of the catalogue"),
         (
             ["compare", "camp/parts", "-p", "astar"],
