@@ -63,7 +63,7 @@ def entrants_of(planners: Sequence[str] | None, settings: Sequence[str] | None) 
         labels[label] = name if mark else label
     if len(labels) < len(words) or not 2 <= len(labels) <= MAX_PLANNERS:
         raise InputError(
-            f"--planner {' '.join(words)}: name two to six different planners; "
+            f"{' '.join(['--planner', *words])}: name two to six different planners; "
             "one planner with other options gets a label, such as --planner few=aco-han --set few.ants=10"
         )
     own: dict[str, list[str]] = {label: [] for label in labels}

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from antdrive.sim.cli import options
-from antdrive.sim.cli.campaign_tables import Against, Metrics, Where, campaign_of_words, compare_campaign
+from antdrive.sim.cli.campaign_tables import Against, Allow, Metrics, Where, campaigns_of_words, compare_campaigns
 from antdrive.sim.cli.comparing import (
     COMPARED,
     Compared,
@@ -44,9 +44,7 @@ if TYPE_CHECKING:
 MARKER = "comparison.json"
 Worlds = Annotated[
     list[str],
-    typer.Argument(
-        metavar="WORLD...", help="Names of worlds in the catalogue, or world files; or a campaign's folder."
-    ),
+    typer.Argument(metavar="WORLD...", help="Names of worlds in the catalogue, or world files; or campaigns' folders."),
 ]
 Planners = Annotated[
     list[str] | None,
@@ -94,16 +92,17 @@ def compare(
     speed: options.Speed = 1.0,
     metric: Metrics = None,
     against: Against = None,
+    allow: Allow = None,
     where: Where = None,
     json: options.Json = False,
 ) -> int:
     """Compare planners: drive worlds with each, or read a campaign.
 
     The planners are paired by world and seed. Figures and film show the first of them. Exit code 0: every run succeeded.
-    A campaign's folder, made by `antdrive sweep`: success with intervals, and tests of every pair.
+    Folders of campaigns, made by `antdrive sweep`: success with intervals, outcomes, and tests of every pair.
     """
-    if (campaign := campaign_of_words(worlds, context)) is not None:
-        return compare_campaign(campaign, planner or (), metric, against, where, json)
+    if campaigns := campaigns_of_words(worlds, context):
+        return compare_campaigns(campaigns, planner or (), metric, against, allow, where, json)
     entrants = entrants_of(planner, settings)
     rest = {"margin": margin, "cell": cell, "smoothing": smoothing, "noise": noise}
     scenarios = _scenarios(worlds, entrants, robot, seed, rest)
