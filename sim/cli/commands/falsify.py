@@ -121,6 +121,7 @@ def _facts(
         "robot": setup.robot.name,
         **asked,
         "runs": hunt.runs,
+        "driven": hunt.driven,
         "interrupted": hunt.interrupted,
         "failures": len(hunt.findings),
         "distinct": len(hunt.distinct),
@@ -133,7 +134,8 @@ def _print(hunt: "Hunt", reported: "list[Reported]", folder: Path, filmed: bool)
     from antdrive.sim.falsify.report import SUITE
 
     ended = "interrupted after" if hunt.interrupted else "after"
-    print_line(f"{ended} {hunt.runs} runs: {len(hunt.findings)} failures, {len(hunt.distinct)} of them different")
+    runs = f"{hunt.runs} runs, {hunt.driven} of them with a path on the grid"
+    print_line(f"{ended} {runs}: {len(hunt.findings)} failures, {len(hunt.distinct)} of them different")
     if reported:
         print_table(
             ("name", "run", "repeats", "obstacles", "failure"),

@@ -16,6 +16,7 @@ from antdrive.sim.falsify import hunt as hunting
 from antdrive.sim.falsify import report as reporting
 from antdrive.sim.falsify import search
 from antdrive.sim.falsify.failure import failure_of
+from antdrive.sim.falsify.handover import fingerprint_of
 from antdrive.sim.falsify.hunt import Hunt, find_failures
 from antdrive.sim.falsify.report import report
 from antdrive.sim.falsify.search import METHODS, REHEARSED, guided_world, rehearsed_clearance
@@ -44,7 +45,8 @@ def test_every_finding_fails_again_and_leaves_room(found: Hunt) -> None:
     assert found.findings
     for finding in found.findings:
         scenario = finding.scenario
-        assert failure_of(run(scenario)) == finding.failure
+        done = run(scenario)
+        assert (failure_of(done), fingerprint_of(done)) == (finding.failure, finding.fingerprint)
         grid = rasterise(scenario.task.world, 0.02, scenario.inflate)
         plan = load_planner("dijkstra").plan(Query.between(grid, scenario.task), np.random.default_rng(0))
         assert plan.solved, "a fine grid has a path with the clearance that the set-up claims"
@@ -54,6 +56,7 @@ def test_the_same_seed_finds_the_same(found: Hunt, careless: Scenario) -> None:
     again = find_failures(careless, budget=3, seed=3, method="random")
     first = [finding for finding in found.findings if finding.number <= 3]
     assert [finding.scenario for finding in again.findings] == [finding.scenario for finding in first]
+    assert [finding.fingerprint for finding in again.findings] == [finding.fingerprint for finding in first]
 
 
 def test_a_finding_that_resembles_another_is_not_counted_twice(found: Hunt, careless: Scenario) -> None:
@@ -78,6 +81,7 @@ def test_ctrl_c_keeps_what_was_found(careless: Scenario, monkeypatch: pytest.Mon
     stopped = find_failures(careless, budget=50, method=method)
     assert (stopped.runs, stopped.interrupted) == (2, True)
     assert len(stopped.findings) == sum(failure_of(done) is not None for done in runs)
+    assert stopped.driven == sum(done.rollout is not None for done in runs)
 
 
 class Crashes(AStar):
@@ -114,6 +118,8 @@ def test_ctrl_c_while_shrinking_hands_over_what_was_found(
     monkeypatch.setattr(reporting, "shrink", interrupted)
     reported = report(Hunt(found.distinct[:1], 1), tmp_path)
     assert [one.repeats for one in reported] == [True]
+    other = replace(found.distinct[0], fingerprint="of another drive")
+    assert [one.repeats for one in report(Hunt((other,), 1), tmp_path, seconds=0)] == [False]
 
 
 def test_no_path_counts_only_where_the_grid_has_no_excuse(small_scenario: Scenario) -> None:
