@@ -26,7 +26,7 @@ from antdrive.sim.regression.scenarios import task_of as scenario_task
 from antdrive.sim.regression.suite import load_suite
 from antdrive.worlds import Disc, FieldError, World, rasterise
 
-CARELESS: dict[str, Any] = {"margin": 0.0, "noise": 6.0, "smoothing": "none"}
+CARELESS: dict[str, Any] = {"margin": 0.0, "noise": 6.0, "smoothing": "none", "physics_hz": 120}
 
 
 @pytest.fixture(scope="module")
@@ -78,6 +78,7 @@ def test_ctrl_c_keeps_what_was_found(careless: Scenario, monkeypatch: pytest.Mon
         return runs[-1]
 
     monkeypatch.setattr(hunting, "run", until_the_third)
+    monkeypatch.setattr(search, "REHEARSED", 3)
     stopped = find_failures(careless, budget=50, method=method)
     assert (stopped.runs, stopped.interrupted) == (2, True)
     assert len(stopped.findings) == sum(failure_of(done) is not None for done in runs)
@@ -94,7 +95,10 @@ class Crashes(AStar):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_planner_that_raises_is_a_finding(jackal: RobotSpec, tmp_path: Path, method: str) -> None:
+def test_a_planner_that_raises_is_a_finding(
+    jackal: RobotSpec, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, method: str
+) -> None:
+    monkeypatch.setattr(search, "REHEARSED", 3)
     setup = Scenario.of("empty", Crashes(), jackal, **CARELESS)
     hunt = find_failures(setup, budget=4, seed=3, method=method, obstacles=2)
     raised = [finding for finding in hunt.findings if finding.failure.outcome == "planner_error"]
@@ -102,7 +106,7 @@ def test_a_planner_that_raises_is_a_finding(jackal: RobotSpec, tmp_path: Path, m
     assert raised
     assert sum(finding.is_new for finding in raised) == 1
     assert "IndexError: pop from empty list" in raised[0].failure.cause
-    small = shrink(raised[0].scenario, seconds=5)
+    small = shrink(raised[0].scenario, seconds=1)
     assert small.failure == raised[0].failure
     (handed,) = report(Hunt((raised[0],), 4), tmp_path, seconds=0)
     (case,) = load_suite(tmp_path / "failures.drive.yaml")

@@ -29,6 +29,7 @@ from antdrive import list_robots
 numba.njit(lambda: 0.0)()
 pytest_plugins = ["pytester"]
 PLUGIN = ("-p", "antdrive.sim.regression.plugin", "-p", "no:cacheprovider")
+RUN_FIGURES, PLAN_FIGURES = (f"antdrive.sim.view.figures.{name}_figures." for name in ("run", "plan"))
 SUITE = """schema: 1
 defaults: {planner: astar, world: small.yaml}
 scenarios:
@@ -40,8 +41,17 @@ SMALL = "{schema: 1, bounds: [0, 0, 4, 2], start: [0.6, 1, 0], goal: [3.4, 1], c
 
 
 @pytest.fixture
-def project(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytest.Pytester:
+def pictures() -> bool:
+    """Whether pictures are drawn; else empty files stand for them, which is quicker."""
+    return False
+
+
+@pytest.fixture
+def project(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, pictures: bool) -> pytest.Pytester:
     """A folder with a suite; results go beside it, without films."""
+    if not pictures:
+        monkeypatch.setattr(RUN_FIGURES + "overview", lambda rollout, path: Path(path).touch())
+        monkeypatch.setattr(PLAN_FIGURES + "plan_figure", lambda task, grid, plan, robot, path: Path(path).touch())
     monkeypatch.setenv("XDG_CACHE_HOME", str(pytester.path / "cache"))
     monkeypatch.setenv("PYTEST_ADDOPTS", "--drive-film=never")
     monkeypatch.delenv("GITHUB_STEP_SUMMARY", raising=False)
@@ -131,6 +141,7 @@ def test_tests_in_python_have_baselines_of_their_own(project: pytest.Pytester) -
     last.stdout.fnmatch_lines(["FAILED: unused baseline: *test_named.json; remove it"])
 
 
+@pytest.mark.parametrize("pictures", [True])
 def test_a_worse_drive_fails_with_what_was_lost_and_where_it_parts(accepted: pytest.Pytester) -> None:
     folder = accepted.path / "res"
     (accepted.path / "slow.yaml").write_text(_robot().replace("max_speed: 0.7", "max_speed: 0.4"))
@@ -147,6 +158,7 @@ def test_a_worse_drive_fails_with_what_was_lost_and_where_it_parts(accepted: pyt
         f"overview: {folder}/a/clear-0/overview.png",
     ])  # fmt: skip
     written = sorted(path.name for path in (folder / "a" / "clear-0").iterdir())
+    assert all(path.stat().st_size > 10_000 for path in (folder / "a" / "clear-0").glob("*.png"))
     assert written == ["commands.txt", "overview.png", "result.json", "rollout.npz", "then-and-now.png"]
     accepted.makefile(".drive.yaml", a=SUITE)
     accepted.runpytest(*PLUGIN, "-k", "clear", "--drive-results", "res").assert_outcomes(passed=1, deselected=1)
