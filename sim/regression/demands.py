@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 import operator
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, Literal
 
+from antdrive.sim.log.margin import CAUSES
 from antdrive.sim.log.metrics import METRICS, Tolerance
 from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.regression.touching import KINDS
 from antdrive.worlds.errors import FieldError
 from antdrive.worlds.files.checks import show, suggest
 
@@ -22,6 +24,9 @@ LEAST_TRAJECTORY = 0.002  # baselines hold positions in whole millimetres [m]
 
 #: Metrics that no repetition reproduces.
 WALL_CLOCK = ("plan_s", "drive_wall_s")
+
+#: The keys of `expect` that are no metrics.
+VERDICT = ("outcome", "certified", "touched", "cause")
 
 _SIGNS: Mapping[str, Callable[[float, float], bool]] = MappingProxyType(
     {">=": operator.ge, "<=": operator.le, ">": operator.gt, "<": operator.lt, "==": operator.eq}
@@ -64,6 +69,8 @@ class Demands:
     Attributes:
         outcome: how the run must end
         certified: whether the drive must be certified collision-free; None: it must be if it is to succeed
+        touched: what kind of thing must be touched first, one of `KINDS`; None: any, or none
+        cause: what must have taken most of the margin by then, one of `CAUSES`; None: anything
         bounds: bounds on metrics
         tolerances: how much worse than the baseline each metric may be, where it is not the metric's own tolerance; None:
             the metric is not compared
@@ -73,6 +80,8 @@ class Demands:
 
     outcome: Outcome = Outcome.SUCCEEDED
     certified: bool | None = None
+    touched: str | None = None
+    cause: str | None = None
     bounds: tuple[Bound, ...] = ()
     tolerances: Mapping[str, Tolerance | None] = field(default_factory=dict)
     trajectory: float | Literal["exact"] | None = None
@@ -104,7 +113,7 @@ class Demands:
         >>> Demands.of({"min_clearance_m": ">= 0.05"}, {"duration_s": "10 %", "jerk_rms": "any"}, 0.05)
 
         Args:
-            expect: outcome, certified, and bounds on metrics such as ">= 5, <= 30"
+            expect: outcome, certified, what is touched and why, and bounds on metrics such as ">= 5, <= 30"
             tolerance: by metric, or `end_m`: a number in its unit, a share such as "10 %", or "any"
             trajectory: a distance [m], or "exact"
 
@@ -113,11 +122,14 @@ class Demands:
         """
         bounds: list[Bound] = []
         for key, value in expect.items():
-            if key not in ("outcome", "certified"):
+            if key not in VERDICT:
                 bounds += _bounds(key, value)
+        outcome = _outcome(expect.get("outcome", Outcome.SUCCEEDED.key))
         return cls(
-            outcome=_outcome(expect.get("outcome", Outcome.SUCCEEDED.key)),
+            outcome=outcome,
             certified=_certified(expect.get("certified")),
+            touched=_of_a_contact("touched", expect, KINDS, outcome),
+            cause=_of_a_contact("cause", expect, tuple(CAUSES), outcome),
             bounds=tuple(bounds),
             tolerances={key: _tolerance(key, value) for key, value in tolerance.items()},
             trajectory=_trajectory(trajectory),
@@ -138,9 +150,21 @@ def _certified(value: Any) -> bool | None:
     return value
 
 
+def _of_a_contact(key: str, expect: Mapping[str, Any], known: Sequence[str], outcome: Outcome) -> str | None:
+    """What is demanded of a contact, which must be what the test expects."""
+    value = expect.get(key)
+    if value is None:
+        return None
+    if value not in known:
+        raise FieldError(f"expect.{key}", f"unknown {show(value)}; choose from {', '.join(known)}")
+    if not outcome.with_contact:
+        raise FieldError(f"expect.{key}", f"nothing is touched where the outcome is {outcome.key}; leave it out")
+    return str(value)
+
+
 def _bounds(key: str, value: Any) -> list[Bound]:
     if key not in METRICS:
-        known = ["outcome", "certified", *METRICS]
+        known = [*VERDICT, *METRICS]
         raise FieldError(f"expect.{key}", f"no such metric; {suggest(key, known)}")
     if key in WALL_CLOCK:
         raise FieldError(f"expect.{key}", "depends on the machine and its load, so no test can bound it; leave it out")

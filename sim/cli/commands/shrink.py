@@ -10,8 +10,18 @@ from antdrive.sim.cli import options
 from antdrive.sim.cli.compiling import compile_once
 from antdrive.sim.cli.console import print_files, print_json, print_line, working
 from antdrive.sim.cli.exits import FAILED, SUCCEEDED
-from antdrive.sim.cli.write import check_folder, this_command, write_film, write_result, write_run
+from antdrive.sim.cli.write import (
+    check_folder,
+    fingerprint,
+    free_folder,
+    this_command,
+    write_film,
+    write_marker,
+    write_result,
+    write_run,
+)
 from antdrive.worlds.errors import InputError
+from antdrive.worlds.files.atomic import claimed
 
 if TYPE_CHECKING:
     from antdrive.sim.falsify.handover import Handover
@@ -19,6 +29,7 @@ if TYPE_CHECKING:
     from antdrive.sim.regression.suite import SuiteCase
     from antdrive.sim.scenario import Scenario
 
+MARKER = "shrink.json"  # which failure a folder is of
 While = Annotated[
     str | None,
     typer.Option(
@@ -62,17 +73,20 @@ def shrink(
     crossed = None if bound is None else parse_bound(bound)
     scenario, case = _of_a_test(failure) if "::" in failure else (_of_a_log(failure), None)
     name = f"{scenario_name(scenario.task.world.name)}-small"
-    folder = out or Path("out") / name
+    mark = fingerprint(scenario, str(crossed))
+    folder = out or free_folder(Path("out") / name, MARKER, mark)
     check_folder(folder)
     compile_once()
-    with working("shrinking") as progress:
-        journal = folder / "journal.json"
-        shrunk = make_small(scenario, bound=crossed, seconds=seconds, journal=journal, jobs=jobs, progress=progress)
-    note = f"shrunk from {scenario.task.world.name}: {shrunk.summary}"
-    least = named(shrunk.scenario, name, note)
-    small = least if shrunk.failure.outcome == RAISED else run(least)
-    handover = Handover(name, small, crossed, shrunk.failure.sentence, _planner_beside(case, folder))
-    report, repeats = _write(shrunk, handover, folder, film, figures)
+    with claimed(folder):
+        write_marker(folder / MARKER, {"fingerprint": mark, "command": this_command()})
+        with working("shrinking") as progress:
+            journal = folder / "journal.json"
+            shrunk = make_small(scenario, bound=crossed, seconds=seconds, journal=journal, jobs=jobs, progress=progress)
+        note = f"shrunk from {scenario.task.world.name}: {shrunk.summary}"
+        least = named(shrunk.scenario, name, note)
+        small = least if shrunk.failure.outcome == RAISED else run(least)
+        handover = Handover(name, small, crossed, shrunk.failure.sentence, _planner_beside(case, folder))
+        report, repeats = _write(shrunk, handover, folder, film, figures)
     if json:
         print_json(report)
     else:

@@ -16,12 +16,15 @@ from antdrive.sim.falsify import hunt as hunting
 from antdrive.sim.falsify import report as reporting
 from antdrive.sim.falsify import search
 from antdrive.sim.falsify.failure import failure_of
-from antdrive.sim.falsify.handover import fingerprint_of
+from antdrive.sim.falsify.handover import expectation, fingerprint_of
 from antdrive.sim.falsify.hunt import Hunt, find_failures
 from antdrive.sim.falsify.report import report
 from antdrive.sim.falsify.search import METHODS, REHEARSED, guided_world, rehearsed_clearance
 from antdrive.sim.falsify.shrink import shrink
 from antdrive.sim.falsify.space import WorldSpace, feasible
+from antdrive.sim.log.margin import CAUSES
+from antdrive.sim.regression.demands import Demands
+from antdrive.sim.regression.judging import unfulfilled
 from antdrive.sim.regression.scenarios import task_of as scenario_task
 from antdrive.sim.regression.suite import load_suite
 from antdrive.worlds import Disc, FieldError, World, rasterise
@@ -50,6 +53,19 @@ def test_every_finding_fails_again_and_leaves_room(found: Hunt) -> None:
         grid = rasterise(scenario.task.world, 0.02, scenario.inflate)
         plan = load_planner("dijkstra").plan(Query.between(grid, scenario.task), np.random.default_rng(0))
         assert plan.solved, "a fine grid has a path with the clearance that the set-up claims"
+
+
+def test_a_test_of_a_finding_demands_what_was_touched_and_why(found: Hunt) -> None:
+    finding = next(one for one in found.findings if one.failure.touched == "cylinder")
+    done, failure = run(finding.scenario), finding.failure
+    expected = expectation(done)
+    assert expected == {"outcome": "collided", "touched": "cylinder", "cause": failure.cause}
+    assert list(unfulfilled(done, Demands.of(expected))) == []
+    other = next(cause for cause in CAUSES if cause != failure.cause)
+    assert list(unfulfilled(done, Demands.of({**expected, "cause": other}))) == [
+        f"cause: {failure.cause} took most of the margin, expected {other}"
+    ]
+    assert list(unfulfilled(done, Demands.of({**expected, "touched": "wall"}))) == ["touched: cylinder, expected wall"]
 
 
 def test_the_same_seed_finds_the_same(found: Hunt, careless: Scenario) -> None:
