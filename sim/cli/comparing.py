@@ -43,6 +43,27 @@ class Entrant:
     settings: tuple[str, ...] = ()
 
 
+def check_worlds(words: Sequence[str]) -> None:
+    """Check that there are worlds of these names, before anything is said about planners, which a campaign's folder needs none of.
+
+    Args:
+        words: names of worlds in the catalogue, or world files
+
+    Raises:
+        InputError: there is no such world.
+    """
+    from antdrive.worlds import list_worlds
+    from antdrive.worlds.files.checks import suggest
+
+    known = list_worlds()
+    for word in words:
+        if word in known or Path(word).is_file():
+            continue
+        if Path(word).is_dir():
+            raise InputError(f"{word}: neither a world file nor the folder of a campaign, as antdrive sweep writes it")
+        raise InputError(f"{word}: no such file or folder, nor a world of the catalogue; {suggest(word, known)}")
+
+
 def entrants_of(planners: Sequence[str] | None, settings: Sequence[str] | None) -> list[Entrant]:
     """The planners of `--planner NAME` or `--planner LABEL=NAME`, with the options of `--set GROUP.KEY=VALUE`.
 

@@ -11,8 +11,8 @@ from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.pipeline import Run
 from antdrive.sim.regression.checking import RAISED
-from antdrive.sim.regression.demands import WALL_CLOCK, Bound
-from antdrive.sim.regression.touching import CYLINDER, NOTHING, UNSEEN, WALL, cause_of_contact, touched_first
+from antdrive.sim.regression.demands import CYLINDER, UNSEEN, WALL, WALL_CLOCK, Bound
+from antdrive.sim.regression.touching import NOTHING, cause_of_contact, touched_first
 from antdrive.worlds.errors import FieldError
 from antdrive.worlds.files.checks import suggest
 

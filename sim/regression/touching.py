@@ -7,11 +7,9 @@ import dataclasses
 from antdrive.sim.log.contacts import touches_of
 from antdrive.sim.log.margin import budget
 from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.regression.demands import CYLINDER, MOVER, UNSEEN, WALL
 
-#: The kinds of things that a robot can touch.
-CYLINDER, UNSEEN, MOVER, WALL = "cylinder", "unseen cylinder", "mover", "wall"
-NOTHING = "nothing"
-KINDS = (CYLINDER, UNSEEN, MOVER, WALL)
+NOTHING = "nothing"  # is what a drive without a contact touched
 
 
 def touched_first(rollout: Rollout) -> str:

@@ -12,6 +12,7 @@ from antdrive.sim.cli.comparing import (
     COMPARED,
     Compared,
     Entrant,
+    check_worlds,
     difference_cells,
     differences,
     entrants_of,
@@ -104,6 +105,7 @@ def compare(
     """
     if (campaign := campaign_of_words(worlds, context)) is not None:
         return compare_campaign(campaign, planner or (), metric, against, where, json)
+    check_worlds(worlds)
     entrants = entrants_of(planner, settings)
     rest = {"margin": margin, "cell": cell, "smoothing": smoothing, "noise": noise}
     scenarios = _scenarios(worlds, entrants, robot, seed, rest)

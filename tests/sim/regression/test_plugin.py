@@ -22,7 +22,8 @@ import antdrive.sim.regression.summary
 import antdrive.sim.regression.unused
 import antdrive.sim.view.figures.plan_figures
 import antdrive.sim.view.figures.run_figures
-import antdrive.sim.view.figures.then_and_now  # noqa: F401
+import antdrive.sim.view.figures.then_and_now
+import antdrive.sim.warm  # noqa: F401
 from antdrive import list_robots
 
 # What the compiler loads when it first compiles must not be forgotten either: it cannot be loaded twice.
@@ -270,6 +271,60 @@ def test_a_baseline_that_cannot_be_written_is_one_line(accepted: pytest.Pytester
     found = accepted.runpytest(*PLUGIN, "-k", "clear", "--drive-update")
     folder.chmod(0o700)
     found.stdout.fnmatch_lines(["*clear-0.json: cannot be written*"])
+
+
+TWO = (
+    "def test_two(drive):\n    drive('small.yaml', 'astar', name='one')\n    drive('small.yaml', 'astar', name='two')\n"
+)
+
+
+@pytest.mark.parametrize("change", ["rename", "drop"])
+def test_the_baseline_of_a_drive_that_is_gone_is_unused(project: pytest.Pytester, change: str) -> None:
+    project.makepyfile(test_m=TWO)
+    project.runpytest(*PLUGIN, "test_m.py", "--drive-update-new", "--drive-strict").assert_outcomes(passed=1)
+    gone = TWO.replace("'two'", "'other'") if change == "rename" else "".join(TWO.splitlines(keepends=True)[:2])
+    (project.path / "test_m.py").write_text(gone)
+    found = project.runpytest(*PLUGIN, "test_m.py", "--drive-update-new", "--drive-strict")
+    found.stdout.fnmatch_lines(["FAILED: unused baseline: *test_two-two.json; remove it"])
+    found.stdout.no_fnmatch_line("*test_two-one.json*")
+    assert found.ret == 1
+    (project.path / "test_m.py").write_text(gone + "    assert False\n")
+    found = project.runpytest(*PLUGIN, "test_m.py", "--drive-strict")
+    found.stdout.no_fnmatch_line("*unused baseline*")  # it might have come after what failed
+
+
+def test_commands_work_where_pytest_was_started_and_in_its_rootdir(project: pytest.Pytester) -> None:
+    project.makeini("[pytest]\n")
+    inner = project.mkdir("inner")
+    (inner / "small.yaml").write_text(SMALL)
+    (inner / "b.drive.yaml").write_text("{schema: 1, scenarios: {far: {world: small.yaml, planner: astar}}}")
+    (inner / "test_b.py").write_text("def test_far(drive): drive('small.yaml', 'astar')\n")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(inner)
+        found = project.runpytest(*PLUGIN, f"--rootdir={project.path}")
+    found.assert_outcomes(failed=2)
+    found.stdout.fnmatch_lines([f"*accept this drive with antdrive accept '{inner}/b.drive.yaml::far[[]0[]]'"])
+    found.stdout.fnmatch_lines([f"repeat: antdrive check '{inner}/b.drive.yaml::far[[]0[]]'"])
+    found.stdout.fnmatch_lines([f"        antdrive run {inner}/small.yaml --planner astar*"])
+    found.stdout.fnmatch_lines([f"E*repeat: pytest {inner}/test_b.py::test_far"])
+    for folder in (inner, project.path):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.chdir(folder)
+            again = project.runpytest(*PLUGIN, f"{inner}/test_b.py::test_far", "--drive-update")
+        again.assert_outcomes(passed=1)
+
+
+def test_kernels_are_compiled_before_the_first_drive_with_one_line(
+    project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    compiled: list[int] = []
+    monkeypatch.setattr("antdrive.sim.warm.is_warm", lambda: bool(compiled))
+    monkeypatch.setattr("antdrive.sim.warm.warm", lambda: compiled.append(1))
+    monkeypatch.setattr("antdrive.worlds.kernel_cache.cache_folder", lambda: project.path)
+    for _ in range(2):
+        project.runpytest(*PLUGIN, "-k", "closed", "--drive-update-new").assert_outcomes(passed=1, deselected=1)
+    assert compiled == [1]
+    assert capfd.readouterr().err.count("antdrive: compiling the planners, once for this installation") == 1
 
 
 def test_junit_properties_and_the_summary_of_a_ci_run(

@@ -22,15 +22,19 @@ def collided(collided_run: Run, tmp_path: Path) -> Path:
 
 
 def test_a_failure_becomes_a_world_and_a_suite(antdrive: Call, collided: Path, tmp_path: Path) -> None:
-    code, out, err = antdrive("shrink", collided, "--out", "small", "--json", "--no-figures", "--no-film")
+    other = tmp_path / "out" / "small-small" / "shrink.json"
+    other.parent.mkdir(parents=True)
+    other.write_text('{"fingerprint": "of another failure in this world"}')
+    code, out, err = antdrive("shrink", collided, "--json", "--no-figures", "--no-film")
     assert (code, err) == (0, "")
+    assert list(other.parent.iterdir()) == [other]
     facts = json.loads(out)
     assert (facts["failure"]["outcome"], facts["failure"]["touched"]) == ("collided", "unseen cylinder")
     assert (facts["complete"], facts["repeats"]) == (True, True)
-    folder = tmp_path / "small"
+    (folder,) = (tmp_path / "out").glob("small-small-????????")
     written = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
     name = "small-small"
-    files = {f"{name}.drive.yaml", "journal.json", "result.json", "rollout.npz", f"worlds/{name}.yaml"}
+    files = {f"{name}.drive.yaml", "journal.json", "shrink.json", "result.json", "rollout.npz", f"worlds/{name}.yaml"}
     assert written == files
     assert load_task(folder / "worlds" / f"{name}.yaml").world.obstacles == ()
     suite = folder / f"{name}.drive.yaml"
