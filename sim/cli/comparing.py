@@ -8,6 +8,7 @@ import shlex
 import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from antdrive.sim.cli.parse import pair
@@ -44,7 +45,7 @@ class Entrant:
 
 
 def check_worlds(words: Sequence[str]) -> None:
-    """Check that there are worlds of these names, before anything is said about planners, which a campaign's folder needs none of.
+    """Check that there are worlds of these names, before anything is said about planners, which a campaign needs none of.
 
     Args:
         words: names of worlds in the catalogue, or world files

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import operator
 import re
@@ -59,6 +60,12 @@ class Bound:
             found: the metric of a drive
         """
         return not math.isnan(found) and _SIGNS[self.sign](found, self.value)
+
+    @property
+    def opposite(self) -> Bound | None:
+        """The bound that holds where this one does not; None for an equality."""
+        signs = {">=": "<", "<=": ">", ">": "<=", "<": ">="}
+        return dataclasses.replace(self, sign=signs[self.sign]) if self.sign in signs else None
 
     def __str__(self) -> str:
         return f"{self.metric} {self.sign} {self.value:g}"

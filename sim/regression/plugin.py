@@ -313,8 +313,8 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
     """Say what was driven, on the terminal and in the file that GITHUB_STEP_SUMMARY names."""
-    told = config.stash[_LISTENER].told
-    unused = sorted(config.stash[_UNUSED])
+    told, found = config.stash[_LISTENER].told, config.stash[_UNUSED]
+    unused = sorted(found)
     if not (told or unused):
         return
     from antdrive.sim.regression.summary import add_to_page, drives_in, lines
