@@ -33,7 +33,7 @@ SIM_RANKS = {
     "pipeline": 3,
     "view": 4,
     "papers": 5,
-    "warm": 5,
+    "warm": 4.5,
     "regression": 5,
     "campaigns": 5,
     "falsify": 6,

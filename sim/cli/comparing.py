@@ -8,6 +8,7 @@ import shlex
 import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from antdrive.sim.cli.parse import pair
@@ -41,6 +42,27 @@ class Entrant:
     label: str
     name: str
     settings: tuple[str, ...] = ()
+
+
+def check_worlds(words: Sequence[str]) -> None:
+    """Check that there are worlds of these names, before anything is said about planners, which a campaign needs none of.
+
+    Args:
+        words: names of worlds in the catalogue, or world files
+
+    Raises:
+        InputError: there is no such world.
+    """
+    from antdrive.worlds import list_worlds
+    from antdrive.worlds.files.checks import suggest
+
+    known = list_worlds()
+    for word in words:
+        if word in known or Path(word).is_file():
+            continue
+        if Path(word).is_dir():
+            raise InputError(f"{word}: neither a world file nor the folder of a campaign, as antdrive sweep writes it")
+        raise InputError(f"{word}: no such file or folder, nor a world of the catalogue; {suggest(word, known)}")
 
 
 def entrants_of(planners: Sequence[str] | None, settings: Sequence[str] | None) -> list[Entrant]:

@@ -12,6 +12,7 @@ from antdrive.sim.cli.comparing import (
     COMPARED,
     Compared,
     Entrant,
+    check_worlds,
     difference_cells,
     differences,
     entrants_of,
@@ -103,6 +104,7 @@ def compare(
     """
     if campaigns := campaigns_of_words(worlds, context):
         return compare_campaigns(campaigns, planner or (), metric, against, allow, where, json)
+    check_worlds(worlds)
     entrants = entrants_of(planner, settings)
     rest = {"margin": margin, "cell": cell, "smoothing": smoothing, "noise": noise}
     scenarios = _scenarios(worlds, entrants, robot, seed, rest)
