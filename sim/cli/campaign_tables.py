@@ -74,7 +74,8 @@ def campaigns_of_words(words: Sequence[str], context: typer.Context) -> list[Pat
     folders = [word for word in words if is_campaign(Path(word))]
     given = {name for name in context.params if _is_given(context, name)}
     if not folders:
-        _check_worlds(words, given)
+        for name in sorted(given & {"metric", "against", "allow", "where"}):
+            raise InputError(f"--{name}: is for the folder of a campaign; {words[0]} is none")
         return []
     if len(folders) < len(words):
         raise InputError(f"{' '.join(words)}: name folders of campaigns, or worlds")
@@ -84,19 +85,6 @@ def campaigns_of_words(words: Sequence[str], context: typer.Context) -> list[Pat
             f"--{option}: is for drives; a campaign's folder takes --planner, --metric, --against, --allow, --where and --json"
         )
     return [Path(folder) for folder in folders]
-
-
-def _check_worlds(words: Sequence[str], given: set[str]) -> None:
-    """Refuse what is neither a campaign nor a world, and options that worlds do not take."""
-    from antdrive.worlds.files.world_file import list_worlds
-
-    for word in words:
-        if Path(word).is_dir():
-            raise InputError(f"{word}: is no campaign's folder; antdrive sweep writes {MARKS[0]} into one")
-        if "planner" not in given and not Path(word).exists() and word not in list_worlds():
-            raise InputError(f"{word}: no such folder of a campaign, world file, or world of the catalogue")
-    for name in sorted(given & {"metric", "against", "allow", "where"}):
-        raise InputError(f"--{name}: is for the folder of a campaign; {words[0]} is none")
 
 
 def _is_given(context: typer.Context, name: str) -> bool:

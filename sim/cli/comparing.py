@@ -53,8 +53,8 @@ def check_worlds(words: Sequence[str]) -> None:
     Raises:
         InputError: there is no such world.
     """
-    from antdrive.worlds import list_worlds
     from antdrive.worlds.files.checks import suggest
+    from antdrive.worlds.files.world_file import list_worlds
 
     known = list_worlds()
     for word in words:

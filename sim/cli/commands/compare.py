@@ -109,8 +109,8 @@ def compare(
     rest = {"margin": margin, "cell": cell, "smoothing": smoothing, "noise": noise}
     scenarios = _scenarios(worlds, entrants, robot, seed, rest)
     cases = [(world, number) for world in worlds for number in range(seed, seed + seeds)]
-    folder, mark = _default_folder(scenarios, cases)
-    folder = out or folder
+    default, mark = _default_folder(scenarios, cases)
+    folder = out or default
     if video is not None:
         check_film(video)
     check_folder(folder)
@@ -124,9 +124,8 @@ def compare(
         drives = [{"label": run.label, **run.facts} for run in runs]
         write_marker(folder / MARKER, {**facts, "drives": drives, **told})
     if json:
-        print_json(
-            {"runs": {run.label: run.facts for run in runs[: len(entrants)]}, "drives": drives, **told, "files": files}
-        )
+        first = {run.label: run.facts for run in runs[: len(entrants)]}
+        print_json({"runs": first, "drives": drives, **told, "files": files})
     else:
         _print(runs, len(cases), told, files)
     if len(logs) < 2:

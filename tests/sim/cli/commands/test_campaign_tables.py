@@ -141,10 +141,10 @@ def test_report_writes_every_kind(antdrive: Call, campaign: Path, tmp_path: Path
             ["compare", "camp", "--against", "astar", "--allow", "fun=1"],
             "camp: allow: unknown 'fun'; choose from success",
         ),
-        (["compare", "kamp"], "kamp: no such folder of a campaign, world file, or world of the catalogue"),
+        (["compare", "kamp"], "kamp: no such file or folder, nor a world of the catalogue"),
         (
             ["compare", "camp/parts", "-p", "astar"],
-            "camp/parts: is no campaign's folder; antdrive sweep writes manifest",
+            "camp/parts: neither a world file nor the folder of a campaign, as antdrive sweep",
         ),
         (["compare", "forest"], "--planner: name two to six different planners"),
         (["report", "camp", ".", "-o", "r.md"], ".: is no campaign's folder, as camp is; report about them apart"),
