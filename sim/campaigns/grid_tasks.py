@@ -60,7 +60,8 @@ def _drawn(
     """Random tasks in one world. They depend on it and on the seed alone, not on the campaign's other worlds."""
     content = int(canonical_hash(world.task)[:16], 16)
     rng = np.random.default_rng([asked.seed, content])
-    grid = rasterise(world.task.world, campaign.entry.settings.cell or world.task.cell, inflate)
+    cell = max(entry.cell or world.task.cell for entry in campaign.settings)
+    grid = rasterise(world.task.world, cell, inflate)
     free = np.argwhere(grid.moves > 0)
     for number in range(asked.random):
         task = _draw(rng, grid, free, asked.min_distance, world.task, robots) if len(free) else None

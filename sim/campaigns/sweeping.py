@@ -168,7 +168,7 @@ def _begin(store: Store, campaign: Campaign, expansion: Expansion, jobs: Sequenc
     for path, task in expansion.worlds.items():
         if not (store.folder / path).exists():
             save_task(task, store.folder / path)
-    for path, source in expansion.robots.items():
+    for path, source in {**expansion.robots, **expansion.planners}.items():
         with written_whole(store.folder / path) as part:
             shutil.copyfile(source, part)
     store.begin(manifest, grid_table(jobs))
