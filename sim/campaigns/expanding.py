@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import shlex
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -101,8 +102,7 @@ def expand(campaign: Campaign) -> Expansion:
             key = key_of(identity, seed)
             jobs.setdefault(key, Job(key, case, seed))
     counts = {
-        "worlds": len(worlds),
-        "tasks": len(tasks) // len(worlds),
+        **_count_tasks(tasks),
         "robots": len(robots),
         "routes": len(campaign.entry.routes),
         "noise": len(campaign.entry.noise),
@@ -115,6 +115,14 @@ def expand(campaign: Campaign) -> Expansion:
     own = {one.word: one.file for one in robots if one.file is not None}
     codes = {one.word.rpartition(":")[0]: one.file for one in planners if one.file is not None}
     return Expansion(tuple(jobs.values()), wanted - len(jobs), counts, files, own, codes)
+
+
+def _count_tasks(tasks: Sequence[NamedTask]) -> dict[str, int]:
+    """How many worlds there are, and tasks in each; where these differ, how many tasks in all worlds."""
+    each = Counter(one.world for one in tasks)
+    if len(set(each.values())) == 1:
+        return {"worlds": len(each), "tasks": len(tasks) // len(each)}
+    return {f"tasks in {len(each)} worlds": len(tasks)}
 
 
 def _robots(campaign: Campaign) -> list[NamedRobot]:

@@ -175,7 +175,7 @@ def _say_size(expansion: "Expansion", out: Path | None, json: bool) -> int:
     if json:
         print_json(facts)
         return SUCCEEDED
-    print_line(" x ".join(f"{count} {name}" for name, count in expansion.counts.items()))
+    print_line(" x ".join(f"{count} {name if count != 1 else _one(name)}" for name, count in expansion.counts.items()))
     more = (
         f"; {expansion.duplicates} combinations that mean the same as others are left out"
         if expansion.duplicates
@@ -183,6 +183,11 @@ def _say_size(expansion: "Expansion", out: Path | None, json: bool) -> int:
     )
     print_line(f"{len(expansion.jobs)} runs, {missing} of them missing{more}")
     return SUCCEEDED
+
+
+def _one(name: str) -> str:
+    """The singular of what is counted."""
+    return name if " " in name or name == "settings" else name.removesuffix("s")
 
 
 def _facts(results: "SweepResults") -> dict[str, Any]:

@@ -6,6 +6,7 @@ import dataclasses
 import hashlib
 import itertools
 import json
+import math
 import re
 from pathlib import Path
 
@@ -275,6 +276,72 @@ def test_classes_of_one_name_in_two_files_are_two_planners(tmp_path: Path) -> No
         (tmp_path / folder / "mine.py").write_text(MINE.replace("from beside import NOTHING", f"FOLDER = {folder!r}"))
     campaign = make_campaign({"worlds": ["empty"], "planners": ["a/mine.py:Mine", "b/mine.py:Mine"]}, tmp_path)
     assert [job.case.planner for job in expand(campaign).jobs] == ["mine.py:Mine", "b/mine.py:Mine"]
+
+
+MAP = "type octile\nheight 4\nwidth 6\nmap\n" + "......\n" * 4
+
+
+def movingai(folder: Path) -> None:
+    lines = [f"0\tm.map\t6\t4\t{k}\t0\t5\t3\t{5 - k}.0" for k in range(5)]
+    folder.mkdir(exist_ok=True)
+    (folder / "m.map").write_text(MAP)
+    (folder / "m.map.scen").write_text("\n".join(["version 1", *lines]) + "\n")
+
+
+@pytest.mark.parametrize(
+    "worlds",
+    [
+        [{"import": "a/m.map", "problem": "0-4"}],
+        [{"import": "a/m.map", "problem": [0, 1, 2, 3, 4]}],
+        [{"import": "a/m.map", "problem": k} for k in (0, 1, 2, 2, 3, 4)],
+    ],
+)
+def test_problems_of_a_map_are_tasks_of_one_world(worlds: list[object], tmp_path: Path) -> None:
+    movingai(tmp_path / "a")
+    expansion = expand(make_campaign({"worlds": worlds, "planners": ["astar"]}, tmp_path))
+    assert [(job.case.world, job.case.task_name) for job in expansion.jobs] == [("m", f"problem-{k}") for k in range(5)]
+    assert [job.case.task.start[0] for job in expansion.jobs] == [k + 0.5 for k in range(5)]
+    assert {name: expansion.counts[name] for name in ("worlds", "tasks")} == {"worlds": 1, "tasks": 5}
+
+
+def test_maps_and_tasks_of_one_name_all_have_names_of_their_own(tmp_path: Path) -> None:
+    movingai(tmp_path / "a")
+    movingai(tmp_path / "b")
+    (tmp_path / "b" / "m.map").write_text(MAP.replace("......", ".....@", 1))
+    ends = [{"start": [x, 0.5, 0], "goal": [4.5, 2.5]} for x in (0.5, 1.5, 2.5)]
+    maps = [{"import": f"{folder}/m.map", "problem": "1-2"} for folder in ("a", "b")]
+    worlds = [*maps, *({"import": "a/m.map", **one} for one in ends)]
+    expansion = expand(make_campaign({"worlds": worlds, "planners": ["astar"]}, tmp_path))
+    assert [(job.case.world, job.case.task_name) for job in expansion.jobs] == [
+        ("m", "problem-1"), ("m", "problem-2"), ("b/m.map#m", "problem-1"), ("b/m.map#m", "problem-2"), ("m", "own"),
+        *((f"a/m.map#m start={x},0.5,0 goal=4.5,2.5", "own") for x in (1.5, 2.5)),
+    ]  # fmt: skip
+    assert expansion.counts["tasks in 4 worlds"] == 7
+
+
+def test_a_map_that_changes_is_read_again(tmp_path: Path) -> None:
+    movingai(tmp_path)
+    campaign = {"worlds": [{"import": "m.map", "problem": 0}], "planners": ["astar"]}
+    (before,) = expand(make_campaign(campaign, tmp_path)).jobs
+    scen = tmp_path / "m.map.scen"
+    scen.write_text(scen.read_text().replace("\t0\t0\t5\t3", "\t1\t1\t5\t3", 1))
+    (after,) = expand(make_campaign(campaign, tmp_path)).jobs
+    assert before.key != after.key
+
+
+@pytest.mark.parametrize("value", ["0-", [1, 1], "x", 2.5, -1])
+def test_a_wrong_problem_is_named(value: object, tmp_path: Path) -> None:
+    movingai(tmp_path)
+    campaign = make_campaign({"worlds": [{"import": "m.map", "problem": value}], "planners": ["astar"]}, tmp_path)
+    with pytest.raises(InputError, match=r"^campaign: worlds\[0\]\.problem: must be"):
+        expand(campaign)
+
+
+def test_drawn_tasks_keep_clear_of_cylinders_that_nobody_knows_of() -> None:
+    unseen = [{"x": x, "y": y, "radius": 0.5} for x in (1.0, 3.0, 5.0) for y in (1.0, 3.0, 5.0)]
+    campaign = {"worlds": "empty", "planners": "astar", "tasks": {"random": 20}, "settings": {"unseen": unseen}}
+    starts = [job.case.task.start[:2] for job in expand(make_campaign(campaign)).jobs]
+    assert min(math.dist(start, (one["x"], one["y"])) for start in starts for one in unseen) > 0.5
 
 
 def test_the_schema_names_every_key() -> None:
