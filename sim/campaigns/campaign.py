@@ -138,6 +138,9 @@ class CampaignFile(BaseModel):
         {},
         description="how robots drive, such as {cell: 0.1, time_limit: 60}; a list of values stands for several settings",
     )
+    run_limit: float | None = Field(
+        None, gt=0, description="wall-clock time that a run may take before its process is ended [s]; none by default"
+    )
     rollouts: Literal["none", "failed", "all"] = Field("none", description="which runs' logs are kept")
 
 
@@ -184,14 +187,27 @@ def make_campaign(data: Mapping[str, Any], folder: str | os.PathLike[str] = ".",
     """A campaign from plain data with the keys of a campaign file; `schema` may be left out.
 
     Args:
-        data: mappings, lists, numbers and texts
+        data: mappings, lists, numbers and texts; also tuples, ranges, paths, and numbers and arrays of numpy
         folder: where relative paths begin
         source: what messages call the data
 
     Raises:
         InputError: something in the data is wrong.
     """
-    return _checked(Document(source, {"schema": 1, **data}), Path(folder))
+    return _checked(
+        Document(source, {"schema": 1, **{key: _plain(value) for key, value in data.items()}}), Path(folder)
+    )
+
+
+def _plain(value: Any) -> Any:
+    """What Python code gives, as a file would hold it: numpy's numbers and arrays, tuples, ranges and paths."""
+    if isinstance(value, Mapping):
+        return {key: _plain(one) for key, one in value.items()}
+    if isinstance(value, list | tuple | range):
+        return [_plain(one) for one in value]
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    return value.tolist() if hasattr(value, "tolist") else value
 
 
 def _checked(document: Document, folder: Path) -> Campaign:

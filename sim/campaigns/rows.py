@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 CRASHED = "crashed"  # the outcome of a run whose process died, or in which antdrive itself failed
 PLANNER_FAULT = "planner_fault"  # the outcome of a run whose planner raised something
+TOO_SLOW = "too_slow"  # the outcome of a run that was ended because it took longer than the campaign's limit
 WALL_TIMES = ("plan_s", "drive_wall_s")  # metrics that differ between repetitions
 #: The columns that differ between repetitions of the same run; the canonical table is without them.
 NOT_CANONICAL = (*WALL_TIMES, "attempts")
@@ -175,10 +176,20 @@ def fault_row(key: str, outcome: str, reason: str) -> dict[str, Any]:
 
     Args:
         key: the run's key
-        outcome: `crashed` or `planner_fault`
+        outcome: `crashed`, `planner_fault` or `too_slow`
         reason: what happened, in words
     """
     return _empty(key) | {"outcome": outcome, "succeeded": False, "reason": reason}
+
+
+def slow_row(key: str, limit: float) -> dict[str, Any]:
+    """The row of a run that was ended because it took too long.
+
+    Args:
+        key: the run's key
+        limit: how long a run may take [s]
+    """
+    return fault_row(key, TOO_SLOW, f"took longer than the campaign's run_limit of {limit:g} s")
 
 
 def _empty(key: str) -> dict[str, Any]:

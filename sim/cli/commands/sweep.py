@@ -79,7 +79,17 @@ Rollouts = Annotated[
     str | None,
     typer.Option("--keep", metavar="WHICH", help="Logs to keep: none, failed or all.  [default: as the campaign says]"),
 ]
-Retry = Annotated[bool, typer.Option("--retry-crashed", help="Make runs again whose processes died.")]
+Limit = Annotated[
+    float | None,
+    typer.Option("--run-limit", metavar="SECONDS", help="Wall-clock time of a run, after which its process is ended."),
+]
+Retry = Annotated[bool, typer.Option("--retry-crashed", help="Make runs again that crashed.")]
+Again = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="NAME", help="Make runs again of a planner, or with an outcome: planner_fault. May be repeated."
+    ),
+]
 DryRun = Annotated[
     bool, typer.Option("--dry-run", help="Say how many runs there are and how many are missing; run nothing.")
 ]
@@ -101,7 +111,9 @@ def sweep(
     jobs: Jobs = None,
     dask: Dask = None,
     keep: Rollouts = None,
+    run_limit: Limit = None,
     retry_crashed: Retry = False,
+    again: Again = None,
     dry_run: DryRun = False,
     json: Json = False,
 ) -> int:
@@ -119,6 +131,8 @@ def sweep(
         raise InputError("--out: missing; name the folder for the results")
     if keep is not None and keep not in get_args(Kinds):
         raise InputError(f"--keep {keep}: unknown; choose from {', '.join(get_args(Kinds))}")
+    if dask is not None and jobs is not None:
+        raise InputError("--jobs: has no effect with --dask; write --dask local:N for N processes, or leave it out")
     asked = campaign_from(
         campaign,
         worlds=world,
@@ -130,13 +144,16 @@ def sweep(
         noise=noise,
         margin=margin,
         tasks=tasks,
+        run_limit=run_limit,
     )
     expansion = expand(asked)
     if dry_run:
-        return _say_size(expansion, out, json)
+        return _say_size(expansion, out, json, retry_crashed=retry_crashed, again=again or ())
     assert out is not None
-    kept = cast("Keep | None", keep)
-    results = _run(asked, expansion, out, jobs=jobs, dask=dask, keep=kept, retry_crashed=retry_crashed)
+    options: dict[str, Any] = {"retry_crashed": retry_crashed, "again": again or ()}
+    results = _run(asked, expansion, out, jobs=jobs, dask=dask, keep=cast("Keep | None", keep), **options)
+    for note in results.notes:
+        print_error(note)
     if json:
         print_json(_facts(results))
     else:
@@ -159,16 +176,25 @@ def _resumable(folder: Path) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        command = shlex.join(["antdrive", *sys.argv[1:]])
+        command = shlex.join(["antdrive", *_without_again(sys.argv[1:])])
         print_error(f"{folder}: what is done is kept; go on with: {command}")
         raise
 
 
-def _say_size(expansion: "Expansion", out: Path | None, json: bool) -> int:
-    from antdrive.sim.campaigns.store import done_in
+def _without_again(words: list[str]) -> Iterator[str]:
+    """The words of a command without --again: what it made again is not to be made a third time."""
+    rest = iter(words)
+    for word in rest:
+        if word == "--again":
+            next(rest, None)
+        elif not word.startswith("--again="):
+            yield word
 
-    done = done_in(out) if out is not None else set()
-    missing = sum(job.key not in done for job in expansion.jobs)
+
+def _say_size(expansion: "Expansion", out: Path | None, json: bool, **asked: Any) -> int:
+    from antdrive.sim.campaigns.missing import missing_runs
+
+    missing = len(expansion.jobs) if out is None else len(missing_runs(expansion.jobs, out, **asked).jobs)
     facts: dict[str, Any] = {
         "runs": len(expansion.jobs), "missing": missing, "duplicates": expansion.duplicates, "counts": expansion.counts
     }  # fmt: skip
