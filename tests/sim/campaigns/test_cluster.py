@@ -20,7 +20,7 @@ from antdrive.sim.campaigns.expanding import expand
 from antdrive.sim.campaigns.running import log_path
 from antdrive.sim.campaigns.sweeping import run_expansion, sweep
 from antdrive.worlds.errors import InputError
-from tests.sim.campaigns.works import Deadly
+from tests.sim.campaigns.works import Deadly, Endless, Refusing
 
 pytestmark = [
     pytest.mark.slow,  # starting a cluster takes seconds
@@ -77,6 +77,16 @@ def test_a_run_that_kills_its_workers_is_recorded_and_no_other_is_lost() -> None
     rows = [finished.row for finished in run_on_cluster(jobs, Deadly((3,)), "local:2")]
     assert Counter(row["key"] for row in rows) == Counter(job.key for job in jobs)
     assert {row["key"] for row in rows if row["outcome"] == "crashed"} == {job.key for job in jobs if job.seed == 3}
+
+
+def test_a_run_that_does_not_end_is_ended_and_one_that_finds_no_room_ends_the_campaign() -> None:
+    jobs = expand(make_campaign({**CAMPAIGN, "worlds": ["empty"], "seeds": 6})).jobs
+    rows = [finished.row for finished in run_on_cluster(jobs, Endless((3,)), "local:2", limit=1.0)]
+    assert Counter(row["key"] for row in rows) == Counter(job.key for job in jobs)
+    assert {row["outcome"] for row in rows if row["key"] == jobs[3].key} == {"too_slow"}
+    assert sum(row["outcome"] == "succeeded" for row in rows) == 5
+    with pytest.raises(InputError, match="No space left on device"):
+        list(run_on_cluster(jobs, Refusing(), "local:1"))
 
 
 def test_a_scheduler_that_is_gone_ends_the_campaign_which_goes_on_elsewhere(
