@@ -124,15 +124,11 @@ def sweep(
     done, whatever came out of them.
     """
     from antdrive.sim.campaigns.expanding import expand
-    from antdrive.sim.campaigns.running import Keep as Kinds
     from antdrive.sim.cli.campaigns import campaign_from
 
     if out is None and not dry_run:
         raise InputError("--out: missing; name the folder for the results")
-    if keep is not None and keep not in get_args(Kinds):
-        raise InputError(f"--keep {keep}: unknown; choose from {', '.join(get_args(Kinds))}")
-    if dask is not None and jobs is not None:
-        raise InputError("--jobs: has no effect with --dask; write --dask local:N for N processes, or leave it out")
+    _check(keep, dask, jobs)
     asked = campaign_from(
         campaign,
         worlds=world,
@@ -159,6 +155,16 @@ def sweep(
     else:
         _print(results)
     return SUCCEEDED
+
+
+def _check(keep: str | None, dask: str | None, jobs: int | None) -> None:
+    """Refuse options that mean nothing."""
+    from antdrive.sim.campaigns.running import Keep as Kinds
+
+    if keep is not None and keep not in get_args(Kinds):
+        raise InputError(f"--keep {keep}: unknown; choose from {', '.join(get_args(Kinds))}")
+    if dask is not None and jobs is not None:
+        raise InputError("--jobs: has no effect with --dask; write --dask local:N for N processes, or leave it out")
 
 
 def _run(asked: "Campaign", expansion: "Expansion", out: Path, **options: Any) -> "SweepResults":
