@@ -40,7 +40,7 @@ Planners = Annotated[
         "--planner",
         "-p",
         metavar="NAME",
-        help="Planner, with options such as aco-han:ants=10,50 or aco-han:ants=10..50..20. May be repeated.",
+        help="Planner, or FILE.py:CLASS, with options such as aco-han:ants=10,50 or aco-han:ants=10..50..20. May be repeated.",
     ),
 ]
 Robots = Annotated[
