@@ -20,7 +20,7 @@ Planner = Annotated[
         "--planner",
         "-p",
         metavar="NAME",
-        help="Planner, or FILE.py:CLASS; `antdrive planners` lists those that have names.",
+        help="Planner, or FILE.py:CLASS; `antdrive planners` lists names.",
     ),
 ]
 Settings = Annotated[
