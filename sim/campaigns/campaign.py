@@ -105,6 +105,9 @@ def _settings_schema() -> dict[str, Any]:
     schema = SettingsEntry.model_json_schema()
     discs = {"type": "array", "items": schema.pop("$defs")["DiscEntry"]}
     keys = {key: discs if key == "unseen" else one for key, one in schema["properties"].items()}
+    number = keys["controller"]["additionalProperties"]
+    several_numbers = {"anyOf": [number, {"type": "array", "items": number, "minItems": 1}]}
+    keys["controller"] = {**keys["controller"], "additionalProperties": several_numbers}
     several = {key: {"anyOf": [one, {"type": "array", "items": one, "minItems": 1}]} for key, one in keys.items()}
     return {**schema, "properties": several}
 

@@ -356,4 +356,7 @@ def test_the_schema_names_every_key() -> None:
         "settings",
         "rollouts",
     }
+    cells = schema["properties"]["settings"]["properties"]["cell"]["anyOf"]
+    assert cells[1] == {"type": "array", "items": cells[0], "minItems": 1}
+    assert "$ref" not in json.dumps(schema["properties"]["settings"])
     assert schema["required"] == ["schema", "worlds", "planners"]
