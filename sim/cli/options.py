@@ -15,7 +15,13 @@ MAX_MARGIN = 100.0  # [m]
 
 World = Annotated[str, typer.Argument(metavar="WORLD", help="Name of a world in the catalogue, or a world file.")]
 Planner = Annotated[
-    str, typer.Option("--planner", "-p", metavar="NAME", help="Planner; `antdrive planners` lists them.")
+    str,
+    typer.Option(
+        "--planner",
+        "-p",
+        metavar="NAME",
+        help="Planner, or FILE.py:CLASS; `antdrive planners` lists names.",
+    ),
 ]
 Settings = Annotated[
     list[str] | None,
