@@ -47,6 +47,26 @@ class MapArrays(NamedTuple):
     frame: Array
 
 
+class Fan(NamedTuple):
+    """A scan as it lies in the map.
+
+    Attributes:
+        eye: the lidar's pose: x, y, yaw (3,)
+        beams: directions of the beams, seen from the lidar (B, 2)
+        ranges: what they measured (B,) [m]
+        first: the angle of the first beam [rad]
+        spacing: the angle between two beams [rad]
+        closed: whether the first beam is beside the last
+    """
+
+    eye: Array
+    beams: Array
+    ranges: Array
+    first: float
+    spacing: float
+    closed: bool
+
+
 @kernel
 def begins(beams: int, spacing: float, cell: float, out: Array) -> None:
     """out[i] = the distance from which on beam i is needed to leave no cell out [m].
@@ -57,19 +77,19 @@ def begins(beams: int, spacing: float, cell: float, out: Array) -> None:
         step, number = 2, i
         while number and number % 2 == 0:
             step, number = step * 2, number // 2
-        out[i] = 0.5 * cell / (step * spacing) if number else 0.0
+        out[i] = cell / (step * spacing) if number else 0.0
 
 
 @kernel
 def insert(
-    eye: Array, ranges: Array, beams: Array, begin: Array, left_out: Array, horizon: float, trust: float, scan: int,
-    m: MapArrays, changed: Array,
-) -> int:  # fmt: skip
-    """Enter a scan from the lidar's pose `eye`; the number of rows (row, col) written to `changed`.
+    fan: Fan, begin: Array, left_out: Array, horizon: float, trust: float, scan: int, m: MapArrays, changed: Array
+) -> int:
+    """Enter a scan; the number of rows (row, col) written to `changed`.
 
     Hits farther than `horizon` are not entered, nor those of beams in `left_out`; ground is seen free up to `trust`.
     """
-    x, y, cos, sin = eye[0], eye[1], math.cos(eye[2]), math.sin(eye[2])
+    ranges, beams = fan.ranges, fan.beams
+    x, y, cos, sin = fan.eye[0], fan.eye[1], math.cos(fan.eye[2]), math.sin(fan.eye[2])
     count = 0
     for i in range(beams.shape[0]):
         if left_out[i] or not 0.0 < ranges[i] <= horizon:
@@ -81,7 +101,7 @@ def insert(
         length = min(ranges[i], trust)  # inf: nothing there; -inf: something too near to be measured
         if length > begin[i]:
             ux, uy = cos * beams[i, 0] - sin * beams[i, 1], sin * beams[i, 0] + cos * beams[i, 1]
-            count = pass_through(x, y, ux, uy, begin[i], length, scan, m, changed, count)
+            count = pass_through(ux, uy, begin[i], length, scan, fan, m, changed, count)
     return count
 
 
@@ -116,12 +136,12 @@ def hit(px: float, py: float, scan: int, m: MapArrays, changed: Array, count: in
 
 @kernel
 def pass_through(
-    x: float, y: float, ux: float, uy: float, begin: float, length: float, scan: int, m: MapArrays, changed: Array,
-    count: int,
-) -> int:  # fmt: skip
+    ux: float, uy: float, begin: float, length: float, scan: int, fan: Fan, m: MapArrays, changed: Array, count: int
+) -> int:
     """Enter a beam's free way, from `begin` to `length` (Amanatides & Woo 1987)."""
     cell = m.frame[2]
     rows, cols = m.free.shape
+    x, y = fan.eye[0], fan.eye[1]
     sx, sy = (x + begin * ux - m.frame[0]) / cell, (y + begin * uy - m.frame[1]) / cell
     row, col = int(math.floor(sy)), int(math.floor(sx))
     step_x, step_y = 1 if ux > 0.0 else -1, 1 if uy > 0.0 else -1
@@ -132,12 +152,13 @@ def pass_through(
     next_y = ((row + 1 - sy) if uy > 0.0 else (sy - row)) * each_y if uy != 0.0 else math.inf
     rest = length - begin
     while 0 <= row < rows and 0 <= col < cols:
-        if m.occupied[row, col]:
-            count = see_through(row, col, x, y, ux, uy, length, scan, m, changed, count)
-        elif not m.free[row, col]:
-            m.free[row, col] = True
-            changed[count, 0], changed[count, 1] = row, col
-            count += 1
+        if not m.free[row, col]:
+            if m.occupied[row, col]:
+                count = see_through(row, col, scan, fan, m, changed, count)
+            else:
+                m.free[row, col] = True
+                changed[count, 0], changed[count, 1] = row, col
+                count += 1
         if next_x < next_y:
             if next_x >= rest:
                 break
@@ -152,25 +173,15 @@ def pass_through(
 
 
 @kernel
-def see_through(
-    row: int, col: int, x: float, y: float, ux: float, uy: float, length: float, scan: int, m: MapArrays, changed: Array,
-    count: int,
-) -> int:  # fmt: skip
-    """Lower the log-odds of those grains of an occupied cell whose hits a beam has passed right through.
-
-    A beam that passes beside the hits says nothing about them, although it crosses their cell.
-    """
-    near = 0.25 * m.frame[2] / GRAINS
+def see_through(row: int, col: int, scan: int, fan: Fan, m: MapArrays, changed: Array, count: int) -> int:
+    """Lower the log-odds of those grains of an occupied cell whose hits the scan has passed by on both sides."""
     left = False
     lowered = False
     for r in range(GRAINS * row, GRAINS * row + GRAINS):
         for c in range(GRAINS * col, GRAINS * col + GRAINS):
             if m.odds[r, c] <= 0.0:
                 continue
-            box = m.box[r, c]
-            dx, dy = 0.5 * (box[0] + box[2]) - x, 0.5 * (box[1] + box[3]) - y
-            along, across = dx * ux + dy * uy, abs(dx * uy - dy * ux)
-            if m.stamp[r, c] != scan and across <= near and along + m.frame[2] < length:
+            if m.stamp[r, c] != scan and seen_beyond(m.box[r, c], m.frame[2], fan):
                 m.stamp[r, c] = scan
                 m.odds[r, c] -= MISS
                 lowered = True
@@ -184,6 +195,25 @@ def see_through(
         changed[count, 0], changed[count, 1] = row, col
         count += 1
     return count
+
+
+@kernel
+def seen_beyond(box: Array, behind: float, fan: Fan) -> bool:
+    """Whether both beams beside the middle of a box of hits end at least `behind` farther away.
+
+    A beam that passes beside an obstacle says nothing about it: its neighbour on the other side has met the obstacle.
+    """
+    dx, dy = 0.5 * (box[0] + box[2]) - fan.eye[0], 0.5 * (box[1] + box[3]) - fan.eye[1]
+    cos, sin = math.cos(fan.eye[2]), math.sin(fan.eye[2])
+    place = (math.atan2(cos * dy - sin * dx, cos * dx + sin * dy) - fan.first) / fan.spacing
+    low, beams = int(math.floor(place)), fan.ranges.shape[0]
+    high = low + 1
+    if fan.closed:
+        low, high = low % beams, high % beams
+    if low < 0 or high >= beams:
+        return False
+    far = math.hypot(dx, dy) + behind
+    return bool(fan.ranges[low] > far and fan.ranges[high] > far)
 
 
 @kernel

@@ -29,7 +29,7 @@ class OccupancyMap:
 
     A cell is unknown, seen free, or occupied. It is seen free once a beam has passed it, as far as beams lie no farther apart
     than a cell is wide; a thing thinner than that may stand between two of them. A single hit makes a cell occupied, and it
-    is free again when beams have passed right through the place of its hits: up to nine scans, for what was hit often.
+    is free again when the beams on both sides of its hits have ended beyond them: in nine scans, for what was hit often.
 
     Attributes:
         cell: side of a cell [m]
@@ -62,6 +62,7 @@ class OccupancyMap:
         self._lidar, self._grows = lidar, bounds is None
         angles = lidar.angles - lidar.yaw
         self._beams = np.column_stack((np.cos(angles), np.sin(angles)))
+        self._first = float(angles[0])
         self._begin = np.empty(lidar.beams)
         kernels.begins(lidar.beams, lidar.spacing, cell, self._begin)
         self._none = np.zeros(lidar.beams, dtype=np.bool_)
@@ -102,17 +103,10 @@ class OccupancyMap:
             self._make_room(eye[0], eye[1])
         self.scans += 1
         mask = self._none if left_out is None else np.ascontiguousarray(left_out)
+        lidar = self._lidar
+        fan = kernels.Fan(eye, self._beams, ranges, self._first, lidar.spacing, lidar.full_circle)
         count = kernels.insert(
-            eye,
-            ranges,
-            self._beams,
-            self._begin,
-            mask,
-            self.horizon,
-            self.trust,
-            self.scans,
-            self._arrays,
-            self._changed,
+            fan, self._begin, mask, self.horizon, self.trust, self.scans, self._arrays, self._changed
         )
         return self._changed[:count].copy()
 

@@ -51,7 +51,8 @@ def test_free_ground_was_crossed_by_a_beam_and_no_beam_ended_there(
     found: list[tuple[float, ...]], ways: list[Pose]
 ) -> None:
     """The oracle samples the beams of all scans at steps of a tenth of a cell."""
-    scanner, grid = Scanner(EYE, np.array(found)), OccupancyMap(EYE, 0.1, horizon=4.0)
+    scanner = Scanner(EYE, np.array(found))
+    grid = OccupancyMap(EYE, 0.1, horizon=4.0, bounds=(-20.0, -20.0, 20.0, 20.0))
     cells: set[tuple[int, ...]] = set()
     for pose in ways:
         ranges = scanner.scan(pose)
