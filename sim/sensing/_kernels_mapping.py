@@ -25,7 +25,8 @@ class MapArrays(NamedTuple):
     Attributes:
         free: which cells were seen free (R, C)
         occupied: which cells hold hits (R, C); no cell is both
-        turned: the scan in which a cell that had been seen free was last hit and became occupied (R, C); 0: none
+        turned: the scan in which a cell that had been seen free became occupied (R, C); 0: it had not been, or is part of
+            what stands beside it
         slot: the row of an occupied cell in `cells` (R, C)
         cells: the occupied cells (row, col), without order; the first `count[0]` rows count
         count: the number of occupied cells (1,)
@@ -123,7 +124,7 @@ def hit(px: float, py: float, scan: int, m: MapArrays, changed: Array, count: in
         m.odds[r, c] = min(MOST, m.odds[r, c] + HIT)
     row, col = r // GRAINS, c // GRAINS
     if not m.occupied[row, col]:
-        m.turned[row, col] = scan if m.free[row, col] else 0
+        m.turned[row, col] = scan if m.free[row, col] and not beside_standing(row, col, m) else 0
         m.free[row, col] = False
         m.occupied[row, col] = True
         m.slot[row, col] = m.count[0]
@@ -132,6 +133,16 @@ def hit(px: float, py: float, scan: int, m: MapArrays, changed: Array, count: in
         changed[count, 0], changed[count, 1] = row, col
         count += 1
     return count
+
+
+@kernel
+def beside_standing(row: int, col: int, m: MapArrays) -> bool:
+    """Whether a cell beside this one holds what was there from the first: more of it comes into sight on the way."""
+    for r in range(max(0, row - 1), min(m.free.shape[0], row + 2)):
+        for c in range(max(0, col - 1), min(m.free.shape[1], col + 2)):
+            if m.occupied[r, c] and m.turned[r, c] == 0:
+                return True
+    return False
 
 
 @kernel
