@@ -87,7 +87,7 @@ class Lidar:
     def angles(self) -> Floats:
         """The direction of each beam, counter-clockwise from the robot's heading (beams,) [rad]."""
         first = -math.pi if self.full_circle else -self.field_of_view / 2
-        return self.yaw + first + self.spacing * np.arange(self.beams)
+        return np.asarray(self.yaw + first + self.spacing * np.arange(self.beams), dtype=np.float64)
 
     def pose_on(self, robot: Pose) -> Pose:
         """The lidar's own pose on a robot: x, y [m] and yaw [rad].

@@ -124,4 +124,4 @@ def gap_at(ahead: float, left: float, forward: float, bend: float, shape: Array,
     cos, sin = math.cos(bend * done), math.sin(bend * done)
     dx, dy = ahead - x, left - y
     qx, qy = abs(cos * dx + sin * dy) - shape[0], abs(cos * dy - sin * dx) - shape[1]
-    return math.hypot(max(qx, 0.0), max(qy, 0.0)) + min(max(qx, qy), 0.0) - shape[2]
+    return float(math.hypot(max(qx, 0.0), max(qy, 0.0)) + min(max(qx, qy), 0.0) - shape[2])

@@ -121,7 +121,7 @@ class OccupancyMap:
         cos, sin = math.cos(yaw), math.sin(yaw)
         measured = np.where(np.isfinite(ranges), ranges, np.nan)[:, None]
         turned = self._beams @ np.array([[cos, sin], [-sin, cos]])
-        return measured * turned + (x, y)
+        return np.asarray(measured * turned + (x, y), dtype=np.float64)
 
     def explained(self, points: Floats, settle: int) -> Mask:
         """Whether points belong to what stands still (N,): they lie in or beside cells that have long been occupied.
@@ -205,7 +205,7 @@ class OccupancyMap:
             count = int(old.count[0])
             arrays.cells[:count] = old.cells[:count] + (south, west)
             arrays.count[0] = count
-        self._arrays = arrays
+        self._arrays: kernels.MapArrays = arrays
         self._changed = np.empty((shape[0] * shape[1], 2), dtype=np.int32)
         self.layouts += 1
 
