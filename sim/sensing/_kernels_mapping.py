@@ -25,8 +25,7 @@ class MapArrays(NamedTuple):
     Attributes:
         free: which cells were seen free (R, C)
         occupied: which cells hold hits (R, C); no cell is both
-        turned: the scan in which a cell that had been seen free became occupied (R, C); 0: it had not been, or is part of
-            what stands beside it
+        turned: the scan in which a cell that had been seen free became occupied (R, C); 0: it had not been seen before
         slot: the row of an occupied cell in `cells` (R, C)
         cells: the occupied cells (row, col), without order; the first `count[0]` rows count
         count: the number of occupied cells (1,)
@@ -69,13 +68,13 @@ class Fan(NamedTuple):
 
 
 @kernel
-def begins(beams: int, spacing: float, cell: float, out: Array) -> None:
-    """out[i] = the distance from which on beam i is needed to leave no cell out [m].
+def begins(beams: int, spacing: float, cell: float, share: int, out: Array) -> None:
+    """out[i] = the distance from which on beam i is needed to leave no cell out [m], when every `share`-th is entered.
 
     Near the lidar every second, fourth, ... beam crosses all cells that others cross.
     """
     for i in range(beams):
-        step, number = 2, i
+        step, number = 2 * share, i // share
         while number and number % 2 == 0:
             step, number = step * 2, number // 2
         out[i] = cell / (step * spacing) if number else 0.0
@@ -83,9 +82,10 @@ def begins(beams: int, spacing: float, cell: float, out: Array) -> None:
 
 @kernel
 def insert(
-    fan: Fan, begin: Array, left_out: Array, horizon: float, trust: float, scan: int, m: MapArrays, changed: Array
-) -> int:
-    """Enter a scan; the number of rows (row, col) written to `changed`.
+    fan: Fan, begin: Array, share: int, left_out: Array, horizon: float, trust: float, scan: int, m: MapArrays,
+    changed: Array,
+) -> int:  # fmt: skip
+    """Enter a scan, of every `share`-th beam its free way too; the number of rows (row, col) written to `changed`.
 
     Hits farther than `horizon` are not entered, nor those of beams in `left_out`; ground is seen free up to `trust`.
     """
@@ -98,7 +98,7 @@ def insert(
         px = x + ranges[i] * (cos * beams[i, 0] - sin * beams[i, 1])
         py = y + ranges[i] * (sin * beams[i, 0] + cos * beams[i, 1])
         count = hit(px, py, scan, m, changed, count)
-    for i in range(beams.shape[0]):
+    for i in range(scan % share, beams.shape[0], share):
         length = min(ranges[i], trust)  # inf: nothing there; -inf: something too near to be measured
         if length > begin[i]:
             ux, uy = cos * beams[i, 0] - sin * beams[i, 1], sin * beams[i, 0] + cos * beams[i, 1]
@@ -124,7 +124,7 @@ def hit(px: float, py: float, scan: int, m: MapArrays, changed: Array, count: in
         m.odds[r, c] = min(MOST, m.odds[r, c] + HIT)
     row, col = r // GRAINS, c // GRAINS
     if not m.occupied[row, col]:
-        m.turned[row, col] = scan if m.free[row, col] and not beside_standing(row, col, m) else 0
+        m.turned[row, col] = scan if m.free[row, col] else 0
         m.free[row, col] = False
         m.occupied[row, col] = True
         m.slot[row, col] = m.count[0]
@@ -133,16 +133,6 @@ def hit(px: float, py: float, scan: int, m: MapArrays, changed: Array, count: in
         changed[count, 0], changed[count, 1] = row, col
         count += 1
     return count
-
-
-@kernel
-def beside_standing(row: int, col: int, m: MapArrays) -> bool:
-    """Whether a cell beside this one holds what was there from the first: more of it comes into sight on the way."""
-    for r in range(max(0, row - 1), min(m.free.shape[0], row + 2)):
-        for c in range(max(0, col - 1), min(m.free.shape[1], col + 2)):
-            if m.occupied[r, c] and m.turned[r, c] == 0:
-                return True
-    return False
 
 
 @kernel

@@ -8,6 +8,7 @@ from antdrive.sim.sensing._kernels_mapping import GRAINS, MapArrays, grain_disc
 from antdrive.worlds._kernels import Array, kernel
 
 TOUCHING = 1e-3  # where the footprint counts as having met a disc [m]
+SAMPLES = 8  # of the way, for the part of the map that it lies in
 GIVE = 2e-3  # a disc that the footprint overlaps already is shrunk to this distance from it [m]
 
 
@@ -27,12 +28,22 @@ def clear_way(pose: Array, speed: float, yaw_rate: float, shape: Array, limit: f
     bend = math.copysign(1.0, yaw_rate) if turns else yaw_rate / abs(speed)
     best = within_map(pose, forward, bend, radius, limit, m)
     rows, cols = m.free.shape
-    reach = radius + cell + (0.0 if turns else best)
-    row_low = max(0, int(math.floor((pose[1] - reach - m.frame[1]) / cell)))
-    row_high = min(rows - 1, int(math.floor((pose[1] + reach - m.frame[1]) / cell)))
-    col_low = max(0, int(math.floor((pose[0] - reach - m.frame[0]) / cell)))
-    col_high = min(cols - 1, int(math.floor((pose[0] + reach - m.frame[0]) / cell)))
     cos, sin = math.cos(pose[2]), math.sin(pose[2])
+    x_min, x_max, y_min, y_max = (
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+    )  # of the way, from samples half of whose distance is added to its reach
+    for k in range(1, SAMPLES + 1):
+        ahead, left = on_arc(forward, bend, best * k / SAMPLES)
+        x, y = cos * ahead - sin * left, sin * ahead + cos * left
+        x_min, x_max, y_min, y_max = min(x_min, x), max(x_max, x), min(y_min, y), max(y_max, y)
+    reach = radius + cell + 0.5 * best / SAMPLES
+    row_low = max(0, int(math.floor((pose[1] + y_min - reach - m.frame[1]) / cell)))
+    row_high = min(rows - 1, int(math.floor((pose[1] + y_max + reach - m.frame[1]) / cell)))
+    col_low = max(0, int(math.floor((pose[0] + x_min - reach - m.frame[0]) / cell)))
+    col_high = min(cols - 1, int(math.floor((pose[0] + x_max + reach - m.frame[0]) / cell)))
     for row in range(row_low, row_high + 1):
         for col in range(col_low, col_high + 1):
             if m.free[row, col]:
@@ -104,24 +115,21 @@ def contact(ahead: float, left: float, size: float, forward: float, bend: float,
     smaller: it may leave the disc or drive along it, but not come nearer.
     """
     done = 0.0
-    gap = gap_at(ahead, left, forward, bend, shape, 0.0)
-    if gap - size < GIVE:
-        size = gap - GIVE
     while done < limit:
-        away = gap_at(ahead, left, forward, bend, shape, done) - size
+        turn = bend * done
+        cos, sin = math.cos(turn), math.sin(turn)
+        x, y = 0.0, 0.0
+        if forward != 0.0:
+            bent = abs(turn) > 1e-6
+            x = forward * sin / bend if bent else forward * done
+            y = forward * (1.0 - cos) / bend if bent else 0.5 * forward * turn * done
+        dx, dy = ahead - x, left - y
+        qx, qy = abs(cos * dx + sin * dy) - shape[0], abs(cos * dy - sin * dx) - shape[1]
+        gap = math.hypot(max(qx, 0.0), max(qy, 0.0)) + min(max(qx, qy), 0.0) - shape[2]
+        if done == 0.0 and gap - size < GIVE:
+            size = gap - GIVE
+        away = gap - size
         if away <= TOUCHING:
             return done
-        x, y = on_arc(forward, bend, done)
-        swing = abs(bend) * (math.hypot(ahead - x, left - y) + away)
-        done += away / (abs(forward) + swing)
+        done += away / (abs(forward) + abs(bend) * (math.hypot(dx, dy) + away))
     return limit
-
-
-@kernel
-def gap_at(ahead: float, left: float, forward: float, bend: float, shape: Array, done: float) -> float:
-    """Distance from the footprint to a point, after a way; negative inside."""
-    x, y = on_arc(forward, bend, done)
-    cos, sin = math.cos(bend * done), math.sin(bend * done)
-    dx, dy = ahead - x, left - y
-    qx, qy = abs(cos * dx + sin * dy) - shape[0], abs(cos * dy - sin * dx) - shape[1]
-    return float(math.hypot(max(qx, 0.0), max(qy, 0.0)) + min(max(qx, qy), 0.0) - shape[2])

@@ -21,6 +21,7 @@ Cells = npt.NDArray[np.int32]
 Mask = npt.NDArray[np.bool_]
 
 BLOCK = 64  # a map grows by multiples of so many cells
+OFTEN = 12.5  # how often the free way of a beam is entered, where the lidar's rate allows [Hz]
 ROOM = 1.0  # how far beyond its horizon a map that grows is laid out at first [m]
 
 
@@ -29,13 +30,14 @@ class OccupancyMap:
 
     A cell is unknown, seen free, or occupied. It is seen free once a beam has passed it, as far as beams lie no farther apart
     than a cell is wide; a thing thinner than that may stand between two of them. A single hit makes a cell occupied, and it
-    is free again when the beams on both sides of its hits have ended beyond them: in nine scans, for what was hit often.
+    is free again when the beams on both sides of its hits have ended beyond them: at the ninth time, for what was hit often.
 
     Attributes:
         cell: side of a cell [m]
         horizon: hits farther than this are not entered [m]
         trust: ground is seen free up to this distance [m]
         scans: number of scans entered
+        share: of every scan the free ways of every `share`-th beam are entered
         layouts: how often the map was laid out; cells have other numbers after it has grown
 
     Args:
@@ -44,6 +46,8 @@ class OccupancyMap:
         centre: where the robot starts, in the frame of the map [m]
         horizon: hits farther than this are not entered [m]
         bounds: the ground that the map covers, for good; None: it grows as needed [m]
+        share: of every scan the free ways of every `share`-th beam are entered, in turn, and all hits; None: so many that
+            each beam has its turn about 12 times a second
     """
 
     def __init__(
@@ -53,7 +57,9 @@ class OccupancyMap:
         centre: Point = (0.0, 0.0),
         horizon: float = 10.0,
         bounds: Bounds | None = None,
+        share: int | None = None,
     ) -> None:
+        self.share = max(1, round(lidar.rate / OFTEN)) if share is None else share
         require_positive("cell", cell)
         require_positive("horizon", horizon)
         self.cell, self.horizon = cell, min(horizon, lidar.max_range)
@@ -64,7 +70,7 @@ class OccupancyMap:
         self._beams = np.column_stack((np.cos(angles), np.sin(angles)))
         self._first = float(angles[0])
         self._begin = np.empty(lidar.beams)
-        kernels.begins(lidar.beams, lidar.spacing, cell, self._begin)
+        kernels.begins(lidar.beams, lidar.spacing, cell, self.share, self._begin)
         self._none = np.zeros(lidar.beams, dtype=np.bool_)
         half = self.horizon + ROOM
         x, y = centre
@@ -106,7 +112,7 @@ class OccupancyMap:
         lidar = self._lidar
         fan = kernels.Fan(eye, self._beams, ranges, self._first, lidar.spacing, lidar.full_circle)
         count = kernels.insert(
-            fan, self._begin, mask, self.horizon, self.trust, self.scans, self._arrays, self._changed
+            fan, self._begin, self.share, mask, self.horizon, self.trust, self.scans, self._arrays, self._changed
         )
         return self._changed[:count].copy()
 

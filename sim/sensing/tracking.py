@@ -19,6 +19,7 @@ from antdrive.sim.sensing.mapping import OccupancyMap
 from antdrive.worlds import Floats, Pose
 from antdrive.worlds.errors import require_positive
 
+NEXT = 0.1  # neighbouring points so near belong to one surface [m]
 SKIN = 0.06  # points so near to a mover's surface are its own [m]
 
 
@@ -123,7 +124,7 @@ class MoverTracker:
         points = seen.endpoints(pose, ranges)[measured]
         theirs = self._of_tracks(points)
         fresh = theirs | ~seen.explained(points, self._settle)
-        self._match(points[fresh], measured[fresh], pose, time)
+        self._match(points[fresh], measured[fresh], _continues(points, fresh), pose, time)
         self._tracks = [track for track in self._tracks if time - track.last <= self.policy.patience]
         out = np.zeros(len(ranges), dtype=np.bool_)
         out[measured[self._of_tracks(points)]] = True
@@ -154,7 +155,9 @@ class MoverTracker:
         near: npt.NDArray[np.bool_] = np.any(away <= movers.radii + SKIN, axis=1)
         return near
 
-    def _match(self, points: Floats, beams: npt.NDArray[np.intp], pose: Pose, time: float) -> None:
+    def _match(
+        self, points: Floats, beams: npt.NDArray[np.intp], continues: npt.NDArray[np.bool_], pose: Pose, time: float
+    ) -> None:
         policy, lidar = self.policy, self._lidar
         if not len(points):
             return
@@ -175,8 +178,11 @@ class MoverTracker:
             if away <= gate and i in free_rows and k in free_tracks:
                 free_rows.remove(i)
                 free_tracks.remove(k)
-                self._correct(track, points[label == _label_of(found, i, label, policy.least)], found[i], (x, y), time)
+                self._correct(track, points[label == _label_of(i, label, policy.least)], found[i], (x, y), time)
+        part_of_more = np.bincount(label, weights=continues) > 0
         for i in sorted(free_rows):
+            if part_of_more[_label_of(i, label, policy.least)]:
+                continue
             covariance = np.diag([policy.error**2] * 2 + [policy.speed**2 / 4] * 2)
             mean = np.array([found[i, 0], found[i, 1], 0.0, 0.0])
             self._tracks.append(_Track(mean, covariance, float(found[i, 2]), 1, time, mean[:2].copy()))
@@ -196,7 +202,17 @@ class MoverTracker:
         track.moves = track.moves or math.dist(track.mean[:2], track.first) >= self.policy.way
 
 
-def _label_of(found: Floats, row: int, label: npt.NDArray[np.int64], least: int) -> int:
+def _continues(points: Floats, fresh: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Which of the fresh points continue a surface that is explained: more of it has come into sight."""
+    places = np.flatnonzero(fresh)
+    out = np.zeros(len(places), dtype=np.bool_)
+    for side in (-1, 1):
+        beside = (places + side) % max(1, len(points))
+        out |= ~fresh[beside] & (np.hypot(*(points[beside] - points[places]).T) < NEXT)
+    return out
+
+
+def _label_of(row: int, label: npt.NDArray[np.int64], least: int) -> int:
     """The label of the cluster that a row of `found` describes: clusters with too few points have no row."""
     large = np.flatnonzero(np.bincount(label) >= least)
     return int(large[row])

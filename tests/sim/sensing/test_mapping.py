@@ -12,7 +12,7 @@ from antdrive.robots import Lidar
 from antdrive.sim.sensing import OccupancyMap, Scanner
 from antdrive.worlds import Floats, Pose
 
-EYE = Lidar(beams=240, field_of_view=4.7, min_range=0.1, max_range=6.0, rate=20.0, resolution=0.01, sigma=0.003, x=0.1)
+EYE = Lidar(beams=240, field_of_view=4.7, min_range=0.1, max_range=6.0, rate=10.0, resolution=0.01, sigma=0.003, x=0.1)
 POSTS = np.array([[2.0, 0.4, 0.3], [1.0, -1.2, 0.2], [3.5, 1.5, 0.4]])
 
 
