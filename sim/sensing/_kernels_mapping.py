@@ -155,7 +155,8 @@ def pass_through(
     while 0 <= row < rows and 0 <= col < cols:
         if not m.free[row, col]:
             if m.occupied[row, col]:
-                count = see_through(row, col, scan, fan, m, changed, count)
+                if min(next_x, next_y) + 0.5 * cell < rest:  # else the beam ends here or close behind
+                    count = see_through(row, col, scan, fan, m, changed, count)
             else:
                 m.free[row, col] = True
                 changed[count, 0], changed[count, 1] = row, col
