@@ -11,6 +11,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from antdrive.robots.feasible import require_feasible
+from antdrive.robots.lidar import LIDAR_RANGE, Lidar
 from antdrive.robots.spec import NOISE_RANGE, ROBOT_RANGE, Footprint, Noise, RobotSpec
 from antdrive.worlds.errors import FieldError, input_error
 from antdrive.worlds.files.checks import OneLine, SchemaVersion, check, suggest
@@ -69,6 +70,29 @@ class NoiseEntry(BaseModel):
     delay: float = _level("delay", "time from a command to the motors [s]")
 
 
+def _beam(key: str, description: str, default: Any = ...) -> Any:
+    low, high = LIDAR_RANGE[key]
+    return Field(default, ge=low, le=high, description=description)
+
+
+class LidarEntry(BaseModel):
+    """A planar lidar: evenly spaced beams at one height."""
+
+    model_config = _RULES
+
+    beams: int = _beam("beams", "number of beams in a scan")
+    field_of_view: float = _beam("field_of_view", "angle from the first to the last beam [rad]; 6.2832: all around")
+    min_range: float = _beam("min_range", "what is nearer is not measured [m]")
+    max_range: float = _beam("max_range", "what is farther is not seen [m]")
+    rate: float = _beam("rate", "scans in a second [Hz]")
+    resolution: float = _beam("resolution", "ranges are multiples of it [m]; 0: exact", 0.0)
+    sigma: float = _beam("sigma", "standard deviation of a range [m]", 0.0)
+    x: float = _beam("x", "place ahead of the axle's centre [m]", 0.0)
+    y: float = _beam("y", "place to the left of the axle's centre [m]", 0.0)
+    yaw: float = _beam("yaw", "heading, counter-clockwise from the robot's [rad]", 0.0)
+    height: float = _beam("height", "height above the floor [m]; lower cylinders are not seen", 0.2)
+
+
 class RobotFile(BaseModel):
     """A differential-drive robot: two driven wheels on one axle through the centre, and two casters."""
 
@@ -95,6 +119,7 @@ class RobotFile(BaseModel):
     noise: NoiseEntry = Field(
         NoiseEntry(), description="errors of pose, encoders and wheels, and delay; `--noise` multiplies them"
     )
+    lidar: LidarEntry | None = Field(None, description="what the robot sees with, for worlds that it has no map of")
 
 
 def list_robots() -> Mapping[str, Path]:
@@ -141,6 +166,7 @@ def _to_spec(entry: RobotFile, document: Document) -> RobotSpec:
     values["footprint"] = entry.footprint.footprint()
     values["noise"] = Noise(**dict(entry.noise))
     try:
+        values["lidar"] = _lidar(entry.lidar)
         robot = RobotSpec(**values)
         require_feasible(robot)
     except FieldError as error:
@@ -148,6 +174,18 @@ def _to_spec(entry: RobotFile, document: Document) -> RobotSpec:
     return robot
 
 
+def _lidar(entry: LidarEntry | None) -> Lidar | None:
+    try:
+        return None if entry is None else Lidar(**dict(entry))
+    except FieldError as error:
+        raise error.under("lidar") from None
+
+
 def robot_to_dict(robot: RobotSpec) -> dict[str, Any]:
     """A robot as plain data, as it stands in a rollout's record."""
-    return dataclasses.asdict(robot)
+    left_out = {
+        field.name
+        for field in dataclasses.fields(robot)
+        if field.metadata.get("only_if_given") and getattr(robot, field.name) is None
+    }
+    return {key: value for key, value in dataclasses.asdict(robot).items() if key not in left_out}

@@ -6,6 +6,7 @@ import dataclasses
 import math
 from dataclasses import dataclass
 
+from antdrive.robots.lidar import Lidar
 from antdrive.worlds.errors import FieldError
 
 
@@ -117,6 +118,10 @@ ROBOT_RANGE = {
 WHEEL_ROOM = 0.05  # the least distance from a wheel's middle to the footprint's edge, in wheel radii
 
 
+#: Metadata of a field that records and hashes of a robot leave out where it is None: they are as they were before it existed.
+ONLY_IF_GIVEN = {"only_if_given": True}
+
+
 @dataclass(frozen=True, kw_only=True)
 class RobotSpec:
     """A differential-drive robot: two driven wheels on one axle through the centre, and two casters.
@@ -138,6 +143,7 @@ class RobotSpec:
         wheel_friction: Coulomb friction coefficient of the wheels on the floor
         noise: the robot's noise at a scenario's noise level of 1
         source: where these values come from
+        lidar: what the robot sees with; None: it has no lidar
 
     Raises:
         FieldError: a value is not positive or outside its ROBOT_RANGE, or the wheels stand
@@ -160,6 +166,7 @@ class RobotSpec:
     wheel_friction: float = 1.5
     noise: Noise = Noise()
     source: str | None = None
+    lidar: Lidar | None = dataclasses.field(default=None, metadata=ONLY_IF_GIVEN)
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):

@@ -93,6 +93,7 @@ def _drive_and_film() -> None:
     from antdrive.sim.view.film.video import film
     from antdrive.worlds import Cruising
 
+    _sense()
     log = run(_scenario()).rollout
     task = _scenario().task
     comes = Cruising(radius=0.2, position=(2.5, 0.75), velocity=(-2.0, 0.0))  # the robot has to escape from it
@@ -104,6 +105,31 @@ def _drive_and_film() -> None:
         film(log, Path(folder) / "warm.mp4", size=(160, 160), fps=2)
         film(log, Path(folder) / "warm.mp4", size=(160, 160), fps=2, camera="follow")
         film(ants, Path(folder) / "warm.mp4", size=(160, 160), fps=2, prelude=1.0)
+
+
+def _sense() -> None:
+    """Scan a tiny world, map it and follow a mover in it."""
+    import numpy as np
+
+    from antdrive.robots import load_robot
+    from antdrive.sim.sensing import MoverTracker, OccupancyMap, Scanner, clear_distance
+
+    robot = load_robot("turtlebot")
+    assert robot.lidar is not None
+    scanner, seen, tracker = (
+        Scanner.of(robot.lidar, _scenario().task.world),
+        OccupancyMap(robot.lidar),
+        MoverTracker(robot.lidar),
+    )
+    for k in range(4):
+        ranges = scanner.scan(
+            (0.75, 0.75, 0.0), np.array([[2.2 - 0.1 * k, 0.8]]) + (90 if k == 0 else 0), np.array([0.2])
+        )
+        seen.insert((0.75, 0.75, 0.0), ranges, tracker.update(seen, (0.75, 0.75, 0.0), ranges, 0.2 * k))
+    seen.take_as_free((0.75, 0.75), 0.2)
+    seen.forget((2.0, 0.8), 0.3)
+    seen.discs()
+    clear_distance(seen, (0.75, 0.75, 0.0), 0.5, 0.1, robot.footprint, 1.0)
 
 
 def _marker() -> Path | None:

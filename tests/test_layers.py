@@ -24,6 +24,7 @@ SIM_RANKS = {
     "physics": 0,
     "log": 0,
     "statistics": 0,
+    "sensing": 0.5,
     "driving": 1,
     "calibration": 1.5,
     "entries": 1,

@@ -379,7 +379,12 @@ def plain_value(value: Any) -> Any:
     if isinstance(value, Task):
         return task_to_dict(value)
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {field.name: plain_value(getattr(value, field.name)) for field in dataclasses.fields(value)}
+        given = {field: getattr(value, field.name) for field in dataclasses.fields(value)}
+        return {
+            field.name: plain_value(inner)
+            for field, inner in given.items()
+            if not (inner is None and field.metadata.get("only_if_given"))
+        }
     if isinstance(value, Mapping):
         return {str(key): plain_value(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple):

@@ -1,0 +1,6 @@
+"""What a robot without a map has: a lidar's scans, a map made of them, odometry, and movers found in scans."""
+
+import lazy_loader
+
+# __init__.pyi lists the public names and their types. Each name is imported when it is first used.
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,88 @@
+"""What a lidar measures in a world: exact rays against the cylinders and walls that collide."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from antdrive.robots.lidar import Lidar
+from antdrive.sim.sensing import _kernels_rays
+from antdrive.worlds import Bounds, Floats, Pose, World
+
+
+class Scanner:
+    """A lidar in a world.
+
+    Ranges follow REP 117, as the challenge's simulator does: `inf` where nothing is within the lidar's range, `-inf` where
+    something is nearer than it can measure, else the measured distance. Rays have a closed form, so without noise and
+    resolution they are exact to rounding.
+
+    Attributes:
+        lidar: the lidar
+
+    Args:
+        lidar: the lidar
+        discs: what stands still: x, y and radius of each cylinder (N, 3) [m]
+        heights: the cylinders' heights (N,) [m]; those below the beams are not seen. None: all are seen
+        bounds: the walls' inner faces [m]; walls are always high enough. None: no walls
+        mover_heights: the heights of the movers (M,) [m]; None: all are seen
+    """
+
+    def __init__(
+        self,
+        lidar: Lidar,
+        discs: Floats,
+        heights: Floats | None = None,
+        bounds: Bounds | None = None,
+        mover_heights: Floats | None = None,
+    ) -> None:
+        self.lidar = lidar
+        rows = np.ascontiguousarray(discs, dtype=np.float64).reshape(-1, 3)
+        self._discs = rows if heights is None else rows[np.asarray(heights) >= lidar.height]
+        self._bounds = None if bounds is None else np.asarray(bounds, dtype=np.float64)
+        self._movers = None if mover_heights is None else np.asarray(mover_heights) >= lidar.height
+        angles = lidar.angles - lidar.yaw
+        self._beams = np.column_stack((np.cos(angles), np.sin(angles)))
+        self._first = float(angles[0])
+        self._silence = np.zeros(lidar.beams)
+
+    @classmethod
+    def of(cls, lidar: Lidar, world: World) -> Scanner:
+        """The lidar in a world: its cylinders by their heights, its movers, its walls.
+
+        Args:
+            lidar: the lidar
+        """
+        heights = np.array([disc.height for disc in world.obstacles])
+        return cls(lidar, world.discs, heights, world.bounds, np.array([mover.height for mover in world.movers]))
+
+    def scan(
+        self,
+        pose: Pose,
+        mover_positions: Floats | None = None,
+        mover_radii: Floats | None = None,
+        rng: np.random.Generator | None = None,
+    ) -> Floats:
+        """A scan (beams,) [m].
+
+        With `rng` ranges have the lidar's noise. A scan draws one number for each beam, whatever the beams meet, so that what
+        is not seen changes nothing.
+
+        Args:
+            pose: the robot's true pose, not the lidar's
+            mover_positions: where all movers are (M, 2) [m]
+            mover_radii: their radii (M,) [m]
+            rng: where the noise comes from; None: no noise
+        """
+        lidar = self.lidar
+        eye = np.array(lidar.pose_on(pose))
+        out = np.full(lidar.beams, np.inf)
+        if self._bounds is not None:
+            _kernels_rays.cast_walls(eye, self._beams, self._bounds, out)
+        _kernels_rays.cast(eye, self._beams, lidar.spacing, self._first, lidar.max_range, self._discs, out)
+        if mover_positions is not None and mover_radii is not None and len(mover_radii):
+            movers = np.column_stack((mover_positions, mover_radii))
+            movers = np.ascontiguousarray(movers if self._movers is None else movers[self._movers])
+            _kernels_rays.cast(eye, self._beams, lidar.spacing, self._first, lidar.max_range, movers, out)
+        noise = self._silence if rng is None else lidar.sigma * rng.standard_normal(lidar.beams)
+        _kernels_rays.measure(out, noise, lidar.min_range, lidar.max_range, lidar.resolution)
+        return out

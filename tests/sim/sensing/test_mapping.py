@@ -1,0 +1,211 @@
+"""The map holds every hit, calls free only what beams have passed, and lets go of what has moved on."""
+
+import math
+
+import hypothesis
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import strategies as st
+
+from antdrive.robots import Lidar
+from antdrive.sim.sensing import OccupancyMap, Scanner
+from antdrive.worlds import Floats, Pose
+
+EYE = Lidar(beams=240, field_of_view=4.7, min_range=0.1, max_range=6.0, rate=10.0, resolution=0.01, sigma=0.003, x=0.1)
+POSTS = np.array([[2.0, 0.4, 0.3], [1.0, -1.2, 0.2], [3.5, 1.5, 0.4]])
+
+
+def inside(points: Floats, discs: Floats) -> npt.NDArray[np.bool_]:
+    away = np.hypot(*(points[:, None, :] - discs[None, :, :2]).transpose(2, 0, 1))
+    return np.any(away <= discs[:, 2], axis=1)
+
+
+def cell_of(found: OccupancyMap, x: float, y: float) -> tuple[int, int]:
+    return math.floor((y - found.origin[1]) / found.cell), math.floor((x - found.origin[0]) / found.cell)
+
+
+worlds = st.lists(st.tuples(st.floats(-5, 5), st.floats(-5, 5), st.floats(0.02, 1.0)), min_size=1, max_size=8)
+poses = st.lists(st.tuples(st.floats(-8, 8), st.floats(-8, 8), st.floats(-4, 4)), min_size=1, max_size=3)
+
+
+@hypothesis.settings(max_examples=15)
+@hypothesis.given(worlds, poses, st.sampled_from([0.03, 0.05, 0.1, 0.25]), st.integers(0, 9))
+def test_every_hit_lies_in_a_disc_whose_size_is_bounded(
+    found: list[tuple[float, ...]], ways: list[Pose], cell: float, seed: int
+) -> None:
+    scanner, rng = Scanner(EYE, np.array(found)), np.random.default_rng(seed)
+    grid = OccupancyMap(EYE, cell, horizon=4.0)
+    for pose in ways:
+        ranges = scanner.scan(pose, rng=rng)
+        grid.insert(pose, ranges)
+        ends = grid.endpoints(pose, ranges)[np.isfinite(ranges) & (ranges <= 4.0)]
+        discs = grid.discs()
+        assert np.all(inside(ends, discs)) if len(ends) else len(discs) >= 0
+        assert np.all(discs[:, 2] <= max(0.5 * math.hypot(cell, cell) / 2, 0.005) + 2e-4)
+
+
+@hypothesis.settings(max_examples=15)
+@hypothesis.given(worlds, poses)
+def test_free_ground_was_crossed_by_a_beam_and_no_beam_ended_there(
+    found: list[tuple[float, ...]], ways: list[Pose]
+) -> None:
+    """The oracle samples the beams of all scans at steps of a tenth of a cell."""
+    scanner = Scanner(EYE, np.array(found))
+    grid = OccupancyMap(EYE, 0.1, horizon=4.0, bounds=(-20.0, -20.0, 20.0, 20.0))
+    cells: set[tuple[int, ...]] = set()
+    for pose in ways:
+        ranges = scanner.scan(pose)
+        grid.insert(pose, ranges)
+        x, y, _ = EYE.pose_on(pose)
+        angles, lengths = EYE.angles + pose[2], np.minimum(ranges, grid.trust)
+        t = np.minimum(np.arange(0.0, grid.trust + 0.01, 0.01)[:, None], lengths)[:, lengths > 0]
+        samples = np.stack((y + t * np.sin(angles[lengths > 0]), x + t * np.cos(angles[lengths > 0])), axis=-1)
+        indices = np.floor((samples - grid.origin[::-1]) / 0.1).astype(np.int64).reshape(-1, 2)
+        keys = np.unique(indices[:, 0] * 100_000 + indices[:, 1])
+        cells |= set(zip((keys // 100_000).tolist(), (keys % 100_000).tolist(), strict=True))
+    free = set(map(tuple, np.argwhere(grid.seen_free).tolist()))
+    # Samples miss cells whose corners a beam cuts by less than their step.
+    near = {(r + dr, c + dc) for r, c in cells for dr in (-1, 0, 1) for dc in (-1, 0, 1)}
+    assert len(free - cells) <= 0.15 * len(free)
+    assert free <= near
+    assert not np.any(grid.seen_free & grid.occupied)
+
+
+def test_a_beam_that_is_left_out_near_the_lidar_leaves_no_ground_unseen() -> None:
+    grid = OccupancyMap(EYE, 0.05)
+    grid.insert((0, 0, 0), np.full(EYE.beams, np.inf))
+    for away in (0.2, 0.5, 1.0, 2.0):
+        for angle in np.linspace(-2.2, 2.2, 60):
+            assert grid.seen_free[cell_of(grid, 0.1 + away * math.cos(angle), away * math.sin(angle))]
+    assert not grid.seen_free[cell_of(grid, -1.0, 0.0)]  # the blind wedge
+    assert grid.trust == pytest.approx(0.05 / EYE.spacing)
+    assert not grid.seen_free[cell_of(grid, 0.1 + grid.trust + 0.15, 0.0)]
+
+
+def test_something_too_near_to_be_measured_leaves_its_beam_unknown() -> None:
+    grid = OccupancyMap(EYE)
+    assert len(grid.insert((0, 0, 0), np.full(EYE.beams, -np.inf))) == 0
+
+
+def test_changes_are_told_cell_by_cell() -> None:
+    scanner, grid, rng = Scanner(EYE, POSTS), OccupancyMap(EYE), np.random.default_rng(1)
+    free, occupied = grid.seen_free.copy(), grid.occupied.copy()
+    for k in range(30):
+        pose = (0.03 * k, 0.01 * k, 0.02 * k)
+        changed = grid.insert(pose, scanner.scan(pose, rng=rng))
+        differ = np.argwhere((free != grid.seen_free) | (occupied != grid.occupied))
+        assert sorted(map(tuple, changed.tolist())) == sorted(map(tuple, differ.tolist()))
+        free, occupied = grid.seen_free.copy(), grid.occupied.copy()
+    assert occupied.any()
+    assert len(grid.arrays.cells[: grid.arrays.count[0]]) == occupied.sum()
+
+
+def test_what_has_moved_on_is_free_again_after_nine_scans() -> None:
+    scanner, grid = Scanner(EYE, np.empty((0, 3)), bounds=(-4.0, -4.0, 4.0, 4.0)), OccupancyMap(EYE)
+    for _ in range(20):
+        grid.insert((0, 0, 0), scanner.scan((0, 0, 0), np.array([[1.52, 0.02]]), np.array([0.3])))
+    here = cell_of(grid, 1.22, 0.02)
+    assert grid.occupied[here]
+    for _ in range(8):
+        grid.insert((0, 0, 0), scanner.scan((0, 0, 0)))
+    assert grid.occupied[here]
+    grid.insert((0, 0, 0), scanner.scan((0, 0, 0)))
+    assert grid.seen_free[here]
+    near = np.hypot(*(grid.discs()[:, :2] - (1.5, 0.0)).T) < 0.5
+    assert not near.any()
+
+
+def test_what_stands_still_stays_while_the_robot_drives_past() -> None:
+    """Beams that pass beside hits, through the same cells, do not wear them away."""
+    scanner, grid, rng = Scanner(EYE, POSTS), OccupancyMap(EYE), np.random.default_rng(3)
+    ends = []
+    for k in range(200):
+        pose = (0.02 * k, -0.5, 0.0)
+        ranges = scanner.scan(pose, rng=rng)
+        grid.insert(pose, ranges)
+        ends.append(grid.endpoints(pose, ranges)[np.isfinite(ranges) & (np.abs(ranges) < 3)])
+    points, discs = np.concatenate(ends), grid.discs()
+    assert np.mean(inside(points, discs)) > 0.97
+
+
+def test_discs_stand_out_of_the_surface_by_half_a_grain() -> None:
+    scanner, grid = Scanner(EYE, POSTS), OccupancyMap(EYE, 0.05)
+    for k in range(100):
+        pose = (0.02 * k, -0.5, 0.0)
+        grid.insert(pose, scanner.scan(pose))
+    discs = grid.discs()
+    away = np.hypot(*(discs[:, None, :2] - POSTS[None, :, :2]).transpose(2, 0, 1)) - POSTS[:, 2]
+    assert np.max(discs[:, 2] + np.min(away, axis=1)) < 0.03 + 0.01  # a grain's diagonal, and rounding
+    assert np.median(discs[:, 2] + np.min(away, axis=1)) < 0.02
+
+
+def test_a_map_grows_and_keeps_what_it_holds() -> None:
+    scanner = Scanner(EYE, POSTS)
+    small = OccupancyMap(EYE, horizon=3.0)
+    large = OccupancyMap(EYE, horizon=3.0, bounds=(-30.0, -30.0, 30.0, 30.0))
+    for k in range(12):
+        pose = (-0.9 * k, 0.8 * k, 2.0 - 0.1 * k)
+        ranges = scanner.scan(pose)
+        small.insert(pose, ranges)
+        large.insert(pose, ranges)
+    assert small.layouts > 1
+    assert small.seen_free.sum() == large.seen_free.sum()
+    order = np.lexsort(small.discs().T), np.lexsort(large.discs().T)
+    np.testing.assert_allclose(small.discs()[order[0]], large.discs()[order[1]], atol=1e-6)
+
+
+def test_nothing_is_entered_beyond_fixed_bounds() -> None:
+    grid = OccupancyMap(EYE, bounds=(-1.0, -1.0, 1.0, 1.0))
+    grid.insert((0, 0, 0), Scanner(EYE, POSTS).scan((0, 0, 0)))
+    assert grid.layouts == 1
+    assert np.all(np.abs(grid.discs()[:, :2]) <= 1.0)
+
+
+def test_ground_under_the_robot_can_be_taken_as_free() -> None:
+    grid = OccupancyMap(EYE)
+    found = grid.take_as_free((0.0, 0.0), 0.3)
+    assert len(found) == grid.seen_free.sum()
+    assert 0.09 * math.pi < len(found) * 0.05**2 < 0.38**2 * math.pi
+    assert len(grid.take_as_free((0.0, 0.0), 0.3)) == 0
+
+
+def test_a_mover_can_be_forgotten_and_its_beams_left_out() -> None:
+    scanner, grid = Scanner(EYE, np.empty((0, 3))), OccupancyMap(EYE)
+    where, radii = np.array([[1.5, 0.0]]), np.array([0.3])
+    ranges = scanner.scan((0, 0, 0), where, radii)
+    grid.insert((0, 0, 0), ranges, left_out=np.isfinite(ranges))
+    assert not grid.occupied.any()
+    grid.insert((0, 0, 0), ranges)
+    assert len(grid.discs())
+    assert len(grid.forget((1.5, 0.0), 0.5))
+    assert not grid.occupied.any()
+    assert len(grid.discs()) == 0
+
+
+def test_points_on_ground_that_was_free_are_not_explained_until_they_settle() -> None:
+    scanner, grid = Scanner(EYE, POSTS), OccupancyMap(EYE)
+    for _ in range(3):
+        grid.insert((0, 0, 0), scanner.scan((0, 0, 0)))
+    mover = np.array([[1.2, 0.5]]), np.array([0.2])
+    ranges = scanner.scan((0, 0, 0), *mover)
+    points = grid.endpoints((0, 0, 0), ranges)
+    hit = np.isfinite(ranges)
+    theirs = hit & (np.hypot(*(points - mover[0][0]).T) < 0.22)
+    for _ in range(2):  # the same before the scan is entered and after it
+        known = grid.explained(points[hit], settle=20)
+        assert np.array_equal(known, ~theirs[hit])
+        grid.insert((0, 0, 0), ranges)
+    for _ in range(20):
+        grid.insert((0, 0, 0), ranges)
+    assert grid.explained(points[hit], settle=20).all()
+
+
+def test_the_same_scans_give_the_same_map() -> None:
+    def made() -> Floats:
+        scanner, grid, rng = Scanner(EYE, POSTS), OccupancyMap(EYE), np.random.default_rng(5)
+        for k in range(10):
+            grid.insert((0.1 * k, 0, 0), scanner.scan((0.1 * k, 0, 0), rng=rng))
+        return grid.discs()
+
+    assert np.array_equal(made(), made())
