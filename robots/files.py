@@ -11,6 +11,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from antdrive.robots.feasible import require_feasible
+from antdrive.robots.outline import MOST_CORNERS
 from antdrive.robots.spec import NOISE_RANGE, ROBOT_RANGE, Footprint, Noise, RobotSpec
 from antdrive.worlds.errors import FieldError, input_error
 from antdrive.worlds.files.checks import OneLine, SchemaVersion, check, suggest
@@ -21,29 +22,57 @@ _CATALOG = Path(__file__).with_name("catalog")
 _RULES = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
 
 _Size = Annotated[float, Field(gt=0)]
+_Place = Annotated[list[float], Field(min_length=2, max_length=2)]
+
+
+_FORMS = (
+    "write {radius: 0.18} for a disc, {length: 0.5, width: 0.4} for a rectangle, either with centre: [0.1, 0] if its middle "
+    "is not the axle's, or {polygon: [[0.3, -0.2], [0.3, 0.2], [-0.2, 0.2], [-0.2, -0.2]]}"
+)
 
 
 class FootprintEntry(BaseModel):
-    """A disc, given by its radius, or a rectangle, given by its length (along the heading) and width."""
+    """A disc, given by its radius, a rectangle, given by its length (along the heading) and width, or a convex polygon.
+
+    Positions are in the robot's frame: x ahead and y to the left of the axle's centre.
+    """
 
     model_config = _RULES
 
     radius: _Size | None = Field(None, description="radius of a round robot [m]")
     length: _Size | None = Field(None, description="length of a rectangular robot, along its heading [m]")
     width: _Size | None = Field(None, description="width of a rectangular robot [m]")
+    centre: _Place | None = Field(
+        None, description="middle of the disc or rectangle: x ahead, y to the left of the axle's centre [m]"
+    )
+    polygon: list[_Place] | None = Field(
+        None,
+        description="corners of a convex outline, in order: x ahead, y to the left of the axle's centre [m]; at most "
+        f"{MOST_CORNERS}",
+    )
 
     @model_validator(mode="after")
     def _one_kind(self) -> FootprintEntry:
-        given = {key for key in ("radius", "length", "width") if getattr(self, key) is not None}
-        if given not in ({"radius"}, {"length", "width"}):
-            raise ValueError("write {radius: 0.18} for a disc or {length: 0.5, width: 0.4} for a rectangle")
+        given = {key for key in ("radius", "length", "width", "polygon") if getattr(self, key) is not None}
+        if given not in ({"radius"}, {"length", "width"}, {"polygon"}) or (self.centre and self.polygon):
+            raise ValueError(_FORMS)
         return self
 
     def footprint(self) -> Footprint:
-        """The footprint that this entry describes."""
+        """The footprint that this entry describes.
+
+        Raises:
+            FieldError: the polygon is not convex.
+        """
+        centre = (self.centre[0], self.centre[1]) if self.centre is not None else (0.0, 0.0)
+        if self.polygon is not None:
+            try:
+                return Footprint.polygon(self.polygon)
+            except FieldError as error:
+                raise FieldError("footprint.polygon", error.problem) from None
         if self.radius is not None:
-            return Footprint.disc(self.radius)
-        return Footprint.rectangle(self.length or 0.0, self.width or 0.0)
+            return Footprint.disc(self.radius, centre)
+        return Footprint.rectangle(self.length or 0.0, self.width or 0.0, centre)
 
 
 def _level(key: str, description: str) -> Any:
@@ -70,16 +99,14 @@ class NoiseEntry(BaseModel):
 
 
 class RobotFile(BaseModel):
-    """A differential-drive robot: two driven wheels on one axle through the centre, and two casters."""
+    """A differential-drive robot: two driven wheels on one axle, whose centre is the robot's origin, and two casters."""
 
     model_config = _RULES
 
     schema_: SchemaVersion = Field(alias="schema", description="write schema: 1")
     name: OneLine = Field(min_length=1, max_length=200, description="name of the robot, by default that of the file")
     source: str | None = Field(None, description="where these values come from, free text")
-    footprint: FootprintEntry = Field(
-        description="write {radius: 0.18} for a disc or {length: 0.5, width: 0.4} for a rectangle [m]"
-    )
+    footprint: FootprintEntry = Field(description=f"{_FORMS} [m]")
     height: float = _number("height", "height of the body [m]")
     mass: float = _number("mass", "mass of the whole robot [kg]")
     wheel_radius: float = _number("wheel_radius", "radius of the driven wheels [m]")
@@ -138,9 +165,9 @@ def robot_schema() -> dict[str, Any]:
 
 def _to_spec(entry: RobotFile, document: Document) -> RobotSpec:
     values = {name: getattr(entry, name) for name in RobotFile.model_fields if name != "schema_"}
-    values["footprint"] = entry.footprint.footprint()
     values["noise"] = Noise(**dict(entry.noise))
     try:
+        values["footprint"] = entry.footprint.footprint()
         robot = RobotSpec(**values)
         require_feasible(robot)
     except FieldError as error:
@@ -150,4 +177,21 @@ def _to_spec(entry: RobotFile, document: Document) -> RobotSpec:
 
 def robot_to_dict(robot: RobotSpec) -> dict[str, Any]:
     """A robot as plain data, as it stands in a rollout's record."""
-    return dataclasses.asdict(robot)
+    data = dataclasses.asdict(robot)
+    if not robot.footprint.corners:
+        del data["footprint"]["corners"]
+    return data
+
+
+def footprint_to_dict(footprint: Footprint) -> dict[str, Any]:
+    """A footprint as it stands in a robot's file.
+
+    Args:
+        footprint: a disc, a rectangle or a polygon without round corners
+    """
+    corners = footprint.corners
+    if footprint.is_disc or len(corners) == 1:
+        return {"radius": footprint.rounding, **({"centre": list(corners[0])} if corners else {})}
+    if corners:
+        return {"polygon": [list(corner) for corner in corners]}
+    return {"length": 2 * footprint.half_length, "width": 2 * footprint.half_width}

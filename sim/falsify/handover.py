@@ -14,6 +14,7 @@ import yaml
 
 from antdrive.planners import PlannerError, list_planners
 from antdrive.robots import Avoidance, PurePursuit, RobotSpec, list_robots, load_robot
+from antdrive.robots.files import footprint_to_dict
 from antdrive.sim.driving.replanning import ReplanPolicy
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.pipeline import Run, run
@@ -214,9 +215,7 @@ def _robot(robot: RobotSpec, folder: Path) -> str:
     if robot.name in list_robots() and load_robot(robot.name) == robot:
         return robot.name
     data = {"schema": 1, **dataclasses.asdict(robot)}
-    foot = robot.footprint
-    sides = {"length": 2 * foot.half_length, "width": 2 * foot.half_width}
-    data["footprint"] = {"radius": foot.radius} if foot.is_disc else sides
+    data["footprint"] = footprint_to_dict(robot.footprint)
     name = "".join(c if c.isalnum() or c in "-_." else "_" for c in robot.name)
     target = folder / "robots" / f"{name}.yaml"
     with written_whole(target) as part:

@@ -379,7 +379,9 @@ def plain_value(value: Any) -> Any:
     if isinstance(value, Task):
         return task_to_dict(value)
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {field.name: plain_value(getattr(value, field.name)) for field in dataclasses.fields(value)}
+        # A field that came later is left out where it says nothing, so that older logs and hashes stay as they are.
+        fields = [field for field in dataclasses.fields(value) if not _says_nothing(field, getattr(value, field.name))]
+        return {field.name: plain_value(getattr(value, field.name)) for field in fields}
     if isinstance(value, Mapping):
         return {str(key): plain_value(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple):
@@ -387,6 +389,10 @@ def plain_value(value: Any) -> Any:
     if isinstance(value, np.generic):
         return value.item()
     return value if isinstance(value, bool | int | float | str | None) else str(value)
+
+
+def _says_nothing(field: dataclasses.Field[Any], value: Any) -> bool:
+    return bool(field.metadata.get("left_out_if_default")) and value == field.default
 
 
 def settings_of(values: Any) -> dict[str, Any]:
