@@ -36,7 +36,7 @@ def robot_svg(robot: RobotSpec) -> str:
             f'<rect class="footprint" x="{xmin:.6g}" y="{ymin:.6g}" width="{2 * half_x:.6g}" '
             f'height="{2 * half_y:.6g}" rx="{MM * foot.rounding:.6g}" {paint}'
         ]
-    radius, thickness = MM * robot.wheel_radius, MM * _wheel_thickness(robot)
+    radius, thickness = MM * robot.wheel_radius, MM * wheel_thickness(robot)
     for y in (MM * robot.track / 2, -MM * robot.track / 2):
         parts.append(
             f'<rect class="wheel" x="{-radius:.6g}" y="{y - thickness / 2:.6g}" width="{2 * radius:.6g}" '
@@ -66,12 +66,17 @@ def robot_svg(robot: RobotSpec) -> str:
 
 def robot_card(robot: RobotSpec) -> str:
     """A robot as HTML: its drawing, then its main values."""
+    return card(robot_svg(robot), robot.name, facts_of(robot))
+
+
+def facts_of(robot: RobotSpec) -> dict[str, str]:
+    """A robot's main values in words."""
     noise = robot.noise
     noisy = (
         f"pose ±{noise.pose_xy:g} m, ±{noise.pose_yaw:g} rad; encoders ±{100 * noise.encoder:g} %; "
         f"slip ±{100 * noise.slip:g} %; delay {noise.delay:g} s"
     )
-    facts = {
+    return {
         "footprint": footprint_text(robot),
         "body": f"{robot.height:g} m high, {robot.mass:g} kg",
         "wheels": f"radius {robot.wheel_radius:g} m, {robot.track:g} m apart",
@@ -80,7 +85,6 @@ def robot_card(robot: RobotSpec) -> str:
         f"lateral {robot.max_lateral_acceleration:g} m/s²",
         "noise": noisy if noise.nonzero else "none",
     }
-    return card(robot_svg(robot), robot.name, facts)
 
 
 def footprint_text(robot: RobotSpec) -> str:
@@ -100,7 +104,7 @@ def footprint_text(robot: RobotSpec) -> str:
     return text + (off if math.hypot(x, y) > 1e-9 else "")
 
 
-def _wheel_thickness(robot: RobotSpec) -> float:
+def wheel_thickness(robot: RobotSpec) -> float:
     """How thick the wheels are drawn, so that they stay within the footprint [m]."""
     foot = robot.footprint
     if foot.corners:

@@ -146,6 +146,20 @@ def load_robot(robot: str | os.PathLike[str]) -> RobotSpec:
     return _robot_in(read_yaml(path), os.fspath(path), path.stem)
 
 
+def robot_from_text(text: str, source: str, stem: str) -> RobotSpec:
+    """The robot in the text of a robot file.
+
+    Args:
+        text: the file's text
+        source: what errors call it
+        stem: the robot's name where the text has none
+
+    Raises:
+        InputError: something in it is wrong.
+    """
+    return _robot_in(text, source, stem)
+
+
 @reused(16)
 def _robot_in(text: str, source: str, stem: str) -> RobotSpec:
     """The robot in the text of a robot file."""

@@ -174,9 +174,13 @@ class Footprint:
             return list(corners)
         points: list[Point] = []
         for k, (x, y) in enumerate(corners):
-            before, after = corners[k - 1], corners[k + 1 - len(corners)]
-            first, last = (_outwards(before, (x, y)), _outwards((x, y), after)) if len(corners) > 1 else (0.0, 0.0)
-            turn = (last - first) % (2 * math.pi) or (2 * math.pi if len(corners) == 1 else math.pi / 2)
+            if not self.corners:
+                first, turn = k * math.pi / 2, math.pi / 2
+            elif len(corners) == 1:
+                first, turn = 0.0, 2 * math.pi
+            else:
+                first = _outwards(corners[k - 1], (x, y))
+                turn = (_outwards((x, y), corners[k + 1 - len(corners)]) - first) % (2 * math.pi)
             count = max(1, round(4 * steps * turn / (2 * math.pi)))
             angles = (first + turn * j / count for j in range(count + (len(corners) > 1)))
             points += [(x + r * math.cos(angle), y + r * math.sin(angle)) for angle in angles]

@@ -154,6 +154,17 @@ def test_radii_bounds_depth_and_reach_are_those_of_the_outline(foot: Footprint) 
     assert np.abs(drawn).max() == pytest.approx(foot.radius, abs=2e-3)
 
 
+@pytest.mark.parametrize("foot", [Footprint.disc(0.3), Footprint.rectangle(0.6, 0.4), Footprint(0.2, 0.1, 0.05)])
+def test_what_is_drawn_of_a_centred_footprint_is_its_outline(foot: Footprint) -> None:
+    points = foot.outline(16)
+    assert max(abs(foot.depth(x, y)) for x, y in points) < 1e-9
+    xs, ys = zip(*points, strict=True)
+    assert (min(xs), min(ys), max(xs), max(ys)) == pytest.approx(foot.bounds)
+    area = sum(x * ys[k - 1] - y * xs[k - 1] for k, (x, y) in enumerate(points)) / -2
+    a, b, r = foot.half_length, foot.half_width, foot.rounding
+    assert area == pytest.approx(4 * (a * b + (a + b) * r) + math.pi * r**2, rel=2e-3)
+
+
 def _at(angle: float, away: float) -> tuple[float, float]:
     return away * math.cos(angle), away * math.sin(angle)
 

@@ -51,7 +51,10 @@ def test_a_door_for_the_rectangle_and_not_for_the_disc_is_named_with_what_both_n
     reason = run(gate(robot, 0.95, cell=0.05)).reason
     disc = 2 * (0.03 + (0.6708 if any(centre) else 0.5408))
     assert reason.startswith("no path for a disc of 0.")
-    assert "the widest disc that passes has a radius of 0.475 m, at (3.00, 2.00), between obstacles[0] at (3, 2.725)" in reason
+    assert (
+        "the widest disc that passes has a radius of 0.475 m, at (3.00, 2.00), between obstacles[0] at (3, 2.725)"
+        in reason
+    )
     assert reason.endswith(
         f"the place is 0.95 m wide, and plans are made for the disc around cart, which needs {disc:.3g} m; "
         "its rectangle of 0.9 x 0.6 m would need 0.66 m straight ahead"
