@@ -45,7 +45,7 @@ def no_path_reason(s: Scenario, grid: Grid, said: str) -> str:
 
 def _narrowest_place(s: Scenario) -> str:
     """How wide a disc passes, where that is decided, and whether a smaller margin would help."""
-    task, robot = s.task, s.robot
+    task = s.task
     passage = widest_passage(task, s.inflate)
     if passage is None:
         return "not even a point gets through"

@@ -157,7 +157,7 @@ def polygon_turn_clearance(
         for k in range(corners.shape[0]):
             if on_arc(math.atan2(corners[k, 1], corners[k, 0]), angle, -turn):
                 best = min(best, away - math.hypot(corners[k, 0], corners[k, 1]) - discs[j, 2])
-    for end in (yaw, yaw + turn):
+    for end in (yaw + 0.0, yaw + turn):  # of one type, also where the yaw is an integer
         best = min(best, polygon_wall_distance(x, y, math.cos(end), math.sin(end), corners, bounds))
     for q in range(4):  # the walls, by the direction in which they are
         room = abs(bounds[q] - (x if q % 2 == 0 else y))

@@ -49,7 +49,7 @@ class UrdfJoint:
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class CollisionPiece:
     """A piece of collision geometry, in the root's frame.
 
     Attributes:
@@ -88,7 +88,7 @@ class UrdfModel:
     name: str
     joints: dict[str, UrdfJoint]
     places: dict[str, Floats]
-    pieces: tuple[Piece, ...]
+    pieces: tuple[CollisionPiece, ...]
     masses: dict[str, float]
     drive: dict[str, str]
     left_out: tuple[str, ...]
@@ -277,7 +277,7 @@ class _Shapes:
         self._path, self._meshes, self._without = path, meshes, without_meshes
         self.left_out: list[str] = []
 
-    def piece(self, link: str, place: Floats, element: ET.Element) -> Iterator[Piece]:
+    def piece(self, link: str, place: Floats, element: ET.Element) -> Iterator[CollisionPiece]:
         """The piece of a <collision>; none for a mesh that is left out."""
         geometry = element.find("geometry")
         shape = None if geometry is None else next(iter(geometry), None)
@@ -306,7 +306,7 @@ class _Shapes:
             raise input_error(str(self._path), f"link {link}", f"unknown geometry <{shape.tag}>")
         placed = points @ place[:3, :3].T + place[:3, 3]
         centre = (placed.min(axis=0) + placed.max(axis=0)) / 2
-        yield Piece(link, shape.tag, placed, centre, radius, length)
+        yield CollisionPiece(link, shape.tag, placed, centre, radius, length)
 
     def _mesh(self, link: str, shape: ET.Element) -> Floats | None:
         """The vertices (N, 3) of a mesh; None where it is left out."""

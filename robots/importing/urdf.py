@@ -93,8 +93,9 @@ def import_urdf(
     points = [_from_above(piece.points, frame) for piece in low]
     outline = footprint_around(_with_wheels(points, wheels), footprint)
     names = sorted({piece.link for piece in low})
-    what = f"{'disc' if outline.rounding else 'rectangle' if outline.box else 'outline'} around the collision geometry of {_few(names)}"
-    what += f", and around the wheels{'' if math.isinf(below) else f', below {below:g} m'}"
+    kind = "disc" if outline.rounding else "rectangle" if outline.box else "outline"
+    what = f"{kind} around the collision geometry of {_few(names)}, and around the wheels"
+    what += "" if math.isinf(below) else f", below {below:g} m"
     values = _values(model, wheels, outline, floor, given)
     text = _text(model, path, outline, what, values)
     return ImportedRobot(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from antdrive.robots.importing.model import Piece, UrdfJoint, UrdfModel
+from antdrive.robots.importing.model import CollisionPiece, UrdfJoint, UrdfModel
 from antdrive.worlds.errors import InputError, input_error
 from antdrive.worlds.types import Floats
 
@@ -132,12 +132,12 @@ def _stands(model: UrdfModel, joint: UrdfJoint) -> bool:
 
 
 def _wheel(model: UrdfModel, joint: UrdfJoint, radius: float | None) -> DrivenWheel:
-    own: list[Piece] = [piece for piece in model.pieces if piece.link == joint.child]
+    own: list[CollisionPiece] = [piece for piece in model.pieces if piece.link == joint.child]
     if not own:
         size = model.drive.get("wheel_radius") or model.drive.get("wheelRadius")
-        across = model.drive.get("wheel_diameter") or model.drive.get("wheelDiameter")
+        diameter = model.drive.get("wheel_diameter") or model.drive.get("wheelDiameter")
         try:
-            told = float(size) if size else float(across) / 2 if across else None
+            told = float(size) if size else float(diameter) / 2 if diameter else None
         except ValueError:
             told = None
         if radius is None and not told:

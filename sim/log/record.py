@@ -199,7 +199,8 @@ class DriveRecord:
         seed: the seed that all of the run's random numbers follow from
         planner: the planner and its settings
         plan: the plan's size beside the shortest paths that are possible
-        robot: the robot's specification, with the keys of `RobotSpec`: footprint, drive, limits and noise
+        robot: the robot's specification, with the keys of `RobotSpec`: footprint, drive, limits and noise; `footprint.corners`
+            only where it is a polygon or beside the axle
         controller: the controller and its settings
         smoothing: how the planned cells became the route
         perception: what the robot knew of movers; null in a world without movers

@@ -68,10 +68,11 @@ def robot_figure(
 def _draw_pieces(axes: Any, pieces: Sequence[Floats], above: Sequence[Floats]) -> list[Patch]:
     """Draw the outline of each piece; one patch of each kind for the legend."""
     handles: list[Patch] = []
-    for group, style, label in (
+    kinds: tuple[tuple[Sequence[Floats], dict[str, Any], str], ...] = (
         (above, {"fc": "none", "ec": hexed(MUTED), "ls": ":", "lw": 1.0}, "collision geometry above"),
         (pieces, {"fc": "#dfe5f2", "ec": "#8a97b3", "lw": 0.8, "alpha": 0.75}, "collision geometry"),
-    ):
+    )
+    for group, style, label in kinds:
         for k, points in enumerate(group):
             hull = convex_hull([(float(x), float(y)) for x, y in points])
             patch = axes.add_patch(Polygon(hull, **style, label=label))

@@ -36,7 +36,10 @@ def test_a_robot_is_described_and_drawn(antdrive: Call, tmp_path: Path) -> None:
     assert "0.9 × 0.6 m; its middle 0.15 m ahead of the axle" in out
     assert "0.6708 m around the axle" in out
     assert (tmp_path / "warehouse.svg").read_text().startswith("<?xml")
-    assert json.loads(antdrive("robots", "show", "pioneer3dx", "--json")[1])["footprint"]["corners"][0] == [0.188, -0.1905]
+    assert json.loads(antdrive("robots", "show", "pioneer3dx", "--json")[1])["footprint"]["corners"][0] == [
+        0.188,
+        -0.1905,
+    ]
     assert antdrive("robots", "show", "wharehouse")[0] == 2
     assert antdrive("robots", "show", "jackal", "-o", str(tmp_path / "a.gif"))[0] == 2
 
@@ -44,7 +47,9 @@ def test_a_robot_is_described_and_drawn(antdrive: Call, tmp_path: Path) -> None:
 def test_a_robot_is_imported_from_urdf_and_drawn(antdrive: Call, tmp_path: Path) -> None:
     source, target = URDF / "pioneer3dx.urdf", tmp_path / "mine.yaml"
     words = ("robots", "import", str(source), "-o", str(target))
-    code, out, err = antdrive(*words, "--figure", str(tmp_path / "mine.png"), "--set", "mass=11", "--footprint", "rectangle")
+    code, out, err = antdrive(
+        *words, "--figure", str(tmp_path / "mine.png"), "--set", "mass=11", "--footprint", "rectangle"
+    )
     assert (code, err) == (0, "")
     assert "# read: cylinder of link lwheel" in out
     assert load_robot(target).mass == 11
@@ -60,10 +65,16 @@ def test_what_cannot_be_imported_is_said_in_one_line_and_nothing_is_written(antd
     for words, says in (
         ((str(URDF / "husky.urdf"),), "2 pairs of wheels on axles"),
         ((str(URDF / "none.urdf"),), "none.urdf"),
-        ((str(URDF / "burger.urdf"), "--set", "colour=3"), "--set colour: no such number in a robot file; choose from height"),
+        (
+            (str(URDF / "burger.urdf"), "--set", "colour=3"),
+            "--set colour: no such number in a robot file; choose from height",
+        ),
         ((str(URDF / "burger.urdf"), "--set", "mass"), "--set mass: write KEY=VALUE"),
         ((str(URDF / "burger.urdf"), "--set", "mass=-3"), "mass: must be at least 0.01"),
-        ((str(URDF / "burger.urdf"), "--footprint", "star"), "--footprint star: choose from auto, disc, rectangle, polygon"),
+        (
+            (str(URDF / "burger.urdf"), "--footprint", "star"),
+            "--footprint star: choose from auto, disc, rectangle, polygon",
+        ),
     ):
         code, out, error = antdrive("robots", "import", *words, "-o", str(target))
         assert (code, out, error.count("\n")) == (2, "", 1)
