@@ -136,14 +136,17 @@ def read_model(path: Path, *, meshes: Path | None = None, without_meshes: bool =
         for name, link in links.items()
         for mass in link.findall("inertial/mass")
     }
-    drive = {
-        element.tag: (element.text or "").strip()
-        for plugin in root.findall("gazebo/plugin")
-        for element in plugin
-        if plugin.find("left_joint") is not None or plugin.find("leftJoint") is not None
-    }
+    plugins = [plugin for plugin in root.findall("gazebo/plugin") if _drives_two_wheels(plugin)]
+    drive = {element.tag: (element.text or "").strip() for plugin in plugins for element in plugin}
     return UrdfModel(
         path, root.get("name", path.stem), joints, places, tuple(pieces), masses, drive, tuple(reader.left_out)
+    )
+
+
+def _drives_two_wheels(plugin: ET.Element) -> bool:
+    """Whether a Gazebo plugin names one left and one right joint; those of vehicles that skid name several."""
+    return any(
+        len(plugin.findall(f"left{end}")) == len(plugin.findall(f"right{end}")) == 1 for end in ("_joint", "Joint")
     )
 
 

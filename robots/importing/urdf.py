@@ -90,6 +90,11 @@ def import_urdf(
     floor = min(wheel.centre[2] - wheel.radius for wheel in wheels)
     low = [piece for piece in model.pieces if piece.points[:, 2].min() - floor <= below]
     high = [piece for piece in model.pieces if piece.points[:, 2].min() - floor > below]
+    if not {piece.link for piece in low} - {wheel.joint.child for wheel in wheels}:
+        where = "" if math.isinf(below) else f" below {below:g} m"
+        raise input_error(
+            str(path), f"has no collision geometry{where} beside its wheels, from which a footprint could follow"
+        )
     points = [_from_above(piece.points, frame) for piece in low]
     outline = footprint_around(_with_wheels(points, wheels), footprint)
     names = sorted({piece.link for piece in low})

@@ -160,6 +160,28 @@ def test_steered_wheels_and_rollers_are_no_differential_drive(tmp_path: Path) ->
         import_urdf(path)
 
 
+def test_a_plugin_for_a_vehicle_that_skids_chooses_no_axle(tmp_path: Path) -> None:
+    plugin = "<gazebo><plugin>" + "".join(
+        f"<{side}_joint>{end}_{side}_wheel</{side}_joint>" for side in ("left", "right") for end in ("front", "rear")
+    ) + "</plugin></gazebo></robot>"  # fmt: skip
+    path = changed(tmp_path, "husky.urdf", ("</robot>", plugin))
+    with pytest.raises(InputError, match="2 pairs of wheels on axles"):
+        import_urdf(path)
+    one = re.sub(r"<(left|right)_joint>front.*?</(left|right)_joint>", "", plugin)
+    path = changed(tmp_path, "husky.urdf", ("</robot>", one))
+    assert import_urdf(path).robot.footprint.bounds[2] == pytest.approx(0.751, abs=1e-3)
+
+
+def test_a_robot_without_collision_geometry_has_no_footprint(tmp_path: Path) -> None:
+    body = '<collision><origin xyz="-0.064 0 0.0815"/><geometry><box size="0.281 0.306 0.119"/></geometry></collision>'
+    with pytest.raises(
+        InputError, match="has no collision geometry beside its wheels, from which a footprint could follow"
+    ):
+        import_urdf(changed(tmp_path, "waffle.urdf", (body, "")))
+    with pytest.raises(InputError, match=r"has no collision geometry below 0\.005 m beside its wheels"):
+        imported("burger.urdf", below=0.005)
+
+
 def test_wheels_can_be_told_by_joint_or_link() -> None:
     there = imported("burger.urdf").robot
     assert imported("burger.urdf", left="wheel_left_link", right="wheel_right_joint").robot == there
