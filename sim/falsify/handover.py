@@ -15,6 +15,7 @@ import yaml
 
 from antdrive.planners import PlannerError, list_planners
 from antdrive.robots import Avoidance, PurePursuit, RobotSpec, list_robots, load_robot
+from antdrive.robots.files import footprint_to_dict
 from antdrive.sim.driving.replanning import ReplanPolicy
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.pipeline import Run, run
@@ -237,9 +238,7 @@ def _robot(robot: RobotSpec, folder: Path, robots: dict[str, RobotSpec]) -> str:
 
 def _write_robot(robot: RobotSpec, target: Path) -> None:
     data = {"schema": 1, **dataclasses.asdict(robot)}
-    foot = robot.footprint
-    sides = {"length": 2 * foot.half_length, "width": 2 * foot.half_width}
-    data["footprint"] = {"radius": foot.radius} if foot.is_disc else sides
+    data["footprint"] = footprint_to_dict(robot.footprint)
     with written_whole(target) as part:
         text = yaml.safe_dump({key: value for key, value in data.items() if value is not None}, sort_keys=False)
         part.write_text(text, encoding="utf-8")

@@ -21,7 +21,7 @@ from antdrive.robots.footprint import footprint_clearance
 from antdrive.robots.spec import RobotSpec
 from antdrive.sim.physics.bullet import CHASSIS, GROUND, OBSTACLE, WHEELS, bullet, client, drawn_as
 from antdrive.sim.physics.movers import MoverBodies
-from antdrive.sim.physics.urdf import CASTER_GAP, robot_urdf, rolling_radius
+from antdrive.sim.physics.urdf import CASTER_GAP, CHASSIS_FILE, chassis_mesh, robot_urdf, rolling_radius
 from antdrive.worlds.errors import FieldError
 from antdrive.worlds.trajectories import Trajectories
 from antdrive.worlds.types import Floats, Pose
@@ -259,6 +259,10 @@ class Engine:
             path = os.path.join(folder, "robot.urdf")
             with open(path, "w", encoding="utf-8") as file:
                 file.write(text)
+            mesh = chassis_mesh(self.robot)
+            if mesh is not None:
+                with open(os.path.join(folder, CHASSIS_FILE), "w", encoding="utf-8") as file:
+                    file.write(mesh)
             flags = p.URDF_USE_IMPLICIT_CYLINDER | p.URDF_USE_INERTIA_FROM_FILE
             self._robot = p.loadURDF(path, flags=flags, physicsClientId=self._client)
         for link in range(-1, 4):

@@ -93,7 +93,7 @@ def _draw_robot(axes: Any, scene: Scene, pose: tuple[float, float, float], colou
     x, y, yaw = pose
     foot = scene.robot.footprint
     turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
-    ahead = turn @ [foot.half_length + foot.rounding, 0.0]
+    ahead = turn @ [foot.reach(0.0) if foot.corners else foot.half_length + foot.rounding, 0.0]
     style: dict[str, Any] = {
         "fill": True,
         "fc": (1, 1, 1, 0.55),
@@ -104,9 +104,7 @@ def _draw_robot(axes: Any, scene: Scene, pose: tuple[float, float, float], colou
     if foot.is_disc:
         axes.add_patch(Circle((x, y), foot.rounding, **style))
     else:
-        a, b = foot.half_length + foot.rounding, foot.half_width + foot.rounding
-        corners = np.array([(a, b), (-a, b), (-a, -b), (a, -b)]) @ turn.T + [x, y]
-        axes.add_patch(Polygon(corners, **style))
+        axes.add_patch(Polygon(np.array(foot.outline()) @ turn.T + [x, y], **style))
     axes.plot([x, x + ahead[0]], [y, y + ahead[1]], color=hexed(colour), lw=1.3, zorder=zorder)
 
 

@@ -284,8 +284,14 @@ class Compositor:
     def _draw_shadows(self, frame: Picture, pose: Floats, movers: Floats) -> None:
         """Draw the soft shadows of robot and movers, and a glow under a robot that is small in the picture."""
         tall, foot = robot_height(self.scene.robot), self.scene.robot.footprint
-        shape = np.array([foot.half_length, foot.half_width, foot.rounding])
-        self._draw_shadow(frame, pose, shape, tall, SHADOW_BLUR + 0.3 * tall)
+        shape, place = np.array([foot.half_length, foot.half_width, foot.rounding]), pose
+        if foot.corners:  # the shadow of the rectangle around it
+            xmin, ymin, xmax, ymax = foot.bounds
+            x, y, turn = (xmin + xmax) / 2, (ymin + ymax) / 2, np.exp(1j * pose[2])
+            off = (x + 1j * y) * turn
+            place = np.array([pose[0] + off.real, pose[1] + off.imag, pose[2]])
+            shape = np.array([(xmax - xmin) / 2 - foot.rounding, (ymax - ymin) / 2 - foot.rounding, foot.rounding])
+        self._draw_shadow(frame, place, shape, tall, SHADOW_BLUR + 0.3 * tall)
         wide = round(2 * foot.radius / self.camera.pixel)
         if wide < 0.05 * frame.shape[1]:
             px, py = self.pixel(pose[0], pose[1], tall / 2)
