@@ -32,6 +32,7 @@ SIM_RANKS = {
     "reasons": 2,
     "pipeline": 3,
     "view": 4,
+    "export": 5,
     "papers": 5,
     "warm": 5,
     "regression": 5,

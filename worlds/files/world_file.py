@@ -89,6 +89,13 @@ class WorldFile(BaseModel):
     obstacles: list[DiscEntry] = Field([], description="upright cylinders")
     time_limit: Size | None = Field(None, description="simulated time allowed [s]; by default ample for the route")
     movers: list[MoverEntry] = Field([], max_length=1000, description="moving cylinders")
+    frame: list[Coordinate] | None = Field(
+        None,
+        min_length=3,
+        max_length=3,
+        description="write [x, y, yaw]: where the world's origin lies in the map that it was made from, in metres and radians; "
+        "exports use it",
+    )
 
 
 def list_worlds() -> Mapping[str, Path]:
@@ -158,6 +165,7 @@ def task_to_dict(task: Task) -> dict[str, Any]:
         "goal_tolerance": float(task.goal_tolerance),
         "cell": float(task.cell),
         **({} if task.time_limit is None else {"time_limit": float(task.time_limit)}),
+        **({"frame": [float(v) for v in task.frame]} if any(task.frame) else {}),
         "obstacles": [
             {"x": float(d.x), "y": float(d.y), "radius": float(d.radius), "height": float(d.height)}
             for d in world.obstacles
@@ -197,7 +205,8 @@ def _to_task(document: Document) -> Task:
     try:
         world = World(entry.name, (xmin, ymin, xmax, ymax), discs, entry.source, movers)
         goal = entry.goal[0], entry.goal[1]
-        return Task(world, (x, y, yaw), goal, entry.goal_tolerance, entry.cell, entry.time_limit)
+        frame = (0.0, 0.0, 0.0) if entry.frame is None else (entry.frame[0], entry.frame[1], entry.frame[2])
+        return Task(world, (x, y, yaw), goal, entry.goal_tolerance, entry.cell, entry.time_limit, frame)
     except FieldError as error:
         raise document.field_error(error) from None
 
