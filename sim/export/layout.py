@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from antdrive.sim.export.frames import MAP, in_map
+from antdrive.sim.export.frames import MAP
 from antdrive.sim.log.rollout import Rollout
+from antdrive.worlds.plane import in_map
 
 SHOWN = ("/map", "/plan", "/obstacles", "/movers", "/contacts", "/scan", "/robot_description")
 MARGIN = 1.15  # how much more than the world the picture shows

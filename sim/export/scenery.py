@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from antdrive.sim.export.description import description, wheel_places
-from antdrive.sim.export.frames import BASE, LIDAR, MAP, ODOM, in_map, mover_frame
+from antdrive.sim.export.frames import BASE, LIDAR, MAP, ODOM, mover_frame
 from antdrive.sim.export.libraries import message_types
 from antdrive.sim.export.topics import Floats, Topic, nanoseconds
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.view.scene import Scene, contact_point
 from antdrive.worlds.grid import rasterise
+from antdrive.worlds.plane import in_map
 
 CUBE, SPHERE, CYLINDER, LINE_STRIP = 1, 2, 3, 4  # kinds of markers
 KNOWN, UNSEEN, MOVING, TOUCHED = (

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from antdrive.sim.export.frames import in_map
 from antdrive.sim.log.rollout import Rollout
+from antdrive.worlds.plane import in_map
 
 
 def write_tables(rollout: Rollout, folder: Path) -> None:
