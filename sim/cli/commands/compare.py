@@ -110,9 +110,8 @@ def compare(
         return compare_campaign(campaign, planner or (), metric, against, where, json)
     entrants = entrants_of(planner, settings)
     rest = {"margin": margin, "cell": cell, "smoothing": smoothing, "noise": noise}
-    scenarios = _scenarios(
-        {world: chosen_task(world, task, start, goal) for world in worlds}, entrants, robot, seed, rest
-    )
+    tasks = {world: chosen_task(world, task, start, goal) for world in worlds}
+    scenarios = _scenarios(tasks, entrants, robot, seed, rest)
     cases = [(world, number) for world in worlds for number in range(seed, seed + seeds)]
     folder, mark = _default_folder(scenarios, cases)
     folder = out or folder
@@ -134,10 +133,15 @@ def compare(
         )
     else:
         _print(runs, len(cases), told, files)
-    if len(logs) < 2:
-        found = "only one planner" if logs else "no planner"
-        print_error(f"{found} found a path: there is nothing to compare in a figure or film")
+    _warn_of_few(len(logs))
     return SUCCEEDED if all(run.facts["succeeded"] for run in runs) else FAILED
+
+
+def _warn_of_few(drives: int) -> None:
+    """Say why there is no figure and no film, if fewer than two planners drove."""
+    if drives < 2:
+        found = "only one planner" if drives else "no planner"
+        print_error(f"{found} found a path: there is nothing to compare in a figure or film")
 
 
 def _scenarios(

@@ -120,11 +120,17 @@ def run(
         print_json(report)
     else:
         print_run(result, files)
-    if gui and result.rollout is not None:
-        from antdrive.sim.view.window import show
-
-        show(result.rollout)
+    if gui:
+        _show(result)
     return SUCCEEDED if result.succeeded else FAILED
+
+
+def _show(result: "Run") -> None:
+    """Replay the drive in a window, if there was one."""
+    from antdrive.sim.view.window import show
+
+    if result.rollout is not None:
+        show(result.rollout)
 
 
 def _write_views(result: "Run", files: dict[str, str], video: Path | None, prelude: float) -> dict[str, Any]:
