@@ -33,6 +33,7 @@ SIM_RANKS = {
     "reasons": 2,
     "pipeline": 3,
     "view": 4,
+    "export": 5,
     "papers": 5,
     "warm": 4.5,
     "regression": 5,

@@ -84,16 +84,16 @@ class RandomTasks(BaseModel):
 
 def _tasks(value: Any) -> Any:
     listed = isinstance(value, list) and value and all(isinstance(one, dict) for one in value)
-    if value != "own" and not isinstance(value, dict) and not listed:
+    if value not in ("own", "named") and not isinstance(value, dict) and not listed:
         raise ValueError(
-            f"must be own, {{random: 30, min_distance: 5}} or a list of {{start, goal}}, got {show(value)}"
+            f"must be own, named, {{random: 30, min_distance: 5}} or a list of {{start, goal}}, got {show(value)}"
         )
     return value
 
 
 _TASKS_SCHEMA: dict[str, Any] = {
     "anyOf": [
-        {"const": "own"},
+        {"enum": ["own", "named"]},
         RandomTasks.model_json_schema(),
         {"type": "array", "items": TaskEntry.model_json_schema()},
     ]
@@ -134,7 +134,8 @@ class CampaignFile(BaseModel):
     seeds: Seeds = Field([0], description="how many seeds, or a list such as [3, 7], or a range such as 0-9")
     tasks: Annotated[Any, PlainValidator(_tasks), WithJsonSchema(_TASKS_SCHEMA)] = Field(
         "own",
-        description="own: the worlds' own starts and goals; {random: 30, seed: 1, min_distance: 5}; or a list of "
+        description="own: the worlds' own starts and goals; named: the tasks that their files list; {random: 30, seed: 1, "
+        "min_distance: 5}; or a list of "
         "{start: [x, y, yaw], goal: [x, y]}",
     )
     settings: Annotated[dict[str, Any], WithJsonSchema(_settings_schema())] = Field(

@@ -16,6 +16,7 @@ from antdrive.sim.log.binding import canonical_hash
 from antdrive.worlds import Disc, Grid, Task, rasterise
 from antdrive.worlds.errors import FieldError
 
+NAMED = "named"  # the value of a campaign's key tasks that means those of the worlds' files
 TRIES = 1000  # pairs that are drawn for one task
 ROOM = 0.03  # the margin of drawn tasks where the campaign's margins are chosen later [m]
 
@@ -36,6 +37,14 @@ def campaign_tasks(campaign: Campaign, worlds: Sequence[NamedTask], robots: Sequ
         inflate = max(robot.radius for robot in robots) + max(margins)
         for world in _each_once(worlds):
             yield from _drawn(campaign, campaign.tasks, world, robots, inflate)
+    elif campaign.entry.tasks == NAMED:
+        for world in worlds:
+            if not world.others:
+                raise campaign.error(
+                    ("tasks",), f"the file of world {world.world} lists no tasks; write them there, or own"
+                )
+            for name, task in world.others.items():
+                yield dataclasses.replace(world, name=name, task=task, catalogue=None)
     elif campaign.tasks:
         for world in _each_once(worlds):
             yield from _listed(campaign, world)

@@ -6,15 +6,15 @@ import dataclasses
 import glob
 import itertools
 import os
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from antdrive.sim.campaigns.campaign import Campaign, seeds_of
 from antdrive.sim.entries import option_text, seed_list
 from antdrive.sim.settings import generated
-from antdrive.worlds import Task, World, list_worlds, load_task
+from antdrive.worlds import Task, World, list_worlds, load_task, load_tasks
 from antdrive.worlds.errors import FieldError, InputError
 from antdrive.worlds.files.checks import show, suggest
 from antdrive.worlds.files.document import Location
@@ -33,6 +33,7 @@ class NamedTask:
         task: the task
         catalogue: the world's name in the catalogue, if the task is the one of the catalogue
         place: where the campaign names the world
+        others: the other tasks that the world's file lists, by name
     """
 
     world: str
@@ -40,6 +41,7 @@ class NamedTask:
     task: Task
     catalogue: str | None
     place: Location
+    others: Mapping[str, Task] = field(default_factory=dict)
 
 
 def campaign_worlds(campaign: Campaign) -> list[NamedTask]:
@@ -89,11 +91,14 @@ def _same(task: Task, other: Task) -> bool:
 def _named(campaign: Campaign, place: Location, name: str) -> Iterator[tuple[NamedTask, str]]:
     known = list_worlds()
     if name in known:
-        yield NamedTask(name, OWN, load_task(known[name]), name, place), name
+        yield NamedTask(name, OWN, load_task(known[name]), name, place, load_tasks(name)), name
         return
     for path in _files(campaign, place, name, f"nor a world of the catalogue; {suggest(Path(name).stem, known)}"):
         task = load_task(path)
-        yield NamedTask(task.world.name, OWN, task, None, place), os.path.relpath(path, campaign.folder)
+        yield (
+            NamedTask(task.world.name, OWN, task, None, place, load_tasks(path)),
+            os.path.relpath(path, campaign.folder),
+        )
 
 
 def _files(campaign: Campaign, place: Location, pattern: str, otherwise: str) -> list[Path]:

@@ -15,6 +15,7 @@ import typer.core
 from antdrive.sim.cli.commands.accept import accept
 from antdrive.sim.cli.commands.check import check
 from antdrive.sim.cli.commands.compare import compare
+from antdrive.sim.cli.commands.export import export_drive
 from antdrive.sim.cli.commands.falsify import falsify
 from antdrive.sim.cli.commands.find_margin import find_margin
 from antdrive.sim.cli.commands.margin import margin
@@ -51,6 +52,7 @@ COMMANDS: Mapping[str, Callable[..., int]] = MappingProxyType(
         "sweep": sweep,
         "render": render,
         "report": report,
+        "export": export_drive,
         "verify": verify,
         "check": check,
         "accept": accept,

@@ -58,8 +58,18 @@ def _keys(words: dict[str, Any]) -> dict[str, Any]:
     if words["run_limit"] is not None:
         found["run_limit"] = words["run_limit"]
     if words["tasks"] is not None:
-        found["tasks"] = {"random": words["tasks"]}
+        found["tasks"] = _tasks(words["tasks"])
     return found
+
+
+def _tasks(text: str) -> Any:
+    """The value of a campaign's key `tasks` from NUMBER, NUMBER:METRES, own or named."""
+    if text in ("own", "named"):
+        return text
+    number, mark, metres = text.partition(":")
+    if not (number.isascii() and number.isdigit() and int(number) and bool(mark) == bool(metres)):
+        raise InputError(f"--tasks {text}: write NUMBER or NUMBER:METRES, such as 30:5, or own or named")
+    return {"random": int(number), **({"min_distance": _number(f"--tasks {text}", metres)} if mark else {})}
 
 
 def _absolute(worlds: list[Any]) -> list[Any]:

@@ -110,7 +110,7 @@ def mark_of(scenarios: Mapping[str, Scenario], cases: Sequence[tuple[str, int]])
     return hashlib.sha256(repr((facts, list(cases))).encode()).hexdigest()[:8]
 
 
-def repeating(scenario: Scenario, entrant: Entrant, world: str, robot: str) -> str:
+def repeating(scenario: Scenario, entrant: Entrant, world: str, robot: str, ends: Sequence[str] = ()) -> str:
     """The `antdrive run` that repeats one of the compared runs.
 
     Args:
@@ -118,6 +118,7 @@ def repeating(scenario: Scenario, entrant: Entrant, world: str, robot: str) -> s
         entrant: its planner, as given
         world: as it was given
         robot: as it was given
+        ends: the words that give its start and goal, where it is not the world's own
     """
     given = {
         "--planner": entrant.name,
@@ -130,7 +131,7 @@ def repeating(scenario: Scenario, entrant: Entrant, world: str, robot: str) -> s
     words = [str(word) for option in given.items() for word in option]
     words += [word for text in entrant.settings for word in ("--set", text)]
     cell = [] if scenario.cell is None else ["--cell", str(scenario.cell)]
-    return shlex.join(["antdrive", "run", world, *words, *cell])
+    return shlex.join(["antdrive", "run", world, *words, *ends, *cell])
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """`antdrive compare`."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -23,7 +23,7 @@ from antdrive.sim.cli.comparing import (
 from antdrive.sim.cli.compiling import compile_once
 from antdrive.sim.cli.console import planning, print_error, print_files, print_json, print_line, print_table
 from antdrive.sim.cli.exits import FAILED, SUCCEEDED
-from antdrive.sim.cli.scenario import make_scenario
+from antdrive.sim.cli.scenario import chosen_task, ends_words, make_scenario
 from antdrive.sim.cli.write import (
     check_film,
     check_folder,
@@ -41,6 +41,7 @@ from antdrive.worlds.files.atomic import claimed
 if TYPE_CHECKING:
     from antdrive.sim.log.rollout import Rollout
     from antdrive.sim.scenario import Scenario
+    from antdrive.worlds import Task
 
 MARKER = "comparison.json"
 Worlds = Annotated[
@@ -82,6 +83,9 @@ def compare(
     seeds: Seeds = 1,
     margin: options.Margin = 0.03,
     cell: options.CellSize = None,
+    task: options.TaskName = None,
+    start: options.Start = None,
+    goal: options.Goal = None,
     smoothing: options.Smoothing = "clearance",
     noise: options.Noise = 0.0,
     out: options.Out = None,
@@ -107,7 +111,8 @@ def compare(
     check_worlds(worlds)
     entrants = entrants_of(planner, settings)
     rest = {"margin": margin, "cell": cell, "smoothing": smoothing, "noise": noise}
-    scenarios = _scenarios(worlds, entrants, robot, seed, rest)
+    tasks = {world: chosen_task(world, task, start, goal) for world in worlds}
+    scenarios = _scenarios(tasks, entrants, robot, seed, rest)
     cases = [(world, number) for world in worlds for number in range(seed, seed + seeds)]
     default, mark = _default_folder(scenarios, cases)
     folder = out or default
@@ -117,7 +122,7 @@ def compare(
     compile_once()
     with claimed(folder):
         facts = {"fingerprint": mark, "command": this_command()}
-        runs, logs = _drive(scenarios, cases, folder, robot, figures, facts)
+        runs, logs = _drive(scenarios, cases, folder, robot, figures, facts, ends_words(task, start, goal))
         files = {run.label: run.facts["folder"] for run in runs} if len(cases) == 1 else {"folder": str(folder)}
         files |= _views(logs, folder, video, speed, figures)
         told = {"differences": differences(runs), "same": same_drives(runs, smoothing)}
@@ -128,19 +133,24 @@ def compare(
         print_json({"runs": first, "drives": drives, **told, "files": files})
     else:
         _print(runs, len(cases), told, files)
-    if len(logs) < 2:
-        found = "only one planner" if logs else "no planner"
-        print_error(f"{found} found a path: there is nothing to compare in a figure or film")
+    _warn_of_few(len(logs))
     return SUCCEEDED if all(run.facts["succeeded"] for run in runs) else FAILED
 
 
+def _warn_of_few(drives: int) -> None:
+    """Say why there is no figure and no film, if fewer than two planners drove."""
+    if drives < 2:
+        found = "only one planner" if drives else "no planner"
+        print_error(f"{found} found a path: there is nothing to compare in a figure or film")
+
+
 def _scenarios(
-    worlds: Sequence[str], entrants: Sequence[Entrant], robot: str, seed: int, rest: dict[str, Any]
+    worlds: "Mapping[str, str | Task]", entrants: Sequence[Entrant], robot: str, seed: int, rest: dict[str, Any]
 ) -> "dict[tuple[str, Entrant], Scenario]":
     """The scenario of every world, as given, and planner, with the first seed."""
     scenarios = {
-        (world, entrant): make_scenario(world, entrant.name, list(entrant.settings), robot, seed=seed, **rest)
-        for world in worlds
+        (world, entrant): make_scenario(task, entrant.name, list(entrant.settings), robot, seed=seed, **rest)
+        for world, task in worlds.items()
         for entrant in entrants
     }
     if len({scenario.task.world.name for scenario in scenarios.values()}) < len(worlds):
@@ -166,6 +176,7 @@ def _drive(
     robot: str,
     figures: bool,
     facts: dict[str, str],
+    ends: Sequence[str],
 ) -> "tuple[list[Compared], dict[str, Rollout]]":
     """Drive every case with every planner, each into its folder; the runs, and the logs of the first case by label."""
     import dataclasses
@@ -186,7 +197,7 @@ def _drive(
             if not runs:  # an interrupted comparison leaves the results that it has, marked as its own
                 write_marker(folder / MARKER, facts)
             written = write_run(result, part / entrant.label, figures=figures and place == 0)
-            write_result(result, written, repeating(scenario, entrant, world, robot))
+            write_result(result, written, repeating(scenario, entrant, world, robot, ends))
             kept = Compared.of(entrant.label, result)
             runs.append(dataclasses.replace(kept, facts={**kept.facts, "folder": str(part / entrant.label)}))
             if place == 0 and result.rollout is not None:

@@ -61,7 +61,12 @@ Margins = Annotated[
     list[str] | None, typer.Option("--margin", metavar="METRES|auto", help="Margin [m]. May be repeated.")
 ]
 Tasks = Annotated[
-    int | None, typer.Option(min=1, metavar="NUMBER", help="Random starts and goals in each world.  [default: its own]")
+    str | None,
+    typer.Option(
+        metavar="NUMBER[:METRES]|named",
+        help="Random starts and goals in each world, at least so many metres apart; or named: those that its file lists.  "
+        "[default: its own]",
+    ),
 ]
 Jobs = Annotated[
     int | None,

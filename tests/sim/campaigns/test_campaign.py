@@ -54,7 +54,10 @@ def expanded(text: str, folder: Path) -> list[tuple[str, str, str, int]]:
             "4: robots[0]: jakal: no such file, nor a robot of the catalogue; did you mean jackal?",
         ),
         (HEAD + "rollouts: some\n", "4: rollouts: must be 'none', 'failed' or 'all', got \"some\""),
-        (HEAD + "tasks: twice\n", "4: tasks: must be own, {random: 30, min_distance: 5} or a list of {start, goal}"),
+        (
+            HEAD + "tasks: twice\n",
+            "4: tasks: must be own, named, {random: 30, min_distance: 5} or a list of {start, goal}",
+        ),
         (HEAD + "tasks:\n  random: 0\n", "5: tasks.random: must be at least 1, got 0"),
         (HEAD + "tasks: {random: 2, min_distance: 99}\n", "4: tasks: no start and goal 99 m apart"),
         (HEAD + "tasks:\n  - {start: [1, 1, 0]}\n", "5: tasks[0].goal: missing; write [x, y] in metres"),
