@@ -116,10 +116,7 @@ def compare(
     cases = [(world, number) for world in worlds for number in range(seed, seed + seeds)]
     default, mark = _default_folder(scenarios, cases)
     folder = out or default
-    if video is not None:
-        check_film(video)
-    check_folder(folder)
-    compile_once()
+    _make_ready(folder, video)
     with claimed(folder):
         facts = {"fingerprint": mark, "command": this_command()}
         runs, logs = _drive(scenarios, cases, folder, robot, figures, facts, ends_words(task, start, goal))
@@ -135,6 +132,14 @@ def compare(
         _print(runs, len(cases), told, files)
     _warn_of_few(len(logs))
     return SUCCEEDED if all(run.facts["succeeded"] for run in runs) else FAILED
+
+
+def _make_ready(folder: Path, video: Path | None) -> None:
+    """Refuse places where nothing can be written, before anything is driven, and compile the kernels."""
+    if video is not None:
+        check_film(video)
+    check_folder(folder)
+    compile_once()
 
 
 def _warn_of_few(drives: int) -> None:

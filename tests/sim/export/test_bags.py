@@ -142,7 +142,7 @@ def test_stamps_are_in_order_and_have_a_transform_at_or_before_them(said: list[S
         assert set(frames) <= known | {"map"}
         for stamp in [header.stamp] if header else [t.header.stamp for t in transforms]:
             assert nanoseconds(stamp) == entry.at
-    assert known == {"odom", "base_link", "left_wheel", "right_wheel", "mover_0", "mover_1"}
+    assert known == {"odom", "base_link", "base_scan", "left_wheel", "right_wheel", "mover_0", "mover_1"}
 
 
 def test_fixed_transforms_are_sent_twice_and_the_world_lies_in_its_map(said: list[Said]) -> None:
