@@ -79,6 +79,26 @@ SEARCHES = {
         },
         ({"form": "letter"}, {"form": "local"}),
     ),
+    "as": Search(
+        SUGANTHI,
+        ("as", {"ants": 50, **TABLE_1, "heuristic": "step", "iterations": 100}),
+        "as",
+        {"ants": 50, "iterations": 100, **TABLE_1},
+        math.inf,
+        {"heuristic": ("step", "goal"), "backtrack": (False, True), "shortcut": (False, True)},
+        {},
+        (),
+    ),
+    "iaco": Search(
+        SUGANTHI,
+        ("as", {"ants": 50, **TABLE_1, "heuristic": "step", "iterations": 100}),
+        "iaco",
+        {"ants": 25, "explorers": 75, "iterations": 100, **TABLE_1},
+        math.inf,
+        {"heuristic": ("step", "goal"), "backtrack": (False, True), "shortcut": (False, True), "elite": (1.0, 25.0)},
+        {},
+        (),
+    ),
 }
 
 

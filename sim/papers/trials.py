@@ -11,12 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from antdrive.planners import PlanResult, Query, load_planner
+from antdrive.planners import Planner, PlanResult, Query, load_planner
 from antdrive.planners.iterative import Iteration, as_iterative
 from antdrive.sim.papers import maps
+from antdrive.sim.papers.baselines import total_cost
 from antdrive.worlds.errors import FieldError
 
 ENDLESS = 1_000_000  # iterations; the ant steps end such a plan much earlier
+CLOSE = 0.25  # a path is close to the shortest when it is at most this share longer
+LAST = 10  # iterations over which `unrest` is measured
 
 
 @dataclass(frozen=True)
@@ -29,6 +32,7 @@ class Trial:
         result: the plan
         optimum: the length of the shortest path with the same moves
         cpu_s: processor time of the plan [s]
+        total: hasan's total cost of the path; inf if there is none
     """
 
     seed: int
@@ -36,6 +40,7 @@ class Trial:
     result: PlanResult
     optimum: float
     cpu_s: float
+    total: float
 
     @property
     def length(self) -> float:
@@ -58,12 +63,38 @@ class Trial:
         known = self.result.history.iteration_best
         return float(known[-1]) if len(known) else math.inf
 
+    @property
+    def settled(self) -> float:
+        """The iteration, from 1, that found the path; inf if there is none."""
+        best = self.result.history.best
+        return float(np.argmax(best <= best[-1] * (1 + 1e-9)) + 1) if self.result.solved and len(best) else math.inf
 
-def solve(planner: str, options: Mapping[str, Any], query: Query, seed: int, work: float = math.inf) -> Trial:
+    @property
+    def effort(self) -> float:
+        """How much work it took until the path was within `CLOSE` of the shortest; inf if it never was.
+
+        Every iteration counts as the same share of the work.
+        """
+        near = np.flatnonzero(self.result.history.best <= (1 + CLOSE) * self.optimum + 1e-9)
+        return self.result.work * (near[0] + 1) / len(self.result.history) if len(near) else math.inf
+
+    @property
+    def unrest(self) -> float:
+        """The standard deviation of the best paths of the last `LAST` iterations; inf where some had none."""
+        known = self.result.history.iteration_best[-LAST:]
+        return float(known.std()) if len(known) and np.isfinite(known).all() else math.inf
+
+    @property
+    def work(self) -> float:
+        """What the planner counts as its work: ant steps, cells propagated, chromosomes."""
+        return float(self.result.work)
+
+
+def solve(planner: str | Planner, options: Mapping[str, Any], query: Query, seed: int, work: float = math.inf) -> Trial:
     """Plan once.
 
     Args:
-        planner: its name
+        planner: its name, or itself
         options: its parameters
         query: the map with start and goal
         seed: of the planner's random numbers
@@ -73,17 +104,19 @@ def solve(planner: str, options: Mapping[str, Any], query: Query, seed: int, wor
     Raises:
         FieldError: `work` is finite and the planner has no iterations.
     """
-    chosen, rng = load_planner(planner, **options), np.random.default_rng(seed)
+    chosen = load_planner(planner, **options) if isinstance(planner, str) else planner
+    rng = np.random.default_rng(seed)
     started = time.process_time()
     if math.isfinite(work):
         ants = as_iterative(chosen)
         if ants is None:
-            raise FieldError("work", f"{planner} plans at once; its work cannot be limited")
+            raise FieldError("work", f"{type(chosen).__name__} plans at once; its work cannot be limited")
         endless = dataclasses.replace(ants, iterations=ENDLESS)
         result = endless.answer(query, _until(endless.iterate(query, rng), work))
     else:
         result = chosen.plan(query, rng)
-    return Trial(seed, seed, result, maps.optimum(query), time.process_time() - started)
+    spent = time.process_time() - started
+    return Trial(seed, seed, result, maps.optimum(query), spent, total_cost(query, result))
 
 
 def _until(states: Iterator[Iteration], work: float) -> Iterator[Iteration]:
