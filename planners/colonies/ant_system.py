@@ -80,9 +80,11 @@ class AntSystem(Colony):
         """eta^beta for each move of `graph`, as a share of the largest value in its cell."""
         if self.heuristic == "goal":
             # The goal is at distance 0 from itself; the bound makes every ant beside the goal step onto it.
-            eta = graph.at_neighbours(1.0 / np.maximum(graph.distance_to(graph.goal), 0.01))
+            eta = graph.at_neighbours(1.0 / np.maximum(graph.distance_to(graph.goal), 0.01))  # ibraheem2016 eq. 6
         else:
-            eta = np.where(np.isfinite(graph.at_neighbours(np.ones(len(graph.mask)))), 1.0 / STEP, -np.inf)
+            eta = np.where(
+                np.isfinite(graph.at_neighbours(np.ones(len(graph.mask)))), 1.0 / STEP, -np.inf
+            )  # suganthi2019 eq. 6
         beta = ibraheem_beta(max(graph.shape)) if self.beta is None else self.beta
         return shares(eta, beta)
 
@@ -106,13 +108,13 @@ class AntSystem(Colony):
         """Evaporate `trail`; every ant of `state` that arrived deposits on its arcs (suganthi2019 eq. 2-4)."""
         from antdrive.planners.colonies import _kernels_colony
 
-        _kernels_colony.evaporate(trail.ravel(), self.evaporation)
-        tours = state.tours
-        _kernels_colony.deposit_on_arcs(trail, state.graph.shape[1], tours.cells, tours.sizes, self.amounts(state))
+        tours, amounts = state.tours, self.amounts(state)
+        _kernels_colony.evaporate(trail.ravel(), self.evaporation)  # eq. 2, first term
+        _kernels_colony.deposit_on_arcs(trail, state.graph.shape[1], tours.cells, tours.sizes, amounts)  # eq. 2-3
 
     def amounts(self, state: IterationState) -> Floats:
         """What each ant of `state` deposits on an arc (ants,): Q / L_k, 0 if the ant did not arrive."""
-        return self.deposit / state.tours.lengths
+        return self.deposit / state.tours.lengths  # eq. 4
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,7 +141,7 @@ class AgeingAnts(AntSystem):
     def amounts(self, state: IterationState) -> Floats:
         """Q_m / L_m for each ant m of `state`, with Q_m by eq. 5."""
         count = len(state.tours)
-        return self.aged(state.rng.random(count)) / state.tours.lengths
+        return self.aged(state.rng.random(count)) / state.tours.lengths  # eq. 4
 
     def aged(self, rand: Floats) -> Floats:
         """Q_m of ants m = 1 to M (eq. 5), clipped to its bounds, which eq. 5 as printed may leave.
@@ -148,7 +150,7 @@ class AgeingAnts(AntSystem):
             rand: a random number in [0, 1) for each ant (M,)
         """
         span, m = self.q_max - self.q_min, np.arange(1, len(rand) + 1)
-        amounts = self.q_max - span / 2 * rand - span / len(rand) * m
+        amounts = self.q_max - span / 2 * rand - span / len(rand) * m  # eq. 5
         return np.clip(amounts, self.q_min, self.q_max)
 
 
@@ -206,7 +208,7 @@ class ExploringAnts(AntSystem):
         """Q / L_k and, for the best ants of `state`, a Q / L_best more, shared among them (eq. 7-8)."""
         lengths = state.tours.lengths
         best = lengths <= lengths.min() + 1e-9
-        return np.where(best, 1.0 + self.elite / best.sum(), 1.0) * self.deposit / lengths
+        return np.where(best, 1.0 + self.elite / best.sum(), 1.0) * self.deposit / lengths  # eq. 4, 7 and 8
 
 
 def ibraheem_beta(side: int) -> float:
