@@ -1,10 +1,10 @@
 """Which reading of a paper makes its claims true? `python -m benchmarks.readings PLANNER [--seeds N]`.
 
-Planners: pfaco (lee2008), as and iaco (suganthi2019). Each reading of what the paper leaves open runs on the same recreated
-maps with the same seeds and the same number of ant steps; a second table varies the constants for which the paper gives no
-value over two levels each, in a fractional design of eight runs (resolution III, generators D = AB, E = AC). A gap is how
-much longer a path is than the shortest over the same moves; intervals are bootstrapped over maps, and p is Wilcoxon's, both
-against the rival at equal ant steps. The paper's own constants stay as they are.
+Planners: pfaco (lee2008), as and iaco (suganthi2019), maco (ibraheem2016). Each reading of what the paper leaves open runs
+on the same recreated maps with the same seeds and the same number of ant steps. For pfaco a second table varies the
+constants for which the paper gives no value over two levels each, in a fractional design of eight runs (resolution III,
+generators D = AB, E = AC). A gap is how much longer a path is than the shortest over the same moves; intervals are
+bootstrapped over maps, and p is Wilcoxon's, against the rival on the same maps. The paper's own constants stay as they are.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from antdrive.planners import Query
+from antdrive.sim.papers.experiments import Experiment, ibraheem2016
 from antdrive.sim.papers.maps import blocks, scattered
 from antdrive.sim.papers.trials import Trial, solve
 from antdrive.sim.statistics.bootstrap import medians_by_world
@@ -59,6 +60,13 @@ LEE = {
     "4: 100×100": lambda seed: blocks(100, 100, 25, 16, 400 + seed),
     "5: 100×100": lambda seed: blocks(100, 100, 25, 16, 500 + seed),
 }
+
+
+def _numbered(experiment: Experiment) -> Callable[[int], Query]:
+    """The experiment's maps, one for each seed."""
+    return lambda seed: experiment.query(experiment.world(seed))
+
+
 SUGANTHI = {f"{size}×{size}": partial(scattered, size, 0.15) for size in (20, 30, 50)}
 TABLE_1 = {"alpha": 1.0, "beta": 1.0, "evaporation": 0.3, "deposit": 1.0}
 
@@ -96,6 +104,16 @@ SEARCHES = {
         {"ants": 25, "explorers": 75, "iterations": 100, **TABLE_1},
         math.inf,
         {"heuristic": ("step", "goal"), "backtrack": (False, True), "shortcut": (False, True), "elite": (1.0, 25.0)},
+        {},
+        (),
+    ),
+    "maco": Search(
+        {e.map: _numbered(e) for e in ibraheem2016() if e.planner == "maco" and e.map[0] in "34"},
+        ("as", {"ants": 50, "iterations": 100, "evaporation": 0.3}),
+        "maco",
+        {"ants": 50, "iterations": 100, "evaporation": 0.3},
+        math.inf,
+        {"q_max": (1.0, 2.0, 5.0, 20.0), "q_min": (0.1, 0.5)},
         {},
         (),
     ),

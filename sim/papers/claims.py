@@ -280,7 +280,8 @@ def _suganthi(reading: str, ants: str, improved: str) -> tuple[Claim, ...]:
 
 SUGANTHI2019 = (
     *_suganthi("ours", "as", "iaco"),
-    *_suganthi("ants leave dead ends, loops are cut", "as, loops cut", "iaco, loops cut"),
+    *_suganthi("ants leave dead ends, loops are cut, a = 1", "as, loops cut", "iaco, loops cut"),
+    *_suganthi("ants leave dead ends, loops are cut, a = 25", "as, loops cut", "iaco, loops cut, a = 25"),
     Claim(
         paper="suganthi2019",
         source="Table 2",

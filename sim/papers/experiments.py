@@ -121,7 +121,10 @@ def han2007() -> list[Experiment]:
 
 
 def suganthi2019() -> list[Experiment]:
-    """Table 2: four sizes, three planners; ants as the text says, and ants that leave dead ends and cut loops."""
+    """Table 2: four sizes, three planners; ants as the text says, and ants that leave dead ends and cut loops.
+
+    The paper does not say what an ant in a dead end does, whether loops are cut, or how large a of eq. 7 is.
+    """
     common = {
         "alpha": 1.0,
         "beta": 1.0,
@@ -137,6 +140,7 @@ def suganthi2019() -> list[Experiment]:
         ("iaco", "iaco", {"ants": 25, "explorers": 75, **common}),
         ("as", "as, loops cut", {"ants": 50, **common, **freed}),
         ("iaco", "iaco, loops cut", {"ants": 25, "explorers": 75, **common, **freed}),
+        ("iaco", "iaco, loops cut, a = 25", {"ants": 25, "explorers": 75, "elite": 25.0, **common, **freed}),
     ]
     printed = {
         10: (13.899, 13.899, 13.899),
@@ -163,7 +167,7 @@ def suganthi2019() -> list[Experiment]:
             comparable=True,
         )
         for size, values in printed.items()
-        for (planner, label, options), value in zip(arms, (*values, values[0], values[2]), strict=True)
+        for (planner, label, options), value in zip(arms, (*values, values[0], values[2], values[2]), strict=True)
     ]
 
 

@@ -24,8 +24,9 @@ from antdrive.worlds.errors import InputError
 from antdrive.worlds.files.atomic import written_whole
 
 if TYPE_CHECKING:
-    from antdrive.planners import History
+    from antdrive.planners import History, PlanResult, Query
 
+PAINTED = 3  # planners whose paths are drawn on one map
 PC, PM = (0.1, 0.25, 0.5, 0.75, 0.9), (0.05, 0.1, 0.2, 0.4, 0.6)  # crossover, mutation: han2007's sweep
 
 
@@ -93,6 +94,7 @@ def reproduce(
     suffixes: Sequence[str],
     jobs: int = 1,
     quick: bool = False,
+    films: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> Reproduction:
     """Run the experiments of papers again, judge the papers' claims, and write tables, CSV files and figures.
@@ -104,6 +106,7 @@ def reproduce(
         suffixes: the figures' formats, for example (".png", ".pdf")
         jobs: the number of processes
         quick: a tenth of the ant steps where an experiment counts them, and two candidates of each map
+        films: whether to film a drive for each paper, the planning first
         progress: called with the fraction of experiments that is done
 
     Raises:
@@ -132,7 +135,16 @@ def reproduce(
     for paper in papers:
         chosen = [(e, trials) for e, trials in zip(experiments, found, strict=True) if e.paper == paper]
         files |= _figures(paper, chosen, folder, min(seeds, 2 if quick else 10), suffixes)
+        if films:
+            files |= _filmed(paper, folder)
     return Reproduction(rows, verdicts, files)
+
+
+def _filmed(paper: str, folder: Path) -> dict[str, str]:
+    from antdrive.sim.papers.films import film_paper
+
+    film = film_paper(paper, folder)
+    return {} if film is None else {f"{paper} film": str(film)}
 
 
 def _hurried(experiment: Experiment) -> Experiment:
@@ -272,11 +284,11 @@ def _figures(
     seeds: int,
     suffixes: Sequence[str],
 ) -> dict[str, str]:
-    """Draw length by iteration on the paper's second map and, for han2007, by ants and by Pc and Pm.
+    """Draw length by iteration on the paper's second map, paths on all maps and, for han2007, length by ants and by Pc and Pm.
 
     `seeds` are those of the sweep over Pc and Pm.
     """
-    from antdrive.sim.view.figures.paper_figures import history_figure
+    from antdrive.sim.view.figures.paper_figures import history_figure, maps_figure
 
     files: dict[str, str] = {}
     names = list(dict.fromkeys(experiment.map for experiment, _ in found))
@@ -292,10 +304,29 @@ def _figures(
             path = folder / f"{paper}-history{suffix}"
             history_figure(histories, path, unit="cells")
             files[f"{paper} history{end}"] = str(path)
+        drawn_on = folder / f"{paper}-maps{suffix}"
+        maps_figure(_drawn(found), drawn_on)
+        files[f"{paper} maps{end}"] = str(drawn_on)
         if paper == "han2007":
             drawn = _han_figures(found, folder, seeds, suffix)
             files |= {f"{name}{end}": str(path) for name, path in drawn.items()}
     return files
+
+
+def _drawn(
+    found: Sequence[tuple[Experiment, list[Trial]]],
+) -> dict[str, tuple[Query, dict[str, PlanResult]]]:
+    """The first map of each experiment with the path of its median seed, for `PAINTED` planners of a map."""
+    maps_drawn: dict[str, tuple[Query, dict[str, PlanResult]]] = {}
+    for experiment, trials in found:
+        if experiment.name == "steps":  # the same plans as those of the total costs
+            continue
+        query = experiment.query(experiment.world(trials[0].seed))
+        plans = maps_drawn.setdefault(experiment.map, (query, {}))[1]
+        on_it = sorted((t for t in trials if t.world == trials[0].world), key=lambda trial: trial.length)
+        if len(plans) < PAINTED:
+            plans[experiment.name] = on_it[(len(on_it) - 1) // 2].result
+    return maps_drawn
 
 
 def _han_figures(

@@ -82,7 +82,9 @@ def _less(test: Less, found: Found) -> Judged:
     value, interval = _median(difference, world)
     below = interval.high < test.margin if test.strict else interval.high <= test.margin
     above = interval.low >= test.margin if test.strict else interval.low > test.margin
-    counts = f"{int((difference < 0).sum())} less, {int((difference == 0).sum())} equal, {int((difference > 0).sum())} more"
+    counts = (
+        f"{int((difference < 0).sum())} less, {int((difference == 0).sum())} equal, {int((difference > 0).sum())} more"
+    )
     why = f"{counts}; Wilcoxon's p {wilcoxon(difference):.2g}"
     ours = f"median difference {_with_interval(value, interval, test.quantity)}"
     return _decided(below, above, len(difference)), value, interval, ours, why

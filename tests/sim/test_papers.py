@@ -4,7 +4,7 @@ import math
 import numpy as np
 import pytest
 
-from antdrive.sim.papers import maps, reproduce
+from antdrive.sim.papers import films, maps, reproduce
 from antdrive.sim.papers.experiments import PAPERS
 from antdrive.sim.papers.reproduce import reproduce as measure_again
 from antdrive.sim.papers.verdicts import Decision
@@ -64,7 +64,7 @@ def test_a_papers_experiments_are_run_and_written_to_files(tmp_path, monkeypatch
         assert row.best <= row.mean
         assert row.arrived == row.seeds == 2
         assert row.gap > -0.15
-    figures = {"han2007 history", "han2007 ants", "han2007 sweep"}
+    figures = {"han2007 maps", "han2007 history", "han2007 ants", "han2007 sweep"}
     assert set(files) == {"table", "csv", "claims", "claims csv"} | figures
     # Those claims are judged whose experiments were run: two on each kind of mean, and that of 10 and 100 ants.
     assert [verdict.claim.source for verdict in found.verdicts].count("§5.2, Table 5.2.1") == 4
@@ -79,3 +79,25 @@ def test_a_papers_experiments_are_run_and_written_to_files(tmp_path, monkeypatch
 def test_an_unknown_paper_is_refused(tmp_path):
     with pytest.raises(InputError, match="unknown paper 'nobody'; choose from han2007"):
         measure_again(["nobody"], tmp_path, seeds=1, suffixes=(".png",))
+
+
+def test_a_paper_is_filmed_with_its_planning(tmp_path, monkeypatch):
+    shown = {}
+
+    def film(rollout, path, **options):
+        shown.update(options, path=path, rollout=rollout)
+
+    monkeypatch.setattr(films, "film", film)
+    assert films.film_paper("han2007", tmp_path) == tmp_path / "han2007.mp4"
+    assert shown["rollout"].outcome.value == "stopped at the goal without contact"
+    assert shown["prelude"] > 0  # the colony plans in iterations
+    assert set(films.SCENES) == set(PAPERS)
+    for paper, scene in films.SCENES.items():
+        assert (scene.map, scene.name) in {(e.map, e.name) for e in PAPERS[paper]()}
+
+
+def test_a_picture_becomes_a_world_that_a_robot_drives():
+    task = films.paper_scenario("ibraheem2016").task
+    assert task.start[:2] == (0.5 * films.CELL, 0.5 * films.CELL)
+    assert task.goal == (19.5 * films.CELL, 19.5 * films.CELL)
+    assert len(task.world.discs)

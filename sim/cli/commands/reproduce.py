@@ -31,6 +31,9 @@ def reproduce(
         ),
     ] = False,
     jobs: Annotated[int, typer.Option(min=1, max=256, metavar="NUMBER", help="Number of processes.")] = 1,
+    films: Annotated[
+        bool, typer.Option("--films", help="Film a drive for each paper: its colony plans, a robot drives.")
+    ] = False,
     vector: options.Vector = False,
     json: options.Json = False,
 ) -> int:
@@ -53,7 +56,14 @@ def reproduce(
     compile_once()
     with claimed(folder), bar("planning") as progress:
         found = repeat(
-            papers, folder, seeds=seeds, suffixes=suffixes(vector), jobs=jobs, quick=quick, progress=progress
+            papers,
+            folder,
+            seeds=seeds,
+            suffixes=suffixes(vector),
+            jobs=jobs,
+            quick=quick,
+            films=films,
+            progress=progress,
         )
         facts = {"fingerprint": mark, "command": this_command()}
         result = {
