@@ -1,7 +1,7 @@
 """`antdrive reproduce`."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -55,23 +55,14 @@ def reproduce(
     check_folder(folder)
     compile_once()
     with claimed(folder), bar("planning") as progress:
-        found = repeat(
-            papers,
-            folder,
-            seeds=seeds,
-            suffixes=suffixes(vector),
-            jobs=jobs,
-            quick=quick,
-            films=films,
-            progress=progress,
-        )
-        facts = {"fingerprint": mark, "command": this_command()}
+        wanted: dict[str, Any] = {"suffixes": suffixes(vector), "jobs": jobs, "quick": quick, "films": films}
+        found = repeat(papers, folder, seeds=seeds, progress=progress, **wanted)
         result = {
             "rows": [vars(row) for row in found.rows],
             "claims": [verdict_facts(verdict) for verdict in found.verdicts],
             "files": found.files,
         }
-        write_marker(folder / MARKER, facts | result)
+        write_marker(folder / MARKER, {"fingerprint": mark, "command": this_command(), **result})
     if json:
         print_json(result)
     else:
