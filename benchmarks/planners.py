@@ -168,7 +168,7 @@ def paper_maps(quick: bool) -> Iterator[tuple[str, str, str, dict[str, Any], lis
         queries = [random_grid(size, seed, 0.15) for seed in seeds]
         for name, options, figure in (
             ("as", {"ants": 50, **common}, figures[0]),
-            ("pfaco", {"ants": 50, "iterations": 100, "ranks": 15}, figures[1]),
+            ("pfaco", {"ants": 50, "iterations": 100, "ranks": 15, "form": "letter"}, figures[1]),
             ("iaco", {"ants": 25, "explorers": 75, **common}, figures[2]),
         ):
             yield "suganthi2019", f"{size}×{size}, 15 % blocked", name, options, queries, f"{figure:g}"
@@ -191,7 +191,7 @@ def paper_maps(quick: bool) -> Iterator[tuple[str, str, str, dict[str, Any], lis
         place = f"{number}: {rows}×{cols}, 25 obstacles"
         # The number of iterations is not stated; the paper's times are hours for the one, minutes for the other.
         old = {"ants": 500, "beta": 2.0, "evaporation": 0.01, "iterations": 1000}
-        new = {"iterations": 200}
+        new = {"iterations": 200, "form": "letter"}
         for name, options, length, wall in (("as", old, *figures[:2]), ("pfaco", new, *figures[2:])):
             yield "lee2008", place, name, options, queries, f"{length:g}, {wall:g} s"
 
