@@ -104,7 +104,9 @@ def maps_figure(
     with styled():
         across = min(len(paths), 3)
         down = -(-len(paths) // across)
-        figure = new_figure(3.3 * across, 3.8 * down)
+        figure = new_figure(3.3 * across, 4.1 * down)
+        layout: Any = figure.get_layout_engine()
+        layout.set(h_pad=0.16, hspace=0.06)  # room for titles above and legends below the maps
         for k, (title, (query, plans)) in enumerate(paths.items()):
             axes: Any = figure.add_subplot(down, across, k + 1, label=title)
             axes.imshow(query.grid.free, cmap="gray", origin="lower", vmin=0, vmax=1, interpolation="nearest")
