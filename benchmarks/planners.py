@@ -161,6 +161,7 @@ def paper_maps(quick: bool) -> Iterator[tuple[str, str, str, dict[str, Any], lis
     seeds = SEEDS[:3] if quick else SEEDS
     # suganthi2019, Table 2: sizes; the blocked share is not stated.
     common = {"alpha": 1.0, "beta": 1.0, "evaporation": 0.3, "deposit": 1.0, "heuristic": "step", "iterations": 100}
+    dying = {"backtrack": False, "shortcut": False, "elite": 1.0}  # not the planner's defaults
     printed = {
         10: (13.899, 13.899, 13.899), 20: (28.627, 38.627, 28.627), 30: (46.527, 59.355, 42.184), 50: (96.125, 109.761, 94.326),
     }  # fmt: skip
@@ -169,7 +170,7 @@ def paper_maps(quick: bool) -> Iterator[tuple[str, str, str, dict[str, Any], lis
         for name, options, figure in (
             ("as", {"ants": 50, **common}, figures[0]),
             ("pfaco", {"ants": 50, "iterations": 100, "ranks": 15, "form": "letter"}, figures[1]),
-            ("iaco", {"ants": 25, "explorers": 75, **common}, figures[2]),
+            ("iaco", {"ants": 25, "explorers": 75, **common, **dying}, figures[2]),
         ):
             yield "suganthi2019", f"{size}×{size}, 15 % blocked", name, options, queries, f"{figure:g}"
     # ibraheem2016, Table 2: 5 and 10 obstacles; those of the larger maps are not stated.

@@ -280,8 +280,8 @@ def _suganthi(reading: str, ants: str, improved: str) -> tuple[Claim, ...]:
 
 SUGANTHI2019 = (
     *_suganthi("ours", "as", "iaco"),
-    *_suganthi("ants leave dead ends, loops are cut, a = 1", "as, loops cut", "iaco, loops cut"),
-    *_suganthi("ants leave dead ends, loops are cut, a = 25", "as, loops cut", "iaco, loops cut, a = 25"),
+    *_suganthi("a = 1", "as", "iaco, a = 1"),
+    *_suganthi("a = 1, ants die in dead ends, loops stay", "as, ants die", "iaco, ants die"),
     Claim(
         paper="suganthi2019",
         source="Table 2",

@@ -121,9 +121,9 @@ def han2007() -> list[Experiment]:
 
 
 def suganthi2019() -> list[Experiment]:
-    """Table 2: four sizes, three planners; ants as the text says, and ants that leave dead ends and cut loops.
+    """Table 2: four sizes, three planners, in three readings of what the paper leaves open.
 
-    The paper does not say what an ant in a dead end does, whether loops are cut, or how large a of eq. 7 is.
+    It does not say what an ant in a dead end does, whether loops are cut, or how large a of eq. 7 is.
     """
     common = {
         "alpha": 1.0,
@@ -133,14 +133,15 @@ def suganthi2019() -> list[Experiment]:
         "heuristic": "step",
         "iterations": 100,
     }
-    freed = {"backtrack": True, "shortcut": True}
+    freed, letter = {"backtrack": True, "shortcut": True}, {"backtrack": False, "shortcut": False}
+    many: dict[str, Any] = {"ants": 25, "explorers": 75, **common}
     arms: list[tuple[str, str, dict[str, Any]]] = [
-        ("as", "as", {"ants": 50, **common}),
+        ("as", "as", {"ants": 50, **common, **freed}),
         ("pfaco", "pfaco", {"ants": 50, "iterations": 100, "ranks": 15}),
-        ("iaco", "iaco", {"ants": 25, "explorers": 75, **common}),
-        ("as", "as, loops cut", {"ants": 50, **common, **freed}),
-        ("iaco", "iaco, loops cut", {"ants": 25, "explorers": 75, **common, **freed}),
-        ("iaco", "iaco, loops cut, a = 25", {"ants": 25, "explorers": 75, "elite": 25.0, **common, **freed}),
+        ("iaco", "iaco", {**many, **freed, "elite": 25.0}),
+        ("as", "as, ants die", {"ants": 50, **common, **letter}),
+        ("iaco", "iaco, ants die", {**many, **letter, "elite": 1.0}),
+        ("iaco", "iaco, a = 1", {**many, **freed, "elite": 1.0}),
     ]
     printed = {
         10: (13.899, 13.899, 13.899),

@@ -41,7 +41,7 @@ class FilmedExperiment:
 SCENES: Mapping[str, FilmedExperiment] = MappingProxyType(
     {
         "han2007": FilmedExperiment("14 obstacles", "100 ants"),
-        "suganthi2019": FilmedExperiment("20×20", "iaco, loops cut"),
+        "suganthi2019": FilmedExperiment("20×20", "iaco"),
         "ibraheem2016": FilmedExperiment("20×20, 10 obstacles", "maco"),
         "lee2008": FilmedExperiment("2: 50×44", "pfaco"),
         "hasan": FilmedExperiment("1a curved walls", "mmas-dstar"),

@@ -86,7 +86,7 @@ def _less(test: Less, found: Found) -> Judged:
         f"{int((difference < 0).sum())} less, {int((difference == 0).sum())} equal, {int((difference > 0).sum())} more"
     )
     why = f"{counts}; Wilcoxon's p {wilcoxon(difference):.2g}"
-    ours = f"median difference {_with_interval(value, interval, test.quantity)}"
+    ours = f"median difference {_with_interval(value, interval, test.quantity, endless='∞')}"
     return _decided(below, above, len(difference)), value, interval, ours, why
 
 
@@ -214,13 +214,13 @@ UNITS: Mapping[str, tuple[int, str]] = {
 }
 
 
-def _with_interval(value: float, interval: Interval, quantity: str) -> str:
+def _with_interval(value: float, interval: Interval, quantity: str, endless: str = "no path") -> str:
     digits, unit = UNITS[quantity]
 
     def number(one: float) -> str:
         if math.isnan(one):
             return "–"
-        return f"{one:.{digits}f}" if abs(one) < NO_PATH / 10 else ("no path" if one > 0 else "−no path")
+        return f"{one:.{digits}f}" if abs(one) < NO_PATH / 10 else (endless if one > 0 else f"−{endless}")
 
     return f"{number(value)}{unit} [{number(interval.low)}, {number(interval.high)}]"
 
