@@ -34,6 +34,7 @@ class Experiment:
         worlds: how many different maps there are; 0: one for each seed
         work: where it is finite, planning ends after so many ant steps
         most_seeds: more seeds than this would tell nothing new
+        slow: takes seconds, its map or its plans, and is left out of a quick look
         made: the planner itself, where it is not one of the registry
     """
 
@@ -50,6 +51,7 @@ class Experiment:
     worlds: int = 1
     work: float = math.inf
     most_seeds: int = 1000
+    slow: bool = False
     made: Planner | None = None
 
     @property
@@ -166,6 +168,7 @@ def suganthi2019() -> list[Experiment]:
             query=_candidates(size, 100 * size, kinds[size][0], **kinds[size][1]),
             worlds=CANDIDATES,
             comparable=True,
+            slow=size == 50,
         )
         for size, values in printed.items()
         for (planner, label, options), value in zip(arms, (*values, values[0], values[2], values[2]), strict=True)
@@ -190,6 +193,7 @@ def ibraheem2016() -> list[Experiment]:
             query=_candidates(size, 100 * size, moves, blocks=count * 3 // 5, largest=size // 4),
             worlds=CANDIDATES,
             comparable=True,
+            slow=size == 40,
         )
         for size, (count, *values, moves) in printed.items()
         for name, value in zip(("as", "maco"), values, strict=True)

@@ -225,22 +225,22 @@ def _with_interval(value: float, interval: Interval, quantity: str, endless: str
     return f"{number(value)}{unit} [{number(interval.low)}, {number(interval.high)}]"
 
 
-#: The headings of the table of claims.
-VERDICT_HEADS = ("paper", "source", "claim", "reading", "printed", "ours", "verdict", "why")
+#: The headings of the table of claims; the verdict comes first, as a terminal may cut the lines.
+VERDICT_HEADS = ("verdict", "paper", "claim", "reading", "printed", "ours", "why", "source")
 
 
 def verdict_cells(verdict: Verdict) -> list[str]:
     """A row of the table as text, under `VERDICT_HEADS`."""
     claim = verdict.claim
     return [
+        verdict.decision.value,
         claim.paper,
-        claim.source,
         claim.sentence,
         claim.reading,
         claim.printed,
         verdict.ours,
-        verdict.decision.value,
         verdict.why,
+        claim.source,
     ]
 
 
