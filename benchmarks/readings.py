@@ -28,6 +28,7 @@ from antdrive.sim.statistics.bootstrap import medians_by_world
 from antdrive.sim.statistics.significance import wilcoxon
 
 Options = Mapping[str, Any]
+NO_PATH = 1e6  # the gap that stands for no path [%]
 
 
 @dataclass(frozen=True)
@@ -130,11 +131,11 @@ def gaps(planner: str, options: Options, search: Search, seeds: int) -> tuple[li
 
 def line(name: str, found: Sequence[float], rival: Sequence[float], cpu: float) -> str:
     """A row of the table: arrivals, median gap with its interval, how often it beat the rival, p."""
-    values = np.array(found)
+    large = np.nan_to_num(np.array([found, rival]), posinf=NO_PATH)
+    values = large[0]
     low, high = medians_by_world(values[:, None], np.arange(len(values)))[0]
-    large = np.nan_to_num(np.array([found, rival]), posinf=1e6)
     better, worse = int((large[0] < large[1]).sum()), int((large[0] > large[1]).sum())
-    arrived = int(np.isfinite(values).sum())
+    arrived = int((values < NO_PATH).sum())
     cells = [
         name,
         f"{arrived}/{len(values)}",
@@ -147,7 +148,7 @@ def line(name: str, found: Sequence[float], rival: Sequence[float], cpu: float) 
 
 
 def _number(value: float) -> str:
-    return f"{value:.1f} %" if math.isfinite(value) else "no path"
+    return f"{value:.1f} %" if value < NO_PATH / 10 else "no path"
 
 
 def designs(search: Search) -> Iterator[tuple[str, Options]]:
