@@ -150,8 +150,8 @@ def _values(
     given: Mapping[str, float],
 ) -> list[_Value]:
     left, right = wheels
-    track = float(np.linalg.norm(left.centre - right.centre))
-    radius = (left.radius + right.radius) / 2
+    track = _seven(float(np.linalg.norm(left.centre - right.centre)))
+    radius = _seven((left.radius + right.radius) / 2)
     top = max((float(piece.points[:, 2].max()) for piece in model.pieces), default=0.0) - floor
     xmin, ymin, xmax, ymax = outline.bounds
     found: dict[str, tuple[float, str]] = {
@@ -180,7 +180,7 @@ def _speeds(
 ) -> None:
     """Add the limits of the speeds: those of the drive plugin, what the joints allow, or assumed ones."""
     radius, track = found["wheel_radius"][0], found["track"][0]
-    turning = min((wheel.joint.velocity or math.inf for wheel in wheels), default=math.inf)
+    turning = _seven(min(wheel.joint.velocity or math.inf for wheel in wheels))
     plain = 0.05 <= turning * radius < 20  # 0 and very large limits mean none
     limit = f"limit of joint {wheels[0].joint.name}"
     for key, tags, most, assumed in (
@@ -190,20 +190,20 @@ def _speeds(
         told = next((_positive(model.drive[tag]) for tag in tags if tag in model.drive), None)
         if key in given:
             continue
-        if told:
+        if told and plain and told > most:
+            found[key] = _five(most), f"computed: {limit}; the drive plugin says {told:g}"
+        elif told:
             found[key] = told, "read: the drive plugin"
         elif plain and key == "max_speed":
-            found[key] = min(most, 10.0), f"computed: {limit} times the wheels' radius"
+            found[key] = min(_five(most), 10.0), f"computed: {limit} times the wheels' radius"
         elif plain:
-            found[key] = min(most, math.pi), f"computed: {limit}, at most half a turn a second"
+            found[key] = min(_five(most), 3.14), f"computed: {limit}, at most half a turn a second"
         else:
             found[key] = assumed, "assumed: the file has no limit"
     needs = max(found["max_speed"][0], found["max_yaw_rate"][0] * track / 2) / radius
     if "max_wheel_speed" not in given:
-        reads = plain and turning >= needs * (1 - 1e-9)
-        found["max_wheel_speed"] = (turning * (1 + 1e-9), f"read: {limit}") if reads else (
-            1.2 * needs, "assumed: 1.2 times what the speeds need"
-        )  # fmt: skip
+        needs_more = 1.2 * needs, "assumed: 1.2 times what the speeds need"
+        found["max_wheel_speed"] = (turning, f"read: {limit}") if plain else needs_more
 
 
 def _forces(
@@ -236,6 +236,18 @@ def _forces(
             )
     if "max_lateral_acceleration" not in given:
         found["max_lateral_acceleration"] = ACCELERATION, "assumed"
+
+
+def _seven(value: float) -> float:
+    """A number as the file will have it, in seven digits, so that what follows from it is exactly reached."""
+    return float(f"{value:.7g}")
+
+
+def _five(value: float) -> float:
+    """The largest number of five digits that is not above a value."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - 4)
+    near = float(f"{value:.5g}")
+    return near if near <= value else float(f"{near - unit:.5g}")
 
 
 def _positive(text: str) -> float | None:
@@ -274,7 +286,7 @@ def _text(model: UrdfModel, path: Path, outline: Footprint, what: str, values: l
 
 def _rounded(value: _Value) -> str:
     """A value in seven digits, with a point, as YAML's floats are written."""
-    digits = value.value if value.how == "given" else float(f"{value.value:.7g}")
+    digits = value.value if value.how == "given" else _seven(value.value)
     return f"{digits:.10f}".rstrip("0").rstrip(".") if digits < 1e9 else repr(digits)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -88,6 +89,17 @@ def test_limits_come_from_the_drive_plugin_where_there_is_one() -> None:
     found = imported("waffle.urdf")
     assert (found.robot.max_speed, found.robot.max_yaw_rate) == (0.26, 1.82)
     assert "max_speed: 0.26                 # read: the drive plugin" in found.text
+
+
+def test_limits_that_contradict_each_other_are_resolved_or_refused(tmp_path: Path) -> None:
+    slow = ('<axis xyz="0 1 0"/>', '<axis xyz="0 1 0"/><limit effort="2" velocity="5"/>')
+    found = import_urdf(changed(tmp_path, "waffle.urdf", slow))
+    assert found.robot.max_speed == pytest.approx(5 * 0.033)
+    assert "limit of joint wheel_left_joint; the drive plugin says 0.26" in found.text
+    with pytest.raises(
+        InputError, match=r"max_wheel_speed: 7 rad/s on a robot of 1 kg .* but max_speed is 9; raise max_wheel_speed"
+    ):
+        imported("burger.urdf", given={"max_speed": 9.0})
 
 
 def test_a_robot_that_turns_by_skidding_is_asked_for_its_axle() -> None:
@@ -232,6 +244,33 @@ def test_masses_and_torques_that_a_file_lacks_are_assumed(tmp_path: Path) -> Non
     found = import_urdf(path)
     assert found.robot.mass == pytest.approx(150 * 0.281 * 0.306 * 0.141, rel=1e-3)
     assert "# assumed: 150 kg/m3, as the file has no masses" in found.text
+
+
+@given(st.floats(0.01, 0.5), st.floats(0.2, 2.0), st.floats(1.0, 100.0))
+def test_any_limits_of_the_joints_give_a_robot_that_reaches_what_it_promises(
+    radius: float, track: float, velocity: float
+) -> None:
+    """Whatever the rounding does: a robot whose motors fall short by the last digit would be refused."""
+    text = (FIXTURES / "waffle.urdf").read_text().partition("<gazebo>")[0] + "</robot>"
+    body = f'<box size="{2.5 * max(radius, track)} {2 * track} {3 * radius}"/>'
+    for old, new in (
+        ('<box size="0.281 0.306 0.119"/>', body),
+        ('radius="0.033"', f'radius="{radius!r}"'),
+        ("0.1435 0.033", f"{track / 2!r} {radius!r}"),
+        ('<axis xyz="0 1 0"/>', f'<axis xyz="0 1 0"/><limit effort="0" velocity="{velocity!r}"/>'),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "any.urdf"
+        path.write_text(text)
+        refused, robot = "", None
+        try:
+            robot = import_urdf(path).robot
+        except InputError as error:
+            refused = str(error)
+    assert "reach" not in refused, "only a robot that antdrive is not meant for is refused"
+    assert robot is None or 0.05 <= robot.max_speed <= max(velocity * radius * (1 + 1e-6), 0.5)
 
 
 points = st.tuples(st.floats(-1, 1), st.floats(-1, 1))

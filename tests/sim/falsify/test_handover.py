@@ -8,10 +8,11 @@ import pytest
 import yaml
 
 from antdrive.planners import load_planner
-from antdrive.robots import Avoidance, PurePursuit
+from antdrive.robots import Avoidance, PurePursuit, load_robot
 from antdrive.sim import Certificate, Perception, ReplanPolicy, Run, Scenario
 from antdrive.sim.falsify.handover import (
     Handover,
+    _robot,
     expectation,
     fingerprint_of,
     run_elsewhere,
@@ -118,3 +119,9 @@ def test_a_scenario_has_a_name_that_suites_take(small_run: Run, tmp_path: Path, 
     assert scenario_name(text) == name
     suite = write_suite(tmp_path / "s.drive.yaml", [Handover(f"{scenario_name(text)}-small", small_run)])
     assert [case.name for case in load_suite(suite)] == [f"{name}-small"]
+
+
+@pytest.mark.parametrize("name", ["warehouse", "pioneer3dx"])
+def test_a_robot_whose_footprint_is_beside_its_axle_is_handed_over_as_it_is(name: str, tmp_path: Path) -> None:
+    mine = replace(load_robot(name), name="mine", mass=31.0)
+    assert load_robot(tmp_path / _robot(mine, tmp_path)) == mine
