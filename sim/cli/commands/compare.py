@@ -113,8 +113,8 @@ def compare(
     tasks = {world: chosen_task(world, task, start, goal) for world in worlds}
     scenarios = _scenarios(tasks, entrants, robot, seed, rest)
     cases = [(world, number) for world in worlds for number in range(seed, seed + seeds)]
-    folder, mark = _default_folder(scenarios, cases)
-    folder = out or folder
+    usual, mark = _default_folder(scenarios, cases)
+    folder = out or usual
     if video is not None:
         check_film(video)
     check_folder(folder)
@@ -125,12 +125,10 @@ def compare(
         files = {run.label: run.facts["folder"] for run in runs} if len(cases) == 1 else {"folder": str(folder)}
         files |= _views(logs, folder, video, speed, figures)
         told = {"differences": differences(runs), "same": same_drives(runs, smoothing)}
-        drives = [{"label": run.label, **run.facts} for run in runs]
-        write_marker(folder / MARKER, {**facts, "drives": drives, **told})
+        told["drives"] = [{"label": run.label, **run.facts} for run in runs]
+        write_marker(folder / MARKER, {**facts, **told})
     if json:
-        print_json(
-            {"runs": {run.label: run.facts for run in runs[: len(entrants)]}, "drives": drives, **told, "files": files}
-        )
+        print_json({"runs": {run.label: run.facts for run in runs[: len(entrants)]}, **told, "files": files})
     else:
         _print(runs, len(cases), told, files)
     _warn_of_few(len(logs))
