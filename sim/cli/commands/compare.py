@@ -112,7 +112,7 @@ def compare(
     entrants = entrants_of(planner, settings)
     rest = {"margin": margin, "cell": cell, "smoothing": smoothing, "noise": noise}
     tasks = {world: chosen_task(world, task, start, goal) for world in worlds}
-    scenarios = _scenarios(tasks, entrants, robot, seed, rest)
+    scenarios = _scenarios(worlds, tasks, entrants, robot, seed, rest)
     cases = [(world, number) for world in worlds for number in range(seed, seed + seeds)]
     default, mark = _default_folder(scenarios, cases)
     folder = out or default
@@ -123,11 +123,10 @@ def compare(
         files = {run.label: run.facts["folder"] for run in runs} if len(cases) == 1 else {"folder": str(folder)}
         files |= _views(logs, folder, video, speed, figures)
         told = {"differences": differences(runs), "same": same_drives(runs, smoothing)}
-        drives = [{"label": run.label, **run.facts} for run in runs]
-        write_marker(folder / MARKER, {**facts, "drives": drives, **told})
+        told["drives"] = [{"label": run.label, **run.facts} for run in runs]
+        write_marker(folder / MARKER, {**facts, **told})
     if json:
-        first = {run.label: run.facts for run in runs[: len(entrants)]}
-        print_json({"runs": first, "drives": drives, **told, "files": files})
+        print_json({"runs": {run.label: run.facts for run in runs[: len(entrants)]}, **told, "files": files})
     else:
         _print(runs, len(cases), told, files)
     _warn_of_few(len(logs))
@@ -150,12 +149,17 @@ def _warn_of_few(drives: int) -> None:
 
 
 def _scenarios(
-    worlds: "Mapping[str, str | Task]", entrants: Sequence[Entrant], robot: str, seed: int, rest: dict[str, Any]
+    worlds: Sequence[str],
+    tasks: "Mapping[str, str | Task]",
+    entrants: Sequence[Entrant],
+    robot: str,
+    seed: int,
+    rest: dict[str, Any],
 ) -> "dict[tuple[str, Entrant], Scenario]":
     """The scenario of every world, as given, and planner, with the first seed."""
     scenarios = {
-        (world, entrant): make_scenario(task, entrant.name, list(entrant.settings), robot, seed=seed, **rest)
-        for world, task in worlds.items()
+        (world, entrant): make_scenario(tasks[world], entrant.name, list(entrant.settings), robot, seed=seed, **rest)
+        for world in worlds
         for entrant in entrants
     }
     if len({scenario.task.world.name for scenario in scenarios.values()}) < len(worlds):
