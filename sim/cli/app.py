@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from antdrive.sim.cli.commands.accept import accept
+from antdrive.sim.cli.commands.barn import barn
 from antdrive.sim.cli.commands.check import check
 from antdrive.sim.cli.commands.compare import compare
 from antdrive.sim.cli.commands.falsify import falsify
@@ -45,6 +46,7 @@ COMMANDS: Mapping[str, Callable[..., int]] = MappingProxyType(
         "plan": plan,
         "compare": compare,
         "sweep": sweep,
+        "barn": barn,
         "render": render,
         "report": report,
         "verify": verify,
