@@ -84,6 +84,11 @@ class SettingsEntry(BaseModel):
     unseen: list[DiscEntry] = Field(
         [], description="cylinders {x, y, radius} that neither planner nor controller knows of"
     )
+    map: str = Field(
+        "given", description="what the robot knows of the world: given, or none but for what its lidar sees"
+    )
+    localisation: str = Field("fixes", description="how the robot knows its pose: fixes, odometry or true")
+    odometry: float = Field(1.0, ge=0, description="the factor on the errors of odometry")
     sees: str = Field("velocities", description="what the robot perceives of movers: KIND or KIND:METRES")
     avoid: Switch = Field(
         True,
@@ -118,7 +123,7 @@ def setting_words(entry: SettingsEntry) -> list[str]:
     words = [
         word for key, value in entry.controller.items() for word in ("--set", f"controller.{key}={option_text(value)}")
     ]
-    for key in ("cell", "time_limit", "sees"):
+    for key in ("cell", "time_limit", "sees", "map", "localisation", "odometry"):
         if key in entry.model_fields_set and getattr(entry, key) is not None:
             words += [f"--{key.replace('_', '-')}", option_text(getattr(entry, key))]
     words += [word for disc in entry.unseen for word in ("--unseen", f"{disc.x},{disc.y},{disc.radius}")]

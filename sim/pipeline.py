@@ -24,10 +24,12 @@ from antdrive.planners import (
     checked,
     smooth,
 )
-from antdrive.robots import LIMITERS, NoiseModel, TrackedPath
+from antdrive.robots import LIMITERS, TrackedPath
 from antdrive.sim.driving.cellwise import monitor_class
 from antdrive.sim.driving.drive import drive
+from antdrive.sim.driving.driver import EXPLORING_LIMITERS
 from antdrive.sim.driving.leaving import cannot_leave, is_narrow
+from antdrive.sim.driving.localising import noise_model_of
 from antdrive.sim.driving.perception import Predictor
 from antdrive.sim.driving.recorder import Drive
 from antdrive.sim.driving.replanning import OBSTRUCTED, Replan, ReplanMonitor
@@ -51,6 +53,7 @@ from antdrive.sim.log.streams import random_stream
 from antdrive.sim.physics.engine import Engine
 from antdrive.sim.reasons import no_path_reason
 from antdrive.sim.scenario import Scenario
+from antdrive.sim.unknown import caution_of, exploration_of
 from antdrive.worlds import Cruising, Disc, Grid, Route, Task, World, rasterise
 from antdrive.worlds.drawing import LINE, card, world_svg
 from antdrive.worlds.errors import FieldError
@@ -170,6 +173,8 @@ def plan(s: Scenario) -> tuple[Grid, PlanResult]:
     Raises:
         PlannerError: the planner raised something, or returned something that is no `PlanResult`.
     """
+    if s.exploring:
+        return exploration_of(s).plan(s.task.start)
     grid = _grid(by_geometry(s.task.world), s.cell or s.task.cell, s.inflate)
     query = _query(s, grid)
     answer = checked(query, ask(s.planner, query, s.rng("planner"), s.planner_label))
@@ -243,22 +248,20 @@ def run(
         PlannerError: the planner raised something, or returned something that is no `PlanResult`.
     """
     grid, answer = planned or plan(s)
-    if planned and answer.status is not PlanStatus.INVALID:
+    if planned and answer.status is not PlanStatus.INVALID and not s.exploring:
         answer = _drivable(s, grid, checked(_query(s, grid), answer))
     if not answer.solved:
         return Run(s, grid, answer)
-    route, tracked = _tracked(s, grid, answer)
+    exploration = exploration_of(s) if s.exploring else None
+    route, tracked = exploration.route(s.task.start, grid, answer) if exploration else _tracked(s, grid, answer)
     limit = s.time_limit or s.task.time_limit or 30.0 + 10.0 * route.length / s.robot.max_speed
     _load_replanning(s)
     started = time.perf_counter()
-    noise = s.robot.noise.scaled(s.noise)
-    noise_model = (
-        NoiseModel(noise, s.robot.track, 1 / s.control_hz, s.task.start, s.rng("noise")) if noise.nonzero else None
-    )
+    noise_model = noise_model_of(s.localisation, s.robot, s.noise, s.odometry, 1 / s.control_hz, s.task.start, s.seed)
     trajectories = s.trajectories
     predictor = Predictor(trajectories, s.effective_perception, s.control_hz) if trajectories else None
-    monitor = _monitor(s, grid, predictor)
-    if monitor:
+    monitor = exploration or _monitor(s, grid, predictor)
+    if isinstance(monitor, ReplanMonitor):
         monitor.track(answer, route)
     with Engine(s.driven_world, s.robot, physics_hz=s.physics_hz, trajectories=trajectories) as engine:
         log = drive(
@@ -272,9 +275,13 @@ def run(
             avoidance=s.effective_avoidance,
             predictor=predictor,
             monitor=monitor,
+            caution=caution_of(s, exploration) if exploration else None,
             progress=progress,
         )
-    rollout = _record(s, grid, answer, route, log, monitor.log if monitor else [], limit, time.perf_counter() - started)
+    wall = time.perf_counter() - started
+    rollout = _record(s, grid, answer, route, log, monitor.log if monitor else [], limit, wall)
+    if exploration:
+        rollout = dataclasses.replace(rollout, **exploration.logged(s.physics_hz // s.control_hz, len(log.t)))
     return Run(s, grid, answer, rollout, certify(rollout))
 
 
@@ -337,6 +344,7 @@ def _record(
 ) -> Rollout:
     """The rollout of a drive: its arrays, and the record of what it came from."""
     perception, avoidance, among_movers = s.effective_perception, s.effective_avoidance, bool(s.driven_world.movers)
+    replans_there = among_movers or s.exploring
     record = DriveRecord(
         task=s.task,
         unseen=s.unseen,
@@ -350,12 +358,13 @@ def _record(
         if among_movers
         else None,
         avoidance=settings_of(avoidance) if among_movers and avoidance else None,
-        replanning=settings_of(s.replanning) if among_movers and s.replanning else None,
+        replanning=settings_of(s.replanning) if replans_there and s.replanning else None,
         replans=tuple(_replan_record(replan) for replan in replans),
-        limiters=LIMITERS,
+        limiters=EXPLORING_LIMITERS if s.exploring else LIMITERS,
         noise=s.noise,
         margin=s.margin,
         margin_choice=_margin_record(s),
+        sensing=s.sensing,
         inflate=s.inflate,
         cell=grid.cell,
         physics_hz=s.physics_hz,
@@ -380,12 +389,14 @@ def _record(
         estimate=log.estimate,
         actuated=log.actuated,
         route=route.xy,
-        cells=answer.cells,
+        cells=answer.cells if not s.exploring else answer.cells[:0],  # they lie on the grid of what was seen
         record=record,
     )
 
 
 def _plan_record(s: Scenario, grid: Grid, answer: PlanResult) -> PlanRecord:
+    if s.exploring:  # the shortest ways are those of the world as it is
+        grid = _grid(by_geometry(s.task.world), grid.cell, s.inflate)
     grid_optimum, euclidean_optimum = _optima(_by_contents(grid, s.task))
     return PlanRecord(
         cost_m=finite_or_none(answer.cost),

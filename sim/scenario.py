@@ -12,12 +12,13 @@ import numpy as np
 
 from antdrive.planners import SMOOTHINGS, Planner, capabilities_of, load_planner, record_name
 from antdrive.robots import Avoidance, PurePursuit, RobotSpec, load_robot, overlap_at
+from antdrive.robots.odometry import Odometry
 from antdrive.sim.calibration.choice import choose_margin
 from antdrive.sim.calibration.prediction import Calibration
 from antdrive.sim.calibration.trial import Conditions
 from antdrive.sim.driving.perception import Perception
 from antdrive.sim.driving.replanning import ReplanPolicy
-from antdrive.sim.log.record import settings_of
+from antdrive.sim.log.record import LOCALISATIONS, MAPS, SensingRecord, settings_of
 from antdrive.sim.log.streams import random_stream
 from antdrive.worlds import Disc, Task, Trajectories, World, load_task
 from antdrive.worlds.drawing import card, world_svg
@@ -48,6 +49,10 @@ class Scenario:
         avoidance: how the robot avoids movers; None: not at all
         replanning: when the robot looks for a new route in a world with movers; None: never
         unseen: obstacles that neither the planner nor the controller knows of
+        map: `given`: planner and controller know the world; `none`: the robot knows only what its lidar has seen
+        localisation: how the robot knows its pose: `fixes` with the noise of its file, `odometry` without any fix,
+            `matching`: odometry that is corrected by laying scans on the map that the robot makes, or `true`, without error
+        odometry: the factor on the errors of odometry, see `antdrive.robots.odometry`
         time_limit: simulated time after which the drive ends [s]; None: the task's own, or 30 s plus ten times the
             route at full speed
         physics_hz: physics steps per simulated second, 60 to 10000
@@ -72,6 +77,9 @@ class Scenario:
     avoidance: Avoidance | None = field(default_factory=Avoidance)
     replanning: ReplanPolicy | None = field(default_factory=ReplanPolicy)
     unseen: tuple[Disc, ...] = ()
+    map: str = "given"
+    localisation: str = "fixes"
+    odometry: float = 1.0
     time_limit: float | None = None
     physics_hz: int = 240
     control_hz: int = 60
@@ -87,6 +95,7 @@ class Scenario:
             self.robot.noise.scaled(self.noise)
         except ValueError as error:
             raise FieldError("noise", f"{self.noise:g} times the robot's own is too much: {error}") from None
+        self._check_sensing()
         if self.time_limit is not None and not self.time_limit > 0:
             raise FieldError("time_limit", f"must be greater than 0, got {self.time_limit:g}")
         self._check_rates()
@@ -94,6 +103,31 @@ class Scenario:
         if overlap:
             x, y, _ = self.task.start
             raise FieldError("start", f"{self.robot.name} at ({x:g}, {y:g}) {overlap}; move the start away from it")
+
+    def _check_sensing(self) -> None:
+        """Refuse unknown kinds of maps and localisation, and a robot without a map that has no lidar."""
+        for key, known in (("map", MAPS), ("localisation", LOCALISATIONS)):
+            if getattr(self, key) not in known:
+                raise FieldError(key, f"unknown {getattr(self, key)!r:.60}; choose from {', '.join(known)}")
+        if not self.odometry >= 0:
+            raise FieldError("odometry", f"must be at least 0, got {self.odometry:g}")
+        try:
+            Odometry().scaled(self.odometry)
+        except FieldError as error:
+            raise FieldError(
+                "odometry", f"{self.odometry:g} times the documented errors is too much: {error}"
+            ) from None
+        if self.map == "none" and self.robot.lidar is None:
+            raise FieldError(
+                "map", f"none: {self.robot.name} has no lidar; add one to its file, or drive jackal or turtlebot"
+            )
+        if self.map == "given" and self.localisation == "matching":
+            raise FieldError("localisation", "matching: needs map none; with a given map the robot makes none")
+        can = capabilities_of(self.planner)
+        if self.map == "none" and can.needs_motions:
+            raise FieldError(
+                "map", f"none: {self.planner_label} plans among known motions, and a robot without a map knows none"
+            )
 
     def _check_rates(self) -> None:
         """Refuse rates at which the robot is not simulated as it would drive."""
@@ -132,7 +166,7 @@ class Scenario:
             raise FieldError("unseen", f"must hold Disc objects, got {self.unseen!r:.60}")
         if self.seed < 0:
             raise FieldError("seed", f"must be at least 0, got {self.seed}")
-        for key in ("margin", "noise", "cell", "time_limit"):
+        for key in ("margin", "noise", "odometry", "cell", "time_limit"):
             value = getattr(self, key)
             optional = value is None and key in ("cell", "time_limit")
             if not optional and (not isinstance(value, int | float | np.number) or isinstance(value, bool)):
@@ -156,6 +190,9 @@ class Scenario:
         avoidance: Avoidance | None = AVOIDANCE,
         replanning: ReplanPolicy | None = REPLANNING,
         unseen: tuple[Disc, ...] = (),
+        map: str = "given",
+        localisation: str = "fixes",
+        odometry: float = 1.0,
         time_limit: float | None = None,
         physics_hz: int = 240,
         control_hz: int = 60,
@@ -164,8 +201,9 @@ class Scenario:
 
         >>> Scenario.of("forest", "aco-han", "jackal", options={"ants": 30}, noise=1.0, seed=2)
 
-        The settings margin, cell, smoothing, seed, controller, noise, perception, avoidance, replanning,
-        unseen, time_limit, physics_hz and control_hz are the fields of `Scenario`. "auto": see `with_chosen_margin`.
+        The settings margin, cell, smoothing, seed, controller, noise, perception, avoidance, replanning, unseen,
+        map, localisation, odometry, time_limit, physics_hz and control_hz are the fields of `Scenario`. "auto": see
+        `with_chosen_margin`.
 
         Args:
             world: a world of the catalogue, a world file, or a task
@@ -185,19 +223,11 @@ class Scenario:
             planner_name=record_name(planner) if isinstance(planner, str) else "",
             robot=robot if isinstance(robot, RobotSpec) else load_robot(robot),
             margin=0.0 if margin == "auto" else margin,
-            cell=cell,
-            smoothing=smoothing,
-            seed=seed,
-            controller=controller,
-            noise=noise,
-            perception=perception,
-            avoidance=avoidance,
-            replanning=replanning,
-            unseen=unseen,
-            time_limit=time_limit,
-            physics_hz=physics_hz,
-            control_hz=control_hz,
-        )
+            cell=cell, smoothing=smoothing, seed=seed, controller=controller, noise=noise,
+            perception=perception, avoidance=avoidance, replanning=replanning, unseen=unseen,
+            map=map, localisation=localisation, odometry=odometry,
+            time_limit=time_limit, physics_hz=physics_hz, control_hz=control_hz,
+        )  # fmt: skip
         return scenario.with_chosen_margin() if margin == "auto" else scenario
 
     @property
@@ -248,6 +278,8 @@ class Scenario:
             "replanning": REPLANNING,
         }
         changed: dict[str, Any] = {key: _changed(getattr(self, key), default) for key, default in defaults.items()}
+        if self.sensing is not None:
+            changed |= settings_of(self.sensing)
         if self.unseen:
             changed["unseen"] = [[disc.x, disc.y, disc.radius] for disc in self.unseen]
         return {
@@ -288,6 +320,18 @@ class Scenario:
     def trajectories(self) -> Trajectories:
         """The motions of the world's movers, drawn from the seed."""
         return Trajectories.of(self.driven_world, self.task.start[:2], self.seed)
+
+    @property
+    def exploring(self) -> bool:
+        """Whether the robot has no map."""
+        return self.map == "none"
+
+    @property
+    def sensing(self) -> SensingRecord | None:
+        """What the robot knows of the world and of its pose, for the record; None where that is the map and pose fixes."""
+        if (self.map, self.localisation) == ("given", "fixes"):
+            return None
+        return SensingRecord(map=self.map, localisation=self.localisation, odometry=float(self.odometry))
 
     @property
     def timed(self) -> bool:

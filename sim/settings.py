@@ -20,6 +20,9 @@ from antdrive.worlds.reuse import reused
 Fail: TypeAlias = Callable[[str, str], InputError]
 
 
+SENSING = {"map": "given", "localisation": "fixes", "odometry": 1.0}
+
+
 def scenario_fields(entry: SettingsEntry, fail: Fail) -> dict[str, Any]:
     """The fields of a scenario that an entry's settings stand for, by name.
 
@@ -41,6 +44,8 @@ def scenario_fields(entry: SettingsEntry, fail: Fail) -> dict[str, Any]:
         "time_limit": entry.time_limit,
         "physics_hz": entry.physics_hz,
         "control_hz": entry.control_hz,
+        # The names of a campaign's runs are made of all of this: they are as they were before there were these settings.
+        **{key: getattr(entry, key) for key, usual in SENSING.items() if getattr(entry, key) != usual},
     }
 
 

@@ -31,6 +31,7 @@ SIM_RANKS = {
     "settings": 2,
     "scenario": 2,
     "reasons": 2,
+    "unknown": 2.5,
     "pipeline": 3,
     "view": 4,
     "export": 5,

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from antdrive.robots._kernels_footprint import polygon_distance, polygon_wall_distance
-from antdrive.worlds._kernels import Array, doubled_rows, kernel, segment_clearance, wall_distance
+from antdrive.worlds._kernels import Array, kernel, segment_clearance, wall_distance
 
 
 class ObstacleIndex(NamedTuple):
@@ -33,20 +33,31 @@ def index_discs(discs: Array, bounds: Array, side: float, distance: float) -> tu
     cols = int((bounds[2] - bounds[0]) / side) + 1
     rows = int((bounds[3] - bounds[1]) / side) + 1
     starts = np.zeros(rows * cols + 1, np.int64)
-    found = np.empty((16 + discs.shape[0], 3))
-    count = 0
-    for b in range(rows * cols):
-        x_min, y_min = bounds[0] + (b % cols) * side, bounds[1] + (b // cols) * side
+    found, fill = np.empty((0, 3)), starts
+    for filling in range(2):  # first the discs of each square are counted, then entered where its count says
         for j in range(discs.shape[0]):
-            dx = max(max(x_min - discs[j, 0], discs[j, 0] - x_min - side), 0.0)
-            dy = max(max(y_min - discs[j, 1], discs[j, 1] - y_min - side), 0.0)
-            if math.hypot(dx, dy) - discs[j, 2] <= distance:
-                if count == found.shape[0]:
-                    found = doubled_rows(found)
-                found[count, 0], found[count, 1], found[count, 2] = discs[j, 0], discs[j, 1], discs[j, 2]
-                count += 1
-        starts[b + 1] = count
-    return found[:count].copy(), starts
+            reach = distance + discs[j, 2] + 0.01 * side  # the squares beyond are farther away, whatever the rounding
+            c_low = max(0, int(math.floor((discs[j, 0] - reach - bounds[0]) / side)))
+            c_high = min(cols - 1, int(math.floor((discs[j, 0] + reach - bounds[0]) / side)))
+            r_low = max(0, int(math.floor((discs[j, 1] - reach - bounds[1]) / side)))
+            r_high = min(rows - 1, int(math.floor((discs[j, 1] + reach - bounds[1]) / side)))
+            for r in range(r_low, r_high + 1):
+                for c in range(c_low, c_high + 1):
+                    x_min, y_min = bounds[0] + c * side, bounds[1] + r * side
+                    dx = max(max(x_min - discs[j, 0], discs[j, 0] - x_min - side), 0.0)
+                    dy = max(max(y_min - discs[j, 1], discs[j, 1] - y_min - side), 0.0)
+                    if math.hypot(dx, dy) - discs[j, 2] <= distance:
+                        b = r * cols + c
+                        if filling:
+                            found[fill[b]] = discs[j]
+                            fill[b] += 1
+                        else:
+                            starts[b + 1] += 1
+        if not filling:
+            starts = np.cumsum(starts)
+            fill = starts.copy()
+            found = np.empty((starts[-1], 3))
+    return found, starts
 
 
 @kernel

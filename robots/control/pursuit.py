@@ -83,6 +83,7 @@ class TrackedPath:
         obstacles: the obstacles that the controller knows, by place
         limits: what the robot's drive can do
         tuning: the controller's settings for this robot and route
+        backwards: whether the robot follows it tail first
     """
 
     route: Route
@@ -91,6 +92,7 @@ class TrackedPath:
     obstacles: ObstacleIndex
     limits: MotionLimits
     tuning: PursuitTuning
+    backwards: bool = False
 
     @property
     def length(self) -> float:
@@ -230,6 +232,10 @@ class PurePursuit:
             command: the command of the last period
             state: the state that the last call returned; at first a `PursuitState()`
         """
+        if tracked.backwards:  # a robot with two driven wheels, seen from behind, is one that drives forwards
+            seen = (pose[0], pose[1], pose[2] + math.pi), Twist(-command.speed, command.yaw_rate)
+            ahead, after = self.step(replace(tracked, backwards=False), *seen, state)
+            return Twist(-ahead.speed, ahead.yaw_rate), after
         speed, yaw_rate, arc, turning, limiter = _kernels_pursuit.pursue(
             *pose, *command, state.arc, state.turning,
             tracked.samples, tracked.obstacles, tracked.limits, tracked.tuning,

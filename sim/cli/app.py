@@ -13,6 +13,7 @@ import typer
 import typer.core
 
 from antdrive.sim.cli.commands.accept import accept
+from antdrive.sim.cli.commands.barn import barn
 from antdrive.sim.cli.commands.check import check
 from antdrive.sim.cli.commands.compare import compare
 from antdrive.sim.cli.commands.export import export_drive
@@ -50,6 +51,7 @@ COMMANDS: Mapping[str, Callable[..., int]] = MappingProxyType(
         "plan": plan,
         "compare": compare,
         "sweep": sweep,
+        "barn": barn,
         "render": render,
         "report": report,
         "export": export_drive,

@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from antdrive.robots import Avoidance, NoiseModel, PurePursuit, TrackedPath, Twist
+from antdrive.sim.driving.caution import Caution
 from antdrive.sim.driving.driver import STUCK_TIME, Driver
+from antdrive.sim.driving.exploring import Exploration
+from antdrive.sim.driving.localising import OdometryModel
 from antdrive.sim.driving.perception import Predictor
 from antdrive.sim.driving.recorder import Drive, Ending, Recorder
 from antdrive.sim.driving.replanning import ReplanMonitor
+from antdrive.sim.driving.survey import Survey
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.physics.engine import Engine
 from antdrive.worlds import Task
@@ -29,7 +33,8 @@ def drive(
     noise_model: NoiseModel | None = None,
     avoidance: Avoidance | None = None,
     predictor: Predictor | None = None,
-    monitor: ReplanMonitor | None = None,
+    monitor: ReplanMonitor | Exploration | None = None,
+    caution: Caution | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Drive:
     """Drive along a path until the robot stands at its end, touches something, is stuck, or the time is over.
@@ -45,6 +50,7 @@ def drive(
         avoidance: how the robot avoids the movers that `predictor` predicts; None: it does not
         predictor: predicts the movers; None: the robot does not perceive them
         monitor: finds new routes on the way; None: the robot keeps to its path
+        caution: keeps a robot without a map within its sight; None: the robot has a map
         progress: is called with the fraction of the route that is done, about ten times per simulated second
 
     Raises:
@@ -53,13 +59,14 @@ def drive(
     substeps, rest = divmod(engine.physics_hz, control_hz)
     if rest or substeps < 1:
         raise FieldError("control_hz", f"must divide the physics rate {engine.physics_hz}, got {control_hz}")
-    driver = Driver(controller, tracked, task, engine.robot, control_hz, avoidance, predictor, monitor)
+    driver = Driver(controller, tracked, task, engine.robot, control_hz, avoidance, predictor, monitor, caution)
+    survey = monitor.survey if isinstance(monitor, Exploration) else None
     log = Recorder(engine, task.start, noisy=noise_model is not None)
     ending = Ending(Outcome.COLLIDED) if log.touched else None
     for tick in range(round(time_limit * control_hz)):
         if ending:
             break
-        ending = _control_period(tick, engine, driver, log, noise_model, substeps)
+        ending = _control_period(tick, engine, driver, log, noise_model, survey, substeps)
         if progress is not None and tick % (control_hz // PROGRESS_HZ or 1) == 0:
             progress(driver.fraction)
     if log.touched:
@@ -69,13 +76,26 @@ def drive(
 
 
 def _control_period(
-    tick: int, engine: Engine, driver: Driver, log: Recorder, noise_model: NoiseModel | None, substeps: int
+    tick: int,
+    engine: Engine,
+    driver: Driver,
+    log: Recorder,
+    noise_model: NoiseModel | None,
+    survey: Survey | None,
+    substeps: int,
 ) -> Ending | None:
     """Sense, decide, act and log for one control period; how the drive ends in it, if it does."""
     pose = log.state.pose
     if noise_model:
-        log.note_estimate(noise_model.estimate_pose(pose, Twist(log.state.speed, log.state.yaw_rate)))
+        estimate = noise_model.estimate_pose(pose, Twist(log.state.speed, log.state.yaw_rate))
+        if survey:
+            estimate = survey.look(tick, pose, estimate)
+            if isinstance(noise_model, OdometryModel):
+                noise_model.correct(estimate)
+        log.note_estimate(estimate)
         pose = noise_model.pose_after_delay()
+    elif survey:
+        survey.look(tick, pose, pose)
     ending = driver.decide(tick, pose, log.state)
     if ending:
         return ending

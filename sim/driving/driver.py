@@ -15,6 +15,8 @@ from antdrive.robots import (
     TrackedPath,
     Twist,
 )
+from antdrive.sim.driving.caution import Caution
+from antdrive.sim.driving.exploring import Exploration
 from antdrive.sim.driving.perception import Predictor
 from antdrive.sim.driving.recorder import Ending
 from antdrive.sim.driving.replanning import MISSED, ReplanMonitor
@@ -29,6 +31,8 @@ STUCK_TIME = 8.0  # a robot without progress for this long is stuck [s]
 STUCK_PROGRESS = 0.02  # what counts as progress along the route [m]
 GOAL_SHARE = 0.95  # a robot that avoids a mover may stop early within this fraction of the goal's tolerance
 AVOIDING = LIMITERS.index("avoid")
+EXPLORING_LIMITERS = (*LIMITERS, "sight")  # the rules where the robot has no map
+OUT_OF_SIGHT = EXPLORING_LIMITERS.index("sight")
 
 
 class StuckClock(NamedTuple):
@@ -73,11 +77,13 @@ class Driver:
         control_hz: int,
         avoidance: Avoidance | None,
         predictor: Predictor | None,
-        monitor: ReplanMonitor | None,
+        monitor: ReplanMonitor | Exploration | None,
+        caution: Caution | None = None,
     ) -> None:
         self.tracked, self.command, self.pursuit = tracked, Twist(0.0, 0.0), PursuitState()
         self._controller, self._task, self._robot, self._hz = controller, task, robot, control_hz
         self._avoidance, self._predictor, self._monitor = avoidance, predictor, monitor
+        self._caution = caution
         self._avoidance_state = AvoidanceState()
         self._clock = StuckClock()
         self._patience = round(STUCK_TIME * control_hz)
@@ -111,14 +117,19 @@ class Driver:
                 return self._wrong_plan(tick)
             if self._monitor.blockage.reason:
                 return Ending(Outcome.BLOCKED, self._monitor.blockage.reason)
+        if isinstance(self._monitor, Exploration):
+            self.tracked = self._monitor.refreshed(self.tracked, pose)
         last, before = self.command, self.pursuit
         self.command, self.pursuit = self._pursue(pose, last, before)
+        if isinstance(self._monitor, Exploration) and self._monitor.lost:
+            self.command = _brake(last, self._robot, self._hz)
         speed_limit = self._keep_to_schedule(tick, last)
         if self._avoidance is not None and self._predictor is not None:
             stopping = before.limiter == AVOIDING and self._stops_at_goal(pose, last)
             if stopping and _standing(state):
                 return self._arrival(state)
             self._avoid_movers(tick, pose, last, before, speed_limit, stopping)
+        self._keep_within_sight(pose, last)
         ending = self._end_of_route(tick, pose, state)
         waiting = self.pursuit.limiter == AVOIDING or speed_limit < WAITING_SPEED
         self._clock = self._clock.after(self.pursuit, waiting)
@@ -149,6 +160,14 @@ class Driver:
         self.tracked, self.pursuit = tracked, PursuitState(limiter=self.pursuit.limiter)
         self._clock = self._clock._replace(farthest=0.0)
         return True
+
+    def _keep_within_sight(self, pose: Pose, last: Twist) -> None:
+        """Slow down where the robot could not stop on ground that it has seen."""
+        if self._caution is None:
+            return
+        self.command, slowed = self._caution.limit(pose, last, self.command)
+        if slowed:
+            self.pursuit = self.pursuit._replace(limiter=OUT_OF_SIGHT)
 
     def _keep_to_schedule(self, tick: int, last: Twist) -> float:
         """Slow the command down to the schedule, if there is one. Returns the speed that it allows [m/s]."""

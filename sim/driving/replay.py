@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from antdrive.robots import NoiseModel, Twist
+from antdrive.robots import Twist
+from antdrive.sim.driving.localising import noise_model_of
 from antdrive.sim.driving.recorder import Ending, Recorder
 from antdrive.sim.log.rollout import Rollout
-from antdrive.sim.log.streams import random_stream
 from antdrive.sim.physics.engine import Engine
 from antdrive.worlds.errors import FieldError
 from antdrive.worlds.plane import wrap_angle
@@ -99,12 +99,13 @@ def replay(rollout: Rollout) -> ReplayCheck:
 
 def _other_noise(rollout: Rollout) -> Iterator[str]:
     """What of a noisy log is not as the seed's noise makes it."""
-    record, start = rollout.record, rollout.record.task.start
-    noise = record.robot.noise.scaled(record.noise)
-    if not noise.nonzero or len(rollout.actuated) != len(rollout.t):
+    record = rollout.record
+    odometry = 1.0 if record.sensing is None else record.sensing.odometry
+    model = noise_model_of(
+        record.localisation, record.robot, record.noise, odometry, 1 / record.control_hz, record.task.start, record.seed
+    )
+    if model is None or len(rollout.actuated) != len(rollout.t):
         return
-    rng = random_stream(record.seed, "noise")
-    model = NoiseModel(noise, record.robot.track, 1 / record.control_hz, start, rng)
     found: list[tuple[float, ...]] = []
     # A period's first row is the last of the period before; a contact ends the control of the robot.
     touched = int(rollout.contacts[0, 0]) if len(rollout.contacts) else len(rollout.t)
@@ -119,6 +120,8 @@ def _other_noise(rollout: Rollout) -> Iterator[str]:
     drawn = np.array(found)
     off = drawn[:, :3] - rollout.estimate[rows]
     off[:, 2] = wrap_angle(off[:, 2])
+    if record.localisation == "matching":  # its estimates follow from scans, too
+        off[:] = 0.0
     for name, error in (("estimate", off), ("actuated", drawn[:, 3:] - rollout.actuated[np.array(rows) + 1])):
         wrong = (np.abs(error) > SAME_NOISE).any(axis=1)
         if wrong.any():

@@ -50,7 +50,7 @@ def scans(rollout: Rollout) -> list[Topic]:
     lidar: Any = getattr(rollout.record.robot, "lidar", None)
     if found is None or lidar is None or not len(found):
         return []
-    rows = np.asarray(rollout.scan_rows)  # type: ignore[attr-defined]
+    rows = np.asarray(rollout.scan_rows)
     ranges = np.where(found == 0, np.inf, np.where(found == TOO_NEAR, -np.inf, found * 1e-3))
     whole = lidar.field_of_view >= 2 * math.pi - 1e-6
     step = lidar.field_of_view / max(1, lidar.beams - (0 if whole else 1))

@@ -214,6 +214,8 @@ def _among_movers(scenario: Scenario) -> dict[str, Any]:
         ("replan", scenario.replanning, ReplanPolicy()),
     ):
         plain[key] = "none" if settings is None else _changed(settings, usual) or True
+    if scenario.sensing is not None:
+        plain |= dataclasses.asdict(scenario.sensing)
     return {key: value for key, value in plain.items() if value is not True}
 
 

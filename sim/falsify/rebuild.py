@@ -42,6 +42,10 @@ def rebuilt(record: DriveRecord, planner: Planner | None = None) -> Scenario:
             among_movers["perception"] = Perception(kind=perception.kind, range=distance)  # type: ignore[arg-type]
             among_movers["avoidance"] = _settings(Avoidance, record.avoidance, "avoidance")
             among_movers["replanning"] = _settings(ReplanPolicy, record.replanning, "replanning")
+        sensing: dict[str, Any] = {}
+        if record.sensing is not None:
+            sensing = dataclasses.asdict(record.sensing)
+            among_movers["replanning"] = _settings(ReplanPolicy, record.replanning, "replanning")
         controller = _settings(PurePursuit, record.controller.settings, "controller.settings")
         assert controller is not None
         return Scenario(
@@ -60,6 +64,7 @@ def rebuilt(record: DriveRecord, planner: Planner | None = None) -> Scenario:
             physics_hz=record.physics_hz,
             control_hz=record.control_hz,
             **among_movers,
+            **sensing,
         )
     except FieldError as error:
         raise InputError(str(error.under("record"))) from None

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from antdrive.robots.odometry import SAMPLE_RATE, Odometry
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.planned import contradictions
 from antdrive.sim.log.rollout import Rollout
@@ -122,10 +123,10 @@ def _check_actuated(rollout: Rollout, end: int) -> Iterator[str]:
     noise = robot.noise.scaled(record.noise)
     rows = len(rollout.t)
     for name in ("estimate", "actuated"):
-        if (len(getattr(rollout, name)) == rows) != noise.nonzero:
+        if (len(getattr(rollout, name)) == rows) != (noise.nonzero or record.localisation in ("odometry", "matching")):
             yield f"{name}: must have {rows if noise.nonzero else 0} rows at a noise of {record.noise:g}"
             return
-    if not noise.nonzero:
+    if not len(rollout.actuated):
         return
     period = max(1, record.physics_hz // record.control_hz)
     late = round(noise.delay * record.control_hz) * period
@@ -178,6 +179,9 @@ def _check_estimate(rollout: Rollout) -> Iterator[str]:
     """The estimated pose must be as near to the true one as pose fixes and odometry keep it."""
     if not len(rollout.estimate):
         return
+    if rollout.record.localisation != "fixes":
+        yield from _check_unfixed_estimate(rollout)
+        return
     robot = rollout.record.robot
     noise = robot.noise.scaled(rollout.record.noise)
     # Twenty fixes after an error of odometry the filter has corrected it, see MIN_GAIN.
@@ -188,6 +192,30 @@ def _check_estimate(rollout: Rollout) -> Iterator[str]:
     most = SIGMAS * (noise.pose_xy + robot.max_speed * noise.pose_yaw) + odometry + STILL
     if not far <= most or not turned <= SIGMAS * noise.pose_yaw + 2 * odometry / robot.track + STILL:
         yield f"estimate: up to {far:.3g} m and {turned:.3g} rad off the pose, more than the robot's noise allows"
+
+
+def _check_unfixed_estimate(rollout: Rollout) -> Iterator[str]:
+    """Without pose fixes the estimate must be the pose, or drift from it no faster than the documented odometry."""
+    record = rollout.record
+    off = rollout.estimate - rollout.pose
+    apart, turned = np.hypot(off[:, 0], off[:, 1]), np.abs(wrap_angle(off[:, 2]))
+    if record.localisation == "true":
+        # A row between two control periods keeps the error of the one before, which is none.
+        if apart.max() > EXACT or turned.max() > EXACT:
+            yield "estimate: must be the pose where the robot is localised without error"
+        return
+    assert record.sensing is not None
+    errors, noise = Odometry().scaled(record.sensing.odometry), record.robot.noise.scaled(record.noise)
+    way = np.cumsum(np.abs(rollout.twist[:, 0])) / record.physics_hz
+    turn = np.cumsum(np.abs(rollout.twist[:, 1])) / record.physics_hz
+    samples = SAMPLE_RATE * rollout.t
+    steady = errors.gyro_bias * rollout.t + errors.yaw_scale * turn
+    heading = SIGMAS * (steady + errors.gyro_noise * np.sqrt(samples) / SAMPLE_RATE)
+    scale = errors.speed_scale + errors.speed_noise + noise.slip + noise.encoder
+    far = SIGMAS * scale * way + 2 * np.minimum(heading, np.pi) * way
+    wrong = (turned > heading + STILL) | (apart > far + STILL)
+    if wrong.any():
+        yield f"estimate: farther off the pose than odometry drifts, from t = {rollout.t[int(wrong.argmax())]:.3f} s"
 
 
 def _check_end(rollout: Rollout) -> Iterator[str]:

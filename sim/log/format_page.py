@@ -48,7 +48,7 @@ def _arrays() -> Iterable[tuple[str, ...]]:
     contents = attributes_of(Rollout)
     for field in dataclasses.fields(Rollout):
         dtype = re.search(r"np\.(\w+)\]$", str(field.type))
-        shape = re.search(r"\((T|N|K|P)[\w, ]*\)", contents[field.name])
+        shape = re.search(r"\((T|N|K|P|S)[\w, ]*\)", contents[field.name])
         if dtype and shape:
             yield f"`{field.name}`", shape[0], dtype[1], contents[field.name]
 

@@ -42,6 +42,10 @@ MAX_MARGIN = 1000.0
 
 MARGIN_ROUNDING = 1e-9  # [m]
 
+#: What a robot may know of the world before it drives, and how it may know its pose.
+MAPS = ("given", "none")
+LOCALISATIONS = ("fixes", "odometry", "matching", "true")
+
 #: The trigger of a replan by a planner that decides anew at every cell.
 DECISION = "decision"
 
@@ -144,6 +148,27 @@ class ReplanRecord:
 
 
 @dataclass(frozen=True, kw_only=True)
+class SensingRecord:
+    """What the robot knew of the world and of its own pose.
+
+    Attributes:
+        map: given, or none: then it knew what its lidar had seen
+        localisation: fixes, odometry, matching or true
+        odometry: the factor on the errors of odometry
+    """
+
+    map: str
+    localisation: str
+    odometry: float
+
+    def __post_init__(self) -> None:
+        for key, known in (("map", MAPS), ("localisation", LOCALISATIONS)):
+            if getattr(self, key) not in known:
+                raise FieldError(key, f"must be one of {', '.join(known)}, got {getattr(self, key)!r:.40}")
+        _at_least(self, 0.0, "odometry")
+
+
+@dataclass(frozen=True, kw_only=True)
 class MarginRecord:
     """How `--margin auto` chose the margin.
 
@@ -219,6 +244,7 @@ class DriveRecord:
         outcome: how the drive ended, such as succeeded, collided or timed_out
         reason: details of the outcome, in words; may be empty
         versions: versions of antdrive, Python and the packages that computed the drive
+        sensing: what the robot knew of the world and of its pose; the key is left out where that is the map and pose fixes
         times: wall-clock times, not covered by the digest
         digest: the SHA-256 over arrays and record, see `Rollout.digest`; null until the log is saved
 
@@ -254,6 +280,7 @@ class DriveRecord:
     versions: Mapping[str, str]
     times: TimesRecord
     margin_choice: MarginRecord | None = None
+    sensing: SensingRecord | None = None
     digest: str | None = None
 
     def __post_init__(self) -> None:
@@ -287,11 +314,22 @@ class DriveRecord:
         world = self.task.world
         return dataclasses.replace(world, obstacles=world.obstacles + self.unseen) if self.unseen else world
 
+    @property
+    def exploring(self) -> bool:
+        """Whether the robot had no map."""
+        return self.sensing is not None and self.sensing.map == "none"
+
+    @property
+    def localisation(self) -> str:
+        """How the robot knew its pose: fixes, odometry, matching or true."""
+        return "fixes" if self.sensing is None else self.sensing.localisation
+
     def as_dict(self) -> dict[str, Any]:
         """The record as plain values, for JSON."""
         values = {field.name: plain_value(getattr(self, field.name)) for field in dataclasses.fields(self)}
-        if self.margin_choice is None:  # logs without it are as they were before margins could be chosen
-            del values["margin_choice"]
+        for key in ("margin_choice", "sensing"):  # logs without them are as they were before there were such things
+            if values[key] is None:
+                del values[key]
         return values
 
     def to_json(self, *, without: Sequence[str] = ()) -> str:
@@ -428,6 +466,7 @@ _NESTED: Mapping[str, type[Any]] = {
     "perception": PerceptionRecord,
     "replans": ReplanRecord,
     "margin_choice": MarginRecord,
+    "sensing": SensingRecord,
     "times": TimesRecord,
 }
 

@@ -29,7 +29,13 @@ MAX_ROWS = 20_000_000  # a day at 240 Hz
 MAX_VALUE = 1e12  # of any number in the arrays; sums and squares of greater ones lose all meaning
 MAX_RECORD = 32_000_000  # characters of the record; a world of 20,000 cylinders takes 2 million
 #: The dtypes of the arrays that do not hold float64.
-DTYPES = {"limiter": np.dtype("u1"), "cells": np.dtype("<i4")}
+DTYPES = {
+    "limiter": np.dtype("u1"),
+    "cells": np.dtype("<i4"),
+    "scans": np.dtype("<u2"),
+    "scan_rows": np.dtype("<i4"),
+    "seen": np.dtype("<f4"),
+}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -51,6 +57,11 @@ class Rollout:
         estimate: the estimated pose (T, 3) of a noisy robot, x, y [m] and yaw [rad]; (0, 3) for a perfect robot
         actuated: forward speed [m/s] and yaw rate [rad/s] that the motors of a noisy robot were set to (T, 2), after
             delay and slip; (0, 2) for a perfect robot, whose motors are set to `command`
+        scans: the lidar's ranges of a robot without a map (S, beams) [mm]; 0 where nothing was in range, 1 where something
+            was too near to measure. This array and the next two are left out of files and of the digest where they are empty
+        scan_rows: the row of each scan (S,)
+        seen: what plans on the way were made around, as discs (K, 4): the row of the plan, x, y and radius [m], in the frame of
+            the estimated poses
         record: everything else: scenario, plan and outcome
     """
 
@@ -66,6 +77,9 @@ class Rollout:
     cells: npt.NDArray[np.int32]
     estimate: npt.NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))
     actuated: npt.NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+    scans: npt.NDArray[np.uint16] = field(default_factory=lambda: np.empty((0, 0), dtype=np.uint16))
+    scan_rows: npt.NDArray[np.int32] = field(default_factory=lambda: np.empty(0, dtype=np.int32))
+    seen: npt.NDArray[np.float32] = field(default_factory=lambda: np.empty((0, 4), dtype=np.float32))
     record: DriveRecord
 
     @property
@@ -96,12 +110,17 @@ class Rollout:
     def _hash(self, record: str) -> str:
         """The SHA-256 of every array and of a JSON text."""
         sha = hashlib.sha256()
-        for name in ARRAYS:
+        for name in self._written:
             array = np.ascontiguousarray(getattr(self, name))
             sha.update(f"{name} {array.dtype.str} {array.shape}\n".encode())
             sha.update(array.tobytes())
         sha.update(record.encode())
         return sha.hexdigest()
+
+    @property
+    def _written(self) -> tuple[str, ...]:
+        """The arrays that files and digests hold."""
+        return ARRAYS + tuple(name for name in SENSED if np.size(getattr(self, name)))
 
     def legs(self) -> list[tuple[slice, npt.NDArray[np.float64]]]:
         """The routes (N, 2) [m] that were followed, each with its rows: the first route, then one for each replan."""
@@ -134,7 +153,7 @@ class Rollout:
         text = dataclasses.replace(self.record, digest=self.digest).to_json()
         DriveRecord.from_json(text)  # a log that could not be read again is not written
         with written_whole(target) as temporary, temporary.open("wb") as file:
-            np.savez_compressed(file, record=np.array(text), **{name: getattr(self, name) for name in ARRAYS})
+            np.savez_compressed(file, record=np.array(text), **{name: getattr(self, name) for name in self._written})
         return target
 
     @classmethod
@@ -146,7 +165,8 @@ class Rollout:
                 a key of the record is missing or impossible.
         """
         with guarded_log(path) as archive:
-            arrays = {name: read_array(archive, name) for name in ARRAYS}
+            there = [name for name in SENSED if f"{name}.npy" in archive.namelist()]
+            arrays = {name: read_array(archive, name) for name in (*ARRAYS, *there)}
             loaded = cls(**arrays, record=_record_in(archive))
             for problem in loaded.problems():
                 raise ValueError(problem)
@@ -173,6 +193,7 @@ class Rollout:
                 yield f"{name}: must hold finite numbers, found others"
             elif array.size and float(np.abs(array.astype(np.float64)).max()) > MAX_VALUE:
                 yield f"{name}: must hold numbers within {MAX_VALUE:g}, found others"
+        yield from self._scan_problems(rows)
         if _fits(self.contacts.shape, (None, 4)) and self.contacts.dtype.kind == "f" and len(self.contacts):
             steps = self.contacts[:, 0]
             if not (steps.min() >= 0 and steps.max() < rows):
@@ -190,6 +211,17 @@ class Rollout:
         names = len(self.record.limiters)
         if self.limiter.dtype.kind in "iu" and np.size(self.limiter) and not 0 <= self.limiter.max() < max(1, names):
             yield f"limiter: must hold indices into the {names} of record.limiters, found {self.limiter.max()}"
+
+    def _scan_problems(self, rows: int) -> Iterator[str]:
+        """Scans of another number of beams than the robot has, or at no row of the log."""
+        lidar, at = self.record.robot.lidar, self.scan_rows
+        if len(self.scans) and (lidar is None or self.scans.shape[1:] != (lidar.beams,)):
+            yield f"scans: must have the {lidar.beams if lidar else 0} beams of the robot's lidar, found {self.scans.shape}"
+        if len(self.scans) != np.size(at):
+            yield f"scan_rows: must be {len(self.scans)}, one for each scan, found {np.size(at)}"
+        for name, places in (("scan_rows", at), ("seen", self.seen[:, 0] if self.seen.ndim == 2 else at)):
+            if np.size(places) and not (places.min() >= 0 and places.max() < rows and (np.diff(places) >= 0).all()):
+                yield f"{name}: must be at rows from 0 to {rows - 1}, in order"
 
     def _work_problems(self, rows: int) -> Iterator[str]:
         """Too many distances to compute when the log is checked, or too many steps of wanderers, drawn one by one."""
@@ -224,8 +256,10 @@ class Rollout:
         return card(picture, f"{task.world.name}: {self.outcome.value}", facts)
 
 
-#: The names of a log's arrays, in the order of the digest.
-ARRAYS = tuple(entry.name for entry in dataclasses.fields(Rollout) if entry.name != "record")
+#: The names of the arrays that only logs of robots without a map hold, in the order of the digest, after the others.
+SENSED = ("scans", "scan_rows", "seen")
+#: The names of the arrays of every log, in the order of the digest.
+ARRAYS = tuple(entry.name for entry in dataclasses.fields(Rollout) if entry.name not in ("record", *SENSED))
 
 
 def read_record(path: str | Path) -> DriveRecord:
@@ -265,6 +299,9 @@ def _shapes(rows: int, noisy: set[str]) -> dict[str, tuple[int | None, ...]]:
         "cells": (None, 2),
         "estimate": (rows if "estimate" in noisy else 0, 3),
         "actuated": (rows if "actuated" in noisy else 0, 2),
+        "scans": (None, None),
+        "scan_rows": (None,),
+        "seen": (None, 4),
     }
 
 

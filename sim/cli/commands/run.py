@@ -60,6 +60,27 @@ Sees = Annotated[
         "with METRES, only of movers within that range [m].",
     ),
 ]
+Map = Annotated[
+    str,
+    typer.Option(
+        metavar="given|none",
+        help="What the robot knows of the world before it drives: all of it, or nothing but what its lidar sees on the way.",
+    ),
+]
+Localisation = Annotated[
+    str,
+    typer.Option(
+        metavar="KIND",
+        help="How the robot knows its pose: fixes (with the noise of its file), odometry (wheels and gyro, which drift), "
+        "matching (odometry, corrected by laying scans on the map that it makes) or true (without error).",
+    ),
+]
+OdometryFactor = Annotated[
+    float,
+    typer.Option(
+        "--odometry", min=0.0, max=100.0, metavar="FACTOR", help="Multiple of the documented errors of odometry."
+    ),
+]
 Video = Annotated[Path | None, typer.Option(metavar="FILE", help="Film the drive: .mp4, .gif or .webp.")]
 Gui = Annotated[bool, typer.Option("--gui", help="Replay the drive in a window afterwards; needs a screen.")]
 
@@ -82,6 +103,9 @@ def run(
     avoid: Avoid = True,
     replan: Replan = True,
     sees: Sees = "velocities",
+    map: Map = "given",
+    localisation: Localisation = "fixes",
+    odometry: OdometryFactor = 1.0,
     out: options.Out = None,
     video: Video = None,
     prelude: options.Prelude = 0.0,
@@ -94,20 +118,13 @@ def run(
 
     Exit code 0: the robot stopped at the goal, and its log proves that it touched nothing.
     """
+    knows: dict[str, Any] = {"map": map, "localisation": localisation, "odometry": odometry}
+    hidden = tuple(disc(text) for text in unseen or ())
     scenario = make_scenario(
-        chosen_task(world, task, start, goal),
-        planner,
-        settings,
-        robot,
-        seed=seed,
-        margin=margin,
-        cell=cell,
-        smoothing=smoothing,
-        noise=noise,
-        unseen=tuple(disc(text) for text in unseen or ()),
-        time_limit=time_limit,
-        **among_movers(avoid, replan, sees),
-    )
+        chosen_task(world, task, start, goal), planner, settings, robot,
+        seed=seed, margin=margin, cell=cell, smoothing=smoothing, noise=noise, unseen=hidden, time_limit=time_limit,
+        **knows, **among_movers(avoid, replan, sees),
+    )  # fmt: skip
     folder = out or default_folder(scenario)
     _check_views(scenario, video, prelude, gui)
     check_folder(folder)

@@ -6,8 +6,8 @@ import re
 from pathlib import Path
 
 from antdrive.sim.log.format_page import with_tables
-from antdrive.sim.log.record import DriveRecord, MarginRecord, record_keys
-from antdrive.sim.log.rollout import ARRAYS
+from antdrive.sim.log.record import DriveRecord, MarginRecord, SensingRecord, record_keys
+from antdrive.sim.log.rollout import ARRAYS, SENSED
 from tests.sim.records import made_up_record
 
 PAGE = Path(__file__).parents[3] / "docs" / "rollout-format.md"
@@ -21,10 +21,11 @@ def test_the_pages_tables_are_those_of_the_code() -> None:
 def test_the_page_describes_every_array_and_every_key() -> None:
     page = PAGE.read_text(encoding="utf-8")
     choice = MarginRecord(loss_m=0.03, reserve_m=0.01, probability=1e-3, drives=80)
-    record = made_up_record(margin_choice=choice)
+    sensing = SensingRecord(map="none", localisation="odometry", odometry=1.0)
+    record = made_up_record(margin_choice=choice, sensing=sensing)
     written = json.loads(record.to_json())
     assert set(written) == {field.name for field in dataclasses.fields(DriveRecord)}
-    for name in (*ARRAYS, *written, *(f"plan.{key}" for key in written["plan"]), "margin_choice.loss_m"):
+    for name in (*ARRAYS, *SENSED, *written, *(f"plan.{key}" for key in written["plan"]), "margin_choice.loss_m"):
         assert re.search(rf"^\| `{re.escape(name)}` \|", page, re.MULTILINE), name
 
 

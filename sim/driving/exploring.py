@@ -1,0 +1,373 @@
+"""Routes in a world without a map: planned through what the lidar has seen, and anew when it finds something in the way.
+
+What nobody has seen counts as free for a plan (S. Koenig and Y. Smirnov, *Sensor-based planning with the freespace
+assumption*, ICRA 1997), and never for the speed, see `antdrive.sim.driving.caution`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import time
+from typing import Any
+
+import numpy as np
+
+from antdrive.planners import (
+    Planner,
+    PlanResult,
+    PlanStatus,
+    Query,
+    Replanner,
+    answered,
+    ask,
+    blaming,
+    capabilities_of,
+    checked,
+    smooth,
+)
+from antdrive.planners.plan import Cell
+from antdrive.robots import PurePursuit, RobotSpec, TrackedPath
+from antdrive.robots.control._kernels_obstacles import ObstacleIndex
+from antdrive.sim.driving import _kernels_hits
+from antdrive.sim.driving.replanning import STRAYED, Replan, ReplanPolicy
+from antdrive.sim.driving.survey import Survey
+from antdrive.worlds import Bounds, Disc, Floats, Grid, Pose, Route, Task, World, point_clearance, rasterise
+
+DISCOVERED = "discovered"
+STALLED = "stalled"
+BACKED = "backed off"
+LOST = "no way"
+
+GROWTH = (4.0, 16.0)  # how far beyond start and goal plans may lead, then if there is no path [m]
+MARGINS = (1.0, 0.0)  # shares of the margin that plans keep, then if the way is long or there is none
+FAIR = 1.25  # a way that is longer than the straight line by more than this factor is long
+DETOUR = 1.15  # a way with less margin must be shorter by this factor
+CORRIDOR = 1.2  # a route is smoothed among what lies within this distance of the plan, beyond the inflation [m]
+NEAR = 2.4  # the controller knows what lies within this distance of the robot [m]
+INTERVAL = 0.15  # the shortest time between two plans [s]
+PATIENCE = 3  # plans in a row that find no path before the robot no longer believes what it saw long ago
+LOOK_AT_ROUTE = 0.1  # spacing of the points of a route that are looked at [m]
+TOLERANCE = 0.008  # a route may lose this much of its clearance without being planned anew [m]
+BLUR = 0.02  # and this much more for each metre of distance [m/m]
+FORGIVING = 0.005  # the arcs of a disc may come this much closer to what was hit than in a known world [m]
+CORNERED = 0.1  # and those of a rectangle by this share more of what its corners stand out [m/m]
+TURNING = 0.015  # a rectangle that turns on the spot keeps this much more from what was hit than in a known world [m]
+STALL_TIME = 2.5  # a robot that does not move for this long tries something else [s]
+STALL_DISTANCE = 0.06  # [m]
+TRAIL = 0.05  # spacing of the points of the driven track [m]
+BACK_OFF = (0.4, 0.8, 1.5)  # how far the robot backs off, the first time and then [m]
+
+
+class Unblocked:
+    """What the driver asks about movers that close every way: none do, and all are passed as avoidance would have it.
+
+    Attributes:
+        reason: empty
+    """
+
+    reason = ""
+
+    @property
+    def gaps(self) -> Unblocked:
+        """Where the robot may pass closer: nowhere."""
+        return self
+
+    def closer(self, tick: int, robot: tuple[float, float]) -> float:
+        """By how much less than avoidance keeps the robot may pass movers [m]."""
+        return 0.0
+
+
+class Exploration:
+    """Finds routes through what a robot without a map has seen.
+
+    Attributes:
+        wrong: what was wrong with the planner's first wrong plan; empty if none was
+        log: every attempt to find a new route
+        lost: whether there is no path through what was seen; then the robot stops
+    """
+
+    schedule = None
+    may_wait = False
+    blockage = Unblocked()
+
+    def __init__(
+        self,
+        planner: Planner,
+        survey: Survey,
+        task: Task,
+        rng: np.random.Generator,
+        *,
+        robot: RobotSpec,
+        controller: PurePursuit,
+        policy: ReplanPolicy,
+        margin: float,
+        smoothing: str,
+        cell: float,
+        hz: int,
+    ) -> None:
+        self.survey, self.wrong, self.log = survey, "", list[Replan]()
+        self._planner, self._task, self._rng = planner, task, rng
+        self._robot, self._controller, self._policy = robot, controller, policy
+        self._margin, self._smoothing, self._cell, self._hz = margin, smoothing, cell, hz
+        self._replanners: dict[tuple[float, float, Bounds], tuple[Replanner, Cell]] = {}
+        self._ahead, self._needed = np.empty((0, 2)), np.empty(0)
+        self._arcs = np.empty(0)
+        self._looked = self._indexed = 0
+        self._planned_at = -math.inf
+        self.lost, self._failures = False, 0
+        self._trail: list[tuple[float, float]] = []
+        self._rest = (0.0, task.start[:2])
+        self._stalls, self._stalled_at = 0, task.start[:2]
+        self._tick = 0
+        self._seen: list[tuple[int, Floats]] = []
+
+    # ---- plans
+
+    def plan(self, pose: Pose) -> tuple[Grid, PlanResult]:
+        """The grid and the plan from a pose, through what is known; with less margin where there is no path otherwise."""
+        straight = math.dist(pose[:2], self._task.goal)
+        best: tuple[Grid, PlanResult] | None = None
+        for growth in GROWTH:
+            for share in MARGINS:
+                grid, answer = found = self._planned(pose, self._bounds(growth), share * self._margin)
+                if answer.status is PlanStatus.INVALID:
+                    return found
+                if best is None or answer.cost < best[1].cost / DETOUR:
+                    best = grid, answer
+                if answer.cost <= FAIR * straight:
+                    break
+            assert best is not None
+            if best[1].solved:
+                break
+        assert best is not None
+        return best
+
+    def _planned(self, pose: Pose, bounds: Bounds, margin: float) -> tuple[Grid, PlanResult]:
+        """The grid and the plan from a pose, within bounds and with a margin [m]."""
+        task = self._known(pose, bounds)
+        grid = rasterise(task.world, self._cell, self._robot.radius + margin)
+        return grid, self._ask(task, grid)
+
+    def route(self, pose: Pose, grid: Grid, answer: PlanResult) -> tuple[Route, TrackedPath]:
+        """The route of a plan, smoothed, and the same prepared for the controller."""
+        bounds = _bounds_of(grid)
+        task = self._known(pose, bounds)
+        self._seen.append((self._tick, task.world.discs))
+        line = np.vstack([[pose[:2]], grid.xy(answer.line), [self._task.goal]])
+        discs = _kernels_hits.near_polyline(line, task.world.discs, grid.inflate + CORRIDOR)
+        near = dataclasses.replace(task, world=_world(bounds, discs))
+        route = smooth(answer, grid, near, kind=self._smoothing)
+        tracked = self._prepare(route, near.world, grid.inflate - self._robot.radius)
+        self._watch(route, near.world, grid.inflate)
+        return route, tracked
+
+    def _bounds(self, growth: float) -> Bounds:
+        (x0, y0), (x1, y1) = self._task.start[:2], self._task.goal
+        return min(x0, x1) - growth, min(y0, y1) - growth, max(x0, x1) + growth, max(y0, y1) + growth
+
+    def _known(self, pose: Pose, bounds: Bounds) -> Task:
+        """The task as it is known, from a pose."""
+        discs = self.survey.discs(bounds)
+        for point in (pose[:2], self._task.goal):  # what covers the robot or the goal is an error of the map
+            discs = discs[np.hypot(discs[:, 0] - point[0], discs[:, 1] - point[1]) > discs[:, 2] + 1e-3]
+        return dataclasses.replace(self._task, world=_world(bounds, discs), start=pose)
+
+    def _ask(self, task: Task, grid: Grid) -> PlanResult:
+        query = Query.between(grid, task)
+        if query.unreachable:
+            return PlanResult(status=PlanStatus.NO_PATH, reason=query.unreachable)
+        planner = self._planner
+        if capabilities_of(planner).own_replanner:
+            answer = self._repaired(query)
+        else:
+            answer = ask(planner, query, self._rng)
+        plan = checked(query, answer)
+        if plan.status is PlanStatus.INVALID:
+            self.wrong = self.wrong or plan.reason
+        return plan
+
+    def _repaired(self, query: Query) -> PlanResult:
+        grid, planner = query.grid, self._planner
+        key = grid.cell, grid.inflate, _bounds_of(grid)
+        with blaming(planner):
+            replanner, goal = self._replanners.get(key, (None, None))
+            if replanner is None or goal != query.goal:
+                replanner = planner.replanner(query, self._rng)  # type: ignore[attr-defined]
+                self._replanners[key] = replanner, query.goal
+            else:
+                replanner.change(grid)
+                replanner.move(query.start)
+            answer = replanner.result()
+        return answered(planner, answer)
+
+    def _prepare(self, route: Route, world: World, margin: float) -> TrackedPath:
+        robot = self._robot
+        tracked = self._controller.prepare(route, world, robot, margin, 1 / self._hz, self._task.goal_tolerance)
+        foot, tuning = robot.footprint, tracked.tuning
+        give = FORGIVING + CORNERED * (robot.radius - min(foot.half_length, foot.half_width) - foot.rounding)
+        return dataclasses.replace(
+            tracked,
+            tuning=tuning._replace(
+                lookahead_clearance=tuning.lookahead_clearance - give,
+                stopping_clearance=tuning.stopping_clearance - give,
+                robot_radius=tuning.robot_radius + TURNING,
+                rounding=tuning.rounding + TURNING,
+            ),
+        )
+
+    # ---- what the driver asks
+
+    def refreshed(self, tracked: TrackedPath, pose: Pose) -> TrackedPath:
+        """The path with what the lidar has just seen near the robot."""
+        if self._indexed == self.survey.count:
+            return tracked
+        self._indexed = self.survey.count
+        x, y, _ = pose
+        discs = self.survey.discs((x - NEAR, y - NEAR, x + NEAR, y + NEAR))
+        old = tracked.obstacles
+        index = ObstacleIndex(discs, np.array([0, len(discs)]), old.bounds, 1e6)
+        return dataclasses.replace(tracked, obstacles=index)
+
+    def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
+        """Why a new route is due now; empty if none is.
+
+        Args:
+            tick: the number of the control period
+            pose: the robot's estimated pose [m, m, rad]
+            waiting: whether the robot waits for a mover
+            tracked: the path that the robot follows
+            arc: how far the robot has got along the path [m]
+        """
+        now = tick / self._hz
+        if self.lost:
+            return LOST if now - self._planned_at >= INTERVAL else ""
+        self._note_way(now, pose, waiting, tracked.backwards)
+        if tracked.backwards:
+            done = tracked.length - arc < 2 * TRAIL or now - self._rest[0] > STALL_TIME
+            return BACKED if done else ""
+        if now - self._planned_at < INTERVAL:
+            return ""
+        if now - self._rest[0] > STALL_TIME:
+            return STALLED
+        deviation = math.dist(_point_at(tracked.route, arc), pose[:2])
+        if deviation > self._policy.max_deviation:
+            return STRAYED
+        if self._looked != self.survey.count:
+            self._looked = self.survey.count
+            if self._discovered(pose, arc):
+                return DISCOVERED
+        return ""
+
+    def replan(self, tick: int, pose: Pose, trigger: str) -> TrackedPath | None:
+        """A new path from a pose [m, m, rad], prepared for the controller; None if there is none.
+
+        Args:
+            tick: the number of the control period
+            pose: the robot's estimated pose [m, m, rad]
+            trigger: why a new route is due; goes into the log
+        """
+        now, started = tick / self._hz, time.perf_counter()
+        self._planned_at, self._tick = now, tick
+        if trigger == STALLED:
+            self._rest = now, pose[:2]
+            self._stalls = self._stalls + 1 if math.dist(self._stalled_at, pose[:2]) < 1.0 else 1
+            self._stalled_at = pose[:2]
+            back = self._back_off(pose) if self._stalls > 1 else None
+            if back is not None:
+                self.log.append(
+                    Replan(now, trigger, True, back.length, 0, back.route.xy, time.perf_counter() - started)
+                )
+                return back
+        if trigger == BACKED:
+            self._rest = now, pose[:2]
+        if self._failures >= PATIENCE:
+            self._failures = 0
+            self.survey.forget(pose)
+        grid, plan = self.plan(pose)
+        route, tracked = None, None
+        if plan.solved and len(plan.cells) and not self.wrong:
+            route, tracked = self.route(pose, grid, plan)
+        cost, xy = (plan.cost, route.xy) if route else (math.inf, np.empty((0, 2)))
+        self.log.append(Replan(now, trigger, route is not None, cost, plan.work, xy, time.perf_counter() - started))
+        self.lost = route is None
+        self._failures = self._failures + 1 if self.lost else 0
+        if self.lost:
+            self._rest = now, pose[:2]
+        return tracked
+
+    def logged(self, per_tick: int, rows: int) -> dict[str, Any]:
+        """The arrays of a log about what was seen, by the names of `Rollout`.
+
+        Args:
+            per_tick: rows of the log in a control period
+            rows: of the log
+        """
+        scans = [scan for scan in self.survey.scans if scan.tick * per_tick < rows]
+        seen = [(tick, discs) for tick, discs in self._seen if tick * per_tick < rows]
+        tables = [np.column_stack((np.full(len(discs), tick * per_tick), discs)) for tick, discs in seen]
+        return {
+            "scans": np.array([scan.millimetres for scan in scans], dtype=np.uint16),
+            "scan_rows": np.array([scan.tick * per_tick for scan in scans], dtype=np.int32),
+            "seen": np.concatenate(tables).astype(np.float32) if tables else np.empty((0, 4), dtype=np.float32),
+        }
+
+    # ---- the route ahead
+
+    def _watch(self, route: Route, world: World, inflate: float) -> None:
+        """Note the points of a route and the clearance that they are to keep."""
+        arcs = np.arange(0.0, route.length + LOOK_AT_ROUTE, LOOK_AT_ROUTE)
+        self._arcs = arcs
+        self._ahead = np.stack([np.interp(arcs, route.arc, route.xy[:, k]) for k in (0, 1)], axis=1)
+        self._needed = np.minimum(point_clearance(world, self._ahead), inflate)
+
+    def _discovered(self, pose: Pose, arc: float) -> bool:
+        """Whether the last scan met something where the route ahead leads."""
+        first = int(arc / LOOK_AT_ROUTE)
+        ahead, needed = self._ahead[first:], self._needed[first:]
+        if not len(ahead) or not len(self.survey.hits):
+            return False
+        room = _kernels_hits.hit_distances(ahead, self.survey.hits)
+        spare = TOLERANCE + BLUR * (self._arcs[first:] - arc)
+        return bool((room < needed - spare).any())
+
+    # ---- recovery
+
+    def _note_way(self, now: float, pose: Pose, waiting: bool, backwards: bool) -> None:
+        if waiting or math.dist(self._rest[1], pose[:2]) > STALL_DISTANCE:
+            self._rest = now, pose[:2]
+        if not backwards and (not self._trail or math.dist(self._trail[-1], pose[:2]) >= TRAIL):
+            self._trail.append(pose[:2])
+
+    def _back_off(self, pose: Pose) -> TrackedPath | None:
+        """The way back along the driven track."""
+        wanted = BACK_OFF[min(self._stalls - 2, len(BACK_OFF) - 1)]
+        points, length = [pose[:2]], 0.0
+        while self._trail and length < wanted:
+            point = self._trail.pop()
+            step = math.dist(points[-1], point)
+            if step > 0.5 * TRAIL:
+                points.append(point)
+                length += step
+        if length < 2 * TRAIL:
+            return None
+        discs = np.empty((0, 3))
+        route = Route(np.array(points))
+        return dataclasses.replace(self._prepare(route, _world(self._bounds(GROWTH[1]), discs), 0.0), backwards=True)
+
+
+def _world(bounds: Bounds, discs: Floats) -> World:
+    return World("seen", bounds, tuple(Disc(x, y, r) for x, y, r in discs.tolist()))
+
+
+def _bounds_of(grid: Grid) -> Bounds:
+    rows, cols = grid.shape
+    x, y = grid.origin
+    half = grid.cell / 2
+    return x - half, y - half, x + (cols - 0.5) * grid.cell, y + (rows - 0.5) * grid.cell
+
+
+def _point_at(route: Route, arc: float) -> tuple[float, float]:
+    """The point of a route at a distance from its start [m]."""
+    x, y = (float(np.interp(arc, route.arc, route.xy[:, k])) for k in (0, 1))
+    return x, y

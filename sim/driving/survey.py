@@ -1,0 +1,169 @@
+"""What a robot without a map knows of the world: what its lidar has seen, in the frame of its odometry."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections import deque
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.robots import RobotSpec
+from antdrive.sim.driving import _kernels_hits
+from antdrive.sim.sensing.mapping import OccupancyMap
+from antdrive.sim.sensing.matching import ScanMatcher
+from antdrive.sim.sensing.scanner import Scanner
+from antdrive.sim.sensing.sight import clear_distance, clear_turn
+from antdrive.worlds import Bounds, Floats, Pose, Trajectories
+
+MAP_CELL = 0.05  # side of the map's cells [m]
+RECENT = 1.0  # scans of this time are kept where the map is made anew [s]
+PAD = 0.01  # the robot keeps this from what was hit and from what was not seen: rounding of ranges, and of cells [m]
+
+
+class Scan(NamedTuple):
+    """One scan, as the log keeps it.
+
+    Attributes:
+        tick: the control period in which it was taken
+        millimetres: the ranges (beams,); 0 where nothing was in range, 1 where something was too near to measure
+    """
+
+    tick: int
+    millimetres: npt.NDArray[np.uint16]
+
+
+@dataclass(frozen=True, eq=False)
+class Senses:
+    """What a robot is surveying with.
+
+    Attributes:
+        scanner: the lidar in the true world
+        trajectories: the true motions of the movers; None where there are none
+        rng: where the noise of ranges comes from; None: no noise
+        hz: control periods per second
+    """
+
+    scanner: Scanner
+    trajectories: Trajectories | None
+    rng: np.random.Generator | None
+    hz: int
+
+
+class Survey:
+    """The robot's knowledge. It takes a scan when one is due, and builds a map of it.
+
+    True poses and the true world are used for nothing but the ranges of scans.
+
+    Attributes:
+        map: what was hit, and which ground was seen free
+        scans: all scans so far
+        hits: where the beams of the last scan ended, in the frame of odometry (beams, 2) [m]; not numbers where they hit nothing
+
+    Args:
+        start: the first pose, from which odometry counts; what the robot covers when it turns there is taken for free
+        matching: whether scans correct the estimated pose by what is on the map
+    """
+
+    def __init__(self, senses: Senses, robot: RobotSpec, start: Pose, *, matching: bool = False) -> None:
+        self._senses, self._lidar = senses, senses.scanner.lidar
+        foot = robot.footprint
+        self._footprint = dataclasses.replace(foot, rounding=foot.rounding + PAD)
+        self._radius = robot.radius
+        self.map = self._empty_map(start)
+        self._recent: deque[tuple[Pose, Floats]] = deque(maxlen=math.ceil(RECENT * self._lidar.rate))
+        self._matcher = ScanMatcher(self._lidar) if matching else None
+        self.scans: list[Scan] = []
+        self.hits = np.empty((0, 2))
+
+    @property
+    def count(self) -> int:
+        """The number of scans so far."""
+        return len(self.scans)
+
+    def look(self, tick: int, pose: Pose, estimate: Pose) -> Pose:
+        """Take a scan if one is due in a control period; the estimated pose, which the scan may correct.
+
+        Args:
+            tick: the number of the control period
+            pose: the robot's true pose, from which the lidar sees
+            estimate: where the robot believes it is
+        """
+        per_tick = self._lidar.rate / self._senses.hz
+        if self.scans and math.floor(tick * per_tick) == math.floor((tick - 1) * per_tick):
+            return estimate
+        if self.scans and tick == self.scans[-1].tick:
+            return estimate
+        ranges = self._scan(tick, pose)
+        if self._matcher is not None:
+            estimate = self._matcher.corrected(self.map, estimate, ranges)
+        self.map.insert(estimate, ranges)
+        self.hits = self.map.endpoints(estimate, ranges)
+        self._recent.append((estimate, ranges))
+        self.scans.append(Scan(tick, millimetres(ranges)))
+        return estimate
+
+    def discs(self, bounds: Bounds) -> Floats:
+        """What was hit within bounds, as discs (N, 3) [m].
+
+        Args:
+            bounds: x_min, y_min, x_max, y_max [m]
+        """
+        found: Floats = _kernels_hits.discs_within(self.map.arrays, np.array(bounds))
+        return found
+
+    def forget(self, pose: Pose) -> None:
+        """Make the map anew of the latest scans: what was seen before may be elsewhere in a frame that drifts.
+
+        Args:
+            pose: where the robot believes it is; what it covers when it turns there is taken for free
+        """
+        self.map = self._empty_map(pose)
+        for estimate, ranges in self._recent:
+            self.map.insert(estimate, ranges)
+
+    def _empty_map(self, pose: Pose) -> OccupancyMap:
+        seen = OccupancyMap(self._lidar, MAP_CELL, pose[:2])
+        seen.take_as_free(pose[:2], self._radius)
+        return seen
+
+    def clear_distance(self, pose: Pose, speed: float, yaw_rate: float, longest: float) -> float:
+        """How far the robot can go on an arc over ground that it has seen free [m].
+
+        Args:
+            pose: where it is
+            speed: forward speed on the arc [m/s], not 0
+            yaw_rate: yaw rate on it [rad/s]
+            longest: no more is asked for [m]
+        """
+        return clear_distance(self.map, pose, speed, yaw_rate, self._footprint, longest)
+
+    def clear_turn(self, pose: Pose, yaw_rate: float, farthest: float) -> float:
+        """How far the robot can turn on the spot over ground that it has seen free [rad].
+
+        Args:
+            pose: where it is
+            yaw_rate: counter-clockwise; only its sign counts
+            farthest: no more is asked for [rad]
+        """
+        return clear_turn(self.map, pose, yaw_rate, self._footprint, farthest)
+
+    def _scan(self, tick: int, pose: Pose) -> Floats:
+        senses = self._senses
+        movers = senses.trajectories
+        if not movers:
+            return senses.scanner.scan(pose, rng=senses.rng)
+        return senses.scanner.scan(pose, movers.positions(np.array([tick / senses.hz]))[0], movers.radii, senses.rng)
+
+
+def millimetres(ranges: Floats) -> npt.NDArray[np.uint16]:
+    """Ranges as the log keeps them (beams,): 0 where nothing was in range, 1 where something was too near to measure.
+
+    Args:
+        ranges: of a scan (beams,) [m]
+    """
+    kept = np.where(np.isfinite(ranges), np.clip(np.round(ranges * 1000.0), 2, 65535), np.where(ranges < 0, 1, 0))
+    return kept.astype(np.uint16)

@@ -1,0 +1,58 @@
+"""A scenario without a map: what the robot surveys with, and what finds its routes."""
+
+from __future__ import annotations
+
+from antdrive.planners import capabilities_of
+from antdrive.sim.driving.caution import Caution
+from antdrive.sim.driving.exploring import Exploration
+from antdrive.sim.driving.replanning import ReplanPolicy
+from antdrive.sim.driving.survey import Senses, Survey
+from antdrive.sim.scenario import Scenario
+from antdrive.sim.sensing.scanner import Scanner
+from antdrive.worlds import Task, World
+
+FINE = 0.05  # planners that search plan on cells of this side at most [m]
+
+
+def exploration_of(s: Scenario) -> Exploration:
+    """What finds the routes of a drive without a map, after the first look from the start."""
+    lidar = s.robot.lidar
+    assert lidar is not None
+    world = s.driven_world
+    senses = Senses(Scanner.of(lidar, world), s.trajectories or None, s.rng("lidar") if s.noise else None, s.control_hz)
+    survey = Survey(senses, s.robot, s.task.start, matching=s.localisation == "matching")
+    survey.look(0, s.task.start, s.task.start)
+    return Exploration(
+        s.planner,
+        survey,
+        told(s.task),
+        s.rng("replanner"),
+        robot=s.robot,
+        controller=s.controller,
+        policy=s.replanning or ReplanPolicy(),
+        margin=s.margin,
+        smoothing=s.smoothing,
+        cell=planning_cell(s),
+        hz=s.control_hz,
+    )
+
+
+def told(task: Task) -> Task:
+    """All that the robot is told of a task: its first pose, where the goal is from there, and how close it must come."""
+    (x0, y0), (x1, y1) = task.start[:2], task.goal
+    empty = World("unknown", (min(x0, x1) - 1.0, min(y0, y1) - 1.0, max(x0, x1) + 1.0, max(y0, y1) + 1.0))
+    return Task(empty, task.start, task.goal, task.goal_tolerance)
+
+
+def planning_cell(s: Scenario) -> float:
+    """The side of the cells that routes are planned on [m]."""
+    if s.cell is not None:
+        return s.cell
+    return s.task.cell if capabilities_of(s.planner).iterative else min(s.task.cell, FINE)
+
+
+def caution_of(s: Scenario, exploration: Exploration) -> Caution:
+    """What keeps the robot within its sight: one scan may be as old as their period, and commands are late."""
+    assert s.robot.lidar is not None
+    reaction = 1 / s.control_hz + 1 / s.robot.lidar.rate + s.robot.noise.scaled(s.noise).delay
+    return Caution(exploration.survey, s.robot, s.control_hz, reaction)

@@ -1,0 +1,192 @@
+"""Drives without a map: what the robot knows comes from its lidar, its odometry and the goal alone."""
+
+import dataclasses
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from antdrive.planners import load_planner
+from antdrive.robots import RobotSpec, Twist
+from antdrive.sim import Outcome, Rollout, Run, Scenario, run
+from antdrive.sim.driving.caution import Caution
+from antdrive.sim.driving.replay import replay
+from antdrive.sim.driving.survey import Senses, Survey
+from antdrive.sim.falsify.rebuild import rebuilt
+from antdrive.sim.sensing import Scanner
+from antdrive.sim.unknown import told
+from antdrive.worlds import Disc, Task, World, generate
+from antdrive.worlds.errors import FieldError
+
+POSTS = tuple(Disc(3.0, 0.15 * k, 0.075) for k in range(14))  # a row that leaves a gap at the top
+ROOM = World("room", (0.0, 0.0, 6.0, 4.0), POSTS)
+TASK = Task(ROOM, (0.8, 0.8, 0.0), (5.2, 0.8), goal_tolerance=0.25, cell=0.1)
+
+
+def scenario(robot: RobotSpec, task: Task = TASK, planner: str = "astar", **settings: object) -> Scenario:
+    given = {"map": "none", "localisation": "matching", "noise": 1.0, **settings}
+    return Scenario(task=task, planner=load_planner(planner), planner_name=planner, robot=robot, **given)  # type: ignore[arg-type]
+
+
+@pytest.fixture(scope="module")
+def drive(jackal: RobotSpec) -> Run:
+    return run(scenario(jackal))
+
+
+@pytest.fixture(scope="module")
+def log(drive: Run) -> Rollout:
+    assert drive.rollout is not None
+    return drive.rollout
+
+
+def test_the_robot_finds_the_gap_and_touches_nothing(drive: Run, log: Rollout) -> None:
+    assert drive.succeeded, (drive.outcome, drive.reason, drive.certificate)
+    assert log.pose[:, 1].max() > 2.3  # where the gap is
+    assert log.record.sensing is not None
+    assert log.record.sensing.map == "none"
+
+
+def test_the_log_holds_scans_and_what_was_seen(log: Rollout, tmp_path: Path) -> None:
+    per_second = len(log.scans) / log.t[-1]
+    assert per_second == pytest.approx(50, rel=0.02)
+    assert log.scans.shape[1] == 720
+    # A box of walls is never out of range; row 0 looks at the row of posts 2.2 m ahead.
+    assert log.scans.min() > 1
+    assert log.scans[0, 360] == pytest.approx(1000 * (3.0 - 0.075 - 0.8 - 0.055), abs=30)
+    x, y, radius = log.seen[log.seen[:, 0] == 0][:, 1:].T  # each disc of the first plan lies on a post or a wall
+    walls = np.minimum(np.minimum(x, 6 - x), np.minimum(y, 4 - y))
+    posts = np.min([np.hypot(x - d.x, y - d.y) - d.radius for d in POSTS], axis=0)
+    assert np.abs(np.minimum(walls, posts)).max() < 0.02
+    assert radius.max() < 0.02
+    path = log.save(tmp_path / "log.npz")
+    assert path.stat().st_size / log.t[-1] < 0.3e6  # bytes a second: 3 MB in ten seconds
+    again = Rollout.load(path)
+    assert again.digest == log.digest
+    assert np.array_equal(again.scans, log.scans)
+    broken = dataclasses.replace(log, scans=log.scans[:, :-1])
+    assert any("beams" in problem for problem in broken.problems())
+
+
+def test_scans_draw_the_world_around_the_estimated_poses(log: Rollout, jackal: RobotSpec) -> None:
+    assert jackal.lidar is not None
+    row, ranges = int(log.scan_rows[-1]), log.scans[-1] / 1000.0
+    x, y, yaw = jackal.lidar.pose_on(tuple(log.pose[row]))
+    ends = np.stack(
+        [x + ranges * np.cos(yaw + jackal.lidar.angles), y + ranges * np.sin(yaw + jackal.lidar.angles)], axis=1
+    )
+    walls = np.minimum(np.minimum(ends[:, 0], 6 - ends[:, 0]), np.minimum(ends[:, 1], 4 - ends[:, 1]))
+    posts = np.min([np.abs(np.hypot(ends[:, 0] - d.x, ends[:, 1] - d.y) - d.radius) for d in POSTS], axis=0)
+    assert np.minimum(np.abs(walls), posts).max() < 0.02
+
+
+def test_scans_keep_the_estimate_near_the_truth(log: Rollout) -> None:
+    off = np.hypot(*(log.estimate - log.pose)[:, :2].T)
+    assert 0 < off.max() < 0.06
+
+
+def test_the_drive_can_be_replayed_and_rebuilt(drive: Run, log: Rollout) -> None:
+    found = replay(log)
+    assert found.exact
+    assert found.problems == ()
+    assert rebuilt(log.record).sensing == drive.scenario.sensing
+    assert run(rebuilt(log.record)).rollout.digest == log.digest  # type: ignore[union-attr]
+
+
+def test_odometry_alone_drifts_and_is_caught_when_it_is_edited(jackal: RobotSpec) -> None:
+    done = run(scenario(jackal, localisation="odometry", seed=3))
+    assert done.rollout is not None
+    off = np.hypot(*(done.rollout.estimate - done.rollout.pose)[:, :2].T)
+    assert done.succeeded, (done.outcome, done.reason)
+    assert off[-1] > 0.02
+    assert replay(done.rollout).problems == ()
+    shifted = done.rollout.estimate + (0.1, 0.0, 0.0)
+    assert any(
+        "estimate" in problem for problem in replay(dataclasses.replace(done.rollout, estimate=shifted)).problems
+    )
+
+
+def test_the_true_pose_is_known_without_error(jackal: RobotSpec) -> None:
+    done = run(scenario(jackal, localisation="true"))
+    assert done.succeeded
+    assert done.rollout is not None
+    rows = done.rollout.scan_rows
+    assert np.array_equal(done.rollout.estimate[rows], done.rollout.pose[rows])
+
+
+def test_what_no_beam_has_met_changes_nothing(jackal: RobotSpec, log: Rollout) -> None:
+    hidden = dataclasses.replace(ROOM, obstacles=(*POSTS, Disc(4.2, 1.2, 0.2)))  # behind the row
+    other = run(scenario(jackal, dataclasses.replace(TASK, world=hidden))).rollout
+    assert other is not None
+    differ = (log.scans[: len(other.scans)] != other.scans[: len(log.scans)]).any(axis=1)
+    assert differ.any()
+    first = int(log.scan_rows[int(differ.argmax())])
+    assert first > 240  # the cylinder comes into sight, but not soon
+    for name in ("pose", "twist", "command", "estimate", "actuated"):
+        assert np.array_equal(getattr(log, name)[: first + 1], getattr(other, name)[: first + 1]), name
+
+
+def test_an_unseen_cylinder_is_discovered_and_passed(turtlebot: RobotSpec) -> None:
+    task = Task(World("hall", (0.0, 0.0, 6.0, 4.0)), (0.8, 2.0, 0.0), (5.2, 2.0), cell=0.1)
+    hidden = (Disc(3.0, 2.0, 0.2),)
+    blind = run(scenario(turtlebot, task, map="given", localisation="fixes", noise=0.0, unseen=hidden))
+    seeing = run(scenario(turtlebot, task, noise=0.0, unseen=hidden))
+    assert blind.outcome is Outcome.COLLIDED
+    assert seeing.succeeded, (seeing.outcome, seeing.reason)
+
+
+@pytest.mark.parametrize(("robot", "seed"), [("turtlebot", 1), ("jackal", 2)])
+def test_nothing_that_stands_is_touched_in_random_forests(
+    robot: str, seed: int, request: pytest.FixtureRequest
+) -> None:
+    task = generate("forest", np.random.default_rng(seed), {"size": "7", "count": "12"}, name="small")
+    done = run(scenario(request.getfixturevalue(robot), task, "dstar-lite", seed=seed))
+    assert done.rollout is not None
+    assert not len(done.rollout.contacts), done.reason
+    assert done.succeeded, (done.outcome, done.reason)
+
+
+def test_the_robot_can_stop_on_ground_that_it_has_seen(jackal: RobotSpec) -> None:
+    assert jackal.lidar is not None
+    senses = Senses(Scanner.of(jackal.lidar, ROOM), None, None, 60)
+    survey = Survey(senses, jackal, TASK.start)
+    survey.look(0, TASK.start, TASK.start)
+    caution = Caution(survey, jackal, 60, 0.1)
+    free = caution.limit(TASK.start, Twist(1.0, 0.0), Twist(1.0, 0.0))
+    assert free == (Twist(1.0, 0.0), False)  # stops within 0.35 m, sees 2 m
+    back, slowed = caution.limit(TASK.start, Twist(0.0, 0.0), Twist(-0.5, 0.0))
+    assert slowed  # nobody has looked behind the robot, and a wall is 0.8 m from its centre
+    assert back.speed > -0.3
+    near = (2.4, 0.8, 0.0)
+    stop, slowed = caution.limit(near, Twist(1.0, 0.0), Twist(1.0, 0.0))
+    assert slowed
+    assert stop.speed == pytest.approx(1.0 - jackal.max_acceleration / 60)  # brakes as hard as it can
+
+
+def test_the_robot_is_told_no_obstacle_and_no_wall() -> None:
+    moved = dataclasses.replace(TASK, world=World("other", (-9.0, -9.0, 9.0, 9.0)))
+    assert told(TASK) == told(moved)
+    assert told(TASK).world.obstacles == ()
+
+
+def test_settings_that_make_no_sense_are_refused(jackal: RobotSpec) -> None:
+    for settings, key in (
+        ({"map": "some"}, "map"),
+        ({"localisation": "gps"}, "localisation"),
+        ({"odometry": -1.0}, "odometry"),
+        ({"map": "given"}, "localisation"),
+        ({"planner": "sipp"}, "map"),
+    ):
+        with pytest.raises(FieldError) as caught:
+            scenario(jackal, **settings)  # type: ignore[arg-type]
+        assert caught.value.key == key
+    with pytest.raises(FieldError, match="no lidar"):
+        scenario(dataclasses.replace(jackal, lidar=None))
+
+
+def test_a_drive_with_a_map_is_recorded_as_before(jackal: RobotSpec) -> None:
+    usual = scenario(jackal, map="given", localisation="fixes")
+    assert usual.sensing is None
+    assert "map" not in usual.as_dict()["settings"]
+    assert scenario(jackal).as_dict()["settings"]["map"] == "none"
+    assert math.isfinite(usual.odometry)

@@ -1,0 +1,49 @@
+"""Scan matching takes back drift, and nothing else."""
+
+import math
+
+import numpy as np
+import pytest
+
+from antdrive.robots import RobotSpec
+from antdrive.sim.sensing import OccupancyMap, Scanner
+from antdrive.sim.sensing.matching import ScanMatcher
+from antdrive.worlds import Disc, Floats, World
+
+WORLD = World("room", (0.0, 0.0, 6.0, 5.0), (Disc(2.0, 3.5, 0.3), Disc(4.0, 1.5, 0.2), Disc(3.2, 4.1, 0.15)))
+POSE = (2.0, 1.5, 0.4)
+
+
+def looked(robot: RobotSpec, world: World = WORLD) -> tuple[OccupancyMap, Floats]:
+    """A map of some scans from one place, and another scan from there, with noise."""
+    assert robot.lidar is not None
+    scanner, rng = Scanner.of(robot.lidar, world), np.random.default_rng(0)
+    seen = OccupancyMap(robot.lidar, 0.05, POSE[:2])
+    for _ in range(4):
+        seen.insert(POSE, scanner.scan(POSE, rng=rng))
+    return seen, scanner.scan(POSE, rng=rng)
+
+
+@pytest.mark.parametrize("off", [(0.01, 0.0, 0.0), (0.0, -0.012, 0.0), (0.0, 0.0, 0.008), (-0.008, 0.008, -0.006)])
+def test_a_pose_that_has_drifted_is_corrected(off: tuple[float, float, float], jackal: RobotSpec) -> None:
+    assert jackal.lidar is not None
+    seen, ranges = looked(jackal)
+    drifted = (POSE[0] + off[0], POSE[1] + off[1], POSE[2] + off[2])
+    for _ in range(3):  # as one scan after the other does
+        drifted = ScanMatcher(jackal.lidar).corrected(seen, drifted, ranges)
+    x, y, yaw = drifted
+    assert math.hypot(x - POSE[0], y - POSE[1]) < 0.005
+    assert abs(yaw - POSE[2]) < 0.002
+
+
+def test_an_empty_map_corrects_nothing(jackal: RobotSpec) -> None:
+    assert jackal.lidar is not None
+    _, ranges = looked(jackal)
+    assert ScanMatcher(jackal.lidar).corrected(OccupancyMap(jackal.lidar, 0.05, POSE[:2]), POSE, ranges) == POSE
+
+
+def test_a_correction_that_is_too_large_is_not_believed(jackal: RobotSpec) -> None:
+    assert jackal.lidar is not None
+    seen, ranges = looked(jackal)
+    far = (POSE[0] + 0.05, POSE[1], POSE[2])
+    assert ScanMatcher(jackal.lidar).corrected(seen, far, ranges) == far
