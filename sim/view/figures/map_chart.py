@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 
 FIELD = LinearSegmentedColormap.from_list("field", [hexed(stop) for stop in FIELD_STOPS])
+MANY = 1000  # cylinders
 SPEEDS = LinearSegmentedColormap.from_list("speed", [hexed(stop) for stop in SPEED_STOPS])
 
 
@@ -71,9 +72,9 @@ def draw_map(axes: Any, scene: Scene, *, floor: bool = True) -> None:
         axes.add_collection(layer)
         layer.set_clip_path(inside)
     for chosen, colour in ((known, OBSTACLE), (scene.obstacles[scene.unseen], UNSEEN)):
-        bodies = PathCollection(
-            _circles(chosen[:, :2], chosen[:, 2]), facecolor=hexed(colour), edgecolor="white", linewidth=0.4, zorder=3
-        )
+        edge = 0.4 if len(chosen) <= MANY else 0.0  # white edges of thousands would leave nothing else to see
+        circles = _circles(chosen[:, :2], chosen[:, 2])
+        bodies = PathCollection(circles, facecolor=hexed(colour), edgecolor="white", linewidth=edge, zorder=3)
         axes.add_collection(bodies)
         bodies.set_clip_path(inside)
     for piece in scene.tracks:
