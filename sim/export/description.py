@@ -56,12 +56,12 @@ def description(robot: RobotSpec) -> str:
 
 
 def _body(robot: RobotSpec) -> tuple[str, float, float]:
-    """The body's geometry, and its middle in the robot's frame, x and y [m]."""
+    """The body's geometry, and its middle in the robot's frame, x and y [m]; a polygon is described by the box around it."""
     foot, height = robot.footprint, robot.height
-    if foot.is_disc:
-        return f'<cylinder radius="{foot.rounding!r}" length="{height!r}"/>', 0.0, 0.0
-    half_length, half_width = foot.half_length + foot.rounding, foot.half_width + foot.rounding
-    xmin, ymin, xmax, ymax = getattr(foot, "bounds", (-half_length, -half_width, half_length, half_width))
+    if foot.is_disc or len(foot.corners) == 1:
+        x, y = foot.corners[0] if foot.corners else (0.0, 0.0)
+        return f'<cylinder radius="{foot.rounding!r}" length="{height!r}"/>', x, y
+    xmin, ymin, xmax, ymax = foot.bounds
     size = f"{xmax - xmin!r} {ymax - ymin!r} {height!r}"
     return f'<box size="{size}"/>', (xmin + xmax) / 2, (ymin + ymax) / 2
 
