@@ -122,7 +122,11 @@ def _entrance(grid: Grid, task: Task, point: Point, within: float) -> tuple[Cell
     # A point may itself lie closer to a disc than the inflation; then the line must not come closer than the
     # point.
     own = float(point_clearance(task.world, [point])[0])
-    clear = segment_clearance(task.world, centres, ends) >= min(grid.inflate, own) - 1e-9
+    needed = min(grid.inflate, own)
+    # Cylinders that no line comes as close to as that change nothing.
+    discs = task.world.discs
+    beside = discs[np.hypot(*(discs[:, :2] - point).T) - discs[:, 2] <= needed + distance.max() + 1e-6]
+    clear = segment_clearance(task.world, centres, ends, beside) >= needed - 1e-9
     fit = clear & (distance <= within)
     if not fit.any():
         return (row, col), False

@@ -106,6 +106,8 @@ class World:
     def _require_short_walks(self) -> None:
         """Refuse phases of wanderers that are too many steps: they are drawn one by one before a run starts."""
         steps = {i: math.floor(m.phase / m.period) for i, m in enumerate(self.movers) if isinstance(m, Wandering)}
+        if not steps:
+            return
         most = MAX_WALK // (200 + len(self.obstacles))
         if sum(steps.values()) > most:
             i = max(steps, key=lambda i: steps[i])
@@ -151,6 +153,34 @@ class World:
         return ways
 
 
+class PointWorld(World):
+    """A world that was measured, as numbers: its `Disc` records are made when somebody asks for them, which planners do not."""
+
+    @classmethod
+    def of(cls, name: str, bounds: Bounds, discs: Floats) -> PointWorld:
+        """The world of so many cylinders.
+
+        Args:
+            name: what people call the world
+            bounds: the walls' inner faces: xmin, ymin, xmax, ymax [m]
+            discs: x, y and radius of each cylinder (N, 3) [m]
+
+        Raises:
+            FieldError: a value is not finite, or a radius is not positive.
+        """
+        for row in np.flatnonzero(~(np.isfinite(discs).all(axis=1) & (discs[:, 2] > 0)))[:1].tolist():
+            Disc(*discs[row].tolist())
+        world = cls(name, bounds)
+        del world.__dict__["obstacles"]
+        world.__dict__["_discs"] = discs
+        return world
+
+    @functools.cached_property
+    def obstacles(self) -> tuple[Disc, ...]:
+        """The cylinders, one by one."""
+        return tuple(Disc(x, y, radius) for x, y, radius in self._discs.tolist())
+
+
 @dataclass(frozen=True)
 class Task:
     """A world with a start pose and a goal to reach: what a world file holds.
@@ -193,7 +223,11 @@ class Task:
         xmin, ymin, xmax, ymax = self.world.bounds
         if not (xmin <= x <= xmax and ymin <= y <= ymax):
             raise FieldError(key, f"({x:g}, {y:g}) is out of bounds {list(self.world.bounds)}")
-        for i, disc in enumerate(self.world.obstacles):
+        discs = self.world.discs
+        # Distances of many at once may round otherwise, so they only say which cylinders are worth a look.
+        near = np.hypot(x - discs[:, 0], y - discs[:, 1]) <= discs[:, 2] * (1 + 1e-9)
+        for i in np.flatnonzero(near).tolist():
+            disc = self.world.obstacles[i]
             if math.hypot(x - disc.x, y - disc.y) <= disc.radius:
                 raise FieldError(
                     key,
