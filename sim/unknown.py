@@ -20,7 +20,7 @@ def exploration_of(s: Scenario) -> Exploration:
     assert lidar is not None
     world = s.driven_world
     senses = Senses(Scanner.of(lidar, world), s.trajectories or None, s.rng("lidar") if s.noise else None, s.control_hz)
-    survey = Survey(senses, s.robot, s.task.start, matching=s.localisation == "matching")
+    survey = Survey(senses, s.robot, s.task.start, s.task.goal, matching=s.localisation == "matching")
     survey.look(0, s.task.start, s.task.start)
     return Exploration(
         s.planner,

@@ -99,6 +99,16 @@ class TrackedPath:
         """Length of the route [m]."""
         return float(self.samples.arc[-1])
 
+    def among(self, obstacles: ObstacleIndex) -> TrackedPath:
+        """The same path among other obstacles.
+
+        Args:
+            obstacles: what the controller is to know
+        """
+        return TrackedPath(
+            self.route, self.goal_distance, self.samples, obstacles, self.limits, self.tuning, self.backwards
+        )
+
     @property
     def for_any_turn(self) -> TrackedPath:
         """The same path for a robot that turns on the spot the shorter way round, whatever is in its way."""

@@ -6,27 +6,7 @@ import math
 
 import numpy as np
 
-from antdrive.sim.sensing._kernels_mapping import GRAINS, MapArrays, grain_disc
 from antdrive.worlds._kernels import Array, kernel
-
-
-@kernel
-def discs_within(m: MapArrays, bounds: Array) -> Array:
-    """A disc (x, y, radius) around the hits of every grain whose cell meets a rectangle (D, 3) [m]."""
-    out = np.empty((m.count[0] * GRAINS * GRAINS, 3))
-    cell = m.frame[2]
-    count = 0
-    for i in range(m.count[0]):
-        row, col = m.cells[i, 0], m.cells[i, 1]
-        x, y = m.frame[0] + col * cell, m.frame[1] + row * cell
-        if x > bounds[2] or y > bounds[3] or x + cell < bounds[0] or y + cell < bounds[1]:
-            continue
-        for r in range(GRAINS * row, GRAINS * row + GRAINS):
-            for c in range(GRAINS * col, GRAINS * col + GRAINS):
-                if m.odds[r, c] > 0.0:
-                    out[count, 0], out[count, 1], out[count, 2] = grain_disc(m.box[r, c])
-                    count += 1
-    return out[:count].copy()
 
 
 @kernel
@@ -51,15 +31,35 @@ def near_polyline(xy: Array, discs: Array, distance: float) -> Array:
 
 
 @kernel
-def hit_distances(points: Array, hits: Array) -> Array:
-    """The distance from each point to the nearest hit; beams that hit nothing are not numbers."""
-    out = np.empty(points.shape[0])
+def hit_within(
+    points: Array, needed: Array, ahead: Array, tolerance: float, blur: float, x0: float, y0: float, yaw: float,
+    beams: Array, ranges: Array,
+) -> bool:  # fmt: skip
+    """Whether a beam from (x0, y0) ends nearer to point i than needed[i], less `tolerance` and `blur` * ahead[i]."""
+    distances = needed - (tolerance + blur * ahead)
+    x_min, x_max, y_min, y_max, most = math.inf, -math.inf, math.inf, -math.inf, 0.0
     for i in range(points.shape[0]):
-        best = math.inf
-        for j in range(hits.shape[0]):
-            dx, dy = points[i, 0] - hits[j, 0], points[i, 1] - hits[j, 1]
-            away = dx * dx + dy * dy
-            if away < best:
-                best = away
-        out[i] = math.sqrt(best)
-    return out
+        x_min, x_max = min(x_min, points[i, 0]), max(x_max, points[i, 0])
+        y_min, y_max = min(y_min, points[i, 1]), max(y_max, points[i, 1])
+        most = max(most, distances[i])
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    for j in range(beams.shape[0]):
+        if not 0.0 <= ranges[j] < math.inf:
+            continue
+        x = x0 + ranges[j] * (cos * beams[j, 0] - sin * beams[j, 1])
+        y = y0 + ranges[j] * (sin * beams[j, 0] + cos * beams[j, 1])
+        if x < x_min - most or x > x_max + most or y < y_min - most or y > y_max + most:
+            continue
+        for i in range(points.shape[0]):
+            dx, dy = points[i, 0] - x, points[i, 1] - y
+            if distances[i] > 0.0 and dx * dx + dy * dy < distances[i] * distances[i]:
+                return True
+    return False
+
+
+@kernel
+def point_at(xy: Array, arc: Array, at: float) -> tuple[float, float]:
+    """The point of a polyline at a distance from its start; `arc` holds those of its points."""
+    k = min(max(int(np.searchsorted(arc, at)), 1), arc.shape[0] - 1)
+    share = min(max((at - arc[k - 1]) / (arc[k] - arc[k - 1]), 0.0), 1.0)
+    return xy[k - 1, 0] + share * (xy[k, 0] - xy[k - 1, 0]), xy[k - 1, 1] + share * (xy[k, 1] - xy[k - 1, 1])

@@ -31,8 +31,9 @@ from antdrive.robots import PurePursuit, RobotSpec, TrackedPath
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex
 from antdrive.sim.driving import _kernels_hits
 from antdrive.sim.driving.replanning import STRAYED, Replan, ReplanPolicy
-from antdrive.sim.driving.survey import Survey
-from antdrive.worlds import Bounds, Disc, Floats, Grid, Pose, Route, Task, World, point_clearance, rasterise
+from antdrive.sim.driving.survey import Survey, millimetres
+from antdrive.worlds import Bounds, Floats, Grid, Pose, Route, Task, World, point_clearance, rasterise
+from antdrive.worlds.world import PointWorld
 
 DISCOVERED = "discovered"
 STALLED = "stalled"
@@ -44,12 +45,10 @@ MARGINS = (1.0, 0.0)  # shares of the margin that plans keep, then if the way is
 FAIR = 1.25  # a way that is longer than the straight line by more than this factor is long
 DETOUR = 1.15  # a way with less margin must be shorter by this factor
 CORRIDOR = 1.2  # a route is smoothed among what lies within this distance of the plan, beyond the inflation [m]
-NEAR = 2.4  # the controller knows what lies within this distance of the robot [m]
+SPARE = 0.25  # the controller knows what lies this much farther away than its longest arcs lead [m]
 INTERVAL = 0.15  # the shortest time between two plans [s]
 PATIENCE = 3  # plans in a row that find no path before the robot no longer believes what it saw long ago
 LOOK_AT_ROUTE = 0.1  # spacing of the points of a route that are looked at [m]
-TOLERANCE = 0.008  # a route may lose this much of its clearance without being planned anew [m]
-BLUR = 0.02  # and this much more for each metre of distance [m/m]
 FORGIVING = 0.005  # the arcs of a disc may come this much closer to what was hit than in a known world [m]
 CORNERED = 0.1  # and those of a rectangle by this share more of what its corners stand out [m/m]
 TURNING = 0.015  # a rectangle that turns on the spot keeps this much more from what was hit than in a known world [m]
@@ -121,6 +120,7 @@ class Exploration:
         self._stalls, self._stalled_at = 0, task.start[:2]
         self._tick = 0
         self._seen: list[tuple[int, Floats]] = []
+        self._known_as: tuple[tuple[Any, ...], Task] = (), task
 
     # ---- plans
 
@@ -168,10 +168,15 @@ class Exploration:
 
     def _known(self, pose: Pose, bounds: Bounds) -> Task:
         """The task as it is known, from a pose."""
+        key = self.survey.map, self.survey.count, pose, bounds
+        if self._known_as[0] == key:
+            return self._known_as[1]
         discs = self.survey.discs(bounds)
         for point in (pose[:2], self._task.goal):  # what covers the robot or the goal is an error of the map
             discs = discs[np.hypot(discs[:, 0] - point[0], discs[:, 1] - point[1]) > discs[:, 2] + 1e-3]
-        return dataclasses.replace(self._task, world=_world(bounds, discs), start=pose)
+        known = dataclasses.replace(self._task, world=_world(bounds, discs), start=pose)
+        self._known_as = key, known
+        return known
 
     def _ask(self, task: Task, grid: Grid) -> PlanResult:
         query = Query.between(grid, task)
@@ -224,10 +229,10 @@ class Exploration:
             return tracked
         self._indexed = self.survey.count
         x, y, _ = pose
-        discs = self.survey.discs((x - NEAR, y - NEAR, x + NEAR, y + NEAR))
-        old = tracked.obstacles
-        index = ObstacleIndex(discs, np.array([0, len(discs)]), old.bounds, 1e6)
-        return dataclasses.replace(tracked, obstacles=index)
+        near = self._controller.lookahead_max + tracked.tuning.lookahead_clearance + SPARE
+        discs = self.survey.discs((x - near, y - near, x + near, y + near))
+        index = ObstacleIndex(discs, np.array([0, len(discs)]), tracked.obstacles.bounds, 1e6)
+        return tracked.among(index)
 
     def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
         """Why a new route is due now; empty if none is.
@@ -250,7 +255,7 @@ class Exploration:
             return ""
         if now - self._rest[0] > STALL_TIME:
             return STALLED
-        deviation = math.dist(_point_at(tracked.route, arc), pose[:2])
+        deviation = math.dist(_kernels_hits.point_at(tracked.samples.xy, tracked.samples.arc, arc), pose[:2])
         if deviation > self._policy.max_deviation:
             return STRAYED
         if self._looked != self.survey.count:
@@ -307,7 +312,7 @@ class Exploration:
         seen = [(tick, discs) for tick, discs in self._seen if tick * per_tick < rows]
         tables = [np.column_stack((np.full(len(discs), tick * per_tick), discs)) for tick, discs in seen]
         return {
-            "scans": np.array([scan.millimetres for scan in scans], dtype=np.uint16),
+            "scans": millimetres(np.array([scan.ranges for scan in scans])),
             "scan_rows": np.array([scan.tick * per_tick for scan in scans], dtype=np.int32),
             "seen": np.concatenate(tables).astype(np.float32) if tables else np.empty((0, 4), dtype=np.float32),
         }
@@ -325,11 +330,7 @@ class Exploration:
         """Whether the last scan met something where the route ahead leads."""
         first = int(arc / LOOK_AT_ROUTE)
         ahead, needed = self._ahead[first:], self._needed[first:]
-        if not len(ahead) or not len(self.survey.hits):
-            return False
-        room = _kernels_hits.hit_distances(ahead, self.survey.hits)
-        spare = TOLERANCE + BLUR * (self._arcs[first:] - arc)
-        return bool((room < needed - spare).any())
+        return len(ahead) > 0 and self.survey.hit_within(ahead, needed, self._arcs[first:] - arc)
 
     # ---- recovery
 
@@ -357,7 +358,7 @@ class Exploration:
 
 
 def _world(bounds: Bounds, discs: Floats) -> World:
-    return World("seen", bounds, tuple(Disc(x, y, r) for x, y, r in discs.tolist()))
+    return PointWorld.of("seen", bounds, discs)
 
 
 def _bounds_of(grid: Grid) -> Bounds:
@@ -365,9 +366,3 @@ def _bounds_of(grid: Grid) -> Bounds:
     x, y = grid.origin
     half = grid.cell / 2
     return x - half, y - half, x + (cols - 0.5) * grid.cell, y + (rows - 0.5) * grid.cell
-
-
-def _point_at(route: Route, arc: float) -> tuple[float, float]:
-    """The point of a route at a distance from its start [m]."""
-    x, y = (float(np.interp(arc, route.arc, route.xy[:, k])) for k in (0, 1))
-    return x, y

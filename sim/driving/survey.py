@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections import deque
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -17,23 +16,27 @@ from antdrive.sim.sensing.mapping import OccupancyMap
 from antdrive.sim.sensing.matching import ScanMatcher
 from antdrive.sim.sensing.scanner import Scanner
 from antdrive.sim.sensing.sight import clear_distance, clear_turn
-from antdrive.worlds import Bounds, Floats, Pose, Trajectories
+from antdrive.worlds import Bounds, Floats, Point, Pose, Trajectories
 
 MAP_CELL = 0.05  # side of the map's cells [m]
 RECENT = 1.0  # scans of this time are kept where the map is made anew [s]
+TOLERANCE = 0.008  # a route may lose this much of its clearance without being planned anew [m]
+BLUR = 0.02  # and this much more for each metre of distance [m/m]
 PAD = 0.01  # the robot keeps this from what was hit and from what was not seen: rounding of ranges, and of cells [m]
 
 
 class Scan(NamedTuple):
-    """One scan, as the log keeps it.
+    """One scan.
 
     Attributes:
         tick: the control period in which it was taken
-        millimetres: the ranges (beams,); 0 where nothing was in range, 1 where something was too near to measure
+        estimate: where the robot believed it was
+        ranges: what was measured (beams,) [m]
     """
 
     tick: int
-    millimetres: npt.NDArray[np.uint16]
+    estimate: Pose
+    ranges: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,23 +64,22 @@ class Survey:
     Attributes:
         map: what was hit, and which ground was seen free
         scans: all scans so far
-        hits: where the beams of the last scan ended, in the frame of odometry (beams, 2) [m]; not numbers where they hit nothing
 
     Args:
         start: the first pose, from which odometry counts; what the robot covers when it turns there is taken for free
+        goal: where the robot is to go; the map is laid out for the way there [m]
         matching: whether scans correct the estimated pose by what is on the map
     """
 
-    def __init__(self, senses: Senses, robot: RobotSpec, start: Pose, *, matching: bool = False) -> None:
+    def __init__(self, senses: Senses, robot: RobotSpec, start: Pose, goal: Point, *, matching: bool = False) -> None:
         self._senses, self._lidar = senses, senses.scanner.lidar
         foot = robot.footprint
         self._footprint = dataclasses.replace(foot, rounding=foot.rounding + PAD)
-        self._radius = robot.radius
+        self._radius, self._goal = robot.radius, goal
         self.map = self._empty_map(start)
-        self._recent: deque[tuple[Pose, Floats]] = deque(maxlen=math.ceil(RECENT * self._lidar.rate))
+        self._recent = math.ceil(RECENT * self._lidar.rate)
         self._matcher = ScanMatcher(self._lidar) if matching else None
         self.scans: list[Scan] = []
-        self.hits = np.empty((0, 2))
 
     @property
     def count(self) -> int:
@@ -101,9 +103,7 @@ class Survey:
         if self._matcher is not None:
             estimate = self._matcher.corrected(self.map, estimate, ranges)
         self.map.insert(estimate, ranges)
-        self.hits = self.map.endpoints(estimate, ranges)
-        self._recent.append((estimate, ranges))
-        self.scans.append(Scan(tick, millimetres(ranges)))
+        self.scans.append(Scan(tick, estimate, ranges))
         return estimate
 
     def discs(self, bounds: Bounds) -> Floats:
@@ -112,8 +112,21 @@ class Survey:
         Args:
             bounds: x_min, y_min, x_max, y_max [m]
         """
-        found: Floats = _kernels_hits.discs_within(self.map.arrays, np.array(bounds))
-        return found
+        return self.map.discs(bounds)
+
+    def hit_within(self, points: Floats, needed: Floats, ahead: Floats) -> bool:
+        """Whether a beam of the last scan ended clearly nearer to a point of a route than the clearance that it needs.
+
+        Args:
+            points: places (N, 2) [m]
+            needed: the clearance of each (N,) [m]
+            ahead: how far along the route each is (N,) [m]; the farther, the less exact is what is seen there
+        """
+        scan = self.scans[-1]
+        x, y, yaw = self._lidar.pose_on(scan.estimate)
+        return bool(
+            _kernels_hits.hit_within(points, needed, ahead, TOLERANCE, BLUR, x, y, yaw, self.map.beams, scan.ranges)
+        )
 
     def forget(self, pose: Pose) -> None:
         """Make the map anew of the latest scans: what was seen before may be elsewhere in a frame that drifts.
@@ -122,11 +135,11 @@ class Survey:
             pose: where the robot believes it is; what it covers when it turns there is taken for free
         """
         self.map = self._empty_map(pose)
-        for estimate, ranges in self._recent:
-            self.map.insert(estimate, ranges)
+        for scan in self.scans[-self._recent :]:
+            self.map.insert(scan.estimate, scan.ranges)
 
     def _empty_map(self, pose: Pose) -> OccupancyMap:
-        seen = OccupancyMap(self._lidar, MAP_CELL, pose[:2])
+        seen = OccupancyMap(self._lidar, MAP_CELL, pose[:2], goal=self._goal)
         seen.take_as_free(pose[:2], self._radius)
         return seen
 
@@ -160,10 +173,10 @@ class Survey:
 
 
 def millimetres(ranges: Floats) -> npt.NDArray[np.uint16]:
-    """Ranges as the log keeps them (beams,): 0 where nothing was in range, 1 where something was too near to measure.
+    """Ranges as the log keeps them: 0 where nothing was in range, 1 where something was too near to measure.
 
     Args:
-        ranges: of a scan (beams,) [m]
+        ranges: of scans (..., beams) [m]
     """
     kept = np.where(np.isfinite(ranges), np.clip(np.round(ranges * 1000.0), 2, 65535), np.where(ranges < 0, 1, 0))
     return kept.astype(np.uint16)

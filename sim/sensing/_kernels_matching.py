@@ -63,7 +63,7 @@ def partner(x: float, y: float, near: int, m: MapArrays) -> tuple[bool, float, f
         for c in range(max(0, col - near), min(cols, col + near + 1)):
             if m.odds[r, c] < SETTLED:
                 continue
-            gx, gy, _ = grain_disc(m.box[r, c])
+            gx, gy, _ = grain_disc(m.box, r, c)
             away = (gx - x) * (gx - x) + (gy - y) * (gy - y)
             if away < best:
                 best, bx, by, found = away, gx, gy, True

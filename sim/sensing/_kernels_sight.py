@@ -58,7 +58,7 @@ def clear_way(pose: Array, speed: float, yaw_rate: float, shape: Array, limit: f
             for r in range(GRAINS * row, GRAINS * row + GRAINS):
                 for c in range(GRAINS * col, GRAINS * col + GRAINS):
                     if m.odds[r, c] > 0.0:
-                        gx, gy, size = grain_disc(m.box[r, c])
+                        gx, gy, size = grain_disc(m.box, r, c)
                         dx, dy = gx - pose[0], gy - pose[1]
                         best = contact(cos * dx + sin * dy, cos * dy - sin * dx, size, forward, bend, shape, best)
     return best

@@ -8,6 +8,8 @@ are touched, so a scan costs the same however large the map is.
 from __future__ import annotations
 
 import math
+import mmap
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +19,7 @@ from antdrive.sim.sensing import _kernels_mapping as kernels
 from antdrive.worlds import Bounds, Floats, Point, Pose
 from antdrive.worlds.errors import require_positive
 
+EVERYWHERE = (-math.inf, -math.inf, math.inf, math.inf)
 Cells = npt.NDArray[np.int32]
 Mask = npt.NDArray[np.bool_]
 
@@ -38,6 +41,7 @@ class OccupancyMap:
         trust: ground is seen free up to this distance [m]
         scans: number of scans entered
         share: of every scan the free ways of every `share`-th beam are entered
+        beams: directions of the lidar's beams, seen from the lidar (beams, 2)
         layouts: how often the map was laid out; cells have other numbers after it has grown
 
     Args:
@@ -46,6 +50,7 @@ class OccupancyMap:
         centre: where the robot starts, in the frame of the map [m]
         horizon: hits farther than this are not entered [m]
         bounds: the ground that the map covers, for good; None: it grows as needed [m]
+        goal: where the robot is to go [m]; a map that grows is laid out for the way there. None: for no way
         share: of every scan the free ways of every `share`-th beam are entered, in turn, and all hits; None: so many that
             each beam has its turn about 12 times a second
     """
@@ -58,6 +63,7 @@ class OccupancyMap:
         horizon: float = 10.0,
         bounds: Bounds | None = None,
         share: int | None = None,
+        goal: Point | None = None,
     ) -> None:
         self.share = max(1, round(lidar.rate / OFTEN)) if share is None else share
         require_positive("cell", cell)
@@ -67,14 +73,19 @@ class OccupancyMap:
         self.scans = self.layouts = 0
         self._lidar, self._grows = lidar, bounds is None
         angles = lidar.angles - lidar.yaw
-        self._beams = np.column_stack((np.cos(angles), np.sin(angles)))
+        self.beams = np.column_stack((np.cos(angles), np.sin(angles)))
         self._first = float(angles[0])
         self._begin = np.empty(lidar.beams)
         kernels.begins(lidar.beams, lidar.spacing, cell, self.share, self._begin)
         self._none = np.zeros(lidar.beams, dtype=np.bool_)
         half = self.horizon + ROOM
         x, y = centre
-        self._lay_out(bounds or (x - half, y - half, x + half, y + half))
+        more = (0, 0, 0, 0)
+        if bounds is None and goal is not None:
+            more = self._blocks(x - goal[0], y - goal[1], goal[0] - x, goal[1] - y)
+        bounds = bounds or (x - half, y - half, x + half, y + half)
+        cols, rows = (math.ceil((bounds[k + 2] - bounds[k]) / cell) for k in (0, 1))
+        self._lay_out(bounds[0], bounds[1], rows, cols, more)
 
     @property
     def origin(self) -> Point:
@@ -104,13 +115,14 @@ class OccupancyMap:
             ranges: the scan (beams,) [m]
             left_out: beams whose hits are not entered, such as those of movers (beams,)
         """
-        eye = np.array(self._lidar.pose_on(pose))
+        x, y, yaw = self._lidar.pose_on(pose)
         if self._grows:
-            self._make_room(eye[0], eye[1])
+            self._make_room(x, y)
+        eye = np.array((x, y, math.cos(yaw), math.sin(yaw)))
         self.scans += 1
         mask = self._none if left_out is None else np.ascontiguousarray(left_out)
         lidar = self._lidar
-        fan = kernels.Fan(eye, self._beams, ranges, self._first, lidar.spacing, lidar.full_circle)
+        fan = kernels.Fan(eye, self.beams, ranges, self._first, lidar.spacing, lidar.full_circle)
         count = kernels.insert(
             fan, self._begin, self.share, mask, self.horizon, self.trust, self.scans, self._arrays, self._changed
         )
@@ -126,7 +138,7 @@ class OccupancyMap:
         x, y, yaw = self._lidar.pose_on(pose)
         cos, sin = math.cos(yaw), math.sin(yaw)
         measured = np.where(np.isfinite(ranges), ranges, np.nan)[:, None]
-        turned = self._beams @ np.array([[cos, sin], [-sin, cos]])
+        turned = self.beams @ np.array([[cos, sin], [-sin, cos]])
         return np.asarray(measured * turned + (x, y), dtype=np.float64)
 
     def explained(self, points: Floats, settle: int) -> Mask:
@@ -143,9 +155,14 @@ class OccupancyMap:
         kernels.explained(np.ascontiguousarray(points), self.scans, settle, self._arrays, out)
         return out
 
-    def discs(self) -> Floats:
-        """Discs around all hits (D, 3): x, y, radius [m]. Every point that was entered and not seen through lies in one."""
-        return kernels.discs_of(self._arrays)  # type: ignore[no-any-return]
+    def discs(self, within: Bounds | None = None) -> Floats:
+        """Discs around all hits (D, 3): x, y, radius [m]. Every point that was entered and not seen through lies in one.
+
+        Args:
+            within: only those of cells that meet this rectangle [m]; None: all
+        """
+        found: Floats = kernels.discs_within(self._arrays, *(within or EVERYWHERE))
+        return found
 
     def forget(self, place: Point, radius: float) -> Cells:
         """Take what was hit around a place for free ground, and return the cells (K, 2): a mover has gone on.
@@ -169,51 +186,52 @@ class OccupancyMap:
 
     def _make_room(self, x: float, y: float) -> None:
         """Grow where the horizon around the lidar would leave the map."""
-        x0, y0 = self.origin
-        rows, cols = self._arrays.free.shape
-        need = (x - self.horizon - x0, y - self.horizon - y0, x0 + cols * self.cell - x, y0 + rows * self.cell - y)
-        if need[0] >= 0 and need[1] >= 0 and min(need[2:]) >= self.horizon:
+        x_low, x_high, y_low, y_high = self._room
+        if x_low <= x <= x_high and y_low <= y <= y_high:
             return
-        west, south = (max(0, math.ceil(-side / self.cell / BLOCK)) * BLOCK for side in need[:2])
-        east, north = (max(0, math.ceil((self.horizon - side) / self.cell / BLOCK)) * BLOCK for side in need[2:])
-        self._lay_out((x0, y0, x0 + cols * self.cell, y0 + rows * self.cell), (west, south, east, north))
+        old, far, (x0, y0) = self._arrays, self.horizon, self.origin
+        rows, cols = old.free.shape
+        need = (x0 + far - x, y0 + far - y, x + far - x0 - cols * self.cell, y + far - y0 - rows * self.cell)
+        more = self._blocks(*need)
+        self._lay_out(x0, y0, rows, cols, more)
+        self._arrays.free[more[1] : more[1] + rows, more[0] : more[0] + cols] = old.free
+        kernels.move_hits(old, self._arrays, more[1], more[0])
 
-    def _lay_out(self, bounds: Bounds, more: tuple[int, int, int, int] = (0, 0, 0, 0)) -> None:
-        """New arrays for the ground within `bounds` and `more` cells in the west, south, east and north."""
+    def _blocks(self, west: float, south: float, east: float, north: float) -> tuple[int, int, int, int]:
+        """How many cells are to be added on each side for so many metres: whole blocks, none for less than 0."""
+        w, s, e, n = (max(0, math.ceil(side / self.cell / BLOCK)) * BLOCK for side in (west, south, east, north))
+        return w, s, e, n
+
+    def _lay_out(self, x0: float, y0: float, rows: int, cols: int, more: tuple[int, int, int, int]) -> None:
+        """New arrays for so many cells from a corner on and `more` in the west, south, east and north."""
         west, south, east, north = more
-        cols = (
-            round((bounds[2] - bounds[0]) / self.cell) if any(more) else math.ceil((bounds[2] - bounds[0]) / self.cell)
-        )
-        rows = (
-            round((bounds[3] - bounds[1]) / self.cell) if any(more) else math.ceil((bounds[3] - bounds[1]) / self.cell)
-        )
         shape = (rows + south + north, cols + west + east)
         fine = (kernels.GRAINS * shape[0], kernels.GRAINS * shape[1])
-        arrays = kernels.MapArrays(
-            free=np.zeros(shape, dtype=np.bool_),
-            occupied=np.zeros(shape, dtype=np.bool_),
-            turned=np.zeros(shape, dtype=np.int32),
-            slot=np.zeros(shape, dtype=np.int32),
-            cells=np.empty((shape[0] * shape[1], 2), dtype=np.int32),
+        self._arrays: kernels.MapArrays = kernels.MapArrays(
+            free=_zeros(shape, dtype=np.bool_),
+            occupied=_zeros(shape, dtype=np.bool_),
+            turned=_zeros(shape, dtype=np.int32),
+            slot=_zeros(shape, dtype=np.int32),
+            cells=_zeros((shape[0] * shape[1], 2), dtype=np.int32),
             count=np.zeros(1, dtype=np.int64),
-            odds=np.zeros(fine, dtype=np.float32),
-            stamp=np.zeros(fine, dtype=np.int32),
-            box=np.zeros((*fine, 4), dtype=np.float32),
-            frame=np.array([bounds[0] - west * self.cell, bounds[1] - south * self.cell, self.cell]),
+            odds=_zeros(fine, dtype=np.float32),
+            stamp=_zeros(fine, dtype=np.int32),
+            box=_zeros((*fine, 4), dtype=np.float32),
+            frame=np.array([x0 - west * self.cell, y0 - south * self.cell, self.cell]),
         )
-        if any(more):
-            old = self._arrays
-            for name in ("free", "occupied", "turned", "slot", "odds", "stamp", "box"):
-                scale = kernels.GRAINS if name in ("odds", "stamp", "box") else 1
-                r, c = scale * south, scale * west
-                part = getattr(old, name)
-                getattr(arrays, name)[r : r + part.shape[0], c : c + part.shape[1]] = part
-            count = int(old.count[0])
-            arrays.cells[:count] = old.cells[:count] + (south, west)
-            arrays.count[0] = count
-        self._arrays: kernels.MapArrays = arrays
-        self._changed = np.empty((shape[0] * shape[1], 2), dtype=np.int32)
+        self._changed = _zeros((shape[0] * shape[1], 2), dtype=np.int32)
+        (x, y), far = self.origin, self.horizon
+        self._room = x + far, x + shape[1] * self.cell - far, y + far, y + shape[0] * self.cell - far
         self.layouts += 1
+
+
+def _zeros(shape: tuple[int, ...], dtype: npt.DTypeLike) -> npt.NDArray[Any]:
+    """An array of zeros whose pages the system provides when they are first written to: most of a map stays empty.
+
+    `np.zeros` writes all of them, wherever the allocator has used the memory before.
+    """
+    kind = np.dtype(dtype)
+    return np.frombuffer(mmap.mmap(-1, math.prod(shape) * kind.itemsize), kind).reshape(shape)
 
 
 def _read_only(array: Mask) -> Mask:

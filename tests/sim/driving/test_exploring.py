@@ -149,7 +149,7 @@ def test_nothing_that_stands_is_touched_in_random_forests(
 def test_the_robot_can_stop_on_ground_that_it_has_seen(jackal: RobotSpec) -> None:
     assert jackal.lidar is not None
     senses = Senses(Scanner.of(jackal.lidar, ROOM), None, None, 60)
-    survey = Survey(senses, jackal, TASK.start)
+    survey = Survey(senses, jackal, TASK.start, TASK.goal)
     survey.look(0, TASK.start, TASK.start)
     caution = Caution(survey, jackal, 60, 0.1)
     free = caution.limit(TASK.start, Twist(1.0, 0.0), Twist(1.0, 0.0))
