@@ -54,6 +54,8 @@ format: $(VENV)/.dev
 
 bench: $(VENV)/.dev $(VENV)/.warm
 	@$(BIN)/python -m benchmarks.loop
+	@echo
+	@$(BIN)/python -m benchmarks.exploring
 
 mutants: $(VENV)/.dev $(VENV)/.warm
 	@$(BIN)/python -m tools.mutants

@@ -1,0 +1,113 @@
+"""Measure what driving without a map adds to the drive loop: `python -m benchmarks.exploring`, part of `make bench`.
+
+Prints Markdown.
+Six of BARN's worlds, `jackal`, `--map none`, and the same drives with the map. All times are processor time for each
+simulated second. *Loop* is the drive loop without what follows it in the row; the share is what follows, over the loop.
+The second of two drives of each kind counts, so that files are read and kernels loaded.
+
+- scan: the exact rays, their noise
+- map: the scan entered
+- watch: whether the route ahead is still clear, and the discs for the controller
+- sight: how far the robot may go on ground that it has seen
+- replans: plans, their smoothing, their preparation for the controller
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from antdrive.sim import Scenario, pipeline, run
+from antdrive.sim.driving.caution import Caution
+from antdrive.sim.driving.exploring import Exploration
+from antdrive.sim.driving.survey import Survey
+from antdrive.sim.sensing import OccupancyMap
+from benchmarks.cost import BARN
+from benchmarks.drives import barn_tasks
+from benchmarks.planners import table
+
+WORLDS = ("world_0", "world_138", "world_186", "world_24", "world_288", "world_66")
+PARTS = ("scan", "map", "watch", "sight", "replans")
+
+
+class Meter:
+    """Adds up the processor time of functions by name; of calls within calls only the outermost counts.
+
+    Attributes:
+        spent: seconds by name
+    """
+
+    def __init__(self) -> None:
+        self.spent: dict[str, float] = {}
+        self._within = ""
+
+    def watch(self, owner: Any, method: str, name: str) -> None:
+        """Measure a function of a module or a class from now on."""
+        inner: Callable[..., Any] = getattr(owner, method)
+
+        def measured(*args: Any, **options: Any) -> Any:
+            if self._within and self._within != "loop":
+                return inner(*args, **options)
+            outside, self._within = self._within, name
+            started = time.process_time()
+            try:
+                return inner(*args, **options)
+            finally:
+                self.spent[name] = self.spent.get(name, 0.0) + time.process_time() - started
+                self._within = outside
+
+        setattr(owner, method, measured)
+
+
+def costs(meter: Meter, scenario: Scenario) -> tuple[dict[str, float], bool]:
+    """What the parts of a drive's loop cost for each simulated second [ms/s], and whether the drive was certified."""
+    run(scenario)
+    meter.spent.clear()
+    done = run(scenario)
+    assert done.rollout is not None
+    loop = meter.spent["loop"] - sum(meter.spent.get(part, 0.0) for part in PARTS)
+    seconds = 1e-3 * float(done.rollout.t[-1])
+    found = {part: meter.spent.get(part, 0.0) / seconds for part in PARTS}
+    return {"loop": loop / seconds, **found}, done.succeeded
+
+
+def rows(source: Path) -> Iterator[list[str]]:
+    meter = Meter()
+    meter.watch(pipeline, "drive", "loop")
+    for owner, method, name in (
+        (Survey, "_scan", "scan"),
+        (OccupancyMap, "insert", "map"),
+        (Exploration, "trigger", "watch"),
+        (Exploration, "refreshed", "watch"),
+        (Caution, "limit", "sight"),
+        (Exploration, "replan", "replans"),
+    ):
+        meter.watch(owner, method, name)
+    tasks, shares = barn_tasks(source), []
+    for world in WORLDS:
+        given, _ = costs(meter, Scenario.of(tasks[world], "astar", "jackal"))
+        found, certified = costs(meter, Scenario.of(tasks[world], "astar", "jackal", map="none"))
+        shares.append(sum(found[part] for part in PARTS) / found["loop"])
+        name = world if certified else f"{world} (not certified)"
+        cells = [f"{found[part]:.2f}" for part in ("loop", *PARTS)]
+        yield [name, f"{given['loop']:.1f}", *cells, f"{100 * shares[-1]:.0f} %"]
+    yield ["median", *[""] * (2 + len(PARTS)), f"{100 * statistics.median(shares):.0f} %"]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--barn", type=Path, default=BARN, help="folder or archive of BARN's world_*.world files")
+    options = parser.parse_args()
+    if not options.barn.exists():
+        print(f"no worlds at {options.barn}; give --barn")
+        return
+    for line in table(("world", "loop with the map [ms/s]", "loop", *PARTS, "share"), rows(options.barn)):
+        print(line, flush=True)
+
+
+if __name__ == "__main__":
+    main()
