@@ -8,7 +8,7 @@ import numpy.typing as npt
 import pytest
 from hypothesis import strategies as st
 
-from antdrive.robots import Lidar
+from antdrive.robots import Lidar, RobotSpec
 from antdrive.sim.sensing import OccupancyMap, Scanner
 from antdrive.worlds import Floats, Pose
 
@@ -209,3 +209,16 @@ def test_the_same_scans_give_the_same_map() -> None:
         return grid.discs()
 
     assert np.array_equal(made(), made())
+
+
+def test_a_map_laid_out_for_the_way_holds_what_one_that_grows_holds(jackal: RobotSpec) -> None:
+    assert jackal.lidar is not None
+    scanner = Scanner(jackal.lidar, np.array([[3.0, 1.0, 0.3], [9.0, -1.0, 0.2]]))
+    grown, ready = OccupancyMap(jackal.lidar), OccupancyMap(jackal.lidar, goal=(9.0, 0.0))
+    for x in np.arange(0.0, 8.0, 0.25).tolist():
+        for grid in (grown, ready):
+            grid.insert((x, 0.0, 0.0), scanner.scan((x, 0.0, 0.0)))
+    assert grown.layouts > ready.layouts == 1
+    order, other = (np.lexsort(grid.discs().T) for grid in (grown, ready))
+    np.testing.assert_allclose(grown.discs()[order], ready.discs()[other], atol=1e-6)
+    assert np.count_nonzero(grown.seen_free) == np.count_nonzero(ready.seen_free)
