@@ -5,10 +5,11 @@ from __future__ import annotations
 import functools
 import hashlib
 import importlib
+import importlib.machinery
 import importlib.util
 import sys
 from pathlib import Path
-from types import ModuleType
+from types import CodeType, ModuleType
 from typing import Any
 
 from antdrive.worlds import InputError
@@ -110,25 +111,44 @@ def _from_file(path: Path) -> ModuleType:
     return _loaded(path.resolve(), _hash(_content(path)))
 
 
-@functools.lru_cache(maxsize=64)
-def _loaded(path: Path, content: str) -> ModuleType:
-    """A file's module, loaded once per process and content of the file. It may import modules beside it."""
-    name = f"_antdrive_own_{path.stem}_{abs(hash((path, content))):x}"
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
-        raise ImportError("is not a Python file")
+class _Source(importlib.machinery.SourceFileLoader):
+    """Compiles the file as it is: a cached compilation may be that of another text of the same second and length."""
+
+    def get_code(self, fullname: str) -> CodeType:
+        path = self.get_filename(fullname)
+        return self.source_to_code(self.get_data(path), path)
+
+
+def from_source(name: str, path: Path) -> ModuleType:
+    """A new module that runs a file as it is now, and is known by its name meanwhile and afterwards.
+
+    Args:
+        name: of the module
+        path: the file
+    """
+    spec = importlib.util.spec_from_loader(name, _Source(name, str(path)))
+    assert spec is not None
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module  # dataclasses look their module up
-    beside = str(path.parent)
-    added = beside not in sys.path
-    if added:
-        sys.path.append(beside)
     try:
         spec.loader.exec_module(module)
     except BaseException:
         del sys.modules[name]
         raise
+    return module
+
+
+@functools.lru_cache(maxsize=64)
+def _loaded(path: Path, content: str) -> ModuleType:
+    """A file's module, loaded once per process and content of the file. It may import modules beside it."""
+    name = f"_antdrive_own_{path.stem}_{abs(hash((path, content))):x}"
+    beside = str(path.parent)
+    added = beside not in sys.path
+    if added:
+        sys.path.append(beside)
+    try:
+        return from_source(name, path)
     finally:
         if added:
             sys.path.remove(beside)
-    return module

@@ -49,7 +49,7 @@ def scenario_fields(entry: SettingsEntry, fail: Fail) -> dict[str, Any]:
     }
 
 
-@reused(1024)
+@reused(64)
 def generated(kind: str, seed: int, options: tuple[tuple[str, str], ...]) -> Task:
     """The random world that {generate: KIND, seed: SEED} with options stands for.
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from antdrive.planners.own_code import from_source
 from antdrive.planners.plan import Planner
 from antdrive.planners.registry import load_planner, make_planner
 from antdrive.robots.files import list_robots
@@ -160,18 +161,8 @@ def _from_file(case: SuiteCase, source: str) -> ModuleType:
 @functools.lru_cache(maxsize=64)
 def _loaded(path: Path, mtime: int) -> ModuleType:
     name = f"{FROM_FILE}{path.stem}_{abs(hash(path)):x}"
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
-        raise ImportError("is not a Python file")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # dataclasses look their module up
-    try:
-        with _importing_for(path.parent):
-            spec.loader.exec_module(module)
-    except BaseException:
-        del sys.modules[name]
-        raise
-    return module
+    with _importing_for(path.parent):
+        return from_source(name, path)
 
 
 @contextlib.contextmanager

@@ -61,15 +61,17 @@ def test_drives_of_the_test_meet_what_they_should(fresh: dict[str, Any]) -> None
     assert len({digest for digest, _ in fresh.values()}) == len(fresh)
 
 
-def one_by_one(self: Engine, first: int, shape: int, centres: list[Any]) -> int:
+def one_by_one(self: Engine, indices: list[int], shape: int, centres: list[Any]) -> list[int]:
     """Obstacles as they were built before: a call for each, drawn by Bullet as it likes."""
     p, client = bullet(), self._client
-    for index, centre in enumerate(centres, first):
+    bodies = []
+    for index, centre in zip(indices, centres, strict=True):
         body = p.createMultiBody(0, shape, basePosition=centre, useMaximalCoordinates=1, physicsClientId=client)
         p.changeDynamics(body, -1, activationState=p.ACTIVATION_STATE_SLEEP, physicsClientId=client)
         p.setCollisionFilterGroupMask(body, -1, 8, 4, physicsClientId=client)
         self._obstacles[body] = index
-    return len(centres)
+        bodies.append(body)
+    return bodies
 
 
 @pytest.mark.parametrize("name", ["slalom", "hit", "movers"])

@@ -52,7 +52,7 @@ def barn(
     out: Out = Path("out/barn"),
     json: options.Json = False,
 ) -> int:
-    """Drive the BARN challenge's worlds, and print its table: success, time and score.
+    """Drive the BARN challenge's worlds and print its table.
 
     Exit code 0: all runs are done, whatever came out of them. The same command goes on after an interruption.
     """

@@ -86,7 +86,9 @@ Rollouts = Annotated[
 ]
 Limit = Annotated[
     float | None,
-    typer.Option("--run-limit", metavar="SECONDS", help="Wall-clock time of a run, after which its process is ended."),
+    typer.Option(
+        "--run-limit", metavar="SECONDS", help="Wall-clock time of a run, after which its process is ended [s]."
+    ),
 ]
 Retry = Annotated[bool, typer.Option("--retry-crashed", help="Make runs again that crashed.")]
 Again = Annotated[

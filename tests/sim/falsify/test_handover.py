@@ -124,4 +124,4 @@ def test_a_scenario_has_a_name_that_suites_take(small_run: Run, tmp_path: Path, 
 @pytest.mark.parametrize("name", ["warehouse", "pioneer3dx"])
 def test_a_robot_whose_footprint_is_beside_its_axle_is_handed_over_as_it_is(name: str, tmp_path: Path) -> None:
     mine = replace(load_robot(name), name="mine", mass=31.0)
-    assert load_robot(tmp_path / _robot(mine, tmp_path)) == mine
+    assert load_robot(tmp_path / _robot(mine, tmp_path, {})) == mine
