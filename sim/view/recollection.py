@@ -33,6 +33,26 @@ class Beams(NamedTuple):
     reaches: Floats
 
 
+class Sighting(NamedTuple):
+    """A cylinder, when it was first seen, and when the robot was nearest to it.
+
+    Attributes:
+        obstacle: its place in `record.world.obstacles`
+        seen_at: when a beam first met it [s]; infinite if none did
+        seen_from: how far its surface was from the footprint then [m]; not a number if it was never seen
+        nearest_at: when the robot was nearest [s]
+        nearest: how far the surface was from the footprint then [m]
+        touched: whether the robot touched it
+    """
+
+    obstacle: int
+    seen_at: float
+    seen_from: float
+    nearest_at: float
+    nearest: float
+    touched: bool
+
+
 class Recollection:
     """The scans of a log, entered one after the other. Moments are asked for in increasing order.
 
@@ -152,3 +172,40 @@ def laid_in_world(points: Floats, drift: Floats) -> Floats:
     """
     cos, sin, x, y = drift.tolist()
     return np.asarray((points - (x, y)) @ np.array([[cos, -sin], [sin, cos]]), dtype=np.float64)
+
+
+def sightings(rollout: Rollout, met: Floats) -> list[Sighting]:
+    """First sight and nearest approach of every cylinder, those that the robot came nearest to first.
+
+    Args:
+        rollout: the log
+        met: when each was first seen (N,) [s], as `Recollection.met` has it
+    """
+    world, foot = rollout.record.world, rollout.record.robot.footprint
+    touched = set(rollout.contacts[:, 1].astype(int).tolist())
+    found = []
+    for j, disc in enumerate(world.obstacles):
+        dx, dy = disc.x - rollout.pose[:, 0], disc.y - rollout.pose[:, 1]
+        cos, sin = np.cos(rollout.pose[:, 2]), np.sin(rollout.pose[:, 2])
+        ahead = np.maximum(np.abs(cos * dx + sin * dy) - foot.half_length, 0.0)
+        aside = np.maximum(np.abs(cos * dy - sin * dx) - foot.half_width, 0.0)
+        away = np.hypot(ahead, aside) - foot.rounding - disc.radius
+        k = int(away.argmin())
+        first = float(met[j])
+        seen_from = float(away[np.searchsorted(rollout.t, first - 1e-9)]) if math.isfinite(first) else math.nan
+        found.append(Sighting(j, first, seen_from, float(rollout.t[k]), float(away[k]), j in touched))
+    return sorted(found, key=lambda sight: (not sight.touched, sight.nearest))
+
+
+def containers(cylinders: Floats) -> npt.NDArray[np.intp]:
+    """For each of the cylinders (N, 4) one that it stands in, or itself: nobody sees what stands in another one.
+
+    Args:
+        cylinders: x, y, radius and height of each [m]
+    """
+    found = np.arange(len(cylinders))
+    for j, (x, y, radius, _) in enumerate(cylinders):
+        room = cylinders[:, 2] - radius - np.hypot(cylinders[:, 0] - x, cylinders[:, 1] - y)
+        room[j] = 0.0
+        found[j] = room.argmax()
+    return found

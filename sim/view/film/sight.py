@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from antdrive.sim.view import _kernels_seen as kernels
 from antdrive.sim.view.film import _kernels_paint as painting
-from antdrive.sim.view.recollection import Recollection, laid_in_world
+from antdrive.sim.view.recollection import Recollection, containers, laid_in_world
 from antdrive.sim.view.scene import Scene
 from antdrive.sim.view.style import BEAM, HATCH, HIT, PALE
 
@@ -38,7 +38,7 @@ class SightPainter:
         self._recollection, self._scene = recollection, scene
         self._drift = recollection.drift(0.0)
         self._discs = np.empty((0, 3))
-        self._around = _containers(scene.obstacles)
+        self._around = containers(scene.obstacles)
 
     def advance(self, at: float) -> None:
         """Go on to a moment [s]."""
@@ -106,13 +106,3 @@ class SightPainter:
         inverse = np.linalg.inv(plane)
         colour = np.array(HIT, dtype=np.float64)
         painting.blend_capsules(frame, everywhere, plane, inverse, np.ascontiguousarray(rows), colour, 0.9)
-
-
-def _containers(cylinders: Floats) -> npt.NDArray[np.intp]:
-    """For each of the cylinders (N, 4) one that it stands in, or itself: nobody sees what stands in another one."""
-    found = np.arange(len(cylinders))
-    for j, (x, y, radius, _) in enumerate(cylinders):
-        room = cylinders[:, 2] - radius - np.hypot(cylinders[:, 0] - x, cylinders[:, 1] - y)
-        room[j] = 0.0
-        found[j] = room.argmax()
-    return found

@@ -12,7 +12,7 @@ from antdrive.sim.view.film import sight
 from antdrive.sim.view.film.camera import CAMERAS
 from antdrive.sim.view.film.overlay import legend_entries
 from antdrive.sim.view.film.shot import Shot
-from antdrive.sim.view.recollection import Recollection
+from antdrive.sim.view.recollection import Recollection, containers
 from antdrive.sim.view.scene import Scene
 from tests.sim.view.scanned import scanned
 
@@ -101,7 +101,7 @@ def test_hits_are_where_the_map_has_them(log: Rollout, monkeypatch: pytest.Monke
 
 
 def test_what_stands_inside_a_cylinder_looks_like_it(log: Rollout) -> None:
-    around = sight._containers(np.array([[0, 0, 0.5, 1], [0.1, 0, 0.2, 1], [2, 0, 0.2, 1], [0.6, 0, 0.3, 1.0]]))
+    around = containers(np.array([[0, 0, 0.5, 1], [0.1, 0, 0.2, 1], [2, 0, 0.2, 1], [0.6, 0, 0.3, 1.0]]))
     assert around.tolist() == [0, 0, 2, 3]
 
 
