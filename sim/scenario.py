@@ -26,6 +26,7 @@ from antdrive.worlds.errors import FieldError
 
 PHYSICS_HZ = (60, 10_000)  # slower physics jolts the robot
 SLOWEST_CONTROL = 10  # [Hz]
+FINE = 0.05  # without a map, planners that search plan on cells of this side at most [m]
 
 CONTROLLER, PERCEPTION, AVOIDANCE, REPLANNING = PurePursuit(), Perception(), Avoidance(), ReplanPolicy()
 
@@ -292,7 +293,7 @@ class Scenario:
             "noise": self.noise,
             "margin_m": self.margin,
             "margin_auto": self.chosen is not None,
-            "cell_m": self.cell or task.cell,
+            "cell_m": self.planning_cell,
             "physics_hz": self.physics_hz,
             "control_hz": self.control_hz,
             "time_limit_s": self.time_limit or task.time_limit,
@@ -325,6 +326,14 @@ class Scenario:
     def exploring(self) -> bool:
         """Whether the robot has no map."""
         return self.map == "none"
+
+    @property
+    def planning_cell(self) -> float:
+        """The side of the cells that routes are planned on [m]; searches without a map have fine ones."""
+        if self.cell is not None:
+            return self.cell
+        fine = self.exploring and not capabilities_of(self.planner).iterative
+        return min(self.task.cell, FINE) if fine else self.task.cell
 
     @property
     def sensing(self) -> SensingRecord | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from antdrive.planners import capabilities_of
 from antdrive.sim.driving.caution import Caution
 from antdrive.sim.driving.exploring import Exploration
 from antdrive.sim.driving.replanning import ReplanPolicy
@@ -10,8 +9,6 @@ from antdrive.sim.driving.survey import Senses, Survey
 from antdrive.sim.scenario import Scenario
 from antdrive.sim.sensing.scanner import Scanner
 from antdrive.worlds import Task, World
-
-FINE = 0.05  # planners that search plan on cells of this side at most [m]
 
 
 def exploration_of(s: Scenario) -> Exploration:
@@ -32,7 +29,7 @@ def exploration_of(s: Scenario) -> Exploration:
         policy=s.replanning or ReplanPolicy(),
         margin=s.margin,
         smoothing=s.smoothing,
-        cell=planning_cell(s),
+        cell=s.planning_cell,
         hz=s.control_hz,
     )
 
@@ -42,13 +39,6 @@ def told(task: Task) -> Task:
     (x0, y0), (x1, y1) = task.start[:2], task.goal
     empty = World("unknown", (min(x0, x1) - 1.0, min(y0, y1) - 1.0, max(x0, x1) + 1.0, max(y0, y1) + 1.0))
     return Task(empty, task.start, task.goal, task.goal_tolerance)
-
-
-def planning_cell(s: Scenario) -> float:
-    """The side of the cells that routes are planned on [m]."""
-    if s.cell is not None:
-        return s.cell
-    return s.task.cell if capabilities_of(s.planner).iterative else min(s.task.cell, FINE)
 
 
 def caution_of(s: Scenario, exploration: Exploration) -> Caution:

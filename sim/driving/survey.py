@@ -72,7 +72,7 @@ class Survey:
         self._senses, self._lidar = senses, senses.scanner.lidar
         foot = robot.footprint
         self._footprint = dataclasses.replace(foot, rounding=foot.rounding + PAD)
-        self._radius = robot.radius
+        self._radius = robot.radius + 2 * PAD  # a turn on the spot sweeps over this
         self.map = self._empty_map(start)
         self._recent: deque[tuple[Pose, Floats]] = deque(maxlen=math.ceil(RECENT * self._lidar.rate))
         self._matcher = ScanMatcher(self._lidar) if matching else None

@@ -114,6 +114,14 @@ def test_the_true_pose_is_known_without_error(jackal: RobotSpec) -> None:
     assert np.array_equal(done.rollout.estimate[rows], done.rollout.pose[rows])
 
 
+def test_a_robot_that_looks_the_other_way_turns_round(jackal: RobotSpec) -> None:
+    backwards = dataclasses.replace(TASK, start=(1.2, 0.8, math.pi), goal=(2.2, 2.0))
+    done = run(scenario(jackal, backwards, noise=0.0))
+    assert done.succeeded, (done.outcome, done.reason)
+    assert done.rollout is not None
+    assert done.scenario.as_dict()["cell_m"] == done.rollout.record.cell == 0.05
+
+
 def test_what_no_beam_has_met_changes_nothing(jackal: RobotSpec, log: Rollout) -> None:
     hidden = dataclasses.replace(ROOM, obstacles=(*POSTS, Disc(4.2, 1.2, 0.2)))  # behind the row
     other = run(scenario(jackal, dataclasses.replace(TASK, world=hidden))).rollout
