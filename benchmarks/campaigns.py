@@ -1,18 +1,22 @@
-"""What campaigns survive and cost: `python -m benchmarks.campaigns [kill] [efficiency] [overhead] [--small] [--drive]`.
+"""What campaigns survive and cost: `python -m benchmarks.campaigns [PART ...] [--small] [--drive]`, by default all parts.
 
 - kill: 2,000 short runs with 20 `kill -9` at random moments: of workers, of the parent, of dask's workers and of its
   scheduler, five each. After resuming, the canonical table must be that of an undisturbed campaign, byte for byte.
+  kill-worker, kill-parent, kill-dask-worker and kill-dask-scheduler are parts of their own.
+- equality: 160 drives of two planners in four worlds, with and without noise: one table, byte for byte, from this process, from
+  1, 2 and 4 processes, from dask, and in other orders.
 - efficiency: runs that compute for 0.2 s on one and on two processes, local and dask: T1 / (2 T2), without the start.
 - overhead: 100,000 runs that do nothing: what the engines, the folder and the expansion cost for each.
 
-`--small` takes a twentieth of the runs. `--drive` kills campaigns of real drives instead of runs that sleep. Each result is kept
-in out/campaigns and not measured again.
+`--small` takes a twentieth of the runs. `--drive` kills campaigns of real drives instead of runs that sleep. Each result (of
+`kill`: of each victim) is kept in out/campaigns and not measured again.
 """
 
 from __future__ import annotations
 
 import argparse
 import contextlib
+import dataclasses
 import hashlib
 import json
 import os
@@ -28,6 +32,7 @@ from pathlib import Path
 from typing import Any
 
 from antdrive.sim.campaigns import canonical_bytes, expand, make_campaign, read_results
+from antdrive.sim.campaigns.expanding import Expansion
 from antdrive.sim.campaigns.job import Job
 from antdrive.sim.campaigns.rows import fault_row
 from antdrive.sim.campaigns.running import Finished
@@ -39,6 +44,7 @@ OUT = Path(__file__).parent.parent / "out" / "campaigns"
 SHORT = 0.02  # how long a run sleeps in a campaign that is killed [s]
 LONG = 0.2  # how long a run computes where efficiency is measured [s]
 VICTIMS = ("worker", "parent", "dask worker", "dask scheduler")
+PARTS = ("kill", *(f"kill-{v.replace(' ', '-')}" for v in VICTIMS), "equality", "efficiency", "overhead")
 
 
 @dataclass(frozen=True)
@@ -221,6 +227,35 @@ def efficiency(runs: int) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def equality(runs: int) -> dict[str, Any]:
+    """Which ways to make a campaign give the table of this process, byte for byte."""
+    asked = make_campaign(
+        {
+            "worlds": ["empty", "gate", "slalom", "u-trap"], "planners": ["astar", {"name": "aco-han", "ants": 10}],
+            "noise": [0, 1], "seeds": max(1, runs // 16),
+        }
+    )  # fmt: skip
+    calm, rng = expand(asked), random.Random(1)
+    back = dataclasses.replace(calm, jobs=calm.jobs[::-1])
+    mixed = dataclasses.replace(calm, jobs=tuple(rng.sample(calm.jobs, len(calm.jobs))))
+    ways: dict[str, tuple[Expansion, dict[str, Any]]] = {
+        "this process": (calm, {"jobs": 0}),
+        **{f"{n} processes": (calm, {"jobs": n}) for n in (1, 2, 4)},
+        **{f"dask, {n} processes": (calm, {"dask": f"local:{n}"}) for n in (1, 2)},
+        "2 processes, backwards": (back, {"jobs": 2}),
+        "2 processes, mixed": (mixed, {"jobs": 2}),
+        "this process, mixed": (mixed, {"jobs": 0}),
+    }
+    hashes = {}
+    for name, (expansion, options) in ways.items():
+        folder = OUT / "folders" / f"equality-{name.replace(' ', '-').replace(',', '')}"
+        shutil.rmtree(folder, ignore_errors=True)
+        run_expansion(asked, expansion, folder, **options)
+        hashes[name] = hashlib.sha256(canonical_bytes(folder)).hexdigest()
+    equal = {name: one == hashes["this process"] for name, one in hashes.items()}
+    return {"runs": len(calm.jobs), **equal, "equal": sum(equal.values()), "of": len(ways)}
+
+
 def overhead(runs: int) -> dict[str, Any]:
     """What a run costs that does nothing [ms]."""
     begun = time.perf_counter()
@@ -241,15 +276,17 @@ def overhead(runs: int) -> dict[str, Any]:
 
 def print_parts(parts: list[str], share: float, drive: bool) -> Iterator[str]:
     """The tables of the wanted parts."""
-    if "kill" in parts:
+    victims = [v for v in VICTIMS if "kill" in parts or f"kill-{v.replace(' ', '-')}" in parts]
+    if victims:
         runs, kills = int(2000 * share), max(1, int(5 * share**0.5))
         rows = [
             kept(f"kill-{v.replace(' ', '-')}-{runs}-{drive}", lambda v=v: kill(v, kills, runs, drive))  # type: ignore[misc]
-            for v in VICTIMS
+            for v in victims
         ]
         heads = ("killed", "kills", "commands", "lost", "double", "same table", "s")
         yield "\n".join(table(heads, [tuple(map(str, row.values())) for row in rows]))
-    for name, measure, runs in (("efficiency", efficiency, 1000), ("overhead", overhead, 100_000)):
+    measures = (("equality", equality, 160), ("efficiency", efficiency, 1000), ("overhead", overhead, 100_000))
+    for name, measure, runs in measures:
         if name in parts:
             found = kept(f"{name}-{int(runs * share)}", lambda m=measure, n=int(runs * share): m(n))  # type: ignore[misc]
             yield "\n".join(table((name, "value"), [(key, f"{value:.4g}") for key, value in found.items()]))
@@ -262,13 +299,15 @@ def main() -> None:
         go(Path(folder), int(runs), work, jobs=2, dask=dask[0] if dask else None)
         return
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("parts", nargs="*", default=[], metavar="PART")
+    parser.add_argument("parts", nargs="*", default=[], metavar="PART", help=", ".join(PARTS))
     parser.add_argument("--small", action="store_true")
     parser.add_argument("--drive", action="store_true")
     asked = parser.parse_args()
-    for text in print_parts(
-        asked.parts or ["kill", "efficiency", "overhead"], 0.05 if asked.small else 1.0, asked.drive
-    ):
+    for part in asked.parts:
+        if part not in PARTS:
+            parser.error(f"unknown part {part!r}; choose from {', '.join(PARTS)}")
+    parts = asked.parts or ["kill", "equality", "efficiency", "overhead"]
+    for text in print_parts(parts, 0.05 if asked.small else 1.0, asked.drive):
         print(text, flush=True)
 
 

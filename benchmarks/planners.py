@@ -161,6 +161,7 @@ def paper_maps(quick: bool) -> Iterator[tuple[str, str, str, dict[str, Any], lis
     seeds = SEEDS[:3] if quick else SEEDS
     # suganthi2019, Table 2: sizes; the blocked share is not stated.
     common = {"alpha": 1.0, "beta": 1.0, "evaporation": 0.3, "deposit": 1.0, "heuristic": "step", "iterations": 100}
+    dying = {"backtrack": False, "shortcut": False, "elite": 1.0}  # not the planner's defaults
     printed = {
         10: (13.899, 13.899, 13.899), 20: (28.627, 38.627, 28.627), 30: (46.527, 59.355, 42.184), 50: (96.125, 109.761, 94.326),
     }  # fmt: skip
@@ -168,8 +169,8 @@ def paper_maps(quick: bool) -> Iterator[tuple[str, str, str, dict[str, Any], lis
         queries = [random_grid(size, seed, 0.15) for seed in seeds]
         for name, options, figure in (
             ("as", {"ants": 50, **common}, figures[0]),
-            ("pfaco", {"ants": 50, "iterations": 100, "ranks": 15}, figures[1]),
-            ("iaco", {"ants": 25, "explorers": 75, **common}, figures[2]),
+            ("pfaco", {"ants": 50, "iterations": 100, "ranks": 15, "form": "letter"}, figures[1]),
+            ("iaco", {"ants": 25, "explorers": 75, **common, **dying}, figures[2]),
         ):
             yield "suganthi2019", f"{size}×{size}, 15 % blocked", name, options, queries, f"{figure:g}"
     # ibraheem2016, Table 2: 5 and 10 obstacles; those of the larger maps are not stated.
@@ -191,7 +192,7 @@ def paper_maps(quick: bool) -> Iterator[tuple[str, str, str, dict[str, Any], lis
         place = f"{number}: {rows}×{cols}, 25 obstacles"
         # The number of iterations is not stated; the paper's times are hours for the one, minutes for the other.
         old = {"ants": 500, "beta": 2.0, "evaporation": 0.01, "iterations": 1000}
-        new = {"iterations": 200}
+        new = {"iterations": 200, "form": "letter"}
         for name, options, length, wall in (("as", old, *figures[:2]), ("pfaco", new, *figures[2:])):
             yield "lee2008", place, name, options, queries, f"{length:g}, {wall:g} s"
 

@@ -40,8 +40,13 @@ class Least(NamedTuple):
     near: str
 
 
-def cloud(footprint: Mapping[str, float]) -> tuple[Array, Array]:
+def cloud(footprint: Mapping[str, Any]) -> tuple[Array, Array]:
     """Points (P, 2) on the outline of a footprint, as in a robot's file, and points inside it [m]."""
+    if "polygon" in footprint:
+        return _polygon_cloud(np.array(footprint["polygon"], dtype=np.float64))
+    if footprint.get("centre"):
+        edge, inside = cloud({key: value for key, value in footprint.items() if key != "centre"})
+        return edge + footprint["centre"], inside + footprint["centre"]
     if "radius" in footprint:
         r = float(footprint["radius"])
         turn = np.linspace(0.0, 2 * math.pi, math.ceil(2 * math.pi * r / SPACING), endpoint=False)
@@ -59,6 +64,18 @@ def cloud(footprint: Mapping[str, float]) -> tuple[Array, Array]:
     if "radius" in footprint:
         inside = inside[np.hypot(*inside.T) < half_x]
     return edge, inside
+
+
+def _polygon_cloud(corners: Array) -> tuple[Array, Array]:
+    following = np.roll(corners, -1, axis=0)
+    counts = 1 + np.ceil(np.hypot(*(following - corners).T) / SPACING).astype(int)
+    edge = np.concatenate([np.linspace(a, b, n) for a, b, n in zip(corners, following, counts, strict=True)])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    lattice = np.stack(np.meshgrid(*(np.arange(a, b, SPACING) for a, b in zip(low, high, strict=True))), axis=-1)
+    inside = lattice.reshape(-1, 2)
+    away = inside[None] - corners[:, None]
+    sides = (following - corners)[:, :1] * away[..., 1] - (following - corners)[:, 1:] * away[..., 0]
+    return edge, inside[(sides > 0).all(axis=0) | (sides < 0).all(axis=0)]
 
 
 def along_arcs(pose: Array, twist: Array, hz: int) -> Iterator[tuple[float, Array]]:
@@ -116,7 +133,7 @@ def _bouncing(x: float, v: float, low: float, high: float, t: Array) -> Array:
 
 
 def least_clearance(
-    world: Mapping[str, Any], footprint: Mapping[str, float], pose: Array, twist: Array, hz: int
+    world: Mapping[str, Any], footprint: Mapping[str, Any], pose: Array, twist: Array, hz: int
 ) -> Least:
     """The least distance from a footprint to every cylinder, mover and wall of a world during a drive.
 

@@ -1,11 +1,12 @@
 """Runs of a suite in other processes, as `benchmarks.planted` and `benchmarks.suites` need them.
 
-As a plugin of pytest, `-p benchmarks.suite_runs`, it writes what came out of each test into the file that ANTDRIVE_RUN names, and
-shuffles the tests with the seed in ANTDRIVE_SHUFFLE.
+As a plugin of pytest, `-p benchmarks.suite_runs`, it writes what came out of each test into the file that ANTDRIVE_RUN names,
+shuffles the tests with the seed in ANTDRIVE_SHUFFLE, and runs each of them ANTDRIVE_TIMES times.
 """
 
 from __future__ import annotations
 
+import copy
 import json
 import os
 import random
@@ -24,39 +25,53 @@ PLUGINS = ("-p", "antdrive.sim.regression.plugin", "-p", "benchmarks.suite_runs"
 #: What came out of each test, by its name.
 Tests: TypeAlias = dict[str, dict[str, Any]]
 
-_TESTS: Tests = {}
+_ROUNDS: list[Tests] = []  # the first results of all tests, the second ones, and so on
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    items += [_twin(item) for _ in range(int(os.environ.get("ANTDRIVE_TIMES", "1")) - 1) for item in tuple(items)]
     seed = os.environ.get("ANTDRIVE_SHUFFLE")
     if seed:
         random.Random(int(seed)).shuffle(items)
 
 
+def _twin(item: pytest.Item) -> pytest.Item:
+    """Another item for the same test; pytest would not set up and tear down the same one between two turns."""
+    twin = copy.copy(item)
+    twin.stash, twin.user_properties = pytest.Stash(), []
+    if isinstance(twin, pytest.Function):
+        twin._initrequest()
+    return twin
+
+
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
     if report.when == "call" or report.failed:
         facts = {name.removeprefix("drive."): value for name, value in report.user_properties}
-        _TESTS[report.nodeid.rpartition("/")[2]] = {
+        _keep(report.nodeid.rpartition("/")[2], {
             "passed": report.passed, "message": report.longreprtext, "digest": facts.get("digest", ""),
             "outcome": facts.get("outcome", ""), "results": facts.get("results", ""),
-        }  # fmt: skip
+        })  # fmt: skip
 
 
 def pytest_collectreport(report: pytest.CollectReport) -> None:
     if report.failed:
-        _TESTS[report.nodeid] = {
-            "passed": False,
-            "message": report.longreprtext,
-            "digest": "",
-            "outcome": "",
-            "results": "",
-        }
+        facts = {"message": report.longreprtext, "digest": "", "outcome": "", "results": ""}
+        _keep(report.nodeid, {"passed": False, **facts})
+
+
+def _keep(name: str, facts: dict[str, Any]) -> None:
+    """Put a test's result into the first round that has none of this test."""
+    for tests in _ROUNDS:
+        if name not in tests:
+            tests[name] = facts
+            return
+    _ROUNDS.append({name: facts})
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
     path = os.environ.get("ANTDRIVE_RUN")
     if path and not hasattr(session.config, "workeroutput"):
-        Path(path).write_text(json.dumps(_TESTS))
+        Path(path).write_text(json.dumps(_ROUNDS))
 
 
 def with_pytest(
@@ -71,15 +86,37 @@ def with_pytest(
         env: variables to set
         cwd: the working directory; by default the folder
     """
+    (tests,) = rounds_with_pytest(folder, *words, flags=flags, env=env, cwd=cwd)
+    return tests
+
+
+def rounds_with_pytest(
+    folder: Path,
+    *words: str,
+    times: int = 1,
+    flags: Sequence[str] = (),
+    env: Mapping[str, str] | None = None,
+    cwd: Path | None = None,
+) -> list[Tests]:
+    """The same where one process runs each test several times, a round for each time.
+
+    Args:
+        folder: holds the suites
+        words: further words for pytest
+        times: how often each test is run
+        flags: for the interpreter
+        env: variables to set
+        cwd: the working directory; by default the folder
+    """
     out = folder / "tests.json"
     out.unlink(missing_ok=True)
     command = [sys.executable, *flags, "-m", "pytest", "-q", *PLUGINS, "--drive-film=never", *words]
-    env = environment(out, env)
+    env = environment(out, {**(env or {}), "ANTDRIVE_TIMES": str(times)})
     done = subprocess.run(command, cwd=cwd or folder, env=env, capture_output=True, text=True, check=False)
     if not out.exists():
         raise RuntimeError(done.stdout[-2000:] + done.stderr[-2000:])
     found = json.loads(out.read_text())
-    assert isinstance(found, dict)
+    assert isinstance(found, list)
     return found
 
 

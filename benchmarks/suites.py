@@ -1,19 +1,21 @@
 """What suites cost, and whether they flake: `python -m benchmarks.suites [--scenarios 200] [--jobs 2]`, or
-`--repeats N [--results FILE.jsonl]`.
+`--repeats N [--within M] [--results FILE.jsonl]`.
 
 `--scenarios` makes a suite of random worlds, accepts it, and checks it without films; collecting it is timed apart. Processor
 seconds are those of all processes, so that they can be compared between busy and quiet machines.
 
-`--repeats N` drives the tests of `examples/regression_suite` N times over, in the order of the file and shuffled, in one
-process, with `pytest -n 2` and with `antdrive check --jobs 2`, and counts tests that failed and drives that were not the first
-ones, bit for bit. Each round is a line of the file of results, as soon as it is over; a later call goes on until the file has N
-rounds, and one without `--repeats` says what the file has. The exit code is 1 if a test failed or a drive was another one.
+`--repeats N` drives the tests of `examples/regression_suite` N times over: in the order of the file and shuffled, in one process
+and with `pytest -n 2`, M times in each run of pytest, and now and then with `antdrive check --jobs 2`. It counts tests that
+failed and drives that were not the first ones, bit for bit. Each round is a line of the file of results, as soon as the run of
+pytest is over; a later call goes on until the file has N rounds, and one without `--repeats` says what the file has. The exit
+code is 1 if a test failed or a drive was another one.
 """
 
 from __future__ import annotations
 
 import argparse
 import dataclasses
+import functools
 import itertools
 import resource
 import shutil
@@ -28,7 +30,7 @@ import yaml
 
 from benchmarks.planners import table
 from benchmarks.resuming import append_line, current_commit, read_lines
-from benchmarks.suite_runs import EXAMPLE, PLUGINS, Tests, environment, with_check, with_pytest
+from benchmarks.suite_runs import EXAMPLE, PLUGINS, Tests, environment, rounds_with_pytest, with_check
 
 
 def suite(scenarios: int) -> str:
@@ -66,33 +68,39 @@ def speed(scenarios: int, jobs: int) -> Iterator[list[str]]:
             yield [f"`{' '.join(words[:2])}`, {scenarios} scenarios", *timed(folder, *words)]
 
 
-def ways() -> Iterator[tuple[str, Callable[[Path], Tests]]]:
-    """Ways to run the tests of a folder, by turns, each time in another order."""
+def ways(within: int) -> Iterator[tuple[str, Callable[[Path], list[Tests]]]]:
+    """Ways to run the tests of a folder, by turns, each time in another order; what comes is the result of each round."""
     for seed in itertools.count(1):
         shuffled = {"ANTDRIVE_SHUFFLE": str(seed), "PYTHONHASHSEED": str(seed)}
-        yield "antdrive check --jobs 2", lambda folder: with_check(folder, "--jobs", "2")
-        yield "pytest, shuffled", lambda folder, env=shuffled: with_pytest(folder, env=env)  # type: ignore[misc]
-        yield "pytest -n 2", lambda folder: with_pytest(folder, "-n", "2")
-        yield "pytest", lambda folder: with_pytest(folder)
+        yield "antdrive check --jobs 2", lambda folder: [with_check(folder, "--jobs", "2")]
+        yield "pytest, shuffled", functools.partial(rounds_with_pytest, times=within, env=shuffled)
+        yield "pytest -n 2", lambda folder: rounds_with_pytest(folder, "-n", "2", times=within)
+        yield "pytest", functools.partial(rounds_with_pytest, times=within)
 
 
-def repeats(times: int, results: Path | None) -> list[Round]:
-    """The rounds of a file of results, and new ones until there are as many as asked for.
+def repeats(times: int, within: int, results: Path | None) -> list[Round]:
+    """The rounds of a file of results, and new ones until there are as many as asked for, or a few more.
 
     Args:
         times: how many rounds
+        within: how many of them are made in one run of pytest
         results: the file; None: all rounds are new, and none is kept
     """
     found = [Round(**line) for line in read_lines(results)]
+    sessions = max((one.session for one in found), default=-1) + 1
     with tempfile.TemporaryDirectory() as name:
         folder = Path(shutil.copytree(EXAMPLE, Path(name) / "checkout", ignore=shutil.ignore_patterns("__pycache__")))
-        for number, (way, run) in itertools.islice(enumerate(ways()), len(found), times):
-            tests = run(folder)
-            digests = {name: str(test["digest"]) for name, test in tests.items()}
-            failed = {name: str(test["message"])[:2000] for name, test in tests.items() if not test["passed"]}
-            found.append(Round(number, way, digests, failed, current_commit()))
-            append_line(results, dataclasses.asdict(found[-1]))
-            print(number, way, f"{len(tests)} tests, {len(failed)} failed", file=sys.stderr)
+        for session, (way, run) in itertools.islice(enumerate(ways(within)), sessions, None):
+            if len(found) >= times:
+                break
+            made = run(folder)
+            for tests in made:
+                digests = {name: str(test["digest"]) for name, test in tests.items()}
+                failed = {name: str(test["message"])[:2000] for name, test in tests.items() if not test["passed"]}
+                found.append(Round(session, len(found), way, digests, failed, current_commit()))
+                append_line(results, dataclasses.asdict(found[-1]))
+            failures = sum(len(one.failed) for one in found[-len(made) :])
+            print(f"{len(found)} rounds; {way}: {len(made)} of them, {failures} failed", file=sys.stderr, flush=True)
     return found
 
 
@@ -101,13 +109,15 @@ class Round:
     """One run of the example's tests.
 
     Attributes:
-        number: counted from 0; it decides the way and the order of the tests
+        session: the run of pytest or `antdrive check`, counted from 0; it decides the way and the order of the tests
+        number: counted from 0
         way: how the tests were run
         digests: of each test's drive
         failed: the messages of tests that failed, by name
         commit: the commit of antdrive
     """
 
+    session: int
     number: int
     way: str
     digests: dict[str, str]
@@ -137,11 +147,12 @@ def main() -> None:
     parser.add_argument("--scenarios", type=int, default=200, help="of the generated suite")
     parser.add_argument("--jobs", type=int, default=2, help="processes of accept and check")
     parser.add_argument("--repeats", type=int, default=0, help="how often to run the example's tests instead")
+    parser.add_argument("--within", type=int, default=10, help="how often one run of pytest runs them")
     parser.add_argument("--results", type=Path, help="file with a line for each of these runs, to go on with")
     arguments = parser.parse_args()
     rounds: list[Round] = []
     if arguments.repeats or arguments.results:
-        rounds = repeats(arguments.repeats, arguments.results)
+        rounds = repeats(arguments.repeats, arguments.within, arguments.results)
         found = table(["run with", "rounds", "tests", "failed", "other drive"], counted(rounds))
     else:
         heads = ["command", "wall time", "processor time", "says"]

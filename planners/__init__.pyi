@@ -36,6 +36,7 @@ from .iterative import Progress as Progress
 from .iterative import as_iterative as as_iterative
 from .iterative import keep_best as keep_best
 from .iterative import watch as watch
+from .own_code import record_name as record_name
 from .plan import Capabilities as Capabilities
 from .plan import Cell as Cell
 from .plan import Cells as Cells
@@ -52,6 +53,7 @@ from .registry import PLANNERS as PLANNERS
 from .registry import describe as describe
 from .registry import list_planners as list_planners
 from .registry import load_planner as load_planner
+from .registry import planner_version as planner_version
 from .replanning.agents import AgentStats as AgentStats
 from .replanning.agents import OnlineAgent as OnlineAgent
 from .replanning.agents import ReplanningAgent as ReplanningAgent

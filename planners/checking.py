@@ -17,7 +17,7 @@ import numpy as np
 from antdrive.planners.graph.sipp import TimedPlan
 from antdrive.planners.plan import Cell, History, Planner, PlannerError, PlanResult, PlanStatus, Query, path_cost
 from antdrive.worlds import Floats
-from antdrive.worlds.ends import end_reach
+from antdrive.worlds.ends import end_reach, longest_line
 from antdrive.worlds.errors import InputError
 from antdrive.worlds.plane import polyline_length, segment_lengths, wrap_angle
 
@@ -109,8 +109,9 @@ def check_plan(query: Query, result: PlanResult) -> str:
 
     Cells run from the query's start to its goal along allowed moves, and cost what `path_cost` says. Waypoints join the
     same ends, keep the clearance, and have the length of a curve that rounds their corners; a start that has less room
-    than that is left by a first leg that comes no closer, within `end_reach`. With waypoints, the cost may be infinite: then
-    the grid has no path, and the cells are merely those that the line passes. The times of a `TimedPlan` increase. A path
+    than that is left by a first leg that comes no closer, within `end_reach`. They are no longer than `longest_line` allows for
+    the cells beside them. With waypoints, the cost may be infinite: then the grid has no path, and the cells are merely those
+    that the line passes. The times of a `TimedPlan` increase. A path
     that was found when planning stopped early is checked, too.
 
     Args:
@@ -280,7 +281,17 @@ def _waypoints(query: Query, result: PlanResult, xy: Floats) -> str:
     slack = RELATIVE * drawn + NEAR
     if not drawn - _rounded_off(xy) - slack <= length <= drawn + slack:
         return f"length: {length:.9g} m, but the waypoints are {drawn:.9g} m long"
+    if length > longest_line(result.cost, _leads(query, result), query.grid.cell) + slack:
+        return f"waypoints: they are {length:.9g} m long, but the cells beside them only {result.cost:.9g} m"
     return ""
+
+
+def _leads(query: Query, result: PlanResult) -> float:
+    """The distances of the first cell from the exact start and of the last from the exact goal, together [m]."""
+    if query.task is None:
+        return 0.0
+    first, last = query.grid.xy(result.cells[[0, -1]])
+    return math.dist(first, query.task.start[:2]) + math.dist(last, query.task.goal)
 
 
 def _ends(query: Query) -> list[list[tuple[float, float]]]:

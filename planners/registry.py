@@ -23,6 +23,7 @@ from antdrive.planners.graph.dstar import DStar
 from antdrive.planners.graph.dstar_lite import DStarLite
 from antdrive.planners.graph.search import AStar, Dijkstra
 from antdrive.planners.graph.sipp import SafeIntervals
+from antdrive.planners.own_code import is_own, module_hash, own_object, own_version
 from antdrive.planners.plan import Planner
 from antdrive.worlds import FieldError, InputError
 
@@ -50,13 +51,15 @@ def load_planner(name: str, /, **options: Any) -> Planner:
     """The planner of that name, with options set.
 
     Args:
-        name: one of `list_planners()`
+        name: one of `list_planners()`, or FILE.py:CLASS or MODULE:CLASS for people's own code
         options: the planner's options by name; values may be text, as from a command line
 
     Raises:
         InputError: there is no such planner or option, or the option does not take the value; lists what is
             valid.
     """
+    if is_own(name):
+        return make_planner(own_object(name), name, **options)
     planner = PLANNERS.get(name)
     if planner is None:
         entry = _plugins().get(name)
@@ -78,6 +81,26 @@ def make_planner(made: Any, name: str, /, **options: Any) -> Planner:
         InputError: it is no planner, its class cannot be called without arguments, or an option is wrong.
     """
     return _with_options(name, _instance(made, f"planner {name!r}"), options)
+
+
+def planner_version(name: str) -> str:
+    """What the code of a planner is: its distribution with version, and the hash of its file unless it is antdrive's.
+
+    Args:
+        name: what `load_planner` takes
+
+    Raises:
+        InputError: there is no such planner.
+    """
+    if is_own(name):
+        own_object(name)
+        return own_version(name)
+    if name in PLANNERS:
+        return f"antdrive {importlib.metadata.version('antdrive')}"
+    load_planner(name)
+    entry = _plugins()[name]
+    version = entry.dist.version if entry.dist is not None else "without version"
+    return f"{_maker(entry)} {version} {module_hash(entry.module)}".rstrip()
 
 
 def list_planners() -> Mapping[str, Planner]:

@@ -13,13 +13,16 @@ NEAR = 0.25
 
 
 @kernel
-def footprint_clearances(poses: Array, shape: Array, discs: Array, bounds: Array, out: Array) -> None:
+def footprint_clearances(poses: Array, shape: Array, corners: Array, discs: Array, bounds: Array, out: Array) -> None:
     """out[i] = distance from the footprint at poses[i] to the nearest disc surface or wall.
 
-    `shape` holds half length, half width and rounding of a rounded rectangle.
+    `shape` holds half length, half width and rounding of a rounded rectangle; where there are `corners` (K, 2), they are
+    those of the polygon in its place.
     """
     hx, hy, rounding = shape[0], shape[1], shape[2]
     radius = math.hypot(hx, hy) + rounding
+    for k in range(corners.shape[0]):
+        radius = max(radius, math.hypot(corners[k, 0], corners[k, 1]) + rounding)
     near = np.empty_like(discs)
     count = 0
     anchor_x, anchor_y = math.inf, math.inf
@@ -28,6 +31,14 @@ def footprint_clearances(poses: Array, shape: Array, discs: Array, bounds: Array
         if not math.hypot(x - anchor_x, y - anchor_y) <= NEAR:
             anchor_x, anchor_y = x, y
             count = discs_near(x, y, radius + 2.0 * NEAR, discs, near)
+        if corners.shape[0] > 0:
+            best = polygon_wall_distance(x, y, cos, sin, corners, bounds)
+            for j in range(count):
+                dx, dy = near[j, 0] - x, near[j, 1] - y
+                apart = polygon_distance(cos * dx + sin * dy, cos * dy - sin * dx, corners)
+                best = min(best, apart - near[j, 2])
+            out[i] = best - rounding
+            continue
         extent_x = hx * abs(cos) + hy * abs(sin) + rounding
         extent_y = hx * abs(sin) + hy * abs(cos) + rounding
         best = min(
@@ -42,6 +53,40 @@ def footprint_clearances(poses: Array, shape: Array, discs: Array, bounds: Array
             inside = min(max(qx, qy), 0.0)
             best = min(best, outside + inside - rounding - near[j, 2])
         out[i] = best
+
+
+@kernel
+def polygon_distance(x: float, y: float, corners: Array) -> float:
+    """The distance from a convex polygon (K, 2), counter-clockwise, to a point; within it minus that to the nearest edge.
+
+    A polygon of one corner is a point.
+    """
+    over, apart2 = -math.inf, math.inf
+    for k in range(corners.shape[0]):
+        ax, ay = corners[k - 1, 0], corners[k - 1, 1]
+        ex, ey = corners[k, 0] - ax, corners[k, 1] - ay
+        dx, dy = x - ax, y - ay
+        length2 = ex * ex + ey * ey
+        share = 0.0
+        if length2 > 0.0:
+            share = min(max((dx * ex + dy * ey) / length2, 0.0), 1.0)
+            over = max(over, (dx * ey - dy * ex) / math.sqrt(length2))
+        else:
+            over = math.inf
+        dx, dy = dx - share * ex, dy - share * ey
+        apart2 = min(apart2, dx * dx + dy * dy)
+    return over if over <= 0.0 else math.sqrt(apart2)
+
+
+@kernel
+def polygon_wall_distance(x: float, y: float, cos: float, sin: float, corners: Array, bounds: Array) -> float:
+    """The distance from a polygon (K, 2) at (x, y), turned by an angle with this cosine and sine, to the nearest wall."""
+    best = math.inf
+    for k in range(corners.shape[0]):
+        cx = x + cos * corners[k, 0] - sin * corners[k, 1]
+        cy = y + sin * corners[k, 0] + cos * corners[k, 1]
+        best = min(best, min(min(cx - bounds[0], bounds[2] - cx), min(cy - bounds[1], bounds[3] - cy)))
+    return best
 
 
 @kernel

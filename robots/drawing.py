@@ -19,37 +19,42 @@ MM = 1000.0  # the drawing's unit, because browsers render text in units of a me
 def robot_svg(robot: RobotSpec) -> str:
     """A robot from above as SVG, heading right, to scale: footprint, wheels, heading and a ruler.
 
-    Its coordinates are millimetres from the robot's centre, y upwards.
+    Its coordinates are millimetres from the axle's centre, y upwards.
     """
     foot = robot.footprint
-    half_x, half_y = MM * (foot.half_length + foot.rounding), MM * (foot.half_width + foot.rounding)
+    xmin, ymin, xmax, ymax = (MM * value for value in foot.bounds)
+    half_x, half_y, middle = (xmax - xmin) / 2, (ymax - ymin) / 2, (xmin + xmax) / 2
     pad = 0.12 * max(half_x, half_y)
-    left, bottom, width, height = -half_x - pad, -half_y - 3 * pad, 2 * (half_x + pad), 2 * half_y + 4 * pad
+    left, bottom, width, height = xmin - pad, ymin - 3 * pad, 2 * (half_x + pad), 2 * half_y + 4 * pad
     pen = 1.6 * width / WIDTH
-    parts = [
-        f'<rect class="footprint" x="{-half_x:.6g}" y="{-half_y:.6g}" width="{2 * half_x:.6g}" '
-        f'height="{2 * half_y:.6g}" rx="{MM * foot.rounding:.6g}" fill="{BODY}" stroke="{BODY_EDGE}" '
-        f'stroke-width="{pen:.3g}"/>'
-    ]
-    radius, thickness = MM * robot.wheel_radius, MM * _wheel_thickness(robot)
+    paint = f'fill="{BODY}" stroke="{BODY_EDGE}" stroke-width="{pen:.3g}"/>'
+    if len(foot.corners) > 1:
+        points = " ".join(f"{MM * x:.6g},{MM * y:.6g}" for x, y in foot.outline())
+        parts = [f'<polygon class="footprint" points="{points}" {paint}']
+    else:
+        parts = [
+            f'<rect class="footprint" x="{xmin:.6g}" y="{ymin:.6g}" width="{2 * half_x:.6g}" '
+            f'height="{2 * half_y:.6g}" rx="{MM * foot.rounding:.6g}" {paint}'
+        ]
+    radius, thickness = MM * robot.wheel_radius, MM * wheel_thickness(robot)
     for y in (MM * robot.track / 2, -MM * robot.track / 2):
         parts.append(
             f'<rect class="wheel" x="{-radius:.6g}" y="{y - thickness / 2:.6g}" width="{2 * radius:.6g}" '
             f'height="{thickness:.6g}" rx="{min(radius, thickness) / 4:.3g}" fill="{WHEEL}"/>'
         )
-    tip, barb = 0.85 * half_x, 0.14 * half_x
+    tip, barb = 0.85 * (MM * foot.reach(0.0) if foot.corners else half_x), 0.14 * half_x
     parts.append(
         f'<path class="heading" d="M 0 0 H {tip:.4g} M {tip - barb:.4g} {barb:.4g} L {tip:.4g} 0 '
         f'L {tip - barb:.4g} {-barb:.4g}" fill="none" stroke="{HEADING}" stroke-width="{1.4 * pen:.3g}"/>'
     )
     ruler = _ruler_length(2 * half_x / MM)
     parts.append(
-        f'<path class="ruler" d="M {-MM * ruler / 2:.6g} {bottom + pad:.6g} h {MM * ruler:.6g}" stroke="{RULER}" '
+        f'<path class="ruler" d="M {middle - MM * ruler / 2:.6g} {bottom + pad:.6g} h {MM * ruler:.6g}" stroke="{RULER}" '
         f'stroke-width="{pen:.3g}"/>'
     )
     # The label stays outside the group, whose flipped y axis would turn it upside down.
     label = (
-        f'<text x="0" y="{-bottom - 1.25 * pad:.4g}" font-size="{1.1 * pad:.3g}" text-anchor="middle" '
+        f'<text x="{middle:.6g}" y="{-bottom - 1.25 * pad:.4g}" font-size="{1.1 * pad:.3g}" text-anchor="middle" '
         f'font-family="sans-serif" fill="{RULER}">{ruler:g} m</text>'
     )
     return (
@@ -61,14 +66,18 @@ def robot_svg(robot: RobotSpec) -> str:
 
 def robot_card(robot: RobotSpec) -> str:
     """A robot as HTML: its drawing, then its main values."""
-    foot, noise = robot.footprint, robot.noise
-    length, width = 2 * (foot.half_length + foot.rounding), 2 * (foot.half_width + foot.rounding)
+    return card(robot_svg(robot), robot.name, facts_of(robot))
+
+
+def facts_of(robot: RobotSpec) -> dict[str, str]:
+    """A robot's main values in words."""
+    noise = robot.noise
     noisy = (
         f"pose ±{noise.pose_xy:g} m, ±{noise.pose_yaw:g} rad; encoders ±{100 * noise.encoder:g} %; "
         f"slip ±{100 * noise.slip:g} %; delay {noise.delay:g} s"
     )
-    facts = {
-        "footprint": f"disc, diameter {length:g} m" if foot.is_disc else f"{length:g} × {width:g} m",
+    return {
+        "footprint": footprint_text(robot),
         "body": f"{robot.height:g} m high, {robot.mass:g} kg",
         "wheels": f"radius {robot.wheel_radius:g} m, {robot.track:g} m apart",
         "speed": f"up to {robot.max_speed:g} m/s, {robot.max_yaw_rate:g} rad/s",
@@ -76,12 +85,30 @@ def robot_card(robot: RobotSpec) -> str:
         f"lateral {robot.max_lateral_acceleration:g} m/s²",
         "noise": noisy if noise.nonzero else "none",
     }
-    return card(robot_svg(robot), robot.name, facts)
 
 
-def _wheel_thickness(robot: RobotSpec) -> float:
+def footprint_text(robot: RobotSpec) -> str:
+    """A robot's footprint in words: kind, size, and where it is on the axle."""
+    foot = robot.footprint
+    xmin, ymin, xmax, ymax = foot.bounds
+    size = f"{xmax - xmin:g} × {ymax - ymin:g} m"
+    if foot.is_disc or len(foot.corners) == 1:
+        text = f"disc, diameter {2 * foot.rounding:g} m"
+    elif len(foot.corners) and foot.box is None:
+        text = f"polygon of {len(foot.corners)} corners, {size}"
+    else:
+        text = size
+    x, y = (xmin + xmax) / 2, (ymin + ymax) / 2
+    aside = f" and {abs(y):.3g} m to the {'left' if y > 0 else 'right'}" if abs(y) > 1e-9 else ""
+    off = f"; its middle {abs(x):.3g} m {'ahead of' if x >= 0 else 'behind'} the axle{aside}"
+    return text + (off if math.hypot(x, y) > 1e-9 else "")
+
+
+def wheel_thickness(robot: RobotSpec) -> float:
     """How thick the wheels are drawn, so that they stay within the footprint [m]."""
     foot = robot.footprint
+    if foot.corners:
+        return max(min(2 * robot.wheel_radius * WHEEL_ASPECT, 2 * robot.wheel_room), 0.02 * robot.track)
     beyond = max(robot.wheel_radius - foot.half_length, 0)
     edge = foot.half_width + math.sqrt(max(foot.rounding**2 - beyond**2, 0))
     room = 2 * (edge - robot.track / 2)

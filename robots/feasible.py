@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from antdrive.robots.spec import RobotSpec
+from antdrive.robots.spec import Footprint, RobotSpec
 from antdrive.worlds.errors import FieldError
 
 GRAVITY = 9.81  # [m/s^2]
@@ -41,12 +41,26 @@ def require_feasible(robot: RobotSpec) -> None:
 
 
 def yaw_inertia(robot: RobotSpec) -> float:
-    """Moment of inertia of a robot's body about its vertical axis, mass spread evenly [kg m^2]."""
-    foot = robot.footprint
+    """Moment of inertia of a robot's body about the vertical axis through its axle's centre, mass spread evenly [kg m^2]."""
+    return yaw_inertia_of(robot.mass, robot.footprint)
+
+
+def yaw_inertia_of(mass: float, foot: Footprint) -> float:
+    """The same of a mass [kg] that is spread evenly over a footprint."""
+    if len(foot.corners) == 1:
+        (x, y), r = foot.corners[0], foot.rounding
+        return mass * (r**2 / 2 + x**2 + y**2)
+    if foot.corners:
+        area = moment = 0.0  # triangles between the origin and each edge
+        for (ax, ay), (bx, by) in zip(foot.corners, (*foot.corners[1:], foot.corners[0]), strict=True):
+            triangle = (ax * by - ay * bx) / 2
+            area += triangle
+            moment += triangle * (ax**2 + ax * bx + bx**2 + ay**2 + ay * by + by**2) / 6
+        return mass * moment / area
     if foot.is_disc:
-        return robot.mass * foot.rounding**2 / 2
+        return mass * foot.rounding**2 / 2
     half_length, half_width = foot.half_length + foot.rounding, foot.half_width + foot.rounding
-    return robot.mass * (half_length**2 + half_width**2) / 3
+    return mass * (half_length**2 + half_width**2) / 3
 
 
 def _require_reached(key: str, what: str, robot: RobotSpec, limit: str, reached: float, unit: str) -> None:

@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from antdrive.robots.feasible import require_feasible
 from antdrive.robots.lidar import LIDAR_RANGE, Lidar
+from antdrive.robots.outline import MOST_CORNERS
 from antdrive.robots.spec import NOISE_RANGE, ROBOT_RANGE, Footprint, Noise, RobotSpec
 from antdrive.worlds.errors import FieldError, input_error
 from antdrive.worlds.files.checks import OneLine, SchemaVersion, check, suggest
@@ -22,29 +23,57 @@ _CATALOG = Path(__file__).with_name("catalog")
 _RULES = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
 
 _Size = Annotated[float, Field(gt=0)]
+_Place = Annotated[list[float], Field(min_length=2, max_length=2)]
+
+
+_FORMS = (
+    "write {radius: 0.18} for a disc, {length: 0.5, width: 0.4} for a rectangle, either with centre: [0.1, 0] if its middle "
+    "is not the axle's, or {polygon: [[0.3, -0.2], [0.3, 0.2], [-0.2, 0.2], [-0.2, -0.2]]}"
+)
 
 
 class FootprintEntry(BaseModel):
-    """A disc, given by its radius, or a rectangle, given by its length (along the heading) and width."""
+    """A disc, given by its radius, a rectangle, given by its length (along the heading) and width, or a convex polygon.
+
+    Positions are in the robot's frame: x ahead and y to the left of the axle's centre.
+    """
 
     model_config = _RULES
 
     radius: _Size | None = Field(None, description="radius of a round robot [m]")
     length: _Size | None = Field(None, description="length of a rectangular robot, along its heading [m]")
     width: _Size | None = Field(None, description="width of a rectangular robot [m]")
+    centre: _Place | None = Field(
+        None, description="middle of the disc or rectangle: x ahead, y to the left of the axle's centre [m]"
+    )
+    polygon: list[_Place] | None = Field(
+        None,
+        description="corners of a convex outline, in order: x ahead, y to the left of the axle's centre [m]; at most "
+        f"{MOST_CORNERS}",
+    )
 
     @model_validator(mode="after")
     def _one_kind(self) -> FootprintEntry:
-        given = {key for key in ("radius", "length", "width") if getattr(self, key) is not None}
-        if given not in ({"radius"}, {"length", "width"}):
-            raise ValueError("write {radius: 0.18} for a disc or {length: 0.5, width: 0.4} for a rectangle")
+        given = {key for key in ("radius", "length", "width", "polygon") if getattr(self, key) is not None}
+        if given not in ({"radius"}, {"length", "width"}, {"polygon"}) or (self.centre and self.polygon):
+            raise ValueError(_FORMS)
         return self
 
     def footprint(self) -> Footprint:
-        """The footprint that this entry describes."""
+        """The footprint that this entry describes.
+
+        Raises:
+            FieldError: the polygon is not convex.
+        """
+        centre = (self.centre[0], self.centre[1]) if self.centre is not None else (0.0, 0.0)
+        if self.polygon is not None:
+            try:
+                return Footprint.polygon(self.polygon)
+            except FieldError as error:
+                raise FieldError("footprint.polygon", error.problem) from None
         if self.radius is not None:
-            return Footprint.disc(self.radius)
-        return Footprint.rectangle(self.length or 0.0, self.width or 0.0)
+            return Footprint.disc(self.radius, centre)
+        return Footprint.rectangle(self.length or 0.0, self.width or 0.0, centre)
 
 
 def _level(key: str, description: str) -> Any:
@@ -94,16 +123,14 @@ class LidarEntry(BaseModel):
 
 
 class RobotFile(BaseModel):
-    """A differential-drive robot: two driven wheels on one axle through the centre, and two casters."""
+    """A differential-drive robot: two driven wheels on one axle, whose centre is the robot's origin, and two casters."""
 
     model_config = _RULES
 
     schema_: SchemaVersion = Field(alias="schema", description="write schema: 1")
     name: OneLine = Field(min_length=1, max_length=200, description="name of the robot, by default that of the file")
     source: str | None = Field(None, description="where these values come from, free text")
-    footprint: FootprintEntry = Field(
-        description="write {radius: 0.18} for a disc or {length: 0.5, width: 0.4} for a rectangle [m]"
-    )
+    footprint: FootprintEntry = Field(description=f"{_FORMS} [m]")
     height: float = _number("height", "height of the body [m]")
     mass: float = _number("mass", "mass of the whole robot [kg]")
     wheel_radius: float = _number("wheel_radius", "radius of the driven wheels [m]")
@@ -144,6 +171,20 @@ def load_robot(robot: str | os.PathLike[str]) -> RobotSpec:
     return _robot_in(read_yaml(path), os.fspath(path), path.stem)
 
 
+def robot_from_text(text: str, source: str, stem: str) -> RobotSpec:
+    """The robot in the text of a robot file.
+
+    Args:
+        text: the file's text
+        source: what errors call it
+        stem: the robot's name where the text has none
+
+    Raises:
+        InputError: something in it is wrong.
+    """
+    return _robot_in(text, source, stem)
+
+
 @reused(16)
 def _robot_in(text: str, source: str, stem: str) -> RobotSpec:
     """The robot in the text of a robot file."""
@@ -163,10 +204,10 @@ def robot_schema() -> dict[str, Any]:
 
 def _to_spec(entry: RobotFile, document: Document) -> RobotSpec:
     values = {name: getattr(entry, name) for name in RobotFile.model_fields if name != "schema_"}
-    values["footprint"] = entry.footprint.footprint()
     values["noise"] = Noise(**dict(entry.noise))
     try:
         values["lidar"] = _lidar(entry.lidar)
+        values["footprint"] = entry.footprint.footprint()
         robot = RobotSpec(**values)
         require_feasible(robot)
     except FieldError as error:
@@ -186,6 +227,23 @@ def robot_to_dict(robot: RobotSpec) -> dict[str, Any]:
     left_out = {
         field.name
         for field in dataclasses.fields(robot)
-        if field.metadata.get("only_if_given") and getattr(robot, field.name) is None
+        if field.metadata.get("left_out_if_default") and getattr(robot, field.name) == field.default
     }
-    return {key: value for key, value in dataclasses.asdict(robot).items() if key not in left_out}
+    data = {key: value for key, value in dataclasses.asdict(robot).items() if key not in left_out}
+    if not robot.footprint.corners:
+        del data["footprint"]["corners"]
+    return data
+
+
+def footprint_to_dict(footprint: Footprint) -> dict[str, Any]:
+    """A footprint as it stands in a robot's file.
+
+    Args:
+        footprint: a disc, a rectangle or a polygon without round corners
+    """
+    corners = footprint.corners
+    if footprint.is_disc or len(corners) == 1:
+        return {"radius": footprint.rounding, **({"centre": list(corners[0])} if corners else {})}
+    if corners:
+        return {"polygon": [list(corner) for corner in corners]}
+    return {"length": 2 * footprint.half_length, "width": 2 * footprint.half_width}

@@ -22,8 +22,17 @@ def footprint_clearance(world: World, footprint: Footprint, poses: npt.ArrayLike
         poses: x, y and yaw of the robot's centre, shape (N, 3) [m, rad]
     """
     rows = np.ascontiguousarray(poses, dtype=np.float64).reshape(-1, 3)
-    shape = np.array([footprint.half_length, footprint.half_width, footprint.rounding])
     out = np.empty(len(rows))
     bounds = np.asarray(world.bounds, dtype=np.float64)
-    _kernels_footprint.footprint_clearances(rows, shape, world.discs, bounds, out)
+    _kernels_footprint.footprint_clearances(rows, *shape_of(footprint), world.discs, bounds, out)
     return out
+
+
+def shape_of(footprint: Footprint) -> tuple[Floats, Floats]:
+    """A footprint as kernels take it: half length, half width and rounding (3,), and a polygon's corners (K, 2) [m].
+
+    Args:
+        footprint: the robot's footprint
+    """
+    shape = np.array([footprint.half_length, footprint.half_width, footprint.rounding])
+    return shape, np.array(footprint.corners, dtype=np.float64).reshape(-1, 2)

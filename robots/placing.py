@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.robots.spec import RobotSpec
+from antdrive.robots.spec import Footprint, RobotSpec
 from antdrive.worlds import Disc, Floats, Pose, World
 
 WALLS = ("the left wall", "the lower wall", "the right wall", "the upper wall")
@@ -23,6 +23,13 @@ def gaps(world: World, robot: RobotSpec, poses: npt.ArrayLike) -> Floats:
     foot, discs = robot.footprint, world.discs
     cos, sin = np.cos(yaw), np.sin(yaw)
     dx, dy = discs[:, 0] - x, discs[:, 1] - y
+    if foot.corners:
+        to_discs = _beyond_polygon(foot, cos * dx + sin * dy, cos * dy - sin * dx) - foot.rounding - discs[:, 2]
+        cx, cy = np.array(foot.corners).T
+        at_x, at_y = x + cos * cx - sin * cy, y + sin * cx + cos * cy
+        xmin, ymin, xmax, ymax = world.bounds
+        room = at_x.min(1) - xmin, at_y.min(1) - ymin, xmax - at_x.max(1), ymax - at_y.max(1)
+        return np.hstack([to_discs, np.stack(room, axis=1) - foot.rounding])
     ahead, beside = np.abs(cos * dx + sin * dy) - foot.half_length, np.abs(cos * dy - sin * dx) - foot.half_width
     outside = np.hypot(np.maximum(ahead, 0.0), np.maximum(beside, 0.0))
     to_discs = outside + np.minimum(np.maximum(ahead, beside), 0.0) - foot.rounding - discs[:, 2]
@@ -30,6 +37,19 @@ def gaps(world: World, robot: RobotSpec, poses: npt.ArrayLike) -> Floats:
     reach_y = foot.half_length * np.abs(sin) + foot.half_width * np.abs(cos) + foot.rounding
     xmin, ymin, xmax, ymax = world.bounds
     return np.hstack([to_discs, x - reach_x - xmin, y - reach_y - ymin, xmax - x - reach_x, ymax - y - reach_y])
+
+
+def _beyond_polygon(footprint: Footprint, x: Floats, y: Floats) -> Floats:
+    """The distance from a footprint's polygon to points in its frame, negative within it [m]."""
+    corners = np.array(footprint.corners)
+    over, apart = np.full(x.shape, -np.inf), np.full(x.shape, np.inf)
+    for (ax, ay), (bx, by) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        length = float(np.hypot(bx - ax, by - ay))
+        ex, ey = ((bx - ax) / length, (by - ay) / length) if length else (0.0, 0.0)
+        along = np.clip((x - ax) * ex + (y - ay) * ey, 0.0, length)
+        apart = np.minimum(apart, np.hypot(x - ax - along * ex, y - ay - along * ey))
+        over = np.maximum(over, (x - ax) * ey - (y - ay) * ex if length else np.inf)
+    return np.where(over <= 0, over, apart)
 
 
 def name_of(world: World, index: int, unseen: int = 0) -> str:

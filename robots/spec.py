@@ -7,45 +7,8 @@ import math
 from dataclasses import dataclass
 
 from antdrive.robots.lidar import Lidar
+from antdrive.robots.outline import Footprint as Footprint
 from antdrive.worlds.errors import FieldError
-
-
-@dataclass(frozen=True)
-class Footprint:
-    """The robot's outline from above: a rectangle, centred on the axle, moved outwards by `rounding`.
-
-    A disc is a rectangle of size zero with a rounding, so one distance formula serves every footprint.
-
-    Attributes:
-        half_length: half the rectangle's length, along the robot's heading [m]
-        half_width: half its width [m]
-        rounding: how far the outline is moved outwards [m]
-    """
-
-    half_length: float = 0.0
-    half_width: float = 0.0
-    rounding: float = 0.0
-
-    @classmethod
-    def disc(cls, radius: float) -> Footprint:
-        """A disc of the given radius [m]."""
-        return cls(rounding=radius)
-
-    @classmethod
-    def rectangle(cls, length: float, width: float) -> Footprint:
-        """A rectangle of the given length, along the robot's heading, and width [m]."""
-        return cls(half_length=length / 2, half_width=width / 2)
-
-    @property
-    def is_disc(self) -> bool:
-        """Whether the footprint is a disc."""
-        return self.half_length == 0 and self.half_width == 0
-
-    @property
-    def radius(self) -> float:
-        """Radius of the smallest disc around the footprint, centred on the axle [m]."""
-        return math.hypot(self.half_length, self.half_width) + self.rounding
-
 
 #: The lowest and highest value of each field of `Noise`.
 NOISE_RANGE = {
@@ -118,13 +81,11 @@ ROBOT_RANGE = {
 WHEEL_ROOM = 0.05  # the least distance from a wheel's middle to the footprint's edge, in wheel radii
 
 
-#: Metadata of a field that records and hashes of a robot leave out where it is None: they are as they were before it existed.
-ONLY_IF_GIVEN = {"only_if_given": True}
-
-
 @dataclass(frozen=True, kw_only=True)
 class RobotSpec:
-    """A differential-drive robot: two driven wheels on one axle through the centre, and two casters.
+    """A differential-drive robot: two driven wheels on one axle, whose centre is the robot's origin, and two casters.
+
+    The footprint may reach farther ahead than behind; the mass counts as centred on the axle.
 
     Attributes:
         name: what the robot is called
@@ -166,7 +127,7 @@ class RobotSpec:
     wheel_friction: float = 1.5
     noise: Noise = Noise()
     source: str | None = None
-    lidar: Lidar | None = dataclasses.field(default=None, metadata=ONLY_IF_GIVEN)
+    lidar: Lidar | None = dataclasses.field(default=None, metadata={"left_out_if_default": True})
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
@@ -179,26 +140,44 @@ class RobotSpec:
         for key in ("half_length", "half_width", "rounding"):
             if not getattr(foot, key) >= 0:
                 raise FieldError(f"footprint.{key}", f"must be at least 0, got {getattr(foot, key):g}")
-        for side in (foot.half_length, foot.half_width):
-            _require_range("footprint", 2 * (side + foot.rounding))
+        try:
+            foot.require_convex()
+        except FieldError as error:
+            raise error.under("footprint") from None
+        xmin, ymin, xmax, ymax = foot.bounds
+        for size in (xmax - xmin, ymax - ymin):
+            _require_range("footprint", size)
         self._require_wheels_inside()
 
     def _require_wheels_inside(self) -> None:
         # Only the chassis detects contacts, so no part of a wheel may stand outside it.
         foot, half_track = self.footprint, self.track / 2
-        if foot.is_disc and math.hypot(half_track, self.wheel_radius) > foot.rounding:
+        if foot.corners:
+            self._require_wheels_in_polygon()
+        elif foot.is_disc and math.hypot(half_track, self.wheel_radius) > foot.rounding:
             raise FieldError(
                 "track", f"wheels of {self.wheel_radius:g} m, {self.track:g} m apart, stand outside the footprint"
             )
-        if not foot.is_disc and half_track > foot.half_width + foot.rounding:
+        elif not foot.is_disc and half_track > foot.half_width + foot.rounding:
             raise FieldError("track", f"wheels {self.track:g} m apart stand outside the footprint")
-        if not foot.is_disc and self.wheel_radius > foot.half_length + foot.rounding:
+        elif not foot.is_disc and self.wheel_radius > foot.half_length + foot.rounding:
             raise FieldError("wheel_radius", f"wheels of {self.wheel_radius:g} m stand outside the footprint")
         if self.wheel_room < WHEEL_ROOM * self.wheel_radius:
             raise FieldError(
                 "track",
                 f"wheels {self.track:g} m apart have their middles {self.wheel_room:g} m from the footprint's edge; "
                 f"their own width needs {WHEEL_ROOM * self.wheel_radius:g} m",
+            )
+
+    def _require_wheels_in_polygon(self) -> None:
+        r, half_track = self.wheel_radius, self.track / 2
+        ends = [(x, y) for x in (-r, r) for y in (-half_track, half_track)]
+        x, y = min(ends, key=lambda end: self.footprint.depth(*end))
+        if self.footprint.depth(x, y) < 0:
+            raise FieldError(
+                "footprint",
+                f"wheels of {r:g} m, {self.track:g} m apart, stand outside it at ({x:g}, {y:g}); the origin of the footprint "
+                "is the axle's centre",
             )
 
     @property
@@ -209,8 +188,7 @@ class RobotSpec:
     @property
     def wheel_room(self) -> float:
         """Distance from the middle of a wheel to the footprint's edge, seen from above [m]."""
-        foot = self.footprint
-        return min(foot.half_length, foot.half_width - self.track / 2) + foot.rounding
+        return min(self.footprint.depth(0.0, side * self.track / 2) for side in (1, -1))
 
     def _repr_html_(self) -> str:
         """The robot as notebooks show it."""

@@ -209,7 +209,18 @@ def _drivable(s: Scenario, grid: Grid, answer: PlanResult) -> PlanResult:
 
 def _tracked(s: Scenario, grid: Grid, answer: PlanResult) -> tuple[Route, TrackedPath]:
     """The route of a plan, and the same prepared for the controller."""
-    route = smooth(answer, grid, s.task, kind="none" if s.timed else s.smoothing)
+    numbers = bits(answer.cost, s.margin, 1 / s.control_hz)
+    line = answer.waypoints.tobytes() if answer.waypoints is not None else b""
+    plan_made = answer.cells.tobytes(), line, numbers, type(s.controller), repr((s.robot, s.controller))
+    contents = _by_contents(grid, s.task)
+    kind = "none" if s.timed else s.smoothing
+    return _tracked_plan(Keyed((s, grid, answer), (*contents.key, *plan_made)), kind)
+
+
+@reused(64)
+def _tracked_plan(asked: Keyed[tuple[Scenario, Grid, PlanResult]], kind: str) -> tuple[Route, TrackedPath]:
+    s, grid, answer = asked.value
+    route = smooth(answer, grid, s.task, kind=kind)
     period, tolerance = 1 / s.control_hz, s.task.goal_tolerance
     return route, s.controller.prepare(route, s.task.world, s.robot, s.margin, period, tolerance)
 

@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from antdrive.planners import SMOOTHINGS, Planner, capabilities_of, load_planner
+from antdrive.planners import SMOOTHINGS, Planner, capabilities_of, load_planner, record_name
 from antdrive.robots import Avoidance, PurePursuit, RobotSpec, load_robot, overlap_at
 from antdrive.robots.odometry import Odometry
 from antdrive.sim.calibration.choice import choose_margin
@@ -208,7 +208,7 @@ class Scenario:
 
         Args:
             world: a world of the catalogue, a world file, or a task
-            planner: a planner's name, or a planner
+            planner: a planner's name, FILE.py:CLASS, MODULE:CLASS, or a planner
             robot: a robot of the catalogue, a robot file, or a robot
             options: options of a planner that is given by name
 
@@ -221,7 +221,7 @@ class Scenario:
         scenario = cls(
             task=world if isinstance(world, Task) else load_task(world),
             planner=load_planner(planner, **(options or {})) if isinstance(planner, str) else planner,
-            planner_name=planner if isinstance(planner, str) else "",
+            planner_name=record_name(planner) if isinstance(planner, str) else "",
             robot=robot if isinstance(robot, RobotSpec) else load_robot(robot),
             margin=0.0 if margin == "auto" else margin,
             cell=cell, smoothing=smoothing, seed=seed, controller=controller, noise=noise,

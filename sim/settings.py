@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import math
 from collections.abc import Callable
 from typing import Any, TypeAlias, get_args
@@ -15,6 +14,7 @@ from antdrive.sim.entries import SettingsEntry
 from antdrive.worlds import Disc, Task, generate
 from antdrive.worlds.errors import FieldError, InputError
 from antdrive.worlds.files.checks import suggest
+from antdrive.worlds.reuse import reused
 
 #: The error for a key, such as "planner.ants", and what is wrong with its value: file, line, key and problem.
 Fail: TypeAlias = Callable[[str, str], InputError]
@@ -49,7 +49,7 @@ def scenario_fields(entry: SettingsEntry, fail: Fail) -> dict[str, Any]:
     }
 
 
-@functools.lru_cache(maxsize=1024)
+@reused(1024)
 def generated(kind: str, seed: int, options: tuple[tuple[str, str], ...]) -> Task:
     """The random world that {generate: KIND, seed: SEED} with options stands for.
 

@@ -27,6 +27,7 @@ def test_a_robot_of_the_catalogue_has_a_source_and_noise_and_drives(name: str) -
     robot = load_robot(name)
     assert robot.source, "the file says after which specification it is made"
     assert robot.noise.nonzero, "the file documents the robot's noise"
+    assert f"| `{name}` |" in (ROOT / "docs" / "robots.md").read_text()
     assert run(Scenario.of("empty", "astar", robot)).succeeded
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from antdrive.sim import Outcome
+from antdrive.sim.cli.app import main
 from antdrive.worlds import load_task
 
 ROOT = Path(__file__).parent.parent
@@ -25,13 +26,26 @@ def test_the_outcomes_that_are_no_success_are_listed() -> None:
     assert re.findall(r"`(\w+)`", listed[1]) == [o.key for o in Outcome if o is not Outcome.SUCCEEDED]
 
 
-def test_the_python_block_is_ten_lines_that_run(tmp_path: Path) -> None:
+@pytest.fixture
+def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder, in which commands are called. In this process, because each of its own would load all anew."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def exit_code(words: list[str], monkeypatch: pytest.MonkeyPatch) -> int:
+    monkeypatch.setattr(sys, "argv", words)
+    with pytest.raises(SystemExit) as ended:
+        main()
+    return int(ended.value.code or 0)
+
+
+def test_the_python_block_is_ten_lines_that_run(home: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (code,) = blocks("python")
     assert len([line for line in code.splitlines() if line.strip()]) <= 10
-    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.splitlines()[0] == "stopped at the goal without contact"
-    assert (tmp_path / "forest.npz").exists()
+    exec(compile(code, "README.md", "exec"), {"__name__": "__main__"})
+    assert capsys.readouterr().out.splitlines()[0] == "stopped at the goal without contact"
+    assert (home / "forest.npz").exists()
 
 
 def test_the_python_block_passes_mypy_strict(tmp_path: Path) -> None:
@@ -50,33 +64,19 @@ def test_the_python_block_passes_mypy_strict(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_the_world_file_is_driven(tmp_path: Path) -> None:
+def test_the_world_file_is_driven(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (text,) = blocks("yaml")
-    (tmp_path / "two-posts.yaml").write_text(text)
-    assert len(load_task(tmp_path / "two-posts.yaml").world.obstacles) == 2
-    done = subprocess.run(
-        [sys.executable, "-m", "antdrive", "run", "two-posts.yaml"],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
+    (home / "two-posts.yaml").write_text(text)
+    assert len(load_task(home / "two-posts.yaml").world.obstacles) == 2
+    assert exit_code(["antdrive", "run", "two-posts.yaml"], monkeypatch) == 0
 
 
-def test_the_commands_work(tmp_path: Path) -> None:
+def test_the_commands_work(home: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     lines = [line.split("#")[0].strip() for block in blocks("sh") for line in block.splitlines()]
     commands = [(shlex.split(line.split("||")[0]), "||" in line) for line in lines if line.startswith("antdrive")]
     assert len(commands) >= 5
     for command, fails in commands:
-        done = subprocess.run(
-            [sys.executable, "-m", "antdrive", *command[1:]],
-            cwd=tmp_path,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert done.returncode == fails, (command, done.stdout, done.stderr)
+        assert exit_code(command, monkeypatch) == fails, (command, *capsys.readouterr())
 
 
 @pytest.mark.parametrize("target", ["demo", "test"])

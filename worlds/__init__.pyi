@@ -2,6 +2,7 @@ from .errors import FieldError as FieldError
 from .errors import InputError as InputError
 from .files.world_file import list_worlds as list_worlds
 from .files.world_file import load_task as load_task
+from .files.world_file import load_tasks as load_tasks
 from .files.world_file import save_task as save_task
 from .files.world_file import task_from_dict as task_from_dict
 from .files.world_file import task_schema as task_schema

@@ -3,11 +3,14 @@
 A start or a goal need not lie at the centre of a free cell. The robot gets to a free cell near it on a straight line, no
 longer than `end_reach`. Where the start has less room than paths keep, that line, and nothing else of the path, may come
 as close to an obstacle as the start itself. Where the goal has less room, the path ends within the goal's tolerance of it.
+The line of a planner that is not bound to the grid has a path of cells beside it, which is as long but for `DETOUR`.
 """
 
 from __future__ import annotations
 
 import math
+
+DETOUR = 3.0  # cells by which the line of a planner that is not bound to the grid may be longer than its cells
 
 
 def cells_beside(inflate: float, cell: float) -> int:
@@ -30,3 +33,14 @@ def end_reach(inflate: float, cell: float) -> float:
         cell: side of a cell [m]
     """
     return math.sqrt(2.0) * (cells_beside(inflate, cell) + 0.5) * cell
+
+
+def longest_line(cost: float, leads: float, cell: float) -> float:
+    """The greatest length of a line beside a path of cells [m].
+
+    Args:
+        cost: length of the cells [m]
+        leads: the distances of the first cell from the start and of the last from the goal, together [m]
+        cell: side of a cell [m]
+    """
+    return cost + leads + DETOUR * cell

@@ -7,18 +7,51 @@ import hashlib
 import os
 import stat
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 
 _ROOT = Path(__file__).parent.parent  # the package antdrive
+PACKAGES = ("worlds", "planners", "robots", "sim")
+
+
+def sources_stamp() -> str:
+    """A SHA-256 of the text of every kernel file of antdrive, as this process has imported them.
+
+    Modules are imported when they are needed, so files that are edited meanwhile are of two versions in one process. What is
+    compiled then must not be taken for either version's, by this or any later process: the stamp is that of both texts.
+    """
+    first, then, stamp = _first_state()
+    if _state(first) == then:
+        return stamp
+    texts = {path: path.read_bytes() if path.exists() else b"" for path in first}
+    return stamp if texts == first else _sha([*first.values(), *texts.values()])
 
 
 @functools.cache
-def sources_stamp() -> str:
-    """A SHA-256 of the text of every kernel file of antdrive."""
+def _first_state() -> tuple[dict[Path, bytes], list[tuple[int, int]], str]:
+    """The texts of all kernel files when this is first called, what `_state` says of them, and their stamp."""
+    paths = [path for package in PACKAGES for path in sorted((_ROOT / package).rglob("_kernels*.py"))]
+    state = _state(paths)  # before they are read, so that an edit in between shows
+    texts = {path: path.read_bytes() for path in paths}
+    return texts, state, _sha(texts.values())
+
+
+def _state(paths: Iterable[Path]) -> list[tuple[int, int]]:
+    """When files were last written, and their sizes; zeros for those that are gone."""
+    found = []
+    for path in paths:
+        try:
+            status = os.stat(path)
+            found.append((status.st_mtime_ns, status.st_size))
+        except OSError:
+            found.append((0, 0))
+    return found
+
+
+def _sha(texts: Iterable[bytes]) -> str:
     sha = hashlib.sha256()
-    for package in ("worlds", "planners", "robots", "sim"):
-        for path in sorted((_ROOT / package).rglob("_kernels*.py")):
-            sha.update(path.read_bytes())
+    for text in texts:
+        sha.update(text)
     return sha.hexdigest()
 
 

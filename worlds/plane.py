@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.worlds.types import Floats
+from antdrive.worlds.types import Floats, Pose
 
 Angle = TypeVar("Angle", float, Floats)
 
@@ -48,3 +48,33 @@ def polyline_length(xy: npt.ArrayLike) -> float:
         xy: the polyline's points (N, 2)
     """
     return float(segment_lengths(xy).sum())
+
+
+def in_map(frame: Pose, points: npt.ArrayLike) -> Floats:
+    """Points (N, 2) or poses (N, 3) of the world in the frame of its map; the same numbers, bit for bit, where the two agree.
+
+    Args:
+        frame: the world's pose in its map: x, y [m] and yaw [rad]
+        points: x, y [m] and, for poses, yaw [rad]
+    """
+    found = np.array(points, dtype=np.float64)
+    x, y, yaw = frame
+    if (x, y, yaw) == (0.0, 0.0, 0.0):
+        return found
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    found[..., :2] = found[..., :2] @ np.array([[cosine, sine], [-sine, cosine]]) + (x, y)
+    if found.shape[-1] > 2:
+        found[..., 2] = wrap_angle(found[..., 2] + yaw)
+    return found
+
+
+def out_of_map(frame: Pose, points: npt.ArrayLike) -> Floats:
+    """Points (N, 2) or poses (N, 3) of a map in the frame of a world that was made from it: the inverse of `in_map`.
+
+    Args:
+        frame: the world's pose in its map: x, y [m] and yaw [rad]
+        points: x, y [m] and, for poses, yaw [rad]
+    """
+    x, y, yaw = frame
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    return in_map((-x * cosine - y * sine, x * sine - y * cosine, -yaw), points)

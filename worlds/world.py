@@ -162,6 +162,7 @@ class Task:
         goal_tolerance: how close to the goal the robot must stop [m]
         cell: the grid resolution that planners use unless another is given [m]
         time_limit: simulated time allowed unless another limit is given [s]; None: ample for the route
+        frame: how the world lies in the map that it was made from, for exports: x, y [m] and yaw [rad] of its frame there
 
     Raises:
         FieldError: the start or the goal is out of bounds or inside a cylinder, or a size is not positive.
@@ -173,9 +174,10 @@ class Task:
     goal_tolerance: float = 0.25
     cell: float = 0.5
     time_limit: float | None = None
+    frame: Pose = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        for key, values in (("start", self.start), ("goal", self.goal)):
+        for key, values in (("start", self.start), ("goal", self.goal), ("frame", self.frame)):
             for value in values:
                 require_finite(key, value)
         for key in ("goal_tolerance", "cell", "time_limit"):

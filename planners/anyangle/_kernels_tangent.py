@@ -134,7 +134,7 @@ def keep_outer(discs: Array, bounds: Array) -> Array:
             if j == i or not keep[j]:
                 continue
             room = discs[j, 2] - r
-            if room < -EPS:
+            if room < -EPS or abs(x - discs[j, 0]) > room + 1e-3:  # nearly all discs, without a root
                 continue
             if math.hypot(x - discs[j, 0], y - discs[j, 1]) <= room + EPS:
                 # Of two equal discs the first stays.

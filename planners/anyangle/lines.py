@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from antdrive.planners.plan import Cells, Query
 from antdrive.worlds import Floats, Point
+from antdrive.worlds.ends import longest_line
 from antdrive.worlds.plane import polyline_length
 
 if TYPE_CHECKING:  # importing kernels loads the compiler
@@ -102,19 +103,41 @@ def cells_along(query: Query, waypoints: npt.ArrayLike) -> Cells:
     """A path of allowed moves from start to goal beside a polyline in fractional cells; empty if there is none.
 
     It is the shortest path within a corridor around the polyline; the corridor widens until it contains a
-    path.
+    path. Where the line makes a loop or comes back beside itself, that path would cut it short. Then the path goes
+    leg by leg, from the cell of one waypoint to that of the next.
     """
+    line = np.ascontiguousarray(waypoints, dtype=np.float64).reshape(-1, 2)
+    whole = np.vstack([query.start, line, query.goal]).astype(np.float64)
+    cells = _shortest_beside(query, whole)
+    leads = math.dist(query.start, line[0]) + math.dist(line[-1], query.goal)
+    if not len(cells) or polyline_length(line) <= longest_line(polyline_length(cells), leads, 1.0):
+        return cells
+    parts = [cells[:1]]
+    for cell in [*_passed(query, line), query.goal]:
+        leg = _shortest_beside(query, np.array([parts[-1][-1], cell], dtype=np.float64))
+        if len(leg) > 1:  # 1: the cell is the last one's; 0: no move leads there
+            parts.append(leg[1:])
+    return np.asarray(np.vstack(parts), dtype=np.int32)
+
+
+def _passed(query: Query, line: Floats) -> list[tuple[int, int]]:
+    """The free cells that hold points of a line (M, 2) in fractional cells; a point whose cell is blocked has none."""
+    cells = np.clip(np.floor(line + 0.5).astype(np.int64), 0, np.array(query.grid.shape) - 1)
+    return [(int(row), int(col)) for row, col in cells if query.grid.free[row, col]]
+
+
+def _shortest_beside(query: Query, line: Floats) -> Cells:
+    """The shortest path of cells from the first to the last point of a line, which are cells, in a corridor around it."""
     from antdrive.planners.anyangle import _kernels_lines
     from antdrive.planners.graph import _kernels_search
 
-    line = np.ascontiguousarray(waypoints, dtype=np.float64).reshape(-1, 2)
-    line = np.vstack([query.start, line, query.goal]).astype(np.float64)
+    (r0, c0), (r1, c1) = line[[0, -1]].astype(int).tolist()
     moves, width = query.grid.moves, 1.0
     while True:
         within = width < max(query.grid.shape)
         near = _kernels_lines.corridor_moves(moves, line, width) if within else moves
         near.setflags(write=False)  # the search is compiled for read-only moves, as those of a grid are
-        cells, _, _, _ = _kernels_search.shortest_path(near, *query.start, *query.goal, True)
+        cells, _, _, _ = _kernels_search.shortest_path(near, r0, c0, r1, c1, True)
         if len(cells) or not within:
             return np.asarray(cells, dtype=np.int32)
         width *= 2.0

@@ -38,6 +38,7 @@ class Rules(NamedTuple):
         min_pheromone: the pheromone does not decay below this
         deposit: what a walk of the first rank leaves on each of its cells
         limit: the steps after which a walk ends
+        tabu: whether an ant avoids the cells that it has visited
         backtrack: whether an ant in a dead end steps back
         shortcut: whether walks that arrive are cut short
         quota: the iteration ends when this many walks have ended
@@ -48,6 +49,7 @@ class Rules(NamedTuple):
     min_pheromone: float
     deposit: float
     limit: int
+    tabu: bool
     backtrack: bool
     shortcut: bool
     quota: int
@@ -172,16 +174,17 @@ def cumulate(
     mask: Array,
     offset: Array,
     visited: Array,
+    tabu: bool,
     alpha: float,
     out: Array,
 ) -> float:
-    """out[k] = the attraction of the moves 0 to k from cell i to cells that the ant has not visited; that of all."""
+    """out[k] = the attraction of the moves 0 to k from cell i, with `tabu` to cells not visited; that of all."""
     total = 0.0
     for k in range(8):
         if mask[i] & (1 << k):
             j = i + offset[k]
-            if not visited[ant, j >> 3] & (1 << (j & 7)):
-                total += _power(trail[j], alpha) * heuristic[j]  # eq. 13
+            if not (tabu and visited[ant, j >> 3] & (1 << (j & 7))):
+                total += _power(trail[j], alpha) * heuristic[i, k]  # eq. 13
         out[k] = total
     return total
 
@@ -205,6 +208,22 @@ def cut_walk_short(ant: int, ants: Ants, graph: Graph, first: int, place: Array,
         walk[s] = tour[s]
     ants.sizes[ant] = size
     ants.lengths[ant] = walk_length(tour, size, graph.offset[2])
+
+
+@kernel
+def copy_without_loops(walk: Array, size: int, last: Array, tour: Array) -> int:
+    """`tour` receives the walk, which goes on from the last visit of each cell; the size of the tour.
+
+    `last` (cells,) is working memory.
+    """
+    for s in range(size):
+        last[walk[s]] = s
+    s, n = 0, 0
+    while s < size:
+        tour[n] = walk[s]
+        n += 1
+        s = last[walk[s]] + 1
+    return n
 
 
 @kernel
@@ -252,9 +271,10 @@ def run_colony(
     mask, offset, goal = graph.mask, graph.offset, graph.goal
     states, walks, sizes, taken = ants.states, ants.walks, ants.sizes, ants.taken
     lengths, visited = ants.lengths, ants.visited
-    alpha, limit = rules.alpha, rules.limit
+    alpha, limit, tabu = rules.alpha, rules.limit, rules.tabu
     cumulated = np.empty(8, dtype=np.float64)
     place, tour = np.full(len(mask), -1, dtype=np.int64), np.empty_like(best)
+    last = np.empty_like(place)
     first: Any = np.int64(0)  # a literal 0 would make numba compile `cut_one_short` a second time
     ended, steps, arrived, new = 0, 0, 0, 0
     worst = np.inf  # the longest walk of the ranking once it is full
@@ -263,7 +283,7 @@ def run_colony(
         for ant in range(len(states)):
             size = sizes[ant]
             i: Any = np.int64(walks[ant, size - 1])
-            total = cumulate(i, ant, trail, heuristic, mask, offset, visited, alpha, cumulated)
+            total = cumulate(i, ant, trail, heuristic, mask, offset, visited, tabu, alpha, cumulated)
             taken[ant] += 1
             steps += 1
             if total > 0.0:
@@ -282,11 +302,13 @@ def run_colony(
                     size = sizes[ant]
                     arrivals[arrived] = lengths[ant]
                     arrived += 1
-                    if lengths[ant] < shortest - 1e-9:
-                        shortest, new = lengths[ant], size
-                        for s in range(size):
-                            best[s] = walks[ant, s]
-                    stale |= reward(walks[ant], size, lengths[ant], trail, ranking, rules.deposit)
+                    if lengths[ant] < shortest - 1e-9 or not tabu:
+                        size = copy_without_loops(walks[ant], size, last, tour)
+                        length = walk_length(tour, size, offset[2])
+                        if length < shortest - 1e-9:
+                            shortest, new = length, size
+                            best[:size] = tour[:size]
+                    stale |= reward(walks[ant], sizes[ant], lengths[ant], trail, ranking, rules.deposit)
                 elif taken[ant] < limit and lengths[ant] <= worst:
                     continue
             elif rules.backtrack and size > 1 and taken[ant] < limit:

@@ -27,6 +27,9 @@ from antdrive.worlds._kernels import (
 TURN = 2.0 * math.pi
 GRAZE = 1e-9  # rad: a link that has turned past a disc by less than this touches it
 DEEP = 2e-10  # m: what enters a disc by less than this only touches it
+NOT_INSIDE = (
+    1e-3  # m: a disc whose centre is farther away than radii allow by this is not within another, whatever the rounding
+)
 LOOSE = -1e-11  # rad: a contact whose sweep is less than this does not bend the string
 NONE, OFF, HIT = range(3)  # events while a link turns: it reaches its target, leaves its disc, or meets another disc
 
@@ -186,7 +189,7 @@ def outermost(discs: Array) -> Array:
     keep = np.ones(n, dtype=np.bool_)
     for i in range(n):
         for j in range(n):
-            if i == j or not keep[j]:
+            if i == j or not keep[j] or abs(discs[i, 0] - discs[j, 0]) > discs[j, 2] - discs[i, 2] + NOT_INSIDE:
                 continue
             inside = math.hypot(discs[i, 0] - discs[j, 0], discs[i, 1] - discs[j, 1]) + discs[i, 2] - discs[j, 2]
             if inside <= DEEP and (i > j or inside < -DEEP):

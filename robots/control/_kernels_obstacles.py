@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from antdrive.robots._kernels_footprint import polygon_distance, polygon_wall_distance
 from antdrive.worlds._kernels import Array, kernel, segment_clearance, wall_distance
 
 
@@ -116,13 +117,16 @@ def arc_clearance(
 
 @kernel
 def turn_clearance(
-    x: float, y: float, yaw: float, turn: float, half_length: float, half_width: float, rounding: float, discs: Array,
-    bounds: Array,
+    x: float, y: float, yaw: float, turn: float, half_length: float, half_width: float, rounding: float, corners: Array,
+    discs: Array, bounds: Array,
 ) -> float:  # fmt: skip
     """Distance from a rounded rectangle that turns about its centre by `turn` to the nearest disc surface or wall.
 
     Seen from the rectangle, a disc moves on a circle, and is nearest at one of its ends or in line with a corner.
+    Where there are `corners` (K, 2), they are those of the polygon in the rectangle's place.
     """
+    if corners.shape[0] > 0:
+        return polygon_turn_clearance(x, y, yaw, turn, corners, discs, bounds) - rounding
     corner = math.atan2(half_width, half_length)
     radius = math.hypot(half_length, half_width)
     best = math.inf
@@ -147,6 +151,31 @@ def turn_clearance(
         for side in (corner, math.pi - corner, math.pi + corner, 2.0 * math.pi - corner):
             if on_arc(side, angle, -turn):
                 best = min(best, room - radius - rounding)
+    return best
+
+
+@kernel
+def polygon_turn_clearance(
+    x: float, y: float, yaw: float, turn: float, corners: Array, discs: Array, bounds: Array
+) -> float:
+    """The same for a convex polygon (K, 2) around (x, y), in the frame that is turned by `yaw`."""
+    best = math.inf
+    for j in range(discs.shape[0]):
+        dx, dy = discs[j, 0] - x, discs[j, 1] - y
+        away, angle = math.hypot(dx, dy), math.atan2(dy, dx) - yaw
+        for end in (angle, angle - turn):
+            best = min(best, polygon_distance(away * math.cos(end), away * math.sin(end), corners) - discs[j, 2])
+        for k in range(corners.shape[0]):
+            if on_arc(math.atan2(corners[k, 1], corners[k, 0]), angle, -turn):
+                best = min(best, away - math.hypot(corners[k, 0], corners[k, 1]) - discs[j, 2])
+    for end in (yaw + 0.0, yaw + turn):  # of one type, also where the yaw is an integer
+        best = min(best, polygon_wall_distance(x, y, math.cos(end), math.sin(end), corners, bounds))
+    for q in range(4):  # the walls, by the direction in which they are
+        room = abs(bounds[q] - (x if q % 2 == 0 else y))
+        angle = (2 + q) * 0.5 * math.pi - yaw
+        for k in range(corners.shape[0]):
+            if on_arc(math.atan2(corners[k, 1], corners[k, 0]), angle, -turn):
+                best = min(best, room - math.hypot(corners[k, 0], corners[k, 1]))
     return best
 
 

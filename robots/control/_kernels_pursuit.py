@@ -53,6 +53,7 @@ class PursuitTuning(NamedTuple):
         half_length: of the footprint, without its rounding; 0 if no turn on the spot is to be checked [m]
         half_width: the same across [m]
         rounding: radius of the footprint's corners [m]
+        corners: of a footprint that is a polygon (K, 2) [m]; none if it is not, or no turn is to be checked
         lookahead_time: the lookahead is the speed times this [s]
         lookahead_min: shortest lookahead [m]
         lookahead_max: longest lookahead [m]
@@ -75,6 +76,7 @@ class PursuitTuning(NamedTuple):
     half_length: float
     half_width: float
     rounding: float
+    corners: Array
     lookahead_time: float
     lookahead_min: float
     lookahead_max: float
@@ -299,17 +301,17 @@ def speed_limit(
 def clear_turn(
     x: float, y: float, yaw: float, bearing: float, distance: float, discs: Array, bounds: Array, tuning: PursuitTuning
 ) -> float:
-    """By how much to turn on the spot towards a bearing; 0 where a rectangle would touch something on the way.
+    """By how much to turn on the spot towards a bearing; 0 where the footprint would touch something on the way.
 
     `distance` is that from the centre to the nearest obstacle: one that is farther than the circumscribed radius is in no
     turn's way, and one that is nearer is in the way of the longer turn, too, which leads two corners past it.
     """
-    hx, hy, rounding = tuning.half_length, tuning.half_width, tuning.rounding
-    if distance > tuning.robot_radius or (hx == 0.0 and hy == 0.0):
+    hx, hy, rounding, corners = tuning.half_length, tuning.half_width, tuning.rounding, tuning.corners
+    if distance > tuning.robot_radius or (hx == 0.0 and hy == 0.0 and corners.shape[0] == 0):
         return bearing
-    now = turn_clearance(x, y, yaw, 0.0, hx, hy, rounding, discs, bounds)
+    now = turn_clearance(x, y, yaw, 0.0, hx, hy, rounding, corners, discs, bounds)
     least = min(TURN_CLEARANCE, now - START_TOLERANCE)
-    return bearing if turn_clearance(x, y, yaw, bearing, hx, hy, rounding, discs, bounds) >= least else 0.0
+    return bearing if turn_clearance(x, y, yaw, bearing, hx, hy, rounding, corners, discs, bounds) >= least else 0.0
 
 
 @kernel

@@ -225,5 +225,5 @@ def _weights(avoidance: Avoidance, radius: float, footprint: Footprint) -> kerne
         reversal_time=avoidance.reversal_time,
         reversal_distance=radius + avoidance.min_clearance + avoidance.reversal_margin,
         reversal_weight=avoidance.reversal_weight,
-        narrowest=min(footprint.half_length, footprint.half_width) + footprint.rounding,
+        narrowest=footprint.inner_radius,
     )

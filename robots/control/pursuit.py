@@ -102,7 +102,7 @@ class TrackedPath:
     @property
     def for_any_turn(self) -> TrackedPath:
         """The same path for a robot that turns on the spot the shorter way round, whatever is in its way."""
-        return replace(self, tuning=self.tuning._replace(half_length=0.0, half_width=0.0))
+        return replace(self, tuning=self.tuning._replace(half_length=0.0, half_width=0.0, corners=np.empty((0, 2))))
 
     @property
     def without_turning(self) -> TrackedPath:
@@ -254,6 +254,7 @@ class PurePursuit:
             half_length=robot.footprint.half_length,
             half_width=robot.footprint.half_width,
             rounding=robot.footprint.rounding,
+            corners=np.array(robot.footprint.corners, dtype=np.float64).reshape(-1, 2),
             lookahead_time=self.corner_lookahead_time if route.curvature is None else self.lookahead_time,
             lookahead_min=self.lookahead_min,
             lookahead_max=self.lookahead_max,

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -83,20 +84,32 @@ class RandomTasks(BaseModel):
 
 def _tasks(value: Any) -> Any:
     listed = isinstance(value, list) and value and all(isinstance(one, dict) for one in value)
-    if value != "own" and not isinstance(value, dict) and not listed:
+    if value not in ("own", "named") and not isinstance(value, dict) and not listed:
         raise ValueError(
-            f"must be own, {{random: 30, min_distance: 5}} or a list of {{start, goal}}, got {show(value)}"
+            f"must be own, named, {{random: 30, min_distance: 5}} or a list of {{start, goal}}, got {show(value)}"
         )
     return value
 
 
 _TASKS_SCHEMA: dict[str, Any] = {
     "anyOf": [
-        {"const": "own"},
+        {"enum": ["own", "named"]},
         RandomTasks.model_json_schema(),
         {"type": "array", "items": TaskEntry.model_json_schema()},
     ]
 }
+
+
+def _settings_schema() -> dict[str, Any]:
+    """The JSON Schema of settings in which a list of values may take the place of each."""
+    schema = SettingsEntry.model_json_schema()
+    discs = {"type": "array", "items": schema.pop("$defs")["DiscEntry"]}
+    keys = {key: discs if key == "unseen" else one for key, one in schema["properties"].items()}
+    number = keys["controller"]["additionalProperties"]
+    several_numbers = {"anyOf": [number, {"type": "array", "items": number, "minItems": 1}]}
+    keys["controller"] = {**keys["controller"], "additionalProperties": several_numbers}
+    several = {key: {"anyOf": [one, {"type": "array", "items": one, "minItems": 1}]} for key, one in keys.items()}
+    return {**schema, "properties": several}
 
 
 class CampaignFile(BaseModel):
@@ -121,12 +134,16 @@ class CampaignFile(BaseModel):
     seeds: Seeds = Field([0], description="how many seeds, or a list such as [3, 7], or a range such as 0-9")
     tasks: Annotated[Any, PlainValidator(_tasks), WithJsonSchema(_TASKS_SCHEMA)] = Field(
         "own",
-        description="own: the worlds' own starts and goals; {random: 30, seed: 1, min_distance: 5}; or a list of "
+        description="own: the worlds' own starts and goals; named: the tasks that their files list; {random: 30, seed: 1, "
+        "min_distance: 5}; or a list of "
         "{start: [x, y, yaw], goal: [x, y]}",
     )
-    settings: SettingsEntry = Field(
-        default_factory=SettingsEntry.model_construct,
-        description="settings that all runs share, such as {cell: 0.1, time_limit: 60}",
+    settings: Annotated[dict[str, Any], WithJsonSchema(_settings_schema())] = Field(
+        {},
+        description="how robots drive, such as {cell: 0.1, time_limit: 60}; a list of values stands for several settings",
+    )
+    run_limit: float | None = Field(
+        None, gt=0, description="wall-clock time that a run may take before its process is ended [s]; none by default"
     )
     rollouts: Literal["none", "failed", "all"] = Field("none", description="which runs' logs are kept")
 
@@ -141,6 +158,7 @@ class Campaign:
         document: its data, with the line of each value
         entry: its data, checked
         tasks: the tasks in each world; empty: the worlds' own
+        settings: every combination of the settings that it lists; one with the defaults where it lists none
     """
 
     source: str
@@ -148,6 +166,7 @@ class Campaign:
     document: Document
     entry: CampaignFile
     tasks: RandomTasks | tuple[TaskEntry, ...]
+    settings: tuple[SettingsEntry, ...]
 
     def error(self, location: Location, problem: str) -> InputError:
         """The error for a value: file, line, key and problem.
@@ -172,27 +191,65 @@ def make_campaign(data: Mapping[str, Any], folder: str | os.PathLike[str] = ".",
     """A campaign from plain data with the keys of a campaign file; `schema` may be left out.
 
     Args:
-        data: mappings, lists, numbers and texts
+        data: mappings, lists, numbers and texts; also tuples, ranges, paths, and numbers and arrays of numpy
         folder: where relative paths begin
         source: what messages call the data
 
     Raises:
         InputError: something in the data is wrong.
     """
-    return _checked(Document(source, {"schema": 1, **data}), Path(folder))
+    return _checked(
+        Document(source, {"schema": 1, **{key: _plain(value) for key, value in data.items()}}), Path(folder)
+    )
+
+
+def _plain(value: Any) -> Any:
+    """What Python code gives, as a file would hold it: numpy's numbers and arrays, tuples, ranges and paths."""
+    if isinstance(value, Mapping):
+        return {key: _plain(one) for key, one in value.items()}
+    if isinstance(value, list | tuple | range):
+        return [_plain(one) for one in value]
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    return value.tolist() if hasattr(value, "tolist") else value
 
 
 def _checked(document: Document, folder: Path) -> Campaign:
     entry = check(CampaignFile, document)
+    settings = tuple(_settings(document, entry.settings))
     if isinstance(entry.tasks, dict):
-        return Campaign(document.source, folder, document, entry, check(RandomTasks, _part(document, "tasks")))
+        return Campaign(
+            document.source, folder, document, entry, check(RandomTasks, _part(document, "tasks")), settings
+        )
     tasks = entry.tasks if isinstance(entry.tasks, list) else []
     checked = tuple(check(TaskEntry, _part(document, "tasks", i)) for i in range(len(tasks)))
     names = [task.name or str(i) for i, task in enumerate(checked)]
     for i, name in enumerate(names):
         if name in names[:i]:
             raise document.error(("tasks", i, "name"), f"{name!r} is the name of another task, too")
-    return Campaign(document.source, folder, document, entry, checked)
+    return Campaign(document.source, folder, document, entry, checked, settings)
+
+
+def _settings(document: Document, given: dict[str, Any]) -> Iterator[SettingsEntry]:
+    """Every combination of the settings that a campaign lists; the last of several lists varies fastest."""
+    lists = [_alternatives(document, key, value) for key, value in given.items()]
+    for values in itertools.product(*lists):
+        data = dict(zip(given, values, strict=True))
+        yield check(SettingsEntry, _Part(document.source, data, whole=document, place=("settings",)))
+
+
+def _alternatives(document: Document, key: str, value: Any) -> list[Any]:
+    """The values that a setting takes: those of a list, and every combination of the lists within a mapping."""
+    if isinstance(value, dict):
+        inner = [one if isinstance(one, list) else [one] for one in value.values()]
+        found: list[Any] = [dict(zip(value, values, strict=True)) for values in itertools.product(*inner)]
+    elif key == "unseen":  # one value is a list itself
+        found = value if isinstance(value, list) and value and isinstance(value[0], list) else [value]
+    else:
+        found = value if isinstance(value, list) else [value]
+    if not found:
+        raise document.error(("settings", key), "must have at least one value, got an empty list")
+    return found
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import itertools
 import shlex
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,8 @@ from antdrive.sim.campaigns.grid_planners import PlannerVariant, planner_variant
 from antdrive.sim.campaigns.grid_tasks import campaign_tasks
 from antdrive.sim.campaigns.grid_worlds import NamedTask, campaign_worlds
 from antdrive.sim.campaigns.job import Job, SweepCase, key_of
-from antdrive.sim.entries import has_flags, option_text, setting_words
+from antdrive.sim.campaigns.rows import setting_columns
+from antdrive.sim.entries import SettingsEntry, has_flags, option_text, setting_words
 from antdrive.sim.log.binding import canonical_hash
 from antdrive.sim.settings import scenario_fields
 from antdrive.worlds import Task
@@ -32,15 +34,32 @@ class NamedRobot:
 
     Attributes:
         robot: the robot
+        name: what tables call it: its own name, or its file where another robot of the campaign has that name, too
         content: its canonical hash
         word: what commands call it
         file: its file; None: it is of the catalogue
     """
 
     robot: RobotSpec
+    name: str
     content: str
     word: str
     file: Path | None
+
+
+@dataclass(frozen=True, eq=False)
+class NamedSettings:
+    """One combination of route, noise, margin and settings.
+
+    Attributes:
+        fields: fields of `Scenario` by name; the margin may be "auto"
+        columns: what tables say of them, by column
+        words: the words of `antdrive run` for them; None where it has no flags for all
+    """
+
+    fields: Mapping[str, Any]
+    columns: Mapping[str, Any]
+    words: tuple[str, ...] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +72,7 @@ class Expansion:
         counts: how many there are of worlds, tasks in each, robots, and so on, by name
         worlds: the world files that the runs' commands name, by path relative to the campaign's folder
         robots: likewise the files of robots
+        planners: likewise the files of people's own planners
     """
 
     jobs: tuple[Job, ...]
@@ -60,6 +80,7 @@ class Expansion:
     counts: dict[str, int]
     worlds: dict[str, Task]
     robots: dict[str, Path]
+    planners: dict[str, Path]
 
 
 def expand(campaign: Campaign) -> Expansion:
@@ -75,24 +96,33 @@ def expand(campaign: Campaign) -> Expansion:
     _check(campaign, tasks, robots, settings, planners[0])
     jobs: dict[str, Job] = {}
     files: dict[str, Task] = {}
-    for case in _cases(campaign, tasks, robots, settings, planners, files):
+    for case in _cases(tasks, robots, settings, planners, files):
         identity = case.identity
         for seed in campaign.entry.seeds:
             key = key_of(identity, seed)
             jobs.setdefault(key, Job(key, case, seed))
     counts = {
-        "worlds": len(worlds),
-        "tasks": len(tasks) // len(worlds),
+        **_count_tasks(tasks),
         "robots": len(robots),
         "routes": len(campaign.entry.routes),
         "noise": len(campaign.entry.noise),
         "margin": len(campaign.entry.margin),
+        "settings": len(campaign.settings),
         "planners": len(planners),
         "seeds": len(campaign.entry.seeds),
     }
     wanted = len(tasks) * len(robots) * len(settings) * len(planners) * len(campaign.entry.seeds)
     own = {one.word: one.file for one in robots if one.file is not None}
-    return Expansion(tuple(jobs.values()), wanted - len(jobs), counts, files, own)
+    codes = {one.word.rpartition(":")[0]: one.file for one in planners if one.file is not None}
+    return Expansion(tuple(jobs.values()), wanted - len(jobs), counts, files, own, codes)
+
+
+def _count_tasks(tasks: Sequence[NamedTask]) -> dict[str, int]:
+    """How many worlds there are, and tasks in each; where these differ, how many tasks in all worlds."""
+    each = Counter(one.world for one in tasks)
+    if len(set(each.values())) == 1:
+        return {"worlds": len(each), "tasks": len(tasks) // len(each)}
+    return {f"tasks in {len(each)} worlds": len(tasks)}
 
 
 def _robots(campaign: Campaign) -> list[NamedRobot]:
@@ -107,25 +137,34 @@ def _robots(campaign: Campaign) -> list[NamedRobot]:
         robot = load_robot(path)
         content = canonical_hash(robot)
         word = name if name in known else f"{ROBOTS}/{content[:8]}/{path.name}"
-        found.setdefault(content, NamedRobot(robot, content, word, None if name in known else path))
+        if content not in found:
+            taken = {one.name for one in found.values()}
+            called = next(one for one in (robot.name, name, f"{name} {content[:8]}") if one not in taken)
+            found[content] = NamedRobot(robot, called, content, word, None if name in known else path)
     return list(found.values())
 
 
-def _settings(campaign: Campaign) -> list[dict[str, Any]]:
-    """The fields of scenarios for every combination of route, noise and margin."""
+def _settings(campaign: Campaign) -> list[NamedSettings]:
+    """Every combination of route, noise, margin and settings."""
     entry = campaign.entry
 
     def fail(key: str, problem: str) -> InputError:
         return campaign.error(("settings", *key.split(".")), problem)
 
-    shared = scenario_fields(entry.settings, fail)
+    shared = [(one, scenario_fields(one, fail)) for one in campaign.settings]
     for i, route in enumerate(entry.routes):
         if route not in SMOOTHINGS:
             raise campaign.error(("routes", i), f"unknown {route!r}; {suggest(route, SMOOTHINGS)}")
     return [
-        {**shared, "smoothing": route, "noise": noise, "margin": margin}
-        for route, noise, margin in itertools.product(entry.routes, entry.noise, entry.margin)
+        _named_settings(one, {**fields, "smoothing": route, "noise": noise, "margin": margin})
+        for route, noise, margin, (one, fields) in itertools.product(entry.routes, entry.noise, entry.margin, shared)
     ]
+
+
+def _named_settings(entry: SettingsEntry, fields: dict[str, Any]) -> NamedSettings:
+    asked = ["--margin", option_text(fields["margin"]), "--smoothing", fields["smoothing"]]
+    words = (*asked, "--noise", option_text(fields["noise"]), *setting_words(entry)) if has_flags(entry) else None
+    return NamedSettings(fields, setting_columns(fields), words)
 
 
 #: Where a campaign writes what a scenario calls by another name.
@@ -142,51 +181,49 @@ def _check(
     campaign: Campaign,
     tasks: Sequence[NamedTask],
     robots: Sequence[NamedRobot],
-    settings: Sequence[dict[str, Any]],
+    settings: Sequence[NamedSettings],
     planner: PlannerVariant,
 ) -> None:
     """Refuse, before any work, settings that a robot cannot have and starts where one has no room."""
+    obstructed = list({one.fields["unseen"]: one for one in reversed(settings)}.values())
     for robot in robots:
         for n, task in enumerate(tasks):
-            for fields in settings if n == 0 else settings[:1]:
-                margin = 0.0 if fields["margin"] == "auto" else None
+            for one in settings if n == 0 else obstructed:
+                margin = 0.0 if one.fields["margin"] == "auto" else None
                 try:
-                    _case(task, robot, fields, planner, None).scenario(0, margin)
+                    _case(task, robot, one, planner).scenario(0, margin)
                 except FieldError as error:
                     place = _PLACES.get(error.key, ("settings", error.key))
                     where = task.place if error.key == "start" and not campaign.tasks else place
-                    raise campaign.error(where, f"{task.world} with {robot.robot.name}: {error.problem}") from None
+                    raise campaign.error(where, f"{task.world} with {robot.name}: {error.problem}") from None
 
 
 def _cases(
-    campaign: Campaign,
     tasks: Sequence[NamedTask],
     robots: Sequence[NamedRobot],
-    settings: Sequence[dict[str, Any]],
+    settings: Sequence[NamedSettings],
     planners: Sequence[PlannerVariant],
     files: dict[str, Task],
 ) -> Iterator[SweepCase]:
     """Every combination but for the seeds; `files` is filled with the worlds that commands name."""
-    flags = has_flags(campaign.entry.settings)
-    further = setting_words(campaign.entry.settings) if flags else []
     for task in tasks:
         content = canonical_hash(task.task)
         word = task.catalogue or f"{WORLDS}/{_file_name(task)}-{content[:8]}.yaml"
         if task.catalogue is None:
             files[word] = task.task
-        for robot, fields, planner in itertools.product(robots, settings, planners):
-            words = _words(word, robot.word, fields, planner, further) if flags else None
-            yield _case(task, robot, fields, planner, words, content)
+        for robot, one, planner in itertools.product(robots, settings, planners):
+            yield _case(task, robot, one, planner, word, content)
 
 
 def _case(
     task: NamedTask,
     robot: NamedRobot,
-    fields: dict[str, Any],
+    settings: NamedSettings,
     planner: PlannerVariant,
-    words: str | None,
+    word: str = "",
     content: str = "",
 ) -> SweepCase:
+    """A run but for its seed; its command calls the world by `word`."""
     return SweepCase(
         task=task.task,
         world=task.world,
@@ -194,21 +231,24 @@ def _case(
         task_name=task.name,
         planner=planner.label,
         planner_name=planner.name,
+        planner_source=planner.source,
+        planner_version=planner.version,
         given=planner.given,
         options=planner.options,
         robot=robot.robot,
+        robot_name=robot.name,
         robot_hash=robot.content,
-        fields=fields,
-        words=words,
+        fields=settings.fields,
+        columns=settings.columns,
+        words=None if settings.words is None else _words(word, robot.word, settings.words, planner),
     )
 
 
-def _words(world: str, robot: str, fields: dict[str, Any], planner: PlannerVariant, further: Sequence[str]) -> str:
+def _words(world: str, robot: str, settings: Sequence[str], planner: PlannerVariant) -> str:
     """The command that repeats a run, from within the campaign's folder, without its seed."""
-    words = ["antdrive", "run", world, "--planner", planner.name]
+    words = ["antdrive", "run", world, "--planner", planner.word]
     words += [word for key, value in planner.given.items() for word in ("--set", f"planner.{key}={option_text(value)}")]
-    words += ["--robot", robot, "--margin", option_text(fields["margin"]), "--smoothing", fields["smoothing"]]
-    return shlex.join([*words, "--noise", option_text(fields["noise"]), *further])
+    return shlex.join([*words, "--robot", robot, *settings])
 
 
 def _file_name(task: NamedTask) -> str:

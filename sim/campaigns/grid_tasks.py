@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -13,9 +13,10 @@ from antdrive.robots import RobotSpec, overlap_at
 from antdrive.sim.campaigns.campaign import Campaign, RandomTasks
 from antdrive.sim.campaigns.grid_worlds import NamedTask
 from antdrive.sim.log.binding import canonical_hash
-from antdrive.worlds import Grid, Task, rasterise
+from antdrive.worlds import Disc, Grid, Task, rasterise
 from antdrive.worlds.errors import FieldError
 
+NAMED = "named"  # the value of a campaign's key tasks that means those of the worlds' files
 TRIES = 1000  # pairs that are drawn for one task
 ROOM = 0.03  # the margin of drawn tasks where the campaign's margins are chosen later [m]
 
@@ -34,13 +35,29 @@ def campaign_tasks(campaign: Campaign, worlds: Sequence[NamedTask], robots: Sequ
     if isinstance(campaign.tasks, RandomTasks):
         margins = [ROOM if margin == "auto" else float(margin) for margin in campaign.entry.margin]
         inflate = max(robot.radius for robot in robots) + max(margins)
-        for world in worlds:
+        for world in _each_once(worlds):
             yield from _drawn(campaign, campaign.tasks, world, robots, inflate)
-    elif campaign.tasks:
+    elif campaign.entry.tasks == NAMED:
         for world in worlds:
+            if not world.others:
+                raise campaign.error(
+                    ("tasks",), f"the file of world {world.world} lists no tasks; write them there, or own"
+                )
+            for name, task in world.others.items():
+                yield dataclasses.replace(world, name=name, task=task, catalogue=None)
+    elif campaign.tasks:
+        for world in _each_once(worlds):
             yield from _listed(campaign, world)
     else:
         yield from worlds
+
+
+def _each_once(worlds: Sequence[NamedTask]) -> Iterable[NamedTask]:
+    """The worlds, each with the first of its own tasks, which others take the place of."""
+    found: dict[str, NamedTask] = {}
+    for one in worlds:
+        found.setdefault(one.world, one)
+    return found.values()
 
 
 def _listed(campaign: Campaign, world: NamedTask) -> Iterator[NamedTask]:
@@ -57,13 +74,15 @@ def _listed(campaign: Campaign, world: NamedTask) -> Iterator[NamedTask]:
 def _drawn(
     campaign: Campaign, asked: RandomTasks, world: NamedTask, robots: Sequence[RobotSpec], inflate: float
 ) -> Iterator[NamedTask]:
-    """Random tasks in one world. They depend on it and on the seed alone, not on the campaign's other worlds."""
+    """Random tasks in one world. They depend on it, the seed and what needs room, not on the campaign's other worlds."""
+    unseen = tuple(dict.fromkeys(Disc(d.x, d.y, d.radius, d.height) for one in campaign.settings for d in one.unseen))
     content = int(canonical_hash(world.task)[:16], 16)
     rng = np.random.default_rng([asked.seed, content])
-    grid = rasterise(world.task.world, campaign.entry.settings.cell or world.task.cell, inflate)
+    cell = max(entry.cell or world.task.cell for entry in campaign.settings)
+    grid = rasterise(world.task.world, cell, inflate)
     free = np.argwhere(grid.moves > 0)
     for number in range(asked.random):
-        task = _draw(rng, grid, free, asked.min_distance, world.task, robots) if len(free) else None
+        task = _draw(rng, grid, free, asked.min_distance, world.task, robots, unseen) if len(free) else None
         if task is None:
             problem = (
                 f"no start and goal {asked.min_distance:g} m apart with a path between them found in {TRIES} draws in world "
@@ -74,7 +93,13 @@ def _drawn(
 
 
 def _draw(
-    rng: np.random.Generator, grid: Grid, free: np.ndarray, distance: float, own: Task, robots: Sequence[RobotSpec]
+    rng: np.random.Generator,
+    grid: Grid,
+    free: np.ndarray,
+    distance: float,
+    own: Task,
+    robots: Sequence[RobotSpec],
+    unseen: tuple[Disc, ...],
 ) -> Task | None:
     """A task with the start and the goal in free cells, the robot facing the goal; None if none was found."""
     for _ in range(TRIES):
@@ -86,7 +111,7 @@ def _draw(
             task = dataclasses.replace(own, start=start, goal=(goal_x, goal_y))
         except FieldError:
             continue
-        fits = not any(overlap_at(task.world, robot, start) for robot in robots)
+        fits = not any(overlap_at(task.world, robot, start, unseen) for robot in robots)
         if fits and PLANNERS["astar"].plan(Query.between(grid, task), rng).solved:
             return task
     return None

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import glob
+import itertools
 import os
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from antdrive.sim.campaigns.campaign import Campaign, seeds_of
-from antdrive.sim.entries import option_text
+from antdrive.sim.entries import option_text, seed_list
 from antdrive.sim.settings import generated
-from antdrive.worlds import Task, list_worlds, load_task
+from antdrive.worlds import Task, World, list_worlds, load_task, load_tasks
 from antdrive.worlds.errors import FieldError, InputError
 from antdrive.worlds.files.checks import show, suggest
 from antdrive.worlds.files.document import Location
@@ -33,6 +33,7 @@ class NamedTask:
         task: the task
         catalogue: the world's name in the catalogue, if the task is the one of the catalogue
         place: where the campaign names the world
+        others: the other tasks that the world's file lists, by name
     """
 
     world: str
@@ -40,12 +41,14 @@ class NamedTask:
     task: Task
     catalogue: str | None
     place: Location
+    others: Mapping[str, Task] = field(default_factory=dict)
 
 
 def campaign_worlds(campaign: Campaign) -> list[NamedTask]:
     """The worlds of a campaign with their own tasks, in its order; files of a pattern by name.
 
     Worlds that share a name have their path or options in what the campaign calls them, so that no two are called the same.
+    Several problems of one map are tasks of one world.
 
     Raises:
         InputError: there is no such world, or a file is wrong.
@@ -65,24 +68,37 @@ def campaign_worlds(campaign: Campaign) -> list[NamedTask]:
 
 
 def _distinct(found: list[tuple[NamedTask, str]]) -> list[NamedTask]:
-    """The worlds, each once; those with a name of others are called by their second name."""
-    first: dict[str, Task] = {}
-    worlds: dict[str, NamedTask] = {}
+    """The tasks, each once; no two of them, and no two worlds, are called the same."""
+    geometries: dict[str, World] = {}
+    tasks: dict[tuple[str, str], NamedTask] = {}
     for one, second in found:
-        taken = first.setdefault(one.world, one.task)
-        name = one.world if taken == one.task else second
-        worlds.setdefault(name, dataclasses.replace(one, world=name))
-    return list(worlds.values())
+        geometry = dataclasses.replace(one.task.world, source=None)
+        for world in itertools.chain((one.world, second), (f"{second} ({n})" for n in itertools.count(2))):
+            there = tasks.get((world, one.name))
+            if there is None and geometries.setdefault(world, geometry) == geometry:
+                tasks[world, one.name] = dataclasses.replace(one, world=world)
+                break
+            if there is not None and _same(there.task, one.task):
+                break
+    return list(tasks.values())
+
+
+def _same(task: Task, other: Task) -> bool:
+    """Whether two tasks differ in nothing but what is said of where their worlds come from."""
+    return dataclasses.replace(task, world=dataclasses.replace(task.world, source=other.world.source)) == other
 
 
 def _named(campaign: Campaign, place: Location, name: str) -> Iterator[tuple[NamedTask, str]]:
     known = list_worlds()
     if name in known:
-        yield NamedTask(name, OWN, load_task(known[name]), name, place), name
+        yield NamedTask(name, OWN, load_task(known[name]), name, place, load_tasks(name)), name
         return
     for path in _files(campaign, place, name, f"nor a world of the catalogue; {suggest(Path(name).stem, known)}"):
         task = load_task(path)
-        yield NamedTask(task.world.name, OWN, task, None, place), os.path.relpath(path, campaign.folder)
+        yield (
+            NamedTask(task.world.name, OWN, task, None, place, load_tasks(path)),
+            os.path.relpath(path, campaign.folder),
+        )
 
 
 def _files(campaign: Campaign, place: Location, pattern: str, otherwise: str) -> list[Path]:
@@ -119,19 +135,29 @@ def _imported(campaign: Campaign, place: Location, entry: dict[str, Any]) -> Ite
     pattern, barn = entry.pop("import"), entry.pop("barn", False)
     if not isinstance(pattern, str) or not isinstance(barn, bool):
         raise campaign.error(place, "write {import: FILES, barn: true} with the options of antdrive worlds import")
-    options = tuple((key, tuple(value) if isinstance(value, list) else value) for key, value in entry.items())
+    problems = _problems(campaign, place, entry)
+    suffix = "".join(f" {key}={option_text(value)}" for key, value in entry.items())
+    options = {key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()}
     for path in _files(campaign, (*place, "import"), pattern, ""):
-        try:
-            tasks = _read_foreign(str(path), path.stat().st_mtime_ns, barn, options)
-        except FieldError as error:
-            raise campaign.error((*place, error.key), error.problem) from None
-        except TypeError:
-            raise campaign.error(place, "an option has a value of the wrong type") from None
-        for task in tasks:
-            second = f"{os.path.relpath(path, campaign.folder)}#{task.world.name}"
-            yield NamedTask(task.world.name, OWN, task, None, place), second
+        for problem in problems:
+            try:
+                tasks = import_file(path, barn=barn, problem=problem, **options)
+            except FieldError as error:
+                raise campaign.error((*place, error.key), error.problem) from None
+            except TypeError:
+                raise campaign.error(place, "an option has a value of the wrong type") from None
+            for task in tasks:
+                name = OWN if problem is None else f"problem-{problem}"
+                second = f"{os.path.relpath(path, campaign.folder)}#{task.world.name}{suffix}"
+                yield NamedTask(task.world.name, name, task, None, place), second
 
 
-@functools.lru_cache(maxsize=1024)
-def _read_foreign(path: str, mtime: int, barn: bool, options: tuple[tuple[str, Any], ...]) -> list[Task]:
-    return import_file(path, barn=barn, **dict(options))
+def _problems(campaign: Campaign, place: Location, entry: dict[str, Any]) -> list[int] | list[None]:
+    """The problems of a map that an entry lists as 7, [3, 7] or 0-99; it is left without them."""
+    given = entry.pop("problem", None)
+    if given is None:
+        return [None]
+    try:
+        return seed_list([given] if type(given) is int else given)
+    except ValueError as error:
+        raise campaign.error((*place, "problem"), str(error)) from None

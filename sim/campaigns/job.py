@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from antdrive.planners import load_planner
+from antdrive.planners import PLANNERS, load_planner, record_name
 from antdrive.robots import RobotSpec
 from antdrive.sim.calibration.prediction import Calibration
 from antdrive.sim.log.record import settings_of
@@ -29,11 +29,15 @@ class SweepCase:
         task_name: what the campaign calls start and goal; "own": they are the world's own
         planner: what the campaign calls the planner with its options, such as "aco-han ants=50"
         planner_name: the planner's registered name
+        planner_source: what `load_planner` takes for it
+        planner_version: what the planner's code is, such as "antdrive 0.1.0" or "mine 1.0 5f3a09c2"
         given: the options that the campaign sets, by name
         options: all of the planner's options by name, as plain values
         robot: the robot
+        robot_name: what the campaign calls the robot
         robot_hash: the canonical hash of the robot
         fields: fields of `Scenario` by name; the margin may be "auto"
+        columns: what tables say of these fields, by column
         words: the words of the command that repeats a run, without its seed; None where no command can
         calibration: what the margin "auto" was chosen by; None: not chosen yet, or the margin is a number
     """
@@ -44,11 +48,15 @@ class SweepCase:
     task_name: str
     planner: str
     planner_name: str
+    planner_source: str
+    planner_version: str
     given: Mapping[str, Any]
     options: Mapping[str, Any]
     robot: RobotSpec
+    robot_name: str
     robot_hash: str
     fields: Mapping[str, Any]
+    columns: Mapping[str, Any]
     words: str | None
     calibration: Calibration | None = None
 
@@ -67,8 +75,8 @@ class SweepCase:
         chosen = self.calibration.margin if self.calibration else 0.0
         scenario = Scenario(
             task=self.task,
-            planner=load_planner(self.planner_name, **self.given),
-            planner_name=self.planner_name,
+            planner=load_planner(self.planner_source, **self.given),
+            planner_name=record_name(self.planner_source),
             robot=self.robot,
             seed=seed,
             calibration=self.calibration,
@@ -86,6 +94,8 @@ class SweepCase:
             "robot": self.robot_hash,
             "settings": settings_of(self.fields),
         }
+        if self.planner_name not in PLANNERS:  # people's own planners change more often than antdrive
+            parts["planner_version"] = self.planner_version
         return json.dumps(parts, sort_keys=True)
 
 

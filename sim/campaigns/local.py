@@ -11,20 +11,21 @@ import os
 import signal
 import time
 from collections import Counter, deque
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
 from antdrive.sim.campaigns.job import Job
-from antdrive.sim.campaigns.rows import CRASHED, fault_row
+from antdrive.sim.campaigns.rows import CRASHED, fault_row, slow_row
 from antdrive.sim.campaigns.running import Finished, Work, again
 from antdrive.sim.campaigns.waiting import Waiting
 from antdrive.worlds.errors import InputError
 
 ATTEMPTS = 2  # of a run that kills its process
 STILLBORN = 3  # workers in a row that end before they are ready, after which none is started
+LOOK = 1.0  # how long to wait for a result before something else is done [s]
 GRACE = 1.0  # how long workers may take to end by themselves [s]
 
 
@@ -38,6 +39,7 @@ class _Worker:
     handed: deque[Job] = field(default_factory=deque)  # the first is the one that is being made
     world: str | None = None
     since: float = 0.0  # when the run began that is being made
+    slow: bool = False  # whether it was ended because that run took too long
 
 
 def run_here(jobs: Iterable[Job], work: Work) -> Generator[Finished, None, None]:
@@ -51,16 +53,36 @@ def run_here(jobs: Iterable[Job], work: Work) -> Generator[Finished, None, None]
         yield work(job)
 
 
-def run_locally(jobs: Iterable[Job], work: Work, processes: int) -> Generator[Finished, None, None]:
+@dataclass(frozen=True)
+class Refusal:
+    """What a worker hands back where the campaign cannot go on.
+
+    Attributes:
+        problem: what is wrong, in one line
+    """
+
+    problem: str
+
+
+def run_locally(
+    jobs: Iterable[Job],
+    work: Work,
+    processes: int,
+    *,
+    limit: float | None = None,
+    tick: Callable[[], None] = lambda: None,
+) -> Generator[Finished, None, None]:
     """Make runs in worker processes; the results come in any order.
 
     Args:
         jobs: the runs
         work: what to do with each; must be picklable
         processes: how many workers
+        limit: how long a run may take before its process is ended [s]; None: as long as it likes
+        tick: is called about every second while nothing ends
 
     Raises:
-        InputError: no worker can be started.
+        InputError: no worker can be started, or a run finds that the campaign cannot go on.
     """
     waiting = Waiting(jobs, processes)
     workers: list[_Worker] = []
@@ -70,7 +92,11 @@ def run_locally(jobs: Iterable[Job], work: Work, processes: int) -> Generator[Fi
         while waiting or any(worker.handed for worker in workers):
             while waiting and len(workers) < processes:
                 workers.append(_start(work))
-            for pipe in wait([worker.pipe for worker in workers]):
+            ended = wait([worker.pipe for worker in workers], _patience(workers, limit))
+            if not ended:
+                tick()
+            _end_slow(workers, limit)
+            for pipe in ended:
                 worker = next(worker for worker in workers if worker.pipe is pipe)
                 try:
                     finished = worker.pipe.recv()
@@ -81,8 +107,10 @@ def run_locally(jobs: Iterable[Job], work: Work, processes: int) -> Generator[Fi
                         raise InputError(
                             "--jobs: worker processes end before they begin; is there memory for them?"
                         ) from None
-                    yield from _buried(worker, waiting, attempts)
+                    yield from _buried(worker, waiting, attempts, limit)
                     continue
+                if isinstance(finished, Refusal):
+                    raise InputError(finished.problem)
                 if finished is not None:
                     yield _credited(worker, finished, waiting, attempts)
                 worker.ready, stillborn = True, 0
@@ -92,11 +120,30 @@ def run_locally(jobs: Iterable[Job], work: Work, processes: int) -> Generator[Fi
         _stop(workers)
 
 
+def _patience(workers: Iterable[_Worker], limit: float | None) -> float:
+    """How long to wait for a result: a second at most, and no longer than until a run takes too long [s]."""
+    if limit is None:
+        return LOOK
+    now = time.monotonic()
+    left = [worker.since + limit - now for worker in workers if worker.ready and worker.handed and not worker.slow]
+    return max(0.0, min([LOOK, *left]))
+
+
+def _end_slow(workers: Iterable[_Worker], limit: float | None) -> None:
+    """End workers whose run takes too long; that they have ended shows when their pipe is read."""
+    for worker in workers:
+        at_work = worker.ready and worker.handed and not worker.pipe.poll()
+        if limit is not None and at_work and time.monotonic() - worker.since > limit:
+            worker.slow = True
+            with contextlib.suppress(OSError):
+                os.kill(worker.process.pid, signal.SIGKILL)
+
+
 def _credited(worker: _Worker, finished: Finished, waiting: Waiting, attempts: Counter[str]) -> Finished:
     """The result of the run that a worker was making; the worker is making the next one now."""
     job, now = worker.handed.popleft(), time.monotonic()
     waiting.measured(now - worker.since)
-    worker.world, worker.since = job.case.world, now
+    worker.world, worker.since, worker.slow = job.case.world, now, False
     return again(finished, attempts[job.key] + 1) if attempts[job.key] else finished
 
 
@@ -110,7 +157,9 @@ def _hand(worker: _Worker, waiting: Waiting) -> None:
             worker.pipe.send(chunk)
 
 
-def _buried(worker: _Worker, waiting: Waiting, attempts: Counter[str]) -> Generator[Finished, None, None]:
+def _buried(
+    worker: _Worker, waiting: Waiting, attempts: Counter[str], limit: float | None
+) -> Generator[Finished, None, None]:
     """Give back what a dead worker was handed; the run that it was making is a result if it was its last attempt."""
     worker.pipe.close()
     worker.process.join()
@@ -118,7 +167,9 @@ def _buried(worker: _Worker, waiting: Waiting, attempts: Counter[str]) -> Genera
         return
     job = worker.handed.popleft()
     attempts[job.key] += 1
-    if attempts[job.key] < ATTEMPTS:
+    if worker.slow and limit is not None:
+        yield again(Finished(slow_row(job.key, limit)), attempts[job.key])
+    elif attempts[job.key] < ATTEMPTS:
         worker.handed.appendleft(job)
     else:
         row = fault_row(job.key, CRASHED, f"the process that made it ended {_how(worker.process.exitcode)}")
@@ -191,4 +242,11 @@ def serve(pipe: Connection, work: Work) -> None:
             for job in pipe.recv():
                 if pipe.poll():  # while it is at work, a worker is sent nothing: the pipe was closed
                     return
-                pipe.send(work(job))
+                pipe.send(_result(work, job))
+
+
+def _result(work: Work, job: Job) -> Finished | Refusal:
+    try:
+        return work(job)
+    except InputError as error:
+        return Refusal(str(error))

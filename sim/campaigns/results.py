@@ -24,12 +24,14 @@ class SweepResults:
         table: an Arrow table with a row for each run that is done, in the campaign's order
         size: how many runs the campaign has
         made: how many of them were made by the call that returned this
+        notes: what people should know who go on with a campaign, a sentence each
     """
 
     folder: Path
     table: pyarrow.Table
     size: int
     made: int = 0
+    notes: tuple[str, ...] = ()
 
     @property
     def complete(self) -> bool:

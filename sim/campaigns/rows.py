@@ -8,12 +8,17 @@ from __future__ import annotations
 
 import functools
 import json
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from antdrive.robots import Avoidance, PurePursuit
 from antdrive.sim.campaigns.extras import parquet_library
 from antdrive.sim.campaigns.job import Job
+from antdrive.sim.driving.replanning import ReplanPolicy
+from antdrive.sim.entries import option_text
 from antdrive.sim.log.metrics import METRICS
+from antdrive.sim.log.record import settings_of
 from antdrive.sim.pipeline import Run, versions
 
 if TYPE_CHECKING:
@@ -21,6 +26,7 @@ if TYPE_CHECKING:
 
 CRASHED = "crashed"  # the outcome of a run whose process died, or in which antdrive itself failed
 PLANNER_FAULT = "planner_fault"  # the outcome of a run whose planner raised something
+TOO_SLOW = "too_slow"  # the outcome of a run that was ended because it took longer than the campaign's limit
 WALL_TIMES = ("plan_s", "drive_wall_s")  # metrics that differ between repetitions
 #: The columns that differ between repetitions of the same run; the canonical table is without them.
 NOT_CANONICAL = (*WALL_TIMES, "attempts")
@@ -36,12 +42,23 @@ GRID: Mapping[str, str] = {
     "task": "string",
     "planner": "string",
     "planner_name": "string",
+    "planner_version": "string",
     "options": "string",
     "robot": "string",
+    "robot_hash": "string",
     "smoothing": "string",
     "noise": "double",
+    "margin_asked": "string",
     "margin": "double",
     "cell": "double",
+    "controller": "string",
+    "sees": "string",
+    "avoid": "string",
+    "replan": "string",
+    "unseen": "string",
+    "time_limit": "double",
+    "physics_hz": "int64",
+    "control_hz": "int64",
     "seed": "int64",
     "command": "string",
 }
@@ -82,15 +99,47 @@ def grid_row(job: Job) -> dict[str, Any]:
         "task": case.task_name,
         "planner": case.planner,
         "planner_name": case.planner_name,
+        "planner_version": case.planner_version,
         "options": json.dumps(case.options, sort_keys=True),
-        "robot": case.robot.name,
-        "smoothing": fields["smoothing"],
-        "noise": float(fields["noise"]),
+        "robot": case.robot_name,
+        "robot_hash": case.robot_hash,
+        **case.columns,
         "margin": None if margin == "auto" else float(margin),
         "cell": float(fields["cell"] or case.task.cell),
         "seed": job.seed,
         "command": None if case.words is None else f"{case.words} --seed {job.seed}",
     }
+
+
+def setting_columns(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """What tables say of a run's settings, by column.
+
+    Args:
+        fields: fields of `Scenario` by name; the margin may be "auto"
+    """
+    sees, margin, limit = fields["perception"], fields["margin"], fields["time_limit"]
+    return {
+        "smoothing": fields["smoothing"],
+        "noise": float(fields["noise"]),
+        "margin_asked": margin if margin == "auto" else str(float(margin)),
+        "controller": _changes(fields["controller"], PurePursuit()),
+        "sees": sees.kind if math.isinf(sees.range) else f"{sees.kind}:{sees.range:g}",
+        "avoid": _changes(fields["avoidance"], Avoidance()),
+        "replan": _changes(fields["replanning"], ReplanPolicy()),
+        "unseen": " ".join(f"{disc.x:g},{disc.y:g},{disc.radius:g}" for disc in fields["unseen"]) or "none",
+        "time_limit": None if limit is None else float(limit),
+        "physics_hz": fields["physics_hz"],
+        "control_hz": fields["control_hz"],
+    }
+
+
+def _changes(record: Any, default: Any) -> str:
+    """The settings of a record that are not the defaults, as NAME=VALUE."""
+    if record is None:
+        return "none"
+    usual = settings_of(default)
+    changed = (f"{key}={option_text(value)}" for key, value in settings_of(record).items() if value != usual[key])
+    return " ".join(changed) or "default"
 
 
 def run_row(key: str, run: Run, rollout: str | None) -> dict[str, Any]:
@@ -127,10 +176,20 @@ def fault_row(key: str, outcome: str, reason: str) -> dict[str, Any]:
 
     Args:
         key: the run's key
-        outcome: `crashed` or `planner_fault`
+        outcome: `crashed`, `planner_fault` or `too_slow`
         reason: what happened, in words
     """
     return _empty(key) | {"outcome": outcome, "succeeded": False, "reason": reason}
+
+
+def slow_row(key: str, limit: float) -> dict[str, Any]:
+    """The row of a run that was ended because it took too long.
+
+    Args:
+        key: the run's key
+        limit: how long a run may take [s]
+    """
+    return fault_row(key, TOO_SLOW, f"took longer than the campaign's run_limit of {limit:g} s")
 
 
 def _empty(key: str) -> dict[str, Any]:

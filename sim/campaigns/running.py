@@ -14,6 +14,7 @@ from antdrive.sim.campaigns.rows import CRASHED, PLANNER_FAULT, fault_row, run_r
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import Run, run
 from antdrive.sim.scenario import Scenario
+from antdrive.worlds.errors import InputError
 
 Keep: TypeAlias = Literal["none", "failed", "all"]
 LOGS = "rollouts"  # the folder with the logs that are kept
@@ -36,7 +37,11 @@ class Work(Protocol):
     """What workers do with a run."""
 
     def __call__(self, job: Job) -> Finished:
-        """Make the run; whatever goes wrong in it stands in the row."""
+        """Make the run; whatever goes wrong in it stands in the row.
+
+        Raises:
+            InputError: the campaign cannot go on, such as where logs cannot be written.
+        """
 
 
 @dataclass(frozen=True)
@@ -52,9 +57,15 @@ class Driving:
     folder: str | None = None
 
     def __call__(self, job: Job) -> Finished:
-        """Make the run. What its planner raises, and what antdrive itself raises, is the run's result, not the campaign's end."""
+        """Make the run. What its planner raises, and what antdrive itself raises, is the run's result, not the campaign's end.
+
+        Raises:
+            InputError: the planner does not exist on this machine, or the log cannot be written.
+        """
         try:
             done = run(prepare(job))
+        except InputError:
+            raise
         except PlannerError as error:
             return Finished(fault_row(job.key, PLANNER_FAULT, str(error)))
         except Exception as error:
@@ -66,9 +77,12 @@ class Driving:
         if log is None or self.keep == "none" or (self.keep == "failed" and done.succeeded):
             return Finished(run_row(job.key, done, None))
         row = run_row(job.key, done, log_path(job.key))
-        if self.folder is None:
-            return Finished(row, _bytes_of(log))
-        log.save(Path(self.folder) / log_path(job.key))
+        try:
+            if self.folder is None:
+                return Finished(row, _bytes_of(log))
+            log.save(Path(self.folder) / log_path(job.key))
+        except OSError as error:
+            raise InputError(f"{log_path(job.key)}: cannot be written ({error.strerror or error})") from None
         return Finished(row)
 
 

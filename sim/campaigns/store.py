@@ -1,11 +1,11 @@
 """A campaign's folder: what is to be run, what came out so far, and a table of both.
 
-    manifest.json   the campaign as written, its size and hash, the versions that began it
+    manifest.json   the campaign as written, its size and hash, the versions of the latest command
     grid.parquet    a row for each run: what it is
     parts/          what came out of runs: a file for every few seconds, merged from time to time
     rollouts/       the logs that are kept
     worlds/, robots/  files for the commands that repeat runs
-    runs.parquet    the table of all runs that are done, written at the end
+    runs.parquet    the table of all runs that are done, written when a command begins and when it ends
 
 Every file is written under another name, brought to the disk and then renamed, so that a process that is killed leaves no
 half of one. A run that was made twice stands in two parts; the table has it once.
@@ -17,7 +17,7 @@ import json
 import os
 import time
 import uuid
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 MANIFEST, GRID_FILE, PARTS, TABLE = "manifest.json", "grid.parquet", "parts", "runs.parquet"
 FLUSH_EVERY = 2.0  # finished runs are written at least this often [s]
+TRIES = 100  # at reading parts that another process merges meanwhile
 MOST_PARTS = 200  # more are merged into one
 UNFINISHED = ".new-"  # what the names of files begin with that are being written
 
@@ -56,23 +57,30 @@ class Store:
             manifest: the campaign and facts about it, as plain data
             grid: a row for each run
         """
-        (self.folder / TABLE).unlink(missing_ok=True)  # of the campaign as it was
         write_table(grid, self.folder / GRID_FILE)
         text = json.dumps(manifest, indent=1, ensure_ascii=False)
         with written_whole(self.folder / MANIFEST) as part:
             part.write_text(text + "\n", encoding="utf-8")
+        write_table(joined(self.folder), self.folder / TABLE)  # until there is another one at the end
 
     def add(self, row: Mapping[str, Any], log: bytes | None = None) -> None:
-        """Keep what came out of a run; it is on the disk after `FLUSH_EVERY` seconds at most, if runs go on ending.
+        """Keep what came out of a run; it is on the disk after `FLUSH_EVERY` seconds, if `tick` is called that often.
 
         Args:
             row: as `run_row` and `fault_row` return it
             log: the run's log, if it is to be written where the row says
         """
         if log is not None:
-            with written_whole(self.folder / row["rollout"]) as part:
-                part.write_bytes(log)
+            try:
+                with written_whole(self.folder / row["rollout"]) as part:
+                    part.write_bytes(log)
+            except OSError as error:
+                raise InputError(f"{row['rollout']}: cannot be written ({error.strerror or error})") from None
         self._rows.append(row)
+        self.tick()
+
+    def tick(self) -> None:
+        """Write what came out of runs, if that was not done for `FLUSH_EVERY` seconds."""
         if time.monotonic() - self._written > FLUSH_EVERY:
             self.flush()
 
@@ -93,6 +101,24 @@ class Store:
             write_table(_results(self.folder), self.folder / PARTS / _part_name())
             for path in old:
                 path.unlink(missing_ok=True)
+        self._parts = 1
+
+    def drop(self, keys: Set[str]) -> None:
+        """Forget what came out of some runs, so that they are made again.
+
+        Args:
+            keys: of the runs
+        """
+        old, table = parts_in(self.folder), _results(self.folder)
+        names = table["key"].to_pylist()
+        for i, path in enumerate(table["rollout"].to_pylist()):
+            if path is not None and names[i] in keys:
+                (self.folder / path).unlink(missing_ok=True)
+        write_table(
+            _rows(table, [i for i, key in enumerate(names) if key not in keys]), self.folder / PARTS / _part_name()
+        )
+        for path in old:
+            path.unlink(missing_ok=True)
         self._parts = 1
 
     def finish(self) -> pyarrow.Table:
@@ -121,16 +147,23 @@ def opened(folder: str | os.PathLike[str]) -> Iterator[Store]:
         yield Store(path)
 
 
-def done_in(folder: Path, *, crashed: bool = True) -> set[str]:
-    """The keys of all runs that were ever made in a folder, also of campaigns that have changed since.
+def outcomes_in(folder: Path) -> dict[str, str]:
+    """How each run ended that was ever made in a folder, by key, also of campaigns that have changed since.
 
     Args:
         folder: a campaign's folder, or one that does not exist yet
-        crashed: whether runs count that crashed
     """
     results = _results(folder)
-    rows = zip(results["key"].to_pylist(), results["outcome"].to_pylist(), strict=True)
-    return {key for key, outcome in rows if crashed or outcome != CRASHED}
+    return dict(zip(results["key"].to_pylist(), results["outcome"].to_pylist(), strict=True))
+
+
+def former_grid(folder: Path) -> pyarrow.Table | None:
+    """What the runs were of the campaign that a folder held before; None if it held none.
+
+    Args:
+        folder: a campaign's folder, or a new one
+    """
+    return _read(folder / GRID_FILE) if (folder / GRID_FILE).exists() else None
 
 
 def read_manifest(folder: str | Path) -> dict[str, Any]:
@@ -146,8 +179,8 @@ def read_manifest(folder: str | Path) -> dict[str, Any]:
         raise input_error(str(folder), f"no {MANIFEST} in this folder; antdrive sweep writes it") from None
     except (OSError, ValueError) as error:
         raise input_error(str(path), f"cannot be read ({error})") from None
-    if not isinstance(found, dict):
-        raise input_error(str(path), "is no manifest of a campaign")
+    if not isinstance(found, dict) or type(found.get("size")) is not int:
+        raise input_error(str(path), "is no manifest of a campaign; antdrive sweep writes a new one")
     return found
 
 
@@ -219,10 +252,26 @@ def _part_name() -> str:
     return f"{time.time_ns():020d}-{uuid.uuid4().hex[:8]}.parquet"
 
 
+def _tables(folder: Path) -> list[pyarrow.Table]:
+    """The parts of a folder, also while another process merges them."""
+    for _ in range(TRIES):
+        tables = []
+        for path in parts_in(folder):
+            try:
+                tables.append(_cast(_read(path), result_schema()))
+            except InputError:
+                if path.exists():
+                    raise
+                break  # it was merged into another one since it was listed
+        else:
+            return tables
+    raise input_error(str(folder / PARTS), "changes faster than it can be read; try again")
+
+
 def _results(folder: Path) -> pyarrow.Table:
     """What came out of all runs that were ever made in a folder, each once: a run that did not crash counts first."""
     arrow, schema = parquet_library(), result_schema()
-    tables = [_cast(_read(path), schema) for path in parts_in(folder)]
+    tables = _tables(folder)
     table = arrow.concat_tables(tables) if tables else schema.empty_table()
     places: dict[str, int] = {}
     outcomes = table["outcome"].to_pylist()
@@ -252,4 +301,5 @@ def _read(path: Path) -> pyarrow.Table:
     except FileNotFoundError:
         raise input_error(str(path), "no such file; antdrive sweep writes it") from None
     except (OSError, arrow.ArrowException) as error:
-        raise input_error(str(path), f"cannot be read as Parquet ({error})") from None
+        remedy = "; without this file its runs are made again" if path.parent.name == PARTS else ""
+        raise input_error(str(path), f"cannot be read as Parquet ({error}){remedy}") from None

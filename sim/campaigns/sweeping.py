@@ -9,7 +9,7 @@ import os
 import shutil
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from antdrive.sim.calibration.choice import choose_margin
 from antdrive.sim.calibration.prediction import Calibration
@@ -18,12 +18,14 @@ from antdrive.sim.campaigns.expanding import Expansion, expand
 from antdrive.sim.campaigns.extras import parquet_library
 from antdrive.sim.campaigns.job import Job, SweepCase
 from antdrive.sim.campaigns.local import run_here, run_locally
+from antdrive.sim.campaigns.missing import changed_planners, missing_runs
 from antdrive.sim.campaigns.results import SweepResults
 from antdrive.sim.campaigns.rows import grid_table
 from antdrive.sim.campaigns.running import Driving, Finished, Keep, Work
-from antdrive.sim.campaigns.store import Store, done_in, opened
+from antdrive.sim.campaigns.store import Store, opened
 from antdrive.sim.pipeline import versions
 from antdrive.worlds import save_task
+from antdrive.worlds.errors import FieldError
 from antdrive.worlds.files.atomic import written_whole
 
 
@@ -35,6 +37,7 @@ def sweep(
     dask: str | None = None,
     keep: Keep | None = None,
     retry_crashed: bool = False,
+    again: Sequence[str] = (),
     progress: Callable[[int, int], None] | None = None,
 ) -> SweepResults:
     """Make all runs of a campaign that its folder does not hold yet. Whatever ends it, the same call goes on later.
@@ -45,7 +48,8 @@ def sweep(
         jobs: number of processes; None: one per core; 0: this process, which a run that crashes then ends
         dask: the cluster that makes the runs instead: "local:N", or the address of a scheduler, "tcp://HOST:PORT"
         keep: which runs' logs are kept: none, failed or all; None: as the campaign says
-        retry_crashed: whether runs are made again whose processes died
+        retry_crashed: whether runs are made again that crashed
+        again: planners, by label or name, and outcomes whose runs are made again; their present results are forgotten
         progress: is called at first and after each run with the numbers of runs that are done and of all
 
     Raises:
@@ -53,7 +57,15 @@ def sweep(
     """
     asked = campaign_of(campaign)
     return run_expansion(
-        asked, expand(asked), folder, jobs=jobs, dask=dask, keep=keep, retry_crashed=retry_crashed, progress=progress
+        asked,
+        expand(asked),
+        folder,
+        jobs=jobs,
+        dask=dask,
+        keep=keep,
+        retry_crashed=retry_crashed,
+        again=again,
+        progress=progress,
     )
 
 
@@ -66,6 +78,7 @@ def run_expansion(
     dask: str | None = None,
     keep: Keep | None = None,
     retry_crashed: bool = False,
+    again: Sequence[str] = (),
     progress: Callable[[int, int], None] | None = None,
     work: Work | None = None,
 ) -> SweepResults:
@@ -78,47 +91,64 @@ def run_expansion(
         jobs: number of processes; None: one per core; 0: this process
         dask: the cluster that makes the runs instead
         keep: which runs' logs are kept; None: as the campaign says
-        retry_crashed: whether runs are made again whose processes died
+        retry_crashed: whether runs are made again that crashed
+        again: planners, by label or name, and outcomes whose runs are made again; their present results are forgotten
         progress: is called at first and after each run with the numbers of runs that are done and of all
         work: what is done with a run; None: it is driven
 
     Raises:
         InputError: another process writes into the folder, or the scheduler is gone.
     """
+    _check(campaign, jobs, dask, keep)
     parquet_library()
     report = progress or (lambda done, size: None)
     with opened(folder) as store:
         all_jobs = calibrated(expansion.jobs)
+        missing = missing_runs(all_jobs, store.folder, retry_crashed=retry_crashed, again=again)
+        notes = tuple(changed_planners(all_jobs, store.folder))
+        if missing.forgotten:
+            store.drop(missing.forgotten)
         _begin(store, campaign, expansion, all_jobs)
-        done = done_in(store.folder, crashed=not retry_crashed)
-        todo = [job for job in all_jobs if job.key not in done]
-        made, before, size = 0, len(all_jobs) - len(todo), len(all_jobs)
+        made, before, size = 0, len(all_jobs) - len(missing.jobs), len(all_jobs)
         report(before, size)
         # Workers of another machine hand logs back; those of this one write them.
         shared = None if dask is not None and not dask.startswith("local:") else str(store.folder.resolve())
         driving = Driving(keep or campaign.entry.rollouts, shared)
         try:
-            with contextlib.closing(_engine(todo, work or driving, jobs, dask)) as finished:
+            engine = _engine(missing.jobs, work or driving, jobs, dask, limit=campaign.entry.run_limit, tick=store.tick)
+            with contextlib.closing(engine) as finished:
                 for one in finished:
                     store.add(one.row, one.log)
                     made += 1
                     report(before + made, size)
         finally:
             table = store.finish()
-    return SweepResults(Path(folder), table, size, made)
+    return SweepResults(Path(folder), table, size, made, notes)
 
 
-def _engine(todo: list[Job], work: Work, jobs: int | None, dask: str | None) -> Generator[Finished, None, None]:
+def _check(campaign: Campaign, jobs: int | None, dask: str | None, keep: str | None) -> None:
+    """Refuse, before any work, what a caller cannot mean."""
+    if jobs is not None and (not isinstance(jobs, int) or jobs < 0):
+        raise FieldError("jobs", f"must be a number of processes, or 0 for this process, got {jobs!r}")
+    if keep is not None and keep not in get_args(Keep):
+        raise FieldError("keep", f"unknown {keep!r}; choose from {', '.join(get_args(Keep))}")
+    if jobs == 0 and dask is None and campaign.entry.run_limit is not None:
+        raise FieldError("jobs", "must be at least 1 with a run_limit: this process cannot end itself")
+
+
+def _engine(
+    todo: Sequence[Job], work: Work, jobs: int | None, dask: str | None, **watched: Any
+) -> Generator[Finished, None, None]:
     if dask is not None:
         from antdrive.sim.campaigns.cluster import run_on_cluster
 
-        return run_on_cluster(todo, work, dask)
+        return run_on_cluster(todo, work, dask, **watched)
     if jobs == 0:
         return run_here(todo, work)
     import joblib
 
     cores = int(joblib.cpu_count())  # of a container, not of its host
-    return run_locally(todo, work, min(jobs or cores, max(1, len(todo))))
+    return run_locally(todo, work, min(jobs or cores, max(1, len(todo))), **watched)
 
 
 def calibrated(jobs: Iterable[Job]) -> list[Job]:
@@ -168,7 +198,7 @@ def _begin(store: Store, campaign: Campaign, expansion: Expansion, jobs: Sequenc
     for path, task in expansion.worlds.items():
         if not (store.folder / path).exists():
             save_task(task, store.folder / path)
-    for path, source in expansion.robots.items():
+    for path, source in {**expansion.robots, **expansion.planners}.items():
         with written_whole(store.folder / path) as part:
             shutil.copyfile(source, part)
     store.begin(manifest, grid_table(jobs))

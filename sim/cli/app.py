@@ -10,11 +10,13 @@ from types import MappingProxyType
 from typing import Annotated, Any
 
 import typer
+import typer.core
 
 from antdrive.sim.cli.commands.accept import accept
 from antdrive.sim.cli.commands.barn import barn
 from antdrive.sim.cli.commands.check import check
 from antdrive.sim.cli.commands.compare import compare
+from antdrive.sim.cli.commands.export import export_drive
 from antdrive.sim.cli.commands.falsify import falsify
 from antdrive.sim.cli.commands.find_margin import find_margin
 from antdrive.sim.cli.commands.margin import margin
@@ -23,7 +25,10 @@ from antdrive.sim.cli.commands.planners import planners
 from antdrive.sim.cli.commands.render import render
 from antdrive.sim.cli.commands.report import report
 from antdrive.sim.cli.commands.reproduce import reproduce
-from antdrive.sim.cli.commands.robots import robots
+from antdrive.sim.cli.commands.robots.import_ import import_robot
+from antdrive.sim.cli.commands.robots.list import list_all
+from antdrive.sim.cli.commands.robots.print_ import print_robot
+from antdrive.sim.cli.commands.robots.show import show_robot
 from antdrive.sim.cli.commands.run import run
 from antdrive.sim.cli.commands.schema import schema
 from antdrive.sim.cli.commands.shrink import shrink
@@ -49,6 +54,7 @@ COMMANDS: Mapping[str, Callable[..., int]] = MappingProxyType(
         "barn": barn,
         "render": render,
         "report": report,
+        "export": export_drive,
         "verify": verify,
         "check": check,
         "accept": accept,
@@ -58,7 +64,6 @@ COMMANDS: Mapping[str, Callable[..., int]] = MappingProxyType(
         "shrink": shrink,
         "reproduce": reproduce,
         "planners": planners,
-        "robots": robots,
         "schema": schema,
         "warm": warm,
     }
@@ -71,6 +76,10 @@ WORLDS: Mapping[str, Callable[..., int]] = MappingProxyType(
         "import": import_world,
         "export": export_world,
     }
+)
+#: `antdrive robots` alone lists, and `antdrive robots NAME` prints.
+ROBOTS: Mapping[str, Callable[..., int]] = MappingProxyType(
+    {"list": list_all, "print": print_robot, "show": show_robot, "import": import_robot}
 )
 
 # typer exports only descendants of the error that it raises for every wrong word.
@@ -129,12 +138,24 @@ def application() -> typer.Typer:
     worlds = typer.Typer(
         help="List, show, generate, import and export worlds.", no_args_is_help=True, rich_markup_mode=None
     )
-    for group, commands in ((app, COMMANDS), (worlds, WORLDS)):
+    robots = typer.Typer(help="List, print, show and import robots.", rich_markup_mode=None, cls=_RobotsGroup)
+    for group, commands in ((app, COMMANDS), (worlds, WORLDS), (robots, ROBOTS)):
         for name, command in commands.items():
             group.command(name)(command)
     app.add_typer(worlds, name="worlds")
+    app.add_typer(robots, name="robots")
     app.callback()(_global_options)
     return app
+
+
+class _RobotsGroup(typer.core.TyperGroup):
+    """`antdrive robots` with the command that is meant where none is named."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        first = next((word for word in args if not word.startswith("-")), None)
+        if first not in self.commands and not {"-h", "--help"} & set(args):
+            args = ["list" if first is None else "print", *args]
+        return super().parse_args(ctx, args)
 
 
 def _print_version(wanted: bool) -> None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -19,22 +19,33 @@ Metrics = Annotated[
     typer.Option(
         "--metric",
         metavar="NAME",
-        help="Metric to compare besides success, for a campaign's folder. May be repeated.  [default: duration_s]",
+        help="Metric to compare besides success, of a campaign. May be repeated.  "
+        "[default: driven_length_m, duration_s, plan_s]",
     ),
 ]
 Against = Annotated[
     str | None,
-    typer.Option(metavar="PLANNER", help="Compare this planner with each other one only, for a campaign's folder."),
+    typer.Option(metavar="PLANNER", help="Compare this planner with each other one only, of a campaign."),
 ]
 
 Where = Annotated[
     list[str] | None,
     typer.Option(
-        metavar="COLUMN=VALUE", help="Take only some runs of a campaign's folder, such as noise=1. May be repeated."
+        metavar="COLUMN=VALUE",
+        help="Take only some runs of a campaign, such as noise=1, noise=0,1 or duration_s=10..20. May be repeated.",
     ),
 ]
 
-COMPARE_OPTIONS = ("worlds", "planner", "metric", "against", "where", "json")
+Allow = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="MEASURE=DIFFERENCE",
+        help="By how much a planner may be worse than --against and still count as not worse, such as success=0.02 or "
+        "duration_s=1, of a campaign. May be repeated.",
+    ),
+]
+
+COMPARE_OPTIONS = ("worlds", "planner", "metric", "against", "allow", "where", "json")
 
 
 #: Files of a campaign's folder, as `sim/campaigns/store` names them; that module would load much more.
@@ -50,8 +61,8 @@ def is_campaign(folder: Path) -> bool:
     return all((folder / name).is_file() for name in MARKS)
 
 
-def campaign_of_words(words: Sequence[str], context: typer.Context) -> Path | None:
-    """The campaign's folder that `antdrive compare` was given, if it is one.
+def campaigns_of_words(words: Sequence[str], context: typer.Context) -> list[Path]:
+    """The campaigns' folders that `antdrive compare` was given, if they are.
 
     Args:
         words: the worlds named
@@ -63,17 +74,17 @@ def campaign_of_words(words: Sequence[str], context: typer.Context) -> Path | No
     folders = [word for word in words if is_campaign(Path(word))]
     given = {name for name in context.params if _is_given(context, name)}
     if not folders:
-        for name in sorted(given & {"metric", "against", "where"}):
+        for name in sorted(given & {"metric", "against", "allow", "where"}):
             raise InputError(f"--{name}: is for the folder of a campaign; {words[0]} is none")
-        return None
-    if len(words) > 1:
-        raise InputError(f"{' '.join(words)}: name one campaign's folder, or worlds")
+        return []
+    if len(folders) < len(words):
+        raise InputError(f"{' '.join(words)}: name folders of campaigns, or worlds")
     for name in sorted(given - set(COMPARE_OPTIONS)):
         option = name.replace("_", "-")
         raise InputError(
-            f"--{option}: is for drives; a campaign's folder takes --planner, --metric, --against, --where and --json"
+            f"--{option}: is for drives; a campaign's folder takes --planner, --metric, --against, --allow, --where and --json"
         )
-    return Path(folders[0])
+    return [Path(folder) for folder in folders]
 
 
 def _is_given(context: typer.Context, name: str) -> bool:
@@ -81,58 +92,67 @@ def _is_given(context: typer.Context, name: str) -> bool:
     return source is not None and source.name == "COMMANDLINE"
 
 
-def compare_campaign(
-    folder: Path,
+def compare_campaigns(
+    folders: Sequence[Path],
     planners: Sequence[str],
     metrics: Sequence[str] | None,
     against: str | None,
+    allow: Sequence[str] | None,
     where: Sequence[str] | None,
     json: bool,
 ) -> int:
     """Print success of each planner and the comparison of each pair.
 
     Args:
-        folder: the campaign's folder
+        folders: of the campaigns
         planners: labels of those to compare; all without
         metrics: to compare besides success
         against: label of the planner that each other one is compared with
+        allow: MEASURE=DIFFERENCE by which a planner may be worse than that one
         where: COLUMN=VALUE of the runs to take
         json: print one JSON object
     """
     from antdrive.sim.campaigns.reporting import summarise_campaign
 
-    chosen = tuple(metrics or ("duration_s",))
-    summary = summarise_campaign(
-        folder, metrics=chosen, against=against, planners=planners, where=_conditions(where), strict=True
-    )
+    words: dict[str, Any] = {"allow": _allowed(allow, against), "where": _conditions(where), "strict": True}
+    summary = summarise_campaign(folders, metrics=metrics or None, against=against, planners=planners, **words)
     if json:
         print_json(_plain(summary))
         return SUCCEEDED
-    from antdrive.sim.view.campaign.cells import pair_cells, success_cells
+    from antdrive.sim.view.campaign.cells import all_cells
 
-    _print_table(success_cells(summary))
-    for name, rows in summary.comparisons.items():
+    for table in all_cells(summary):
+        _print_table(table)
         print_line()
-        _print_table(pair_cells(name, rows))
-    print_line()
     for note in (*summary.notes, f"Medians are over the {summary.common} instances that every planner solved."):
         print_line(note)
     return SUCCEEDED
 
 
-def report_campaign_folder(folder: Path, out: Path, title: str | None, where: Sequence[str] | None, json: bool) -> int:
-    """Write the report of a campaign.
+def report_campaigns(
+    folders: Sequence[Path],
+    out: Path,
+    json: bool,
+    allow: Sequence[str] | None,
+    where: Sequence[str] | None,
+    against: str | None,
+    **words: Any,
+) -> int:
+    """Write the report of a campaign, or of several.
 
     Args:
-        folder: the campaign's folder
+        folders: of the campaigns
         out: the file to write
-        title: of the report
-        where: COLUMN=VALUE of the runs to take
         json: print one JSON object
+        allow: MEASURE=DIFFERENCE by which a planner may be worse than `against`
+        where: COLUMN=VALUE of the runs to take
+        against: label of the planner that each other one is compared with
+        words: the rest of what `report_campaign` takes
     """
     from antdrive.sim.campaigns.reporting import report_campaign
 
-    files = report_campaign(folder, out, title=title, where=_conditions(where))
+    words |= {"allow": _allowed(allow, against), "where": _conditions(where), "against": against}
+    files = report_campaign(folders, out, **words)
     size = sum(path.stat().st_size for path in files)
     if json:
         print_json({"file": str(files[0]), "files": [str(path) for path in files], "bytes": size})
@@ -142,12 +162,29 @@ def report_campaign_folder(folder: Path, out: Path, title: str | None, where: Se
     return SUCCEEDED
 
 
+def _allowed(allow: Sequence[str] | None, against: str | None) -> dict[str, float]:
+    """What `--allow` says, by measure."""
+    found = {}
+    for text in allow or ():
+        if against is None:
+            raise InputError(f"--allow {text}: needs --against PLANNER, the one that others may not be worse than")
+        measure, _, value = text.partition("=")
+        try:
+            found[measure] = float(value)
+        except ValueError:
+            raise InputError(f"--allow {text}: must be MEASURE=DIFFERENCE, such as success=0.02") from None
+    return found
+
+
 def _conditions(where: Sequence[str] | None) -> dict[str, str]:
-    """What `--where` says, by column."""
+    """What `--where` says, by column: a run has one of the values named for it."""
     for text in where or ():
         if "=" not in text:
             raise InputError(f"--where {text}: must be COLUMN=VALUE, such as noise=1")
-    return {text.partition("=")[0]: text.partition("=")[2] for text in where or ()}
+    found: dict[str, str] = {}
+    for column, _, value in (text.partition("=") for text in where or ()):
+        found[column] = f"{found[column]},{value}" if column in found else value
+    return found
 
 
 def _print_table(table: "TextTable") -> None:
@@ -161,6 +198,7 @@ def _plain(summary: "CampaignSummary") -> dict[str, object]:
         "size": summary.size,
         "planners": [row.as_dict() for row in summary.success],
         "comparisons": {name: [row.as_dict() for row in rows] for name, rows in summary.comparisons.items()},
+        "not_worse": [row.as_dict() for row in summary.allowances],
         "common": summary.common,
         "medians": {
             name: [

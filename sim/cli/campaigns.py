@@ -35,6 +35,8 @@ def campaign_from(path: Path | None, **words: Any) -> Campaign:
         return make_campaign(given, ".", SOURCE)
     file = load_campaign(path)
     # Paths in options begin where the command runs, those in the file beside the file.
+    if "planners" in given:
+        given["planners"] = [_absolute_planner(one) for one in given["planners"]]
     for key in ("worlds", "robots"):
         given[key] = _absolute(given[key]) if key in given else file.document.data.get(key)
     merged = {**file.document.data, **{key: value for key, value in given.items() if value is not None}}
@@ -53,9 +55,21 @@ def _keys(words: dict[str, Any]) -> dict[str, Any]:
         found["margin"] = [text if text == "auto" else _number("--margin", text) for text in words["margin"]]
     if words["seeds"] is not None:
         found["seeds"] = _seeds(words["seeds"])
+    if words["run_limit"] is not None:
+        found["run_limit"] = words["run_limit"]
     if words["tasks"] is not None:
-        found["tasks"] = {"random": words["tasks"]}
+        found["tasks"] = _tasks(words["tasks"])
     return found
+
+
+def _tasks(text: str) -> Any:
+    """The value of a campaign's key `tasks` from NUMBER, NUMBER:METRES, own or named."""
+    if text in ("own", "named"):
+        return text
+    number, mark, metres = text.partition(":")
+    if not (number.isascii() and number.isdigit() and int(number) and bool(mark) == bool(metres)):
+        raise InputError(f"--tasks {text}: write NUMBER or NUMBER:METRES, such as 30:5, or own or named")
+    return {"random": int(number), **({"min_distance": _number(f"--tasks {text}", metres)} if mark else {})}
 
 
 def _absolute(worlds: list[Any]) -> list[Any]:
@@ -64,6 +78,14 @@ def _absolute(worlds: list[Any]) -> list[Any]:
 
     known = {*list_worlds(), *list_robots()}
     return [str(Path(one).absolute()) if isinstance(one, str) and one not in known else one for one in worlds]
+
+
+def _absolute_planner(entry: Any) -> Any:
+    """A planner whose file, if it is in one, is found from any folder."""
+    if isinstance(entry, dict):
+        return {**entry, "name": _absolute_planner(entry["name"])}
+    file, mark, word = entry.rpartition(":")
+    return f"{Path(file).absolute()}{mark}{word}" if file.endswith(".py") else entry
 
 
 def _seeds(text: str) -> Any:
@@ -82,8 +104,13 @@ def _generated(text: str) -> dict[str, Any]:
 
 
 def _planner(text: str) -> Any:
-    """A planner from NAME or NAME:KEY=VALUES:KEY=VALUES, where VALUES are 10,50 or 10..50..20."""
+    """A planner from NAME or NAME:KEY=VALUES:KEY=VALUES, where VALUES are 10,50 or 10..50..20.
+
+    NAME may be FILE.py:CLASS or MODULE:CLASS.
+    """
     name, *options = text.split(":")
+    if options and "=" not in options[0] and (name.endswith(".py") or "." in name):
+        name += f":{options.pop(0)}"
     entry: dict[str, Any] = {"name": name}
     for option in options:
         key, mark, values = option.partition("=")

@@ -8,6 +8,7 @@ import shlex
 import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from antdrive.sim.cli.parse import pair
@@ -43,6 +44,27 @@ class Entrant:
     settings: tuple[str, ...] = ()
 
 
+def check_worlds(words: Sequence[str]) -> None:
+    """Check that there are worlds of these names, before anything is said about planners, which a campaign needs none of.
+
+    Args:
+        words: names of worlds in the catalogue, or world files
+
+    Raises:
+        InputError: there is no such world.
+    """
+    from antdrive.worlds.files.checks import suggest
+    from antdrive.worlds.files.world_file import list_worlds
+
+    known = list_worlds()
+    for word in words:
+        if word in known or Path(word).is_file():
+            continue
+        if Path(word).is_dir():
+            raise InputError(f"{word}: neither a world file nor the folder of a campaign, as antdrive sweep writes it")
+        raise InputError(f"{word}: no such file or folder, nor a world of the catalogue; {suggest(word, known)}")
+
+
 def entrants_of(planners: Sequence[str] | None, settings: Sequence[str] | None) -> list[Entrant]:
     """The planners of `--planner NAME` or `--planner LABEL=NAME`, with the options of `--set GROUP.KEY=VALUE`.
 
@@ -63,7 +85,7 @@ def entrants_of(planners: Sequence[str] | None, settings: Sequence[str] | None) 
         labels[label] = name if mark else label
     if len(labels) < len(words) or not 2 <= len(labels) <= MAX_PLANNERS:
         raise InputError(
-            f"--planner {' '.join(words)}: name two to six different planners; "
+            f"{' '.join(['--planner', *words])}: name two to six different planners; "
             "one planner with other options gets a label, such as --planner few=aco-han --set few.ants=10"
         )
     own: dict[str, list[str]] = {label: [] for label in labels}
@@ -88,7 +110,7 @@ def mark_of(scenarios: Mapping[str, Scenario], cases: Sequence[tuple[str, int]])
     return hashlib.sha256(repr((facts, list(cases))).encode()).hexdigest()[:8]
 
 
-def repeating(scenario: Scenario, entrant: Entrant, world: str, robot: str) -> str:
+def repeating(scenario: Scenario, entrant: Entrant, world: str, robot: str, ends: Sequence[str] = ()) -> str:
     """The `antdrive run` that repeats one of the compared runs.
 
     Args:
@@ -96,6 +118,7 @@ def repeating(scenario: Scenario, entrant: Entrant, world: str, robot: str) -> s
         entrant: its planner, as given
         world: as it was given
         robot: as it was given
+        ends: the words that give its start and goal, where it is not the world's own
     """
     given = {
         "--planner": entrant.name,
@@ -108,7 +131,7 @@ def repeating(scenario: Scenario, entrant: Entrant, world: str, robot: str) -> s
     words = [str(word) for option in given.items() for word in option]
     words += [word for text in entrant.settings for word in ("--set", text)]
     cell = [] if scenario.cell is None else ["--cell", str(scenario.cell)]
-    return shlex.join(["antdrive", "run", world, *words, *cell])
+    return shlex.join(["antdrive", "run", world, *words, *ends, *cell])
 
 
 @dataclass(frozen=True)

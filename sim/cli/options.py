@@ -14,8 +14,23 @@ import typer
 MAX_MARGIN = 100.0  # [m]
 
 World = Annotated[str, typer.Argument(metavar="WORLD", help="Name of a world in the catalogue, or a world file.")]
+TaskName = Annotated[
+    str | None,
+    typer.Option("--task", metavar="NAME", help="One of the world file's tasks.  [default: its own start and goal]"),
+]
+Start = Annotated[
+    str | None,
+    typer.Option(metavar="X,Y,YAW", help="Another start [m, m, rad].  [default: the task's]"),
+]
+Goal = Annotated[str | None, typer.Option(metavar="X,Y", help="Another goal [m].  [default: the task's]")]
 Planner = Annotated[
-    str, typer.Option("--planner", "-p", metavar="NAME", help="Planner; `antdrive planners` lists them.")
+    str,
+    typer.Option(
+        "--planner",
+        "-p",
+        metavar="NAME",
+        help="Planner, or FILE.py:CLASS; `antdrive planners` lists names.",
+    ),
 ]
 Settings = Annotated[
     list[str] | None,

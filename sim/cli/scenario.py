@@ -12,11 +12,51 @@ if TYPE_CHECKING:
     from antdrive.robots import PurePursuit
     from antdrive.sim.driving.perception import Perception
     from antdrive.sim.scenario import Scenario
+    from antdrive.worlds import Task
 
 GROUPS = ("planner", "controller")  # what `--set GROUP.KEY=VALUE` can set
 
 
-def make_scenario(world: str, planner: str, settings: list[str] | None, robot: str, **rest: Any) -> Scenario:
+def chosen_task(world: str, task: str | None, start: str | None, goal: str | None) -> str | Task:
+    """The world with the start and goal that options give; its name where they give none.
+
+    Args:
+        world: as it was given
+        task: `--task`
+        start: `--start`
+        goal: `--goal`
+
+    Raises:
+        InputError: there is no such task, or the place is not in free ground; the message names the option.
+    """
+    if task is None and start is None and goal is None:
+        return world
+    import dataclasses
+
+    from antdrive.sim.cli.parse import numbers
+    from antdrive.worlds import load_task
+
+    ends = {"start": numbers("--start", start, 3), "goal": numbers("--goal", goal, 2)}
+    try:
+        given: dict[str, Any] = {key: value for key, value in ends.items() if value is not None}
+        return dataclasses.replace(load_task(world, task), **given)
+    except FieldError as error:
+        raise InputError(f"--{error.key}: {error.problem}") from None
+
+
+def ends_words(task: str | None, start: str | None, goal: str | None) -> list[str]:
+    """The words of a command that give the same start and goal.
+
+    Args:
+        task: `--task`
+        start: `--start`
+        goal: `--goal`
+    """
+    given = {"--task": task, "--start": start, "--goal": goal}
+    return [f"{option}={value}" for option, value in given.items() if value is not None]
+
+
+def make_scenario(world: str | Task, planner: str, settings: list[str] | None, robot: str, **rest: Any) -> Scenario:
     """The scenario that a command's options describe; `rest` are fields of `Scenario`.
 
     With the margin "auto" the robot is calibrated, if that was not done before.
@@ -35,8 +75,8 @@ def make_scenario(world: str, planner: str, settings: list[str] | None, robot: s
         scenario = Scenario.of(world, planner, robot, options=chosen["planner"], controller=controller, **given)
         return with_chosen_margin(scenario) if auto else scenario
     except FieldError as error:
-        if error.key == "start":  # no option sets it
-            raise input_error(world, str(error)) from None
+        if error.key == "start":  # the robot does not fit there
+            raise input_error(world if isinstance(world, str) else world.world.name, str(error)) from None
         raise InputError(f"--{error.key.replace('_', '-')}: {error.problem}") from None
 
 

@@ -96,8 +96,13 @@ def write_marker(path: Path, facts: Mapping[str, Any]) -> None:
         temporary.write_text(as_json(dict(facts)) + "\n", encoding="utf-8")
 
 
-def fingerprint(scenario: Scenario) -> str:
-    """Eight hexadecimal digits that differ between scenarios: of SHA-256 over all of its fields."""
+def fingerprint(scenario: Scenario, *more: object) -> str:
+    """Eight hexadecimal digits that differ between scenarios: of SHA-256 over all of its fields.
+
+    Args:
+        scenario: the scenario
+        more: what is asked for beside it, such as the budget of a search
+    """
     import dataclasses
 
     from antdrive.sim.log.record import settings_of
@@ -105,7 +110,7 @@ def fingerprint(scenario: Scenario) -> str:
     fields = {field.name: getattr(scenario, field.name) for field in dataclasses.fields(scenario)}
     planner = fields.pop("planner")
     settings = settings_of(planner) if dataclasses.is_dataclass(planner) else type(planner).__qualname__
-    return hashlib.sha256(repr((settings, fields)).encode()).hexdigest()[:8]
+    return hashlib.sha256(repr((settings, fields, *more)).encode()).hexdigest()[:8]
 
 
 def file_name(name: str) -> str:

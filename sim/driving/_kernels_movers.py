@@ -4,19 +4,27 @@ from __future__ import annotations
 
 import math
 
+from antdrive.robots._kernels_footprint import polygon_distance
 from antdrive.worlds._kernels import Array, kernel
 
 
 @kernel
-def lower_by_movers(poses: Array, footprint: Array, movers: Array, radii: Array, clearance: Array) -> None:
+def lower_by_movers(
+    poses: Array, footprint: Array, corners: Array, movers: Array, radii: Array, clearance: Array
+) -> None:
     """Lower clearance[i] to the distance from the footprint at poses[i] to the nearest of movers[i] (M, 2).
 
-    `footprint` holds half length, half width and rounding of a rounded rectangle.
+    `footprint` holds half length, half width and rounding of a rounded rectangle; where there are `corners` (K, 2), they are
+    those of the polygon in its place.
     """
     for i in range(poses.shape[0]):
         x, y, cos, sin = poses[i, 0], poses[i, 1], math.cos(poses[i, 2]), math.sin(poses[i, 2])
         for m in range(radii.shape[0]):
             dx, dy = movers[i, m, 0] - x, movers[i, m, 1] - y
+            if corners.shape[0] > 0:
+                apart = polygon_distance(cos * dx + sin * dy, cos * dy - sin * dx, corners)
+                clearance[i] = min(clearance[i], apart - footprint[2] - radii[m])
+                continue
             qx = abs(cos * dx + sin * dy) - footprint[0]
             qy = abs(cos * dy - sin * dx) - footprint[1]
             outside = math.hypot(max(qx, 0.0), max(qy, 0.0))

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from antdrive.robots import Twist, footprint_clearance
+from antdrive.robots.footprint import shape_of
 from antdrive.sim.driving import _kernels_movers
 from antdrive.sim.log.contacts import touches
 from antdrive.sim.log.outcome import Outcome
@@ -119,9 +120,8 @@ class Recorder:
         movers = engine.mover_track(len(t))
         contacts = np.array(self._contacts, dtype=np.float64).reshape(-1, 4)
         if engine.trajectories:
-            foot = engine.robot.footprint
-            shape = np.array([foot.half_length, foot.half_width, foot.rounding])
-            _kernels_movers.lower_by_movers(pose, shape, movers, engine.trajectories.radii, clearance)
+            shape = shape_of(engine.robot.footprint)
+            _kernels_movers.lower_by_movers(pose, *shape, movers, engine.trajectories.radii, clearance)
             if ending.outcome is Outcome.COLLIDED:
                 ending = _attribute(engine, engine.trajectories, t, pose, twist, movers, contacts)
         return Drive(

@@ -2,26 +2,19 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import re
 from dataclasses import dataclass
 
 from antdrive.planners import PlannerError
-from antdrive.sim.log.contacts import touches_of
-from antdrive.sim.log.margin import budget
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
-from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import Run
 from antdrive.sim.regression.checking import RAISED
-from antdrive.sim.regression.demands import WALL_CLOCK, Bound
+from antdrive.sim.regression.demands import CYLINDER, UNSEEN, WALL, WALL_CLOCK, Bound
+from antdrive.sim.regression.touching import NOTHING, cause_of_contact, touched_first
 from antdrive.worlds.errors import FieldError
 from antdrive.worlds.files.checks import suggest
-
-#: The kinds of things that a robot can touch.
-CYLINDER, UNSEEN, MOVER, WALL = "cylinder", "unseen cylinder", "mover", "wall"
-NOTHING = "nothing"
 
 _BOUND = re.compile(r"\s*(\w+)\s*(<=|>=|<|>|==)\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*")
 
@@ -90,27 +83,13 @@ def failure_of(run: Run, bound: Bound | None = None) -> Failure | None:
         assert run.certificate is not None
         return Failure(run.outcome.key, touched, "certificate: " + without_numbers(run.certificate.problems[0]))
     if rollout is not None and touched in (CYLINDER, WALL):
-        return Failure(run.outcome.key, touched, _cause_of_contact(rollout))
+        return Failure(run.outcome.key, touched, cause_of_contact(rollout))
     return Failure(run.outcome.key, touched, "" if touched != NOTHING else without_numbers(run.reason))
 
 
 def failure_of_planner(error: PlannerError) -> Failure:
     """The failure of a run that ended because the planner raised something."""
     return Failure(RAISED, NOTHING, without_numbers(str(error)))
-
-
-def touched_first(rollout: Rollout) -> str:
-    """The kind of thing that a drive touched first, or `NOTHING`."""
-    found = touches_of(rollout)
-    if not found:
-        return NOTHING
-    index, record = found[0].obstacle, rollout.record
-    known = len(record.task.world.obstacles)
-    for kind, count in ((CYLINDER, known), (UNSEEN, len(record.unseen)), (MOVER, len(record.task.world.movers))):
-        if index < count:
-            return kind
-        index -= count
-    return WALL
 
 
 def without_numbers(text: str) -> str:
@@ -122,13 +101,3 @@ def without_numbers(text: str) -> str:
     masked = re.sub(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?", "#", text)
     masked = re.sub(r"the (?:left|lower|right|upper) wall|(?:obstacles|movers|unseen)\[#\]", "#", masked)
     return re.sub(r" at \(#, #\)(?: with radius #)?", "", masked)
-
-
-def _cause_of_contact(rollout: Rollout) -> str:
-    """What took most of the margin at the tightest place up to the first contact."""
-    rows = int(rollout.contacts[0, 0]) + 1
-    arrays = ("t", "pose", "twist", "command", "clearance", "limiter", "movers")
-    cut = {name: getattr(rollout, name)[:rows] for name in arrays}
-    cut |= {name: getattr(rollout, name)[:rows] for name in ("estimate", "actuated") if len(getattr(rollout, name))}
-    spent = budget(dataclasses.replace(rollout, **cut))
-    return max(spent.contributions, key=lambda part: part.at_tightest).cause

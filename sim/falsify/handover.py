@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -14,12 +15,14 @@ import yaml
 
 from antdrive.planners import PlannerError, list_planners
 from antdrive.robots import Avoidance, PurePursuit, RobotSpec, list_robots, load_robot
+from antdrive.robots.files import footprint_to_dict
 from antdrive.sim.driving.replanning import ReplanPolicy
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.pipeline import Run, run
 from antdrive.sim.regression.demands import Bound
 from antdrive.sim.regression.scenarios import scenario_of
 from antdrive.sim.regression.suite import load_suite
+from antdrive.sim.regression.touching import cause_of_contact, touched_first
 from antdrive.sim.scenario import Scenario
 from antdrive.worlds import save_task
 from antdrive.worlds.errors import InputError
@@ -61,7 +64,8 @@ def write_suite(path: Path, handovers: Sequence[Handover]) -> Path:
     Raises:
         InputError: a file cannot be written.
     """
-    entries = {}
+    entries: dict[str, Any] = {}
+    robots: dict[str, RobotSpec] = {}
     for handover in handovers:
         failed = handover.run
         scenario = failed.scenario if isinstance(failed, Run) else failed
@@ -70,7 +74,7 @@ def write_suite(path: Path, handovers: Sequence[Handover]) -> Path:
         entries[handover.name] = {
             **({"note": handover.note} if handover.note else {}),
             "world": str(world),
-            **suite_entry(scenario, _robot(scenario.robot, path.parent)),
+            **suite_entry(scenario, _robot(scenario.robot, path.parent, robots)),
             **({"planner": handover.planner} if handover.planner else {}),
             **({"expect": expectation(failed, handover.bound)} if isinstance(failed, Run) else {}),
             "baseline": False,
@@ -122,6 +126,10 @@ def expectation(failed: Run, bound: Bound | None = None) -> dict[str, Any]:
     expected: dict[str, Any] = {"outcome": failed.outcome.key}
     if failed.outcome is Outcome.SUCCEEDED:
         expected["certified"] = failed.succeeded
+    if failed.rollout is not None and failed.outcome.with_contact:
+        expected["touched"] = touched_first(failed.rollout)
+        if bound is None and (cause := cause_of_contact(failed.rollout)):
+            expected["cause"] = cause
     if bound is not None:
         expected[bound.metric] = f"{bound.sign} {bound.value!r}"
     return expected
@@ -211,17 +219,28 @@ def _among_movers(scenario: Scenario) -> dict[str, Any]:
     return {key: value for key, value in plain.items() if value is not True}
 
 
-def _robot(robot: RobotSpec, folder: Path) -> str:
-    """The robot's name in the catalogue, or the file beside the suite that is written for it."""
+def _robot(robot: RobotSpec, folder: Path, robots: dict[str, RobotSpec]) -> str:
+    """The robot's name in the catalogue, or the file beside the suite that is written for it.
+
+    Args:
+        robot: the robot
+        folder: the suite's folder
+        robots: the robots that have files there so far, by the files' names; the robot is added
+    """
     if robot.name in list_robots() and load_robot(robot.name) == robot:
         return robot.name
+    plain = "".join(c if c.isalnum() or c in "-_." else "_" for c in robot.name)
+    names = (plain if k == 1 else f"{plain}-{k}" for k in itertools.count(1))
+    name = next(name for name in names if robots.get(name, robot) == robot)
+    if name not in robots:
+        robots[name] = robot
+        _write_robot(robot, folder / "robots" / f"{name}.yaml")
+    return f"robots/{name}.yaml"
+
+
+def _write_robot(robot: RobotSpec, target: Path) -> None:
     data = {"schema": 1, **dataclasses.asdict(robot)}
-    foot = robot.footprint
-    sides = {"length": 2 * foot.half_length, "width": 2 * foot.half_width}
-    data["footprint"] = {"radius": foot.radius} if foot.is_disc else sides
-    name = "".join(c if c.isalnum() or c in "-_." else "_" for c in robot.name)
-    target = folder / "robots" / f"{name}.yaml"
+    data["footprint"] = footprint_to_dict(robot.footprint)
     with written_whole(target) as part:
         text = yaml.safe_dump({key: value for key, value in data.items() if value is not None}, sort_keys=False)
         part.write_text(text, encoding="utf-8")
-    return f"robots/{name}.yaml"

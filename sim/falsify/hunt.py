@@ -11,6 +11,7 @@ import numpy as np
 from antdrive.planners import PlannerError
 from antdrive.sim.falsify.diversity import driven_line, is_new
 from antdrive.sim.falsify.failure import Failure, failure_of, failure_of_planner
+from antdrive.sim.falsify.handover import fingerprint_of
 from antdrive.sim.falsify.search import METHODS
 from antdrive.sim.falsify.space import WorldSpace, feasible
 from antdrive.sim.log.outcome import Outcome
@@ -32,6 +33,8 @@ class Finding:
         line: the line that was driven until then (N, 2) [m]; (0, 2) if nothing was driven
         number: which run of the search found it, counted from 1
         is_new: whether it differs from all that were found before; `antdrive.sim.falsify.diversity` defines it
+        fingerprint: the run in one text, which is the same wherever the run is the same bit for bit; what the planner raised,
+            if it did
     """
 
     scenario: Scenario
@@ -39,6 +42,7 @@ class Finding:
     line: Floats
     number: int
     is_new: bool
+    fingerprint: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,11 +52,13 @@ class Hunt:
     Attributes:
         findings: the failures in the order in which they were found
         runs: how many runs were made
+        driven: in how many of them the robot drove; in the others the planner found no path, or raised something
         interrupted: whether Ctrl-C ended the search
     """
 
     findings: tuple[Finding, ...]
     runs: int
+    driven: int = 0
     interrupted: bool = False
 
     @property
@@ -93,7 +99,7 @@ def find_failures(
         raise FieldError("budget", f"must be at least 1, got {budget}")
     space, rng = WorldSpace(obstacles, setup.robot.radius), np.random.default_rng([seed, obstacles])
     findings: list[Finding] = []
-    number = 0
+    number = driven = 0
     try:
         for number in range(1, budget + 1):
             numbered = dataclasses.replace(setup, seed=number)
@@ -101,16 +107,17 @@ def find_failures(
             try:
                 done = run(tried)
             except PlannerError as error:
-                findings.append(_undriven(tried, failure_of_planner(error), number, findings))
+                findings.append(_undriven(tried, failure_of_planner(error), number, findings, str(error)))
             else:
+                driven += done.rollout is not None
                 failure = _failure(done)
                 if failure is not None:
                     findings.append(_finding(done, failure, number, findings))
             if progress is not None:
                 progress(number, sum(finding.is_new for finding in findings))
     except KeyboardInterrupt:
-        return Hunt(tuple(findings), number - 1, interrupted=True)
-    return Hunt(tuple(findings), number)
+        return Hunt(tuple(findings), number - 1, driven, interrupted=True)
+    return Hunt(tuple(findings), number, driven)
 
 
 def _next_world(space: WorldSpace, rng: np.random.Generator, method: str, setup: Scenario, name: str) -> Scenario:
@@ -144,14 +151,15 @@ def _failure(done: Run) -> Failure | None:
     return failure if feasible(scenario.task, scenario.inflate + cell) else None
 
 
-def _undriven(scenario: Scenario, failure: Failure, number: int, known: list[Finding]) -> Finding:
+def _undriven(scenario: Scenario, failure: Failure, number: int, known: list[Finding], fingerprint: str) -> Finding:
     is_known = any(finding.failure == failure for finding in known)
-    return Finding(scenario, failure, np.empty((0, 2)), number, not is_known)
+    return Finding(scenario, failure, np.empty((0, 2)), number, not is_known, fingerprint)
 
 
 def _finding(done: Run, failure: Failure, number: int, known: list[Finding]) -> Finding:
     line = np.empty((0, 2)) if done.rollout is None else driven_line(done.rollout)
     if not len(line):
-        return _undriven(done.scenario, failure, number, known)
+        return _undriven(done.scenario, failure, number, known, fingerprint_of(done))
     alike = [finding.line for finding in known if finding.failure == failure]
-    return Finding(done.scenario, failure, line, number, is_new(line, alike, done.scenario.robot.radius))
+    new = is_new(line, alike, done.scenario.robot.radius)
+    return Finding(done.scenario, failure, line, number, new, fingerprint_of(done))

@@ -102,12 +102,11 @@ def _name(index: int) -> str:
 
 def _repeats(finding: Finding, small: Run | Scenario, found_elsewhere: str, small_elsewhere: str) -> bool:
     """Whether a failure and its small scenario gave the same bits in another process, and fail in the same way."""
-    again = run_if_planned(finding.scenario)
-    if isinstance(small, Scenario) or isinstance(again, str):  # the planner raised something
-        masked = {without_numbers(text) for text in (str(again), found_elsewhere, small_elsewhere)}
+    if isinstance(small, Scenario):  # the planner raised something
+        masked = {without_numbers(text) for text in (finding.fingerprint, found_elsewhere, small_elsewhere)}
         return masked == {finding.failure.cause}
-    same = (found_elsewhere, small_elsewhere) == (fingerprint_of(again), fingerprint_of(small))
-    return same and failure_of(again) == failure_of(small) == finding.failure
+    same = (found_elsewhere, small_elsewhere) == (finding.fingerprint, fingerprint_of(small))
+    return same and failure_of(small) == finding.failure
 
 
 def _write(small: Sequence[Run | Scenario], findings: Sequence[Finding], folder: Path) -> Path:

@@ -33,7 +33,7 @@ from antdrive.worlds.errors import FieldError
 from antdrive.worlds.limits import MAX_NEAR_DISTANCES
 from antdrive.worlds.plane import segment_lengths, wrap_angle
 from antdrive.worlds.trajectories import Trajectories
-from antdrive.worlds.types import Floats
+from antdrive.worlds.types import Bounds, Floats, Point
 
 SAME_CLEARANCE = 1e-9  # closed-form distances, computed twice, agree to this [m]
 # Contact points describe the pose before a step, and a robot pushes some millimetres into what it hits. Physics and
@@ -173,7 +173,7 @@ def _clearances(rollout: Rollout) -> tuple[Floats, Floats]:
     """The distances from the footprint to the nearest cylinder or wall (T,) and to each mover (T, M) [m]."""
     foot, world = rollout.record.robot.footprint, rollout.record.world
     half = np.array([foot.half_length, foot.half_width])
-    rounding = foot.rounding
+    rounding, sides = foot.rounding, max(1, len(foot.corners))
     xmin, ymin, xmax, ymax = world.bounds
     discs = world.discs
     x, y, yaw = rollout.pose.T
@@ -181,25 +181,54 @@ def _clearances(rollout: Rollout) -> tuple[Floats, Floats]:
     reach_x = half @ rotation + rounding
     reach_y = half[::-1] @ rotation + rounding
     best = np.minimum.reduce([x - reach_x - xmin, xmax - x - reach_x, y - reach_y - ymin, ymax - y - reach_y])
+    if foot.corners:
+        best = _polygon_to_walls(foot.corners, rollout.pose, world.bounds).min(axis=1) - rounding
 
     def distance(rows: npt.NDArray[np.int64], centres: npt.NDArray[np.complex128], radii: Floats) -> Floats:
         body = (centres - (x + 1j * y)[rows, None]) * np.exp(-1j * yaw[rows, None])  # in the robot's frame
+        if foot.corners:
+            return _polygon_to_points(foot.corners, body) - rounding - radii
         over = np.stack([np.abs(body.real) - half[0], np.abs(body.imag) - half[1]])
         outside = np.linalg.norm(np.maximum(over, 0.0), axis=0)
         return np.asarray(outside + np.minimum(over.max(axis=0), 0.0) - rounding - radii)
 
     for block, near in _blocks(rollout.pose[:, :2], foot.radius, discs):
         centres = (near[:, 0] + 1j * near[:, 1])[None]
-        for rows in np.array_split(block, 1 + len(block) * len(near) // 1_000_000):
+        for rows in np.array_split(block, 1 + len(block) * len(near) * sides // 1_000_000):
             best[rows] = np.minimum(best[rows], distance(rows, centres, near[:, 2]).min(axis=1))
     radii = np.array([mover.radius for mover in world.movers])
     moving = np.empty((len(x), len(radii)))
-    for rows in np.array_split(np.arange(len(x)), 1 + moving.size // 1_000_000):
+    for rows in np.array_split(np.arange(len(x)), 1 + moving.size * sides // 1_000_000):
         if not len(radii):
             break
         centres = rollout.movers[rows]
         moving[rows] = distance(rows, centres[..., 0] + 1j * centres[..., 1], radii)
     return np.asarray(best), moving
+
+
+def _polygon_to_points(corners: tuple[Point, ...], points: npt.NDArray[np.complex128]) -> Floats:
+    """The distance from a convex polygon to points x + iy (...) in its frame, negative within it [m].
+
+    Each point is looked at from each edge, turned so that the edge lies along the real axis and the inside is to the left.
+    """
+    here = np.array([complex(*corner) for corner in corners])
+    if len(here) == 1:
+        return np.asarray(np.abs(points - here[0]))
+    edge = np.roll(here, -1) - here
+    seen = (points[..., None] - here) * (np.conj(edge) / np.abs(edge))
+    apart = np.abs(seen - np.clip(seen.real, 0.0, np.abs(edge))).min(axis=-1)
+    depth = seen.imag.min(axis=-1)
+    return np.asarray(np.where(depth >= 0, -depth, apart))
+
+
+def _polygon_to_walls(corners: tuple[Point, ...], pose: Floats, bounds: Bounds) -> Floats:
+    """The distance from a polygon at each pose (T, 3) to the left, right, lower and upper wall, shape (T, 4) [m]."""
+    here = np.array([complex(*corner) for corner in corners])
+    placed = (pose[:, 0] + 1j * pose[:, 1])[:, None] + np.exp(1j * pose[:, 2])[:, None] * here
+    xmin, ymin, xmax, ymax = bounds
+    low, high = placed.real.min(axis=1), placed.real.max(axis=1)
+    near, far = placed.imag.min(axis=1), placed.imag.max(axis=1)
+    return np.stack([low - xmin, xmax - high, near - ymin, ymax - far], axis=1)
 
 
 def _blocks(places: Floats, radius: float, discs: Floats) -> Iterator[tuple[npt.NDArray[np.int64], Floats]]:
@@ -448,6 +477,10 @@ def _gaps(rollout: Rollout) -> Floats:
     x, y, yaw = (column[:, None] for column in rollout.pose.T)
     round_ones = np.concatenate([discs, moving], axis=1)
     body = (round_ones[..., 0] - x + 1j * (round_ones[..., 1] - y)) * np.exp(-1j * yaw)
+    if foot.corners:
+        apart = np.maximum(_polygon_to_points(foot.corners, body), 0.0) - foot.rounding - round_ones[..., 2]
+        away = _polygon_to_walls(foot.corners, rollout.pose, world.bounds) - foot.rounding
+        return np.concatenate([apart, away], axis=1)
     ahead, aside = np.abs(body.real) - foot.half_length, np.abs(body.imag) - foot.half_width
     apart = np.hypot(np.maximum(ahead, 0.0), np.maximum(aside, 0.0)) - foot.rounding - round_ones[..., 2]
     xmin, ymin, xmax, ymax = world.bounds

@@ -145,6 +145,9 @@ class _Attribution:
 def _gap(footprint: Footprint, pose: Any, centre: Any, radius: float) -> float:
     """The distance from a footprint to a disc, 0 or less where they overlap [m]."""
     dx, dy, yaw = centre[0] - pose[0], centre[1] - pose[1], pose[2]
+    if footprint.corners:
+        place = math.cos(yaw) * dx + math.sin(yaw) * dy, math.cos(yaw) * dy - math.sin(yaw) * dx
+        return -footprint.depth(*place) - radius
     ahead = abs(math.cos(yaw) * dx + math.sin(yaw) * dy) - footprint.half_length
     aside = abs(math.cos(yaw) * dy - math.sin(yaw) * dx) - footprint.half_width
     return math.hypot(max(ahead, 0.0), max(aside, 0.0)) - footprint.rounding - radius

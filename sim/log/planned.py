@@ -13,7 +13,7 @@ import numpy as np
 
 from antdrive.sim.log.record import DECISION
 from antdrive.sim.log.rollout import Rollout
-from antdrive.worlds.ends import end_reach
+from antdrive.worlds.ends import end_reach, longest_line
 from antdrive.worlds.plane import arc_lengths, polyline_length
 from antdrive.worlds.types import Floats
 
@@ -21,7 +21,6 @@ NEAR = 1.5  # cells between a route's end and a point that has room, at most
 JUST_ROOM = 1e-6  # a goal with no more room than the inflation and this may count as one with too little [m]
 ROUTE_SLACK = 0.012  # smoothing keeps the inflation to a centimetre, and replans are rounded to 0.1 mm [m]
 SAME_LENGTH = 1e-6  # lengths that are computed twice agree to this share
-DETOUR = 3.0  # cells by which an any-angle planner's line may be longer than its cells and what leads to them
 AWAY_TIME = 0.5  # a robot is no farther off its route than its radius and what it drives in this time [s]
 POINT_SPACING = 0.05  # of the points of a route whose clearance is looked at [m]
 
@@ -155,7 +154,7 @@ def _check_lengths(rollout: Rollout) -> Iterator[str]:
         value = getattr(plan, key)
         if value is not None and not _by_cells(rollout) and value < straight:
             yield f"record.plan.{key}: {value:.6g} m, but start and goal are farther apart"
-    if plan.cost_m is not None and plan.length_m > plan.cost_m + leads + DETOUR * cell:
+    if plan.cost_m is not None and plan.length_m > longest_line(plan.cost_m, leads, cell) + slack:
         yield f"record.plan.length_m: {plan.length_m:.6g} m, but the cells are {plan.cost_m:.6g} m long"
 
 

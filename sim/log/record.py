@@ -224,7 +224,8 @@ class DriveRecord:
         seed: the seed that all of the run's random numbers follow from
         planner: the planner and its settings
         plan: the plan's size beside the shortest paths that are possible
-        robot: the robot's specification, with the keys of `RobotSpec`: footprint, drive, limits and noise
+        robot: the robot's specification, with the keys of `RobotSpec`: footprint, drive, limits and noise; `footprint.corners`
+            only where it is a polygon or beside the axle
         controller: the controller and its settings
         smoothing: how the planned cells became the route
         perception: what the robot knew of movers; null in a world without movers
@@ -417,12 +418,9 @@ def plain_value(value: Any) -> Any:
     if isinstance(value, Task):
         return task_to_dict(value)
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        given = {field: getattr(value, field.name) for field in dataclasses.fields(value)}
-        return {
-            field.name: plain_value(inner)
-            for field, inner in given.items()
-            if not (inner is None and field.metadata.get("only_if_given"))
-        }
+        # A field that came later is left out where it says nothing, so that older logs and hashes stay as they are.
+        fields = [field for field in dataclasses.fields(value) if not _says_nothing(field, getattr(value, field.name))]
+        return {field.name: plain_value(getattr(value, field.name)) for field in fields}
     if isinstance(value, Mapping):
         return {str(key): plain_value(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple):
@@ -430,6 +428,10 @@ def plain_value(value: Any) -> Any:
     if isinstance(value, np.generic):
         return value.item()
     return value if isinstance(value, bool | int | float | str | None) else str(value)
+
+
+def _says_nothing(field: dataclasses.Field[Any], value: Any) -> bool:
+    return bool(field.metadata.get("left_out_if_default")) and value == field.default
 
 
 def settings_of(values: Any) -> dict[str, Any]:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from types import MappingProxyType
 from typing import Any
 
-from antdrive.planners import Query
+from antdrive.planners import Planner, Query
 from antdrive.sim.papers import maps
+from antdrive.sim.papers.baselines import FirstTouchDStar
+from antdrive.sim.papers.candidates import MoveCount, candidate
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,62 +24,109 @@ class Experiment:
         paper: the paper's short name
         map: the map in words
         planner: the planner's name
-        query: gives the map with start and goal for a seed; a map that the paper specifies is the same for
-            every seed
-        printed: the paper's value; lengths in cells
+        query: gives the map with start and goal for a number
+        printed: the paper's value; lengths in cells; None: the paper prints none
         options: the planner's parameters
-        recreated: the paper shows its map as a picture only; a random map of the same size and kind takes its
-            place
-        quantity: the value that is printed and measured: `length` or `steps`
+        recreated: the paper shows its map as a picture only; random maps of the same size and kind take its place
+        comparable: the shortest path of the recreated maps is as long as the paper says, so that lengths compare
+        quantity: the value that is printed and measured: `length`, `steps` or another property of `Trial`
+        label: the planner with its setting, unique among the experiments of a map
+        worlds: how many different maps there are; 0: one for each seed
+        work: where it is finite, planning ends after so many ant steps
+        most_seeds: more seeds than this would tell nothing new
+        slow: takes seconds, its map or its plans, and is left out of a quick look
+        made: the planner itself, where it is not one of the registry
     """
 
     paper: str
     map: str
     planner: str
     query: Callable[[int], Query]
-    printed: float
+    printed: float | None
     options: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     recreated: bool = True
+    comparable: bool = False
     quantity: str = "length"
+    label: str = ""
+    worlds: int = 1
+    work: float = math.inf
+    most_seeds: int = 1000
+    slow: bool = False
+    made: Planner | None = None
+
+    @property
+    def name(self) -> str:
+        """The planner with its setting."""
+        return self.label or self.planner
+
+    def world(self, seed: int) -> int:
+        """The number of the map that a seed gets."""
+        return seed % self.worlds if self.worlds else seed
+
+
+#: How many candidates take the place of a picture.
+CANDIDATES = 5
 
 
 def _for_every_seed(query: Query) -> Callable[[int], Query]:
     return lambda seed: query
 
 
-def _lee_map(number: int, rows: int, cols: int, seed: int) -> Query:
-    return maps.blocks(rows, cols, 25, max(rows, cols) // 6, 100 * number + seed)
+def _candidates(size: int, first: int, moves: tuple[int, int], **kind: Any) -> Callable[[int], Query]:
+    """Candidates for a square map from corner to corner, with `moves` = (straight, diagonal) of the shortest path."""
+    return lambda seed: _candidate((size, size), (0, 0), (size - 1, size - 1), moves, first + seed, *kind.items())
+
+
+@functools.cache
+def _candidate(
+    shape: tuple[int, int],
+    start: tuple[int, int],
+    goal: tuple[int, int],
+    moves: tuple[int, int],
+    seed: int,
+    *kind: tuple[str, Any],
+) -> Query:
+    return candidate(shape, start, goal, MoveCount(*moves), seed, **dict(kind))
 
 
 def han2007() -> list[Experiment]:
-    """Experiment 6 with ants, and the genetic algorithm around one obstacle."""
+    """Experiment 6 with ants, the genetic algorithm around one obstacle, and both on the same maps."""
     ants, single = maps.han_ants(), maps.han_genes((10.0, 10.0, 5.0))
-    with_ants = [
-        Experiment(
+    many, one = "14 obstacles", "one obstacle of radius 5"
+
+    def experiment(
+        where: str, query: Query, planner: str, label: str, printed: float | None, **options: Any
+    ) -> Experiment:
+        return Experiment(
             paper="han2007",
-            map=f"14 obstacles, {count} ants",
-            planner="aco-han",
-            options={"ants": count},
-            query=_for_every_seed(ants),
+            map=where,
+            planner=planner,
+            label=label,
+            options=options,
+            query=_for_every_seed(query),
             printed=printed,
             recreated=False,
         )
-        for count, printed in ((10, 45.357), (100, 38.6223), (500, 36.237))
+
+    return [
+        experiment(many, ants, "aco-han", "10 ants", 45.357, ants=10),
+        experiment(many, ants, "aco-han", "100 ants", 38.6223, ants=100),
+        experiment(many, ants, "aco-han", "500 ants", 36.237, ants=500),
+        experiment(many, ants, "aco-han", "100 ants, elite", None, ants=100, elitism=100),
+        experiment(many, ants, "ga-han", "4 via points", None, via_points=4, mutation=0.4),
+        experiment(many, ants, "ga-han", "1 via point", None, via_points=1, tries=20_000),
+        experiment(one, single, "ga-han", "3 via points", 33.1798, via_points=3),
+        experiment(one, single, "ga-han", "2 via points", None, via_points=2),
+        experiment(one, single, "ga-han", "1 via point", None, via_points=1),
+        experiment(one, single, "ga-han", "3 via points, no elite", None, via_points=3, elitism=False),
     ]
-    with_genes = Experiment(
-        paper="han2007",
-        map="one obstacle of radius 5, 3 via points",
-        planner="ga-han",
-        options={"via_points": 3},
-        query=_for_every_seed(single),
-        printed=33.1798,
-        recreated=False,
-    )
-    return [*with_ants, with_genes]
 
 
 def suganthi2019() -> list[Experiment]:
-    """Table 2: four sizes, three planners."""
+    """Table 2: four sizes, three planners, in three readings of what the paper leaves open.
+
+    It does not say what an ant in a dead end does, whether loops are cut, or how large a of eq. 7 is.
+    """
     common = {
         "alpha": 1.0,
         "beta": 1.0,
@@ -85,38 +135,53 @@ def suganthi2019() -> list[Experiment]:
         "heuristic": "step",
         "iterations": 100,
     }
-    options: dict[str, dict[str, Any]] = {
-        "as": {"ants": 50, **common},
-        "pfaco": {"ants": 50, "iterations": 100, "ranks": 15},
-        "iaco": {"ants": 25, "explorers": 75, **common},
-    }
+    freed, letter = {"backtrack": True, "shortcut": True}, {"backtrack": False, "shortcut": False}
+    many: dict[str, Any] = {"ants": 25, "explorers": 75, **common}
+    arms: list[tuple[str, str, dict[str, Any]]] = [
+        ("as", "as", {"ants": 50, **common, **freed}),
+        ("pfaco", "pfaco", {"ants": 50, "iterations": 100, "ranks": 15}),
+        ("iaco", "iaco", {**many, **freed, "elite": 25.0}),
+        ("as", "as, ants die", {"ants": 50, **common, **letter}),
+        ("iaco", "iaco, ants die", {**many, **letter, "elite": 1.0}),
+        ("iaco", "iaco, a = 1", {**many, **freed, "elite": 1.0}),
+    ]
     printed = {
         10: (13.899, 13.899, 13.899),
         20: (28.627, 38.627, 28.627),
         30: (46.527, 59.355, 42.184),
         50: (96.125, 109.761, 94.326),
     }
+    kinds: dict[int, tuple[tuple[int, int], dict[str, Any]]] = {
+        10: ((4, 7), {"blocked": 0.15}),
+        20: ((6, 16), {"blocked": 0.15}),
+        30: ((4, 27), {"blocked": 0.08}),
+        50: ((42, 37), {"blocked": 0.05, "blocks": 6, "largest": 35, "thin": True}),
+    }
     return [
         Experiment(
             paper="suganthi2019",
-            map=f"{size}×{size}, 15 % blocked",
-            planner=name,
-            options=options[name],
+            map=f"{size}×{size}",
+            planner=planner,
+            label=label,
+            options=options,
             printed=value,
-            query=partial(maps.scattered, size, 0.15),
+            query=_candidates(size, 100 * size, kinds[size][0], **kinds[size][1]),
+            worlds=CANDIDATES,
+            comparable=True,
+            slow=size == 50,
         )
         for size, values in printed.items()
-        for name, value in zip(options, values, strict=True)
+        for (planner, label, options), value in zip(arms, (*values, values[0], values[2], values[2]), strict=True)
     ]
 
 
 def ibraheem2016() -> list[Experiment]:
     """Table 2: four sizes, ant system and ageing ants."""
     printed = {
-        10: (5, 15.07, 15.07),
-        20: (10, 28.6274, 28.6274),
-        30: (15, 45.9411, 45.1127),
-        40: (20, 62.6690, 61.8406),
+        10: (5, 15.07, 15.07, (8, 5)),
+        20: (10, 28.6274, 28.6274, (6, 16)),
+        30: (15, 45.9411, 45.1127, (14, 22)),
+        40: (20, 62.6690, 61.8406, (18, 31)),
     }
     return [
         Experiment(
@@ -125,54 +190,101 @@ def ibraheem2016() -> list[Experiment]:
             planner=name,
             printed=value,
             options={"ants": 50, "iterations": 100, "evaporation": 0.3},
-            query=partial(maps.blocks, size, size, count, size // 4),
+            query=_candidates(size, 100 * size, moves, blocks=count * 3 // 5, largest=size // 4),
+            worlds=CANDIDATES,
+            comparable=True,
+            slow=size == 40,
         )
-        for size, (count, *values) in printed.items()
+        for size, (count, *values, moves) in printed.items()
         for name, value in zip(("as", "maco"), values, strict=True)
     ]
 
 
 def lee2008() -> list[Experiment]:
-    """Tables I and II: five maps, ant system and ants on a potential field."""
+    """Tables I and II: five maps, ant system and ants on a potential field, with equal numbers of ant steps."""
     printed = {
-        1: (25, 25, 72.0833, 59.2548),
-        2: (50, 44, 83.3970, 64.0833),
-        3: (100, 100, 154.2376, 123.6102),
-        4: (100, 100, 175.2376, 135.8234),
-        5: (100, 100, 168.6518, 131.6812),
+        1: ((25, 25), (24, 24), 72.0833, 59.2548, None, 2e5),
+        2: ((50, 44), (49, 35), 83.3970, 64.0833, (16, 34), 1e6),
+        3: ((100, 100), (99, 58), 154.2376, 123.6102, (43, 57), 3e6),
+        4: ((100, 100), (99, 79), 175.2376, 135.8234, (34, 72), 3e6),
+        5: ((100, 100), (99, 69), 168.6518, 131.6812, (44, 62), 3e6),
     }
-    options: dict[str, dict[str, Any]] = {
-        "as": {"ants": 500, "beta": 2.0, "evaporation": 0.01, "iterations": 100},
-        "pfaco": {},
-    }
-    return [
-        Experiment(
-            paper="lee2008",
-            map=f"{number}: {rows}×{cols}",
-            planner=name,
-            options=options[name],
-            printed=value,
-            query=partial(_lee_map, number, rows, cols),
-        )
-        for number, (rows, cols, *values) in printed.items()
-        for name, value in zip(options, values, strict=True)
+    arms: list[tuple[str, str, dict[str, Any]]] = [
+        ("as", "as", {"ants": 500, "beta": 2.0, "evaporation": 0.01}),
+        ("pfaco", "pfaco", {}),
+        ("pfaco", "pfaco, to the letter", {"form": "letter", "memory": "none"}),
     ]
+    found = []
+    for number, (shape, goal, *values, moves, work) in printed.items():
+        if moves is None:  # no map of this size with so long a way was found by chance
+            query: Callable[[int], Query] = functools.partial(_lee_blocks, shape, number)
+        else:
+            query = functools.partial(_lee_candidate, shape, goal, moves, number)
+        found += [
+            Experiment(
+                paper="lee2008",
+                map=f"{number}: {shape[0]}×{shape[1]}",
+                planner=planner,
+                label=label,
+                options=options,
+                printed=value,
+                query=query,
+                worlds=0 if moves is None else 2 * CANDIDATES,
+                comparable=moves is not None,
+                work=work,
+            )
+            for (planner, label, options), value in zip(arms, (*values, values[1]), strict=True)
+        ]
+    return found
+
+
+def _lee_blocks(shape: tuple[int, int], number: int, seed: int) -> Query:
+    return maps.blocks(*shape, 25, max(shape) // 6, 100 * number + seed)
+
+
+def _lee_candidate(
+    shape: tuple[int, int], apart: tuple[int, int], moves: tuple[int, int], number: int, seed: int
+) -> Query:
+    """A candidate whose start and goal are as far apart as the printed path says, on opposite edges."""
+    aside = (shape[1] - 1 - apart[1]) // 2
+    start, goal = (0, aside), (apart[0], aside + apart[1])
+    kind = (("blocks", 20), ("largest", max(shape) // 6))
+    return _candidate(shape, start, goal, moves, 100 * number + seed, *kind)
 
 
 def hasan() -> list[Experiment]:
-    """Table 1: six environments without moving obstacles; the paper prints steps."""
-    printed = (65, 43, 49, 64, 91, 66)
-    return [
-        Experiment(
-            paper="hasan",
-            map=name,
-            planner="mmas-dstar",
-            query=_for_every_seed(query),
-            printed=float(value),
-            quantity="steps",
-        )
-        for (name, query), value in zip(maps.environments().items(), printed, strict=True)
+    """Table 1: six environments without moving obstacles; the paper prints steps for its ants, total costs for both."""
+    printed = {
+        "1a curved walls": (65, 2491.8, 3318.4),
+        "2b overlapping curved walls": (43, 1052.4, 2559.8),
+        "3c vertical rows": (49, 1238.6, 1238.6),
+        "4d concentric circles": (64, 2281.2, 5857.8),
+        "5e many shapes": (91, 5086.4, 5380.6),
+        "5f the same, across the wall": (66, 2477.8, 3249.2),
+    }
+    environments = maps.environments()
+    rivals: list[tuple[str, str, Planner | None]] = [
+        ("mmas-dstar", "mmas-dstar", None),
+        ("dstar", "dstar", None),
+        ("dstar", "D* that lowers no cost", FirstTouchDStar()),
     ]
+    found = []
+    for name, (steps, cost, rival) in printed.items():
+        query = _for_every_seed(environments[name])
+        common: dict[str, Any] = {"paper": "hasan", "map": name, "query": query, "most_seeds": 1}
+        found.append(Experiment(**common, planner="mmas-dstar", label="steps", printed=float(steps), quantity="steps"))
+        found += [
+            Experiment(
+                **common,
+                planner=planner,
+                label=label,
+                made=made,
+                printed=rival if planner == "dstar" else cost,
+                quantity="total",
+            )
+            for planner, label, made in rivals
+        ]
+    return found
 
 
 #: By the short name of each paper, a function that lists its experiments.

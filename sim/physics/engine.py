@@ -1,6 +1,7 @@
 """A world and a robot in physics: place, command, step, state, contacts.
 
-Obstacles are sleeping maximal-coordinate bodies, so 400 of them were measured to cost hardly more than ten.
+Obstacles are sleeping maximal-coordinate bodies, so 400 of them were measured to cost hardly more than ten. In worlds of
+thousands, only those around the robot have bodies.
 Collision groups let the chassis meet obstacles, movers and walls only; the wheels meet only the floor.
 """
 
@@ -12,6 +13,7 @@ import math
 import os
 import tempfile
 from collections.abc import Iterator, Sequence
+from types import TracebackType
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -20,7 +22,8 @@ from antdrive.robots.footprint import footprint_clearance
 from antdrive.robots.spec import RobotSpec
 from antdrive.sim.physics.bullet import CHASSIS, GROUND, OBSTACLE, WHEELS, bullet, client, drawn_as
 from antdrive.sim.physics.movers import MoverBodies
-from antdrive.sim.physics.urdf import CASTER_GAP, robot_urdf, rolling_radius
+from antdrive.sim.physics.near import NearBodies
+from antdrive.sim.physics.urdf import CASTER_GAP, CHASSIS_FILE, chassis_mesh, robot_urdf, rolling_radius
 from antdrive.worlds.errors import FieldError
 from antdrive.worlds.trajectories import Trajectories
 from antdrive.worlds.types import Floats, Pose
@@ -33,10 +36,14 @@ SETTLING_TIME = 0.1  # in which a placed robot sinks onto its wheels [s]
 TOUCHING_DISTANCE = 1e-4  # surfaces closer than this touch [m]
 MAX_JOINT_VELOCITY = 1e6  # of wheels; Bullet's default of 100 would slow down small wheels [rad/s]
 RESIDUAL = 5e-7  # where the solver stops for geared wheels; at 2e-6 speeds are 4 mm/s off [(rad/s)^2]
+USUAL_RESIDUAL = 1e-7  # the same of all other wheels, which is Bullet's default [(rad/s)^2]
 OVERSPEED = 1.5  # no robot drives faster by itself than its highest speed times this
 # Any other body, the robot's link -1, any link of the other: naming these costs 0.4 us a step.
 CHASSIS_AND_ANY = (-1, -1, -2)
 BATCH = 5000  # bodies that are built in one call at most
+MANY_BODIES = 1000  # in worlds of more cylinders only those near the robot have bodies
+LOOK_EVERY = 8  # physics steps after which bodies are looked for again
+NEAR_MARGIN = 0.2  # how much farther than the robot can get in that time bodies are made [m]
 WALL_THICKNESS = 0.1  # half of it [m]
 
 
@@ -124,19 +131,23 @@ class Engine:
         self._build_robot()
         self._obstacles: dict[int, int] = {}  # contact index by body number, without movers
         # Bullet's search tree, and with it the order of contacts, follows the order in which bodies are made.
-        first = 0
-        for (radius, height), alike in itertools.groupby(self.world.obstacles, _size):
-            shape = p.createCollisionShape(p.GEOM_CYLINDER, radius=radius, height=height, physicsClientId=self._client)
-            first += self._build_obstacles(first, shape, [(disc.x, disc.y, height / 2) for disc in alike])
+        self._shapes: dict[tuple[float, float], int] = {}
+        self._near = self._near_bodies() if len(self.world.obstacles) > MANY_BODIES else None
+        if self._near is None:
+            for _, alike in itertools.groupby(enumerate(self.world.obstacles), lambda one: _size(one[1])):
+                indices, discs = zip(*alike, strict=True)
+                self._build_cylinders(discs[0], list(indices))
         self._movers = self._mover_bodies(self.trajectories) if self.trajectories else None
         standing = len(self.world.obstacles) + len(self.world.movers)
         for i, (half_extents, centre) in enumerate(_walls(self.world, max(2 * self.robot.height, 0.2)), standing):
             shape = p.createCollisionShape(p.GEOM_BOX, halfExtents=half_extents, physicsClientId=self._client)
-            self._build_obstacles(i, shape, [centre])
+            self._build_obstacles([i], shape, [centre])
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self._open.close()
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._open.__exit__(kind, error, traceback)
 
     def place(self, pose: Pose) -> None:
         """Put the robot at a pose, at rest on its wheels, and restart the movers at time 0.
@@ -151,6 +162,8 @@ class Engine:
         p.resetBaseVelocity(self._robot, (0, 0, 0), (0, 0, 0), physicsClientId=self._client)
         self.command(0.0, 0.0)
         self._steps = 0
+        if self._near is not None:
+            self._near.start(x, y)
         if self._movers is not None:
             self._movers.park()
         free = footprint_clearance(self.world, self.robot.footprint, [pose])[0] > 0
@@ -180,6 +193,9 @@ class Engine:
         """Advance one physics step and return the chassis's contacts after it."""
         if self._movers is not None:
             self._movers.steer(self._steps)
+        if self._near is not None and self._steps % LOOK_EVERY == 0:
+            (x, y, _), _ = self._p.getBasePositionAndOrientation(self._robot, self._client)
+            self._near.follow(x, y)
         self._steps += 1
         self._p.stepSimulation(self._client)
         points = self._p.getContactPoints(self._robot, *CHASSIS_AND_ANY, self._client)
@@ -247,13 +263,18 @@ class Engine:
         torque = self.robot.wheel_torque * (self._rolling / self.robot.wheel_radius)
         self._torques = torque, torque
         gear = self.robot.wheel_radius / self._rolling
-        if gear > 1:  # the solver measures in rad/s, and smaller spheres turn faster
-            p.setPhysicsEngineParameter(solverResidualThreshold=RESIDUAL * gear**2, physicsClientId=self._client)
+        # The solver measures in rad/s, and smaller spheres turn faster. The client may have simulated another robot before.
+        residual = RESIDUAL * gear**2 if gear > 1 else USUAL_RESIDUAL
+        p.setPhysicsEngineParameter(solverResidualThreshold=residual, physicsClientId=self._client)
         text = robot_urdf(self.robot, self._com_drop)
         with tempfile.TemporaryDirectory() as folder:
             path = os.path.join(folder, "robot.urdf")
             with open(path, "w", encoding="utf-8") as file:
                 file.write(text)
+            mesh = chassis_mesh(self.robot)
+            if mesh is not None:
+                with open(os.path.join(folder, CHASSIS_FILE), "w", encoding="utf-8") as file:
+                    file.write(mesh)
             flags = p.URDF_USE_IMPLICIT_CYLINDER | p.URDF_USE_INERTIA_FROM_FILE
             self._robot = p.loadURDF(path, flags=flags, physicsClientId=self._client)
         for link in range(-1, 4):
@@ -277,8 +298,24 @@ class Engine:
         fast = OVERSPEED * self.robot.max_speed
         return MoverBodies(trajectories, self.robot.radius, fast, where, self.physics_hz, self._client)
 
-    def _build_obstacles(self, first: int, shape: int, centres: list[Point3]) -> int:
-        """Build bodies of one shape, with contact indices from `first` on; their number.
+    def _near_bodies(self) -> NearBodies:
+        """The bodies around the robot; it cannot pass beyond them before it is looked at again."""
+        way = OVERSPEED * self.robot.max_speed * LOOK_EVERY / self.physics_hz
+        reach = self.robot.radius + way + NEAR_MARGIN
+        return NearBodies(self.world.obstacles, reach, _size, self._build_cylinders, self._obstacles, self._client)
+
+    def _build_cylinders(self, alike: Disc, indices: list[int]) -> list[int]:
+        """Build the bodies of obstacles of one size, the first of them given; the bodies' numbers."""
+        radius, height = size = _size(alike)
+        if size not in self._shapes:
+            self._shapes[size] = self._p.createCollisionShape(
+                self._p.GEOM_CYLINDER, radius=radius, height=height, physicsClientId=self._client
+            )
+        places = [(disc.x, disc.y, height / 2) for disc in map(self.world.obstacles.__getitem__, indices)]
+        return self._build_obstacles(indices, self._shapes[size], places)
+
+    def _build_obstacles(self, indices: list[int], shape: int, centres: list[Point3]) -> list[int]:
+        """Build bodies of one shape with these contact indices; their numbers.
 
         Many in one call take a tenth of the time of as many calls.
         """
@@ -295,11 +332,11 @@ class Engine:
                 physicsClientId=self._client,
             )
         ]
-        for index, body in enumerate(bodies, first):
+        for index, body in zip(indices, bodies, strict=True):
             p.changeDynamics(body, -1, activationState=p.ACTIVATION_STATE_SLEEP, physicsClientId=self._client)
             p.setCollisionFilterGroupMask(body, -1, OBSTACLE, CHASSIS, physicsClientId=self._client)
             self._obstacles[body] = index
-        return len(bodies)
+        return bodies
 
 
 def _size(disc: Disc) -> tuple[float, float]:

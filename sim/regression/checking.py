@@ -45,6 +45,7 @@ class CheckResult:
     Attributes:
         address: the test, as commands name it
         passed: whether nothing is wrong
+        case: the test's name in its baseline; empty if it has none
         outcome: how the run ended, such as succeeded
         certified: whether the drive is certified collision-free
         faults: why the test fails, a sentence each
@@ -63,6 +64,7 @@ class CheckResult:
     passed: bool
     outcome: str
     certified: bool
+    case: str = ""
     faults: tuple[str, ...] = ()
     gains: tuple[str, ...] = ()
     details: tuple[str, ...] = ()
@@ -101,7 +103,11 @@ def check_case(case: SuiteCase, *, update: Update = "", results: Results | None 
         InputError: the suite, a file that it names, or the baseline is wrong.
     """
     scenario = scenario_of(case)
-    commands = tuple(filter(None, (shlex.join(["antdrive", "check", case.address]), run_command(case))))
+    # The commands must work in the folder where pytest was started, and in its rootdir, to which its own names of tests relate.
+    anywhere = results is not None and results.root.resolve() != Path.cwd().resolve()
+    address = f"{case.suite}::{case.id}" if anywhere else case.address
+    run_alone = run_command(case, anywhere=anywhere)
+    commands = tuple(filter(None, (shlex.join(["antdrive", "check", address]), run_alone)))
     try:
         run = drive(scenario)
     except PlannerError as error:
@@ -116,6 +122,7 @@ def check_case(case: SuiteCase, *, update: Update = "", results: Results | None 
         name=case.id,
         update=update,
         commands=commands,
+        accept=shlex.join(["antdrive", "accept", address]),
         folder=folder,
         results=results,
     )
@@ -264,6 +271,7 @@ def check_run(
         passed=judgement.passed,
         outcome=run.outcome.key,
         certified=run.certificate is not None and run.certificate.certified,
+        case="" if path is None else name,
         faults=judgement.faults,
         gains=judgement.gains,
         details=details,

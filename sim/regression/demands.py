@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import operator
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, Literal
@@ -22,6 +23,13 @@ LEAST_TRAJECTORY = 0.002  # baselines hold positions in whole millimetres [m]
 
 #: Metrics that no repetition reproduces.
 WALL_CLOCK = ("plan_s", "drive_wall_s")
+
+#: The kinds of things that a robot can touch.
+CYLINDER, UNSEEN, MOVER, WALL = "cylinder", "unseen cylinder", "mover", "wall"
+KINDS = (CYLINDER, UNSEEN, MOVER, WALL)
+
+#: The keys of `expect` that are no metrics.
+VERDICT = ("outcome", "certified", "touched", "cause")
 
 _SIGNS: Mapping[str, Callable[[float, float], bool]] = MappingProxyType(
     {">=": operator.ge, "<=": operator.le, ">": operator.gt, "<": operator.lt, "==": operator.eq}
@@ -53,6 +61,12 @@ class Bound:
         """
         return not math.isnan(found) and _SIGNS[self.sign](found, self.value)
 
+    @property
+    def opposite(self) -> Bound | None:
+        """The bound that holds where this one does not; None for an equality."""
+        signs = {">=": "<", "<=": ">", ">": "<=", "<": ">="}
+        return dataclasses.replace(self, sign=signs[self.sign]) if self.sign in signs else None
+
     def __str__(self) -> str:
         return f"{self.metric} {self.sign} {self.value:g}"
 
@@ -64,6 +78,8 @@ class Demands:
     Attributes:
         outcome: how the run must end
         certified: whether the drive must be certified collision-free; None: it must be if it is to succeed
+        touched: what kind of thing must be touched first, one of `KINDS`; None: any, or none
+        cause: what must have taken most of the margin by then, one of `causes`; None: anything
         bounds: bounds on metrics
         tolerances: how much worse than the baseline each metric may be, where it is not the metric's own tolerance; None:
             the metric is not compared
@@ -73,6 +89,8 @@ class Demands:
 
     outcome: Outcome = Outcome.SUCCEEDED
     certified: bool | None = None
+    touched: str | None = None
+    cause: str | None = None
     bounds: tuple[Bound, ...] = ()
     tolerances: Mapping[str, Tolerance | None] = field(default_factory=dict)
     trajectory: float | Literal["exact"] | None = None
@@ -104,7 +122,7 @@ class Demands:
         >>> Demands.of({"min_clearance_m": ">= 0.05"}, {"duration_s": "10 %", "jerk_rms": "any"}, 0.05)
 
         Args:
-            expect: outcome, certified, and bounds on metrics such as ">= 5, <= 30"
+            expect: outcome, certified, what is touched and why, and bounds on metrics such as ">= 5, <= 30"
             tolerance: by metric, or `end_m`: a number in its unit, a share such as "10 %", or "any"
             trajectory: a distance [m], or "exact"
 
@@ -113,11 +131,14 @@ class Demands:
         """
         bounds: list[Bound] = []
         for key, value in expect.items():
-            if key not in ("outcome", "certified"):
+            if key not in VERDICT:
                 bounds += _bounds(key, value)
+        outcome = _outcome(expect.get("outcome", Outcome.SUCCEEDED.key))
         return cls(
-            outcome=_outcome(expect.get("outcome", Outcome.SUCCEEDED.key)),
+            outcome=outcome,
             certified=_certified(expect.get("certified")),
+            touched=_of_a_contact("touched", expect, lambda: KINDS, outcome),
+            cause=_of_a_contact("cause", expect, causes, outcome),
             bounds=tuple(bounds),
             tolerances={key: _tolerance(key, value) for key, value in tolerance.items()},
             trajectory=_trajectory(trajectory),
@@ -138,9 +159,31 @@ def _certified(value: Any) -> bool | None:
     return value
 
 
+def causes() -> Sequence[str]:
+    """What can take the margin. Where they are listed loads the compiler, which collecting tests does not need."""
+    from antdrive.sim.log.margin import CAUSES
+
+    return tuple(CAUSES)
+
+
+def _of_a_contact(
+    key: str, expect: Mapping[str, Any], choices: Callable[[], Sequence[str]], outcome: Outcome
+) -> str | None:
+    """What is demanded of a contact, which must be what the test expects."""
+    value = expect.get(key)
+    if value is None:
+        return None
+    known = choices()
+    if value not in known:
+        raise FieldError(f"expect.{key}", f"unknown {show(value)}; choose from {', '.join(known)}")
+    if not outcome.with_contact:
+        raise FieldError(f"expect.{key}", f"nothing is touched where the outcome is {outcome.key}; leave it out")
+    return str(value)
+
+
 def _bounds(key: str, value: Any) -> list[Bound]:
     if key not in METRICS:
-        known = ["outcome", "certified", *METRICS]
+        known = [*VERDICT, *METRICS]
         raise FieldError(f"expect.{key}", f"no such metric; {suggest(key, known)}")
     if key in WALL_CLOCK:
         raise FieldError(f"expect.{key}", "depends on the machine and its load, so no test can bound it; leave it out")

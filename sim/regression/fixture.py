@@ -50,7 +50,9 @@ class DriveFixture:
     Args:
         file: the test's file
         test: the test's name in the file, such as test_mine[3]
-        address: the test as pytest's command line names it
+        address: the test as pytest names it, relative to its rootdir
+        repeat: the test as commands name it, where these would not work in every folder in which people may call them; by
+            default the address
         update: which baselines to write
         results: where logs, pictures and films are written; None: nowhere
         report: is called with what came out of each drive
@@ -62,11 +64,13 @@ class DriveFixture:
         file: Path,
         test: str,
         address: str,
+        repeat: str = "",
         update: Update = "",
         results: Results | None = None,
         report: Callable[[CheckResult], None] = lambda result: None,
     ) -> None:
         self._file, self._test, self._address = file, test, address
+        self._repeat = repeat or address
         self._update, self._results, self._report = update, results, report
         self._names: set[str] = set()
 
@@ -120,8 +124,8 @@ class DriveFixture:
             address=self._address,
             name=whole,
             update=self._update,
-            commands=(shlex.join(["pytest", self._address]),),
-            accept=shlex.join(["pytest", self._address, "--drive-update"]),
+            commands=(shlex.join(["pytest", self._repeat]),),
+            accept=shlex.join(["pytest", self._repeat, "--drive-update"]),
             folder=self._results.of(self._file, whole) if self._results else None,
             results=self._results,
         )

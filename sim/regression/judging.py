@@ -19,6 +19,7 @@ from antdrive.sim.regression.baseline import Baseline
 from antdrive.sim.regression.demands import END, WALL_CLOCK, Demands
 from antdrive.sim.regression.nearest import nearest_of
 from antdrive.sim.regression.parting import end_distance, farthest
+from antdrive.sim.regression.touching import cause_of_contact, touched_first
 
 #: In words, what is worse about a metric.
 _WORSE = {"m": "longer", "s": "longer"}
@@ -90,11 +91,21 @@ def unfulfilled(run: Run, demands: Demands) -> Iterator[str]:
         yield f"certificate: not certified collision-free ({'; '.join(problems)})"
     elif demands.certified is False and certified:
         yield "certificate: certified collision-free, expected not to be"
+    if run.outcome is demands.outcome and run.rollout is not None:
+        yield from _other_contact(run.rollout, demands)
     for bound in demands.bounds:
         if run.rollout is None:
             yield f"{bound.metric}: the robot did not drive, expected {bound.sign} {bound.value:g}"
         elif not bound.holds(found := METRICS[bound.metric](run.rollout)):
             yield f"{bound.metric}: {found:.6g}, expected {bound.sign} {bound.value:g}{_place(bound.metric, run.rollout)}"
+
+
+def _other_contact(rollout: Rollout, demands: Demands) -> Iterator[str]:
+    """How the first contact differs from the one that is demanded."""
+    if demands.touched is not None and (touched := touched_first(rollout)) != demands.touched:
+        yield f"touched: {touched}, expected {demands.touched}"
+    elif demands.cause is not None and (cause := cause_of_contact(rollout)) != demands.cause:
+        yield f"cause: {cause or 'none'} took most of the margin, expected {demands.cause}"
 
 
 def _verdict(run: Run, baseline: Baseline) -> list[str]:

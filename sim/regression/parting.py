@@ -56,7 +56,10 @@ def distances(baseline: Baseline, rollout: Rollout) -> Floats:
 
 def farthest(baseline: Baseline, rollout: Rollout) -> float:
     """The largest distance between the two robots at the same time, up to the end of the later one [m]."""
-    return max(float(distances(baseline, rollout).max(initial=0.0)), end_distance(baseline, rollout))
+    beyond = rollout.pose[rollout.t > baseline.times[-1], :2] if baseline.line else rollout.pose[:0, :2]
+    after = np.hypot(*(beyond - baseline.xy[-1]).T) if len(beyond) else np.zeros(0)
+    during = float(distances(baseline, rollout).max(initial=0.0))
+    return max(during, float(after.max(initial=0.0)), end_distance(baseline, rollout))
 
 
 def end_distance(baseline: Baseline, rollout: Rollout) -> float:

@@ -5,7 +5,9 @@ Importing it must cost nothing: a run of pytest that collects no suite and uses 
 
 from __future__ import annotations
 
+import contextlib
 import os
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,7 +27,8 @@ _DROVE = pytest.StashKey[list[Any]]()  # the results of a test's drives
 FILMS_KEY = "antdrive_films"  # under which a process of xdist is told where films are counted
 _PLACES = pytest.StashKey[str]()  # the folder in which films of failed drives are counted
 _UNUSED = pytest.StashKey[set[str]]()  # the baselines that no test uses
-_TOLD = pytest.StashKey[list[Any]]()  # the properties of reports that tell of drives
+_COMPILED = pytest.StashKey[bool]()  # whether the kernels were compiled, or found to be
+_LISTENER = pytest.StashKey["_Listener"]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -49,8 +52,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Begin the lists of this run."""
-    config.stash[_UNUSED], config.stash[_TOLD] = set(), []
-    config.pluginmanager.register(_Listener(config.stash[_TOLD]), "antdrive-listener")
+    config.stash[_UNUSED], config.stash[_LISTENER] = set(), _Listener()
+    config.pluginmanager.register(config.stash[_LISTENER], "antdrive-listener")
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> DriveSuite | None:
@@ -96,6 +99,7 @@ class DriveItem(pytest.Item):
         from antdrive.sim.regression.checking import check_case
         from antdrive.sim.regression.fixture import DriveFailure
 
+        compile_first(self.config)
         result = check_case(self.case, update=update_of(self.config), results=results_of(self.config))
         note(self, result)
         if not result.passed:
@@ -124,15 +128,37 @@ def drive(request: pytest.FixtureRequest) -> DriveFixture:
     """
     from antdrive.sim.regression.fixture import DriveFixture
 
-    item = request.node
+    compile_first(request.config)
+    item, config = request.node, request.config
+    at_root = config.invocation_params.dir.resolve() == config.rootpath.resolve()
     return DriveFixture(
         file=item.path,
         test=_name_in_file(item),
         address=item.nodeid,
+        repeat="" if at_root else f"{item.path}::{item.nodeid.partition('::')[2]}",
         update=update_of(request.config),
         results=results_of(request.config),
         report=lambda result: note(item, result),
     )
+
+
+def compile_first(config: pytest.Config) -> None:
+    """Compile the kernels before the first drive of an installation, and say so.
+
+    Args:
+        config: of this run of pytest
+    """
+    if _COMPILED in config.stash:
+        return
+    config.stash[_COMPILED] = True
+    from antdrive.sim.regression.compiling import compile_in_turn
+
+    def say(text: str) -> None:
+        capture = config.pluginmanager.getplugin("capturemanager")
+        with capture.global_and_fixture_disabled() if capture else contextlib.nullcontext():
+            print(f"\nantdrive: {text}", file=sys.stderr, flush=True)  # noqa: T201 - in a process of xdist, too
+
+    compile_in_turn(say)
 
 
 def note(item: pytest.Item, result: CheckResult) -> None:
@@ -232,14 +258,38 @@ def _add_extras(report: Any, results: list[CheckResult]) -> None:
 
 
 class _Listener:
-    """Keeps what reports tell of drives; with xdist they come from other processes."""
+    """Keeps what reports tell of drives; with xdist they come from other processes.
 
-    def __init__(self, found: list[Any]) -> None:
-        self._found = found
+    Attributes:
+        told: the properties of reports that tell of drives
+        passed: the tests that passed, each with the names of its drives that have baselines
+    """
+
+    def __init__(self) -> None:
+        self.told: list[Any] = []
+        self.passed: dict[str, set[str]] = {}
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        if report.when == "call" and any(name == "drive.test" for name, _ in report.user_properties):
-            self._found.append(report.user_properties)
+        if report.when != "call":
+            return
+        if report.passed:
+            self.passed[report.nodeid] = {str(value) for name, value in report.user_properties if name == "drive.case"}
+        if any(name == "drive.test" for name, _ in report.user_properties):
+            self.told.append(report.user_properties)
+
+
+def _gone_drives(config: pytest.Config) -> Iterator[Path]:
+    """The baselines of drives that tests of this run, which passed, no longer make."""
+    modules: dict[Path, dict[str, set[str]]] = {}
+    for nodeid, drives in config.stash[_LISTENER].passed.items():
+        file, _, name = nodeid.partition("::")
+        if not file.endswith(SUFFIX):
+            modules.setdefault(config.rootpath / file, {})[name.replace("::", ".")] = drives
+    for path, made in modules.items():
+        if (path.parent / "baselines" / path.stem).is_dir():
+            from antdrive.sim.regression.unused import unused_drives_of_module
+
+            yield from unused_drives_of_module(path, made)
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -253,16 +303,17 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     """Fail for unused baselines if asked to; in a process of xdist, hand them over."""
     config = session.config
     found = config.stash[_UNUSED]
-    unused = sorted(found)
     if hasattr(config, "workeroutput"):
-        config.workeroutput[WORKER_KEY] = unused
-    elif unused and config.getoption("drive_strict") and session.exitstatus == pytest.ExitCode.OK:
+        config.workeroutput[WORKER_KEY] = sorted(found)
+        return
+    found.update(map(str, _gone_drives(config)))
+    if found and config.getoption("drive_strict") and session.exitstatus == pytest.ExitCode.OK:
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
     """Say what was driven, on the terminal and in the file that GITHUB_STEP_SUMMARY names."""
-    found, told = config.stash[_UNUSED], config.stash[_TOLD]
+    told, found = config.stash[_LISTENER].told, config.stash[_UNUSED]
     unused = sorted(found)
     if not (told or unused):
         return

@@ -81,28 +81,33 @@ def robot_of(case: SuiteCase) -> RobotSpec:
     return load_robot(path)
 
 
-def run_command(case: SuiteCase) -> str | None:
-    """The `antdrive run` command that drives a test's scenario alone; None where only `antdrive check` can."""
+def run_command(case: SuiteCase, *, anywhere: bool = False) -> str | None:
+    """The `antdrive run` command that drives a test's scenario alone; None where only `antdrive check` can.
+
+    Args:
+        case: the test
+        anywhere: whether the command is to work in every folder, not in the working directory alone
+    """
     entry = case.entry
     planner = {"name": entry.planner} if isinstance(entry.planner, str) else dict(entry.planner)
     usual = entry.start is None and entry.goal is None
     if not (usual and has_flags(entry)) or any(key in planner for key in SOURCES):
         return None
-    world, before = _world_words(case)
+    world, before = _world_words(case, anywhere)
     words = ["antdrive", "run", world, "--planner", planner.pop("name")]
     words += [word for key, value in planner.items() for word in ("--set", f"planner.{key}={option_text(value)}")]
-    words += ["--robot", _shown_name(case, entry.robot, list_robots()), "--seed", str(case.seed)]
+    words += ["--robot", _shown_name(case, entry.robot, list_robots(), anywhere), "--seed", str(case.seed)]
     for key in ("margin", "smoothing", "noise"):
         if key in entry.model_fields_set:
             words += [f"--{key}", option_text(getattr(entry, key))]
     return before + shlex.join([*words, *setting_words(entry)])
 
 
-def _world_words(case: SuiteCase) -> tuple[str, str]:
+def _world_words(case: SuiteCase, anywhere: bool) -> tuple[str, str]:
     """What a command calls the world of a test, and the command that must write a random one before."""
     world = case.entry.world
     if isinstance(world, str):
-        return _shown_name(case, world, list_worlds()), ""
+        return _shown_name(case, world, list_worlds(), anywhere), ""
     options = dict(world)
     kind, seed = options.pop("generate"), options.pop("seed", 0)
     name = f"{kind}-{seed}.yaml"
@@ -111,8 +116,11 @@ def _world_words(case: SuiteCase) -> tuple[str, str]:
     return name, f"{shlex.join(words)} && "
 
 
-def _shown_name(case: SuiteCase, name: str, known: Mapping[str, Path]) -> str:
-    return name if name in known else shown_path((case.suite.parent / name).resolve())
+def _shown_name(case: SuiteCase, name: str, known: Mapping[str, Path], anywhere: bool) -> str:
+    if name in known:
+        return name
+    path = (case.suite.parent / name).resolve()
+    return str(path) if anywhere else shown_path(path)
 
 
 def _with_ends(case: SuiteCase, task: Task) -> Task:

@@ -15,7 +15,7 @@ from pydantic import BaseModel, Field, PlainValidator, WithJsonSchema
 from antdrive.sim.entries import RULES, MarginValue, SeedList, SettingsEntry, TextOrMapping
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
-from antdrive.sim.regression.demands import END, Demands
+from antdrive.sim.regression.demands import END, KINDS, Demands, causes
 from antdrive.worlds.errors import FieldError, InputError, input_error
 from antdrive.worlds.files.checks import SchemaVersion, check
 from antdrive.worlds.files.document import Document, Location, read_document
@@ -246,6 +246,11 @@ def suite_schema() -> dict[str, Any]:
         "properties": {
             "outcome": {"enum": [outcome.key for outcome in Outcome]},
             "certified": {"type": "boolean"},
+            "touched": {"enum": list(KINDS), "description": "what kind of thing must be touched first"},
+            "cause": {
+                "enum": list(causes()),
+                "description": "what must have taken most of the margin until the contact",
+            },
             **{name: {**bound, "description": metric.definition} for name, metric in METRICS.items()},
         },
         "additionalProperties": False,

@@ -22,6 +22,7 @@ def properties(result: CheckResult) -> list[tuple[str, str]]:
     """
     facts = {
         "test": result.address,
+        "case": result.case,
         "passed": str(result.passed).lower(),
         "outcome": result.outcome,
         "certified": str(result.certified).lower(),

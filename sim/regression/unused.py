@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 
 from antdrive.sim.regression.suite import BASELINES, SUFFIX, SuiteCase, baseline_folder, load_suite
@@ -37,6 +37,31 @@ def unused_of_module(module: Path, tests: Iterable[str]) -> Iterator[Path]:
         tests: the names of all its tests
     """
     names = tuple(tests)
+    for path, case in _of_module(module):
+        if not any(_belongs(case, name) for name in names):
+            yield path
+
+
+def unused_drives_of_module(module: Path, drives: Mapping[str, Collection[str]]) -> Iterator[Path]:
+    """The baselines in the folder of a module of tests that belong to drives which their tests no longer make.
+
+    Args:
+        module: the module's file
+        drives: the names of the drives that each test made, by the test's name; tests that ended early are left out
+    """
+    for path, case in _of_module(module):
+        owners = [name for name in drives if _belongs(case, name)]
+        if owners and case not in drives[max(owners, key=len)]:
+            yield path
+
+
+def _belongs(case: str, test: str) -> bool:
+    """Whether a baseline is that of a test's only drive, or of a drive that has a name."""
+    return case == test or case.startswith(f"{test}-")
+
+
+def _of_module(module: Path) -> Iterator[tuple[Path, str]]:
+    """The baselines in a module's folder, each with the name that it holds; without those of a suite of the same name."""
     beside = module.resolve().with_suffix(SUFFIX)
     used: set[Path] = set()
     if beside.exists():
@@ -48,11 +73,9 @@ def unused_of_module(module: Path, tests: Iterable[str]) -> Iterator[Path]:
         if path.resolve() in used:
             continue
         try:
-            case = str(json.loads(path.read_text(encoding="utf-8"))["case"])
+            yield path, str(json.loads(path.read_text(encoding="utf-8"))["case"])
         except (OSError, ValueError, KeyError, TypeError):
-            case = ""
-        if not any(case == name or case.startswith(f"{name}-") for name in names):
-            yield path
+            yield path, ""
 
 
 def _files(folder: Path) -> list[Path]:

@@ -1,7 +1,8 @@
 """Bootstrap intervals that resample worlds and then the runs within each world.
 
 Runs in one world resemble each other, so that resampling single runs gives intervals that are too narrow for statements
-about other worlds (Field and Welsh 2007). All columns see the same resampled runs: paired stays paired.
+about other worlds (Field and Welsh 2007). Samples are drawn among the runs that count: a repetition that is no evidence has
+no part in them, so that an interval is the same however often a drive was repeated.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy.typing as npt
 from antdrive.sim.statistics.proportions import CONFIDENCE, Interval
 
 Floats: TypeAlias = npt.NDArray[np.float64]
+Flags: TypeAlias = npt.NDArray[np.bool_]
 Ints: TypeAlias = npt.NDArray[np.int64]
 
 RESAMPLES = 2000
@@ -43,39 +45,74 @@ def resampled(world: Ints, resamples: int = RESAMPLES, seed: int = SEED) -> Iter
         yield weights
 
 
-def medians_by_world(values: Floats, world: Ints, resamples: int = RESAMPLES) -> list[Interval]:
+def medians_by_world(
+    values: Floats,
+    world: Ints,
+    resamples: int = RESAMPLES,
+    *,
+    counted: Flags | None = None,
+    confidence: float = CONFIDENCE,
+) -> list[Interval]:
     """Percentile intervals for the median of each column of values (N, K), nan left out.
 
     Args:
         values: one column for each statistic
         world: the index of each row's world, (N,)
         resamples: number of samples
+        counted: the rows that each column's samples are drawn from, (N, K); all without. A row that is counted and nan is
+            drawn and left out; one that is not counted has no part in the sample.
+        confidence: the share of such intervals that hold the truth
     """
-    columns = [_Sorted.of(values[:, k]) for k in range(values.shape[1])]
-    found: list[list[Floats]] = [[] for _ in columns]
-    for weights in resampled(world, resamples):
-        for column, medians in zip(columns, found, strict=True):
-            medians.append(column.medians(weights))
-    return [_percentiles(np.concatenate(medians)) for medians in found]
+    found = np.full((resamples, values.shape[1]), np.nan)
+    for rows, columns in _columns_alike(values, counted):
+        chosen = [_Sorted.of(values[rows, k]) for k in columns]
+        first = 0
+        for weights in resampled(world[rows], resamples):
+            for k, column in zip(columns, chosen, strict=True):
+                found[first : first + len(weights), k] = column.medians(weights)
+            first += len(weights)
+    return [_percentiles(found[:, k], confidence) for k in range(values.shape[1])]
 
 
-def means_by_world(values: Floats, world: Ints, resamples: int = RESAMPLES) -> list[Interval]:
+def means_by_world(
+    values: Floats,
+    world: Ints,
+    resamples: int = RESAMPLES,
+    *,
+    counted: Flags | None = None,
+    confidence: float = CONFIDENCE,
+) -> list[Interval]:
     """Percentile intervals for the mean of each column of values (N, K), nan left out.
 
     Args:
         values: one column for each statistic, such as 1 for success and 0 for failure
         world: the index of each row's world, (N,)
         resamples: number of samples
+        counted: the rows that each column's samples are drawn from, (N, K); all without
+        confidence: the share of such intervals that hold the truth
     """
-    known = ~np.isnan(values)
-    filled = np.where(known, values, 0.0)
-    blocks = []
-    for weights in resampled(world, resamples):
-        totals = weights @ known.astype(float)
-        with np.errstate(invalid="ignore"):
-            blocks.append((weights @ filled) / np.where(totals > 0, totals, np.nan))
-    means = np.concatenate(blocks)
-    return [_percentiles(means[:, k]) for k in range(values.shape[1])]
+    found = np.full((resamples, values.shape[1]), np.nan)
+    for rows, columns in _columns_alike(values, counted):
+        known = ~np.isnan(values[rows][:, columns])
+        filled = np.where(known, values[rows][:, columns], 0.0)
+        first = 0
+        for weights in resampled(world[rows], resamples):
+            totals = weights @ known.astype(float)
+            with np.errstate(invalid="ignore"):
+                found[first : first + len(weights), columns] = (weights @ filled) / np.where(totals > 0, totals, np.nan)
+            first += len(weights)
+    return [_percentiles(found[:, k], confidence) for k in range(values.shape[1])]
+
+
+def _columns_alike(values: Floats, counted: Flags | None) -> Iterator[tuple[Ints, Ints]]:
+    """Rows that are counted, and the columns for which they are: these see the same samples."""
+    if counted is None:
+        yield np.arange(len(values)), np.arange(values.shape[1])
+        return
+    masks, inverse = np.unique(counted, axis=1, return_inverse=True)
+    for k, mask in enumerate(masks.T):
+        if mask.any():
+            yield np.flatnonzero(mask), np.flatnonzero(inverse.ravel() == k)
 
 
 class _Sorted:
@@ -100,10 +137,10 @@ class _Sorted:
         return np.where(total[:, 0] > 0, (self.values[lower] + self.values[upper]) / 2, np.nan)
 
 
-def _percentiles(statistics: Floats) -> Interval:
+def _percentiles(statistics: Floats, confidence: float) -> Interval:
     known = statistics[~np.isnan(statistics)]
     if not len(known):
         return Interval(np.nan, np.nan)
-    tail = (1 - CONFIDENCE) / 2
+    tail = (1 - confidence) / 2
     low, high = np.quantile(known, [tail, 1 - tail])
     return Interval(float(low), float(high))

@@ -1,12 +1,11 @@
-"""The two tables of a campaign: how often each planner succeeds, and each pair of planners on the runs they share."""
+"""Each pair of planners on the runs that they share: success, and any metric."""
 
 from __future__ import annotations
 
-import collections
 import dataclasses
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
@@ -15,7 +14,7 @@ import numpy.typing as npt
 
 from antdrive.sim.statistics.bootstrap import means_by_world, medians_by_world
 from antdrive.sim.statistics.pairing import PairedRuns
-from antdrive.sim.statistics.proportions import Interval, paired_difference, wilson
+from antdrive.sim.statistics.proportions import CONFIDENCE, Interval, paired_difference
 from antdrive.sim.statistics.significance import (
     differences,
     flips_by_world,
@@ -39,39 +38,6 @@ NOWHERE = Interval(math.nan, math.nan)
 
 
 @dataclass(frozen=True)
-class PlannerSuccess:
-    """How often a planner succeeds.
-
-    Attributes:
-        planner: its label
-        runs: number of its runs
-        counted: number of different runs: where the seed changes no drive, one run stands for all seeds
-        successes: how many of the counted runs succeeded
-        interval: Wilson's 95 % interval for the share
-        over_worlds: 95 % bootstrap interval over worlds; nan where no world has two counted runs, or there is one world
-        outcomes: number of all runs by outcome
-    """
-
-    planner: str
-    runs: int
-    counted: int
-    successes: int
-    interval: Interval
-    over_worlds: Interval
-    outcomes: Mapping[str, int]
-
-    @property
-    def share(self) -> float:
-        """The share of the counted runs that succeeded."""
-        return self.successes / self.counted
-
-    def as_dict(self) -> dict[str, Any]:
-        """All fields as plain values, and the share."""
-        fields = dataclasses.asdict(self)
-        return {**fields, "share": self.share, "interval": list(self.interval), "over_worlds": list(self.over_worlds)}
-
-
-@dataclass(frozen=True)
 class PairedComparison:
     """Two planners on the runs that they share.
 
@@ -79,7 +45,9 @@ class PairedComparison:
         measure: "success" or the name of a metric
         first: label of the first planner
         second: label of the second planner
+        direction: whether lower or higher values are better, or neither
         pairs: number of pairs that the numbers rest on
+        worlds: number of worlds that these pairs are in
         dropped: pairs left out because not both succeeded; 0 for success
         unpaired: runs of either planner without a partner
         first_wins: pairs in which the first planner's value is better; where no direction is, those in which it is lower
@@ -87,7 +55,8 @@ class PairedComparison:
         ties: pairs with equal values
         difference: first minus second: of success shares, or the median of the paired differences
         interval: 95 % interval of the difference
-        effect: matched-pairs rank biserial correlation, -1 to 1; above 0 if the first planner wins
+        effect: matched-pairs rank biserial correlation, -1 to 1; above 0 if the first planner wins, or has less where no
+            direction is better
         p: exact McNemar or Wilcoxon signed rank, over pairs; nan without pairs
         p_worlds: signs flipped by world; nan where no world has two pairs, or there is one world
         p_holm: `p` with Holm's correction over all comparisons of this measure
@@ -97,7 +66,9 @@ class PairedComparison:
     measure: str
     first: str
     second: str
+    direction: Direction
     pairs: int
+    worlds: int
     dropped: int
     unpaired: int
     first_wins: int
@@ -117,39 +88,26 @@ class PairedComparison:
         return max((p for p in (self.p_holm, self.p_worlds_holm) if not math.isnan(p)), default=math.nan)
 
     @property
-    def better(self) -> str:
-        """The planner that is better, if both corrected p-values are below 0.05; else empty."""
+    def decided(self) -> str:
+        """The planner that `effect` favours, if both corrected p-values are below 0.05; else empty."""
         if not self.decisive_p < ALPHA or self.effect == 0:
             return ""
         return self.first if self.effect > 0 else self.second
 
+    @property
+    def better(self) -> str:
+        """The planner that is better, if that is decided and one direction is better; else empty."""
+        return "" if self.direction == "neither" else self.decided
+
+    @property
+    def lower(self) -> str:
+        """The planner with less, if that is decided and no direction is better; else empty."""
+        return self.decided if self.direction == "neither" else ""
+
     def as_dict(self) -> dict[str, Any]:
-        """All fields as plain values, and which planner is better."""
-        return {**dataclasses.asdict(self), "interval": list(self.interval), "better": self.better}
-
-
-def success_table(paired: PairedRuns) -> list[PlannerSuccess]:
-    """A row for each planner, in the order of the runs."""
-    outcomes = paired.table.texts("outcome")
-    masks = [paired.counted(k) for k in range(len(paired.planners))]
-    shares = np.where(np.stack(masks, axis=1), paired.success, np.nan)
-    over = means_by_world(shares, paired.world)
-    rows = []
-    for k, (planner, mask) in enumerate(zip(paired.planners, masks, strict=True)):
-        here = paired.row[paired.present[:, k], k]
-        successes = int(paired.success[mask, k].sum())
-        rows.append(
-            PlannerSuccess(
-                planner=planner,
-                runs=len(here),
-                counted=int(mask.sum()),
-                successes=successes,
-                interval=wilson(successes, int(mask.sum())),
-                over_worlds=over[k] if _clustered(paired, mask) else NOWHERE,
-                outcomes=dict(sorted(collections.Counter(outcomes[row] for row in here).items())),
-            )
-        )
-    return rows
+        """All fields as plain values, and which planner is better, or has less."""
+        fields = {**dataclasses.asdict(self), "interval": list(self.interval)}
+        return {**fields, "better": self.better, "lower": self.lower}
 
 
 def pairs_of(paired: PairedRuns, against: str | None = None) -> list[tuple[int, int]]:
@@ -189,22 +147,21 @@ def compare_success(paired: PairedRuns, pairs: Pairs) -> list[PairedComparison]:
     masks = [paired.counted(i, j) for i, j in pairs]
     raw = [paired.success[:, i].astype(float) - paired.success[:, j] for i, j in pairs]
     gaps = np.stack([np.where(mask, gap, np.nan) for mask, gap in zip(masks, raw, strict=True)], axis=1)
-    by_world = means_by_world(gaps, paired.world)
+    by_world = means_by_world(gaps, paired.world, counted=np.stack(masks, axis=1))
     rows = []
     for k, (i, j) in enumerate(pairs):
         mask, gap = masks[k], gaps[masks[k], k]
         first, second = int((gap > 0).sum()), int((gap < 0).sum())
-        both = int((paired.success[mask, i] & paired.success[mask, j]).sum())
-        n = int(mask.sum())
-        interval = paired_difference(both, first, second, n - both - first - second) if n else NOWHERE
-        if _clustered(paired, mask):
-            interval = Interval(min(interval.low, by_world[k].low), max(interval.high, by_world[k].high))
+        n, worlds = int(mask.sum()), paired.worlds_in(mask)
+        interval = success_interval(paired, mask, i, j, by_world[k]) if n else NOWHERE
         rows.append(
             PairedComparison(
                 measure=SUCCESS,
                 first=paired.planners[i],
                 second=paired.planners[j],
+                direction="higher",
                 pairs=n,
+                worlds=worlds,
                 dropped=0,
                 unpaired=_unpaired(paired, i, j),
                 first_wins=first,
@@ -218,6 +175,31 @@ def compare_success(paired: PairedRuns, pairs: Pairs) -> list[PairedComparison]:
             )
         )
     return _corrected(paired, rows, masks, gaps)
+
+
+def success_interval(
+    paired: PairedRuns, mask: Flags, i: int, j: int, resampled: Interval, confidence: float = CONFIDENCE
+) -> Interval:
+    """An interval for the difference of two planners' success that holds over runs and over worlds.
+
+    Args:
+        paired: the runs
+        mask: the instances that count, at least one, (N,)
+        i: index of the first planner
+        j: index of the second planner
+        resampled: the bootstrap interval over worlds
+        confidence: the share of such intervals that hold the true difference
+    """
+    first, second = paired.success[mask, i], paired.success[mask, j]
+    both, one, other = (int(found.sum()) for found in (first & second, first & ~second, ~first & second))
+    interval = paired_difference(both, one, other, len(first) - both - one - other, confidence)
+    if not paired.several_in_worlds(mask):
+        return interval
+    if len(np.unique(first.astype(int) - second)) == 1:  # no resample differs: a world counts as one pair
+        worlds = paired.worlds_in(mask)
+        both, one, other = (round(worlds * count / len(first)) for count in (both, one, other))
+        resampled = paired_difference(both, one, other, worlds - both - one - other, confidence)
+    return Interval(min(interval.low, resampled.low), max(interval.high, resampled.high))
 
 
 def compare_metric(paired: PairedRuns, pairs: Pairs, metric: str, better: Direction) -> list[PairedComparison]:
@@ -244,7 +226,7 @@ def compare_metric(paired: PairedRuns, pairs: Pairs, metric: str, better: Direct
         rank[masks[-1]] = signed_ranks(gap[masks[-1]])
         gaps.append(gap)
         ranks.append(rank)
-    intervals = medians_by_world(np.stack(gaps, axis=1), paired.world)
+    intervals = medians_by_world(np.stack(gaps, axis=1), paired.world, counted=np.stack(shared, axis=1))
     sign = 1 if better == "higher" else -1
     rows = []
     for k, (i, j) in enumerate(pairs):
@@ -255,7 +237,9 @@ def compare_metric(paired: PairedRuns, pairs: Pairs, metric: str, better: Direct
                 measure=metric,
                 first=paired.planners[i],
                 second=paired.planners[j],
+                direction=better,
                 pairs=len(gap),
+                worlds=paired.worlds_in(masks[k]),
                 dropped=int((shared[k] & ~masks[k]).sum()),
                 unpaired=_unpaired(paired, i, j),
                 first_wins=higher if sign > 0 else lower,
@@ -271,32 +255,6 @@ def compare_metric(paired: PairedRuns, pairs: Pairs, metric: str, better: Direct
     return _corrected(paired, rows, masks, np.stack(ranks, axis=1))
 
 
-def common_medians(paired: PairedRuns, metrics: Sequence[str]) -> tuple[int, dict[str, list[tuple[float, Interval]]]]:
-    """The median of each metric and planner over the instances in which every planner succeeded.
-
-    Args:
-        paired: the runs
-        metrics: columns
-
-    Returns:
-        The number of those instances, and for each metric the medians of the planners with 95 % bootstrap intervals.
-    """
-    common = paired.success.all(axis=1) & paired.counted(*range(len(paired.planners)))
-    found = {}
-    for metric in metrics:
-        values = paired.values(metric)[common]
-        if len(values) and np.isfinite(values).all():
-            intervals = medians_by_world(values, paired.world[common])
-            found[metric] = list(zip(np.median(values, axis=0).tolist(), intervals, strict=True))
-    return int(common.sum()), found
-
-
-def _clustered(paired: PairedRuns, mask: Flags) -> bool:
-    """Whether there are several worlds, and several instances in one of them."""
-    sizes = np.bincount(paired.world[mask])
-    return bool((sizes > 0).sum() > 1 and sizes.max() > 1)
-
-
 def _unpaired(paired: PairedRuns, i: int, j: int) -> int:
     return int((paired.present[:, i] != paired.present[:, j]).sum())
 
@@ -309,7 +267,7 @@ def _corrected(
         [sums_by_world(np.nan_to_num(column), paired.world, len(paired.worlds)) for column in scores.T], axis=1
     )
     flipped = flips_by_world(sums[(sums != 0).any(axis=1)])  # other worlds add nothing
-    over = np.array([p if _clustered(paired, mask) else math.nan for p, mask in zip(flipped, masks, strict=True)])
+    over = np.array([p if paired.several_in_worlds(mask) else math.nan for p, mask in zip(flipped, masks, strict=True)])
     single, worlds = holm(np.array([row.p for row in rows])), holm(over)
     return [
         dataclasses.replace(row, p_worlds=float(over[k]), p_holm=float(single[k]), p_worlds_holm=float(worlds[k]))

@@ -9,6 +9,8 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from antdrive.sim.statistics.columns import ASKED, DRIVEN, SETTINGS
+from antdrive.sim.statistics.selecting import column_named, places_of
 from antdrive.worlds.errors import FieldError
 
 Floats: TypeAlias = npt.NDArray[np.float64]
@@ -40,6 +42,13 @@ class RunTable:
     def __contains__(self, name: str) -> bool:
         return name in self.columns
 
+    @property
+    def settings(self) -> tuple[str, ...]:
+        """The columns that say what a run is, besides place, planner and seed: of two margins the one that was asked for."""
+        return tuple(
+            name for name in SETTINGS if name in self.columns and not (name == DRIVEN and ASKED in self.columns)
+        )
+
     def texts(self, name: str) -> list[str]:
         """A column as text; empty where there is no value.
 
@@ -66,24 +75,39 @@ class RunTable:
         return done
 
     def where(self, column: str, value: str) -> RunTable:
-        """The runs with one value in a column.
+        """The runs with some values in a column.
 
         Args:
             column: its name; "ants" stands for "option.ants", too
-            value: as text; numbers are compared as numbers
+            value: one, several as "0,1", or a range of numbers as "10..20"; numbers are compared as numbers
 
         Raises:
             FieldError: no such column, or no run with this value.
         """
-        name = column if column in self.columns or f"option.{column}" not in self.columns else f"option.{column}"
-        if name not in self.columns:
-            raise FieldError(column, f"no such column; choose from {', '.join(self.columns)}")
-        texts = self.texts(name)
-        kept = [k for k, text in enumerate(texts) if text == value or _same_number(text, value)]
-        if not kept:
-            known = ", ".join(list(dict.fromkeys(texts))[:20])
-            raise FieldError(column, f"no run with {value!r}; the campaign has {known}")
-        return RunTable({key: [values[k] for k in kept] for key, values in self.columns.items()})
+        return self.take(places_of(column, self.columns[column_named(self.columns, column)], value))
+
+    def of_planners(self, labels: Sequence[str]) -> RunTable:
+        """The runs of some planners.
+
+        Args:
+            labels: of the planners
+
+        Raises:
+            FieldError: no such planner among the runs.
+        """
+        mine = self.texts("planner")
+        for label in labels:
+            if label not in mine:
+                raise FieldError("planner", f"unknown {label!r}; the campaign has {', '.join(dict.fromkeys(mine))}")
+        return self.take([k for k, label in enumerate(mine) if label in labels])
+
+    def take(self, rows: Sequence[int]) -> RunTable:
+        """Some of the runs.
+
+        Args:
+            rows: their numbers
+        """
+        return RunTable({name: [values[k] for k in rows] for name, values in self.columns.items()})
 
     def codes(self, name: str) -> npt.NDArray[np.int64]:
         """Equal numbers for runs with equal texts in a column, (N,).
@@ -92,10 +116,3 @@ class RunTable:
             name: the column
         """
         return np.unique(np.array(self.texts(name), dtype=object), return_inverse=True)[1].astype(np.int64)
-
-
-def _same_number(text: str, value: str) -> bool:
-    try:
-        return float(text) == float(value)
-    except ValueError:
-        return False

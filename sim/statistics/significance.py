@@ -122,12 +122,14 @@ def sums_by_world(values: Floats, world: Ints, worlds: int) -> Floats:
 def holm(p_values: Floats) -> Floats:
     """Holm's adjusted p-values (Holm 1979), (K,); nan stays nan and does not count.
 
+    The k-th smallest of m is multiplied by m + 1 - k, and none is below a smaller one's.
+
     Args:
         p_values: of all comparisons of a family
     """
     adjusted = np.full(len(p_values), np.nan)
-    known = ~np.isnan(p_values)
-    if known.any():
-        multitest = library("statsmodels.stats.multitest")
-        adjusted[known] = multitest.multipletests(p_values[known], method="holm")[1]
+    known = np.flatnonzero(~np.isnan(p_values))
+    order = known[np.argsort(p_values[known], kind="stable")]
+    larger = np.arange(len(order), 0, -1) * p_values[order]
+    adjusted[order] = np.minimum(np.maximum.accumulate(larger), 1.0) if len(order) else larger
     return adjusted

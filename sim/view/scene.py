@@ -171,8 +171,7 @@ def contact_point(scene: Scene, pose: npt.ArrayLike, index: int, movers: Floats)
         return ((x0, y), (x1, y), (x, y0), (x, y1))[(index - len(discs)) % 4]
     ox, oy, radius = (float(value) for value in discs[index])
     cosine, sine = math.cos(yaw), math.sin(yaw)
-    ahead = min(max((ox - x) * cosine + (oy - y) * sine, -foot.half_length), foot.half_length)
-    aside = min(max((oy - y) * cosine - (ox - x) * sine, -foot.half_width), foot.half_width)
+    ahead, aside = foot.nearest((ox - x) * cosine + (oy - y) * sine, (oy - y) * cosine - (ox - x) * sine)
     nx, ny = x + ahead * cosine - aside * sine, y + ahead * sine + aside * cosine
     gap = math.hypot(nx - ox, ny - oy)
     if gap < 1e-9:

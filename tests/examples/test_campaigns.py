@@ -9,11 +9,12 @@ from pathlib import Path
 
 import pytest
 
+from antdrive.planners import PLANNERS, capabilities_of
 from antdrive.sim.campaigns import expand, load_campaign
 from tests.conftest import SHARED
 
 FOLDER = Path(__file__).parent.parent.parent / "examples" / "campaigns"
-SIZES = dict(re.findall(r"^\| `([\w.]+)` \|.*\| ([^|]+) \|$", (FOLDER / "README.md").read_text(), re.MULTILINE))
+SIZES = dict(re.findall(r"^\| `([\w.-]+)` \|.*\| ([^|]+) \|$", (FOLDER / "README.md").read_text(), re.MULTILINE))
 FILES = sorted(path.name for path in FOLDER.glob("*.yaml"))
 
 
@@ -21,7 +22,7 @@ def test_the_readme_lists_every_campaign() -> None:
     assert sorted(SIZES) == FILES
 
 
-@pytest.mark.parametrize("name", [name for name in FILES if name != "barn.yaml"])
+@pytest.mark.parametrize("name", [name for name in FILES if not name.startswith("barn")])
 def test_a_campaign_has_the_runs_that_the_readme_says(name: str) -> None:
     expansion = expand(load_campaign(FOLDER / name))
     assert len(expansion.jobs) == int(SIZES[name])
@@ -29,15 +30,22 @@ def test_a_campaign_has_the_runs_that_the_readme_says(name: str) -> None:
     assert len({job.key for job in expansion.jobs}) == len(expansion.jobs)
 
 
-def test_the_barn_campaign_reads_the_worlds_beside_it(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("name", "each"), [("barn.yaml", 6), ("barn-planners.yaml", 170)])
+def test_a_barn_campaign_reads_the_worlds_beside_it(name: str, each: int, tmp_path: Path) -> None:
     archive = SHARED / "barn" / "barn50.tar.xz"
     if not archive.exists():
         pytest.skip("needs ../shared/data/barn/barn50.tar.xz")
-    shutil.copy(FOLDER / "barn.yaml", tmp_path)
+    shutil.copy(FOLDER / name, tmp_path)
     (tmp_path / "barn").mkdir()
     with tarfile.open(archive) as tar:
-        for name in [name for name in tar.getnames() if name.endswith(".world")][:3]:
-            tar.extract(name, tmp_path / "barn", filter="data")
-    expansion = expand(load_campaign(tmp_path / "barn.yaml"))
-    assert SIZES["barn.yaml"] == "worlds × 6"
-    assert len(expansion.jobs) == 3 * 6
+        for member in [member for member in tar.getnames() if member.endswith(".world")][:3]:
+            tar.extract(member, tmp_path / "barn", filter="data")
+    expansion = expand(load_campaign(tmp_path / name))
+    assert SIZES[name] == f"worlds × {each}"
+    assert len(expansion.jobs) == 3 * each
+
+
+def test_the_campaign_of_all_planners_has_all_that_plan_in_worlds_that_stand_still() -> None:
+    entries = load_campaign(FOLDER / "barn-planners.yaml").entry.planners
+    names = {one if isinstance(one, str) else one["name"] for one in entries}
+    assert names == {name for name, planner in PLANNERS.items() if not capabilities_of(planner).needs_motions}

@@ -75,6 +75,10 @@ def test_its_workflow_calls_pytest_with_options_that_exist(checkout: Path, varia
     (job,) = yaml.safe_load((EXAMPLE / ".github" / "workflows" / "drives.yml").read_text())["jobs"].values()
     (words,) = [step["run"].split() for step in job["steps"] if step.get("run", "").startswith("pytest")]
     assert run([*words, "--collect-only", "-q"], checkout, variables).returncode == 0
+    places = [step["with"]["path"] for step in job["steps"] if "repository" in step.get("with", {})]
+    (installs,) = [step["run"].split() for step in job["steps"] if step.get("run", "").startswith("pip")]
+    assert [f"./{place}" for place in places] == [word for word in installs if "/" in word]
+    assert "antdrive" not in installs, "is on no index"
     kept = next(step["with"]["path"] for step in job["steps"] if "upload-artifact" in step.get("uses", ""))
     assert words[words.index("--drive-results") + 1] == kept
 

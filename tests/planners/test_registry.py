@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import hashlib
 import importlib
 import inspect
 import re
@@ -23,6 +24,7 @@ from antdrive.planners import (
     describe,
     list_planners,
     load_planner,
+    planner_version,
 )
 from antdrive.sim.view.style import PLANNER_STYLES
 from antdrive.sim.warm import TOGETHER
@@ -68,6 +70,8 @@ def test_the_example_plugin_joins_through_its_entry_point(site: Site) -> None:
     site.install(name, {"wavefront": source}, entries)
 
     assert "wavefront" in list_planners()
+    digest = hashlib.sha256(source.encode()).hexdigest()[:8]
+    assert planner_version("wavefront") == f"{name} 1.0 {digest}"
     query = catalogue()["slalom"]
     result = load_planner("wavefront").plan(query, np.random.default_rng(0))
     assert result.solved

@@ -1,11 +1,14 @@
 import dataclasses
+import json
 import math
 from pathlib import Path
 
 import pytest
 
-from antdrive.robots import RobotSpec, list_robots, load_robot, robot_schema
+from antdrive.robots import Footprint, RobotSpec, list_robots, load_robot, robot_schema, robot_to_dict
+from antdrive.robots.files import footprint_to_dict
 from antdrive.sim import Engine
+from antdrive.sim.log.binding import canonical_hash
 from antdrive.worlds import InputError, World
 
 GOOD = """\
@@ -41,6 +44,41 @@ def test_a_robot_is_described_by_one_file(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("entry", "footprint"),
+    [
+        ("{radius: 0.2, centre: [0.05, -0.01]}", Footprint.disc(0.2, (0.05, -0.01))),
+        ("{radius: 0.2, centre: [0, 0]}", Footprint.disc(0.2)),
+        ("{length: 0.9, width: 0.6, centre: [0.15, 0.0]}", Footprint.rectangle(0.9, 0.6, (0.15, 0.0))),
+        (
+            "{polygon: [[0.4, 0], [-0.2, 0.4], [-0.2, -0.4]]}",
+            Footprint(corners=((0.4, 0.0), (-0.2, 0.4), (-0.2, -0.4))),
+        ),
+    ],
+)
+def test_a_footprint_need_not_be_centred_on_the_axle(tmp_path: Path, entry: str, footprint: Footprint) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text(GOOD.replace("{radius: 0.2}", entry))
+    mine = load_robot(path)
+    assert mine.footprint == footprint
+    path.write_text(GOOD.replace("{radius: 0.2}", json.dumps(footprint_to_dict(footprint))))
+    assert load_robot(path) == mine, "what is written of it is read as the same"
+
+
+def test_robots_without_corners_and_lidar_are_recorded_as_they_always_were() -> None:
+    """Their logs and hashes stay the same, bit for bit."""
+    jackal, turtlebot = (dataclasses.replace(load_robot(name), lidar=None) for name in ("jackal", "turtlebot"))
+    assert canonical_hash(jackal) == "8b9a050572644a9fa8fa254c229c73dd56e9a5dfaf8124b543ecbd96a284d8c2"
+    assert canonical_hash(turtlebot) == "6015e6951db89082ddc290423b7db58efc1c599cf120244d54e904d6f4220f5f"
+    assert robot_to_dict(load_robot("jackal"))["footprint"] == {
+        "half_length": 0.254,
+        "half_width": 0.215,
+        "rounding": 0.0,
+    }
+    corners = robot_to_dict(load_robot("warehouse"))["footprint"]["corners"]
+    assert corners == ((0.6, -0.3), (0.6, 0.3), (-0.3, 0.3), (-0.3, -0.3))
+
+
+@pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
         ("mass: 5.0", "mass: -5.0", "mass: must be at least 0.01, got -5.0"),
@@ -53,6 +91,20 @@ def test_a_robot_is_described_by_one_file(tmp_path: Path) -> None:
         ("wheel_radius: 0.04", "wheel_radius: 0.4", "track: wheels of 0.4 m"),
         ("{radius: 0.2}", "{length: 0.6, width: 0.2}", "track: wheels 0.25 m apart stand outside the footprint"),
         ("{radius: 0.2}", "{length: 0.06, width: 0.3}", "wheel_radius: wheels of 0.04 m stand outside the footprint"),
+        ("{radius: 0.2}", "{polygon: [[0.2, 0.2], [0.2, -0.2]]}", "footprint.polygon: must be three points or more"),
+        (
+            "{radius: 0.2}",
+            "{polygon: [[0.3, -0.2], [0.3, 0.2], [0.0, 0.05], [-0.3, 0.2], [-0.3, -0.2]]}",
+            "footprint.polygon: must be a convex polygon; it turns inwards at (0, 0.05)",
+        ),
+        ("{radius: 0.2}", "{radius: 0.2, polygon: [[1, 0], [0, 1], [-1, -1]]}", "footprint: write {radius: 0.18}"),
+        ("{radius: 0.2}", "{centre: [0.1, 0.0]}", "footprint: write {radius: 0.18}"),
+        ("{radius: 0.2}", "{radius: 0.2, centre: [0.1]}", "footprint.centre: must have 2 entries"),
+        (
+            "{radius: 0.2}",
+            "{length: 0.5, width: 0.4, centre: [0.23, 0.0]}",
+            "footprint: wheels of 0.04 m, 0.25 m apart, stand",
+        ),
         ("max_speed: 1", "max_speed: .inf", "max_speed: must be"),
         ("max_speed: 1", "max_speed: 0.0024", "max_speed: must be at least 0.05, got 0.0024"),
         ("max_speed: 1", "max_speed: 30", "max_speed: must be at most 10, got 30"),

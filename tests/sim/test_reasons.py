@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
 from antdrive.planners import GridPlanner, PlanResult, PlanStatus, Query, load_planner
-from antdrive.robots import RobotSpec
+from antdrive.robots import Footprint, RobotSpec
 from antdrive.sim import Outcome, Scenario, run
 from antdrive.worlds import Disc, Task, World
 
@@ -39,6 +40,48 @@ def test_a_gate_that_is_too_narrow_for_the_margin_is_named_with_a_margin_that_wo
 
 def test_a_robot_that_is_wider_than_the_gate_is_told_so(turtlebot: RobotSpec) -> None:
     assert run(gate(turtlebot, 0.3)).reason.endswith("this robot does not fit through")
+
+
+@pytest.mark.parametrize("centre", [(0.0, 0.0), (0.15, 0.0)])
+def test_a_door_for_the_rectangle_and_not_for_the_disc_is_named_with_what_both_need(
+    jackal: RobotSpec, centre: tuple[float, float]
+) -> None:
+    """A robot of 0.9 x 0.6 m before a door of 0.95 m."""
+    robot = replace(jackal, name="cart", footprint=Footprint.rectangle(0.9, 0.6, centre))
+    reason = run(gate(robot, 0.95, cell=0.05)).reason
+    disc = 2 * (0.03 + (0.6708 if any(centre) else 0.5408))
+    assert reason.startswith("no path for a disc of 0.")
+    assert (
+        "the widest disc that passes has a radius of 0.475 m, at (3.00, 2.00), between obstacles[0] at (3, 2.725)"
+        in reason
+    )
+    assert reason.endswith(
+        f"the place is 0.95 m wide, and plans are made for the disc around cart, which needs {disc:.3g} m; "
+        "its rectangle of 0.9 x 0.6 m would need 0.66 m straight ahead"
+    )
+    assert run(gate(robot, 0.62, cell=0.05)).reason.endswith("would not fit either: it needs 0.66 m straight ahead")
+
+
+def test_a_margin_that_would_do_is_named_for_a_rectangle_too(jackal: RobotSpec) -> None:
+    reason = run(gate(jackal, 0.7, cell=0.05)).reason
+    assert reason.endswith("its rectangle of 0.508 x 0.43 m would need 0.49 m straight ahead; "
+                           "a margin below 0.0172 m leaves a way, on cells that are fine enough")  # fmt: skip
+
+
+def test_in_a_world_of_very_many_obstacles_the_place_is_found_on_the_cells(
+    jackal: RobotSpec, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import antdrive.sim.reasons as reasons
+
+    monkeypatch.setattr(reasons, "MOST_OBSTACLES", 3)
+    reason = run(gate(replace(jackal, footprint=Footprint.rectangle(0.9, 0.6)), 0.95, cell=0.05)).reason
+    found = re.search(r"a radius of about (0\.\d+) m, near \((.*), (.*)\); the place", reason)
+    assert found, reason
+    about, x, y = map(float, found.groups())
+    assert 0.40 <= about <= 0.48
+    assert np.hypot(x - 3.0, y - 2.0) < 0.15
+    closed = gate(jackal, 0.02, cell=0.05)
+    assert run(closed).reason.endswith("no disc of 0.0028 m gets through, on these cells")
 
 
 def test_cells_that_would_do_are_named(turtlebot: RobotSpec) -> None:

@@ -368,7 +368,7 @@ def small_copy(robot: RobotSpec, k: float) -> RobotSpec:
     root = math.sqrt(k)
     return replace(
         robot,
-        footprint=Footprint(*(k * side for side in dataclasses.astuple(robot.footprint))),
+        footprint=Footprint(*(k * side for side in dataclasses.astuple(robot.footprint)[:3])),
         height=k * robot.height,
         mass=k**3 * robot.mass,
         wheel_radius=k * robot.wheel_radius,

@@ -87,6 +87,31 @@ def with_line(task: Task, *points: tuple[float, float], margin: float = 0.03) ->
     return check_plan(query, dataclasses.replace(answer, waypoints=grid.fractional(line), length=length))
 
 
+def test_a_line_that_leads_elsewhere_than_its_cells_is_a_wrong_plan() -> None:
+    """The certificate refuses it as well; it is said before the robot drives."""
+    task = Task(ROOM, (0.5, 2.0, 0.0), (5.5, 2.0), cell=0.2)
+    assert with_line(task, (3.0, 2.4)) == ""
+    assert with_line(task, (0.5, 3.5), (5.5, 3.5)).startswith("waypoints: they are 8 m long, but the cells beside them")
+
+
+def test_a_plan_with_loops_is_driven_and_certified_but_not_with_the_cells_of_a_short_cut() -> None:
+    """A genetic algorithm that is stopped early finds such lines: 13.4 m where 6.3 m are enough."""
+    task = Task(World("hall", (0.0, 0.0, 8.0, 6.0), ()), (1.0, 1.0, 0.0), (7.0, 1.0), cell=0.2)
+    few = {"iterations": 1, "population": 2, "via_points": 4}
+    result = run(Scenario.of(task, "ga-han", seed=40, options=few))
+    assert result.outcome is Outcome.SUCCEEDED
+    assert result.certificate is not None
+    assert result.certificate.problems == ()
+    assert result.rollout is not None
+    record, shortest = result.rollout.record, 6.0 + 0.2 * (math.sqrt(2.0) - 1.0)
+    assert record.plan.length_m > shortest + 5.0
+    (row, first), (_, last) = result.rollout.cells[[0, -1]].tolist()
+    straight = np.array([(row, col) for col in range(first, last + 1)], dtype=np.int32)
+    plan = dataclasses.replace(record.plan, cost_m=(len(straight) - 1) * record.cell)
+    forged = dataclasses.replace(result.rollout, cells=straight, record=dataclasses.replace(record, plan=plan))
+    assert any(p.startswith("record.plan.length_m: ") for p in certify(forged).problems)
+
+
 def test_a_line_may_leave_a_tight_start_but_not_go_on_there() -> None:
     assert with_line(EDGE, (0.9, 0.6)) == ""
     assert "does not keep 0.21 m" in with_line(EDGE, (2.2, 0.2), (2.2, 1.4))

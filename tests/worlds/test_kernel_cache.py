@@ -182,3 +182,24 @@ def test_the_stamp_covers_every_kernel_file() -> None:
     )
     assert len(found) > 15
     assert len(kernel_cache.sources_stamp()) == 64
+
+
+def test_code_of_files_that_were_edited_meanwhile_is_of_neither_version(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "worlds" / "_kernels_a.py"
+    file.parent.mkdir()
+    stamps = {}
+    monkeypatch.setattr(kernel_cache, "_ROOT", tmp_path)
+    try:
+        for text in ("one", "three"):  # each as a process of its own
+            file.write_text(text)
+            kernel_cache._first_state.cache_clear()
+            stamps[text] = kernel_cache.sources_stamp()
+        file.write_text("one")
+        mixed = kernel_cache.sources_stamp()
+        assert len({mixed, *stamps.values()}) == 3
+        file.write_text("three")
+        assert kernel_cache.sources_stamp() == stamps["three"]
+    finally:
+        kernel_cache._first_state.cache_clear()

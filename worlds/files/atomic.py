@@ -6,6 +6,7 @@ import errno
 import os
 import platform
 import re
+import shutil
 import tempfile
 import zlib
 from collections.abc import Iterator
@@ -51,6 +52,35 @@ def written_whole(path: str | Path) -> Iterator[Path]:
             raise InputError(f"{target}: cannot be written ({error.strerror})") from None
     finally:
         temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def folder_written_whole(path: str | Path) -> Iterator[Path]:
+    """A context with a temporary folder, which becomes `path` when the block succeeds and is removed when it fails.
+
+    Args:
+        path: the folder to make; it must not exist, or be empty
+
+    Raises:
+        InputError: there is something, or the folder cannot be written to.
+    """
+    target = Path(path)
+    try:
+        if target.is_file() or (target.is_dir() and any(target.iterdir())):
+            raise InputError(f"{target}: exists; name a new folder")
+        target.parent.mkdir(parents=True, exist_ok=True)
+        temporary = Path(tempfile.mkdtemp(dir=target.parent, prefix=f".{target.name[:LONGEST_STEM]}-"))
+    except OSError as error:
+        raise InputError(f"{target}: cannot be written ({error.strerror})") from None
+    try:
+        yield temporary
+        temporary.chmod(0o777 & ~_umask())
+        try:
+            temporary.replace(target)
+        except OSError as error:
+            raise InputError(f"{target}: cannot be written ({error.strerror})") from None
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
 
 
 def _umask() -> int:

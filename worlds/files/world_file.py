@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -70,6 +71,22 @@ class MoverEntry(BaseModel):
     walk: WalkEntry | None = Field(None, description="write {cell: 0.5, period: 1.0}")
 
 
+class EndsEntry(BaseModel):
+    """Another start and goal in the same world; `--task NAME` chooses it."""
+
+    model_config = _RULES
+
+    name: OneLine = Field(min_length=1, max_length=100, description="what --task calls it")
+    start: list[Coordinate] | None = Field(
+        None,
+        min_length=3,
+        max_length=3,
+        description="write [x, y, yaw] in metres and radians; by default the world's own",
+    )
+    goal: list[Coordinate] = Field(min_length=2, max_length=2, description="write [x, y] in metres")
+    goal_tolerance: Size | None = Field(None, description="how close to the goal the robot must stop [m]")
+
+
 class WorldFile(BaseModel):
     """A world with a start and a goal, as written in a file."""
 
@@ -89,6 +106,14 @@ class WorldFile(BaseModel):
     obstacles: list[DiscEntry] = Field([], description="upright cylinders")
     time_limit: Size | None = Field(None, description="simulated time allowed [s]; by default ample for the route")
     movers: list[MoverEntry] = Field([], max_length=1000, description="moving cylinders")
+    tasks: list[EndsEntry] = Field([], max_length=10_000, description="other starts and goals, by name")
+    frame: list[Coordinate] | None = Field(
+        None,
+        min_length=3,
+        max_length=3,
+        description="write [x, y, yaw]: where the world's origin lies in the map that it was made from, in metres and radians; "
+        "exports use it",
+    )
 
 
 def list_worlds() -> Mapping[str, Path]:
@@ -96,30 +121,72 @@ def list_worlds() -> Mapping[str, Path]:
     return dict(sorted((path.stem, path) for path in _CATALOG.glob("*.yaml")))
 
 
-def load_task(world: str | os.PathLike[str]) -> Task:
+def load_task(world: str | os.PathLike[str], name: str | None = None) -> Task:
     """The task in a world file, or in the catalogue.
 
     Args:
         world: a name of the catalogue, or a path; a text that is both means the catalogue
+        name: one of the file's `tasks`; None: the world's own start and goal
+
+    Raises:
+        InputError: there is no such world or task, or something in the file is wrong.
+    """
+    found = _tasks_of(world)
+    if name not in found:
+        known = [known for known in found if known is not None]
+        hint = suggest(name or "", known) if known else "the world has no tasks beside its own start and goal"
+        raise input_error(os.fspath(world), f"no task {name!r:.60}; {hint}")
+    return found[name]
+
+
+def load_tasks(world: str | os.PathLike[str]) -> Mapping[str, Task]:
+    """The tasks under the key `tasks` of a world file or of a world of the catalogue, by name.
+
+    Args:
+        world: as for `load_task`
 
     Raises:
         InputError: there is no such world, or something in the file is wrong.
     """
+    return {name: task for name, task in _tasks_of(world).items() if name is not None}
+
+
+def _tasks_of(world: str | os.PathLike[str]) -> Mapping[str | None, Task]:
+    """The tasks of a world by name; None is its own."""
     known = list_worlds()
     path = known[world] if isinstance(world, str) and world in known else Path(world)
     if not os.path.lexists(path):
         hint = suggest(path.stem, known)
         raise input_error(os.fspath(world), f"no such file, nor a world of the catalogue; {hint}")
-    return _task_in(read_yaml(path), os.fspath(path), path.stem)
+    return _tasks_in(read_yaml(path), os.fspath(path), path.stem)
 
 
 @reused(16)
-def _task_in(text: str, source: str, stem: str) -> Task:
-    """The task in the text of a world file."""
+def _tasks_in(text: str, source: str, stem: str) -> Mapping[str | None, Task]:
+    """The tasks in the text of a world file."""
     document = parse_document(text, source)
     if isinstance(document.data, dict):
         document.data.setdefault("name", "".join(filter(str.isprintable, stem))[:200] or "world")
-    return _to_task(document)
+    entry = check(WorldFile, document)
+    own = _to_task(document, entry)
+    found: dict[str | None, Task] = {None: own}
+    return found | _named_tasks(document, entry, own)
+
+
+def _named_tasks(document: Document, entry: WorldFile, own: Task) -> dict[str | None, Task]:
+    """The tasks beside a world's own."""
+    found: dict[str | None, Task] = {}
+    for i, ends in enumerate(entry.tasks):
+        if ends.name in found:
+            raise document.error(("tasks", i, "name"), f"{ends.name!r} is the name of two tasks")
+        start = own.start if ends.start is None else (ends.start[0], ends.start[1], ends.start[2])
+        tolerance = ends.goal_tolerance or own.goal_tolerance
+        try:
+            goal = ends.goal[0], ends.goal[1]
+            found[ends.name] = dataclasses.replace(own, start=start, goal=goal, goal_tolerance=tolerance)
+        except FieldError as error:
+            raise document.field_error(error, "tasks", i) from None
+    return found
 
 
 def save_task(task: Task, path: str | Path) -> None:
@@ -158,6 +225,7 @@ def task_to_dict(task: Task) -> dict[str, Any]:
         "goal_tolerance": float(task.goal_tolerance),
         "cell": float(task.cell),
         **({} if task.time_limit is None else {"time_limit": float(task.time_limit)}),
+        **({"frame": [float(v) for v in task.frame]} if any(task.frame) else {}),
         "obstacles": [
             {"x": float(d.x), "y": float(d.y), "radius": float(d.radius), "height": float(d.height)}
             for d in world.obstacles
@@ -186,8 +254,8 @@ def task_schema() -> dict[str, Any]:
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "antdrive world"}
 
 
-def _to_task(document: Document) -> Task:
-    entry = check(WorldFile, document)
+def _to_task(document: Document, entry: WorldFile | None = None) -> Task:
+    entry = entry or check(WorldFile, document)
     xmin, ymin, xmax, ymax = entry.bounds
     if (xmax - xmin) / entry.cell * (ymax - ymin) / entry.cell > MAX_CELLS:
         raise document.error(("cell",), f"{entry.cell:g} m cuts these bounds into more than {MAX_CELLS} cells")
@@ -197,7 +265,8 @@ def _to_task(document: Document) -> Task:
     try:
         world = World(entry.name, (xmin, ymin, xmax, ymax), discs, entry.source, movers)
         goal = entry.goal[0], entry.goal[1]
-        return Task(world, (x, y, yaw), goal, entry.goal_tolerance, entry.cell, entry.time_limit)
+        frame = (0.0, 0.0, 0.0) if entry.frame is None else (entry.frame[0], entry.frame[1], entry.frame[2])
+        return Task(world, (x, y, yaw), goal, entry.goal_tolerance, entry.cell, entry.time_limit, frame)
     except FieldError as error:
         raise document.field_error(error) from None
 

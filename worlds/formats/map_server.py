@@ -8,6 +8,7 @@ the lowest. The other modes differ little: in `scale`, pixels that are not opaqu
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import warnings
 from collections.abc import Iterable
@@ -26,6 +27,7 @@ from antdrive.worlds.files.world_file import Coordinate, Size
 from antdrive.worlds.formats.cellmap import CellMap, Cells, cell_map, file_task
 from antdrive.worlds.formats.checks import require_no_movers
 from antdrive.worlds.limits import MAX_CELLS
+from antdrive.worlds.plane import in_map, out_of_map
 from antdrive.worlds.types import Floats, Point, Pose
 from antdrive.worlds.world import Task
 
@@ -69,13 +71,6 @@ class MapFile(BaseModel):
     def _zero_or_one(cls, negate: Any) -> Any:
         return bool(negate) if type(negate) is int and negate in (0, 1) else negate
 
-    @field_validator("origin")
-    @classmethod
-    def _upright(cls, origin: list[float]) -> list[float]:
-        if len(origin) == 3 and origin[2] != 0:
-            raise ValueError(f"a map turned by {origin[2]:g} rad is not supported; turn the image and write a yaw of 0")
-        return origin
-
     @field_validator("free_thresh")
     @classmethod
     def _below(cls, free: float, info: ValidationInfo) -> float:
@@ -93,11 +88,13 @@ class ServedMap:
         cells: the free cells; unknown cells are free only where that was asked for
         unknown: how many cells are neither free nor occupied
         ends: start and goal, where antdrive wrote the map
+        frame: where the frame of the cells lies in that of the map; not zero for a turned map, whose cells begin at (0, 0)
     """
 
     cells: CellMap
     unknown: int
     ends: KeptEnds | None
+    frame: Pose = (0.0, 0.0, 0.0)
 
 
 def import_map_server(
@@ -112,10 +109,12 @@ def import_map_server(
 ) -> Task:
     """A map of map_server as a world of discs; see `map_task`.
 
+    A map that is turned becomes a world that is not; the task's `frame` says how it lies in its map.
+
     Args:
         path: the YAML file, which names the image
-        start: the robot's first pose [m, m, rad]; needed unless `export_map_server` wrote the map
-        goal: [m]; needed unless `export_map_server` wrote the map
+        start: the robot's first pose in the map [m, m, rad]; needed unless `export_map_server` wrote the map
+        goal: in the map [m]; needed unless `export_map_server` wrote the map
         unknown_is_free: whether unknown cells are free instead of blocked
         overhang: how far discs may reach beyond blocked cells [m]; see `map_task`
         cell: the task's grid resolution [m]; by default that of the map
@@ -134,9 +133,16 @@ def import_map_server(
     source = f"the map_server map {file.name}"
     if served.unknown:
         source += f" with {served.unknown} unknown cells taken for {'free' if unknown_is_free else 'blocked'}"
-    return file_task(
+    if any(served.frame):
+        start, goal = _out_of_map(served.frame, start), _out_of_map(served.frame, goal)
+    task = file_task(
         file, served.cells, start, goal, source=source, overhang=overhang, cell=cell, goal_tolerance=goal_tolerance
     )
+    return dataclasses.replace(task, frame=served.frame)
+
+
+def _out_of_map(frame: Pose, end: Any) -> Any:
+    return None if end is None else tuple(out_of_map(frame, [end])[0].tolist())
 
 
 def read_map(path: str | os.PathLike[str], *, unknown_is_free: bool = False) -> ServedMap:
@@ -162,8 +168,10 @@ def read_map(path: str | os.PathLike[str], *, unknown_is_free: bool = False) -> 
     free, occupied = known & (p < entry.free_thresh), known & (p > entry.occupied_thresh)
     cells = np.array((~occupied if unknown_is_free else free)[::-1])
     cells.setflags(write=False)
-    x, y, _ = entry.origin
-    return ServedMap(CellMap(cells, entry.resolution, (x, y)), int((~free & ~occupied).sum()), entry.antdrive)
+    x, y, yaw = entry.origin
+    frame, corner = ((x, y, yaw), (0.0, 0.0)) if yaw else ((0.0, 0.0, 0.0), (x, y))
+    found = CellMap(cells, entry.resolution, corner)
+    return ServedMap(found, int((~free & ~occupied).sum()), entry.antdrive, frame)
 
 
 def _levels(path: Path, average_alpha: bool) -> tuple[Floats, Cells]:
@@ -230,13 +238,13 @@ def export_map_server(task: Task, path: str | Path, *, resolution: float | None 
     text = (
         f"image: '{name}'\n"
         f"resolution: {yaml_number(cells.resolution)}\n"
-        f"origin: {_yaml_list((*cells.origin, 0.0))}\n"
+        f"origin: {_yaml_list(in_map(task.frame, [(*cells.origin, 0.0)])[0].tolist())}\n"
         "negate: 0\n"
         "occupied_thresh: 0.65\n"
         "free_thresh: 0.196\n"
         "antdrive:\n"
-        f"  start: {_yaml_list(task.start)}\n"
-        f"  goal: {_yaml_list(task.goal)}\n"
+        f"  start: {_yaml_list(in_map(task.frame, [task.start])[0].tolist())}\n"
+        f"  goal: {_yaml_list(in_map(task.frame, [task.goal])[0].tolist())}\n"
         f"  goal_tolerance: {yaml_number(task.goal_tolerance)}\n"
     )
     with written_whole(image) as part:

@@ -1,17 +1,18 @@
 """`antdrive compare`."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from antdrive.sim.cli import options
-from antdrive.sim.cli.campaign_tables import Against, Metrics, Where, campaign_of_words, compare_campaign
+from antdrive.sim.cli.campaign_tables import Against, Allow, Metrics, Where, campaigns_of_words, compare_campaigns
 from antdrive.sim.cli.comparing import (
     COMPARED,
     Compared,
     Entrant,
+    check_worlds,
     difference_cells,
     differences,
     entrants_of,
@@ -22,7 +23,7 @@ from antdrive.sim.cli.comparing import (
 from antdrive.sim.cli.compiling import compile_once
 from antdrive.sim.cli.console import planning, print_error, print_files, print_json, print_line, print_table
 from antdrive.sim.cli.exits import FAILED, SUCCEEDED
-from antdrive.sim.cli.scenario import make_scenario
+from antdrive.sim.cli.scenario import chosen_task, ends_words, make_scenario
 from antdrive.sim.cli.write import (
     check_film,
     check_folder,
@@ -40,13 +41,12 @@ from antdrive.worlds.files.atomic import claimed
 if TYPE_CHECKING:
     from antdrive.sim.log.rollout import Rollout
     from antdrive.sim.scenario import Scenario
+    from antdrive.worlds import Task
 
 MARKER = "comparison.json"
 Worlds = Annotated[
     list[str],
-    typer.Argument(
-        metavar="WORLD...", help="Names of worlds in the catalogue, or world files; or a campaign's folder."
-    ),
+    typer.Argument(metavar="WORLD...", help="Names of worlds in the catalogue, or world files; or campaigns' folders."),
 ]
 Planners = Annotated[
     list[str] | None,
@@ -83,6 +83,9 @@ def compare(
     seeds: Seeds = 1,
     margin: options.Margin = 0.03,
     cell: options.CellSize = None,
+    task: options.TaskName = None,
+    start: options.Start = None,
+    goal: options.Goal = None,
     smoothing: options.Smoothing = "clearance",
     noise: options.Noise = 0.0,
     out: options.Out = None,
@@ -94,52 +97,68 @@ def compare(
     speed: options.Speed = 1.0,
     metric: Metrics = None,
     against: Against = None,
+    allow: Allow = None,
     where: Where = None,
     json: options.Json = False,
 ) -> int:
     """Compare planners: drive worlds with each, or read a campaign.
 
     The planners are paired by world and seed. Figures and film show the first of them. Exit code 0: every run succeeded.
-    A campaign's folder, made by `antdrive sweep`: success with intervals, and tests of every pair.
+    Folders of campaigns, made by `antdrive sweep`: success with intervals, outcomes, and tests of every pair.
     """
-    if (campaign := campaign_of_words(worlds, context)) is not None:
-        return compare_campaign(campaign, planner or (), metric, against, where, json)
+    if campaigns := campaigns_of_words(worlds, context):
+        return compare_campaigns(campaigns, planner or (), metric, against, allow, where, json)
+    check_worlds(worlds)
     entrants = entrants_of(planner, settings)
     rest = {"margin": margin, "cell": cell, "smoothing": smoothing, "noise": noise}
-    scenarios = _scenarios(worlds, entrants, robot, seed, rest)
+    tasks = {world: chosen_task(world, task, start, goal) for world in worlds}
+    scenarios = _scenarios(worlds, tasks, entrants, robot, seed, rest)
     cases = [(world, number) for world in worlds for number in range(seed, seed + seeds)]
-    folder, mark = _default_folder(scenarios, cases)
-    folder = out or folder
+    default, mark = _default_folder(scenarios, cases)
+    folder = out or default
+    _make_ready(folder, video)
+    with claimed(folder):
+        facts = {"fingerprint": mark, "command": this_command()}
+        runs, logs = _drive(scenarios, cases, folder, robot, figures, facts, ends_words(task, start, goal))
+        files = {run.label: run.facts["folder"] for run in runs} if len(cases) == 1 else {"folder": str(folder)}
+        files |= _views(logs, folder, video, speed, figures)
+        told = {"differences": differences(runs), "same": same_drives(runs, smoothing)}
+        told["drives"] = [{"label": run.label, **run.facts} for run in runs]
+        write_marker(folder / MARKER, {**facts, **told})
+    if json:
+        print_json({"runs": {run.label: run.facts for run in runs[: len(entrants)]}, **told, "files": files})
+    else:
+        _print(runs, len(cases), told, files)
+    _warn_of_few(len(logs))
+    return SUCCEEDED if all(run.facts["succeeded"] for run in runs) else FAILED
+
+
+def _make_ready(folder: Path, video: Path | None) -> None:
+    """Refuse places where nothing can be written, before anything is driven, and compile the kernels."""
     if video is not None:
         check_film(video)
     check_folder(folder)
     compile_once()
-    with claimed(folder):
-        facts = {"fingerprint": mark, "command": this_command()}
-        runs, logs = _drive(scenarios, cases, folder, robot, figures, facts)
-        files = {run.label: run.facts["folder"] for run in runs} if len(cases) == 1 else {"folder": str(folder)}
-        files |= _views(logs, folder, video, speed, figures)
-        told = {"differences": differences(runs), "same": same_drives(runs, smoothing)}
-        drives = [{"label": run.label, **run.facts} for run in runs]
-        write_marker(folder / MARKER, {**facts, "drives": drives, **told})
-    if json:
-        print_json(
-            {"runs": {run.label: run.facts for run in runs[: len(entrants)]}, "drives": drives, **told, "files": files}
-        )
-    else:
-        _print(runs, len(cases), told, files)
-    if len(logs) < 2:
-        found = "only one planner" if logs else "no planner"
+
+
+def _warn_of_few(drives: int) -> None:
+    """Say why there is no figure and no film, if fewer than two planners drove."""
+    if drives < 2:
+        found = "only one planner" if drives else "no planner"
         print_error(f"{found} found a path: there is nothing to compare in a figure or film")
-    return SUCCEEDED if all(run.facts["succeeded"] for run in runs) else FAILED
 
 
 def _scenarios(
-    worlds: Sequence[str], entrants: Sequence[Entrant], robot: str, seed: int, rest: dict[str, Any]
+    worlds: Sequence[str],
+    tasks: "Mapping[str, str | Task]",
+    entrants: Sequence[Entrant],
+    robot: str,
+    seed: int,
+    rest: dict[str, Any],
 ) -> "dict[tuple[str, Entrant], Scenario]":
     """The scenario of every world, as given, and planner, with the first seed."""
     scenarios = {
-        (world, entrant): make_scenario(world, entrant.name, list(entrant.settings), robot, seed=seed, **rest)
+        (world, entrant): make_scenario(tasks[world], entrant.name, list(entrant.settings), robot, seed=seed, **rest)
         for world in worlds
         for entrant in entrants
     }
@@ -166,6 +185,7 @@ def _drive(
     robot: str,
     figures: bool,
     facts: dict[str, str],
+    ends: Sequence[str],
 ) -> "tuple[list[Compared], dict[str, Rollout]]":
     """Drive every case with every planner, each into its folder; the runs, and the logs of the first case by label."""
     import dataclasses
@@ -186,7 +206,7 @@ def _drive(
             if not runs:  # an interrupted comparison leaves the results that it has, marked as its own
                 write_marker(folder / MARKER, facts)
             written = write_run(result, part / entrant.label, figures=figures and place == 0)
-            write_result(result, written, repeating(scenario, entrant, world, robot))
+            write_result(result, written, repeating(scenario, entrant, world, robot, ends))
             kept = Compared.of(entrant.label, result)
             runs.append(dataclasses.replace(kept, facts={**kept.facts, "folder": str(part / entrant.label)}))
             if place == 0 and result.rollout is not None:

@@ -12,13 +12,26 @@ from antdrive.sim.cli.compiling import compile_once
 from antdrive.sim.cli.console import bar, print_json, print_line, print_table
 from antdrive.sim.cli.exits import FAILED, SUCCEEDED
 from antdrive.sim.cli.scenario import make_scenario
-from antdrive.sim.cli.write import RUN_FILES, check_folder, write_film, write_result, write_run
+from antdrive.sim.cli.write import (
+    RUN_FILES,
+    check_folder,
+    file_name,
+    fingerprint,
+    free_folder,
+    this_command,
+    write_film,
+    write_marker,
+    write_result,
+    write_run,
+)
+from antdrive.worlds.files.atomic import claimed
 
 if TYPE_CHECKING:
     from antdrive.sim.falsify.hunt import Hunt
     from antdrive.sim.falsify.report import Reported
     from antdrive.sim.scenario import Scenario
 
+MARKER = "falsify.json"  # which search a folder is of
 Budget = Annotated[int, typer.Option(min=1, max=1_000_000, metavar="NUMBER", help="Runs that the search may make.")]
 Method = Annotated[
     str, typer.Option(metavar="NAME", help="How worlds are chosen: guided (by rehearsals without physics) or random.")
@@ -62,19 +75,23 @@ def falsify(
     from antdrive.sim.falsify.hunt import find_failures
 
     setup = make_scenario("empty", planner, settings, robot, margin=margin, cell=cell, smoothing=smoothing, noise=noise)
-    folder = out or Path("out") / f"falsify-{planner}-{setup.robot.name}-{seed}"
+    mark = fingerprint(setup, budget, seed, method, obstacles, seconds)
+    usual = Path("out") / file_name(f"falsify-{planner}-{setup.robot.name}-{seed}")
+    folder = out or free_folder(usual, MARKER, mark)
     check_folder(folder)
     compile_once()
-    with bar("looking for failures") as progress:
-        hunt = find_failures(
-            setup,
-            budget=budget,
-            seed=seed,
-            method=method,
-            obstacles=obstacles,
-            progress=lambda runs, found: progress(runs / budget),
-        )
-    reported = _report(hunt, folder, seconds, film)
+    with claimed(folder):
+        write_marker(folder / MARKER, {"fingerprint": mark, "command": this_command()})
+        with bar("looking for failures") as progress:
+            hunt = find_failures(
+                setup,
+                budget=budget,
+                seed=seed,
+                method=method,
+                obstacles=obstacles,
+                progress=lambda runs, found: progress(runs / budget),
+            )
+        reported = _report(hunt, folder, seconds, film)
     if json:
         print_json(_facts(setup, hunt, reported, {"budget": budget, "seed": seed, "method": method}, folder))
     else:
@@ -121,6 +138,7 @@ def _facts(
         "robot": setup.robot.name,
         **asked,
         "runs": hunt.runs,
+        "driven": hunt.driven,
         "interrupted": hunt.interrupted,
         "failures": len(hunt.findings),
         "distinct": len(hunt.distinct),
@@ -133,7 +151,8 @@ def _print(hunt: "Hunt", reported: "list[Reported]", folder: Path, filmed: bool)
     from antdrive.sim.falsify.report import SUITE
 
     ended = "interrupted after" if hunt.interrupted else "after"
-    print_line(f"{ended} {hunt.runs} runs: {len(hunt.findings)} failures, {len(hunt.distinct)} of them different")
+    runs = f"{hunt.runs} runs, {hunt.driven} of them with a path on the grid"
+    print_line(f"{ended} {runs}: {len(hunt.findings)} failures, {len(hunt.distinct)} of them different")
     if reported:
         print_table(
             ("name", "run", "repeats", "obstacles", "failure"),

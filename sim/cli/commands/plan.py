@@ -10,7 +10,7 @@ from antdrive.sim.cli.compiling import compile_once
 from antdrive.sim.cli.console import planning, print_files, print_json, print_line
 from antdrive.sim.cli.exits import FAILED, SUCCEEDED
 from antdrive.sim.cli.output import chosen_margin, in_brackets, plain
-from antdrive.sim.cli.scenario import make_scenario
+from antdrive.sim.cli.scenario import chosen_task, make_scenario
 from antdrive.sim.cli.write import suffixes
 from antdrive.worlds.files.atomic import claimed
 
@@ -28,6 +28,9 @@ def plan(
     seed: options.Seed = 0,
     margin: options.Margin = 0.03,
     cell: options.CellSize = None,
+    task: options.TaskName = None,
+    start: options.Start = None,
+    goal: options.Goal = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", metavar="FOLDER", help="Draw the plan's figures into this folder.")
     ] = None,
@@ -41,7 +44,9 @@ def plan(
     from antdrive.planners import keep_best
     from antdrive.sim.pipeline import plan as make_plan
 
-    scenario = make_scenario(world, planner, settings, robot, seed=seed, margin=margin, cell=cell)
+    scenario = make_scenario(
+        chosen_task(world, task, start, goal), planner, settings, robot, seed=seed, margin=margin, cell=cell
+    )
     compile_once()
     with planning(f"planning with {planner}"), keep_best():
         grid, answer = make_plan(scenario)

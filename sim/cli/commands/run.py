@@ -11,7 +11,7 @@ from antdrive.sim.cli.console import bar, planning, print_json
 from antdrive.sim.cli.exits import FAILED, SUCCEEDED
 from antdrive.sim.cli.output import print_run
 from antdrive.sim.cli.parse import disc
-from antdrive.sim.cli.scenario import among_movers, make_scenario
+from antdrive.sim.cli.scenario import among_movers, chosen_task, make_scenario
 from antdrive.sim.cli.write import (
     check_film,
     check_folder,
@@ -93,6 +93,9 @@ def run(
     seed: options.Seed = 0,
     margin: options.Margin = 0.03,
     cell: options.CellSize = None,
+    task: options.TaskName = None,
+    start: options.Start = None,
+    goal: options.Goal = None,
     smoothing: options.Smoothing = "clearance",
     noise: options.Noise = 0.0,
     unseen: Unseen = None,
@@ -118,7 +121,7 @@ def run(
     knows: dict[str, Any] = {"map": map, "localisation": localisation, "odometry": odometry}
     hidden = tuple(disc(text) for text in unseen or ())
     scenario = make_scenario(
-        world, planner, settings, robot,
+        chosen_task(world, task, start, goal), planner, settings, robot,
         seed=seed, margin=margin, cell=cell, smoothing=smoothing, noise=noise, unseen=hidden, time_limit=time_limit,
         **knows, **among_movers(avoid, replan, sees),
     )  # fmt: skip
@@ -134,11 +137,17 @@ def run(
         print_json(report)
     else:
         print_run(result, files)
-    if gui and result.rollout is not None:
-        from antdrive.sim.view.window import show
-
-        show(result.rollout)
+    if gui:
+        _show(result)
     return SUCCEEDED if result.succeeded else FAILED
+
+
+def _show(result: "Run") -> None:
+    """Replay the drive in a window, if there was one."""
+    from antdrive.sim.view.window import show
+
+    if result.rollout is not None:
+        show(result.rollout)
 
 
 def _write_views(result: "Run", files: dict[str, str], video: Path | None, prelude: float) -> dict[str, Any]:

@@ -10,15 +10,27 @@ from antdrive.sim.cli import options
 from antdrive.sim.cli.compiling import compile_once
 from antdrive.sim.cli.console import print_files, print_json, print_line, working
 from antdrive.sim.cli.exits import FAILED, SUCCEEDED
-from antdrive.sim.cli.write import check_folder, this_command, write_film, write_result, write_run
+from antdrive.sim.cli.write import (
+    check_folder,
+    fingerprint,
+    free_folder,
+    this_command,
+    write_film,
+    write_marker,
+    write_result,
+    write_run,
+)
 from antdrive.worlds.errors import InputError
+from antdrive.worlds.files.atomic import claimed
 
 if TYPE_CHECKING:
     from antdrive.sim.falsify.handover import Handover
     from antdrive.sim.falsify.shrink import Shrunk
+    from antdrive.sim.regression.demands import Bound
     from antdrive.sim.regression.suite import SuiteCase
     from antdrive.sim.scenario import Scenario
 
+MARKER = "shrink.json"  # which failure a folder is of
 While = Annotated[
     str | None,
     typer.Option(
@@ -37,7 +49,10 @@ Jobs = Annotated[int, typer.Option(min=1, max=64, metavar="NUMBER", help="Proces
 
 def shrink(
     failure: Annotated[
-        str, typer.Argument(metavar="ROLLOUT.npz|SUITE::SCENARIO", help="Log of a failed drive, or a test of a suite.")
+        str,
+        typer.Argument(
+            metavar="ROLLOUT|SUITE::SCENARIO", help="Log of a failed drive or its folder, or a test of a suite."
+        ),
     ],
     bound: While = None,
     seconds: Seconds = 60.0,
@@ -49,7 +64,8 @@ def shrink(
 ) -> int:
     """Find the smallest world that still fails.
 
-    It fails in the same way: same outcome, same kind of thing touched, same cause. Leaves out obstacles and movers, noise and
+    It fails in the same way: same outcome, same kind of thing touched, same cause; a test that succeeds but for a bound in its
+    `expect` fails in the same way while it does not keep that. Leaves out obstacles and movers, noise and
     digits, and moves start, goal and walls nearer. Writes the world, a suite with the scenario and how it fails, the log and
     a film. Exit code 0: the result fails in the same way, in another process too.
     """
@@ -59,20 +75,23 @@ def shrink(
     from antdrive.sim.pipeline import run
     from antdrive.sim.regression.checking import RAISED
 
-    crossed = None if bound is None else parse_bound(bound)
     scenario, case = _of_a_test(failure) if "::" in failure else (_of_a_log(failure), None)
+    crossed = parse_bound(bound) if bound is not None else _bound_not_kept(case, scenario)
     name = f"{scenario_name(scenario.task.world.name)}-small"
-    folder = out or Path("out") / name
+    mark = fingerprint(scenario, str(crossed))
+    folder = out or free_folder(Path("out") / name, MARKER, mark)
     check_folder(folder)
     compile_once()
-    with working("shrinking") as progress:
-        journal = folder / "journal.json"
-        shrunk = make_small(scenario, bound=crossed, seconds=seconds, journal=journal, jobs=jobs, progress=progress)
-    note = f"shrunk from {scenario.task.world.name}: {shrunk.summary}"
-    least = named(shrunk.scenario, name, note)
-    small = least if shrunk.failure.outcome == RAISED else run(least)
-    handover = Handover(name, small, crossed, shrunk.failure.sentence, _planner_beside(case, folder))
-    report, repeats = _write(shrunk, handover, folder, film, figures)
+    with claimed(folder):
+        write_marker(folder / MARKER, {"fingerprint": mark, "command": this_command()})
+        with working("shrinking") as progress:
+            journal = folder / "journal.json"
+            shrunk = make_small(scenario, bound=crossed, seconds=seconds, journal=journal, jobs=jobs, progress=progress)
+        note = f"shrunk from {scenario.task.world.name}: {shrunk.summary}"
+        least = named(shrunk.scenario, name, note)
+        small = least if shrunk.failure.outcome == RAISED else run(least)
+        handover = Handover(name, small, crossed, shrunk.failure.sentence, _planner_beside(case, folder))
+        report, repeats = _write(shrunk, handover, folder, film, figures)
     if json:
         print_json(report)
     else:
@@ -92,12 +111,33 @@ def _of_a_test(words: str) -> "tuple[Scenario, SuiteCase]":
     return scenario_of(cases[0], with_chosen_margin), cases[0]
 
 
+def _bound_not_kept(case: "SuiteCase | None", scenario: "Scenario") -> "Bound | None":
+    """What counts as failing where a test's drive is a certified success and does not keep a bound that the test has."""
+    from antdrive.planners import PlannerError
+    from antdrive.sim.log.metrics import METRICS
+    from antdrive.sim.pipeline import run
+
+    if case is None or not case.demands.bounds:
+        return None
+    try:
+        done = run(scenario)
+    except PlannerError:  # the failure itself
+        return None
+    if not done.succeeded or done.rollout is None:
+        return None
+    rollout = done.rollout
+    broken = (bound for bound in case.demands.bounds if not bound.holds(METRICS[bound.metric](rollout)))
+    return next((opposite for bound in broken if (opposite := bound.opposite) is not None), None)
+
+
 def _of_a_log(words: str) -> "Scenario":
     """The scenario of a log, rebuilt from its record."""
     from antdrive.sim.falsify.rebuild import rebuilt
     from antdrive.sim.log.rollout import read_record
     from antdrive.worlds.errors import input_error
 
+    if (log := Path(words) / "rollout.npz").is_file():
+        words = str(log)
     try:
         return rebuilt(read_record(words))
     except InputError as error:

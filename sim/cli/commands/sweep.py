@@ -40,7 +40,7 @@ Planners = Annotated[
         "--planner",
         "-p",
         metavar="NAME",
-        help="Planner, with options such as aco-han:ants=10,50 or aco-han:ants=10..50..20. May be repeated.",
+        help="Planner, or FILE.py:CLASS, with options such as aco-han:ants=10,50 or aco-han:ants=10..50..20. May be repeated.",
     ),
 ]
 Robots = Annotated[
@@ -61,7 +61,12 @@ Margins = Annotated[
     list[str] | None, typer.Option("--margin", metavar="METRES|auto", help="Margin [m]. May be repeated.")
 ]
 Tasks = Annotated[
-    int | None, typer.Option(min=1, metavar="NUMBER", help="Random starts and goals in each world.  [default: its own]")
+    str | None,
+    typer.Option(
+        metavar="NUMBER[:METRES]|named",
+        help="Random starts and goals in each world, at least so many metres apart; or named: those that its file lists.  "
+        "[default: its own]",
+    ),
 ]
 Jobs = Annotated[
     int | None,
@@ -79,7 +84,17 @@ Rollouts = Annotated[
     str | None,
     typer.Option("--keep", metavar="WHICH", help="Logs to keep: none, failed or all.  [default: as the campaign says]"),
 ]
-Retry = Annotated[bool, typer.Option("--retry-crashed", help="Make runs again whose processes died.")]
+Limit = Annotated[
+    float | None,
+    typer.Option("--run-limit", metavar="SECONDS", help="Wall-clock time of a run, after which its process is ended."),
+]
+Retry = Annotated[bool, typer.Option("--retry-crashed", help="Make runs again that crashed.")]
+Again = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="NAME", help="Make runs again of a planner, or with an outcome: planner_fault. May be repeated."
+    ),
+]
 DryRun = Annotated[
     bool, typer.Option("--dry-run", help="Say how many runs there are and how many are missing; run nothing.")
 ]
@@ -101,7 +116,9 @@ def sweep(
     jobs: Jobs = None,
     dask: Dask = None,
     keep: Rollouts = None,
+    run_limit: Limit = None,
     retry_crashed: Retry = False,
+    again: Again = None,
     dry_run: DryRun = False,
     json: Json = False,
 ) -> int:
@@ -112,13 +129,11 @@ def sweep(
     done, whatever came out of them.
     """
     from antdrive.sim.campaigns.expanding import expand
-    from antdrive.sim.campaigns.running import Keep as Kinds
     from antdrive.sim.cli.campaigns import campaign_from
 
     if out is None and not dry_run:
         raise InputError("--out: missing; name the folder for the results")
-    if keep is not None and keep not in get_args(Kinds):
-        raise InputError(f"--keep {keep}: unknown; choose from {', '.join(get_args(Kinds))}")
+    _check(keep, dask, jobs)
     asked = campaign_from(
         campaign,
         worlds=world,
@@ -130,18 +145,31 @@ def sweep(
         noise=noise,
         margin=margin,
         tasks=tasks,
+        run_limit=run_limit,
     )
     expansion = expand(asked)
     if dry_run:
-        return _say_size(expansion, out, json)
+        return _say_size(expansion, out, json, retry_crashed=retry_crashed, again=again or ())
     assert out is not None
-    kept = cast("Keep | None", keep)
-    results = _run(asked, expansion, out, jobs=jobs, dask=dask, keep=kept, retry_crashed=retry_crashed)
+    options: dict[str, Any] = {"retry_crashed": retry_crashed, "again": again or ()}
+    results = _run(asked, expansion, out, jobs=jobs, dask=dask, keep=cast("Keep | None", keep), **options)
+    for note in results.notes:
+        print_error(note)
     if json:
         print_json(_facts(results))
     else:
         _print(results)
     return SUCCEEDED
+
+
+def _check(keep: str | None, dask: str | None, jobs: int | None) -> None:
+    """Refuse options that mean nothing."""
+    from antdrive.sim.campaigns.running import Keep as Kinds
+
+    if keep is not None and keep not in get_args(Kinds):
+        raise InputError(f"--keep {keep}: unknown; choose from {', '.join(get_args(Kinds))}")
+    if dask is not None and jobs is not None:
+        raise InputError("--jobs: has no effect with --dask; write --dask local:N for N processes, or leave it out")
 
 
 def _run(asked: "Campaign", expansion: "Expansion", out: Path, **options: Any) -> "SweepResults":
@@ -159,23 +187,32 @@ def _resumable(folder: Path) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        command = shlex.join(["antdrive", *sys.argv[1:]])
+        command = shlex.join(["antdrive", *_without_again(sys.argv[1:])])
         print_error(f"{folder}: what is done is kept; go on with: {command}")
         raise
 
 
-def _say_size(expansion: "Expansion", out: Path | None, json: bool) -> int:
-    from antdrive.sim.campaigns.store import done_in
+def _without_again(words: list[str]) -> Iterator[str]:
+    """The words of a command without --again: what it made again is not to be made a third time."""
+    rest = iter(words)
+    for word in rest:
+        if word == "--again":
+            next(rest, None)
+        elif not word.startswith("--again="):
+            yield word
 
-    done = done_in(out) if out is not None else set()
-    missing = sum(job.key not in done for job in expansion.jobs)
+
+def _say_size(expansion: "Expansion", out: Path | None, json: bool, **asked: Any) -> int:
+    from antdrive.sim.campaigns.missing import missing_runs
+
+    missing = len(expansion.jobs) if out is None else len(missing_runs(expansion.jobs, out, **asked).jobs)
     facts: dict[str, Any] = {
         "runs": len(expansion.jobs), "missing": missing, "duplicates": expansion.duplicates, "counts": expansion.counts
     }  # fmt: skip
     if json:
         print_json(facts)
         return SUCCEEDED
-    print_line(" x ".join(f"{count} {name}" for name, count in expansion.counts.items()))
+    print_line(" x ".join(f"{count} {name if count != 1 else _one(name)}" for name, count in expansion.counts.items()))
     more = (
         f"; {expansion.duplicates} combinations that mean the same as others are left out"
         if expansion.duplicates
@@ -183,6 +220,11 @@ def _say_size(expansion: "Expansion", out: Path | None, json: bool) -> int:
     )
     print_line(f"{len(expansion.jobs)} runs, {missing} of them missing{more}")
     return SUCCEEDED
+
+
+def _one(name: str) -> str:
+    """The singular of what is counted."""
+    return name if " " in name or name == "settings" else name.removesuffix("s")
 
 
 def _facts(results: "SweepResults") -> dict[str, Any]:

@@ -60,7 +60,7 @@ def campaign_charts(summary: CampaignSummary, styles: Sequence[LabelStyle]) -> l
         styles: of the planners
     """
     paired = summary.paired
-    whole = paired.present.all(axis=1)
+    whole = paired.counted(*range(len(paired.planners)))
     charts = []
     if whole.any() and len(paired.planners) > 1:
         for name in known_metrics(paired, PROFILED):
@@ -70,7 +70,7 @@ def campaign_charts(summary: CampaignSummary, styles: Sequence[LabelStyle]) -> l
     if whole.any():
         for name in known_metrics(paired, DISTRIBUTED):
             charts.append(_distribution(name, distributions(paired.values(name)[whole]), int(whole.sum()), styles))
-    common = np.asarray(paired.success.all(axis=1))
+    common = np.asarray(paired.success.all(axis=1)) & whole
     if common.any():
         charts += [
             chart for name in known_metrics(paired, BOXED) for chart in _size_boxes(paired, name, common, styles)
@@ -86,8 +86,8 @@ def _profile(name: str, curves: Sequence[StepCurve], count: int, styles: Sequenc
         axes.set(xlabel=f"{_plain(name)}: times the best planner's", ylabel="share of instances")
 
     note = (
-        f"The share of {count} instances (world, task, settings, seed) that a planner solves at no more than x times the "
-        "least value that any planner reached there. Failures stay below. Higher is better."
+        f"The share of {count} instances (world, task, settings, seed; repetitions once) that a planner solves at no more "
+        "than x times the least value that any planner reached there. Failures stay below. Higher is better."
     )
     return Chart(f"Performance profile: {_plain(name)}", note, _drawn(draw, styles))
 
@@ -189,7 +189,7 @@ def _boxes_of_option(
     paired: PairedRuns, planner: str, column: str, mine: list[int], values: list[str], styles: Sequence[LabelStyle]
 ) -> list[Chart]:
     option = column.removeprefix("option.")
-    common = paired.success[:, mine].all(axis=1)
+    common = paired.success[:, mine].all(axis=1) & paired.counted(*mine)
     charts = []
     for name in known_metrics(paired, BOXED):
         found = [paired.values(name)[common, k] for k in mine]

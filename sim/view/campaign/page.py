@@ -13,7 +13,16 @@ from typing import Any
 from urllib.parse import quote
 
 from antdrive.sim.log.metrics import METRICS
-from antdrive.sim.view.campaign.cells import TextTable, pair_cells, percent, percents, success_cells, success_note
+from antdrive.sim.view.campaign.cells import (
+    WORDS,
+    TextTable,
+    all_cells,
+    allowance_cells,
+    pair_cells,
+    success_cells,
+    success_note,
+)
+from antdrive.sim.view.campaign.headline import headline
 from antdrive.sim.view.campaign.summary import CampaignSummary, measure_title
 from antdrive.worlds.errors import InputError
 from antdrive.worlds.files.atomic import written_whole
@@ -54,10 +63,6 @@ def check_suffix(out: Path) -> None:
         raise InputError(f"{out}: unknown suffix {out.suffix!r}; choose one of {', '.join(WRITERS)}")
 
 
-def _tables(summary: CampaignSummary) -> list[TextTable]:
-    return [success_cells(summary), *(pair_cells(name, rows) for name, rows in summary.comparisons.items())]
-
-
 def _written(out: Path, text: str) -> list[Path]:
     with written_whole(out) as temporary:
         temporary.write_text(text, encoding="utf-8")
@@ -70,13 +75,15 @@ def _write_csv(summary: CampaignSummary, folder: Path, out: Path) -> list[Path]:
     with written_whole(out) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
         medians = [f"{name}{end}" for name in names for end in ("_median", "_low", "_high")]
-        writer.writerow(
-            ["planner", "runs", "counted", "succeeded", "share", "low", "high", "worlds_low", "worlds_high", *medians]
-        )
+        outcomes = sorted({name for row in summary.success for name in row.outcomes})
+        counts = ["planner", "runs", "elsewhere", "counted", "succeeded"]
+        shares = ["share", "low", "high", "worlds_low", "worlds_high"]
+        writer.writerow([*counts, *shares, *medians, *(f"outcome.{name}" for name in outcomes)])
         for k, row in enumerate(summary.success):
             found = [value for name in names for value in (summary.medians[name][k][0], *summary.medians[name][k][1])]
-            counts = [row.planner, row.runs, row.counted, row.successes]
-            writer.writerow(_plain([*counts, row.share, *row.interval, *row.over_worlds, *found]))
+            counted = [row.planner, row.runs, row.elsewhere, row.counted, row.successes]
+            ended = [row.outcomes.get(name, 0) for name in outcomes]
+            writer.writerow(_plain([*counted, row.share, *row.interval, *row.over_worlds, *found, *ended]))
     rows = [row for comparisons in summary.comparisons.values() for row in comparisons]
     if not rows:
         return [out]
@@ -97,7 +104,7 @@ def _plain(values: Sequence[Any]) -> list[Any]:
 
 def _write_latex(summary: CampaignSummary, folder: Path, out: Path) -> list[Path]:
     lines = ["% antdrive report; needs \\usepackage{booktabs} and, for long tables, \\usepackage{longtable}"]
-    for table in _tables(summary):
+    for table in all_cells(summary):
         lines += ["", f"% {latex_text(table.title)}", *_latex_table(table)]
     lines += ["", *(f"% {latex_text(note)}" for note in summary.notes)]
     return _written(out, "\n".join(lines).rstrip() + "\n")
@@ -107,8 +114,7 @@ def _latex_table(table: TextTable) -> list[str]:
     def line(cells: Sequence[str]) -> str:
         return " & ".join(latex_text(cell) for cell in cells) + r" \\"
 
-    words = {"planner", "first", "second", "better"}
-    align = "".join("l" if heading in words else "r" for heading in table.headings)
+    align = "".join("l" if heading in WORDS else "r" for heading in table.headings)
     environment = "longtable" if len(table.rows) > LATEX_PAGE else "tabular"
     head = [f"\\begin{{{environment}}}{{{align}}}", r"\toprule", line(table.headings), r"\midrule"]
     if environment == "longtable":
@@ -139,7 +145,12 @@ def _write_markdown(summary: CampaignSummary, folder: Path, out: Path) -> list[P
         for k in failures[:MARKDOWN_FAILURES]
     ]
     text = environment.get_template("campaign.md.j2").render(
-        **_common(summary), tables=_tables(summary), most=MARKDOWN_ROWS, failures=listed, failed=len(failures)
+        **_common(summary),
+        tables=all_cells(summary),
+        words=WORDS,
+        most=MARKDOWN_ROWS,
+        failures=listed,
+        failed=len(failures),
     )
     return _written(out, text)
 
@@ -153,7 +164,6 @@ def _write_page(summary: CampaignSummary, folder: Path, out: Path) -> list[Path]
     planners = summary.paired.planners
     styles = label_styles(planners, [names[label] or label for label in planners])
     base = quote(Path(os.path.relpath(folder.resolve(), out.resolve().parent)).as_posix()) + "/"
-    rows = summary.paired.row[summary.paired.row >= 0]
     text = (
         _environment()
         .get_template("campaign.html.j2")
@@ -166,21 +176,14 @@ def _write_page(summary: CampaignSummary, folder: Path, out: Path) -> list[Path]
             success_headings=success_cells(summary).headings,
             success_note=success_note,
             pairs=[(name, pair_cells(name, found)) for name, found in summary.comparisons.items()],
+            allowances=allowance_cells(summary) if summary.allowances else None,
             measure_title=measure_title,
+            words=WORDS,
             charts=campaign_charts(summary, styles),
-            data=page_data(_taken(summary, rows.tolist()), planners, base),
+            data=page_data(summary.table, planners, base),
         )
     )
     return _written(out, text)
-
-
-def _taken(summary: CampaignSummary, rows: Sequence[int]) -> Any:
-    """The runs of the planners that are looked at, in the order of the table."""
-    table = summary.table
-    if len(rows) == len(table):
-        return table
-    order = sorted(rows)
-    return type(table)({name: [values[k] for k in order] for name, values in table.columns.items()})
 
 
 def _common(summary: CampaignSummary) -> dict[str, Any]:
@@ -188,28 +191,10 @@ def _common(summary: CampaignSummary) -> dict[str, Any]:
         "title": summary.title,
         "version": metadata.version("antdrive"),
         "summary": summary,
-        "cards": _cards(summary),
+        "cards": headline(summary),
         "notes": summary.notes,
         "definitions": {name: METRICS[name].definition for name in summary.comparisons if name in METRICS},
     }
-
-
-def _cards(summary: CampaignSummary) -> list[tuple[str, str]]:
-    """The headline numbers, each with its meaning."""
-    best = max(summary.success, key=lambda row: (row.interval.low, row.share))
-    table, paired = summary.table, summary.paired
-    runs = sum(row.runs for row in summary.success)
-    done = f"{runs:,}" if len(table) >= summary.size or runs < len(table) else f"{runs:,} of {summary.size:,}"
-    seeds = len(set(table.texts("seed")))
-    died = sum(row.outcomes.get("crashed", 0) + row.outcomes.get("planner_fault", 0) for row in summary.success)
-    return [
-        (done, "runs"),
-        (str(len(paired.planners)), "planner" if len(paired.planners) == 1 else "planners"),
-        (str(len(paired.worlds)), "world" if len(paired.worlds) == 1 else "worlds"),
-        (str(seeds), "seed" if seeds == 1 else "seeds"),
-        (f"{percent(best.share)} %", f"succeeded with {best.planner} (95 %: {percents(best.interval)})"),
-        *([(str(died), "ended by a crash or a planner's error")] if died else []),
-    ]
 
 
 def _environment() -> Any:

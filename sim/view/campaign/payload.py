@@ -9,17 +9,18 @@ from typing import Any
 
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.statistics.columns import HASHES
 from antdrive.sim.statistics.runs import RunTable
 from antdrive.sim.view.campaign.summary import measure_title
 
-#: The columns of the page's table, if they are in the campaign's: those after the first row only where they differ.
+#: The columns of the page's table, if they are in the campaign's; a task and settings stand between them where they differ.
 SHOWN = ("world", "planner", "outcome", "seed")
-WHERE_DIFFERENT = ("task", "robot", "smoothing", "noise", "margin", "cell")
 MEASURED = ("plan_length_m", "driven_length_m", "duration_s", "min_clearance_m", "plan_s")
 SENTENCES = {
     **{outcome.key: outcome.value for outcome in Outcome},
     "crashed": "the process of the run died",
     "planner_fault": "the planner raised an error",
+    "too_slow": "the run took longer than the campaign allows",
 }
 SIGNIFICANT = 6  # digits of numbers in the page
 
@@ -35,7 +36,8 @@ def page_data(table: RunTable, planners: Sequence[str], base: str) -> str:
     columns = [_column(name, table.columns[name]) for name in table.columns if name != "command"]
     columns.append({"name": "command", **_commands(table)})
     kept = [column for column in columns if column is not None]
-    different = [name for name in WHERE_DIFFERENT if len(set(table.columns.get(name, [None]))) > 1]
+    axes = [name for name in ("folder", "task", *table.settings) if name not in HASHES]
+    different = [name for name in axes if len(set(table.columns.get(name, [None]))) > 1]
     options = [name for name in table.columns if name.startswith("option.")]
     order = (*SHOWN[:2], *different, *options, *SHOWN[2:], *MEASURED)
     names = {column["name"] for column in kept}

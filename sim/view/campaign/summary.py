@@ -4,28 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
 from antdrive.sim.log.metrics import METRICS
-from antdrive.sim.statistics.comparison import (
-    SUCCESS,
-    PairedComparison,
-    PlannerSuccess,
-    common_medians,
-    compare_metric,
-    compare_success,
-    pairs_of,
-    success_table,
-)
+from antdrive.sim.statistics.comparison import SUCCESS, PairedComparison, compare_metric, compare_success, pairs_of
+from antdrive.sim.statistics.noninferiority import NonInferiority, not_worse
 from antdrive.sim.statistics.pairing import PairedRuns
 from antdrive.sim.statistics.proportions import Interval
 from antdrive.sim.statistics.runs import RunTable
+from antdrive.sim.statistics.success import PlannerSuccess, common_medians, success_table
+from antdrive.sim.view.campaign.headline import notes_on
 from antdrive.worlds.errors import FieldError
 
 DEFAULT_METRICS = ("driven_length_m", "duration_s", "plan_s")
 TITLES = {"plan_s": "planning time", "drive_wall_s": "wall time of the drive", "path_length_m": "planned length"}
-SETTINGS = ("robot", "smoothing", "noise", "margin", "cell")  # over which shares are taken, if there are several
 UNITS = ("_rad_per_m", "_m", "_s")  # that the names of metrics end with
 
 
@@ -36,12 +30,13 @@ class CampaignSummary:
     Attributes:
         title: of the page
         paired: the runs, by instance and planner
-        size: how many runs the campaign has; fewer may be done
+        size: how many runs of these planners the campaign has; fewer may be done
         success: a row for each planner
         comparisons: by measure, "success" first, a row for each pair of planners; empty with one planner
         common: number of instances in which every planner succeeded
         medians: by metric, the median of each planner over those instances, with its interval
         refusal: why planners are not compared; empty where they are
+        allowances: whether planners are not worse than one of them by more than was allowed; empty where that is not asked
     """
 
     title: str
@@ -52,6 +47,7 @@ class CampaignSummary:
     common: int
     medians: Mapping[str, Sequence[tuple[float, Interval]]]
     refusal: str = ""
+    allowances: Sequence[NonInferiority] = ()
 
     @property
     def table(self) -> RunTable:
@@ -61,33 +57,7 @@ class CampaignSummary:
     @property
     def notes(self) -> list[str]:
         """What a reader of the tables must know about this campaign, a sentence each."""
-        still = [p for p, row in zip(self.paired.planners, self.success, strict=True) if row.counted < row.runs]
-        worlds = len(self.paired.worlds)
-        found: list[str] = []
-        if len(self.table) < self.size:
-            found.append(f"{self.size - len(self.table)} of {self.size} runs are not done yet.")
-        worlds_of = self.table.texts("world")
-        for name in SETTINGS:
-            values = list(
-                dict.fromkeys(f"{v:g}" if isinstance(v, float) else str(v) for v in self.table.columns.get(name, ()))
-            )
-            if len(set(zip(worlds_of, self.table.texts(name), strict=True))) > worlds:  # not only from world to world
-                some = ", ".join(values[:5]) + (", …" if len(values) > 5 else "")
-                found.append(
-                    f"Shares and medians are over several values of {name} ({some}); --where {name}={values[0]} takes one."
-                )
-        if still:
-            found.append(
-                f"Drives of {', '.join(still)} repeat with other seeds. Repetitions count once, except in pairs with a "
-                "planner whose drives the seed changes."
-            )
-        if worlds == 1:
-            found.append("There is one world: the intervals and tests say nothing about other worlds.")
-        elif worlds < 6:
-            found.append(f"{worlds} worlds are too few for a test over worlds: its p-value cannot be below 0.05.")
-        if self.refusal:
-            found.append(f"Planners are not compared: {self.refusal}.")
-        return found
+        return notes_on(self)
 
 
 def summarise(
@@ -98,6 +68,7 @@ def summarise(
     metrics: Sequence[str] | None = None,
     against: str | None = None,
     planners: Sequence[str] = (),
+    allow: Mapping[str, float] = MappingProxyType({}),
     strict: bool = False,
 ) -> CampaignSummary:
     """Compute a campaign's tables.
@@ -105,18 +76,20 @@ def summarise(
     Args:
         table: the runs that are done
         title: of the page
-        size: how many runs the campaign has
+        size: how many runs of these planners the campaign has; as many as are done without
         metrics: to compare besides success; `DEFAULT_METRICS` without
         against: the planner that each other one is compared with; every pair without
         planners: labels of those to look at; all without
+        allow: by how much a planner may be worse than `against` and still count as not worse, by measure
         strict: refuse where no two planners can be compared, instead of saying so in the summary
 
     Raises:
         FieldError: an unknown planner or metric, no runs, or nothing to compare.
     """
-    paired = PairedRuns.of(table)
+    paired = PairedRuns.of(table.of_planners(planners) if planners else table)
     if planners:
         paired = paired.select(planners)
+    table = paired.table
     chosen = list(metrics) if metrics is not None else known_metrics(paired, DEFAULT_METRICS)
     for name in chosen:
         if name not in METRICS:
@@ -135,7 +108,20 @@ def summarise(
             comparisons[name] = compare_metric(paired, pairs, name, METRICS[name].better)
     common, medians = common_medians(paired, chosen)
     rows = success_table(paired)
-    return CampaignSummary(title, paired, size or len(table), rows, comparisons, common, medians, refusal)
+    allowances = _allowances(paired, against, allow)
+    return CampaignSummary(title, paired, size or len(table), rows, comparisons, common, medians, refusal, allowances)
+
+
+def _allowances(paired: PairedRuns, against: str | None, allow: Mapping[str, float]) -> list[NonInferiority]:
+    if allow and against is None:
+        raise FieldError("allow", "needs a planner to compare with (against)")
+    found = []
+    for name, allowed in allow.items():
+        if name != SUCCESS and name not in METRICS:
+            raise FieldError("allow", f"unknown {name!r}; choose from {', '.join([SUCCESS, *METRICS])}")
+        better = "higher" if name == SUCCESS else METRICS[name].better
+        found += not_worse(paired, against or "", name, allowed, better)
+    return found
 
 
 def known_metrics(paired: PairedRuns, names: Sequence[str]) -> list[str]:

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
-from matplotlib.collections import LineCollection, PatchCollection
+from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.patches import Circle, Patch, Polygon, Rectangle
+from matplotlib.path import Path
 
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.view.scene import Scene, contact_point
@@ -57,23 +58,22 @@ def draw_map(axes: Any, scene: Scene, *, floor: bool = True) -> None:
     known = scene.obstacles[~scene.unseen]
     if scene.has_zones:
         # One opaque layer: where zones overlap, transparent ones would look darker.
-        zones = [Circle((x, y), r + scene.inflate) for x, y, r, _ in known]
+        zones = _circles(known[:, :2], known[:, 2] + scene.inflate)
         i = scene.inflate
         zones_walls = [
-            Rectangle((x0, y0), i, y1 - y0),
-            Rectangle((x1 - i, y0), i, y1 - y0),
-            Rectangle((x0, y0), x1 - x0, i),
-            Rectangle((x0, y1 - i), x1 - x0, i),
+            _corners(*corners)
+            for corners in ((x0, y0, x0 + i, y1), (x1 - i, y0, x1, y1), (x0, y0, x1, y0 + i), (x0, y1 - i, x1, y1))
         ]
         pale = tuple(1 - 0.22 * (1 - channel / 255) for channel in ZONE)
-        layer = PatchCollection([*zones, *zones_walls], facecolor=pale, edgecolor="none", zorder=1.2)
+        layer = PathCollection([*zones, *zones_walls], facecolor=pale, edgecolor="none", zorder=1.2)
         if not floor:
             layer.set(facecolor="none", edgecolor=hexed(ZONE), linewidth=0.6, alpha=0.8)
         axes.add_collection(layer)
         layer.set_clip_path(inside)
     for chosen, colour in ((known, OBSTACLE), (scene.obstacles[scene.unseen], UNSEEN)):
-        discs = [Circle((x, y), r) for x, y, r, _ in chosen]
-        bodies = PatchCollection(discs, facecolor=hexed(colour), edgecolor="white", linewidth=0.4, zorder=3)
+        bodies = PathCollection(
+            _circles(chosen[:, :2], chosen[:, 2]), facecolor=hexed(colour), edgecolor="white", linewidth=0.4, zorder=3
+        )
         axes.add_collection(bodies)
         bodies.set_clip_path(inside)
     for piece in scene.tracks:
@@ -88,12 +88,24 @@ def draw_map(axes: Any, scene: Scene, *, floor: bool = True) -> None:
     _draw_robot(axes, scene, scene.start, START, 4.0)
 
 
+def _circles(centres: Floats, radii: Floats) -> list[Path]:
+    """Circles as paths; matplotlib's own circles take ten times as long, which counts in worlds of thousands."""
+    unit = Path.unit_circle()
+    points, codes = np.asarray(unit.vertices), unit.codes
+    return [Path(points * r + centre, codes) for centre, r in zip(centres, radii.tolist(), strict=True)]
+
+
+def _corners(x0: float, y0: float, x1: float, y1: float) -> Path:
+    """A rectangle as a path."""
+    return Path([(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)], closed=True)
+
+
 def _draw_robot(axes: Any, scene: Scene, pose: tuple[float, float, float], colour: Any, zorder: float) -> None:
     """Draw the footprint's outline at a pose, with a line from its centre along the heading."""
     x, y, yaw = pose
     foot = scene.robot.footprint
     turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
-    ahead = turn @ [foot.half_length + foot.rounding, 0.0]
+    ahead = turn @ [foot.reach(0.0) if foot.corners else foot.half_length + foot.rounding, 0.0]
     style: dict[str, Any] = {
         "fill": True,
         "fc": (1, 1, 1, 0.55),
@@ -104,9 +116,7 @@ def _draw_robot(axes: Any, scene: Scene, pose: tuple[float, float, float], colou
     if foot.is_disc:
         axes.add_patch(Circle((x, y), foot.rounding, **style))
     else:
-        a, b = foot.half_length + foot.rounding, foot.half_width + foot.rounding
-        corners = np.array([(a, b), (-a, b), (-a, -b), (a, -b)]) @ turn.T + [x, y]
-        axes.add_patch(Polygon(corners, **style))
+        axes.add_patch(Polygon(np.array(foot.outline()) @ turn.T + [x, y], **style))
     axes.plot([x, x + ahead[0]], [y, y + ahead[1]], color=hexed(colour), lw=1.3, zorder=zorder)
 
 

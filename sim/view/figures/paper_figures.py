@@ -16,7 +16,7 @@ from antdrive.sim.view.figures.canvas import checked, finished, new_figure, styl
 from antdrive.sim.view.style import INK, MUTED, hexed, planner_style
 
 if TYPE_CHECKING:
-    from antdrive.planners.plan import History
+    from antdrive.planners.plan import History, PlanResult, Query
 
 Floats = npt.NDArray[np.float64]
 
@@ -80,6 +80,52 @@ def history_figure(
         axes.set(xlabel="iteration", ylabel=f"best path so far [{unit}]")
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.legend(loc="upper right")
+        return finished(figure, target, dpi)
+
+
+def maps_figure(
+    paths: Mapping[str, tuple[Query, Mapping[str, PlanResult]]], path: str | Path | None = None, *, dpi: float = 160
+) -> Figure:
+    """Draw paths on maps as the papers do: blocked cells black, the start a red square, the goal a blue one.
+
+    Args:
+        paths: by title, a map and the plans on it by planner; the first is drawn in blue, the second in red, further
+            ones in the planners' own colours
+        path: the file to write; its suffix chooses PNG, PDF or SVG; None: no file
+        dpi: pixels per inch
+
+    Returns:
+        The figure, which may be labelled and saved; `panels` gives its axes by name.
+
+    Raises:
+        InputError: a suffix that is none of .png, .pdf, .svg.
+    """
+    target = checked(path)
+    with styled():
+        across = min(len(paths), 3)
+        down = -(-len(paths) // across)
+        figure = new_figure(3.3 * across, 4.1 * down)
+        layout: Any = figure.get_layout_engine()
+        layout.set(h_pad=0.16, hspace=0.06)  # room for titles above and legends below the maps
+        for k, (title, (query, plans)) in enumerate(paths.items()):
+            axes: Any = figure.add_subplot(down, across, k + 1, label=title)
+            axes.imshow(query.grid.free, cmap="gray", origin="lower", vmin=0, vmax=1, interpolation="nearest")
+            for number, (name, plan) in enumerate(plans.items()):
+                colour = ("#1f4fd8", "#d81f1f", hexed(planner_style(name)[0]))[min(number, 2)]
+                if plan.solved:
+                    length = f"{name}: {plan.line_length:.2f}"
+                    line = (
+                        query.grid.fractional(query.grid.xy(plan.cells)) if plan.waypoints is None else plan.waypoints
+                    )
+                    axes.plot(line[:, 1], line[:, 0], color=colour, lw=1.6, label=length)
+                else:
+                    axes.plot([], [], color=colour, lw=1.6, label=f"{name}: no path")
+            for cell, colour in ((query.start, "#d81f1f"), (query.goal, "#1f4fd8")):
+                axes.plot(cell[1], cell[0], "s", ms=6, color=colour, clip_on=False, zorder=4)
+            axes.set_title(title)
+            axes.set(xticks=[], yticks=[])
+            axes.grid(False)
+            axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.01), ncols=1)
         return finished(figure, target, dpi)
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -47,6 +47,7 @@ Picture = npt.NDArray[np.uint8]  # (H, W, 3)
 
 HIDDEN_OPACITY = 0.16  # of a robot behind a cylinder, so that it is never lost
 SHADOW_BLUR = 0.05  # softness of the shadow of a flat body [m]
+MANY, FEW_SIDES = 1000, 12  # in worlds of more cylinders, which look small, each is drawn with few sides
 FORECAST = 1.5  # how far ahead the motion of movers is drawn [s]
 
 
@@ -305,8 +306,14 @@ class Compositor:
     def _draw_shadows(self, frame: Picture, pose: Floats, movers: Floats) -> None:
         """Draw the soft shadows of robot and movers, and a glow under a robot that is small in the picture."""
         tall, foot = robot_height(self.scene.robot), self.scene.robot.footprint
-        shape = np.array([foot.half_length, foot.half_width, foot.rounding])
-        self._draw_shadow(frame, pose, shape, tall, SHADOW_BLUR + 0.3 * tall)
+        shape, place = np.array([foot.half_length, foot.half_width, foot.rounding]), pose
+        if foot.corners:  # the shadow of the rectangle around it
+            xmin, ymin, xmax, ymax = foot.bounds
+            x, y, turn = (xmin + xmax) / 2, (ymin + ymax) / 2, np.exp(1j * pose[2])
+            off = (x + 1j * y) * turn
+            place = np.array([pose[0] + off.real, pose[1] + off.imag, pose[2]])
+            shape = np.array([(xmax - xmin) / 2 - foot.rounding, (ymax - ymin) / 2 - foot.rounding, foot.rounding])
+        self._draw_shadow(frame, place, shape, tall, SHADOW_BLUR + 0.3 * tall)
         wide = round(2 * foot.radius / self.camera.pixel)
         if wide < 0.05 * frame.shape[1]:
             px, py = self.pixel(pose[0], pose[1], tall / 2)
@@ -382,8 +389,14 @@ def still_meshes(scene: Scene, tall: Floats) -> list[tuple[Mesh, Colour]]:
     """Everything that stands still as coloured meshes: the kerb in pieces, and cylinders of heights `tall` (N,) [m]."""
     width = kerb_width(scene)
     found = [(mesh, KERB) for mesh in kerb(scene.bounds, width, 0.8 * width)]
+    many = len(scene.obstacles) > MANY
+    rough = cylinder(1.0, 0.0, 1.0, sides=FEW_SIDES)
     for (x, y, radius, _), z, unseen in zip(scene.obstacles, tall, scene.unseen, strict=True):
-        found.append((cylinder(radius, 0.0, float(z), x=x, y=y), UNSEEN if unseen else OBSTACLE))
+        if many:
+            mesh = replace(rough, vertices=rough.vertices * (radius, radius, z) + (x, y, 0.0))
+        else:
+            mesh = cylinder(radius, 0.0, float(z), x=x, y=y)
+        found.append((mesh, UNSEEN if unseen else OBSTACLE))
     return found
 
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
+from antdrive.robots.spec import Footprint
 from antdrive.sim.view.scene import Body
 from antdrive.sim.view.style import SHELL, TURRET, WHITE, Colour
+from antdrive.worlds.types import Point
 
 Floats = npt.NDArray[np.float64]
 
@@ -127,36 +130,51 @@ def robot_parts(body: Body) -> tuple[Part, ...]:
     turn in wells.
     """
     foot, r = body.footprint, body.wheel_radius
-    length, width = foot.half_length + foot.rounding, foot.half_width + foot.rounding
+    xmin, ymin, xmax, ymax = foot.bounds
+    length, width, middle_x, middle_y = (xmax - xmin) / 2, (ymax - ymin) / 2, (xmin + xmax) / 2, (ymin + ymax) / 2
     size = min(length, width)
-    outline = _outline(foot.half_length, foot.half_width, foot.rounding)
+    outline = _outline(foot)
     half_track = body.track / 2
-    outside = math.sqrt(max(width**2 - r**2, 0.0)) if foot.is_disc else width
+    edge_y = half_track + foot.depth(0.0, half_track) if foot.corners else width
+    outside = math.sqrt(max(width**2 - r**2, 0.0)) if foot.is_disc else edge_y
     tread = float(np.clip(2 * (outside - half_track), 0.35 * r, 0.9 * r))
     well_x, well_y = 1.12 * r, half_track - 0.62 * tread
     floor = 0.35 * r
     deck = max(min(1.45 * r, 0.8 * robot_height(body)), floor + 0.3 * r)
     edge = 0.12 * (deck - floor)
     roof = max(robot_height(body), deck + 0.2 * r)
-    front, rear = _cut(outline, 0, well_x), _cut(outline, 0, -well_x, keep_low=True)
-    middle = np.array([(-well_x, -well_y), (well_x, -well_y), (well_x, well_y), (-well_x, well_y)])
+    ahead, behind = min(well_x, 0.98 * xmax), max(-well_x, 0.98 * xmin)
+    front, rear = _cut(outline, 0, ahead), _cut(outline, 0, behind, keep_low=True)
+    middle = np.array([(behind, -well_y), (ahead, -well_y), (ahead, well_y), (behind, well_y)])
     shell = [prism(front, floor, deck, chamfer=edge), prism(rear, floor, deck, chamfer=edge)]
     shell.append(prism(middle, floor, deck))
-    back = -0.08 * length
-    turret = prism(outline * (0.60 if foot.is_disc else 0.66) + [back, 0.0], deck, roof, chamfer=0.05 * size)
-    arrow = join(*_arrow(back, 0.50 * size, roof, 0.012 * size))
-    lamps = join(
-        *(
-            box(0.80 * length, side - 0.08 * size, 0.90 * length, side + 0.08 * size, deck, deck + 0.05 * size)
-            for side in (-0.26 * width, 0.26 * width)
-        )
-    )
-    parts = [Part(join(*shell), SHELL), Part(turret, TURRET), Part(join(arrow, lamps), WHITE)]
+    back, core = middle_x - 0.08 * length, np.array([middle_x, middle_y])
+    smaller = (outline - core) * (0.60 if foot.is_disc else 0.66) + [back, middle_y]
+    turret = prism(smaller, deck, roof, chamfer=0.05 * size)
+    arrow = [
+        replace(part, vertices=part.vertices + [0, middle_y, 0])
+        for part in _arrow(back, 0.50 * size, roof, 0.012 * size)
+    ]
+    lamps = _lamps(foot, (middle_x, middle_y), (length, width), deck)
+    parts = [Part(join(*shell), SHELL), Part(turret, TURRET), Part(join(*arrow, *lamps), WHITE)]
     for side in (1, -1):
         axle = (0.0, side * half_track, r)
         tyre, marks = _wheel(r, tread, side)
         parts += [Part(tyre, (30, 34, 42), side, axle), Part(marks, (236, 238, 242), side, axle)]
     return tuple(parts)
+
+
+def _lamps(foot: Footprint, middle: Point, half: Point, deck: float) -> list[Mesh]:
+    """Two lamps on the deck in front, closer together or farther back where the front is narrow; none where it is pointed."""
+    (x, y), (length, width), size = middle, half, min(half)
+    for ahead, apart in itertools.product((0.90, 0.75, 0.6), (0.26, 0.18, 0.1)):
+        front, aside, wide = ahead * length, apart * width, 0.08 * size
+        if all(foot.depth(x + front, y + side * (aside + wide)) >= 0 for side in (-1, 1)):
+            return [
+                box(x + front - 0.1 * length, y + s - wide, x + front, y + s + wide, deck, deck + 0.05 * size)
+                for s in (-aside, aside)
+            ]
+    return []
 
 
 def _wheel(radius: float, tread: float, side: int) -> tuple[Mesh, Mesh]:
@@ -204,13 +222,16 @@ def _arrow(x: float, reach: float, low: float, thin: float) -> list[Mesh]:
     ]
 
 
-def _outline(half_length: float, half_width: float, rounding: float, *, steps: int = 16) -> Floats:
-    """A rounded rectangle (K, 2), counter-clockwise."""
-    corner = max(rounding, 0.0)
+def _outline(foot: Footprint, *, steps: int = 16) -> Floats:
+    """A footprint's outline (K, 2), counter-clockwise."""
+    if foot.corners:
+        return np.array(foot.outline(steps))
+    corner = max(foot.rounding, 0.0)
     points = []
     for k, (sx, sy) in enumerate(((1, 1), (-1, 1), (-1, -1), (1, -1))):
+        x, y = sx * foot.half_length, sy * foot.half_width
         for angle in np.linspace(k * math.pi / 2, (k + 1) * math.pi / 2, steps if corner > 0 else 1, endpoint=False):
-            points.append((sx * half_length + corner * math.cos(angle), sy * half_width + corner * math.sin(angle)))
+            points.append((x + corner * math.cos(angle), y + corner * math.sin(angle)))
     return np.array(points)
 
 

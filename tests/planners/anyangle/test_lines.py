@@ -138,6 +138,23 @@ def test_cells_pass_obstacles_on_the_same_side_as_the_line() -> None:
         assert {int(r) for r, c in along if c == 10} <= set(range(int(row) - 1, int(row) + 2))
 
 
+@given(st.lists(st.tuples(st.integers(0, 11), st.integers(0, 15)), min_size=1, max_size=6))
+def test_cells_are_as_long_as_a_line_with_loops(via: list[tuple[int, int]]) -> None:
+    query = Query(Grid.from_free(np.ones((12, 16)), cell=0.5), (1, 1), (10, 14))
+    line = [query.start, *via, query.goal]
+    along = cells_along(query, line)
+    assert is_a_path(query, along)
+    assert polyline_length(along) >= polyline_length(line) - 3.0
+
+
+def test_a_line_with_loops_passes_blocked_and_isolated_cells_by() -> None:
+    query = picture("." * 12, "." * 12, ".....###....", ".....#.#....", ".....###....", "." * 12, "." * 12)
+    loops = [(0, 0), (6, 11), (3, 6), (0, 11), (6, 0), (3, 5), (0, 11), (6, 11)]
+    along = cells_along(query, loops)
+    assert is_a_path(query, along)
+    assert {(6, 11), (0, 11), (6, 0)} <= {tuple(cell) for cell in along.tolist()}
+
+
 def test_the_corridor_widens_until_it_contains_a_path() -> None:
     query = picture("....#....", "....#....", "....#....", ".........")
     assert is_a_path(query, cells_along(query, [(0, 0), (0, 8), (3, 8)]))

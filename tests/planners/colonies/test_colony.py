@@ -116,7 +116,7 @@ def test_ants_walk_along_allowed_moves_and_visit_no_cell_twice(backtrack: bool) 
     assert done.sizes.min() > 0 if backtrack else done.sizes.min() == 0
 
 
-@pytest.mark.parametrize("planner", [AntSystem(beta=20.0), ExploringAnts(beta=0.0, explorers=3)])
+@pytest.mark.parametrize("planner", [AntSystem(beta=20.0), ExploringAnts(beta=0.0, explorers=3, backtrack=False)])
 def test_backtracking_ants_leave_a_trap_in_which_others_die(planner: Colony) -> None:
     size = 24
     free = np.ones((size, size), dtype=np.bool_)

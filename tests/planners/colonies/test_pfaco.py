@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,8 +9,9 @@ import pytest
 from antdrive.planners import PlanResult, PlanStatus, PotentialFieldAnts, Query
 from antdrive.planners.colonies import _kernels_pfaco
 from antdrive.planners.colonies.colony import ColonyGraph
-from antdrive.planners.colonies.pfaco import AntPool
-from antdrive.worlds import Grid
+from antdrive.planners.colonies.pfaco import FIELDS, FORMS, AntPool
+from antdrive.sim.papers.maps import blocks
+from antdrive.worlds import DIRECTIONS, Grid
 from tests.planners.worlds_to_solve import catalogue, optimum
 
 OPEN = Query(Grid.from_free(np.ones((4, 5))), (0, 0), (3, 4))
@@ -31,6 +33,79 @@ def test_the_potential_is_that_worked_out_by_hand() -> None:
     for cell, value in expected.items():
         assert field[cell] == pytest.approx(value + 1.0), cell  # shifted above 0 by attraction / 2
     assert field[0, 4] == 0
+
+
+def test_a_potential_measured_from_the_goal_is_highest_there() -> None:
+    field = PotentialFieldAnts(attraction=2.0, repulsion=0.0, field="goal").potential(OPEN).reshape(4, 5)
+    assert field[0, 0] == pytest.approx(1.0)  # the farthest cell, 5 from the goal
+    assert field[3, 4] == pytest.approx(25.0 + 1.0)
+    assert field[3, 3] == pytest.approx(16.0 + 1.0)
+
+
+@pytest.mark.parametrize(
+    ("form", "expected"),
+    [
+        # U of the cells (0, 0) to (1, 2) is d^2 + 1: 1, 2, 5 and 2, 3, 6; k_att = 2.
+        ("letter", {"east": 5.0, "west": 1.0, "north": 3.0, "north east": 6.0, "north west": 2.0}),
+        ("rise", {"east": 3.0, "west": 1.0, "north": 1.0, "north east": 4.0, "north west": 1.0}),
+        ("local", {"east": 5.0, "west": 1.0, "north": 3.0, "north east": 6.0, "north west": 2.0}),
+    ],
+)
+def test_what_attracts_an_ant_is_that_worked_out_by_hand(form: Any, expected: dict[str, float]) -> None:
+    query = Query(Grid.from_free(np.ones((2, 3))), (0, 0), (1, 2))
+    planner = PotentialFieldAnts(attraction=2.0, repulsion=0.0, form=form)
+    graph = ColonyGraph.of(query)
+    drawn = planner.attractions(graph, planner.potential(query))
+    step = {(0, 1): "east", (0, -1): "west", (1, 0): "north", (1, 1): "north east", (1, -1): "north west"}
+    found = {step[d]: drawn[1, k] for k, d in enumerate(DIRECTIONS) if drawn[1, k]}
+    assert found == pytest.approx(expected)
+
+
+def test_a_local_potential_is_measured_from_the_lowest_cell_around() -> None:
+    query = Query(Grid.from_free(np.ones((1, 9))), (0, 0), (0, 8))
+    planner = PotentialFieldAnts(attraction=2.0, repulsion=0.0, form="local")
+    drawn = planner.attractions(ColonyGraph.of(query), planner.potential(query))
+    assert sorted(drawn[6][drawn[6] > 0]) == pytest.approx([1.0, 49.0 - 25.0 + 1.0])  # back to 5, on to 7
+    assert sorted(drawn[8][drawn[8] > 0]) == pytest.approx([1.0])
+    letter = PotentialFieldAnts(attraction=2.0, repulsion=0.0, form="letter")
+    drawn = letter.attractions(ColonyGraph.of(query), letter.potential(query))
+    assert sorted(drawn[6][drawn[6] > 0]) == pytest.approx([26.0, 50.0])
+
+
+def test_without_a_memory_walks_return_to_cells_and_the_path_loses_its_loops() -> None:
+    query = Query(Grid.from_free(np.ones((6, 6))), (0, 0), (5, 5))
+    planner = PotentialFieldAnts(ants=4, ranks=3, iterations=4, form="letter", memory="none")
+    graph, rng = ColonyGraph.of(query), np.random.default_rng(0)
+    pool = AntPool.of(planner, graph, rng)
+    pool.run(np.ones(36), np.where(graph.at_neighbours(np.ones(36)) > 0, 1.0, 0.0), 1.0)
+    assert pool.best is not None
+    assert len(set(pool.best.tolist())) == len(pool.best)
+    walk = pool.ranking.walks[0, : pool.ranking.sizes[0]].tolist()
+    assert len(set(walk)) < len(walk)
+    result = solve(planner, query)
+    assert result.solved
+    assert result.history.best[-1] == pytest.approx(result.cost)
+
+
+def test_loops_are_left_out_of_a_walk_without_a_memory() -> None:
+    walk, tour = np.array([0, 1, 2, 1, 4, 5, 4, 8], dtype=np.int32), np.zeros(8, dtype=np.int32)
+    size = _kernels_pfaco.copy_without_loops(walk, 8, np.zeros(9, dtype=np.int64), tour)
+    assert tour[:size].tolist() == [0, 1, 4, 8]
+
+
+def test_ants_cross_a_large_map_unless_they_follow_the_letter() -> None:
+    # The claim of lee2008 at a fifth of its ants: docs/papers/lee2008.md has the figures with all of them.
+    query = blocks(100, 100, 25, 16, 300)
+    gaps = {form: solve(PotentialFieldAnts(ants=100, iterations=60, form=form), query).cost for form in FORMS}
+    assert optimum(query) <= min(gaps["local"], gaps["rise"])
+    assert max(gaps["local"], gaps["rise"]) <= 1.2 * optimum(query)
+    assert not gaps["letter"] <= 2 * optimum(query)
+
+
+def test_a_potential_measured_from_the_goal_gives_shorter_paths_to_a_goal_that_is_not_the_farthest_cell() -> None:
+    query = catalogue()["slalom"]
+    start, goal = (solve(PotentialFieldAnts(iterations=30, field=field), query).cost for field in FIELDS)
+    assert optimum(query) <= goal < 1.08 * optimum(query) < start
 
 
 def test_the_ranking_list_is_kept_by_length_times_cells() -> None:
@@ -93,7 +168,7 @@ def test_pheromone_decays_every_tick_but_not_below_its_minimum() -> None:
     planner = PotentialFieldAnts(ants=4, evaporation=0.5, min_pheromone=0.3, convergence=1e-9)
     pool = AntPool.of(planner, ColonyGraph.of(query), np.random.default_rng(0))
     trail = np.array([1, 0, 1, 0, 0, 0.4, 2, 1, 1])
-    arrivals, steps = pool.run(trail, np.ones(9), 1.0)
+    arrivals, steps = pool.run(trail, np.ones((9, 8)), 1.0)
     np.testing.assert_allclose(trail, [1, 0, 0.5, 0, 0, 0.3, 1, 0.5, 0.5])
     assert (len(arrivals), steps) == (0, 4)
 
@@ -137,7 +212,7 @@ def test_backtracking_ants_leave_dead_ends() -> None:
     ("key", "value"),
     [
         ("ants", 0), ("ranks", 0), ("evaporation", 1.5), ("mix", -0.1), ("beta_2", -1.0), ("influence", 0.0),
-        ("min_pheromone", 0.0),
+        ("min_pheromone", 0.0), ("form", "steep"), ("field", "end"), ("memory", "some"),
     ],
 )  # fmt: skip
 def test_options_out_of_range_are_refused_by_name(key: str, value: object) -> None:

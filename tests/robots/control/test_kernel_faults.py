@@ -59,7 +59,7 @@ def test_the_clearance_of_a_turn_is_the_least_of_its_headings(
     headings = yaw + turn * np.linspace(0, 1, 2000)
     poses = np.stack([np.full(2000, at[0]), np.full(2000, at[1]), headings], axis=1)
     expected = footprint_clearance(world, Footprint(*half, rounding), poses).min()
-    found = turn_clearance(*at, yaw, turn, *half, rounding, world.discs, np.array(bounds))
+    found = turn_clearance(*at, yaw, turn, *half, rounding, np.empty((0, 2)), world.discs, np.array(bounds))
     if expected > 0:
         assert expected - 2e-3 <= found <= expected + 1e-9
     else:  # by how much it would overlap does not matter

@@ -86,6 +86,7 @@ TUNING = PursuitTuning(
     half_length=0.0,
     half_width=0.0,
     rounding=0.2,
+    corners=np.empty((0, 2)),
     lookahead_time=0.25,
     lookahead_min=0.1,
     lookahead_max=1.0,

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import itertools
 import json
+import math
+import re
 from pathlib import Path
 
 import pytest
@@ -13,8 +16,10 @@ from hypothesis import strategies as st
 
 from antdrive import load_task
 from antdrive.planners import PLANNERS
+from antdrive.robots import list_robots
 from antdrive.sim.campaigns import campaign_schema, expand, load_campaign, make_campaign
 from antdrive.sim.campaigns.grid_planners import values_of
+from antdrive.sim.campaigns.rows import grid_row
 from antdrive.sim.log.binding import hashes_of
 from antdrive.sim.pipeline import run
 from antdrive.worlds import Disc, Task, World, save_task
@@ -49,11 +54,20 @@ def expanded(text: str, folder: Path) -> list[tuple[str, str, str, int]]:
             "4: robots[0]: jakal: no such file, nor a robot of the catalogue; did you mean jackal?",
         ),
         (HEAD + "rollouts: some\n", "4: rollouts: must be 'none', 'failed' or 'all', got \"some\""),
-        (HEAD + "tasks: twice\n", "4: tasks: must be own, {random: 30, min_distance: 5} or a list of {start, goal}"),
+        (
+            HEAD + "tasks: twice\n",
+            "4: tasks: must be own, named, {random: 30, min_distance: 5} or a list of {start, goal}",
+        ),
         (HEAD + "tasks:\n  random: 0\n", "5: tasks.random: must be at least 1, got 0"),
         (HEAD + "tasks: {random: 2, min_distance: 99}\n", "4: tasks: no start and goal 99 m apart"),
         (HEAD + "tasks:\n  - {start: [1, 1, 0]}\n", "5: tasks[0].goal: missing; write [x, y] in metres"),
         (HEAD + "tasks:\n  - {start: [1, 1, 0], goal: [99, 1]}\n", "5: tasks[0].goal: in world empty: "),
+        (HEAD + "settings: {cell: []}\n", "4: settings.cell: must have at least one value"),
+        (HEAD + "settings: {cell: [0.1, 0]}\n", "4: settings.cell: must be greater than 0, got 0"),
+        (
+            "schema: 1\nworlds: [empty]\nplanners:\n  - {name: as, ants: {from: .nan, to: 50, step: 10}}\n",
+            "4: planners[0].ants: must go up from a number",
+        ),
         (HEAD + "settings: {physics_hz: 20}\n", "4: settings.physics_hz: empty with turtlebot: must be between 60"),
         (HEAD + "settings: {controller: {lokahead: 1.0}}\n", "4: settings.controller.lokahead: unknown setting"),
         (
@@ -174,6 +188,165 @@ def test_worlds_of_one_name_are_called_by_their_files(tmp_path: Path) -> None:
     assert [job.case.world for job in expand(campaign).jobs] == ["empty", "b/w.yaml"]
 
 
+def test_lists_of_settings_are_multiplied_and_stand_in_columns() -> None:
+    settings = {
+        "cell": [0.1, 0.2], "time_limit": 60, "sees": ["velocities", "positions:3"],
+        "controller": {"lookahead_time": [0.4, 0.5], "lookahead_min": 0.2}, "avoid": [True, False],
+        "unseen": [[{"x": 3.0, "y": 3.0, "radius": 0.2}], []],
+    }  # fmt: skip
+    jobs = expand(make_campaign({"worlds": ["empty"], "planners": ["astar"], "settings": settings})).jobs
+    rows = [grid_row(job) for job in jobs]
+    assert len({job.key for job in jobs}) == len(jobs) == 2 * 2 * 2 * 2 * 2
+    seen = [{row[name] for row in rows} for name in ("cell", "time_limit", "sees", "controller", "avoid", "unseen")]
+    assert seen == [
+        {0.1, 0.2}, {60.0}, {"velocities", "positions:3"},
+        {f"lookahead_time={s} lookahead_min=0.2" for s in (0.4, 0.5)}, {"default", "none"}, {"3,3,0.2", "none"},
+    ]  # fmt: skip
+    words = "--set controller.lookahead_time=0.5 --set controller.lookahead_min=0.2 --cell 0.2 --time-limit 60"
+    assert words in rows[-1]["command"]
+    assert "--no-avoid" in rows[-1]["command"]
+    assert all(job.case.scenario(0).time_limit == 60 for job in jobs)
+
+
+def test_robots_of_one_name_are_called_by_their_files(tmp_path: Path) -> None:
+    text = list_robots()["turtlebot"].read_text()
+    for name, mass in (("a", 1), ("b", 2), ("c", 1)):
+        (tmp_path / f"{name}.yaml").write_text(re.sub(r"(?m)^mass: ", f"mass: {mass}", text))
+    campaign = {"worlds": ["empty"], "planners": ["astar"], "robots": ["a.yaml", "b.yaml", "c.yaml"]}
+    rows = [grid_row(job) for job in expand(make_campaign(campaign, tmp_path)).jobs]
+    assert [row["robot"] for row in rows] == ["turtlebot", "b.yaml"], "c is a again"
+    assert len({row["robot_hash"] for row in rows}) == 2
+
+
+def test_a_margin_stands_in_the_table_as_it_was_asked() -> None:
+    campaign = {"worlds": ["empty"], "planners": ["astar"], "margin": [0, 0.04, "auto"]}
+    rows = [grid_row(job) for job in expand(make_campaign(campaign)).jobs]
+    assert [(row["margin_asked"], row["margin"]) for row in rows] == [("0.0", 0.0), ("0.04", 0.04), ("auto", None)]
+
+
+MINE = """
+from dataclasses import dataclass
+from antdrive.planners import AStar
+from beside import NOTHING
+
+@dataclass(frozen=True)
+class Mine(AStar):
+    width: int = 3
+"""
+
+
+def test_a_planner_in_a_file_has_options_and_a_key_that_follows_the_file(tmp_path: Path) -> None:
+    (tmp_path / "beside.py").write_text("NOTHING = 0\n")
+    campaign = {"worlds": ["empty"], "planners": [{"name": "mine.py:Mine", "width": [4, 5]}]}
+
+    def rows() -> list[dict[str, object]]:
+        return [grid_row(job) for job in expand(make_campaign(campaign, tmp_path)).jobs]
+
+    (tmp_path / "mine.py").write_text(MINE)
+    first = rows()
+    assert [row["planner"] for row in first] == ["mine.py:Mine width=4", "mine.py:Mine width=5"]
+    hashed = hashlib.sha256(MINE.encode()).hexdigest()[:8]
+    assert first[0]["planner_version"] == f"mine.py {hashed}"
+    assert f"--planner planners/{hashed}/mine.py:Mine" in str(first[0]["command"])
+    assert [row["key"] for row in rows()] == [row["key"] for row in first]
+    (tmp_path / "mine.py").write_text(MINE + "# corrected\n")
+    assert not {row["key"] for row in rows()} & {row["key"] for row in first}
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("", "has no 'Mine'; it has nothing"),
+        ("class Other: ...", "has no 'Mine'; it has Other"),
+        ("class Mine: ...", "is not a planner: it has no method `plan(query, rng)`"),
+        ("1 / 0", "cannot be imported (ZeroDivisionError: division by zero)"),
+        ("raise SystemExit(3)", "ends the program while it is imported (exit code 3)"),
+        (None, "no such file"),
+    ],
+)
+def test_a_wrong_planner_file_is_named(text: str | None, problem: str, tmp_path: Path) -> None:
+    if text is not None:
+        (tmp_path / "mine.py").write_text(text)
+    with pytest.raises(InputError, match=r"^campaign: planners\[0\]: .*mine\.py") as refused:
+        expand(make_campaign({"worlds": ["empty"], "planners": ["mine.py:Mine"]}, tmp_path))
+    assert problem in str(refused.value)
+
+
+def test_classes_of_one_name_in_two_files_are_two_planners(tmp_path: Path) -> None:
+    (tmp_path / "beside.py").write_text("NOTHING = 0\n")
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "mine.py").write_text(MINE.replace("from beside import NOTHING", f"FOLDER = {folder!r}"))
+    campaign = make_campaign({"worlds": ["empty"], "planners": ["a/mine.py:Mine", "b/mine.py:Mine"]}, tmp_path)
+    assert [job.case.planner for job in expand(campaign).jobs] == ["mine.py:Mine", "b/mine.py:Mine"]
+
+
+MAP = "type octile\nheight 4\nwidth 6\nmap\n" + "......\n" * 4
+
+
+def movingai(folder: Path) -> None:
+    lines = [f"0\tm.map\t6\t4\t{k}\t0\t5\t3\t{5 - k}.0" for k in range(5)]
+    folder.mkdir(exist_ok=True)
+    (folder / "m.map").write_text(MAP)
+    (folder / "m.map.scen").write_text("\n".join(["version 1", *lines]) + "\n")
+
+
+@pytest.mark.parametrize(
+    "worlds",
+    [
+        [{"import": "a/m.map", "problem": "0-4"}],
+        [{"import": "a/m.map", "problem": [0, 1, 2, 3, 4]}],
+        [{"import": "a/m.map", "problem": k} for k in (0, 1, 2, 2, 3, 4)],
+    ],
+)
+def test_problems_of_a_map_are_tasks_of_one_world(worlds: list[object], tmp_path: Path) -> None:
+    movingai(tmp_path / "a")
+    expansion = expand(make_campaign({"worlds": worlds, "planners": ["astar"]}, tmp_path))
+    assert [(job.case.world, job.case.task_name) for job in expansion.jobs] == [("m", f"problem-{k}") for k in range(5)]
+    assert [job.case.task.start[0] for job in expansion.jobs] == [k + 0.5 for k in range(5)]
+    assert {name: expansion.counts[name] for name in ("worlds", "tasks")} == {"worlds": 1, "tasks": 5}
+
+
+def test_maps_and_tasks_of_one_name_all_have_names_of_their_own(tmp_path: Path) -> None:
+    movingai(tmp_path / "a")
+    movingai(tmp_path / "b")
+    (tmp_path / "b" / "m.map").write_text(MAP.replace("......", ".....@", 1))
+    ends = [{"start": [x, 0.5, 0], "goal": [4.5, 2.5]} for x in (0.5, 1.5, 2.5)]
+    maps = [{"import": f"{folder}/m.map", "problem": "1-2"} for folder in ("a", "b")]
+    worlds = [*maps, *({"import": "a/m.map", **one} for one in ends)]
+    expansion = expand(make_campaign({"worlds": worlds, "planners": ["astar"]}, tmp_path))
+    assert [(job.case.world, job.case.task_name) for job in expansion.jobs] == [
+        ("m", "problem-1"), ("m", "problem-2"), ("b/m.map#m", "problem-1"), ("b/m.map#m", "problem-2"), ("m", "own"),
+        *((f"a/m.map#m start={x},0.5,0 goal=4.5,2.5", "own") for x in (1.5, 2.5)),
+    ]  # fmt: skip
+    assert expansion.counts["tasks in 4 worlds"] == 7
+
+
+def test_a_map_that_changes_is_read_again(tmp_path: Path) -> None:
+    movingai(tmp_path)
+    campaign = {"worlds": [{"import": "m.map", "problem": 0}], "planners": ["astar"]}
+    (before,) = expand(make_campaign(campaign, tmp_path)).jobs
+    scen = tmp_path / "m.map.scen"
+    scen.write_text(scen.read_text().replace("\t0\t0\t5\t3", "\t1\t1\t5\t3", 1))
+    (after,) = expand(make_campaign(campaign, tmp_path)).jobs
+    assert before.key != after.key
+
+
+@pytest.mark.parametrize("value", ["0-", [1, 1], "x", 2.5, -1])
+def test_a_wrong_problem_is_named(value: object, tmp_path: Path) -> None:
+    movingai(tmp_path)
+    campaign = make_campaign({"worlds": [{"import": "m.map", "problem": value}], "planners": ["astar"]}, tmp_path)
+    with pytest.raises(InputError, match=r"^campaign: worlds\[0\]\.problem: must be"):
+        expand(campaign)
+
+
+def test_drawn_tasks_keep_clear_of_cylinders_that_nobody_knows_of() -> None:
+    unseen = [{"x": x, "y": y, "radius": 0.5} for x in (1.0, 3.0, 5.0) for y in (1.0, 3.0, 5.0)]
+    campaign = {"worlds": "empty", "planners": "astar", "tasks": {"random": 20}, "settings": {"unseen": unseen}}
+    starts = [job.case.task.start[:2] for job in expand(make_campaign(campaign)).jobs]
+    assert min(math.dist(start, (one["x"], one["y"])) for start in starts for one in unseen) > 0.5
+
+
 def test_the_schema_names_every_key() -> None:
     schema = campaign_schema()
     assert set(schema["properties"]) >= {
@@ -186,4 +359,7 @@ def test_the_schema_names_every_key() -> None:
         "settings",
         "rollouts",
     }
+    cells = schema["properties"]["settings"]["properties"]["cell"]["anyOf"]
+    assert cells[1] == {"type": "array", "items": cells[0], "minItems": 1}
+    assert "$ref" not in json.dumps(schema["properties"]["settings"])
     assert schema["required"] == ["schema", "worlds", "planners"]

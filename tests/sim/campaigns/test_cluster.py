@@ -9,18 +9,20 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 pytest.importorskip("distributed")
 
 from antdrive.sim.campaigns import canonical_bytes, make_campaign, read_results
-from antdrive.sim.campaigns.cluster import run_on_cluster
+from antdrive.sim.campaigns.cluster import _received, run_chunk, run_on_cluster
 from antdrive.sim.campaigns.expanding import expand
 from antdrive.sim.campaigns.running import log_path
 from antdrive.sim.campaigns.sweeping import run_expansion, sweep
+from antdrive.sim.campaigns.waiting import Waiting
 from antdrive.worlds.errors import InputError
-from tests.sim.campaigns.works import Deadly
+from tests.sim.campaigns.works import Deadly, Endless, Refusing
 
 pytestmark = [
     pytest.mark.slow,  # starting a cluster takes seconds
@@ -79,6 +81,25 @@ def test_a_run_that_kills_its_workers_is_recorded_and_no_other_is_lost() -> None
     assert {row["key"] for row in rows if row["outcome"] == "crashed"} == {job.key for job in jobs if job.seed == 3}
 
 
+def test_a_run_that_does_not_end_is_ended() -> None:
+    jobs = expand(make_campaign({**CAMPAIGN, "worlds": ["empty"], "seeds": 6})).jobs
+    rows = [finished.row for finished in run_on_cluster(jobs, Endless((3,)), "local:2", limit=1.0)]
+    assert Counter(row["key"] for row in rows) == Counter(job.key for job in jobs)
+    assert {row["outcome"] for row in rows if row["key"] == jobs[3].key} == {"too_slow"}
+    assert sum(row["outcome"] == "succeeded" for row in rows) == 5
+
+
+def test_a_run_that_finds_no_room_ends_the_campaign() -> None:
+    jobs = expand(make_campaign({**CAMPAIGN, "worlds": ["empty"], "seeds": 4})).jobs
+    try:
+        run_chunk(Refusing(), jobs)
+    except InputError as error:
+        raised = error
+    failed = SimpleNamespace(status="error", exception=lambda: raised)
+    with pytest.raises(InputError, match="No space left on device"):
+        list(_received(failed, list(jobs), Waiting(jobs, 1), None))
+
+
 def test_a_scheduler_that_is_gone_ends_the_campaign_which_goes_on_elsewhere(
     tmp_path: Path, scheduler: tuple[subprocess.Popen[bytes], str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -99,9 +120,9 @@ def test_a_scheduler_that_is_gone_ends_the_campaign_which_goes_on_elsewhere(
     assert canonical_bytes(tmp_path / "killed") == canonical_bytes(tmp_path / "calm")
 
 
-@pytest.mark.parametrize("address", ["local:", "local:x", "localhost:8786", "tcp://"])
+@pytest.mark.parametrize("address", ["local:", "local:x", "local:0", "localhost:8786", "tcp://"])
 def test_a_wrong_address_is_refused(address: str) -> None:
-    with pytest.raises(InputError, match="write local:N with a number of processes, or tcp://HOST:PORT"):
+    with pytest.raises(InputError, match="write local:N with a number of processes above 0, or tcp://HOST:PORT"):
         next(run_on_cluster([], Deadly(), address))
 
 

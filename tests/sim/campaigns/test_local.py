@@ -7,12 +7,13 @@ from pathlib import Path
 
 import pytest
 
+from antdrive.sim.campaigns import local
 from antdrive.sim.campaigns.campaign import make_campaign
 from antdrive.sim.campaigns.expanding import expand
 from antdrive.sim.campaigns.job import Job
 from antdrive.sim.campaigns.local import run_locally
 from antdrive.worlds.errors import InputError
-from tests.sim.campaigns.works import Deadly, Listing, Unloadable
+from tests.sim.campaigns.works import Deadly, Endless, Listing, Refusing, Unloadable
 
 
 def jobs(worlds: int = 1, seeds: int = 8) -> tuple[Job, ...]:
@@ -36,6 +37,29 @@ def test_a_run_whose_process_dies_once_is_tried_again(tmp_path: Path) -> None:
     assert len(rows) == 8
     assert {row["outcome"] for row in rows} == {"succeeded"}
     assert attempts == {f"seed {seed}": 2 if seed == 2 else 1 for seed in range(8)}
+
+
+def test_a_run_that_does_not_end_is_ended_and_not_tried_again() -> None:
+    rows = [finished.row for finished in run_locally(jobs(), Endless((2, 6)), 2, limit=0.5)]
+    assert Counter(row["key"] for row in rows) == Counter(job.key for job in jobs())
+    slow = {row["key"]: row for row in rows if row["outcome"] != "succeeded"}
+    assert set(slow) == {job.key for job in jobs() if job.seed in (2, 6)}
+    assert {(row["outcome"], row["reason"], row["attempts"]) for row in slow.values()} == {
+        ("too_slow", "took longer than the campaign's run_limit of 0.5 s", 1)
+    }
+
+
+def test_a_run_that_finds_that_nothing_can_be_written_ends_the_campaign() -> None:
+    with pytest.raises(InputError, match=r"^rollouts/ab\.npz: cannot be written \(No space left on device\)$"):
+        list(run_locally(jobs(), Refusing(), 1))
+
+
+def test_somebody_else_has_a_turn_while_a_run_takes_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(local, "LOOK", 0.05)
+    turns: list[int] = []
+    rows = list(run_locally(jobs(seeds=1), Deadly(seconds=0.5), 1, tick=lambda: turns.append(1)))
+    assert len(rows) == 1
+    assert len(turns) > 2
 
 
 def test_workers_that_end_before_they_begin_end_the_campaign() -> None:

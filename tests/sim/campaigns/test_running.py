@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import errno
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,7 @@ from antdrive.sim.calibration.trial import Conditions
 from antdrive.sim.campaigns import expand, job, make_campaign, running, sweeping
 from antdrive.sim.campaigns.running import Driving, log_path
 from antdrive.sim.campaigns.sweeping import calibrated, sweep
+from antdrive.worlds.errors import InputError
 
 BASE = {"worlds": ["empty", "no-path"], "planners": ["astar"]}
 
@@ -48,6 +51,26 @@ def test_logs_are_kept_by_rule_and_hold_what_the_row_says(keep: Any, kept: int, 
     if kept:
         assert rows[0]["rollout"] == log_path(rows[0]["key"])
         assert Rollout.load(tmp_path / rows[0]["rollout"]).digest == rows[0]["digest"]
+
+
+@pytest.mark.parametrize("folder", ["", None])
+def test_a_log_that_cannot_be_written_is_no_crash_of_the_run(
+    folder: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(log: Rollout, path: Path) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Rollout, "save", full)
+    driving = Driving("all", None if folder is None else str(tmp_path))
+    with pytest.raises(InputError, match=r"^rollouts/.*\.npz: cannot be written \(No space left on device\)$"):
+        driving(expand(make_campaign(BASE)).jobs[0])
+
+
+def test_a_planner_that_this_machine_lacks_ends_the_campaign(monkeypatch: pytest.MonkeyPatch) -> None:
+    one = expand(make_campaign(BASE)).jobs[0]
+    case = dataclasses.replace(one.case, planner_source="elsewhere")
+    with pytest.raises(InputError, match="no planner is called 'elsewhere'"):
+        Driving()(one._replace(case=case))
 
 
 def test_the_log_of_a_failed_drive_is_kept(tmp_path: Path) -> None:

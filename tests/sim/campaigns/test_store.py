@@ -87,6 +87,41 @@ def test_a_part_that_another_version_wrote_is_read_and_lacks_what_it_lacks(tmp_p
     assert (row["outcome"], row["spl"], "gone" in row) == ("succeeded", None, False)
 
 
+def test_results_are_read_while_another_process_merges_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    kept = begun(tmp_path)
+    for job in JOBS:
+        kept.add(fault_row(job.key, "succeeded", ""))
+        kept.flush()
+    listed, read = store.parts_in(tmp_path), store._read
+    merging = iter([kept.merge])
+
+    def read_and_merge(path: Path) -> pyarrow.Table:
+        table = read(path)
+        if path == listed[0]:
+            next(merging, lambda: None)()
+        return table
+
+    monkeypatch.setattr(store, "_read", read_and_merge)
+    assert outcomes(tmp_path) == dict.fromkeys(range(6), "succeeded")
+    assert next(merging, None) is None, "parts were merged between two reads"
+
+
+def test_the_table_is_there_while_a_command_goes_on(tmp_path: Path) -> None:
+    kept = begun(tmp_path)
+    kept.add(fault_row(JOBS[0].key, "succeeded", ""))
+    kept.finish()
+    store.Store(tmp_path).begin({"size": 3}, grid_table(JOBS[:3]))
+    assert pyarrow.parquet.read_table(tmp_path / "runs.parquet")["key"].to_pylist() == [JOBS[0].key]
+
+
+@pytest.mark.parametrize("text", ["{}", "[]", '{"size": "6"}'])
+def test_a_manifest_without_the_size_is_named(tmp_path: Path, text: str) -> None:
+    begun(tmp_path)
+    (tmp_path / "manifest.json").write_text(text)
+    with pytest.raises(InputError, match=r"manifest\.json: is no manifest of a campaign"):
+        read_results(tmp_path)
+
+
 @pytest.mark.parametrize("name", ["grid.parquet", "manifest.json", "parts/1.parquet"])
 def test_a_damaged_file_is_named(tmp_path: Path, name: str) -> None:
     begun(tmp_path)

@@ -11,6 +11,7 @@ from pathlib import Path
 from antdrive.sim.campaigns.job import Job
 from antdrive.sim.campaigns.rows import fault_row
 from antdrive.sim.campaigns.running import Finished
+from antdrive.worlds.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,28 @@ class Listing:
         with Path(self.path).open("a") as stream:
             stream.write(f"{os.getpid()} {job.case.world}\n")
         return Finished(fault_row(job.key, "succeeded", ""))
+
+
+@dataclass(frozen=True)
+class Endless:
+    """A run whose seed is among `seeds` does not end."""
+
+    seeds: tuple[int, ...]
+
+    def __call__(self, job: Job) -> Finished:
+        while job.seed in self.seeds:
+            time.sleep(0.1)
+        return Finished(fault_row(job.key, "succeeded", f"seed {job.seed}"))
+
+
+@dataclass(frozen=True)
+class Refusing:
+    """A run whose seed is 3 finds that the campaign cannot go on."""
+
+    def __call__(self, job: Job) -> Finished:
+        if job.seed == 3:
+            raise InputError("rollouts/ab.npz: cannot be written (No space left on device)")
+        return Finished(fault_row(job.key, "succeeded", f"seed {job.seed}"))
 
 
 class Unloadable:

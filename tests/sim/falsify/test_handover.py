@@ -8,10 +8,11 @@ import pytest
 import yaml
 
 from antdrive.planners import load_planner
-from antdrive.robots import Avoidance, PurePursuit
+from antdrive.robots import Avoidance, PurePursuit, load_robot
 from antdrive.sim import Certificate, Perception, ReplanPolicy, Run, Scenario
 from antdrive.sim.falsify.handover import (
     Handover,
+    _robot,
     expectation,
     fingerprint_of,
     run_elsewhere,
@@ -61,10 +62,20 @@ def test_a_robot_of_ones_own_is_written_beside_the_suite(
     assert scenario_of(case).robot == own
 
 
+def test_two_robots_of_one_name_have_files_of_their_own(small_run: Run, tmp_path: Path) -> None:
+    spec = small_run.scenario.robot
+    robots = [replace(spec, name="mine", max_speed=speed, source=None) for speed in (0.61, 0.62, 0.61)]
+    runs = [replace(small_run, scenario=replace(small_run.scenario, robot=robot)) for robot in robots]
+    suite = write_suite(tmp_path / "s.drive.yaml", [Handover(f"r{k}", done) for k, done in enumerate(runs)])
+    assert [scenario_of(case).robot for case in load_suite(suite)] == robots
+    assert sorted(path.name for path in (tmp_path / "robots").iterdir()) == ["mine-2.yaml", "mine.yaml"]
+
+
 def test_the_suite_holds_as_long_as_the_failure_repeats(collided_run: Run, tmp_path: Path) -> None:
     suite = write_suite(tmp_path / "s.drive.yaml", [Handover("hit", collided_run, note="as it was")])
     (case,) = load_suite(suite)
     assert check_case(case).faults == ()
+    assert case.entry.expect == {"outcome": "collided", "touched": "unseen cylinder"}
     mended = yaml.safe_load(suite.read_text())
     del mended["scenarios"]["hit"]["unseen"]
     suite.write_text(yaml.safe_dump(mended))
@@ -108,3 +119,9 @@ def test_a_scenario_has_a_name_that_suites_take(small_run: Run, tmp_path: Path, 
     assert scenario_name(text) == name
     suite = write_suite(tmp_path / "s.drive.yaml", [Handover(f"{scenario_name(text)}-small", small_run)])
     assert [case.name for case in load_suite(suite)] == [f"{name}-small"]
+
+
+@pytest.mark.parametrize("name", ["warehouse", "pioneer3dx"])
+def test_a_robot_whose_footprint_is_beside_its_axle_is_handed_over_as_it_is(name: str, tmp_path: Path) -> None:
+    mine = replace(load_robot(name), name="mine", mass=31.0)
+    assert load_robot(tmp_path / _robot(mine, tmp_path)) == mine

@@ -16,16 +16,20 @@ from antdrive.sim.falsify import hunt as hunting
 from antdrive.sim.falsify import report as reporting
 from antdrive.sim.falsify import search
 from antdrive.sim.falsify.failure import failure_of
+from antdrive.sim.falsify.handover import expectation, fingerprint_of
 from antdrive.sim.falsify.hunt import Hunt, find_failures
 from antdrive.sim.falsify.report import report
 from antdrive.sim.falsify.search import METHODS, REHEARSED, guided_world, rehearsed_clearance
 from antdrive.sim.falsify.shrink import shrink
 from antdrive.sim.falsify.space import WorldSpace, feasible
+from antdrive.sim.log.margin import CAUSES
+from antdrive.sim.regression.demands import Demands
+from antdrive.sim.regression.judging import unfulfilled
 from antdrive.sim.regression.scenarios import task_of as scenario_task
 from antdrive.sim.regression.suite import load_suite
 from antdrive.worlds import Disc, FieldError, World, rasterise
 
-CARELESS: dict[str, Any] = {"margin": 0.0, "noise": 6.0, "smoothing": "none"}
+CARELESS: dict[str, Any] = {"margin": 0.0, "noise": 6.0, "smoothing": "none", "physics_hz": 120}
 
 
 @pytest.fixture(scope="module")
@@ -44,16 +48,31 @@ def test_every_finding_fails_again_and_leaves_room(found: Hunt) -> None:
     assert found.findings
     for finding in found.findings:
         scenario = finding.scenario
-        assert failure_of(run(scenario)) == finding.failure
+        done = run(scenario)
+        assert (failure_of(done), fingerprint_of(done)) == (finding.failure, finding.fingerprint)
         grid = rasterise(scenario.task.world, 0.02, scenario.inflate)
         plan = load_planner("dijkstra").plan(Query.between(grid, scenario.task), np.random.default_rng(0))
         assert plan.solved, "a fine grid has a path with the clearance that the set-up claims"
+
+
+def test_a_test_of_a_finding_demands_what_was_touched_and_why(found: Hunt) -> None:
+    finding = next(one for one in found.findings if one.failure.touched == "cylinder")
+    done, failure = run(finding.scenario), finding.failure
+    expected = expectation(done)
+    assert expected == {"outcome": "collided", "touched": "cylinder", "cause": failure.cause}
+    assert list(unfulfilled(done, Demands.of(expected))) == []
+    other = next(cause for cause in CAUSES if cause != failure.cause)
+    assert list(unfulfilled(done, Demands.of({**expected, "cause": other}))) == [
+        f"cause: {failure.cause} took most of the margin, expected {other}"
+    ]
+    assert list(unfulfilled(done, Demands.of({**expected, "touched": "wall"}))) == ["touched: cylinder, expected wall"]
 
 
 def test_the_same_seed_finds_the_same(found: Hunt, careless: Scenario) -> None:
     again = find_failures(careless, budget=3, seed=3, method="random")
     first = [finding for finding in found.findings if finding.number <= 3]
     assert [finding.scenario for finding in again.findings] == [finding.scenario for finding in first]
+    assert [finding.fingerprint for finding in again.findings] == [finding.fingerprint for finding in first]
 
 
 def test_a_finding_that_resembles_another_is_not_counted_twice(found: Hunt, careless: Scenario) -> None:
@@ -75,9 +94,11 @@ def test_ctrl_c_keeps_what_was_found(careless: Scenario, monkeypatch: pytest.Mon
         return runs[-1]
 
     monkeypatch.setattr(hunting, "run", until_the_third)
+    monkeypatch.setattr(search, "REHEARSED", 3)
     stopped = find_failures(careless, budget=50, method=method)
     assert (stopped.runs, stopped.interrupted) == (2, True)
     assert len(stopped.findings) == sum(failure_of(done) is not None for done in runs)
+    assert stopped.driven == sum(done.rollout is not None for done in runs)
 
 
 class Crashes(AStar):
@@ -90,7 +111,10 @@ class Crashes(AStar):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_planner_that_raises_is_a_finding(jackal: RobotSpec, tmp_path: Path, method: str) -> None:
+def test_a_planner_that_raises_is_a_finding(
+    jackal: RobotSpec, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, method: str
+) -> None:
+    monkeypatch.setattr(search, "REHEARSED", 3)
     setup = Scenario.of("empty", Crashes(), jackal, **CARELESS)
     hunt = find_failures(setup, budget=4, seed=3, method=method, obstacles=2)
     raised = [finding for finding in hunt.findings if finding.failure.outcome == "planner_error"]
@@ -98,7 +122,7 @@ def test_a_planner_that_raises_is_a_finding(jackal: RobotSpec, tmp_path: Path, m
     assert raised
     assert sum(finding.is_new for finding in raised) == 1
     assert "IndexError: pop from empty list" in raised[0].failure.cause
-    small = shrink(raised[0].scenario, seconds=5)
+    small = shrink(raised[0].scenario, seconds=1)
     assert small.failure == raised[0].failure
     (handed,) = report(Hunt((raised[0],), 4), tmp_path, seconds=0)
     (case,) = load_suite(tmp_path / "failures.drive.yaml")
@@ -114,6 +138,8 @@ def test_ctrl_c_while_shrinking_hands_over_what_was_found(
     monkeypatch.setattr(reporting, "shrink", interrupted)
     reported = report(Hunt(found.distinct[:1], 1), tmp_path)
     assert [one.repeats for one in reported] == [True]
+    other = replace(found.distinct[0], fingerprint="of another drive")
+    assert [one.repeats for one in report(Hunt((other,), 1), tmp_path, seconds=0)] == [False]
 
 
 def test_no_path_counts_only_where_the_grid_has_no_excuse(small_scenario: Scenario) -> None:

@@ -1,5 +1,6 @@
 """Shrinking keeps the failure, leaves nothing that can be left out, and goes on where it stopped."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from antdrive.sim.falsify.trials import Trials, changeable, identity_of, room_in
 from antdrive.worlds import Cruising, Disc, InputError, Task, World
 
 SIDE = 6.0
+COARSE = {"physics_hz": 80, "control_hz": 20}  # a third of the work of a drive; nothing here depends on the rates
 
 
 def clutter(count: int, rng: np.random.Generator) -> tuple[Disc, ...]:
@@ -30,7 +32,7 @@ def task_with(*discs: Disc) -> Task:
     return Task(World("planted", (0.0, 0.0, SIDE, SIDE), discs), (0.61234, 3.0, 0.0), (5.4, 3.0), cell=0.25)
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def fenced(small_scenario: Scenario) -> Scenario:
     """No path: a fence of cylinders from wall to wall, among clutter; without movers nothing is driven, so it is quick."""
     fence = [Disc(3.0 + 0.01 * k, 0.4 + 0.74 * k, 0.26) for k in range(8)]
@@ -40,12 +42,33 @@ def fenced(small_scenario: Scenario) -> Scenario:
     )
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def struck(small_scenario: Scenario) -> Scenario:
     """A contact with one of two unseen cylinders on the route, by a noisy robot."""
     unseen = (Disc(3.0, 3.0, 0.2), Disc(1.0, 5.0, 0.2), Disc(4.0, 3.1, 0.3))
     task = task_with(*clutter(5, np.random.default_rng(3)))
-    return replace(small_scenario, task=task, unseen=unseen, noise=0.5, seed=12)
+    return replace(small_scenario, task=task, unseen=unseen, noise=0.5, seed=12, **COARSE)
+
+
+@pytest.fixture(scope="module")
+def steps(struck: Scenario) -> list[Scenario]:
+    """The steps by which the contact is made small; the last one is the result."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def struck_small(struck: Scenario, steps: list[Scenario]) -> Shrunk:
+    first = Trials.first
+
+    def watched(self: Trials, candidates: Iterable[Scenario | None]) -> Scenario | None:
+        found = first(self, candidates)
+        if found is not None:
+            steps.append(found)
+        return found
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Trials, "first", watched)
+        return shrink(struck)
 
 
 def without_one(scenario: Scenario) -> list[Scenario | None]:
@@ -77,8 +100,8 @@ def test_a_world_without_a_path_keeps_the_cylinders_that_close_it(fenced: Scenar
     assert np.ptp(small.task.world.bounds) < SIDE
 
 
-def test_a_contact_with_an_unseen_cylinder_keeps_that_cylinder_alone(struck: Scenario) -> None:
-    shrunk = shrink(struck)
+def test_a_contact_with_an_unseen_cylinder_keeps_that_cylinder_alone(struck: Scenario, struck_small: Shrunk) -> None:
+    shrunk = struck_small
     assert shrunk.failure == Failure("collided", "unseen cylinder", "")
     assert_small(shrunk)
     small = shrunk.scenario
@@ -91,7 +114,7 @@ def test_the_mover_that_was_touched_is_kept_alone(small_scenario: Scenario) -> N
     movers = tuple(Cruising(radius=0.2, position=(5.0, y), velocity=(-0.6, 0.0)) for y in (1.0, 3.0, 5.0))
     world = World("movers", (0.0, 0.0, SIDE, SIDE), clutter(3, np.random.default_rng(3)), movers=movers)
     task = Task(world, (0.6, 3.0, 0.0), (5.4, 3.0), cell=0.25)
-    shrunk = shrink(replace(small_scenario, task=task, avoidance=None, replanning=None))
+    shrunk = shrink(replace(small_scenario, task=task, avoidance=None, replanning=None, **COARSE))
     assert shrunk.failure == Failure("collided", "mover", "")
     assert_small(shrunk)
     assert (len(shrunk.scenario.task.world.movers), shrunk.scenario.task.world.obstacles) == (1, ())
@@ -100,7 +123,7 @@ def test_the_mover_that_was_touched_is_kept_alone(small_scenario: Scenario) -> N
 def test_a_bound_on_a_metric_persists(small_scenario: Scenario) -> None:
     bound = parse_bound("min_clearance_m < 0.05")
     tight = replace(small_scenario, task=task_with(Disc(3.0, 2.5, 0.3), Disc(3.0, 3.5, 0.25), Disc(1.0, 5.0, 0.2)))
-    tight = replace(tight, margin=0.0, smoothing="taut")
+    tight = replace(tight, margin=0.0, smoothing="taut", **COARSE)
     shrunk = shrink(tight, bound=bound)
     rollout = run(shrunk.scenario).rollout
     assert rollout is not None
@@ -175,20 +198,9 @@ def test_answers_that_no_longer_hold_are_forgotten(fenced: Scenario, tmp_path: P
     assert changeable(again.scenario) == changeable(honest.scenario)
 
 
-def test_every_accepted_step_fails_in_the_same_way(struck: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:
-    accepted: list[Scenario] = []
-    first = Trials.first
-
-    def watched(self: Trials, candidates: object) -> Scenario | None:
-        found = first(self, candidates)  # type: ignore[arg-type]
-        if found is not None:
-            accepted.append(found)
-        return found
-
-    monkeypatch.setattr(Trials, "first", watched)
-    shrunk = shrink(struck)
-    assert len(accepted) > 3
-    assert {failure_of(run(step)) for step in accepted} == {shrunk.failure}
+def test_every_accepted_step_fails_in_the_same_way(struck_small: Shrunk, steps: list[Scenario]) -> None:
+    assert len(steps) > 3
+    assert {failure_of(run(step)) for step in steps} == {struck_small.failure}
 
 
 def test_a_moved_wall_cuts_no_cylinder_that_was_whole(small_scenario: Scenario) -> None:
@@ -215,7 +227,7 @@ def test_a_moved_wall_cuts_no_cylinder_that_was_whole(small_scenario: Scenario) 
 def test_the_touched_cylinder_stays_whole_within_the_walls(small_scenario: Scenario) -> None:
     """A contact beside the straight way to the goal, with a cylinder that reaches far aside."""
     blind = Disc(3.0, 3.7, 0.75)
-    small = shrink(replace(small_scenario, task=task_with(), unseen=(blind,))).scenario
+    small = shrink(replace(small_scenario, task=task_with(), unseen=(blind,), **COARSE)).scenario
     xmin, ymin, xmax, ymax = small.task.world.bounds
     (disc,) = small.unseen
     assert min(disc.x - xmin, xmax - disc.x, disc.y - ymin, ymax - disc.y) >= disc.radius

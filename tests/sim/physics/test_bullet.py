@@ -54,3 +54,50 @@ def test_stdout_is_back_when_the_last_client_is_closed(capfd: pytest.CaptureFixt
     second.__exit__(None, None, None)
     libc.puts(b"after")
     assert written(capfd) == "after\n"
+
+
+def test_an_engine_takes_the_client_that_another_has_left(turtlebot: RobotSpec) -> None:
+    p = bullet()
+    with Engine(OPEN, turtlebot) as first:
+        number = first._client
+        assert number > 0
+    assert p.isConnected(number)
+    assert p.getNumBodies(number) == 0
+    with Engine(OPEN, turtlebot) as second:
+        assert second._client == number
+
+
+def test_a_client_of_ones_own_is_never_the_one_that_is_kept(turtlebot: RobotSpec) -> None:
+    """Calls of PyBullet without a client's number mean client 0."""
+    p = bullet()
+    with Engine(OPEN, turtlebot):
+        pass
+    mine = p.connect(p.DIRECT)
+    try:
+        assert mine == 0
+        box = p.createMultiBody(0, p.createCollisionShape(p.GEOM_BOX, halfExtents=[1, 1, 1]))
+        with Engine(OPEN, turtlebot) as engine:
+            engine.place((0, 0, 0))
+        assert p.getNumBodies() == 1
+        assert p.getBodyUniqueId(0) == box
+    finally:
+        p.disconnect(mine)
+
+
+def test_a_kept_client_that_was_closed_is_replaced(turtlebot: RobotSpec) -> None:
+    p = bullet()
+    with Engine(OPEN, turtlebot) as first:
+        number = first._client
+    p.disconnect(number)
+    with Engine(OPEN, turtlebot) as second:
+        second.place((0, 0, 0))
+        assert second.step() == []
+
+
+def test_a_client_whose_world_failed_is_not_kept(turtlebot: RobotSpec) -> None:
+    with Engine(OPEN, turtlebot) as first:
+        number = first._client
+    with pytest.raises(KeyError), client() as taken:
+        raise KeyError
+    assert taken == number
+    assert not bullet().isConnected(number)

@@ -111,6 +111,7 @@ def test_clients_are_closed_even_after_an_error(turtlebot: RobotSpec) -> None:
     number = engine._client
     assert bullet().getConnectionInfo(number)["isConnected"] == 0
     with client() as fresh:
+        assert bullet().getNumBodies(fresh) == 0
         assert bullet().getConnectionInfo(fresh)["isConnected"] == 1
 
 

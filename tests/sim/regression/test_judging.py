@@ -6,7 +6,8 @@ import dataclasses
 import json
 import math
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ from antdrive.sim.regression.artefacts import MOST_FILMS, Results, drive_of, fil
 from antdrive.sim.regression.baseline import MAX_BYTES
 from antdrive.sim.regression.explaining import explain
 from antdrive.sim.regression.nearest import nearest_of, touched_in
-from antdrive.sim.regression.parting import distances, parting
+from antdrive.sim.regression.parting import distances, farthest, parting
 from antdrive.worlds.errors import FieldError, InputError
 
 PLAIN = Demands()
@@ -298,6 +299,15 @@ def test_an_accepted_drive_of_movers_has_movers_in_its_picture(baseline: Baselin
     then = drive_of(baseline, small_run.rollout)
     assert then.outcome is Outcome.SUCCEEDED
     assert np.abs(np.interp(then.t, small_run.rollout.t, small_run.rollout.clearance) - then.clearance).max() < 2e-3
+
+
+def test_a_way_after_the_baselines_end_is_looked_at_although_it_comes_back(baseline: Baseline, small_run: Run) -> None:
+    assert small_run.rollout is not None
+    end, last = baseline.times[-1], small_run.rollout.pose[-1:]
+    t = np.append(small_run.rollout.t, end + np.array([1.0, 2.0]))
+    longer = SimpleNamespace(t=t, pose=np.concatenate([small_run.rollout.pose, last + [0.3, 0.4, 0.0], last]))
+    assert farthest(baseline, cast(Any, longer)) == pytest.approx(0.5, abs=2e-3)
+    assert farthest(baseline, small_run.rollout) < 2e-3
 
 
 @given(st.lists(st.text(min_size=1), min_size=2, max_size=2, unique=True))

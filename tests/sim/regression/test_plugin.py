@@ -22,13 +22,15 @@ import antdrive.sim.regression.summary
 import antdrive.sim.regression.unused
 import antdrive.sim.view.figures.plan_figures
 import antdrive.sim.view.figures.run_figures
-import antdrive.sim.view.figures.then_and_now  # noqa: F401
+import antdrive.sim.view.figures.then_and_now
+import antdrive.sim.warm  # noqa: F401
 from antdrive import list_robots
 
 # What the compiler loads when it first compiles must not be forgotten either: it cannot be loaded twice.
 numba.njit(lambda: 0.0)()
 pytest_plugins = ["pytester"]
 PLUGIN = ("-p", "antdrive.sim.regression.plugin", "-p", "no:cacheprovider")
+RUN_FIGURES, PLAN_FIGURES = (f"antdrive.sim.view.figures.{name}_figures." for name in ("run", "plan"))
 SUITE = """schema: 1
 defaults: {planner: astar, world: small.yaml}
 scenarios:
@@ -40,8 +42,17 @@ SMALL = "{schema: 1, bounds: [0, 0, 4, 2], start: [0.6, 1, 0], goal: [3.4, 1], c
 
 
 @pytest.fixture
-def project(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytest.Pytester:
+def pictures() -> bool:
+    """Whether pictures are drawn; else empty files stand for them, which is quicker."""
+    return False
+
+
+@pytest.fixture
+def project(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, pictures: bool) -> pytest.Pytester:
     """A folder with a suite; results go beside it, without films."""
+    if not pictures:
+        monkeypatch.setattr(RUN_FIGURES + "overview", lambda rollout, path: Path(path).touch())
+        monkeypatch.setattr(PLAN_FIGURES + "plan_figure", lambda task, grid, plan, robot, path: Path(path).touch())
     monkeypatch.setenv("XDG_CACHE_HOME", str(pytester.path / "cache"))
     monkeypatch.setenv("PYTEST_ADDOPTS", "--drive-film=never")
     monkeypatch.delenv("GITHUB_STEP_SUMMARY", raising=False)
@@ -131,6 +142,7 @@ def test_tests_in_python_have_baselines_of_their_own(project: pytest.Pytester) -
     last.stdout.fnmatch_lines(["FAILED: unused baseline: *test_named.json; remove it"])
 
 
+@pytest.mark.parametrize("pictures", [True])
 def test_a_worse_drive_fails_with_what_was_lost_and_where_it_parts(accepted: pytest.Pytester) -> None:
     folder = accepted.path / "res"
     (accepted.path / "slow.yaml").write_text(_robot().replace("max_speed: 0.7", "max_speed: 0.4"))
@@ -147,6 +159,7 @@ def test_a_worse_drive_fails_with_what_was_lost_and_where_it_parts(accepted: pyt
         f"overview: {folder}/a/clear-0/overview.png",
     ])  # fmt: skip
     written = sorted(path.name for path in (folder / "a" / "clear-0").iterdir())
+    assert all(path.stat().st_size > 10_000 for path in (folder / "a" / "clear-0").glob("*.png"))
     assert written == ["commands.txt", "overview.png", "result.json", "rollout.npz", "then-and-now.png"]
     accepted.makefile(".drive.yaml", a=SUITE)
     accepted.runpytest(*PLUGIN, "-k", "clear", "--drive-results", "res").assert_outcomes(passed=1, deselected=1)
@@ -258,6 +271,60 @@ def test_a_baseline_that_cannot_be_written_is_one_line(accepted: pytest.Pytester
     found = accepted.runpytest(*PLUGIN, "-k", "clear", "--drive-update")
     folder.chmod(0o700)
     found.stdout.fnmatch_lines(["*clear-0.json: cannot be written*"])
+
+
+TWO = (
+    "def test_two(drive):\n    drive('small.yaml', 'astar', name='one')\n    drive('small.yaml', 'astar', name='two')\n"
+)
+
+
+@pytest.mark.parametrize("change", ["rename", "drop"])
+def test_the_baseline_of_a_drive_that_is_gone_is_unused(project: pytest.Pytester, change: str) -> None:
+    project.makepyfile(test_m=TWO)
+    project.runpytest(*PLUGIN, "test_m.py", "--drive-update-new", "--drive-strict").assert_outcomes(passed=1)
+    gone = TWO.replace("'two'", "'other'") if change == "rename" else "".join(TWO.splitlines(keepends=True)[:2])
+    (project.path / "test_m.py").write_text(gone)
+    found = project.runpytest(*PLUGIN, "test_m.py", "--drive-update-new", "--drive-strict")
+    found.stdout.fnmatch_lines(["FAILED: unused baseline: *test_two-two.json; remove it"])
+    found.stdout.no_fnmatch_line("*test_two-one.json*")
+    assert found.ret == 1
+    (project.path / "test_m.py").write_text(gone + "    assert False\n")
+    found = project.runpytest(*PLUGIN, "test_m.py", "--drive-strict")
+    found.stdout.no_fnmatch_line("*unused baseline*")  # it might have come after what failed
+
+
+def test_commands_work_where_pytest_was_started_and_in_its_rootdir(project: pytest.Pytester) -> None:
+    project.makeini("[pytest]\n")
+    inner = project.mkdir("inner")
+    (inner / "small.yaml").write_text(SMALL)
+    (inner / "b.drive.yaml").write_text("{schema: 1, scenarios: {far: {world: small.yaml, planner: astar}}}")
+    (inner / "test_b.py").write_text("def test_far(drive): drive('small.yaml', 'astar')\n")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(inner)
+        found = project.runpytest(*PLUGIN, f"--rootdir={project.path}")
+    found.assert_outcomes(failed=2)
+    found.stdout.fnmatch_lines([f"*accept this drive with antdrive accept '{inner}/b.drive.yaml::far[[]0[]]'"])
+    found.stdout.fnmatch_lines([f"repeat: antdrive check '{inner}/b.drive.yaml::far[[]0[]]'"])
+    found.stdout.fnmatch_lines([f"        antdrive run {inner}/small.yaml --planner astar*"])
+    found.stdout.fnmatch_lines([f"E*repeat: pytest {inner}/test_b.py::test_far"])
+    for folder in (inner, project.path):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.chdir(folder)
+            again = project.runpytest(*PLUGIN, f"{inner}/test_b.py::test_far", "--drive-update")
+        again.assert_outcomes(passed=1)
+
+
+def test_kernels_are_compiled_before_the_first_drive_with_one_line(
+    project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    compiled: list[int] = []
+    monkeypatch.setattr("antdrive.sim.warm.is_warm", lambda: bool(compiled))
+    monkeypatch.setattr("antdrive.sim.warm.warm", lambda: compiled.append(1))
+    monkeypatch.setattr("antdrive.worlds.kernel_cache.cache_folder", lambda: project.path)
+    for _ in range(2):
+        project.runpytest(*PLUGIN, "-k", "closed", "--drive-update-new").assert_outcomes(passed=1, deselected=1)
+    assert compiled == [1]
+    assert capfd.readouterr().err.count("antdrive: compiling the planners, once for this installation") == 1
 
 
 def test_junit_properties_and_the_summary_of_a_ci_run(

@@ -210,6 +210,8 @@ def test_a_planner_of_ones_own_comes_from_a_file_or_a_module(tmp_path: Path, mon
         ("world: empty, start: [0, 0, 0]", 3, "scenarios.one.start: "),
         ("world: empty, start: [0, 0]", 3, "scenarios.one.start: must have 3 entries, got 2; write [x, y, yaw]"),
         ("world: empty, expect: {outcome: won}", 3, 'scenarios.one.expect.outcome: unknown outcome "won"; choose from'),
+        ("world: empty, expect: {outcome: collided, touched: tree}", 3, 'scenarios.one.expect.touched: unknown "tree"; choose'),
+        ("world: empty, expect: {cause: slip}", 3, "scenarios.one.expect.cause: nothing is touched where the outcome is"),
         ("world: empty, expect: {min_clearence_m: 1}", 3, "scenarios.one.expect.min_clearence_m: no such metric; did you"),
         ("world: empty, expect: {duration_s: short}", 3, 'scenarios.one.expect.duration_s: must be a bound such as'),
         ("world: empty, expect: {certified: maybe}", 3, "scenarios.one.expect.certified: must be true or false"),

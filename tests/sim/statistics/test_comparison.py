@@ -1,20 +1,17 @@
 """The two tables: known differences are found, equal planners are not told apart, nothing unpaired is compared."""
 
+import dataclasses
 import itertools
 import math
 
 import numpy as np
 import pytest
 
-from antdrive.sim.statistics.comparison import (
-    common_medians,
-    compare_metric,
-    compare_success,
-    pairs_of,
-    success_table,
-)
+from antdrive.sim.statistics.columns import SETTINGS
+from antdrive.sim.statistics.comparison import compare_metric, compare_success, pairs_of
 from antdrive.sim.statistics.pairing import PairedRuns
 from antdrive.sim.statistics.runs import RunTable
+from antdrive.sim.statistics.success import common_medians, success_table
 from antdrive.worlds import FieldError
 from tests.sim.made_up_campaign import Skill, made_up_columns, made_up_runs
 
@@ -100,14 +97,12 @@ def test_runs_without_a_partner_are_counted_and_left_out() -> None:
     assert metric.pairs + metric.dropped == 12
 
 
-@pytest.mark.parametrize(
-    "key", ["world", "world_hash", "task", "robot", "smoothing", "noise", "margin", "cell", "seed"]
-)
+@pytest.mark.parametrize("key", ["world", "world_hash", "task", "seed", *SETTINGS])
 def test_runs_that_differ_in_anything_are_no_pairs(key: str) -> None:
     columns = made_up_columns({"a": Skill(), "b": Skill()}, worlds=2, seeds=2)
     columns[key] = [
         f"other {value}" if isinstance(value, str) else (value or 0) + 50 if name == "b" else value
-        for name, value in zip(columns["planner"], columns[key], strict=True)
+        for name, value in zip(columns["planner"], columns.get(key, [None] * 8), strict=True)
     ]
     if isinstance(columns[key][0], str):
         columns[key] = [f"{value} of {name}" for name, value in zip(columns["planner"], columns[key], strict=True)]
@@ -142,6 +137,43 @@ def test_seeds_that_change_no_drive_are_no_evidence() -> None:
     assert common_medians(still, ["duration_s"])[0] == still.success.all(axis=1).sum() / 10
 
 
+def repeated(columns: dict, times: int) -> RunTable:
+    """Each run `times` times, with seeds of its own that change no drive."""
+    found = {name: [value for value in values for _ in range(times)] for name, values in columns.items()}
+    found["seed"] = [times * seed + k for seed in columns["seed"] for k in range(times)]
+    return RunTable(found)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1.0], ids=["alone", "with runs of another setting"])
+def test_repetitions_change_no_figure(noise: float) -> None:
+    planners = {"astar": Skill(0.8, 1.0, seeded=False), "dijkstra": Skill(0.7, 1.02, seeded=False)}
+    columns = made_up_columns(planners, worlds=15, seeds=1)
+    other = made_up_columns(planners, worlds=15, seeds=1, rng_seed=2)
+    other["noise"] = [noise] * 30
+    tables = []
+    for times in (1, 2, 7):
+        still = repeated(columns, times).columns
+        both = RunTable({name: [*still[name], *(other[name] if noise else ())] for name in columns})
+        paired = PairedRuns.of(both)
+        rows = [
+            (row.planner, row.counted, row.successes, row.interval, row.over_worlds) for row in success_table(paired)
+        ]
+        pairs = [dataclasses.replace(row, unpaired=0) for row in compare_success(paired, [(0, 1)])]
+        pairs += compare_metric(paired, [(0, 1)], "duration_s", "lower")
+        tables.append(repr((rows, pairs, common_medians(paired, ["duration_s"]))))
+    assert tables[0] == tables[1] == tables[2]
+
+
+def test_a_wall_time_of_repeated_drives_is_their_median() -> None:
+    columns = made_up_columns({"astar": Skill(1.0, seeded=False), "ants": Skill(1.0)}, worlds=2, seeds=3)
+    columns["plan_s"] = [0.3, 0.1, 0.2, 4, 5, 6, 0.9, 0.7, 0.8, 7, 8, 9]
+    paired = PairedRuns.of(RunTable(columns))
+    assert paired.values("plan_s").T.tolist() == [[0.2] * 3 + [0.8] * 3, [4, 5, 6, 7, 8, 9]]
+    assert common_medians(paired.select(["astar"]), ["plan_s"])[1]["plan_s"][0][0] == 0.5
+    first = [paired.table.columns["duration_s"][k] for k in (0, 6)]
+    assert paired.values("duration_s")[[0, 3], 0].tolist() == first
+
+
 def test_seeds_that_change_drives_under_some_settings_count_there() -> None:
     quiet = made_up_columns({"a": Skill(0.8, seeded=False), "b": Skill(0.9, seeded=False)}, worlds=6, seeds=5)
     noisy = made_up_columns({"a": Skill(0.8), "b": Skill(0.9)}, worlds=6, seeds=5)
@@ -149,6 +181,60 @@ def test_seeds_that_change_drives_under_some_settings_count_there() -> None:
     paired = PairedRuns.of(RunTable({name: [*quiet[name], *noisy[name]] for name in quiet}))
     assert [row.counted for row in success_table(paired)] == [6 + 30, 6 + 30]
     assert compare_success(paired, [(0, 1)])[0].pairs == 36
+
+
+def test_shares_are_over_the_instances_that_every_planner_ran() -> None:
+    columns = made_up_columns({"a": Skill(1.0), "b": Skill(1.0)}, worlds=8, seeds=2)
+    hard = [world >= "world-004" for world in columns["world"]]
+    columns["succeeded"] = columns["certified"] = [not one for one in hard]
+    easy_only = rows_of({**columns, "hard": hard}, lambda row: row["planner"] == "a" or not row["hard"])
+    rows = success_table(PairedRuns.of(easy_only))
+    assert [(row.planner, row.share, row.runs, row.elsewhere, row.counted) for row in rows] == [
+        ("a", 1.0, 16, 8, 8), ("b", 1.0, 8, 0, 8),
+    ]  # fmt: skip
+    apart = rows_of({**columns, "hard": hard}, lambda row: (row["planner"] == "a") == row["hard"])
+    assert [(row.share, row.elsewhere, row.counted) for row in success_table(PairedRuns.of(apart))] == [
+        (1.0, 0, 8), (0.0, 0, 8),
+    ]  # fmt: skip
+
+
+def test_where_all_runs_end_alike_whole_worlds_are_counted() -> None:
+    always, never = Skill(1.0), Skill(0.0)
+    rows = success_table(PairedRuns.of(made_up_runs({"a": always, "b": never}, worlds=4, seeds=50)))
+    z2 = 1.959963984540054**2
+    assert rows[0].over_worlds == pytest.approx((4 / (4 + z2), 1.0)), "Wilson's limit for 4 of 4"
+    assert rows[1].over_worlds == pytest.approx((0.0, z2 / (4 + z2)))
+    assert rows[0].interval.low > 0.98, "over single runs"
+    for first, second, low, high in ((always, always, -z2 / (4 + z2), z2 / (4 + z2)), (never, never, -0.49, 0.49)):
+        row = compare_success(PairedRuns.of(made_up_runs({"a": first, "b": second}, worlds=4, seeds=50)), [(0, 1)])[0]
+        assert row.interval == pytest.approx((low, high), abs=0.001)
+    row = compare_success(PairedRuns.of(made_up_runs({"a": always, "b": never}, worlds=4, seeds=50)), [(0, 1)])[0]
+    assert row.interval == pytest.approx((1 - 2**0.5 * z2 / (4 + z2), 1.0)), "Newcombe's for 4 of 4 against 0 of 4"
+
+
+def test_a_metric_without_a_direction_has_no_better_planner() -> None:
+    paired = PairedRuns.of(made_up_runs({"a": Skill(1.0, 1.0), "b": Skill(1.0, 1.3)}, worlds=10, seeds=3))
+    row = compare_metric(paired, [(0, 1)], "duration_s", "neither")[0]
+    assert (row.better, row.lower, row.as_dict()["better"], row.as_dict()["lower"]) == ("", "a", "", "a")
+    row = compare_metric(paired, [(0, 1)], "duration_s", "lower")[0]
+    assert (row.better, row.lower) == ("a", "")
+
+
+def test_runs_are_paired_by_the_margin_that_was_asked_for_and_by_the_robots_content() -> None:
+    columns = made_up_columns({"a": Skill(1.0), "b": Skill(1.0)}, worlds=2, seeds=1)
+    two = {name: [*values, *values] for name, values in columns.items()}
+    with pytest.raises(
+        FieldError, match="lacks robot_hash and margin_asked, which may tell them apart; antdrive sweep"
+    ):
+        PairedRuns.of(RunTable(two))
+    asked = PairedRuns.of(RunTable({**two, "margin_asked": ["0.03"] * 4 + ["auto"] * 4}))
+    assert compare_success(asked, [(0, 1)])[0].pairs == 4, "auto chose the margin that was asked for as well"
+    chosen = {**columns, "margin_asked": ["auto"] * 4, "margin": [0.03, 0.04, 0.03, 0.04]}
+    assert PairedRuns.of(RunTable(chosen)).shared.all(), "both asked for the same"
+    robots = PairedRuns.of(RunTable({**two, "robot_hash": ["1"] * 4 + ["2"] * 4}))
+    assert compare_success(robots, [(0, 1)])[0].pairs == 4
+    with pytest.raises(FieldError, match="one is needed to pair them"):
+        PairedRuns.of(RunTable({**two, "robot_hash": ["1"] * 8, "margin_asked": ["0.03"] * 8}))
 
 
 def test_a_world_that_decides_alone_is_no_evidence_for_other_worlds() -> None:

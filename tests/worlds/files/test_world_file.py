@@ -3,9 +3,11 @@
 import json
 import math
 import os
+import re
 import stat
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +22,7 @@ from antdrive.worlds import (
     World,
     list_worlds,
     load_task,
+    load_tasks,
     save_task,
     task_from_dict,
     task_schema,
@@ -339,7 +342,7 @@ def test_a_written_file_may_be_read_like_any_other(tmp_path):
 def test_the_schema_lists_every_key_and_the_required_ones():
     schema = task_schema()
     json.dumps(schema)
-    assert set(schema["properties"]) == {*task_to_dict(TASK), "movers", "time_limit"}
+    assert set(schema["properties"]) == {*task_to_dict(TASK), "movers", "time_limit", "tasks", "frame"}
     assert schema["required"] == ["schema", "bounds", "start", "goal"]
     assert schema["additionalProperties"] is False
     assert schema["properties"]["start"]["minItems"] == schema["properties"]["start"]["maxItems"] == 3
@@ -349,3 +352,57 @@ def test_the_schema_lists_every_key_and_the_required_ones():
 def test_the_catalogue_is_the_files_that_come_along():
     assert all(path.is_file() for path in list_worlds().values())
     assert list(list_worlds()) == sorted(list_worlds())
+
+
+# Tasks beside a world's own
+
+NAMED = """\
+schema: 1
+bounds: [0, 0, 10, 6]
+start: [1, 1, 0]
+goal: [9, 1]
+goal_tolerance: 0.3
+tasks:
+  - {name: dock, goal: [9, 5]}
+  - {name: back, start: [9, 5, 3.1], goal: [1, 1], goal_tolerance: 0.1}
+"""
+
+
+def test_tasks_are_chosen_by_name(tmp_path):
+    (tmp_path / "office.yaml").write_text(NAMED)
+    own, dock, back = (load_task(tmp_path / "office.yaml", name) for name in (None, "dock", "back"))
+    assert (own.start, own.goal) == ((1, 1, 0), (9, 1))
+    assert (dock.start, dock.goal, dock.goal_tolerance) == ((1, 1, 0), (9, 5), 0.3)
+    assert (back.start, back.goal, back.goal_tolerance) == ((9, 5, 3.1), (1, 1), 0.1)
+    assert load_tasks(tmp_path / "office.yaml") == {"dock": dock, "back": back}
+    assert load_tasks("empty") == {}
+
+
+@pytest.mark.parametrize(
+    ("text", "error"),
+    [
+        (NAMED + "  - {name: dock, goal: [1, 5]}\n", "office.yaml:9: tasks[2].name: 'dock' is the name of two tasks"),
+        (NAMED + "  - {name: out, goal: [99, 5]}\n", "office.yaml:9: tasks[2].goal: (99, 5) is out of bounds"),
+        (NAMED + "  - {goal: [1, 5]}\n", "office.yaml:9: tasks[2].name: missing"),
+        (NAMED + "frame: [0, 0]\n", "office.yaml:9: frame: must have 3 entries"),
+    ],
+)
+def test_wrong_tasks_are_refused(tmp_path, text, error):
+    (tmp_path / "office.yaml").write_text(text)
+    with pytest.raises(InputError, match=re.escape(error)):
+        load_task(tmp_path / "office.yaml")
+
+
+def test_an_unknown_task_is_refused_with_those_that_there_are(tmp_path):
+    (tmp_path / "office.yaml").write_text(NAMED)
+    with pytest.raises(InputError, match=r"office.yaml: no task 'dok'; did you mean dock\?"):
+        load_task(tmp_path / "office.yaml", "dok")
+    with pytest.raises(InputError, match="empty: no task 'dock'; the world has no tasks beside its own start and goal"):
+        load_task("empty", "dock")
+
+
+def test_how_a_world_lies_in_its_map_is_kept(tmp_path):
+    task = replace(TASK, frame=(1.5, -2.0, 0.25))
+    save_task(task, tmp_path / "w.yaml")
+    assert load_task(tmp_path / "w.yaml") == task
+    assert "frame" not in task_to_dict(TASK)

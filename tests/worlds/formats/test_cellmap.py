@@ -12,7 +12,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from antdrive.worlds import CellMap, Disc, InputError, Task, World, cell_map, map_task, rasterise
-from antdrive.worlds.formats.cellmap import cover
+from antdrive.worlds.formats.cellmap import cover, watch_conversion
 from tests.worlds.oracles import worlds
 
 CORNER = (math.sqrt(2) - 1) / 2
@@ -221,3 +221,15 @@ def test_a_world_made_from_a_worlds_cells_blocks_all_that_the_world_does(world: 
 def test_unusable_resolutions_are_refused(resolution: float) -> None:
     with pytest.raises(InputError, match="resolution: "):
         cell_map(World("w", (0.0, 0.0, 10.0, 10.0)), resolution)
+
+
+def test_a_conversion_says_how_far_it_is() -> None:
+    free = np.ones((20, 20), dtype=np.bool_)
+    free[8:12, 3:15] = False
+    shares: list[float] = []
+    with watch_conversion(shares.append):
+        map_task(CellMap(free, 0.1), (0.3, 0.3, 0.0), (1.7, 1.7), name="made")
+    map_task(CellMap(free, 0.1), (0.3, 0.3, 0.0), (1.7, 1.7), name="nobody watches")
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+    assert len(shares) == 3

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from antdrive.worlds import InputError, import_map_server, load_task, save_task
+from antdrive.worlds import InputError, export_map_server, import_map_server, load_task, save_task
 from antdrive.worlds.formats.map_server import read_map
 
 GOOD = """\
@@ -150,7 +150,6 @@ BAD: dict[str, tuple[str, bytes | None, str]] = {
     "resolution text": (GOOD.replace("0.5", "5e-2"), PGM, "resolution: must be a number, got \"5e-2\" (text); write 5.0e-2"),
     "resolution nan": (GOOD.replace("0.5", ".nan"), PGM, "resolution: must be a finite number, got .nan"),
     "origin without yaw": (GOOD.replace(", 0.0]", "]"), PGM, "made.yaml:3: origin: must have 3 entries, got 2; write [x"),
-    "turned": (GOOD.replace(", 0.0]", ", 0.1]"), PGM, "made.yaml:3: origin: a map turned by 0.1 rad is not supported"),
     "negate 2": (GOOD.replace("negate: 0", "negate: 2"), PGM, "made.yaml:4: negate: must be true or false, got 2"),
     "threshold 65": (GOOD.replace("0.65", "65"), PGM, "made.yaml:5: occupied_thresh: must be at most 1, got 65"),
     "threshold below 0": (GOOD.replace("0.196", "-0.1"), PGM, "made.yaml:6: free_thresh: must be at least 0, got -0.1"),
@@ -187,3 +186,26 @@ def test_malformed_maps_get_a_message_of_one_line(case: str, tmp_path: Path) -> 
     assert str(caught.value).startswith(str(path))
     assert says in str(caught.value)
     assert str(caught.value).isprintable()
+
+
+def test_a_turned_map_becomes_an_upright_world_that_knows_how_it_lies(tmp_path: Path) -> None:
+    """The same picture, upright and turned: same world, and the ends go the way that complex numbers turn."""
+    turn, corner = 0.4, complex(2.0, -3.0)
+    for name, origin in (("upright", "[0.0, 0.0, 0.0]"), ("turned", "[2.0, -3.0, 0.4]")):
+        Image.fromarray(np.full((8, 8), 254, dtype=np.uint8)).save(tmp_path / f"{name}.png")
+        lines = f"image: {name}.png\nresolution: 0.5\norigin: {origin}\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.2\n"
+        (tmp_path / f"{name}.yaml").write_text(lines)
+    upright = import_map_server(tmp_path / "upright.yaml", start=(1.0, 1.0, 0.1), goal=(3.0, 2.0))
+    start, goal = (complex(*end) * np.exp(1j * turn) + corner for end in ((1.0, 1.0), (3.0, 2.0)))
+    turned = import_map_server(
+        tmp_path / "turned.yaml", start=(start.real, start.imag, 0.5), goal=(goal.real, goal.imag)
+    )
+    assert turned.world.bounds == upright.world.bounds
+    assert turned.start == pytest.approx(upright.start)
+    assert turned.goal == pytest.approx(upright.goal)
+    assert (turned.frame, upright.frame) == ((2.0, -3.0, 0.4), (0.0, 0.0, 0.0))
+    export_map_server(turned, tmp_path / "again.yaml")
+    again = import_map_server(tmp_path / "again.yaml")
+    assert again.frame == pytest.approx(turned.frame)
+    assert again.start == pytest.approx(turned.start)
+    assert again.goal == pytest.approx(turned.goal)

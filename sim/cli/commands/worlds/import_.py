@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from antdrive.sim.cli import options
-from antdrive.sim.cli.console import print_files, print_json, print_line
+from antdrive.sim.cli.console import bar, print_files, print_json, print_line
 from antdrive.sim.cli.exits import SUCCEEDED
 from antdrive.sim.cli.output import task_facts
 from antdrive.sim.cli.parse import numbers
@@ -17,7 +17,7 @@ from antdrive.worlds.errors import FieldError, InputError
 if TYPE_CHECKING:
     from antdrive.worlds import Task
 
-MANY = 5000  # cylinders; from here on, setting up physics takes long
+MANY = 5000  # cylinders; from here on, planning takes seconds
 
 Source = Annotated[
     Path,
@@ -94,23 +94,25 @@ def import_world(
     wider than on the map. The key `source` of the world file says how far cylinders protrude from blocked cells.
     """
     from antdrive.worlds import import_file
+    from antdrive.worlds.formats.cellmap import watch_conversion
     from antdrive.worlds.formats.importing import IMPORTS, import_format
 
     try:
         file_format = import_format(path, barn=barn)
-        tasks = import_file(
-            path,
-            start=numbers("--start", start, 3),
-            goal=numbers("--goal", goal, 2),
-            bounds=numbers("--bounds", bounds, 4),
-            cell=cell,
-            barn=barn,
-            skip_unsupported=skip_unsupported or None,
-            unknown=unknown,
-            overhang=overhang,
-            resolution=resolution,
-            problem=problem,
-        )
+        with bar("converting") as progress, watch_conversion(progress):
+            tasks = import_file(
+                path,
+                start=numbers("--start", start, 3),
+                goal=numbers("--goal", goal, 2),
+                bounds=numbers("--bounds", bounds, 4),
+                cell=cell,
+                barn=barn,
+                skip_unsupported=skip_unsupported or None,
+                unknown=unknown,
+                overhang=overhang,
+                resolution=resolution,
+                problem=problem,
+            )
     except FieldError as error:
         raise InputError(f"--{error.key.replace('_', '-')}: {error.problem}") from None
     is_set = file_format is IMPORTS["dynabarn"]
@@ -156,6 +158,6 @@ def _print(tasks: "Sequence[Task]", files: Sequence[Path], *, is_map: bool) -> N
         world = tasks[0].world
         print_line(f"{world.name}: {len(world.obstacles)} obstacles, {world.source}")
         if is_map and len(world.obstacles) > MANY:
-            print_line(f"  more than {MANY} make runs slow to start; a larger --overhang needs fewer of them")
+            print_line(f"  more than {MANY} make planning take seconds; a larger --overhang needs fewer of them")
     for file in files:
         print_files({"world": str(file)})

@@ -9,6 +9,7 @@ from antdrive.sim.cli import options
 from antdrive.sim.cli.console import print_files, print_json, print_line
 from antdrive.sim.cli.exits import SUCCEEDED
 from antdrive.sim.cli.output import task_facts
+from antdrive.sim.cli.scenario import chosen_task
 
 UNITS = {"bounds": " m", "start": " m, m, rad", "goal": " m", "goal_tolerance": " m", "cell": " m"}
 
@@ -17,6 +18,9 @@ def show_world(
     world: options.World,
     robot: options.Robot = "turtlebot",
     margin: options.Margin = 0.03,
+    task: options.TaskName = None,
+    start: options.Start = None,
+    goal: options.Goal = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", metavar="FILE", help="Draw the world: .png, .svg or .pdf.")
     ] = None,
@@ -25,27 +29,31 @@ def show_world(
     """Describe a world, and whether a robot can cross it."""
     from antdrive.planners import Query, load_planner, reachable
     from antdrive.robots import list_robots, load_robot, overlap_at
-    from antdrive.worlds import load_task, rasterise, task_to_dict
+    from antdrive.worlds import load_task, load_tasks, rasterise, task_to_dict
 
-    task, spec = load_task(world), load_robot(robot)
-    grid = rasterise(task.world, task.cell, spec.radius + margin)
-    query = Query.between(grid, task)
+    given, spec = chosen_task(world, task, start, goal), load_robot(robot)
+    shown = load_task(given) if isinstance(given, str) else given
+    grid = rasterise(shown.world, shown.cell, spec.radius + margin)
+    query, named = Query.between(grid, shown), list(load_tasks(world))
     known = {name: load_robot(name) for name in list_robots()}
-    starts = {each.name: overlap_at(task.world, each, task.start) for each in (*known.values(), spec)}
+    starts = {each.name: overlap_at(shown.world, each, shown.start) for each in (*known.values(), spec)}
     passable = not starts[spec.name] and query.blocked_end is None and reachable(query)
     if out is not None:
         import numpy as np
 
         from antdrive.sim.view.figures.plan_figures import plan_figure
 
-        plan_figure(task, grid, load_planner("astar").plan(query, np.random.default_rng(0)), spec, out)
+        plan_figure(shown, grid, load_planner("astar").plan(query, np.random.default_rng(0)), spec, out)
     if json:
-        print_json({**task_to_dict(task), "passable": passable, "robot": spec.name, "margin": margin, "starts": starts})
+        facts = {"passable": passable, "robot": spec.name, "margin": margin, "starts": starts, "tasks": named}
+        print_json({**task_to_dict(shown), **facts})
         return SUCCEEDED
-    for key, value in task_facts(task).items():
+    for key, value in task_facts(shown).items():
         print_line(f"{key + UNITS.get(key, ''):18} {value}")
     print_line(f"{'passable':18} {'yes' if passable else 'no'}, for {spec.name} with a margin of {margin:g} m")
     for name, overlap in starts.items():
         print_line(f"{'start for ' + name:18} {overlap or 'free'}")
+    if named:
+        print_line(f"{'tasks':18} {', '.join(named)}")
     print_files({} if out is None else {"figure": str(out)})
     return SUCCEEDED

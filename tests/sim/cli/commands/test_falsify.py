@@ -1,6 +1,7 @@
 """`antdrive falsify`."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -41,8 +42,17 @@ def test_failures_are_handed_over_as_a_suite(antdrive: Call) -> None:
 def test_a_set_up_without_failures_is_exit_code_0(antdrive: Call) -> None:
     code, out, err = antdrive("falsify", "-p", "astar", "--budget", "1", "--out", "none")
     assert (code, err) == (0, "")
-    assert out == "after 1 runs: 0 failures, 0 of them different\n"
-    assert list(Path("none").iterdir()) == []
+    assert out == "after 1 runs, 1 of them with a path on the grid: 0 failures, 0 of them different\n"
+    assert [path.name for path in Path("none").iterdir()] == ["falsify.json"]
+
+
+def test_other_searches_have_other_folders(antdrive: Call) -> None:
+    search = ("falsify", "-p", "astar", "--budget", "1", "--margin")
+    for margin in ("0.03", "0.04", "0.03"):
+        assert antdrive(*search, margin)[0] == 0
+    first, second = sorted(path.name for path in Path("out").iterdir())
+    assert first == "falsify-astar-turtlebot-0"
+    assert re.fullmatch(f"{first}-[0-9a-f]{{8}}", second)
 
 
 def test_nothing_of_an_earlier_search_is_left(antdrive: Call) -> None:
@@ -50,7 +60,7 @@ def test_nothing_of_an_earlier_search_is_left(antdrive: Call) -> None:
     for name in ("failures.drive.yaml", "failure-1/rollout.npz"):
         (Path("none") / name).touch()
     assert antdrive("falsify", "-p", "astar", "--budget", "1", "--out", "none")[0] == 0
-    assert list(Path("none").iterdir()) == []
+    assert [path.name for path in Path("none").iterdir()] == ["falsify.json"]
 
 
 @pytest.mark.parametrize(

@@ -22,15 +22,19 @@ def collided(collided_run: Run, tmp_path: Path) -> Path:
 
 
 def test_a_failure_becomes_a_world_and_a_suite(antdrive: Call, collided: Path, tmp_path: Path) -> None:
-    code, out, err = antdrive("shrink", collided, "--out", "small", "--json", "--no-figures", "--no-film")
+    other = tmp_path / "out" / "small-small" / "shrink.json"
+    other.parent.mkdir(parents=True)
+    other.write_text('{"fingerprint": "of another failure in this world"}')
+    code, out, err = antdrive("shrink", collided, "--json", "--no-figures", "--no-film")
     assert (code, err) == (0, "")
+    assert list(other.parent.iterdir()) == [other]
     facts = json.loads(out)
     assert (facts["failure"]["outcome"], facts["failure"]["touched"]) == ("collided", "unseen cylinder")
     assert (facts["complete"], facts["repeats"]) == (True, True)
-    folder = tmp_path / "small"
+    (folder,) = (tmp_path / "out").glob("small-small-????????")
     written = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
     name = "small-small"
-    files = {f"{name}.drive.yaml", "journal.json", "result.json", "rollout.npz", f"worlds/{name}.yaml"}
+    files = {f"{name}.drive.yaml", "journal.json", "shrink.json", "result.json", "rollout.npz", f"worlds/{name}.yaml"}
     assert written == files
     assert load_task(folder / "worlds" / f"{name}.yaml").world.obstacles == ()
     suite = folder / f"{name}.drive.yaml"
@@ -77,3 +81,20 @@ def test_a_planner_from_a_file_goes_with_the_suite(antdrive: Call, tmp_path: Pat
     assert json.loads(out)["repeats"]
     (case,) = load_suite(tmp_path / "deep" / "small" / "empty-small.drive.yaml")
     assert case.entry.planner == {"file": "../../own.py", "name": "Mine"}
+
+
+def test_a_test_that_fails_by_its_bound_is_shrunk_until_it_would_keep_it(antdrive: Call, small: Path) -> None:
+    """The bound is on the route's length, which no drive changes: two runs of the test itself, and quick ones after it."""
+    text = "{schema: 1, scenarios: {a: {world: small.yaml, planner: astar, expect: {spl: '>= 0.999'}}}}"
+    (small.parent / "a.drive.yaml").write_text(text)
+    code, out, err = antdrive("shrink", "a.drive.yaml::a", "--json", "--no-figures", "--no-film", "--seconds", "1")
+    assert (code, err) == (0, "")
+    assert json.loads(out)["failure"] == {"outcome": "succeeded", "touched": "nothing", "cause": "spl < 0.999"}
+    (case,) = load_suite(next(Path("out/small-small").glob("*.drive.yaml")))
+    assert case.entry.expect == {"outcome": "succeeded", "certified": True, "spl": "< 0.999"}
+
+
+def test_the_folder_of_a_run_stands_for_its_log(refused: Refused, small_run: Run, tmp_path: Path) -> None:
+    assert small_run.rollout is not None
+    small_run.rollout.save(tmp_path / "run" / "rollout.npz")
+    assert "small: this run does not fail" in refused("shrink", "run")

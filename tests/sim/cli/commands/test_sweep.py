@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from antdrive.sim.campaigns import canonical_bytes, read_results
+from antdrive.sim.cli.commands.sweep import _without_again
 from antdrive.sim.cli.console import duration
 from antdrive.worlds.files.atomic import claimed
 from tests.sim.cli.calling import Call, Refused
@@ -73,6 +74,34 @@ def test_the_command_in_a_row_repeats_the_run(antdrive: Call, campaign: Path, mo
     assert json.loads(Path("again/result.json").read_text())["digest"] == row["digest"]
 
 
+def test_a_planner_in_a_file_is_swept_and_its_command_repeats_the_run(
+    antdrive: Call, campaign: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lines = ["from dataclasses import dataclass", "from antdrive.planners import AStar", "@dataclass(frozen=True)"]
+    Path("mine.py").write_text("\n".join([*lines, "class Mine(AStar):", "    width: int = 3", ""]))
+    code, out, _ = antdrive("sweep", campaign, "-o", "out", "--jobs", "1", "-p", "mine.py:Mine:width=4", "--json")
+    assert (code, json.loads(out)["succeeded"]) == (0, 1)
+    (row,) = read_results("out").table.to_pylist()
+    assert row["planner"] == "mine.py:Mine width=4"
+    monkeypatch.chdir("out")
+    antdrive(*shlex.split(row["command"])[1:], "--no-figures", "--out", "again")
+    found = json.loads(Path("again/result.json").read_text())
+    assert (found["digest"], found["planner"]) == (row["digest"], "Mine")
+
+
+def test_runs_that_are_asked_for_again_count_as_missing(antdrive: Call, campaign: Path) -> None:
+    antdrive("sweep", campaign, "-o", "out", "--jobs", "1")
+    _, out, _ = antdrive(
+        "sweep", campaign, "-o", "out", "--dry-run", "--again", "aco-han", "--again", "no_path", "--json"
+    )
+    assert json.loads(out)["missing"] == 2
+
+
+def test_the_command_that_goes_on_does_not_make_runs_a_third_time() -> None:
+    words = ["sweep", "c.yaml", "--again", "astar", "-o", "out", "--again=crashed"]
+    assert list(_without_again(words)) == ["sweep", "c.yaml", "-o", "out"]
+
+
 def test_two_commands_on_one_folder_do_not_mix(refused: Refused, campaign: Path) -> None:
     with claimed("out"):
         assert "is writing into this folder; wait for it" in refused("sweep", campaign, "-o", "out", "--jobs", "1")
@@ -96,6 +125,10 @@ def test_a_folder_with_other_files_is_left_alone(refused: Refused, campaign: Pat
         (["campaign.yaml", "-o", "out", "-p", "as:ants=1..x..2"], "--planner x: must be a number"),
         (["campaign.yaml", "-o", "out", "--seeds", "1,b"], "--seeds b: must be a whole number"),
         (["campaign.yaml", "-o", "out", "--dask", "host"], "--dask: host: write local:N with a number of processes"),
+        (["campaign.yaml", "-o", "out", "--dask", "local:0"], "--dask: local:0: write local:N"),
+        (["campaign.yaml", "-o", "out", "--dask", "local:2", "-j", "2"], "--jobs: has no effect with --dask"),
+        (["campaign.yaml", "-o", "out", "--again", "x"], "--again x: no such planner or outcome; choose from astar"),
+        (["campaign.yaml", "-o", "out", "--run-limit", "0"], "run_limit: must be greater than 0, got 0"),
         (["nowhere.yaml", "-o", "out"], "nowhere.yaml: no such file"),
     ],
 )

@@ -20,6 +20,7 @@ from antdrive.sim.view import figures as figures_package
 from antdrive.sim.view.figures.canvas import panels, save_figure
 from antdrive.sim.view.figures.paper_figures import ants_figure, history_figure, sweep_figure
 from antdrive.sim.view.figures.plan_figures import bars_figure, contours_figure, plan_figure
+from antdrive.sim.view.figures.robot_figure import robot_figure
 from antdrive.sim.view.figures.run_figures import certificate_figure, comparison_figure, overview
 from antdrive.sim.view.figures.then_and_now import then_and_now
 from antdrive.sim.view.style import BAD, GOOD, planner_style
@@ -163,6 +164,7 @@ def test_every_figure_gives_its_axes_back_to_be_labelled_and_saved(made_up_drive
         (bars_figure(grid, learnt.field), ["field"]),
         (contours_figure(task, grid, learnt, ROBOT), ["map"]),
         (history_figure({"as": [history]}), ["history"]),
+        (robot_figure(ROBOT), ["map"]),
         (ants_figure({10: [3.0]}, planner="aco-han", optimum=2.0), ["lengths"]),
         (sweep_figure([0.1], [0.2, 0.3], table), ["with elitism", "without elitism"]),
     ]
@@ -187,7 +189,7 @@ def test_no_figure_function_is_left_out(made_up_drive):
             if function.__module__ == module.__name__ and not name.startswith("_") and path.stem != "canvas":
                 found[name] = inspect.signature(function)
     with_path = {name: of for name, of in found.items() if "path" in of.parameters}
-    assert len(with_path) == 10
+    assert len(with_path) == 11
     assert all(of.parameters["path"].default is None and of.return_annotation == "Figure" for of in with_path.values())
     assert all(name.startswith("draw_") for name in found.keys() - with_path.keys() - {"plan_figures"})
 

@@ -1,0 +1,205 @@
+"""A building of 40 x 30 m as a map of 0.05 m a pixel: what each stage of its use costs, and the loop among 10,000 cylinders.
+
+python -m benchmarks.building            # a table for docs/benchmarks.md
+python -m benchmarks.building --map DIR  # only write the map, to look at it
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import resource
+import statistics
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from PIL import Image
+
+from antdrive.planners import Query, checked, load_planner, smooth
+from antdrive.robots import PurePursuit, load_robot
+from antdrive.sim import Engine, Rollout, Scenario, certify, run
+from antdrive.sim.driving.drive import drive
+from antdrive.worlds import Disc, Route, Task, World, import_map_server, load_task, rasterise, save_task
+
+RESOLUTION = 0.05  # [m]
+SIZE = (40.0, 30.0)  # [m]
+START, GOAL = (1.5, 15.0, 0.0), (38.0, 26.6)
+DOOR, WALL, CORRIDOR = 1.0, 0.15, 2.2  # widths [m]
+ROUNDS = 7
+T = TypeVar("T")
+
+
+def building(seed: int = 0) -> np.ndarray:
+    """The free pixels: rooms on both sides of three corridors, each with a door and furniture."""
+    rng = np.random.default_rng(seed)
+    width, height = (round(side / RESOLUTION) for side in SIZE)
+    free = np.ones((height, width), dtype=bool)
+
+    def fill(x0: float, y0: float, x1: float, y1: float, value: bool = False) -> None:
+        box = [round(v / RESOLUTION) for v in (y0, y1, x0, x1)]
+        free[max(0, box[0]) : box[1], max(0, box[2]) : box[3]] = value
+
+    for x0, y0, x1, y1 in ((0, 0, 40, WALL), (0, 30 - WALL, 40, 30), (0, 0, WALL, 30), (40 - WALL, 0, 40, 30)):
+        fill(x0, y0, x1, y1)
+    corridors = (5.0, 15.0, 25.0)  # along x
+    for y in corridors:
+        for side in (-1, 1):
+            wall = y + side * CORRIDOR / 2
+            fill(0, wall - WALL / 2, 40, wall + WALL / 2)
+    fill(19.0 - WALL, 0, 19.0, 30)  # a corridor along y joins the three
+    fill(21.0, 0, 21.0 + WALL, 30)
+    fill(19.0, WALL, 21.0, 30 - WALL, True)
+    for y in corridors:
+        fill(WALL, y - CORRIDOR / 2 + WALL / 2, 40 - WALL, y + CORRIDOR / 2 - WALL / 2, True)
+    for low, high in ((WALL, 3.9), (6.1, 13.9), (16.1, 23.9), (26.1, 30 - WALL)):
+        for left, right in ((WALL, 19.0 - WALL), (21.0 + WALL, 40 - WALL)):
+            edges = np.linspace(left, right, 6)
+            for x in edges[1:-1]:
+                fill(x - WALL / 2, low, x + WALL / 2, high)
+            for a, b in itertools.pairwise(edges):
+                _furnish(rng, fill, float(a), low, float(b), high)
+    for y in corridors:  # doors of both sides, at last
+        for left, right in ((WALL, 19.0 - WALL), (21.0 + WALL, 40 - WALL)):
+            for middle in np.linspace(left, right, 11)[1::2]:
+                for side in (-1, 1):
+                    wall = y + side * CORRIDOR / 2
+                    fill(middle - DOOR / 2, wall - WALL, middle + DOOR / 2, wall + WALL, True)
+    return free
+
+
+def _furnish(rng: np.random.Generator, fill: Callable[..., None], x0: float, y0: float, x1: float, y1: float) -> None:
+    """Desks and chairs, with a free aisle before the doors."""
+    for _ in range(5):
+        wide, deep = rng.uniform(0.4, 1.4), rng.uniform(0.4, 0.8)
+        x = rng.uniform(x0 + 0.2, max(x0 + 0.21, x1 - wide - 0.2))
+        y = rng.uniform(y0 + 0.9, max(y0 + 0.91, y1 - deep - 0.9))
+        fill(x, y, x + wide, y + deep)
+    for _ in range(3):
+        x, y = rng.uniform(x0 + 0.4, x1 - 0.8), rng.uniform(y0 + 0.9, max(y0 + 0.91, y1 - 1.3))
+        fill(x, y, x + 0.4, y + 0.4)
+
+
+def write_map(folder: Path) -> Path:
+    """The building as map_server has it."""
+    picture = np.where(building()[::-1], 254, 0).astype(np.uint8)
+    Image.fromarray(picture).save(folder / "building.png")
+    path = folder / "building.yaml"
+    path.write_text(
+        f"image: building.png\nresolution: {RESOLUTION}\norigin: [0.0, 0.0, 0.0]\nnegate: 0\n"
+        "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    )
+    return path
+
+
+def stage(name: str, work: Callable[[], T]) -> T:
+    """Do some work and print its time and the most memory that the process has held so far."""
+    started = time.perf_counter()
+    result = work()
+    seconds = time.perf_counter() - started
+    print(
+        f"{name:44} {seconds:8.2f} s   {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:7.0f} MB", flush=True
+    )
+    return result
+
+
+def stages(folder: Path) -> None:
+    """Import, plan, drive, check, film."""
+    from antdrive.sim.view.figures.run_figures import overview
+    from antdrive.sim.view.film.video import film
+
+    stage("load kernels with a small world", lambda: run(Scenario.of("gate", "astar")))
+    path = stage("draw the map", lambda: write_map(folder))
+    task = stage("import it", lambda: import_map_server(path, start=START, goal=GOAL))
+    print(f"  {len(task.world.obstacles)} cylinders")
+    stage("write the world file", lambda: save_task(task, folder / "world.yaml"))
+    task = stage("read the world file", lambda: load_task(folder / "world.yaml"))
+    robot = load_robot("turtlebot")
+    grid = stage("grid of 0.05 m", lambda: rasterise(task.world, RESOLUTION, robot.radius + 0.03))
+    query = Query.between(grid, task)
+    answer = stage("plan with astar", lambda: load_planner("astar").plan(query, np.random.default_rng(0)))
+    print(f"  {answer.line_length:.1f} m over {len(answer.cells)} cells")
+    stage("check the plan", lambda: checked(query, answer))
+    route = stage("route with clearance", lambda: smooth(answer, grid, task, kind="clearance"))
+    print(f"  {route.length:.1f} m")
+    stage("controller's index", lambda: PurePursuit().prepare(route, task.world, robot, 0.03, 1 / 60))
+
+    def build() -> None:
+        with Engine(task.world, robot):
+            pass
+
+    stage("build the bodies", build)
+    result = stage("plan and drive, as antdrive run does", lambda: run(Scenario.of(task, "astar")))
+    assert result.rollout is not None
+    log = result.rollout
+    print(f"  {log.outcome.key} after {log.t[-1]:.1f} s, {log.record.times.drive_wall_s:.2f} s of wall time driving")
+    stage("write the log", lambda: log.save(folder / "rollout.npz"))
+    log = stage("read the log", lambda: Rollout.load(folder / "rollout.npz"))
+    print(f"  {stage('certify it', lambda: certify(log)).sentence}")
+    stage("overview figure", lambda: overview(log, folder / "overview.png"))
+    film(log, folder / "film.mp4", size=(320, 240), speed=60.0)
+    made: Any = stage(
+        "film at 60 times the speed, 640 x 480", lambda: film(log, folder / "film.mp4", size=(640, 480), speed=60.0)
+    )
+    print(f"  {made.frames} frames")
+
+
+def task_among(count: int) -> Task:
+    """An 18 m drive among `count` thin cylinders in a hall of 40 x 30 m."""
+    rng = np.random.default_rng(0)
+    discs: list[Disc] = []
+    while len(discs) < count:
+        x, y = rng.uniform((0.2, 0.2), (39.8, 29.8)).tolist()
+        if abs(y - 15) > 1:
+            discs.append(Disc(x, y, 0.05))
+    return Task(World(f"hall-{count}", (0, 0, 40, 30), tuple(discs)), (1, 15, 0), (19, 15))
+
+
+def loop(counts: tuple[int, ...] = (400, 10_000)) -> None:
+    """Print what a step of the drive loop costs among many cylinders, and how much of that is physics."""
+    robot, controller = load_robot("turtlebot"), PurePursuit()
+    x = np.linspace(1, 19, 73)
+    route = Route(np.stack([x, 15 + 0.4 * np.sin((x - 1) * np.pi / 3)], axis=1))
+    costs: dict[int, list[float]] = {count: [] for count in counts}
+    built = []
+    for count in counts:
+        task = task_among(count)
+        tracked = controller.prepare(route, task.world, robot, 0.05, 1 / 60)
+        built.append((count, task, tracked, Engine(task.world, robot).__enter__()))
+    for turn in range(ROUNDS + 1):
+        for count, task, tracked, engine in built:
+            started = time.perf_counter()
+            log = drive(engine, controller, tracked, task, time_limit=120)
+            assert log.outcome.name == "SUCCEEDED", log.outcome
+            if turn:
+                costs[count].append((time.perf_counter() - started) / (len(log.t) - 1) * 1e6)
+    first = costs[counts[0]]
+    print("\ncylinders   us/step   / the first")
+    for count, values in costs.items():
+        ratio = statistics.median(a / b for a, b in zip(values, first, strict=True))
+        print(f"{count:9}   {statistics.median(values):7.1f}   {ratio:11.2f}")
+    for *_, engine in built:
+        engine.__exit__(None, None, None)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--map", type=Path)
+    parser.add_argument("--only", choices=("stages", "loop"))
+    asked = parser.parse_args()
+    if asked.map is not None:
+        asked.map.mkdir(parents=True, exist_ok=True)
+        print(write_map(asked.map))
+        return
+    if asked.only != "loop":
+        with tempfile.TemporaryDirectory() as folder:
+            stages(Path(folder))
+    if asked.only != "stages":
+        loop()
+
+
+if __name__ == "__main__":
+    main()

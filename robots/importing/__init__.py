@@ -1,0 +1,1 @@
+"""Robots out of other programs' files."""

@@ -1,0 +1,100 @@
+"""Convex outlines around points in the plane: few corners, and nothing cut off."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from antdrive.robots.outline import Footprint
+from antdrive.worlds.types import Point
+
+MOST_OUTLINE = 12  # corners of an outline that was computed
+LIKE = 0.97  # the share of a disc or rectangle that an outline fills which counts as one
+
+
+def convex_hull(points: Iterable[Point]) -> list[Point]:
+    """The corners of the convex hull, counter-clockwise.
+
+    Args:
+        points: at least three that are not on one line [m]
+    """
+    ordered = sorted({(round(x, 7), round(y, 7)) for x, y in points})
+    halves: list[list[Point]] = []
+    for way in (ordered, ordered[::-1]):
+        chain: list[Point] = []
+        for point in way:
+            while len(chain) > 1 and _area(chain[-2], chain[-1], point) <= 1e-12:
+                chain.pop()
+            chain.append(point)
+        halves.append(chain[:-1])
+    return halves[0] + halves[1]
+
+
+def fewer_corners(corners: list[Point], most: int) -> list[Point]:
+    """A polygon around a convex one with no more than `most` corners: the edges that cost the least area are left out.
+
+    Args:
+        corners: counter-clockwise [m]
+        most: how many corners may remain
+    """
+    corners = list(corners)
+    while len(corners) > max(most, 4):
+        best: tuple[float, int, Point] | None = None
+        for k in range(len(corners)):
+            a, b, c, d = (corners[(k + j) % len(corners)] for j in range(4))
+            tip = _meeting(a, b, d, c)
+            if tip is not None and (best is None or _area(b, tip, c) < best[0]):
+                best = (_area(b, tip, c), k, tip)
+        if best is None:
+            break
+        _, k, tip = best
+        gone = corners[(k + 2) % len(corners)]
+        corners[(k + 1) % len(corners)] = tip
+        corners.remove(gone)
+    return corners
+
+
+def footprint_around(points: Iterable[Point], kind: str = "auto") -> Footprint:
+    """A footprint that holds all points: a disc or a rectangle where they nearly fill one, and else a polygon.
+
+    Args:
+        points: in the robot's frame [m]
+        kind: disc, rectangle, polygon, or auto
+    """
+    hull = convex_hull(points)
+    area = sum(_area((0.0, 0.0), a, b) for a, b in zip(hull, hull[1:] + hull[:1], strict=True))
+    xs, ys = zip(*hull, strict=True)
+    xmin, xmax, ymin, ymax = min(xs), max(xs), min(ys), max(ys)
+    middle = ((xmin + xmax) / 2, (ymin + ymax) / 2)
+    reach = max(math.dist(middle, corner) for corner in hull)
+    if kind == "disc" or (kind == "auto" and area >= LIKE * math.pi * reach**2):
+        away = max(math.hypot(*corner) for corner in hull)
+        if kind == "disc" or away <= 1.02 * reach:
+            return Footprint.disc(_up(away))
+        return Footprint.disc(_up(reach), (round(middle[0], 5), round(middle[1], 5)))
+    length, width = xmax - xmin, ymax - ymin
+    if kind == "rectangle" or (kind == "auto" and area >= LIKE * length * width):
+        near_x, near_y = (0.0 if abs(m) < 5e-4 else round(m, 5) for m in middle)
+        return Footprint.rectangle(
+            _up(length + 2 * abs(near_x - middle[0])), _up(width + 2 * abs(near_y - middle[1])), (near_x, near_y)
+        )
+    return Footprint.polygon([(round(x, 5), round(y, 5)) for x, y in fewer_corners(hull, MOST_OUTLINE)])
+
+
+def _up(value: float) -> float:
+    """A length, rounded up to a hundredth of a millimetre, but for what rounding itself adds."""
+    return math.ceil(value * 1e5 - 1e-3) / 1e5
+
+
+def _area(a: Point, b: Point, c: Point) -> float:
+    return ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])) / 2
+
+
+def _meeting(a: Point, b: Point, d: Point, c: Point) -> Point | None:
+    """Where the ways from a through b and from d through c meet ahead of both; None where they do not."""
+    ux, uy, vx, vy = b[0] - a[0], b[1] - a[1], c[0] - d[0], c[1] - d[1]
+    cross = ux * vy - uy * vx
+    if cross >= -1e-12:  # they part, or the turn from one to the other is half a circle
+        return None
+    share = ((c[0] - b[0]) * vy - (c[1] - b[1]) * vx) / cross
+    return (b[0] + share * ux, b[1] + share * uy) if share >= 0 else None

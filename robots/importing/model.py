@@ -1,0 +1,344 @@
+"""What a URDF file says, with every link where it is when all joints are at zero. Lengths in metres."""
+
+from __future__ import annotations
+
+import importlib
+import math
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from antdrive.worlds.errors import InputError, input_error
+from antdrive.worlds.formats.xml import parse_xml
+from antdrive.worlds.types import Floats
+
+CIRCLE = np.exp(2j * math.pi * np.arange(96) / 96) / math.cos(math.pi / 96)  # around a circle of radius 1
+MOST_LINKS = 10_000
+
+
+@dataclass(frozen=True, eq=False)
+class UrdfJoint:
+    """A joint of a URDF file.
+
+    Attributes:
+        name: its name
+        kind: fixed, continuous, revolute, prismatic, floating or planar
+        parent: the link that holds it
+        child: the link that it moves
+        place: its frame in that of the model's root (4, 4)
+        axis: the direction of its axis in the root's frame (3,)
+        velocity: the limit of its speed [rad/s]; None where the file has none
+        effort: the limit of its torque [N m]; None where the file has none
+        range: how far it turns, from its lower to its upper limit [rad]; inf where it turns freely
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    place: Floats
+    axis: Floats
+    velocity: float | None
+    effort: float | None
+    range: float
+
+
+@dataclass(frozen=True, eq=False)
+class CollisionPiece:
+    """A piece of collision geometry, in the root's frame.
+
+    Attributes:
+        link: the link that it belongs to
+        kind: box, cylinder, sphere or mesh
+        points: points whose convex hull holds it (N, 3)
+        centre: its middle (3,)
+        radius: of a cylinder or sphere [m]
+        length: of a cylinder [m]
+    """
+
+    link: str
+    kind: str
+    points: Floats
+    centre: Floats
+    radius: float | None = None
+    length: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class UrdfModel:
+    """A robot as a URDF file describes it.
+
+    Attributes:
+        source: the file
+        name: the robot's name in it
+        joints: its joints by name
+        places: the frame of each link in that of the root (4, 4)
+        pieces: its collision geometry
+        masses: the mass of each link that has one [kg]
+        drive: what a Gazebo plugin for differential drives says, by tag
+        left_out: meshes that were not found
+    """
+
+    source: Path
+    name: str
+    joints: dict[str, UrdfJoint]
+    places: dict[str, Floats]
+    pieces: tuple[CollisionPiece, ...]
+    masses: dict[str, float]
+    drive: dict[str, str]
+    left_out: tuple[str, ...]
+
+    def above(self, link: str) -> Iterator[UrdfJoint]:
+        """The joints between a link and the root, from the link on.
+
+        Args:
+            link: the link
+        """
+        holders = {joint.child: joint for joint in self.joints.values()}
+        while link in holders:
+            yield holders[link]
+            link = holders[link].parent
+
+
+def read_model(path: Path, *, meshes: Path | None = None, without_meshes: bool = False) -> UrdfModel:
+    """The robot in a URDF or xacro file.
+
+    Args:
+        path: the file; .xacro is expanded first
+        meshes: the folder in which meshes are looked for; by default beside the file and above it
+        without_meshes: leave out meshes that are not found, instead of refusing the file
+
+    Raises:
+        InputError: the file cannot be read, or is no robot.
+    """
+    root = _root_element(path)
+    if root.tag != "robot":
+        raise input_error(str(path), f"its root element is <{root.tag}>; a URDF file begins with <robot>")
+    links = {_named(path, link): link for link in root.findall("link")}
+    if not 0 < len(links) <= MOST_LINKS:
+        raise input_error(str(path), f"has {len(links)} links; a robot has 1 to {MOST_LINKS}")
+    found = [_joint(path, element) for element in root.findall("joint")]
+    places, joints = _placed(path, set(links), found)
+    reader = _Shapes(path, meshes, without_meshes)
+    pieces = [
+        piece
+        for name, link in links.items()
+        for element in link.findall("collision")
+        for piece in reader.piece(name, places[name] @ _origin(path, element), element)
+    ]
+    masses = {
+        name: _number(path, mass, "value", 0.0)
+        for name, link in links.items()
+        for mass in link.findall("inertial/mass")
+    }
+    plugins = [plugin for plugin in root.findall("gazebo/plugin") if _drives_two_wheels(plugin)]
+    drive = {element.tag: (element.text or "").strip() for plugin in plugins for element in plugin}
+    return UrdfModel(
+        path, root.get("name", path.stem), joints, places, tuple(pieces), masses, drive, tuple(reader.left_out)
+    )
+
+
+def _drives_two_wheels(plugin: ET.Element) -> bool:
+    """Whether a Gazebo plugin names one left and one right joint; those of vehicles that skid name several."""
+    return any(
+        len(plugin.findall(f"left{end}")) == len(plugin.findall(f"right{end}")) == 1 for end in ("_joint", "Joint")
+    )
+
+
+def _root_element(path: Path) -> ET.Element:
+    if path.suffix.lower() != ".xacro":
+        return parse_xml(path)
+    if not path.is_file():
+        raise input_error(str(path), "no such file")
+    xacrodoc = optional("xacrodoc", "xacro files are expanded with it")
+    try:
+        text = xacrodoc.XacroDoc.from_file(str(path)).to_urdf_string()
+    except Exception as error:  # xacro raises whatever its expressions raise
+        raise input_error(str(path), f"xacro cannot expand it: {error or type(error).__name__}") from None
+    with tempfile.TemporaryDirectory() as folder:
+        expanded = Path(folder) / f"{path.stem}.urdf"
+        expanded.write_text(text, encoding="utf-8")
+        try:
+            return parse_xml(expanded)
+        except InputError as error:
+            raise InputError(str(error).replace(str(expanded), str(path))) from None
+
+
+def optional(module: str, purpose: str) -> Any:
+    """A module of the extra `urdf`.
+
+    Args:
+        module: its name
+        purpose: what it is needed for
+
+    Raises:
+        InputError: it is not installed.
+    """
+    try:
+        return importlib.import_module(module)
+    except ModuleNotFoundError:
+        raise InputError(f"{module}: not installed; {purpose}: pip install 'antdrive[urdf]'") from None
+
+
+def _named(path: Path, element: ET.Element) -> str:
+    name = element.get("name")
+    if not name:
+        raise input_error(str(path), f"a <{element.tag}> has no name")
+    return name
+
+
+def _numbers(path: Path, element: ET.Element | None, key: str, default: tuple[float, ...]) -> Floats:
+    text = None if element is None else element.get(key)
+    if text is None:
+        return np.array(default)
+    try:
+        values = np.array([float(word) for word in text.split()])
+    except ValueError:
+        values = np.array([math.nan])
+    if len(values) != len(default) or not np.isfinite(values).all() or not (np.abs(values) <= 1e6).all():
+        tag = "" if element is None else element.tag
+        raise input_error(str(path), f"<{tag} {key}={text!r}>", f"must be {len(default)} numbers")
+    return values
+
+
+def _number(path: Path, element: ET.Element | None, key: str, default: float) -> float:
+    return float(_numbers(path, element, key, (default,))[0])
+
+
+def _origin(path: Path, element: ET.Element) -> Floats:
+    """The frame (4, 4) that an element's <origin> describes."""
+    origin = element.find("origin")
+    place = np.eye(4)
+    roll, pitch, yaw = _numbers(path, origin, "rpy", (0.0, 0.0, 0.0))
+    place[:3, :3] = _turn(2, yaw) @ _turn(1, pitch) @ _turn(0, roll)
+    place[:3, 3] = _numbers(path, origin, "xyz", (0.0, 0.0, 0.0))
+    return place
+
+
+def _turn(axis: int, angle: float) -> Floats:
+    turn, (a, b) = np.eye(3), ((1, 2), (2, 0), (0, 1))[axis]
+    turn[a, a] = turn[b, b] = math.cos(angle)
+    turn[a, b], turn[b, a] = -math.sin(angle), math.sin(angle)
+    return turn
+
+
+def _joint(path: Path, element: ET.Element) -> UrdfJoint:
+    """A joint, with its place and axis in the frame of its parent."""
+    name, kind = _named(path, element), element.get("type", "")
+    ends = [element.find(tag) for tag in ("parent", "child")]
+    parent, child = ("" if end is None else end.get("link", "") for end in ends)
+    limit = element.find("limit")
+    lower, upper = (_number(path, limit, key, 0.0) for key in ("lower", "upper"))
+    velocity, effort = (_number(path, limit, key, 0.0) for key in ("velocity", "effort"))
+    axis = _numbers(path, element.find("axis"), "xyz", (1.0, 0.0, 0.0))
+    if not np.any(axis):
+        raise input_error(str(path), f"joint {name}", "its axis is 0 0 0")
+    turns = math.inf if kind == "continuous" else upper - lower
+    place = _origin(path, element)
+    return UrdfJoint(
+        name, kind, parent, child, place, axis / np.linalg.norm(axis), velocity or None, effort or None, turns
+    )
+
+
+def _placed(path: Path, links: set[str], found: list[UrdfJoint]) -> tuple[dict[str, Floats], dict[str, UrdfJoint]]:
+    """The frame of each link, and the joints with place and axis, in the frame of the root."""
+    for joint in found:
+        for link in (joint.parent, joint.child):
+            if link not in links:
+                raise input_error(str(path), f"joint {joint.name}", f"there is no link {link!r}")
+    children = [joint.child for joint in found]
+    roots = sorted(links - set(children))
+    if len(roots) != 1 or len(children) != len(set(children)):
+        raise input_error(
+            str(path), f"its links must form one tree; links without a parent: {', '.join(roots) or 'none'}"
+        )
+    places: dict[str, Floats] = {roots[0]: np.eye(4)}
+    joints: dict[str, UrdfJoint] = {}
+    while len(joints) < len(found):
+        ready = [joint for joint in found if joint.parent in places and joint.name not in joints]
+        if not ready:
+            raise input_error(str(path), "two joints have one name, or joints form a ring")
+        for joint in ready:
+            place = places[joint.parent] @ joint.place
+            places[joint.child] = place
+            facts = (joint.velocity, joint.effort, joint.range)
+            joints[joint.name] = UrdfJoint(
+                joint.name, joint.kind, joint.parent, joint.child, place, place[:3, :3] @ joint.axis, *facts
+            )
+    return places, joints
+
+
+class _Shapes:
+    """Reads collision geometry, meshes among it."""
+
+    def __init__(self, path: Path, meshes: Path | None, without_meshes: bool) -> None:
+        self._path, self._meshes, self._without = path, meshes, without_meshes
+        self.left_out: list[str] = []
+
+    def piece(self, link: str, place: Floats, element: ET.Element) -> Iterator[CollisionPiece]:
+        """The piece of a <collision>; none for a mesh that is left out."""
+        geometry = element.find("geometry")
+        shape = None if geometry is None else next(iter(geometry), None)
+        if shape is None:
+            raise input_error(str(self._path), f"link {link}", "a <collision> has no geometry")
+        radius = length = None
+        if shape.tag == "box":
+            half = _numbers(self._path, shape, "size", (0.0, 0.0, 0.0)) / 2
+            points = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half
+        elif shape.tag == "cylinder":
+            radius, length = (_number(self._path, shape, key, 0.0) for key in ("radius", "length"))
+            ring = radius * np.column_stack([CIRCLE.real, CIRCLE.imag])
+            points = np.vstack([np.column_stack([ring, np.full(len(ring), z)]) for z in (-length / 2, length / 2)])
+        elif shape.tag == "sphere":
+            radius = _number(self._path, shape, "radius", 0.0)
+            ring, flat = radius * np.column_stack([CIRCLE.real, CIRCLE.imag]), np.zeros(len(CIRCLE))
+            place = place.copy()
+            place[:3, :3] = np.eye(3)
+            points = np.vstack([np.column_stack([ring, flat]), [[0, 0, radius], [0, 0, -radius]]])
+        elif shape.tag == "mesh":
+            mesh = self._mesh(link, shape)
+            if mesh is None:
+                return
+            points = mesh * _numbers(self._path, shape, "scale", (1.0, 1.0, 1.0))
+        else:
+            raise input_error(str(self._path), f"link {link}", f"unknown geometry <{shape.tag}>")
+        placed = points @ place[:3, :3].T + place[:3, 3]
+        centre = (placed.min(axis=0) + placed.max(axis=0)) / 2
+        yield CollisionPiece(link, shape.tag, placed, centre, radius, length)
+
+    def _mesh(self, link: str, shape: ET.Element) -> Floats | None:
+        """The vertices (N, 3) of a mesh; None where it is left out."""
+        name = shape.get("filename", "")
+        file = next((file for file in self._candidates(name) if file.is_file()), None)
+        if file is None:
+            if not self._without:
+                raise input_error(
+                    str(self._path),
+                    f"link {link}",
+                    f"mesh {name} is not found; say where with --meshes FOLDER, or --without-meshes",
+                )
+            self.left_out.append(f"{link}: {name}")
+            return None
+        trimesh = optional("trimesh", f"mesh {file.name} is read with it")
+        try:
+            vertices = np.asarray(trimesh.load(str(file), force="mesh").vertices, dtype=np.float64)
+        except Exception as error:  # each format has errors of its own
+            raise input_error(str(file), f"cannot be read as a mesh: {error or type(error).__name__}") from None
+        if not len(vertices) or not np.isfinite(vertices).all():
+            raise input_error(str(file), "has no vertices, or some that are not finite")
+        return vertices
+
+    def _candidates(self, name: str) -> Iterator[Path]:
+        """Where a mesh may be: package://NAME/meshes/a.stl is below a folder called NAME, or the folder given."""
+        bare = name.partition("://")[2] if "://" in name else name
+        inside = bare.partition("/")[2] if name.startswith("package://") else bare
+        folders = [self._meshes] if self._meshes is not None else [self._path.parent, *self._path.resolve().parents]
+        for folder in folders:
+            yield folder / bare
+            yield folder / inside
+            yield folder / Path(bare).name

@@ -1,0 +1,317 @@
+"""Robot files out of URDF: every value with a comment that says where it comes from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from antdrive.robots.feasible import GRAVITY, yaw_inertia_of
+from antdrive.robots.files import RobotFile, footprint_to_dict, robot_from_text
+from antdrive.robots.importing.hull import footprint_around
+from antdrive.robots.importing.model import UrdfModel, read_model
+from antdrive.robots.importing.wheels import DrivenWheel, driven_wheels
+from antdrive.robots.spec import Footprint, RobotSpec
+from antdrive.worlds.errors import InputError, input_error
+from antdrive.worlds.types import Floats
+
+KINDS = ("auto", "disc", "rectangle", "polygon")
+DENSITY = 150.0  # of a robot whose file has no masses [kg/m^3]
+ACCELERATION, YAW_ACCELERATION = 1.0, 8.0  # that are assumed where the motors allow them [m/s^2], [rad/s^2]
+SPEED, YAW_RATE = 0.5, 2.0  # that are assumed where the file has no limits [m/s], [rad/s]
+SPARE = 0.9  # the share of what the motors could do that is used
+FRICTION = 1.5  # of wheels
+
+
+class _Value(NamedTuple):
+    """A value of the robot file, and where it comes from."""
+
+    key: str
+    value: float
+    how: str
+
+
+@dataclass(frozen=True, eq=False)
+class ImportedRobot:
+    """A robot out of a URDF file.
+
+    Attributes:
+        robot: the robot
+        text: its file, with a comment for each value
+        pieces: the collision geometry below the height of the import, from above: points of each piece in the robot's
+            frame (N, 2) [m]
+        above: the same of the pieces that lie above that height
+        left_out: meshes that were not found
+    """
+
+    robot: RobotSpec
+    text: str
+    pieces: tuple[Floats, ...]
+    above: tuple[Floats, ...]
+    left_out: tuple[str, ...]
+
+
+def import_urdf(
+    path: Path,
+    *,
+    left: str | None = None,
+    right: str | None = None,
+    below: float = math.inf,
+    footprint: str = "auto",
+    meshes: Path | None = None,
+    without_meshes: bool = False,
+    given: Mapping[str, float] | None = None,
+) -> ImportedRobot:
+    """A differential-drive robot out of a URDF or xacro file.
+
+    Args:
+        path: the file
+        left: the joint or link of the left driven wheel; None: found by its axle
+        right: the same of the right one
+        below: collision geometry that lies higher above the floor is no part of the footprint [m]
+        footprint: its kind: disc, rectangle, polygon, or auto for the first of these that fits
+        meshes: the folder in which meshes are looked for; None: beside the file and above it
+        without_meshes: leave out meshes that are not found
+        given: values of the robot file by key, which replace what the file says
+
+    Raises:
+        InputError: the file cannot be read, or describes no differential drive.
+    """
+    given = _checked(given or {})
+    if footprint not in KINDS:
+        raise InputError(f"--footprint {footprint}: choose from {', '.join(KINDS)}")
+    model = read_model(path, meshes=meshes, without_meshes=without_meshes)
+    wheels = driven_wheels(model, left, right, given.get("wheel_radius"))
+    frame = _frame(wheels)
+    floor = min(wheel.centre[2] - wheel.radius for wheel in wheels)
+    low = [piece for piece in model.pieces if piece.points[:, 2].min() - floor <= below]
+    high = [piece for piece in model.pieces if piece.points[:, 2].min() - floor > below]
+    if not {piece.link for piece in low} - {wheel.joint.child for wheel in wheels}:
+        where = "" if math.isinf(below) else f" below {below:g} m"
+        raise input_error(
+            str(path), f"has no collision geometry{where} beside its wheels, from which a footprint could follow"
+        )
+    points = [_from_above(piece.points, frame) for piece in low]
+    outline = footprint_around(_with_wheels(points, wheels), footprint)
+    names = sorted({piece.link for piece in low})
+    kind = "disc" if outline.rounding else "rectangle" if outline.box else "outline"
+    what = f"{kind} around the collision geometry of {_few(names)}, and around the wheels"
+    what += "" if math.isinf(below) else f", below {below:g} m"
+    values = _values(model, wheels, outline, floor, given)
+    text = _text(model, path, outline, what, values)
+    return ImportedRobot(
+        robot_from_text(text, f"{path}, as imported", path.stem),
+        text,
+        tuple(points),
+        tuple(_from_above(piece.points, frame) for piece in high),
+        model.left_out,
+    )
+
+
+def _checked(given: Mapping[str, float]) -> dict[str, float]:
+    keys = [key for key, field in RobotFile.model_fields.items() if field.annotation is float]
+    for key in given:
+        if key not in keys:
+            raise InputError(f"--set {key}: no such number in a robot file; choose from {', '.join(keys)}")
+    return dict(given)
+
+
+def _frame(wheels: tuple[DrivenWheel, DrivenWheel]) -> Floats:
+    """The robot's origin and axes, seen from above, in the root's frame: origin, x and y as rows (3, 2)."""
+    left, right = wheels
+    across = (left.centre - right.centre)[:2]
+    y = across / np.linalg.norm(across)
+    return np.array([(left.centre[:2] + right.centre[:2]) / 2, (y[1], -y[0]), y])
+
+
+def _from_above(points: Floats, frame: Floats) -> Floats:
+    return np.asarray((points[:, :2] - frame[0]) @ frame[1:].T)
+
+
+def _with_wheels(points: list[Floats], wheels: tuple[DrivenWheel, DrivenWheel]) -> list[tuple[float, float]]:
+    """All points of the pieces, and the corners of both wheels, seen from above."""
+    half = float(np.linalg.norm(wheels[0].centre - wheels[1].centre)) / 2
+    found = [(float(x), float(y)) for piece in points for x, y in piece]
+    for side, wheel in zip((1, -1), wheels, strict=True):
+        for x in (-wheel.radius, wheel.radius):
+            found += [(x, side * half - wheel.width / 2), (x, side * half + wheel.width / 2)]
+    return found
+
+
+def _values(
+    model: UrdfModel,
+    wheels: tuple[DrivenWheel, DrivenWheel],
+    outline: Footprint,
+    floor: float,
+    given: Mapping[str, float],
+) -> list[_Value]:
+    left, right = wheels
+    track = _seven(float(np.linalg.norm(left.centre - right.centre)))
+    radius = _seven((left.radius + right.radius) / 2)
+    top = max((float(piece.points[:, 2].max()) for piece in model.pieces), default=0.0) - floor
+    xmin, ymin, xmax, ymax = outline.bounds
+    found: dict[str, tuple[float, str]] = {
+        "height": (max(top, 2 * radius), "computed: top of the collision geometry above the floor"),
+        "wheel_radius": (radius, f"read: {left.read_from}"),
+        "track": (track, f"computed: between the middles of {left.joint.child} and {right.joint.child}"),
+    }
+    if sum(model.masses.values()) > 0:
+        found["mass"] = sum(model.masses.values()), f"computed: sum of the masses of {len(model.masses)} links"
+    else:
+        box = (xmax - xmin) * (ymax - ymin) * found["height"][0]
+        found["mass"] = DENSITY * box, f"assumed: {DENSITY:g} kg/m3, as the file has no masses"
+    for key, value in given.items():
+        found[key] = value, "given"
+    _speeds(model, wheels, found, given)
+    _forces(wheels, outline, found, given)
+    order = [key for key, field in RobotFile.model_fields.items() if field.annotation is float and key in found]
+    return [_Value(key, *found[key]) for key in order]
+
+
+def _speeds(
+    model: UrdfModel,
+    wheels: tuple[DrivenWheel, DrivenWheel],
+    found: dict[str, tuple[float, str]],
+    given: Mapping[str, float],
+) -> None:
+    """Add the limits of the speeds: those of the drive plugin, what the joints allow, or assumed ones."""
+    radius, track = found["wheel_radius"][0], found["track"][0]
+    turning = _seven(min(wheel.joint.velocity or math.inf for wheel in wheels))
+    plain = 0.05 <= turning * radius < 20  # 0 and very large limits mean none
+    limit = f"limit of joint {wheels[0].joint.name}"
+    for key, tags, most, assumed in (
+        ("max_speed", ("max_linear_velocity", "max_linear_speed"), turning * radius, SPEED),
+        ("max_yaw_rate", ("max_angular_velocity", "max_angular_speed"), 2 * turning * radius / track, YAW_RATE),
+    ):
+        told = next((_positive(model.drive[tag]) for tag in tags if tag in model.drive), None)
+        if key in given:
+            continue
+        if told and plain and told > most:
+            found[key] = _five(most), f"computed: {limit}; the drive plugin says {told:g}"
+        elif told:
+            found[key] = told, "read: the drive plugin"
+        elif plain and key == "max_speed":
+            found[key] = min(_five(most), 10.0), f"computed: {limit} times the wheels' radius"
+        elif plain:
+            found[key] = min(_five(most), 3.14), f"computed: {limit}, at most half a turn a second"
+        else:
+            found[key] = assumed, "assumed: the file has no limit"
+    needs = max(found["max_speed"][0], found["max_yaw_rate"][0] * track / 2) / radius
+    if "max_wheel_speed" not in given:
+        needs_more = 1.2 * needs, "assumed: 1.2 times what the speeds need"
+        found["max_wheel_speed"] = (turning, f"read: {limit}") if plain else needs_more
+
+
+def _forces(
+    wheels: tuple[DrivenWheel, DrivenWheel],
+    outline: Footprint,
+    found: dict[str, tuple[float, str]],
+    given: Mapping[str, float],
+) -> None:
+    """Add the motors' torque and the accelerations that they and the wheels' grip allow."""
+    mass, radius, track = (found[key][0] for key in ("mass", "wheel_radius", "track"))
+    effort = min((wheel.joint.effort or math.inf for wheel in wheels), default=math.inf)
+    if "wheel_torque" not in given:
+        plain = mass * 0.05 * radius < effort < 1e4
+        enough = 2 * mass * ACCELERATION * radius
+        found["wheel_torque"] = (
+            (effort, f"read: limit of joint {wheels[0].joint.name}")
+            if plain
+            else (enough, f"assumed: 4 times what {ACCELERATION:g} m/s2 need")
+        )
+    inertia = yaw_inertia_of(mass, outline)
+    force = min(found["wheel_torque"][0] / radius, given.get("wheel_friction", FRICTION) * mass * GRAVITY / 2)
+    for key, most, usual in (
+        ("max_acceleration", 2 * force / mass, ACCELERATION),
+        ("max_yaw_acceleration", force * track / inertia, YAW_ACCELERATION),
+    ):
+        if key not in given:
+            usable = SPARE * most
+            found[key] = (
+                (usual, "assumed") if usual <= usable else (usable, "computed: nine tenths of what the motors reach")
+            )
+    if "max_lateral_acceleration" not in given:
+        found["max_lateral_acceleration"] = ACCELERATION, "assumed"
+
+
+def _seven(value: float) -> float:
+    """A number as the file will have it, in seven digits, so that what follows from it is exactly reached."""
+    return float(f"{value:.7g}")
+
+
+def _five(value: float) -> float:
+    """The largest number of five digits that is not above a value."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - 4)
+    near = float(f"{value:.5g}")
+    return near if near <= value else float(f"{near - unit:.5g}")
+
+
+def _positive(text: str) -> float | None:
+    try:
+        value = float(text)
+    except ValueError:
+        return None
+    return value if 0 < value < math.inf else None
+
+
+def _text(model: UrdfModel, path: Path, outline: Footprint, what: str, values: list[_Value]) -> str:
+    """The robot's file."""
+    name = "".join(c for c in model.name if c.isprintable()).strip() or path.stem
+    rows = [("schema: 1", ""), (f"name: {_quoted(name[:200])}", "read: the robot's name")]
+    rows.append((f"source: {_quoted(f'imported from {path.name}')}", ""))
+    foot = footprint_to_dict(outline)
+    if outline.box is not None and outline.corners:
+        length, width, centre = outline.box
+        foot = {"length": round(length, 9), "width": round(width, 9), "centre": [round(v, 9) for v in centre]}
+    rows.append((f"footprint: {_flow(foot)}", f"computed: {what}"))
+    rows += [(f"{value.key}: {_rounded(value)}", value.how) for value in values]
+    lines = []
+    for text, how in rows:
+        comment = "".join(c if c.isprintable() else "?" for c in how)
+        if not comment:
+            lines.append(text)
+        elif len(text) > 40:
+            lines += [f"# {comment}", text]
+        else:
+            lines.append(f"{text:32}# {comment}")
+    if model.left_out:
+        left = "; ".join("".join(c if c.isprintable() else "?" for c in mesh) for mesh in model.left_out)
+        lines.append(f"# left out, because they were not found: {left}")
+    return "\n".join(lines) + "\n"
+
+
+def _rounded(value: _Value) -> str:
+    """A value in seven digits, with a point, as YAML's floats are written."""
+    digits = value.value if value.how == "given" else _seven(value.value)
+    return f"{digits:.10f}".rstrip("0").rstrip(".") if digits < 1e9 else repr(digits)
+
+
+def _flow(entry: Mapping[str, object]) -> str:
+    return "{" + ", ".join(f"{key}: {value}" for key, value in entry.items()) + "}"
+
+
+def _quoted(text: str) -> str:
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    return f'"{escaped}"'
+
+
+def _few(names: list[str]) -> str:
+    return ", ".join(names[:4]) + (f" and {len(names) - 4} more links" if len(names) > 4 else "")
+
+
+def require_writable(target: Path, source: Path) -> None:
+    """Refuse to write a robot over the file that it comes from.
+
+    Args:
+        target: the robot file
+        source: the URDF file
+
+    Raises:
+        InputError: they are one file.
+    """
+    if target.exists() and source.exists() and target.samefile(source):
+        raise input_error(str(target), "is the file to import; give another with --out")

@@ -1,0 +1,186 @@
+"""Which two wheels drive a robot that a URDF file describes, and why some robots are no differential drive."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from antdrive.robots.importing.model import CollisionPiece, UrdfJoint, UrdfModel
+from antdrive.worlds.errors import InputError, input_error
+from antdrive.worlds.types import Floats
+
+LEVEL = 0.1  # the most that the axis of a wheel may rise, as the sine of an angle
+SAME = 0.02  # two wheels are alike, and on one axle, if they differ by no more than this share of their distance
+SWIVEL = 0.9  # the least vertical part of the axis of a caster or a steering joint
+
+
+@dataclass(frozen=True, eq=False)
+class DrivenWheel:
+    """A driven wheel.
+
+    Attributes:
+        joint: the joint that turns it
+        centre: its middle, in the root's frame (3,) [m]
+        radius: [m]
+        width: along its axis [m]
+        read_from: where these values come from, in words
+    """
+
+    joint: UrdfJoint
+    centre: Floats
+    radius: float
+    width: float
+    read_from: str
+
+
+def driven_wheels(
+    model: UrdfModel, left: str | None = None, right: str | None = None, radius: float | None = None
+) -> tuple[DrivenWheel, DrivenWheel]:
+    """The left and the right driven wheel.
+
+    Args:
+        model: the robot
+        left: the joint or link of the left wheel; None: to be found
+        right: the same of the right wheel
+        radius: of both wheels [m]; None: as the file has it
+
+    Raises:
+        InputError: the robot is no differential drive, or it is not clear which wheels drive it.
+    """
+    if (left is None) != (right is None):
+        raise InputError("--left, --right: give both or none")
+    plugin = [model.drive.get(f"{side}_joint") or model.drive.get(f"{side}Joint") for side in ("left", "right")]
+    if left is not None and right is not None:
+        names: tuple[str, str] | None = (left, right)
+    else:
+        names = (plugin[0], plugin[1]) if plugin[0] and plugin[1] else None
+    if names is not None:
+        pair = (
+            _wheel(model, _joint_called(model, names[0]), radius),
+            _wheel(model, _joint_called(model, names[1]), radius),
+        )
+        if not _on_one_axle(*pair):
+            raise input_error(str(model.source), f"{names[0]} and {names[1]} are no two wheels on one axle")
+        return pair
+    return _in_order(model, _only_pair(model, radius))
+
+
+def _joint_called(model: UrdfModel, name: str) -> UrdfJoint:
+    found = model.joints.get(name) or next((joint for joint in model.joints.values() if joint.child == name), None)
+    if found is None or not _turns_as_wheel(found):
+        some = ", ".join(joint.name for joint in model.joints.values() if _turns_as_wheel(joint)) or "none"
+        problem = "no such joint or link" if found is None else "does not turn freely about a level axis"
+        raise input_error(str(model.source), f"{name}: {problem}; joints that do: {some}")
+    return found
+
+
+def _turns_as_wheel(joint: UrdfJoint) -> bool:
+    return joint.kind in ("continuous", "revolute") and joint.range > 2 * math.pi and abs(joint.axis[2]) < LEVEL
+
+
+def _only_pair(model: UrdfModel, radius: float | None) -> tuple[DrivenWheel, DrivenWheel]:
+    """The only two wheels that stand on the floor, on one axle, and are neither steered nor on a caster."""
+    where = str(model.source)
+    turning = [joint for joint in model.joints.values() if _turns_as_wheel(joint)]
+    held = {joint.name: list(model.above(joint.parent)) for joint in turning}
+    steering = [
+        over.name for joint in turning for over in held[joint.name]
+        if over.kind == "revolute" and over.range <= 2 * math.pi and abs(over.axis[2]) > SWIVEL
+    ]  # fmt: skip
+    if steering:
+        raise input_error(where, f"{', '.join(dict.fromkeys(steering))} steer wheels: this is no differential drive")
+    fixed = [joint for joint in turning if all(over.kind == "fixed" for over in held[joint.name])]
+    rollers = [joint.name for joint in turning if any(over in fixed for over in held[joint.name])]
+    if rollers:
+        raise input_error(
+            where, f"its wheels carry {len(rollers)} rollers, such as {rollers[0]}: this is no differential drive"
+        )
+    wheels = [_wheel(model, joint, radius) for joint in fixed if _stands(model, joint)]
+    if len(wheels) < 2:
+        raise input_error(
+            where,
+            f"has {len(wheels)} wheels that turn freely and stand on the floor; a differential drive has two; if there are, "
+            "name their joints with --left and --right",
+        )
+    pairs = [pair for pair in itertools.combinations(wheels, 2) if _on_one_axle(*pair)]
+    if not pairs:
+        names = ", ".join(wheel.joint.name for wheel in wheels)
+        raise input_error(
+            where, f"no two of its {len(wheels)} wheels share an axle ({names}): this is no differential drive"
+        )
+    if len(pairs) > 1:
+        axles = "; ".join(f"{a.joint.name} and {b.joint.name}" for a, b in pairs)
+        raise input_error(
+            where,
+            f"{len(pairs)} pairs of wheels on axles ({axles}): it turns by skidding, or some are not driven; "
+            "choose the axle that it turns about with --left and --right",
+        )
+    return pairs[0]
+
+
+def _stands(model: UrdfModel, joint: UrdfJoint) -> bool:
+    """Whether what a joint turns is a wheel and not a spinning sensor: round, and among the lowest parts."""
+    own = [piece for piece in model.pieces if piece.link == joint.child]
+    if not own:
+        return "wheel" in f"{joint.name} {joint.child}".lower()
+    lowest = min(float(piece.points[:, 2].min()) for piece in model.pieces)
+    size = max(float(np.ptp(piece.points[:, 2])) for piece in own)
+    return min(float(piece.points[:, 2].min()) for piece in own) <= lowest + 0.25 * size
+
+
+def _wheel(model: UrdfModel, joint: UrdfJoint, radius: float | None) -> DrivenWheel:
+    own: list[CollisionPiece] = [piece for piece in model.pieces if piece.link == joint.child]
+    if not own:
+        size = model.drive.get("wheel_radius") or model.drive.get("wheelRadius")
+        diameter = model.drive.get("wheel_diameter") or model.drive.get("wheelDiameter")
+        try:
+            told = float(size) if size else float(diameter) / 2 if diameter else None
+        except ValueError:
+            told = None
+        if radius is None and not told:
+            raise input_error(
+                str(model.source), f"link {joint.child}", "has no collision geometry; say --wheel-radius METRES"
+            )
+        r = radius or told or 0.0
+        says = "given" if radius else "the drive plugin"
+        return DrivenWheel(
+            joint, joint.place[:3, 3], r, 0.2 * r, f"{says}; width assumed, position from joint {joint.name}"
+        )
+    piece = max(own, key=lambda piece: float(np.ptp(piece.points, axis=0).max()))
+    along = piece.points @ joint.axis
+    middle = joint.place[:3, 3] + joint.axis * (float(along.min() + along.max()) / 2 - joint.place[:3, 3] @ joint.axis)
+    across = piece.points - middle - np.outer((piece.points - middle) @ joint.axis, joint.axis)
+    r = piece.radius if piece.radius is not None else float(np.linalg.norm(across, axis=1).max())
+    width = 0.2 * r if piece.kind == "sphere" else float(np.ptp(along))
+    how = f"{piece.kind} of link {joint.child}"
+    if radius is not None:
+        r, how = radius, f"given, instead of {r:.4g} from {how}"
+    return DrivenWheel(joint, middle, r, width, how)
+
+
+def _on_one_axle(a: DrivenWheel, b: DrivenWheel) -> bool:
+    """Whether two wheels of one size turn about one line."""
+    apart = b.centre - a.centre
+    away = float(np.linalg.norm(apart))
+    if away < max(a.radius, b.radius) / 2 or abs(abs(float(a.joint.axis @ b.joint.axis)) - 1) > SAME:
+        return False
+    beside = apart - (apart @ a.joint.axis) * a.joint.axis
+    return float(np.linalg.norm(beside)) <= SAME * away and abs(a.radius - b.radius) <= SAME * a.radius
+
+
+def _in_order(model: UrdfModel, pair: tuple[DrivenWheel, DrivenWheel]) -> tuple[DrivenWheel, DrivenWheel]:
+    """A pair as left and right: along the root's y axis, or by their names where the axle lies otherwise."""
+    a, b = pair
+    apart = a.centre - b.centre
+    if abs(float(apart[1])) >= 0.5 * float(np.linalg.norm(apart)):
+        return (a, b) if apart[1] > 0 else (b, a)
+    for first, second in ((a, b), (b, a)):
+        if "left" in first.joint.name.lower() and "right" in second.joint.name.lower():
+            return first, second
+    raise input_error(
+        str(model.source),
+        f"it is not clear which of {a.joint.name} and {b.joint.name} is on the left; say so with --left and --right",
+    )

@@ -1,0 +1,39 @@
+"""`antdrive export`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from antdrive.sim.cli import options
+from antdrive.sim.cli.console import print_files, print_json
+from antdrive.sim.cli.exits import SUCCEEDED
+from antdrive.sim.cli.parse import log_at
+from antdrive.worlds.errors import FieldError, InputError
+
+
+def export_drive(
+    rollout: Annotated[Path, typer.Argument(metavar="ROLLOUT", help="Log of a drive, or the folder of a run.")],
+    out: Annotated[
+        Path,
+        typer.Option("--out", "-o", metavar="PATH", help="The .mcap file, or a new folder for rosbag2 and csv."),
+    ],
+    to: Annotated[str, typer.Option("--to", metavar="KIND", help="mcap, rosbag2 or csv.")] = "mcap",
+    json: options.Json = False,
+) -> int:
+    """Export a drive for Foxglove, RViz and spreadsheets.
+
+    mcap and rosbag2 hold ROS 2 messages, without ROS; they need antdrive[ros].
+    """
+    from antdrive.sim.export.exporting import export
+
+    try:
+        files = export(log_at(rollout), to, out)
+    except FieldError as error:
+        raise InputError(f"--{error.key}: {error.problem}") from None
+    written = {("layout" if file.name.endswith(".foxglove.json") else to): str(file) for file in files}
+    if json:
+        print_json({"files": written})
+    else:
+        print_files(written)
+    return SUCCEEDED

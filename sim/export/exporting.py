@@ -1,0 +1,118 @@
+"""A log, exported to what other programs read."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+
+from antdrive.sim.export.bags import metadata, write_mcap
+from antdrive.sim.export.layout import foxglove_layout
+from antdrive.sim.export.samples import samples
+from antdrive.sim.export.scenery import scenery
+from antdrive.sim.export.tables import write_tables
+from antdrive.sim.export.topics import Topic
+from antdrive.sim.log.certificate import certify
+from antdrive.sim.log.rollout import Rollout
+from antdrive.worlds.errors import FieldError, InputError, input_error
+from antdrive.worlds.files.atomic import folder_written_whole, written_whole
+from antdrive.worlds.files.world_file import save_task
+
+LAYOUT = ".foxglove.json"
+
+
+def export(log: str | Path, to: str, path: str | Path) -> list[Path]:
+    """Export a log; the files or the folder are written whole or not at all.
+
+    Args:
+        log: the log's file
+        to: a key of `EXPORTS`: mcap, rosbag2 or csv
+        path: the file of an mcap, or the folder to make
+
+    Returns:
+        What was written.
+
+    Raises:
+        FieldError: `to` is unknown.
+        InputError: the log cannot be read, the place cannot be written to, or a package is not installed.
+    """
+    if to not in EXPORTS:
+        raise FieldError("to", f"unknown {to!r}; choose from {', '.join(EXPORTS)}")
+    source, target = Path(log), Path(path)
+    rollout = Rollout.load(source)
+    return EXPORTS[to](rollout, source, target)
+
+
+def topics_of(rollout: Rollout) -> list[Topic]:
+    """All messages of a drive. At the first stamp the fixed transforms come first, on both of their topics.
+
+    Args:
+        rollout: the log
+    """
+    static, few = scenery(rollout)
+    many = samples(rollout)
+    moving = many[0]
+    stamps = np.concatenate([static.stamps, moving.stamps])
+    tf = Topic(moving.name, moving.kind, stamps, [*static.payloads, *moving.payloads])
+    return [static, tf, *many[1:], *few]
+
+
+def attachments_of(rollout: Rollout, log: Path) -> dict[str, tuple[str, bytes]]:
+    """The files that a bag keeps inside: media type and content by name.
+
+    Args:
+        rollout: the log
+        log: its file
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        save_task(rollout.record.task, Path(folder) / "world.yaml")
+        world = (Path(folder) / "world.yaml").read_bytes()
+    certificate = json.dumps(certify(rollout).as_dict(), indent=2, default=str)
+    return {
+        "world.yaml": ("application/yaml", world),
+        "certificate.json": ("application/json", certificate.encode()),
+        "digest.txt": ("text/plain", f"{rollout.record.digest}\n".encode()),
+        "rollout.npz": ("application/octet-stream", log.read_bytes()),
+    }
+
+
+def _to_mcap(rollout: Rollout, log: Path, target: Path) -> list[Path]:
+    if target.suffix != ".mcap":
+        raise input_error(str(target), "name a file that ends in .mcap")
+    layout = target.with_suffix(LAYOUT)
+    with written_whole(target) as part:
+        write_mcap(part, topics_of(rollout), attachments_of(rollout, log))
+    with written_whole(layout) as part:
+        part.write_text(_layout(rollout), encoding="utf-8")
+    return [target, layout]
+
+
+def _to_rosbag2(rollout: Rollout, log: Path, target: Path) -> list[Path]:
+    with folder_written_whole(target) as folder:
+        topics, bag = topics_of(rollout), f"{target.name}.mcap"
+        write_mcap(folder / bag, topics, attachments_of(rollout, log))
+        (folder / "metadata.yaml").write_text(metadata(bag, topics), encoding="utf-8")
+        (folder / f"{target.name}{LAYOUT}").write_text(_layout(rollout), encoding="utf-8")
+    return [target]
+
+
+def _to_csv(rollout: Rollout, log: Path, target: Path) -> list[Path]:
+    if target.suffix == ".csv":
+        raise InputError(f"{target}: name a folder; drive, plan and contacts are a file each")
+    with folder_written_whole(target) as folder:
+        write_tables(rollout, folder)
+    return [target]
+
+
+def _layout(rollout: Rollout) -> str:
+    return json.dumps(foxglove_layout(rollout), indent=2) + "\n"
+
+
+#: How to export a log, by what it becomes.
+EXPORTS: Mapping[str, Callable[[Rollout, Path, Path], list[Path]]] = MappingProxyType(
+    {"mcap": _to_mcap, "rosbag2": _to_rosbag2, "csv": _to_csv}
+)

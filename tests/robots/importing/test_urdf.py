@@ -1,0 +1,314 @@
+"""Robots out of URDF: what public dimensions say is what is imported, and what is no differential drive is refused."""
+
+from __future__ import annotations
+
+import math
+import re
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from antdrive.robots import Footprint, RobotSpec, load_robot
+from antdrive.robots.importing.hull import convex_hull, fewer_corners, footprint_around
+from antdrive.robots.importing.urdf import ImportedRobot, import_urdf
+from antdrive.worlds import InputError
+
+FIXTURES = Path(__file__).parent / "urdf"
+#: What public specifications say: length, width, height, mass, wheel radius, track, and the kind of footprint.
+PUBLIC = {
+    "burger.urdf": (0.138, 0.178, 0.192, 1.0, 0.033, 0.160, "polygon"),
+    "waffle.urdf": (0.281, 0.306, 0.141, 1.8, 0.033, 0.287, "rectangle"),
+    "turtlebot4.urdf": (0.341, 0.341, 0.351, 3.9, 0.03575, 0.233, "disc"),
+    "pioneer3dx.urdf": (0.455, 0.381, 0.237, 9.0, 0.0975, 0.331, "polygon"),
+    "warehouse.urdf.xacro": (0.9, 0.6, 0.352, 70.0, 0.0625, 0.445, "rectangle"),
+}
+CATALOGUE = {
+    "burger.urdf": "turtlebot3-burger",
+    "waffle.urdf": "turtlebot3-waffle",
+    "turtlebot4.urdf": "turtlebot4",
+    "pioneer3dx.urdf": "pioneer3dx",
+    "warehouse.urdf.xacro": "warehouse",
+}
+
+
+def imported(name: str, **settings: Any) -> ImportedRobot:
+    if name.endswith(".xacro"):
+        pytest.importorskip("xacrodoc")
+    return import_urdf(FIXTURES / name, **settings)
+
+
+def changed(tmp_path: Path, name: str, *changes: tuple[str, str]) -> Path:
+    text = (FIXTURES / name).read_text()
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    path = tmp_path / name
+    path.write_text(text)
+    return path
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_what_is_imported_is_within_a_hundredth_of_the_public_dimensions(name: str) -> None:
+    robot = imported(name).robot
+    xmin, ymin, xmax, ymax = robot.footprint.bounds
+    kind = "disc" if robot.footprint.rounding else "rectangle" if robot.footprint.box else "polygon"
+    found = (xmax - xmin, ymax - ymin, robot.height, robot.mass, robot.wheel_radius, robot.track)
+    assert found == pytest.approx(PUBLIC[name][:-1], rel=0.01)
+    assert kind == PUBLIC[name][-1]
+    ours = load_robot(CATALOGUE[name])
+    assert robot.footprint.bounds == pytest.approx(ours.footprint.bounds, abs=0.01 * ours.radius)
+    assert (robot.track, robot.wheel_radius, robot.mass) == pytest.approx(
+        (ours.track, ours.wheel_radius, ours.mass), rel=0.01
+    )
+
+
+def test_the_file_says_of_each_value_where_it_comes_from(tmp_path: Path) -> None:
+    found = imported("pioneer3dx.urdf", given={"mass": 9.5})
+    path = tmp_path / "pioneer.yaml"
+    path.write_text(found.text)
+    assert load_robot(path) == found.robot
+    assert found.robot.mass == 9.5
+    numbers = [line for line in found.text.splitlines() if re.match(r"\w+: [\d.]+ ", line)]
+    assert len(numbers) == 11
+    kinds = {line.split(":")[0]: line.split("# ")[1].split(":")[0] for line in numbers}
+    assert kinds == {
+        "height": "computed", "mass": "given", "wheel_radius": "read", "track": "computed", "max_speed": "computed",
+        "max_yaw_rate": "computed", "max_acceleration": "assumed", "max_yaw_acceleration": "assumed",
+        "max_lateral_acceleration": "assumed", "max_wheel_speed": "read", "wheel_torque": "read",
+    }  # fmt: skip
+    assert set(yaml.safe_load(found.text)) == {"schema", "name", "source", "footprint", *kinds}
+
+
+def test_limits_come_from_the_drive_plugin_where_there_is_one() -> None:
+    found = imported("waffle.urdf")
+    assert (found.robot.max_speed, found.robot.max_yaw_rate) == (0.26, 1.82)
+    assert "max_speed: 0.26                 # read: the drive plugin" in found.text
+
+
+def test_limits_that_contradict_each_other_are_resolved_or_refused(tmp_path: Path) -> None:
+    slow = ('<axis xyz="0 1 0"/>', '<axis xyz="0 1 0"/><limit effort="2" velocity="5"/>')
+    found = import_urdf(changed(tmp_path, "waffle.urdf", slow))
+    assert found.robot.max_speed == pytest.approx(5 * 0.033)
+    assert "limit of joint wheel_left_joint; the drive plugin says 0.26" in found.text
+    with pytest.raises(
+        InputError, match=r"max_wheel_speed: 7 rad/s on a robot of 1 kg .* but max_speed is 9; raise max_wheel_speed"
+    ):
+        imported("burger.urdf", given={"max_speed": 9.0})
+
+
+def test_a_robot_that_turns_by_skidding_is_asked_for_its_axle() -> None:
+    with pytest.raises(
+        InputError, match=r"2 pairs of wheels on axles \(front_left_wheel and front_right_wheel; rear_left"
+    ):
+        imported("husky.urdf")
+    robot = imported("husky.urdf", left="rear_left_wheel", right="rear_right_wheel").robot
+    assert robot.footprint.bounds == pytest.approx((-0.239, -0.335, 0.751, 0.335), abs=1e-3)
+
+
+JOINT = '<joint name="{}" type="{}"><parent link="base_link"/><child link="{}"/><origin xyz="{}"/><axis xyz="0 0 1"/>{}</joint>'
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "says"),
+    [
+        ("burger.urdf", (("<robot name", "<sdf name"), ("</robot>", "</sdf>")), "its root element is <sdf>"),
+        ("burger.urdf", (('type="continuous"', 'type="fixed"'),), "has 0 wheels that turn freely and stand on the floor"),
+        ("burger.urdf", (("0 -0.080 0.023", "0.05 -0.080 0.023"),), "no two of its 2 wheels share an axle"),
+        ("burger.urdf", (('child link="scan"', 'child link="scam"'),), "joint scan_joint: there is no link 'scam'"),
+        ("burger.urdf", (('child link="scan"', 'child link="base_link"'),), "its links must form one tree"),
+        ("burger.urdf", (('radius="0.035"', 'radius="wide"'),), "<cylinder radius='wide'>: must be 1 numbers"),
+        ("burger.urdf", (('<box size="0.138 0.140 0.143"/>', '<mesh filename="package://a/b.stl"/>'),),
+         "link base_link: mesh package://a/b.stl is not found; say where with --meshes FOLDER"),
+        ("burger.urdf", (("0 -0.080 0.023", "0 -0.120 0.023"),), ""),  # the axle's middle is not the root's
+        ("burger.urdf", (("<box size", "<cone size"),), "link base_link: unknown geometry <cone>"),
+        ("burger.urdf", (('<link name="scan">', "<link>"),), "a <link> has no name"),
+        ("burger.urdf", (('value="0.83"', 'value="nan"'),), "must be 1 numbers"),
+        ("burger.urdf", (("<robot name", "<!DOCTYPE robot><robot name"),), "declares a document type"),
+        ("burger.urdf", (('value="0.83"', 'value="2e8"'),), "must be 1 numbers"),
+        ("burger.urdf", (('value="0.83"', 'value="2e5"'),), "as imported"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_with_a_file_is_said_in_one_line(
+    tmp_path: Path, name: str, changes: tuple[tuple[str, str], ...], says: str
+) -> None:
+    path = changed(tmp_path, name, *changes)
+    if not says:
+        import_urdf(path)
+        return
+    with pytest.raises(InputError) as caught:
+        import_urdf(path)
+    assert says in str(caught.value)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_steered_wheels_and_rollers_are_no_differential_drive(tmp_path: Path) -> None:
+    steered = '<link name="knuckle"/>' + JOINT.format(
+        "steer", "revolute", "knuckle", "0.2 0.1 0", '<limit lower="-1" upper="1"/>'
+    )
+    path = changed(
+        tmp_path,
+        "waffle.urdf",
+        ("<gazebo>", steered + "<gazebo>"),
+        ('<parent link="base_link"/><child link="left"/>', '<parent link="knuckle"/><child link="left"/>'),
+        ("<left_joint>wheel_left_joint</left_joint>", ""),
+    )
+    with pytest.raises(InputError, match="steer steer wheels: this is no differential drive"):
+        import_urdf(path)
+    roller = (
+        '<link name="roller"/><joint name="roller_joint" type="continuous"><parent link="left"/><child link="roller"/>'
+        '<origin xyz="0 0 -0.03"/><axis xyz="1 0 0"/></joint>'
+    )
+    path = changed(
+        tmp_path, "waffle.urdf", ("<gazebo>", roller + "<gazebo>"), ("<left_joint>wheel_left_joint</left_joint>", "")
+    )
+    with pytest.raises(InputError, match="carry 1 rollers, such as roller_joint"):
+        import_urdf(path)
+
+
+def test_a_plugin_for_a_vehicle_that_skids_chooses_no_axle(tmp_path: Path) -> None:
+    plugin = "<gazebo><plugin>" + "".join(
+        f"<{side}_joint>{end}_{side}_wheel</{side}_joint>" for side in ("left", "right") for end in ("front", "rear")
+    ) + "</plugin></gazebo></robot>"  # fmt: skip
+    path = changed(tmp_path, "husky.urdf", ("</robot>", plugin))
+    with pytest.raises(InputError, match="2 pairs of wheels on axles"):
+        import_urdf(path)
+    one = re.sub(r"<(left|right)_joint>front.*?</(left|right)_joint>", "", plugin)
+    path = changed(tmp_path, "husky.urdf", ("</robot>", one))
+    assert import_urdf(path).robot.footprint.bounds[2] == pytest.approx(0.751, abs=1e-3)
+
+
+def test_a_robot_without_collision_geometry_has_no_footprint(tmp_path: Path) -> None:
+    body = '<collision><origin xyz="-0.064 0 0.0815"/><geometry><box size="0.281 0.306 0.119"/></geometry></collision>'
+    with pytest.raises(
+        InputError, match="has no collision geometry beside its wheels, from which a footprint could follow"
+    ):
+        import_urdf(changed(tmp_path, "waffle.urdf", (body, "")))
+    with pytest.raises(InputError, match=r"has no collision geometry below 0\.005 m beside its wheels"):
+        imported("burger.urdf", below=0.005)
+
+
+def test_wheels_can_be_told_by_joint_or_link() -> None:
+    there = imported("burger.urdf").robot
+    assert imported("burger.urdf", left="wheel_left_link", right="wheel_right_joint").robot == there
+    back = imported("burger.urdf", left="wheel_right_link", right="wheel_left_link").robot  # it drives backwards
+    assert back.footprint.bounds == pytest.approx((-0.037, -0.089, 0.101, 0.089), abs=1e-4)
+    with pytest.raises(
+        InputError, match="scan: does not turn freely about a level axis; joints that do: wheel_left_joint, wh"
+    ):
+        imported("burger.urdf", left="scan", right="wheel_right_link")
+    with pytest.raises(InputError, match="wheel: no such joint or link"):
+        imported("burger.urdf", left="wheel", right="wheel_right_link")
+    with pytest.raises(InputError, match="--left, --right: give both or none"):
+        imported("burger.urdf", left="wheel")
+
+
+def test_what_lies_higher_is_left_out_and_meshes_too_where_asked(tmp_path: Path) -> None:
+    wide = changed(tmp_path, "turtlebot4.urdf", ('size="0.1 0.1 0.246"', 'size="0.9 0.1 0.246"'))
+    assert import_urdf(wide).robot.radius > 0.45
+    low = import_urdf(wide, below=0.1)
+    assert low.robot.footprint.is_disc
+    assert low.robot.radius == pytest.approx(0.1705, rel=0.01)
+    assert (len(low.pieces), len(low.above)) == (3, 1)
+    assert low.robot.height == pytest.approx(0.351), "the body is as high as it is"
+    mesh = changed(
+        tmp_path, "turtlebot4.urdf", ('<box size="0.1 0.1 0.246"/>', '<mesh filename="package://tb/mast.stl"/>')
+    )
+    found = import_urdf(mesh, without_meshes=True)
+    assert found.left_out == ("mast: package://tb/mast.stl",)
+    assert found.text.endswith("# left out, because they were not found: mast: package://tb/mast.stl\n")
+
+
+def test_a_mesh_is_read_with_its_scale(tmp_path: Path) -> None:
+    pytest.importorskip("trimesh")
+    corners = [(x, y, z) for x in (-1, 1) for y in (-2, 2) for z in (-1, 1)]
+    (tmp_path / "meshes").mkdir()
+    text = "".join(f"v {x} {y} {z}\n" for x, y, z in corners) + "f 1 2 3\nf 6 7 8\nf 1 5 8\nf 2 4 6\nf 3 4 7\n"
+    (tmp_path / "meshes" / "body.obj").write_text(text)
+    path = changed(
+        tmp_path,
+        "waffle.urdf",
+        ('<box size="0.281 0.306 0.119"/>', '<mesh filename="package://waffle/meshes/body.obj" scale="0.2 0.1 0.05"/>'),
+    )
+    assert import_urdf(path).robot.footprint.bounds == pytest.approx((-0.264, -0.2, 0.136, 0.2), abs=1e-4)
+
+
+def test_masses_and_torques_that_a_file_lacks_are_assumed(tmp_path: Path) -> None:
+    path = changed(tmp_path, "waffle.urdf", ('<mass value="1.74"/>', ""), ('<mass value="0.03"/>', ""))
+    found = import_urdf(path)
+    assert found.robot.mass == pytest.approx(150 * 0.281 * 0.306 * 0.141, rel=1e-3)
+    assert "# assumed: 150 kg/m3, as the file has no masses" in found.text
+
+
+@given(st.floats(0.01, 0.5), st.floats(0.2, 2.0), st.floats(1.0, 100.0))
+def test_any_limits_of_the_joints_give_a_robot_that_reaches_what_it_promises(
+    radius: float, track: float, velocity: float
+) -> None:
+    """Whatever the rounding does: a robot whose motors fall short by the last digit would be refused."""
+    text = (FIXTURES / "waffle.urdf").read_text().partition("<gazebo>")[0] + "</robot>"
+    body = f'<box size="{2.5 * max(radius, track)} {2 * track} {3 * radius}"/>'
+    for old, new in (
+        ('<box size="0.281 0.306 0.119"/>', body),
+        ('radius="0.033"', f'radius="{radius!r}"'),
+        ("0.1435 0.033", f"{track / 2!r} {radius!r}"),
+        ('<axis xyz="0 1 0"/>', f'<axis xyz="0 1 0"/><limit effort="0" velocity="{velocity!r}"/>'),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "any.urdf"
+        path.write_text(text)
+        refused, robot = "", None
+        try:
+            robot = import_urdf(path).robot
+        except InputError as error:
+            refused = str(error)
+    assert "reach" not in refused, "only a robot that antdrive is not meant for is refused"
+    assert robot is None or 0.05 <= robot.max_speed <= max(velocity * radius * (1 + 1e-6), 0.5)
+
+
+points = st.tuples(st.floats(-1, 1), st.floats(-1, 1))
+
+
+@given(st.lists(points, min_size=3, max_size=60), st.sampled_from(["auto", "disc", "rectangle", "polygon"]))
+def test_a_footprint_holds_every_point_that_it_was_made_around(some: list[tuple[float, float]], kind: str) -> None:
+    ring = [(0.3 * math.cos(k), 0.2 * math.sin(k)) for k in range(7)]
+    foot = footprint_around(some + ring, kind)
+    assert min(foot.depth(x, y) for x, y in some + ring) >= -3e-5
+    assert len(foot.corners) <= 12
+    foot.require_convex()
+
+
+@given(st.integers(13, 90), st.floats(0.3, 1.0))
+def test_fewer_corners_cost_little(count: int, squash: float) -> None:
+    ellipse = [(math.cos(2 * math.pi * k / count), squash * math.sin(2 * math.pi * k / count)) for k in range(count)]
+    fewer = fewer_corners(convex_hull(ellipse), 12)
+    assert 4 <= len(fewer) <= 12
+    x, y = np.array(fewer).T
+    area = (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2
+    assert squash * 3.0 < area < squash * math.pi * 1.08
+    foot = Footprint.polygon(fewer)
+    assert min(foot.depth(*point) for point in ellipse) > -1e-6
+
+
+def test_the_yaw_of_the_axle_is_the_robots(tmp_path: Path) -> None:
+    """A model whose ahead is the root's y axis: the same robot, turned."""
+    text = (FIXTURES / "burger.urdf").read_text()
+    for old, new in (
+        ('<origin xyz="-0.032 0 0.070"/>', '<origin xyz="0 -0.032 0.070" rpy="0 0 1.5707963"/>'),
+        ('xyz="0 0.080 0.023" rpy="-1.5707963 0 0"', 'xyz="-0.080 0 0.023" rpy="-1.5707963 0 1.5707963"'),
+        ('xyz="0 -0.080 0.023" rpy="-1.5707963 0 0"', 'xyz="0.080 0 0.023" rpy="-1.5707963 0 1.5707963"'),
+        ('xyz="-0.032 0 0.167"', 'xyz="0 -0.032 0.167"'),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    path = tmp_path / "turned.urdf"
+    path.write_text(text)
+    robot: RobotSpec = import_urdf(path).robot
+    assert robot.footprint.bounds == pytest.approx((-0.101, -0.089, 0.037, 0.089), abs=1e-4)

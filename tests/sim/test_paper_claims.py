@@ -1,0 +1,233 @@
+"""Claims and their verdicts, on trials made up so that the answer is known."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from antdrive.planners import PLANNERS, History, Query
+from antdrive.sim.papers import candidates
+from antdrive.sim.papers.baselines import FirstTouchDStar, total_cost
+from antdrive.sim.papers.candidates import MoveCount, candidate, move_counts
+from antdrive.sim.papers.claims import CLAIMS, Arm, Arrive, Cases, Claim, Less, Mean, Test, Wider, Within
+from antdrive.sim.papers.experiments import PAPERS
+from antdrive.sim.papers.maps import environments, optimum
+from antdrive.sim.papers.trials import Trial, solve
+from antdrive.sim.papers.verdicts import Decision, judge, verdict_facts
+from antdrive.worlds import Grid
+from antdrive.worlds.errors import FieldError
+
+ONE, TWO = Arm("m", "one"), Arm("m", "two")
+
+
+def trials(values: Any, worlds: int = 0) -> list[Trial]:
+    """Trials whose gap is the value; nan: no path."""
+    made = []
+    for seed, value in enumerate(values):
+        solved = not math.isnan(value)
+        result = SimpleNamespace(solved=solved, line_length=100.0 + value if solved else math.inf)
+        made.append(Trial(seed, seed % worlds if worlds else seed, cast(Any, result), 100.0, 0.1, 0.0))
+    return made
+
+
+def verdict(test: Test, first: Any, second: Any = (), worlds: int = 0) -> Any:
+    claim = Claim(paper="lee2008", source="s", sentence="x", printed="p", test=test)
+    return judge(claim, {ONE: trials(first, worlds), TWO: trials(second, worlds)})
+
+
+def test_every_claim_names_experiments_of_its_paper() -> None:
+    for paper, experiments in PAPERS.items():
+        known = {Arm(e.map, e.name) for e in experiments() if e.name != "steps"}
+        claims = [claim for claim in CLAIMS if claim.paper == paper]
+        assert claims
+        for claim in claims:
+            assert claim.arms <= known, claim.sentence
+            assert claim.printed
+        texts = [(claim.sentence, claim.reading) for claim in claims]
+        assert len(set(texts)) == len(texts)
+        names = [(e.map, e.name) for e in experiments()]
+        assert len(set(names)) == len(names)
+
+
+@pytest.mark.parametrize(("shift", "decision"), [(-2.0, Decision.HOLDS), (2.0, Decision.REFUTED), (0.0, Decision.OPEN)])
+def test_less_is_decided_by_the_interval_of_the_paired_difference(shift: float, decision: Decision) -> None:
+    rng = np.random.default_rng(1)
+    second = rng.uniform(5, 9, 50)
+    first = second + shift + np.resize([-1.0, 1.0], 50) * rng.uniform(0.1, 1, 50)
+    found = verdict(Less(((ONE, TWO),)), first, second)
+    assert found.decision is decision
+    assert found.low <= found.value <= found.high
+    assert found.value == pytest.approx(np.median(first - second))
+
+
+def test_equal_values_refute_less_but_not_no_more() -> None:
+    same = np.full(20, 3.0)
+    assert verdict(Less(((ONE, TWO),)), same, same).decision is Decision.REFUTED
+    assert verdict(Less(((ONE, TWO),), strict=False), same, same).decision is Decision.HOLDS
+    assert verdict(Less(((ONE, TWO),), margin=1.0, strict=False), same + 1.0, same).decision is Decision.HOLDS
+    assert verdict(Less(((ONE, TWO),), margin=1.0, strict=False), same + 1.1, same).decision is Decision.REFUTED
+
+
+def test_a_path_is_less_than_none_and_none_equals_none() -> None:
+    none = np.full(20, math.nan)
+    assert verdict(Less(((ONE, TWO),)), np.full(20, 500.0), none).decision is Decision.HOLDS
+    assert verdict(Less(((ONE, TWO),)), none, np.full(20, 500.0)).decision is Decision.REFUTED
+    assert verdict(Less(((ONE, TWO),), strict=False), none, none).value == 0.0
+    assert "no path" in verdict(Within((ONE,), 5.0), none).ours
+
+
+def test_runs_of_one_map_do_not_count_as_maps() -> None:
+    rng = np.random.default_rng(0)
+    by_map = np.array([-1.0, 2.0, -1.5, 1.0, -0.5])
+    first = np.resize(by_map, 100) + rng.normal(0, 0.01, 100)
+    second = np.zeros(100)
+    apart = verdict(Less(((ONE, TWO),)), first, second)
+    together = verdict(Less(((ONE, TWO),)), first, second, worlds=5)
+    assert together.high - together.low >= apart.high - apart.low
+    assert together.decision is Decision.OPEN
+
+
+def test_a_median_is_within_a_bound_or_beyond_it() -> None:
+    assert verdict(Within((ONE,), 10.0), np.linspace(4, 8, 30)).decision is Decision.HOLDS
+    assert verdict(Within((ONE,), 10.0), np.linspace(14, 18, 30)).decision is Decision.REFUTED
+    assert verdict(Within((ONE,), 10.0), np.linspace(5, 15, 30)).decision is Decision.OPEN
+    assert verdict(Within((ONE,), 10.0), np.linspace(4, 8, 5)).decision is Decision.OPEN  # too few
+
+
+def test_a_mean_is_the_printed_one_within_its_margin() -> None:
+    values = np.linspace(-0.5, 0.5, 50)
+    assert verdict(Mean(ONE, 101.0, "length"), values).decision is Decision.HOLDS
+    assert verdict(Mean(ONE, 120.0, "length"), values).decision is Decision.REFUTED
+    assert verdict(Mean(ONE, 105.2, "length", margin=0.05), values).decision is Decision.OPEN
+    assert verdict(Mean(ONE, 101.0, "length"), np.full(9, math.nan)).decision is Decision.OPEN
+
+
+def test_arrivals_are_judged_by_wilsons_interval() -> None:
+    few, most = np.resize([1.0, *[math.nan] * 24], 50), np.resize([math.nan, *[1.0] * 49], 50)
+    assert verdict(Arrive(ONE, most=0.2), few).decision is Decision.HOLDS
+    assert verdict(Arrive(ONE, most=0.2), most).decision is Decision.REFUTED
+    assert verdict(Arrive(ONE, least=0.8), most).decision is Decision.HOLDS
+    assert verdict(Arrive(ONE, least=0.97), most).decision is Decision.OPEN
+    assert verdict(Arrive(ONE, most=0.2), few).value == 2 / 50
+
+
+def test_scatter_is_the_range_between_quartiles() -> None:
+    rng = np.random.default_rng(0)
+    calm, wild = rng.uniform(4, 6, 50), rng.uniform(0, 40, 50)
+    assert verdict(Wider(((ONE, TWO),)), wild, calm).decision is Decision.HOLDS
+    assert verdict(Wider(((ONE, TWO),)), calm, wild).decision is Decision.REFUTED
+    assert verdict(Wider(((ONE, TWO),)), calm, calm).decision is not Decision.HOLDS
+
+
+def test_cases_are_counted() -> None:
+    pairs = ((ONE, TWO), (ONE, TWO))
+    assert verdict(Cases(pairs, "gap", 2), [1.0], [2.0]).decision is Decision.HOLDS
+    assert verdict(Cases(pairs, "gap", 2), [2.0], [2.0]).decision is Decision.REFUTED
+    assert verdict_facts(verdict(Cases(pairs, "gap", 2), [2.0], [2.0]))["verdict"] == "does not hold"
+
+
+@pytest.mark.parametrize(
+    ("printed", "digits", "expected"),
+    [
+        (13.899, 3, [(4, 7)]),
+        (28.627, 3, [(6, 16)]),
+        (42.184, 3, [(4, 27)]),
+        (96.125, 3, [(24, 51)]),
+        (109.761, 3, []),  # suganthi2019 prints it, and no path over square cells has it
+        (123.6102, 4, [(43, 57)]),
+    ],
+)
+def test_a_printed_length_tells_the_moves(printed: float, digits: int, expected: list[tuple[int, int]]) -> None:
+    assert move_counts(printed, digits) == [MoveCount(*pair) for pair in expected]
+    for straight, diagonal in expected:
+        assert straight + math.sqrt(2) * diagonal == pytest.approx(printed, abs=10.0**-digits)
+
+
+def test_the_lengths_and_cells_that_lee2008_prints_agree() -> None:
+    tables = {
+        72.0833: 59,
+        83.3970: 67,
+        154.2376: 125,
+        175.2376: 146,
+        168.6518: 139,
+        59.2548: 47,
+        64.0833: 51,
+        123.6102: 101,
+        135.8234: 107,
+        131.6812: 107,
+    }
+    for length, cells in tables.items():
+        (moves,) = move_counts(length, 4)
+        assert moves.straight + moves.diagonal + 1 == cells
+
+
+def test_moves_that_can_be_monotone() -> None:
+    assert MoveCount(6, 16).monotone(19, 19)
+    assert MoveCount(43, 57).monotone(99, 58)
+    assert not MoveCount(24, 51).monotone(49, 49)  # more diagonal moves than rows
+    assert not MoveCount(14, 32).monotone(24, 24)
+
+
+def test_a_candidate_has_the_length_asked_for_and_depends_on_the_seed_alone() -> None:
+    moves = MoveCount(6, 16)
+    one, same, other = (candidate((20, 20), (0, 0), (19, 19), moves, seed, blocked=0.15) for seed in (1, 1, 2))
+    for query in (one, other):
+        assert optimum(query) == pytest.approx(moves.length)
+        assert query.grid.free[:2, :2].all()
+    assert (one.grid.free == same.grid.free).all()
+    assert (one.grid.free != other.grid.free).any()
+
+
+def test_a_length_that_no_map_has_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(candidates, "MAPS", 3)
+    with pytest.raises(FieldError, match="no map of 3 x 3 cells"):
+        candidate((3, 3), (0, 0), (2, 2), MoveCount(9, 9), 0)
+
+
+def test_a_plan_ends_with_the_iteration_that_uses_up_its_ant_steps() -> None:
+    query = candidate((20, 20), (0, 0), (19, 19), MoveCount(6, 16), 1, blocked=0.15)
+    whole = solve("as", {"iterations": 40}, query, 3)
+    part = solve("as", {"iterations": 40}, query, 3, work=whole.work / 2)
+    assert whole.work / 2 <= part.work < whole.work
+    count = len(part.result.history)
+    np.testing.assert_array_equal(part.result.history.best, whole.result.history.best[:count])
+    with pytest.raises(FieldError, match="plans at once"):
+        solve("astar", {}, query, 3, work=10.0)
+
+
+def test_the_quantities_of_a_trial_are_those_worked_out_by_hand() -> None:
+    best = np.array([math.inf, 150.0, 124.0, 110.0, 110.0])
+    history = History(best, np.array([9.0, 9.0, 9.0, 4.0, 6.0]), best, np.ones(5, dtype=np.int64))
+    result = SimpleNamespace(solved=True, history=history, work=50, line_length=110.0)
+    trial = Trial(0, 0, cast(Any, result), 100.0, 0.1, 0.0)
+    assert (trial.effort, trial.settled, trial.gap) == (30.0, 4.0, pytest.approx(10.0))
+    assert trial.last == 6.0
+    assert trial.unrest == pytest.approx(np.std([9, 9, 9, 4, 6]))
+    none = dataclasses.replace(trial, result=cast(Any, SimpleNamespace(solved=False, history=history, work=50)))
+    assert (none.length, none.gap, none.steps, none.settled) == (math.inf,) * 4
+
+
+def test_the_total_cost_is_that_of_hasans_straight_row() -> None:
+    # Table 1, 3c: 49 straight moves would cost 1 + 2 + ... + 49 = 1225; the paper prints 1238.6.
+    query = environments()["3c vertical rows"]
+    assert total_cost(query, PLANNERS["astar"].plan(query, np.random.default_rng(0))) == pytest.approx(1225.0)
+    diagonal = Query(Grid.from_free(np.ones((3, 3))), (0, 0), (2, 2))
+    assert total_cost(diagonal, PLANNERS["astar"].plan(diagonal, np.random.default_rng(0))) == pytest.approx(1.4 + 2.8)
+
+
+def test_a_dstar_that_lowers_no_cost_finds_longer_paths_where_walls_are_concave() -> None:
+    longer = 0
+    for query in environments().values():
+        plan = FirstTouchDStar().plan(query, np.random.default_rng(0))
+        assert plan.solved
+        assert plan.cost >= optimum(query) - 1e-9
+        longer += plan.cost > 1.05 * optimum(query)
+    assert longer >= 3
+    shut = np.ones((3, 3))
+    shut[1] = 0
+    assert not FirstTouchDStar().plan(Query(Grid.from_free(shut), (0, 0), (2, 2)), np.random.default_rng(0)).solved
