@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -52,7 +52,7 @@ class SightPainter:
         """Where places (N, 2) on the robot's map lie in the world now [m]."""
         return laid_in_world(points, self._drift)
 
-    def cover(self, frame: Picture, backdrop: Backdrop, inverse: Floats, fine: int) -> None:
+    def cover(self, frame: Picture, backdrop: Backdrop, inverse: npt.NDArray[np.floating[Any]], fine: int) -> None:
         """Hatch the ground that was never seen, and pale the obstacles that no beam has met.
 
         Args:
@@ -73,7 +73,13 @@ class SightPainter:
         if unmet.any():
             kernels.pale_bodies(frame, visible, backdrop.bodies, fine, unmet, tints[0], PALENESS)
 
-    def lay_fan(self, frame: Picture, backdrop: Backdrop, forward: Floats, inverse: Floats) -> None:
+    def lay_fan(
+        self,
+        frame: Picture,
+        backdrop: Backdrop,
+        forward: npt.NDArray[np.floating[Any]],
+        inverse: npt.NDArray[np.floating[Any]],
+    ) -> None:
         """Lay the beams of the last scan on the ground.
 
         Args:
