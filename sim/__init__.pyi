@@ -29,6 +29,7 @@ from .view.figures.plan_figures import plan_figure as plan_figure
 from .view.figures.run_figures import certificate_figure as certificate_figure
 from .view.figures.run_figures import comparison_figure as comparison_figure
 from .view.figures.run_figures import overview as overview
+from .view.figures.sight_figure import sight_figure as sight_figure
 from .view.film.video import FilmInfo as FilmInfo
 from .view.film.video import film as film
 from .view.film.video import still as still

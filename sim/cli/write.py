@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from antdrive.sim.scenario import Scenario
     from antdrive.sim.view.film.video import FilmInfo
 
-FIGURES = ("overview", "certificate", "plan", "tour", "history", "field-bars", "field-contours")
+FIGURES = ("overview", "certificate", "sight", "plan", "tour", "history", "field-bars", "field-contours")
 #: Every file that `write_run` may write into a folder.
 RUN_FILES = ("result.json", "rollout.npz", *(name + suffix for name in FIGURES for suffix in (".png", ".pdf")))
 
@@ -156,6 +156,11 @@ def _write_figures(run: Run, folder: Path, log: str, endings: Sequence[str]) -> 
         if run.certificate is not None:
             files["certificate" + end] = str(folder / f"certificate{suffix}")
             certificate_figure(run.rollout, run.certificate, files["certificate" + end])
+        if len(run.rollout.scans):
+            from antdrive.sim.view.figures.sight_figure import sight_figure
+
+            files["sight" + end] = str(folder / f"sight{suffix}")
+            sight_figure(run.rollout, files["sight" + end])
     made = plan_figures(s.task, run.grid, run.plan, s.robot, folder, name=s.planner_name, suffixes=endings)
     return files | {name: str(path) for name, path in made.items()}
 

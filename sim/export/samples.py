@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,7 +12,7 @@ from antdrive.sim.export.frames import BASE, ESTIMATE, LIDAR, ODOM, mover_frame
 from antdrive.sim.export.topics import Floats, Stamps, Topic, nanoseconds
 from antdrive.sim.log.rollout import Rollout
 
-TOO_NEAR = 1  # the range in a log's scans that stands for "nearer than the lidar measures" [mm]; 0: nothing in range
+NOTHING, TOO_NEAR = 0, 1  # what stands in a log's scans for "nothing in range" and "nearer than the lidar measures"
 
 
 def samples(rollout: Rollout) -> list[Topic]:
@@ -44,26 +43,24 @@ def scans(rollout: Rollout) -> list[Topic]:
     Ranges are as REP 117 has them: +inf where nothing was in range, -inf where something was too near to measure.
 
     Args:
-        rollout: the log; its `scans` (S, B) [mm] and `scan_rows` (S,) are read where it has them
+        rollout: the log
     """
-    found: Any = getattr(rollout, "scans", None)
-    lidar: Any = getattr(rollout.record.robot, "lidar", None)
-    if found is None or lidar is None or not len(found):
+    lidar = rollout.record.robot.lidar
+    if lidar is None or not len(rollout.scans):
         return []
-    rows = np.asarray(rollout.scan_rows)
-    ranges = np.where(found == 0, np.inf, np.where(found == TOO_NEAR, -np.inf, found * 1e-3))
-    whole = lidar.field_of_view >= 2 * math.pi - 1e-6
-    step = lidar.field_of_view / max(1, lidar.beams - (0 if whole else 1))
+    logged = rollout.scans
+    ranges = np.where(logged == NOTHING, np.inf, np.where(logged == TOO_NEAR, -np.inf, logged * 1e-3))
+    first = float(lidar.angles[0]) - lidar.yaw
     values = {
-        "angle_min": -lidar.field_of_view / 2,
-        "angle_max": -lidar.field_of_view / 2 + step * (lidar.beams - 1),
-        "angle_increment": step,
+        "angle_min": first,
+        "angle_max": first + lidar.spacing * (lidar.beams - 1),
+        "angle_increment": lidar.spacing,
         "time_increment": 0.0,
         "scan_time": 1 / lidar.rate,
         "range_min": lidar.min_range,
         "range_max": lidar.max_range,
     }
-    return [laser_scans("/scan", nanoseconds(rollout.t[rows]), ranges, values)]
+    return [laser_scans("/scan", nanoseconds(rollout.t[rollout.scan_rows]), ranges, values)]
 
 
 def transforms(topic: str, stamps: Stamps, frames: Sequence[tuple[str, str]], poses: Floats, z: float = 0.0) -> Topic:

@@ -59,7 +59,7 @@ def _static(rollout: Rollout) -> Any:
     x, y, yaw = rollout.record.task.frame
     placed = [(MAP, ODOM, (x, y, 0.0), yaw)]
     placed += [(BASE, link, place, 0.0) for link, place in wheel_places(robot).items()]
-    lidar: Any = getattr(robot, "lidar", None)
+    lidar = robot.lidar
     if lidar is not None:
         placed.append((BASE, LIDAR, (lidar.x, lidar.y, lidar.height), lidar.yaw))
     return _of(

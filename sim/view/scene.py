@@ -63,6 +63,7 @@ class Scene:
         inflate: how far the planner kept its path from obstacles: the robot's radius plus the margin [m]
         margin: the part of `inflate` beyond the robot's radius [m]
         robot: the robot's shape
+        mapped: whether the robot had a map, and kept a distance from all obstacles from the start
         mover_radii: one per mover [m]
         movers: one position per mover [m]: at the run's end, or at t = 0 for a plan that was not driven
         tracks: polylines (N, 2) that movers follow [m]; a mover that jumps has several
@@ -78,6 +79,7 @@ class Scene:
     inflate: float
     margin: float
     robot: Body
+    mapped: bool = True
     mover_radii: tuple[float, ...] = ()
     movers: tuple[Point, ...] = ()
     tracks: tuple[Floats, ...] = ()
@@ -98,6 +100,7 @@ class Scene:
             inflate=record.inflate,
             margin=record.margin,
             robot=Body.of(record.robot),
+            mapped=not record.exploring,
             mover_radii=tuple(mover.radius for mover in world.movers),
             movers=tuple((float(x), float(y)) for x, y in rollout.movers[-1]) if len(rollout.movers) else (),
             tracks=mover_tracks(rollout.movers),
@@ -130,6 +133,11 @@ class Scene:
             movers=tuple((x, y) for x, y in positions[0].tolist()),
             tracks=mover_tracks(positions),
         )
+
+    @property
+    def has_zones(self) -> bool:
+        """Whether there is ground around the obstacles that plans keep off from the start."""
+        return self.mapped and self.inflate > 0
 
     def region(self, points: Floats) -> tuple[Floats, Floats]:
         """The corners (2,), (2,) [m] of the part of the world to show: around start, goal and points (N, 2).

@@ -31,6 +31,12 @@ START: Colour = (52, 92, 190)
 GOAL: Colour = (0, 138, 92)
 CONTACT: Colour = (214, 34, 44)
 
+# What a robot without a map has seen.
+BEAM: Colour = (20, 140, 214)
+HIT: Colour = (0, 62, 148)
+PALE: Colour = (222, 226, 232)  # ground and obstacles never seen
+HATCH: Colour = (186, 194, 206)
+
 # Text and the band below a film's picture.
 INK: Colour = (28, 33, 44)
 MUTED: Colour = (104, 114, 130)

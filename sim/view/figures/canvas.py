@@ -145,5 +145,5 @@ def panels(figure: Figure) -> dict[str, Axes]:
 #: The names that the axes of figures have.
 PANELS = (
     *("map", "clearance", "speed", "limiters", "distance", "readings"),
-    *("history", "field", "lengths", "with elitism", "without elitism"),
+    *("explored", "first sights", "history", "field", "lengths", "with elitism", "without elitism"),
 )

@@ -57,7 +57,7 @@ def draw_map(axes: Any, scene: Scene, *, floor: bool = True) -> None:
     inside = Rectangle((x0, y0), x1 - x0, y1 - y0, fill=False, ec=hexed(KERB), lw=3.0, zorder=4.5)
     axes.add_patch(inside)
     known = scene.obstacles[~scene.unseen]
-    if scene.inflate > 0:
+    if scene.has_zones:
         # One opaque layer: where zones overlap, transparent ones would look darker.
         zones = _circles(known[:, :2], known[:, 2] + scene.inflate)
         i = scene.inflate
@@ -172,7 +172,7 @@ def draw_legend(axes: Any, handles: list[Any], scene: Scene) -> None:
         known.append(Patch(fc=hexed(UNSEEN), label="placed after planning"))
     if scene.mover_radii:
         known.append(Patch(fc=hexed(MOVER), label="moving obstacle"))
-    if scene.inflate > 0:
+    if scene.has_zones:
         pale = tuple(1 - 0.22 * (1 - channel / 255) for channel in ZONE)
         known.append(Patch(fc=pale, ec=hexed(ZONE), lw=0.5, label=f"inflated by {scene.inflate:.2f} m"))
     axes.legend(

@@ -84,7 +84,13 @@ class Camera:
     @property
     def ground(self) -> Floats:
         """The homogeneous map (3, 3) from points (x, y, 1) on the ground to pixels."""
+        return self.plane(0.0)
+
+    def plane(self, height: float) -> Floats:
+        """The homogeneous map (3, 3) from points (x, y, 1) at a height [m] above the ground to pixels."""
         clip = self.full[:, [0, 1, 3]]
+        if height:
+            clip = clip + np.outer(self.full[:, 2], [0.0, 0.0, height])
         width, height = self.size
         return np.array(
             [

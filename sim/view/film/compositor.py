@@ -22,6 +22,7 @@ from antdrive.sim.view.film.camera import Camera
 from antdrive.sim.view.film.ground import dashes, kerb_width, paint_ground
 from antdrive.sim.view.film.meshes import Mesh, Part, cylinder, join, kerb, robot_height, robot_parts
 from antdrive.sim.view.film.raycast import Solids
+from antdrive.sim.view.film.sight import SightPainter
 from antdrive.sim.view.film.text import glow
 from antdrive.sim.view.film.tiny_renderer import Box, add_mesh, merged, overlap, render
 from antdrive.sim.view.film.triangles import Solid, draw_solids, placed
@@ -59,12 +60,14 @@ class Backdrop:
         pixels: the picture (H, W, 3)
         visible: the fraction of each pixel that shows ground (H, W)
         depth: depth of the bodies in clip space, 1 where there is none, at the resolution they were rendered in
+        bodies: at the same resolution the number of the obstacle in sight, -1 for ground; empty unless sight is painted
     """
 
     camera: Camera
     pixels: Picture
     visible: npt.NDArray[np.float32]
     depth: npt.NDArray[np.float32]
+    bodies: npt.NDArray[np.int32]
 
 
 class Compositor:
@@ -80,15 +83,23 @@ class Compositor:
         route: a polyline (N, 2) [m] that stays on the ground; for a route that changes, use `show_route`
         fine: each pixel is the mean of fine x fine rendered ones
         moving_camera: the camera will move, so the backdrop is cast by rays
+        sight: what a robot without a map has seen; None: it had a map
     """
 
     def __init__(
-        self, scene: Scene, camera: Camera, *, route: Floats, fine: int = 2, moving_camera: bool = False
+        self,
+        scene: Scene,
+        camera: Camera,
+        *,
+        route: Floats,
+        fine: int = 2,
+        moving_camera: bool = False,
+        sight: SightPainter | None = None,
     ) -> None:
         self.scene = scene
         self.camera = camera
         self.fine = fine
-        self._moving_camera = moving_camera
+        self._moving_camera, self._sight = moving_camera, sight
         self.tall = np.minimum(scene.obstacles[:, 3], drawn_height(scene))
         self._route = np.ascontiguousarray(route, dtype=np.float64).reshape(-1, 2)
         self._sun, self._light = _sun(camera)
@@ -171,6 +182,11 @@ class Compositor:
         x, y, yaw = (float(value) for value in np.asarray(pose))
         places = np.asarray(movers, dtype=np.float64).reshape(-1, 2)
         frame = self._canvas.copy()
+        if self._sight is not None:
+            self._sight.cover(frame, self.backdrop, self._inverse, self.fine)
+            self._sight.lay_fan(frame, self.backdrop, self._forward, self._inverse)
+            for label in self._labels:
+                self._put_label(frame, *label)
         for rows in self._changing_route:
             self._blend(frame, rows, ROUTE, 0.85)
         if velocities is not None:
@@ -181,6 +197,8 @@ class Compositor:
         for box in merged([b for b in boxes if b is not None]):
             inside = [body for body, b in zip(bodies, boxes, strict=True) if b is not None and overlap(b, box)]
             self._put_bodies(frame, box, [solid for body in inside for solid in body])
+        if self._sight is not None:
+            self._sight.put_hits(frame, self.backdrop)
         return frame
 
     def field_frame(self, grid: Grid, levels: Floats, path: Floats) -> Picture:
@@ -243,6 +261,9 @@ class Compositor:
         else:
             self._load(camera.sees(self._centres, self._radii))
             image, depth, seg = render(self._still, camera, None, self.fine, self._light)
+        bodies = np.empty((0, 0), dtype=np.int32)
+        if self._sight is not None:  # TinyRenderer draws many obstacles as one body
+            bodies = seg if self._moving_camera else self._solids.render(camera, self.fine, self._light)[2]
         width, height = camera.size
         visible = np.empty((height, width), dtype=np.float32)
         ground = np.empty((height, width), dtype=np.bool_)
@@ -251,7 +272,7 @@ class Compositor:
         rgb = paint_ground(camera, self.scene, self._route, ground, self.tall, self._sun)
         pixels = np.empty((height, width, 3), dtype=np.uint8)
         kernels.resolve(rgb, image, seg, self.fine, visible, pixels)
-        return Backdrop(camera, pixels, visible, depth)
+        return Backdrop(camera, pixels, visible, depth, bodies)
 
     def _paint_trail(self, rows: Floats, colours: Floats) -> None:
         visible = self.backdrop.visible

@@ -48,7 +48,7 @@ def paint_ground(
         np.array([GROUND, PAPER, GRID], dtype=np.float64),
     )
     line = 1.5 * camera.pixel
-    if scene.inflate > 0:
+    if scene.has_zones:
         brush.zones(scene, line)
     shade = np.ones((height, width), dtype=np.float32)
     cylinders = scene.obstacles.copy()

@@ -17,10 +17,14 @@ from antdrive.sim.view.scene import Scene
 from antdrive.sim.view.style import (
     BAD,
     BAND,
+    BEAM,
     CALM,
+    HATCH,
+    HIT,
     INK,
     MOVER,
     MUTED,
+    PALE,
     ROUTE,
     SHELL,
     UNSEEN,
@@ -171,14 +175,14 @@ def _metres(value: float) -> str:
     return f"{value + 0.0 if abs(value) >= 5e-4 else 0.0:.3f} m"
 
 
-_WIDE_KINDS = ("ramp", "field", "line", "dash", "zone")
+_WIDE_KINDS = ("ramp", "field", "line", "dash", "zone", "hatch")
 
 
 class LegendEntry(NamedTuple):
     """A line of the legend.
 
     Attributes:
-        kind: how its sample is drawn: `ramp`, `field`, `line`, `dash`, `zone`, `dot` or `scale`
+        kind: how its sample is drawn: `ramp`, `field`, `line`, `dash`, `zone`, `hatch`, `dot` or `scale`
         colour: of the sample
         text: its meaning
         width: of a scale bar [px]
@@ -191,7 +195,7 @@ class LegendEntry(NamedTuple):
 
 
 def legend_entries(
-    scene: Scene, step: float, pixel: float, *, planning: bool = False, replans: bool = False
+    scene: Scene, step: float, pixel: float, *, planning: bool = False, replans: bool = False, sight: bool = False
 ) -> list[LegendEntry]:
     """The legend's lines: one for each kind of thing in the picture.
 
@@ -201,6 +205,7 @@ def legend_entries(
         pixel: the width of a pixel in the middle of the picture [m]
         planning: the picture shows planning, not a drive
         replans: the robot replanned during the run
+        sight: the picture shows what the robot has seen
     """
     if planning:
         found = [LegendEntry("field", INK, "planner's field"), LegendEntry("line", SHELL, "best path so far")]
@@ -209,10 +214,16 @@ def legend_entries(
         found = [LegendEntry("ramp", INK, speeds), LegendEntry("dash", ROUTE, "planned route")]
     if replans:
         found.append(LegendEntry("dot", ROUTE, "new route"))
-    if scene.inflate > 0:
+    if scene.has_zones:
         found.append(LegendEntry("zone", ZONE, f"inflated by {scene.inflate:.2f} m"))
     if scene.unseen.any():
         found.append(LegendEntry("dot", UNSEEN, "placed after planning"))
+    if sight:
+        found += [
+            LegendEntry("zone", BEAM, "beams of the lidar"),
+            LegendEntry("dot", HIT, "hit, on the robot's map"),
+            LegendEntry("hatch", HATCH, "never seen"),
+        ]
     if scene.mover_radii:
         found.append(LegendEntry("dot", MOVER, "moving obstacle, 1.5 s ahead"))
     return [*found, LegendEntry("scale", INK, f"{step:g} m (grid)", step / pixel)]
@@ -269,6 +280,11 @@ def _draw_sample(draw: ImageDraw.ImageDraw, entry: LegendEntry, x: int, y: float
     elif kind == "zone":
         pale = tuple(round(238 + (c - 238) * 0.3) for c in colour)
         draw.rounded_rectangle((x, y - 0.4 * size, x + wide, y + 0.4 * size), size // 4, fill=pale, outline=colour)
+    elif kind == "hatch":
+        high = round(0.4 * size)
+        draw.rectangle((x, y - high, x + wide, y + high), fill=PALE)
+        for at in range(x + high, x + wide - high, max(4, size // 2)):
+            draw.line([(at - high, y + high), (at + high, y - high)], fill=colour, width=max(1, size // 9))
     elif kind == "dot":
         draw.ellipse((x + wide / 2 - r, y - r, x + wide / 2 + r, y + r), fill=colour)
     else:  # a scale bar

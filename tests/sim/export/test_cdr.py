@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from antdrive.robots.lidar import Lidar
 from antdrive.sim.export import samples
 from antdrive.sim.export.cdr import CdrLayout
 from antdrive.sim.export.libraries import message_types
@@ -100,7 +101,7 @@ def test_numbers() -> None:
 
 def log_with_scans(beams: int, field_of_view: float) -> Any:
     """As much of a log with scans as the export of scans reads."""
-    lidar = SimpleNamespace(beams=beams, field_of_view=field_of_view, rate=50.0, min_range=0.1, max_range=5.0)
+    lidar = Lidar(beams=beams, field_of_view=field_of_view, rate=50.0, min_range=0.1, max_range=5.0)
     scans = np.random.default_rng(5).integers(0, 5000, size=(2, beams)).astype(np.uint16)
     scans[0, :2] = 0, 1
     record = SimpleNamespace(robot=SimpleNamespace(lidar=lidar))
@@ -133,7 +134,11 @@ def test_scans(beams: int, around: float, step: float) -> None:
 
 
 def test_a_log_without_scans_has_no_topic_for_them() -> None:
-    assert samples.scans(SimpleNamespace(record=SimpleNamespace(robot=None))) == []  # type: ignore[arg-type]
+    log = log_with_scans(3, math.pi)
+    log.scans = np.empty((0, 0), dtype=np.uint16)
+    assert samples.scans(log) == []
+    log.record.robot.lidar = None
+    assert samples.scans(log) == []
 
 
 def test_a_number_out_of_place_would_be_seen() -> None:

@@ -1,0 +1,114 @@
+"""What a robot without a map has seen, in the pictures of a film: beams, hits, ground and obstacles never seen."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.sim.view import _kernels_seen as kernels
+from antdrive.sim.view.film import _kernels_paint as painting
+from antdrive.sim.view.recollection import Recollection, containers, laid_in_world
+from antdrive.sim.view.scene import Scene
+from antdrive.sim.view.style import BEAM, HATCH, HIT, PALE
+
+if TYPE_CHECKING:
+    from antdrive.sim.view.film.compositor import Backdrop
+
+Floats = npt.NDArray[np.float64]
+Picture = npt.NDArray[np.uint8]  # (H, W, 3)
+
+VEIL, LINES = 0.62, 0.75  # how much of ground that was never seen is covered by the veil, and by its hatching
+PALENESS = 0.80  # of obstacles that were never seen
+TINT, BEAMS = 0.13, 0.30  # strength of the fan of beams and of its lines
+DRAWN_BEAMS = 90  # in a full circle, at most
+HATCHING = 9.0  # distance between the lines of the hatching [px]
+
+
+class SightPainter:
+    """Paints what a robot had seen into frames. Moments are asked for in increasing order.
+
+    Args:
+        recollection: what it had seen
+        scene: what stands in the world
+    """
+
+    def __init__(self, recollection: Recollection, scene: Scene) -> None:
+        self._recollection, self._scene = recollection, scene
+        self._drift = recollection.drift(0.0)
+        self._discs = np.empty((0, 3))
+        self._around = containers(scene.obstacles)
+
+    def advance(self, at: float) -> None:
+        """Go on to a moment [s]."""
+        recollection = self._recollection
+        recollection.advance(at)
+        self._drift = recollection.drift(at)
+        discs = recollection.map.discs()
+        self._discs = np.column_stack([laid_in_world(discs[:, :2], self._drift), discs[:, 2]])
+
+    def laid(self, points: Floats) -> Floats:
+        """Where places (N, 2) on the robot's map lie in the world now [m]."""
+        return laid_in_world(points, self._drift)
+
+    def cover(self, frame: Picture, backdrop: Backdrop, inverse: npt.NDArray[np.floating[Any]], fine: int) -> None:
+        """Hatch the ground that was never seen, and pale the obstacles that no beam has met.
+
+        Args:
+            frame: the picture, before the robot is drawn
+            backdrop: what stands still, with the numbers of bodies
+            inverse: the map from pixels to the ground (3, 3)
+            fine: each pixel is the mean of fine x fine rendered ones
+        """
+        seen, pixel = self._recollection.map, backdrop.camera.pixel
+        style = np.array([VEIL, LINES, HATCHING * pixel, pixel])
+        tints = np.array([PALE, HATCH], dtype=np.float64)
+        arrays, bounds = seen.arrays, np.array(self._scene.bounds)
+        visible = backdrop.visible
+        kernels.veil(
+            frame, visible, inverse, bounds, self._drift, arrays.free, arrays.occupied, arrays.frame, style, tints
+        )
+        unmet = np.isinf(self._recollection.met)[self._around]
+        if unmet.any():
+            kernels.pale_bodies(frame, visible, backdrop.bodies, fine, unmet, tints[0], PALENESS)
+
+    def lay_fan(
+        self,
+        frame: Picture,
+        backdrop: Backdrop,
+        forward: npt.NDArray[np.floating[Any]],
+        inverse: npt.NDArray[np.floating[Any]],
+    ) -> None:
+        """Lay the beams of the last scan on the ground.
+
+        Args:
+            frame: the picture, before the robot is drawn
+            backdrop: what stands still
+            forward: the map from the ground to pixels (3, 3)
+            inverse: the map from pixels to the ground (3, 3)
+        """
+        lidar, (eye, first, reaches) = self._recollection.lidar, self._recollection.beams
+        every = max(1, round(2 * np.pi / lidar.spacing / DRAWN_BEAMS))
+        style = np.array([TINT, BEAMS, backdrop.camera.pixel])
+        closed, colour = lidar.full_circle, np.array(BEAM, dtype=np.float64)
+        visible = backdrop.visible
+        kernels.lay_fan(
+            frame, visible, forward, inverse, eye, first, lidar.spacing, closed, reaches, every, style, colour
+        )
+
+    def put_hits(self, frame: Picture, backdrop: Backdrop) -> None:
+        """Put the hits on the robot's map over everything, at the height of the beams.
+
+        Args:
+            frame: the picture
+            backdrop: what stands still
+        """
+        camera = backdrop.camera
+        plane = camera.plane(min(self._recollection.lidar.height, 0.3))
+        x, y, radius = self._discs.T
+        rows = np.column_stack([x, y, x, y, np.maximum(radius, 1.1 * camera.pixel)])
+        everywhere = np.ones_like(backdrop.visible)
+        inverse = np.linalg.inv(plane)
+        colour = np.array(HIT, dtype=np.float64)
+        painting.blend_capsules(frame, everywhere, plane, inverse, np.ascontiguousarray(rows), colour, 0.9)

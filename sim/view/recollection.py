@@ -1,0 +1,211 @@
+"""What a robot without a map had seen at any moment of its drive, made again from the scans of its log."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.robots.lidar import Lidar
+from antdrive.sim.driving.survey import MAP_CELL
+from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.sensing.mapping import OccupancyMap
+from antdrive.sim.view import _kernels_seen as kernels
+from antdrive.worlds.types import Floats, Pose
+
+NOTHING, TOO_NEAR = 0, 1  # what stands in a log for "nothing in range" and "nearer than the lidar measures"
+ROUNDING = 0.0015  # of a range in a log, and what is left over [m]
+
+
+class Beams(NamedTuple):
+    """A scan as it lay in the world.
+
+    Attributes:
+        eye: the lidar's true x, y [m] and yaw [rad] (3,)
+        first: the direction of the first beam, from the lidar's heading [rad]
+        reaches: how far each beam got (beams,) [m]: to what it met, or to the lidar's range
+    """
+
+    eye: Floats
+    first: float
+    reaches: Floats
+
+
+class Sighting(NamedTuple):
+    """A cylinder, when it was first seen, and when the robot was nearest to it.
+
+    Attributes:
+        obstacle: its place in `record.world.obstacles`
+        seen_at: when a beam first met it [s]; infinite if none did
+        seen_from: how far its surface was from the footprint then [m]; not a number if it was never seen
+        nearest_at: when the robot was nearest [s]
+        nearest: how far the surface was from the footprint then [m]
+        touched: whether the robot touched it
+    """
+
+    obstacle: int
+    seen_at: float
+    seen_from: float
+    nearest_at: float
+    nearest: float
+    touched: bool
+
+
+class Recollection:
+    """The scans of a log, entered one after the other. Moments are asked for in increasing order.
+
+    The map is made anew at the poses that the robot believed in, so it is the robot's own, with one difference: a robot
+    that found no way forgets what it saw long ago, and here nothing is forgotten.
+
+    Attributes:
+        lidar: the robot's lidar
+        map: what was hit and which ground was seen free, in the frame of the estimated poses
+        met: when a beam first met each cylinder, in the order of `record.world.obstacles` (N,) [s]; infinite if none did yet
+
+    Raises:
+        ValueError: the log has no scans.
+    """
+
+    def __init__(self, rollout: Rollout) -> None:
+        lidar = rollout.record.robot.lidar
+        if lidar is None or not len(rollout.scans):
+            raise ValueError("the log has no scans")
+        self.lidar: Lidar = lidar
+        self._rollout = rollout
+        self._times = rollout.t[rollout.scan_rows]
+        self._first = float(lidar.angles[0]) - lidar.yaw
+        self._noticeable = 4 * lidar.sigma + lidar.resolution / 2 + ROUNDING
+        self._entered = 0
+        self._discs = rollout.record.world.discs
+        self.met: Floats = np.full(len(self._discs), math.inf)
+        start = rollout.record.task.start
+        self.map = OccupancyMap(lidar, MAP_CELL, start[:2])
+        self.map.take_as_free(start[:2], rollout.record.robot.radius)
+
+    @property
+    def times(self) -> Floats:
+        """When each scan was taken (S,) [s]."""
+        return self._times
+
+    @property
+    def explored(self) -> float:
+        """The ground on the map that was seen free or hit [m²]."""
+        return float(np.count_nonzero(self.seen)) * self.map.cell**2
+
+    @property
+    def seen(self) -> npt.NDArray[np.bool_]:
+        """Which cells of the map were seen free or hit (rows, cols)."""
+        return np.asarray(self.map.seen_free | self.map.occupied)
+
+    def known(self, points: Floats) -> npt.NDArray[np.bool_]:
+        """Whether places lie on ground that was seen free or hit (N,).
+
+        Args:
+            points: places in the frame of the estimated poses (N, 2) [m]
+        """
+        cols, rows = np.floor((points - self.map.origin) / self.map.cell).astype(np.int64).T
+        high, wide = self.map.occupied.shape
+        within = (rows >= 0) & (rows < high) & (cols >= 0) & (cols < wide)
+        return np.asarray(within & self.seen[np.where(within, rows, 0), np.where(within, cols, 0)])
+
+    def advance(self, at: float) -> None:
+        """Enter all scans up to a moment.
+
+        Args:
+            at: the moment [s]
+        """
+        last = int(np.searchsorted(self._times, at + 1e-9, side="right"))
+        for k in range(self._entered, last):
+            self._enter(k)
+        self._entered = max(self._entered, last)
+
+    def _enter(self, k: int) -> None:
+        logged = self._rollout.scans[k]
+        ranges = np.where(logged == NOTHING, np.inf, np.where(logged == TOO_NEAR, -np.inf, logged / 1000.0))
+        self.map.insert(self._estimate(int(self._rollout.scan_rows[k])), ranges)
+        beams = self._beams(k)
+        lidar, now = self.lidar, float(self._times[k])
+        closed, slack = lidar.full_circle, self._noticeable
+        kernels.first_meetings(
+            beams.eye, beams.first, lidar.spacing, closed, beams.reaches, self._discs, slack, now, self.met
+        )
+
+    @property
+    def beams(self) -> Beams:
+        """The last scan that was entered."""
+        return self._beams(max(0, self._entered - 1))
+
+    def _beams(self, k: int) -> Beams:
+        logged = self._rollout.scans[k]
+        reaches = np.where(logged == NOTHING, self.lidar.max_range, np.where(logged == TOO_NEAR, 0.0, logged / 1000.0))
+        x, y, yaw = self._rollout.pose[self._rollout.scan_rows[k]].tolist()
+        return Beams(np.array(self.lidar.pose_on((x, y, yaw))), self._first, reaches)
+
+    def _estimate(self, row: int) -> Pose:
+        poses = self._rollout.estimate if len(self._rollout.estimate) else self._rollout.pose
+        x, y, yaw = poses[row].tolist()
+        return x, y, yaw
+
+    def drift(self, at: float) -> Floats:
+        """Where the robot's map lies, if it is laid so that the robot is where it believes to be: (4,).
+
+        The cosine and the sine of a turn, then x and y [m]: what they do to a point of the world gives its place on the map.
+
+        Args:
+            at: the moment [s]
+        """
+        row = min(max(0, int(np.searchsorted(self._rollout.t, at + 1e-9, side="right")) - 1), len(self._rollout.t) - 1)
+        x, y, yaw = self._rollout.pose[row].tolist()
+        ex, ey, believed = self._estimate(row)
+        cos, sin = math.cos(believed - yaw), math.sin(believed - yaw)
+        return np.array([cos, sin, ex - cos * x + sin * y, ey - sin * x - cos * y])
+
+
+def laid_in_world(points: Floats, drift: Floats) -> Floats:
+    """Where places on the robot's map lie in the world (N, 2) [m].
+
+    Args:
+        points: places on the map (N, 2) [m]
+        drift: as `Recollection.drift` gives it (4,)
+    """
+    cos, sin, x, y = drift.tolist()
+    return np.asarray((points - (x, y)) @ np.array([[cos, -sin], [sin, cos]]), dtype=np.float64)
+
+
+def sightings(rollout: Rollout, met: Floats) -> list[Sighting]:
+    """First sight and nearest approach of every cylinder, those that the robot came nearest to first.
+
+    Args:
+        rollout: the log
+        met: when each was first seen (N,) [s], as `Recollection.met` has it
+    """
+    world, foot = rollout.record.world, rollout.record.robot.footprint
+    touched = set(rollout.contacts[:, 1].astype(int).tolist())
+    found = []
+    for j, disc in enumerate(world.obstacles):
+        dx, dy = disc.x - rollout.pose[:, 0], disc.y - rollout.pose[:, 1]
+        cos, sin = np.cos(rollout.pose[:, 2]), np.sin(rollout.pose[:, 2])
+        ahead = np.maximum(np.abs(cos * dx + sin * dy) - foot.half_length, 0.0)
+        aside = np.maximum(np.abs(cos * dy - sin * dx) - foot.half_width, 0.0)
+        away = np.hypot(ahead, aside) - foot.rounding - disc.radius
+        k = int(away.argmin())
+        first = float(met[j])
+        seen_from = float(away[np.searchsorted(rollout.t, first - 1e-9)]) if math.isfinite(first) else math.nan
+        found.append(Sighting(j, first, seen_from, float(rollout.t[k]), float(away[k]), j in touched))
+    return sorted(found, key=lambda sight: (not sight.touched, sight.nearest))
+
+
+def containers(cylinders: Floats) -> npt.NDArray[np.intp]:
+    """For each of the cylinders (N, 4) one that it stands in, or itself: nobody sees what stands in another one.
+
+    Args:
+        cylinders: x, y, radius and height of each [m]
+    """
+    found = np.arange(len(cylinders))
+    for j, (x, y, radius, _) in enumerate(cylinders):
+        room = cylinders[:, 2] - radius - np.hypot(cylinders[:, 0] - x, cylinders[:, 1] - y)
+        room[j] = 0.0
+        found[j] = room.argmax()
+    return found

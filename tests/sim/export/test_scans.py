@@ -1,0 +1,68 @@
+"""Exported scans, read back and laid out through the exported transforms, end on what stands in the world."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from antdrive.sim.export.exporting import export
+from antdrive.sim.log.rollout import Rollout
+from tests.sim.view.scanned import scanned
+
+mcap_reader = pytest.importorskip("mcap.reader", reason="mcap is not installed")
+mcap_ros2 = pytest.importorskip("mcap_ros2.decoder", reason="mcap-ros2-support is not installed")
+
+
+@pytest.fixture(scope="module")
+def log(made_up_drive: Callable[..., Rollout]) -> Rollout:
+    """A drive with a lidar that sits off the middle and looks aside."""
+    return scanned(made_up_drive(size=(6.0, 4.0), obstacles=30), x=0.06, y=-0.03, yaw=0.4, max_range=2.5)
+
+
+@pytest.fixture(scope="module")
+def said(log: Rollout, tmp_path_factory: pytest.TempPathFactory) -> list[tuple[str, int, Any]]:
+    place = tmp_path_factory.mktemp("scans")
+    log.save(place / "rollout.npz")
+    export(place / "rollout.npz", "mcap", place / "drive.mcap")
+    with (place / "drive.mcap").open("rb") as file:
+        reader = mcap_reader.make_reader(file, decoder_factories=[mcap_ros2.DecoderFactory()])
+        return [(channel.topic, raw.log_time, message) for _, channel, raw, message in reader.iter_decoded_messages()]
+
+
+def placed(transform: Any, points: Any) -> Any:
+    """Points of the child frame in its parent, as complex numbers."""
+    q, at = transform.rotation, transform.translation
+    return points * complex(q.w, q.z) ** 2 + complex(at.x, at.y)
+
+
+def test_scans_come_at_their_rate(log: Rollout, said: list[tuple[str, int, Any]]) -> None:
+    scans = [(at, message) for topic, at, message in said if topic == "/scan"]
+    assert [at for at, _ in scans] == [round(float(t) * 1e9) for t in log.t[log.scan_rows]]
+    assert {message.header.frame_id for _, message in scans} == {"base_scan"}
+    assert {round(message.scan_time, 6) for _, message in scans} == {0.1}
+
+
+def off_surfaces(log: Rollout, points: Any) -> float:
+    """How far the farthest of the points is from every cylinder and wall [m]."""
+    discs, (x0, y0, x1, y1) = log.record.world.discs, log.record.world.bounds
+    away = np.abs(np.abs(points[:, None] - (discs[:, 0] + 1j * discs[:, 1])) - discs[:, 2]).min(axis=1)
+    walls = np.abs([points.real - x0, points.real - x1, points.imag - y0, points.imag - y1]).min(axis=0)
+    return float(np.minimum(away, walls).max())
+
+
+def test_scans_end_on_cylinders_and_walls(log: Rollout, said: list[tuple[str, int, Any]]) -> None:
+    fixed = {t.child_frame_id: t for topic, _, m in said if topic == "/tf_static" for t in m.transforms}
+    assert fixed["base_scan"].header.frame_id == "base_link"
+    moving = {at: t for topic, at, m in said if topic == "/tf" for t in m.transforms if t.child_frame_id == "base_link"}
+    for at, scan in [(at, message) for topic, at, message in said if topic == "/scan"]:
+        ranges = np.asarray(scan.ranges)
+        angles = scan.angle_min + scan.angle_increment * np.arange(len(ranges))
+        assert abs(math.remainder(scan.angle_max - angles[-1], 2 * math.pi)) < 1e-4
+        hit = np.isfinite(ranges)
+        assert hit.sum() > 20
+        seen = (ranges[hit] * np.exp(1j * angles[hit])).astype(complex)
+        base = moving[at].transform
+        assert off_surfaces(log, placed(base, placed(fixed["base_scan"].transform, seen))) < 2e-3
+        assert off_surfaces(log, placed(base, seen)) > 0.03  # without the lidar's own place on the robot
