@@ -16,7 +16,7 @@ from antdrive.sim.driving.survey import Senses, Survey
 from antdrive.sim.falsify.rebuild import rebuilt
 from antdrive.sim.sensing import Scanner
 from antdrive.sim.unknown import told
-from antdrive.worlds import Disc, Task, World, generate
+from antdrive.worlds import Disc, Task, World, generate, load_task
 from antdrive.worlds.errors import FieldError
 
 POSTS = tuple(Disc(3.0, 0.15 * k, 0.075) for k in range(14))  # a row that leaves a gap at the top
@@ -95,8 +95,8 @@ def test_the_drive_can_be_replayed_and_rebuilt(drive: Run, log: Rollout) -> None
 
 def test_an_estimate_that_a_scan_moved_before_the_robot_drove_is_certified(jackal: RobotSpec) -> None:
     """Among few posts the first scans are laid on the map with an error that no drift explains."""
-    world = World("posts", (0.0, 0.0, 6.0, 6.0), (Disc(3.0, 3.0, 0.3), Disc(2.4, 3.9, 0.25)))
-    done = run(scenario(jackal, Task(world, (1.0, 1.0, 0.0), (5.0, 5.0), goal_tolerance=0.25, cell=0.1)))
+    posts = Disc(3.0, 3.0, 0.3), Disc(2.4, 3.9, 0.25)
+    done = run(scenario(jackal, load_task("empty"), unseen=posts))
     assert done.succeeded, (done.outcome, done.reason, done.certificate)
 
 
