@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
 from antdrive.worlds.errors import InputError, input_error
 from antdrive.worlds.formats.xml import parse_xml
+from antdrive.worlds.optional import optional
 from antdrive.worlds.types import Floats
 
 CIRCLE = np.exp(2j * math.pi * np.arange(96) / 96) / math.cos(math.pi / 96)  # around a circle of radius 1
@@ -155,7 +154,7 @@ def _root_element(path: Path) -> ET.Element:
         return parse_xml(path)
     if not path.is_file():
         raise input_error(str(path), "no such file")
-    xacrodoc = optional("xacrodoc", "xacro files are expanded with it")
+    xacrodoc = optional("xacrodoc", "urdf", "xacro files are expanded with it")
     try:
         text = xacrodoc.XacroDoc.from_file(str(path)).to_urdf_string()
     except Exception as error:  # xacro raises whatever its expressions raise
@@ -167,22 +166,6 @@ def _root_element(path: Path) -> ET.Element:
             return parse_xml(expanded)
         except InputError as error:
             raise InputError(str(error).replace(str(expanded), str(path))) from None
-
-
-def optional(module: str, purpose: str) -> Any:
-    """A module of the extra `urdf`.
-
-    Args:
-        module: its name
-        purpose: what it is needed for
-
-    Raises:
-        InputError: it is not installed.
-    """
-    try:
-        return importlib.import_module(module)
-    except ModuleNotFoundError:
-        raise InputError(f"{module}: not installed; {purpose}: pip install 'antdrive[urdf]'") from None
 
 
 def _named(path: Path, element: ET.Element) -> str:
@@ -324,7 +307,7 @@ class _Shapes:
                 )
             self.left_out.append(f"{link}: {name}")
             return None
-        trimesh = optional("trimesh", f"mesh {file.name} is read with it")
+        trimesh = optional("trimesh", "urdf", f"mesh {file.name} is read with it")
         try:
             vertices = np.asarray(trimesh.load(str(file), force="mesh").vertices, dtype=np.float64)
         except Exception as error:  # each format has errors of its own

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import importlib
 from typing import Any
 
-from antdrive.worlds.errors import InputError
+from antdrive.worlds.optional import optional
 
 
 def parquet_library() -> Any:
@@ -14,8 +13,9 @@ def parquet_library() -> Any:
     Raises:
         InputError: it is not installed.
     """
-    _load("pyarrow.parquet", "campaigns", "a campaign's table is kept as Parquet")
-    return importlib.import_module("pyarrow")
+    purpose = "a campaign's table is kept as Parquet"
+    optional("pyarrow.parquet", "campaigns", purpose)
+    return optional("pyarrow", "campaigns", purpose)
 
 
 def cluster_library() -> Any:
@@ -24,13 +24,4 @@ def cluster_library() -> Any:
     Raises:
         InputError: it is not installed.
     """
-    return _load("distributed", "cluster", "--dask spreads runs over machines with it")
-
-
-def _load(module: str, extra: str, purpose: str) -> Any:
-    """A module of an optional package; `extra` names the extra that installs it."""
-    try:
-        return importlib.import_module(module)
-    except ModuleNotFoundError:
-        package = module.partition(".")[0]
-        raise InputError(f"{package}: not installed; {purpose}: pip install 'antdrive[{extra}]'") from None
+    return optional("distributed", "cluster", "--dask spreads runs over machines with it")

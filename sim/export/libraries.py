@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import functools
-import importlib
 from typing import Any
 
-from antdrive.worlds.errors import InputError
+from antdrive.worlds.optional import optional
 
 
 def library(name: str) -> Any:
@@ -18,13 +17,7 @@ def library(name: str) -> Any:
     Raises:
         InputError: it is not installed.
     """
-    try:
-        return importlib.import_module(name)
-    except ModuleNotFoundError:
-        package = name.partition(".")[0]
-        raise InputError(
-            f"{package}: not installed; bags are written with it: pip install 'antdrive[ros]'; --to csv works without"
-        ) from None
+    return optional(name, "ros", "bags are written with it, tables (--to csv) without")
 
 
 @functools.cache

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import importlib
 from typing import Any
 
-from antdrive.worlds.errors import InputError
+from antdrive.worlds.optional import optional
 
 
 def library(name: str) -> Any:
@@ -17,8 +16,4 @@ def library(name: str) -> Any:
     Raises:
         InputError: it is not installed.
     """
-    try:
-        return importlib.import_module(name)
-    except ImportError:
-        package = name.partition(".")[0]
-        raise InputError(f"{package} is not installed; pip install 'antdrive[campaigns]'") from None
+    return optional(name, "campaigns", "statistics of campaigns are computed with it")
