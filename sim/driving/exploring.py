@@ -31,7 +31,8 @@ from antdrive.robots import PurePursuit, RobotSpec, TrackedPath
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex
 from antdrive.sim.driving import _kernels_hits
 from antdrive.sim.driving.replanning import STRAYED, Replan, ReplanPolicy
-from antdrive.sim.driving.survey import Survey, millimetres
+from antdrive.sim.driving.survey import Survey
+from antdrive.sim.log.scans import millimetres
 from antdrive.worlds import Bounds, Floats, Grid, Pose, Route, Task, World, point_clearance, rasterise
 from antdrive.worlds.world import PointWorld
 

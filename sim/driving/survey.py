@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from antdrive.robots import RobotSpec
 from antdrive.sim.driving import _kernels_hits
@@ -171,13 +170,3 @@ class Survey:
         if not movers:
             return senses.scanner.scan(pose, rng=senses.rng)
         return senses.scanner.scan(pose, movers.positions(np.array([tick / senses.hz]))[0], movers.radii, senses.rng)
-
-
-def millimetres(ranges: Floats) -> npt.NDArray[np.uint16]:
-    """Ranges as the log keeps them: 0 where nothing was in range, 1 where something was too near to measure.
-
-    Args:
-        ranges: of scans (..., beams) [m]
-    """
-    kept = np.where(np.isfinite(ranges), np.clip(np.round(ranges * 1000.0), 2, 65535), np.where(ranges < 0, 1, 0))
-    return kept.astype(np.uint16)

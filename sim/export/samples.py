@@ -11,8 +11,7 @@ from antdrive.sim.export.cdr import CdrLayout
 from antdrive.sim.export.frames import BASE, ESTIMATE, LIDAR, ODOM, mover_frame
 from antdrive.sim.export.topics import Floats, Stamps, Topic, nanoseconds
 from antdrive.sim.log.rollout import Rollout
-
-NOTHING, TOO_NEAR = 0, 1  # what stands in a log's scans for "nothing in range" and "nearer than the lidar measures"
+from antdrive.sim.log.scans import ranges_of
 
 
 def samples(rollout: Rollout) -> list[Topic]:
@@ -48,8 +47,7 @@ def scans(rollout: Rollout) -> list[Topic]:
     lidar = rollout.record.robot.lidar
     if lidar is None or not len(rollout.scans):
         return []
-    logged = rollout.scans
-    ranges = np.where(logged == NOTHING, np.inf, np.where(logged == TOO_NEAR, -np.inf, logged * 1e-3))
+    ranges = ranges_of(rollout.scans)
     first = float(lidar.angles[0]) - lidar.yaw
     values = {
         "angle_min": first,

@@ -11,11 +11,11 @@ import numpy.typing as npt
 from antdrive.robots.lidar import Lidar
 from antdrive.sim.driving.survey import MAP_CELL
 from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.log.scans import ranges_of
 from antdrive.sim.sensing.mapping import OccupancyMap
 from antdrive.sim.view import _kernels_seen as kernels
 from antdrive.worlds.types import Floats, Pose
 
-NOTHING, TOO_NEAR = 0, 1  # what stands in a log for "nothing in range" and "nearer than the lidar measures"
 ROUNDING = 0.0015  # of a range in a log, and what is left over [m]
 
 
@@ -122,9 +122,7 @@ class Recollection:
         self._entered = max(self._entered, last)
 
     def _enter(self, k: int) -> None:
-        logged = self._rollout.scans[k]
-        ranges = np.where(logged == NOTHING, np.inf, np.where(logged == TOO_NEAR, -np.inf, logged / 1000.0))
-        self.map.insert(self._estimate(int(self._rollout.scan_rows[k])), ranges)
+        self.map.insert(self._estimate(int(self._rollout.scan_rows[k])), ranges_of(self._rollout.scans[k]))
         beams = self._beams(k)
         lidar, now = self.lidar, float(self._times[k])
         closed, slack = lidar.full_circle, self._noticeable
@@ -138,8 +136,8 @@ class Recollection:
         return self._beams(max(0, self._entered - 1))
 
     def _beams(self, k: int) -> Beams:
-        logged = self._rollout.scans[k]
-        reaches = np.where(logged == NOTHING, self.lidar.max_range, np.where(logged == TOO_NEAR, 0.0, logged / 1000.0))
+        ranges = ranges_of(self._rollout.scans[k])
+        reaches = np.where(np.isposinf(ranges), self.lidar.max_range, np.maximum(ranges, 0.0))
         x, y, yaw = self._rollout.pose[self._rollout.scan_rows[k]].tolist()
         return Beams(np.array(self.lidar.pose_on((x, y, yaw))), self._first, reaches)
 

@@ -4,9 +4,9 @@ import dataclasses
 
 import numpy as np
 
-from antdrive.sim.driving.survey import millimetres
 from antdrive.sim.log.record import SensingRecord
 from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.log.scans import millimetres
 from antdrive.sim.sensing import Scanner
 
 
