@@ -72,7 +72,7 @@ Judged = tuple[Decision, float, Interval, str, str]
 
 @functools.singledispatch
 def _judged(test: Any, found: Found) -> Judged:
-    raise NotImplementedError(type(test).__name__)
+    raise TypeError(f"no judge for a test of type {type(test).__name__}")
 
 
 @_judged.register

@@ -206,7 +206,6 @@ def see_through(row: int, col: int, scan: int, fan: Fan, m: MapArrays, changed: 
                 odds[r, c] = 0.0
     if lowered and not left:
         vacate(row, col, m)
-        m.free[row, col] = True
         changed[count, 0], changed[count, 1] = row, col
         count += 1
     return count
@@ -233,8 +232,8 @@ def seen_beyond(box: Array, r: int, c: int, behind: float, fan: Fan) -> bool:
 
 @kernel
 def vacate(row: int, col: int, m: MapArrays) -> None:
-    """Take an occupied cell off the list; it is then unknown."""
-    m.occupied[row, col] = False
+    """Take an occupied cell off the list; it is then free ground."""
+    m.occupied[row, col], m.free[row, col] = False, True
     m.count[0] -= 1
     last, gap = m.count[0], m.slot[row, col]
     other_row, other_col = m.cells[last, 0], m.cells[last, 1]
@@ -280,7 +279,6 @@ def forget(x: float, y: float, radius: float, m: MapArrays, changed: Array) -> i
             for c in range(GRAINS * col, GRAINS * col + GRAINS):
                 m.odds[r, c] = 0.0
         vacate(row, col, m)
-        m.free[row, col] = True
         changed[count, 0], changed[count, 1] = row, col
         count += 1
     return count
