@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from antdrive.sim import Run, run
-from antdrive.sim.regression import load_suite
+from antdrive.sim.regression import Baseline, load_suite
 from antdrive.worlds import Disc, load_task
 from tests.sim.cli.calling import Call, Refused
 
@@ -92,6 +92,18 @@ def test_a_test_that_fails_by_its_bound_is_shrunk_until_it_would_keep_it(antdriv
     assert json.loads(out)["failure"] == {"outcome": "succeeded", "touched": "nothing", "cause": "spl < 0.999"}
     (case,) = load_suite(next(Path("out/small-small").glob("*.drive.yaml")))
     assert case.entry.expect == {"outcome": "succeeded", "certified": True, "spl": "< 0.999"}
+
+
+def test_a_test_that_fails_by_its_baseline_is_shrunk_while_it_is_worse(
+    antdrive: Call, small: Path, small_run: Run
+) -> None:
+    suite = small.parent / "a.drive.yaml"
+    suite.write_text("{schema: 1, scenarios: {a: {world: small.yaml, planner: astar}}}")
+    made = Baseline.of(small_run, "a[0]")
+    replace(made, metrics={**made.metrics, "spl": 2.0}).save(small.parent / "baselines" / "a" / "a-0.json")
+    code, out, err = antdrive("shrink", "a.drive.yaml::a", "--json", "--no-figures", "--no-film", "--seconds", "1")
+    assert (code, err) == (0, "")
+    assert json.loads(out)["failure"] == {"outcome": "succeeded", "touched": "nothing", "cause": "spl < 1.99"}
 
 
 def test_the_folder_of_a_run_stands_for_its_log(refused: Refused, small_run: Run, tmp_path: Path) -> None:
