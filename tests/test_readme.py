@@ -49,7 +49,7 @@ def test_the_python_block_is_ten_lines_that_run(home: Path, capsys: pytest.Captu
 
 
 def test_the_python_block_passes_mypy_strict(tmp_path: Path) -> None:
-    """With the project's own settings, which are strict: with others mypy would check all of antdrive anew, and again after it."""
+    """With the project's own settings, which are strict: with others mypy would check all of antdrive, and once more after it."""
     (code,) = blocks("python")
     settings = ROOT / "pyproject.toml"
     assert "[tool.mypy]\nstrict = true\n" in settings.read_text()

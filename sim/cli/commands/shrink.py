@@ -130,8 +130,11 @@ def _of_a_log(words: str) -> "Scenario":
     """The scenario of a log, rebuilt from its record."""
     from antdrive.sim.falsify.rebuild import rebuilt
     from antdrive.sim.log.rollout import read_record
+    from antdrive.sim.regression.suite import SUFFIX
     from antdrive.worlds.errors import input_error
 
+    if words.endswith(SUFFIX):
+        raise InputError(f"{words}: is a suite; name one of its tests, as {words}::SCENARIO")
     if (log := Path(words) / "rollout.npz").is_file():
         words = str(log)
     try:

@@ -61,6 +61,7 @@ def test_what_cannot_be_shrunk_is_one_line(refused: Refused, small_run: Run, col
     assert "--while: unknown metric 'clearance'" in refused("shrink", collided, "--while", "clearance < 1")
     suite = tmp_path / "two.drive.yaml"
     suite.write_text("{schema: 1, scenarios: {a: {world: empty, seeds: [0, 1]}}}")
+    assert "two.drive.yaml: is a suite; name one of its tests" in refused("shrink", "two.drive.yaml")
     assert "name one of two.drive.yaml::a[0], two.drive.yaml::a[1]" in refused("shrink", "two.drive.yaml::a")
     rollout = run(replace(small_run.scenario, planner_name="mine")).rollout
     assert rollout is not None
