@@ -217,6 +217,22 @@ HAN2007 = (
     ),
     Claim(
         paper="han2007",
+        source="§5.1, experiment 5",
+        sentence="With elitism a higher mutation rate gives shorter paths: 0.8 shorter ones than 0.2",
+        printed="figure 5.1.10",
+        test=Less(((Arm(ONE, "3 via points, Pm 0.8"), Arm(ONE, "3 via points")),), "last"),
+    ),
+    Claim(
+        paper="han2007",
+        source="§5.1, experiment 5",
+        sentence="Without elitism it does not",
+        printed="figure 5.1.10",
+        test=Less(
+            ((Arm(ONE, "3 via points, no elite"), Arm(ONE, "3 via points, Pm 0.8, no elite")),), "last", strict=False
+        ),
+    ),
+    Claim(
+        paper="han2007",
         source="§6.0",
         sentence="The genetic algorithm's paths are shorter than the ants'",
         printed="–",
@@ -235,7 +251,11 @@ HAN2007 = (
 SIZES = ("10×10", "20×20", "30×30", "50×50")
 
 
-def _suganthi(reading: str, ants: str, improved: str) -> tuple[Claim, ...]:
+def _suganthi(reading: str, ants: str, improved: str, margin: float = 2.5) -> tuple[Claim, ...]:
+    """The claims on one reading; `margin` is what counts as no longer [% of the shortest path].
+
+    One diagonal move that is missed is 2.05 % of the shortest path at 20 x 20.
+    """
     printed = ("13.899, 13.899", "28.627, 28.627", "42.184, 46.527", "94.326, 96.125")
     return (
         *(
@@ -244,18 +264,18 @@ def _suganthi(reading: str, ants: str, improved: str) -> tuple[Claim, ...]:
                 source="Table 2",
                 sentence=f"At {size} IACO's path is no longer than ACO's",
                 printed=lengths,
-                test=Less(_pairs((size,), improved, ants), margin=1.0, strict=False),
+                test=Less(_pairs((size,), improved, ants), margin=margin, strict=False),
                 reading=reading,
-                remark="up to 1 % of the shortest path",
+                remark=f"up to {margin:g} % of the shortest path",
             )
             for size, lengths in zip(SIZES, printed, strict=True)
         ),
         Claim(
             paper="suganthi2019",
             source="Table 2",
-            sentence="At 10×10 and 20×20 IACO finds the shortest path, or nearly: within 2 %",
+            sentence="At 10×10 and 20×20 IACO finds the shortest path, or nearly: within 2.5 %",
             printed="13.899, 28.627",
-            test=Within(_arms(SIZES[:2], improved), 2.0),
+            test=Within(_arms(SIZES[:2], improved), 2.5),
             reading=reading,
         ),
         Claim(
@@ -281,7 +301,34 @@ def _suganthi(reading: str, ants: str, improved: str) -> tuple[Claim, ...]:
 SUGANTHI2019 = (
     *_suganthi("ours", "as", "iaco"),
     *_suganthi("a = 1", "as", "iaco, a = 1"),
-    *_suganthi("a = 1, ants die in dead ends, loops stay", "as, ants die", "iaco, ants die"),
+    *_suganthi("a = 1, ants die in dead ends, loops stay", "as, ants die", "iaco, ants die", margin=5.0),
+    *(
+        Claim(
+            paper="suganthi2019",
+            source="Table 2",
+            sentence="At 30×30 and 50×50 IACO's path is shorter than ACO's",
+            printed="42.184 < 46.527, 94.326 < 96.125",
+            test=Less(_pairs(SIZES[2:], improved, "as")),
+            reading=reading,
+        )
+        for reading, improved in (("ours", "iaco"), ("a = 1", "iaco, a = 1"))
+    ),
+    Claim(
+        paper="suganthi2019",
+        source="§V, Fig. 6",
+        sentence="At 10×10 and 20×20 IACO converges about as fast as ACO: at most 10 iterations later",
+        printed="figure 6",
+        test=Less(_pairs(SIZES[:2], "iaco", "as"), "near", margin=10.0, strict=False),
+        remark="iterations to a path within 5 % of the shortest",
+    ),
+    Claim(
+        paper="suganthi2019",
+        source="§V, Fig. 6",
+        sentence="At 30×30 and 50×50 IACO converges in fewer iterations than ACO",
+        printed="figure 6",
+        test=Less(_pairs(SIZES[2:], "iaco", "as"), "near"),
+        remark="iterations to a path within 5 % of the shortest",
+    ),
     Claim(
         paper="suganthi2019",
         source="Table 2",
@@ -308,8 +355,7 @@ IBRAHEEM2016 = (
             source="Table 2",
             sentence=f"At {size.split(',')[0]} MACO's path is no longer than ACO's",
             printed=lengths,
-            test=Less(_pairs((size,), "maco", "as"), margin=0.5, strict=False),
-            remark="up to 0.5 % of the shortest path",
+            test=Less(_pairs((size,), "maco", "as"), strict=False),
         )
         for size, lengths in zip(
             SQUARES, ("15.07, 15.07", "28.6274, 28.6274", "45.1127, 45.9411", "61.8406, 62.6690"), strict=True
@@ -335,6 +381,34 @@ IBRAHEEM2016 = (
         sentence="At 10×10 and 20×20 ACO finds the shortest path",
         printed="15.07, 28.6274",
         test=Within(_arms(SQUARES[:2], "as"), 0.0),
+    ),
+)
+
+IBRAHEEM2016 += (
+    *(
+        Claim(
+            paper="ibraheem2016",
+            source="§7.1, Fig. 8",
+            sentence=f"At {size.split(',')[0]} {sentence}",
+            printed="figure 8",
+            test=Less(((Arm(size, f"as, {enough} ants"), Arm(size, rival)),), strict=strict),
+        )
+        for size, enough in zip(SQUARES, (20, 40), strict=False)
+        for sentence, rival, strict in (
+            (f"{enough} ants are enough: 50 find no shorter path", "as", False),
+            (f"{enough} ants find shorter paths than 5", "as, 5 ants", True),
+        )
+    ),
+    *(
+        Claim(
+            paper="ibraheem2016",
+            source="§7.1, Fig. 9",
+            sentence="At 20×20 paths are shorter with rho between 0.3 and 0.7 than outside",
+            printed="figure 9",
+            test=Less(((Arm(SQUARES[1], inside), Arm(SQUARES[1], f"as, rho {outside}")),)),
+            reading=reading,
+        )
+        for inside, outside, reading in (("as", "0.1", "0.3 against 0.1"), ("as, rho 0.7", "0.9", "0.7 against 0.9"))
     ),
 )
 

@@ -210,6 +210,7 @@ UNITS: Mapping[str, tuple[int, str]] = {
     "last": (2, ""),
     "unrest": (2, ""),
     "settled": (0, " iterations"),
+    "near": (0, " iterations"),
     "effort": (0, " steps"),
 }
 
