@@ -15,7 +15,7 @@ from antdrive.planners import PLANNERS, History, Query
 from antdrive.sim.papers import candidates
 from antdrive.sim.papers.baselines import FirstTouchDStar, total_cost
 from antdrive.sim.papers.candidates import MoveCount, candidate, move_counts, winding_candidate
-from antdrive.sim.papers.claims import CLAIMS, Arm, Arrive, Cases, Claim, Less, Mean, Test, Wider, Within
+from antdrive.sim.papers.claims import CLAIMS, Arm, Arrive, Cases, Claim, Less, Mean, Oftener, Test, Wider, Within
 from antdrive.sim.papers.experiments import PAPERS
 from antdrive.sim.papers.keeping import keep_trials, kept_trials, trials_key
 from antdrive.sim.papers.maps import environments, optimum
@@ -75,6 +75,19 @@ def test_equal_values_refute_less_but_not_no_more() -> None:
     assert verdict(Less(((ONE, TWO),), strict=False), same, same).decision is Decision.HOLDS
     assert verdict(Less(((ONE, TWO),), margin=1.0, strict=False), same + 1.0, same).decision is Decision.HOLDS
     assert verdict(Less(((ONE, TWO),), margin=1.0, strict=False), same + 1.1, same).decision is Decision.REFUTED
+
+
+def test_oftener_counts_pairs_where_the_median_difference_is_zero() -> None:
+    same, other = np.zeros(40), np.r_[np.ones(16), np.zeros(24)]
+    assert verdict(Less(((ONE, TWO),)), same, other).value == 0.0
+    found = verdict(Oftener(((ONE, TWO),)), same, other)
+    assert found.decision is Decision.HOLDS
+    assert found.value == pytest.approx(-40.0)
+    assert "below in 16 of 40 pairs, above in 0: -40 points" in found.ours
+    assert verdict(Oftener(((ONE, TWO),)), other, same).decision is Decision.REFUTED
+    assert verdict(Oftener(((ONE, TWO),)), same, same).decision is Decision.REFUTED
+    both = np.resize([-1.0, 1.0], 40)
+    assert verdict(Oftener(((ONE, TWO),)), both, np.zeros(40)).decision is Decision.OPEN
 
 
 def test_a_path_is_less_than_none_and_none_equals_none() -> None:

@@ -7,7 +7,7 @@ import typer
 
 from antdrive.sim.cli import options
 from antdrive.sim.cli.compiling import compile_once
-from antdrive.sim.cli.console import bar, print_files, print_json, print_table
+from antdrive.sim.cli.console import bar, print_files, print_json, print_line, print_table
 from antdrive.sim.cli.exits import SUCCEEDED
 from antdrive.sim.cli.write import check_folder, free_folder, suffixes, this_command, write_marker
 from antdrive.worlds.files.atomic import claimed
@@ -72,5 +72,6 @@ def reproduce(
         print_table(VERDICT_HEADS, map(verdict_cells, found.verdicts))
         print_files(found.files)
         if found.kept:
-            print(f"{found.kept} of {len(found.rows)} experiments were done before and were taken from {folder / TRIALS}")
+            count = f"{found.kept} of {len(found.rows)}"
+            print_line(f"{count} experiments were done before and were taken from {folder / TRIALS}")
     return SUCCEEDED

@@ -77,22 +77,25 @@ def convergence_figure(
         figure = new_figure(3.9 * across, 3.2 * -(-len(curves) // across))
         for k, (title, on_map) in enumerate(curves.items()):
             axes: Any = figure.add_subplot(-(-len(curves) // across), across, k + 1, label=title)
-            tops = [_draw(axes, curve, number, on_map, single) for number, curve in enumerate(on_map)]
+            spans = [_draw(axes, curve, number, on_map, single) for number, curve in enumerate(on_map)]
             optimum = on_map[0].optimum
             axes.axhline(optimum, color=hexed(MUTED), ls="--", lw=1.0, label="shortest")
             counted = on_map[0].steps is not None
             axes.set(
                 title=title, xlabel="million ant steps" if counted else "iteration", ylabel="best path so far [cells]"
             )
-            top = min(max(tops, default=optimum), HIGHEST * optimum)
-            axes.set_ylim(optimum - 0.06 * (top - optimum) - 0.1, top + 0.06 * (top - optimum) + 0.1)
+            low = min([optimum, *(span[0] for span in spans)])
+            top = min(max(span[1] for span in spans), HIGHEST * optimum)
+            axes.set_ylim(low - 0.06 * (top - low) - 0.1, top + 0.06 * (top - low) + 0.1)
             axes.set_xlim(left=0.0)
             axes.legend(loc="upper right", fontsize=7)
         return finished(figure, target, dpi)
 
 
-def _draw(axes: Any, curve: ConvergenceCurve, number: int, among: Sequence[ConvergenceCurve], single: bool) -> float:
-    """Draw a curve; the largest length that should be seen."""
+def _draw(
+    axes: Any, curve: ConvergenceCurve, number: int, among: Sequence[ConvergenceCurve], single: bool
+) -> tuple[float, float]:
+    """Draw a curve; the least and the largest length that should be seen."""
     colour, dash = _style(curve, number, among, single)
     scale = 1.0 if curve.steps is None else 1e-6
     if single:
@@ -115,11 +118,11 @@ def _draw(axes: Any, curve: ConvergenceCurve, number: int, among: Sequence[Conve
         ceiling = np.minimum(high, HIGHEST * 2 * curve.optimum)
         axes.fill_between(x[known], low[known], ceiling[known], step="post", color=colour, alpha=0.22, lw=0)
     if curve.printed is not None and len(x):
-        axes.plot(
-            x[-1], curve.printed, "s", ms=5, color=colour, mfc="white", clip_on=False, zorder=4, label="in the paper"
-        )
-    shown = [float(values.max()) for values in (middle[known], high[known][-1:]) if len(values)]
-    return max([*(value for value in shown if value < NO_PATH / 10), curve.printed or 0.0])
+        label = "in the paper" if all(other.printed is None for other in among[:number]) else None
+        axes.plot(x[-1], curve.printed, "s", ms=5, color=colour, mfc="white", clip_on=False, zorder=4, label=label)
+    shown = [*middle[known], *high[known][-1:], *low[known][-1:], *([] if curve.printed is None else [curve.printed])]
+    finite = [float(value) for value in shown if value < NO_PATH / 10] or [curve.optimum]
+    return min(finite), max(finite)
 
 
 def _style(curve: ConvergenceCurve, number: int, among: Sequence[ConvergenceCurve], single: bool) -> tuple[str, Any]:
