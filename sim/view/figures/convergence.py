@@ -73,7 +73,7 @@ def convergence_figure(
     """
     target = checked(path)
     with styled():
-        across = min(len(curves), 3)
+        across = 2 if len(curves) == 4 else min(len(curves), 3)
         figure = new_figure(3.9 * across, 3.2 * -(-len(curves) // across))
         for k, (title, on_map) in enumerate(curves.items()):
             axes: Any = figure.add_subplot(-(-len(curves) // across), across, k + 1, label=title)
