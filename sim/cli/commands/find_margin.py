@@ -10,7 +10,7 @@ from antdrive.sim.cli import options
 from antdrive.sim.cli.compiling import compile_once
 from antdrive.sim.cli.console import planning, print_json, print_line, print_table
 from antdrive.sim.cli.exits import FAILED, SUCCEEDED
-from antdrive.sim.cli.scenario import make_scenario
+from antdrive.sim.cli.scenario import chosen_task, ends_words, make_scenario
 from antdrive.worlds.errors import InputError
 
 if TYPE_CHECKING:
@@ -28,6 +28,9 @@ def find_margin(
         str | None,
         typer.Option("--generate", metavar="KIND", help="Instead of WORLD: a random forest or barn for each seed."),
     ] = None,
+    task: options.TaskName = None,
+    start: options.Start = None,
+    goal: options.Goal = None,
     planner: options.Planner = "astar",
     settings: options.Settings = None,
     robot: options.Robot = "turtlebot",
@@ -59,7 +62,12 @@ def find_margin(
 
     if (world is None) == (kind is None):
         raise InputError("find-margin: name a world, or a kind of random worlds with --generate forest|barn")
-    base = make_scenario(world or "empty", planner, settings, robot, cell=cell, smoothing=smoothing, noise=noise)
+    if kind is not None and ends_words(task, start, goal):
+        raise InputError(
+            "--task, --start, --goal: random worlds have their own starts and goals; name a world for others"
+        )
+    chosen = chosen_task(world, task, start, goal) if world is not None else "empty"
+    base = make_scenario(chosen, planner, settings, robot, cell=cell, smoothing=smoothing, noise=noise)
     base = base if max_speed is None else _slowed(base, max_speed)
     tasks = {n: base.task if kind is None else _generated(kind, n) for n in range(seed, seed + seeds)}
 
