@@ -20,6 +20,7 @@ from antdrive.sim.entries import option_text
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.record import settings_of
 from antdrive.sim.pipeline import Run, versions
+from antdrive.sim.settings import SENSING
 
 if TYPE_CHECKING:
     import pyarrow
@@ -51,6 +52,9 @@ GRID: Mapping[str, str] = {
     "margin_asked": "string",
     "margin": "double",
     "cell": "double",
+    "map": "string",
+    "localisation": "string",
+    "odometry": "double",
     "controller": "string",
     "sees": "string",
     "avoid": "string",
@@ -122,6 +126,7 @@ def setting_columns(fields: Mapping[str, Any]) -> dict[str, Any]:
         "smoothing": fields["smoothing"],
         "noise": float(fields["noise"]),
         "margin_asked": margin if margin == "auto" else str(float(margin)),
+        **{key: fields.get(key, usual) for key, usual in SENSING.items()},
         "controller": _changes(fields["controller"], PurePursuit()),
         "sees": sees.kind if math.isinf(sees.range) else f"{sees.kind}:{sees.range:g}",
         "avoid": _changes(fields["avoidance"], Avoidance()),
