@@ -5,7 +5,8 @@
   kill-worker, kill-parent, kill-dask-worker and kill-dask-scheduler are parts of their own.
 - equality: 160 drives of two planners in four worlds, with and without noise: one table, byte for byte, from this process, from
   1, 2 and 4 processes, from dask, and in other orders.
-- efficiency: runs that compute for 0.2 s on one and on two processes, local and dask: T1 / (2 T2), without the start.
+- efficiency: runs that compute for 0.2 s on one and on two processes, local and dask: T1 / (2 T2), without the start; the same
+  of plain processes, which is what the machine gives.
 - overhead: 100,000 runs that do nothing: what the engines, the folder and the expansion cost for each.
 
 `--small` takes a twentieth of the runs. `--drive` kills campaigns of real drives instead of runs that sleep. Each result (of
@@ -23,6 +24,7 @@ import os
 import random
 import shutil
 import signal
+import statistics
 import subprocess
 import sys
 import time
@@ -43,6 +45,7 @@ from benchmarks.planners import table
 OUT = Path(__file__).parent.parent / "out" / "campaigns"
 SHORT = 0.02  # how long a run sleeps in a campaign that is killed [s]
 LONG = 0.2  # how long a run computes where efficiency is measured [s]
+ROUNDS = 3  # how often each engine has its turn there
 VICTIMS = ("worker", "parent", "dask worker", "dask scheduler")
 PARTS = ("kill", *(f"kill-{v.replace(' ', '-')}" for v in VICTIMS), "equality", "efficiency", "overhead")
 
@@ -204,27 +207,48 @@ def kill(victim: str, kills: int, runs: int, drive: bool) -> dict[str, Any]:
 
 
 def efficiency(runs: int) -> dict[str, Any]:
-    """T1 / (2 T2) of runs that compute for 0.2 s, in turns."""
+    """T1 / (2 T2) of runs that compute for 0.2 s: medians of rounds, in each of which every engine has its turn.
+
+    *bare* is the same work in plain processes that share nothing: what the machine itself gives to two processes.
+    """
     trial, started_at = Computing(100_000), time.perf_counter()
     (job,) = expand(make_campaign({"worlds": ["empty"], "planners": ["astar"]})).jobs
     trial(job)
-    work = Computing(int(100_000 * LONG / (time.perf_counter() - started_at)))
+    rounds = int(100_000 * LONG / (time.perf_counter() - started_at))
     engines: dict[str, dict[str, Any]] = {
         "local 1": {"jobs": 1}, "local 2": {"jobs": 2}, "dask 1": {"dask": "local:1"}, "dask 2": {"dask": "local:2"}
     }  # fmt: skip
-    times = {}
-    for name, options in engines.items():
-        folder = OUT / "folders" / f"efficiency-{name.replace(' ', '-')}"
-        shutil.rmtree(folder, ignore_errors=True)
-        times[name] = go(folder, runs, work, **options)
-    here = time.perf_counter()
-    for _ in range(10):
+    times: dict[str, list[float]] = {name: [] for name in ("bare 1", "bare 2", *engines)}
+    part = max(1, runs // ROUNDS)
+    for _ in range(ROUNDS):
+        times["bare 1"].append(bare(1, part, rounds))
+        times["bare 2"].append(bare(2, part, rounds))
+        for name, options in engines.items():
+            folder = OUT / "folders" / f"efficiency-{name.replace(' ', '-')}"
+            shutil.rmtree(folder, ignore_errors=True)
+            times[name].append(go(folder, part, Computing(rounds), **options))
+    found = {name: statistics.median(each) for name, each in times.items()}
+    ratios = {
+        name: statistics.median(one / two / 2 for one, two in zip(times[f"{name} 1"], times[f"{name} 2"], strict=True))
+        for name in ("bare", "local", "dask")
+    }
+    return {"rounds": ROUNDS, "runs": part, "run_s": found["bare 1"] / part, **found, **ratios}
+
+
+def bare(processes: int, runs: int, rounds: int) -> float:
+    """The time that plain processes take for runs that they share out evenly, without their start [s]."""
+    command = [sys.executable, "-m", "benchmarks.campaigns", "_compute", str(runs // processes), str(rounds)]
+    started = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(processes)]
+    return max(float(one.communicate()[0]) for one in started)
+
+
+def compute(runs: int, rounds: int) -> float:
+    """The time that runs which compute take in this process [s]."""
+    (job,) = expand(make_campaign({"worlds": ["empty"], "planners": ["astar"]})).jobs
+    work, begun = Computing(rounds), time.perf_counter()
+    for _ in range(runs):
         work(job)
-    alone = (time.perf_counter() - here) / 10
-    return {
-        "runs": runs, "run_s": alone, **times,
-        "local": times["local 1"] / times["local 2"] / 2, "dask": times["dask 1"] / times["dask 2"] / 2,
-    }  # fmt: skip
+    return time.perf_counter() - begun
 
 
 def equality(runs: int) -> dict[str, Any]:
@@ -293,6 +317,9 @@ def print_parts(parts: list[str], share: float, drive: bool) -> Iterator[str]:
 
 
 def main() -> None:
+    if sys.argv[1:2] == ["_compute"]:
+        print(compute(int(sys.argv[2]), int(sys.argv[3])))
+        return
     if sys.argv[1:2] == ["_go"]:
         folder, runs, drive, *dask = sys.argv[2:]
         work = None if drive == "1" else Sleeping(SHORT)

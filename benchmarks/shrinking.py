@@ -1,6 +1,7 @@
-"""How small failures become, and how long it takes: `python -m benchmarks.shrinking [--failures N] [--seconds S]`.
+"""How small failures become, and how long it takes: `python -m benchmarks.shrinking [--failures N] [--seconds S]
+[--robot NAME]`.
 
-Random forests of 60 cylinders on 14 m, driven by `jackal` without a margin, without smoothing and with its noise; the first
+Random forests of 60 cylinders on 14 m, driven by `turtlebot` without a margin, without smoothing and with its noise; the first
 drives that fail are shrunk.
 """
 
@@ -24,11 +25,11 @@ from benchmarks.planners import table
 FOREST = {"count": "60", "size": "14", "radius": "0.15,0.5", "clearance": "1.0"}
 
 
-def failed_runs() -> Iterator[Run]:
-    """Drives that fail, by seed."""
+def failed_runs(robot: str) -> Iterator[Run]:
+    """Drives of a robot that fail, by seed."""
     for seed in itertools.count():
         task = generate("forest", np.random.default_rng(seed), FOREST, name=f"forest-{seed}", note="")
-        done = run(Scenario.of(task, "astar", "jackal", margin=0.0, noise=1.0, smoothing="none", seed=seed))
+        done = run(Scenario.of(task, "astar", robot, margin=0.0, noise=1.0, smoothing="none", seed=seed))
         if not done.succeeded:
             yield done
 
@@ -44,9 +45,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--failures", type=int, default=10, help="how many failures are shrunk")
     parser.add_argument("--seconds", type=float, default=600.0, help="wall-clock time for each [s]")
+    parser.add_argument("--robot", default="turtlebot", help="that drives")
     arguments = parser.parse_args()
     rows, counts, times = [], [], []
-    for done in itertools.islice(failed_runs(), arguments.failures):
+    for done in itertools.islice(failed_runs(arguments.robot), arguments.failures):
         started, cpu = time.perf_counter(), time.process_time()
         shrunk = shrink(done.scenario, seconds=arguments.seconds)
         wall, cpu = time.perf_counter() - started, time.process_time() - cpu

@@ -123,7 +123,8 @@ def shortest(discs: npt.ArrayLike, bounds: Bounds, inflate: float, start: Point,
 
     inflated = np.array(discs, dtype=np.float64).reshape(-1, 3)
     inflated[:, 2] += inflate
-    box = np.array([bounds[0] + inflate, bounds[1] + inflate, bounds[2] - inflate, bounds[3] - inflate])
+    xmin, ymin, xmax, ymax = map(float, bounds)  # whole numbers would compile every kernel again
+    box = np.array([xmin + inflate, ymin + inflate, xmax - inflate, ymax - inflate])
     if not (box[0] <= box[2] and box[1] <= box[3]):
         return None
     both = np.array([start, goal], dtype=np.float64)
