@@ -140,20 +140,11 @@ def sweep(
     if out is None and not dry_run:
         raise InputError("--out: missing; name the folder for the results")
     _check(keep, dask, jobs)
+    knows = {"map": map, "localisation": localisation, "odometry": odometry}
     asked = campaign_from(
-        campaign,
-        worlds=world,
-        generate=generate,
-        planners=planner,
-        robots=robot,
-        seeds=seeds,
-        routes=smoothing,
-        noise=noise,
-        margin=margin,
-        settings={"map": map, "localisation": localisation, "odometry": odometry},
-        tasks=tasks,
-        run_limit=run_limit,
-    )
+        campaign, worlds=world, generate=generate, planners=planner, robots=robot, seeds=seeds, routes=smoothing,
+        noise=noise, margin=margin, settings=knows, tasks=tasks, run_limit=run_limit,
+    )  # fmt: skip
     expansion = expand(asked)
     if dry_run:
         return _say_size(expansion, out, json, retry_crashed=retry_crashed, again=again or ())
