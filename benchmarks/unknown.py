@@ -41,12 +41,14 @@ class Variant:
         lidar: what differs from the lidar of `jackal`, by the keys of a robot file
         odometry: the factor on the errors of odometry
         planner: the planner's name
+        localisation: how the robot knows its pose
     """
 
     name: str
     lidar: Mapping[str, Any] = field(default_factory=dict)
     odometry: float = 1.0
     planner: str = "astar"
+    localisation: str = "matching"
 
 
 VARIANTS = (
@@ -54,6 +56,7 @@ VARIANTS = (
     *(Variant(f"range {far:g} m", {"max_range": far}) for far in (10.0, 5.0, 2.5)),
     *(Variant(f"{beams} beams", {"beams": beams}) for beams in (180, 60)),
     *(Variant(f"odometry x {factor:g}", odometry=factor) for factor in (0.0, 5.0)),
+    *(Variant(f"odometry x {f:g} without matching", odometry=f, localisation="odometry") for f in (1.0, 5.0)),
     *(Variant(planner, planner=planner) for planner in ("dstar-lite", "ants")),
 )
 
@@ -91,7 +94,8 @@ def ablations(options: argparse.Namespace) -> Iterator[str]:
                 given = {**sensing, "map": "given", "localisation": "fixes"}
                 known[variant.planner] = driven(f"{variant.planner} with the map", variant.planner, "jackal", given)
                 yield row(f"{variant.planner} with the map", known[variant.planner], fastest, None)
-            robot, settings = robot_of(variant, options.results), {**sensing, "odometry": variant.odometry}
+            robot = robot_of(variant, options.results)
+            settings = {**sensing, "odometry": variant.odometry, "localisation": variant.localisation}
             runs = driven(variant.name, variant.planner, robot, settings)
             yield row(variant.name, runs, fastest, known[variant.planner])
 

@@ -170,7 +170,7 @@ def run_row(key: str, run: Run, rollout: str | None) -> dict[str, Any]:
         "certified": run.certificate is not None and run.certificate.certified,
         "digest": log.digest,
         "drive_digest": log.drive_digest,
-        **run.metrics,
+        **{name: None if math.isnan(value) else value for name, value in run.metrics.items()},
         "plan_length_m": log.record.plan.length_m,
         "grid_optimum_m": log.record.plan.grid_optimum_m,
     }
