@@ -49,6 +49,7 @@ from antdrive.sim.log.record import (
     settings_of,
 )
 from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.log.sights import passed
 from antdrive.sim.log.streams import random_stream
 from antdrive.sim.physics.engine import Engine
 from antdrive.sim.reasons import no_path_reason
@@ -141,6 +142,7 @@ class Run:
             "succeeded": self.succeeded,
             "certificate": self.certificate.as_dict() if self.certificate else None,
             "metrics": measure(self.rollout) if self.rollout else {"plan_s": self.plan.wall_s},
+            **({"sights": [sight.as_dict() for sight in passed(log)]} if log is not None and len(log.scans) else {}),
             "digest": self.rollout.digest if self.rollout else None,
         }
 

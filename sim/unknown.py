@@ -5,20 +5,23 @@ from __future__ import annotations
 from antdrive.sim.driving.caution import Caution
 from antdrive.sim.driving.exploring import Exploration
 from antdrive.sim.driving.replanning import ReplanPolicy
-from antdrive.sim.driving.survey import Senses, Survey
+from antdrive.sim.driving.rescanning import survey_of
 from antdrive.sim.scenario import Scenario
-from antdrive.sim.sensing.scanner import Scanner
 from antdrive.worlds import Task, World
 
 
 def exploration_of(s: Scenario) -> Exploration:
     """What finds the routes of a drive without a map, after the first look from the start."""
-    lidar = s.robot.lidar
-    assert lidar is not None
-    world = s.driven_world
-    senses = Senses(Scanner.of(lidar, world), s.trajectories or None, s.rng("lidar") if s.noise else None, s.control_hz)
-    survey = Survey(senses, s.robot, s.task.start, s.task.goal, matching=s.localisation == "matching")
-    survey.look(0, s.task.start, s.task.start)
+    survey = survey_of(
+        s.robot,
+        s.task,
+        s.driven_world,
+        s.trajectories,
+        seed=s.seed,
+        noisy=s.noise > 0,
+        matching=s.localisation == "matching",
+        hz=s.control_hz,
+    )
     return Exploration(
         s.planner,
         survey,
