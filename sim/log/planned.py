@@ -161,7 +161,8 @@ def _check_lengths(rollout: Rollout) -> Iterator[str]:
 def _check_movers_known(rollout: Rollout) -> Iterator[str]:
     """What was known of movers, and how they were avoided, is recorded where there are movers, and nowhere else."""
     record = rollout.record
-    moving = bool(record.world.movers)
+    watching = record.perception is not None and record.perception.kind == "lidar"
+    moving = bool(record.world.movers) or watching
     if (record.perception is not None) != moving:
         yield f"record.perception: must {'not ' if moving else ''}be null {'among' if moving else 'without'} movers"
     for key in ("avoidance", "replanning"):

@@ -6,8 +6,16 @@ import numpy as np
 import pytest
 
 from antdrive.robots import Lidar, RobotSpec
-from antdrive.sim.sensing import MoverTracker, OccupancyMap, Scanner, TrackedMovers, TrackingPolicy
-from antdrive.worlds import Floats
+from antdrive.sim.sensing import (
+    KnownGround,
+    MappedGround,
+    MoverTracker,
+    OccupancyMap,
+    Scanner,
+    TrackedMovers,
+    TrackingPolicy,
+)
+from antdrive.worlds import Disc, Floats, World
 
 POSTS = np.array([[2.5, 1.8, 0.2], [2.5, -2.2, 0.3], [-1.0, 2.0, 0.4]])
 BOUNDS = (-4.0, -4.0, 6.0, 4.0)
@@ -29,7 +37,7 @@ def watched(
         places = start + velocity * (t - 1) if t >= 1 else away
         pose = (speed * t, 0.0, 0.0)
         ranges = scanner.scan(pose, places, radii, rng)
-        theirs = tracker.update(grid, pose, ranges, t)
+        theirs = tracker.update(MappedGround(grid, 100), pose, ranges, t)
         grid.insert(pose, ranges, left_out=theirs)
     return tracker.movers(), places, grid
 
@@ -85,16 +93,22 @@ def test_a_mover_leaves_nothing_in_the_map(jackal: RobotSpec) -> None:
     assert where[0, 1] == pytest.approx(0.9)
 
 
-def test_a_mover_out_of_sight_is_given_up() -> None:
+def test_a_mover_that_beams_pass_through_is_gone_and_a_hidden_one_is_remembered() -> None:
     lidar = Lidar(beams=360, field_of_view=2 * math.pi, min_range=0.1, max_range=8.0, rate=20.0)
     scanner, grid, tracker = Scanner(lidar, POSTS, bounds=BOUNDS), OccupancyMap(lidar), MoverTracker(lidar)
     for k in range(58):
         there = np.array([[2.0, 0.02 * k - 0.8]]) if 10 <= k < 40 else np.array([[90.0, 90.0]])
         ranges = scanner.scan((0, 0, 0), there, np.array([0.3]))
-        grid.insert((0, 0, 0), ranges, left_out=tracker.update(grid, (0, 0, 0), ranges, k / 20))
-        assert k in range(10, 20) or len(tracker.movers().radii) == (k >= 20)
-    tracker.update(grid, (0, 0, 0), scanner.scan((0, 0, 0)), 3.1)
-    assert len(tracker.movers().radii) == 0
+        grid.insert((0, 0, 0), ranges, left_out=tracker.update(MappedGround(grid, 40), (0, 0, 0), ranges, k / 20))
+        assert k in range(10, 20) or k in (40, 41) or len(tracker.movers().radii) == (20 <= k < 40)
+    known = KnownGround(lidar, World("hall", BOUNDS, tuple(Disc(*row) for row in POSTS.tolist())))
+    tracker, screen = MoverTracker(lidar), Scanner(lidar, np.vstack([POSTS, [1.0, 0.0, 0.4]]), bounds=BOUNDS)
+    for k in range(100):
+        there = np.array([[2.0, 0.02 * min(k, 30) - 1.2]])
+        ranges = (scanner if k < 20 else screen).scan((0, 0, 0), there, np.array([0.1]))
+        tracker.update(known, (0, 0, 0), ranges, k / 20)
+        mine = np.abs(tracker.movers().positions[:, 0] - 2.0) < 0.3
+        assert mine.sum() == (2 <= k < 80)  # hidden by a screen from the 20th scan on, and for 3 s remembered
 
 
 def test_the_same_scans_give_the_same_tracks(jackal: RobotSpec) -> None:
