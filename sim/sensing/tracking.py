@@ -114,6 +114,7 @@ class _Track:
     views: int = 0  # how often it was seen from edge to edge
     weight: float = 0.0  # of the views of its radius
     through: int = 0  # in how many scans in a row beams have passed where it should be
+    sure: bool = False  # whether it was seen so often, and its velocity was known so well, that it counts
     moves: bool = False  # whether it has come far enough to be a mover
     rested: float = 0.0  # since when it has been where it stands [s]
     anchor: tuple[float, float] = field(default=(0.0, 0.0))  # where that is, or where it was first seen [m]
@@ -241,7 +242,7 @@ class MoverTracker:
         places = np.array([(track.x, track.y) for track in self._tracks])
         radii = np.array([track.radius for track in self._tracks])
         reach = np.array([min(CLAIM_MOST, CLAIM + 2 * math.sqrt(track.variance)) for track in self._tracks])
-        sure = np.array([track.moves and track.seen >= self.policy.confirmed for track in self._tracks])
+        sure = np.array([track.moves and track.sure for track in self._tracks])
         off = np.abs(np.hypot(*(hits.points[:, None] - places).transpose(2, 0, 1)) - radii)
         # What stands still explains other points too well to give them to a track that only passes.
         allowed = np.where(hits.explained[:, None], np.where(sure, SKIN, -1.0), reach)
@@ -373,6 +374,7 @@ class MoverTracker:
             return
         track.correct(x, y, self._error(x, y, view, whole) ** 2)
         track.seen += 1
+        track.sure = track.sure or (track.seen >= self.policy.confirmed and track.spread < SURE**2)
         track.last = view.time
         track.through = 0
         if not complete:
@@ -395,11 +397,10 @@ class MoverTracker:
     def _goes_on(self, track: _Track, view: _View) -> bool:
         if track.last == view.time:
             return True
-        counts = track.seen >= self.policy.confirmed
-        if view.time - track.last > (self.policy.patience if counts else self.policy.doubt):
+        if view.time - track.last > (self.policy.patience if track.sure else self.policy.doubt):
             return False
         track.through = track.through + 1 if self._seen_through(track, view) else 0
-        return track.through < (THROUGH if counts else 1)
+        return track.through < (THROUGH if track.sure else 1)
 
     def _seen_through(self, track: _Track, view: _View) -> bool:
         """Whether beams have passed where the track should be."""
@@ -415,8 +416,7 @@ class MoverTracker:
         return len(beams) > 0 and away < lidar.max_range and bool(np.mean(view.ranges[beams] > away) > 0.5)
 
     def _counts(self, track: _Track, complete: bool) -> bool:
-        sure = track.seen >= self.policy.confirmed and track.spread < SURE**2
-        return sure and (complete or track.moves)
+        return track.sure and (complete or track.moves)
 
     def _on_movers(self, points: Floats) -> npt.NDArray[np.bool_]:
         """Which points lie on or in movers that count."""
