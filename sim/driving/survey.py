@@ -14,7 +14,7 @@ from antdrive.robots import RobotSpec
 from antdrive.sim.driving import _kernels_hits
 from antdrive.sim.driving.watching import Watch
 from antdrive.sim.sensing.mapping import OccupancyMap
-from antdrive.sim.sensing.matching import ScanMatcher
+from antdrive.sim.sensing.matching import FAR, ScanMatcher, sliding_left_out
 from antdrive.sim.sensing.scanner import Scanner
 from antdrive.sim.sensing.sight import clear_distance, clear_turn
 from antdrive.worlds import Bounds, Floats, Point, Pose, Trajectories
@@ -136,12 +136,20 @@ class Survey:
             return estimate
         ranges = self._senses.ranges(tick, pose)
         if self._matcher is not None:
-            standing = self.watch.standing(estimate, ranges, tick) if self.watch is not None else ranges
-            estimate = self._matcher.corrected(self.map, estimate, standing)
+            estimate = self._matched(self._matcher, estimate, ranges, tick)
         movers = self.watch.read_on_map(self.map, estimate, ranges, tick) if self.watch is not None else None
         self.map.insert(estimate, ranges, movers)
         self.scans.append(Scan(tick, estimate, ranges, movers))
         return estimate
+
+    def _matched(self, matcher: ScanMatcher, estimate: Pose, ranges: Floats, tick: int) -> Pose:
+        """The estimated pose, corrected by a scan; among movers by what stands, and by nothing that slides along a wall."""
+        if self.watch is None:
+            return matcher.corrected(self.map, estimate, ranges)
+        standing = self.watch.standing(estimate, ranges, tick)
+        corrected = matcher.corrected(self.map, estimate, standing)
+        near = np.where(standing <= FAR, standing, np.inf)
+        return sliding_left_out(estimate, corrected, self.map.endpoints(estimate, near))
 
     def discs(self, bounds: Bounds) -> Floats:
         """What was hit within bounds, as discs (N, 3) [m].
@@ -162,9 +170,7 @@ class Survey:
         scan = self.scans[-1]
         x, y, yaw = self._lidar.pose_on(scan.estimate)
         ranges = scan.ranges if scan.movers is None else np.where(scan.movers, np.inf, scan.ranges)
-        return bool(
-            _kernels_hits.hit_within(points, needed, ahead, TOLERANCE, BLUR, x, y, yaw, self.map.beams, ranges)
-        )
+        return bool(_kernels_hits.hit_within(points, needed, ahead, TOLERANCE, BLUR, x, y, yaw, self.map.beams, ranges))
 
     def forget(self, pose: Pose) -> None:
         """Make the map anew of the latest scans: what was seen before may be elsewhere in a frame that drifts.

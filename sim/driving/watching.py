@@ -79,7 +79,13 @@ class Watch:
         """
         tables = [
             np.column_stack(
-                (np.full(len(found.radii), tick * per_tick), found.numbers, found.positions, found.velocities, found.radii)
+                (
+                    np.full(len(found.radii), tick * per_tick),
+                    found.numbers,
+                    found.positions,
+                    found.velocities,
+                    found.radii,
+                )
             )
             for tick, found in self._log
             if tick * per_tick < rows

@@ -225,7 +225,10 @@ class Rollout:
         if len(self.scans) != np.size(at):
             yield f"scan_rows: must be {len(self.scans)}, one for each scan, found {np.size(at)}"
         tables = [("seen", self.seen), ("tracks", self.tracks)]
-        for name, places in [("scan_rows", at), *((name, table[:, 0] if table.ndim == 2 else at) for name, table in tables)]:
+        for name, places in [
+            ("scan_rows", at),
+            *((name, table[:, 0] if table.ndim == 2 else at) for name, table in tables),
+        ]:
             if np.size(places) and not (places.min() >= 0 and places.max() < rows and (np.diff(places) >= 0).all()):
                 yield f"{name}: must be at rows from 0 to {rows - 1}, in order"
 

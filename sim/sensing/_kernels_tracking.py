@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from antdrive.worlds._kernels import Array, kernel
 
 ROUNDS = 12  # of the fit of a circle's centre

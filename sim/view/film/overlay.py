@@ -15,11 +15,11 @@ from antdrive.sim.view.film.replay import SLOW_MOTION
 from antdrive.sim.view.film.text import Sprite, fitted, font, pill, plate, text_width
 from antdrive.sim.view.scene import Scene
 from antdrive.sim.view.style import (
-    FOLLOWED,
     BAD,
     BAND,
     BEAM,
     CALM,
+    FOLLOWED,
     HATCH,
     HIT,
     INK,
@@ -196,7 +196,13 @@ class LegendEntry(NamedTuple):
 
 
 def legend_entries(
-    scene: Scene, step: float, pixel: float, *, planning: bool = False, replans: bool = False, sight: bool = False,
+    scene: Scene,
+    step: float,
+    pixel: float,
+    *,
+    planning: bool = False,
+    replans: bool = False,
+    sight: bool = False,
     followed: bool = False,
 ) -> list[LegendEntry]:
     """The legend's lines: one for each kind of thing in the picture.

@@ -60,7 +60,9 @@ class Replay:
         self._jumps = jumps(self._movers)
         lidar, hz = rollout.record.robot.lidar, rollout.record.physics_hz
         self._tracks = rollout.tracks.astype(np.float64)
-        self._scan_rows = math.ceil(hz / lidar.rate) + hz // rollout.record.control_hz if lidar else 0  # between two scans
+        self._scan_rows = (
+            math.ceil(hz / lidar.rate) + hz // rollout.record.control_hz if lidar else 0
+        )  # between two scans
         self.replans: list[ReplanEvent] = []
         route = rollout.route
         for replan in rollout.record.replans:

@@ -41,7 +41,6 @@ FLASH = 0.45  # the picture's border flashes this long after a contact [s]
 REPLAN_CAPTION = 1.5  # the cause of a replan is shown this long [s]
 
 
-
 class Shot:
     """The frames of a run as one camera sees it. Ask for moments in increasing order. Use it in a `with` block.
 
@@ -84,7 +83,9 @@ class Shot:
             self._camera = self._aim(camera, rollout, (size[0], size[1] - band))
             step, pixel = grid_step(self._camera), self._camera.pixel
             sight = self._sight is not None
-            entries = legend_entries(scene, step, pixel, planning=planning, replans=replans, sight=sight, followed=self._follows_movers)
+            entries = legend_entries(
+                scene, step, pixel, planning=planning, replans=replans, sight=sight, followed=self._follows_movers
+            )
             self._legend = legend_card(entries, layout) if card and not bare else None
             if self._legend is not None and self._fits_beside_world(self._legend):
                 break
@@ -173,7 +174,7 @@ class Shot:
         return view
 
     def _followed(self, at: float) -> Floats:
-        """The movers that the robot follows, where they lie in the world: a robot without a map believes in a frame that drifts."""
+        """The movers that the robot follows, where they lie in the world; without a map the robot's own frame drifts."""
         found = self.replay.followed(at)
         if self._sight is not None:
             found[:, :2] = self._sight.laid(found[:, :2])

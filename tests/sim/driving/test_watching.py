@@ -18,7 +18,9 @@ from antdrive.worlds import Disc, Keyframed, Task, World
 from antdrive.worlds.errors import FieldError
 
 # A closet of touching posts in the lower right corner, into which no beam gets.
-CLOSET = tuple(Disc(5.0 + 0.14 * k, 1.2, 0.075) for k in range(22)) + tuple(Disc(5.0, 0.14 * k, 0.075) for k in range(9))
+CLOSET = tuple(Disc(5.0 + 0.14 * k, 1.2, 0.075) for k in range(22)) + tuple(
+    Disc(5.0, 0.14 * k, 0.075) for k in range(9)
+)
 CROSSING = Keyframed(radius=0.3, keyframes=((0.0, 4.2, 3.5), (4.0, 4.2, 1.7)), loop="pingpong")
 HIDDEN = Keyframed(radius=0.2, keyframes=((0.0, 6.0, 0.6), (4.0, 7.2, 0.6)), loop="pingpong")
 HALL = World("hall", (0.0, 0.0, 8.0, 4.5), CLOSET, movers=(CROSSING,))
@@ -48,7 +50,10 @@ def test_what_is_on_no_map_is_seen_and_avoided(drive: Run, log: Rollout, jackal:
     assert blind.outcome is Outcome.COLLIDED
     assert drive.succeeded, (drive.outcome, drive.reason, drive.certificate)
     assert log.record.perception is not None
-    assert (log.record.perception.kind, drive.scenario.as_dict()["settings"]["perception"]) == ("lidar", {"kind": "lidar"})
+    assert (log.record.perception.kind, drive.scenario.as_dict()["settings"]["perception"]) == (
+        "lidar",
+        {"kind": "lidar"},
+    )
 
 
 def test_the_log_tells_where_the_robot_believed_movers_to_be(log: Rollout, tmp_path: Path) -> None:
