@@ -349,8 +349,7 @@ def _record(
     wall: float,
 ) -> Rollout:
     """The rollout of a drive: its arrays, and the record of what it came from."""
-    perception, avoidance = s.effective_perception, s.effective_avoidance
-    among_movers = bool(s.driven_world.movers) or s.watching
+    perception, avoidance, among_movers = s.effective_perception, s.effective_avoidance, s.among_movers
     replans_there = among_movers or s.exploring
     record = DriveRecord(
         task=s.task,

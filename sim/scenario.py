@@ -354,6 +354,11 @@ class Scenario:
         return bool(self.driven_world.movers) and capabilities_of(self.planner).needs_motions
 
     @property
+    def among_movers(self) -> bool:
+        """Whether there are movers, or the robot looks for some."""
+        return bool(self.driven_world.movers) or self.watching
+
+    @property
     def watching(self) -> bool:
         """Whether the robot looks for movers with its lidar, and is told nothing of them."""
         return self.effective_perception.kind == "lidar"

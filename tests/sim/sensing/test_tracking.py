@@ -121,3 +121,35 @@ def test_the_same_scans_give_the_same_tracks(jackal: RobotSpec) -> None:
 def test_a_policy_refuses_what_finds_nothing() -> None:
     with pytest.raises(ValueError, match="gap: must be greater than 0, got 0"):
         TrackingPolicy(gap=0.0)
+
+
+def test_a_map_explains_what_stands_on_it_and_nothing_else() -> None:
+    lidar = Lidar(beams=360, field_of_view=2 * math.pi, min_range=0.1, max_range=8.0, rate=20.0, sigma=0.005, height=0.3)
+    low, tall, new = Disc(1.0, 1.0, 0.2, 0.2), Disc(2.0, 0.0, 0.3), (-1.5, -1.0, 0.25)
+    world = World("hall", BOUNDS, (low, tall))
+    scanner = Scanner(lidar, np.array([[2.0, 0.0, 0.3], new, [1.0, 1.0, 0.2]]), bounds=BOUNDS)
+    truth, believed = (0.0, 0.0, 0.0), (0.02, -0.01, 0.01)
+    ranges = scanner.scan(truth, rng=np.random.default_rng(1))
+    for pose, errors in ((truth, ()), (believed, (math.inf, 0.02, 0.01))):
+        hits = KnownGround(lidar, world, *errors).hits(pose, ranges)
+        near = np.hypot(*(hits.points - new[:2]).T) < 0.45
+        low_seen = np.hypot(*(hits.points - (1.0, 1.0)).T) < 0.35  # the lidar passes over this one, so it must be another
+        assert near.sum() > 5
+        assert np.array_equal(~hits.explained, near | low_seen)
+    short = KnownGround(lidar, world, 1.9).hits(truth, ranges)
+    assert ranges[short.beams].max() <= 1.9
+
+
+def test_what_may_move_is_no_mark_to_steer_by(jackal: RobotSpec) -> None:
+    assert jackal.lidar is not None
+    scanner, grid, tracker = Scanner(jackal.lidar, POSTS, bounds=BOUNDS), OccupancyMap(jackal.lidar), MoverTracker(jackal.lidar)
+    for k in range(76):
+        there, pose = np.array([[2.0 + 0.01 * k, 0.3]]), (0.0, 0.0, 0.0)
+        ranges = scanner.scan(pose, there, np.array([0.2]))
+        doubted = tracker.suspected(pose, ranges, k / 50)
+        points = grid.endpoints(pose, ranges)
+        on_mover, on_post = (np.hypot(*(points - at).T) < r + 0.02 for at, r in ((there[0], 0.2), (POSTS[0, :2], 0.2)))
+        assert k == 0 or doubted[on_mover].all()
+        if k in (20, 75):
+            assert doubted[on_post].all() == (k == 20)  # a post is trusted once it has been known for a second
+        grid.insert(pose, ranges, tracker.update(MappedGround(grid, 100), pose, ranges, k / 50))
