@@ -335,7 +335,7 @@ class MoverTracker:
         return float(out[0]), float(out[1])
 
     def _whole(self, cluster: Indices, view: _View) -> bool:
-        """Whether a cluster is seen from edge to edge: the beams beside it got farther."""
+        """Whether a cluster is seen from edge to edge: the beams beside it got clearly farther, so nothing goes on there."""
         beams, lidar = view.hits.beams[cluster], self._lidar
         for edge, side in ((beams[0], -1), (beams[-1], 1)):
             beside = int(edge) + side
@@ -343,7 +343,7 @@ class MoverTracker:
                 beside %= lidar.beams
             elif not 0 <= beside < lidar.beams:
                 return False
-            if view.ranges[beside] < view.ranges[edge]:
+            if view.ranges[beside] < view.ranges[edge] + self.policy.gap / 2:
                 return False
         return True
 
@@ -382,6 +382,8 @@ class MoverTracker:
 
     def _judge(self, track: _Track, cluster: Indices, view: _View, round_: bool) -> None:
         """Whether a track moves, on a map that is being made: what stood at first, or has stood for long, is part of it."""
+        if track.views < self.policy.confirmed:  # a part of something seems to move as more of it comes into sight
+            track.rested, track.anchor = view.time, (track.x, track.y)
         away = math.dist((track.x, track.y), track.anchor)
         fresh = float(np.mean(~view.hits.explained[cluster]))
         if not track.moves:
