@@ -153,3 +153,16 @@ def test_what_may_move_is_no_mark_to_steer_by(jackal: RobotSpec) -> None:
         if k in (20, 75):
             assert doubted[on_post].all() == (k == 20)  # a post is trusted once it has been known for a second
         grid.insert(pose, ranges, tracker.update(MappedGround(grid, 100), pose, ranges, k / 50))
+
+
+def test_a_pillar_that_is_passed_does_not_move(jackal: RobotSpec) -> None:
+    """Its far side comes into sight, on ground that beams have grazed."""
+    assert jackal.lidar is not None
+    pillars = np.array([[2.0, 1.0, 0.35], [2.0, -1.2, 0.35]])
+    scanner, grid, tracker = Scanner(jackal.lidar, pillars, bounds=BOUNDS), OccupancyMap(jackal.lidar), MoverTracker(jackal.lidar)
+    rng = np.random.default_rng(0)
+    for k in range(150):
+        pose = (0.03 * k - 0.5, 0.05 * math.sin(0.1 * k), 0.1 * math.cos(0.1 * k))
+        ranges = scanner.scan(pose, rng=rng)
+        grid.insert(pose, ranges, tracker.update(MappedGround(grid, 100), pose, ranges, k / 50))
+        assert not len(tracker.movers().radii), k
