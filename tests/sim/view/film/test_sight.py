@@ -116,8 +116,9 @@ def test_the_legend_names_what_is_painted(log: Rollout) -> None:
 
 def test_movers_that_are_followed_have_rings_and_nothing_else_changes(log: Rollout) -> None:
     with Shot(log, camera="top", size=SIZE, bare=True) as shot:
-        plain = shot._compositor.frame(shot.replay.pose(0.0)).astype(int)
-        ringed = shot._compositor.frame(shot.replay.pose(0.0), followed=np.array([[3.0, 2.0, 0.4, 0.0, 0.5]])).astype(int)
+        pose, movers = shot.replay.pose(0.0), np.array([[3.0, 2.0, 0.4, 0.0, 0.5]])
+        plain = shot._compositor.frame(pose).astype(int)
+        ringed = shot._compositor.frame(pose, followed=movers).astype(int)
         x, y = (np.array(shot._compositor.pixel(*at)) for at in ((3.0, 2.0), (3.55, 2.0)))
     rows, cols = np.nonzero(np.abs(ringed - plain).max(axis=-1) > 20)
     away = np.hypot(cols + 0.5 - x[0], rows + 0.5 - x[1])
