@@ -13,6 +13,7 @@ from antdrive.sim import Outcome, Perception, Rollout, Run, Scenario, run
 from antdrive.sim.driving.watching import TrackedPredictor, Watch
 from antdrive.sim.falsify.rebuild import rebuilt
 from antdrive.sim.log.certificate import certify
+from antdrive.sim.log.record import PerceptionRecord
 from antdrive.sim.sensing import KnownGround, Scanner
 from antdrive.worlds import Disc, Keyframed, Task, World
 from antdrive.worlds.errors import FieldError
@@ -74,6 +75,10 @@ def test_the_log_tells_where_the_robot_believed_movers_to_be(log: Rollout, tmp_p
     broken = dataclasses.replace(log, tracks=log.tracks[::-1].copy())
     assert any("tracks" in problem for problem in broken.problems())
     assert certify(log).certified
+    told = dataclasses.replace(log.record, perception=PerceptionRecord(kind="velocities", range_m=None))
+    flat = log.tracks * np.array([1, 1, 1, 1, 1, 1, 0], dtype=np.float32)
+    for forged in (dataclasses.replace(log, record=told), dataclasses.replace(log, tracks=flat)):
+        assert any("tracks" in problem for problem in certify(forged).problems)
 
 
 def test_a_mover_that_no_beam_meets_changes_nothing(jackal: RobotSpec, log: Rollout) -> None:
@@ -91,7 +96,8 @@ def test_a_mover_that_no_beam_meets_changes_nothing(jackal: RobotSpec, log: Roll
 
 
 def test_a_robot_without_a_map_follows_movers_too(jackal: RobotSpec) -> None:
-    done = run(scenario(jackal, map="none", localisation="matching", noise=1.0))
+    short = dataclasses.replace(TASK, start=(2.6, 2.2, 0.0), goal=(5.6, 2.2))
+    done = run(scenario(jackal, short, map="none", localisation="matching", noise=1.0, unseen=()))
     assert done.rollout is not None
     assert done.succeeded, (done.outcome, done.reason, done.certificate)
     tracks = done.rollout.tracks
