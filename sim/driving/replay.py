@@ -102,7 +102,7 @@ def replay(rollout: Rollout) -> ReplayCheck:
 def _other_senses(rollout: Rollout) -> Iterator[str]:
     """What of a log is not as the seed's noise and the lidar make it: estimates, targets of the motors, scans."""
     record = rollout.record
-    again = Rescanning(rollout) if len(rollout.scans) else None
+    again = Rescanning(rollout) if record.exploring and len(rollout.scans) else None
     if record.exploring and again is None:
         yield "replay: the log of a robot without a map has no scans"
         return

@@ -13,6 +13,7 @@ import numpy as np
 from antdrive.robots import RobotSpec
 from antdrive.sim.driving.exploring import PATIENCE
 from antdrive.sim.driving.survey import Senses, Survey
+from antdrive.sim.driving.watching import Watch
 from antdrive.sim.log.record import DriveRecord, ReplanRecord
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.scans import millimetres
@@ -30,6 +31,7 @@ def survey_of(
     seed: int,
     noisy: bool,
     matching: bool,
+    watching: bool,
     hz: int,
 ) -> Survey:
     """The survey of a robot without a map, after the first look from the start.
@@ -42,12 +44,14 @@ def survey_of(
         seed: the drive's seed
         noisy: whether ranges have noise
         matching: whether scans correct the estimated pose
+        watching: whether the robot looks for movers in the scans
         hz: control periods per second
     """
     assert robot.lidar is not None
     rng = random_stream(seed, "lidar") if noisy else None
     senses = Senses(Scanner.of(robot.lidar, world), trajectories or None, rng, hz)
-    survey = Survey(senses, robot, task.start, task.goal, matching=matching)
+    watch = Watch(robot.lidar, hz) if watching else None
+    survey = Survey(senses, robot, task.start, task.goal, matching=matching, watch=watch)
     survey.look(0, task.start, task.start)
     return survey
 
@@ -71,6 +75,7 @@ class Rescanning:
             seed=record.seed,
             noisy=record.noise > 0,
             matching=record.localisation == "matching",
+            watching=record.perception is not None and record.perception.kind == "lidar",
             hz=record.control_hz,
         )
         self._forgetting = set(forgetting_ticks(record))

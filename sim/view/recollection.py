@@ -12,6 +12,7 @@ from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.scans import ranges_of
 from antdrive.sim.log.sights import Beams, beams_of, lidar_of, meet
 from antdrive.sim.sensing.mapping import OccupancyMap
+from antdrive.sim.sensing.tracking import SKIN
 from antdrive.worlds.types import Floats, Pose
 
 
@@ -78,8 +79,19 @@ class Recollection:
         self._entered = max(self._entered, last)
 
     def _enter(self, k: int) -> None:
-        self.map.insert(self._estimate(int(self._rollout.scan_rows[k])), ranges_of(self._rollout.scans[k]))
+        row, ranges = int(self._rollout.scan_rows[k]), ranges_of(self._rollout.scans[k])
+        self.map.insert(self._estimate(row), ranges, self._of_movers(row, ranges))
         meet(self._rollout, k, self.met)
+
+    def _of_movers(self, row: int, ranges: Floats) -> npt.NDArray[np.bool_] | None:
+        """Which beams of a scan met movers that the robot followed, and left out of its map (beams,); None: no such movers."""
+        tracks = self._rollout.tracks
+        movers = tracks[slice(*np.searchsorted(tracks[:, 0], (row, row + 1)))].astype(np.float64)
+        if not len(movers):
+            return None
+        points = self.map.endpoints(self._estimate(row), ranges)
+        away = np.hypot(*(points[:, None] - movers[:, 2:4]).transpose(2, 0, 1)) - movers[:, 6]
+        return np.asarray((away <= SKIN).any(axis=1))  # not a number where a beam met nothing
 
     @property
     def beams(self) -> Beams:

@@ -56,8 +56,8 @@ Sees = Annotated[
     str,
     typer.Option(
         metavar="KIND[:METRES]",
-        help="What the robot perceives of movers: positions, velocities or motions (their whole future); "
-        "with METRES, only of movers within that range [m].",
+        help="What the robot perceives of movers: positions, velocities, motions (their whole future), or lidar: nothing but "
+        "what its lidar shows; with METRES, only of movers within that range [m].",
     ),
 ]
 Video = Annotated[Path | None, typer.Option(metavar="FILE", help="Film the drive: .mp4, .gif or .webp.")]
