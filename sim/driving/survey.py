@@ -63,6 +63,7 @@ class Survey:
     Attributes:
         map: what was hit, and which ground was seen free
         scans: all scans so far
+        whole: how many of them were entered as a whole, with the ground that is free
 
     Args:
         start: the first pose, from which odometry counts; what the robot covers when it turns there is taken for free
@@ -79,12 +80,9 @@ class Survey:
         self.map = self._empty_map(start)
         self._recent = math.ceil(RECENT * self._lidar.rate)
         self._matcher = ScanMatcher(self._lidar) if matching else None
+        self._per_tick = self._lidar.rate / senses.hz
         self.scans: list[Scan] = []
-
-    @property
-    def count(self) -> int:
-        """The number of scans so far."""
-        return len(self.scans)
+        self.whole = 0
 
     def look(self, tick: int, pose: Pose, estimate: Pose) -> Pose:
         """Take a scan if one is due in a control period; the estimated pose, which the scan may correct.
@@ -94,14 +92,15 @@ class Survey:
             pose: the robot's true pose, from which the lidar sees
             estimate: where the robot believes it is
         """
-        per_tick = self._lidar.rate / self._senses.hz
-        if self.scans and math.floor(tick * per_tick) == math.floor((tick - 1) * per_tick):
-            return estimate
-        if self.scans and tick == self.scans[-1].tick:
+        if self.scans and (
+            math.floor(tick * self._per_tick) == math.floor((tick - 1) * self._per_tick) or tick == self.scans[-1].tick
+        ):
             return estimate
         ranges = self._scan(tick, pose)
-        if self._matcher is not None:
-            estimate = self._matcher.corrected(self.map, estimate, ranges)
+        if self.map.whole:
+            self.whole += 1
+            if self._matcher is not None:
+                estimate = self._matcher.corrected(self.map, estimate, ranges)
         self.map.insert(estimate, ranges)
         self.scans.append(Scan(tick, estimate, ranges))
         return estimate
