@@ -89,6 +89,7 @@ class Survey:
     Attributes:
         map: what was hit, and which ground was seen free
         scans: all scans so far
+        whole: how many of them were entered as a whole, with the ground that is free
         watch: what follows the movers in the scans; None: nothing does
 
     Args:
@@ -118,11 +119,7 @@ class Survey:
         self._matcher = ScanMatcher(self._lidar) if matching else None
         self.watch = watch
         self.scans: list[Scan] = []
-
-    @property
-    def count(self) -> int:
-        """The number of scans so far."""
-        return len(self.scans)
+        self.whole = 0
 
     def look(self, tick: int, pose: Pose, estimate: Pose) -> Pose:
         """Take a scan if one is due in a control period; the estimated pose, which the scan may correct.
@@ -135,8 +132,10 @@ class Survey:
         if not self._senses.due(tick, self.scans[-1].tick if self.scans else -1):
             return estimate
         ranges = self._senses.ranges(tick, pose)
-        if self._matcher is not None:
-            estimate = self._matched(self._matcher, estimate, ranges, tick)
+        if self.map.whole:
+            self.whole += 1
+            if self._matcher is not None:
+                estimate = self._matched(self._matcher, estimate, ranges, tick)
         movers = self.watch.read_on_map(self.map, estimate, ranges, tick) if self.watch is not None else None
         self.map.insert(estimate, ranges, movers)
         self.scans.append(Scan(tick, estimate, ranges, movers))

@@ -44,7 +44,7 @@ class ScanMatcher:
         """
         lidar = self._lidar
         eye = np.array(lidar.pose_on(pose))
-        first = seen.scans % self._every
+        first = seen.scans // seen.share % self._every
         x, y, yaw, pairs = _kernels_matching.match(
             eye, self._beams, ranges, self._every, first, FAR, NEAR, FEWEST, seen.arrays
         )

@@ -19,7 +19,7 @@ def looked(robot: RobotSpec, world: World = WORLD) -> tuple[OccupancyMap, Floats
     assert robot.lidar is not None
     scanner, rng = Scanner.of(robot.lidar, world), np.random.default_rng(0)
     seen = OccupancyMap(robot.lidar, 0.05, POSE[:2])
-    for _ in range(4):
+    for _ in range(8):
         seen.insert(POSE, scanner.scan(POSE, rng=rng))
     return seen, scanner.scan(POSE, rng=rng)
 
