@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import os
 import shlex
 import tempfile
@@ -55,7 +56,7 @@ class CheckResult:
         commands: how to repeat the test
         files: what was written about it, by name
         unfilmed: whether it failed and has no film, because the run has made `MOST_FILMS` already
-        metrics: the drive's metrics; empty if the robot did not drive
+        metrics: the drive's metrics, as far as it has them; empty if the robot did not drive
         digest: `Rollout.drive_digest`; empty if the robot did not drive
         wall_s: how long the test took [s]
     """
@@ -279,7 +280,7 @@ def check_run(
         commands=commands,
         files=files,
         unfilmed=unfilmed,
-        metrics=run.metrics if run.rollout is not None else {},
+        metrics={name: x for name, x in run.metrics.items() if not math.isnan(x)} if run.rollout is not None else {},
         digest=run.rollout.drive_digest if run.rollout is not None else "",
         wall_s=_wall(run) + time.perf_counter() - started,
     )
