@@ -49,9 +49,20 @@ test: $(VENV)/.dev $(VENV)/.warm
 test-slow: $(VENV)/.dev $(VENV)/.warm
 	@$(BIN)/python -m pytest --numprocesses 2 --dist loadgroup -m ''
 
-docs: $(VENV)/.docs $(VENV)/.warm
+# The code of the tutorials and of the gallery runs again when the packages change.
+SOURCES := $(wildcard */*.py */*/*.py */*/*/*.py */*/*/*/*.py)
+
+docs/_build/.tutorials: $(VENV)/.docs $(VENV)/.warm $(SOURCES) $(wildcard docs/tutorials/*.md)
+	@$(BIN)/python -m tools.pages docs/tutorials/*.md
+	@mkdir -p docs/_build && touch $@
+
+docs/_build/.gallery: $(VENV)/.docs $(VENV)/.warm $(SOURCES)
+	@rm -rf docs/_gallery
+	@mkdir -p docs/_build && touch $@
+
+docs: docs/_build/.tutorials docs/_build/.gallery
 	@$(BIN)/python -m sphinx --builder html --fail-on-warning --keep-going --nitpicky --quiet -d docs/_build/doctrees docs docs/_build/html
-	@echo "docs/_build/html/index.html"
+	@$(BIN)/python -m tools.site docs/_build/html
 
 lint: $(VENV)/.dev
 	@$(BIN)/ruff check .

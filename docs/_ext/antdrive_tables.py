@@ -91,9 +91,10 @@ def parts_of(schema: Mapping[str, Any]) -> Iterable[tuple[str, Mapping[str, Any]
                 yield key, part
 
 
-def table(heads: Row, rows: Iterable[Row]) -> list[str]:
+def table(heads: Row, rows: Iterable[Row], widths: tuple[int, ...] = ()) -> list[str]:
     """A table as reST."""
-    lines = [".. list-table::", "   :header-rows: 1", ""]
+    widened = [f"   :widths: {' '.join(map(str, widths))}"] if widths else []
+    lines = [".. list-table::", "   :header-rows: 1", *widened, ""]
     for row in (heads, *rows):
         lines += [f"   {'*' if i == 0 else ' '} - {cell}" for i, cell in enumerate(row)]
     return [*lines, ""]
