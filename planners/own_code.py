@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
+import contextlib
+import difflib
 import functools
 import hashlib
 import importlib
 import importlib.machinery
 import importlib.util
+import inspect
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any
 
-from antdrive.worlds import InputError
+from antdrive.worlds.errors import InputError, input_error
 
 DIGITS = 8  # hexadecimal digits of a file's hash
+FROM_FILE = "_antdrive_own_"  # what the names of modules begin with that were loaded from a file
+
+#: The folder that each module was imported for and lies in, by the module's name.
+_OWNERS: dict[str, Path] = {}
+#: Modules whose names another folder's modules have at present.
+_ASIDE: dict[Path, dict[str, ModuleType]] = {}
 
 
 def is_own(name: str) -> bool:
@@ -35,6 +45,22 @@ def record_name(name: str) -> str:
     return name.rpartition(":")[2]
 
 
+class OwnCodeError(InputError):
+    """A file or module of people's own is not there, cannot be imported, or lacks the class.
+
+    Attributes:
+        problem: what is wrong, on one line
+        of_class: whether the file or module is there and lacks the class
+    """
+
+    def __init__(self, problem: str, of_class: bool = False) -> None:
+        super().__init__(str(input_error(problem)), of_class)
+        self.problem, self.of_class = str(self.args[0]), of_class
+
+    def __str__(self) -> str:
+        return f"planner: {self.problem}"
+
+
 def own_object(name: str) -> Any:
     """What a file or module of people's own calls by the name behind the last colon.
 
@@ -45,22 +71,45 @@ def own_object(name: str) -> Any:
         InputError: there is no such file, module or class, or it cannot be imported.
     """
     source, _, word = name.rpartition(":")
+    return object_in(source, word, is_file=source.endswith(".py"))
+
+
+def object_in(source: str, word: str, folder: Path | None = None, *, is_file: bool) -> Any:
+    """What a file or module of people's own calls by a name.
+
+    A file is read again when its content has changed. Folders may have modules of the same name.
+
+    Args:
+        source: the file or module
+        word: the name in it
+        folder: what the file is relative to, and where modules are looked for as well; None: the working directory
+        is_file: whether the source is a file, not a module
+
+    Raises:
+        OwnCodeError: there is no such file, module or name, or it cannot be imported.
+    """
     try:
-        module = _from_file(Path(source)) if source.endswith(".py") else _from_module(source)
+        module = _from_file(source, folder) if is_file else _from_module(source, folder)
     except InputError:
         raise
     except SystemExit as error:
-        raise InputError(
-            f"planner: {source}: ends the program while it is imported (exit code {error.code}); guard what it runs "
-            'with if __name__ == "__main__"'
-        ) from error
+        problem = f"{source}: ends the program while it is imported (exit code {error.code}); guard what it runs"
+        raise OwnCodeError(f'{problem} with if __name__ == "__main__"') from error
     except Exception as error:  # people's own code may raise anything while it is imported
-        problem = f"cannot be imported ({type(error).__name__}: {error})"
-        raise InputError(f"planner: {source}: {problem}") from error
+        raise OwnCodeError(f"{source}: cannot be imported ({type(error).__name__}: {error})") from error
     if not word or not hasattr(module, word):
-        names = ", ".join(one for one in vars(module) if not one.startswith("_")) or "nothing"
-        raise InputError(f"planner: {source} has no {word!r}; it has {names}")
+        raise OwnCodeError(f"{source} has no {word!r}; {_choices(module, word)}", of_class=True)
     return getattr(module, word)
+
+
+def is_importable_elsewhere(planner: object) -> bool:
+    """Whether other processes can import a planner's class; those of files and modules beside a suite only this one can.
+
+    Args:
+        planner: the planner
+    """
+    home = type(planner).__module__
+    return not home.startswith(FROM_FILE) and home not in _OWNERS
 
 
 def own_version(name: str) -> str:
@@ -96,18 +145,36 @@ def _content(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except FileNotFoundError:
-        raise InputError(f"planner: {path}: no such file") from None
+        raise OwnCodeError(f"{path}: no such file") from None
     except OSError as error:
-        raise InputError(f"planner: {path}: cannot be read ({error.strerror})") from None
+        raise OwnCodeError(f"{path}: cannot be read ({error.strerror})") from None
 
 
-def _from_module(name: str) -> ModuleType:
-    if str(Path.cwd()) not in sys.path and "" not in sys.path:  # a command's path begins with its own folder
-        sys.path.append(str(Path.cwd()))
-    return importlib.import_module(name)
+def _choices(module: ModuleType, word: str) -> str:
+    """A hint at what could be meant by a name that a module lacks: its planners, or all that it has."""
+    known = {name: value for name, value in vars(module).items() if not name.startswith("_")}
+    planners = [name for name, value in known.items() if inspect.getattr_static(value, "plan", None) is not None]
+    close = difflib.get_close_matches(word, planners or known, n=1)
+    return f"did you mean {close[0]}?" if close else f"it has {', '.join(planners or known) or 'nothing'}"
 
 
-def _from_file(path: Path) -> ModuleType:
+def _from_module(name: str, folder: Path | None) -> ModuleType:
+    """A module that can be imported, or one in the working directory or a folder."""
+    if folder is None and str(Path.cwd()) not in sys.path and "" not in sys.path:
+        sys.path.append(str(Path.cwd()))  # for good: other processes are given this path; a command's begins elsewhere
+    home, top = (folder or Path()).resolve(), name.partition(".")[0]
+    with _importing_for(home, owned=folder is not None):
+        module = importlib.import_module(name)
+    own, taken = _module_in(home, top), getattr(sys.modules.get(top), "__file__", None)
+    if own is not None and taken is not None and Path(taken).resolve() != own:
+        where = "beside the suite" if folder is not None else "in the working directory"
+        problem = f"{top} is imported from {taken}, and there is one {where}"
+        raise OwnCodeError(f"{problem}; give it another name, or name its file")
+    return module
+
+
+def _from_file(source: str, folder: Path | None) -> ModuleType:
+    path = (folder or Path()) / source
     return _loaded(path.resolve(), _hash(_content(path)))
 
 
@@ -142,13 +209,52 @@ def from_source(name: str, path: Path) -> ModuleType:
 @functools.lru_cache(maxsize=64)
 def _loaded(path: Path, content: str) -> ModuleType:
     """A file's module, loaded once per process and content of the file. It may import modules beside it."""
-    name = f"_antdrive_own_{path.stem}_{abs(hash((path, content))):x}"
-    beside = str(path.parent)
-    added = beside not in sys.path
-    if added:
-        sys.path.append(beside)
-    try:
+    name = f"{FROM_FILE}{path.stem}_{abs(hash((path, content))):x}"
+    with _importing_for(path.parent, owned=True):
         return from_source(name, path)
+
+
+@contextlib.contextmanager
+def _importing_for(folder: Path, *, owned: bool) -> Iterator[None]:
+    """A context in which modules are also looked for in the working directory and a folder, after all others.
+
+    Modules of other folders are set aside where this folder has one of the same name.
+
+    Args:
+        folder: the folder
+        owned: whether what is imported from the folder meanwhile is for it alone
+    """
+    for name, owner in list(_OWNERS.items()):
+        if owner != folder and _module_in(folder, name.partition(".")[0]) is not None:
+            del _OWNERS[name]
+            if name in sys.modules:
+                _ASIDE.setdefault(owner, {})[name] = sys.modules.pop(name)
+    for name, module in _ASIDE.pop(folder, {}).items():
+        sys.modules[name], _OWNERS[name] = module, folder
+    before = set(sys.modules)
+    try:
+        with _looking_in(Path.cwd(), folder):
+            yield
     finally:
-        if added:
-            sys.path.remove(beside)
+        for name in set(sys.modules) - before if owned else ():
+            file = getattr(sys.modules[name], "__file__", None)
+            if file is not None and not name.startswith(FROM_FILE) and Path(file).resolve().is_relative_to(folder):
+                _OWNERS[name] = folder
+
+
+def _module_in(folder: Path, name: str) -> Path | None:
+    """The file of a module or package in a folder; None if there is none."""
+    found = importlib.machinery.PathFinder.find_spec(name, [str(folder)])
+    return Path(found.origin).resolve() if found is not None and found.origin is not None else None
+
+
+@contextlib.contextmanager
+def _looking_in(*folders: Path) -> Iterator[None]:
+    """A context in which modules are also looked for in some folders, after all others."""
+    added = [text for text in dict.fromkeys(map(str, folders)) if text not in sys.path]
+    sys.path.extend(added)
+    try:
+        yield
+    finally:
+        for text in added:
+            sys.path.remove(text)

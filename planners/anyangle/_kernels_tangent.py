@@ -18,6 +18,7 @@ EPS = 5e-10  # m: a gap no wider than this is closed; a line may enter a disc by
 TURN = 2.0 * math.pi
 ANGLE = 1e-9  # rad: an angle this close to the end of a free arc does not lie on the arc
 BACK = 1e-7  # rad: going backwards along a rim by less than this is rounding and counts as no length
+SECTORS = 512  # of directions, for each of which a disc is remembered that was in the way
 SAME = 1e-12  # m: lengths that differ by less are equal
 
 
@@ -28,11 +29,27 @@ class Rims(NamedTuple):
         first: disc i has the arcs first[i] to first[i + 1] (N + 1,)
         begin: the angle at which each arc begins (A,)
         width: the angle that each arc covers, 2 pi where the whole rim is free (A,)
+        ends: cosine and sine of the angle at which each arc begins, and of that at which it ends (A, 4)
     """
 
     first: Array
     begin: Array
     width: Array
+    ends: Array
+
+
+class Sweep(NamedTuple):
+    """The discs from left to right, in which those near a place are a slice.
+
+    Attributes:
+        order: the discs by x (N,)
+        x: the x of each, ascending [m] (N,)
+        widest: the largest radius [m]
+    """
+
+    order: Array
+    x: Array
+    widest: float
 
 
 class Bins(NamedTuple):
@@ -60,6 +77,7 @@ class Obstacles(NamedTuple):
         rims: the free arcs of the discs
         bins: the discs by place
         gates: segments between discs or walls that just touch, which no path crosses [m] (G, 4)
+        goals: -1 for the goal, then the discs that a path may touch
     """
 
     discs: Array
@@ -67,6 +85,7 @@ class Obstacles(NamedTuple):
     rims: Rims
     bins: Bins
     gates: Array
+    goals: Array
 
 
 class Lines(NamedTuple):
@@ -121,16 +140,38 @@ def wrapped(angle: float) -> float:
 
 
 @kernel
+def swept(discs: Array) -> Sweep:
+    """The discs from left to right."""
+    order = np.argsort(discs[:, 0])
+    x = np.empty(len(order), dtype=np.float64)
+    widest = 0.0
+    for p in range(len(order)):
+        x[p] = discs[order[p], 0]
+        widest = max(widest, discs[p, 2])
+    return Sweep(order, x, widest)
+
+
+@inline
+def slice_near(sweep: Sweep, x: float, reach: float) -> tuple[int, int]:
+    """Where in `Sweep.order` the discs begin and end that may come within `reach` of a point with this x."""
+    apart = reach + sweep.widest + 1e-6
+    return int(np.searchsorted(sweep.x, x - apart)), int(np.searchsorted(sweep.x, x + apart, side="right"))
+
+
+@kernel
 def keep_outer(discs: Array, bounds: Array) -> Array:
     """Which discs (N, 3) have a rim that is at least partly outside all other discs and inside the bounds."""
     n = discs.shape[0]
+    sweep = swept(discs)
     keep = np.ones(n, dtype=np.bool_)
     for i in range(n):
         x, y, r = discs[i, 0], discs[i, 1], discs[i, 2]
         if x + r <= bounds[0] or x - r >= bounds[2] or y + r <= bounds[1] or y - r >= bounds[3]:
             keep[i] = False
             continue
-        for j in range(n):
+        left, right = slice_near(sweep, x, r)
+        for p in range(left, right):
+            j = sweep.order[p]
             if j == i or not keep[j]:
                 continue
             room = discs[j, 2] - r
@@ -155,13 +196,16 @@ def free_arcs(discs: Array, bounds: Array) -> Rims:
     low = np.empty(2 * (n + 5), dtype=np.float64)
     high = np.empty(2 * (n + 5), dtype=np.float64)
     order = np.empty(2 * (n + 5), dtype=np.int64)
+    sweep = swept(discs)
     size = 0
     for i in range(n):
         x, y, r = discs[i, 0], discs[i, 1], discs[i, 2]
         m = 0
         gone = False
-        for j in range(n + 4):
-            if j < n:  # another disc
+        left, right = slice_near(sweep, x, r)
+        for p in range(left, right + 4):
+            if p < right:  # another disc
+                j = sweep.order[p]
                 if j == i:
                     continue
                 dx, dy, s = discs[j, 0] - x, discs[j, 1] - y, discs[j, 2]
@@ -172,7 +216,7 @@ def free_arcs(discs: Array, bounds: Array) -> Rims:
                 middle = math.atan2(dy, dx)
                 cosine = (r * r + d2 - s * s) / (2.0 * r * d) if d > 0.0 else 2.0
             else:  # a wall: right, upper, left, lower
-                k = j - n
+                k = p - right
                 if k == 0:
                     d = bounds[2] - x
                 elif k == 1:
@@ -214,17 +258,21 @@ def free_arcs(discs: Array, bounds: Array) -> Rims:
         # The gap that contains the angle 0 comes last.
         reach = high[order[0]]
         for q in range(1, m):
-            p = order[q]
-            if low[p] > reach + 2.0 * ANGLE:
-                begin[size], width[size] = reach, low[p] - reach
+            here = order[q]
+            if low[here] > reach + 2.0 * ANGLE:
+                begin[size], width[size] = reach, low[here] - reach
                 size += 1
-            reach = max(reach, high[p])
+            reach = max(reach, high[here])
         rest = min(low[order[0]] + TURN - reach, TURN - ANGLE)  # less than a full rim, as one contact cuts it
         if rest > 2.0 * ANGLE:
             begin[size], width[size] = wrapped(reach), rest
             size += 1
     first[n] = size
-    return Rims(first, begin[:size], width[:size])
+    ends = np.empty((size, 4), dtype=np.float64)
+    for a in range(size):
+        ends[a, 0], ends[a, 1] = math.cos(begin[a]), math.sin(begin[a])
+        ends[a, 2], ends[a, 3] = math.cos(begin[a] + width[a]), math.sin(begin[a] + width[a])
+    return Rims(first, begin[:size], width[:size], ends)
 
 
 @inline
@@ -239,6 +287,28 @@ def arc_at(first: Array, begin: Array, width: Array, i: int, angle: float) -> in
             if past > ANGLE and past < width[a] - ANGLE:
                 found = a
     return found
+
+
+@kernel
+def misses(rims: Rims, i: int, turn: int, dx: float, dy: float, across: float) -> bool:
+    """Whether the tangent in direction of (dx, dy) surely touches disc i, with this turn, on no free arc; without an angle.
+
+    A line that leaves a disc and touches it at the angle `a` passes the other disc at the distance
+    turn * (cos a * dx + sin a * dy) + across beside where it should. Over an arc that holds the tangent, this distance
+    changes from negative to positive, if the arc is no wider than 120 degrees and the tangent no more than 30 degrees off
+    the direction of (dx, dy). For other arcs and tangents the answer is no.
+    """
+    if 4.0 * across * across > dx * dx + dy * dy:
+        return False
+    slack = 1e-9 * (abs(dx) + abs(dy))
+    for a in range(rims.first[i], rims.first[i + 1]):
+        if rims.width[a] > 2.0:
+            return False
+        begins = turn * (rims.ends[a, 0] * dx + rims.ends[a, 1] * dy) + across
+        ends = turn * (rims.ends[a, 2] * dx + rims.ends[a, 3] * dy) + across
+        if begins <= slack and ends >= -slack:
+            return False
+    return True
 
 
 @inline
@@ -259,18 +329,23 @@ def gates(discs: Array, bounds: Array) -> Array:
     """The segments (G, 4) between discs, or between a disc and a wall, that just touch: no path crosses them."""
     n = discs.shape[0]
     out = np.empty((16, 4), dtype=np.float64)
+    sweep = swept(discs)
     size = 0
     for i in range(n):
         x, y, r = discs[i, 0], discs[i, 1], discs[i, 2]
-        for j in range(i + 1, n + 4):
-            if j < n:
+        left, right = slice_near(sweep, x, r)
+        for p in range(left, right + 4):
+            if p < right:
+                j = sweep.order[p]
+                if j <= i:
+                    continue
                 bx, by = discs[j, 0], discs[j, 1]
                 gap = abs(bx - x) + abs(by - y)
                 if gap < r + discs[j, 2] - 4.0 * EPS or gap > 1.5 * (r + discs[j, 2]) + 1e-6:
                     continue
                 gap = math.hypot(bx - x, by - y) - r - discs[j, 2]
             else:
-                k = j - n
+                k = p - right
                 bx, by = x, y
                 if k == 0:
                     bx = bounds[2] + 1.0
@@ -334,11 +409,18 @@ def bins(discs: Array, bounds: Array) -> Bins:
     return Bins(start, items, shape, cell)
 
 
+@inline
+def enters(discs: Array, k: int, ax: float, ay: float, bx: float, by: float) -> bool:
+    """Whether the segment ab enters disc k."""
+    r = discs[k, 2] - EPS
+    return bool(r > 0.0 and segment_distance2(discs[k, 0], discs[k, 1], ax, ay, bx, by) < r * r)
+
+
 @kernel
-def visible(
+def blocked_by(
     ax: float, ay: float, bx: float, by: float, i: int, j: int, discs: Array, bounds: Array, grid: Bins, gates: Array
-) -> bool:
-    """Whether the segment ab enters no disc but i and j, to which it is tangent, and crosses no gate."""
+) -> int:
+    """A disc that the segment ab enters, other than i and j, to which it is tangent; -2 if it crosses a gate, or -1."""
     start, items, bin_side = grid.start, grid.items, grid.side
     rows, cols = grid.shape[0], grid.shape[1]
     px, py = (ax - bounds[0]) / bin_side, (ay - bounds[1]) / bin_side
@@ -358,12 +440,9 @@ def visible(
     while True:
         b = row * cols + col
         for q in range(start[b], start[b + 1]):
-            k = items[q]
-            if k in (i, j):
-                continue
-            r = discs[k, 2] - EPS
-            if r > 0.0 and segment_distance2(discs[k, 0], discs[k, 1], ax, ay, bx, by) < r * r:
-                return False
+            k = int(items[q])
+            if k not in (i, j) and enters(discs, k, ax, ay, bx, by):
+                return k
         if todo == 0:
             break
         todo -= 1
@@ -377,8 +456,8 @@ def visible(
         gx, gy, hx, hy = gates[g, 0], gates[g, 1], gates[g, 2], gates[g, 3]
         apart = side(gx, gy, hx, hy, ax, ay) * side(gx, gy, hx, hy, bx, by) < 0.0
         if apart and side(ax, ay, bx, by, gx, gy) * side(ax, ay, bx, by, hx, hy) <= 0.0:
-            return False
-    return True
+            return -2
+    return -1
 
 
 @kernel
@@ -453,20 +532,40 @@ def doubled_lines(lines: Lines) -> Lines:
     )
 
 
+@inline
+def least_by(ends: Array, least: float, ax: float, ay: float, bx: float, by: float, length: float) -> float:
+    """A length that every path still to be found which takes the line from a to b exceeds.
+
+    The way to `a` is no shorter than the straight line from the start. It is no shorter, too, than `least` without the
+    straight line from `a` to the goal: A* finds the ways in the order of their length with that line added.
+    """
+    to_a = math.hypot(ax - ends[0, 0], ay - ends[0, 1])
+    to_a = max(to_a, least - math.hypot(ends[1, 0] - ax, ends[1, 1] - ay))
+    return to_a + length + math.hypot(ends[1, 0] - bx, ends[1, 1] - by)
+
+
 @kernel
-def add_tangents(obstacles: Obstacles, ends: Array, line: int, lines: Lines, count: int) -> tuple[int, int]:
+def add_tangents(
+    obstacles: Obstacles, ends: Array, line: int, lines: Lines, count: int, limit: float
+) -> tuple[int, int]:
     """Add the tangents that leave the disc and turn which `line` reaches; for -1, those from the start.
 
-    There are 2 N + 1 at most, one to the goal and two to each disc; `lines` has room for them. Returns the
-    number of lines in the table, and the number of lines that were checked against the other discs.
+    There are 2 N + 1 at most, one to the goal and two to each disc; `lines` has room for them. Tangents that are no part of
+    a path of at most `limit` are left out, those of which it is sure. Returns the number of lines in the table, and the
+    number of lines that were checked against the other discs.
     """
     discs, bounds, grid, gates, checked = obstacles.discs, obstacles.bounds, obstacles.bins, obstacles.gates, 0
-    first, begin, width = obstacles.rims.first, obstacles.rims.begin, obstacles.rims.width
+    rims = obstacles.rims
+    first, begin, width = rims.first, rims.begin, rims.width
+    blockers = np.full(SECTORS, -1, dtype=np.int64)
     i, s, x, y, r = -1, 1, ends[0, 0], ends[0, 1], 0.0
+    least = math.hypot(ends[1, 0] - x, ends[1, 1] - y)  # the length of every path that is still to be found
     if line >= 0:
         i, s = lines.disc[line], lines.turn[line]
         x, y, r = discs[i, 0], discs[i, 1], discs[i, 2]
-    for j in range(-1, discs.shape[0]):
+        seg = lines.segment[line]
+        least = lines.best[line] + math.hypot(ends[1, 0] - seg[2], ends[1, 1] - seg[3])
+    for j in obstacles.goals:
         if j == i and j >= 0:
             continue
         for side_of_disc in range(2 if j >= 0 else 1):
@@ -475,8 +574,10 @@ def add_tangents(obstacles: Obstacles, ends: Array, line: int, lines: Lines, cou
                 dx, dy, q = ends[1, 0] - x, ends[1, 1] - y, 0.0
             else:
                 dx, dy, q = discs[j, 0] - x, discs[j, 1] - y, discs[j, 2]
-            d = math.hypot(dx, dy)
             across = t * q - s * r
+            if (i >= 0 and misses(rims, i, s, dx, dy, across)) or (j >= 0 and misses(rims, j, t, dx, dy, across)):
+                continue
+            d = math.hypot(dx, dy)
             if abs(across) > d + 4.0 * EPS:
                 continue
             sine = min(1.0, max(-1.0, across / d)) if d > 0.0 else 0.0
@@ -495,11 +596,19 @@ def add_tangents(obstacles: Obstacles, ends: Array, line: int, lines: Lines, cou
                 if arc < 0:
                     continue
                 bx, by = discs[j, 0] + q * math.cos(reach), discs[j, 1] + q * math.sin(reach)
-            checked += 1
-            if not visible(ax, ay, bx, by, i, j, discs, bounds, grid, gates):
+            length = math.sqrt(max(0.0, d * d - across * across))
+            if limit < np.inf and least_by(ends, least, ax, ay, bx, by, length) > limit:
                 continue
-            lines.leave[count], lines.reach[count] = leave, reach
-            lines.length[count] = math.sqrt(max(0.0, d * d - across * across))
+            checked += 1
+            sector = min(int(wrapped(heading) * (SECTORS / TURN)), SECTORS - 1)
+            k = blockers[sector]  # what was in the way of another line in this direction often is again
+            if k >= 0 and k not in (i, j) and enters(discs, k, ax, ay, bx, by):
+                continue
+            k = blocked_by(ax, ay, bx, by, i, j, discs, bounds, grid, gates)
+            if k != -1:
+                blockers[sector] = k
+                continue
+            lines.leave[count], lines.reach[count], lines.length[count] = leave, reach, length
             lines.segment[count, 0], lines.segment[count, 1] = ax, ay
             lines.segment[count, 2], lines.segment[count, 3] = bx, by
             lines.from_arc[count], lines.arc[count] = from_arc, arc
@@ -588,18 +697,36 @@ def way_to(line: int, lines: Lines) -> Array:
 
 
 @kernel
-def shortest_path(discs: Array, bounds: Array, ends: Array) -> tuple[Array, float, int]:
+def touchable(discs: Array, rims: Rims, ends: Array, limit: float) -> Array:
+    """-1 for the goal, then the discs with a free arc that a path of at most `limit` from ends[0] to ends[1] may touch."""
+    found = np.empty(len(discs) + 1, dtype=np.int64)
+    found[0], size = -1, 1
+    for i in range(len(discs)):
+        least = -2.0 * discs[i, 2]
+        for end in range(2):
+            least += math.hypot(discs[i, 0] - ends[end, 0], discs[i, 1] - ends[end, 1])
+        if rims.first[i] < rims.first[i + 1] and least <= limit:
+            found[size] = i
+            size += 1
+    return found[:size]
+
+
+@kernel
+def shortest_path(discs: Array, bounds: Array, ends: Array, limit: float) -> tuple[Array, float, int]:
     """The shortest path from point ends[0] to ends[1]: its lines (L, 6), its length, how many lines were checked.
 
     `discs` are inflated, `bounds` shrunk; none of the discs lies within another (`keep_outer`). A line is x,
     y where it begins, x, y where it ends, and the disc that it reaches with the turn (1 left, -1 right)
-    around it; the disc is -1 at the goal. There is no path if there are no lines.
+    around it; the disc is -1 at the goal. There is no path of at most `limit` if there are no lines; a limit that is little
+    more than the length of the path saves most of the search.
 
     A* over the tangents between discs. The tangents from a disc are found when the search first reaches that
     disc and turn; every line that arrives there tries all that leave the same free arc ahead of it.
     """
     n = discs.shape[0]
-    obstacles = Obstacles(discs, bounds, free_arcs(discs, bounds), bins(discs, bounds), gates(discs, bounds))
+    rims = free_arcs(discs, bounds)
+    near = touchable(discs, rims, ends, limit)
+    obstacles = Obstacles(discs, bounds, rims, bins(discs, bounds), gates(discs, bounds), near)
     lines = empty_lines(max(256, 2 * n + 1))
     span = np.full((2 * n + 1, 2), -1, dtype=np.int64)  # the lines that leave each disc by turn, the start last
     latest = np.full(2 * len(obstacles.rims.begin), -1, dtype=np.int64)
@@ -611,7 +738,7 @@ def shortest_path(discs: Array, bounds: Array, ends: Array) -> tuple[Array, floa
             if count + 2 * n + 1 > len(lines.leave):
                 lines = doubled_lines(lines)
             span[source, 0] = count
-            count, more = add_tangents(obstacles, ends, line, lines, count)
+            count, more = add_tangents(obstacles, ends, line, lines, count, limit)
             span[source, 1] = count
             checked += more
         first, last = span[source, 0], span[source, 1]

@@ -15,10 +15,13 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.planners.anyangle.lines import RouteEnds, cells_along, cells_under, route_ends
+from antdrive.planners.graph.search import AStar
 from antdrive.planners.iterative import require
 from antdrive.planners.plan import Capabilities, GridPlanner, PlanResult, PlanStatus, Query, path_cost
 from antdrive.worlds import Bounds, Floats, InputError, Point, Task
 
+#: Among more discs than this, a path on the grid bounds the search first; among fewer the bound would not pay.
+MANY_DISCS = 1000
 NO_GAP = "discs and walls leave no way from the start to the goal for this clearance"
 
 
@@ -112,18 +115,30 @@ class TangentPath:
         return np.array(points)
 
 
-def shortest(discs: npt.ArrayLike, bounds: Bounds, inflate: float, start: Point, goal: Point) -> TangentPath | None:
+def shortest(
+    discs: npt.ArrayLike, bounds: Bounds, inflate: float, start: Point, goal: Point, *, expected: float = math.inf
+) -> TangentPath | None:
     """The shortest path that stays `inflate` [m] from all discs (N, 3: x, y, radius) and inside the bounds.
 
     None if there is no such path. Contact closes a gap: nothing passes between two discs exactly 2 `inflate`
     apart, or between such a disc and a wall. Both ends must have the clearance; having just the clearance
     suffices.
+
+    Args:
+        discs: x, y, radius of each [m] (N, 3)
+        bounds: the walls [m]
+        inflate: the clearance [m]
+        start: the path's first point [m]
+        goal: its last point [m]
+        expected: a length that the path probably does not exceed [m], which makes the search faster; a path that does is
+            found, too
     """
     from antdrive.planners.anyangle import _kernels_tangent
 
     inflated = np.array(discs, dtype=np.float64).reshape(-1, 3)
     inflated[:, 2] += inflate
-    box = np.array([bounds[0] + inflate, bounds[1] + inflate, bounds[2] - inflate, bounds[3] - inflate])
+    xmin, ymin, xmax, ymax = map(float, bounds)  # whole numbers would compile every kernel again
+    box = np.array([xmin + inflate, ymin + inflate, xmax - inflate, ymax - inflate])
     if not (box[0] <= box[2] and box[1] <= box[3]):
         return None
     both = np.array([start, goal], dtype=np.float64)
@@ -132,7 +147,12 @@ def shortest(discs: npt.ArrayLike, bounds: Bounds, inflate: float, start: Point,
         if min(x - box[0], y - box[1], box[2] - x, box[3] - y, *rim) < -_kernels_tangent.EPS:
             return None
     inflated = np.ascontiguousarray(inflated[_kernels_tangent.keep_outer(inflated, box)])
-    way, _, checked = _kernels_tangent.shortest_path(inflated, box, both)
+    way, checked = np.empty((0, 6)), 0
+    for limit in dict.fromkeys((expected, math.inf)):
+        way, _, more = _kernels_tangent.shortest_path(inflated, box, both, limit)
+        checked += more
+        if len(way):
+            break
     if not len(way):
         return None
     pieces = _pieces(way, inflated) or [Line(start, goal)]  # the ends may be one point
@@ -176,7 +196,10 @@ class Tangent(GridPlanner):
         grid, world = query.grid, query.task.world
         ends = route_ends(query, touching=True)
         reason = _unusable_ends(query, query.task, ends)
-        found = None if reason else shortest(world.discs, world.bounds, grid.inflate, ends.start, ends.goal)
+        found = None
+        if not reason:
+            most = _expected(query, ends, rng) if len(world.discs) > MANY_DISCS else math.inf
+            found = shortest(world.discs, world.bounds, grid.inflate, ends.start, ends.goal, expected=most)
         if found is None:
             return PlanResult(status=PlanStatus.NO_PATH, reason=reason or NO_GAP, work_unit=WORK_UNIT)
         xy = ends.with_leads(found.polyline(self.bulge, world.discs, world.bounds, grid.inflate))
@@ -197,6 +220,15 @@ class Tangent(GridPlanner):
 
 
 WORK_UNIT = "tangents checked"
+
+
+def _expected(query: Query, ends: RouteEnds, rng: np.random.Generator) -> float:
+    """The length of the shortest path on the grid, with the ways to its ends [m]; infinite if there is none."""
+    answer = AStar().plan(query, rng)
+    if not answer.solved:
+        return math.inf
+    first, last = query.grid.xy(answer.cells[[0, -1]])
+    return answer.cost + math.dist(first, ends.start) + math.dist(last, ends.goal) + 1e-6
 
 
 def _unusable_ends(query: Query, task: Task, ends: RouteEnds) -> str:

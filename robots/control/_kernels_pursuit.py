@@ -301,17 +301,24 @@ def speed_limit(
 def clear_turn(
     x: float, y: float, yaw: float, bearing: float, distance: float, discs: Array, bounds: Array, tuning: PursuitTuning
 ) -> float:
-    """By how much to turn on the spot towards a bearing; 0 where the footprint would touch something on the way.
+    """By how much to turn on the spot towards a bearing; 0 where the footprint would touch something either way round.
 
     `distance` is that from the centre to the nearest obstacle: one that is farther than the circumscribed radius is in no
-    turn's way, and one that is nearer is in the way of the longer turn, too, which leads two corners past it.
+    turn's way, and one that is nearer is in the way of a centred rectangle's longer turn, too, which leads two corners past
+    it. A polygon with one far corner may still get by the longer way round.
     """
     hx, hy, rounding, corners = tuning.half_length, tuning.half_width, tuning.rounding, tuning.corners
     if distance > tuning.robot_radius or (hx == 0.0 and hy == 0.0 and corners.shape[0] == 0):
         return bearing
     now = turn_clearance(x, y, yaw, 0.0, hx, hy, rounding, corners, discs, bounds)
     least = min(TURN_CLEARANCE, now - START_TOLERANCE)
-    return bearing if turn_clearance(x, y, yaw, bearing, hx, hy, rounding, corners, discs, bounds) >= least else 0.0
+    if turn_clearance(x, y, yaw, bearing, hx, hy, rounding, corners, discs, bounds) >= least:
+        return bearing
+    if corners.shape[0] > 0:
+        longer = bearing - math.copysign(2.0 * math.pi, bearing)
+        if turn_clearance(x, y, yaw, longer, hx, hy, rounding, corners, discs, bounds) >= least:
+            return longer
+    return 0.0
 
 
 @kernel

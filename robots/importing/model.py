@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -158,7 +159,7 @@ def _root_element(path: Path) -> ET.Element:
     try:
         text = xacrodoc.XacroDoc.from_file(str(path)).to_urdf_string()
     except Exception as error:  # xacro raises whatever its expressions raise
-        raise input_error(str(path), f"xacro cannot expand it: {error or type(error).__name__}") from None
+        raise input_error(str(path), f"xacro cannot expand it: {_in_one_line(error)}") from None
     with tempfile.TemporaryDirectory() as folder:
         expanded = Path(folder) / f"{path.stem}.urdf"
         expanded.write_text(text, encoding="utf-8")
@@ -166,6 +167,14 @@ def _root_element(path: Path) -> ET.Element:
             return parse_xml(expanded)
         except InputError as error:
             raise InputError(str(error).replace(str(expanded), str(path))) from None
+
+
+def _in_one_line(error: Exception) -> str:
+    """What xacro says, without the class and the repetition that it begins with, and without line breaks, real or spelt out."""
+    text = " ".join(str(error).replace("\\n", " ").split()) or type(error).__name__
+    text = re.sub(r"^<class '[^']*'>: ", "", text)
+    half = len(text) // 2
+    return text[:half] if text[:half] == text[half + 1 :] else text
 
 
 def _named(path: Path, element: ET.Element) -> str:

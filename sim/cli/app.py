@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import select
 import signal
 import sys
 import traceback
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import Annotated, Any
+from typing import Annotated, Any, TextIO
 
 import typer
 import typer.core
@@ -41,7 +43,7 @@ from antdrive.sim.cli.commands.worlds.import_ import import_world
 from antdrive.sim.cli.commands.worlds.list import list_worlds
 from antdrive.sim.cli.commands.worlds.show import show_world
 from antdrive.sim.cli.console import print_error, print_line
-from antdrive.sim.cli.exits import FAULT, INTERRUPTED, SUCCEEDED, TERMINATED, WRONG_INPUT
+from antdrive.sim.cli.exits import BROKEN_PIPE, FAULT, INTERRUPTED, SUCCEEDED, TERMINATED, WRONG_INPUT
 from antdrive.worlds.errors import FieldError, InputError, input_error
 
 #: The commands by name, in the order in which `antdrive --help` lists them. Each returns its exit code.
@@ -89,7 +91,7 @@ _USAGE_ERROR: Any = typer.BadParameter.__mro__[2]
 HELP = """Plan paths, drive them in physics, certify the drives and film them.
 
 Exit codes: 0: success. 1: the drive or the plan failed, or a log proves nothing. 2: wrong input. 3: a fault of a planner or of
-antdrive. 130, 143: interrupted.
+antdrive. 130, 143: interrupted. 141: nobody reads what is printed.
 """
 DEBUG = "--debug"  # is taken wherever it stands, so that it can be added to a command that failed
 
@@ -97,7 +99,25 @@ DEBUG = "--debug"  # is taken wherever it stands, so that it can be added to a c
 def main() -> None:
     """Run the command line; the exit code says how it ended."""
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(TERMINATED))  # ends like Ctrl-C: temporary files are removed
-    words = [word for word in sys.argv[1:] if word != DEBUG]
+    try:
+        code = _exit_code_of([word for word in sys.argv[1:] if word != DEBUG])
+    except BrokenPipeError as error:
+        unread = [stream for stream in (sys.__stdout__, sys.__stderr__) if stream is not None and _is_unread(stream)]
+        for stream in unread:  # what it still holds goes nowhere, or Python would try again at its end
+            with open(os.devnull, "wb") as nowhere:
+                os.dup2(nowhere.fileno(), stream.fileno())
+        if not unread:  # another pipe, such as that to a process of the program's own
+            _print_fault(error, debug=DEBUG in sys.argv[1:])
+        code = BROKEN_PIPE if unread else FAULT
+    sys.exit(code)
+
+
+def _exit_code_of(words: list[str]) -> int:
+    """Run the command that words name; its exit code.
+
+    Raises:
+        BrokenPipeError: the other end of a pipe is closed, such as that of stdout.
+    """
     try:
         code = application()(args=words, standalone_mode=False)
     except (InputError, FieldError) as error:
@@ -105,6 +125,8 @@ def main() -> None:
         code = WRONG_INPUT
     except (KeyboardInterrupt, typer.Abort):
         code = INTERRUPTED
+    except BrokenPipeError:
+        raise
     except OSError as error:  # such as a full disk
         print_error(f"{error.filename or 'output'}: {error.strerror}")
         code = WRONG_INPUT
@@ -114,6 +136,8 @@ def main() -> None:
     except SystemExit as error:
         if error.code == TERMINATED:
             raise
+        if isinstance(error.__context__, BrokenPipeError):  # typer ends the program for it
+            raise error.__context__ from None
         print_error("internal error: what was called ended the program; a planner must not call exit()")
         code = FAULT
     except Exception as error:
@@ -121,7 +145,14 @@ def main() -> None:
         code = FAULT
     if code == INTERRUPTED:  # typer turns Ctrl-C within a command into this code
         print_error("interrupted")
-    sys.exit(code if isinstance(code, int) else SUCCEEDED)
+    return code if isinstance(code, int) else SUCCEEDED
+
+
+def _is_unread(stream: TextIO) -> bool:
+    """Whether a stream is a pipe whose other end is closed."""
+    poll = select.poll()
+    poll.register(stream.fileno(), 0)  # errors are always told
+    return any(event & (select.POLLERR | select.POLLHUP) for _, event in poll.poll(0))
 
 
 def application() -> typer.Typer:

@@ -7,4 +7,5 @@ FAILED = 1  # the command ran, and its verdict is no: no path, a wrong plan, a c
 WRONG_INPUT = 2  # something that a person wrote is wrong, or an output cannot be written
 FAULT = 3  # a planner or antdrive itself did something that it must not do
 INTERRUPTED = 130  # Ctrl-C
+BROKEN_PIPE = 141  # nobody reads any more what is printed, as in `antdrive ... | head`
 TERMINATED = 143  # SIGTERM

@@ -64,7 +64,7 @@ def drive_suites(
     jobs: int | None,
     *,
     update: Update,
-    results: Results | None,
+    results: Results,
     show: Callable[[CheckResult], None] = lambda result: None,
 ) -> list[CheckResult]:
     """Drive and judge all tests that the words name, with a progress bar.
@@ -74,7 +74,7 @@ def drive_suites(
         only: a pattern for scenarios' names
         jobs: number of processes; None: one per core
         update: which baselines to write
-        results: where logs, pictures and films are written; None: nowhere
+        results: where logs, pictures and films are written
         show: is called with each result as soon as it is there, in the order of the tests
 
     Raises:

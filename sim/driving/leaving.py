@@ -30,8 +30,9 @@ def cannot_leave(
 ) -> str:
     """What the robot would touch on its way out of a narrow place, and what turning needs there; empty if it gets out.
 
-    The controller's own commands are followed exactly, from rest, until the robot could turn freely. A controller
-    turns on the spot the shorter way round and has no other, so a way out that it does not take is no way out.
+    The controller's own commands are followed exactly, from rest, until the robot could turn freely. A way out that it does
+    not take is no way out. It turns the shorter way round; a robot that is not centred on its axle turns the other way
+    where the shorter is blocked and the longer is not.
 
     Args:
         tracked: the route that the robot is to follow
@@ -41,6 +42,8 @@ def cannot_leave(
         start: its first pose [m, rad]
         control_hz: control periods per second
     """
+    if robot.footprint.corners and _gets_away(tracked, controller, world, robot, start, control_hz):
+        return ""
     pose, command, state = start, Twist(0.0, 0.0), PursuitState()
     path = tracked.for_any_turn
     for _ in range(round(REHEARSED * control_hz)):
@@ -59,6 +62,25 @@ def cannot_leave(
         x, y, yaw = way[-1].tolist()
         pose = (x, y, yaw)
     return ""
+
+
+def _gets_away(
+    tracked: TrackedPath, controller: PurePursuit, world: World, robot: RobotSpec, start: Pose, control_hz: int
+) -> bool:
+    """Whether a robot that turns only where nothing is in its way leaves the narrow place and touches nothing."""
+    pose, command, state = start, Twist(0.0, 0.0), PursuitState()
+    for _ in range(round(REHEARSED * control_hz)):
+        if not is_narrow(world, robot, pose):
+            return True
+        command, state = controller.step(tracked, pose, command, state)
+        if not any(command):
+            return False
+        way = _way(pose, command, 1 / control_hz, robot.radius)
+        if (footprint_clearance(world, robot.footprint, way) <= 0).any():
+            return False
+        x, y, yaw = way[-1].tolist()
+        pose = (x, y, yaw)
+    return False
 
 
 def _room(world: World, pose: Pose) -> float:

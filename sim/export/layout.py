@@ -11,6 +11,7 @@ from antdrive.sim.log.rollout import Rollout
 from antdrive.worlds.plane import in_map
 
 SHOWN = ("/map", "/plan", "/obstacles", "/movers", "/contacts", "/scan", "/robot_description")
+TITLES = ("foxglovePanelTitle", "lichtblickPanelTitle")  # what each of the two programs calls a panel's title
 MARGIN = 1.15  # how much more than the world the picture shows
 SCENE, CLEARANCE, SPEEDS, LIMITER = "3D!drive", "Plot!clearance", "Plot!speeds", "StateTransitions!limiter"
 
@@ -30,7 +31,15 @@ def foxglove_layout(rollout: Rollout) -> dict[str, Any]:
             CLEARANCE: _plot("Clearance [m]", {"/clearance.data": "clearance"}),
             SPEEDS: _plot("Speed [m/s]", {"/cmd_vel.linear.x": "commanded", "/odom.twist.twist.linear.x": "measured"}),
             LIMITER: {
-                "paths": [{"value": "/limiter_name.data", "label": "limited by", "timestampMethod": "receiveTime"}],
+                **dict.fromkeys(TITLES, "Limited by"),
+                "paths": [
+                    {
+                        "value": "/limiter_name.data",
+                        "label": "limited by",
+                        "enabled": True,
+                        "timestampMethod": "receiveTime",
+                    }
+                ],
                 "isSynced": True,
             },
         },
@@ -78,7 +87,7 @@ def _scene(middle: list[float], height: float) -> dict[str, Any]:
 
 def _plot(title: str, lines: dict[str, str]) -> dict[str, Any]:
     return {
-        "title": title,
+        **dict.fromkeys(TITLES, title),
         "paths": [
             {"value": path, "label": label, "enabled": True, "timestampMethod": "receiveTime"}
             for path, label in lines.items()
@@ -87,6 +96,8 @@ def _plot(title: str, lines: dict[str, str]) -> dict[str, Any]:
         "showYAxisLabels": True,
         "showLegend": True,
         "legendDisplay": "floating",
+        "showPlotValuesInLegend": False,
+        "sidebarDimension": 240,
         "isSynced": True,
         "xAxisVal": "timestamp",
     }

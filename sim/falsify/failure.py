@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from antdrive.planners import PlannerError
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import Run
-from antdrive.sim.regression.checking import RAISED
+from antdrive.sim.regression.checking import RAISED, own_baseline
 from antdrive.sim.regression.demands import CYLINDER, UNSEEN, WALL, WALL_CLOCK, Bound
+from antdrive.sim.regression.judging import judge, limits, unfulfilled
+from antdrive.sim.regression.suite import SuiteCase
 from antdrive.sim.regression.touching import NOTHING, cause_of_contact, touched_first
-from antdrive.worlds.errors import FieldError
+from antdrive.worlds.errors import FieldError, input_error
 from antdrive.worlds.files.checks import suggest
 
 _BOUND = re.compile(r"\s*(\w+)\s*(<=|>=|<|>|==)\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*")
@@ -85,6 +89,41 @@ def failure_of(run: Run, bound: Bound | None = None) -> Failure | None:
     if rollout is not None and touched in (CYLINDER, WALL):
         return Failure(run.outcome.key, touched, cause_of_contact(rollout))
     return Failure(run.outcome.key, touched, "" if touched != NOTHING else without_numbers(run.reason))
+
+
+def bound_broken_in(case: SuiteCase, done: Run) -> Bound | None:
+    """What counts as failing where a test's drive ends as expected but breaks a bound of the test or of its baseline.
+
+    None where it breaks none: then the run itself is the failure, or there is none.
+
+    Args:
+        case: the test
+        done: its run
+
+    Raises:
+        InputError: the run differs from its baseline in what no other world can repeat; or the baseline is damaged.
+    """
+    rollout, demands = done.rollout, case.demands
+    if rollout is None or done.outcome is not demands.outcome:
+        return None
+    if (found := _first_broken(demands.bounds, rollout)) is not None:
+        return found
+    if not case.entry.baseline or any(unfulfilled(done, demands)):
+        return None
+    baseline = own_baseline(case.baseline_path, case.id)
+    faults = () if baseline is None else judge(done, demands, baseline).faults
+    if baseline is None or not faults:
+        return None
+    same = baseline.outcome is done.outcome and baseline.line
+    found = _first_broken(limits(demands, baseline), rollout) if same else None
+    if found is None and done.succeeded:
+        raise input_error(case.address, f"{faults[0]}; no other world repeats that, so there is nothing to shrink")
+    return found
+
+
+def _first_broken(bounds: Iterable[Bound], rollout: Rollout) -> Bound | None:
+    broken = (bound.broken(METRICS[bound.metric](rollout)) for bound in bounds)
+    return next((bound for bound in broken if bound is not None), None)
 
 
 def failure_of_planner(error: PlannerError) -> Failure:

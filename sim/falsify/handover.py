@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
+import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,6 +21,7 @@ from antdrive.sim.driving.replanning import ReplanPolicy
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.pipeline import Run, run
 from antdrive.sim.regression.demands import Bound
+from antdrive.sim.regression.names import is_own_entry
 from antdrive.sim.regression.scenarios import scenario_of
 from antdrive.sim.regression.suite import load_suite
 from antdrive.sim.regression.touching import cause_of_contact, touched_first
@@ -114,6 +116,27 @@ def suite_entry(scenario: Scenario, robot: str) -> dict[str, Any]:
         if getattr(scenario, key) != usual:
             plain[key] = getattr(scenario, key)
     return plain | (_among_movers(scenario) if scenario.task.world.movers else {})
+
+
+def planner_moved(given: str | Mapping[str, Any], home: Path, folder: Path) -> str | dict[str, Any] | None:
+    """The words of a suite for a planner in a file or module of people's own, as a suite in another folder writes them.
+
+    None for a registered planner.
+
+    Args:
+        given: the words as a suite in `home` has them
+        home: the folder that files are relative to
+        folder: the folder of the other suite
+    """
+    if not is_own_entry(given):
+        return None
+    words = {"name": given} if isinstance(given, str) else dict(given)
+    file, mark, word = words["name"].rpartition(":")
+    if "file" in words:
+        words["file"] = os.path.relpath(home / words["file"], folder)
+    elif mark and file.endswith(".py"):
+        words["name"] = f"{os.path.relpath(home / file, folder)}:{word}"
+    return words if len(words) > 1 else str(words["name"])
 
 
 def expectation(failed: Run, bound: Bound | None = None) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from typing import Any
 
 from antdrive.planners import Planner, PlannerError
 from antdrive.planners.anyangle.passage import MOST_OBSTACLES
+from antdrive.planners.own_code import is_importable_elsewhere
 from antdrive.sim.falsify.failure import Failure, failure_of, failure_of_planner
 from antdrive.sim.falsify.space import feasible
 from antdrive.sim.log.outcome import Outcome
@@ -20,7 +21,6 @@ from antdrive.sim.log.record import settings_of
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import ENDED_BY, Run, plan, run, versions
 from antdrive.sim.regression.demands import Bound
-from antdrive.sim.regression.names import is_importable_elsewhere
 from antdrive.sim.scenario import Scenario
 from antdrive.worlds.errors import FieldError, InputError
 from antdrive.worlds.files.atomic import written_whole

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.planners import PLANNERS, Query
-from antdrive.worlds import Grid
+from antdrive.worlds import DIRECTIONS, Grid
 from antdrive.worlds.errors import FieldError
 
 Picture = npt.NDArray[np.bool_]
@@ -24,6 +24,12 @@ SQRT2 = math.sqrt(2.0)
 EQUAL = 1e-6  # lengths that differ by less are the same: two sums of moves differ by more for all lengths here
 TRIES = 300  # obstacles tried before a map is begun anew
 MAPS = 1000  # maps begun before a candidate is given up
+MEANDERS = 200_000  # paths drawn before a winding candidate is given up
+LEGS = (
+    (1, 5),
+    (3, 10),
+)  # how many moves a winding path goes on in one direction, along an axis and aslant: at least, below
+APART, LATER = 3, 6  # cells of a winding path that are `LATER` moves or more apart lie `APART` cells apart or more
 
 
 @dataclass(frozen=True)
@@ -110,6 +116,76 @@ def candidate(
         if found is not None:
             return found
     raise FieldError("moves", f"no map of {shape[0]} x {shape[1]} cells was found whose shortest path has {moves}")
+
+
+def winding_candidate(shape: tuple[int, int], moves: MoveCount, seed: int, *, largest: int) -> Query:
+    """A random map whose shortest path has these moves and winds: a length for which no way can be monotone.
+
+    A path of the wanted moves is drawn first, and start and goal are its ends. Walls are then put across every way that
+    is shorter, and never onto the path, until none is left.
+
+    Args:
+        shape: rows and columns
+        moves: the moves of the shortest path
+        seed: of path and walls
+        largest: the longest wall [cells]
+
+    Raises:
+        FieldError: no such map was found.
+    """
+    rng = np.random.default_rng(seed)
+    for _ in range(MEANDERS):
+        cells = _meander(rng, shape, moves)
+        if cells is not None:
+            query = _walled(rng, shape, cells, moves.length, largest)
+            if query is not None:
+                return query
+    raise FieldError(
+        "moves", f"no map of {shape[0]} x {shape[1]} cells was found whose shortest path winds with {moves}"
+    )
+
+
+def _meander(rng: np.random.Generator, shape: tuple[int, int], moves: MoveCount) -> npt.NDArray[np.int64] | None:
+    """The cells (N, 2) of a random path over these moves; None if it does not fit or comes near itself."""
+    left, way = [moves.straight, moves.diagonal], int(rng.integers(8))
+    steps: list[tuple[int, int]] = []
+    while any(left):
+        aslant = way & 1
+        count = min(left[aslant], int(rng.integers(*LEGS[aslant])))
+        if not count:
+            return None
+        steps += [DIRECTIONS[way]] * count
+        left[aslant] -= count
+        # Where two diagonal moves meet at a right angle, two straight ones lead past the cell between them.
+        way = (way + int(rng.choice((-1, 1) if aslant else (-2, -1, 1, 2)))) % 8
+    cells = np.vstack([(0, 0), steps]).cumsum(axis=0)
+    cells -= cells.min(axis=0)
+    room = np.array(shape) - cells.max(axis=0)
+    if (room < 1).any():
+        return None
+    cells += rng.integers(0, room)
+    distance = np.abs(cells[:, None] - cells).max(axis=2)
+    return None if (distance[np.triu_indices(len(cells), LATER)] < APART).any() else cells
+
+
+def _walled(
+    rng: np.random.Generator, shape: tuple[int, int], cells: npt.NDArray[np.int64], length: float, largest: int
+) -> Query | None:
+    """Walls across all ways that are shorter than a path; None if some cannot be closed."""
+    kept = np.zeros(shape, dtype=np.bool_)
+    kept[tuple(cells.T)] = True
+    kept[cells[:-1, 0], cells[1:, 1]] = kept[cells[1:, 0], cells[:-1, 1]] = True  # a diagonal move needs both corners
+    free = np.ones(shape, dtype=np.bool_)
+    start, goal = (int(cells[0, 0]), int(cells[0, 1])), (int(cells[-1, 0]), int(cells[-1, 1]))
+    while True:
+        query, path, shortest = _solved(free, start, goal)
+        if shortest > length - EQUAL:
+            return query
+        others = path[~kept[tuple(path.T)]]
+        if not len(others):
+            return None
+        _put(rng, free, others[rng.integers(len(others))], largest, thin=True)
+        free |= kept
 
 
 def _lengthened(

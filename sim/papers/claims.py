@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -33,6 +35,21 @@ class Less:
     quantity: str = "gap"
     margin: float = 0.0
     strict: bool = True
+
+
+@dataclass(frozen=True)
+class Oftener:
+    """The first arm's values are below the second's in more pairs than they are above.
+
+    For values of which many are equal, as lengths on small maps: their median difference is 0 whatever the others are.
+
+    Attributes:
+        pairs: first and second arm, of the same map; all pairs count together
+        quantity: a property of `Trial`
+    """
+
+    pairs: tuple[tuple[Arm, Arm], ...]
+    quantity: str = "gap"
 
 
 @dataclass(frozen=True)
@@ -112,7 +129,7 @@ class Cases:
     least: int
 
 
-Test = Less | Within | Mean | Arrive | Wider | Cases
+Test = Less | Oftener | Within | Mean | Arrive | Wider | Cases
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -217,6 +234,26 @@ HAN2007 = (
     ),
     Claim(
         paper="han2007",
+        source="§5.1, experiment 5",
+        sentence="With elitism a higher mutation rate gives shorter paths: 0.8 shorter ones than 0.2",
+        printed="figure 5.1.10",
+        test=Less(((Arm(ONE, "3 via points, Pm 0.8"), Arm(ONE, "3 via points")),), "last"),
+    ),
+    Claim(
+        paper="han2007",
+        source="§5.1, experiment 5",
+        sentence="Without elitism it does not",
+        printed="figure 5.1.10",
+        test=Less(
+            ((Arm(ONE, "3 via points, no elite"), Arm(ONE, "3 via points, Pm 0.8, no elite")),),
+            "last",
+            margin=0.5,
+            strict=False,
+        ),
+        remark="up to half a cell",
+    ),
+    Claim(
+        paper="han2007",
         source="§6.0",
         sentence="The genetic algorithm's paths are shorter than the ants'",
         printed="–",
@@ -235,7 +272,11 @@ HAN2007 = (
 SIZES = ("10×10", "20×20", "30×30", "50×50")
 
 
-def _suganthi(reading: str, ants: str, improved: str) -> tuple[Claim, ...]:
+def _suganthi(reading: str, ants: str, improved: str, margin: float = 2.5) -> tuple[Claim, ...]:
+    """The claims on one reading; `margin` is what counts as no longer [% of the shortest path].
+
+    One diagonal move that is missed is 2.05 % of the shortest path at 20 x 20.
+    """
     printed = ("13.899, 13.899", "28.627, 28.627", "42.184, 46.527", "94.326, 96.125")
     return (
         *(
@@ -244,18 +285,18 @@ def _suganthi(reading: str, ants: str, improved: str) -> tuple[Claim, ...]:
                 source="Table 2",
                 sentence=f"At {size} IACO's path is no longer than ACO's",
                 printed=lengths,
-                test=Less(_pairs((size,), improved, ants), margin=1.0, strict=False),
+                test=Less(_pairs((size,), improved, ants), margin=margin, strict=False),
                 reading=reading,
-                remark="up to 1 % of the shortest path",
+                remark=f"up to {margin:g} % of the shortest path",
             )
             for size, lengths in zip(SIZES, printed, strict=True)
         ),
         Claim(
             paper="suganthi2019",
             source="Table 2",
-            sentence="At 10×10 and 20×20 IACO finds the shortest path, or nearly: within 2 %",
+            sentence="At 10×10 and 20×20 IACO finds the shortest path, or nearly: within 2.5 %",
             printed="13.899, 28.627",
-            test=Within(_arms(SIZES[:2], improved), 2.0),
+            test=Within(_arms(SIZES[:2], improved), 2.5),
             reading=reading,
         ),
         Claim(
@@ -281,7 +322,30 @@ def _suganthi(reading: str, ants: str, improved: str) -> tuple[Claim, ...]:
 SUGANTHI2019 = (
     *_suganthi("ours", "as", "iaco"),
     *_suganthi("a = 1", "as", "iaco, a = 1"),
-    *_suganthi("a = 1, ants die in dead ends, loops stay", "as, ants die", "iaco, ants die"),
+    *_suganthi("a = 1, ants die in dead ends, loops stay", "as, ants die", "iaco, ants die", margin=5.0),
+    Claim(
+        paper="suganthi2019",
+        source="Table 2",
+        sentence="At 30×30 IACO's path is shorter than ACO's",
+        printed="42.184 < 46.527",
+        test=Oftener(_pairs(SIZES[2:3], "iaco", "as")),
+    ),
+    Claim(
+        paper="suganthi2019",
+        source="§V, Fig. 6",
+        sentence="At 10×10 and 20×20 IACO converges about as fast as ACO: at most 10 iterations later",
+        printed="figure 6",
+        test=Less(_pairs(SIZES[:2], "iaco", "as"), "near", margin=10.0, strict=False),
+        remark="iterations to a path within 5 % of the shortest",
+    ),
+    Claim(
+        paper="suganthi2019",
+        source="§V, Fig. 6",
+        sentence="At 30×30 IACO converges in fewer iterations than ACO",
+        printed="figure 6",
+        test=Less(_pairs(SIZES[2:3], "iaco", "as"), "near"),
+        remark="iterations to a path within 5 % of the shortest",
+    ),
     Claim(
         paper="suganthi2019",
         source="Table 2",
@@ -299,6 +363,7 @@ SUGANTHI2019 = (
     ),
 )
 
+_no_more: Callable[..., Test] = functools.partial(Less, strict=False)
 SQUARES = ("10×10, 5 obstacles", "20×20, 10 obstacles", "30×30, 15 obstacles", "40×40, 20 obstacles")
 
 IBRAHEEM2016 = (
@@ -308,8 +373,7 @@ IBRAHEEM2016 = (
             source="Table 2",
             sentence=f"At {size.split(',')[0]} MACO's path is no longer than ACO's",
             printed=lengths,
-            test=Less(_pairs((size,), "maco", "as"), margin=0.5, strict=False),
-            remark="up to 0.5 % of the shortest path",
+            test=Less(_pairs((size,), "maco", "as"), strict=False),
         )
         for size, lengths in zip(
             SQUARES, ("15.07, 15.07", "28.6274, 28.6274", "45.1127, 45.9411", "61.8406, 62.6690"), strict=True
@@ -320,7 +384,7 @@ IBRAHEEM2016 = (
         source="Table 2",
         sentence="At 30×30 and 40×40 MACO's path is shorter than ACO's",
         printed="45.1127 < 45.9411, 61.8406 < 62.6690",
-        test=Less(_pairs(SQUARES[2:], "maco", "as")),
+        test=Oftener(_pairs(SQUARES[2:], "maco", "as")),
     ),
     Claim(
         paper="ibraheem2016",
@@ -338,6 +402,34 @@ IBRAHEEM2016 = (
     ),
 )
 
+IBRAHEEM2016 += (
+    *(
+        Claim(
+            paper="ibraheem2016",
+            source="§7.1, Fig. 8",
+            sentence=f"At {size.split(',')[0]} {sentence}",
+            printed="figure 8",
+            test=kind(((Arm(size, f"as, {enough} ants"), Arm(size, rival)),)),
+        )
+        for size, enough in zip(SQUARES, (20, 40), strict=False)
+        for sentence, rival, kind in (
+            (f"{enough} ants are enough: 50 find no shorter path", "as", _no_more),
+            (f"{enough} ants find shorter paths than 5", "as, 5 ants", Oftener),
+        )
+    ),
+    *(
+        Claim(
+            paper="ibraheem2016",
+            source="§7.1, Fig. 9",
+            sentence="At 20×20 paths are shorter with rho between 0.3 and 0.7 than outside",
+            printed="figure 9",
+            test=Oftener(((Arm(SQUARES[1], inside), Arm(SQUARES[1], f"as, rho {outside}")),)),
+            reading=reading,
+        )
+        for inside, outside, reading in (("as", "0.1", "0.3 against 0.1"), ("as, rho 0.7", "0.9", "0.7 against 0.9"))
+    ),
+)
+
 LEE = ("1: 25×25", "2: 50×44", "3: 100×100", "4: 100×100", "5: 100×100")
 LEE_PRINTED = ("59.25 < 72.08", "64.08 < 83.40", "123.61 < 154.24", "135.82 < 175.24", "131.68 < 168.65")
 
@@ -352,6 +444,23 @@ LEE2008 = (
             remark="equal ant steps",
         )
         for name, printed in zip(LEE, LEE_PRINTED, strict=True)
+    ),
+    Claim(
+        paper="lee2008",
+        source="Tables I and II",
+        sentence="On map 1 PFACO's path is shorter than ACO's",
+        printed=LEE_PRINTED[0],
+        test=Less(_pairs(LEE[:1], "pfaco, stepping back", "as")),
+        reading="ants step back out of dead ends",
+        remark="equal ant steps",
+    ),
+    Claim(
+        paper="lee2008",
+        source="§V",
+        sentence="On the maps of 100×100 cells PFACO's paths are acceptable: within 15 % of the shortest",
+        printed="123.61, 135.82, 131.68",
+        test=Within(_arms(LEE[2:], "pfaco, stepping back"), 15.0),
+        reading="ants step back out of dead ends",
     ),
     Claim(
         paper="lee2008",

@@ -13,7 +13,7 @@ from typing import Any
 from antdrive.planners import Planner, Query
 from antdrive.sim.papers import maps
 from antdrive.sim.papers.baselines import FirstTouchDStar
-from antdrive.sim.papers.candidates import MoveCount, candidate
+from antdrive.sim.papers.candidates import MoveCount, candidate, winding_candidate
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,6 +34,7 @@ class Experiment:
         worlds: how many different maps there are; 0: one for each seed
         work: where it is finite, planning ends after so many ant steps
         most_seeds: more seeds than this would tell nothing new
+        rounds: how many times as many seeds as asked for are run, where single runs differ widely
         slow: takes seconds, its map or its plans, and is left out of a quick look
         made: the planner itself, where it is not one of the registry
     """
@@ -50,7 +51,8 @@ class Experiment:
     label: str = ""
     worlds: int = 1
     work: float = math.inf
-    most_seeds: int = 1000
+    most_seeds: int = 10_000
+    rounds: int = 1
     slow: bool = False
     made: Planner | None = None
 
@@ -63,9 +65,14 @@ class Experiment:
         """The number of the map that a seed gets."""
         return seed % self.worlds if self.worlds else seed
 
+    def seeds(self, asked: int) -> range:
+        """The seeds to run where so many were asked for."""
+        return range(min(asked * self.rounds, self.most_seeds))
 
-#: How many candidates take the place of a picture.
-CANDIDATES = 5
+
+#: How many candidates take the place of a picture: where differences are small or single runs differ widely, for lee2008,
+#: and for the rest.
+MANY_CANDIDATES, LEE_CANDIDATES, CANDIDATES = 50, 10, 5
 
 
 def _for_every_seed(query: Query) -> Callable[[int], Query]:
@@ -119,6 +126,10 @@ def han2007() -> list[Experiment]:
         experiment(one, single, "ga-han", "2 via points", None, via_points=2),
         experiment(one, single, "ga-han", "1 via point", None, via_points=1),
         experiment(one, single, "ga-han", "3 via points, no elite", None, via_points=3, elitism=False),
+        experiment(one, single, "ga-han", "3 via points, Pm 0.8", None, via_points=3, mutation=0.8),
+        experiment(
+            one, single, "ga-han", "3 via points, Pm 0.8, no elite", None, via_points=3, mutation=0.8, elitism=False
+        ),
     ]
 
 
@@ -137,6 +148,7 @@ def suganthi2019() -> list[Experiment]:
     }
     freed, letter = {"backtrack": True, "shortcut": True}, {"backtrack": False, "shortcut": False}
     many: dict[str, Any] = {"ants": 25, "explorers": 75, **common}
+    wild = ("as, ants die", "iaco, ants die")  # two of their runs differ by a quarter of the length
     arms: list[tuple[str, str, dict[str, Any]]] = [
         ("as", "as", {"ants": 50, **common, **freed}),
         ("pfaco", "pfaco", {"ants": 50, "iterations": 100, "ranks": 15}),
@@ -166,9 +178,10 @@ def suganthi2019() -> list[Experiment]:
             options=options,
             printed=value,
             query=_candidates(size, 100 * size, kinds[size][0], **kinds[size][1]),
-            worlds=CANDIDATES,
+            worlds=MANY_CANDIDATES if label in wild and size < 50 else CANDIDATES,
             comparable=True,
             slow=size == 50,
+            rounds=10 if label in wild and size < 50 else 1,
         )
         for size, values in printed.items()
         for (planner, label, options), value in zip(arms, (*values, values[0], values[2], values[2]), strict=True)
@@ -183,27 +196,42 @@ def ibraheem2016() -> list[Experiment]:
         30: (15, 45.9411, 45.1127, (14, 22)),
         40: (20, 62.6690, 61.8406, (18, 31)),
     }
+    table_1: dict[str, Any] = {"ants": 50, "iterations": 100, "evaporation": 0.3}
+    varied: dict[int, dict[str, dict[str, Any]]] = {
+        10: {"as, 5 ants": {"ants": 5}, "as, 20 ants": {"ants": 20}},
+        20: {
+            "as, 5 ants": {"ants": 5},
+            "as, 40 ants": {"ants": 40},
+            **{f"as, rho {share:g}": {"evaporation": share} for share in (0.1, 0.7, 0.9)},
+        },
+    }
     return [
         Experiment(
             paper="ibraheem2016",
             map=f"{size}×{size}, {count} obstacles",
-            planner=name,
+            planner=planner,
+            label=label,
             printed=value,
-            options={"ants": 50, "iterations": 100, "evaporation": 0.3},
+            options={**table_1, **options},
             query=_candidates(size, 100 * size, moves, blocks=count * 3 // 5, largest=size // 4),
-            worlds=CANDIDATES,
+            worlds=MANY_CANDIDATES,
             comparable=True,
             slow=size == 40,
+            rounds=4,
         )
         for size, (count, *values, moves) in printed.items()
-        for name, value in zip(("as", "maco"), values, strict=True)
+        for planner, label, value, options in (
+            ("as", "as", values[0], {}),
+            ("maco", "maco", values[1], {}),
+            *(("as", label, None, options) for label, options in varied.get(size, {}).items()),
+        )
     ]
 
 
 def lee2008() -> list[Experiment]:
     """Tables I and II: five maps, ant system and ants on a potential field, with equal numbers of ant steps."""
     printed = {
-        1: ((25, 25), (24, 24), 72.0833, 59.2548, None, 2e5),
+        1: ((25, 25), None, 72.0833, 59.2548, (14, 32), 2e6),
         2: ((50, 44), (49, 35), 83.3970, 64.0833, (16, 34), 1e6),
         3: ((100, 100), (99, 58), 154.2376, 123.6102, (43, 57), 3e6),
         4: ((100, 100), (99, 79), 175.2376, 135.8234, (34, 72), 3e6),
@@ -213,11 +241,12 @@ def lee2008() -> list[Experiment]:
         ("as", "as", {"ants": 500, "beta": 2.0, "evaporation": 0.01}),
         ("pfaco", "pfaco", {}),
         ("pfaco", "pfaco, to the letter", {"form": "letter", "memory": "none"}),
+        ("pfaco", "pfaco, stepping back", {"backtrack": True}),
     ]
     found = []
     for number, (shape, goal, *values, moves, work) in printed.items():
-        if moves is None:  # no map of this size with so long a way was found by chance
-            query: Callable[[int], Query] = functools.partial(_lee_blocks, shape, number)
+        if goal is None:  # no way so long is monotone on so small a map
+            query: Callable[[int], Query] = functools.partial(_lee_winding, shape, moves, number)
         else:
             query = functools.partial(_lee_candidate, shape, goal, moves, number)
         found += [
@@ -229,17 +258,18 @@ def lee2008() -> list[Experiment]:
                 options=options,
                 printed=value,
                 query=query,
-                worlds=0 if moves is None else 2 * CANDIDATES,
-                comparable=moves is not None,
+                worlds=LEE_CANDIDATES,
+                comparable=True,
                 work=work,
             )
-            for (planner, label, options), value in zip(arms, (*values, values[1]), strict=True)
+            for (planner, label, options), value in zip(arms, (*values, values[1], values[1]), strict=True)
         ]
     return found
 
 
-def _lee_blocks(shape: tuple[int, int], number: int, seed: int) -> Query:
-    return maps.blocks(*shape, 25, max(shape) // 6, 100 * number + seed)
+@functools.cache
+def _lee_winding(shape: tuple[int, int], moves: tuple[int, int], number: int, seed: int) -> Query:
+    return winding_candidate(shape, MoveCount(*moves), 100 * number + seed, largest=max(shape) // 4)
 
 
 def _lee_candidate(

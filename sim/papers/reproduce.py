@@ -5,29 +5,26 @@ from __future__ import annotations
 import csv
 import dataclasses
 import math
+import re
 import statistics
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import joblib
 import numpy as np
 
-from antdrive.sim.papers import maps
 from antdrive.sim.papers.claims import CLAIMS, Arm
 from antdrive.sim.papers.experiments import PAPERS, Experiment
+from antdrive.sim.papers.keeping import keep_trials, kept_trials, trials_key
 from antdrive.sim.papers.trials import Trial, solve
 from antdrive.sim.papers.verdicts import VERDICT_HEADS, Verdict, judge, verdict_cells, verdict_facts
 from antdrive.sim.statistics.bootstrap import medians_by_world
 from antdrive.worlds.errors import InputError
 from antdrive.worlds.files.atomic import written_whole
 
-if TYPE_CHECKING:
-    from antdrive.planners import History, PlanResult, Query
-
-PAINTED = 3  # planners whose paths are drawn on one map
-PC, PM = (0.1, 0.25, 0.5, 0.75, 0.9), (0.05, 0.1, 0.2, 0.4, 0.6)  # crossover, mutation: han2007's sweep
+TRIALS = "trials"  # the folder of the trials within that of the results
 
 
 @dataclass(frozen=True)
@@ -79,11 +76,13 @@ class Reproduction:
         rows: a row for each experiment
         verdicts: a verdict for each claim whose experiments were run
         files: the paths of the files by name
+        kept: how many experiments were taken from the files of an earlier, interrupted command
     """
 
     rows: list[ResultRow]
     verdicts: list[Verdict]
     files: dict[str, str]
+    kept: int
 
 
 def reproduce(
@@ -99,6 +98,9 @@ def reproduce(
 ) -> Reproduction:
     """Run the experiments of papers again, judge the papers' claims, and write tables, CSV files and figures.
 
+    The trials of an experiment are written as soon as it is done. A second call with the same folder and seeds takes them
+    from there, unless the source code has changed in between.
+
     Args:
         papers: short names, from `PAPERS`
         folder: where the files go
@@ -107,7 +109,7 @@ def reproduce(
         jobs: the number of processes
         quick: a tenth of the ant steps where an experiment counts them, two candidates of each map, and no slow experiments
         films: whether to film a drive for each paper, the planning first
-        progress: called with the fraction of experiments that is done
+        progress: called with the fraction of trials that is done
 
     Raises:
         InputError: an unknown paper.
@@ -116,15 +118,8 @@ def reproduce(
     experiments = [experiment for paper in papers for experiment in PAPERS[paper]()]
     if quick:
         experiments = [_hurried(experiment) for experiment in experiments if not experiment.slow]
-    found: list[list[Trial]] = []
-    rows = []
-    with joblib.Parallel(n_jobs=jobs) as parallel:
-        for k, experiment in enumerate(experiments):
-            trials = _trials(experiment, seeds, parallel)
-            found.append(trials)
-            rows.append(_row(experiment, trials))
-            if progress is not None:
-                progress((k + 1) / len(experiments))
+    found, kept = _all_trials(experiments, folder / TRIALS, seeds, jobs, progress)
+    rows = [_row(experiment, trials) for experiment, trials in zip(experiments, found, strict=True)]
     verdicts = _verdicts(list(zip(experiments, found, strict=True)))
     files = {
         "table": str(_write_table(rows, folder / "table.md")),
@@ -132,12 +127,14 @@ def reproduce(
         "claims": str(_write_claims(verdicts, folder / "claims.md")),
         "claims csv": str(_write_csv([verdict_facts(verdict) for verdict in verdicts], folder / "claims.csv")),
     }
+    from antdrive.sim.papers.drawing import draw_figures
+
     for paper in papers:
         chosen = [(e, trials) for e, trials in zip(experiments, found, strict=True) if e.paper == paper]
-        files |= _figures(paper, chosen, folder, 1 if quick else min(seeds, 10), suffixes)
+        files |= draw_figures(paper, chosen, folder, 1 if quick else min(seeds, 10), suffixes)
         if films:
             files |= _filmed(paper, folder)
-    return Reproduction(rows, verdicts, files)
+    return Reproduction(rows, verdicts, files, kept)
 
 
 def _filmed(paper: str, folder: Path) -> dict[str, str]:
@@ -148,19 +145,46 @@ def _filmed(paper: str, folder: Path) -> dict[str, str]:
 
 
 def _hurried(experiment: Experiment) -> Experiment:
-    return dataclasses.replace(experiment, work=experiment.work / 10, worlds=min(experiment.worlds, 2))
+    return dataclasses.replace(experiment, work=experiment.work / 10, worlds=min(experiment.worlds, 2), rounds=1)
 
 
-def _trials(experiment: Experiment, seeds: int, parallel: joblib.Parallel) -> list[Trial]:
-    chosen = range(min(seeds, experiment.most_seeds))
+def _all_trials(
+    experiments: Sequence[Experiment],
+    folder: Path,
+    seeds: int,
+    jobs: int,
+    progress: Callable[[float], None] | None,
+) -> tuple[list[list[Trial]], int]:
+    """The trials of each experiment, and how many experiments were in the folder already."""
+    total, done, kept = sum(len(experiment.seeds(seeds)) for experiment in experiments), 0, 0
+    found: list[list[Trial]] = []
+    with joblib.Parallel(n_jobs=jobs, return_as="generator") as parallel:
+        for experiment in experiments:
+            words = f"{experiment.paper} {experiment.map} {experiment.name}"
+            path, key = folder / f"{re.sub(r'[^A-Za-z0-9×*]+', '-', words)}.npz", trials_key(experiment, seeds)
+            trials = kept_trials(path, key)
+            if trials is None:
+                trials = []
+                for trial in parallel(_planned(experiment, seeds)):
+                    trials.append(dataclasses.replace(trial, world=experiment.world(trial.seed)))
+                    if progress is not None:
+                        progress((done + len(trials)) / total)
+                keep_trials(trials, path, key)
+            else:
+                kept += 1
+            done += len(trials)
+            found.append(trials)
+    if progress is not None:
+        progress(1.0)
+    return found, kept
+
+
+def _planned(experiment: Experiment, seeds: int) -> Iterator[Any]:
+    """The calls that plan an experiment; each map is made when its turn comes."""
     planner = experiment.made or experiment.planner
-    trials: list[Trial] = parallel(
-        joblib.delayed(solve)(
-            planner, experiment.options, experiment.query(experiment.world(seed)), seed, experiment.work
-        )
-        for seed in chosen
-    )
-    return [dataclasses.replace(trial, world=experiment.world(trial.seed)) for trial in trials]
+    for seed in experiment.seeds(seeds):
+        query = experiment.query(experiment.world(seed))
+        yield joblib.delayed(solve)(planner, experiment.options, query, seed, experiment.work)
 
 
 def _verdicts(found: Sequence[tuple[Experiment, list[Trial]]]) -> list[Verdict]:
@@ -275,92 +299,3 @@ def _write_csv(rows: Sequence[Mapping[str, Any]], path: Path) -> Path:
             writer.writerow(list(rows[0]))
         writer.writerows([list(row.values()) for row in rows])
     return path
-
-
-def _figures(
-    paper: str,
-    found: Sequence[tuple[Experiment, list[Trial]]],
-    folder: Path,
-    seeds: int,
-    suffixes: Sequence[str],
-) -> dict[str, str]:
-    """Draw length by iteration on the paper's second map, paths on all maps and, for han2007, length by ants and by Pc and Pm.
-
-    `seeds` are those of the sweep over Pc and Pm.
-    """
-    from antdrive.sim.view.figures.paper_figures import history_figure, maps_figure
-
-    files: dict[str, str] = {}
-    names = list(dict.fromkeys(experiment.map for experiment, _ in found))
-    chosen = names[min(1, len(names) - 1)]
-    histories: dict[str, Sequence[History]] = {
-        experiment.name: [trial.result.history for trial in trials]
-        for experiment, trials in found
-        if experiment.map == chosen and all(len(trial.result.history) for trial in trials)
-    }
-    for suffix in suffixes:
-        end = "" if suffix == suffixes[0] else f" {suffix[1:]}"
-        if histories:
-            path = folder / f"{paper}-history{suffix}"
-            history_figure(histories, path, unit="cells")
-            files[f"{paper} history{end}"] = str(path)
-        drawn_on = folder / f"{paper}-maps{suffix}"
-        maps_figure(_drawn(found), drawn_on)
-        files[f"{paper} maps{end}"] = str(drawn_on)
-        if paper == "han2007":
-            drawn = _han_figures(found, folder, seeds, suffix)
-            files |= {f"{name}{end}": str(path) for name, path in drawn.items()}
-    return files
-
-
-def _drawn(
-    found: Sequence[tuple[Experiment, list[Trial]]],
-) -> dict[str, tuple[Query, dict[str, PlanResult]]]:
-    """The first map of each experiment with the path of its median seed, for `PAINTED` planners of a map."""
-    maps_drawn: dict[str, tuple[Query, dict[str, PlanResult]]] = {}
-    for experiment, trials in found:
-        if experiment.name == "steps":  # the same plans as those of the total costs
-            continue
-        query = experiment.query(experiment.world(trials[0].seed))
-        plans = maps_drawn.setdefault(experiment.map, (query, {}))[1]
-        on_it = sorted((t for t in trials if t.world == trials[0].world), key=lambda trial: trial.length)
-        if len(plans) < PAINTED:
-            plans[experiment.name] = on_it[(len(on_it) - 1) // 2].result
-    return maps_drawn
-
-
-def _han_figures(
-    found: Sequence[tuple[Experiment, list[Trial]]], folder: Path, seeds: int, suffix: str
-) -> dict[str, Path]:
-    """Draw han2007's figures: path length by number of ants, and by the parameters of the genetic algorithm."""
-    from antdrive.sim.view.figures.paper_figures import ants_figure, sweep_figure
-
-    with_ants = [(e, trials) for e, trials in found if e.planner == "aco-han" and e.printed is not None]
-    lengths = {int(e.options["ants"]): [t.length for t in trials if t.result.solved] for e, trials in with_ants}
-    printed = {int(experiment.options["ants"]): experiment.printed or math.nan for experiment, _ in with_ants}
-    ants, sweep = folder / f"han2007-ants{suffix}", folder / f"han2007-sweep{suffix}"
-    ants_figure(
-        lengths,
-        ants,
-        planner="aco-han",
-        printed=printed,
-        unit="cells",
-        optimum=maps.optimum(maps.han_ants()),
-    )
-    sweep_figure(PC, PM, _sweep(seeds), sweep)
-    return {"han2007 ants": ants, "han2007 sweep": sweep}
-
-
-def _sweep(seeds: int) -> dict[bool, Any]:
-    """Mean length of the genetic algorithm's paths by crossover and mutation, with and without elitism."""
-    query = maps.han_genes()
-    found = {}
-    for elitism in (True, False):
-        values = np.full((len(PC), len(PM)), np.nan)
-        for (i, j), _ in np.ndenumerate(values):
-            options = {"crossover": PC[i], "mutation": PM[j], "elitism": elitism}
-            trials = [solve("ga-han", options, query, seed) for seed in range(seeds)]
-            lengths = [trial.length if elitism else trial.last for trial in trials if trial.result.solved]
-            values[i, j] = np.mean(lengths) if lengths else np.nan
-        found[elitism] = values
-    return found

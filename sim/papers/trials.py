@@ -19,6 +19,7 @@ from antdrive.worlds.errors import FieldError
 
 ENDLESS = 1_000_000  # iterations; the ant steps end such a plan much earlier
 CLOSE = 0.25  # a path is close to the shortest when it is at most this share longer
+NEAR = 0.05  # and near to it at this share
 LAST = 10  # iterations over which `unrest` is measured
 
 
@@ -68,6 +69,12 @@ class Trial:
         """The iteration, from 1, that found the path; inf if there is none."""
         best = self.result.history.best
         return float(np.argmax(best <= best[-1] * (1 + 1e-9)) + 1) if self.result.solved and len(best) else math.inf
+
+    @property
+    def near(self) -> float:
+        """The iteration, from 1, with which the path was within `NEAR` of the shortest; inf if it never was."""
+        near = np.flatnonzero(self.result.history.best <= (1 + NEAR) * self.optimum + 1e-9)
+        return float(near[0] + 1) if len(near) else math.inf
 
     @property
     def effort(self) -> float:

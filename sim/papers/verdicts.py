@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.sim.papers.claims import Arm, Arrive, Cases, Claim, Less, Mean, Wider, Within
+from antdrive.sim.papers.claims import Arm, Arrive, Cases, Claim, Less, Mean, Oftener, Wider, Within
 from antdrive.sim.papers.trials import Trial
 from antdrive.sim.statistics.bootstrap import means_by_world, medians_by_world, resampled
 from antdrive.sim.statistics.proportions import Interval, wilson
@@ -88,6 +88,19 @@ def _less(test: Less, found: Found) -> Judged:
     why = f"{counts}; Wilcoxon's p {wilcoxon(difference):.2g}"
     ours = f"median difference {_with_interval(value, interval, test.quantity, endless='∞')}"
     return _decided(below, above, len(difference)), value, interval, ours, why
+
+
+@_judged.register
+def _oftener(test: Oftener, found: Found) -> Judged:
+    first, second, world = _paired(test.pairs, test.quantity, found)
+    signs = np.sign(np.round(first - second, 9))
+    alone = np.arange(len(signs)) if len(set(world.tolist())) == 1 else world
+    value, interval = 100 * float(signs.mean()), means_by_world(100 * signs[:, None], alone)[0]
+    less, more = int((signs < 0).sum()), int((signs > 0).sum())
+    points = f"{value:+.0f} points [{interval.low:.0f}, {interval.high:.0f}]"
+    ours = f"below in {less} of {len(signs)} pairs, above in {more}: {points}"
+    decision = _decided(interval.high < 0, interval.low >= 0, len(signs))
+    return decision, value, interval, ours, "share of pairs above less share below, bootstrapped"
 
 
 @_judged.register
@@ -210,6 +223,7 @@ UNITS: Mapping[str, tuple[int, str]] = {
     "last": (2, ""),
     "unrest": (2, ""),
     "settled": (0, " iterations"),
+    "near": (0, " iterations"),
     "effort": (0, " steps"),
 }
 

@@ -256,7 +256,7 @@ def check_run(
         InputError: the baseline is wrong, or it or the folder cannot be written.
     """
     started = time.perf_counter()
-    baseline = None if path is None or update == "all" else _own_baseline(path, name)
+    baseline = None if path is None or update == "all" else own_baseline(path, name)
     accepted = ""
     if path is not None and baseline is None:
         accept = accept or shlex.join(["antdrive", "accept", address])
@@ -323,8 +323,16 @@ def _written(
     return files, drove and results.films == "failed" and not filmed
 
 
-def _own_baseline(path: Path, name: str) -> Baseline | None:
-    """The baseline in a file, which must be that of the test."""
+def own_baseline(path: Path, name: str) -> Baseline | None:
+    """The baseline in a file, which must be that of the test; None if there is no such file.
+
+    Args:
+        path: the file
+        name: the test's name in its suite or file
+
+    Raises:
+        InputError: the file is no baseline, or that of another test.
+    """
     baseline = Baseline.load(path)
     if baseline is not None and baseline.case != name:
         problem = f"belongs to {baseline.case}, not to {name}; remove the file, and accept {name} anew"

@@ -61,11 +61,16 @@ class Bound:
         """
         return not math.isnan(found) and _SIGNS[self.sign](found, self.value)
 
-    @property
-    def opposite(self) -> Bound | None:
-        """The bound that holds where this one does not; None for an equality."""
-        signs = {">=": "<", "<=": ">", ">": "<=", "<": ">="}
-        return dataclasses.replace(self, sign=signs[self.sign]) if self.sign in signs else None
+    def broken(self, found: float) -> Bound | None:
+        """The bound that values keep which break this one as a value does; None where the value keeps it, or is no number.
+
+        Args:
+            found: the metric of a drive
+        """
+        if self.holds(found) or math.isnan(found):
+            return None
+        signs = {">=": "<", "<=": ">", ">": "<=", "<": ">=", "==": ">" if found > self.value else "<"}
+        return dataclasses.replace(self, sign=signs[self.sign])
 
     def __str__(self) -> str:
         return f"{self.metric} {self.sign} {self.value:g}"

@@ -16,7 +16,7 @@ from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import Run
 from antdrive.sim.regression.baseline import Baseline
-from antdrive.sim.regression.demands import END, WALL_CLOCK, Demands
+from antdrive.sim.regression.demands import END, WALL_CLOCK, Bound, Demands
 from antdrive.sim.regression.nearest import nearest_of
 from antdrive.sim.regression.parting import end_distance, farthest
 from antdrive.sim.regression.touching import cause_of_contact, touched_first
@@ -32,6 +32,7 @@ _WORDS = {
 #: The metrics that messages begin with.
 FIRST = ("contacts_driving", "min_clearance_m", "duration_s", "driven_length_m")
 _PLACED = ("min_clearance_m",)
+ROUNDED = 1e-6  # the last decimal of a baseline's metrics
 
 
 @dataclass(frozen=True)
@@ -155,7 +156,7 @@ def _compare(
         return
     worse_by = now - then if metric.better == "lower" else then - now
     allowed = tolerance.allowed(then)
-    if abs(worse_by) <= allowed + 1e-6:  # baselines are rounded to six decimals
+    if abs(worse_by) <= allowed + ROUNDED:
         return
     text = f"{name}: {now:.6g}{unit}, in the baseline {then:.6g}{unit}: {abs(worse_by):.3g}{unit}"
     if worse_by > 0:
@@ -163,6 +164,21 @@ def _compare(
         faults.append(f"{text} {words}, tolerance {allowed:.3g}{unit}{_place(name, rollout)}")
     else:
         gains.append(f"{text} better")
+
+
+def limits(demands: Demands, baseline: Baseline) -> Iterator[Bound]:
+    """The bounds on metrics that a baseline sets: a drive that breaks one is worse than the baseline by more than its tolerance.
+
+    Args:
+        demands: what the test demands
+        baseline: the earlier drive
+    """
+    for name in (*FIRST, *(name for name in METRICS if name not in FIRST)):
+        better, tolerance, then = METRICS[name].better, demands.tolerance(name), baseline.metric(name)
+        if better == "neither" or tolerance is None or name in WALL_CLOCK or not math.isfinite(then):
+            continue
+        allowed = tolerance.allowed(then) + ROUNDED
+        yield Bound(name, "<=", then + allowed) if better == "lower" else Bound(name, ">=", then - allowed)
 
 
 def _place(name: str, rollout: Rollout) -> str:

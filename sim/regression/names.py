@@ -2,18 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
-import functools
-import importlib
-import importlib.util
-import sys
-from collections.abc import Iterator, Mapping
-from importlib.machinery import PathFinder
+from collections.abc import Mapping
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
-from antdrive.planners.own_code import from_source
+from antdrive.planners.own_code import OwnCodeError, is_own, object_in, record_name
 from antdrive.planners.plan import Planner
 from antdrive.planners.registry import load_planner, make_planner
 from antdrive.robots.files import list_robots
@@ -23,14 +16,7 @@ from antdrive.worlds.files.checks import show, suggest
 from antdrive.worlds.files.world_file import list_worlds
 
 #: Where a planner comes from: a key of the mapping, beside its options.
-SOURCES = ("module", "file")
-#: What the names of modules begin with that were loaded from a file.
-FROM_FILE = "_antdrive_suite_"
-
-_OWNERS: dict[
-    str, Path
-] = {}  # the folder of suites that each module was imported for and lies in, by the module's name
-_ASIDE: dict[Path, dict[str, ModuleType]] = {}  # modules whose names another folder's modules have at present
+SOURCES = frozenset({"module", "file"})
 
 
 def check_names(case: SuiteCase) -> None:
@@ -43,7 +29,7 @@ def check_names(case: SuiteCase) -> None:
     if isinstance(entry.world, str):
         world_path(case, entry.world)
     robot_path(case)
-    if not (isinstance(entry.planner, dict) and any(key in entry.planner for key in SOURCES)):
+    if not is_own_entry(entry.planner):
         planner_of(case)
 
 
@@ -83,13 +69,10 @@ def planner_of(case: SuiteCase) -> tuple[Planner, str]:
     if len(sources) > 1:
         raise case.error("planner.file", "a planner comes from a module or from a file; keep one")
     try:
-        if not sources:
+        if not sources and not is_own(name):
             return load_planner(name, **options), name
-        ((key, source),) = sources.items()
-        if not isinstance(source, str):
-            raise case.error(f"planner.{key}", f"must be text, got {show(source)}")
-        made = _attribute(case, key, source, name)
-        return make_planner(made, name, **options), name
+        made = _own(case, name, sources)
+        return make_planner(made, record_name(name), **options), record_name(name)
     except InputError as error:
         text = str(error)
         if text.startswith("planner.") and ": " in text:  # an option
@@ -98,10 +81,15 @@ def planner_of(case: SuiteCase) -> tuple[Planner, str]:
         raise (error if text.startswith(case.document.source) else _at_planner(case, text)) from None
 
 
-def is_importable_elsewhere(planner: Planner) -> bool:
-    """Whether other processes can import a planner's class; those of files and modules beside a suite only this one can."""
-    home = type(planner).__module__
-    return not home.startswith(FROM_FILE) and home not in _OWNERS
+def is_own_entry(planner: str | Mapping[str, Any]) -> bool:
+    """Whether the words of a suite name a planner in a file or module.
+
+    Args:
+        planner: a name, or a mapping with a name and options
+    """
+    name = planner if isinstance(planner, str) else planner.get("name")
+    sources = () if isinstance(planner, str) else (key for key in SOURCES if key in planner)
+    return any(sources) or (isinstance(name, str) and is_own(name))
 
 
 def _path(case: SuiteCase, key: str, name: str, known: Mapping[str, Path]) -> Path:
@@ -119,89 +107,21 @@ def _at_planner(case: SuiteCase, text: str) -> InputError:
     return case.error("planner", text.removeprefix("planner: "))
 
 
-def _attribute(case: SuiteCase, key: str, source: str, name: str) -> Any:
-    """What a module or a file of people's own calls `name`."""
+def _own(case: SuiteCase, name: str, sources: Mapping[str, Any]) -> Any:
+    """What a module or a file of people's own calls by a name, from FILE.py:NAME, MODULE:NAME or a key of `SOURCES`."""
+    if not sources:
+        key, (source, _, word) = "planner", name.rpartition(":")
+        is_file, of_word = source.endswith(".py"), key
+    else:
+        ((key, source),) = sources.items()
+        key, word, is_file, of_word = f"planner.{key}", name, key == "file", "planner.name"
+        if not isinstance(source, str):
+            raise case.error(key, f"must be text, got {show(source)}")
+        if is_own(name):
+            raise case.error(of_word, f"must be the class alone, because {key} says where it is, got {show(name)}")
+    if is_file and not (case.suite.parent / source).is_file():
+        raise case.error(key, f"{source}: no such file beside the suite")
     try:
-        module = _from_file(case, source) if key == "file" else _from_module(case, source)
-    except InputError:
-        raise
-    except SystemExit as error:
-        problem = f"{source}: ends the program while it is imported (exit code {error.code}); guard what it runs"
-        raise case.error(f"planner.{key}", f'{problem} with if __name__ == "__main__"') from error
-    except Exception as error:  # people's own code may raise anything while it is imported
-        raise case.error(f"planner.{key}", f"{source}: cannot be imported ({type(error).__name__}: {error})") from error
-    if not hasattr(module, name):
-        names = [word for word in vars(module) if not word.startswith("_")]
-        raise case.error(
-            "planner.name", f"{source} has no {name!r}; {suggest(name, names) if names else 'it is empty'}"
-        )
-    return getattr(module, name)
-
-
-def _from_module(case: SuiteCase, source: str) -> ModuleType:
-    """A module that can be imported, or one in the suite's folder."""
-    folder, top = case.suite.parent, source.partition(".")[0]
-    with _importing_for(folder):
-        module = importlib.import_module(source)
-    own, taken = _module_in(folder, top), getattr(sys.modules[top], "__file__", None)
-    if own is not None and taken is not None and Path(taken).resolve() != own:
-        problem = f"{top} is imported from {taken}, and there is one beside the suite"
-        raise case.error("planner.module", f"{problem}; give it another name, or write file: and the path")
-    return module
-
-
-def _from_file(case: SuiteCase, source: str) -> ModuleType:
-    """A file's module, loaded once per process and version of the file."""
-    path = (case.suite.parent / source).resolve()
-    if not path.is_file():
-        raise case.error("planner.file", f"{source}: no such file beside the suite")
-    return _loaded(path, path.stat().st_mtime_ns)
-
-
-@functools.lru_cache(maxsize=64)
-def _loaded(path: Path, mtime: int) -> ModuleType:
-    name = f"{FROM_FILE}{path.stem}_{abs(hash(path)):x}"
-    with _importing_for(path.parent):
-        return from_source(name, path)
-
-
-@contextlib.contextmanager
-def _importing_for(folder: Path) -> Iterator[None]:
-    """A context in which modules are also looked for in the working directory and a suite's folder, after all others.
-
-    Modules of other suites' folders are set aside where this folder has one of the same name.
-    """
-    for name, owner in list(_OWNERS.items()):
-        if owner != folder and _module_in(folder, name.partition(".")[0]) is not None:
-            del _OWNERS[name]
-            if name in sys.modules:
-                _ASIDE.setdefault(owner, {})[name] = sys.modules.pop(name)
-    for name, module in _ASIDE.pop(folder, {}).items():
-        sys.modules[name], _OWNERS[name] = module, folder
-    before = set(sys.modules)
-    try:
-        with _looking_in(Path.cwd(), folder):
-            yield
-    finally:
-        for name in set(sys.modules) - before:
-            file = getattr(sys.modules[name], "__file__", None)
-            if file is not None and not name.startswith(FROM_FILE) and Path(file).resolve().is_relative_to(folder):
-                _OWNERS[name] = folder
-
-
-def _module_in(folder: Path, name: str) -> Path | None:
-    """The file of a module or package in a folder; None if there is none."""
-    found = PathFinder.find_spec(name, [str(folder)])
-    return Path(found.origin).resolve() if found is not None and found.origin is not None else None
-
-
-@contextlib.contextmanager
-def _looking_in(*folders: Path) -> Iterator[None]:
-    """A context in which modules are also looked for in some folders, after all others."""
-    added = [str(folder) for folder in folders if str(folder) not in sys.path]
-    sys.path.extend(added)
-    try:
-        yield
-    finally:
-        for folder in added:
-            sys.path.remove(folder)
+        return object_in(source, word, case.suite.parent, is_file=is_file)
+    except OwnCodeError as error:
+        raise case.error(of_word if error.of_class else key, error.problem) from error

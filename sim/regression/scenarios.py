@@ -6,10 +6,11 @@ import dataclasses
 import shlex
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 from antdrive.robots import RobotSpec, list_robots, load_robot
 from antdrive.sim.entries import has_flags, option_text, setting_words
-from antdrive.sim.regression.names import SOURCES, planner_of, robot_path, world_path
+from antdrive.sim.regression.names import SOURCES, is_own_entry, planner_of, robot_path, world_path
 from antdrive.sim.regression.suite import SuiteCase, shown_path
 from antdrive.sim.scenario import Scenario
 from antdrive.sim.settings import generated, scenario_fields
@@ -91,16 +92,28 @@ def run_command(case: SuiteCase, *, anywhere: bool = False) -> str | None:
     entry = case.entry
     planner = {"name": entry.planner} if isinstance(entry.planner, str) else dict(entry.planner)
     usual = entry.start is None and entry.goal is None
-    if not (usual and has_flags(entry)) or any(key in planner for key in SOURCES):
+    word = _planner_word(case, planner, anywhere)
+    if not (usual and has_flags(entry)) or word is None:
         return None
     world, before = _world_words(case, anywhere)
-    words = ["antdrive", "run", world, "--planner", planner.pop("name")]
+    words = ["antdrive", "run", world, "--planner", word]
     words += [word for key, value in planner.items() for word in ("--set", f"planner.{key}={option_text(value)}")]
     words += ["--robot", _shown_name(case, entry.robot, list_robots(), anywhere), "--seed", str(case.seed)]
     for key in ("margin", "smoothing", "noise"):
         if key in entry.model_fields_set:
             words += [f"--{key}", option_text(getattr(entry, key))]
     return before + shlex.join([*words, *setting_words(entry)])
+
+
+def _planner_word(case: SuiteCase, planner: dict[str, Any], anywhere: bool) -> str | None:
+    """What a command calls a planner, whose name is taken out of its words; None where it is in a module beside the suite."""
+    name = planner.pop("name")
+    if not is_own_entry({"name": name, **planner}):
+        return str(name)
+    file, word = (planner.pop("file", None), name) if SOURCES & planner.keys() else name.rpartition(":")[::2]
+    if file is None or not file.endswith(".py"):
+        return None
+    return f"{_shown_name(case, file, {}, anywhere)}:{word}"
 
 
 def _world_words(case: SuiteCase, anywhere: bool) -> tuple[str, str]:

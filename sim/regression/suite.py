@@ -60,8 +60,8 @@ class ScenarioEntry(SettingsEntry):
     robot: str = Field("turtlebot", description="a robot file relative to the suite, or a robot of the catalogue")
     planner: TextOrMapping = Field(
         "ants",
-        description="a planner's name; {name: aco-han, ants: 200} with options; {module: my_package.planners, name: Mine} or "
-        "{file: planners.py, name: Mine} for a planner of your own",
+        description="a planner's name; {name: aco-han, ants: 200} with options; planners.py:Mine, {file: planners.py, "
+        "name: Mine} or {module: my_package.planners, name: Mine} for a planner of your own",
     )
     smoothing: str = Field("clearance", description="none, taut or clearance")
     margin: MarginValue = Field(

@@ -46,6 +46,25 @@ def test_a_module_is_found_in_the_working_directory(tmp_path: Path, monkeypatch:
     assert planner_version("own_module_of_a_test:Mine") == f"own_module_of_a_test {digest}"
 
 
+def test_a_module_that_is_taken_from_elsewhere_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "json.py").write_text(TEXT)
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(
+        InputError, match=r"json is imported from .*, and there is one in the working directory; give it"
+    ):
+        load_planner("json:Mine")
+
+
+def test_files_of_different_folders_have_modules_of_their_own(tmp_path: Path) -> None:
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "beside_own_code.py").write_text(f"WIDTH = {'ab'.index(folder)}\n")
+        text = TEXT.replace("= 3", "= beside_own_code.WIDTH").replace("\nfrom", "\nimport beside_own_code\nfrom", 1)
+        (tmp_path / folder / "mine.py").write_text(text)
+    widths = [load_planner(f"{tmp_path}/{folder}/mine.py:Mine").width for folder in "abab"]  # type: ignore[attr-defined]
+    assert widths == [0, 1, 0, 1]
+
+
 def test_the_version_of_a_planner_is_that_of_its_distribution() -> None:
     assert planner_version("astar") == f"antdrive {importlib.metadata.version('antdrive')}"
 
@@ -56,6 +75,7 @@ def test_the_version_of_a_planner_is_that_of_its_distribution() -> None:
         ("no_such_module_here:Mine", r"cannot be imported \(ModuleNotFoundError: "),
         ("json:Mine", "json has no 'Mine'; it has "),
         ("json:", "json has no ''"),
+        ("antdrive.planners.graph.search:Astar", r"has no 'Astar'; did you mean AStar\?"),
         (":Mine", "cannot be imported"),
         ("nowhere.py:Mine", "nowhere.py: no such file"),
         ("nosuch", "no planner is called 'nosuch'"),

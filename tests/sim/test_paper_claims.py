@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -13,9 +14,10 @@ import pytest
 from antdrive.planners import PLANNERS, History, Query
 from antdrive.sim.papers import candidates
 from antdrive.sim.papers.baselines import FirstTouchDStar, total_cost
-from antdrive.sim.papers.candidates import MoveCount, candidate, move_counts
-from antdrive.sim.papers.claims import CLAIMS, Arm, Arrive, Cases, Claim, Less, Mean, Test, Wider, Within
+from antdrive.sim.papers.candidates import MoveCount, candidate, move_counts, winding_candidate
+from antdrive.sim.papers.claims import CLAIMS, Arm, Arrive, Cases, Claim, Less, Mean, Oftener, Test, Wider, Within
 from antdrive.sim.papers.experiments import PAPERS
+from antdrive.sim.papers.keeping import keep_trials, kept_trials, trials_key
 from antdrive.sim.papers.maps import environments, optimum
 from antdrive.sim.papers.trials import Trial, solve
 from antdrive.sim.papers.verdicts import Decision, judge, verdict_facts
@@ -48,6 +50,8 @@ def test_every_claim_names_experiments_of_its_paper() -> None:
         for claim in claims:
             assert claim.arms <= known, claim.sentence
             assert claim.printed
+        for experiment in experiments():
+            assert len(experiment.seeds(7)) == (1 if paper == "hasan" else 7 * experiment.rounds)
         texts = [(claim.sentence, claim.reading) for claim in claims]
         assert len(set(texts)) == len(texts)
         names = [(e.map, e.name) for e in experiments()]
@@ -71,6 +75,19 @@ def test_equal_values_refute_less_but_not_no_more() -> None:
     assert verdict(Less(((ONE, TWO),), strict=False), same, same).decision is Decision.HOLDS
     assert verdict(Less(((ONE, TWO),), margin=1.0, strict=False), same + 1.0, same).decision is Decision.HOLDS
     assert verdict(Less(((ONE, TWO),), margin=1.0, strict=False), same + 1.1, same).decision is Decision.REFUTED
+
+
+def test_oftener_counts_pairs_where_the_median_difference_is_zero() -> None:
+    same, other = np.zeros(40), np.r_[np.ones(16), np.zeros(24)]
+    assert verdict(Less(((ONE, TWO),)), same, other).value == 0.0
+    found = verdict(Oftener(((ONE, TWO),)), same, other)
+    assert found.decision is Decision.HOLDS
+    assert found.value == pytest.approx(-40.0)
+    assert "below in 16 of 40 pairs, above in 0: -40 points" in found.ours
+    assert verdict(Oftener(((ONE, TWO),)), other, same).decision is Decision.REFUTED
+    assert verdict(Oftener(((ONE, TWO),)), same, same).decision is Decision.REFUTED
+    both = np.resize([-1.0, 1.0], 40)
+    assert verdict(Oftener(((ONE, TWO),)), both, np.zeros(40)).decision is Decision.OPEN
 
 
 def test_a_path_is_less_than_none_and_none_equals_none() -> None:
@@ -183,6 +200,47 @@ def test_a_candidate_has_the_length_asked_for_and_depends_on_the_seed_alone() ->
     assert (one.grid.free != other.grid.free).any()
 
 
+def test_a_winding_candidate_has_the_moves_asked_for_and_turns_back_in_rows_and_columns() -> None:
+    moves = MoveCount(14, 32)  # lee2008's map 1: 78 cells over rows and columns, of which the map has 24 + 24
+    for seed in (101, 102):
+        query = winding_candidate((25, 25), moves, seed, largest=6)
+        steps = np.diff(PLANNERS["astar"].plan(query, np.random.default_rng(0)).cells, axis=0)
+        diagonal = int((np.abs(steps).sum(axis=1) == 2).sum())
+        assert (len(steps) - diagonal, diagonal) == (14, 32)
+        assert (steps.min(axis=0) == -1).all()
+        assert (steps.max(axis=0) == 1).all()
+        same = winding_candidate((25, 25), moves, seed, largest=6)
+        assert (same.grid.free == query.grid.free).all()
+        assert (same.start, same.goal) == (query.start, query.goal)
+
+
+def test_trials_are_kept_in_a_file_with_all_their_quantities(tmp_path: Path) -> None:
+    one, other = (e for e in PAPERS["han2007"]() if e.name in ("10 ants", "3 via points"))
+    shut = Query(Grid.from_free(np.eye(3)), (0, 0), (2, 0))  # a trial without a path, and one without iterations
+    cases = [
+        (one.planner, {**one.options, "iterations": 3}, one.query(0)),
+        (other.planner, {**other.options, "iterations": 3}, other.query(0)),
+        ("astar", {}, one.query(0)),
+        ("astar", {}, shut),
+    ]
+    made = [solve(planner, options, query, 3) for planner, options, query in cases]
+    path, key = tmp_path / "t.npz", trials_key(one, 4)
+    keep_trials(made, path, key)
+    read = kept_trials(path, key)
+    assert read is not None
+    quantities = ("length", "gap", "steps", "last", "settled", "near", "effort", "unrest", "work", "cpu_s", "total")
+    for before, after in zip(made, read, strict=True):
+        for name in ("seed", "world", "optimum", *quantities):
+            np.testing.assert_equal(getattr(after, name), getattr(before, name), err_msg=name)
+        np.testing.assert_array_equal(after.result.line, before.result.line)
+        assert after.result.status is before.result.status
+    assert kept_trials(path, trials_key(one, 5)) is None
+    assert kept_trials(path, trials_key(dataclasses.replace(one, options={"ants": 11}), 4)) is None
+    path.write_bytes(path.read_bytes()[:-200])
+    assert kept_trials(path, key) is None
+    assert kept_trials(tmp_path / "none.npz", key) is None
+
+
 def test_a_length_that_no_map_has_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(candidates, "MAPS", 3)
     with pytest.raises(FieldError, match="no map of 3 x 3 cells"):
@@ -206,6 +264,8 @@ def test_the_quantities_of_a_trial_are_those_worked_out_by_hand() -> None:
     result = SimpleNamespace(solved=True, history=history, work=50, line_length=110.0)
     trial = Trial(0, 0, cast(Any, result), 100.0, 0.1, 0.0)
     assert (trial.effort, trial.settled, trial.gap) == (30.0, 4.0, pytest.approx(10.0))
+    assert trial.near == math.inf
+    assert dataclasses.replace(trial, optimum=105.0).near == 4.0  # 110 is within 5 % of 105
     assert trial.last == 6.0
     assert trial.unrest == pytest.approx(np.std([9, 9, 9, 4, 6]))
     none = dataclasses.replace(trial, result=cast(Any, SimpleNamespace(solved=False, history=history, work=50)))

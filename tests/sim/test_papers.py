@@ -4,7 +4,7 @@ import math
 import numpy as np
 import pytest
 
-from antdrive.sim.papers import films, maps, reproduce
+from antdrive.sim.papers import drawing, films, maps, reproduce
 from antdrive.sim.papers.experiments import PAPERS
 from antdrive.sim.papers.reproduce import reproduce as measure_again
 from antdrive.sim.papers.verdicts import Decision
@@ -28,7 +28,13 @@ def test_the_shortest_path_of_a_recreated_map_is_the_best_that_its_paper_prints(
     printed = {
         "suganthi2019": {"10×10": 13.899, "20×20": 28.627, "30×30": 42.184},
         "ibraheem2016": {"10×10, 5 obstacles": 15.07, "20×20, 10 obstacles": 28.6274, "30×30, 15 obstacles": 45.1127},
-        "lee2008": {"2: 50×44": 64.0833, "3: 100×100": 123.6102, "4: 100×100": 135.8234, "5: 100×100": 131.6812},
+        "lee2008": {
+            "1: 25×25": 59.2548,
+            "2: 50×44": 64.0833,
+            "3: 100×100": 123.6102,
+            "4: 100×100": 135.8234,
+            "5: 100×100": 131.6812,
+        },
     }
     for paper, lengths in printed.items():
         found = {experiment.map: experiment for experiment in PAPERS[paper]() if experiment.comparable}
@@ -51,8 +57,8 @@ def test_a_recreated_map_depends_on_the_seed_alone():
 
 
 def test_a_papers_experiments_are_run_and_written_to_files(tmp_path, monkeypatch):
-    monkeypatch.setattr(reproduce, "PC", (0.25,))
-    monkeypatch.setattr(reproduce, "PM", (0.1, 0.2))
+    monkeypatch.setattr(drawing, "PC", (0.25,))
+    monkeypatch.setattr(drawing, "PM", (0.1, 0.2))
     few = [e for e in PAPERS["han2007"]() if e.printed is not None and e.options.get("ants", 0) < 500]
     monkeypatch.setattr(reproduce, "PAPERS", {"han2007": lambda: few})
     seen = []
@@ -64,7 +70,7 @@ def test_a_papers_experiments_are_run_and_written_to_files(tmp_path, monkeypatch
         assert row.best <= row.mean
         assert row.arrived == row.seeds == 2
         assert row.gap > -0.15
-    figures = {"han2007 maps", "han2007 history", "han2007 ants", "han2007 sweep"}
+    figures = {"han2007 maps", "han2007 history", "han2007 run", "han2007 ants", "han2007 sweep"}
     assert set(files) == {"table", "csv", "claims", "claims csv"} | figures
     # Those claims are judged whose experiments were run: two on each kind of mean, and that of 10 and 100 ants.
     assert [verdict.claim.source for verdict in found.verdicts].count("§5.2, Table 5.2.1") == 4
@@ -74,6 +80,18 @@ def test_a_papers_experiments_are_run_and_written_to_files(tmp_path, monkeypatch
     assert "38.6223" in table
     with (tmp_path / "table.csv").open(newline="") as file:
         assert [float(line["mean"]) for line in csv.DictReader(file)] == [row.mean for row in rows]
+
+    # The same command again takes the trials from their files, all but the one that is lost, and finds the same.
+    assert found.kept == 0
+    lost = sorted((tmp_path / "trials").glob("*.npz"))[1]
+    lost.unlink()
+    monkeypatch.setattr(drawing, "draw_figures", lambda *rest: {})
+    again = measure_again(["han2007"], tmp_path, seeds=2, suffixes=(".png",))
+    assert again.kept == len(few) - 1
+    timed = {"plan_s": 0.0}
+    assert [vars(row) | timed for row in again.rows] == [vars(row) | timed for row in rows]
+    assert again.verdicts == found.verdicts
+    assert lost.exists()
 
 
 def test_an_unknown_paper_is_refused(tmp_path):

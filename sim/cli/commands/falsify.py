@@ -24,6 +24,7 @@ from antdrive.sim.cli.write import (
     write_result,
     write_run,
 )
+from antdrive.worlds.errors import InputError
 from antdrive.worlds.files.atomic import claimed
 
 if TYPE_CHECKING:
@@ -72,8 +73,12 @@ def falsify(
     A path exists in each of them. Failures are run again in another process, shrunk, and written as a suite with a film
     each. Ctrl-C keeps what was found. Exit code 0: nothing was found. Exit code 1: the set-up fails in some world.
     """
+    from antdrive.planners.own_code import is_own
     from antdrive.sim.falsify.hunt import find_failures
 
+    if is_own(planner):
+        problem = "failures are run again in other processes, which know registered planners only"
+        raise InputError(f"--planner {planner}: {problem}; register the class under the entry point antdrive.planners")
     setup = make_scenario("empty", planner, settings, robot, margin=margin, cell=cell, smoothing=smoothing, noise=noise)
     mark = fingerprint(setup, budget, seed, method, obstacles, seconds)
     usual = Path("out") / file_name(f"falsify-{planner}-{setup.robot.name}-{seed}")

@@ -10,7 +10,7 @@ from antdrive.sim.cli import options
 from antdrive.sim.cli.compiling import compile_once
 from antdrive.sim.cli.console import planning, print_json, print_line, print_table
 from antdrive.sim.cli.exits import FAILED, SUCCEEDED
-from antdrive.sim.cli.scenario import make_scenario
+from antdrive.sim.cli.scenario import chosen_task, ends_words, make_scenario
 from antdrive.worlds.errors import InputError
 
 if TYPE_CHECKING:
@@ -28,6 +28,9 @@ def find_margin(
         str | None,
         typer.Option("--generate", metavar="KIND", help="Instead of WORLD: a random forest or barn for each seed."),
     ] = None,
+    task: options.TaskName = None,
+    start: options.Start = None,
+    goal: options.Goal = None,
     planner: options.Planner = "astar",
     settings: options.Settings = None,
     robot: options.Robot = "turtlebot",
@@ -57,9 +60,8 @@ def find_margin(
     from antdrive.sim.log.margin import find_margin as search
     from antdrive.sim.pipeline import run as drive
 
-    if (world is None) == (kind is None):
-        raise InputError("find-margin: name a world, or a kind of random worlds with --generate forest|barn")
-    base = make_scenario(world or "empty", planner, settings, robot, cell=cell, smoothing=smoothing, noise=noise)
+    chosen = _chosen(world, kind, task, start, goal)
+    base = make_scenario(chosen, planner, settings, robot, cell=cell, smoothing=smoothing, noise=noise)
     base = base if max_speed is None else _slowed(base, max_speed)
     tasks = {n: base.task if kind is None else _generated(kind, n) for n in range(seed, seed + seeds)}
 
@@ -76,6 +78,19 @@ def find_margin(
     else:
         _print(base, trials, smallest)
     return FAILED if smallest is None else SUCCEEDED
+
+
+def _chosen(world: str | None, kind: str | None, task: str | None, start: str | None, goal: str | None) -> "str | Task":
+    """The world of every drive; for random worlds a stand-in."""
+    if (world is None) == (kind is None):
+        raise InputError("find-margin: name a world, or a kind of random worlds with --generate forest|barn")
+    if world is not None:
+        return chosen_task(world, task, start, goal)
+    if ends_words(task, start, goal):
+        raise InputError(
+            "--task, --start, --goal: random worlds have their own starts and goals; name a world for others"
+        )
+    return "empty"
 
 
 def _slowed(scenario: "Scenario", speed: float) -> "Scenario":

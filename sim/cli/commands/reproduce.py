@@ -7,7 +7,7 @@ import typer
 
 from antdrive.sim.cli import options
 from antdrive.sim.cli.compiling import compile_once
-from antdrive.sim.cli.console import bar, print_files, print_json, print_table
+from antdrive.sim.cli.console import bar, print_files, print_json, print_line, print_table
 from antdrive.sim.cli.exits import SUCCEEDED
 from antdrive.sim.cli.write import check_folder, free_folder, suffixes, this_command, write_marker
 from antdrive.worlds.files.atomic import claimed
@@ -40,10 +40,11 @@ def reproduce(
     """Repeat a paper's experiments: printed against measured.
 
     Prints a table of what the paper printed beside what was measured, then each of the paper's claims with our figure, its
-    interval, and whether it holds; and draws the paper's figures. Claims are told apart from chance with 50 seeds.
+    interval, and whether it holds; and draws the paper's figures. Claims are told apart from chance with 50 seeds. The same
+    command goes on where it was interrupted.
     """
     from antdrive.sim.papers.experiments import PAPERS
-    from antdrive.sim.papers.reproduce import HEADS, check_papers, row_cells
+    from antdrive.sim.papers.reproduce import HEADS, TRIALS, check_papers, row_cells
     from antdrive.sim.papers.reproduce import reproduce as repeat
     from antdrive.sim.papers.verdicts import VERDICT_HEADS, verdict_cells, verdict_facts
 
@@ -61,6 +62,7 @@ def reproduce(
             "rows": [vars(row) for row in found.rows],
             "claims": [verdict_facts(verdict) for verdict in found.verdicts],
             "files": found.files,
+            "kept": found.kept,
         }
         write_marker(folder / MARKER, {"fingerprint": mark, "command": this_command(), **result})
     if json:
@@ -69,4 +71,7 @@ def reproduce(
         print_table(HEADS, map(row_cells, found.rows))
         print_table(VERDICT_HEADS, map(verdict_cells, found.verdicts))
         print_files(found.files)
+        if found.kept:
+            count = f"{found.kept} of {len(found.rows)}"
+            print_line(f"{count} experiments were done before and were taken from {folder / TRIALS}")
     return SUCCEEDED

@@ -64,10 +64,10 @@ def shrink(
 ) -> int:
     """Find the smallest world that still fails.
 
-    It fails in the same way: same outcome, same kind of thing touched, same cause; a test that succeeds but for a bound in its
-    `expect` fails in the same way while it does not keep that. Leaves out obstacles and movers, noise and
-    digits, and moves start, goal and walls nearer. Writes the world, a suite with the scenario and how it fails, the log and
-    a film. Exit code 0: the result fails in the same way, in another process too.
+    It fails in the same way: same outcome, same kind of thing touched, same cause; a test that ends as expected but breaks a
+    bound of its `expect`, or is worse than its baseline allows, does that in the same way. Leaves out obstacles and movers, noise
+    and digits, and moves start, goal and walls nearer. Writes the world, a suite with the scenario and how it fails, the log
+    and a film. Exit code 0: the result fails in the same way, in another process too.
     """
     from antdrive.sim.falsify.failure import parse_bound
     from antdrive.sim.falsify.handover import Handover, scenario_name
@@ -112,30 +112,29 @@ def _of_a_test(words: str) -> "tuple[Scenario, SuiteCase]":
 
 
 def _bound_not_kept(case: "SuiteCase | None", scenario: "Scenario") -> "Bound | None":
-    """What counts as failing where a test's drive is a certified success and does not keep a bound that the test has."""
+    """What counts as failing where a test's drive ends as expected and breaks a bound of the test or of its baseline."""
     from antdrive.planners import PlannerError
-    from antdrive.sim.log.metrics import METRICS
+    from antdrive.sim.falsify.failure import bound_broken_in
     from antdrive.sim.pipeline import run
 
-    if case is None or not case.demands.bounds:
+    if case is None or not (case.demands.bounds or case.entry.baseline):
         return None
+    compile_once()
     try:
-        done = run(scenario)
+        return bound_broken_in(case, run(scenario))
     except PlannerError:  # the failure itself
         return None
-    if not done.succeeded or done.rollout is None:
-        return None
-    rollout = done.rollout
-    broken = (bound for bound in case.demands.bounds if not bound.holds(METRICS[bound.metric](rollout)))
-    return next((opposite for bound in broken if (opposite := bound.opposite) is not None), None)
 
 
 def _of_a_log(words: str) -> "Scenario":
     """The scenario of a log, rebuilt from its record."""
     from antdrive.sim.falsify.rebuild import rebuilt
     from antdrive.sim.log.rollout import read_record
+    from antdrive.sim.regression.suite import SUFFIX
     from antdrive.worlds.errors import input_error
 
+    if words.endswith(SUFFIX):
+        raise InputError(f"{words}: is a suite; name one of its tests, as {words}::SCENARIO")
     if (log := Path(words) / "rollout.npz").is_file():
         words = str(log)
     try:
@@ -144,16 +143,11 @@ def _of_a_log(words: str) -> "Scenario":
         raise error if str(error).startswith(words) else input_error(words, str(error)) from None
 
 
-def _planner_beside(case: "SuiteCase | None", folder: Path) -> dict[str, Any] | None:
+def _planner_beside(case: "SuiteCase | None", folder: Path) -> "str | dict[str, Any] | None":
     """A test's planner that is not registered, in the words of a suite in another folder; None for all others."""
-    import os
+    from antdrive.sim.falsify.handover import planner_moved
 
-    given = case.entry.planner if case is not None else None
-    if case is None or not isinstance(given, dict) or not {"file", "module"} & given.keys():
-        return None
-    if "file" not in given:
-        return given
-    return {**given, "file": os.path.relpath(case.suite.parent / given["file"], folder)}
+    return None if case is None else planner_moved(case.entry.planner, case.suite.parent, folder)
 
 
 def _write(

@@ -15,6 +15,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from antdrive.planners import AStar, PlanStatus, Query, Tangent, route_along
+from antdrive.planners.anyangle import _kernels_tangent
 from antdrive.planners.anyangle.tangent import Arc, Line, TangentPath, shortest
 from antdrive.worlds import Disc, InputError, Task, World, forest, polyline_clearance, rasterise
 from tests.planners.worlds_to_solve import catalogue, random_query
@@ -362,3 +363,52 @@ def test_a_lattice_of_discs_that_all_touch_is_solved() -> None:
         if found is not None:
             assert found.length <= optimum.cost + 0.2
             assert polyline_clearance(world, found.polyline(1e-3, discs, box, inflate)) >= inflate - 1e-9
+
+
+# -- what makes it fast
+
+
+@settings(max_examples=60)
+@given(some_discs, st.sampled_from([0.3, 0.999, 1.0, 1.05, 2.0]))
+def test_an_expected_length_right_or_wrong_changes_no_path(discs: Discs, share: float) -> None:
+    found = shortest(discs, WALLS, 0.1, START, GOAL)
+    expected = 1.0 if found is None else share * found.length + 1e-9
+    again = shortest(discs, WALLS, 0.1, START, GOAL, expected=expected)
+    assert (found is None) == (again is None)
+    if found and again:
+        assert again.length == pytest.approx(found.length, abs=1e-12)
+        assert share < 1.0 or again.work <= found.work
+
+
+def test_among_many_discs_a_path_on_the_grid_bounds_the_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    query = catalogue()["forest"]
+    free = Tangent().plan(query, RNG)
+    monkeypatch.setattr("antdrive.planners.anyangle.tangent.MANY_DISCS", 0)
+    bounded = Tangent().plan(query, RNG)
+    assert bounded.length == free.length
+    np.testing.assert_array_equal(bounded.line, free.line)
+    assert bounded.work < free.work
+
+
+@settings(max_examples=100)
+@given(some_discs, st.floats(-12, 12), st.floats(-12, 12), st.floats(0, 1.7), st.sampled_from([-1, 1]), st.data())
+def test_no_tangent_to_a_free_arc_is_passed_over(
+    discs: Discs, dx: float, dy: float, radius: float, turn: int, data: st.DataObject
+) -> None:
+    assume(discs)
+    table = np.array(discs)
+    rims = _kernels_tangent.free_arcs(table, np.array(WALLS))
+    i = data.draw(st.integers(0, len(discs) - 1))
+    other = data.draw(st.sampled_from([-1, 1]))
+    across = other * radius - turn * table[i, 2]
+    d = math.hypot(dx, dy)
+    assume(d > abs(across))
+    angle = (math.atan2(dy, dx) - math.asin(across / d) - turn * math.pi / 2) % math.tau
+    touched = any(
+        (angle - begin) % math.tau < width - 1e-9
+        for begin, width in zip(
+            rims.begin[rims.first[i] :], rims.width[rims.first[i] : rims.first[i + 1]], strict=False
+        )
+    )
+    passed_over = _kernels_tangent.misses(rims, i, turn, dx, dy, across)
+    assert not (touched and passed_over)

@@ -1,4 +1,4 @@
-"""Every equation of the papers on ants against numbers worked out by hand, on grids of a few cells."""
+"""Every equation of the papers behind the planners against numbers worked out by hand, on grids of a few cells."""
 
 from __future__ import annotations
 
@@ -8,12 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from antdrive.planners import AcoHan, MaxMinDStar, PotentialFieldAnts, Query
+from antdrive.planners import AcoHan, MaxMinDStar, PotentialField, PotentialFieldAnts, Query
+from antdrive.planners.anyangle import _kernels_ga
+from antdrive.planners.anyangle.lines import terrain
 from antdrive.planners.colonies import _kernels_mmas_dstar, _kernels_pfaco
 from antdrive.planners.colonies.ant_system import AgeingAnts, AntSystem, ExploringAnts, ibraheem_beta
 from antdrive.planners.colonies.colony import ChoiceContext, Colony, ColonyGraph, IterationState, Walks
+from antdrive.planners.colonies.mmas import MaxMinAnts
 from antdrive.planners.colonies.pfaco import AntPool
-from antdrive.worlds import Floats, Grid
+from antdrive.worlds import Disc, Floats, Grid, Task, World, rasterise
 
 EAST, NORTH_EAST, NORTH, WEST = 0, 1, 2, 4
 
@@ -61,6 +64,23 @@ def test_han2007_4_2_2_and_4_2_3() -> None:
 def test_han2007_4_2_4() -> None:
     trail = after(AcoHan(evaporation=0.1, elitism=4), ROW, [[0, 1, 2]], [2.0], np.ones(3))
     assert trail == pytest.approx([3.4] * 3)  # 1.4 + 4 / 2
+
+
+def test_han2007_4_1_1_and_4_1_2() -> None:
+    # The thesis' own example: (x - 12)^2 + (y - 12)^2 = 4 and the chromosome (0, 0), (10, 10), (20, 20). Its first line
+    # ends 2.83 from the centre and is clear, its second passes through. By way of (16, 6) both lines are clear: the
+    # distances are 18 / sqrt(73) - 2 and 28 / sqrt(53) - 2.
+    task = Task(World("thesis", (-0.5, -0.5, 20.5, 20.5), (Disc(12, 12, 2),)), (0.0, 0.0, 0.0), (20.0, 20.0), cell=1.0)
+    land = terrain(Query.between(rasterise(task.world, 1.0), task))
+    start, middle, goal = np.array([0.0, 0.0]), np.array([[10.0, 10.0]]), np.array([20.0, 20.0])
+    assert _kernels_ga.feasible(np.empty((0, 2)), np.array([start, middle[0]]), land)
+    assert not _kernels_ga.feasible(middle, np.array([start, goal]), land)
+    assert _kernels_ga.feasible(np.array([[16.0, 6.0]]), np.array([start, goal]), land)
+
+
+def test_han2007_fitness_is_the_distance_of_the_path() -> None:
+    ends = np.array([[0.0, 0.0], [20.0, 20.0]])
+    assert _kernels_ga.length_of(np.array([[3.0, 4.0], [20.0, 4.0]]), ends) == pytest.approx(5.0 + 17.0 + 16.0)
 
 
 # suganthi2019
@@ -122,6 +142,35 @@ def test_ibraheem2016_5() -> None:
 # lee2008
 
 
+def test_lee2008_1() -> None:
+    row = graph(1, 4, (0, 3))
+    trail = np.ones((4, 8))
+    trail[1, WEST] = 3.0
+    # From cell 1: eta is 1 towards the goal, 1/3 away from it, squared 1/9; the pheromone is 1 and 3: weights 1 and 1/3.
+    assert shares(AntSystem(alpha=1.0, beta=2.0), row, trail, 1) == pytest.approx({EAST: 0.75, WEST: 0.25})
+
+
+def test_lee2008_2_to_4() -> None:
+    # rho, 0.99, is the share retained: 0.99 * 2 + 1 / 2.
+    trail = after(AntSystem(ants=500, beta=2.0, evaporation=0.01), ROW, [[0, 1, 2]], [2.0], np.full((3, 8), 2.0))
+    assert trail[0, EAST] == pytest.approx(2.48)
+
+
+def test_lee2008_7_9_and_11() -> None:
+    free = np.ones((1, 6))
+    free[0, 5] = 0
+    field = PotentialField(k_att=2.0, k_rep=8.0, influence=2.0).potential(Query(Grid.from_free(free), (0, 0), (0, 3)))
+    # To the goal: d^2 is 9, 4, 1, 0, 1; beside the obstacle 4 (1 - 1/2)^2 = 1 is added, 2 cells from it 0.
+    assert field[0] == pytest.approx([9.0, 4.0, 1.0, 0.0, 2.0, math.inf])
+
+
+def test_lee2008_5_6_and_8() -> None:
+    # Down the gradient: from (0, 0) U falls by 9 - 4 = 5 to the east, by 13 - 9 over sqrt(2) = 2.83 aslant.
+    query = Query(Grid.from_free(np.ones((3, 4))), (0, 0), (0, 3))
+    plan = PotentialField(k_rep=0.0).plan(query, np.random.default_rng(0))
+    assert plan.cells.tolist() == [[0, 0], [0, 1], [0, 2], [0, 3]]
+
+
 def test_lee2008_9_and_11() -> None:
     free = np.ones((1, 7))
     free[0, 6] = 0
@@ -172,6 +221,36 @@ def test_lee2008_15() -> None:
     assert _kernels_pfaco.enter(walk, 5, 4.0, ranking) == 0  # 5 cells, length 4: cost 20
     assert _kernels_pfaco.enter(walk, 4, 4.5, ranking) == 0  # cost 18: longer, but of fewer cells
     assert ranking.costs[ranking.order[:2]].tolist() == [18.0, 20.0]
+
+
+def test_lee2008_rank_determines_the_deposit() -> None:
+    empty = np.zeros((4, 3), dtype=np.int32), np.zeros(4, dtype=np.int64), np.zeros(4), np.zeros(4, dtype=np.int64)
+    ranking = _kernels_pfaco.Ranking(*empty, np.zeros(2, dtype=np.int64))
+    walk, trail = np.arange(3, dtype=np.int32), np.zeros(3)
+    _kernels_pfaco.reward(walk, 3, 5.0, trail, ranking, 2.0)
+    assert trail == pytest.approx([2.0] * 3)  # the first rank of four
+    _kernels_pfaco.reward(walk, 3, 6.0, trail, ranking, 2.0)
+    assert trail == pytest.approx([3.5] * 3)  # the second: 2 (1 - 1/4) more
+
+
+# Stützle & Hoos 2000, as hasan tells it
+
+
+def test_hasan_4() -> None:
+    # Only the best ant deposits: 0.8 * 1 + 1 / 2; on the other's arcs 0.8 is left. Both are within the bounds.
+    planner = MaxMinAnts(evaporation=0.2, p_best=0.9)
+    trail = after(planner, SQUARE, [[0, 1, 3], [0, 2, 3]], [2.0, 2.0], np.ones((4, 8)))
+    assert trail[0, EAST] == trail[1, NORTH] == pytest.approx(1.3)
+    assert trail[0, NORTH] == pytest.approx(0.8)
+
+
+def test_stuetzle_hoos_7_and_11() -> None:
+    # A tour of 2 steps on 2 x 2 cells with 3 moves each, one of them back: tau_max = 1 / (0.2 * 2); with p_best = 0.81 a
+    # step is right with probability 0.9, and tau_min = tau_max * 0.1 / ((2 - 1) * 0.9).
+    best = Walks(np.array([[0, 1, 3]], dtype=np.int32), np.array([3]), np.array([2.0]))
+    tau_min, tau_max = MaxMinAnts(evaporation=0.2, p_best=0.81).bounds(SQUARE, best)
+    assert tau_max == pytest.approx(2.5)
+    assert tau_min == pytest.approx(0.277778, rel=1e-5)
 
 
 # hasan

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from antdrive.planners import AStar, Dijkstra, Query, path_cost, reachable
+from antdrive.planners import PLANNERS, AStar, Dijkstra, Query, path_cost, reachable
 from antdrive.worlds import DIRECTIONS, Grid
-from tests.planners.worlds_to_solve import optimum, optimum_by_scipy, random_discs, random_query, thinned
+from tests.planners.worlds_to_solve import catalogue, optimum, optimum_by_scipy, random_discs, random_query, thinned
 
 RNG = np.random.default_rng(0)  # searches draw nothing from it
 SEARCHES = [Dijkstra(), AStar()]
@@ -88,6 +88,17 @@ def test_the_first_path_that_closes_the_goal_may_not_be_the_shortest() -> None:
     query = Query(Grid(moves > 0, moves), (20, 5), (20, 29))
     for search in SEARCHES:
         assert search.plan(query, RNG).cost == pytest.approx(26 + 5 * math.sqrt(2), abs=1e-9)
+
+
+def test_grid_paths_are_longer_than_the_exact_shortest_as_the_docstring_says() -> None:
+    gaps = []
+    for query in catalogue().values():
+        exact = PLANNERS["tangent"].plan(query, RNG)
+        gaps.append(AStar().plan(query, RNG).cost / exact.line_length - 1)
+    assert len(gaps) == 5
+    assert (float(np.median(gaps)), max(gaps)) == pytest.approx((0.117, 0.212), abs=0.001)
+    ground = Query(Grid.from_free(np.ones((200, 200))), (0, 0), (82, 198))  # 22.5 degrees: 2.414 to the side of 1
+    assert AStar().plan(ground, RNG).cost / math.hypot(82, 198) == pytest.approx(1.0824, abs=1e-4)
 
 
 def _corridor(turns: list[tuple[int, int]]) -> list[tuple[int, int]]:

@@ -23,7 +23,8 @@ def follow(
 ) -> tuple[np.ndarray, np.ndarray, list[PursuitState]]:
     controller = PurePursuit()
     tracked = controller.prepare(route, world, robot, margin, DT)
-    command, state = Twist(0, 0), PursuitState()
+    pose = (float(pose[0]), float(pose[1]), float(pose[2]))  # for whole numbers the kernel would be compiled again
+    command, state = Twist(0.0, 0.0), PursuitState()
     poses, commands, states = [pose], [command], [state]
     for _ in range(60 * 120):
         command, state = controller.step(tracked, pose, command, state)
@@ -97,7 +98,7 @@ def test_a_robot_far_from_its_route_does_not_creep_back_to_a_corner(side: float,
     route = Route(np.array([(0.0, 0.0), (2.0, 0.0), (0.0, -0.8 * side)]))
     controller = PurePursuit()
     tracked = controller.prepare(route, OPEN, turtlebot, 0.05, DT)
-    pose, command, state = (2.05, 0.8 * side, -math.pi / 2 * side), Twist(0, 0), PursuitState(arc=1.95)
+    pose, command, state = (2.05, 0.8 * side, -math.pi / 2 * side), Twist(0.0, 0.0), PursuitState(arc=1.95)
     fastest = 0.0
     for period in range(60 * 4):
         command, state = controller.step(tracked, pose, command, state)

@@ -312,3 +312,25 @@ def test_the_yaw_of_the_axle_is_the_robots(tmp_path: Path) -> None:
     path.write_text(text)
     robot: RobotSpec = import_urdf(path).robot
     assert robot.footprint.bounds == pytest.approx((-0.101, -0.089, 0.037, 0.089), abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("inside", "says"),
+    [
+        ('<link name="${1/0}"/>', "division by zero when evaluating expression"),
+        ('<xacro:include filename="$(find nowhere)/a.xacro"/>', "Package not found: nowhere"),
+        ("<xacro:wheel/>", "unknown macro name: xacro:wheel"),
+    ],
+    ids=["expression", "package", "macro"],
+)
+def test_what_xacro_cannot_expand_is_refused_in_one_line(tmp_path: Path, inside: str, says: str) -> None:
+    pytest.importorskip("xacrodoc")
+    path = tmp_path / "robot.xacro"
+    path.write_text(f'<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="x">{inside}</robot>')
+    with pytest.raises(InputError) as caught:
+        import_urdf(path)
+    message = str(caught.value)
+    assert message.startswith(f"{path}: xacro cannot expand it: {says}")
+    assert message.isprintable()
+    assert message.count(says) == 1
+    assert "\\n" not in message

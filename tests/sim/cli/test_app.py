@@ -1,6 +1,7 @@
 """What every command shares: help, exit codes, streams, interruptions."""
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -15,6 +16,7 @@ import typer
 
 from antdrive.planners import PLANNERS, PlanResult, Progress, Query, watch
 from antdrive.sim.cli.app import COMMANDS, WORLDS, application
+from antdrive.sim.cli.exits import BROKEN_PIPE
 from tests.sim.cli.calling import Call, Refused
 
 
@@ -66,6 +68,29 @@ def test_python_m_antdrive_is_the_command_and_prints_nothing_else(small: Path, t
     assert done.returncode == 0
     assert done.stderr == ""
     assert json.loads(done.stdout)["succeeded"]
+
+
+@pytest.mark.parametrize("closed", ["stdout", "stderr"])
+def test_a_closed_pipe_ends_the_program_silently(closed: str) -> None:
+    """As in `antdrive planners | head`, and with an error that nobody reads."""
+    words = ["planners"] if closed == "stdout" else ["planners", "--bogus"]
+    reading, writing = os.pipe()
+    os.close(reading)
+    other = "stderr" if closed == "stdout" else "stdout"
+    command = [sys.executable, "-m", "antdrive", *words]
+    streams: dict[str, int] = {closed: writing, other: subprocess.PIPE}
+    done = subprocess.run(command, check=False, **streams)  # type: ignore[call-overload]
+    os.close(writing)
+    assert (done.returncode, getattr(done, other)) == (BROKEN_PIPE, b"")
+
+
+def test_another_closed_pipe_is_a_fault(antdrive: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    def closed(*_: object, **__: object) -> None:
+        raise BrokenPipeError(32, "Broken pipe")
+
+    monkeypatch.setattr("antdrive.sim.pipeline.run", closed)
+    code, _, err = antdrive("run", "empty")
+    assert (code, err.startswith("antdrive: internal error: BrokenPipeError: ")) == (3, True)
 
 
 def test_ctrl_c_is_one_line(antdrive: Call, monkeypatch: pytest.MonkeyPatch) -> None:

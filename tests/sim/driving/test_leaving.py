@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from antdrive.planners import load_planner
-from antdrive.robots import LIMITERS, Footprint, PurePursuit, RobotSpec, overlap_at
+from antdrive.robots import LIMITERS, Footprint, PurePursuit, RobotSpec, load_robot, overlap_at
 from antdrive.sim import Engine, Outcome, Scenario, plan, run
 from antdrive.sim.driving.drive import drive
 from antdrive.sim.driving.leaving import is_narrow
@@ -91,3 +91,20 @@ def test_a_rectangle_does_not_turn_into_a_post_on_its_way(jackal: RobotSpec, sid
     assert LIMITERS[ends["any turn"].limiter[-1]] == "rotate"
     assert ends["checked"].outcome is Outcome.STUCK
     assert ends["checked"].clearance.min() > 0.9 * gap
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_a_robot_that_is_not_centred_turns_the_longer_way_where_the_shorter_is_blocked(side: int) -> None:
+    """A post stands beside the long nose, on the side of the goal, which is behind: the nose gets there past the other side."""
+    robot, start = load_robot("warehouse"), (4.0, 4.0, 0.0)
+    post = Disc(4.3, 4.0 + 0.46 * side, 0.05)
+    task = Task(World("nose", (0, 0, 8, 8), (post,)), start, (2.0, 4.0 + 3.0 * side), cell=0.1)
+    done = run(Scenario(task=task, planner=load_planner("astar"), robot=robot))
+    assert done.succeeded, (done.reason, done.certificate)
+    assert done.rollout is not None
+    turned = np.unwrap(done.rollout.pose[:, 2])
+    assert side * turned[np.abs(turned).argmax()] < 0, "away from the post"
+    assert np.abs(turned).max() > math.pi, "more than half a turn"
+    closed = dataclasses.replace(task.world, obstacles=(post, Disc(4.3, 4.0 - 0.46 * side, 0.05)))
+    refused = run(Scenario(task=dataclasses.replace(task, world=closed), planner=load_planner("astar"), robot=robot))
+    assert (refused.outcome, "turning on the spot" in refused.reason) == (Outcome.NO_PATH, True), refused.reason

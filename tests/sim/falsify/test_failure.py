@@ -1,13 +1,18 @@
 """What counts as a failure, and which failures are the same."""
 
+import dataclasses
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import pytest
 
-from antdrive.sim import Certificate, Outcome, Run, Scenario, run
-from antdrive.sim.falsify.failure import Failure, failure_of, parse_bound, without_numbers
+from antdrive.sim import METRICS, Certificate, Outcome, Run, Scenario, run
+from antdrive.sim.falsify.failure import Failure, bound_broken_in, failure_of, parse_bound, without_numbers
+from antdrive.sim.regression import Baseline, Demands, SuiteCase, load_suite
+from antdrive.sim.regression.demands import Bound
 from antdrive.worlds import Cruising, Disc, Task, World
-from antdrive.worlds.errors import FieldError
+from antdrive.worlds.errors import FieldError, InputError
 
 
 def test_a_certified_success_is_no_failure(small_run: Run) -> None:
@@ -70,3 +75,67 @@ def test_reasons_from_different_worlds_are_the_same_without_their_numbers() -> N
     two = "turning on the spot at the start would bring jackal into the left wall; x 1e-05 m"
     assert without_numbers(one) == without_numbers(two)
     assert without_numbers("movers[0] stands") != without_numbers("nothing stands")
+
+
+@pytest.fixture
+def case(tmp_path: Path) -> SuiteCase:
+    """A test that expects nothing of the small run's metrics; its baseline says what each test below writes into it."""
+    path = tmp_path / "a.drive.yaml"
+    path.write_text("{schema: 1, scenarios: {small: {world: empty}}}")
+    return load_suite(path)[0]
+
+
+def accepted(case: SuiteCase, run: Run, line: float = 0.0, **metrics: float) -> None:
+    """Write the baseline of a drive with other metrics, and with its end elsewhere."""
+    made = Baseline.of(run, case.id)
+    x, y, yaw, rule = made.line[-1]
+    moved = (*made.line[:-1], (x + line, y, yaw, rule))
+    dataclasses.replace(made, metrics={**made.metrics, **metrics}, line=moved).save(case.baseline_path)
+
+
+def demanding(case: SuiteCase, **expect: Any) -> SuiteCase:
+    return dataclasses.replace(case, demands=Demands.of(expect))
+
+
+def test_a_test_that_is_worse_than_its_baseline_fails_by_the_bound_that_this_sets(
+    case: SuiteCase, small_run: Run
+) -> None:
+    assert bound_broken_in(case, small_run) is None, "there is no baseline"
+    accepted(case, small_run)
+    assert bound_broken_in(case, small_run) is None, "it is as good as its baseline"
+    drove = small_run.metrics
+    for name, then, sign in (
+        ("duration_s", drove["duration_s"] - 1.0, ">"),
+        ("min_clearance_m", drove["min_clearance_m"] + 0.1, "<"),
+        ("jerk_rms", drove["jerk_rms"] / 2, ">"),
+    ):
+        accepted(case, small_run, **{name: then})
+        found = bound_broken_in(case, small_run)
+        assert found is not None
+        assert (found.metric, found.sign) == (name, sign)
+        allowed = METRICS[name].tolerance.allowed(then)
+        assert found.value == pytest.approx(then + (allowed if sign == ">" else -allowed), abs=2e-6)
+        failure = failure_of(small_run, found)
+        assert failure is not None
+        assert failure.cause == str(found)
+
+
+def test_a_bound_of_the_test_comes_before_its_baseline(case: SuiteCase, small_run: Run) -> None:
+    accepted(case, small_run, duration_s=0.5)
+    assert bound_broken_in(demanding(case, spl=">= 0.9999"), small_run) == Bound("spl", "<", 0.9999)
+    contacts = demanding(case, contacts_driving=2)
+    assert bound_broken_in(contacts, small_run) == Bound("contacts_driving", "<", 2.0)
+
+
+def test_a_run_that_ends_otherwise_is_the_failure_itself(case: SuiteCase, small_run: Run, collided_run: Run) -> None:
+    accepted(case, small_run, duration_s=0.5)
+    assert bound_broken_in(case, collided_run) is None
+    assert bound_broken_in(demanding(case, outcome="collided", touched="unseen cylinder"), collided_run) is None
+
+
+def test_what_no_other_world_repeats_is_said_in_one_line(case: SuiteCase, small_run: Run) -> None:
+    accepted(case, small_run, line=0.2)
+    with pytest.raises(
+        InputError, match=r"a\.drive\.yaml::small\[0\]: end_m: .* 0\.2 m apart.*; no other world repeats that"
+    ):
+        bound_broken_in(case, small_run)

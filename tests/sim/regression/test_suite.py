@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import json
+import os
 import re
 from dataclasses import fields
 from pathlib import Path
@@ -11,11 +12,12 @@ from pathlib import Path
 import pytest
 
 from antdrive import Disc, Outcome, Scenario
+from antdrive.planners.own_code import is_importable_elsewhere
 from antdrive.sim.calibration.prediction import Calibration
 from antdrive.sim.calibration.trial import Conditions
 from antdrive.sim.cli.commands.run import run as command
 from antdrive.sim.regression import Baseline, SuiteCase, check_case, load_suite, scenario_of, select
-from antdrive.sim.regression.names import is_importable_elsewhere
+from antdrive.sim.regression.names import check_names
 from antdrive.sim.regression.scenarios import run_command
 from antdrive.sim.regression.suite import ScenarioEntry
 from antdrive.worlds.errors import InputError
@@ -159,15 +161,34 @@ def test_a_random_world_is_that_of_the_command_that_writes_it(tmp_path: Path) ->
 
 
 def test_a_planner_of_ones_own_comes_from_a_file_or_a_module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    source = "from antdrive.planners.graph.search import AStar\nclass Mine(AStar):\n    pass\nREADY = Mine()\n"
-    (tmp_path / "own_planners_of_a_test.py").write_text(source)
-    for where in ("file: own_planners_of_a_test.py", "module: own_planners_of_a_test"):
-        for name in ("Mine", "READY"):
-            case = only(tmp_path, f"world: empty, planner: {{{where}, name: {name}}}")
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "own_planners_of_a_test.py"
+    source = "from antdrive.planners import AStar\nclass Mine(AStar):\n    pass\nREADY = Mine()\n"
+    path.write_text(source)
+    for name in ("Mine", "READY"):
+        for words, in_a_file in (
+            (f"{{file: {path.name}, name: {name}}}", True),
+            (f"{{module: {path.stem}, name: {name}}}", False),
+            (f"{path.name}:{name}", True),
+            (f"{{name: '{path.stem}:{name}'}}", False),
+        ):
+            case = only(tmp_path, f"world: empty, planner: {words}")
+            check_names(case)
             made = scenario_of(case)
             assert type(made.planner).__name__ == "Mine"
             assert made.planner_label == name
-            assert run_command(case) is None
+            command = (
+                f"antdrive run empty --planner {path.name}:{name} --robot turtlebot --seed 0" if in_a_file else None
+            )
+            assert run_command(case) == command
+    path.write_text(source.replace("pass", "old = 1"))
+    os.utime(path, (1, 1))
+    made = scenario_of(only(tmp_path, f"world: empty, planner: {path.name}:Mine"))
+    os.utime(path, (1, 1))
+    path.write_text(source.replace("pass", "old = 2"))
+    os.utime(path, (1, 1))
+    again = scenario_of(only(tmp_path, f"world: empty, planner: {path.name}:Mine"))
+    assert (made.planner.old, again.planner.old) == (1, 2), "by its content, not by its time"  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize(
@@ -187,6 +208,10 @@ def test_a_planner_of_ones_own_comes_from_a_file_or_a_module(tmp_path: Path, mon
         ("world: empty, planner: {name: aco-han, antss: 3}", 3, "scenarios.one.planner.antss: no option of aco-han"),
         ("world: empty, planner: {name: aco-han, ants: many}", 3, "scenarios.one.planner.ants: must be a whole number"),
         ("world: empty, planner: {name: X, file: no.py}", 3, "scenarios.one.planner.file: no.py: no such file beside"),
+        ("world: empty, planner: no.py:X", 3, "scenarios.one.planner: no.py: no such file beside"),
+        ("world: empty, planner: math:cosh", 3, "scenarios.one.planner: planner 'cosh' "),
+        ("world: empty, planner: math:X", 3, "scenarios.one.planner: math has no 'X'"),
+        ("world: empty, planner: {name: 'a:X', file: no.py}", 3, "scenarios.one.planner.name: must be the class alone"),
         ("world: empty, planner: {name: X, module: no_such_module}", 3, "scenarios.one.planner.module: no_such_module: cannot"),
         ("world: empty, planner: {name: X, module: math}", 3, "scenarios.one.planner.name: math has no 'X'"),
         ("world: empty, planner: {name: pi, module: math}", 3, "scenarios.one.planner: planner 'pi' is not a planner"),
@@ -299,8 +324,8 @@ def test_suites_of_different_folders_have_modules_of_their_own(tmp_path: Path) -
         (tmp_path / folder / "same_name.py").write_text(mine)
     for folder in ("a", "b", "a", "b"):
         place = tmp_path / folder
-        for source in ("module: same_name", "file: same_name.py"):
-            planner = scenario_of(only(place, f"world: empty, planner: {{{source}, name: Mine}}")).planner
+        for source in ("{module: same_name, name: Mine}", "{file: same_name.py, name: Mine}", "same_name:Mine"):
+            planner = scenario_of(only(place, f"world: empty, planner: {source}")).planner
             assert planner.of == folder  # type: ignore[attr-defined]
             assert made.setdefault((folder, source), type(planner)) is type(planner)
 
@@ -309,7 +334,7 @@ def test_planners_beside_a_suite_stay_in_their_process(tmp_path: Path) -> None:
     (tmp_path / "beside_it.py").write_text(
         "from antdrive.planners.graph.search import AStar\nclass Mine(AStar):\n    pass\n"
     )
-    for words in ("{module: beside_it, name: Mine}", "{file: beside_it.py, name: Mine}"):
+    for words in ("{module: beside_it, name: Mine}", "{file: beside_it.py, name: Mine}", "beside_it.py:Mine"):
         assert not is_importable_elsewhere(scenario_of(only(tmp_path, f"world: empty, planner: {words}")).planner)
     assert is_importable_elsewhere(scenario_of(only(tmp_path, "world: empty, planner: astar")).planner)
 

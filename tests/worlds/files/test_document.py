@@ -27,7 +27,7 @@ def read(text: str) -> Any:
         found = parse_document(text, "file")
     except InputError as error:
         return str(error)
-    return repr(found.data), found.lines
+    return repr(found.data), dict(found.lines)
 
 
 def read_by_pyyaml(text: str, monkeypatch: pytest.MonkeyPatch) -> Any:
@@ -66,3 +66,61 @@ def test_a_deep_text_is_refused_and_not_followed(opening: str) -> None:
 def test_both_parsers_allow_the_same_depth(levels: int, monkeypatch: pytest.MonkeyPatch) -> None:
     text = "a: " + "[" * levels + "1" + "]" * levels
     assert read(text) == read_by_pyyaml(text, monkeypatch)
+
+
+NUMBERS = (
+    "0",
+    "1",
+    "-3",
+    "2.5",
+    "-0.0",
+    "1.0e-07",
+    "12.25e+3",
+    "1e5",
+    "010",
+    "1_0",
+    ".5",
+    "5.",
+    "true",
+    "x",
+    "",
+    "[1]",
+    "'1'",
+)
+ENTRIES = (
+    "  - {{x: {0}, y: {1}}}\n",
+    "  - {{x: {0}, y: {1}}} \n",
+    "  - {{x: {0}}}\n",
+    "  - {{y: {1}, x: {0}}}\n",
+    "  # a\n",
+    "\n",
+)
+BEFORE = ("", "a: 1\n", "a: {b: 1,\n", "a: 'b\n", "a: b\n  c\n", "posts: []\n", "a:\n", "- a\n", "{\n", "\tb\n")
+AFTER = ("", "a: 1\n", "  b: 1\n", "}\n", "'\n", "c: [1, 2]\n", "# end\n", "posts:\n  - {x: 1.0, y: 2.0}\n", "...\n")
+
+
+@settings(max_examples=150)
+@given(
+    st.sampled_from(BEFORE),
+    st.lists(
+        st.tuples(st.sampled_from((ENTRIES[0],) * 8 + ENTRIES), *(st.sampled_from(NUMBERS[:7] * 4 + NUMBERS),) * 2),
+        max_size=4,
+    ),
+    st.sampled_from(AFTER),
+)
+def test_a_table_is_the_same_however_it_is_read(before: str, rows: list[tuple[str, str, str]], after: str) -> None:
+    text = before + "posts:\n" + "".join(entry.format(*numbers) for entry, *numbers in rows) + after
+    with pytest.MonkeyPatch.context() as patch:
+        assert read(text) == read_by_pyyaml(text, patch)
+
+
+@pytest.mark.skipif(not yaml.__with_libyaml__, reason="PyYAML was built without libyaml")
+def test_no_parser_sees_the_rows_of_a_table(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = []
+    compose = document._compose
+    monkeypatch.setattr(document, "_compose", lambda text: seen.append(text) or compose(text))
+    found = parse_document("a: 1\nposts:\n" + "  - {x: 1.5, y: -2}\n" * 300 + "b: 2\n", "file")
+    assert found.data == {"a": 1, "posts": [{"x": 1.5, "y": -2}] * 300, "b": 2}
+    assert (found.lines["posts", 299, "y"], found.lines["posts", 0], found.lines["b",]) == (302, 3, 303)
+    assert [text.count("{") for text in seen] == [0]
+    assert "file:302: posts[299].y: wrong" in str(found.error(("posts", 299, "y"), "wrong"))

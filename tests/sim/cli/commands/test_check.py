@@ -49,10 +49,11 @@ def test_a_suite_is_accepted_and_then_passes(antdrive: Call, suite: Path) -> Non
 
 def test_a_collision_fails_is_explained_and_is_not_accepted(antdrive: Call, suite: Path) -> None:
     suite.write_text(SUITE + HIT)
-    code, out, _ = antdrive("accept", "a.drive.yaml", "--only", "hit")
+    code, out, _ = antdrive("accept", "a.drive.yaml", "--only", "hit", "--film", "never", "--results", "first")
     assert code == 1
     assert "not accepted, because the drive is not what the test expects" in out
     assert not (suite.parent / "baselines").exists()
+    assert Path("first/a/hit-0/overview.png").is_file()
     code, out, _ = antdrive("check", "a.drive.yaml::hit", "--json", "--film", "never", "--results", "res")
     found = json.loads(out)
     (test,) = found["tests"]
@@ -199,6 +200,7 @@ def test_ci_gets_junit_a_summary_and_unused_baselines(
             "a.drive.yaml::: names no test; write a.drive.yaml for all, or a.drive.yaml::SCENARIO",
         ),
         (["check", "a.drive.yaml", "--film", "often"], "--film often: unknown; choose from never, failed, always"),
+        (["accept", "a.drive.yaml", "--film", "no"], "--film no: unknown; choose from never, failed, always"),
         (["check", "small.yaml"], "small.yaml: is no suite; the name of a suite ends in .drive.yaml"),
     ],
 )

@@ -65,8 +65,12 @@ def test_nothing_of_an_earlier_search_is_left(antdrive: Call) -> None:
 
 @pytest.mark.parametrize(
     ("words", "says"),
-    [(["--method", "wise"], "choose from guided, random"), (["-p", "nobody"], "no planner is called 'nobody'")],
-    ids=["method", "planner"],
+    [
+        (["--method", "wise"], "choose from guided, random"),
+        (["-p", "nobody"], "no planner is called 'nobody'"),
+        (["-p", "mine.py:Mine"], "which know registered planners only; register the class"),
+    ],
+    ids=["method", "planner", "own"],
 )
 def test_wrong_input_is_one_line(refused: Refused, words: list[str], says: str) -> None:
     assert says in refused("falsify", *words)

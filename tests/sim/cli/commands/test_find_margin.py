@@ -19,6 +19,7 @@ def test_the_smallest_safe_margin_is_found(antdrive: Call, small: Path) -> None:
     assert (code, err) == (0, "")
     assert 0 <= facts["margin_m"] <= 0.03
     assert facts["trials"][0]["margin"] == pytest.approx(0.2)
+    assert code == antdrive("find-margin", small, "--seeds", "1", "--start", "0.7,0.7,0.5", "-p", "astar")[0]
     words = antdrive("find-margin", small, "--seeds", "1", "-p", "astar", "--max-speed", "0.3")[1]
     assert re.search(r"smallest safe margin for turtlebot at up to 0.3 m/s: 0\.\d+ m, from 1 drive\n", words)
 
@@ -39,6 +40,9 @@ def test_the_answer_says_how_many_worlds_it_rests_on(capsys: pytest.CaptureFixtu
         (["find-margin"], "name a world, or a kind of random worlds"),
         (["find-margin", "empty", "--generate", "barn"], "name a world, or a kind of random worlds"),
         (["find-margin", "--generate", "desert"], "choose from forest, barn"),
+        (["find-margin", "--generate", "barn", "--goal", "1,1"], "random worlds have their own starts and goals"),
+        (["find-margin", "empty", "--task", "dock"], "no task 'dock'"),
+        (["find-margin", "empty", "--goal", "99,1"], "--goal: "),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )

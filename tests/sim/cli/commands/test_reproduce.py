@@ -20,6 +20,8 @@ def test_wrong_input_is_one_line_and_exit_code_2(refused: Refused, words: list[s
 
 
 def test_the_default_folder_is_never_that_of_another_repetition(antdrive: Call) -> None:
-    for seeds in ("1", "2", "1"):
-        assert antdrive("reproduce", "hasan", "--seeds", seeds)[0] == 0
+    for seeds, kept in (("1", False), ("2", False), ("1", True)):
+        code, shown, _ = antdrive("reproduce", "hasan", "--seeds", seeds)
+        assert code == 0
+        assert ("24 of 24 experiments were done before" in shown) == kept
     assert sorted(path.name for path in Path("out").iterdir()) == ["reproduce-hasan", "reproduce-hasan-2-seeds"]

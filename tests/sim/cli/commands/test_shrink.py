@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from antdrive.sim import Run, run
-from antdrive.sim.regression import load_suite
+from antdrive.sim.regression import Baseline, load_suite
 from antdrive.worlds import Disc, load_task
 from tests.sim.cli.calling import Call, Refused
 
@@ -61,6 +61,7 @@ def test_what_cannot_be_shrunk_is_one_line(refused: Refused, small_run: Run, col
     assert "--while: unknown metric 'clearance'" in refused("shrink", collided, "--while", "clearance < 1")
     suite = tmp_path / "two.drive.yaml"
     suite.write_text("{schema: 1, scenarios: {a: {world: empty, seeds: [0, 1]}}}")
+    assert "two.drive.yaml: is a suite; name one of its tests" in refused("shrink", "two.drive.yaml")
     assert "name one of two.drive.yaml::a[0], two.drive.yaml::a[1]" in refused("shrink", "two.drive.yaml::a")
     rollout = run(replace(small_run.scenario, planner_name="mine")).rollout
     assert rollout is not None
@@ -92,6 +93,18 @@ def test_a_test_that_fails_by_its_bound_is_shrunk_until_it_would_keep_it(antdriv
     assert json.loads(out)["failure"] == {"outcome": "succeeded", "touched": "nothing", "cause": "spl < 0.999"}
     (case,) = load_suite(next(Path("out/small-small").glob("*.drive.yaml")))
     assert case.entry.expect == {"outcome": "succeeded", "certified": True, "spl": "< 0.999"}
+
+
+def test_a_test_that_fails_by_its_baseline_is_shrunk_while_it_is_worse(
+    antdrive: Call, small: Path, small_run: Run
+) -> None:
+    suite = small.parent / "a.drive.yaml"
+    suite.write_text("{schema: 1, scenarios: {a: {world: small.yaml, planner: astar}}}")
+    made = Baseline.of(small_run, "a[0]")
+    replace(made, metrics={**made.metrics, "spl": 2.0}).save(small.parent / "baselines" / "a" / "a-0.json")
+    code, out, err = antdrive("shrink", "a.drive.yaml::a", "--json", "--no-figures", "--no-film", "--seconds", "1")
+    assert (code, err) == (0, "")
+    assert json.loads(out)["failure"] == {"outcome": "succeeded", "touched": "nothing", "cause": "spl < 1.99"}
 
 
 def test_the_folder_of_a_run_stands_for_its_log(refused: Refused, small_run: Run, tmp_path: Path) -> None:

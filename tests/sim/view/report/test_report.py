@@ -289,26 +289,27 @@ ODD_VALUES = [
 ]
 
 
-def test_no_value_in_result_json_ends_in_a_traceback(small_run, collided_run, tmp_path):
+def test_no_value_in_result_json_ends_in_a_traceback(small_run, tmp_path):
+    """Each key with five odd values, each beside a log and without one: ten runs on a page."""
     rng = np.random.default_rng(3)
-    driven = write_run(small_run, tmp_path / "runs" / "driven") / "result.json"
-    facts = json.loads(driven.read_text())
-    claimed = tmp_path / "runs" / "claimed" / "result.json"
-    claimed.parent.mkdir()
+    facts = json.loads((write_run(small_run, tmp_path / "runs" / "driven-0") / "result.json").read_text())
+    for k in range(5):
+        if k:
+            shutil.copytree(tmp_path / "runs" / "driven-0", tmp_path / "runs" / f"driven-{k}")
+        (tmp_path / "runs" / f"claimed-{k}").mkdir()
     for key in [*facts, "files", "metrics.spl", "metrics.driven_length_m", "certificate.bound_m"]:
         value = ODD_VALUES[rng.integers(len(ODD_VALUES))]
-        for odd in (value, None, [], 10**400, "a\ud800"):
+        for k, odd in enumerate((value, None, [], 10**400, "a\ud800")):
             edited = json.loads(json.dumps(facts))
             place, _, inner = key.partition(".")
             if inner:
                 edited[place][inner] = odd
             else:
                 edited[place] = odd
-            for path in (driven, claimed):
-                path.write_text(json.dumps(edited))
-            for kind in ("html", "md"):
-                text = reported(tmp_path / "runs", tmp_path, kind)
-                assert "1 / 2" in text
+            for kind in ("driven", "claimed"):
+                (tmp_path / "runs" / f"{kind}-{k}" / "result.json").write_text(json.dumps(edited))
+        for kind in ("html", "md"):
+            assert "5 / 10" in reported(tmp_path / "runs", tmp_path, kind), key
 
 
 def test_files_that_cannot_be_read_are_one_line(small_run, tmp_path):
