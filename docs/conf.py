@@ -100,6 +100,7 @@ html_static_path = ["_static"]
 html_css_files = ["antdrive.css"]
 html_copy_source = False
 html_show_sourcelink = False
+html_show_search_summary = False  # summaries are fetched, which browsers refuse for files on disk
 html_theme_options = {
     "show_prev_next": True,
     "navigation_with_keys": False,

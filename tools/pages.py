@@ -3,14 +3,15 @@
 Blocks of a page run from top to bottom in one empty folder, Python's in one namespace:
 
 - `python`: what it prints is compared with a block `text` that follows directly.
-- `console`: lines that begin with `$ ` are commands, the others what they print. `|| echo ...` says that a command must fail, `> FILE`
-  writes to a file. Commands are `antdrive`, which runs in this process, `python`, `pytest`, and some of the shell's.
+- `console`: lines that begin with `$ ` are commands, the others what they print. `|| echo ...` says that a command must
+  fail, `> FILE` writes to a file. Commands are `antdrive`, which runs in this process, `python`, `pytest`, and some of
+  the shell's.
 - `sh`: every line is a command, and its output does not matter.
-- `yaml`, `toml` and others: written to FILE after a comment `<!-- file: FILE -->`; a `python` block after such a comment is, too, and is
-  not run by itself.
+- `yaml`, `toml` and others: written to FILE after a comment `<!-- file: FILE -->`; a `python` block after such a comment
+  is, too, and is not run by itself.
 
-`...` in an output stands for anything. A comment `<!-- not run: REASON -->` before a block leaves it out. `--update` writes what was printed
-into the page, apart from outputs with `...` that agree.
+`...` in an output stands for anything. A comment `<!-- not run: REASON -->` before a block leaves it out. `--update`
+writes what was printed into the page, apart from outputs with `...` that agree.
 """
 
 from __future__ import annotations
@@ -130,7 +131,7 @@ def run_words(words: list[str]) -> tuple[int, str]:
         words = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *words[1:]]
     elif words[0] not in SHELL:
         return 127, f"{words[0]}: not a command that pages may use; mark the block with <!-- not run: REASON -->\n"
-    done = subprocess.run(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+    done = subprocess.run(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)  # noqa: S603 (the repository's own pages)
     return done.returncode, done.stdout
 
 
@@ -186,7 +187,7 @@ class Page:
         out = io.StringIO()
         try:
             with contextlib.redirect_stdout(out):
-                exec(compile("\n" * (block.line - 1) + block.text, str(self.path), "exec"), space)
+                exec(compile("\n" * (block.line - 1) + block.text, str(self.path), "exec"), space)  # noqa: S102 (the repository's own pages)
         except Exception as error:
             self.problems.append(f"{self.path}:{block.line}: {type(error).__name__}: {error}")
         return out.getvalue()
@@ -239,7 +240,8 @@ def main(words: list[str]) -> int:
         page = run_page(Path(name))
         if update:
             page.update()
-        print("\n".join(page.problems) or f"{name}: every block runs and prints what the page shows")
+        said = "\n".join(page.problems) or f"{name}: every block runs and prints what the page shows"
+        sys.stdout.write(said + "\n")
         failed |= bool(page.problems)
     return int(failed)
 

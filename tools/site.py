@@ -1,7 +1,7 @@
 """Check the site that was built: `python -m tools.site docs/_build/html`.
 
-Every link within the site leads to a file and, with an anchor, to a place in it. No page loads anything from elsewhere. The first page, with all that
-it loads, is under 1 MB. Films are, too.
+Every link within the site leads to a file and, with an anchor, to a place in it. No page loads anything from elsewhere.
+The first page, with all that it loads, is under 1 MB. Films are, too.
 """
 
 from __future__ import annotations
@@ -12,7 +12,15 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 MOST = 1_000_000  # [B]
-LOADING = {("script", "src"), ("img", "src"), ("link", "href"), ("video", "src"), ("video", "poster"), ("source", "src"), ("iframe", "src")}
+LOADING = {
+    ("script", "src"),
+    ("img", "src"),
+    ("link", "href"),
+    ("video", "src"),
+    ("video", "poster"),
+    ("source", "src"),
+    ("iframe", "src"),
+}
 
 
 class Parsed(HTMLParser):
@@ -50,7 +58,11 @@ def problems_of(site: Path) -> list[str]:
     Args:
         site: the folder with `index.html`
     """
-    pages = {path: Parsed(path.read_text(encoding="utf-8")) for path in sorted(site.rglob("*.html")) if "_static" not in path.parts}
+    pages = {
+        path: Parsed(path.read_text(encoding="utf-8"))
+        for path in sorted(site.rglob("*.html"))
+        if "_static" not in path.parts
+    }
     if site / "index.html" not in pages:
         return [f"{site}: has no index.html"]
     found = []
@@ -59,8 +71,14 @@ def problems_of(site: Path) -> list[str]:
         for target in dict.fromkeys([*page.links, *(one for _, one in page.loads)]):
             wrong = broken(path, target, pages)
             found += [f"{where}: {target}: {wrong}"] if wrong else []
-        found += [f"{where}: loads {one} from elsewhere" for _, one in page.loads if urlsplit(one).scheme in ("http", "https")]
-    found += [f"{path.relative_to(site)}: more than {MOST} bytes" for path in site.rglob("*.mp4") if path.stat().st_size > MOST]
+        found += [
+            f"{where}: loads {one} from elsewhere" for _, one in page.loads if urlsplit(one).scheme in ("http", "https")
+        ]
+    found += [
+        f"{path.relative_to(site)}: more than {MOST} bytes"
+        for path in site.rglob("*.mp4")
+        if path.stat().st_size > MOST
+    ]
     size = weight(site / "index.html", pages[site / "index.html"])
     return found + ([f"index.html: {size} bytes with all that it loads, more than {MOST}"] if size > MOST else [])
 
@@ -89,7 +107,7 @@ def weight(path: Path, page: Parsed) -> int:
 def main(words: list[str]) -> int:
     """Print what is wrong; 1 if something is."""
     found = problems_of(Path(words[0]).resolve())
-    print("\n".join(found) or f"{words[0]}: every link and every anchor leads somewhere")
+    sys.stdout.write(("\n".join(found) or f"{words[0]}: every link and every anchor leads somewhere") + "\n")
     return int(bool(found))
 
 

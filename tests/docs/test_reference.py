@@ -1,4 +1,4 @@
-"""The site's reference is whole: every package that offers names has a page, and whatever a page must describe has a description."""
+"""The site's reference is whole: packages that offer names have pages, and what a page describes has a description."""
 
 from __future__ import annotations
 
@@ -11,7 +11,11 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-STUBS = [*sorted(ROOT.glob("[!.]*/__init__.pyi")), *sorted(ROOT.glob("*/*/__init__.pyi")), ROOT / "antdrive" / "testing.pyi"]
+STUBS = [
+    *sorted(ROOT.glob("[!.]*/__init__.pyi")),
+    *sorted(ROOT.glob("*/*/__init__.pyi")),
+    ROOT / "antdrive" / "testing.pyi",
+]
 NAMES = re.compile(r"^from (\.[\w.]*) import (\w+)", re.MULTILINE)
 
 
@@ -43,7 +47,9 @@ def test_every_constant_that_a_package_offers_has_a_comment(package: str) -> Non
         thing = getattr(module, name)
         if not (inspect.isclass(thing) or inspect.isroutine(thing) or inspect.ismodule(thing)):
             source = Path(str(importlib.import_module(f"{base}{where}").__file__)).read_text()
-            assert re.search(rf"^#: .+\n{name}\b", source, re.MULTILINE), f"{name} of {where} has no line `#: ...` above it"
+            assert re.search(rf"^#: .+\n{name}\b", source, re.MULTILINE), (
+                f"{name} of {where} has no line `#: ...` above it"
+            )
 
 
 def test_the_tutorials_pages_are_listed() -> None:
