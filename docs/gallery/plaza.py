@@ -3,7 +3,8 @@ Across a plaza, among six movers
 ================================
 
 Movers follow keyframes, bounce between walls, or wander. The robot sees where they are and how fast they go, and nothing
-of what they are about to do. Local avoidance looks ahead sixty times a second; a new route is planned when the present one is obstructed.
+of what they are about to do. Local avoidance looks ahead sixty times a second; a new route is planned when the present
+one is obstructed.
 """
 
 from antdrive import Scenario, film, run
