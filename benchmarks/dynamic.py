@@ -1,4 +1,4 @@
-"""Drives among movers: `python -m benchmarks.dynamic [--quick] [--jobs N] [--dynabarn FILE] [TABLE ...]`.
+"""Drives among movers: `python -m benchmarks.dynamic [--quick] [--jobs N] [--dynabarn FILE] [--only TEXT] [TABLE ...]`.
 
 Tables:
 
@@ -43,15 +43,18 @@ from benchmarks.planners import table
 DYNABARN = Path(__file__).parent.parent.parent / "shared" / "data" / "dynabarn" / "dynabarn10.json"
 CLASSES = {"easy": range(20), "medium": range(20, 40), "hard": range(40, 60)}
 START_INTERVAL = 7.3  # between the moments at which drives in one world start [s]
-KNOWN = Perception(kind="motions")
+KNOWN, BY_LIDAR = Perception(kind="motions"), Perception(kind="lidar")
 POLICIES: dict[str, dict[str, Any]] = {
     "neither": {"avoidance": None, "replanning": None},
     "avoid": {"replanning": ReplanPolicy(around_movers=False)},
     "replan": {"avoidance": None},
     "avoid and replan": {},
     "the same, motions known": {"perception": KNOWN},
+    "by lidar: the map is given, movers are not": {"perception": BY_LIDAR},
+    "everything by lidar": {"perception": BY_LIDAR, "map": "none", "localisation": "matching"},
     "keep to a plan in space and time": {"planner": "sipp", "options": {"speed": "1.5"}, "margin": 0.15},
 }
+LISTED = [policy for policy in POLICIES if policy == "avoid and replan" or "by lidar" in policy]  # failures by name
 
 
 class Result(NamedTuple):
@@ -128,7 +131,7 @@ HEADS = (
 )
 
 
-def dynabarn(jobs: int, source: Path, quick: bool) -> Iterator[str]:
+def dynabarn(jobs: int, source: Path, quick: bool, only: str) -> Iterator[str]:
     """DynaBARN's worlds, driven by the jackal."""
     tasks = import_dynabarn(source)
     offsets = [START_INTERVAL * k for k in range(2 if quick else 10)]
@@ -138,6 +141,8 @@ def dynabarn(jobs: int, source: Path, quick: bool) -> Iterator[str]:
     ]
     rows, wrong = [], []
     for policy, settings in POLICIES.items():
+        if only not in policy:
+            continue
         calls = (
             delayed(drive)(name, task, **{"planner": "dstar-lite", "robot": "jackal", **settings})
             for name, task in cases
@@ -146,10 +151,10 @@ def dynabarn(jobs: int, source: Path, quick: bool) -> Iterator[str]:
         for kind, numbers in CLASSES.items():
             some = [r for r in got if int(r.name.split("-")[1].split("+")[0]) in numbers]
             rows.append([policy if kind == "easy" else "", kind, *columns(some)])
-        if policy == "avoid and replan":
-            wrong = [f"- {r.name}: {r.outcome.key} ({r.reason})" for r in got if not r.certified]
+        if policy in LISTED:
+            wrong += [f"- {policy}: {r.name}: {r.outcome.key} ({r.reason})" for r in got if not r.certified]
     yield from table(["the robot may", "worlds", *HEADS], rows)
-    yield "\nDrives that failed with avoidance and replanning:\n"
+    yield "\nDrives that failed with avoidance and replanning, or by lidar:\n"
     yield from wrong
 
 
@@ -196,7 +201,7 @@ def random_drive(seed: int, settings: dict[str, Any]) -> Result:
     return result._replace(proved=proof.solved)
 
 
-def random(jobs: int, source: Path, quick: bool) -> Iterator[str]:
+def random(jobs: int, source: Path, quick: bool, only: str) -> Iterator[str]:
     """Random worlds, driven by the turtlebot."""
     seeds, rows, wrong = range(20 if quick else 500), [], []
     for policy in ("neither", "avoid and replan"):
@@ -214,7 +219,7 @@ def random(jobs: int, source: Path, quick: bool) -> Iterator[str]:
     yield from wrong
 
 
-def hasan(jobs: int, source: Path, quick: bool) -> Iterator[str]:
+def hasan(jobs: int, source: Path, quick: bool, only: str) -> Iterator[str]:
     """hasan's cases, driven by the turtlebot."""
     names = [name for name in list_worlds() if name.startswith("hasan") and load_task(name).world.movers]
     rows = []
@@ -236,12 +241,13 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--quick", action="store_true", help="drive fewer scenarios")
     parser.add_argument("--dynabarn", type=Path, default=DYNABARN, metavar="FILE")
+    parser.add_argument("--only", default="", metavar="TEXT", help="dynabarn: only the rows whose name holds this text")
     given = parser.parse_args()
     for name in given.tables:
         if name not in TABLES:
             parser.error(f"unknown table {name!r}; choose from {', '.join(TABLES)}")
         print(f"## {name}: {TABLES[name].__doc__}\n")
-        print("\n".join(TABLES[name](given.jobs, given.dynabarn, given.quick)), flush=True)
+        print("\n".join(TABLES[name](given.jobs, given.dynabarn, given.quick, given.only)), flush=True)
         print()
 
 

@@ -1,11 +1,13 @@
 """Measure what driving without a map adds to the drive loop: `python -m benchmarks.exploring`, part of `make bench`.
 
 Prints Markdown.
-Six of BARN's worlds, `jackal`, `--map none`, and the same drives with the map. All times are processor time for each
-simulated second. *Loop* is the drive loop without what follows it in the row; the share is what follows, over the loop.
-The second of two drives of each kind counts, so that files are read and kernels loaded.
+Six of BARN's worlds, `jackal`, `--map none`, and the same drives with the map: with exact sensors, then with `--noise 1` and
+odometry, alone and with matching. All times are processor time for each simulated second. *Loop* is the drive loop without
+what follows it in the row; the share is what follows, over the loop. The second of two drives of each kind counts, so that
+files are read and kernels loaded.
 
 - scan: the exact rays, their noise
+- match: the estimated pose corrected by the scan
 - map: the scan entered
 - watch: whether the route ahead is still clear, and the discs for the controller
 - sight: how far the robot may go on ground that it has seen
@@ -26,12 +28,18 @@ from antdrive.sim.driving.caution import Caution
 from antdrive.sim.driving.exploring import Exploration
 from antdrive.sim.driving.survey import Survey
 from antdrive.sim.sensing import OccupancyMap
+from antdrive.sim.sensing.matching import ScanMatcher
 from benchmarks.cost import BARN
 from benchmarks.drives import barn_tasks
 from benchmarks.planners import table
 
 WORLDS = ("world_0", "world_138", "world_186", "world_24", "world_288", "world_66")
-PARTS = ("scan", "map", "watch", "sight", "replans")
+PARTS = ("scan", "match", "map", "watch", "sight", "replans")
+SENSORS: tuple[tuple[str, dict[str, Any]], ...] = (  # how the robot without a map senses
+    ("exact", {}),
+    ("noise 1, odometry", {"noise": 1.0, "localisation": "odometry"}),
+    ("noise 1, matching", {"noise": 1.0, "localisation": "matching"}),
+)
 
 
 class Meter:
@@ -80,6 +88,7 @@ def rows(source: Path) -> Iterator[list[str]]:
     meter.watch(pipeline, "drive", "loop")
     for owner, method, name in (
         (Survey, "_scan", "scan"),
+        (ScanMatcher, "corrected", "match"),
         (OccupancyMap, "insert", "map"),
         (Exploration, "trigger", "watch"),
         (Exploration, "refreshed", "watch"),
@@ -87,15 +96,18 @@ def rows(source: Path) -> Iterator[list[str]]:
         (Exploration, "replan", "replans"),
     ):
         meter.watch(owner, method, name)
-    tasks, shares = barn_tasks(source), []
-    for world in WORLDS:
-        given, _ = costs(meter, Scenario.of(tasks[world], "astar", "jackal"))
-        found, certified = costs(meter, Scenario.of(tasks[world], "astar", "jackal", map="none"))
-        shares.append(sum(found[part] for part in PARTS) / found["loop"])
-        name = world if certified else f"{world} (not certified)"
-        cells = [f"{found[part]:.2f}" for part in ("loop", *PARTS)]
-        yield [name, f"{given['loop']:.1f}", *cells, f"{100 * shares[-1]:.0f} %"]
-    yield ["median", *[""] * (2 + len(PARTS)), f"{100 * statistics.median(shares):.0f} %"]
+    tasks = barn_tasks(source)
+    for sensors, settings in SENSORS:
+        shares = []
+        for world in WORLDS:
+            noise = {"noise": settings["noise"]} if settings else {}
+            given, _ = costs(meter, Scenario.of(tasks[world], "astar", "jackal", **noise))
+            found, certified = costs(meter, Scenario.of(tasks[world], "astar", "jackal", map="none", **settings))
+            shares.append(sum(found[part] for part in PARTS) / found["loop"])
+            name = world if certified else f"{world} (not certified)"
+            cells = [f"{found[part]:.2f}" for part in ("loop", *PARTS)]
+            yield [sensors, name, f"{given['loop']:.1f}", *cells, f"{100 * shares[-1]:.0f} %"]
+        yield [sensors, "median", *[""] * (2 + len(PARTS)), f"{100 * statistics.median(shares):.0f} %"]
 
 
 def main() -> None:
@@ -105,7 +117,7 @@ def main() -> None:
     if not options.barn.exists():
         print(f"no worlds at {options.barn}; give --barn")
         return
-    for line in table(("world", "loop with the map [ms/s]", "loop", *PARTS, "share"), rows(options.barn)):
+    for line in table(("sensors", "world", "loop with the map [ms/s]", "loop", *PARTS, "share"), rows(options.barn)):
         print(line, flush=True)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.robots import Lidar, load_robot
-from antdrive.sim.sensing import MoverTracker, OccupancyMap, Scanner, clear_distance
+from antdrive.sim.sensing import MappedGround, MoverTracker, OccupancyMap, Scanner, clear_distance
 from benchmarks.planners import table
 
 HALL = (-10.0, -10.0, 10.0, 10.0)
@@ -79,7 +79,7 @@ def tracks(lidar: Lidar, blocks: int) -> Iterator[list[str]]:
             here = start + velocity * 2 * np.sin(0.01 * k)  # to and fro
             ranges = scanner.scan((0, 0, 0), here if k >= 50 else here + 90, np.full(count, 0.3), rng)
             started = time.process_time()
-            theirs = tracker.update(seen, (0, 0, 0), ranges, k / lidar.rate)
+            theirs = tracker.update(MappedGround(seen, 100), (0, 0, 0), ranges, k / lidar.rate)
             spent.append(time.process_time() - started)
             seen.insert((0, 0, 0), ranges, left_out=theirs)
             most = max(most, len(tracker.movers().radii))

@@ -109,6 +109,14 @@ def _entrance(grid: Grid, task: Task, point: Point, within: float) -> tuple[Cell
 
     row, col = grid.cell_at(*point)
     rows, cols = grid.shape
+    own = float(point_clearance(task.world, [point])[0])
+    if grid.free[row, col]:  # no centre is nearer than that of the cell around the point
+        centre = grid.xy([(row, col)])
+        off = np.abs(centre[0] - point)
+        if off.max() < 0.5 * grid.cell - 1e-9 and math.hypot(*off) <= within:
+            room = segment_clearance(task.world, centre, np.array([point], dtype=np.float64))
+            if room[0] >= min(grid.inflate, own) - 1e-9:
+                return (row, col), True
     reach = cells_beside(grid.inflate, grid.cell)
     near = [
         (r, c)
@@ -123,7 +131,6 @@ def _entrance(grid: Grid, task: Task, point: Point, within: float) -> tuple[Cell
     ends = np.broadcast_to(np.asarray(point, dtype=np.float64), centres.shape)
     # A point may itself lie closer to a disc than the inflation; then the line must not come closer than the
     # point.
-    own = float(point_clearance(task.world, [point])[0])
     needed = min(grid.inflate, own)
     # Cylinders that no line comes as close to as that change nothing.
     discs = task.world.discs

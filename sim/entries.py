@@ -87,7 +87,7 @@ class SettingsEntry(BaseModel):
     map: str = Field(
         "given", description="what the robot knows of the world: given, or none but for what its lidar sees"
     )
-    localisation: str = Field("fixes", description="how the robot knows its pose: fixes, odometry or true")
+    localisation: str = Field("fixes", description="how the robot knows its pose: fixes, odometry, matching or true")
     odometry: float = Field(1.0, ge=0, description="the factor on the errors of odometry")
     sees: str = Field("velocities", description="what the robot perceives of movers: KIND or KIND:METRES")
     avoid: Switch = Field(

@@ -49,11 +49,12 @@ from antdrive.sim.log.record import (
     settings_of,
 )
 from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.log.sights import passed
 from antdrive.sim.log.streams import random_stream
 from antdrive.sim.physics.engine import Engine
 from antdrive.sim.reasons import no_path_reason
 from antdrive.sim.scenario import Scenario
-from antdrive.sim.unknown import caution_of, exploration_of
+from antdrive.sim.unknown import caution_of, exploration_of, lookout_of, predictor_of
 from antdrive.worlds import Cruising, Disc, Grid, Route, Task, World, rasterise
 from antdrive.worlds.drawing import LINE, card, world_svg
 from antdrive.worlds.errors import FieldError
@@ -141,6 +142,7 @@ class Run:
             "succeeded": self.succeeded,
             "certificate": self.certificate.as_dict() if self.certificate else None,
             "metrics": measure(self.rollout) if self.rollout else {"plan_s": self.plan.wall_s},
+            **({"sights": [sight.as_dict() for sight in passed(log)]} if log is not None and len(log.scans) else {}),
             "digest": self.rollout.digest if self.rollout else None,
         }
 
@@ -259,7 +261,9 @@ def run(
     started = time.perf_counter()
     noise_model = noise_model_of(s.localisation, s.robot, s.noise, s.odometry, 1 / s.control_hz, s.task.start, s.seed)
     trajectories = s.trajectories
-    predictor = Predictor(trajectories, s.effective_perception, s.control_hz) if trajectories else None
+    lookout = lookout_of(s)
+    watch = exploration.survey.watch if exploration else lookout.watch if lookout else None
+    predictor = predictor_of(s, watch)
     monitor = exploration or _monitor(s, grid, predictor)
     if isinstance(monitor, ReplanMonitor):
         monitor.track(answer, route)
@@ -276,17 +280,21 @@ def run(
             predictor=predictor,
             monitor=monitor,
             caution=caution_of(s, exploration) if exploration else None,
+            lookout=lookout,
             progress=progress,
         )
     wall = time.perf_counter() - started
     rollout = _record(s, grid, answer, route, log, monitor.log if monitor else [], limit, wall)
+    per_tick, rows = s.physics_hz // s.control_hz, len(log.t)
     if exploration:
-        rollout = dataclasses.replace(rollout, **exploration.logged(s.physics_hz // s.control_hz, len(log.t)))
+        rollout = dataclasses.replace(rollout, **exploration.logged(per_tick, rows))
+    if watch:
+        rollout = dataclasses.replace(rollout, tracks=watch.logged(per_tick, rows))
     return Run(s, grid, answer, rollout, certify(rollout))
 
 
 def _monitor(s: Scenario, grid: Grid, predictor: Predictor | None) -> ReplanMonitor | None:
-    """The monitor that finds new routes during the drive; None without movers or without a replanning policy."""
+    """The monitor that finds new routes during the drive; None where no movers are predicted or without a replanning policy."""
     if predictor is None or s.replanning is None:
         return None
     avoidance = s.effective_avoidance
@@ -343,7 +351,7 @@ def _record(
     wall: float,
 ) -> Rollout:
     """The rollout of a drive: its arrays, and the record of what it came from."""
-    perception, avoidance, among_movers = s.effective_perception, s.effective_avoidance, bool(s.driven_world.movers)
+    perception, avoidance, among_movers = s.effective_perception, s.effective_avoidance, s.among_movers
     replans_there = among_movers or s.exploring
     record = DriveRecord(
         task=s.task,

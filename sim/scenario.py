@@ -122,6 +122,12 @@ class Scenario:
             raise FieldError(
                 "map", f"none: {self.robot.name} has no lidar; add one to its file, or drive jackal or turtlebot"
             )
+        if self.perception.kind == "lidar" and self.robot.lidar is None:
+            raise FieldError(
+                "sees", f"lidar: {self.robot.name} has no lidar; add one to its file, or drive jackal or turtlebot"
+            )
+        if self.perception.kind == "lidar" and self.map == "given" and self.localisation == "odometry":
+            raise FieldError("sees", "lidar: with a given map the pose must not drift; localise by fixes or true")
         if self.map == "given" and self.localisation == "matching":
             raise FieldError("localisation", "matching: needs map none; with a given map the robot makes none")
         can = capabilities_of(self.planner)
@@ -346,6 +352,16 @@ class Scenario:
     def timed(self) -> bool:
         """Whether the planner plans in space and time, among movers."""
         return bool(self.driven_world.movers) and capabilities_of(self.planner).needs_motions
+
+    @property
+    def among_movers(self) -> bool:
+        """Whether there are movers, or the robot looks for some."""
+        return bool(self.driven_world.movers) or self.watching
+
+    @property
+    def watching(self) -> bool:
+        """Whether the robot looks for movers with its lidar, and is told nothing of them."""
+        return self.effective_perception.kind == "lidar"
 
     @property
     def effective_perception(self) -> Perception:

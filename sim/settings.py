@@ -20,7 +20,8 @@ from antdrive.worlds.reuse import reused
 Fail: TypeAlias = Callable[[str, str], InputError]
 
 
-SENSING = {"map": "given", "localisation": "fixes", "odometry": 1.0}
+#: What a robot knows of the world and of its pose unless it is told otherwise: fields of a scenario.
+SENSING: dict[str, Any] = {"map": "given", "localisation": "fixes", "odometry": 1.0}
 
 
 def scenario_fields(entry: SettingsEntry, fail: Fail) -> dict[str, Any]:

@@ -1,24 +1,36 @@
-"""A scenario without a map: what the robot surveys with, and what finds its routes."""
+"""What a robot finds out by itself: without a map what it surveys with and what finds its routes, and movers by lidar."""
 
 from __future__ import annotations
 
+import math
+
 from antdrive.sim.driving.caution import Caution
 from antdrive.sim.driving.exploring import Exploration
+from antdrive.sim.driving.lookout import Lookout
+from antdrive.sim.driving.perception import Predictor
 from antdrive.sim.driving.replanning import ReplanPolicy
-from antdrive.sim.driving.survey import Senses, Survey
+from antdrive.sim.driving.rescanning import survey_of
+from antdrive.sim.driving.survey import Senses
+from antdrive.sim.driving.watching import TrackedPredictor, Watch
 from antdrive.sim.scenario import Scenario
+from antdrive.sim.sensing.ground import KnownGround
 from antdrive.sim.sensing.scanner import Scanner
 from antdrive.worlds import Task, World
 
 
 def exploration_of(s: Scenario) -> Exploration:
     """What finds the routes of a drive without a map, after the first look from the start."""
-    lidar = s.robot.lidar
-    assert lidar is not None
-    world = s.driven_world
-    senses = Senses(Scanner.of(lidar, world), s.trajectories or None, s.rng("lidar") if s.noise else None, s.control_hz)
-    survey = Survey(senses, s.robot, s.task.start, s.task.goal, matching=s.localisation == "matching")
-    survey.look(0, s.task.start, s.task.start)
+    survey = survey_of(
+        s.robot,
+        s.task,
+        s.driven_world,
+        s.trajectories,
+        seed=s.seed,
+        noisy=s.noise > 0,
+        matching=s.localisation == "matching",
+        watching=s.watching,
+        hz=s.control_hz,
+    )
     return Exploration(
         s.planner,
         survey,
@@ -32,6 +44,35 @@ def exploration_of(s: Scenario) -> Exploration:
         cell=s.planning_cell,
         hz=s.control_hz,
     )
+
+
+def senses_of(s: Scenario) -> Senses:
+    """The robot's lidar in the true world."""
+    assert s.robot.lidar is not None
+    scanner = Scanner.of(s.robot.lidar, s.driven_world)
+    return Senses(scanner, s.trajectories or None, s.rng("lidar") if s.noise else None, s.control_hz)
+
+
+def lookout_of(s: Scenario) -> Lookout | None:
+    """What looks for movers, and for obstacles that are not on the map, where the robot is given a map; None: nothing does."""
+    lidar = s.robot.lidar
+    if not s.watching or s.exploring or lidar is None:
+        return None
+    noise = s.robot.noise.scaled(s.noise)
+    errors = (noise.pose_xy, noise.pose_yaw) if s.localisation == "fixes" else (0.0, 0.0)
+    ground = KnownGround(lidar, s.task.world, math.inf, *errors)
+    return Lookout(senses_of(s), ground, Watch(lidar, s.control_hz, *errors))
+
+
+def predictor_of(s: Scenario, watch: Watch | None) -> Predictor | None:
+    """What predicts the movers for avoidance and replanning: from what the robot is told of them, or from its scans.
+
+    Args:
+        watch: what the scans tell, where the robot looks for movers
+    """
+    if watch is not None:
+        return TrackedPredictor(watch, s.effective_perception, s.control_hz)
+    return Predictor(s.trajectories, s.effective_perception, s.control_hz) if s.trajectories else None
 
 
 def told(task: Task) -> Task:

@@ -112,7 +112,7 @@ def _sense() -> None:
     import numpy as np
 
     from antdrive.robots import load_robot
-    from antdrive.sim.sensing import MoverTracker, OccupancyMap, Scanner, clear_distance
+    from antdrive.sim.sensing import MappedGround, MoverTracker, OccupancyMap, Scanner, clear_distance
 
     robot = load_robot("turtlebot")
     assert robot.lidar is not None
@@ -121,11 +121,12 @@ def _sense() -> None:
         OccupancyMap(robot.lidar),
         MoverTracker(robot.lidar),
     )
+    ground = MappedGround(seen, 10)
     for k in range(4):
         ranges = scanner.scan(
             (0.75, 0.75, 0.0), np.array([[2.2 - 0.1 * k, 0.8]]) + (90 if k == 0 else 0), np.array([0.2])
         )
-        seen.insert((0.75, 0.75, 0.0), ranges, tracker.update(seen, (0.75, 0.75, 0.0), ranges, 0.2 * k))
+        seen.insert((0.75, 0.75, 0.0), ranges, tracker.update(ground, (0.75, 0.75, 0.0), ranges, 0.2 * k))
     seen.take_as_free((0.75, 0.75), 0.2)
     seen.forget((2.0, 0.8), 0.3)
     seen.discs()

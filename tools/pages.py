@@ -31,6 +31,7 @@ from typing import Any
 
 MARK = re.compile(r"<!-- (file|not run): (.+?) -->\s*$")
 SHELL = ("pytest", "ls", "cat", "mkdir", "cp", "sed")
+COMPILING = "antdrive: compiling the planners"  # what only the first command of an installation says
 WIDTH = "100"  # of the terminal that commands believe in
 
 
@@ -124,7 +125,8 @@ def run_words(words: list[str]) -> tuple[int, str]:
         out = io.StringIO()
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):
             code = run_antdrive(words)
-        return code, out.getvalue()
+        said = out.getvalue().splitlines(keepends=True)
+        return code, "".join(line for line in said if not line.startswith(COMPILING))
     if words[0] == "python":
         words = [sys.executable, *words[1:]]
     elif words[0] == "pytest":

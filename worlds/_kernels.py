@@ -13,6 +13,7 @@ from antdrive.worlds._kernels_compiler import kernel as kernel
 Array = Any
 
 SQRT2 = math.sqrt(2.0)
+ROUNDING = 1e-6  # a disc is left out only if it is this much too far away to matter, so that no result changes [m]
 # Directions by bit: E, NE, N, NW, W, SW, S, SE as (row, column) steps; row grows with y.
 DROW = np.array([0, 1, 1, 1, 0, -1, -1, -1], dtype=np.int64)
 DCOL = np.array([1, 1, 0, -1, -1, -1, 0, 1], dtype=np.int64)
@@ -63,6 +64,9 @@ def point_clearances(points: Array, discs: Array, bounds: Array, out: Array) -> 
         x, y = points[i, 0], points[i, 1]
         best = wall_distance(x, y, bounds)
         for j in range(discs.shape[0]):
+            dx, dy, reach = x - discs[j, 0], y - discs[j, 1], best + discs[j, 2] + ROUNDING
+            if dx * dx + dy * dy > reach * reach:
+                continue
             best = min(best, math.hypot(x - discs[j, 0], y - discs[j, 1]) - discs[j, 2])
         out[i] = best
 
@@ -72,7 +76,11 @@ def segment_clearance(ax: float, ay: float, bx: float, by: float, discs: Array, 
     """Distance from a segment to the nearest disc surface or wall."""
     # Inside the box the distance to the nearest wall is concave along a segment, so its minimum is at an end.
     best = min(wall_distance(ax, ay, bounds), wall_distance(bx, by, bounds))
+    mx, my, half = 0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * math.hypot(bx - ax, by - ay) + ROUNDING
     for j in range(discs.shape[0]):
+        dx, dy, reach = discs[j, 0] - mx, discs[j, 1] - my, best + discs[j, 2] + half
+        if dx * dx + dy * dy > reach * reach:
+            continue
         best = min(best, math.sqrt(segment_distance2(discs[j, 0], discs[j, 1], ax, ay, bx, by)) - discs[j, 2])
     return best
 
@@ -94,9 +102,15 @@ def rasterise(
     `closed` has the bits of E, NE, N and NW only, so that each pair of opposite moves is stored once.
     """
     rows, cols = free.shape
+    within = np.empty(cols, dtype=np.bool_)
+    for c in range(cols):
+        x = x0 + c * cell
+        within[c] = min(x - bounds[0], bounds[2] - x) > inflate
     for r in range(rows):
+        y = y0 + r * cell
+        inside = min(y - bounds[1], bounds[3] - y) > inflate
         for c in range(cols):
-            free[r, c] = wall_distance(x0 + c * cell, y0 + r * cell, bounds) > inflate
+            free[r, c] = inside and within[c]
     for j in range(discs.shape[0]):
         cx, cy, radius = discs[j, 0], discs[j, 1], discs[j, 2] + inflate
         r_lo = max(0, int(math.floor((cy - radius - y0) / cell)))
@@ -152,13 +166,18 @@ def allowed_moves(free: Array, closed: Array, moves: Array) -> None:
         for c in range(cols):
             if not free[r, c]:
                 continue
-            for k in range(4):
-                rn, cn = r + DROW[k], c + DCOL[k]
-                if rn < 0 or rn >= rows or cn < 0 or cn >= cols or not free[rn, cn]:
-                    continue
-                if k % 2 == 1 and not (free[r, cn] and free[rn, c]):
-                    continue
-                if closed[r, c] & (1 << k):
-                    continue
-                moves[r, c] |= 1 << k
-                moves[rn, cn] |= 1 << (k + 4)
+            shut = closed[r, c]
+            east, north = c + 1 < cols and free[r, c + 1], r + 1 < rows and free[r + 1, c]
+            if east and not shut & 1:
+                moves[r, c] |= 1
+                moves[r, c + 1] |= 16
+            if north:
+                if east and free[r + 1, c + 1] and not shut & 2:
+                    moves[r, c] |= 2
+                    moves[r + 1, c + 1] |= 32
+                if not shut & 4:
+                    moves[r, c] |= 4
+                    moves[r + 1, c] |= 64
+                if c > 0 and free[r, c - 1] and free[r + 1, c - 1] and not shut & 8:
+                    moves[r, c] |= 8
+                    moves[r + 1, c - 1] |= 128

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from antdrive.robots._kernels_footprint import polygon_distance, polygon_wall_distance
-from antdrive.worlds._kernels import Array, kernel, segment_clearance, wall_distance
+from antdrive.worlds._kernels import ROUNDING, Array, kernel, segment_clearance, wall_distance
 
 
 class ObstacleIndex(NamedTuple):
@@ -97,14 +97,17 @@ def arc_clearance(
         return segment_clearance(x, y, ex, ey, discs, bounds)
     radius = 1.0 / abs(curvature)
     cx, cy = x - math.sin(yaw) / curvature, y + math.cos(yaw) / curvature
-    first = math.atan2(y - cy, x - cx)
+    first, length = math.atan2(y - cy, x - cx), radius * abs(sweep) + ROUNDING
     best = min(wall_distance(x, y, bounds), wall_distance(ex, ey, bounds))
     for q in range(4):  # the arc's extreme points in x and y
         angle = q * 0.5 * math.pi
         if on_arc(angle, first, sweep):
             best = min(best, wall_distance(cx + radius * math.cos(angle), cy + radius * math.sin(angle), bounds))
     for j in range(discs.shape[0]):
-        px, py = discs[j, 0], discs[j, 1]
+        px, py, reach = discs[j, 0], discs[j, 1], best + discs[j, 2] + length
+        near = (px - x) * (px - x) + (py - y) * (py - y) <= reach * reach
+        if not near and (px - ex) * (px - ex) + (py - ey) * (py - ey) > reach * reach:
+            continue
         d = min(math.hypot(px - x, py - y), math.hypot(px - ex, py - ey))
         # No point of the arc is farther from one of its ends than its length.
         if d - discs[j, 2] - radius * abs(sweep) > best:

@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex, nearby
-from antdrive.worlds._kernels import Array, kernel, segment_clearance
+from antdrive.worlds._kernels import ROUNDING, Array, kernel, segment_clearance, segment_distance2, wall_distance
 
 
 class PathSamples(NamedTuple):
@@ -87,6 +87,19 @@ def carrot_at(x: float, y: float, lookahead: float, s: float, k: int, xy: Array,
 
 
 @kernel
+def clearance_below(most: float, ax: float, ay: float, bx: float, by: float, discs: Array, bounds: Array) -> float:
+    """The clearance of a segment if it is less than `most`, else a value that is not less."""
+    best = min(wall_distance(ax, ay, bounds), wall_distance(bx, by, bounds))
+    mx, my, half = 0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * math.hypot(bx - ax, by - ay) + ROUNDING
+    for j in range(discs.shape[0]):
+        dx, dy, reach = discs[j, 0] - mx, discs[j, 1] - my, min(best, most) + discs[j, 2] + half
+        if dx * dx + dy * dy <= reach * reach:
+            away2 = segment_distance2(discs[j, 0], discs[j, 1], ax, ay, bx, by)
+            best = min(best, math.sqrt(away2) - discs[j, 2])
+    return best
+
+
+@kernel
 def clear_lookaheads(
     xy: Array, arc: Array, obstacles: ObstacleIndex, clearance: float, spacing: float, low: float, high: float,
     out: Array,
@@ -109,7 +122,7 @@ def clear_lookaheads(
             length = min(length + step, high)
             t = min(s + length, arc[-1])
             bx, by, kk = point_at(t, kk, xy, arc)
-            c = segment_clearance(ax, ay, bx, by, discs, bounds)
+            c = clearance_below(required, ax, ay, bx, by, discs, bounds)
             if c < required - 1e-9 and c < segment_clearance(bx, by, bx, by, discs, bounds) - 1e-9:
                 break
             clear = length

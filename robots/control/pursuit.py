@@ -190,6 +190,7 @@ class PurePursuit:
         margin: float,
         period: float,
         tolerance: float = math.inf,
+        spacing: float = SPACING,
     ) -> TrackedPath:
         """Prepare a route for tracking.
 
@@ -200,15 +201,17 @@ class PurePursuit:
             margin: the safety margin that the route keeps beyond the robot's radius [m]
             period: control period [s]
             tolerance: goal tolerance [m]; where it is small, the robot stops closer to the route's end
+            spacing: distance between the samples at which lookaheads and speed limits are worked out [m]
         """
         tuning = self._tuning(route, robot, margin, period, min(self.goal_distance, tolerance / 2))
+        tuning = tuning._replace(spacing=spacing)
         obstacles = self._index(world, tuning.lookahead_clearance)
-        lookahead: Floats = np.empty(int(route.arc[-1] / SPACING) + 2)
+        lookahead: Floats = np.empty(int(route.arc[-1] / spacing) + 2)
         _kernels_path.clear_lookaheads(
-            route.xy, route.arc, obstacles, tuning.lookahead_clearance, SPACING, self.lookahead_min,
+            route.xy, route.arc, obstacles, tuning.lookahead_clearance, spacing, self.lookahead_min,
             self.lookahead_max, lookahead,
         )  # fmt: skip
-        at = SPACING * np.arange(len(lookahead))
+        at = spacing * np.arange(len(lookahead))
         profile = speed_profile(
             route,
             robot,
@@ -220,7 +223,7 @@ class PurePursuit:
         heading = np.interp(at, profile.arc, profile.heading)
         if route.curvature is None:
             curvature[:] = np.nan
-        speed = self._speed_limits(route, world, robot, profile, lookahead, tuning.lookahead_time)
+        speed = self._speed_limits(route, world, robot, profile, lookahead, tuning)
         limits = MotionLimits(
             speed=robot.max_speed,
             yaw_rate=robot.max_yaw_rate,
@@ -288,18 +291,25 @@ class PurePursuit:
         return ObstacleIndex(discs, starts, bounds, side)
 
     def _speed_limits(
-        self, route: Route, world: World, robot: RobotSpec, profile: SpeedProfile, lookahead: Floats, time: float
+        self,
+        route: Route,
+        world: World,
+        robot: RobotSpec,
+        profile: SpeedProfile,
+        lookahead: Floats,
+        tuning: PursuitTuning,
     ) -> Floats:
-        """The speed limit at the samples (S,) [m/s]: the least of profile, obstacles and `lookahead` / `time`."""
-        at = SPACING * np.arange(len(lookahead))
+        """The speed limit at the samples (S,) [m/s]: the least of profile, obstacles and `lookahead` over its time."""
+        spacing = tuning.spacing
+        at = spacing * np.arange(len(lookahead))
         xy = np.stack([np.interp(at, route.arc, values) for values in route.xy.T], axis=1)
         clearance = point_clearance(world, xy) - robot.radius
-        speed: Floats = np.minimum(lookahead / time, np.interp(at, profile.arc, profile.limit))
+        speed: Floats = np.minimum(lookahead / tuning.lookahead_time, np.interp(at, profile.arc, profile.limit))
         near_obstacles = self.min_speed_near_obstacles + np.maximum(clearance, 0.0) / self.clearance_time
         speed = np.minimum(speed, near_obstacles)
         for stop in profile.arc[:-1][np.diff(profile.arc) == 0]:
-            speed[int(stop / SPACING) : int(stop / SPACING) + 2] = 0.0
-        _kernels_path.brake_backwards(speed, SPACING, self.braking * robot.max_acceleration)
+            speed[int(stop / spacing) : int(stop / spacing) + 2] = 0.0
+        _kernels_path.brake_backwards(speed, spacing, self.braking * robot.max_acceleration)
         return speed
 
 

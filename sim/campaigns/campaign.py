@@ -100,8 +100,15 @@ _TASKS_SCHEMA: dict[str, Any] = {
 }
 
 
+def _settings_given(value: Any) -> Any:
+    listed = isinstance(value, list) and value and all(isinstance(one, dict) for one in value)
+    if not isinstance(value, dict) and not listed:
+        raise ValueError(f"must be a mapping such as {{cell: 0.1}}, or a list of mappings, got {show(value)}")
+    return value
+
+
 def _settings_schema() -> dict[str, Any]:
-    """The JSON Schema of settings in which a list of values may take the place of each."""
+    """The JSON Schema of settings in which a list of values may take the place of each, and of lists of such settings."""
     schema = SettingsEntry.model_json_schema()
     discs = {"type": "array", "items": schema.pop("$defs")["DiscEntry"]}
     keys = {key: discs if key == "unseen" else one for key, one in schema["properties"].items()}
@@ -109,7 +116,7 @@ def _settings_schema() -> dict[str, Any]:
     several_numbers = {"anyOf": [number, {"type": "array", "items": number, "minItems": 1}]}
     keys["controller"] = {**keys["controller"], "additionalProperties": several_numbers}
     several = {key: {"anyOf": [one, {"type": "array", "items": one, "minItems": 1}]} for key, one in keys.items()}
-    return {**schema, "properties": several}
+    return _of({**schema, "properties": several})
 
 
 class CampaignFile(BaseModel):
@@ -138,9 +145,10 @@ class CampaignFile(BaseModel):
         "min_distance: 5}; or a list of "
         "{start: [x, y, yaw], goal: [x, y]}",
     )
-    settings: Annotated[dict[str, Any], WithJsonSchema(_settings_schema())] = Field(
+    settings: Annotated[Any, PlainValidator(_settings_given), WithJsonSchema(_settings_schema())] = Field(
         {},
-        description="how robots drive, such as {cell: 0.1, time_limit: 60}; a list of values stands for several settings",
+        description="how robots drive, such as {cell: 0.1, time_limit: 60}; a list of values stands for several settings, "
+        "and so does a list of such mappings",
     )
     run_limit: float | None = Field(
         None, gt=0, description="wall-clock time that a run may take before its process is ended [s]; none by default"
@@ -159,6 +167,7 @@ class Campaign:
         entry: its data, checked
         tasks: the tasks in each world; empty: the worlds' own
         settings: every combination of the settings that it lists; one with the defaults where it lists none
+        places: where in the file each of them is written
     """
 
     source: str
@@ -167,6 +176,7 @@ class Campaign:
     entry: CampaignFile
     tasks: RandomTasks | tuple[TaskEntry, ...]
     settings: tuple[SettingsEntry, ...]
+    places: tuple[Location, ...]
 
     def error(self, location: Location, problem: str) -> InputError:
         """The error for a value: file, line, key and problem.
@@ -216,29 +226,41 @@ def _plain(value: Any) -> Any:
 
 def _checked(document: Document, folder: Path) -> Campaign:
     entry = check(CampaignFile, document)
-    settings = tuple(_settings(document, entry.settings))
+    settings, places = zip(*_settings(document, entry.settings), strict=True)
     if isinstance(entry.tasks, dict):
-        return Campaign(
-            document.source, folder, document, entry, check(RandomTasks, _part(document, "tasks")), settings
-        )
+        random = check(RandomTasks, _part(document, "tasks"))
+        return Campaign(document.source, folder, document, entry, random, settings, places)
     tasks = entry.tasks if isinstance(entry.tasks, list) else []
     checked = tuple(check(TaskEntry, _part(document, "tasks", i)) for i in range(len(tasks)))
     names = [task.name or str(i) for i, task in enumerate(checked)]
     for i, name in enumerate(names):
         if name in names[:i]:
             raise document.error(("tasks", i, "name"), f"{name!r} is the name of another task, too")
-    return Campaign(document.source, folder, document, entry, checked, settings)
+    return Campaign(document.source, folder, document, entry, checked, settings, places)
 
 
-def _settings(document: Document, given: dict[str, Any]) -> Iterator[SettingsEntry]:
-    """Every combination of the settings that a campaign lists; the last of several lists varies fastest."""
-    lists = [_alternatives(document, key, value) for key, value in given.items()]
+def _settings(
+    document: Document, given: dict[str, Any] | list[dict[str, Any]]
+) -> Iterator[tuple[SettingsEntry, Location]]:
+    """Every combination of the settings that a campaign lists, and its place; the last of several lists varies fastest."""
+    if isinstance(given, dict):
+        yield from _combinations(document, given, ("settings",))
+    else:
+        for i, one in enumerate(given):
+            yield from _combinations(document, one, ("settings", i))
+
+
+def _combinations(
+    document: Document, given: dict[str, Any], place: Location
+) -> Iterator[tuple[SettingsEntry, Location]]:
+    """Every combination of the settings in one mapping."""
+    lists = [_alternatives(document, key, value, place) for key, value in given.items()]
     for values in itertools.product(*lists):
         data = dict(zip(given, values, strict=True))
-        yield check(SettingsEntry, _Part(document.source, data, whole=document, place=("settings",)))
+        yield check(SettingsEntry, _Part(document.source, data, whole=document, place=place)), place
 
 
-def _alternatives(document: Document, key: str, value: Any) -> list[Any]:
+def _alternatives(document: Document, key: str, value: Any, place: Location) -> list[Any]:
     """The values that a setting takes: those of a list, and every combination of the lists within a mapping."""
     if isinstance(value, dict):
         inner = [one if isinstance(one, list) else [one] for one in value.values()]
@@ -248,7 +270,7 @@ def _alternatives(document: Document, key: str, value: Any) -> list[Any]:
     else:
         found = value if isinstance(value, list) else [value]
     if not found:
-        raise document.error(("settings", key), "must have at least one value, got an empty list")
+        raise document.error((*place, key), "must have at least one value, got an empty list")
     return found
 
 

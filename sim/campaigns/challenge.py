@@ -102,7 +102,9 @@ def unpacked(source: Path, folder: Path) -> Path:
     return found
 
 
-def campaign_data(folder: Path, trials: int, planner: str, robot: str, settings: Mapping[str, Any]) -> dict[str, Any]:
+def campaign_data(
+    folder: Path, trials: int, planner: str, robot: str, settings: Mapping[str, Any], *, with_map: bool = False
+) -> dict[str, Any]:
     """The campaign that drives every world a number of times, as plain data.
 
     Args:
@@ -110,17 +112,30 @@ def campaign_data(folder: Path, trials: int, planner: str, robot: str, settings:
         trials: how often each world is driven
         planner: the planner's name
         settings: of the runs, with the factor on noise
+        with_map: whether each run is made with the map, too, and with pose fixes unless the true pose is known
     """
     files = sorted(folder.rglob(WORLDS), key=lambda path: (len(path.stem), path.stem))
     noise = settings["noise"]
+    driven = [{key: value for key, value in settings.items() if key != "noise"}]
+    if with_map:
+        driven.append({**driven[0], "map": "given", "localisation": localisation_with_map(settings["localisation"])})
     return {
         "worlds": [{"import": str(path.resolve()), "barn": True} for path in files],
         "planners": [planner],
         "robots": [robot],
         "noise": [noise],
         "seeds": list(range(trials)),
-        "settings": {key: value for key, value in settings.items() if key != "noise"},
+        "settings": driven,
     }
+
+
+def localisation_with_map(kind: str) -> str:
+    """How a robot with the map localises itself, beside one without it: it has pose fixes, unless it knows the true pose.
+
+    Args:
+        kind: how the robot without the map does
+    """
+    return "true" if kind == "true" else "fixes"
 
 
 def reference_times(folder: Path) -> dict[str, float]:
@@ -152,6 +167,16 @@ def score(succeeded: bool, seconds: float, fastest: float) -> float:
         fastest: the reference path's time at 2 m/s [s]
     """
     return fastest / min(max(seconds, 2 * fastest), 8 * fastest) if succeeded else 0.0
+
+
+def by_map(table: pyarrow.Table) -> dict[str, pyarrow.Table]:
+    """The runs of robots without a map, `none`, and with it, `given`.
+
+    Args:
+        table: a campaign's
+    """
+    maps = table["map"].to_pylist()
+    return {kind: table.filter([one == kind for one in maps]) for kind in ("none", "given")}
 
 
 def lines(table: pyarrow.Table, fastest: Mapping[str, float]) -> Iterator[BarnLine]:

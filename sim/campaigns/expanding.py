@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import shlex
 from collections import Counter
@@ -24,6 +25,7 @@ from antdrive.sim.settings import scenario_fields
 from antdrive.worlds import Task
 from antdrive.worlds.errors import FieldError, InputError
 from antdrive.worlds.files.checks import suggest
+from antdrive.worlds.files.document import Location
 
 WORLDS, ROBOTS = "worlds", "robots"  # folders in a campaign's folder with what its commands name
 
@@ -55,11 +57,13 @@ class NamedSettings:
         fields: fields of `Scenario` by name; the margin may be "auto"
         columns: what tables say of them, by column
         words: the words of `antdrive run` for them; None where it has no flags for all
+        place: where in the campaign the settings are written
     """
 
     fields: Mapping[str, Any]
     columns: Mapping[str, Any]
     words: tuple[str, ...] | None
+    place: Location
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,23 +152,26 @@ def _settings(campaign: Campaign) -> list[NamedSettings]:
     """Every combination of route, noise, margin and settings."""
     entry = campaign.entry
 
-    def fail(key: str, problem: str) -> InputError:
-        return campaign.error(("settings", *key.split(".")), problem)
+    def fail_at(place: Location, key: str, problem: str) -> InputError:
+        return campaign.error((*place, *key.split(".")), problem)
 
-    shared = [(one, scenario_fields(one, fail)) for one in campaign.settings]
+    listed = zip(campaign.settings, campaign.places, strict=True)
+    shared = [(one, place, scenario_fields(one, functools.partial(fail_at, place))) for one, place in listed]
     for i, route in enumerate(entry.routes):
         if route not in SMOOTHINGS:
             raise campaign.error(("routes", i), f"unknown {route!r}; {suggest(route, SMOOTHINGS)}")
     return [
-        _named_settings(one, {**fields, "smoothing": route, "noise": noise, "margin": margin})
-        for route, noise, margin, (one, fields) in itertools.product(entry.routes, entry.noise, entry.margin, shared)
+        _named_settings(one, place, {**fields, "smoothing": route, "noise": noise, "margin": margin})
+        for route, noise, margin, (one, place, fields) in itertools.product(
+            entry.routes, entry.noise, entry.margin, shared
+        )
     ]
 
 
-def _named_settings(entry: SettingsEntry, fields: dict[str, Any]) -> NamedSettings:
+def _named_settings(entry: SettingsEntry, place: Location, fields: dict[str, Any]) -> NamedSettings:
     asked = ["--margin", option_text(fields["margin"]), "--smoothing", fields["smoothing"]]
     words = (*asked, "--noise", option_text(fields["noise"]), *setting_words(entry)) if has_flags(entry) else None
-    return NamedSettings(fields, setting_columns(fields), words)
+    return NamedSettings(fields, setting_columns(fields), words, place)
 
 
 #: Where a campaign writes what a scenario calls by another name.
@@ -193,7 +200,7 @@ def _check(
                 try:
                     _case(task, robot, one, planner).scenario(0, margin)
                 except FieldError as error:
-                    place = _PLACES.get(error.key, ("settings", error.key))
+                    place = _PLACES.get(error.key, (*one.place, error.key))
                     where = task.place if error.key == "start" and not campaign.tasks else place
                     raise campaign.error(where, f"{task.world} with {robot.name}: {error.problem}") from None
 

@@ -20,6 +20,7 @@ from antdrive.sim.entries import option_text
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.record import settings_of
 from antdrive.sim.pipeline import Run, versions
+from antdrive.sim.settings import SENSING
 
 if TYPE_CHECKING:
     import pyarrow
@@ -51,6 +52,9 @@ GRID: Mapping[str, str] = {
     "margin_asked": "string",
     "margin": "double",
     "cell": "double",
+    "map": "string",
+    "localisation": "string",
+    "odometry": "double",
     "controller": "string",
     "sees": "string",
     "avoid": "string",
@@ -122,6 +126,7 @@ def setting_columns(fields: Mapping[str, Any]) -> dict[str, Any]:
         "smoothing": fields["smoothing"],
         "noise": float(fields["noise"]),
         "margin_asked": margin if margin == "auto" else str(float(margin)),
+        **{key: fields.get(key, usual) for key, usual in SENSING.items()},
         "controller": _changes(fields["controller"], PurePursuit()),
         "sees": sees.kind if math.isinf(sees.range) else f"{sees.kind}:{sees.range:g}",
         "avoid": _changes(fields["avoidance"], Avoidance()),
@@ -165,7 +170,7 @@ def run_row(key: str, run: Run, rollout: str | None) -> dict[str, Any]:
         "certified": run.certificate is not None and run.certificate.certified,
         "digest": log.digest,
         "drive_digest": log.drive_digest,
-        **run.metrics,
+        **{name: None if math.isnan(value) else value for name, value in run.metrics.items()},
         "plan_length_m": log.record.plan.length_m,
         "grid_optimum_m": log.record.plan.grid_optimum_m,
     }

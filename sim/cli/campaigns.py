@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,6 +10,7 @@ from antdrive.worlds.errors import InputError
 
 if TYPE_CHECKING:
     from antdrive.sim.campaigns.campaign import Campaign
+    from antdrive.sim.campaigns.expanding import Expansion
 
 SOURCE = "the options"  # what errors call a campaign that no file describes
 
@@ -39,6 +41,8 @@ def campaign_from(path: Path | None, **words: Any) -> Campaign:
         given["planners"] = [_absolute_planner(one) for one in given["planners"]]
     for key in ("worlds", "robots"):
         given[key] = _absolute(given[key]) if key in given else file.document.data.get(key)
+    if "settings" in given:
+        given["settings"] = _with_settings(file.document.data.get("settings", {}), given["settings"])
     merged = {**file.document.data, **{key: value for key, value in given.items() if value is not None}}
     return make_campaign(merged, file.folder, str(path))
 
@@ -53,6 +57,9 @@ def _keys(words: dict[str, Any]) -> dict[str, Any]:
         found["planners"] = [_planner(text) for text in words["planners"]]
     if words["margin"]:
         found["margin"] = [text if text == "auto" else _number("--margin", text) for text in words["margin"]]
+    settings = {key: value for key, value in words["settings"].items() if value}
+    if settings:
+        found["settings"] = settings
     if words["seeds"] is not None:
         found["seeds"] = _seeds(words["seeds"])
     if words["run_limit"] is not None:
@@ -60,6 +67,31 @@ def _keys(words: dict[str, Any]) -> dict[str, Any]:
     if words["tasks"] is not None:
         found["tasks"] = _tasks(words["tasks"])
     return found
+
+
+def _with_settings(of_file: Any, given: dict[str, Any]) -> Any:
+    """A file's settings with those that options give in the place of the file's."""
+    if isinstance(of_file, list):
+        return [{**one, **given} for one in of_file]
+    return {**of_file, **given}
+
+
+def size_lines(expansion: Expansion, missing: int) -> Iterator[str]:
+    """How large a campaign is, in words.
+
+    Args:
+        expansion: its runs
+        missing: how many of them its folder lacks
+    """
+    counts = expansion.counts.items()
+    yield " x ".join(f"{count} {name if count != 1 else _one(name)}" for name, count in counts)
+    left_out = f"; {expansion.duplicates} combinations that mean the same as others are left out"
+    yield f"{len(expansion.jobs)} runs, {missing} of them missing{left_out if expansion.duplicates else ''}"
+
+
+def _one(name: str) -> str:
+    """The singular of what is counted."""
+    return name if " " in name or name == "settings" else name.removesuffix("s")
 
 
 def _tasks(text: str) -> Any:

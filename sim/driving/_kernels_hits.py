@@ -6,7 +6,9 @@ import math
 
 import numpy as np
 
-from antdrive.worlds._kernels import Array, kernel
+from antdrive.worlds._kernels import ROUNDING, Array, kernel
+
+BLOCK = 8  # points of a route that are looked at together
 
 
 @kernel
@@ -20,6 +22,8 @@ def near_polyline(xy: Array, discs: Array, distance: float) -> Array:
             ax, ay = xy[i, 0], xy[i, 1]
             dx, dy = xy[i + 1, 0] - ax, xy[i + 1, 1] - ay
             px, py = discs[j, 0] - ax, discs[j, 1] - ay
+            if max(abs(px), abs(py)) > reach + abs(dx) + abs(dy):
+                continue
             length2 = dx * dx + dy * dy
             t = min(1.0, max(0.0, (px * dx + py * dy) / length2)) if length2 > 0.0 else 0.0
             ex, ey = px - t * dx, py - t * dy
@@ -42,6 +46,7 @@ def hit_within(
         x_min, x_max = min(x_min, points[i, 0]), max(x_max, points[i, 0])
         y_min, y_max = min(y_min, points[i, 1]), max(y_max, points[i, 1])
         most = max(most, distances[i])
+    blocks = surrounding(points, distances)
     cos, sin = math.cos(yaw), math.sin(yaw)
     for j in range(beams.shape[0]):
         if not 0.0 <= ranges[j] < math.inf:
@@ -50,11 +55,27 @@ def hit_within(
         y = y0 + ranges[j] * (sin * beams[j, 0] + cos * beams[j, 1])
         if x < x_min - most or x > x_max + most or y < y_min - most or y > y_max + most:
             continue
-        for i in range(points.shape[0]):
-            dx, dy = points[i, 0] - x, points[i, 1] - y
-            if distances[i] > 0.0 and dx * dx + dy * dy < distances[i] * distances[i]:
-                return True
+        for k in range(blocks.shape[0]):
+            if x < blocks[k, 0] or x > blocks[k, 1] or y < blocks[k, 2] or y > blocks[k, 3]:
+                continue
+            for i in range(BLOCK * k, min(BLOCK * (k + 1), points.shape[0])):
+                dx, dy = points[i, 0] - x, points[i, 1] - y
+                if distances[i] > 0.0 and dx * dx + dy * dy < distances[i] * distances[i]:
+                    return True
     return False
+
+
+@kernel
+def surrounding(points: Array, distances: Array) -> Array:
+    """Rectangles around BLOCK points each and what lies within their distances: x_min, x_max, y_min, y_max (K, 4)."""
+    out = np.empty(((points.shape[0] + BLOCK - 1) // BLOCK, 4))
+    for k in range(out.shape[0]):
+        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = math.inf, -math.inf, math.inf, -math.inf
+        for i in range(BLOCK * k, min(BLOCK * (k + 1), points.shape[0])):
+            reach = max(distances[i], 0.0) + ROUNDING
+            out[k, 0], out[k, 1] = min(out[k, 0], points[i, 0] - reach), max(out[k, 1], points[i, 0] + reach)
+            out[k, 2], out[k, 3] = min(out[k, 2], points[i, 1] - reach), max(out[k, 3], points[i, 1] + reach)
+    return out
 
 
 @kernel

@@ -144,6 +144,6 @@ class Blockage:
             else "closes the way"
         )
         return (
-            f"movers[{mover}] stands still at ({x:.2f}, {y:.2f}) and {closes}; "
+            f"{self._predictor.name_of(mover)} stands still at ({x:.2f}, {y:.2f}) and {closes}; "
             f"no route to the goal for {self._patience:g} s, in {self.failures} attempts"
         )

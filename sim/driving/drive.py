@@ -9,6 +9,7 @@ from antdrive.sim.driving.caution import Caution
 from antdrive.sim.driving.driver import STUCK_TIME, Driver
 from antdrive.sim.driving.exploring import Exploration
 from antdrive.sim.driving.localising import OdometryModel
+from antdrive.sim.driving.lookout import Lookout
 from antdrive.sim.driving.perception import Predictor
 from antdrive.sim.driving.recorder import Drive, Ending, Recorder
 from antdrive.sim.driving.replanning import ReplanMonitor
@@ -35,6 +36,7 @@ def drive(
     predictor: Predictor | None = None,
     monitor: ReplanMonitor | Exploration | None = None,
     caution: Caution | None = None,
+    lookout: Lookout | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Drive:
     """Drive along a path until the robot stands at its end, touches something, is stuck, or the time is over.
@@ -51,6 +53,7 @@ def drive(
         predictor: predicts the movers; None: the robot does not perceive them
         monitor: finds new routes on the way; None: the robot keeps to its path
         caution: keeps a robot without a map within its sight; None: the robot has a map
+        lookout: looks for movers with the lidar of a robot that has a map; None: the robot's lidar is not used
         progress: is called with the fraction of the route that is done, about ten times per simulated second
 
     Raises:
@@ -60,7 +63,7 @@ def drive(
     if rest or substeps < 1:
         raise FieldError("control_hz", f"must divide the physics rate {engine.physics_hz}, got {control_hz}")
     driver = Driver(controller, tracked, task, engine.robot, control_hz, avoidance, predictor, monitor, caution)
-    survey = monitor.survey if isinstance(monitor, Exploration) else None
+    survey = monitor.survey if isinstance(monitor, Exploration) else lookout
     log = Recorder(engine, task.start, noisy=noise_model is not None)
     ending = Ending(Outcome.COLLIDED) if log.touched else None
     for tick in range(round(time_limit * control_hz)):
@@ -81,7 +84,7 @@ def _control_period(
     driver: Driver,
     log: Recorder,
     noise_model: NoiseModel | None,
-    survey: Survey | None,
+    survey: Survey | Lookout | None,
     substeps: int,
 ) -> Ending | None:
     """Sense, decide, act and log for one control period; how the drive ends in it, if it does."""

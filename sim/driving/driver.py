@@ -30,6 +30,7 @@ WAITING_SPEED = 0.1  # a robot that avoids a mover and is slower than this waits
 STUCK_TIME = 8.0  # a robot without progress for this long is stuck [s]
 STUCK_PROGRESS = 0.02  # what counts as progress along the route [m]
 GOAL_SHARE = 0.95  # a robot that avoids a mover may stop early within this fraction of the goal's tolerance
+DRIFTING_SHARE = 0.6  # and within this one, if it finds movers and its way by its lidar, and where it is by odometry
 AVOIDING = LIMITERS.index("avoid")
 EXPLORING_LIMITERS = (*LIMITERS, "sight")  # the rules where the robot has no map
 OUT_OF_SIGHT = EXPLORING_LIMITERS.index("sight")
@@ -84,6 +85,7 @@ class Driver:
         self._controller, self._task, self._robot, self._hz = controller, task, robot, control_hz
         self._avoidance, self._predictor, self._monitor = avoidance, predictor, monitor
         self._caution = caution
+        self._drifts = isinstance(monitor, Exploration) and monitor.survey.watch is not None
         self._avoidance_state = AvoidanceState()
         self._clock = StuckClock()
         self._patience = round(STUCK_TIME * control_hz)
@@ -244,7 +246,8 @@ class Driver:
         goal = self._task.goal
         distance = command.speed * abs(command.speed) / (2 * self._robot.max_acceleration)
         end = (x + distance * math.cos(yaw), y + distance * math.sin(yaw))
-        return max(math.dist((x, y), goal), math.dist(end, goal)) < GOAL_SHARE * self._task.goal_tolerance
+        share = DRIFTING_SHARE if self._drifts else GOAL_SHARE
+        return max(math.dist((x, y), goal), math.dist(end, goal)) < share * self._task.goal_tolerance
 
 
 def _standing(state: State) -> bool:

@@ -46,6 +46,7 @@ MARGINS = (1.0, 0.0)  # shares of the margin that plans keep, then if the way is
 FAIR = 1.25  # a way that is longer than the straight line by more than this factor is long
 DETOUR = 1.15  # a way with less margin must be shorter by this factor
 CORRIDOR = 1.2  # a route is smoothed among what lies within this distance of the plan, beyond the inflation [m]
+SAMPLES = 0.06  # spacing of the places on a route at which speed limits and lookaheads are worked out [m]
 SPARE = 0.25  # the controller knows what lies this much farther away than its longest arcs lead [m]
 INTERVAL = 0.15  # the shortest time between two plans [s]
 PATIENCE = 3  # plans in a row that find no path before the robot no longer believes what it saw long ago
@@ -169,7 +170,7 @@ class Exploration:
 
     def _known(self, pose: Pose, bounds: Bounds) -> Task:
         """The task as it is known, from a pose."""
-        key = self.survey.map, self.survey.count, pose, bounds
+        key = self.survey.map, len(self.survey.scans), pose, bounds
         if self._known_as[0] == key:
             return self._known_as[1]
         discs = self.survey.discs(bounds)
@@ -209,7 +210,9 @@ class Exploration:
 
     def _prepare(self, route: Route, world: World, margin: float) -> TrackedPath:
         robot = self._robot
-        tracked = self._controller.prepare(route, world, robot, margin, 1 / self._hz, self._task.goal_tolerance)
+        self._indexed = -1  # the path knows the obstacles along the route, and is to know those near the robot
+        tolerance = self._task.goal_tolerance
+        tracked = self._controller.prepare(route, world, robot, margin, 1 / self._hz, tolerance, SAMPLES)
         foot, tuning = robot.footprint, tracked.tuning
         give = FORGIVING + CORNERED * (robot.radius - min(foot.half_length, foot.half_width) - foot.rounding)
         return dataclasses.replace(
@@ -226,9 +229,9 @@ class Exploration:
 
     def refreshed(self, tracked: TrackedPath, pose: Pose) -> TrackedPath:
         """The path with what the lidar has just seen near the robot."""
-        if self._indexed == self.survey.count:
+        if self._indexed == self.survey.whole:
             return tracked
-        self._indexed = self.survey.count
+        self._indexed = self.survey.whole
         x, y, _ = pose
         near = self._controller.lookahead_max + tracked.tuning.lookahead_clearance + SPARE
         discs = self.survey.discs((x - near, y - near, x + near, y + near))
@@ -256,14 +259,13 @@ class Exploration:
             return ""
         if now - self._rest[0] > STALL_TIME:
             return STALLED
+        if self._looked == self.survey.whole:
+            return ""
+        self._looked = self.survey.whole
         deviation = math.dist(_kernels_hits.point_at(tracked.samples.xy, tracked.samples.arc, arc), pose[:2])
         if deviation > self._policy.max_deviation:
             return STRAYED
-        if self._looked != self.survey.count:
-            self._looked = self.survey.count
-            if self._discovered(pose, arc):
-                return DISCOVERED
-        return ""
+        return DISCOVERED if self._discovered(pose, arc) else ""
 
     def replan(self, tick: int, pose: Pose, trigger: str) -> TrackedPath | None:
         """A new path from a pose [m, m, rad], prepared for the controller; None if there is none.

@@ -60,7 +60,7 @@ class NarrowGaps:
         points = np.stack([np.interp(ahead, route.arc, route.xy[:, k]) for k in (0, 1)], axis=1)
         noted = self.noted(tick, robot)
         for m in standing.tolist():
-            gap = np.hypot(*(points - positions[m]).T).min(initial=np.inf) - self._predictor.trajectories.radii[m]
+            gap = np.hypot(*(points - positions[m]).T).min(initial=np.inf) - self._predictor.radius_of(m)
             width = self._widths[m] if m in noted else self.keeps
             if gap < width + SLACK:
                 self._widths[m] = max(width, gap + SLACK)
@@ -110,6 +110,8 @@ class NarrowGaps:
         noted = np.setdiff1d(self.noted(tick, robot), [*self._passed, *self._refused])
         perceived, positions = self._predictor.perceived(tick, robot)
         if not len(noted) or not np.isin(perceived, standing).all():
+            return False
+        if len(positions) != len(self._all):  # a mover has come into sight
             return False
         if not (np.hypot(*(positions - self._all)[perceived].T) <= STILL).all():
             return False

@@ -12,18 +12,19 @@ import numpy.typing as npt
 from antdrive.worlds import Floats, Trajectories
 from antdrive.worlds.errors import FieldError
 
-PerceptionKind: TypeAlias = Literal["positions", "velocities", "motions"]
+PerceptionKind: TypeAlias = Literal["positions", "velocities", "motions", "lidar"]
 CHUNK = 240  # control periods whose positions and velocities are computed at once
 
 
 @dataclass(frozen=True, kw_only=True)
 class Perception:
-    """What the robot perceives of movers in every control period, without error.
+    """What the robot perceives of movers in every control period: without error, or what its lidar shows.
 
     Attributes:
         kind: `positions`: where movers are; the robot predicts that they stay there. `velocities`: their
             velocities too; the robot predicts constant velocity. `motions`: their positions at any time,
-            turns and teleports included; the prediction is exact.
+            turns and teleports included; the prediction is exact. `lidar`: what is found in the scans of the robot's
+            lidar, see `antdrive.sim.sensing.MoverTracker`; the robot predicts constant velocity.
         range: movers are perceived if their surface is within this distance of the robot's centre [m]
 
     Raises:
@@ -55,7 +56,7 @@ class Predictor:
     @property
     def guesses(self) -> bool:
         """Whether the robot sees velocities but does not know what movers do next."""
-        return self._perception.kind == "velocities"
+        return self._perception.kind in ("velocities", "lidar")
 
     def predict(self, tick: int, robot: tuple[float, float], ahead: Floats) -> tuple[Floats, Floats]:
         """Predict the movers that the robot perceives.
@@ -88,6 +89,14 @@ class Predictor:
             return self._everyone
         distances = np.hypot(*(self._now(tick)[0] - robot).T) - self.trajectories.radii
         return np.flatnonzero(distances <= self._perception.range)
+
+    def radius_of(self, mover: int) -> float:
+        """The radius of a mover [m]."""
+        return float(self.trajectories.radii[mover])
+
+    def name_of(self, mover: int) -> str:
+        """What people call a mover."""
+        return f"movers[{mover}]"
 
     def _now(self, tick: int) -> tuple[Floats, Floats]:
         """True positions (M, 2) [m] and velocities (M, 2) [m/s] at a tick."""

@@ -1,7 +1,8 @@
 """Drive a logged drive again: the motors' logged targets, open loop, in the record's world with the record's robot.
 
 Nothing is planned or decided, so the replay depends on physics alone. The noise of a noisy robot is drawn again from the
-record's seed: it must turn the logged commands into the logged targets, and the logged poses into the logged estimates.
+record's seed: it must turn the logged commands into the logged targets, and the logged poses into the logged estimates. The
+scans of a robot without a map are taken and matched again, too.
 On the machine and with the versions that wrote a
 log it gives the same bits; elsewhere rounding differs, and `ROUNDING` says how much is allowed.
 """
@@ -16,8 +17,9 @@ from typing import Any
 import numpy as np
 
 from antdrive.robots import Twist
-from antdrive.sim.driving.localising import noise_model_of
+from antdrive.sim.driving.localising import OdometryModel, noise_model_of
 from antdrive.sim.driving.recorder import Ending, Recorder
+from antdrive.sim.driving.rescanning import Rescanning
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.physics.engine import Engine
 from antdrive.worlds.errors import FieldError
@@ -93,35 +95,47 @@ def replay(rollout: Rollout) -> ReplayCheck:
         problems.append(
             f"replay: physics reports {len(drive.contacts)} contact points, the log {len(rollout.contacts)}"
         )
-    problems += _other_noise(rollout)
+    problems += _other_senses(rollout)
     return ReplayCheck(exact, position, turn, twist, tuple(problems))
 
 
-def _other_noise(rollout: Rollout) -> Iterator[str]:
-    """What of a noisy log is not as the seed's noise makes it."""
+def _other_senses(rollout: Rollout) -> Iterator[str]:
+    """What of a log is not as the seed's noise and the lidar make it: estimates, targets of the motors, scans."""
     record = rollout.record
+    again = Rescanning(rollout) if record.exploring and len(rollout.scans) else None
+    if record.exploring and again is None:
+        yield "replay: the log of a robot without a map has no scans"
+        return
     odometry = 1.0 if record.sensing is None else record.sensing.odometry
     model = noise_model_of(
         record.localisation, record.robot, record.noise, odometry, 1 / record.control_hz, record.task.start, record.seed
     )
-    if model is None or len(rollout.actuated) != len(rollout.t):
-        return
+    if model is not None and not len(rollout.actuated) == len(rollout.estimate) == len(rollout.t):
+        yield "replay: actuated and estimate are missing; the log of a robot with noise has them"
+        model = None
     found: list[tuple[float, ...]] = []
     # A period's first row is the last of the period before; a contact ends the control of the robot.
     touched = int(rollout.contacts[0, 0]) if len(rollout.contacts) else len(rollout.t)
     rows = range(0, min(touched, len(rollout.t) - 1), record.physics_hz // record.control_hz)
-    for row in rows:
+    for tick, row in enumerate(rows):
         x, y, yaw = rollout.pose[row].tolist()
-        estimate = model.estimate_pose((x, y, yaw), Twist(*rollout.twist[row].tolist()))
-        actuated = model.actuate(Twist(*rollout.command[row + 1].tolist()))
-        found.append((*estimate, *actuated))
+        estimate = x, y, yaw
+        if model is not None:
+            estimate = model.estimate_pose((x, y, yaw), Twist(*rollout.twist[row].tolist()))
+        if again is not None:
+            estimate = again.look(tick, (x, y, yaw), estimate)
+            if isinstance(model, OdometryModel):
+                model.correct(estimate)
+            again.plan(tick, model.pose_after_delay() if model is not None else estimate)
+        if model is not None:
+            found.append((*estimate, *model.actuate(Twist(*rollout.command[row + 1].tolist()))))
+    if again is not None:
+        yield from again.problems()
     if not found:
         return
     drawn = np.array(found)
     off = drawn[:, :3] - rollout.estimate[rows]
     off[:, 2] = wrap_angle(off[:, 2])
-    if record.localisation == "matching":  # its estimates follow from scans, too
-        off[:] = 0.0
     for name, error in (("estimate", off), ("actuated", drawn[:, 3:] - rollout.actuated[np.array(rows) + 1])):
         wrong = (np.abs(error) > SAME_NOISE).any(axis=1)
         if wrong.any():

@@ -8,11 +8,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from antdrive.robots import RobotSpec
 from antdrive.sim.driving import _kernels_hits
+from antdrive.sim.driving.watching import Watch
 from antdrive.sim.sensing.mapping import OccupancyMap
-from antdrive.sim.sensing.matching import ScanMatcher
+from antdrive.sim.sensing.matching import FAR, ScanMatcher, sliding_left_out
 from antdrive.sim.sensing.scanner import Scanner
 from antdrive.sim.sensing.sight import clear_distance, clear_turn
 from antdrive.worlds import Bounds, Floats, Point, Pose, Trajectories
@@ -31,11 +33,13 @@ class Scan(NamedTuple):
         tick: the control period in which it was taken
         estimate: where the robot believed it was
         ranges: what was measured (beams,) [m]
+        movers: which beams met movers that are followed (beams,); None where nobody looks for movers
     """
 
     tick: int
     estimate: Pose
     ranges: Floats
+    movers: npt.NDArray[np.bool_] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +58,28 @@ class Senses:
     rng: np.random.Generator | None
     hz: int
 
+    def due(self, tick: int, last: int) -> bool:
+        """Whether a scan is due in a control period, after one in an earlier period; a negative one: after none.
+
+        Args:
+            tick: the number of the control period
+            last: the control period of the scan before
+        """
+        per_tick = self.scanner.lidar.rate / self.hz
+        return last < 0 or (tick != last and math.floor(tick * per_tick) != math.floor((tick - 1) * per_tick))
+
+    def ranges(self, tick: int, pose: Pose) -> Floats:
+        """A scan (beams,) [m].
+
+        Args:
+            tick: the number of the control period
+            pose: the robot's true pose
+        """
+        movers = self.trajectories
+        if not movers:
+            return self.scanner.scan(pose, rng=self.rng)
+        return self.scanner.scan(pose, movers.positions(np.array([tick / self.hz]))[0], movers.radii, self.rng)
+
 
 class Survey:
     """The robot's knowledge. It takes a scan when one is due, and builds a map of it.
@@ -63,14 +89,26 @@ class Survey:
     Attributes:
         map: what was hit, and which ground was seen free
         scans: all scans so far
+        whole: how many of them were entered as a whole, with the ground that is free
+        watch: what follows the movers in the scans; None: nothing does
 
     Args:
         start: the first pose, from which odometry counts; what the robot covers when it turns there is taken for free
         goal: where the robot is to go; the map is laid out for the way there [m]
         matching: whether scans correct the estimated pose by what is on the map
+        watch: follows the movers in the scans, which are then no part of the map; None: they are part of it
     """
 
-    def __init__(self, senses: Senses, robot: RobotSpec, start: Pose, goal: Point, *, matching: bool = False) -> None:
+    def __init__(
+        self,
+        senses: Senses,
+        robot: RobotSpec,
+        start: Pose,
+        goal: Point,
+        *,
+        matching: bool = False,
+        watch: Watch | None = None,
+    ) -> None:
         self._senses, self._lidar = senses, senses.scanner.lidar
         foot = robot.footprint
         self._footprint = dataclasses.replace(foot, rounding=foot.rounding + PAD)
@@ -79,12 +117,9 @@ class Survey:
         self.map = self._empty_map(start)
         self._recent = math.ceil(RECENT * self._lidar.rate)
         self._matcher = ScanMatcher(self._lidar) if matching else None
+        self.watch = watch
         self.scans: list[Scan] = []
-
-    @property
-    def count(self) -> int:
-        """The number of scans so far."""
-        return len(self.scans)
+        self.whole = 0
 
     def look(self, tick: int, pose: Pose, estimate: Pose) -> Pose:
         """Take a scan if one is due in a control period; the estimated pose, which the scan may correct.
@@ -94,17 +129,26 @@ class Survey:
             pose: the robot's true pose, from which the lidar sees
             estimate: where the robot believes it is
         """
-        per_tick = self._lidar.rate / self._senses.hz
-        if self.scans and math.floor(tick * per_tick) == math.floor((tick - 1) * per_tick):
+        if not self._senses.due(tick, self.scans[-1].tick if self.scans else -1):
             return estimate
-        if self.scans and tick == self.scans[-1].tick:
-            return estimate
-        ranges = self._scan(tick, pose)
-        if self._matcher is not None:
-            estimate = self._matcher.corrected(self.map, estimate, ranges)
-        self.map.insert(estimate, ranges)
-        self.scans.append(Scan(tick, estimate, ranges))
+        ranges = self._senses.ranges(tick, pose)
+        if self.map.whole:
+            self.whole += 1
+            if self._matcher is not None:
+                estimate = self._matched(self._matcher, estimate, ranges, tick)
+        movers = self.watch.read_on_map(self.map, estimate, ranges, tick) if self.watch is not None else None
+        self.map.insert(estimate, ranges, movers)
+        self.scans.append(Scan(tick, estimate, ranges, movers))
         return estimate
+
+    def _matched(self, matcher: ScanMatcher, estimate: Pose, ranges: Floats, tick: int) -> Pose:
+        """The estimated pose, corrected by a scan; among movers by what stands, and by nothing that slides along a wall."""
+        if self.watch is None:
+            return matcher.corrected(self.map, estimate, ranges)
+        standing = self.watch.standing(estimate, ranges, tick)
+        corrected = matcher.corrected(self.map, estimate, standing)
+        near = np.where(standing <= FAR, standing, np.inf)
+        return sliding_left_out(estimate, corrected, self.map.endpoints(estimate, near))
 
     def discs(self, bounds: Bounds) -> Floats:
         """What was hit within bounds, as discs (N, 3) [m].
@@ -124,9 +168,8 @@ class Survey:
         """
         scan = self.scans[-1]
         x, y, yaw = self._lidar.pose_on(scan.estimate)
-        return bool(
-            _kernels_hits.hit_within(points, needed, ahead, TOLERANCE, BLUR, x, y, yaw, self.map.beams, scan.ranges)
-        )
+        ranges = scan.ranges if scan.movers is None else np.where(scan.movers, np.inf, scan.ranges)
+        return bool(_kernels_hits.hit_within(points, needed, ahead, TOLERANCE, BLUR, x, y, yaw, self.map.beams, ranges))
 
     def forget(self, pose: Pose) -> None:
         """Make the map anew of the latest scans: what was seen before may be elsewhere in a frame that drifts.
@@ -136,7 +179,7 @@ class Survey:
         """
         self.map = self._empty_map(pose)
         for scan in self.scans[-self._recent :]:
-            self.map.insert(scan.estimate, scan.ranges)
+            self.map.insert(scan.estimate, scan.ranges, scan.movers)
 
     def _empty_map(self, pose: Pose) -> OccupancyMap:
         seen = OccupancyMap(self._lidar, MAP_CELL, pose[:2], goal=self._goal)
@@ -163,10 +206,3 @@ class Survey:
             farthest: no more is asked for [rad]
         """
         return clear_turn(self.map, pose, yaw_rate, self._footprint, farthest)
-
-    def _scan(self, tick: int, pose: Pose) -> Floats:
-        senses = self._senses
-        movers = senses.trajectories
-        if not movers:
-            return senses.scanner.scan(pose, rng=senses.rng)
-        return senses.scanner.scan(pose, movers.positions(np.array([tick / senses.hz]))[0], movers.radii, senses.rng)

@@ -17,6 +17,7 @@ import numpy as np
 from antdrive.sim.log.contacts import touches_of
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.log.sights import seen_ground
 from antdrive.worlds.errors import FieldError
 from antdrive.worlds.plane import polyline_length, wrap_angle
 from antdrive.worlds.types import Floats
@@ -235,6 +236,17 @@ def avoiding_s(rollout: Rollout) -> float:
     return float((rollout.limiter == limiters.index(AVOIDING)).sum() / rollout.record.physics_hz)
 
 
+def explored_m2(rollout: Rollout) -> float:
+    """Ground within the walls that the lidar of a robot without a map saw, from the true poses, in cells of 0.1 m.
+
+    A cell counts if the beam nearest to its middle in direction got farther. Not a number for a robot that had a map.
+    """
+    if not len(rollout.scans):
+        return math.nan
+    seen, cell = seen_ground(rollout)
+    return float(np.count_nonzero(seen)) * cell**2
+
+
 _TABLE = (
     Metric("m", path_length_m, "lower", Tolerance(0.01, 0.01)),
     Metric("m", route_length_m, "lower", Tolerance(0.01, 0.01)),
@@ -258,6 +270,7 @@ _TABLE = (
     Metric("1", contacts_teleported, "lower", Tolerance()),
     Metric("1", replans),
     Metric("s", avoiding_s),
+    Metric("m^2", explored_m2),
 )
 
 #: Every metric by its name, with unit and definition.

@@ -161,9 +161,14 @@ def _check_lengths(rollout: Rollout) -> Iterator[str]:
 def _check_movers_known(rollout: Rollout) -> Iterator[str]:
     """What was known of movers, and how they were avoided, is recorded where there are movers, and nowhere else."""
     record = rollout.record
-    moving = bool(record.world.movers)
+    watching = record.perception is not None and record.perception.kind == "lidar"
+    moving = bool(record.world.movers) or watching
     if (record.perception is not None) != moving:
         yield f"record.perception: must {'not ' if moving else ''}be null {'among' if moving else 'without'} movers"
+    if len(rollout.tracks) and not watching:
+        yield "tracks: must be empty, since the robot did not look for movers with its lidar"
+    elif len(rollout.tracks) and not (rollout.tracks[:, 6] > 0).all():
+        yield "tracks: radii must be greater than 0"
     for key in ("avoidance", "replanning"):
         if getattr(record, key) is not None and not moving and not (key == "replanning" and record.exploring):
             yield f"record.{key}: must be null without movers"

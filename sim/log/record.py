@@ -113,7 +113,7 @@ class PerceptionRecord:
     """What the robot knew of movers while it drove.
 
     Attributes:
-        kind: positions, velocities or motions
+        kind: positions, velocities, motions or lidar
         range_m: how far the robot perceived movers [m]; null if without limit
     """
 
@@ -228,7 +228,7 @@ class DriveRecord:
             only where it is a polygon or beside the axle
         controller: the controller and its settings
         smoothing: how the planned cells became the route
-        perception: what the robot knew of movers; null in a world without movers
+        perception: what the robot knew of movers; null in a world without movers, unless its lidar looked for them
         avoidance: the settings of `Avoidance` as they were in force; null if the robot did not avoid movers
         replanning: the settings of `ReplanPolicy`; null without movers, or if the robot was never to replan
         replans: every search for a new route while driving, in the order of time

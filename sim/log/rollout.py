@@ -35,6 +35,7 @@ DTYPES = {
     "scans": np.dtype("<u2"),
     "scan_rows": np.dtype("<i4"),
     "seen": np.dtype("<f4"),
+    "tracks": np.dtype("<f4"),
 }
 
 
@@ -62,6 +63,9 @@ class Rollout:
         scan_rows: the row of each scan (S,)
         seen: what plans on the way were made around, as discs (K, 4): the row of the plan, x, y and radius [m], in the frame of
             the estimated poses
+        tracks: the movers that a robot which looks for them with its lidar followed (K, 7): the row of the scan, the mover's
+            number in the order in which they were found, x, y [m], velocity along x and y [m/s] and radius [m], in the frame of
+            the estimated poses; left out as the three above are
         record: everything else: scenario, plan and outcome
     """
 
@@ -80,6 +84,7 @@ class Rollout:
     scans: npt.NDArray[np.uint16] = field(default_factory=lambda: np.empty((0, 0), dtype=np.uint16))
     scan_rows: npt.NDArray[np.int32] = field(default_factory=lambda: np.empty(0, dtype=np.int32))
     seen: npt.NDArray[np.float32] = field(default_factory=lambda: np.empty((0, 4), dtype=np.float32))
+    tracks: npt.NDArray[np.float32] = field(default_factory=lambda: np.empty((0, 7), dtype=np.float32))
     record: DriveRecord
 
     @property
@@ -219,7 +224,11 @@ class Rollout:
             yield f"scans: must have the {lidar.beams if lidar else 0} beams of the robot's lidar, found {self.scans.shape}"
         if len(self.scans) != np.size(at):
             yield f"scan_rows: must be {len(self.scans)}, one for each scan, found {np.size(at)}"
-        for name, places in (("scan_rows", at), ("seen", self.seen[:, 0] if self.seen.ndim == 2 else at)):
+        tables = [("seen", self.seen), ("tracks", self.tracks)]
+        for name, places in [
+            ("scan_rows", at),
+            *((name, table[:, 0] if table.ndim == 2 else at) for name, table in tables),
+        ]:
             if np.size(places) and not (places.min() >= 0 and places.max() < rows and (np.diff(places) >= 0).all()):
                 yield f"{name}: must be at rows from 0 to {rows - 1}, in order"
 
@@ -256,8 +265,8 @@ class Rollout:
         return card(picture, f"{task.world.name}: {self.outcome.value}", facts)
 
 
-#: The names of the arrays that only logs of robots without a map hold, in the order of the digest, after the others.
-SENSED = ("scans", "scan_rows", "seen")
+#: The names of the arrays that only logs of robots which use their lidar hold, in the order of the digest, after the others.
+SENSED = ("scans", "scan_rows", "seen", "tracks")
 #: The names of the arrays of every log, in the order of the digest.
 ARRAYS = tuple(entry.name for entry in dataclasses.fields(Rollout) if entry.name not in ("record", *SENSED))
 
@@ -302,6 +311,7 @@ def _shapes(rows: int, noisy: set[str]) -> dict[str, tuple[int | None, ...]]:
         "scans": (None, None),
         "scan_rows": (None,),
         "seen": (None, 4),
+        "tracks": (None, 7),
     }
 
 

@@ -187,7 +187,7 @@ class Baseline:
         if self.outcome in ENDED_BY.values() and not any(parts.values()):
             return
         known = [name for name in METRICS if name not in WALL_CLOCK]
-        missing = [name for name in known if name not in self.metrics]
+        missing = [name for name in known if name not in self.metrics and METRICS[name].better != "neither"]
         if missing:
             yield "metrics", f"{', '.join(missing[:3])}{' and others' if len(missing) > 3 else ''} missing"
         for name in self.metrics:

@@ -1,4 +1,6 @@
 from .dead_reckoning import DeadReckoning as DeadReckoning
+from .ground import KnownGround as KnownGround
+from .ground import MappedGround as MappedGround
 from .mapping import OccupancyMap as OccupancyMap
 from .scanner import Scanner as Scanner
 from .sight import clear_distance as clear_distance

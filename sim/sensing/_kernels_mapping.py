@@ -1,7 +1,8 @@
 """Compiled occupancy map: scans go in, discs come out. Arrays in, arrays out, nothing validated.
 
 Ground is seen free in cells. Hits are kept finer, in grains (GRAINS by GRAINS to a cell), each with its log-odds and with the
-box around the points that were measured in it.
+box around the points that were measured in it. Grains are kept in a list of the occupied cells, those of a cell side by side: so
+all hits of a map lie in a few hundred kilobytes, however large the map is, and stay in the processor's cache.
 """
 
 from __future__ import annotations
@@ -20,31 +21,31 @@ THINNEST = 0.005  # the least radius of a disc [m]
 
 
 class MapArrays(NamedTuple):
-    """The state of a map with R rows and C columns of cells.
+    """The state of a map with R rows and C columns of cells, K of them occupied at most.
+
+    The last four are lists of the occupied cells, without order; the first `count[0]` rows count.
 
     Attributes:
         free: which cells were seen free (R, C)
         occupied: which cells hold hits (R, C); no cell is both
-        turned: the scan in which a cell that had been seen free became occupied (R, C); 0: it had not been seen before
-        slot: the row of an occupied cell in `cells` (R, C)
-        cells: the occupied cells (row, col), without order; the first `count[0]` rows count
+        slot: the row of an occupied cell in the lists (R, C)
         count: the number of occupied cells (1,)
-        odds: log-odds of each grain (GRAINS R, GRAINS C); 0: nothing was hit there
-        stamp: the scan that a grain was last hit in, or looked at: whether it is seen through
-        box: the least x and y and the largest x and y of a grain's hits (GRAINS R, GRAINS C, 4) [m]
         frame: x and y of the lower left corner, and a cell's side (3,) [m]
+        cells: row and column of an occupied cell, and the scan in which it became occupied; 0: it had not been seen before (K, 3)
+        odds: log-odds of its grains, row by row (K, GRAINS * GRAINS); 0: nothing was hit there
+        stamp: the scan that a grain was last hit in, or looked at: whether it is seen through (K, GRAINS * GRAINS)
+        box: the least x and y and the largest x and y of a grain's hits (K, GRAINS * GRAINS, 4) [m]
     """
 
     free: Array
     occupied: Array
-    turned: Array
     slot: Array
-    cells: Array
     count: Array
+    frame: Array
+    cells: Array
     odds: Array
     stamp: Array
     box: Array
-    frame: Array
 
 
 class Fan(NamedTuple):
@@ -54,27 +55,23 @@ class Fan(NamedTuple):
         eye: where the lidar is: x, y, and the cosine and sine of its yaw (4,)
         beams: directions of the beams, seen from the lidar (B, 2)
         ranges: what they measured (B,) [m]
-        first: the angle of the first beam [rad]
-        spacing: the angle between two beams [rad]
         closed: whether the first beam is beside the last
     """
 
     eye: Array
     beams: Array
     ranges: Array
-    first: float
-    spacing: float
     closed: bool
 
 
 @kernel
-def begins(beams: int, spacing: float, cell: float, share: int, out: Array) -> None:
-    """out[i] = the distance from which on beam i is needed to leave no cell out [m], when every `share`-th is entered.
+def begins(beams: int, spacing: float, cell: float, turns: int, out: Array) -> None:
+    """out[i] = the distance from which on beam i is needed to leave no cell out [m], when all have had their turns.
 
     Near the lidar every second, fourth, ... beam crosses all cells that others cross.
     """
     for i in range(beams):
-        step, number = 2 * share, i // share
+        step, number = 2, i // turns
         while number and number % 2 == 0:
             step, number = step * 2, number // 2
         out[i] = cell / (step * spacing) if number else 0.0
@@ -82,64 +79,75 @@ def begins(beams: int, spacing: float, cell: float, share: int, out: Array) -> N
 
 @kernel
 def insert(
-    fan: Fan, begin: Array, share: int, left_out: Array, horizon: float, trust: float, scan: int, m: MapArrays,
-    changed: Array,
+    fan: Fan, begin: Array, turn: int, turns: int, left_out: Array, horizon: float, trust: float, scan: int,
+    m: MapArrays, changed: Array,
 ) -> int:  # fmt: skip
-    """Enter a scan, of every `share`-th beam its free way too; the number of rows (row, col) written to `changed`.
+    """Enter a scan; the number of rows written to `changed`.
+
+    As a whole, with the free ways of every `turns`-th beam from beam `turn` on; or, where `turn` is less than 0, only its hits
+    in cells that are not occupied.
 
     Hits farther than `horizon` are not entered, nor those of beams in `left_out`; ground is seen free up to `trust`.
     """
-    count = enter_hits(fan, left_out, horizon, scan, m, changed)
-    return enter_ways(fan, begin, share, trust, scan, m, changed, count)
+    count = enter_hits(fan, turn >= 0, left_out, horizon, scan, m, changed)
+    return enter_ways(fan, begin, turn, turns, trust, scan, m, changed, count) if turn >= 0 else count
 
 
 @kernel
-def enter_hits(fan: Fan, left_out: Array, horizon: float, scan: int, m: MapArrays, changed: Array) -> int:
+def enter_hits(fan: Fan, whole: bool, left_out: Array, horizon: float, scan: int, m: MapArrays, changed: Array) -> int:
     """Enter the measured points."""
     ranges, beams, x, y, cos, sin = fan.ranges, fan.beams, fan.eye[0], fan.eye[1], fan.eye[2], fan.eye[3]
-    odds, stamp, box, occupied, left, low = m.odds, m.stamp, m.box, m.occupied, m.frame[0], m.frame[1]
-    fine, fine_rows, fine_cols = m.frame[2] / GRAINS, m.odds.shape[0], m.odds.shape[1]
+    occupied, odds, stamp, box, left, low, cell = m.occupied, m.odds, m.stamp, m.box, m.frame[0], m.frame[1], m.frame[2]
+    rows, cols = occupied.shape
     count = 0
     for i in range(beams.shape[0]):
         if left_out[i] or not 0.0 < ranges[i] <= horizon:
             continue
         px = x + ranges[i] * (cos * beams[i, 0] - sin * beams[i, 1])
         py = y + ranges[i] * (sin * beams[i, 0] + cos * beams[i, 1])
-        r, c = int(math.floor((py - low) / fine)), int(math.floor((px - left) / fine))
-        if not (0 <= r < fine_rows and 0 <= c < fine_cols):
+        u, v = (px - left) / cell, (py - low) / cell
+        if not (0.0 <= u < cols and 0.0 <= v < rows):
             continue
-        qx, qy = np.float32(px), np.float32(py)
-        if odds[r, c] > 0.0:
-            box[r, c, 0], box[r, c, 1] = min(box[r, c, 0], qx), min(box[r, c, 1], qy)
-            box[r, c, 2], box[r, c, 3] = max(box[r, c, 2], qx), max(box[r, c, 3], qy)
-        else:
-            box[r, c, 0], box[r, c, 1], box[r, c, 2], box[r, c, 3] = qx, qy, qx, qy
-        if stamp[r, c] != scan:
-            stamp[r, c] = scan
-            odds[r, c] = min(MOST, odds[r, c] + HIT)
-        row, col = r // GRAINS, c // GRAINS
+        row, col = int(v), int(u)
         if not occupied[row, col]:
-            m.turned[row, col] = scan if m.free[row, col] else 0
-            m.free[row, col] = False
-            occupied[row, col] = True
-            m.slot[row, col] = m.count[0]
-            m.cells[m.count[0], 0], m.cells[m.count[0], 1] = row, col
-            m.count[0] += 1
+            occupy(row, col, scan, m)
             changed[count, 0], changed[count, 1] = row, col
             count += 1
+        elif not whole:
+            continue
+        at, k = m.slot[row, col], GRAINS * int(GRAINS * (v - row)) + int(GRAINS * (u - col))
+        qx, qy = np.float32(px), np.float32(py)
+        if odds[at, k] > 0.0:
+            box[at, k, 0], box[at, k, 1] = min(box[at, k, 0], qx), min(box[at, k, 1], qy)
+            box[at, k, 2], box[at, k, 3] = max(box[at, k, 2], qx), max(box[at, k, 3], qy)
+        else:
+            box[at, k, 0], box[at, k, 1], box[at, k, 2], box[at, k, 3] = qx, qy, qx, qy
+        if stamp[at, k] != scan:
+            stamp[at, k] = scan
+            odds[at, k] = min(MOST, odds[at, k] + HIT)
     return count
 
 
 @kernel
+def occupy(row: int, col: int, scan: int, m: MapArrays) -> None:
+    """Put a cell without hits on the list of occupied ones."""
+    at = m.count[0]
+    m.count[0] = at + 1
+    m.cells[at, 0], m.cells[at, 1], m.cells[at, 2] = row, col, scan if m.free[row, col] else 0
+    m.slot[row, col], m.occupied[row, col], m.free[row, col] = at, True, False
+    for k in range(GRAINS * GRAINS):
+        m.odds[at, k], m.stamp[at, k] = 0.0, 0
+
+
+@kernel
 def enter_ways(
-    fan: Fan, begin: Array, share: int, trust: float, scan: int, m: MapArrays, changed: Array, count: int
+    fan: Fan, begin: Array, turn: int, turns: int, trust: float, scan: int, m: MapArrays, changed: Array, count: int
 ) -> int:
-    """Enter the free ways of every `share`-th beam, each from its `begin` on (Amanatides & Woo 1987)."""
+    """Enter the free ways of every `turns`-th beam, each from its `begin` on (Amanatides & Woo 1987)."""
     ranges, beams, x, y, cos, sin = fan.ranges, fan.beams, fan.eye[0], fan.eye[1], fan.eye[2], fan.eye[3]
     free, occupied, left, low, cell = m.free, m.occupied, m.frame[0], m.frame[1], m.frame[2]
-    odds, stamp = m.odds, m.stamp
     rows, cols = free.shape
-    for i in range(scan % share, beams.shape[0], share):
+    for i in range(turn, beams.shape[0], turns):
         rest = min(ranges[i], trust) - begin[i]  # inf: nothing there; -inf: something too near to be measured
         if not rest > 0.0:
             continue
@@ -154,14 +162,12 @@ def enter_ways(
         next_y = ((row + 1 - sy) if uy > 0.0 else (sy - row)) * each_y if uy != 0.0 else math.inf
         while 0 <= row < rows and 0 <= col < cols:
             if not free[row, col]:
-                if occupied[row, col]:
-                    # Else the beam ends here or close behind, or the scan has been here.
-                    if min(next_x, next_y) + 0.5 * cell < rest and unread(odds, stamp, row, col, scan):
-                        count = see_through(row, col, scan, fan, m, changed, count)
-                else:
+                if not occupied[row, col]:
                     free[row, col] = True
                     changed[count, 0], changed[count, 1] = row, col
                     count += 1
+                elif min(next_x, next_y) + 0.5 * cell < rest:  # else the beam ends here or close behind
+                    count = see_through(row, col, scan, i, fan, m, changed, count)
             if next_x < next_y:
                 if next_x >= rest:
                     break
@@ -176,34 +182,26 @@ def enter_ways(
 
 
 @kernel
-def unread(odds: Array, stamp: Array, row: int, col: int, scan: int) -> bool:
-    """Whether a cell holds hits that a scan has neither met nor been compared with."""
-    for r in range(GRAINS * row, GRAINS * row + GRAINS):
-        for c in range(GRAINS * col, GRAINS * col + GRAINS):
-            if odds[r, c] > 0.0 and stamp[r, c] != scan:
-                return True
-    return False
+def see_through(row: int, col: int, scan: int, beam: int, fan: Fan, m: MapArrays, changed: Array, count: int) -> int:
+    """Lower the log-odds of those grains of an occupied cell whose hits the scan has passed by on both sides.
 
-
-@kernel
-def see_through(row: int, col: int, scan: int, fan: Fan, m: MapArrays, changed: Array, count: int) -> int:
-    """Lower the log-odds of those grains of an occupied cell whose hits the scan has passed by on both sides."""
-    odds, stamp = m.odds, m.stamp
+    A grain that the scan has met, or has been compared with, is left alone. `beam` is one that crosses the cell.
+    """
+    odds, stamp, at = m.odds, m.stamp, m.slot[row, col]
     left = False
     lowered = False
-    for r in range(GRAINS * row, GRAINS * row + GRAINS):
-        for c in range(GRAINS * col, GRAINS * col + GRAINS):
-            if odds[r, c] <= 0.0:
-                continue
-            if stamp[r, c] != scan:
-                stamp[r, c] = scan
-                if seen_beyond(m.box, r, c, m.frame[2], fan):
-                    odds[r, c] -= MISS
-                    lowered = True
-            if odds[r, c] > 0.0:
-                left = True
-            else:
-                odds[r, c] = 0.0
+    for k in range(GRAINS * GRAINS):
+        if odds[at, k] <= 0.0:
+            continue
+        if stamp[at, k] != scan:
+            stamp[at, k] = scan
+            if seen_beyond(m.box, at, k, m.frame[2], beam, fan):
+                odds[at, k] -= MISS
+                lowered = True
+        if odds[at, k] > 0.0:
+            left = True
+        else:
+            odds[at, k] = 0.0
     if lowered and not left:
         vacate(row, col, m)
         changed[count, 0], changed[count, 1] = row, col
@@ -212,22 +210,32 @@ def see_through(row: int, col: int, scan: int, fan: Fan, m: MapArrays, changed: 
 
 
 @kernel
-def seen_beyond(box: Array, r: int, c: int, behind: float, fan: Fan) -> bool:
+def seen_beyond(box: Array, at: int, k: int, behind: float, beam: int, fan: Fan) -> bool:
     """Whether both beams beside the middle of a grain's hits end at least `behind` farther away.
 
     A beam that passes beside an obstacle says nothing about it: its neighbour on the other side has met the obstacle.
+    `beam` is one that passes close by, from which the two are looked for.
     """
-    dx, dy = 0.5 * (box[r, c, 0] + box[r, c, 2]) - fan.eye[0], 0.5 * (box[r, c, 1] + box[r, c, 3]) - fan.eye[1]
-    cos, sin = fan.eye[2], fan.eye[3]
-    place = (math.atan2(cos * dy - sin * dx, cos * dx + sin * dy) - fan.first) / fan.spacing
-    low, beams = int(math.floor(place)), fan.ranges.shape[0]
-    high = low + 1
-    if fan.closed:
-        low, high = low % beams, high % beams
-    if low < 0 or high >= beams:
-        return False
-    far = math.hypot(dx, dy) + behind
-    return bool(fan.ranges[low] > far and fan.ranges[high] > far)
+    dx, dy = 0.5 * (box[at, k, 0] + box[at, k, 2]) - fan.eye[0], 0.5 * (box[at, k, 1] + box[at, k, 3]) - fan.eye[1]
+    ahead, left = fan.eye[2] * dx + fan.eye[3] * dy, fan.eye[2] * dy - fan.eye[3] * dx
+    ranges, beams, count = fan.ranges, fan.beams, fan.ranges.shape[0]
+    far2 = (math.sqrt(dx * dx + dy * dy) + behind) ** 2
+    side = beams[beam, 0] * left - beams[beam, 1] * ahead
+    step = 1 if side >= 0.0 else -1
+    last = beam
+    while True:  # beams on the way to the middle; all beams lie within half a turn of it
+        other = last + step
+        if fan.closed:
+            other %= count
+        elif not 0 <= other < count:
+            return False
+        if (beams[other, 0] * left - beams[other, 1] * ahead) * step < 0.0:
+            break
+        last = other
+    return bool(
+        ranges[last] > 0.0 and ranges[other] > 0.0
+        and ranges[last] * ranges[last] > far2 and ranges[other] * ranges[other] > far2
+    )  # fmt: skip
 
 
 @kernel
@@ -236,26 +244,15 @@ def vacate(row: int, col: int, m: MapArrays) -> None:
     m.occupied[row, col], m.free[row, col] = False, True
     m.count[0] -= 1
     last, gap = m.count[0], m.slot[row, col]
-    other_row, other_col = m.cells[last, 0], m.cells[last, 1]
-    m.cells[gap, 0], m.cells[gap, 1] = other_row, other_col
-    m.slot[other_row, other_col] = gap
-
-
-@kernel
-def move_hits(old: MapArrays, m: MapArrays, rows: int, cols: int) -> None:
-    """Enter the occupied cells of a map in a larger one without hits, in which they lie so many rows and columns farther."""
-    m.count[0] = old.count[0]
-    for i in range(old.count[0]):
-        old_row, old_col = old.cells[i, 0], old.cells[i, 1]
-        row, col = old_row + rows, old_col + cols
-        m.cells[i, 0], m.cells[i, 1] = row, col
-        m.slot[row, col], m.turned[row, col], m.occupied[row, col] = i, old.turned[old_row, old_col], True
-        for r in range(GRAINS):
-            for c in range(GRAINS):
-                grain, place = (GRAINS * row + r, GRAINS * col + c), (GRAINS * old_row + r, GRAINS * old_col + c)
-                m.odds[grain], m.stamp[grain] = old.odds[place], old.stamp[place]
-                for k in range(4):
-                    m.box[grain[0], grain[1], k] = old.box[place[0], place[1], k]
+    if gap == last:
+        return
+    m.slot[m.cells[last, 0], m.cells[last, 1]] = gap
+    for k in range(3):
+        m.cells[gap, k] = m.cells[last, k]
+    for k in range(GRAINS * GRAINS):
+        m.odds[gap, k], m.stamp[gap, k] = m.odds[last, k], m.stamp[last, k]
+        for side in range(4):
+            m.box[gap, k, side] = m.box[last, k, side]
 
 
 @kernel
@@ -264,20 +261,16 @@ def forget(x: float, y: float, radius: float, m: MapArrays, changed: Array) -> i
     count = 0
     i = 0
     while i < m.count[0]:
-        row, col = m.cells[i, 0], m.cells[i, 1]
         outside = False
-        for r in range(GRAINS * row, GRAINS * row + GRAINS):
-            for c in range(GRAINS * col, GRAINS * col + GRAINS):
-                if m.odds[r, c] > 0.0:
-                    box = m.box[r, c]
-                    dx, dy = 0.5 * (box[0] + box[2]) - x, 0.5 * (box[1] + box[3]) - y
-                    outside = outside or math.hypot(dx, dy) > radius
+        for k in range(GRAINS * GRAINS):
+            if m.odds[i, k] > 0.0:
+                box = m.box[i, k]
+                dx, dy = 0.5 * (box[0] + box[2]) - x, 0.5 * (box[1] + box[3]) - y
+                outside = outside or math.hypot(dx, dy) > radius
         if outside:
             i += 1
             continue
-        for r in range(GRAINS * row, GRAINS * row + GRAINS):
-            for c in range(GRAINS * col, GRAINS * col + GRAINS):
-                m.odds[r, c] = 0.0
+        row, col = m.cells[i, 0], m.cells[i, 1]
         vacate(row, col, m)
         changed[count, 0], changed[count, 1] = row, col
         count += 1
@@ -308,28 +301,28 @@ def take_as_free(x: float, y: float, radius: float, m: MapArrays, changed: Array
 @kernel
 def discs_within(m: MapArrays, x_min: float, y_min: float, x_max: float, y_max: float) -> Array:
     """A disc (x, y, radius) around the hits of every grain whose cell meets a rectangle (D, 3) [m]."""
-    cells, odds, box, left, low, cell = m.cells, m.odds, m.box, m.frame[0], m.frame[1], m.frame[2]
+    cells, left, low, cell = m.cells, m.frame[0], m.frame[1], m.frame[2]
     out = np.empty((m.count[0] * GRAINS * GRAINS, 3))
     count = 0
     for i in range(m.count[0]):
-        row, col = cells[i, 0], cells[i, 1]
-        x, y = left + col * cell, low + row * cell
+        x, y = left + cells[i, 1] * cell, low + cells[i, 0] * cell
         if x > x_max or y > y_max or x + cell < x_min or y + cell < y_min:
             continue
-        for r in range(GRAINS * row, GRAINS * row + GRAINS):
-            for c in range(GRAINS * col, GRAINS * col + GRAINS):
-                if odds[r, c] > 0.0:
-                    out[count, 0], out[count, 1], out[count, 2] = grain_disc(box, r, c)
-                    count += 1
+        for k in range(GRAINS * GRAINS):
+            if m.odds[i, k] > 0.0:
+                out[count, 0], out[count, 1], out[count, 2] = grain_disc(m.box, i, k)
+                count += 1
     return out[:count].copy()
 
 
 @kernel
-def grain_disc(box: Array, r: int, c: int) -> tuple[float, float, float]:
+def grain_disc(box: Array, at: int, k: int) -> tuple[float, float, float]:
     """The disc around the hits of a grain: x, y, radius [m]."""
-    x_min, y_min, x_max, y_max = box[r, c, 0], box[r, c, 1], box[r, c, 2], box[r, c, 3]
-    x, y = 0.5 * (np.float64(x_min) + x_max), 0.5 * (np.float64(y_min) + y_max)
-    return x, y, max(0.5 * math.hypot(np.float64(x_max) - x_min, np.float64(y_max) - y_min), THINNEST) + SLACK
+    x_min, y_min = np.float64(box[at, k, 0]), np.float64(box[at, k, 1])
+    x_max, y_max = np.float64(box[at, k, 2]), np.float64(box[at, k, 3])
+    wide, high = x_max - x_min, y_max - y_min
+    radius = max(0.5 * math.sqrt(wide * wide + high * high), THINNEST) + SLACK
+    return 0.5 * (x_min + x_max), 0.5 * (y_min + y_max), radius
 
 
 @kernel
@@ -349,5 +342,6 @@ def explained(points: Array, scan: int, settle: int, m: MapArrays, out: Array) -
         out[i] = not m.free[row, col] and not m.occupied[row, col]
         for r in range(max(0, row - 1), min(rows, row + 2)):
             for c in range(max(0, col - 1), min(cols, col + 2)):
-                old = m.turned[r, c] == 0 or scan - m.turned[r, c] >= settle
-                out[i] = out[i] or (m.occupied[r, c] and old)
+                if m.occupied[r, c]:
+                    turned = m.cells[m.slot[r, c], 2]
+                    out[i] = out[i] or turned == 0 or scan - turned >= settle

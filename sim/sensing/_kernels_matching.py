@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 
-from antdrive.sim.sensing._kernels_mapping import MapArrays, grain_disc
+import numpy as np
+
+from antdrive.sim.sensing._kernels_mapping import GRAINS, MapArrays
 from antdrive.worlds._kernels import Array, kernel
 
 ROUNDS = 4  # pairings of hits with the map
@@ -54,17 +56,30 @@ def match(eye: Array, beams: Array, ranges: Array, every: int, first: int, far: 
 @kernel
 def partner(x: float, y: float, near: int, m: MapArrays) -> tuple[bool, float, float]:
     """The settled hit of the map that is nearest to a point, within `near` grains."""
-    fine = m.frame[2] * m.free.shape[0] / m.odds.shape[0]
-    rows, cols = m.odds.shape
-    row, col = int(math.floor((y - m.frame[1]) / fine)), int(math.floor((x - m.frame[0]) / fine))
-    best, bx, by = (near * fine) ** 2, 0.0, 0.0
+    cell = m.frame[2]
+    reach = near * cell / GRAINS
+    rows, cols = m.free.shape
+    row_low, col_low = (
+        int(math.floor((y - reach - m.frame[1]) / cell)),
+        int(math.floor((x - reach - m.frame[0]) / cell)),
+    )
+    row_high, col_high = (
+        int(math.floor((y + reach - m.frame[1]) / cell)),
+        int(math.floor((x + reach - m.frame[0]) / cell)),
+    )
+    best, bx, by = reach * reach, 0.0, 0.0
     found = False
-    for r in range(max(0, row - near), min(rows, row + near + 1)):
-        for c in range(max(0, col - near), min(cols, col + near + 1)):
-            if m.odds[r, c] < SETTLED:
+    for r in range(max(0, row_low), min(rows - 1, row_high) + 1):
+        for c in range(max(0, col_low), min(cols - 1, col_high) + 1):
+            if not m.occupied[r, c]:
                 continue
-            gx, gy, _ = grain_disc(m.box, r, c)
-            away = (gx - x) * (gx - x) + (gy - y) * (gy - y)
-            if away < best:
-                best, bx, by, found = away, gx, gy, True
+            at = m.slot[r, c]
+            for k in range(GRAINS * GRAINS):
+                if m.odds[at, k] < SETTLED:
+                    continue
+                gx = 0.5 * (np.float64(m.box[at, k, 0]) + m.box[at, k, 2])
+                gy = 0.5 * (np.float64(m.box[at, k, 1]) + m.box[at, k, 3])
+                away = (gx - x) * (gx - x) + (gy - y) * (gy - y)
+                if away < best:
+                    best, bx, by, found = away, gx, gy, True
     return found, bx, by

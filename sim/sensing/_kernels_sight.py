@@ -55,12 +55,12 @@ def clear_way(pose: Array, speed: float, yaw_rate: float, shape: Array, limit: f
             if not m.occupied[row, col]:
                 best = contact(ahead, left, math.sqrt(0.5) * cell, forward, bend, shape, best)
                 continue
-            for r in range(GRAINS * row, GRAINS * row + GRAINS):
-                for c in range(GRAINS * col, GRAINS * col + GRAINS):
-                    if m.odds[r, c] > 0.0:
-                        gx, gy, size = grain_disc(m.box, r, c)
-                        dx, dy = gx - pose[0], gy - pose[1]
-                        best = contact(cos * dx + sin * dy, cos * dy - sin * dx, size, forward, bend, shape, best)
+            at = m.slot[row, col]
+            for k in range(GRAINS * GRAINS):
+                if m.odds[at, k] > 0.0:
+                    gx, gy, size = grain_disc(m.box, at, k)
+                    dx, dy = gx - pose[0], gy - pose[1]
+                    best = contact(cos * dx + sin * dy, cos * dy - sin * dx, size, forward, bend, shape, best)
     return best
 
 
@@ -96,7 +96,7 @@ def on_arc(forward: float, bend: float, done: float) -> tuple[float, float]:
 @kernel
 def on_the_way(ahead: float, left: float, forward: float, bend: float, reach: float, limit: float) -> bool:
     """Whether a point may come within `reach` of the robot's centre; False only if it does not."""
-    away = math.hypot(ahead, left)
+    away = math.sqrt(ahead * ahead + left * left)
     if forward == 0.0 or away <= reach:
         return bool(away <= reach)
     if away > limit + reach:
@@ -104,7 +104,8 @@ def on_the_way(ahead: float, left: float, forward: float, bend: float, reach: fl
     if abs(bend) < 1e-6:
         return bool(abs(left) <= reach + 1e-3 and forward * ahead > 0.0)
     # The way lies on a circle around the centre of the turn, at (0, forward / bend).
-    return bool(abs(math.hypot(ahead, left - forward / bend) - 1.0 / abs(bend)) <= reach)
+    beside = left - forward / bend
+    return bool(abs(math.sqrt(ahead * ahead + beside * beside) - 1.0 / abs(bend)) <= reach)
 
 
 @kernel
@@ -125,11 +126,12 @@ def contact(ahead: float, left: float, size: float, forward: float, bend: float,
             y = forward * (1.0 - cos) / bend if bent else 0.5 * forward * turn * done
         dx, dy = ahead - x, left - y
         qx, qy = abs(cos * dx + sin * dy) - shape[0], abs(cos * dy - sin * dx) - shape[1]
-        gap = math.hypot(max(qx, 0.0), max(qy, 0.0)) + min(max(qx, qy), 0.0) - shape[2]
+        out_x, out_y = max(qx, 0.0), max(qy, 0.0)
+        gap = math.sqrt(out_x * out_x + out_y * out_y) + min(max(qx, qy), 0.0) - shape[2]
         if done == 0.0 and gap - size < GIVE:
             size = gap - GIVE
         away = gap - size
         if away <= TOUCHING:
             return done
-        done += away / (abs(forward) + abs(bend) * (math.hypot(dx, dy) + away))
+        done += away / (abs(forward) + abs(bend) * (math.sqrt(dx * dx + dy * dy) + away))
     return limit

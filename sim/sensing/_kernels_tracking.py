@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from antdrive.worlds._kernels import Array, kernel
 
 ROUNDS = 12  # of the fit of a circle's centre
@@ -81,22 +79,3 @@ def centre_of(points: Array, eye_x: float, eye_y: float, radius: float, out: Arr
         if sx * sx + sy * sy < 1e-12:
             break
     out[0], out[1] = x, y
-
-
-@kernel
-def found(
-    points: Array, label: Array, count: int, least: int, eye_x: float, eye_y: float, spacing: float, small: float,
-    large: float,
-) -> Array:  # fmt: skip
-    """A row for each cluster of at least `least` points: x and y of the centre, radius (between `small` and `large`), points."""
-    out = np.empty((count, 4))
-    rows = 0
-    for k in range(count):
-        part = points[label == k]
-        if part.shape[0] < least:
-            continue
-        radius = min(max(visible_radius(part, eye_x, eye_y, spacing), small), large)
-        centre_of(part, eye_x, eye_y, radius, out[rows])
-        out[rows, 2], out[rows, 3] = radius, part.shape[0]
-        rows += 1
-    return out[:rows].copy()

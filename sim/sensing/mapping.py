@@ -24,8 +24,10 @@ Cells = npt.NDArray[np.int32]
 Mask = npt.NDArray[np.bool_]
 
 BLOCK = 64  # a map grows by multiples of so many cells
-OFTEN = 12.5  # how often the free way of a beam is entered, where the lidar's rate allows [Hz]
-ROOM = 1.0  # how far beyond its horizon a map that grows is laid out at first [m]
+OFTEN = 12.5  # how often a scan is entered as a whole, where the lidar's rate allows [Hz]
+EACH_WAY = 6.25  # how often the free way of each beam is entered, where it allows that [Hz]
+LISTED = 2048  # occupied cells that a map has room for at first
+ROOM = 4.0  # how far beyond its horizon a map that grows is laid out at first [m]
 
 
 class OccupancyMap:
@@ -35,12 +37,17 @@ class OccupancyMap:
     than a cell is wide; a thing thinner than that may stand between two of them. A single hit makes a cell occupied, and it
     is free again when the beams on both sides of its hits have ended beyond them: at the ninth time, for what was hit often.
 
+    Every `share`-th scan is entered as a whole. Of the others only the hits in cells that are not occupied are entered: what
+    comes into sight is on the map at once; that ground is free, and where within a cell its hits lie, with the next whole scan.
+    The free ways are those of every `turns`-th beam, in turn, and of all beams of the first scan.
+
     Attributes:
         cell: side of a cell [m]
         horizon: hits farther than this are not entered [m]
         trust: ground is seen free up to this distance [m]
         scans: number of scans entered
-        share: of every scan the free ways of every `share`-th beam are entered
+        share: every `share`-th scan is entered as a whole, the first one, too
+        turns: of these scans the free ways of every `turns`-th beam are entered
         beams: directions of the lidar's beams, seen from the lidar (beams, 2)
         layouts: how often the map was laid out; cells have other numbers after it has grown
 
@@ -51,8 +58,7 @@ class OccupancyMap:
         horizon: hits farther than this are not entered [m]
         bounds: the ground that the map covers, for good; None: it grows as needed [m]
         goal: where the robot is to go [m]; a map that grows is laid out for the way there. None: for no way
-        share: of every scan the free ways of every `share`-th beam are entered, in turn, and all hits; None: so many that
-            each beam has its turn about 12 times a second
+        share: every `share`-th scan is entered as a whole; None: about 12 in a second
     """
 
     def __init__(
@@ -66,6 +72,7 @@ class OccupancyMap:
         goal: Point | None = None,
     ) -> None:
         self.share = max(1, round(lidar.rate / OFTEN)) if share is None else share
+        self.turns = max(1, math.floor(lidar.rate / self.share / EACH_WAY))
         require_positive("cell", cell)
         require_positive("horizon", horizon)
         self.cell, self.horizon = cell, min(horizon, lidar.max_range)
@@ -74,9 +81,8 @@ class OccupancyMap:
         self._lidar, self._grows = lidar, bounds is None
         angles = lidar.angles - lidar.yaw
         self.beams = np.column_stack((np.cos(angles), np.sin(angles)))
-        self._first = float(angles[0])
         self._begin = np.empty(lidar.beams)
-        kernels.begins(lidar.beams, lidar.spacing, cell, self.share, self._begin)
+        kernels.begins(lidar.beams, lidar.spacing, cell, 1, self._begin)
         self._none = np.zeros(lidar.beams, dtype=np.bool_)
         half = self.horizon + ROOM
         x, y = centre
@@ -103,6 +109,11 @@ class OccupancyMap:
         return _read_only(self._arrays.free)
 
     @property
+    def whole(self) -> bool:
+        """Whether the next scan is entered as a whole."""
+        return self.scans % self.share == 0
+
+    @property
     def arrays(self) -> kernels.MapArrays:
         """The arrays of the map, for kernels."""
         return self._arrays
@@ -118,13 +129,15 @@ class OccupancyMap:
         x, y, yaw = self._lidar.pose_on(pose)
         if self._grows:
             self._make_room(x, y)
-        eye = np.array((x, y, math.cos(yaw), math.sin(yaw)))
+        self._lengthen_lists()
+        turn = self.scans // self.share % self.turns if self.whole else -1
+        turns = self.turns if self.scans else 1
         self.scans += 1
         mask = self._none if left_out is None else np.ascontiguousarray(left_out)
-        lidar = self._lidar
-        fan = kernels.Fan(eye, self.beams, ranges, self._first, lidar.spacing, lidar.full_circle)
+        eye = np.array((x, y, math.cos(yaw), math.sin(yaw)))
+        fan = kernels.Fan(eye, self.beams, ranges, self._lidar.full_circle)
         count = kernels.insert(
-            fan, self._begin, self.share, mask, self.horizon, self.trust, self.scans, self._arrays, self._changed
+            fan, self._begin, turn, turns, mask, self.horizon, self.trust, self.scans, self._arrays, self._changed
         )
         return self._changed[:count].copy()
 
@@ -193,36 +206,64 @@ class OccupancyMap:
         rows, cols = old.free.shape
         need = (x0 + far - x, y0 + far - y, x + far - x0 - cols * self.cell, y + far - y0 - rows * self.cell)
         more = self._blocks(*need)
-        self._lay_out(x0, y0, rows, cols, more)
-        self._arrays.free[more[1] : more[1] + rows, more[0] : more[0] + cols] = old.free
-        kernels.move_hits(old, self._arrays, more[1], more[0])
+        self._lay_out(x0, y0, rows, cols, more, old)
+        new, count = self._arrays, int(old.count[0])
+        new.free[more[1] : more[1] + rows, more[0] : more[0] + cols] = old.free
+        new.cells[:count, :2] += (more[1], more[0])
+        listed = new.cells[:count, 0], new.cells[:count, 1]
+        new.occupied[listed], new.slot[listed] = True, np.arange(count)
 
     def _blocks(self, west: float, south: float, east: float, north: float) -> tuple[int, int, int, int]:
         """How many cells are to be added on each side for so many metres: whole blocks, none for less than 0."""
         w, s, e, n = (max(0, math.ceil(side / self.cell / BLOCK)) * BLOCK for side in (west, south, east, north))
         return w, s, e, n
 
-    def _lay_out(self, x0: float, y0: float, rows: int, cols: int, more: tuple[int, int, int, int]) -> None:
-        """New arrays for so many cells from a corner on and `more` in the west, south, east and north."""
+    def _lay_out(
+        self,
+        x0: float,
+        y0: float,
+        rows: int,
+        cols: int,
+        more: tuple[int, int, int, int],
+        old: kernels.MapArrays | None = None,
+    ) -> None:
+        """New arrays for so many cells from a corner on and `more` in the west, south, east and north; lists as in `old`."""
         west, south, east, north = more
         shape = (rows + south + north, cols + west + east)
-        fine = (kernels.GRAINS * shape[0], kernels.GRAINS * shape[1])
-        self._arrays: kernels.MapArrays = kernels.MapArrays(
-            free=_zeros(shape, dtype=np.bool_),
-            occupied=_zeros(shape, dtype=np.bool_),
-            turned=_zeros(shape, dtype=np.int32),
-            slot=_zeros(shape, dtype=np.int32),
-            cells=_zeros((shape[0] * shape[1], 2), dtype=np.int32),
-            count=np.zeros(1, dtype=np.int64),
-            odds=_zeros(fine, dtype=np.float32),
-            stamp=_zeros(fine, dtype=np.int32),
-            box=_zeros((*fine, 4), dtype=np.float32),
-            frame=np.array([x0 - west * self.cell, y0 - south * self.cell, self.cell]),
-        )
+        frame = np.array([x0 - west * self.cell, y0 - south * self.cell, self.cell])
+        free, occupied = _zeros(shape, dtype=np.bool_), _zeros(shape, dtype=np.bool_)
+        slot = _zeros(shape, dtype=np.int32)
+        if old is None:
+            grains = kernels.GRAINS * kernels.GRAINS
+            self._arrays: kernels.MapArrays = kernels.MapArrays(
+                free=free,
+                occupied=occupied,
+                slot=slot,
+                count=np.zeros(1, dtype=np.int64),
+                frame=frame,
+                cells=np.zeros((LISTED, 3), dtype=np.int32),
+                odds=np.zeros((LISTED, grains), dtype=np.float32),
+                stamp=np.zeros((LISTED, grains), dtype=np.int32),
+                box=np.zeros((LISTED, grains, 4), dtype=np.float32),
+            )
+        else:
+            self._arrays = old._replace(free=free, occupied=occupied, slot=slot, frame=frame)
         self._changed = _zeros((shape[0] * shape[1], 2), dtype=np.int32)
         (x, y), far = self.origin, self.horizon
         self._room = x + far, x + shape[1] * self.cell - far, y + far, y + shape[0] * self.cell - far
         self.layouts += 1
+
+    def _lengthen_lists(self) -> None:
+        """Make the lists of occupied cells longer where a scan could fill them."""
+        missing = int(self._arrays.count[0]) + self._lidar.beams - len(self._arrays.cells)
+        if missing <= 0:
+            return
+        lists = {name: getattr(self._arrays, name) for name in ("cells", "odds", "stamp", "box")}
+        longer = {
+            name: np.concatenate((rows, np.zeros((max(missing, len(rows)), *rows.shape[1:]), dtype=rows.dtype)))
+            for name, rows in lists.items()
+        }
+        self._arrays = self._arrays._replace(**longer)
 
 
 def _zeros(shape: tuple[int, ...], dtype: npt.DTypeLike) -> npt.NDArray[Any]:

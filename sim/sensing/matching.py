@@ -15,6 +15,9 @@ BEAMS = 180  # of a scan that are matched, at most
 FAR = 8.0  # hits farther away are not matched [m]
 NEAR = 3  # how far partners are looked for, in grains of the map
 FEWEST = 25  # pairs below which a scan is not matched
+CHORD = 10  # beams between the two hits that tell how a surface lies
+LONGEST_STEP = 0.2  # hits of neighbouring beams farther apart do not belong to one surface [m]
+HELD = 0.1  # a direction is held by the scan where this share of the surfaces face it
 MOST = (0.02, 0.01)  # what one scan may correct; more is an error of the match [m], [rad]
 
 
@@ -41,7 +44,7 @@ class ScanMatcher:
         """
         lidar = self._lidar
         eye = np.array(lidar.pose_on(pose))
-        first = seen.scans % self._every
+        first = seen.scans // seen.share % self._every
         x, y, yaw, pairs = _kernels_matching.match(
             eye, self._beams, ranges, self._every, first, FAR, NEAR, FEWEST, seen.arrays
         )
@@ -51,3 +54,31 @@ class ScanMatcher:
         heading = pose[2] + turn
         cos, sin = math.cos(heading), math.sin(heading)
         return x - cos * lidar.x + sin * lidar.y, y - sin * lidar.x - cos * lidar.y, heading
+
+
+def sliding_left_out(before: Pose, after: Pose, points: Floats) -> Pose:
+    """A corrected pose without the part of its shift that the scan cannot tell: along a wall that is all there is in sight.
+
+    The normals of the surfaces that were hit tell in which directions they hold the pose: along the eigenvectors of their mean
+    outer product whose eigenvalues are not small.
+
+    Args:
+        before: the estimated pose
+        after: the corrected one
+        points: where the beams ended, in their order (beams, 2) [m]; not a number where they are not matched
+    """
+    along = points[CHORD:] - points[:-CHORD]
+    length = np.hypot(along[:, 0], along[:, 1])
+    step = np.hypot(*np.diff(points, axis=0).T)
+    gaps = np.concatenate([[0], np.cumsum(~(step < LONGEST_STEP))])  # also where a point is missing
+    flat = (gaps[CHORD:] == gaps[:-CHORD]) & (length > 0)
+    tangents = along[flat] / length[flat, None]
+    single = max(0, int(np.count_nonzero(np.isfinite(points[:, 0]))) - len(tangents) - CHORD)  # on small things
+    count = single + len(tangents)
+    if not count:
+        return after
+    spread = (np.eye(2) * (single / 2 + len(tangents)) - tangents.T @ tangents) / count
+    values, vectors = np.linalg.eigh(spread)
+    held = vectors[:, values >= HELD]
+    dx, dy = held @ held.T @ np.array([after[0] - before[0], after[1] - before[1]])
+    return before[0] + float(dx), before[1] + float(dy), after[2]

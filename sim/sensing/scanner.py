@@ -6,7 +6,9 @@ import numpy as np
 
 from antdrive.robots.lidar import Lidar
 from antdrive.sim.sensing import _kernels_rays
-from antdrive.worlds import Bounds, Floats, Pose, World
+from antdrive.worlds import Bounds, Floats, Point, Pose, World
+
+RESORT = 1.0  # discs are sorted by their distance again where the lidar has gone so far [m]
 
 
 class Scanner:
@@ -38,12 +40,14 @@ class Scanner:
         self.lidar = lidar
         rows = np.ascontiguousarray(discs, dtype=np.float64).reshape(-1, 3)
         self._discs = rows if heights is None else rows[np.asarray(heights) >= lidar.height]
-        self._bounds = None if bounds is None else np.asarray(bounds, dtype=np.float64)
+        self._bounds = np.asarray(() if bounds is None else bounds, dtype=np.float64)
         self._movers = None if mover_heights is None else np.asarray(mover_heights) >= lidar.height
         angles = lidar.angles - lidar.yaw
         self._beams = np.column_stack((np.cos(angles), np.sin(angles)))
         self._first = float(angles[0])
-        self._silence = np.zeros(lidar.beams)
+        self._limits = np.array((lidar.min_range, lidar.max_range, lidar.resolution, lidar.sigma))
+        self._silence, self._none = np.zeros(lidar.beams), np.empty((0, 3))
+        self._sorted_at = (np.inf, np.inf)
 
     @classmethod
     def of(cls, lidar: Lidar, world: World) -> Scanner:
@@ -73,16 +77,22 @@ class Scanner:
             mover_radii: their radii (M,) [m]
             rng: where the noise comes from; None: no noise
         """
-        lidar = self.lidar
-        eye = np.array(lidar.pose_on(pose))
-        out = np.full(lidar.beams, np.inf)
-        if self._bounds is not None:
-            _kernels_rays.cast_walls(eye, self._beams, self._bounds, out)
-        _kernels_rays.cast(eye, self._beams, lidar.spacing, self._first, lidar.max_range, self._discs, out)
+        eye = self.lidar.pose_on(pose)
+        if abs(eye[0] - self._sorted_at[0]) + abs(eye[1] - self._sorted_at[1]) > RESORT:
+            self._sort(eye[:2])
+        movers = self._none
         if mover_positions is not None and mover_radii is not None and len(mover_radii):
             movers = np.column_stack((mover_positions, mover_radii))
             movers = np.ascontiguousarray(movers if self._movers is None else movers[self._movers])
-            _kernels_rays.cast(eye, self._beams, lidar.spacing, self._first, lidar.max_range, movers, out)
-        noise = self._silence if rng is None else lidar.sigma * rng.standard_normal(lidar.beams)
-        _kernels_rays.measure(out, noise, lidar.min_range, lidar.max_range, lidar.resolution)
+        noise = self._silence if rng is None else rng.standard_normal(self.lidar.beams)
+        out = np.empty(self.lidar.beams)
+        _kernels_rays.scan(
+            np.array(eye), self._beams, self.lidar.spacing, self._first, self._limits, self._discs, movers, self._bounds,
+            noise, out,
+        )  # fmt: skip
         return out
+
+    def _sort(self, eye: Point) -> None:
+        """Put near discs first: rays that they end need not be looked at again."""
+        away = np.hypot(self._discs[:, 0] - eye[0], self._discs[:, 1] - eye[1]) - self._discs[:, 2]
+        self._discs, self._sorted_at = self._discs[np.argsort(away, kind="stable")], eye

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from antdrive.robots.spec import Footprint
 from antdrive.sim.sensing import _kernels_sight
 from antdrive.sim.sensing.mapping import OccupancyMap
@@ -45,5 +43,5 @@ def clear_turn(seen: OccupancyMap, pose: Pose, yaw_rate: float, footprint: Footp
 
 
 def _clear(seen: OccupancyMap, pose: Pose, speed: float, yaw_rate: float, footprint: Footprint, limit: float) -> float:
-    shape = np.array([footprint.half_length, footprint.half_width, footprint.rounding])
-    return float(_kernels_sight.clear_way(np.array(pose), speed, yaw_rate, shape, limit, seen.arrays))
+    shape = footprint.half_length, footprint.half_width, footprint.rounding
+    return float(_kernels_sight.clear_way(pose, speed, yaw_rate, shape, limit, seen.arrays))

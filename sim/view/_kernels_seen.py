@@ -1,4 +1,4 @@
-"""Compiled painting of what a lidar has seen, and when it met what: arrays in, arrays out, nothing validated.
+"""Compiled painting of what a lidar has seen: arrays in, arrays out, nothing validated.
 
 `inv` (3, 3) takes pixels to the ground, `fwd` (3, 3) the ground to pixels.
 """
@@ -11,37 +11,6 @@ import numpy as np
 
 from antdrive.sim.view.film._kernels_paint import pixel_box
 from antdrive.worlds._kernels import Array, inline, kernel
-
-
-@kernel
-def first_meetings(
-    eye: Array, first: float, spacing: float, closed: bool, reaches: Array, discs: Array, slack: float, now: float,
-    met: Array,
-) -> None:  # fmt: skip
-    """Set met[j] = now for every disc (N, 3) not met before on whose surface a beam ended, give or take `slack` [m].
-
-    `eye` is the lidar's true x, y and yaw, `reaches` (B,) how far each beam got; `met` (N,) is infinite before.
-    """
-    beams = reaches.shape[0]
-    for j in range(discs.shape[0]):
-        if met[j] <= now:
-            continue
-        dx, dy, radius = discs[j, 0] - eye[0], discs[j, 1] - eye[1], discs[j, 2]
-        away = math.hypot(dx, dy)
-        if away <= radius:
-            continue
-        middle = (math.atan2(dy, dx) - eye[2] - first) % (2.0 * math.pi)
-        half = math.asin(radius / away)
-        for turn in range(1 if closed else 2):  # a disc may lie across the direction in which the count begins
-            centre = middle - 2.0 * math.pi * turn
-            for k in range(math.ceil((centre - half) / spacing), math.floor((centre + half) / spacing) + 1):
-                if not closed and (k < 0 or k >= beams):
-                    continue
-                aside = k * spacing - centre
-                across = away * math.sin(aside)
-                surface = away * math.cos(aside) - math.sqrt(max(0.0, radius * radius - across * across))
-                if abs(reaches[k % beams] - surface) <= slack:
-                    met[j] = now
 
 
 @inline

@@ -3,54 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.robots.lidar import Lidar
 from antdrive.sim.driving.survey import MAP_CELL
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.scans import ranges_of
+from antdrive.sim.log.sights import Beams, beams_of, lidar_of, meet
 from antdrive.sim.sensing.mapping import OccupancyMap
-from antdrive.sim.view import _kernels_seen as kernels
+from antdrive.sim.sensing.tracking import SKIN
 from antdrive.worlds.types import Floats, Pose
-
-ROUNDING = 0.0015  # of a range in a log, and what is left over [m]
-
-
-class Beams(NamedTuple):
-    """A scan as it lay in the world.
-
-    Attributes:
-        eye: the lidar's true x, y [m] and yaw [rad] (3,)
-        first: the direction of the first beam, from the lidar's heading [rad]
-        reaches: how far each beam got (beams,) [m]: to what it met, or to the lidar's range
-    """
-
-    eye: Floats
-    first: float
-    reaches: Floats
-
-
-class Sighting(NamedTuple):
-    """A cylinder, when it was first seen, and when the robot was nearest to it.
-
-    Attributes:
-        obstacle: its place in `record.world.obstacles`
-        seen_at: when a beam first met it [s]; infinite if none did
-        seen_from: how far its surface was from the footprint then [m]; not a number if it was never seen
-        nearest_at: when the robot was nearest [s]
-        nearest: how far the surface was from the footprint then [m]
-        touched: whether the robot touched it
-    """
-
-    obstacle: int
-    seen_at: float
-    seen_from: float
-    nearest_at: float
-    nearest: float
-    touched: bool
 
 
 class Recollection:
@@ -69,17 +32,11 @@ class Recollection:
     """
 
     def __init__(self, rollout: Rollout) -> None:
-        lidar = rollout.record.robot.lidar
-        if lidar is None or not len(rollout.scans):
-            raise ValueError("the log has no scans")
-        self.lidar: Lidar = lidar
+        lidar = self.lidar = lidar_of(rollout)
         self._rollout = rollout
         self._times = rollout.t[rollout.scan_rows]
-        self._first = float(lidar.angles[0]) - lidar.yaw
-        self._noticeable = 4 * lidar.sigma + lidar.resolution / 2 + ROUNDING
         self._entered = 0
-        self._discs = rollout.record.world.discs
-        self.met: Floats = np.full(len(self._discs), math.inf)
+        self.met: Floats = np.full(len(rollout.record.world.obstacles), math.inf)
         start = rollout.record.task.start
         self.map = OccupancyMap(lidar, MAP_CELL, start[:2])
         self.map.take_as_free(start[:2], rollout.record.robot.radius)
@@ -122,24 +79,24 @@ class Recollection:
         self._entered = max(self._entered, last)
 
     def _enter(self, k: int) -> None:
-        self.map.insert(self._estimate(int(self._rollout.scan_rows[k])), ranges_of(self._rollout.scans[k]))
-        beams = self._beams(k)
-        lidar, now = self.lidar, float(self._times[k])
-        closed, slack = lidar.full_circle, self._noticeable
-        kernels.first_meetings(
-            beams.eye, beams.first, lidar.spacing, closed, beams.reaches, self._discs, slack, now, self.met
-        )
+        row, ranges = int(self._rollout.scan_rows[k]), ranges_of(self._rollout.scans[k])
+        self.map.insert(self._estimate(row), ranges, self._of_movers(row, ranges))
+        meet(self._rollout, k, self.met)
+
+    def _of_movers(self, row: int, ranges: Floats) -> npt.NDArray[np.bool_] | None:
+        """Which beams of a scan met movers that the robot followed, and left out of its map (beams,); None: no such movers."""
+        tracks = self._rollout.tracks
+        movers = tracks[slice(*np.searchsorted(tracks[:, 0], (row, row + 1)))].astype(np.float64)
+        if not len(movers):
+            return None
+        points = self.map.endpoints(self._estimate(row), ranges)
+        away = np.hypot(*(points[:, None] - movers[:, 2:4]).transpose(2, 0, 1)) - movers[:, 6]
+        return np.asarray((away <= SKIN).any(axis=1))  # not a number where a beam met nothing
 
     @property
     def beams(self) -> Beams:
         """The last scan that was entered."""
-        return self._beams(max(0, self._entered - 1))
-
-    def _beams(self, k: int) -> Beams:
-        ranges = ranges_of(self._rollout.scans[k])
-        reaches = np.where(np.isposinf(ranges), self.lidar.max_range, np.maximum(ranges, 0.0))
-        x, y, yaw = self._rollout.pose[self._rollout.scan_rows[k]].tolist()
-        return Beams(np.array(self.lidar.pose_on((x, y, yaw))), self._first, reaches)
+        return beams_of(self._rollout, max(0, self._entered - 1))
 
     def _estimate(self, row: int) -> Pose:
         poses = self._rollout.estimate if len(self._rollout.estimate) else self._rollout.pose
@@ -170,29 +127,6 @@ def laid_in_world(points: Floats, drift: Floats) -> Floats:
     """
     cos, sin, x, y = drift.tolist()
     return np.asarray((points - (x, y)) @ np.array([[cos, -sin], [sin, cos]]), dtype=np.float64)
-
-
-def sightings(rollout: Rollout, met: Floats) -> list[Sighting]:
-    """First sight and nearest approach of every cylinder, those that the robot came nearest to first.
-
-    Args:
-        rollout: the log
-        met: when each was first seen (N,) [s], as `Recollection.met` has it
-    """
-    world, foot = rollout.record.world, rollout.record.robot.footprint
-    touched = set(rollout.contacts[:, 1].astype(int).tolist())
-    found = []
-    for j, disc in enumerate(world.obstacles):
-        dx, dy = disc.x - rollout.pose[:, 0], disc.y - rollout.pose[:, 1]
-        cos, sin = np.cos(rollout.pose[:, 2]), np.sin(rollout.pose[:, 2])
-        ahead = np.maximum(np.abs(cos * dx + sin * dy) - foot.half_length, 0.0)
-        aside = np.maximum(np.abs(cos * dy - sin * dx) - foot.half_width, 0.0)
-        away = np.hypot(ahead, aside) - foot.rounding - disc.radius
-        k = int(away.argmin())
-        first = float(met[j])
-        seen_from = float(away[np.searchsorted(rollout.t, first - 1e-9)]) if math.isfinite(first) else math.nan
-        found.append(Sighting(j, first, seen_from, float(rollout.t[k]), float(away[k]), j in touched))
-    return sorted(found, key=lambda sight: (not sight.touched, sight.nearest))
 
 
 def containers(cylinders: Floats) -> npt.NDArray[np.intp]:

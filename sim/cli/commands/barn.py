@@ -7,26 +7,25 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from antdrive.sim.cli import options
+from antdrive.sim.cli import knowing, options
 from antdrive.sim.cli.compiling import compile_once
 from antdrive.sim.cli.console import campaign_bar, print_error, print_json, print_line, print_table
 from antdrive.sim.cli.exits import FAILED, SUCCEEDED
+from antdrive.worlds.errors import InputError
 
 if TYPE_CHECKING:
+    import pyarrow
+
     from antdrive.sim.campaigns.challenge import BarnLine
     from antdrive.sim.campaigns.results import SweepResults
+    from antdrive.sim.statistics.price import Price
 
 Source = Annotated[
     Path, typer.Argument(metavar="FOLDER", help="Folder with the challenge's world_N.world files, or their archive.")
 ]
-Map = Annotated[
-    str, typer.Option(metavar="given|none", help="What the robot knows of the world before it drives: all, or nothing.")
-]
-Localisation = Annotated[
-    str, typer.Option(metavar="KIND", help="How the robot knows its pose: matching, odometry, fixes or true.")
-]
-Odometry = Annotated[
-    float, typer.Option(min=0.0, max=100.0, metavar="FACTOR", help="Multiple of the documented errors of odometry.")
+WithMap = Annotated[
+    bool,
+    typer.Option("--with-map", help="Drive each run with the map, too, and print what not knowing it costs."),
 ]
 Trials = Annotated[int, typer.Option(min=1, max=10_000, metavar="NUMBER", help="How often each world is driven.")]
 Jobs = Annotated[
@@ -41,9 +40,10 @@ Out = Annotated[
 
 def barn(
     source: Source,
-    map: Map = "none",
-    localisation: Localisation = "matching",
-    odometry: Odometry = 1.0,
+    map: knowing.Map = "none",
+    with_map: WithMap = False,
+    localisation: knowing.Localisation = "matching",
+    odometry: knowing.Odometry = 1.0,
     planner: options.Planner = "astar",
     robot: options.Robot = "jackal",
     noise: options.Noise = 1.0,
@@ -60,7 +60,11 @@ def barn(
     from antdrive.sim.campaigns.campaign import make_campaign
     from antdrive.sim.campaigns.extras import parquet_library
     from antdrive.sim.campaigns.sweeping import sweep
+    from antdrive.sim.statistics.price import prices
+    from antdrive.sim.statistics.runs import RunTable
 
+    if with_map and map != "none":
+        raise InputError("--with-map: is for --map none; with the map there is nothing to compare")
     parquet_library()
     out.mkdir(parents=True, exist_ok=True)
     folder = challenge.unpacked(source, out / "worlds")
@@ -71,7 +75,8 @@ def barn(
         "localisation": "fixes" if given and localisation == "matching" else localisation,
         "odometry": odometry,
     }
-    campaign = make_campaign(challenge.campaign_data(folder, trials, planner, robot, settings), source="barn")
+    data = challenge.campaign_data(folder, trials, planner, robot, settings, with_map=with_map)
+    campaign = make_campaign(data, source="barn")
     compile_once()
     try:
         with campaign_bar("driving") as progress:
@@ -79,15 +84,20 @@ def barn(
     except KeyboardInterrupt:
         print_error(f"{out}: what is done is kept; go on with: antdrive {' '.join(sys.argv[1:])}")
         raise
-    found = list(challenge.lines(results.table, challenge.reference_times(folder)))
+    runs, fastest = challenge.by_map(results.table), challenge.reference_times(folder)
+    found = list(challenge.lines(runs[map], fastest))
+    known = list(challenge.lines(runs["given"], fastest))[-1] if with_map else None
+    (price,) = prices(RunTable(results.table.to_pydict())) if with_map else (None,)
     if json:
-        print_json(_facts(results, found))
+        print_json(_facts(results, found, known, price))
     else:
-        _print(results, found)
+        _print(runs[map], found, known, price)
     return SUCCEEDED if results.complete else FAILED
 
 
-def _facts(results: "SweepResults", found: "list[BarnLine]") -> dict[str, object]:
+def _facts(
+    results: "SweepResults", found: "list[BarnLine]", known: "BarnLine | None", price: "Price | None"
+) -> dict[str, object]:
     from antdrive.sim.campaigns.challenge import OURS, PUBLISHED
 
     return {
@@ -96,21 +106,26 @@ def _facts(results: "SweepResults", found: "list[BarnLine]") -> dict[str, object
         "worlds": [vars(line) for line in found[:-1]],
         "all": vars(found[-1]),
         "published": [vars(entry) for entry in PUBLISHED],
+        **({"with_map": vars(known), "price_of_not_knowing": price.as_dict()} if known and price else {}),
     }
 
 
-def _print(results: "SweepResults", found: "list[BarnLine]") -> None:
+def _print(runs: "pyarrow.Table", found: "list[BarnLine]", known: "BarnLine | None", price: "Price | None") -> None:
     from antdrive.sim.campaigns.challenge import OURS, PUBLISHED
 
     heads = ("world", "runs", "certified", "mean time [s]", "mean score")
+    listed = [*((line.world, line) for line in found), *([("all, with the map", known)] if known else [])]
     print_table(
         heads,
         (
-            (line.world, str(line.runs), str(line.arrived), _number(line.seconds, 2), _number(line.score, 4))
-            for line in found
+            (name, str(line.runs), str(line.arrived), _number(line.seconds, 2), _number(line.score, 4))
+            for name, line in listed
         ),
     )
     print_line("")
+    if price:
+        print_line(price.sentence)
+        print_line("")
     rows = (
         (entry.who, _number(100 * entry.success, 0), _number(entry.seconds, 2), _number(entry.score, 4), entry.where)
         for entry in PUBLISHED
@@ -118,7 +133,7 @@ def _print(results: "SweepResults", found: "list[BarnLine]") -> None:
     print_table(("published", "success [%]", "mean time [s]", "mean score", "where"), rows)
     print_line("")
     print_line(OURS)
-    for row in results.table.select(["world", "seed", "succeeded", "outcome", "reason", "rollout"]).to_pylist():
+    for row in runs.select(["world", "seed", "succeeded", "outcome", "reason", "rollout"]).to_pylist():
         if not row["succeeded"]:
             print_line(
                 f"  {row['world']}, seed {row['seed']}: {row['outcome']}  {row['reason'] or ''}  {row['rollout'] or ''}"

@@ -28,6 +28,10 @@ def render(
     size: Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="Size of the picture [px].")] = "1280x720",
     fps: Annotated[int, typer.Option(min=1, max=240, metavar="NUMBER", help="Frames per second.")] = 30,
     speed: options.Speed = 1.0,
+    at: Annotated[
+        float | None,
+        typer.Option(min=0.0, metavar="SECONDS", help="Write the one frame of this moment [s]: .png or .webp."),
+    ] = None,
     prelude: options.Prelude = 0.0,
     json: options.Json = False,
 ) -> int:
@@ -38,14 +42,14 @@ def render(
     from antdrive.sim.log.rollout import Rollout
 
     logs = [Rollout.load(log_at(path)) for path in rollouts]
-    shape, one_frame = parse_size(size), out.suffix.lower() == ".png"
+    shape, one_frame = parse_size(size), at is not None or out.suffix.lower() == ".png"
     if len(logs) > 1 and (prelude or one_frame):
         raise InputError(f"--out {out}: several rollouts give a film, without a prelude")
     compile_once()
     if one_frame:
         from antdrive.sim.view.film.video import still
 
-        still(logs[0], out, camera=camera, size=shape, note=caption(logs[0]))
+        still(logs[0], out, at, camera=camera, size=shape, note=caption(logs[0]))
         facts: dict[str, Any] = {"file": str(out), "frames": 1}
     elif len(logs) > 1:
         facts = write_comparison_film(logs, out, camera=camera, size=shape, fps=fps, speed=speed)

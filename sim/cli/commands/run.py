@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from antdrive.sim.cli import options
+from antdrive.sim.cli import knowing, options
 from antdrive.sim.cli.compiling import compile_once
 from antdrive.sim.cli.console import bar, planning, print_json
 from antdrive.sim.cli.exits import FAILED, SUCCEEDED
@@ -56,29 +56,8 @@ Sees = Annotated[
     str,
     typer.Option(
         metavar="KIND[:METRES]",
-        help="What the robot perceives of movers: positions, velocities or motions (their whole future); "
-        "with METRES, only of movers within that range [m].",
-    ),
-]
-Map = Annotated[
-    str,
-    typer.Option(
-        metavar="given|none",
-        help="What the robot knows of the world before it drives: all of it, or nothing but what its lidar sees on the way.",
-    ),
-]
-Localisation = Annotated[
-    str,
-    typer.Option(
-        metavar="KIND",
-        help="How the robot knows its pose: fixes (with the noise of its file), odometry (wheels and gyro, which drift), "
-        "matching (odometry, corrected by laying scans on the map that it makes) or true (without error).",
-    ),
-]
-OdometryFactor = Annotated[
-    float,
-    typer.Option(
-        "--odometry", min=0.0, max=100.0, metavar="FACTOR", help="Multiple of the documented errors of odometry."
+        help="What the robot perceives of movers: positions, velocities, motions (their whole future), or lidar: nothing but "
+        "what its lidar shows; with METRES, only of movers within that range [m].",
     ),
 ]
 Video = Annotated[Path | None, typer.Option(metavar="FILE", help="Film the drive: .mp4, .gif or .webp.")]
@@ -103,9 +82,9 @@ def run(
     avoid: Avoid = True,
     replan: Replan = True,
     sees: Sees = "velocities",
-    map: Map = "given",
-    localisation: Localisation = "fixes",
-    odometry: OdometryFactor = 1.0,
+    map: knowing.Map = "given",
+    localisation: knowing.Localisation = "fixes",
+    odometry: knowing.Odometry = 1.0,
     out: options.Out = None,
     video: Video = None,
     prelude: options.Prelude = 0.0,

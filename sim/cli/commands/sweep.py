@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast, get_args
 
 import typer
 
+from antdrive.sim.cli import knowing
 from antdrive.sim.cli.compiling import compile_once
 from antdrive.sim.cli.console import campaign_bar, print_error, print_json, print_line, print_table
 from antdrive.sim.cli.exits import SUCCEEDED
@@ -114,6 +115,9 @@ def sweep(
     smoothing: Routes = None,
     noise: Noise = None,
     margin: Margins = None,
+    map: knowing.Maps = None,
+    localisation: knowing.Localisations = None,
+    odometry: knowing.Odometries = None,
     tasks: Tasks = None,
     jobs: Jobs = None,
     dask: Dask = None,
@@ -136,19 +140,11 @@ def sweep(
     if out is None and not dry_run:
         raise InputError("--out: missing; name the folder for the results")
     _check(keep, dask, jobs)
+    knows = {"map": map, "localisation": localisation, "odometry": odometry}
     asked = campaign_from(
-        campaign,
-        worlds=world,
-        generate=generate,
-        planners=planner,
-        robots=robot,
-        seeds=seeds,
-        routes=smoothing,
-        noise=noise,
-        margin=margin,
-        tasks=tasks,
-        run_limit=run_limit,
-    )
+        campaign, worlds=world, generate=generate, planners=planner, robots=robot, seeds=seeds, routes=smoothing,
+        noise=noise, margin=margin, settings=knows, tasks=tasks, run_limit=run_limit,
+    )  # fmt: skip
     expansion = expand(asked)
     if dry_run:
         return _say_size(expansion, out, json, retry_crashed=retry_crashed, again=again or ())
@@ -206,6 +202,7 @@ def _without_again(words: list[str]) -> Iterator[str]:
 
 def _say_size(expansion: "Expansion", out: Path | None, json: bool, **asked: Any) -> int:
     from antdrive.sim.campaigns.missing import missing_runs
+    from antdrive.sim.cli.campaigns import size_lines
 
     missing = len(expansion.jobs) if out is None else len(missing_runs(expansion.jobs, out, **asked).jobs)
     facts: dict[str, Any] = {
@@ -214,19 +211,9 @@ def _say_size(expansion: "Expansion", out: Path | None, json: bool, **asked: Any
     if json:
         print_json(facts)
         return SUCCEEDED
-    print_line(" x ".join(f"{count} {name if count != 1 else _one(name)}" for name, count in expansion.counts.items()))
-    more = (
-        f"; {expansion.duplicates} combinations that mean the same as others are left out"
-        if expansion.duplicates
-        else ""
-    )
-    print_line(f"{len(expansion.jobs)} runs, {missing} of them missing{more}")
+    for line in size_lines(expansion, missing):
+        print_line(line)
     return SUCCEEDED
-
-
-def _one(name: str) -> str:
-    """The singular of what is counted."""
-    return name if " " in name or name == "settings" else name.removesuffix("s")
 
 
 def _facts(results: "SweepResults") -> dict[str, Any]:

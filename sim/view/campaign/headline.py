@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from antdrive.sim.statistics.columns import HASHES
 from antdrive.sim.statistics.comparison import ALPHA, PairedComparison
+from antdrive.sim.statistics.price import prices
 from antdrive.sim.statistics.proportions import Interval
 from antdrive.sim.statistics.significance import FLIPS
 from antdrive.sim.view.campaign.numbers import percent, percents
@@ -77,6 +78,7 @@ def notes_on(summary: CampaignSummary) -> list[str]:
         found += _too_few_worlds(summary.comparisons)
     if summary.refusal:
         found.append(f"Planners are not compared: {summary.refusal}.")
+    found += [price.sentence for price in prices(summary.table) if price.unpaired < price.drives]
     return found
 
 

@@ -13,9 +13,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Patch
 
 from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.log.sights import Sighting, sightings
 from antdrive.sim.view.figures.canvas import checked, finished, map_size, new_figure, styled
 from antdrive.sim.view.figures.map_chart import draw_map
-from antdrive.sim.view.recollection import Recollection, Sighting, containers, sightings
+from antdrive.sim.view.recollection import Recollection, containers
 from antdrive.sim.view.scene import Scene
 from antdrive.sim.view.style import (
     BAD,

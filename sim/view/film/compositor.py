@@ -28,6 +28,7 @@ from antdrive.sim.view.film.tiny_renderer import Box, add_mesh, merged, overlap,
 from antdrive.sim.view.film.triangles import Solid, draw_solids, placed
 from antdrive.sim.view.scene import Scene
 from antdrive.sim.view.style import (
+    FOLLOWED,
     KERB,
     MOVER,
     OBSTACLE,
@@ -48,6 +49,7 @@ Picture = npt.NDArray[np.uint8]  # (H, W, 3)
 HIDDEN_OPACITY = 0.16  # of a robot behind a cylinder, so that it is never lost
 SHADOW_BLUR = 0.05  # softness of the shadow of a flat body [m]
 MANY, FEW_SIDES = 1000, 12  # in worlds of more cylinders, which look small, each is drawn with few sides
+RING_SIDES, RING_OFF = 32, 0.05  # of the ring around a mover that is followed, and how far off its surface [m]
 FORECAST = 1.5  # how far ahead the motion of movers is drawn [s]
 
 
@@ -170,6 +172,7 @@ class Compositor:
         wheels: tuple[float, float] = (0.0, 0.0),
         movers: npt.ArrayLike = (),
         velocities: npt.ArrayLike | None = None,
+        followed: Floats | None = None,
     ) -> Picture:
         """The picture (H, W, 3) with robot and movers.
 
@@ -178,6 +181,7 @@ class Compositor:
             wheels: how far the left and the right wheel have turned [rad]
             movers: the movers' positions (M, 2) [m]
             velocities: the movers' velocities (M, 2) [m/s], to draw where they will be at constant velocity
+            followed: movers that the robot follows with its lidar (N, 5): x, y [m], their velocities [m/s], radius [m]
         """
         x, y, yaw = (float(value) for value in np.asarray(pose))
         places = np.asarray(movers, dtype=np.float64).reshape(-1, 2)
@@ -199,6 +203,8 @@ class Compositor:
             self._put_bodies(frame, box, [solid for body in inside for solid in body])
         if self._sight is not None:
             self._sight.put_hits(frame, self.backdrop)
+        if followed is not None:
+            self._draw_followed(frame, followed)
         return frame
 
     def field_frame(self, grid: Grid, levels: Floats, path: Floats) -> Picture:
@@ -297,6 +303,19 @@ class Compositor:
         dots = np.vstack([np.column_stack([stop, stop, np.full(len(stop), 2.2 * half)])[moving] for stop in stops])
         for rows, strength in ((lines[moving], 0.45), (dots, 0.75)):
             self._blend(frame, np.ascontiguousarray(rows), MOVER, strength)
+
+    def _draw_followed(self, frame: Picture, followed: Floats) -> None:
+        """Draw a ring where the robot believes a mover to be, and a line to where it will be at the estimated velocity."""
+        turn = np.linspace(0, 2 * math.pi, RING_SIDES + 1)
+        half = 1.2 * self.camera.pixel
+        circle = np.column_stack([np.cos(turn), np.sin(turn)])
+        rims = [np.array([x, y]) + (radius + RING_OFF) * circle for x, y, _, _, radius in followed]
+        rows = [np.column_stack([rim[:-1], rim[1:], np.full(RING_SIDES, half)]) for rim in rims]
+        ahead = followed[:, :2] + FORECAST * followed[:, 2:4]
+        rows.append(np.column_stack([followed[:, :2], ahead, np.full(len(followed), half)]))
+        everywhere = np.ones_like(self.backdrop.visible)
+        lines, tint = np.ascontiguousarray(np.concatenate(rows)), np.array(FOLLOWED, dtype=np.float64)
+        kernels.blend_capsules(frame, everywhere, self._forward, self._inverse, lines, tint, 0.8)
 
     def _blend(self, frame: Picture, rows: Floats, colour: Colour, strength: float) -> None:
         """Blend capsules (N, 5) of one colour into the ground."""

@@ -19,6 +19,7 @@ from antdrive.sim.view.style import (
     BAND,
     BEAM,
     CALM,
+    FOLLOWED,
     HATCH,
     HIT,
     INK,
@@ -195,7 +196,14 @@ class LegendEntry(NamedTuple):
 
 
 def legend_entries(
-    scene: Scene, step: float, pixel: float, *, planning: bool = False, replans: bool = False, sight: bool = False
+    scene: Scene,
+    step: float,
+    pixel: float,
+    *,
+    planning: bool = False,
+    replans: bool = False,
+    sight: bool = False,
+    followed: bool = False,
 ) -> list[LegendEntry]:
     """The legend's lines: one for each kind of thing in the picture.
 
@@ -206,6 +214,7 @@ def legend_entries(
         planning: the picture shows planning, not a drive
         replans: the robot replanned during the run
         sight: the picture shows what the robot has seen
+        followed: it shows the movers that the robot follows with its lidar
     """
     if planning:
         found = [LegendEntry("field", INK, "planner's field"), LegendEntry("line", SHELL, "best path so far")]
@@ -225,7 +234,9 @@ def legend_entries(
             LegendEntry("hatch", HATCH, "never seen"),
         ]
     if scene.mover_radii:
-        found.append(LegendEntry("dot", MOVER, "moving obstacle, 1.5 s ahead"))
+        found.append(LegendEntry("dot", MOVER, "moving obstacle" if followed else "moving obstacle, 1.5 s ahead"))
+    if followed:
+        found.append(LegendEntry("line", FOLLOWED, "mover by lidar, 1.5 s ahead"))
     return [*found, LegendEntry("scale", INK, f"{step:g} m (grid)", step / pixel)]
 
 

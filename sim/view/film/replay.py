@@ -58,6 +58,11 @@ class Replay:
         self._least = np.minimum.accumulate(self._clearance)
         self._movers = rollout.movers if len(rollout.movers) else np.empty((rows, 0, 2))
         self._jumps = jumps(self._movers)
+        lidar, hz = rollout.record.robot.lidar, rollout.record.physics_hz
+        self._tracks = rollout.tracks.astype(np.float64)
+        self._scan_rows = (
+            math.ceil(hz / lidar.rate) + hz // rollout.record.control_hz if lidar else 0
+        )  # between two scans
         self.replans: list[ReplanEvent] = []
         route = rollout.route
         for replan in rollout.record.replans:
@@ -123,6 +128,14 @@ class Replay:
         row = min(self._row(at), len(self.t) - 2)
         step = np.where(self._jumps[row, :, None], 0.0, self._movers[row + 1] - self._movers[row])
         return np.asarray(step / (self.t[row + 1] - self.t[row]))
+
+    def followed(self, at: float) -> Floats:
+        """The movers that the robot follows with its lidar (N, 5): x, y [m], velocity [m/s] and radius [m], at the last scan."""
+        end = int(np.searchsorted(self._tracks[:, 0], self._row(at), side="right"))
+        if not end or self._tracks[end - 1, 0] < self._row(at) - self._scan_rows:
+            return np.empty((0, 5))
+        begin = int(np.searchsorted(self._tracks[:, 0], self._tracks[end - 1, 0], side="left"))
+        return self._tracks[begin:end, 2:].copy()
 
     def _between(self, at: float) -> tuple[int, float]:
         """The last row at or before a moment, and the fraction of the time to the next row that is over."""

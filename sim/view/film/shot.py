@@ -34,6 +34,7 @@ from antdrive.sim.view.recollection import Recollection
 from antdrive.sim.view.scene import Scene
 from antdrive.sim.view.style import CONTACT, GOAL, ROUTE, START, VERDICTS, Colour
 
+Floats = npt.NDArray[np.float64]
 Picture = npt.NDArray[np.uint8]  # (H, W, 3)
 
 FLASH = 0.45  # the picture's border flashes this long after a contact [s]
@@ -71,6 +72,7 @@ class Shot:
         self.outcome = rollout.outcome
         self._follows = camera == "follow"
         self._sight = None
+        self._follows_movers = not planning and len(rollout.tracks) > 0
         if not planning and len(rollout.scans):
             self._sight = SightPainter(Recollection(rollout), scene)
         replans = not planning and any(event.caption for event in self.replay.replans)
@@ -81,7 +83,9 @@ class Shot:
             self._camera = self._aim(camera, rollout, (size[0], size[1] - band))
             step, pixel = grid_step(self._camera), self._camera.pixel
             sight = self._sight is not None
-            entries = legend_entries(scene, step, pixel, planning=planning, replans=replans, sight=sight)
+            entries = legend_entries(
+                scene, step, pixel, planning=planning, replans=replans, sight=sight, followed=self._follows_movers
+            )
             self._legend = legend_card(entries, layout) if card and not bare else None
             if self._legend is not None and self._fits_beside_world(self._legend):
                 break
@@ -160,12 +164,22 @@ class Shot:
             self._sight.advance(at)
         if count != self._replans_shown or self._sight is not None:
             self._show_route(count)
-        view = compositor.frame(replay.pose(at), replay.wheels(at), replay.movers(at), replay.mover_velocities(at))
+        followed = self._followed(at) if self._follows_movers else None
+        velocities = None if self._follows_movers else replay.mover_velocities(at)
+        view = compositor.frame(replay.pose(at), replay.wheels(at), replay.movers(at), velocities, followed)
         if count:
             self._put_replan_caption(view, at, replay.replans[count - 1])
         self._mark_contact(view, at, self._flash, last)
         self._put_legend(view)
         return view
+
+    def _followed(self, at: float) -> Floats:
+        """The movers that the robot follows, where they lie in the world; without a map the robot's own frame drifts."""
+        found = self.replay.followed(at)
+        if self._sight is not None:
+            found[:, :2] = self._sight.laid(found[:, :2])
+            found[:, 2:4] = self._sight.laid(found[:, 2:4]) - self._sight.laid(np.zeros((1, 2)))
+        return found
 
     def put_label(self, view: Picture, text: str, x: float, y: float) -> None:
         """Mark a place on the ground in a picture, with a text above it.

@@ -30,6 +30,8 @@ from antdrive.worlds.files.atomic import written_whole
 Floats = npt.NDArray[np.float64]
 Picture = npt.NDArray[np.uint8]  # (H, W, 3)
 
+STILLS: dict[str, dict[str, Any]] = {".png": {}, ".webp": {"quality": 82, "method": 4}}  # how pictures are written
+
 HOLD = 1.0  # the last picture stays this long [s]
 
 
@@ -143,11 +145,11 @@ def still(
     size: tuple[int, int] = (1280, 720),
     note: str | None = None,
 ) -> Path:
-    """Write one picture of a run as PNG.
+    """Write one picture of a run as PNG or WebP.
 
     Args:
         rollout: the run's log
-        path: the file to write, with the suffix .png
+        path: the file to write, with the suffix .png or .webp
         t: the moment to show [s]; None for the end, with the outcome as a sentence
         camera: `oblique`, `top` or `follow`
         size: width and height, even numbers from 160 to 4096 [px]
@@ -157,16 +159,17 @@ def still(
         The file's path.
 
     Raises:
-        InputError: an unknown camera, a suffix other than .png, or a size that is out of range.
+        InputError: an unknown camera, a suffix other than .png and .webp, or a size that is out of range.
     """
     target = Path(path)
-    if target.suffix.lower() != ".png":
-        raise InputError(f"{target}: unknown suffix {target.suffix!r}; choose .png")
+    kind = target.suffix.lower()
+    if kind not in STILLS:
+        raise InputError(f"{target}: unknown suffix {target.suffix!r}; choose {' or '.join(STILLS)}")
     check_options(camera, size, 1.0, 1.0)
     with Shot(rollout, camera=camera, size=size, note=note) as shot:
         picture = shot.last_frame() if t is None else shot.frame(min(max(float(t), 0.0), shot.replay.duration))
     with written_whole(target) as temporary:
-        Image.fromarray(picture).save(temporary, format="PNG")
+        Image.fromarray(picture).save(temporary, format=kind[1:], **STILLS[kind])
     return target
 
 

@@ -15,6 +15,7 @@ from antdrive.sim.log.metrics import measure
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import DriveRecord
 from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.log.sights import Sighting, passed
 from antdrive.sim.pipeline import Run
 from antdrive.sim.view.style import hexed, planner_style
 from antdrive.worlds.errors import InputError, input_error
@@ -70,6 +71,7 @@ COLUMN_NOTES = (
     ("gap", "how much longer the smoothed route is than the shortest path among the inflated obstacles"),
     ("min clearance", "smallest distance to an obstacle at any logged pose"),
     ("planning", "wall time of the plan, with the kernels loaded"),
+    ("explored", "ground that the lidar of a robot without a map saw"),
     ("proved", "distance that the certificate guarantees between logged poses, too"),
 )
 
@@ -84,8 +86,16 @@ SETTING_COLUMNS: Mapping[str, Column] = MappingProxyType(
         "cell_m": Column("cell [m]", "n"),
         "control_hz": Column("control [Hz]", "n"),
         "physics_hz": Column("physics [Hz]", "n"),
+        "map": Column("map", "t"),
+        "localisation": Column("pose by", "t"),
+        "explored_m2": Column("explored [m²]", "n"),
     }
 )
+
+
+EXPLORED = "explored_m2"
+SENSED = {"map": "given", "localisation": "fixes"}  # what robots know unless the log says otherwise
+LISTED_SIGHTS = 40  # of the cylinders that a robot passed those that it came nearest to
 
 
 @dataclass(frozen=True)
@@ -117,6 +127,7 @@ class LogFacts:
         record: the log's record
         certificate: the log's, computed for the report
         metrics: the log's metrics by name
+        sights: the cylinders that a robot without a map passed, as the log's scans met them
         digest: of the log's content
         settings: the log's settings by the keys of result.json
         contradictions: what result.json says otherwise, a sentence each
@@ -125,6 +136,7 @@ class LogFacts:
     record: DriveRecord
     certificate: Certificate
     metrics: Mapping[str, float]
+    sights: tuple[Sighting, ...]
     digest: str
     settings: Mapping[str, Any]
     contradictions: tuple[str, ...]
@@ -298,6 +310,7 @@ class ReportedRun:
         certificate = {k: v for k, v in self.log.certificate.as_dict().items() if k != "problems"}
         return [
             ("Metrics", _pairs(self.metrics)),
+            ("First sight of what was passed", _sight_pairs(self.log.sights)),
             ("Certificate", _pairs(certificate)),
             ("Planner", _pairs(record["planner"]["settings"])),
             ("Controller", _pairs(record["controller"]["settings"])),
@@ -337,10 +350,11 @@ def facts_of(rollout: Rollout, result: Mapping[str, Any], name: str) -> LogFacts
     """
     try:
         certificate, metrics, digest = certify(rollout), measure(rollout), rollout.digest
+        sights = tuple(passed(rollout))
     except ValueError as error:
         raise input_error(name, str(error)) from None
     claims = tuple(shown(claim) for claim in false_claims(result, rollout, digest))
-    return LogFacts(rollout.record, certificate, metrics, digest, logged_settings(rollout), claims)
+    return LogFacts(rollout.record, certificate, metrics, sights, digest, logged_settings(rollout), claims)
 
 
 def made_run(run: Run) -> ReportedRun:
@@ -363,15 +377,24 @@ def note_differences(runs: Sequence[ReportedRun]) -> list[Column]:
     """
     columns = []
     for key, column in SETTING_COLUMNS.items():
-        texts = _option_texts(runs) if key == "options" else [_setting_text(run.settings.get(key)) for run in runs]
-        if len(set(texts)) > 1:
+        texts = _option_texts(runs) if key == "options" else [_setting_text(run, key) for run in runs]
+        if len(set(texts)) > 1 or (key == EXPLORED and texts[0]):
             columns.append(column)
             for run, text in zip(runs, texts, strict=True):
                 run.differing[key] = text
     return columns
 
 
-def _setting_text(value: Any) -> str:
+def _setting_text(run: ReportedRun, key: str) -> str:
+    if key == EXPLORED:
+        found = number(run.metrics.get(key))
+        return "" if found is None else f"{found:.1f}"
+    if key in SENSED:
+        settings = run.result.get("settings")
+        claimed = settings.get(key) if isinstance(settings, Mapping) else None
+        value = claimed or SENSED[key] if run.log is None else getattr(run.log.record.sensing, key, SENSED[key])
+    else:
+        value = run.settings.get(key)
     return "" if value is None else shown(value, 40)
 
 
@@ -419,6 +442,23 @@ def shown(value: Any, longest: int = LONGEST) -> str:
     text = "".join(c if c.isprintable() else " " for c in text[: 4 * longest])
     text = " ".join(text.split())
     return text if len(text) <= longest else f"{text[:longest]}…"
+
+
+def _sight_pairs(sights: Sequence[Sighting]) -> list[tuple[str, str]]:
+    """When each cylinder was first seen and how near the robot came, those that it came nearest to, in the order of time."""
+    nearest = sorted(sights, key=lambda sight: (not sight.touched, sight.nearest))[:LISTED_SIGHTS]
+    return [
+        (
+            f"obstacle {sight.obstacle}",
+            (
+                f"seen {sight.seen_at:.2f} s, {sight.seen_from:.2f} m; "
+                if math.isfinite(sight.seen_at)
+                else "never seen; "
+            )
+            + f"{'touched' if sight.touched else 'nearest'} {sight.nearest_at:.2f} s, {sight.nearest:.2f} m",
+        )
+        for sight in sorted(nearest, key=lambda sight: sight.nearest_at)
+    ]
 
 
 def _pairs(values: Any) -> list[tuple[str, str]]:

@@ -8,7 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from antdrive.robots import LIMITERS, PurePursuit, PursuitState, RobotSpec, Twist
+from antdrive.robots.control._kernels_path import clearance_below
 from antdrive.worlds import Disc, Route, World, point_clearance
+from antdrive.worlds._kernels import segment_clearance
 
 OPEN = World("open", (-20, -20, 20, 20))
 DT = 1 / 60
@@ -210,3 +212,33 @@ def test_any_grid_like_route_is_driven_to_its_end(turns: list[int], step: float)
 def test_settings_out_of_range_are_refused_by_name(key: str, value: float, message: str) -> None:
     with pytest.raises(ValueError, match=f"{key}: .*{message}"):
         PurePursuit(**{key: value})
+
+
+def test_a_path_may_be_sampled_more_coarsely(turtlebot: RobotSpec) -> None:
+    world = World("post", (-20, -20, 20, 20), (Disc(1.6, 0.9, 0.2),))
+    fine = PurePursuit().prepare(STAIRCASE, world, turtlebot, 0.05, DT)
+    coarse = PurePursuit().prepare(STAIRCASE, world, turtlebot, 0.05, DT, spacing=0.06)
+    assert coarse.tuning.spacing == 0.06
+    assert len(coarse.samples.speed) == int(STAIRCASE.length / 0.06) + 2
+    np.testing.assert_allclose(
+        coarse.samples.lookahead[:-1], fine.samples.lookahead[::3][: len(coarse.samples.speed) - 1]
+    )
+
+
+@given(st.integers(0, 10_000))
+def test_discs_that_are_left_out_change_no_clearance(seed: int) -> None:
+    """The oracle samples the segment."""
+    rng = np.random.default_rng(seed)
+    discs, bounds = (
+        np.column_stack((rng.uniform(0, 9, (40, 2)), rng.uniform(0.01, 0.5, 40))),
+        np.array([0.0, 0.0, 9.0, 9.0]),
+    )
+    a, b = rng.uniform(0, 9, 2), rng.uniform(0, 9, 2)
+    points = a + np.linspace(0, 1, 2000)[:, None] * (b - a)
+    away = np.hypot(*(points[:, None] - discs[:, :2]).transpose(2, 0, 1)) - discs[:, 2]
+    expected = min(away.min(), points.min(), (9 - points).min())
+    found = segment_clearance(*a, *b, discs, bounds)
+    assert found == pytest.approx(expected, abs=1e-4)
+    for most in (expected - 0.1, expected + 0.1):
+        below = clearance_below(most, *a, *b, discs, bounds)
+        assert below == found if found < most else below >= most

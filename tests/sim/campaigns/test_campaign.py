@@ -347,6 +347,32 @@ def test_drawn_tasks_keep_clear_of_cylinders_that_nobody_knows_of() -> None:
     assert min(math.dist(start, (one["x"], one["y"])) for start in starts for one in unseen) > 0.5
 
 
+def test_a_list_of_settings_is_a_list_of_grids() -> None:
+    settings = [{"map": "given"}, {"map": "none", "localisation": "matching", "odometry": [0, 1, 5]}]
+    campaign = make_campaign({"worlds": "empty", "planners": "astar", "robots": "jackal", "settings": settings})
+    rows = [grid_row(job) for job in expand(campaign).jobs]
+    assert [(row["map"], row["localisation"], row["odometry"]) for row in rows] == [
+        ("given", "fixes", 1.0), ("none", "matching", 0.0), ("none", "matching", 1.0), ("none", "matching", 5.0)
+    ]  # fmt: skip
+    assert "--map none --localisation matching --odometry 5" in rows[-1]["command"]
+    settings[1]["localisation"] = "gps"
+    with pytest.raises(InputError, match=r"^campaign: settings\[1\]\.localisation: empty with jackal: unknown 'gps'"):
+        expand(make_campaign({"worlds": "empty", "planners": "astar", "robots": "jackal", "settings": settings}))
+    for wrong in ([], [1], "none"):
+        with pytest.raises(InputError, match="settings: must be a mapping such as"):
+            make_campaign({"worlds": "empty", "planners": "astar", "settings": wrong})
+
+
+def test_runs_with_a_map_have_the_keys_that_they_always_had() -> None:
+    data = {"worlds": "empty", "planners": "astar", "robots": "jackal"}
+    (plain,) = expand(make_campaign(data)).jobs
+    (said,) = expand(make_campaign({**data, "settings": {"map": "given", "localisation": "fixes"}})).jobs
+    (other,) = expand(make_campaign({**data, "settings": {"map": "none"}})).jobs
+    assert plain.key == said.key
+    assert not {"map", "localisation", "odometry"} & set(json.loads(plain.case.identity)["settings"])
+    assert other.key != plain.key
+
+
 def test_the_schema_names_every_key() -> None:
     schema = campaign_schema()
     assert set(schema["properties"]) >= {
@@ -359,7 +385,9 @@ def test_the_schema_names_every_key() -> None:
         "settings",
         "rollouts",
     }
-    cells = schema["properties"]["settings"]["properties"]["cell"]["anyOf"]
+    one, several = schema["properties"]["settings"]["anyOf"]
+    assert several["items"] == one
+    cells = one["properties"]["cell"]["anyOf"]
     assert cells[1] == {"type": "array", "items": cells[0], "minItems": 1}
     assert "$ref" not in json.dumps(schema["properties"]["settings"])
     assert schema["required"] == ["schema", "worlds", "planners"]

@@ -10,7 +10,7 @@ import pyarrow
 import pytest
 
 from antdrive.sim.campaigns.campaign import make_campaign
-from antdrive.sim.campaigns.challenge import campaign_data, lines, reference_times, score, unpacked
+from antdrive.sim.campaigns.challenge import by_map, campaign_data, lines, reference_times, score, unpacked
 from antdrive.sim.campaigns.expanding import expand
 from antdrive.worlds.errors import InputError
 from tests.conftest import SHARED
@@ -78,3 +78,16 @@ def test_the_worlds_of_the_archive_become_a_campaign(tmp_path: Path) -> None:
     assert max(times.values()) == pytest.approx(6.84, abs=0.01)
     with tarfile.open(ARCHIVE) as archive:
         assert len(times) == sum(name.endswith(".npy") for name in archive.getnames())
+
+
+def test_with_the_map_each_run_has_a_partner(tmp_path: Path) -> None:
+    (tmp_path / "world_0.world").touch()
+    settings = {"noise": 1.0, "map": "none", "localisation": "matching", "odometry": 2.0}
+    alone = campaign_data(tmp_path, 2, "astar", "jackal", settings)
+    assert alone["settings"] == [{"map": "none", "localisation": "matching", "odometry": 2.0}]
+    both = campaign_data(tmp_path, 2, "astar", "jackal", settings, with_map=True)
+    assert both["settings"] == [*alone["settings"], {"map": "given", "localisation": "fixes", "odometry": 2.0}]
+    true = campaign_data(tmp_path, 2, "astar", "jackal", {**settings, "localisation": "true"}, with_map=True)
+    assert [one["localisation"] for one in true["settings"]] == ["true", "true"]
+    runs = by_map(pyarrow.table({"map": ["none", "given", "none"], "seed": [0, 0, 1]}))
+    assert (runs["none"]["seed"].to_pylist(), runs["given"]["seed"].to_pylist()) == ([0, 1], [0])

@@ -10,10 +10,13 @@ import pytest
 from antdrive.planners import load_planner
 from antdrive.robots import RobotSpec, Twist
 from antdrive.sim import Outcome, Rollout, Run, Scenario, run
+from antdrive.sim.driving import rescanning
 from antdrive.sim.driving.caution import Caution
 from antdrive.sim.driving.replay import replay
+from antdrive.sim.driving.rescanning import forgetting_ticks
 from antdrive.sim.driving.survey import Senses, Survey
 from antdrive.sim.falsify.rebuild import rebuilt
+from antdrive.sim.log.record import ReplanRecord
 from antdrive.sim.sensing import Scanner
 from antdrive.sim.unknown import told
 from antdrive.worlds import Disc, Task, World, generate, load_task
@@ -111,6 +114,54 @@ def test_odometry_alone_drifts_and_is_caught_when_it_is_edited(jackal: RobotSpec
     assert any(
         "estimate" in problem for problem in replay(dataclasses.replace(done.rollout, estimate=shifted)).problems
     )
+
+
+def test_a_forged_estimate_that_scans_corrected_is_refused(log: Rollout) -> None:
+    """2 mm from one control period on: no scan on this map gives it."""
+    row = int(log.scan_rows[100])
+    shifted = log.estimate.copy()
+    shifted[row:, 1] += 0.002
+    (problem,) = replay(dataclasses.replace(log, estimate=shifted)).problems
+    assert problem.startswith("replay: estimate is not what")
+    assert f"t = {log.t[row]:.3f} s" in problem
+
+
+def test_a_forged_scan_is_refused(log: Rollout) -> None:
+    scans = log.scans.copy()
+    scans[50, 300] += 10
+    (problem,) = replay(dataclasses.replace(log, scans=scans)).problems
+    assert problem.startswith("replay: scans are not what")
+    assert f"t = {log.t[log.scan_rows[50]]:.3f} s" in problem
+    fewer = dataclasses.replace(log, scans=np.delete(log.scans, 50, axis=0), scan_rows=np.delete(log.scan_rows, 50))
+    assert replay(fewer).problems == (problem,)
+    none = dataclasses.replace(log, scans=log.scans[:0], scan_rows=log.scan_rows[:0])
+    assert "no scans" in replay(none).problems[0]
+
+
+def test_the_map_is_forgotten_where_plans_failed(log: Rollout) -> None:
+    """Three plans in a row that fail, then the fourth forgets; a path in between begins the count anew."""
+    lost = ReplanRecord(t=0.0, trigger="no way", solved=False, cost_m=None, work=1, route=())
+    found = dataclasses.replace(lost, solved=True, cost_m=1.0, route=((0.0, 0.0), (1.0, 0.0)))
+    replans = [lost, lost, found, lost, lost, lost, lost, found]
+    timed = tuple(dataclasses.replace(replan, t=(k + 1) / 60) for k, replan in enumerate(replans))
+    assert list(forgetting_ticks(dataclasses.replace(log.record, replans=timed))) == [7]
+    assert list(forgetting_ticks(dataclasses.replace(log.record, replans=timed[:6]))) == []
+
+
+def test_a_drive_that_forgot_its_map_can_be_replayed(jackal: RobotSpec, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A corridor that a row of posts closes, 1 m out of sight from the start."""
+    assert jackal.lidar is not None
+    short = dataclasses.replace(jackal.lidar, field_of_view=2 * math.pi, max_range=3.0)
+    row = tuple(Disc(5.0, 0.15 * k, 0.075) for k in range(12))
+    task = Task(World("corridor", (0.0, 0.0, 7.0, 1.6), row), (1.0, 0.8, 0.0), (6.4, 0.8), cell=0.1)
+    done = run(scenario(dataclasses.replace(jackal, lidar=short), task, time_limit=4.0))
+    assert done.rollout is not None
+    assert done.outcome is Outcome.TIMED_OUT, (done.outcome, done.reason)
+    assert len(list(forgetting_ticks(done.rollout.record))) > 1
+    assert replay(done.rollout).problems == ()
+    monkeypatch.setattr(rescanning, "PATIENCE", 10**6)  # as if it had forgotten nothing
+    (problem,) = replay(done.rollout).problems
+    assert "estimate" in problem
 
 
 def test_the_true_pose_is_known_without_error(jackal: RobotSpec) -> None:

@@ -76,10 +76,11 @@ def straight(**changes: Any) -> Rollout:
         ("contacts_teleported", 0),
         ("replans", 0),
         ("avoiding_s", 0),
+        ("explored_m2", math.nan),  # it had a map; tests/sim/log/test_sights.py has drives without
     ],
 )
 def test_by_hand(name: str, value: float) -> None:
-    assert METRICS[name](straight()) == pytest.approx(value)
+    assert METRICS[name](straight()) == pytest.approx(value, nan_ok=True)
 
 
 def test_every_metric_is_worked_by_hand_here() -> None:
@@ -150,6 +151,6 @@ def test_every_metric_has_a_unit_and_a_definition(name: str) -> None:
     metric = METRICS[name]
     assert metric.name == name
     assert metric.definition.endswith(".")
-    units = {"turning_rad_per_m": "rad/m", "jerk_rms": "m/s^3"}
+    units = {"turning_rad_per_m": "rad/m", "jerk_rms": "m/s^3", "explored_m2": "m^2"}
     suffix = name.rpartition("_")[2]
     assert metric.unit == units.get(name, suffix if suffix in ("m", "s") else "1")

@@ -222,3 +222,36 @@ def test_a_map_laid_out_for_the_way_holds_what_one_that_grows_holds(jackal: Robo
     order, other = (np.lexsort(grid.discs().T) for grid in (grown, ready))
     np.testing.assert_allclose(grown.discs()[order], ready.discs()[other], atol=1e-6)
     assert np.count_nonzero(grown.seen_free) == np.count_nonzero(ready.seen_free)
+
+
+def test_between_whole_scans_only_what_comes_into_sight_is_entered(jackal: RobotSpec) -> None:
+    assert jackal.lidar is not None
+    post, late = np.array([[2.0, 0.0, 0.2]]), np.array([[2.0, 0.0, 0.2], [1.0, 0.5, 0.1]])
+    grid = OccupancyMap(jackal.lidar)
+    assert (grid.share, grid.turns) == (4, 2)
+    for number in range(9):  # the second post comes between two whole scans
+        scanner = Scanner(jackal.lidar, post if number < 2 else late)
+        ranges = scanner.scan((0.0, 0.0, 0.0), rng=np.random.default_rng(number))
+        whole, free, hits = grid.whole, grid.seen_free.copy(), grid.arrays.odds.sum()
+        changed = grid.insert((0.0, 0.0, 0.0), ranges)
+        ends = grid.endpoints((0.0, 0.0, 0.0), ranges)[np.isfinite(ranges)]
+        assert whole == (number % 4 == 0)
+        if whole:
+            assert np.all(inside(ends, grid.discs()))
+            continue
+        assert all(grid.occupied[cell_of(grid, x, y)] for x, y in ends.tolist())
+        assert not np.any(grid.seen_free & ~free)
+        assert (len(changed) > 0) == (grid.arrays.odds.sum() > hits)
+
+
+def test_every_beam_has_its_turn(jackal: RobotSpec) -> None:
+    """After two whole scans the ground is seen as after one of all beams."""
+    assert jackal.lidar is not None
+    scanner = Scanner(jackal.lidar, POSTS)
+    grid, every = OccupancyMap(jackal.lidar), OccupancyMap(jackal.lidar)
+    every.turns = 1
+    for number in range(13):
+        pose = (0.5, 0.2, 0.3) if number else (0.0, 0.0, 0.0)
+        for found in (grid, every):
+            found.insert(pose, scanner.scan(pose))
+    assert np.array_equal(grid.seen_free, every.seen_free)

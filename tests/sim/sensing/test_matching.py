@@ -7,7 +7,7 @@ import pytest
 
 from antdrive.robots import RobotSpec
 from antdrive.sim.sensing import OccupancyMap, Scanner
-from antdrive.sim.sensing.matching import ScanMatcher
+from antdrive.sim.sensing.matching import ScanMatcher, sliding_left_out
 from antdrive.worlds import Disc, Floats, World
 
 WORLD = World("room", (0.0, 0.0, 6.0, 5.0), (Disc(2.0, 3.5, 0.3), Disc(4.0, 1.5, 0.2), Disc(3.2, 4.1, 0.15)))
@@ -19,7 +19,7 @@ def looked(robot: RobotSpec, world: World = WORLD) -> tuple[OccupancyMap, Floats
     assert robot.lidar is not None
     scanner, rng = Scanner.of(robot.lidar, world), np.random.default_rng(0)
     seen = OccupancyMap(robot.lidar, 0.05, POSE[:2])
-    for _ in range(4):
+    for _ in range(8):
         seen.insert(POSE, scanner.scan(POSE, rng=rng))
     return seen, scanner.scan(POSE, rng=rng)
 
@@ -47,3 +47,18 @@ def test_a_correction_that_is_too_large_is_not_believed(jackal: RobotSpec) -> No
     seen, ranges = looked(jackal)
     far = (POSE[0] + 0.05, POSE[1], POSE[2])
     assert ScanMatcher(jackal.lidar).corrected(seen, far, ranges) == far
+
+
+def test_a_shift_along_the_only_wall_in_sight_is_left_out() -> None:
+    before, after = (0.0, 0.0, 0.0), (0.01, 0.02, 0.003)
+    wall = np.column_stack([np.full(60, 2.0), np.linspace(-1, 1, 60)])
+    assert sliding_left_out(before, after, wall) == pytest.approx((0.01, 0.0, 0.003))
+    turned = wall @ np.array([[0.6, 0.8], [-0.8, 0.6]])  # faces the direction (0.6, 0.8)
+    x, y, _ = sliding_left_out(before, after, turned)
+    assert (x, y) == pytest.approx((0.022 * 0.6, 0.022 * 0.8))
+    corner = np.vstack([wall, np.column_stack([np.linspace(1.97, 0, 60), np.ones(60)])])
+    assert sliding_left_out(before, after, corner) == pytest.approx(after)
+    posts = np.repeat(np.random.default_rng(0).uniform(-3, 3, (12, 2)), 5, axis=0)
+    posts += 0.02 * np.arange(60)[:, None] % 0.1
+    assert sliding_left_out(before, after, posts) == pytest.approx(after)
+    assert sliding_left_out(before, after, np.full((60, 2), np.nan)) == after

@@ -6,8 +6,16 @@ import numpy as np
 import pytest
 
 from antdrive.robots import Lidar, RobotSpec
-from antdrive.sim.sensing import MoverTracker, OccupancyMap, Scanner, TrackedMovers, TrackingPolicy
-from antdrive.worlds import Floats
+from antdrive.sim.sensing import (
+    KnownGround,
+    MappedGround,
+    MoverTracker,
+    OccupancyMap,
+    Scanner,
+    TrackedMovers,
+    TrackingPolicy,
+)
+from antdrive.worlds import Disc, Floats, World
 
 POSTS = np.array([[2.5, 1.8, 0.2], [2.5, -2.2, 0.3], [-1.0, 2.0, 0.4]])
 BOUNDS = (-4.0, -4.0, 6.0, 4.0)
@@ -29,7 +37,7 @@ def watched(
         places = start + velocity * (t - 1) if t >= 1 else away
         pose = (speed * t, 0.0, 0.0)
         ranges = scanner.scan(pose, places, radii, rng)
-        theirs = tracker.update(grid, pose, ranges, t)
+        theirs = tracker.update(MappedGround(grid, 100), pose, ranges, t)
         grid.insert(pose, ranges, left_out=theirs)
     return tracker.movers(), places, grid
 
@@ -85,16 +93,22 @@ def test_a_mover_leaves_nothing_in_the_map(jackal: RobotSpec) -> None:
     assert where[0, 1] == pytest.approx(0.9)
 
 
-def test_a_mover_out_of_sight_is_given_up() -> None:
+def test_a_mover_that_beams_pass_through_is_gone_and_a_hidden_one_is_remembered() -> None:
     lidar = Lidar(beams=360, field_of_view=2 * math.pi, min_range=0.1, max_range=8.0, rate=20.0)
     scanner, grid, tracker = Scanner(lidar, POSTS, bounds=BOUNDS), OccupancyMap(lidar), MoverTracker(lidar)
     for k in range(58):
         there = np.array([[2.0, 0.02 * k - 0.8]]) if 10 <= k < 40 else np.array([[90.0, 90.0]])
         ranges = scanner.scan((0, 0, 0), there, np.array([0.3]))
-        grid.insert((0, 0, 0), ranges, left_out=tracker.update(grid, (0, 0, 0), ranges, k / 20))
-        assert k in range(10, 20) or len(tracker.movers().radii) == (k >= 20)
-    tracker.update(grid, (0, 0, 0), scanner.scan((0, 0, 0)), 3.1)
-    assert len(tracker.movers().radii) == 0
+        grid.insert((0, 0, 0), ranges, left_out=tracker.update(MappedGround(grid, 40), (0, 0, 0), ranges, k / 20))
+        assert k in range(10, 20) or k in (40, 41) or len(tracker.movers().radii) == (20 <= k < 40)
+    known = KnownGround(lidar, World("hall", BOUNDS, tuple(Disc(*row) for row in POSTS.tolist())))
+    tracker, screen = MoverTracker(lidar), Scanner(lidar, np.vstack([POSTS, [1.0, 0.0, 0.4]]), bounds=BOUNDS)
+    for k in range(100):
+        there = np.array([[2.0, 0.02 * min(k, 30) - 1.2]])
+        ranges = (scanner if k < 20 else screen).scan((0, 0, 0), there, np.array([0.1]))
+        tracker.update(known, (0, 0, 0), ranges, k / 20)
+        mine = np.abs(tracker.movers().positions[:, 0] - 2.0) < 0.3
+        assert mine.sum() == (2 <= k < 80)  # hidden by a screen from the 20th scan on, and for 3 s remembered
 
 
 def test_the_same_scans_give_the_same_tracks(jackal: RobotSpec) -> None:
@@ -107,3 +121,52 @@ def test_the_same_scans_give_the_same_tracks(jackal: RobotSpec) -> None:
 def test_a_policy_refuses_what_finds_nothing() -> None:
     with pytest.raises(ValueError, match="gap: must be greater than 0, got 0"):
         TrackingPolicy(gap=0.0)
+
+
+def test_a_map_explains_what_stands_on_it_and_nothing_else() -> None:
+    circle, limits = {"beams": 360, "field_of_view": 2 * math.pi}, {"min_range": 0.1, "max_range": 8.0}
+    lidar = Lidar(**circle, **limits, rate=20.0, sigma=0.005, height=0.3)  # type: ignore[arg-type]
+    low, tall, new = Disc(1.0, 1.0, 0.2, 0.2), Disc(2.0, 0.0, 0.3), (-1.5, -1.0, 0.25)
+    world = World("hall", BOUNDS, (low, tall))
+    scanner = Scanner(lidar, np.array([[2.0, 0.0, 0.3], new, [1.0, 1.0, 0.2]]), bounds=BOUNDS)
+    truth, believed = (0.0, 0.0, 0.0), (0.02, -0.01, 0.01)
+    ranges = scanner.scan(truth, rng=np.random.default_rng(1))
+    for pose, errors in ((truth, ()), (believed, (math.inf, 0.02, 0.01))):
+        hits = KnownGround(lidar, world, *errors).hits(pose, ranges)
+        near = np.hypot(*(hits.points - new[:2]).T) < 0.45
+        # The lidar passes over the low cylinder of the map, so what it meets there is something else.
+        instead = np.hypot(*(hits.points - (1.0, 1.0)).T) < 0.35
+        assert near.sum() > 5
+        assert np.array_equal(~hits.explained, near | instead)
+    short = KnownGround(lidar, world, 1.9).hits(truth, ranges)
+    assert ranges[short.beams].max() <= 1.9
+
+
+def test_what_may_move_is_no_mark_to_steer_by(jackal: RobotSpec) -> None:
+    assert jackal.lidar is not None
+    scanner, grid = Scanner(jackal.lidar, POSTS, bounds=BOUNDS), OccupancyMap(jackal.lidar)
+    tracker = MoverTracker(jackal.lidar)
+    for k in range(76):
+        there, pose = np.array([[2.0 + 0.01 * k, 0.3]]), (0.0, 0.0, 0.0)
+        ranges = scanner.scan(pose, there, np.array([0.2]))
+        doubted = tracker.suspected(pose, ranges, k / 50)
+        points = grid.endpoints(pose, ranges)
+        on_mover, on_post = (np.hypot(*(points - at).T) < r + 0.02 for at, r in ((there[0], 0.2), (POSTS[0, :2], 0.2)))
+        assert k == 0 or doubted[on_mover].all()
+        if k in (20, 75):
+            assert doubted[on_post].all() == (k == 20)  # a post is trusted once it has been known for a second
+        grid.insert(pose, ranges, tracker.update(MappedGround(grid, 100), pose, ranges, k / 50))
+
+
+def test_a_pillar_that_is_passed_does_not_move(jackal: RobotSpec) -> None:
+    """Its far side comes into sight, on ground that beams have grazed."""
+    assert jackal.lidar is not None
+    pillars = np.array([[2.0, 1.0, 0.35], [2.0, -1.2, 0.35]])
+    scanner, grid = Scanner(jackal.lidar, pillars, bounds=BOUNDS), OccupancyMap(jackal.lidar)
+    tracker = MoverTracker(jackal.lidar)
+    rng = np.random.default_rng(0)
+    for k in range(150):
+        pose = (0.03 * k - 0.5, 0.05 * math.sin(0.1 * k), 0.1 * math.cos(0.1 * k))
+        ranges = scanner.scan(pose, rng=rng)
+        grid.insert(pose, ranges, tracker.update(MappedGround(grid, 100), pose, ranges, k / 50))
+        assert not len(tracker.movers().radii), k

@@ -63,6 +63,15 @@ def test_options_mean_what_a_file_means(antdrive: Call, campaign: Path) -> None:
     assert json.loads(out)["made"] == 0
 
 
+def test_what_robots_know_is_an_option(antdrive: Call, campaign: Path) -> None:
+    words = ["--map", "none", "--localisation", "odometry", "--odometry", "1", "--odometry", "5", "-r", "jackal"]
+    code, out, _ = antdrive("sweep", campaign, *words, "--dry-run", "--json")
+    assert (code, json.loads(out)["runs"], json.loads(out)["counts"]["settings"]) == (0, 6, 2)
+    campaign.write_text(CAMPAIGN + "settings:\n  - {cell: 0.1}\n  - {map: given}\n")
+    _, out, _ = antdrive("sweep", campaign, "--localisation", "true", "--dry-run", "--json")
+    assert json.loads(out)["counts"]["settings"] == 2
+
+
 def test_the_command_in_a_row_repeats_the_run(antdrive: Call, campaign: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     words = ["--tasks", "2", "--noise", "1", "--smoothing", "taut", "--margin", "0.05", "--seeds", "3,7"]
     antdrive("sweep", campaign, "-o", "out", "--jobs", "1", "-p", "aco-han:ants=5:shortcut=true", *words)

@@ -189,7 +189,7 @@ def test_no_figure_function_is_left_out(made_up_drive):
             if function.__module__ == module.__name__ and not name.startswith("_") and path.stem != "canvas":
                 found[name] = inspect.signature(function)
     with_path = {name: of for name, of in found.items() if "path" in of.parameters}
-    assert len(with_path) == 13
+    assert len(with_path) == 14
     assert all(of.parameters["path"].default is None and of.return_annotation == "Figure" for of in with_path.values())
     assert all(name.startswith("draw_") for name in found.keys() - with_path.keys() - {"plan_figures"})
 

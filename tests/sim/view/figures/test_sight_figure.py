@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.log.sights import sightings
 from antdrive.sim.view.figures.canvas import panels
 from antdrive.sim.view.figures.sight_figure import LISTED, sight_figure
-from antdrive.sim.view.recollection import Recollection, sightings
+from antdrive.sim.view.recollection import Recollection
 from antdrive.worlds import Disc
 from tests.sim.view.scanned import scanned
 

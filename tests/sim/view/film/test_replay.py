@@ -83,3 +83,14 @@ def test_the_least_clearance_is_that_of_the_rows_so_far(made_up_drive):
     replay = Replay(replace(drive, clearance=clearance))
     shown = [replay.min_clearance(row / 240) for row in (99, 99.5, 100, 101)]
     assert shown == [0.5, 0.5, 0.1, 0.1]
+
+
+def test_movers_that_are_followed_are_those_of_the_last_scan(jumped):
+    """Turtlebot's lidar scans at 5 Hz: after two periods without a mover, none is followed."""
+    rows = [(0, 0, 1.0, 0.5, 0.5, 0, 0.2), (48, 0, 1.1, 0.5, 0.5, 0, 0.2), (48, 1, 3.0, 2.0, 0, 0.1, 0.3)]
+    replay = Replay(replace(jumped, tracks=np.array(rows, dtype=np.float32)))
+    assert np.allclose(replay.followed(0.1), [[1.0, 0.5, 0.5, 0.0, 0.2]])
+    assert np.allclose(replay.followed(0.2), [[1.1, 0.5, 0.5, 0, 0.2], [3.0, 2.0, 0, 0.1, 0.3]])
+    assert len(replay.followed(0.39)) == 2
+    assert replay.followed(0.5).shape == (0, 5)
+    assert Replay(jumped).followed(0.1).shape == (0, 5)

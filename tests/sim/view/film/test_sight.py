@@ -112,3 +112,20 @@ def test_the_legend_names_what_is_painted(log: Rollout) -> None:
     named = {entry.text for entry in legend_entries(scene, 0.5, 0.01, sight=True)}
     assert named - plain == {"beams of the lidar", "hit, on the robot's map", "never seen"}
     assert not any("inflated" in text for text in named)
+
+
+def test_movers_that_are_followed_have_rings_and_nothing_else_changes(log: Rollout) -> None:
+    with Shot(log, camera="top", size=SIZE, bare=True) as shot:
+        pose, movers = shot.replay.pose(0.0), np.array([[3.0, 2.0, 0.4, 0.0, 0.5]])
+        plain = shot._compositor.frame(pose).astype(int)
+        ringed = shot._compositor.frame(pose, followed=movers).astype(int)
+        x, y = (np.array(shot._compositor.pixel(*at)) for at in ((3.0, 2.0), (3.55, 2.0)))
+    rows, cols = np.nonzero(np.abs(ringed - plain).max(axis=-1) > 20)
+    away = np.hypot(cols + 0.5 - x[0], rows + 0.5 - x[1])
+    ring = (away > 0.5 * math.dist(x, y)) & (np.abs(rows + 0.5 - x[1]) > 5)  # not the line ahead
+    assert np.count_nonzero(ring) > 60
+    assert np.abs(away[ring] - math.dist(x, y)).max() < 4
+    red, green, blue = ringed[rows, cols].mean(axis=0)
+    assert min(red, blue) > green + 25
+    followed = {entry.text for entry in legend_entries(Scene.of(log), 0.5, 0.01, followed=True)}
+    assert "mover by lidar, 1.5 s ahead" in followed

@@ -243,6 +243,11 @@ def test_a_still_is_a_png(drive, tmp_path):
         still(drive, tmp_path / "a.jpg")
 
 
+def test_a_still_may_be_webp(drive, tmp_path):
+    with Image.open(still(drive, tmp_path / "a.webp", 0.5, size=SIZE)) as picture:
+        assert (picture.format, picture.size, getattr(picture, "n_frames", 1)) == ("WEBP", SIZE, 1)
+
+
 @pytest.mark.parametrize("size", [(320, 240), (640, 480), (1280, 720)])
 def test_the_outcomes_sentence_does_not_cover_the_legend(drive, size):
     with Shot(drive, camera="follow", size=size) as shot:

@@ -1,0 +1,176 @@
+"""Measure drives without a map: `python -m benchmarks.unknown ablations|contacts --results FOLDER [--worlds N] [--jobs N]`.
+
+Prints Markdown. What a folder holds is not driven again, so that an interrupted measurement goes on with the same command.
+
+- ablations: BARN's worlds, `jackal`, noise and `--localisation matching`; the lidar's range and beams, the errors of odometry,
+  or the planner differ from those of the first row. *Price*: ratio of the arrival times, and of the lengths, to the same drives
+  with the map (geometric mean, 95 % interval over worlds). `dstar-lite` repairs its search, `ants` go on with their pheromone.
+- contacts: random forests and worlds of BARN's automaton, half of each, with both robots: contacts while driving.
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from antdrive.robots import list_robots
+from antdrive.sim.campaigns import sweep
+from antdrive.sim.campaigns.challenge import campaign_data, lines, reference_times, unpacked
+from antdrive.sim.statistics.price import Ratio, prices
+from antdrive.sim.statistics.runs import RunTable
+from antdrive.worlds.files.atomic import written_whole
+from benchmarks.cost import BARN
+from benchmarks.planners import table
+
+HEADS = ("", "certified", "score", "time [s]", "contacts", "seen [m²]", "time x", "length x", "wall [s]")
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One row of the ablations.
+
+    Attributes:
+        name: of its folder and row
+        lidar: what differs from the lidar of `jackal`, by the keys of a robot file
+        odometry: the factor on the errors of odometry
+        planner: the planner's name
+        localisation: how the robot knows its pose
+    """
+
+    name: str
+    lidar: Mapping[str, Any] = field(default_factory=dict)
+    odometry: float = 1.0
+    planner: str = "astar"
+    localisation: str = "matching"
+
+
+VARIANTS = (
+    Variant("as it is"),
+    *(Variant(f"range {far:g} m", {"max_range": far}) for far in (10.0, 5.0, 2.5)),
+    *(Variant(f"{beams} beams", {"beams": beams}) for beams in (180, 60)),
+    *(Variant(f"odometry x {factor:g}", odometry=factor) for factor in (0.0, 5.0)),
+    *(Variant(f"odometry x {f:g} without matching", odometry=f, localisation="odometry") for f in (1.0, 5.0)),
+    *(Variant(planner, planner=planner) for planner in ("dstar-lite", "ants")),
+)
+
+
+def robot_of(variant: Variant, folder: Path) -> str:
+    """The robot of a variant: jackal, or a file that differs in its lidar."""
+    if not variant.lidar:
+        return "jackal"
+    data = yaml.safe_load(list_robots()["jackal"].read_text(encoding="utf-8"))
+    data["lidar"] |= variant.lidar
+    data["name"] = f"jackal {variant.name}"
+    path = (folder / f"{variant.name}.yaml").resolve()
+    with written_whole(path) as part:
+        part.write_text(yaml.safe_dump(data), encoding="utf-8")
+    return str(path)
+
+
+def ablations(options: argparse.Namespace) -> Iterator[str]:
+    """The table of all variants, line by line."""
+    options.results.mkdir(parents=True, exist_ok=True)
+    worlds = unpacked(options.barn, options.results / "worlds")
+    fastest = reference_times(worlds)
+    sensing = {"noise": 1.0, "map": "none", "localisation": "matching"}
+
+    def driven(name: str, planner: str, robot: str, settings: Mapping[str, Any]) -> Any:
+        data = campaign_data(worlds, options.trials, planner, robot, settings)
+        chosen = data["worlds"][:: max(1, len(data["worlds"]) // (options.worlds or len(data["worlds"])))]
+        data["worlds"] = chosen[: options.worlds]
+        return sweep(data, options.results / name, jobs=options.jobs, keep="failed").table
+
+    def rows() -> Iterator[list[str]]:
+        known: dict[str, Any] = {}
+        for variant in VARIANTS:
+            if variant.planner not in known:
+                given = {**sensing, "map": "given", "localisation": "fixes"}
+                known[variant.planner] = driven(f"{variant.planner} with the map", variant.planner, "jackal", given)
+                yield row(f"{variant.planner} with the map", known[variant.planner], fastest, None)
+            robot = robot_of(variant, options.results)
+            settings = {**sensing, "odometry": variant.odometry, "localisation": variant.localisation}
+            runs = driven(variant.name, variant.planner, robot, settings)
+            yield row(variant.name, runs, fastest, known[variant.planner])
+
+    yield from table(HEADS, rows())
+
+
+def row(name: str, runs: Any, fastest: Mapping[str, float], known: Any) -> list[str]:
+    """A variant's results beside the same drives with the map."""
+    line, columns = list(lines(runs, fastest))[-1], runs.to_pydict()
+    seen = [area for area in columns["explored_m2"] if area is not None and area == area]
+    time, length = "", ""
+    if known is not None:
+        others = known.to_pydict()
+        (price,) = prices(RunTable({key: columns[key] + others[key] for key in columns}), any_robot=True)
+        time, length = shown(price.time), shown(price.length)
+    return [
+        name,
+        f"{line.arrived} of {line.runs}",
+        f"{line.score:.4f}",
+        f"{line.seconds:.2f}",
+        f"{sum(count or 0 for count in columns['contacts_driving']):.0f}",
+        f"{statistics.fmean(seen):.1f}" if seen else "",
+        time,
+        length,
+        f"{statistics.fmean(wall for wall in columns['drive_wall_s'] if wall is not None):.2f}",
+    ]
+
+
+def shown(ratio: Ratio) -> str:
+    return f"{ratio.mean:.3f} ({ratio.low:.3f}–{ratio.high:.3f})"
+
+
+def contacts(options: argparse.Namespace) -> Iterator[str]:
+    """Contacts by robot and kind of world, and the drives that did not arrive."""
+    half = (options.worlds or 1000) // 2
+    data = {
+        "worlds": [{"generate": kind, "seeds": half} for kind in ("forest", "barn")],
+        "planners": ["astar"],
+        "robots": ["jackal", "turtlebot"],
+        "noise": [1.0],
+        "settings": {"map": "none", "localisation": "matching"},
+    }
+    runs = sweep(data, options.results, jobs=options.jobs, keep="failed").table.to_pylist()
+    yield from table(("robot", "worlds", "drives", "certified", "contacts while driving", "ends"), counted(runs))
+    for run in runs:
+        if not run["succeeded"]:
+            yield f"- {run['world']}, {run['robot']}: {run['outcome']} {run['reason'] or ''}: `{run['command']}`"
+
+
+def counted(runs: Sequence[Mapping[str, Any]]) -> Iterator[list[str]]:
+    for robot in ("jackal", "turtlebot"):
+        for kind in ("forest", "barn"):
+            some = [run for run in runs if run["robot"] == robot and run["world"].startswith(kind)]
+            ends = Counter(run["outcome"] for run in some).most_common()
+            touched = sum(run["contacts_driving"] or 0 for run in some)
+            certified = sum(run["succeeded"] for run in some)
+            words = ", ".join(f"{name} {count}" for name, count in ends)
+            yield [robot, kind, str(len(some)), str(certified), f"{touched:.0f}", words]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", choices=("ablations", "contacts"))
+    parser.add_argument("--results", type=Path, required=True, help="folder for what was driven")
+    parser.add_argument("--barn", type=Path, default=BARN, help="folder or archive of BARN's world_*.world files")
+    parser.add_argument("--worlds", type=int, help="how many worlds; all of BARN's, or 1,000 random ones, without")
+    parser.add_argument("--trials", type=int, default=1, help="how often each of BARN's worlds is driven")
+    parser.add_argument("--jobs", type=int, default=1, help="processes; 0: this one")
+    options = parser.parse_args()
+    if options.what == "ablations" and not options.barn.exists():
+        print(f"no worlds at {options.barn}; give --barn")
+        return
+    for line in {"ablations": ablations, "contacts": contacts}[options.what](options):
+        print(line, flush=True)
+
+
+if __name__ == "__main__":
+    main()

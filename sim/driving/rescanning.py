@@ -1,0 +1,133 @@
+"""Take the scans of a logged drive again, and match them again: what its lidar saw, and where the robot believed it was.
+
+Scans follow from the true poses, the world and the record's seed; estimates that scans correct follow from them and from the
+odometry of the same seed. The map is made anew, and where the robot forgot it, it is forgotten at the same time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from antdrive.robots import RobotSpec
+from antdrive.sim.driving.exploring import PATIENCE
+from antdrive.sim.driving.survey import Senses, Survey
+from antdrive.sim.driving.watching import Watch
+from antdrive.sim.log.record import DriveRecord, ReplanRecord
+from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.log.scans import millimetres
+from antdrive.sim.log.streams import random_stream
+from antdrive.sim.sensing.scanner import Scanner
+from antdrive.worlds import Pose, Task, Trajectories, World
+
+
+def survey_of(
+    robot: RobotSpec,
+    task: Task,
+    world: World,
+    trajectories: Trajectories,
+    *,
+    seed: int,
+    noisy: bool,
+    matching: bool,
+    watching: bool,
+    hz: int,
+) -> Survey:
+    """The survey of a robot without a map, after the first look from the start.
+
+    Args:
+        robot: with a lidar
+        task: where the robot starts and is to go
+        world: all that stands and moves, also what the task's world lacks
+        trajectories: how the world's movers move
+        seed: the drive's seed
+        noisy: whether ranges have noise
+        matching: whether scans correct the estimated pose
+        watching: whether the robot looks for movers in the scans
+        hz: control periods per second
+    """
+    assert robot.lidar is not None
+    rng = random_stream(seed, "lidar") if noisy else None
+    senses = Senses(Scanner.of(robot.lidar, world), trajectories or None, rng, hz)
+    watch = Watch(robot.lidar, hz) if watching else None
+    survey = Survey(senses, robot, task.start, task.goal, matching=matching, watch=watch)
+    survey.look(0, task.start, task.start)
+    return survey
+
+
+class Rescanning:
+    """The survey of a logged drive, made again period by period.
+
+    Args:
+        rollout: the log of a robot without a map, with scans
+    """
+
+    def __init__(self, rollout: Rollout) -> None:
+        record = rollout.record
+        self._rollout = rollout
+        self._per_tick = record.physics_hz // record.control_hz
+        self._survey = survey_of(
+            record.robot,
+            record.task,
+            record.world,
+            rollout.trajectories(),
+            seed=record.seed,
+            noisy=record.noise > 0,
+            matching=record.localisation == "matching",
+            watching=record.perception is not None and record.perception.kind == "lidar",
+            hz=record.control_hz,
+        )
+        self._forgetting = set(forgetting_ticks(record))
+
+    def look(self, tick: int, pose: Pose, estimate: Pose) -> Pose:
+        """The estimated pose of a control period, corrected by the scan if one is due.
+
+        Args:
+            tick: the number of the control period
+            pose: the logged true pose
+            estimate: where odometry says that the robot is
+        """
+        return self._survey.look(tick, pose, estimate)
+
+    def plan(self, tick: int, pose: Pose) -> None:
+        """Forget the map where the robot did so before it planned.
+
+        Args:
+            tick: the number of the control period
+            pose: where the robot believed it would be when its next command takes effect
+        """
+        if tick in self._forgetting:
+            self._survey.forget(pose)
+
+    def problems(self) -> Iterator[str]:
+        """The first scan of the log that is not as the lidar takes it, in a sentence; none if all are."""
+        rows, logged = self._rollout.scan_rows, self._rollout.scans
+        taken = {scan.tick * self._per_tick: scan.ranges for scan in self._survey.scans}
+        last = max(taken)
+        for row in sorted({*taken, *(row for row in rows.tolist() if row <= last)}):
+            at = np.flatnonzero(rows == row)
+            if row in taken and len(at) == 1 and np.array_equal(millimetres(taken[row]), logged[at[0]]):
+                continue
+            yield (
+                f"replay: scans are not what the lidar measures from the logged poses, from t = {self._rollout.t[row]:.3f} s"
+            )
+            return
+
+
+def forgetting_ticks(record: DriveRecord) -> Iterator[int]:
+    """The control periods in which a robot without a map forgot what it had seen: after some plans in a row found no path.
+
+    Args:
+        record: of the log
+    """
+    failures = 0
+    for replan in record.replans:
+        if failures >= PATIENCE:
+            failures = 0
+            yield _tick(record, replan)
+        failures = 0 if replan.solved else failures + 1
+
+
+def _tick(record: DriveRecord, replan: ReplanRecord) -> int:
+    return round(replan.t * record.control_hz)

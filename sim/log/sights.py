@@ -1,0 +1,186 @@
+"""What the scans of a log say: which ground was seen, and when each obstacle first was, from the true poses.
+
+The log alone is read, and no map is made, so that none of this depends on where the robot believed to be.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.robots.footprint import shape_of
+from antdrive.robots.lidar import Lidar
+from antdrive.sim.log import _kernels_sights as kernels
+from antdrive.sim.log.record import finite_or_none
+from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.log.scans import ranges_of
+from antdrive.worlds.types import Floats
+
+PASSED = 0.5  # the robot passed what its surface came this near to [m]
+CELL = 0.1  # side of the cells in which seen ground is counted [m]
+MOST_CELLS = 4_000_000  # of those; in a larger world they are larger
+COUNTED_RATE = 10.0  # scans a second that seen ground is counted of [Hz]
+ROUNDING = 0.0015  # of a range in a log, and what is left over [m]
+
+
+class Beams(NamedTuple):
+    """A scan as it lay in the world.
+
+    Attributes:
+        eye: the lidar's true x, y [m] and yaw [rad] (3,)
+        first: the direction of the first beam, from the lidar's heading [rad]
+        reaches: how far each beam got (beams,) [m]: to what it met, or to the lidar's range
+    """
+
+    eye: Floats
+    first: float
+    reaches: Floats
+
+
+class Sighting(NamedTuple):
+    """A cylinder, when it was first seen, and when the robot was nearest to it.
+
+    Attributes:
+        obstacle: its place in `record.world.obstacles`
+        seen_at: when a beam first met it [s]; infinite if none did
+        seen_from: how far its surface was from the footprint then [m]; not a number if it was never seen
+        nearest_at: when the robot was nearest [s]
+        nearest: how far the surface was from the footprint then [m]
+        touched: whether the robot touched it
+    """
+
+    obstacle: int
+    seen_at: float
+    seen_from: float
+    nearest_at: float
+    nearest: float
+    touched: bool
+
+    @property
+    def passed(self) -> bool:
+        """Whether the robot touched the cylinder or came within 0.5 m of it."""
+        return self.touched or self.nearest <= PASSED
+
+    def as_dict(self) -> dict[str, Any]:
+        """The sighting as plain values, for JSON; what never was is null."""
+        return {
+            "obstacle": self.obstacle,
+            "seen_s": finite_or_none(self.seen_at),
+            "seen_from_m": finite_or_none(self.seen_from),
+            "nearest_s": self.nearest_at,
+            "nearest_m": self.nearest,
+            "touched": self.touched,
+        }
+
+
+def lidar_of(rollout: Rollout) -> Lidar:
+    """The lidar that took a log's scans.
+
+    Raises:
+        ValueError: the log has no scans.
+    """
+    lidar = rollout.record.robot.lidar
+    if lidar is None or not len(rollout.scans):
+        raise ValueError("the log has no scans")
+    return lidar
+
+
+def beams_of(rollout: Rollout, k: int) -> Beams:
+    """A scan of a log where it was taken.
+
+    Args:
+        rollout: a log with scans
+        k: the scan's number
+    """
+    lidar, ranges = lidar_of(rollout), ranges_of(rollout.scans[k])
+    reaches = np.where(np.isposinf(ranges), lidar.max_range, np.maximum(ranges, 0.0))
+    x, y, yaw = rollout.pose[rollout.scan_rows[k]].tolist()
+    return Beams(np.array(lidar.pose_on((x, y, yaw))), float(lidar.angles[0]) - lidar.yaw, reaches)
+
+
+def meet(rollout: Rollout, k: int, met: Floats) -> None:
+    """Note which cylinders a scan is the first to meet.
+
+    Args:
+        rollout: a log with scans
+        k: the scan's number
+        met: when each cylinder of `record.world.obstacles` was first met (N,) [s]; infinite where it was not yet
+    """
+    lidar, (eye, first, reaches) = lidar_of(rollout), beams_of(rollout, k)
+    slack, now = 4 * lidar.sigma + lidar.resolution / 2 + ROUNDING, float(rollout.t[rollout.scan_rows[k]])
+    discs = rollout.record.world.discs
+    kernels.first_meetings(eye, first, lidar.spacing, lidar.full_circle, reaches, discs, slack, now, met)
+
+
+def first_meetings(rollout: Rollout) -> Floats:
+    """When a beam first met each cylinder of `record.world.obstacles` (N,) [s]; infinite where none did.
+
+    Args:
+        rollout: a log with scans
+    """
+    met = np.full(len(rollout.record.world.obstacles), math.inf)
+    for k in range(len(rollout.scans)):
+        if np.isfinite(met).all():
+            break
+        meet(rollout, k, met)
+    return met
+
+
+def sightings(rollout: Rollout, met: Floats) -> list[Sighting]:
+    """First sight and nearest approach of every cylinder, those that the robot came nearest to first.
+
+    Args:
+        rollout: the log
+        met: when each was first seen (N,) [s]
+    """
+    discs, shape = rollout.record.world.discs, shape_of(rollout.record.robot.footprint)
+    touched = set(rollout.contacts[:, 1].astype(int).tolist())
+    row, away = np.zeros(len(discs), dtype=np.int64), np.empty(len(discs))
+    kernels.nearest_approaches(rollout.pose, *shape, discs, row, away)
+    found = []
+    for j, (k, nearest) in enumerate(zip(row.tolist(), away.tolist(), strict=True)):
+        first, seen_from = float(met[j]), math.nan
+        if math.isfinite(first):
+            then = int(np.searchsorted(rollout.t, first - 1e-9))
+            at = np.empty(1)
+            kernels.nearest_approaches(rollout.pose[then : then + 1], *shape, discs[j : j + 1], row[:1].copy(), at)
+            seen_from = float(at[0])
+        found.append(Sighting(j, first, seen_from, float(rollout.t[k]), nearest, j in touched))
+    return sorted(found, key=lambda sight: (not sight.touched, sight.nearest))
+
+
+def passed(rollout: Rollout) -> list[Sighting]:
+    """The cylinders that the robot touched or came within 0.5 m of, in the order in which it was nearest to them.
+
+    Args:
+        rollout: a log; one without scans has none
+    """
+    if not len(rollout.scans):
+        return []
+    return sorted(
+        (sight for sight in sightings(rollout, first_meetings(rollout)) if sight.passed),
+        key=lambda sight: (sight.nearest_at, sight.obstacle),
+    )
+
+
+def seen_ground(rollout: Rollout) -> tuple[npt.NDArray[np.bool_], float]:
+    """Which cells of the ground within the walls the lidar saw (rows, cols), from the lower left on, and their side [m].
+
+    A cell was seen if the beam that was nearest to its middle in direction got farther than the middle. Ten scans a second
+    count, and the last.
+
+    Args:
+        rollout: a log with scans
+    """
+    lidar = lidar_of(rollout)
+    x0, y0, x1, y1 = rollout.record.world.bounds
+    cell = max(CELL, math.sqrt((x1 - x0) * (y1 - y0) / MOST_CELLS))
+    seen = np.zeros((math.ceil((y1 - y0) / cell - 1e-9), math.ceil((x1 - x0) / cell - 1e-9)), dtype=np.bool_)
+    grid, last = np.array([x0, y0, cell]), len(rollout.scans) - 1
+    for k in {*range(0, last + 1, max(1, round(lidar.rate / COUNTED_RATE))), last}:
+        eye, first, reaches = beams_of(rollout, k)
+        kernels.mark_seen(eye, first, lidar.spacing, lidar.full_circle, reaches, grid, seen)
+    return seen, cell

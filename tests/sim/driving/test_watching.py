@@ -1,0 +1,147 @@
+"""Drives among movers that the robot finds with its lidar: told nothing of them, it avoids what no map explains."""
+
+import dataclasses
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from antdrive.planners import load_planner
+from antdrive.robots import RobotSpec
+from antdrive.sim import Outcome, Perception, Rollout, Run, Scenario, run
+from antdrive.sim.driving.watching import TrackedPredictor, Watch
+from antdrive.sim.falsify.rebuild import rebuilt
+from antdrive.sim.log.certificate import certify
+from antdrive.sim.log.record import PerceptionRecord
+from antdrive.sim.sensing import KnownGround, Scanner
+from antdrive.worlds import Disc, Keyframed, Task, World
+from antdrive.worlds.errors import FieldError
+
+# A closet of touching posts in the lower right corner, into which no beam gets.
+CLOSET = tuple(Disc(5.0 + 0.14 * k, 1.2, 0.075) for k in range(22)) + tuple(
+    Disc(5.0, 0.14 * k, 0.075) for k in range(9)
+)
+CROSSING = Keyframed(radius=0.3, keyframes=((0.0, 4.2, 3.5), (4.0, 4.2, 1.7)), loop="pingpong")
+HIDDEN = Keyframed(radius=0.2, keyframes=((0.0, 6.0, 0.6), (4.0, 7.2, 0.6)), loop="pingpong")
+HALL = World("hall", (0.0, 0.0, 8.0, 4.5), CLOSET, movers=(CROSSING,))
+TASK = Task(HALL, (0.8, 2.2, 0.0), (7.0, 2.2), goal_tolerance=0.25, cell=0.1)
+BOX = (Disc(2.3, 2.2, 0.15),)  # stands on the route, and is on no map
+LIDAR = Perception(kind="lidar")
+
+
+def scenario(robot: RobotSpec, task: Task = TASK, **settings: object) -> Scenario:
+    given = {"perception": LIDAR, "unseen": BOX, **settings}
+    return Scenario(task=task, planner=load_planner("astar"), planner_name="astar", robot=robot, **given)  # type: ignore[arg-type]
+
+
+@pytest.fixture(scope="module")
+def drive(jackal: RobotSpec) -> Run:
+    return run(scenario(jackal))
+
+
+@pytest.fixture(scope="module")
+def log(drive: Run) -> Rollout:
+    assert drive.rollout is not None
+    return drive.rollout
+
+
+def test_what_is_on_no_map_is_seen_and_avoided(drive: Run, log: Rollout, jackal: RobotSpec) -> None:
+    blind = run(scenario(jackal, avoidance=None, replanning=None))
+    assert blind.outcome is Outcome.COLLIDED
+    assert drive.succeeded, (drive.outcome, drive.reason, drive.certificate)
+    assert log.record.perception is not None
+    assert (log.record.perception.kind, drive.scenario.as_dict()["settings"]["perception"]) == (
+        "lidar",
+        {"kind": "lidar"},
+    )
+
+
+def test_the_log_tells_where_the_robot_believed_movers_to_be(log: Rollout, tmp_path: Path) -> None:
+    rows, x, y, vx, vy, radius = (log.tracks[:, k] for k in (0, 2, 3, 4, 5, 6))
+    there = log.movers[rows.astype(int), 0]
+    off = np.hypot(x - there[:, 0], y - there[:, 1])
+    on_box = np.hypot(x - BOX[0].x, y - BOX[0].y) < 0.1
+    assert (on_box | (off < 0.15)).all()  # nothing else is followed
+    mine = ~on_box & (rows > 0.5 * 240)
+    assert len(np.unique(log.tracks[mine, 1])) == 1  # one track all the time
+    assert np.median(off[mine]) < 0.02
+    assert np.abs(radius[mine] - 0.3).max() < 0.05
+    assert np.median(np.hypot(vx[mine], np.abs(vy[mine]) - 0.45)) < 0.05
+    assert np.hypot(vx[on_box], vy[on_box])[20:].max() < 0.08
+    again = Rollout.load(log.save(tmp_path / "rollout.npz"))
+    assert again.digest == log.digest
+    assert np.array_equal(again.tracks, log.tracks)
+    broken = dataclasses.replace(log, tracks=log.tracks[::-1].copy())
+    assert any("tracks" in problem for problem in broken.problems())
+    assert certify(log).certified
+    told = dataclasses.replace(log.record, perception=PerceptionRecord(kind="velocities", range_m=None))
+    flat = log.tracks * np.array([1, 1, 1, 1, 1, 1, 0], dtype=np.float32)
+    for forged in (dataclasses.replace(log, record=told), dataclasses.replace(log, tracks=flat)):
+        assert any("tracks" in problem for problem in certify(forged).problems)
+
+
+def test_a_mover_that_no_beam_meets_changes_nothing(jackal: RobotSpec, log: Rollout) -> None:
+    hidden = dataclasses.replace(TASK, world=dataclasses.replace(HALL, movers=(CROSSING, HIDDEN)))
+    other = run(scenario(jackal, hidden)).rollout
+    assert other is not None
+    assert other.movers.shape[1] == 2
+    for name in ("pose", "twist", "command", "limiter", "tracks"):
+        assert np.array_equal(getattr(other, name), getattr(log, name)), name
+    seen = dataclasses.replace(HIDDEN, keyframes=tuple((t, x, y + 1.2) for t, x, y in HIDDEN.keyframes))
+    outside = dataclasses.replace(TASK, world=dataclasses.replace(HALL, movers=(CROSSING, seen)))
+    differs = run(scenario(jackal, outside, time_limit=0.5)).rollout
+    assert differs is not None
+    assert not np.array_equal(differs.tracks, log.tracks[log.tracks[:, 0] < len(differs.t)])
+
+
+def test_a_robot_without_a_map_follows_movers_too(jackal: RobotSpec) -> None:
+    short = dataclasses.replace(TASK, start=(2.6, 2.2, 0.0), goal=(5.6, 2.2))
+    done = run(scenario(jackal, short, map="none", localisation="matching", noise=1.0, unseen=()))
+    assert done.rollout is not None
+    assert done.succeeded, (done.outcome, done.reason, done.certificate)
+    tracks = done.rollout.tracks
+    there = done.rollout.movers[tracks[:, 0].astype(int), 0]
+    off = np.hypot(*(tracks[:, 2:4] - there).T)
+    assert np.median(off) < 0.1
+    assert rebuilt(done.rollout.record).perception == LIDAR
+
+
+def test_an_empty_world_is_watched_as_well(turtlebot: RobotSpec) -> None:
+    empty = Task(World("empty", (0.0, 0.0, 4.0, 3.0)), (0.8, 1.5, 0.0), (3.2, 1.5), cell=0.1)
+    done = run(scenario(turtlebot, empty, unseen=()))
+    assert done.succeeded
+    assert done.rollout is not None
+    assert not len(done.rollout.tracks)
+    assert done.rollout.record.perception is not None
+    assert done.rollout.record.replans == ()
+
+
+def test_movers_are_predicted_at_the_velocity_that_was_estimated(jackal: RobotSpec) -> None:
+    assert jackal.lidar is not None
+    watch, hall = Watch(jackal.lidar, 60), World("hall", (-5.0, -5.0, 5.0, 5.0))
+    scanner = Scanner(jackal.lidar, np.empty((0, 3)), bounds=hall.bounds)
+    ground = KnownGround(jackal.lidar, hall)
+    for tick in range(31):
+        places = np.array([[3.0 - tick / 60, 1.0], [2.0, -2.0]])
+        watch.read(ground, (0.0, 0.0, 0.0), scanner.scan((0.0, 0.0, 0.0), places, np.array([0.3, 0.2])), tick)
+    predictor = TrackedPredictor(watch, LIDAR, 60)
+    places, radii = predictor.predict(36, (0.0, 0.0), np.array([0.0, 1.0]))
+    numbers, everywhere = predictor.perceived(36, (0.0, 0.0))
+    first = int(np.argmin(places[0, :, 1] < 0))
+    assert np.allclose(places[:, first], [[2.4, 1.0], [1.4, 1.0]], atol=0.05)
+    assert np.array_equal(places[0, 1 - first], places[1, 1 - first])  # it stands
+    assert radii[first] == pytest.approx(0.3, abs=0.03)
+    assert np.array_equal(everywhere[numbers], places[0])
+    assert predictor.radius_of(int(numbers[first])) == radii[first]
+    near = TrackedPredictor(watch, Perception(kind="lidar", range=2.3), 60)
+    assert near.within_range(36, (0.0, 0.0)).tolist() == [numbers[first]]
+    assert math.hypot(2.0, 2.0) - 0.2 > 2.3
+
+
+def test_a_lidar_is_needed_and_a_pose_that_fits_the_map(jackal: RobotSpec) -> None:
+    with pytest.raises(FieldError, match="no lidar") as caught:
+        scenario(dataclasses.replace(jackal, lidar=None))
+    assert caught.value.key == "sees"
+    with pytest.raises(FieldError, match="localise by fixes or true"):
+        scenario(jackal, localisation="odometry")
