@@ -1,8 +1,9 @@
 # make demo   plan, drive, certify and film one world
 # make test   the whole test suite (make test-slow: the long ones too)
+# make docs   the site, with everything that its pages show: docs/_build/html/index.html
 # Everything else that these need they set up themselves, in .venv.
 .DELETE_ON_ERROR:
-.PHONY: demo test test-slow lint format bench mutants warm clean help
+.PHONY: demo test test-slow docs lint format bench mutants warm clean help
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -10,7 +11,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 DEMO := out/demo
 
 help:
-	@sed -n '1,3s/^# //p' Makefile
+	@sed -n '1,4s/^# //p' Makefile
 
 # The core, then the compiled kernels' cache, so that the first plan is quick.
 $(VENV)/.core: pyproject.toml tools/find-python
@@ -29,6 +30,11 @@ $(VENV)/.dev: $(VENV)/.core
 	@$(PIP) install --editable '.[dev]'
 	@touch $@
 
+$(VENV)/.docs: $(VENV)/.core
+	@echo "Installing what the site needs"
+	@$(PIP) install --editable '.[docs]'
+	@touch $@
+
 warm: $(VENV)/.warm
 
 demo: $(VENV)/.warm
@@ -42,6 +48,21 @@ test: $(VENV)/.dev $(VENV)/.warm
 
 test-slow: $(VENV)/.dev $(VENV)/.warm
 	@$(BIN)/python -m pytest --numprocesses 2 --dist loadgroup -m ''
+
+# The code of the tutorials and of the gallery runs again when the packages change.
+SOURCES := $(wildcard */*.py */*/*.py */*/*/*.py */*/*/*/*.py)
+
+docs/_build/.tutorials: $(VENV)/.docs $(VENV)/.warm $(SOURCES) $(wildcard docs/tutorials/*.md)
+	@$(BIN)/python -m tools.pages docs/tutorials/*.md
+	@mkdir -p docs/_build && touch $@
+
+docs/_build/.gallery: $(VENV)/.docs $(VENV)/.warm $(SOURCES)
+	@rm -rf docs/_gallery
+	@mkdir -p docs/_build && touch $@
+
+docs: docs/_build/.tutorials docs/_build/.gallery
+	@$(BIN)/python -m sphinx --builder html --fail-on-warning --keep-going --nitpicky --quiet -d docs/_build/doctrees docs docs/_build/html
+	@$(BIN)/python -m tools.site docs/_build/html
 
 lint: $(VENV)/.dev
 	@$(BIN)/ruff check .
@@ -61,5 +82,5 @@ mutants: $(VENV)/.dev $(VENV)/.warm
 	@$(BIN)/python -m tools.mutants
 
 clean:
-	rm -rf $(VENV) .python out .pytest_cache .mypy_cache .ruff_cache
+	rm -rf $(VENV) .python out docs/_build docs/_gallery .pytest_cache .mypy_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

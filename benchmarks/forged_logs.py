@@ -85,7 +85,7 @@ class Log:
         return self
 
     def write(self, path: Path) -> None:
-        """Write the log with a digest that fits it, as docs/rollout-format.md describes it."""
+        """Write the log with a digest that fits it, as docs/reference/rollout-format.md describes it."""
         try:
             text = DriveRecord.from_json(json.dumps(self.record)).to_json(without=("digest", "times"))
         except (FieldError, InputError, ValueError):

@@ -8,7 +8,7 @@ makes sense for. The checks are those of `antdrive verify`, from the cheapest on
 - verify: the log contradicts itself (certificate and consistency)
 - files: the log is about another world or robot than the trusted files (`--world`, `--robot`)
 - replay: physics, given the logged commands, leads elsewhere (`--replay`)
-- none: nothing finds it; docs/certificate.md says so
+- none: nothing finds it; docs/explanation/certificate.md says so
 """
 
 from __future__ import annotations

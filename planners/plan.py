@@ -22,8 +22,10 @@ from antdrive.worlds.errors import FieldError, input_error
 if TYPE_CHECKING:  # importing a grid loads the compiler, which naming a planner should not
     from antdrive.worlds import Grid
 
-Cell: TypeAlias = tuple[int, int]  # (row, col)
-Cells: TypeAlias = npt.NDArray[np.int32]  # (N, 2)
+#: A cell of a grid: row along +y, column along +x.
+Cell: TypeAlias = tuple[int, int]
+#: Cells of a grid, (N, 2): row and column of each.
+Cells: TypeAlias = npt.NDArray[np.int32]
 
 
 class PlanStatus(enum.Enum):

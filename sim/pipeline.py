@@ -130,7 +130,7 @@ class Run:
         return self.rollout
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values, for JSON; `docs/rollout-format.md` lists the keys."""
+        """Plain values, for JSON; `docs/reference/rollout-format.md` lists the keys."""
         log = self.rollout
         options = settings_of(self.plan.options) if log is None else log.record.planner.settings
         return {

@@ -272,7 +272,7 @@ class Scenario:
         return calibration
 
     def as_dict(self) -> dict[str, Any]:
-        """The settings as plain values, for JSON; `docs/rollout-format.md` lists the keys.
+        """The settings as plain values, for JSON; `docs/reference/rollout-format.md` lists the keys.
 
         `settings` holds the values of controller, perception, avoidance and replanning that differ from their defaults, null
         where there is none, and the unseen obstacles.

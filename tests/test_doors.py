@@ -19,7 +19,7 @@ from antdrive.worlds import IMPORTS
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text()
 CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text()
-ROLLOUT_FORMAT = (ROOT / "docs" / "rollout-format.md").read_text()
+ROLLOUT_FORMAT = (ROOT / "docs" / "reference" / "rollout-format.md").read_text()
 
 
 @pytest.mark.parametrize("name", list_robots())
@@ -27,7 +27,7 @@ def test_a_robot_of_the_catalogue_has_a_source_and_noise_and_drives(name: str) -
     robot = load_robot(name)
     assert robot.source, "the file says after which specification it is made"
     assert robot.noise.nonzero, "the file documents the robot's noise"
-    assert f"| `{name}` |" in (ROOT / "docs" / "robots.md").read_text()
+    assert f"| `{name}` |" in (ROOT / "docs" / "reference" / "robots.md").read_text()
     assert run(Scenario.of("empty", "astar", robot)).succeeded
 
 

@@ -85,14 +85,39 @@ def test_make_knows_the_two_commands(target: str) -> None:
     assert done.returncode == 0, done.stderr
 
 
-PAGES = ["README.md", "CONTRIBUTING.md", *(str(p.relative_to(ROOT)) for p in sorted((ROOT / "docs").rglob("*.md")))]
+PAGES = [
+    "README.md",
+    "CONTRIBUTING.md",
+    *(
+        str(p.relative_to(ROOT))
+        for p in sorted((ROOT / "docs").rglob("*.md"))
+        if not {"_build", "_gallery"} & set(p.parts)
+    ),
+]
+
+
+PLACES: dict[Path, set[str]] = {}
+
+
+def places(page: Path) -> set[str]:
+    """The anchors that GitHub, and the site, give to a page's headings."""
+    if page not in PLACES:
+        prose = re.sub(r"^```.*?^```", "", page.read_text(), flags=re.DOTALL | re.MULTILINE)
+        heads = re.findall(r"^#+ (.+)$", prose, flags=re.MULTILINE)
+        PLACES[page] = {re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in heads}
+    return PLACES[page]
 
 
 @pytest.mark.parametrize("page", PAGES)
 def test_links_and_pictures_exist(page: str) -> None:
     targets = [
-        t for t in re.findall(r"\]\(([^)#\s]+)[^)]*\)", (ROOT / page).read_text()) if not t.startswith(("http", "#"))
+        t
+        for t in re.findall(r"\]\(([^)\s]+)[^)]*\)", (ROOT / page).read_text())
+        if not t.startswith(("http", "../_gallery"))
     ]
     assert targets or page != "README.md"
     for target in targets:
-        assert ((ROOT / page).parent / target).exists(), target
+        file, _, place = target.partition("#")
+        found = ((ROOT / page).parent / file) if file else ROOT / page
+        assert found.exists(), target
+        assert not place or place in places(found), target

@@ -72,7 +72,8 @@ def test_a_class_name_has_one_meaning() -> None:
 
 def public() -> list[tuple[str, Any]]:
     found = {}
-    for package in ("antdrive", *(f"antdrive.{name}" for name in PACKAGES)):
+    rooms = ("testing", "sim.campaigns", "sim.regression", "sim.sensing")
+    for package in ("antdrive", *(f"antdrive.{name}" for name in (*PACKAGES, *rooms))):
         module = importlib.import_module(package)
         found |= {f"{package}.{name}": getattr(module, name) for name in module.__all__}
     return [(name, thing) for name, thing in found.items() if inspect.isclass(thing) or inspect.isfunction(thing)]

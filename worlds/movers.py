@@ -150,6 +150,7 @@ class Wandering(_Body):
             raise FieldError("walk.seed", f"must be a whole number of at least 0, got {self.seed}")
 
 
+#: A cylinder that moves, in one of three ways.
 Mover: TypeAlias = Keyframed | Cruising | Wandering
 
 #: The keys of each kind of mover in a file; the first of them says which kind it is.

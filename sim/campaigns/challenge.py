@@ -1,4 +1,4 @@
-"""The BARN challenge's table: its worlds, its score, and what others have published (docs/unknown-worlds.md)."""
+"""The BARN challenge's table: its worlds, its score, and what others have published (docs/explanation/unknown-worlds.md)."""
 
 from __future__ import annotations
 

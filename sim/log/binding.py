@@ -35,7 +35,7 @@ LABELS = ("name", "source")
 def hashes_of(record: DriveRecord) -> dict[str, str]:
     """The SHA-256 of the world with start and goal, of the robot, and of the settings that a record holds.
 
-    Each is that of JSON with sorted keys and Python's default separators; `docs/certificate.md` describes them.
+    Each is that of JSON with sorted keys and Python's default separators; `docs/explanation/certificate.md` describes them.
     """
     values = record.as_dict()
     parts = {

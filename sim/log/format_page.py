@@ -1,4 +1,4 @@
-"""The tables of `docs/rollout-format.md`, generated from the code: `python -m antdrive.sim.log.format_page PAGE.md`.
+"""The tables of `docs/reference/rollout-format.md`, generated from the code: `python -m antdrive.sim.log.format_page PAGE.md`.
 
 A test checks that the page agrees with the code.
 """

@@ -1,7 +1,7 @@
 """The record of a drive: everything a log holds beside its arrays, key by key.
 
 The record is stored as JSON. It is validated in one place, `DriveRecord.from_json`, so that no reader meets a missing
-key or an impossible value. `docs/rollout-format.md` describes every key.
+key or an impossible value. `docs/reference/rollout-format.md` describes every key.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The log of one drive: everything that metrics, certificates, figures and films read.
 
 The file is a `.npz` archive that numpy reads without pickles: one member for each array, and the member `record`, a JSON
-text. `docs/rollout-format.md` describes the format.
+text. `docs/reference/rollout-format.md` describes the format.
 """
 
 from __future__ import annotations

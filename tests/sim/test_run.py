@@ -544,7 +544,11 @@ def test_a_result_tells_every_setting_and_the_page_documents_every_key(
         "controller": {"lookahead_time": 0.7}, "avoidance": None, "unseen": [[3.9, 2.9, 0.05]],
     }  # fmt: skip
     assert small_scenario.as_dict()["settings"] == {}
-    page = (Path(__file__).parents[2] / "docs" / "rollout-format.md").read_text().partition("## result.json")[2]
+    page = (
+        (Path(__file__).parents[2] / "docs" / "reference" / "rollout-format.md")
+        .read_text()
+        .partition("## result.json")[2]
+    )
     documented = set(
         re.findall(r"`(\w+)`", " ".join(row.split("|")[1] for row in page.splitlines() if row.startswith("| `")))
     )

@@ -1,4 +1,4 @@
-"""What docs/campaigns.md shows is right: the file, the columns, the line that reads the table."""
+"""What docs/how-to/campaigns.md shows is right: the file, the columns, the line that reads the table."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from antdrive.sim.campaigns.rows import GRID, RESULT
 from antdrive.sim.log.metrics import METRICS
 from antdrive.worlds.files.document import parse_document
 
-TEXT = (Path(__file__).parent.parent.parent.parent / "docs" / "campaigns.md").read_text()
+TEXT = (Path(__file__).parent.parent.parent.parent / "docs" / "how-to" / "campaigns.md").read_text()
 
 
 def test_the_file_that_the_page_shows_has_every_key_and_is_right() -> None:
     (block,) = re.findall(r"```yaml\n(.*?)```", TEXT, flags=re.DOTALL)
-    data = parse_document(block, "docs/campaigns.md").data
+    data = parse_document(block, "docs/how-to/campaigns.md").data
     assert make_campaign(data).entry.rollouts == "failed"
     assert set(data) == {info.alias or name for name, info in CampaignFile.model_fields.items()}
 

@@ -10,7 +10,7 @@ from antdrive.sim.log.record import DriveRecord, MarginRecord, SensingRecord, re
 from antdrive.sim.log.rollout import ARRAYS, SENSED
 from tests.sim.records import made_up_record
 
-PAGE = Path(__file__).parents[3] / "docs" / "rollout-format.md"
+PAGE = Path(__file__).parents[3] / "docs" / "reference" / "rollout-format.md"
 
 
 def test_the_pages_tables_are_those_of_the_code() -> None:

@@ -13,7 +13,7 @@ from antdrive import METRICS
 from antdrive.sim.regression.suite import ScenarioEntry, load_suite, suite_schema
 
 ROOT = Path(__file__).parents[3]
-PAGE = (ROOT / "docs" / "regression-tests.md").read_text()
+PAGE = (ROOT / "docs" / "how-to" / "regression-tests.md").read_text()
 
 
 def block(language: str) -> str:

@@ -195,7 +195,7 @@ def test_no_figure_function_is_left_out(made_up_drive):
 
 
 def test_the_example_of_the_page_runs(tmp_path):
-    page = Path(__file__).parents[4] / "docs" / "figures.md"
+    page = Path(__file__).parents[4] / "docs" / "how-to" / "figures.md"
     (code,) = re.findall(r"```python\n(.*?)```", page.read_text(), flags=re.DOTALL)
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

@@ -1,0 +1,59 @@
+"""The site's reference is whole: packages that offer names have pages, and what a page describes has a description."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+STUBS = [
+    *sorted(ROOT.glob("[!.]*/__init__.pyi")),
+    *sorted(ROOT.glob("*/*/__init__.pyi")),
+    ROOT / "antdrive" / "testing.pyi",
+]
+NAMES = re.compile(r"^from (\.[\w.]*) import (\w+)", re.MULTILINE)
+
+
+def package_of(stub: Path) -> str:
+    parts = stub.relative_to(ROOT).with_suffix("").parts
+    within = parts[1:] if parts[0] == "antdrive" else parts
+    return ".".join(["antdrive", *(part for part in within if part != "__init__")])
+
+
+PACKAGES = {package_of(stub): stub for stub in STUBS if "docs" not in stub.parts and "out" not in stub.parts}
+
+
+def test_every_package_that_offers_names_has_a_page_in_the_api() -> None:
+    pages = {path.stem: path.read_text() for path in (DOCS / "reference" / "api").glob("*.md")}
+    shown = {found for text in pages.values() for found in re.findall(r"^\.\. offered:: (\S+)$", text, re.MULTILINE)}
+    assert len(PACKAGES) >= 9
+    assert shown == set(PACKAGES)
+    listed = re.search(r"```\{toctree\}.*?```", pages.pop("index"), re.DOTALL)
+    assert listed
+    assert set(pages) <= set(listed[0].split())
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_every_constant_that_a_package_offers_has_a_comment(package: str) -> None:
+    stub = PACKAGES[package]
+    base = package if stub.stem == "__init__" else package.rpartition(".")[0]
+    module = importlib.import_module(package)
+    for where, name in NAMES.findall(stub.read_text()):
+        thing = getattr(module, name)
+        if not (inspect.isclass(thing) or inspect.isroutine(thing) or inspect.ismodule(thing)):
+            source = Path(str(importlib.import_module(f"{base}{where}").__file__)).read_text()
+            assert re.search(rf"^#: .+\n{name}\b", source, re.MULTILINE), (
+                f"{name} of {where} has no line `#: ...` above it"
+            )
+
+
+def test_the_tutorials_pages_are_listed() -> None:
+    text = (DOCS / "tutorials" / "index.md").read_text()
+    assert {path.stem for path in (DOCS / "tutorials").glob("*.md")} - {"index"} == set(
+        text.partition("```{toctree}")[2].split()
+    ) - {":maxdepth:", "1", "```"}

@@ -1,0 +1,95 @@
+"""The runner of pages: what runs, what is compared, and what it takes for wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tools.pages import agrees, blocks_of, run_page
+
+FENCE = "```"
+
+
+def page(tmp_path: Path, text: str) -> Path:
+    path = tmp_path / "page.md"
+    path.write_text(text.replace("'''", FENCE))
+    return path
+
+
+RIGHT = """
+'''python
+a = 1 + 1
+print(a)
+'''
+
+'''text
+2
+'''
+
+<!-- file: folder/note.yaml -->
+'''yaml
+schema: 1
+'''
+
+'''console
+$ cat folder/note.yaml
+schema: 1
+$ antdrive worlds show nowhere.yaml --no-such-option || echo "never said"
+'''
+
+<!-- not run: needs a cluster -->
+'''sh
+sbatch job.sh
+'''
+
+'''python
+assert a == 2
+'''
+"""
+
+
+def test_a_page_runs_from_top_to_bottom_and_wrong_input_is_no_failed_drive(tmp_path: Path) -> None:
+    problems = run_page(page(tmp_path, RIGHT)).problems
+    assert len(problems) == 1, "only the command that ends with 2 instead of 1"
+    assert "nowhere.yaml" in problems[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("'''python\nprint(1)\n'''\n\n'''text\n2\n'''\n", "printed was\n1"),
+        ("'''python\n1 / 0\n'''\n", "page.md:2: ZeroDivisionError"),
+        ("'''console\n$ ls\nsomething\n'''\n", "shows\nsomething"),
+        ("'''sh\ncurl example.org\n'''\n", "curl: not a command that pages may use"),
+        ("'''sh\nantdrive schema nonsense\n'''\n", "unknown kind"),
+    ],
+)
+def test_what_is_wrong_is_told_with_its_line(tmp_path: Path, text: str, says: str) -> None:
+    (problem,) = run_page(page(tmp_path, text)).problems
+    assert says in problem
+
+
+def test_update_writes_what_was_printed_and_the_page_is_right_then(tmp_path: Path) -> None:
+    path = page(tmp_path, "'''python\nprint(1)\nprint(2)\n'''\n\n'''text\nold\n'''\n\nprose\n\n'''console\n$ ls\n'''\n")
+    run_page(path).update()
+    assert "```text\n1\n2\n```\n\nprose" in path.read_text()
+    assert run_page(path).problems == []
+
+
+def test_a_text_that_does_not_follow_is_no_output(tmp_path: Path) -> None:
+    assert run_page(page(tmp_path, "'''python\nprint(1)\n'''\n\nA tree:\n\n'''text\nworlds/\n'''\n")).problems == []
+
+
+def test_three_dots_stand_for_anything_and_nothing_else_does() -> None:
+    assert agrees("took ... s\nend\n", "took 1.25 s\nend\n")
+    assert not agrees("took ... s\n", "took 1.25 m\n")
+    assert not agrees("a.c\n", "abc\n")
+
+
+def test_longer_fences_and_directives_are_read_as_they_are() -> None:
+    text = "````{note}\n```python\nno\n```\n````\n\n:::{tip}\n```python\nyes\n```\n:::\n"
+    assert [(block.language, block.text) for block in blocks_of(text)] == [
+        ("{note}", "```python\nno\n```\n"),
+        ("python", "yes\n"),
+    ]
