@@ -132,7 +132,7 @@ class Exploration:
         best: tuple[Grid, PlanResult] | None = None
         for growth in GROWTH:
             for share in MARGINS:
-                grid, answer = found = self._planned(pose, self._bounds(growth), share * self._margin)
+                grid, answer = found = self._planned(pose, self._bounds(growth, pose), share * self._margin)
                 if answer.status is PlanStatus.INVALID:
                     return found
                 if best is None or answer.cost < best[1].cost / DETOUR:
@@ -164,9 +164,16 @@ class Exploration:
         self._watch(route, near.world, grid.inflate)
         return route, tracked
 
-    def _bounds(self, growth: float) -> Bounds:
-        (x0, y0), (x1, y1) = self._task.start[:2], self._task.goal
-        return min(x0, x1) - growth, min(y0, y1) - growth, max(x0, x1) + growth, max(y0, y1) + growth
+    def _bounds(self, growth: float, pose: Pose) -> Bounds:
+        """Around start and goal, and around the robot where drift took its estimated pose out of there."""
+        (x0, y0), (x1, y1), (x, y) = self._task.start[:2], self._task.goal, pose[:2]
+        low, high = (min(x0, x1) - growth, min(y0, y1) - growth), (max(x0, x1) + growth, max(y0, y1) + growth)
+        return (
+            low[0] if x > low[0] else x - growth,
+            low[1] if y > low[1] else y - growth,
+            high[0] if x < high[0] else x + growth,
+            high[1] if y < high[1] else y + growth,
+        )
 
     def _known(self, pose: Pose, bounds: Bounds) -> Task:
         """The task as it is known, from a pose."""
@@ -357,7 +364,9 @@ class Exploration:
             return None
         discs = np.empty((0, 3))
         route = Route(np.array(points))
-        return dataclasses.replace(self._prepare(route, _world(self._bounds(GROWTH[1]), discs), 0.0), backwards=True)
+        return dataclasses.replace(
+            self._prepare(route, _world(self._bounds(GROWTH[1], pose), discs), 0.0), backwards=True
+        )
 
 
 def _world(bounds: Bounds, discs: Floats) -> World:

@@ -18,7 +18,7 @@ from antdrive.sim.driving.survey import Senses, Survey
 from antdrive.sim.falsify.rebuild import rebuilt
 from antdrive.sim.log.record import ReplanRecord
 from antdrive.sim.sensing import Scanner
-from antdrive.sim.unknown import told
+from antdrive.sim.unknown import exploration_of, told
 from antdrive.worlds import Disc, Task, World, generate, load_task
 from antdrive.worlds.errors import FieldError
 
@@ -227,6 +227,15 @@ def test_the_robot_can_stop_on_ground_that_it_has_seen(jackal: RobotSpec) -> Non
     stop, slowed = caution.limit(near, Twist(1.0, 0.0), Twist(1.0, 0.0))
     assert slowed
     assert stop.speed == pytest.approx(1.0 - jackal.max_acceleration / 60)  # brakes as hard as it can
+
+
+@pytest.mark.parametrize("place", [(-9.0, 0.8), (0.8, 9.0), (12.0, -8.0)])
+def test_routes_begin_where_the_robot_believes_it_is_however_far_it_drifted(
+    jackal: RobotSpec, place: tuple[float, float]
+) -> None:
+    grid, plan = exploration_of(scenario(jackal)).plan((*place, 0.0))
+    assert plan.solved
+    assert math.dist(grid.xy(plan.line)[0], place) <= grid.cell
 
 
 def test_the_robot_is_told_no_obstacle_and_no_wall() -> None:
