@@ -117,6 +117,10 @@ def _checked(given: Mapping[str, float]) -> dict[str, float]:
     for key in given:
         if key not in keys:
             raise InputError(f"--set {key}: no such number in a robot file; choose from {', '.join(keys)}")
+    for key in ("mass", "wheel_radius", "track"):  # limits are computed from these before the file is checked
+        value = given.get(key, 1.0)
+        if not 0 < value < math.inf:
+            raise InputError(f"{key}: must be a number greater than 0, got {value:g}")
     return dict(given)
 
 
@@ -277,7 +281,7 @@ def _text(model: UrdfModel, path: Path, outline: Footprint, what: str, values: l
         elif len(text) > 40:
             lines += [f"# {comment}", text]
         else:
-            lines.append(f"{text:32}# {comment}")
+            lines.append(f"{text:30}  # {comment}")
     if model.left_out:
         left = "; ".join("".join(c if c.isprintable() else "?" for c in mesh) for mesh in model.left_out)
         lines.append(f"# left out, because they were not found: {left}")

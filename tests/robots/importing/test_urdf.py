@@ -194,6 +194,22 @@ def test_a_robot_without_collision_geometry_has_no_footprint(tmp_path: Path) -> 
         imported("burger.urdf", below=0.005)
 
 
+@pytest.mark.parametrize("key", ["mass", "wheel_radius", "track"])
+@pytest.mark.parametrize("value", [0.0, -1.0, math.inf, math.nan])
+def test_given_values_that_no_robot_has_are_refused(key: str, value: float) -> None:
+    with pytest.raises(InputError, match=f"{key}: must be a number greater than 0"):
+        imported("burger.urdf", given={key: value})
+
+
+@pytest.mark.parametrize(
+    ("key", "value"), [("max_lateral_acceleration", 0.785398), ("max_yaw_acceleration", 3.14159265)]
+)
+def test_long_numbers_stand_apart_from_their_comments(key: str, value: float) -> None:
+    found = imported("burger.urdf", given={key: value})
+    assert yaml.safe_load(found.text)[key] == pytest.approx(value)
+    assert getattr(found.robot, key) == pytest.approx(value)
+
+
 def test_wheels_can_be_told_by_joint_or_link() -> None:
     there = imported("burger.urdf").robot
     assert imported("burger.urdf", left="wheel_left_link", right="wheel_right_joint").robot == there
