@@ -59,7 +59,8 @@ def test_the_python_block_passes_mypy_strict(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "mypy", "--config-file", str(settings), *files]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     (found, summary) = done.stdout.splitlines()
-    assert found.startswith(f"{files[1]}:1: error: Function is missing a type annotation"), done.stdout + done.stderr
+    # An equal file of an earlier run may be named, because mypy's cache goes by content.
+    assert "/untyped.py:1: error: Function is missing a type annotation" in found, done.stdout + done.stderr
     assert summary.startswith("Found 1 error in 1 file (checked 2 ")
 
 
