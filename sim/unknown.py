@@ -14,7 +14,6 @@ from antdrive.sim.driving.survey import Senses
 from antdrive.sim.driving.watching import TrackedPredictor, Watch
 from antdrive.sim.scenario import Scenario
 from antdrive.sim.sensing.ground import KnownGround
-from antdrive.sim.sensing.scanner import Scanner
 from antdrive.worlds import Task, World
 
 
@@ -46,13 +45,6 @@ def exploration_of(s: Scenario) -> Exploration:
     )
 
 
-def senses_of(s: Scenario) -> Senses:
-    """The robot's lidar in the true world."""
-    assert s.robot.lidar is not None
-    scanner = Scanner.of(s.robot.lidar, s.driven_world)
-    return Senses(scanner, s.trajectories or None, s.rng("lidar") if s.noise else None, s.control_hz)
-
-
 def lookout_of(s: Scenario) -> Lookout | None:
     """What looks for movers, and for obstacles that are not on the map, where the robot is given a map; None: nothing does."""
     lidar = s.robot.lidar
@@ -61,7 +53,8 @@ def lookout_of(s: Scenario) -> Lookout | None:
     noise = s.robot.noise.scaled(s.noise)
     errors = (noise.pose_xy, noise.pose_yaw) if s.localisation == "fixes" else (0.0, 0.0)
     ground = KnownGround(lidar, s.task.world, math.inf, *errors)
-    return Lookout(senses_of(s), ground, Watch(lidar, s.control_hz, *errors))
+    senses = Senses.of(lidar, s.driven_world, s.trajectories, seed=s.seed, noisy=s.noise > 0, hz=s.control_hz)
+    return Lookout(senses, ground, Watch(lidar, s.control_hz, *errors))
 
 
 def predictor_of(s: Scenario, watch: Watch | None) -> Predictor | None:

@@ -17,8 +17,6 @@ from antdrive.sim.driving.watching import Watch
 from antdrive.sim.log.record import DriveRecord, ReplanRecord
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.scans import millimetres
-from antdrive.sim.log.streams import random_stream
-from antdrive.sim.sensing.scanner import Scanner
 from antdrive.worlds import Pose, Task, Trajectories, World
 
 
@@ -48,8 +46,7 @@ def survey_of(
         hz: control periods per second
     """
     assert robot.lidar is not None
-    rng = random_stream(seed, "lidar") if noisy else None
-    senses = Senses(Scanner.of(robot.lidar, world), trajectories or None, rng, hz)
+    senses = Senses.of(robot.lidar, world, trajectories, seed=seed, noisy=noisy, hz=hz)
     watch = Watch(robot.lidar, hz) if watching else None
     survey = Survey(senses, robot, task.start, task.goal, matching=matching, watch=watch)
     survey.look(0, task.start, task.start)

@@ -11,13 +11,15 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.robots import RobotSpec
+from antdrive.robots.lidar import Lidar
 from antdrive.sim.driving import _kernels_hits
 from antdrive.sim.driving.watching import Watch
+from antdrive.sim.log.streams import random_stream
 from antdrive.sim.sensing.mapping import OccupancyMap
 from antdrive.sim.sensing.matching import FAR, ScanMatcher, sliding_left_out
 from antdrive.sim.sensing.scanner import Scanner
 from antdrive.sim.sensing.sight import clear_distance, clear_turn
-from antdrive.worlds import Bounds, Floats, Point, Pose, Trajectories
+from antdrive.worlds import Bounds, Floats, Point, Pose, Trajectories, World
 
 MAP_CELL = 0.05  # side of the map's cells [m]
 RECENT = 1.0  # scans of this time are kept where the map is made anew [s]
@@ -57,6 +59,20 @@ class Senses:
     trajectories: Trajectories | None
     rng: np.random.Generator | None
     hz: int
+
+    @classmethod
+    def of(cls, lidar: Lidar, world: World, trajectories: Trajectories, *, seed: int, noisy: bool, hz: int) -> Senses:
+        """A lidar in a world, whose noise is drawn from a drive's seed.
+
+        Args:
+            lidar: the robot's lidar
+            world: all that stands and moves
+            trajectories: how the world's movers move
+            seed: the drive's seed
+            noisy: whether ranges have noise
+            hz: control periods per second
+        """
+        return cls(Scanner.of(lidar, world), trajectories or None, random_stream(seed, "lidar") if noisy else None, hz)
 
     def due(self, tick: int, last: int) -> bool:
         """Whether a scan is due in a control period, after one in an earlier period; a negative one: after none.
