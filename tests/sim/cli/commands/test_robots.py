@@ -70,7 +70,7 @@ def test_what_cannot_be_imported_is_said_in_one_line_and_nothing_is_written(antd
             "--set colour: no such number in a robot file; choose from height",
         ),
         ((str(URDF / "burger.urdf"), "--set", "mass"), "--set mass: write KEY=VALUE"),
-        ((str(URDF / "burger.urdf"), "--set", "mass=-3"), "mass: must be at least 0.01"),
+        ((str(URDF / "burger.urdf"), "--set", "mass=-3"), "mass: must be a number greater than 0, got -3"),
         (
             (str(URDF / "burger.urdf"), "--footprint", "star"),
             "--footprint star: choose from auto, disc, rectangle, polygon",
