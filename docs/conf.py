@@ -29,6 +29,7 @@ extensions = [
     "antdrive_films",
     "antdrive_links",
     "antdrive_math",
+    "antdrive_planners",
     "antdrive_tables",
 ]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
