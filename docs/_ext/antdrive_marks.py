@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from sphinx.application import Sphinx
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
 
 FILE = re.compile(r"^<!-- file: (?P<name>.+?) -->\n(?P<fence>```+)(?P<language>\w+)\n", re.MULTILINE)
 NOT_RUN = re.compile(r"^<!-- not run: (?P<reason>.+?) -->\n", re.MULTILINE)

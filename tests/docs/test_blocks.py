@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import importlib
+import re
+from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 
+import pytest
 import yaml
 
 from antdrive.robots.files import robot_from_text
@@ -116,3 +121,26 @@ def test_the_campaign_file_of_the_guide_expands(tmp_path: Path) -> None:
         listed = [one for one in data[key] if one not in imported] if key == "worlds" else data[key]
         assert len(expand(make_campaign({**few, key: listed}, tmp_path)).jobs) == number, key
     assert set(data) == {*few, *numbers, "note", "run_limit", "rollouts"}
+
+
+@pytest.fixture
+def marked(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], str]:
+    monkeypatch.syspath_prepend(str(ROOT / "docs" / "_ext"))
+    found: Callable[[str], str] = importlib.import_module("antdrive_marks").marked
+    return found
+
+
+def test_the_site_shows_files_names_and_why_a_block_was_not_run(marked: Callable[[str], str]) -> None:
+    shown = marked(
+        "Text.\n\n<!-- file: a.yaml -->\n```yaml\na: 1\n```\n\n<!-- not run: they need a cluster -->\n```sh\nx\n```\n"
+    )
+    assert "```{code-block} yaml\n:caption: a.yaml\n\na: 1\n```" in shown
+    assert "does not run these lines: they need a cluster.\n\n```sh" in shown
+
+
+def test_films_of_the_gallery_have_names_of_their_own() -> None:
+    """Examples run at the same time in one folder."""
+    examples = list((ROOT / "docs" / "gallery").glob("*.py"))
+    films = Counter(film for path in examples for film in re.findall(r'"([\w-]+\.mp4)"', path.read_text()))
+    assert len(examples) >= 12
+    assert [film for film, count in films.items() if count > 1] == []
