@@ -36,6 +36,7 @@ import shlex
 import subprocess
 import sys
 import tempfile
+import warnings
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -283,7 +284,10 @@ def pages_with_code(root: Path = ROOT) -> list[Path]:
         for page in pages
         if not {"_build", "_gallery"} & set(page.parts)
         and page.relative_to(root).as_posix() not in TESTED
-        and any(block.language in RUN for block in blocks_of(page.read_text(encoding="utf-8")))
+        and any(
+            block.language in RUN and "not run" not in block.marks
+            for block in blocks_of(page.read_text(encoding="utf-8"))
+        )
     ]
 
 
@@ -309,6 +313,8 @@ def run_pages(paths: list[Path], jobs: int) -> Iterator[tuple[Page, float]]:
         return
     from joblib import Parallel, delayed
 
+    # A process that has grown is replaced between two pages, which is no fault.
+    warnings.filterwarnings("ignore", "A worker stopped while some jobs", UserWarning)
     yield from Parallel(n_jobs=jobs, return_as="generator", pre_dispatch="n_jobs", batch_size=1)(
         delayed(timed)(path) for path in paths
     )
