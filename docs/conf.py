@@ -98,6 +98,7 @@ sphinx_gallery_conf = {
 
 html_theme = "pydata_sphinx_theme"
 html_title = "antdrive"
+html_context = {"default_mode": "auto"}  # without it the theme writes an error to the console on the first visit
 html_static_path = ["_static"]
 html_css_files = ["antdrive.css"]
 html_copy_source = False
