@@ -28,6 +28,7 @@ extensions = [
     "antdrive_commands",
     "antdrive_films",
     "antdrive_links",
+    "antdrive_marks",
     "antdrive_math",
     "antdrive_tables",
 ]
@@ -77,6 +78,7 @@ nitpick_ignore_regex = [
 # The gallery: each example is run by the build.
 sphinx_gallery_conf = {
     "examples_dirs": "gallery",
+    "parallel": True,  # as many as --jobs says
     "gallery_dirs": "_gallery",
     "filename_pattern": r"\.py$",
     "image_scrapers": ("antdrive_films.scrape",),
