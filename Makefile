@@ -49,19 +49,20 @@ test: $(VENV)/.dev $(VENV)/.warm
 test-slow: $(VENV)/.dev $(VENV)/.warm
 	@$(BIN)/python -m pytest --numprocesses 2 --dist loadgroup -m ''
 
-# The code of the tutorials and of the gallery runs again when the packages change.
+# What pages show runs again when they or the packages change. Both halves use as many processes as there are cores.
 SOURCES := $(wildcard */*.py */*/*.py */*/*/*.py */*/*/*/*.py)
+CORES := $(shell nproc)
 
-docs/_build/.tutorials: $(VENV)/.docs $(VENV)/.warm $(SOURCES) $(wildcard docs/tutorials/*.md)
-	@$(BIN)/python -m tools.pages docs/tutorials/*.md
+docs/_build/.pages: $(VENV)/.docs $(VENV)/.warm $(SOURCES) $(wildcard docs/*.md docs/*/*.md docs/*/*/*.md examples/*/*.md)
+	@$(BIN)/python -m tools.pages --all --jobs $(CORES) --kept docs/_build/pages.json
 	@mkdir -p docs/_build && touch $@
 
 docs/_build/.gallery: $(VENV)/.docs $(VENV)/.warm $(SOURCES)
 	@rm -rf docs/_gallery
 	@mkdir -p docs/_build && touch $@
 
-docs: docs/_build/.tutorials docs/_build/.gallery
-	@$(BIN)/python -m sphinx --builder html --fail-on-warning --keep-going --nitpicky --quiet -d docs/_build/doctrees docs docs/_build/html
+docs: docs/_build/.pages docs/_build/.gallery
+	@$(BIN)/python -m sphinx --builder html --fail-on-warning --keep-going --nitpicky --quiet --jobs $(CORES) -d docs/_build/doctrees docs docs/_build/html
 	@$(BIN)/python -m tools.site docs/_build/html
 
 lint: $(VENV)/.dev
