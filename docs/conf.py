@@ -30,6 +30,7 @@ extensions = [
     "antdrive_links",
     "antdrive_marks",
     "antdrive_math",
+    "antdrive_planners",
     "antdrive_tables",
 ]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
