@@ -108,7 +108,7 @@ def main() -> int:
         return 0
     pages = {page.stem: page.read_text(encoding="utf-8") for page in PAGES.glob("*.md")}
     lost = missing(CLAIMS, pages)
-    print("\n".join(lost) or "every claim is on its page")
+    sys.stdout.write("\n".join([*lost, ""]) or "every claim is on its page\n")
     return 1 if lost else 0
 
 
