@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from markdown_it import MarkdownIt
 
 from antdrive.robots.files import robot_from_text
 from antdrive.sim.campaigns import expand, make_campaign
@@ -32,6 +33,8 @@ NOT_RUN = [
     ("examples/campaigns/README.md", "they need the worlds of the BARN challenge"),
     ("examples/plugin_planner/README.md", "they install a package; a test announces the planner without"),
 ]
+#: Diagrams and lists; every other block of text is what the block of Python before it printed.
+PLAIN = ["CONTRIBUTING.md", "docs/explanation/architecture.md", "docs/how-to/regression-tests.md"]
 
 
 def fault(page: str, block: Block) -> str:
@@ -49,6 +52,30 @@ def test_every_block_has_somebody_who_runs_it() -> None:
     faults = [f"{page}:{block.line} {wrong}" for page, block in BLOCKS if (wrong := fault(page, block))]
     assert faults == []
     assert len(BLOCKS) >= 90
+
+
+def code_of(text: str) -> list[tuple[str, int]]:
+    """The kind of each block of code in Markdown, fenced, indented or in a list, and the number of its first line."""
+    blocks = [token for token in MarkdownIt().parse(text) if token.type in ("fence", "code_block") and token.map]
+    return [(token.type, token.map[0] + 1) for token in blocks if token.map]
+
+
+def test_the_runner_finds_every_block_that_markdown_has() -> None:
+    for page in PAGES:
+        text = page.read_text()
+        found = [("fence", block.line - 1) for block in blocks_of(text) if block.language != "before"]
+        assert found == code_of(text), page
+
+
+def test_only_these_blocks_are_neither_code_nor_what_code_printed() -> None:
+    plain = [page for page, block in BLOCKS if block.language == "text" and not block.follows]
+    assert sorted(plain) == PLAIN
+
+
+def test_a_block_that_the_runner_would_not_find_is_noticed() -> None:
+    text = "- list\n\n  ```python\n  1 / 0\n  ```\n\nText:\n\n    1 / 0\n\n~~~python\n1 / 0\n~~~\n"
+    assert blocks_of(text) == []
+    assert code_of(text) == [("fence", 3), ("code_block", 9), ("fence", 11)]
 
 
 def test_a_block_that_nobody_runs_is_noticed() -> None:
