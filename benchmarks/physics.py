@@ -133,7 +133,9 @@ def main() -> None:
             f"| `{name}` | {hz} | {turn.speed:.2f} mm/s, {turn.speed_share:.3%} | {turn.yaw_rate:.2f} mrad/s, "
             f"{turn.yaw_share:.3%} | {turn.sideways:.2f} | {way:.3f} / {ideal:.3f} m | {hard:.3f} m |"
         )
-    print("\n| robot | physics [Hz] | passes | overlap, not felt | felt without overlap | deepest overlap when felt [mm] |")
+    print(
+        "\n| robot | physics [Hz] | passes | overlap, not felt | felt without overlap | deepest overlap when felt [mm] |"
+    )
     print("|---|---|---|---|---|---|")
     for name, hz in itertools.product(ROBOTS, RATES):
         robot = load_robot(name)
