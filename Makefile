@@ -1,9 +1,10 @@
 # make demo   plan, drive, certify and film one world
 # make test   the whole test suite (make test-slow: the long ones too)
 # make docs   the site, with everything that its pages show: docs/_build/html/index.html
+# make dist   wheel and sdist in dist/, checked in a fresh environment outside the checkout
 # Everything else that these need they set up themselves, in .venv.
 .DELETE_ON_ERROR:
-.PHONY: demo test test-slow docs lint format bench mutants warm clean help
+.PHONY: demo test test-slow docs dist lint format bench mutants warm clean help
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -11,7 +12,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 DEMO := out/demo
 
 help:
-	@sed -n '1,4s/^# //p' Makefile
+	@sed -n '1,5s/^# //p' Makefile
 
 # The core, then the compiled kernels' cache, so that the first plan is quick.
 $(VENV)/.core: pyproject.toml tools/find-python
@@ -64,6 +65,13 @@ docs/_build/.gallery: $(VENV)/.docs $(VENV)/.warm $(SOURCES)
 docs: docs/_build/.pages docs/_build/.gallery
 	@$(BIN)/python -m sphinx --builder html --fail-on-warning --keep-going --nitpicky --quiet --jobs $(CORES) -d docs/_build/doctrees docs docs/_build/html
 	@$(BIN)/python -m tools.site docs/_build/html
+
+# `build` makes the sdist, and the wheel from the sdist.
+dist: $(VENV)/.core
+	@$(PIP) install --editable '.[dist]'
+	@rm -rf dist
+	@$(BIN)/python -m build --outdir dist . >/dev/null
+	@$(BIN)/python -m tools.dist dist
 
 lint: $(VENV)/.dev
 	@$(BIN)/ruff check .

@@ -5,10 +5,10 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeAlias
 
 from antdrive.planners import Planner, Query
 from antdrive.sim.papers import maps
@@ -101,75 +101,63 @@ def _candidate(
     return candidate(shape, start, goal, MoveCount(*moves), seed, **dict(kind))
 
 
+#: A setting of a planner: its name, the printed value and the options.
+Setting: TypeAlias = tuple[str, float | None, dict[str, Any]]
+
+
 def han2007() -> list[Experiment]:
     """Experiment 6 with ants, elites on the thesis' simple maps, and the genetic algorithm around one large obstacle."""
-
-    def experiments(
-        where: str, query: Query, planner: str, arms: Sequence[tuple[str, float | None, dict[str, Any]]]
-    ) -> list[Experiment]:
-        return [
-            Experiment(
-                paper="han2007",
-                map=where,
-                planner=planner,
-                label=label,
-                options=options,
-                query=_for_every_seed(query),
-                printed=printed,
-                recreated=False,
-            )
-            for label, printed, options in arms
-        ]
-
     printed = ((10, 45.357), (100, 38.6223), (500, 36.237))
-    table: list[tuple[str, float | None, dict[str, Any]]] = [(f"{n} ants", mean, {"ants": n}) for n, mean in printed]
+    table: list[Setting] = [(f"{n} ants", mean, {"ants": n}) for n, mean in printed]
     # Section 5.2 prints no means for these; its program runs 500 ants.
-    plain: list[tuple[str, float | None, dict[str, Any]]] = [(f"{n} ants", None, {"ants": n}) for n, _ in printed]
-    elite: tuple[str, None, dict[str, Any]] = ("500 ants, elite", None, {"ants": 500, "elitism": 100})
-    # Figure 5.1.9 varies Pc without mutation, figure 5.1.10 varies Pm without crossover.
-    rates = ((0.0, 0.2, (True, False)), (0.0, 0.8, (True, False)), (0.25, 0.0, (True, False)), (0.5, 0.0, (True,)))
-    varied: list[tuple[str, float | None, dict[str, Any]]] = [
-        (
-            f"3 via points, Pc {pc:g}, Pm {pm:g}{'' if kept else ', no elite'}",
-            None,
-            {"via_points": 3, "crossover": pc, "mutation": pm, "elitism": kept},
-        )
-        for pc, pm, elites in (*rates, (0.0, 0.0, (True,)))
-        for kept in elites
-    ]
-    many, one, small, empty = "14 obstacles", "one obstacle of radius 5", "one obstacle of radius 1", "no obstacle"
-    single, listed = maps.han_genes((10.0, 10.0, 5.0)), maps.han_ants()
+    plain: list[Setting] = [(f"{n} ants", None, {"ants": n}) for n, _ in printed]
+    few: Setting = ("100 ants, elite", None, {"ants": 100, "elitism": 100})
+    elite: Setting = ("500 ants, elite", None, {"ants": 500, "elitism": 100})
+    single: Setting = ("1 via point", None, {"via_points": 1, "tries": 20_000})
+    listed = maps.han_ants()
     return [
-        *experiments(many, listed, "aco-han", [*table, ("100 ants, elite", None, {"ants": 100, "elitism": 100})]),
-        *experiments(small, maps.han_ants((10.0, 10.0, 1.0)), "aco-han", [*plain, elite]),
-        *experiments(empty, maps.han_ants(None), "aco-han", [plain[-1], elite]),
-        *experiments(
-            many,
+        *_han_experiments("14 obstacles", listed, "aco-han", [*table, few]),
+        *_han_experiments("one obstacle of radius 1", maps.han_ants((10.0, 10.0, 1.0)), "aco-han", [*plain, elite]),
+        *_han_experiments("no obstacle", maps.han_ants(None), "aco-han", [plain[-1], elite]),
+        *_han_experiments(
+            "14 obstacles",
             listed,
             "ga-han",
-            [
-                ("4 via points", None, {"via_points": 4, "mutation": 0.4}),
-                ("1 via point", None, {"via_points": 1, "tries": 20_000}),
-            ],
+            [("4 via points", None, {"via_points": 4, "mutation": 0.4}), single],
         ),
-        *experiments(
-            "two walls of obstacles",
-            maps.han_genes(*maps.TWO_WALLS),
-            "ga-han",
-            [("1 via point", None, {"via_points": 1, "tries": 20_000})],
+        *_han_experiments("two walls of obstacles", maps.han_genes(*maps.TWO_WALLS), "ga-han", [single]),
+        *_han_experiments(
+            "one obstacle of radius 5", maps.han_genes((10.0, 10.0, 5.0)), "ga-han", list(_han_via_points())
         ),
-        *experiments(
-            one,
-            single,
-            "ga-han",
-            [
-                ("3 via points", 33.1798, {"via_points": 3}),
-                ("2 via points", None, {"via_points": 2}),
-                ("1 via point", None, {"via_points": 1}),
-                ("3 via points, no elite", None, {"via_points": 3, "elitism": False}),
-                *varied,
-            ],
-        ),
+    ]
+
+
+def _han_via_points() -> Iterator[Setting]:
+    """Experiments 4 and 5; figure 5.1.9 varies Pc without mutation, figure 5.1.10 varies Pm without crossover."""
+    yield "3 via points", 33.1798, {"via_points": 3}
+    yield "2 via points", None, {"via_points": 2}
+    yield "1 via point", None, {"via_points": 1}
+    yield "3 via points, no elite", None, {"via_points": 3, "elitism": False}
+    rates = ((0.0, 0.2, (True, False)), (0.0, 0.8, (True, False)), (0.25, 0.0, (True, False)), (0.5, 0.0, (True,)))
+    for pc, pm, elites in (*rates, (0.0, 0.0, (True,))):
+        for kept in elites:
+            name = f"3 via points, Pc {pc:g}, Pm {pm:g}{'' if kept else ', no elite'}"
+            yield name, None, {"via_points": 3, "crossover": pc, "mutation": pm, "elitism": kept}
+
+
+def _han_experiments(where: str, query: Query, planner: str, settings: Sequence[Setting]) -> list[Experiment]:
+    return [
+        Experiment(
+            paper="han2007",
+            map=where,
+            planner=planner,
+            label=label,
+            options=options,
+            query=_for_every_seed(query),
+            printed=printed,
+            recreated=False,
+        )
+        for label, printed, options in settings
     ]
 
 

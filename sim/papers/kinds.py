@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 #: The margin of "no longer than" [points]: A = 0.56, where a small effect begins (Vargha & Delaney 2000), is 56 : 44.
 SMALL_EFFECT = 12.0
 #: What a claim judged with that margin says of it.
-MARGIN_OURS = "margin ours: 12 points, where a small effect begins (Vargha & Delaney 2000)"
+MARGIN_OURS = f"margin ours: {SMALL_EFFECT:g} points, where a small effect begins"
 
 
 class Arm(NamedTuple):

@@ -173,7 +173,7 @@ def _oftener(test: Oftener, found: Found) -> Judged:
     decision, reason = _decided(high < 0, low >= 0, share.pairs, share.value, share.interval, 0.0)
     if not share.known:
         decision, reason = Decision.OPEN, "neither ever gets there"
-    why = _joined(reason, "share of pairs above less share below, bootstrapped", share.median)
+    why = _joined(reason, share.median)
     return Judged(decision, share.value, share.interval, share.ours, why)
 
 
@@ -186,7 +186,7 @@ def _no_worse(test: NoWorse, found: Found) -> Judged:
     )
     if not share.known:
         decision, reason = Decision.OPEN, "neither ever gets there"
-    why = _joined(reason, "share of pairs above less share below, bootstrapped", share.median)
+    why = _joined(reason, share.median)
     return Judged(decision, share.value, share.interval, share.ours, why)
 
 
@@ -408,6 +408,7 @@ UNITS: Mapping[str, tuple[int, str]] = {
     "length": (2, ""),
     "last": (2, ""),
     "unrest": (2, ""),
+    "early_unrest": (2, ""),
     "concentration": (3, ""),
     "work": (0, " steps"),
     "settled": (0, " iterations"),

@@ -54,9 +54,7 @@ def reproduce(
     mark = "quick" if quick else f"{seeds}-seeds"
     folder = out or free_folder(Path("out") / f"reproduce-{paper}", MARKER, mark)
     check_folder(folder)
-    few = too_few_seeds(papers, seeds, quick=quick)
-    if few:
-        print_error(few)
+    _warn_of_few(too_few_seeds(papers, seeds, quick=quick))
     compile_once()
     with claimed(folder), bar("planning") as progress:
         wanted: dict[str, Any] = {"suffixes": suffixes(vector), "jobs": jobs, "quick": quick, "films": films}
@@ -78,3 +76,9 @@ def reproduce(
             count = f"{found.kept} of {len(found.rows)}"
             print_line(f"{count} experiments were done before and were taken from {folder / TRIALS}")
     return SUCCEEDED
+
+
+def _warn_of_few(line: str) -> None:
+    """Say in one line that so few seeds cannot decide some claims; an empty line says nothing."""
+    if line:
+        print_error(line)
