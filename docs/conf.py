@@ -30,6 +30,7 @@ extensions = [
     "antdrive_links",
     "antdrive_marks",
     "antdrive_math",
+    "antdrive_measured",
     "antdrive_planners",
     "antdrive_tables",
 ]
