@@ -54,6 +54,5 @@ def test_every_constant_that_a_package_offers_has_a_comment(package: str) -> Non
 
 def test_the_tutorials_pages_are_listed() -> None:
     text = (DOCS / "tutorials" / "index.md").read_text()
-    assert {path.stem for path in (DOCS / "tutorials").glob("*.md")} - {"index"} == set(
-        text.partition("```{toctree}")[2].split()
-    ) - {":maxdepth:", "1", "```"}
+    listed = {line for line in text.partition("```{toctree}")[2].partition("```")[0].split("\n") if line[:1].isalpha()}
+    assert {path.stem for path in (DOCS / "tutorials").glob("*.md")} - {"index"} == listed
