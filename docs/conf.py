@@ -35,7 +35,14 @@ extensions = [
     "antdrive_tables",
 ]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
-exclude_patterns = ["_build", "_ext", "_templates", "gallery", "_gallery/sg_execution_times.rst", "sg_execution_times.rst"]
+exclude_patterns = [
+    "_build",
+    "_ext",
+    "_templates",
+    "gallery",
+    "_gallery/sg_execution_times.rst",
+    "sg_execution_times.rst",
+]
 # Each is written by sphinx-gallery; none says anything that its page does not.
 suppress_warnings = ["config.cache"]
 
