@@ -71,7 +71,7 @@ def free_cells(world: World, cell: float, inflate: float) -> Mask:
         across, along = x[left[i] : right[i]] - cx, y[low[i] : high[i]] - cy
         apart2 = across * across + (along * along)[:, None]
         free[low[i] : high[i], left[i] : right[i]] &= apart2 > radii[i] * radii[i]
-    return free
+    return np.asarray(free)
 
 
 def known_ground(rollout: Rollout) -> Iterator[Ground]:
