@@ -255,7 +255,8 @@ def export_map_server(
 
     A cell is occupied when a disc or a wall reaches into it by more than a nanometre; no cell is unknown. Heights are
     lost. Start, goal and tolerance, and other tasks, are kept under the key `antdrive`, which map_server ignores and
-    `import_map_server` reads. The map covers the world's bounds; positions in it are those in the map that the world was made from.
+    `import_map_server` reads. The map covers the world's bounds; positions in it are those in the map that the world
+    was made from.
 
     Args:
         task: the world to write

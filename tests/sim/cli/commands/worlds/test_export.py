@@ -34,7 +34,8 @@ def test_a_map_keeps_the_other_tasks_of_its_world_and_other_formats_say_that_the
     name = "dock: \"2\", 'b'"
     Path("w.yaml").write_text(
         "schema: 1\nbounds: [0, 0, 4, 3]\nstart: [0.6, 0.6, 0]\ngoal: [3.4, 0.6]\ncell: 0.1\nframe: [5, 1, 0.5]\n"
-        f"tasks: [{{name: {json.dumps(name)}, goal: [3.4, 2.4]}}, {{name: back, start: [3, 1, 3], goal: [1, 2], goal_tolerance: 0.1}}]\n"
+        f"tasks: [{{name: {json.dumps(name)}, goal: [3.4, 2.4]}}, "
+        "{name: back, start: [3, 1, 3], goal: [1, 2], goal_tolerance: 0.1}]\n"
     )
     assert antdrive("worlds", "export", "w.yaml", "-o", "m.yaml") == (0, "  map      m.yaml\n  image    m.pgm\n", "")
     assert antdrive("worlds", "import", "m.yaml", "-o", "again.yaml")[0] == 0
