@@ -19,7 +19,7 @@ MEDIANS = {
     "driven_length_m": "length m",
     "duration_s": "duration s",
     "min_clearance_m": "least clearance m",
-    "plan_s": "planning s",
+    "plan_s": "planning ms",
 }
 SOURCE = "the options"  # what errors call a campaign that no file describes
 
@@ -202,6 +202,10 @@ def _medians(results: SweepResults) -> Iterator[tuple[str, ...]]:
     rows = [row for row in results.table.select(["planner", "succeeded", *MEDIANS]).to_pylist() if row["succeeded"]]
     for planner in dict.fromkeys(row["planner"] for row in rows):
         own = [row for row in rows if row["planner"] == planner]
-        columns = [np.array([row[name] for row in own], dtype=float) for name in MEDIANS]
+        factors = [1000.0 if unit.endswith(" ms") else 1.0 for unit in MEDIANS.values()]
+        columns = [
+            factor * np.array([row[name] for row in own], dtype=float)
+            for name, factor in zip(MEDIANS, factors, strict=True)
+        ]
         told = (f"{np.median(found):.3g} ({found.min():.3g} to {found.max():.3g})" for found in columns)
         yield planner, str(len(own)), *told
