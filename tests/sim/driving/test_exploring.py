@@ -205,6 +205,15 @@ def test_a_robot_that_looks_the_other_way_turns_round(jackal: RobotSpec) -> None
     assert done.scenario.as_dict()["cell_m"] == done.rollout.record.cell == 0.05
 
 
+@pytest.mark.parametrize(("cell", "short"), [(None, True), (0.3, False)])
+def test_colonies_plan_on_cells_that_leave_gaps_open(jackal: RobotSpec, cell: float | None, short: bool) -> None:
+    """The gap leaves 0.12 m for the robot's middle: no row of cells of 0.3 m lies there, and the way round is long."""
+    posts = tuple(Disc(3.0, y, 0.075) for y in (*np.linspace(0.05, 2.0, 14), *np.linspace(3.0, 3.9, 7)))
+    task = dataclasses.replace(TASK, world=dataclasses.replace(ROOM, obstacles=posts), cell=0.3)
+    _, answer = exploration_of(scenario(jackal, task, "mmas", cell=cell, noise=0.0)).plan(task.start)
+    assert (answer.solved and answer.cost < 1.5 * 4.4) == short, answer.cost
+
+
 def test_what_no_beam_has_met_changes_nothing(jackal: RobotSpec, log: Rollout) -> None:
     hidden = dataclasses.replace(ROOM, obstacles=(*POSTS, Disc(4.2, 1.2, 0.2)))  # behind the row
     other = run(scenario(jackal, dataclasses.replace(TASK, world=hidden))).rollout
