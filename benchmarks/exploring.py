@@ -26,7 +26,7 @@ from typing import Any
 from antdrive.sim import Scenario, pipeline, run
 from antdrive.sim.driving.caution import Caution
 from antdrive.sim.driving.exploring import Exploration
-from antdrive.sim.driving.survey import Survey
+from antdrive.sim.driving.survey import Senses
 from antdrive.sim.sensing import OccupancyMap
 from antdrive.sim.sensing.matching import ScanMatcher
 from benchmarks.cost import BARN
@@ -87,7 +87,7 @@ def rows(source: Path) -> Iterator[list[str]]:
     meter = Meter()
     meter.watch(pipeline, "drive", "loop")
     for owner, method, name in (
-        (Survey, "_scan", "scan"),
+        (Senses, "ranges", "scan"),
         (ScanMatcher, "corrected", "match"),
         (OccupancyMap, "insert", "map"),
         (Exploration, "trigger", "watch"),

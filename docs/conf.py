@@ -28,7 +28,9 @@ extensions = [
     "antdrive_commands",
     "antdrive_films",
     "antdrive_links",
+    "antdrive_marks",
     "antdrive_math",
+    "antdrive_planners",
     "antdrive_tables",
 ]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
@@ -77,6 +79,7 @@ nitpick_ignore_regex = [
 # The gallery: each example is run by the build.
 sphinx_gallery_conf = {
     "examples_dirs": "gallery",
+    "parallel": True,  # as many as --jobs says
     "gallery_dirs": "_gallery",
     "filename_pattern": r"\.py$",
     "image_scrapers": ("antdrive_films.scrape",),
@@ -96,6 +99,7 @@ sphinx_gallery_conf = {
 
 html_theme = "pydata_sphinx_theme"
 html_title = "antdrive"
+html_context = {"default_mode": "auto"}  # without it the theme writes an error to the console on the first visit
 html_static_path = ["_static"]
 html_css_files = ["antdrive.css"]
 html_copy_source = False

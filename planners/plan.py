@@ -27,6 +27,8 @@ Cell: TypeAlias = tuple[int, int]
 #: Cells of a grid, (N, 2): row and column of each.
 Cells: TypeAlias = npt.NDArray[np.int32]
 
+ENDS_TOGETHER = 16  # lines from an end to free cells that are looked at together, the shortest first
+
 
 class PlanStatus(enum.Enum):
     """How planning ended. The value is the sentence shown to people."""
@@ -118,13 +120,9 @@ def _entrance(grid: Grid, task: Task, point: Point, within: float) -> tuple[Cell
             if room[0] >= min(grid.inflate, own) - 1e-9:
                 return (row, col), True
     reach = cells_beside(grid.inflate, grid.cell)
-    near = [
-        (r, c)
-        for r in range(max(0, row - reach), min(rows, row + reach + 1))
-        for c in range(max(0, col - reach), min(cols, col + reach + 1))
-        if grid.free[r, c]
-    ]
-    if not near:
+    low, left = max(0, row - reach), max(0, col - reach)
+    near = np.argwhere(grid.free[low : row + reach + 1, left : col + reach + 1]) + (low, left)
+    if not len(near):
         return (row, col), False
     centres = grid.xy(near)
     distance = np.hypot(*(centres - point).T)
@@ -135,11 +133,15 @@ def _entrance(grid: Grid, task: Task, point: Point, within: float) -> tuple[Cell
     # Cylinders that no line comes as close to as that change nothing.
     discs = task.world.discs
     beside = discs[np.hypot(*(discs[:, :2] - point).T) - discs[:, 2] <= needed + distance.max() + 1e-6]
-    clear = segment_clearance(task.world, centres, ends, beside) >= needed - 1e-9
-    fit = clear & (distance <= within)
-    if not fit.any():
-        return (row, col), False
-    return near[int(np.where(fit, distance, np.inf).argmin())], True
+    order = np.argsort(distance, kind="stable")
+    order = order[distance[order] <= within]
+    for first in range(0, len(order), ENDS_TOGETHER):
+        some = order[first : first + ENDS_TOGETHER]
+        clear = segment_clearance(task.world, centres[some], ends[some], beside) >= needed - 1e-9
+        if clear.any():
+            at_row, at_col = near[some[clear.argmax()]].tolist()
+            return (at_row, at_col), True
+    return (row, col), False
 
 
 @dataclass(frozen=True, eq=False)

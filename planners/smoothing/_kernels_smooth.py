@@ -14,12 +14,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from antdrive.worlds._kernels import (
+    ROUNDING,
+    TOGETHER,
     Array,
+    boxed_clearance,
+    boxes_around,
     doubled,
     doubled_rows,
     inline,
+    is_beyond,
     kernel,
-    segment_clearance,
     segment_distance2,
     wall_distance,
 )
@@ -187,8 +191,17 @@ def outermost(discs: Array) -> Array:
     """Which discs (N, 3) do not lie within another; of equal discs only the first is kept."""
     n = discs.shape[0]
     keep = np.ones(n, dtype=np.bool_)
+    order = np.argsort(discs[:, 0])  # so that those whose centres have nearly the same x are side by side
+    x = discs[order, 0]
+    largest = 0.0
     for i in range(n):
-        for j in range(n):
+        largest = max(largest, discs[i, 2])
+    for i in range(n):
+        reach = largest - discs[i, 2] + NOT_INSIDE
+        for at in range(np.searchsorted(x, discs[i, 0] - 1.01 * reach), n):
+            j = order[at]
+            if x[at] > discs[i, 0] + 1.01 * reach:
+                break
             if i == j or not keep[j] or abs(discs[i, 0] - discs[j, 0]) > discs[j, 2] - discs[i, 2] + NOT_INSIDE:
                 continue
             inside = math.hypot(discs[i, 0] - discs[j, 0], discs[i, 1] - discs[j, 1]) + discs[i, 2] - discs[j, 2]
@@ -275,32 +288,41 @@ def loosest(count: int, contacts: Contacts, heading: Array) -> int:
 
 
 @kernel
-def deepest_entry(count: int, contacts: Contacts, links: Array, discs: Array) -> tuple[int, int, bool]:
+def deepest_entry(count: int, contacts: Contacts, links: Array, discs: Array, boxes: Array) -> tuple[int, int, bool]:
     """The disc that the string enters most, -1 if none; the link or contact that enters it.
 
-    The third value is whether a contact enters it, not a link.
+    The third value is whether a contact enters it, not a link. `boxes` are the rectangles around the discs.
     """
     disc, turn, sweep = contacts
     most, at, entered, on_arc = DEEP, -1, -1, False
     for i in range(count + 1):
         ax, ay, bx, by = links[i, 0], links[i, 1], links[i, 2], links[i, 3]
         before, after = disc[i - 1] if i > 0 else -1, disc[i] if i < count else -1
-        for k in range(discs.shape[0]):
-            if k in (before, after):
+        x_min, x_max = min(ax, bx) - ROUNDING, max(ax, bx) + ROUNDING
+        y_min, y_max = min(ay, by) - ROUNDING, max(ay, by) + ROUNDING
+        for box in range(boxes.shape[0]):
+            if boxes[box, 0] > x_max or boxes[box, 1] > y_max or boxes[box, 2] < x_min or boxes[box, 3] < y_min:
                 continue
-            q = discs[k, 2] - most
-            if q > 0.0 and segment_distance2(discs[k, 0], discs[k, 1], ax, ay, bx, by) < q * q:
-                most = discs[k, 2] - math.sqrt(segment_distance2(discs[k, 0], discs[k, 1], ax, ay, bx, by))
-                at, entered, on_arc = i, k, False
+            for k in range(box * TOGETHER, min(discs.shape[0], (box + 1) * TOGETHER)):
+                q = discs[k, 2] - most
+                if q <= 0.0 or k == before or k == after:
+                    continue
+                away2 = segment_distance2(discs[k, 0], discs[k, 1], ax, ay, bx, by)
+                if away2 < q * q:
+                    most = discs[k, 2] - math.sqrt(away2)
+                    at, entered, on_arc = i, k, False
         if i == count or sweep[i] <= 0.0:
             continue
         x, y, r = discs[after, 0], discs[after, 1], discs[after, 2]
-        for k in range(discs.shape[0]):
-            if k == after:
+        for box in range(boxes.shape[0]):
+            if is_beyond(r + ROUNDING, x, y, boxes[box]):
                 continue
-            depth = discs[k, 2] - abs(math.hypot(discs[k, 0] - x, discs[k, 1] - y) - r)
-            if depth > most and past(discs[k, 0], discs[k, 1], x, y, bx, by, turn[i]) < sweep[i]:
-                most, at, entered, on_arc = depth, i, k, True
+            for k in range(box * TOGETHER, min(discs.shape[0], (box + 1) * TOGETHER)):
+                if k == after:
+                    continue
+                depth = discs[k, 2] - abs(math.hypot(discs[k, 0] - x, discs[k, 1] - y) - r)
+                if depth > most and past(discs[k, 0], discs[k, 1], x, y, bx, by, turn[i]) < sweep[i]:
+                    most, at, entered, on_arc = depth, i, k, True
     return entered, at, on_arc
 
 
@@ -339,6 +361,7 @@ def settle(first: Contacts, discs: Array, ends: Array) -> tuple[bool, Array, Arr
     for i in range(count):
         disc[i], turn[i], sweep[i] = first.disc[i], first.turn[i], first.sweep[i]
     contacts = Contacts(disc, turn, sweep)
+    boxes = boxes_around(discs)
     links = np.empty((room + 1, 4), dtype=np.float64)
     heading = np.empty(room + 1, dtype=np.float64)
     for _ in range(3 * room):
@@ -351,7 +374,7 @@ def settle(first: Contacts, discs: Array, ends: Array) -> tuple[bool, Array, Arr
         if loose >= 0:
             count = drop(count, loose, contacts)
             continue
-        entered, at, on_arc = deepest_entry(count, contacts, links, discs)
+        entered, at, on_arc = deepest_entry(count, contacts, links, discs, boxes)
         if entered < 0:
             return True, disc[:count].copy(), turn[:count].copy(), sweep[:count].copy(), links[: count + 1].copy()
         count = add_contact(count, contacts, links, discs, entered, at, on_arc)
@@ -374,9 +397,10 @@ def string_length(string: String) -> float:
 def string_clearance(string: String, built: Array, bounds: Array) -> float:
     """The exact distance from a string to the nearest wall or surface of the discs as built (N, 3)."""
     (disc, turn, sweep), links, discs = string
+    boxes = boxes_around(built)
     best = np.inf
     for i in range(links.shape[0]):
-        best = min(best, segment_clearance(links[i, 0], links[i, 1], links[i, 2], links[i, 3], built, bounds))
+        best = min(best, boxed_clearance(links[i, 0], links[i, 1], links[i, 2], links[i, 3], built, boxes, bounds))
     for i in range(len(disc)):
         if sweep[i] <= 0.0:
             continue
@@ -386,10 +410,13 @@ def string_clearance(string: String, built: Array, bounds: Array) -> float:
             px, py = x + r * math.cos(0.5 * math.pi * quarter), y + r * math.sin(0.5 * math.pi * quarter)
             if past(px, py, x, y, bx, by, turn[i]) < sweep[i]:
                 best = min(best, wall_distance(px, py, bounds))
-        for k in range(built.shape[0]):
-            gap = abs(math.hypot(built[k, 0] - x, built[k, 1] - y) - r) - built[k, 2]
-            if gap < best and past(built[k, 0], built[k, 1], x, y, bx, by, turn[i]) < sweep[i]:
-                best = gap
+        for box in range(boxes.shape[0]):
+            if is_beyond(r + best + ROUNDING, x, y, boxes[box]):
+                continue
+            for k in range(box * TOGETHER, min(built.shape[0], (box + 1) * TOGETHER)):
+                gap = abs(math.hypot(built[k, 0] - x, built[k, 1] - y) - r) - built[k, 2]
+                if gap < best and past(built[k, 0], built[k, 1], x, y, bx, by, turn[i]) < sweep[i]:
+                    best = gap
     return float(best)
 
 
@@ -413,6 +440,7 @@ def string_points(string: String, built: Array, bounds: Array, clearance: float,
     where the polyline would come closer than `clearance` to a wall or a disc as built.
     """
     (disc, turn, sweep), links, discs = string
+    boxes = boxes_around(built)
     xy = np.empty((256, 2), dtype=np.float64)
     curvature = np.zeros(256, dtype=np.float64)
     size = 0
@@ -445,8 +473,8 @@ def string_points(string: String, built: Array, bounds: Array, clearance: float,
             stretch = r / math.cos(half)
             cx, cy = x + stretch * math.cos(a1), y + stretch * math.sin(a1)
             if half > 1e-5 and waiting < 60:
-                c = segment_clearance(x + r * math.cos(a0), y + r * math.sin(a0), cx, cy, built, bounds)
-                c = min(c, segment_clearance(cx, cy, x + r * math.cos(a2), y + r * math.sin(a2), built, bounds))
+                c = boxed_clearance(x + r * math.cos(a0), y + r * math.sin(a0), cx, cy, built, boxes, bounds)
+                c = min(c, boxed_clearance(cx, cy, x + r * math.cos(a2), y + r * math.sin(a2), built, boxes, bounds))
                 if c < clearance - 5e-10:
                     cuts[waiting] = at + half
                     waiting += 1
@@ -508,6 +536,9 @@ def room_to_grow(xy: Array, discs: Array, box: Array, ends: Array, most: float, 
             if crosses(xy, x, y, bx, by):
                 out[i] = share * gap
         for j in range(i + 1, n):
+            reach = r + discs[j, 2] + 2.05 * max(out[i], out[j])  # 2.05 > 1 / share
+            if abs(discs[j, 0] - x) > reach or abs(discs[j, 1] - y) > reach:
+                continue
             gap = math.hypot(discs[j, 0] - x, discs[j, 1] - y) - r - discs[j, 2]
             if gap < -1e-9 or share * gap >= max(out[i], out[j]):
                 continue
@@ -520,8 +551,11 @@ def room_to_grow(xy: Array, discs: Array, box: Array, ends: Array, most: float, 
 def near_polyline(xy: Array, discs: Array, reach: float) -> Array:
     """Which discs (N, 3) come within `reach` of a polyline (M, 2)."""
     near = np.zeros(discs.shape[0], dtype=np.bool_)
+    x_min, y_min, x_max, y_max = xy[:, 0].min(), xy[:, 1].min(), xy[:, 0].max(), xy[:, 1].max()
     for k in range(discs.shape[0]):
-        q = discs[k, 2] + reach
+        q, x, y = discs[k, 2] + reach, discs[k, 0], discs[k, 1]
+        if min(min(x - x_min, x_max - x), min(y - y_min, y_max - y)) < -q - ROUNDING:
+            continue
         for i in range(xy.shape[0] - 1):
             if segment_distance2(discs[k, 0], discs[k, 1], xy[i, 0], xy[i, 1], xy[i + 1, 0], xy[i + 1, 1]) < q * q:
                 near[k] = True
@@ -532,8 +566,12 @@ def near_polyline(xy: Array, discs: Array, reach: float) -> Array:
 @kernel
 def encloses(there: Array, back: Array, points: Array) -> bool:
     """Whether the loop along one polyline and back along another winds around any of the points (N, 2+)."""
+    y_min, y_max = min(there[:, 1].min(), back[:, 1].min()), max(there[:, 1].max(), back[:, 1].max())
+    x_max = max(there[:, 0].max(), back[:, 0].max())
     for k in range(points.shape[0]):
         x, y = points[k, 0], points[k, 1]
+        if x > x_max + ROUNDING or y < y_min or y > y_max:
+            continue
         winding = 0
         for part in range(2):
             xy = there if part == 0 else back

@@ -5,8 +5,18 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex, nearby
-from antdrive.worlds._kernels import ROUNDING, Array, kernel, segment_clearance, segment_distance2, wall_distance
+from antdrive.worlds._kernels import (
+    ROUNDING,
+    Array,
+    inline,
+    kernel,
+    segment_clearance,
+    segment_distance2,
+    wall_distance,
+)
 
 
 class PathSamples(NamedTuple):
@@ -99,6 +109,18 @@ def clearance_below(most: float, ax: float, ay: float, bx: float, by: float, dis
     return best
 
 
+@inline
+def within_reach(x: float, y: float, reach: float, discs: Array, out: Array) -> Array:
+    """The discs (N, 3) whose surfaces are within reach of a point, in their order; `out` has room for all."""
+    count = 0
+    for j in range(discs.shape[0]):
+        dx, dy, far = discs[j, 0] - x, discs[j, 1] - y, reach + discs[j, 2]
+        if dx * dx + dy * dy <= far * far:
+            out[count, 0], out[count, 1], out[count, 2] = discs[j, 0], discs[j, 1], discs[j, 2]
+            count += 1
+    return out[:count]
+
+
 @kernel
 def clear_lookaheads(
     xy: Array, arc: Array, obstacles: ObstacleIndex, clearance: float, spacing: float, low: float, high: float,
@@ -112,10 +134,14 @@ def clear_lookaheads(
     bounds = obstacles.bounds
     step = 0.5 * low
     k = 0
+    kept = np.empty((16, 3))
     for i in range(out.shape[0]):
         s = min(i * spacing, arc[-1])
         ax, ay, k = point_at(s, k, xy, arc)
-        discs = nearby(ax, ay, obstacles)
+        known = nearby(ax, ay, obstacles)
+        if known.shape[0] > kept.shape[0]:
+            kept = np.empty((2 * known.shape[0], 3))
+        discs = within_reach(ax, ay, high + clearance + ROUNDING, known, kept)
         required = min(clearance, segment_clearance(ax, ay, ax, ay, discs, bounds))
         clear, kk, length = low, k, low
         while length < high:

@@ -77,7 +77,10 @@ Margin = Annotated[
 CellSize = Annotated[
     float | None,
     typer.Option(
-        min=1e-6, max=1e6, metavar="METRES", help="Side of a grid cell [m].  [default: the world's own cell size]"
+        min=1e-6,
+        max=1e6,
+        metavar="METRES",
+        help="Side of a grid cell [m].  [default: the world's own; without a map 0.05 at most]",
     ),
 ]
 Smoothing = Annotated[

@@ -24,11 +24,11 @@ def numbers(option: str, text: str | None, count: int) -> tuple[float, ...] | No
     return values
 
 
-def pair(text: str) -> tuple[str, str]:
-    """Key and value of a `--set KEY=VALUE`."""
+def pair(text: str, option: str = "--set") -> tuple[str, str]:
+    """Key and value of a `--set KEY=VALUE`, or of another option that is written so."""
     key, mark, value = text.partition("=")
     if not mark or not key:
-        raise InputError(f"--set {text}: write KEY=VALUE")
+        raise InputError(f"{option} {text}: write KEY=VALUE")
     return key.strip(), value.strip()
 
 

@@ -17,6 +17,7 @@ from antdrive.worlds._kernels import Array, kernel
 GRAINS = 2
 HIT, MISS, MOST = 0.85, 0.4, 3.5  # steps of the log-odds and their upper limit (Hornung et al. 2013, section 4)
 SLACK = 1e-4  # added to the radius of discs; boxes are kept in single precision [m]
+BESIDE = 1e-9  # a point so far from the sides of a cell lies in it, whatever the rounding [cells]
 THINNEST = 0.005  # the least radius of a disc [m]
 
 
@@ -65,13 +66,13 @@ class Fan(NamedTuple):
 
 
 @kernel
-def begins(beams: int, spacing: float, cell: float, turns: int, out: Array) -> None:
+def begins(beams: int, spacing: float, cell: float, out: Array) -> None:
     """out[i] = the distance from which on beam i is needed to leave no cell out [m], when all have had their turns.
 
     Near the lidar every second, fourth, ... beam crosses all cells that others cross.
     """
     for i in range(beams):
-        step, number = 2, i // turns
+        step, number = 2, i
         while number and number % 2 == 0:
             step, number = step * 2, number // 2
         out[i] = cell / (step * spacing) if number else 0.0
@@ -99,12 +100,18 @@ def enter_hits(fan: Fan, whole: bool, left_out: Array, horizon: float, scan: int
     ranges, beams, x, y, cos, sin = fan.ranges, fan.beams, fan.eye[0], fan.eye[1], fan.eye[2], fan.eye[3]
     occupied, odds, stamp, box, left, low, cell = m.occupied, m.odds, m.stamp, m.box, m.frame[0], m.frame[1], m.frame[2]
     rows, cols = occupied.shape
+    per = 1.0 / cell
     count = 0
     for i in range(beams.shape[0]):
         if left_out[i] or not 0.0 < ranges[i] <= horizon:
             continue
         px = x + ranges[i] * (cos * beams[i, 0] - sin * beams[i, 1])
         py = y + ranges[i] * (sin * beams[i, 0] + cos * beams[i, 1])
+        u, v = (px - left) * per, (py - low) * per
+        if not whole and 1.0 <= u < cols - 1.0 and 1.0 <= v < rows - 1.0:
+            row, col = int(v), int(u)
+            if occupied[row, col] and BESIDE < u - col < 1.0 - BESIDE and BESIDE < v - row < 1.0 - BESIDE:
+                continue  # most of them; the quotient, which rounds otherwise, is not needed
         u, v = (px - left) / cell, (py - low) / cell
         if not (0.0 <= u < cols and 0.0 <= v < rows):
             continue
@@ -143,10 +150,16 @@ def occupy(row: int, col: int, scan: int, m: MapArrays) -> None:
 def enter_ways(
     fan: Fan, begin: Array, turn: int, turns: int, trust: float, scan: int, m: MapArrays, changed: Array, count: int
 ) -> int:
-    """Enter the free ways of every `turns`-th beam, each from its `begin` on (Amanatides & Woo 1987)."""
+    """Enter the free ways of every `turns`-th beam, each from its `begin` on.
+
+    A beam goes through columns of cells or, if it is steep, through rows: *lanes*. Where it leaves a lane follows from the
+    lane's number, so that no step waits for the one before (as in J. Bresenham, IBM Systems Journal 4, 1965, but for all
+    cells that the beam meets).
+    """
     ranges, beams, x, y, cos, sin = fan.ranges, fan.beams, fan.eye[0], fan.eye[1], fan.eye[2], fan.eye[3]
-    free, occupied, left, low, cell = m.free, m.occupied, m.frame[0], m.frame[1], m.frame[2]
-    rows, cols = free.shape
+    left, low, cell = m.frame[0], m.frame[1], m.frame[2]
+    rows, cols = m.free.shape
+    free = m.free.reshape(rows * cols)
     for i in range(turn, beams.shape[0], turns):
         rest = min(ranges[i], trust) - begin[i]  # inf: nothing there; -inf: something too near to be measured
         if not rest > 0.0:
@@ -154,30 +167,68 @@ def enter_ways(
         ux, uy = cos * beams[i, 0] - sin * beams[i, 1], sin * beams[i, 0] + cos * beams[i, 1]
         sx, sy = (x + begin[i] * ux - left) / cell, (y + begin[i] * uy - low) / cell
         row, col = int(math.floor(sy)), int(math.floor(sx))
-        step_x, step_y = 1 if ux > 0.0 else -1, 1 if uy > 0.0 else -1
-        # Distances along the beam, from its begin, to the next sides of cells.
-        each_x = cell / abs(ux) if ux != 0.0 else math.inf
-        each_y = cell / abs(uy) if uy != 0.0 else math.inf
-        next_x = ((col + 1 - sx) if ux > 0.0 else (sx - col)) * each_x if ux != 0.0 else math.inf
-        next_y = ((row + 1 - sy) if uy > 0.0 else (sy - row)) * each_y if uy != 0.0 else math.inf
-        while 0 <= row < rows and 0 <= col < cols:
-            if not free[row, col]:
-                if not occupied[row, col]:
-                    free[row, col] = True
-                    changed[count, 0], changed[count, 1] = row, col
-                    count += 1
-                elif min(next_x, next_y) + 0.5 * cell < rest:  # else the beam ends here or close behind
-                    count = see_through(row, col, scan, i, fan, m, changed, count)
-            if next_x < next_y:
-                if next_x >= rest:
+        if not (0 <= row < rows and 0 <= col < cols):
+            continue
+        # Lanes and cells within a lane are counted in the beam's direction: from the map's other end where that is negative.
+        right, up = ux >= 0.0, uy >= 0.0
+        px, py = sx if right else cols - sx, sy if up else rows - sy
+        c, r = col if right else cols - 1 - col, row if up else rows - 1 - row
+        to_c, to_r = 1 if right else -1, cols if up else -cols
+        flat = abs(ux) >= abs(uy)
+        along, beside = (px, py) if flat else (py, px)
+        lane, place, lanes, places = (c, r, cols, rows) if flat else (r, c, rows, cols)
+        to_lane, to_place = (to_c, to_r) if flat else (to_r, to_c)
+        large, small = max(abs(ux), abs(uy)), min(abs(ux), abs(uy))
+        # The beam leaves the lane that is k farther at the distance (first + k) * cell / large, and the place there at `leaves`.
+        first, slope = lane + 1 - along, small / large
+        left_behind = min(int(math.ceil(rest * large / cell - first)), lanes - 1 - lane)
+        leaves = beside + first * slope
+        at = row * cols + col
+        for k in range(left_behind):
+            if not free[at]:
+                count = enter_cell(at, i, rest, sx, sy, ux, uy, scan, fan, m, changed, count)
+            then = int(math.floor(leaves + k * slope))
+            if then > place:
+                place += 1
+                if place == places:
                     break
-                next_x += each_x
-                col += step_x
-            else:
-                if next_y >= rest:
-                    break
-                next_y += each_y
-                row += step_y
+                at += to_place
+                if not free[at]:
+                    count = enter_cell(at, i, rest, sx, sy, ux, uy, scan, fan, m, changed, count)
+            at += to_lane
+        if place == places:
+            continue
+        if not free[at]:
+            count = enter_cell(at, i, rest, sx, sy, ux, uy, scan, fan, m, changed, count)
+        in_lane = int(math.floor(leaves + max(left_behind, 0) * slope)) > place
+        if in_lane and place + 1 < places and (place + 1 - beside) * cell < rest * small:
+            at += to_place
+            if not free[at]:
+                count = enter_cell(at, i, rest, sx, sy, ux, uy, scan, fan, m, changed, count)
+    return count
+
+
+@kernel
+def enter_cell(
+    at: int, beam: int, rest: float, sx: float, sy: float, ux: float, uy: float, scan: int, fan: Fan, m: MapArrays,
+    changed: Array, count: int,
+) -> int:  # fmt: skip
+    """Enter that a beam crosses a cell that was not seen free; the rows written to `changed`.
+
+    `rest` is the beam's length from (sx, sy) on, in cells, and (ux, uy) its direction.
+    """
+    rows, cols = m.free.shape
+    row, col = at // cols, at % cols
+    if not m.occupied[row, col]:
+        m.free[row, col] = True
+        changed[count, 0], changed[count, 1] = row, col
+        return count + 1
+    # Distances along the beam to the sides of the cell through which it may leave.
+    cell = m.frame[2]
+    to_x = ((col + 1 - sx) if ux > 0.0 else (sx - col)) * cell / abs(ux) if ux != 0.0 else math.inf
+    to_y = ((row + 1 - sy) if uy > 0.0 else (sy - row)) * cell / abs(uy) if uy != 0.0 else math.inf
+    if min(to_x, to_y) + 0.5 * cell < rest:  # else the beam ends here or close behind
+        return see_through(row, col, scan, beam, fan, m, changed, count)
     return count
 
 
@@ -302,17 +353,25 @@ def take_as_free(x: float, y: float, radius: float, m: MapArrays, changed: Array
 def discs_within(m: MapArrays, x_min: float, y_min: float, x_max: float, y_max: float) -> Array:
     """A disc (x, y, radius) around the hits of every grain whose cell meets a rectangle (D, 3) [m]."""
     cells, left, low, cell = m.cells, m.frame[0], m.frame[1], m.frame[2]
-    out = np.empty((m.count[0] * GRAINS * GRAINS, 3))
-    count = 0
+    met = np.empty(m.count[0], dtype=np.int32)
+    near, count = 0, 0
     for i in range(m.count[0]):
         x, y = left + cells[i, 1] * cell, low + cells[i, 0] * cell
         if x > x_max or y > y_max or x + cell < x_min or y + cell < y_min:
             continue
+        met[near] = i
+        near += 1
+        for k in range(GRAINS * GRAINS):
+            count += 1 if m.odds[i, k] > 0.0 else 0
+    out = np.empty((count, 3))
+    count = 0
+    for j in range(near):
+        i = met[j]
         for k in range(GRAINS * GRAINS):
             if m.odds[i, k] > 0.0:
                 out[count, 0], out[count, 1], out[count, 2] = grain_disc(m.box, i, k)
                 count += 1
-    return out[:count].copy()
+    return out
 
 
 @kernel

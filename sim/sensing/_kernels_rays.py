@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from antdrive.worlds._kernels import Array, inline, kernel
 
 SURE = 0.05  # so many beams are looked at beyond those that a disc's angle holds, whatever the rounding
+PAST = 1.0 + 1e-12  # products of rounded numbers are this much too large or too small at most
 ANGLE_ERROR = 2e-5  # more than the largest error of `angle_of` [rad]
 
 
@@ -53,6 +56,7 @@ def cast(pose: Array, beams: Array, spacing: float, first: float, most: float, d
     """
     x, y, cos, sin = pose[0], pose[1], math.cos(pose[2]), math.sin(pose[2])
     turn = 2.0 * math.pi / spacing  # a full turn in beams
+    per, last = 1.0 / spacing, beams.shape[0] - 1
     for j in range(discs.shape[0]):
         dx, dy, radius = discs[j, 0] - x, discs[j, 1] - y, discs[j, 2]
         away2 = dx * dx + dy * dy
@@ -63,14 +67,14 @@ def cast(pose: Array, beams: Array, spacing: float, first: float, most: float, d
                 out[i] = 0.0
             return
         ahead, left = cos * dx + sin * dy, cos * dy - sin * dx
-        middle = (angle_of(left, ahead) - first) / spacing
+        middle = (angle_of(left, ahead) - first) * per
         away = math.sqrt(away2)
         sine = radius / away
         # asin(s) <= s + (pi / 2 - 1) s^3 between 0 and 1.
-        half = (sine + 0.5708 * sine * sine * sine + ANGLE_ERROR) / spacing + SURE
+        half = (sine + 0.5708 * sine * sine * sine + ANGLE_ERROR) * per + SURE
         while middle - turn + half >= 0.0:  # the same angle, turns less
             middle -= turn
-        while middle - half <= beams.shape[0] - 1:  # and turns more
+        while middle - half <= last:  # and turns more
             cast_at(middle - half, middle + half, ahead, left, radius, away - radius, beams, out)
             middle += turn
 
@@ -96,19 +100,21 @@ def cast_walls(pose: Array, beams: Array, bounds: Array, out: Array) -> None:
     if not (bounds[0] < x < bounds[2] and bounds[1] < y < bounds[3]):
         out[:] = 0.0
         return
-    nearest = min(min(bounds[2] - x, x - bounds[0]), min(bounds[3] - y, y - bounds[1]))
+    east, west, north, south = bounds[2] - x, bounds[0] - x, bounds[3] - y, bounds[1] - y
+    nearest = min(min(east, -west), min(north, -south))
     for i in range(beams.shape[0]):
         if out[i] <= nearest:
             continue
         ux, uy = cos * beams[i, 0] - sin * beams[i, 1], sin * beams[i, 0] + cos * beams[i, 1]
-        if ux > 0.0:
-            out[i] = min(out[i], (bounds[2] - x) / ux)
-        elif ux < 0.0:
-            out[i] = min(out[i], (bounds[0] - x) / ux)
-        if uy > 0.0:
-            out[i] = min(out[i], (bounds[3] - y) / uy)
-        elif uy < 0.0:
-            out[i] = min(out[i], (bounds[1] - y) / uy)
+        far = out[i] * PAST  # quotients only where a wall may be nearer
+        if far * ux >= east:
+            out[i] = min(out[i], east / ux)
+        elif far * ux <= west:
+            out[i] = min(out[i], west / ux)
+        if far * uy >= north:
+            out[i] = min(out[i], north / uy)
+        elif far * uy <= south:
+            out[i] = min(out[i], south / uy)
 
 
 @kernel
@@ -119,14 +125,14 @@ def measure(ranges: Array, noise: Array, limits: Array) -> None:
     multiples of the resolution and stay within the lidar's limits.
     """
     least, most, resolution, sigma = limits[0], limits[1], limits[2], limits[3]
-    for i in range(ranges.shape[0]):
+    rounds = resolution > 0.0
+    step = resolution if rounds else 1.0
+    for i in range(ranges.shape[0]):  # without branches, so that several are taken at once
         true = ranges[i]
-        if true > most:
-            ranges[i] = math.inf
-        elif true < least:
-            ranges[i] = -math.inf
-        else:
-            value = true + sigma * noise[i]
-            if resolution > 0.0:
-                value = math.floor(value / resolution + 0.5) * resolution
-            ranges[i] = min(max(value, least), most)
+        value = true + sigma * noise[i]
+        rounded = np.floor(value / step + 0.5) * step
+        value = rounded if rounds else value
+        value = least if value < least else value
+        value = most if value > most else value
+        value = -math.inf if true < least else value
+        ranges[i] = math.inf if true > most else value

@@ -82,7 +82,7 @@ class OccupancyMap:
         angles = lidar.angles - lidar.yaw
         self.beams = np.column_stack((np.cos(angles), np.sin(angles)))
         self._begin = np.empty(lidar.beams)
-        kernels.begins(lidar.beams, lidar.spacing, cell, 1, self._begin)
+        kernels.begins(lidar.beams, lidar.spacing, cell, self._begin)
         self._none = np.zeros(lidar.beams, dtype=np.bool_)
         half = self.horizon + ROOM
         x, y = centre

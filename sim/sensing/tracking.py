@@ -28,6 +28,11 @@ MATURE = 5  # a radius that was seen so often is known: what else is in a cluste
 ROUND = 0.03  # a cluster is round if it lies so near to a circle [m]
 CROOKED = 0.15  # and it is no part of a mover if it is farther off any [m]
 FRESH = 1 / 3  # this share of a mover lies on ground that was seen free, before it counts on a map of the robot's own
+ALL_FRESH = 0.9  # and this share of it, all the way, where only a part of it is seen
+FARTHER = 3.0  # such a part has to have come so many times as far
+FASTER = 0.3  # and to be faster than this [m/s]
+OFTEN = 0.25  # and to have been seen in this share of the scans
+ALIKE = 0.2  # and its radius, unless it was seen from edge to edge, to differ from the usual one by this share at most
 PARTIAL = 3.0  # the centre of a mover that is partly hidden has so many times the error
 THROUGH = 3  # a track through which the beams have passed in so many scans is gone
 SURE = 0.4  # a track counts once its velocity is known so well, as a standard deviation [m/s]
@@ -118,6 +123,9 @@ class _Track:
     moves: bool = False  # whether it has come far enough to be a mover
     rested: float = 0.0  # since when it has been where it stands [s]
     anchor: tuple[float, float] = field(default=(0.0, 0.0))  # where that is, or where it was first seen [m]
+    free_from: tuple[float, float] = field(
+        default=(0.0, 0.0)
+    )  # since when all of it stands on ground that was free [m]
 
     def predict(self, dt: float, acceleration: float) -> None:
         """Go on at constant velocity."""
@@ -313,7 +321,7 @@ class MoverTracker:
             x, y = self._centre(cluster, view, radius)
         error = self._error(x, y, view, whole)
         track = _Track(self._found, x, y, radius, view.time, view.time, error**2, spread=self.policy.speed**2 / 4)
-        track.rested, track.anchor = view.time, (x, y)
+        track.rested, track.anchor, track.free_from = view.time, (x, y), (x, y)
         self._tracks.append(track)
         self._found += 1
 
@@ -382,17 +390,38 @@ class MoverTracker:
 
     def _judge(self, track: _Track, cluster: Indices, view: _View, round_: bool) -> None:
         """Whether a track moves, on a map that is being made: what stood at first, or has stood for long, is part of it."""
+        fresh = float(np.mean(~view.hits.explained[cluster]))
+        if fresh < ALL_FRESH or not track.sure:
+            track.free_from = (track.x, track.y)
         if track.views < self.policy.confirmed:  # a part of something seems to move as more of it comes into sight
             track.rested, track.anchor = view.time, (track.x, track.y)
         away = math.dist((track.x, track.y), track.anchor)
-        fresh = float(np.mean(~view.hits.explained[cluster]))
         if not track.moves:
-            track.moves = away >= self.policy.way and round_ and fresh >= FRESH
+            track.moves = (away >= self.policy.way and round_ and fresh >= FRESH) or self._crosses(track, cluster, view)
         if track.moves:
             if away >= self.policy.way or math.hypot(track.vx, track.vy) > SLOW:
                 track.rested, track.anchor = view.time, (track.x, track.y)
             elif view.time - track.rested > self.policy.settle:
                 track.moves = False
+
+    def _crosses(self, track: _Track, cluster: Indices, view: _View) -> bool:
+        """Whether a track of which perhaps only a part is seen has gone a long way over ground that was seen free.
+
+        Things that stand, seen through gaps between others, seem to move. So what is seen has to be a good part of a circle
+        of the track's size, and that size to be known: from views from edge to edge of it, or of other movers like it.
+        """
+        policy = self.policy
+        came, due = math.dist((track.x, track.y), track.free_from), (view.time - track.begun) * self._lidar.rate
+        if came < FARTHER * policy.way or math.hypot(track.vx, track.vy) < FASTER or track.seen < OFTEN * due:
+            return False
+        if track.views == 0 and abs(track.radius - self._usual) > ALIKE * self._usual:
+            return False
+        points = view.hits.points[cluster]
+        wide = float(np.ptp(points, axis=0).max())
+        if len(cluster) < 2 * policy.least or wide < track.radius / 2 or track.radius >= 0.8 * policy.largest:
+            return False
+        off = np.hypot(*(points - self._centre(cluster, view, track.radius)).T) - track.radius
+        return float(np.sqrt(np.mean(off * off))) <= (ROUND if track.views else ROUND / 2)
 
     # ---- which tracks count, and for how long
 
