@@ -96,7 +96,9 @@ def test_noise_of_a_robot_whose_file_has_none_is_said_to_change_nothing(antdrive
     text = antdrive("robots", "turtlebot")[1]
     Path("bare.yaml").write_text("".join(line for line in text.splitlines(True) if not line.startswith("noise")))
     words = ("run", small, "-p", "astar", "--no-figures", "--out", "o", "--noise", "1")
-    assert "noise 1 changes nothing: the file of turtlebot has no noise section" in antdrive(*words, "-r", "bare.yaml")[1]
+    assert (
+        "noise 1 changes nothing: the file of turtlebot has no noise section" in antdrive(*words, "-r", "bare.yaml")[1]
+    )
     assert "changes nothing" not in antdrive(*words)[1]
 
 
