@@ -22,7 +22,9 @@ campaign = {
 }
 with tempfile.TemporaryDirectory() as folder:
     results = sweep(campaign, Path(folder), jobs=1)
-    table = results.table.select(["world", "planner", "certified", "driven_length_m"]).to_pylist()
+    table = results.table.select(
+        ["world", "planner", "certified", "driven_length_m"]
+    ).to_pylist()
 print(f"{results.size} runs, {results.succeeded} of them certified at the goal")
 
 # %%
@@ -34,14 +36,34 @@ print(f"{results.size} runs, {results.succeeded} of them certified at the goal")
 
 worlds = sorted({row["world"] for row in table})
 planners = list(dict.fromkeys(row["planner"] for row in table))
-lengths = {(row["world"], row["planner"]): row["driven_length_m"] for row in table if row["certified"]}
-cost = np.array([[lengths.get((world, planner), np.nan) for planner in planners] for world in worlds])
+lengths = {
+    (row["world"], row["planner"]): row["driven_length_m"]
+    for row in table
+    if row["certified"]
+}
+cost = np.array(
+    [
+        [lengths.get((world, planner), np.nan) for planner in planners]
+        for world in worlds
+    ]
+)
 
 figure = Figure(figsize=(6.4, 3.8), layout="constrained")
 axes = figure.add_subplot(label="profile")
 for planner, curve in zip(planners, performance_profiles(cost), strict=True):
-    axes.step([1.0, *curve.x, 1.1], [0.0, *curve.share, curve.at(1.1)], where="post", label=planner, lw=2)
-axes.set(xlim=(0.998, 1.1), ylim=(0, 1.02), xlabel="driven length, times the best", ylabel="share of worlds")
+    axes.step(
+        [1.0, *curve.x, 1.1],
+        [0.0, *curve.share, curve.at(1.1)],
+        where="post",
+        label=planner,
+        lw=2,
+    )
+axes.set(
+    xlim=(0.998, 1.1),
+    ylim=(0, 1.02),
+    xlabel="driven length, times the best",
+    ylabel="share of worlds",
+)
 _ = axes.legend(frameon=False)
 
 # %%

@@ -28,7 +28,9 @@ field = plan_figure(scenario.task, grid, found, scenario.robot)
 
 result = run(scenario)
 print(result.outcome.value)
-print(f"{result.metrics['duration_s']:.0f} s, {result.metrics['replans']:.0f} new routes")
+print(
+    f"{result.metrics['duration_s']:.0f} s, {result.metrics['replans']:.0f} new routes"
+)
 film(result.rollout, "spreading.mp4", camera="top", size=(640, 560), speed=6)
 
 # %%

@@ -19,10 +19,15 @@ ageing = paper_scenario("ibraheem2016")
 # Lines are medians of six seeds, bands the range. :doc:`The paper's page </papers/ibraheem2016>` has every claim with its
 # verdict.
 
-runs = {name: [plan(Scenario.of(ageing.task, name, seed=seed))[1] for seed in range(6)] for name in ("maco", "as")}
+runs = {
+    name: [plan(Scenario.of(ageing.task, name, seed=seed))[1] for seed in range(6)]
+    for name in ("maco", "as")
+}
 for name, found in runs.items():
     print(f"{name:>4}: {', '.join(f'{one.cost:.1f}' for one in found)} m")
-iterations = history_figure({name: [one.history for one in found] for name, found in runs.items()})
+iterations = history_figure(
+    {name: [one.history for one in found] for name, found in runs.items()}
+)
 
 # %%
 # Where the pheromone lies in the end

@@ -36,7 +36,9 @@ pheromone = contours_figure(colony.task, grid, found, colony.robot)
 # ---------
 # The option `shortcut`, which the paper does not have, cuts the loops out of each tour.
 
-result = run(Scenario.of("u-trap", "pfaco", options={"ants": 200, "shortcut": True}, seed=1))
+result = run(
+    Scenario.of("u-trap", "pfaco", options={"ants": 200, "shortcut": True}, seed=1)
+)
 print(f"pfaco with shortcut: {result.plan.cost:.2f} m")
 print(result.outcome.value)
 film(result.rollout, "valley.mp4", camera="top", size=(600, 500), speed=4)

@@ -11,10 +11,14 @@ from matplotlib.figure import Figure
 from antdrive import Scenario, film, run
 from antdrive.sim.log.margin import CAUSES, budget
 
-result = run(Scenario.of("slalom", "astar", margin=0.06, smoothing="taut", noise=3.0, seed=3))
+result = run(
+    Scenario.of("slalom", "astar", margin=0.06, smoothing="taut", noise=3.0, seed=3)
+)
 print(result.outcome.value)
 spent = budget(result.rollout)
-print(f"{100 * spent.margin:.0f} cm planned, {100 * spent.left:.1f} cm left at t = {spent.t:.1f} s")
+print(
+    f"{100 * spent.margin:.0f} cm planned, {100 * spent.left:.1f} cm left at t = {spent.t:.1f} s"
+)
 
 # %%
 # Cause by cause
@@ -25,7 +29,12 @@ print(f"{100 * spent.margin:.0f} cm planned, {100 * spent.left:.1f} cm left at t
 figure = Figure(figsize=(7.2, 3.4), layout="constrained")
 axes = figure.add_subplot(label="budget")
 rows = range(len(CAUSES))
-axes.barh([row - 0.2 for row in rows], [100 * one.metres for one in spent.contributions], 0.36, label="at most")
+axes.barh(
+    [row - 0.2 for row in rows],
+    [100 * one.metres for one in spent.contributions],
+    0.36,
+    label="at most",
+)
 axes.barh(
     [row + 0.2 for row in rows],
     [100 * one.at_tightest for one in spent.contributions],
@@ -42,4 +51,6 @@ _ = axes.legend(frameon=False)
 # ---------
 # The robot believes its wheels and a pose that is fixed now and then; both are wrong by three times what its file documents.
 
-film(result.rollout, "budget.mp4", camera="follow", size=(480, 360), fps=20, speed=2)
+film(
+    result.rollout, "budget.mp4", camera="follow", size=(480, 360), fps=20, speed=2
+)

@@ -26,7 +26,9 @@ for left in (1, 43, 85):
         free[low : low + 40, left : left + 40] = True  # a room
         free[door : door + 2, left + 15 : left + 25] = True  # its door
         free[low + 14 : low + 26, left + 26 : left + 36] = False  # its table
-office = map_task(CellMap(free, 0.1), (1.0, 5.3, 0.0), (11.6, 5.3), name="office", cell=0.2)
+office = map_task(
+    CellMap(free, 0.1), (1.0, 5.3, 0.0), (11.6, 5.3), name="office", cell=0.2
+)
 print(f"{len(office.world.obstacles)} cylinders")
 
 # %%
@@ -39,10 +41,13 @@ errands = {
     "room, lower middle": (5.2, 1.2),
 }
 runs = {
-    name: run(Scenario.of(replace(office, goal=goal), "astar", "turtlebot", seed=1)) for name, goal in errands.items()
+    name: run(Scenario.of(replace(office, goal=goal), "astar", "turtlebot", seed=1))
+    for name, goal in errands.items()
 }
 for name, result in runs.items():
-    print(f"{name}: {result.outcome.value}, clearance at least {result.certificate.bound:.2f} m")
+    print(
+        f"{name}: {result.outcome.value}, clearance at least {result.certificate.bound:.2f} m"
+    )
 drives = comparison_figure({name: result.rollout for name, result in runs.items()})
 
 # %%

@@ -23,18 +23,37 @@ query = Query.between(grid, scenario.task)
 # ---------------
 # Lines are medians, bands the range over seeds.
 
-planners = {"iaco": scenario.planner, "as": load_planner("as"), "pfaco": load_planner("pfaco")}
-plans = {name: [one.plan(query, np.random.default_rng(seed)) for seed in range(5)] for name, one in planners.items()}
+planners = {
+    "iaco": scenario.planner,
+    "as": load_planner("as"),
+    "pfaco": load_planner("pfaco"),
+}
+plans = {
+    name: [one.plan(query, np.random.default_rng(seed)) for seed in range(5)]
+    for name, one in planners.items()
+}
 for name, found in plans.items():
     lengths = [one.cost for one in found if one.solved]
-    print(f"{name:>5}: {len(lengths)} of {len(found)} found a path", f"of {min(lengths):.1f} m" if lengths else "")
-iterations = history_figure({name: [one.history for one in found] for name, found in plans.items()})
+    print(
+        f"{name:>5}: {len(lengths)} of {len(found)} found a path",
+        f"of {min(lengths):.1f} m" if lengths else "",
+    )
+iterations = history_figure(
+    {name: [one.history for one in found] for name, found in plans.items()}
+)
 
 # %%
 # Their paths
 # -----------
 
-paths = maps_figure({"20 × 20": (query, {name: found[0] for name, found in plans.items() if found[0].solved})})
+paths = maps_figure(
+    {
+        "20 × 20": (
+            query,
+            {name: found[0] for name, found in plans.items() if found[0].solved},
+        )
+    }
+)
 
 # %%
 # The search and the drive
@@ -43,4 +62,11 @@ paths = maps_figure({"20 × 20": (query, {name: found[0] for name, found in plan
 
 result = run(scenario)
 print(result.outcome.value)
-film(result.rollout, "exploring.mp4", camera="top", size=(480, 480), speed=5, prelude=3.0)
+film(
+    result.rollout,
+    "exploring.mp4",
+    camera="top",
+    size=(480, 480),
+    speed=5,
+    prelude=3.0,
+)

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.sim.driving.rescanning import forgetting_ticks
-from antdrive.sim.driving.survey import MAP_CELL, RECENT
+from antdrive.sim.driving.survey import MAP_CELL, RECENT, horizon_of
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.scans import ranges_of
 from antdrive.sim.log.sights import Beams, beams_of, lidar_of, meet
@@ -98,7 +98,9 @@ class Recollection:
             self._insert(k)
 
     def _empty_map(self, pose: Pose) -> OccupancyMap:
-        seen = OccupancyMap(self.lidar, MAP_CELL, pose[:2])
+        perception = self._rollout.record.perception
+        horizon = horizon_of(watching=perception is not None and perception.kind == "lidar")
+        seen = OccupancyMap(self.lidar, MAP_CELL, pose[:2], horizon)
         seen.take_as_free(pose[:2], self._rollout.record.robot.radius)
         return seen
 
