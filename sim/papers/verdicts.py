@@ -261,7 +261,7 @@ def _wider(test: Wider, found: Found) -> Judged:
         [_quartile_range(first, row) - _quartile_range(second, row) for row in rows], [0.025, 0.975]
     )
     interval = Interval(float(low), float(high))
-    ours = f"ranges differ by {_with_interval(value, interval, test.quantity)}"
+    ours = f"ranges differ by {_with_interval(value, interval, test.quantity, endless=ENDLESS_TEXT)}"
     decision, reason = _decided(low > 0, high <= 0, len(first), value, interval, 0.0)
     return Judged(decision, value, interval, ours, _joined(reason, "ranges between quartiles, bootstrapped"))
 
