@@ -4,7 +4,8 @@ Prints Markdown.
 Six of BARN's worlds, `jackal`, `--map none`, and the same drives with the map: with exact sensors, then with `--noise 1` and
 odometry, alone and with matching. All times are processor time for each simulated second. *Loop* is the drive loop without
 what follows it in the row; the share is what follows, over the loop. Each drive is repeated after a first one, in which files are
-read and kernels loaded; of each part the least counts, so that other work on the machine disturbs the figures less.
+read and kernels loaded; of each part the least counts, so that other work on the machine disturbs the figures less. What reading
+the clock takes is subtracted.
 
 - scan: the exact rays, their noise
 - match: the estimated pose corrected by the scan
@@ -34,6 +35,7 @@ from benchmarks.drives import barn_tasks
 from benchmarks.planners import table
 
 WORLDS = ("world_0", "world_138", "world_186", "world_24", "world_288", "world_66")
+EMPTY = 20_000  # calls of an empty function
 PARTS = ("scan", "match", "map", "watch", "sight", "replans")
 SENSORS: tuple[tuple[str, dict[str, Any]], ...] = (  # how the robot without a map senses
     ("exact", {}),
@@ -45,13 +47,40 @@ SENSORS: tuple[tuple[str, dict[str, Any]], ...] = (  # how the robot without a m
 class Meter:
     """Adds up the processor time of functions by name; of calls within calls only the outermost counts.
 
+    Reading the clock takes as long as a short function does. So an empty function is measured at first, and what it takes is
+    subtracted.
+
     Attributes:
         spent: seconds by name
+        calls: how often a function was called, by name
+        within: what the clock shows for an empty function [s]
+        whole: what measuring it takes [s]
     """
 
     def __init__(self) -> None:
-        self.spent: dict[str, float] = {}
+        self.spent, self.calls = dict[str, float](), dict[str, int]()
         self._within = ""
+        self.within = self.whole = 0.0
+        self.watch(self, "nothing", "nothing")
+        started = time.process_time()
+        for _ in range(EMPTY):
+            self.nothing()
+        self.whole = (time.process_time() - started) / EMPTY
+        self.within = self.spent["nothing"] / EMPTY
+
+    def nothing(self) -> None:
+        """Do nothing."""
+
+    def begin(self) -> None:
+        """Forget what was measured."""
+        self.spent.clear()
+        self.calls.clear()
+
+    def parts(self) -> dict[str, float]:
+        """What the parts took, and the loop without them [s]."""
+        found = {part: self.spent.get(part, 0.0) - self.within * self.calls.get(part, 0) for part in PARTS}
+        clocks = self.whole * sum(self.calls.get(part, 0) for part in PARTS)
+        return {"loop": self.spent["loop"] - sum(found.values()) - clocks, **found}
 
     def watch(self, owner: Any, method: str, name: str) -> None:
         """Measure a function of a module or a class from now on."""
@@ -66,6 +95,7 @@ class Meter:
                 return inner(*args, **options)
             finally:
                 self.spent[name] = self.spent.get(name, 0.0) + time.process_time() - started
+                self.calls[name] = self.calls.get(name, 0) + 1
                 self._within = outside
 
         setattr(owner, method, measured)
@@ -77,10 +107,9 @@ def costs(meter: Meter, scenario: Scenario, drives: int) -> tuple[dict[str, floa
     assert done.rollout is not None
     seconds, found = 1e-3 * float(done.rollout.t[-1]), list[dict[str, float]]()
     for _ in range(drives):
-        meter.spent.clear()
+        meter.begin()
         run(scenario)
-        parts = {part: meter.spent.get(part, 0.0) / seconds for part in PARTS}
-        found.append({"loop": meter.spent["loop"] / seconds - sum(parts.values()), **parts})
+        found.append({part: spent / seconds for part, spent in meter.parts().items()})
     return {part: min(each[part] for each in found) for part in ("loop", *PARTS)}, done.succeeded
 
 
