@@ -1,9 +1,10 @@
 # make demo   plan, drive, certify and film one world
 # make test   the whole test suite (make test-slow: the long ones too)
 # make docs   the site, with everything that its pages show: docs/_build/html/index.html
+# make dist   wheel and sdist in dist/, checked in a fresh environment outside the checkout
 # Everything else that these need they set up themselves, in .venv.
 .DELETE_ON_ERROR:
-.PHONY: demo test test-slow docs lint format bench mutants warm clean help
+.PHONY: demo test test-slow docs dist lint format bench mutants warm clean help
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -11,7 +12,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 DEMO := out/demo
 
 help:
-	@sed -n '1,4s/^# //p' Makefile
+	@sed -n '1,5s/^# //p' Makefile
 
 # The core, then the compiled kernels' cache, so that the first plan is quick.
 $(VENV)/.core: pyproject.toml tools/find-python
@@ -49,20 +50,29 @@ test: $(VENV)/.dev $(VENV)/.warm
 test-slow: $(VENV)/.dev $(VENV)/.warm
 	@$(BIN)/python -m pytest --numprocesses 2 --dist loadgroup -m ''
 
-# The code of the tutorials and of the gallery runs again when the packages change.
-SOURCES := $(wildcard */*.py */*/*.py */*/*/*.py */*/*/*/*.py)
+# What pages show runs again when they or the packages change. Both halves use as many processes as there are cores.
+DEPTHS := * */* */*/* */*/*/*
+SOURCES := $(foreach folder,worlds planners robots sim,$(wildcard $(foreach depth,$(DEPTHS),$(folder)/$(depth).py $(folder)/$(depth).yaml)))
+CORES := $(shell nproc)
 
-docs/_build/.tutorials: $(VENV)/.docs $(VENV)/.warm $(SOURCES) $(wildcard docs/tutorials/*.md)
-	@$(BIN)/python -m tools.pages docs/tutorials/*.md
+docs/_build/.pages: $(VENV)/.docs $(VENV)/.warm $(SOURCES) tools/pages.py $(wildcard docs/*.md docs/*/*.md docs/*/*/*.md examples/*/*.md)
+	@$(BIN)/python -m tools.pages --all --jobs $(CORES) --kept docs/_build/pages.json
 	@mkdir -p docs/_build && touch $@
 
 docs/_build/.gallery: $(VENV)/.docs $(VENV)/.warm $(SOURCES)
 	@rm -rf docs/_gallery
 	@mkdir -p docs/_build && touch $@
 
-docs: docs/_build/.tutorials docs/_build/.gallery
-	@$(BIN)/python -m sphinx --builder html --fail-on-warning --keep-going --nitpicky --quiet -d docs/_build/doctrees docs docs/_build/html
+docs: docs/_build/.pages docs/_build/.gallery
+	@$(BIN)/python -m sphinx --builder html --fail-on-warning --keep-going --nitpicky --quiet --jobs $(CORES) -d docs/_build/doctrees docs docs/_build/html
 	@$(BIN)/python -m tools.site docs/_build/html
+
+# `build` makes the sdist, and the wheel from the sdist.
+dist: $(VENV)/.core
+	@$(PIP) install --editable '.[dist]'
+	@rm -rf dist
+	@$(BIN)/python -m build --outdir dist . >/dev/null
+	@$(BIN)/python -m tools.dist dist
 
 lint: $(VENV)/.dev
 	@$(BIN)/ruff check .

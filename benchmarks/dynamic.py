@@ -24,7 +24,8 @@ from joblib import Parallel, delayed
 
 from antdrive.planners import Query, load_planner, plan_in_time
 from antdrive.robots import load_robot
-from antdrive.sim import Outcome, Perception, ReplanPolicy, Scenario, run
+from antdrive.sim import Outcome, Perception, ReplanPolicy, Rollout, Scenario, run
+from antdrive.sim.log.sights import movers_met
 from antdrive.worlds import (
     Cruising,
     Disc,
@@ -42,6 +43,7 @@ from benchmarks.planners import table
 
 DYNABARN = Path(__file__).parent.parent.parent / "shared" / "data" / "dynabarn" / "dynabarn10.json"
 CLASSES = {"easy": range(20), "medium": range(20, 40), "hard": range(40, 60)}
+JUMP = 0.3  # a mover that gets so far between two rows of a log has jumped [m]
 START_INTERVAL = 7.3  # between the moments at which drives in one world start [s]
 KNOWN, BY_LIDAR = Perception(kind="motions"), Perception(kind="lidar")
 POLICIES: dict[str, dict[str, Any]] = {
@@ -101,8 +103,21 @@ def drive(
     log = done.rollout
     if log is None:
         return Result(name, done.outcome, math.nan, 0, False, done.reason)
-    replans = len(log.record.replans)
-    return Result(name, done.outcome, float(log.t[-1]), replans, done.succeeded, done.reason)
+    replans, reason = len(log.record.replans), "; ".join(filter(None, (done.reason, warning(log))))
+    return Result(name, done.outcome, float(log.t[-1]), replans, done.succeeded, reason)
+
+
+def warning(log: Rollout) -> str:
+    """Of a drive without a map that ended in a contact with a mover: since when the robot followed it, and whether it jumped."""
+    if not len(log.contacts) or not len(log.scans):
+        return ""
+    row, mover = int(log.contacts[0, 0]), int(log.contacts[0, 1]) - len(log.record.world.obstacles)
+    if not 0 <= mover < log.movers.shape[1]:
+        return ""
+    now, followed = float(log.t[row]), movers_met(log)[mover].followed_at
+    jumps = np.flatnonzero(np.hypot(*np.diff(log.movers[: row + 1, mover], axis=0).T) > JUMP)
+    words = f"followed {now - followed:.1f} s before" if followed <= now else "not followed before"
+    return f"{words}, jumped {now - log.t[jumps[-1]]:.1f} s before" if len(jumps) else words
 
 
 def columns(results: Sequence[Result]) -> list[str]:

@@ -1,6 +1,7 @@
 """Measure drives without a map: `python -m benchmarks.unknown ablations|contacts --results FOLDER [--worlds N] [--jobs N]`.
 
 Prints Markdown. What a folder holds is not driven again, so that an interrupted measurement goes on with the same command.
+With `--films` each drive that did not arrive is filmed into the folder `films` of its results.
 
 - ablations: BARN's worlds, `jackal`, noise and `--localisation matching`; the lidar's range and beams, the errors of odometry,
   or the planner differ from those of the first row. *Price*: ratio of the arrival times, and of the lengths, to the same drives
@@ -23,8 +24,10 @@ import yaml
 from antdrive.robots import list_robots
 from antdrive.sim.campaigns import sweep
 from antdrive.sim.campaigns.challenge import campaign_data, lines, reference_times, unpacked
+from antdrive.sim.campaigns.results import SweepResults
 from antdrive.sim.statistics.price import Ratio, prices
 from antdrive.sim.statistics.runs import RunTable
+from antdrive.sim.view.film.failures import film_failures
 from antdrive.worlds.files.atomic import written_whole
 from benchmarks.cost import BARN
 from benchmarks.planners import table
@@ -85,7 +88,7 @@ def ablations(options: argparse.Namespace) -> Iterator[str]:
         data = campaign_data(worlds, options.trials, planner, robot, settings)
         chosen = data["worlds"][:: max(1, len(data["worlds"]) // (options.worlds or len(data["worlds"])))]
         data["worlds"] = chosen[: options.worlds]
-        return sweep(data, options.results / name, jobs=options.jobs, keep="failed").table
+        return filmed(sweep(data, options.results / name, jobs=options.jobs, keep="failed"), options.films).table
 
     def rows() -> Iterator[list[str]]:
         known: dict[str, Any] = {}
@@ -100,6 +103,13 @@ def ablations(options: argparse.Namespace) -> Iterator[str]:
             yield row(variant.name, runs, fastest, known[variant.planner])
 
     yield from table(HEADS, rows())
+
+
+def filmed(results: SweepResults, films: bool) -> SweepResults:
+    """The results, after what failed was filmed, if that is wanted."""
+    if films:
+        film_failures(results.table.to_pylist(), results.folder, results.folder / "films")
+    return results
 
 
 def row(name: str, runs: Any, fastest: Mapping[str, float], known: Any) -> list[str]:
@@ -138,7 +148,7 @@ def contacts(options: argparse.Namespace) -> Iterator[str]:
         "noise": [1.0],
         "settings": {"map": "none", "localisation": "matching"},
     }
-    runs = sweep(data, options.results, jobs=options.jobs, keep="failed").table.to_pylist()
+    runs = filmed(sweep(data, options.results, jobs=options.jobs, keep="failed"), options.films).table.to_pylist()
     yield from table(("robot", "worlds", "drives", "certified", "contacts while driving", "ends"), counted(runs))
     for run in runs:
         if not run["succeeded"]:
@@ -164,6 +174,7 @@ def main() -> None:
     parser.add_argument("--worlds", type=int, help="how many worlds; all of BARN's, or 1,000 random ones, without")
     parser.add_argument("--trials", type=int, default=1, help="how often each of BARN's worlds is driven")
     parser.add_argument("--jobs", type=int, default=1, help="processes; 0: this one")
+    parser.add_argument("--films", action="store_true", help="film each drive that did not arrive")
     options = parser.parse_args()
     if options.what == "ablations" and not options.barn.exists():
         print(f"no worlds at {options.barn}; give --barn")

@@ -28,11 +28,21 @@ extensions = [
     "antdrive_commands",
     "antdrive_films",
     "antdrive_links",
+    "antdrive_marks",
     "antdrive_math",
+    "antdrive_measured",
+    "antdrive_planners",
     "antdrive_tables",
 ]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
-exclude_patterns = ["_build", "_ext", "gallery", "_gallery/sg_execution_times.rst", "sg_execution_times.rst"]
+exclude_patterns = [
+    "_build",
+    "_ext",
+    "_templates",
+    "gallery",
+    "_gallery/sg_execution_times.rst",
+    "sg_execution_times.rst",
+]
 # Each is written by sphinx-gallery; none says anything that its page does not.
 suppress_warnings = ["config.cache"]
 
@@ -77,6 +87,7 @@ nitpick_ignore_regex = [
 # The gallery: each example is run by the build.
 sphinx_gallery_conf = {
     "examples_dirs": "gallery",
+    "parallel": True,  # as many as --jobs says
     "gallery_dirs": "_gallery",
     "filename_pattern": r"\.py$",
     "image_scrapers": ("antdrive_films.scrape",),
@@ -96,7 +107,9 @@ sphinx_gallery_conf = {
 
 html_theme = "pydata_sphinx_theme"
 html_title = "antdrive"
+html_context = {"default_mode": "auto"}  # without it the theme writes an error to the console on the first visit
 html_static_path = ["_static"]
+templates_path = ["_templates"]
 html_css_files = ["antdrive.css"]
 html_copy_source = False
 html_show_sourcelink = False

@@ -26,7 +26,7 @@ from antdrive.worlds.errors import FieldError
 
 PHYSICS_HZ = (60, 10_000)  # slower physics jolts the robot
 SLOWEST_CONTROL = 10  # [Hz]
-FINE = 0.05  # without a map, planners that search plan on cells of this side at most [m]
+FINE = 0.05  # without a map, plans are made on cells of this side at most [m]
 
 CONTROLLER, PERCEPTION, AVOIDANCE, REPLANNING = PurePursuit(), Perception(), Avoidance(), ReplanPolicy()
 
@@ -41,7 +41,7 @@ class Scenario:
         robot: drives it
         planner_name: the planner's name in records; empty: the name of its class
         margin: distance kept free around the robot, on top of its radius [m]
-        cell: grid resolution [m]; None: the task's own
+        cell: grid resolution [m]; None: the task's own, without a map at most 5 cm
         smoothing: how the plan becomes a route: none, taut or clearance, see `antdrive.planners.smooth`
         seed: the seed of all random numbers
         controller: follows the route
@@ -120,11 +120,13 @@ class Scenario:
             ) from None
         if self.map == "none" and self.robot.lidar is None:
             raise FieldError(
-                "map", f"none: {self.robot.name} has no lidar; add one to its file, or drive jackal or turtlebot"
+                "map",
+                f"none: {self.robot.name} has no lidar; add one to its file, or drive jackal or turtlebot4",
             )
         if self.perception.kind == "lidar" and self.robot.lidar is None:
             raise FieldError(
-                "sees", f"lidar: {self.robot.name} has no lidar; add one to its file, or drive jackal or turtlebot"
+                "sees",
+                f"lidar: {self.robot.name} has no lidar; add one to its file, or drive jackal or turtlebot4",
             )
         if self.perception.kind == "lidar" and self.map == "given" and self.localisation == "odometry":
             raise FieldError("sees", "lidar: with a given map the pose must not drift; localise by fixes or true")
@@ -335,11 +337,10 @@ class Scenario:
 
     @property
     def planning_cell(self) -> float:
-        """The side of the cells that routes are planned on [m]; searches without a map have fine ones."""
+        """The side of the cells that routes are planned on [m]; without a map fine ones: coarse ones close gaps."""
         if self.cell is not None:
             return self.cell
-        fine = self.exploring and not capabilities_of(self.planner).iterative
-        return min(self.task.cell, FINE) if fine else self.task.cell
+        return min(self.task.cell, FINE) if self.exploring else self.task.cell
 
     @property
     def sensing(self) -> SensingRecord | None:

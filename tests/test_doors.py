@@ -17,7 +17,7 @@ from antdrive.sim.view.style import VERDICTS
 from antdrive.worlds import IMPORTS
 
 ROOT = Path(__file__).parent.parent
-README = (ROOT / "README.md").read_text()
+GUIDES = {page.stem: page.read_text() for page in (ROOT / "docs" / "how-to").glob("*.md")}
 CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text()
 ROLLOUT_FORMAT = (ROOT / "docs" / "reference" / "rollout-format.md").read_text()
 
@@ -43,7 +43,7 @@ def test_a_metric_has_a_unit_and_a_definition(name: str) -> None:
 def test_a_world_format_has_a_module_tests_and_a_place_in_the_help(name: str) -> None:
     assert (ROOT / "worlds" / "formats" / f"{name}.py").exists()
     assert (ROOT / "tests" / "worlds" / "formats" / f"test_{name}.py").exists()
-    text = f"{import_world.__doc__} {README}".lower().replace("_", "")
+    text = f"{import_world.__doc__} {GUIDES['worlds']}".lower().replace("_", "")
     assert name.replace("_", "") in text
 
 
@@ -56,9 +56,9 @@ def test_a_limiter_has_a_colour_and_an_index_in_the_kernels() -> None:
 
 
 @pytest.mark.parametrize("outcome", Outcome)
-def test_an_outcome_has_a_verdict_a_line_in_the_readme_and_a_row_in_the_format(outcome: Outcome) -> None:
+def test_an_outcome_has_a_verdict_a_line_in_the_guide_and_a_row_in_the_format(outcome: Outcome) -> None:
     assert outcome in VERDICTS
-    assert outcome is Outcome.SUCCEEDED or f"`{outcome.key}`" in README
+    assert outcome is Outcome.SUCCEEDED or f"`{outcome.key}`" in GUIDES["run"]
     assert f"`{outcome.key}`" in ROLLOUT_FORMAT
     assert not outcome.value.endswith("."), "the sentence continues in messages"
 

@@ -10,7 +10,6 @@ import pytest
 
 from antdrive.sim import Outcome
 from antdrive.sim.cli.app import main
-from antdrive.worlds import load_task
 
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text()
@@ -21,7 +20,8 @@ def blocks(language: str) -> list[str]:
 
 
 def test_the_outcomes_that_are_no_success_are_listed() -> None:
-    listed = re.search(r"with 1 if it did not\s+\(([^)]*)\)", TEXT)
+    page = (ROOT / "docs" / "how-to" / "run.md").read_text()
+    listed = re.search(r"with 1 if it did not\s+\(([^)]*)\)", page)
     assert listed
     assert re.findall(r"`(\w+)`", listed[1]) == [o.key for o in Outcome if o is not Outcome.SUCCEEDED]
 
@@ -64,17 +64,14 @@ def test_the_python_block_passes_mypy_strict(tmp_path: Path) -> None:
     assert summary.startswith("Found 1 error in 1 file (checked 2 ")
 
 
-def test_the_world_file_is_driven(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (text,) = blocks("yaml")
-    (home / "two-posts.yaml").write_text(text)
-    assert len(load_task(home / "two-posts.yaml").world.obstacles) == 2
-    assert exit_code(["antdrive", "run", "two-posts.yaml"], monkeypatch) == 0
+def test_it_fits_on_two_screens() -> None:
+    assert len(TEXT.splitlines()) <= 100
 
 
 def test_the_commands_work(home: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     lines = [line.split("#")[0].strip() for block in blocks("sh") for line in block.splitlines()]
     commands = [(shlex.split(line.split("||")[0]), "||" in line) for line in lines if line.startswith("antdrive")]
-    assert len(commands) >= 5
+    assert {fails for _, fails in commands} == {True, False}
     for command, fails in commands:
         assert exit_code(command, monkeypatch) == fails, (command, *capsys.readouterr())
 

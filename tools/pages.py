@@ -7,30 +7,50 @@ Blocks of a page run from top to bottom in one empty folder, Python's in one nam
   fail, `> FILE` writes to a file. Commands are `antdrive`, which runs in this process, `python`, `pytest`, and some of
   the shell's.
 - `sh`: every line is a command, and its output does not matter.
-- `yaml`, `toml` and others: written to FILE after a comment `<!-- file: FILE -->`; a `python` block after such a comment
-  is, too, and is not run by itself.
+- `yaml`, `toml` and others: written to FILE after a comment `<!-- file: FILE -->`, or added to its end after
+  `<!-- added to: FILE -->`; a `python` block after such a comment is, too, and is not run by itself.
 
-`...` in an output stands for anything. A comment `<!-- not run: REASON -->` before a block leaves it out. `--update`
-writes what was printed into the page, apart from outputs with `...` that agree.
+`...` in an output stands for anything. More comments say what a page needs:
+
+- `<!-- before: COMMAND -->` runs a command that the page does not show, for what its readers have already. `{root}` is
+  the folder of the repository.
+- `<!-- not run: REASON -->` before a block leaves it out; the site shows the reason.
+- `<!-- run by: FILE::TEST -->` before a block says which test runs it.
+
+`--all` runs every page with code (`pages_with_code`), `--jobs 2` two at a time. `--kept FILE` keeps what ran without a
+fault and leaves a page out while it and the code are as they were then. `--update` writes what was printed into the
+page, apart from outputs with `...` that agree.
 """
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import dataclasses
+import hashlib
 import io
+import json
 import os
 import re
 import shlex
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+import warnings
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-MARK = re.compile(r"<!-- (file|not run): (.+?) -->\s*$")
-SHELL = ("pytest", "ls", "cat", "mkdir", "cp", "sed")
+ROOT = Path(__file__).resolve().parents[1]
+MARK = re.compile(r"<!-- (file|added to|before|not run|run by): (.+?) -->\s*$")
+SHELL = ("ls", "cat", "mkdir", "cp", "sed")
+CODE = ("antdrive", "worlds", "planners", "robots", "sim", "examples", "tools")  # what pages run
+RUN = ("python", "console", "sh")  # languages that run
+#: Pages whose blocks tests run, each with the tests' file.
+TESTED = {
+    "README.md": "tests/test_readme.py",
+    "examples/regression_suite/README.md": "tests/examples/test_regression_suite.py",
+}
 COMPILING = "antdrive: compiling the planners"  # what only the first command of an installation says
 WIDTH = "100"  # of the terminal that commands believe in
 
@@ -43,7 +63,7 @@ class Block:
         language: the word after the fence
         text: the lines within
         line: the number of its first line, from 1
-        marks: `file` and `not run`, from the comment before it
+        marks: what the comments before it say, by their first word or two
         follows: whether only empty lines lie between it and the block before
     """
 
@@ -66,6 +86,8 @@ def blocks_of(page: str) -> list[Block]:
             mark = MARK.match(line)
             if begin and begin[1].startswith("`"):
                 fence, opened, lines = begin[1], (begin[2], number + 1, follows), []
+            elif mark and mark[1] == "before":
+                found.append(Block("before", mark[2].replace("{root}", str(ROOT)) + "\n", number, {}, False))
             elif mark:
                 marks[mark[1]] = mark[2]
             elif line.strip():
@@ -119,6 +141,13 @@ def run_antdrive(words: list[str]) -> int:
     return 0
 
 
+def declared(wanted: str) -> tuple[int, str]:
+    """Instead of installing an extra: whether antdrive has one of that name. What the page runs next needs what it brings."""
+    _, _, extras = (ROOT / "pyproject.toml").read_text().partition("\n[project.optional-dependencies]\n")
+    known = [f"antdrive[{name}]" for name in re.findall(r"^(\w+) = \[", extras.partition("\n[")[0], re.MULTILINE)]
+    return (0, "") if wanted in known else (1, f"pip install {wanted}: not one of {', '.join(known)}\n")
+
+
 def run_words(words: list[str]) -> tuple[int, str]:
     """Run a command; its exit code and what it printed."""
     if words[0] == "antdrive":
@@ -127,6 +156,8 @@ def run_words(words: list[str]) -> tuple[int, str]:
             code = run_antdrive(words)
         said = out.getvalue().splitlines(keepends=True)
         return code, "".join(line for line in said if not line.startswith(COMPILING))
+    if words[:2] == ["pip", "install"]:
+        return declared(words[2])
     if words[0] == "python":
         words = [sys.executable, *words[1:]]
     elif words[0] == "pytest":
@@ -151,6 +182,14 @@ def run_command(command: str) -> tuple[bool, str]:
     return code == (1 if fails else 0), printed
 
 
+def write(block: Block) -> None:
+    """Write a block to its file, or add it to the file's end."""
+    path = Path(block.marks.get("file") or block.marks["added to"])
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w" if "file" in block.marks else "a", encoding="utf-8") as file:
+        file.write(block.text)
+
+
 @dataclasses.dataclass
 class Page:
     """The run of a page.
@@ -170,14 +209,13 @@ class Page:
         space: dict[str, Any] = {"__name__": "__main__"}
         output: str | None = None
         for block in blocks_of(self.path.read_text(encoding="utf-8")):
-            if "not run" in block.marks:
+            if "not run" in block.marks or "run by" in block.marks:
                 output = None
-            elif "file" in block.marks:
-                Path(block.marks["file"]).parent.mkdir(parents=True, exist_ok=True)
-                Path(block.marks["file"]).write_text(block.text, encoding="utf-8")
+            elif "file" in block.marks or "added to" in block.marks:
+                write(block)
             elif block.language == "python":
                 output = self.run_python(block, space)
-            elif block.language in ("console", "sh"):
+            elif block.language in ("console", "sh", "before"):
                 self.run_shell(block)
             elif block.language == "text" and block.follows and output is not None:
                 self.compare(block.text, output, block.line)
@@ -234,17 +272,81 @@ def run_page(path: Path) -> Page:
             os.chdir(before)
 
 
+def pages_with_code(root: Path = ROOT) -> list[Path]:
+    """Every page of the site and of the examples with a block that runs, apart from those that tests run.
+
+    Args:
+        root: the folder of the repository
+    """
+    pages = [*sorted((root / "docs").rglob("*.md")), *sorted((root / "examples").rglob("*.md"))]
+    return [
+        page
+        for page in pages
+        if not {"_build", "_gallery"} & set(page.parts)
+        and page.relative_to(root).as_posix() not in TESTED
+        and any(
+            block.language in RUN and "not run" not in block.marks
+            for block in blocks_of(page.read_text(encoding="utf-8"))
+        )
+    ]
+
+
+def digest_of(paths: Iterable[Path]) -> str:
+    """SHA-256 of files' contents."""
+    found = hashlib.sha256()
+    for path in paths:
+        found.update(path.read_bytes() + b"\0")
+    return found.hexdigest()
+
+
+def timed(path: Path) -> tuple[Page, float]:
+    """Run a page; what came of it, and the processor time that it took with its commands [s]."""
+    before = sum(os.times()[:4])
+    page = run_page(path)
+    return page, sum(os.times()[:4]) - before
+
+
+def run_pages(paths: list[Path], jobs: int) -> Iterator[tuple[Page, float]]:
+    """Run pages in processes of their own; each with its processor time, in the order in which they were given."""
+    if jobs == 1:
+        yield from map(timed, paths)
+        return
+    from joblib import Parallel, delayed
+
+    # A process that has grown is replaced between two pages, which is no fault.
+    warnings.filterwarnings("ignore", "A worker stopped while some jobs", UserWarning)
+    yield from Parallel(n_jobs=jobs, return_as="generator", pre_dispatch="n_jobs", batch_size=1)(
+        delayed(timed)(path) for path in paths
+    )
+
+
 def main(words: list[str]) -> int:
     """Run pages; 1 if one is wrong."""
-    update = "--update" in words
+    asked = argparse.ArgumentParser(prog="python -m tools.pages", description="Run the code of pages.")
+    asked.add_argument("pages", nargs="*", type=Path)
+    asked.add_argument("--all", action="store_true", help="every page with code")
+    asked.add_argument("--jobs", type=int, default=1, help="pages at a time")
+    asked.add_argument("--kept", type=Path, help="file that keeps what ran without a fault")
+    asked.add_argument("--update", action="store_true", help="write what was printed into the pages")
+    given = asked.parse_args(words)
+    pages = [*given.pages, *(pages_with_code() if given.all else [])]
+    files = (path for folder in CODE for path in (ROOT / folder).rglob("*") if path.suffix in (".py", ".yaml"))
+    code = digest_of(sorted(files))
+    kept = json.loads(given.kept.read_text()) if given.kept and given.kept.exists() else {}
+    keys = {page.resolve(): digest_of([page]) + code for page in pages}
     failed = False
-    for name in [word for word in words if not word.startswith("-")]:
-        page = run_page(Path(name))
-        if update:
+    for page, took in run_pages([path for path, key in keys.items() if kept.get(str(path)) != key], given.jobs):
+        if given.update:
             page.update()
-        said = "\n".join(page.problems) or f"{name}: every block runs and prints what the page shows"
+        name = os.path.relpath(page.path)
+        said = "\n".join(page.problems) or f"{name}: every block runs and prints what the page shows ({took:.0f} s)"
         sys.stdout.write(said + "\n")
+        sys.stdout.flush()
         failed |= bool(page.problems)
+        if given.kept and not page.problems:
+            kept[str(page.path)] = keys[page.path]
+            given.kept.parent.mkdir(parents=True, exist_ok=True)
+            given.kept.write_text(json.dumps(kept))
     return int(failed)
 
 

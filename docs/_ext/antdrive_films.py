@@ -1,13 +1,14 @@
 """Films and figures of the gallery.
 
-An example writes a film with `film(..., "name.mp4")` and leaves figures in variables. After each of its blocks the films
-and figures that are new are shown on the page. The directive `film` shows a film with a poster; nothing is loaded before
-it is played.
+An example writes a film with `film(..., "name.mp4")`, under a name that no other example has, and leaves figures in
+variables. After each of its blocks the films and figures that are new are shown on the page. The directive `film` shows
+a film with a poster; nothing is loaded before it is played.
 """
 
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import weakref
 from pathlib import Path
@@ -23,6 +24,7 @@ from sphinx.errors import ExtensionError
 
 MOST = 1_000_000  # what a film may weigh [B]
 FILMS = "_films"  # where films are in the site
+FILM = re.compile(r'"([\w-]+\.mp4)"')
 _drawn: weakref.WeakSet[Figure] = weakref.WeakSet()
 
 
@@ -37,7 +39,10 @@ def scrape(block: Any, block_vars: dict[str, Any], gallery_conf: dict[str, Any])
     shown = []
     names = block_vars["image_path_iterator"]
     source = Path(gallery_conf["src_dir"])
-    for film in sorted(Path(block_vars["src_file"]).parent.glob("*.mp4")):
+    folder = Path(
+        block_vars["src_file"]
+    ).parent  # other examples may be filming there, so names are read from the block
+    for film in [folder / name for name in FILM.findall(block[1]) if (folder / name).exists()]:
         poster = Path(next(names))
         target = poster.with_suffix(".mp4")
         if film.stat().st_size > MOST:

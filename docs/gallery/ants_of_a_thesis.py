@@ -9,7 +9,9 @@ search his map with fourteen obstacles, and a robot drives what they found.
 from antdrive import Scenario, film, plan, run
 from antdrive.sim import plan_figure
 
-scenario = Scenario.of("han2007-aco", "aco-han-elite", options={"ants": 100}, seed=4)
+scenario = Scenario.of(
+    "han2007-aco", "aco-han-elite", options={"ants": 100}, seed=4
+)
 
 # %%
 # The plan
@@ -28,6 +30,10 @@ plan_found = plan_figure(scenario.task, grid, found, scenario.robot)
 
 result = run(scenario)
 print(result.outcome.value)
-print(f"{result.metrics['driven_length_m']:.2f} m driven in {result.metrics['duration_s']:.1f} s")
-print(f"never nearer than {result.certificate.bound:.3f} m to anything, proved from the log")
-film(result.rollout, "drive.mp4", camera="top", size=(640, 480), speed=6)
+print(
+    f"{result.metrics['driven_length_m']:.2f} m driven in {result.metrics['duration_s']:.1f} s"
+)
+print(
+    f"never nearer than {result.certificate.bound:.3f} m to anything, proved from the log"
+)
+film(result.rollout, "ants.mp4", camera="top", size=(640, 480), speed=6)

@@ -29,4 +29,4 @@ readings = certificate_figure(result.rollout, result.certificate)
 
 passed = run(Scenario.of("empty", "astar", unseen=(hidden,), map="none"))
 print(passed.outcome.value)
-film(passed.rollout, "passed.mp4", camera="top", size=(480, 360), speed=3)
+film(passed.rollout, "passed.mp4", camera="top", size=(720, 540), speed=3)

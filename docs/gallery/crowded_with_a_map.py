@@ -15,8 +15,10 @@ from antdrive.worlds import barn
 world = barn(np.random.default_rng(3), fill=0.27)
 result = run(Scenario.of(world, "astar", "jackal", seed=3))
 print(result.outcome.value)
-print(f"{result.metrics['duration_s']:.1f} s, clearance at least {result.certificate.bound:.3f} m")
-film(result.rollout, "drive.mp4", size=(640, 480), speed=2)
+print(
+    f"{result.metrics['duration_s']:.1f} s, clearance at least {result.certificate.bound:.3f} m"
+)
+film(result.rollout, "crowded-map.mp4", size=(640, 480), speed=2)
 
 # %%
 # What limited its speed

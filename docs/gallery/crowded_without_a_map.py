@@ -14,11 +14,15 @@ from antdrive.sim import sight_figure
 from antdrive.worlds import barn
 
 world = barn(np.random.default_rng(3), fill=0.27)
-scenario = Scenario.of(world, "astar", "jackal", seed=3, map="none", localisation="matching", noise=1)
+scenario = Scenario.of(
+    world, "astar", "jackal", seed=3, map="none", localisation="matching", noise=1
+)
 result = run(scenario)
 print(result.outcome.value)
-print(f"{result.metrics['duration_s']:.1f} s, {result.metrics['replans']:.0f} new routes on the way")
-film(result.rollout, "drive.mp4", camera="top", size=(480, 480), speed=3)
+print(
+    f"{result.metrics['duration_s']:.1f} s, {result.metrics['replans']:.0f} new routes on the way"
+)
+film(result.rollout, "crowded-lidar.mp4", camera="top", size=(480, 480), speed=3)
 
 # %%
 # What it had seen

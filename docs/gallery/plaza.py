@@ -12,7 +12,9 @@ from antdrive.sim import overview
 
 result = run(Scenario.of("plaza-moving", "dstar-lite"))
 print(result.outcome.value)
-print(f"{result.metrics['replans']:.0f} new routes, avoided movers for {result.metrics['avoiding_s']:.1f} s")
+print(
+    f"{result.metrics['replans']:.0f} new routes, avoided movers for {result.metrics['avoiding_s']:.1f} s"
+)
 film(result.rollout, "plaza.mp4", size=(640, 480), speed=2)
 
 # %%

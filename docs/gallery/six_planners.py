@@ -10,7 +10,10 @@ from antdrive import Scenario, run
 from antdrive.sim import comparison_figure
 
 names = ["astar", "tangent", "as", "mmas", "aco-han", "ants"]
-runs = {name: run(Scenario.of("slalom", name, smoothing="none", seed=1)) for name in names}
+runs = {
+    name: run(Scenario.of("slalom", name, smoothing="none", seed=1))
+    for name in names
+}
 for name, result in runs.items():
     length, time = result.metrics["driven_length_m"], result.metrics["duration_s"]
     print(f"{name:>8}: {length:5.2f} m in {time:4.1f} s, {result.outcome.value}")
@@ -19,4 +22,6 @@ for name, result in runs.items():
 # Their drives on one map
 # -----------------------
 
-drives = comparison_figure({name: result.rollout for name, result in runs.items() if result.rollout})
+drives = comparison_figure(
+    {name: result.rollout for name, result in runs.items() if result.rollout}
+)

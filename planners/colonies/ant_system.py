@@ -53,6 +53,9 @@ class AntSystem(Colony):
         initial: the pheromone on every arc at the start
         heuristic: "goal": eta = 1 / distance from the next cell to the goal (ibraheem2016 eq. 6, lee2008);
             "step": eta = 1 / length of the move (suganthi2019 eq. 6)
+        ranks: paths in the ranking list of an iteration: its best `ranks` ants deposit, the first all of eq. 4
+            and each later one a share of 1 / `ranks` less; None: all ants that arrive deposit all of eq. 4.
+            Section V of lee2008 gives its conventional colony such a list of 100 and leaves open what it does
     """
 
     alpha: float = 1.0
@@ -61,6 +64,7 @@ class AntSystem(Colony):
     deposit: float = 1.0
     initial: float = 1.0
     heuristic: Literal["goal", "step"] = "goal"
+    ranks: int | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -70,6 +74,8 @@ class AntSystem(Colony):
         require("evaporation", self.evaporation, at_least=0, at_most=1)
         require("deposit", self.deposit, above=0)
         require("initial", self.initial, above=0)
+        if self.ranks is not None:
+            require("ranks", self.ranks, at_least=1, at_most=1_000_000)
         if self.heuristic not in ("goal", "step"):
             raise FieldError("heuristic", f"must be 'goal' or 'step', got {self.heuristic!r}")
 
@@ -110,6 +116,8 @@ class AntSystem(Colony):
         from antdrive.planners.colonies import _kernels_colony
 
         tours, amounts = state.tours, self.amounts(state)
+        if self.ranks is not None:
+            amounts = amounts * ranked(tours.lengths, self.ranks)
         _kernels_colony.evaporate(trail.ravel(), self.evaporation)  # eq. 2, first term
         _kernels_colony.deposit_on_arcs(trail, state.graph.shape[1], tours.cells, tours.sizes, amounts)  # eq. 2-3
 
@@ -163,23 +171,25 @@ class ExploringAnts(AntSystem):
     """Common ants, exploratory ants that avoid pheromone, and an elite: the improved ACO of suganthi2019.
 
     Section IV of suganthi2019: common ants choose by tau^alpha eta^beta (eq. 1), exploratory ants by eta^beta
-    / tau^alpha (eq. 5), and the best ants of an iteration deposit more (eq. 7-8).
+    / tau^alpha (eq. 5), and the best ants of an iteration, of either kind, deposit more (eq. 7-8). The text
+    below eq. 7 says that its second term is what common ants deposit, and its third has the factor alpha,
+    whose value is 1: that is the default. With `depositors="all"` exploratory ants deposit like common ones.
 
-    The paper leaves three things open: what an ant in a dead end does, whether loops are cut, and a of eq. 7.
-    docs/papers/suganthi2019.md says which readings were tried. Its claims hold where ants step back out of
-    dead ends, tours are cut short, and the elite weighs as much as all common ants together; that is the
-    default. With `backtrack=False`, `shortcut=False` and `elite=1.0` ants die and walk in loops.
+    The paper leaves open what an ant in a dead end does and whether loops are cut; with `backtrack=False` and
+    `shortcut=False` ants die and walk in loops. docs/papers/suganthi2019.md says which readings were tried.
 
     Known weaknesses, measured on the same page: exploratory ants wander, which makes an iteration up to ten
-    times as long as that of `AntSystem`; without the heavy elite they keep paths long. At 50 x 50 cells paths
-    are 5 per cent longer than the shortest.
+    times as long as that of `AntSystem`; where they deposit like common ants, they keep paths long unless the
+    elite is heavy (`elite=25`).
 
     Attributes:
         ants: the number of common ants
         explorers: the number of exploratory ants
         beta: the exponent of the heuristic
-        elite: a of eq. 7, the additional deposit of the iteration's best ants in units of Q / length; 25: as much
-            as all common ants deposit
+        elite: the factor alpha of eq. 7, the additional deposit of the iteration's best ants in units of Q /
+            length
+        depositors: whose tours count in the second term of eq. 7. "common": those of common ants, as the text
+            says; "all": those of exploratory ants, too
         heuristic: as in `AntSystem`
         backtrack: as in `Colony`; open in the paper, which only says that ants in deadlock are a difficulty
         shortcut: as in `Colony`; open in the paper
@@ -188,7 +198,8 @@ class ExploringAnts(AntSystem):
     ants: int = 25
     explorers: int = 75
     beta: float | None = 1.0
-    elite: float = 25.0
+    elite: float = 1.0
+    depositors: Literal["common", "all"] = "common"
     heuristic: Literal["goal", "step"] = "step"
     backtrack: bool = True
     shortcut: bool = True
@@ -197,6 +208,8 @@ class ExploringAnts(AntSystem):
         super().__post_init__()
         require("explorers", self.explorers, at_least=0, at_most=1_000_000)
         require("elite", self.elite, at_least=0)
+        if self.depositors not in ("common", "all"):
+            raise FieldError("depositors", f"must be 'common' or 'all', got {self.depositors!r}")
 
     @property
     def kinds(self) -> tuple[int, ...]:
@@ -221,10 +234,23 @@ class ExploringAnts(AntSystem):
         _kernels_colony.arc_weights(trail, heuristic, self.alpha if context.kind == 0 else -self.alpha, weights)
 
     def amounts(self, state: IterationState) -> Floats:
-        """Q / L_k and, for the best ants of `state`, a Q / L_best more, shared among them (eq. 7-8)."""
+        """Q / L_k where an ant is a depositor and, for the best ants of `state`, elite Q / L_best, shared among them."""
         lengths = state.tours.lengths
         best = lengths <= lengths.min() + 1e-9
-        return np.where(best, 1.0 + self.elite / best.sum(), 1.0) * self.deposit / lengths  # eq. 4, 7 and 8
+        usual = 1.0 if self.depositors == "all" else np.arange(len(lengths)) < self.ants
+        return np.where(best, usual + self.elite / best.sum(), usual) * self.deposit / lengths  # eq. 4, 7 and 8
+
+
+def ranked(lengths: Floats, ranks: int) -> Floats:
+    """The share of its deposit that each ant makes (ants,): 1 for the best, 1 / ranks less with each rank, 0 off the list.
+
+    Args:
+        lengths: of the ants' tours, inf where an ant did not arrive (ants,); of equal ones the earlier ranks first
+        ranks: how many ranks there are
+    """
+    rank = np.empty(len(lengths), dtype=np.int64)
+    rank[np.argsort(lengths, kind="stable")] = np.arange(len(lengths))
+    return np.maximum(1.0 - rank / ranks, 0.0)
 
 
 def ibraheem_beta(side: int) -> float:

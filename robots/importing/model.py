@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-import re
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
+from antdrive.robots.importing.expanding import expanded
 from antdrive.worlds.errors import InputError, input_error
 from antdrive.worlds.formats.xml import parse_xml
 from antdrive.worlds.optional import optional
@@ -104,19 +105,43 @@ class UrdfModel:
             yield holders[link]
             link = holders[link].parent
 
+    def drive_number(self, *tags: str) -> tuple[str, float | None]:
+        """The first of some tags of the drive plugin that has a number greater than 0, and the number; None if none has.
 
-def read_model(path: Path, *, meshes: Path | None = None, without_meshes: bool = False) -> UrdfModel:
+        Args:
+            tags: without brackets
+        """
+        for tag in tags:
+            try:
+                value = float(self.drive.get(tag, ""))
+            except ValueError:
+                continue
+            if 0 < value < math.inf:
+                return tag, value
+        return "", None
+
+
+def read_model(
+    path: Path,
+    *,
+    meshes: Path | None = None,
+    without_meshes: bool = False,
+    arguments: Mapping[str, str] = MappingProxyType({}),
+    packages: Mapping[str, Path] = MappingProxyType({}),
+) -> UrdfModel:
     """The robot in a URDF or xacro file.
 
     Args:
         path: the file; .xacro is expanded first
         meshes: the folder in which meshes are looked for; by default beside the file and above it
         without_meshes: leave out meshes that are not found, instead of refusing the file
+        arguments: values of a xacro file's arguments by name
+        packages: the folders of ROS packages by name, for those that are not found beside the file or above it
 
     Raises:
         InputError: the file cannot be read, or is no robot.
     """
-    root = _root_element(path)
+    root = _root_element(path, arguments, packages)
     if root.tag != "robot":
         raise input_error(str(path), f"its root element is <{root.tag}>; a URDF file begins with <robot>")
     links = {_named(path, link): link for link in root.findall("link")}
@@ -124,7 +149,7 @@ def read_model(path: Path, *, meshes: Path | None = None, without_meshes: bool =
         raise input_error(str(path), f"has {len(links)} links; a robot has 1 to {MOST_LINKS}")
     found = [_joint(path, element) for element in root.findall("joint")]
     places, joints = _placed(path, set(links), found)
-    reader = _Shapes(path, meshes, without_meshes)
+    reader = _Shapes(path, meshes, without_meshes, packages)
     pieces = [
         piece
         for name, link in links.items()
@@ -132,7 +157,7 @@ def read_model(path: Path, *, meshes: Path | None = None, without_meshes: bool =
         for piece in reader.piece(name, places[name] @ _origin(path, element), element)
     ]
     masses = {
-        name: _number(path, mass, "value", 0.0)
+        name: _at_least_0(path, f"link {name}", "mass", _number(path, mass, "value", 0.0))
         for name, link in links.items()
         for mass in link.findall("inertial/mass")
     }
@@ -150,31 +175,19 @@ def _drives_two_wheels(plugin: ET.Element) -> bool:
     )
 
 
-def _root_element(path: Path) -> ET.Element:
+def _root_element(path: Path, arguments: Mapping[str, str], packages: Mapping[str, Path]) -> ET.Element:
     if path.suffix.lower() != ".xacro":
+        if arguments:
+            raise InputError(f"--arg {next(iter(arguments))}: {path.name} is no .xacro, and has no arguments")
         return parse_xml(path)
-    if not path.is_file():
-        raise input_error(str(path), "no such file")
-    xacrodoc = optional("xacrodoc", "urdf", "xacro files are expanded with it")
-    try:
-        text = xacrodoc.XacroDoc.from_file(str(path)).to_urdf_string()
-    except Exception as error:  # xacro raises whatever its expressions raise
-        raise input_error(str(path), f"xacro cannot expand it: {_in_one_line(error)}") from None
+    text = expanded(path, arguments, packages)
     with tempfile.TemporaryDirectory() as folder:
-        expanded = Path(folder) / f"{path.stem}.urdf"
-        expanded.write_text(text, encoding="utf-8")
+        plain = Path(folder) / f"{path.stem}.urdf"
+        plain.write_text(text, encoding="utf-8")
         try:
-            return parse_xml(expanded)
+            return parse_xml(plain)
         except InputError as error:
-            raise InputError(str(error).replace(str(expanded), str(path))) from None
-
-
-def _in_one_line(error: Exception) -> str:
-    """What xacro says, without the class and the repetition that it begins with, and without line breaks, real or spelt out."""
-    text = " ".join(str(error).replace("\\n", " ").split()) or type(error).__name__
-    text = re.sub(r"^<class '[^']*'>: ", "", text)
-    half = len(text) // 2
-    return text[:half] if text[:half] == text[half + 1 :] else text
+            raise InputError(str(error).replace(str(plain), str(path))) from None
 
 
 def _named(path: Path, element: ET.Element) -> str:
@@ -200,6 +213,18 @@ def _numbers(path: Path, element: ET.Element | None, key: str, default: tuple[fl
 
 def _number(path: Path, element: ET.Element | None, key: str, default: float) -> float:
     return float(_numbers(path, element, key, (default,))[0])
+
+
+def _at_least_0(path: Path, where: str, what: str, value: float) -> float:
+    if value < 0:
+        raise input_error(str(path), where, f"{what} must be at least 0, got {value:g}")
+    return value
+
+
+def _greater_than_0(path: Path, where: str, what: str, value: float) -> float:
+    if not value > 0:
+        raise input_error(str(path), where, f"{what} must be greater than 0, got {value:g}")
+    return value
 
 
 def _origin(path: Path, element: ET.Element) -> Floats:
@@ -268,8 +293,8 @@ def _placed(path: Path, links: set[str], found: list[UrdfJoint]) -> tuple[dict[s
 class _Shapes:
     """Reads collision geometry, meshes among it."""
 
-    def __init__(self, path: Path, meshes: Path | None, without_meshes: bool) -> None:
-        self._path, self._meshes, self._without = path, meshes, without_meshes
+    def __init__(self, path: Path, meshes: Path | None, without_meshes: bool, packages: Mapping[str, Path]) -> None:
+        self._path, self._meshes, self._without, self._packages = path, meshes, without_meshes, packages
         self.left_out: list[str] = []
 
     def piece(self, link: str, place: Floats, element: ET.Element) -> Iterator[CollisionPiece]:
@@ -280,14 +305,16 @@ class _Shapes:
             raise input_error(str(self._path), f"link {link}", "a <collision> has no geometry")
         radius = length = None
         if shape.tag == "box":
-            half = _numbers(self._path, shape, "size", (0.0, 0.0, 0.0)) / 2
+            size = _numbers(self._path, shape, "size", (0.0, 0.0, 0.0))
+            _at_least_0(self._path, f"link {link}", "the size of a <box>", float(size.min()))
+            half = size / 2
             points = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half
         elif shape.tag == "cylinder":
-            radius, length = (_number(self._path, shape, key, 0.0) for key in ("radius", "length"))
+            radius, length = (self._extent(link, shape, key) for key in ("radius", "length"))
             ring = radius * np.column_stack([CIRCLE.real, CIRCLE.imag])
             points = np.vstack([np.column_stack([ring, np.full(len(ring), z)]) for z in (-length / 2, length / 2)])
         elif shape.tag == "sphere":
-            radius = _number(self._path, shape, "radius", 0.0)
+            radius = self._extent(link, shape, "radius")
             ring, flat = radius * np.column_stack([CIRCLE.real, CIRCLE.imag]), np.zeros(len(CIRCLE))
             place = place.copy()
             place[:3, :3] = np.eye(3)
@@ -303,6 +330,10 @@ class _Shapes:
         centre = (placed.min(axis=0) + placed.max(axis=0)) / 2
         yield CollisionPiece(link, shape.tag, placed, centre, radius, length)
 
+    def _extent(self, link: str, shape: ET.Element, key: str) -> float:
+        value = _number(self._path, shape, key, 0.0)
+        return _greater_than_0(self._path, f"link {link}", f"the {key} of a <{shape.tag}>", value)
+
     def _mesh(self, link: str, shape: ET.Element) -> Floats | None:
         """The vertices (N, 3) of a mesh; None where it is left out."""
         name = shape.get("filename", "")
@@ -312,7 +343,7 @@ class _Shapes:
                 raise input_error(
                     str(self._path),
                     f"link {link}",
-                    f"mesh {name} is not found; say where with --meshes FOLDER, or --without-meshes",
+                    f"mesh {name} is not found; say where with --meshes FOLDER or --package NAME=FOLDER, or --without-meshes",
                 )
             self.left_out.append(f"{link}: {name}")
             return None
@@ -323,14 +354,27 @@ class _Shapes:
             raise input_error(str(file), f"cannot be read as a mesh: {error or type(error).__name__}") from None
         if not len(vertices) or not np.isfinite(vertices).all():
             raise input_error(str(file), "has no vertices, or some that are not finite")
-        return vertices
+        return vertices * _unit(file)
 
     def _candidates(self, name: str) -> Iterator[Path]:
         """Where a mesh may be: package://NAME/meshes/a.stl is below a folder called NAME, or the folder given."""
         bare = name.partition("://")[2] if "://" in name else name
-        inside = bare.partition("/")[2] if name.startswith("package://") else bare
+        package, _, inside = bare.partition("/") if name.startswith("package://") else ("", "", bare)
+        if package in self._packages:
+            yield self._packages[package] / inside
         folders = [self._meshes] if self._meshes is not None else [self._path.parent, *self._path.resolve().parents]
         for folder in folders:
             yield folder / bare
             yield folder / inside
             yield folder / Path(bare).name
+
+
+def _unit(file: Path) -> float:
+    """The unit of a mesh file [m]. COLLADA states it, and trimesh leaves it to its caller; other formats have none.
+
+    The file's up axis is left as it is, as RViz and Gazebo leave it.
+    """
+    if file.suffix.lower() != ".dae":
+        return 1.0
+    unit = next((element for element in parse_xml(file).iter() if element.tag.rpartition("}")[2] == "unit"), None)
+    return _greater_than_0(file, "<unit>", "meter", _number(file, unit, "meter", 1.0))

@@ -6,13 +6,14 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 
-from antdrive.robots.feasible import GRAVITY, yaw_inertia_of
 from antdrive.robots.files import RobotFile, footprint_to_dict, robot_from_text
 from antdrive.robots.importing.hull import footprint_around
+from antdrive.robots.importing.limits import Found, add_forces, add_speeds, seven_digits
 from antdrive.robots.importing.model import UrdfModel, read_model
 from antdrive.robots.importing.wheels import DrivenWheel, driven_wheels
 from antdrive.robots.spec import Footprint, RobotSpec
@@ -20,11 +21,11 @@ from antdrive.worlds.errors import InputError, input_error
 from antdrive.worlds.types import Floats
 
 KINDS = ("auto", "disc", "rectangle", "polygon")
+RADII = (("wheel_radius", 1.0), ("wheelRadius", 1.0), ("wheel_diameter", 0.5), ("wheelDiameter", 0.5))
+TRACKS = (("wheel_separation", 1.0), ("wheelSeparation", 1.0))
 DENSITY = 150.0  # of a robot whose file has no masses [kg/m^3]
-ACCELERATION, YAW_ACCELERATION = 1.0, 8.0  # that are assumed where the motors allow them [m/s^2], [rad/s^2]
-SPEED, YAW_RATE = 0.5, 2.0  # that are assumed where the file has no limits [m/s], [rad/s]
-SPARE = 0.9  # the share of what the motors could do that is used
-FRICTION = 1.5  # of wheels
+DIFFERENT = 0.01  # a drive plugin contradicts the geometry from this share on
+NOISE = "{pose_xy: 0.01, pose_yaw: 0.01, pose_rate: 20.0, encoder: 0.02, slip: 0.02, delay: 0.05}"  # as the catalogue assumes
 
 
 class _Value(NamedTuple):
@@ -65,6 +66,8 @@ def import_urdf(
     meshes: Path | None = None,
     without_meshes: bool = False,
     given: Mapping[str, float] | None = None,
+    arguments: Mapping[str, str] = MappingProxyType({}),
+    packages: Mapping[str, Path] = MappingProxyType({}),
 ) -> ImportedRobot:
     """A differential-drive robot out of a URDF or xacro file.
 
@@ -77,6 +80,8 @@ def import_urdf(
         meshes: the folder in which meshes are looked for; None: beside the file and above it
         without_meshes: leave out meshes that are not found
         given: values of the robot file by key, which replace what the file says
+        arguments: values of a xacro file's arguments by name
+        packages: the folders of ROS packages by name, for those that are not found beside the file or above it
 
     Raises:
         InputError: the file cannot be read, or describes no differential drive.
@@ -84,7 +89,7 @@ def import_urdf(
     given = _checked(given or {})
     if footprint not in KINDS:
         raise InputError(f"--footprint {footprint}: choose from {', '.join(KINDS)}")
-    model = read_model(path, meshes=meshes, without_meshes=without_meshes)
+    model = read_model(path, meshes=meshes, without_meshes=without_meshes, arguments=arguments, packages=packages)
     wheels = driven_wheels(model, left, right, given.get("wheel_radius"))
     frame = _frame(wheels)
     floor = min(wheel.centre[2] - wheel.radius for wheel in wheels)
@@ -104,7 +109,7 @@ def import_urdf(
     values = _values(model, wheels, outline, floor, given)
     text = _text(model, path, outline, what, values)
     return ImportedRobot(
-        robot_from_text(text, f"{path}, as imported", path.stem),
+        _robot_in(text, path, values),
         text,
         tuple(points),
         tuple(_from_above(piece.points, frame) for piece in high),
@@ -154,112 +159,52 @@ def _values(
     given: Mapping[str, float],
 ) -> list[_Value]:
     left, right = wheels
-    track = _seven(float(np.linalg.norm(left.centre - right.centre)))
-    radius = _seven((left.radius + right.radius) / 2)
+    track = seven_digits(float(np.linalg.norm(left.centre - right.centre)))
+    radius = seven_digits((left.radius + right.radius) / 2)
     top = max((float(piece.points[:, 2].max()) for piece in model.pieces), default=0.0) - floor
     xmin, ymin, xmax, ymax = outline.bounds
-    found: dict[str, tuple[float, str]] = {
+    apart = f"computed: between the middles of {left.joint.child} and {right.joint.child}"
+    size = f"read: {left.read_from}" + ("" if left.told else _contradiction(model, radius, *RADII))
+    found: Found = {
         "height": (max(top, 2 * radius), "computed: top of the collision geometry above the floor"),
-        "wheel_radius": (radius, f"read: {left.read_from}"),
-        "track": (track, f"computed: between the middles of {left.joint.child} and {right.joint.child}"),
+        "wheel_radius": (radius, size),
+        "track": (track, apart + _contradiction(model, track, *TRACKS)),
+        "mass": _mass(model, (xmax - xmin) * (ymax - ymin) * max(top, 2 * radius)),
     }
-    if sum(model.masses.values()) > 0:
-        found["mass"] = sum(model.masses.values()), f"computed: sum of the masses of {len(model.masses)} links"
-    else:
-        box = (xmax - xmin) * (ymax - ymin) * found["height"][0]
-        found["mass"] = DENSITY * box, f"assumed: {DENSITY:g} kg/m3, as the file has no masses"
     for key, value in given.items():
         found[key] = value, "given"
-    _speeds(model, wheels, found, given)
-    _forces(wheels, outline, found, given)
+    add_speeds(model, wheels, found, given)
+    add_forces(model, wheels, outline, found, given)
     order = [key for key, field in RobotFile.model_fields.items() if field.annotation is float and key in found]
     return [_Value(key, *found[key]) for key in order]
 
 
-def _speeds(
-    model: UrdfModel,
-    wheels: tuple[DrivenWheel, DrivenWheel],
-    found: dict[str, tuple[float, str]],
-    given: Mapping[str, float],
-) -> None:
-    """Add the limits of the speeds: those of the drive plugin, what the joints allow, or assumed ones."""
-    radius, track = found["wheel_radius"][0], found["track"][0]
-    turning = _seven(min(wheel.joint.velocity or math.inf for wheel in wheels))
-    plain = 0.05 <= turning * radius < 20  # 0 and very large limits mean none
-    limit = f"limit of joint {wheels[0].joint.name}"
-    for key, tags, most, assumed in (
-        ("max_speed", ("max_linear_velocity", "max_linear_speed"), turning * radius, SPEED),
-        ("max_yaw_rate", ("max_angular_velocity", "max_angular_speed"), 2 * turning * radius / track, YAW_RATE),
-    ):
-        told = next((_positive(model.drive[tag]) for tag in tags if tag in model.drive), None)
-        if key in given:
-            continue
-        if told and plain and told > most:
-            found[key] = _five(most), f"computed: {limit}; the drive plugin says {told:g}"
-        elif told:
-            found[key] = told, "read: the drive plugin"
-        elif plain and key == "max_speed":
-            found[key] = min(_five(most), 10.0), f"computed: {limit} times the wheels' radius"
-        elif plain:
-            found[key] = min(_five(most), 3.14), f"computed: {limit}, at most half a turn a second"
-        else:
-            found[key] = assumed, "assumed: the file has no limit"
-    needs = max(found["max_speed"][0], found["max_yaw_rate"][0] * track / 2) / radius
-    if "max_wheel_speed" not in given:
-        needs_more = 1.2 * needs, "assumed: 1.2 times what the speeds need"
-        found["max_wheel_speed"] = (turning, f"read: {limit}") if plain else needs_more
-
-
-def _forces(
-    wheels: tuple[DrivenWheel, DrivenWheel],
-    outline: Footprint,
-    found: dict[str, tuple[float, str]],
-    given: Mapping[str, float],
-) -> None:
-    """Add the motors' torque and the accelerations that they and the wheels' grip allow."""
-    mass, radius, track = (found[key][0] for key in ("mass", "wheel_radius", "track"))
-    effort = min((wheel.joint.effort or math.inf for wheel in wheels), default=math.inf)
-    if "wheel_torque" not in given:
-        plain = mass * 0.05 * radius < effort < 1e4
-        enough = 2 * mass * ACCELERATION * radius
-        found["wheel_torque"] = (
-            (effort, f"read: limit of joint {wheels[0].joint.name}")
-            if plain
-            else (enough, f"assumed: 4 times what {ACCELERATION:g} m/s2 need")
-        )
-    inertia = yaw_inertia_of(mass, outline)
-    force = min(found["wheel_torque"][0] / radius, given.get("wheel_friction", FRICTION) * mass * GRAVITY / 2)
-    for key, most, usual in (
-        ("max_acceleration", 2 * force / mass, ACCELERATION),
-        ("max_yaw_acceleration", force * track / inertia, YAW_ACCELERATION),
-    ):
-        if key not in given:
-            usable = SPARE * most
-            found[key] = (
-                (usual, "assumed") if usual <= usable else (usable, "computed: nine tenths of what the motors reach")
-            )
-    if "max_lateral_acceleration" not in given:
-        found["max_lateral_acceleration"] = ACCELERATION, "assumed"
-
-
-def _seven(value: float) -> float:
-    """A number as the file will have it, in seven digits, so that what follows from it is exactly reached."""
-    return float(f"{value:.7g}")
-
-
-def _five(value: float) -> float:
-    """The largest number of five digits that is not above a value."""
-    unit = 10.0 ** (math.floor(math.log10(value)) - 4)
-    near = float(f"{value:.5g}")
-    return near if near <= value else float(f"{near - unit:.5g}")
-
-
-def _positive(text: str) -> float | None:
+def _robot_in(text: str, path: Path, values: list[_Value]) -> RobotSpec:
+    """The robot; a value that no robot may have is refused with where it came from."""
     try:
-        value = float(text)
-    except ValueError:
-        return None
-    return value if 0 < value < math.inf else None
+        return robot_from_text(text, f"{path}, as imported", path.stem)
+    except InputError as error:
+        how = next((f" ({value.how})" for value in values if f": {value.key}: " in str(error)), "")
+        raise InputError(f"{error}{how}") from None
+
+
+def _contradiction(model: UrdfModel, value: float, *tags: tuple[str, float]) -> str:
+    """What to add where the drive plugin says otherwise: the tags that it may use, and how often the value they have."""
+    for tag, share in tags:
+        _, told = model.drive_number(tag)
+        if told and abs(told * share - value) > DIFFERENT * value:
+            return f"; <{tag}> of the drive plugin is {told:g}"
+    return ""
+
+
+def _mass(model: UrdfModel, box: float) -> tuple[float, str]:
+    """The mass, of the links that have one, or of a box of a usual density [m^3]."""
+    heavy = [name for name, mass in model.masses.items() if mass > 0]
+    if not heavy:
+        return DENSITY * box, f"assumed: {DENSITY:g} kg/m3, as the file has no masses"
+    light = sorted({piece.link for piece in model.pieces} - set(heavy))
+    without = f"; {_few(light)} {'have' if len(light) > 1 else 'has'} none" if light else ""
+    return sum(model.masses.values()), f"computed: sum of the masses of {_few(heavy)}{without}"
 
 
 def _text(model: UrdfModel, path: Path, outline: Footprint, what: str, values: list[_Value]) -> str:
@@ -273,6 +218,7 @@ def _text(model: UrdfModel, path: Path, outline: Footprint, what: str, values: l
         foot = {"length": round(length, 9), "width": round(width, 9), "centre": [round(v, 9) for v in centre]}
     rows.append((f"footprint: {_flow(foot)}", f"computed: {what}"))
     rows += [(f"{value.key}: {_rounded(value)}", value.how) for value in values]
+    rows.append((f"noise: {NOISE}", "assumed: as in the catalogue; measure the robot's own"))
     lines = []
     for text, how in rows:
         comment = "".join(c if c.isprintable() else "?" for c in how)
@@ -290,7 +236,7 @@ def _text(model: UrdfModel, path: Path, outline: Footprint, what: str, values: l
 
 def _rounded(value: _Value) -> str:
     """A value in seven digits, with a point, as YAML's floats are written."""
-    digits = value.value if value.how == "given" else _seven(value.value)
+    digits = value.value if value.how == "given" else seven_digits(value.value)
     return f"{digits:.10f}".rstrip("0").rstrip(".") if digits < 1e9 else repr(digits)
 
 
@@ -304,7 +250,7 @@ def _quoted(text: str) -> str:
 
 
 def _few(names: list[str]) -> str:
-    return ", ".join(names[:4]) + (f" and {len(names) - 4} more links" if len(names) > 4 else "")
+    return ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
 
 
 def require_writable(target: Path, source: Path) -> None:

@@ -27,6 +27,7 @@ class DrivenWheel:
         radius: [m]
         width: along its axis [m]
         read_from: where these values come from, in words
+        told: whether the radius was given, or the drive plugin's
     """
 
     joint: UrdfJoint
@@ -34,6 +35,7 @@ class DrivenWheel:
     radius: float
     width: float
     read_from: str
+    told: bool = False
 
 
 def driven_wheels(
@@ -72,8 +74,12 @@ def _joint_called(model: UrdfModel, name: str) -> UrdfJoint:
     found = model.joints.get(name) or next((joint for joint in model.joints.values() if joint.child == name), None)
     if found is None or not _turns_as_wheel(found):
         some = ", ".join(joint.name for joint in model.joints.values() if _turns_as_wheel(joint)) or "none"
-        problem = "no such joint or link" if found is None else "does not turn freely about a level axis"
-        raise input_error(str(model.source), f"{name}: {problem}; joints that do: {some}")
+        problem = "no such joint or link"
+        if found is not None:
+            problem = "does not turn freely about a level axis"
+            if found.kind == "revolute":
+                problem = f"is revolute, with a range of {found.range:.4g} rad; a driven wheel's joint is continuous"
+        raise input_error(str(model.source), f"{name}: {problem}; joints that could drive: {some}")
     return found
 
 
@@ -100,11 +106,7 @@ def _only_pair(model: UrdfModel, radius: float | None) -> tuple[DrivenWheel, Dri
         )
     wheels = [_wheel(model, joint, radius) for joint in fixed if _stands(model, joint)]
     if len(wheels) < 2:
-        raise input_error(
-            where,
-            f"has {len(wheels)} wheels that turn freely and stand on the floor; a differential drive has two; if there are, "
-            "name their joints with --left and --right",
-        )
+        raise input_error(where, _too_few(model, fixed, wheels))
     pairs = [pair for pair in itertools.combinations(wheels, 2) if _on_one_axle(*pair)]
     if not pairs:
         names = ", ".join(wheel.joint.name for wheel in wheels)
@@ -121,6 +123,36 @@ def _only_pair(model: UrdfModel, radius: float | None) -> tuple[DrivenWheel, Dri
     return pairs[0]
 
 
+def _too_few(model: UrdfModel, turning: list[UrdfJoint], wheels: list[DrivenWheel]) -> str:
+    """Why fewer than two wheels were found: they turn too little, or something reaches lower; and what helps."""
+    told = "name the joints of its two driven wheels with --left and --right"
+    limited = [
+        joint
+        for joint in model.joints.values()
+        if joint.kind == "revolute" and not _turns_as_wheel(joint) and abs(joint.axis[2]) < LEVEL
+    ]
+    if limited and len(turning) < 2:
+        names = ", ".join(joint.name for joint in limited[:4])
+        least = min(joint.range for joint in limited)
+        return f"{names}: revolute, with a range of {least:.4g} rad; the joint of a driven wheel is continuous"
+    standing = {wheel.joint.name for wheel in wheels}
+    hanging = [joint for joint in turning if joint.name not in standing]
+    if len(turning) >= 2 and hanging:
+        lowest = min(model.pieces, key=lambda piece: float(piece.points[:, 2].min()))
+        low = float(lowest.points[:, 2].min())
+        above = {joint.name: _bottom(model, joint) - low for joint in hanging}
+        names = ", ".join(f"{name} by {height:.4g} m" for name, height in above.items() if math.isfinite(height))
+        if names and lowest.link not in {joint.child for joint in turning}:
+            lower = f"the collision geometry of link {lowest.link} lies lower than its wheels ({names})"
+            return f"{lower}, which then would not stand on the floor; if they drive it, {told}"
+    return f"has {len(wheels)} wheels that turn freely and stand on the floor; a differential drive has two; if there are, {told}"
+
+
+def _bottom(model: UrdfModel, joint: UrdfJoint) -> float:
+    """The lowest point of what a joint turns [m]; inf where it has no collision geometry."""
+    return min((float(p.points[:, 2].min()) for p in model.pieces if p.link == joint.child), default=math.inf)
+
+
 def _stands(model: UrdfModel, joint: UrdfJoint) -> bool:
     """Whether what a joint turns is a wheel and not a spinning sensor: round, and among the lowest parts."""
     own = [piece for piece in model.pieces if piece.link == joint.child]
@@ -128,27 +160,22 @@ def _stands(model: UrdfModel, joint: UrdfJoint) -> bool:
         return "wheel" in f"{joint.name} {joint.child}".lower()
     lowest = min(float(piece.points[:, 2].min()) for piece in model.pieces)
     size = max(float(np.ptp(piece.points[:, 2])) for piece in own)
-    return min(float(piece.points[:, 2].min()) for piece in own) <= lowest + 0.25 * size
+    return _bottom(model, joint) <= lowest + 0.25 * size
 
 
 def _wheel(model: UrdfModel, joint: UrdfJoint, radius: float | None) -> DrivenWheel:
     own: list[CollisionPiece] = [piece for piece in model.pieces if piece.link == joint.child]
     if not own:
-        size = model.drive.get("wheel_radius") or model.drive.get("wheelRadius")
-        diameter = model.drive.get("wheel_diameter") or model.drive.get("wheelDiameter")
-        try:
-            told = float(size) if size else float(diameter) / 2 if diameter else None
-        except ValueError:
-            told = None
-        if radius is None and not told:
+        _, told = model.drive_number("wheel_radius", "wheelRadius")
+        _, diameter = model.drive_number("wheel_diameter", "wheelDiameter")
+        r = radius or told or (diameter or 0.0) / 2
+        if not r:
             raise input_error(
                 str(model.source), f"link {joint.child}", "has no collision geometry; say --wheel-radius METRES"
             )
-        r = radius or told or 0.0
         says = "given" if radius else "the drive plugin"
-        return DrivenWheel(
-            joint, joint.place[:3, 3], r, 0.2 * r, f"{says}; width assumed, position from joint {joint.name}"
-        )
+        how = f"{says}; width assumed, position from joint {joint.name}"
+        return DrivenWheel(joint, joint.place[:3, 3], r, 0.2 * r, how, told=True)
     piece = max(own, key=lambda piece: float(np.ptp(piece.points, axis=0).max()))
     along = piece.points @ joint.axis
     middle = joint.place[:3, 3] + joint.axis * (float(along.min() + along.max()) / 2 - joint.place[:3, 3] @ joint.axis)
@@ -158,7 +185,7 @@ def _wheel(model: UrdfModel, joint: UrdfJoint, radius: float | None) -> DrivenWh
     how = f"{piece.kind} of link {joint.child}"
     if radius is not None:
         r, how = radius, f"given, instead of {r:.4g} from {how}"
-    return DrivenWheel(joint, middle, r, width, how)
+    return DrivenWheel(joint, middle, r, width, how, told=radius is not None)
 
 
 def _on_one_axle(a: DrivenWheel, b: DrivenWheel) -> bool:

@@ -18,6 +18,8 @@ def print_run(run: Run, files: dict[str, str]) -> None:
     print_line(
         f"{s.task.world.name}: {s.robot.name} with {s.planner_name}: {run.outcome.value}" + in_brackets(run.reason)
     )
+    if s.noise and not s.robot.noise.nonzero and s.map == "given" and s.perception.kind != "lidar":
+        print_line(f"  noise {s.noise:g} changes nothing: the file of {s.robot.name} has no noise section")
     if s.chosen is not None:
         print_line(f"  {chosen_margin(s.chosen)}")
     if run.rollout is not None and run.certificate is not None:
@@ -26,8 +28,11 @@ def print_run(run: Run, files: dict[str, str]) -> None:
             f"  drove {facts['driven_length_m']:.2f} m in {facts['duration_s']:.1f} s "
             f"(route {facts['route_length_m']:.2f} m); tracking error at most {facts['tracking_error_max_m']:.3f} m"
         )
-        if facts["replans"] or facts["avoiding_s"]:
-            print_line(f"  replanned {facts['replans']:.0f} times, avoided movers for {facts['avoiding_s']:.1f} s")
+        times, avoiding = facts["replans"], facts["avoiding_s"]
+        did = [f"replanned {times:.0f} time{'s' if times > 1 else ''}"] if times else []
+        did += [f"avoided movers for {avoiding:.1f} s"] if avoiding else []
+        if did:
+            print_line(f"  {', '.join(did)}")
         print_line(f"  {run.certificate.sentence}")
         for problem in run.certificate.problems:
             print_line(f"    {problem}")
@@ -57,6 +62,7 @@ def task_facts(task: Task) -> dict[str, Any]:
         "goal": list(task.goal),
         "goal_tolerance": task.goal_tolerance,
         "cell": task.cell,
+        **({"frame": list(task.frame)} if any(task.frame) else {}),
         "obstacles": len(task.world.obstacles),
         "movers": len(task.world.movers),
     }

@@ -25,6 +25,8 @@ MAP_CELL = 0.05  # side of the map's cells [m]
 RECENT = 1.0  # scans of this time are kept where the map is made anew [s]
 TOLERANCE = 0.008  # a route may lose this much of its clearance without being planned anew [m]
 BLUR = 0.02  # and this much more for each metre of distance [m/m]
+FAR_AMONG_MOVERS = 15.0  # scans are matched up to this far where movers, which are no marks, hide what is near [m]
+HORIZON, HORIZON_AMONG_MOVERS = 10.0, 16.0  # hits farther away are not entered in the map [m]
 PAD = 0.01  # the robot keeps this from what was hit and from what was not seen: rounding of ranges, and of cells [m]
 
 
@@ -97,6 +99,15 @@ class Senses:
         return self.scanner.scan(pose, movers.positions(np.array([tick / self.hz]))[0], movers.radii, self.rng)
 
 
+def horizon_of(*, watching: bool) -> float:
+    """How far away a hit may be that is entered in a robot's map [m].
+
+    Args:
+        watching: whether the robot looks for movers in its scans
+    """
+    return HORIZON_AMONG_MOVERS if watching else HORIZON
+
+
 class Survey:
     """The robot's knowledge. It takes a scan when one is due, and builds a map of it.
 
@@ -130,10 +141,10 @@ class Survey:
         self._footprint = dataclasses.replace(foot, rounding=foot.rounding + PAD)
         self._radius = robot.radius + 2 * PAD  # a turn on the spot sweeps over this
         self._goal = goal
+        self.watch = watch
         self.map = self._empty_map(start)
         self._recent = math.ceil(RECENT * self._lidar.rate)
-        self._matcher = ScanMatcher(self._lidar) if matching else None
-        self.watch = watch
+        self._matcher = ScanMatcher(self._lidar, FAR if watch is None else FAR_AMONG_MOVERS) if matching else None
         self.scans: list[Scan] = []
         self.whole = 0
 
@@ -163,7 +174,7 @@ class Survey:
             return matcher.corrected(self.map, estimate, ranges)
         standing = self.watch.standing(estimate, ranges, tick)
         corrected = matcher.corrected(self.map, estimate, standing)
-        near = np.where(standing <= FAR, standing, np.inf)
+        near = np.where(standing <= FAR_AMONG_MOVERS, standing, np.inf)
         return sliding_left_out(estimate, corrected, self.map.endpoints(estimate, near))
 
     def discs(self, bounds: Bounds) -> Floats:
@@ -198,7 +209,8 @@ class Survey:
             self.map.insert(scan.estimate, scan.ranges, scan.movers)
 
     def _empty_map(self, pose: Pose) -> OccupancyMap:
-        seen = OccupancyMap(self._lidar, MAP_CELL, pose[:2], goal=self._goal)
+        horizon = horizon_of(watching=self.watch is not None)
+        seen = OccupancyMap(self._lidar, MAP_CELL, pose[:2], horizon, goal=self._goal)
         seen.take_as_free(pose[:2], self._radius)
         return seen
 

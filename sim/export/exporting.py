@@ -18,31 +18,40 @@ from antdrive.sim.export.tables import write_tables
 from antdrive.sim.export.topics import Topic
 from antdrive.sim.log.certificate import certify
 from antdrive.sim.log.rollout import Rollout
-from antdrive.worlds.errors import FieldError, InputError, input_error
+from antdrive.worlds.errors import FieldError, input_error
 from antdrive.worlds.files.atomic import folder_written_whole, written_whole
 from antdrive.worlds.files.world_file import save_task
 
 LAYOUT = ".foxglove.json"
 
 
-def export(log: str | Path, to: str, path: str | Path) -> list[Path]:
+def export(log: str | Path, to: str, path: str | Path, *, replace: bool = False) -> list[Path]:
     """Export a log; the files or the folder are written whole or not at all.
 
     Args:
         log: the log's file
         to: a key of `EXPORTS`: mcap, rosbag2 or csv
         path: the file of an mcap, or the folder to make
+        replace: whether an mcap and its layout may replace files that exist; folders are never replaced
 
     Returns:
         What was written.
 
     Raises:
         FieldError: `to` is unknown.
-        InputError: the log cannot be read, the place cannot be written to, or a package is not installed.
+        InputError: the log cannot be read, the place cannot be written to or is taken, or a package is not installed.
     """
     if to not in EXPORTS:
         raise FieldError("to", f"unknown {to!r}; choose from {', '.join(EXPORTS)}")
     source, target = Path(log), Path(path)
+    if target.suffix != ".mcap" and to == "mcap":
+        raise input_error(str(target), "name a file that ends in .mcap")
+    if target.suffix in (".mcap", ".csv") and to != "mcap":
+        kind = "; a file that ends in .mcap is made with --to mcap" if target.suffix == ".mcap" else ""
+        raise input_error(str(target), f"name a folder: {to} is several files{kind}")
+    for file in () if replace or to != "mcap" else (target, _layout_beside(target)):
+        if file.exists():
+            raise input_error(str(file), "exists; name another file, or replace it with --force")
     rollout = Rollout.load(source)
     return EXPORTS[to](rollout, source, target)
 
@@ -81,9 +90,7 @@ def attachments_of(rollout: Rollout, log: Path) -> dict[str, tuple[str, bytes]]:
 
 
 def _to_mcap(rollout: Rollout, log: Path, target: Path) -> list[Path]:
-    if target.suffix != ".mcap":
-        raise input_error(str(target), "name a file that ends in .mcap")
-    layout = target.with_suffix(LAYOUT)
+    layout = _layout_beside(target)
     with written_whole(target) as part:
         write_mcap(part, topics_of(rollout), attachments_of(rollout, log))
     with written_whole(layout) as part:
@@ -101,11 +108,13 @@ def _to_rosbag2(rollout: Rollout, log: Path, target: Path) -> list[Path]:
 
 
 def _to_csv(rollout: Rollout, log: Path, target: Path) -> list[Path]:
-    if target.suffix == ".csv":
-        raise InputError(f"{target}: name a folder; drive, plan and contacts are a file each")
     with folder_written_whole(target) as folder:
         write_tables(rollout, folder)
     return [target]
+
+
+def _layout_beside(target: Path) -> Path:
+    return target.with_suffix(LAYOUT)
 
 
 def _layout(rollout: Rollout) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from antdrive.sim.export.cdr import CdrLayout
-from antdrive.sim.export.frames import BASE, ESTIMATE, LIDAR, ODOM, mover_frame
+from antdrive.sim.export.frames import BASE, ESTIMATE, LIDAR, ODOM, ROBOT_MAP, mover_frame
 from antdrive.sim.export.topics import Floats, Stamps, Topic, nanoseconds
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.scans import ranges_of
@@ -23,7 +23,11 @@ def samples(rollout: Rollout) -> list[Topic]:
     stamps = nanoseconds(rollout.t)
     frames = [(ODOM, BASE), *((ODOM, mover_frame(i)) for i in range(rollout.movers.shape[1]))]
     still = np.zeros((*rollout.movers.shape[:2], 1))
-    poses = np.concatenate([rollout.pose[:, None], np.concatenate([rollout.movers, still], axis=2)], axis=1)
+    placed = [rollout.pose[:, None], np.concatenate([rollout.movers, still], axis=2)]
+    if rollout.record.exploring:
+        frames.append((ODOM, ROBOT_MAP))
+        placed.append(_own_maps(rollout)[:, None])
+    poses = np.concatenate(placed, axis=1)
     topics = [
         transforms("/tf", stamps, frames, poses),
         odometry("/odom", BASE, stamps, rollout.pose, rollout.twist),
@@ -59,6 +63,17 @@ def scans(rollout: Rollout) -> list[Topic]:
         "range_max": lidar.max_range,
     }
     return [laser_scans("/scan", nanoseconds(rollout.t[rollout.scan_rows]), ranges, values)]
+
+
+def _own_maps(rollout: Rollout) -> Floats:
+    """Where the robot's own map lies in each row, x, y [m] and yaw [rad] (N, 3): so that the robot is where it believes to be."""
+    found = np.zeros((len(rollout.t), 3))
+    if len(rollout.estimate):
+        found[:, 2] = rollout.pose[:, 2] - rollout.estimate[:, 2]
+        cos, sin = np.cos(found[:, 2]), np.sin(found[:, 2])
+        x, y = rollout.estimate[:, :2].T
+        found[:, :2] = rollout.pose[:, :2] - np.column_stack([cos * x - sin * y, sin * x + cos * y])
+    return found
 
 
 def transforms(topic: str, stamps: Stamps, frames: Sequence[tuple[str, str]], poses: Floats, z: float = 0.0) -> Topic:

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from antdrive.sim.export.description import description, wheel_places
-from antdrive.sim.export.frames import BASE, LIDAR, MAP, ODOM, mover_frame
+from antdrive.sim.export.frames import BASE, IDENTITY, LIDAR, MAP, ODOM, ROBOT_MAP, mover_frame
+from antdrive.sim.export.ground import GroundGrid, known_ground, planned_ground
 from antdrive.sim.export.libraries import message_types
 from antdrive.sim.export.topics import Floats, Topic, nanoseconds
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.view.scene import Scene, contact_point
-from antdrive.worlds.grid import rasterise
 from antdrive.worlds.plane import in_map
 
 CUBE, SPHERE, CYLINDER, LINE_STRIP = 1, 2, 3, 4  # kinds of markers
@@ -25,7 +25,6 @@ KNOWN, UNSEEN, MOVING, TOUCHED = (
 )
 GOAL, WALL = (0.2, 0.7, 0.3, 0.4), (0.3, 0.32, 0.36, 1.0)
 FLAT, LINE, SPOT = 0.01, 0.05, 0.1  # height of the goal, width of a line, size of a contact [m]
-IDENTITY = (0.0, 0.0, 0.0)
 
 
 def scenery(rollout: Rollout) -> tuple[Topic, list[Topic]]:
@@ -37,14 +36,14 @@ def scenery(rollout: Rollout) -> tuple[Topic, list[Topic]]:
     start = float(rollout.t[0])
     static = _message("/tf_static", "tf2_msgs/msg/TFMessage", [start], [_static(rollout)], latched=True)
     latched: dict[str, tuple[str, Any]] = {
-        "/map": ("nav_msgs/msg/OccupancyGrid", _map(rollout)),
         "/robot_description": ("std_msgs/msg/String", _text(description(rollout.record.robot))),
         "/obstacles": ("visualization_msgs/msg/MarkerArray", _markers(_standing(rollout))),
     }
     if rollout.movers.shape[1]:
         latched["/movers"] = "visualization_msgs/msg/MarkerArray", _markers(_moving(rollout))
     topics = [_message(name, kind, [start], [content], latched=True) for name, (kind, content) in latched.items()]
-    return static, [*topics, _routes(rollout), *_contacts(rollout), _limiters(rollout), _events(rollout)]
+    once = [*_maps(rollout), *topics, _routes(rollout)]
+    return static, [*once, *_contacts(rollout), _limiters(rollout), _events(rollout)]
 
 
 def _message(name: str, kind: str, times: Sequence[float], contents: Iterable[Any], latched: bool = False) -> Topic:
@@ -80,39 +79,47 @@ def _static(rollout: Rollout) -> Any:
     )
 
 
-def _map(rollout: Rollout) -> Any:
-    """The planner's grid: 0 where the robot's centre may be, 100 elsewhere."""
-    record = rollout.record
-    grid = rasterise(record.task.world, record.cell, record.inflate)
-    corner = (grid.origin[0] - grid.cell / 2, grid.origin[1] - grid.cell / 2, 0.0)
-    rows, columns = grid.shape
+def _maps(rollout: Rollout) -> list[Topic]:
+    """The planner's grid, once; of a robot without a map what it had seen, as that grew."""
+    if not rollout.record.exploring:
+        frame, found = MAP, [planned_ground(rollout)]
+    else:
+        frame, found = ROBOT_MAP, list(known_ground(rollout)) if len(rollout.scans) else []
+    kind, times = "nav_msgs/msg/OccupancyGrid", [ground.at for ground in found]
+    return [_message("/map", kind, times, [_grid(ground, frame) for ground in found], latched=True)] if found else []
+
+
+def _grid(ground: GroundGrid, frame: str) -> Any:
+    rows, columns = ground.cells.shape
     info = _of(
         "nav_msgs/msg/MapMetaData",
-        map_load_time=_time(float(rollout.t[0])),
-        resolution=grid.cell,
+        map_load_time=_time(ground.at),
+        resolution=ground.cell,
         width=columns,
         height=rows,
-        origin=_pose(in_map(record.task.frame, [corner])[0].tolist()),
+        origin=_pose(ground.origin),
     )
-    cells = np.where(grid.free, 0, 100).astype(np.int8).reshape(-1)
-    return _of("nav_msgs/msg/OccupancyGrid", header=_header(MAP, float(rollout.t[0])), info=info, data=cells)
+    return _of("nav_msgs/msg/OccupancyGrid", header=_header(frame, ground.at), info=info, data=ground.cells.reshape(-1))
 
 
 def _routes(rollout: Rollout) -> Topic:
     """Each route when the robot began to follow it, its points with the heading towards the next one."""
+    record = rollout.record
+    # A robot without a map plans where it believes to be.
+    frame, lies = (ROBOT_MAP, IDENTITY) if record.exploring else (MAP, record.task.frame)
     times, contents = [], []
     for rows, route in rollout.legs():
         at = float(rollout.t[min(rows.start or 0, len(rollout.t) - 1)])
-        points = in_map(rollout.record.task.frame, route)
+        points = in_map(lies, route)
         steps = np.diff(points, axis=0, append=points[-1:])
         headings = np.arctan2(steps[:, 1], steps[:, 0])
         headings[-1] = headings[-2] if len(headings) > 1 else 0.0
         poses = [
-            _of("geometry_msgs/msg/PoseStamped", header=_header(MAP, at), pose=_pose(pose))
+            _of("geometry_msgs/msg/PoseStamped", header=_header(frame, at), pose=_pose(pose))
             for pose in np.column_stack([points, headings]).tolist()
         ]
         times.append(at)
-        contents.append(_of("nav_msgs/msg/Path", header=_header(MAP, at), poses=poses))
+        contents.append(_of("nav_msgs/msg/Path", header=_header(frame, at), poses=poses))
     return _message("/plan", "nav_msgs/msg/Path", times, contents, latched=True)
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from antdrive.sim.export.frames import IDENTITY
 from antdrive.sim.log.rollout import Rollout
 from antdrive.worlds.plane import in_map
 
@@ -54,9 +55,10 @@ def _drive(rollout: Rollout) -> tuple[list[str], Iterable[Sequence[Any]]]:
 
 
 def _plan(rollout: Rollout) -> Iterable[Sequence[Any]]:
+    lies = IDENTITY if rollout.record.exploring else rollout.record.task.frame  # without a map: in the robot's own
     for number, (rows, route) in enumerate(rollout.legs()):
         begin = float(rollout.t[min(rows.start or 0, len(rollout.t) - 1)])
-        for x, y in in_map(rollout.record.task.frame, route).tolist():
+        for x, y in in_map(lies, route).tolist():
             yield number, begin, x, y
 
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import yaml
 
-from antdrive.planners import PlannerError, list_planners
+from antdrive.planners import PlannerError, list_planners, load_planner
 from antdrive.robots import Avoidance, PurePursuit, RobotSpec, list_robots, load_robot
 from antdrive.robots.files import footprint_to_dict
 from antdrive.sim.driving.replanning import ReplanPolicy
@@ -212,8 +212,19 @@ def run_if_planned(scenario: Scenario) -> Run | str:
 
 def _planner(scenario: Scenario) -> str | dict[str, Any]:
     """The planner's name, with the options that differ from those of that name."""
-    name, planner = scenario.planner_label, scenario.planner
-    options = _changed(planner, list_planners().get(name))
+    name = scenario.planner_label
+    options = _changed(scenario.planner, list_planners().get(name))
+    return {"name": name, **options} if options else name
+
+
+def own_planner_words(scenario: Scenario, name: str) -> str | dict[str, Any]:
+    """People's own planner in the words of a suite, with the options that differ from those of its class.
+
+    Args:
+        scenario: the scenario that has the planner
+        name: FILE.py:CLASS or MODULE:CLASS, as seen from the working directory
+    """
+    options = _changed(scenario.planner, load_planner(name))
     return {"name": name, **options} if options else name
 
 

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from typing import Any, TypeVar
 
 from antdrive.planners import Planner, list_planners, load_planner
+from antdrive.planners.own_code import is_own, own_object, record_name
 from antdrive.robots import Avoidance, PurePursuit
 from antdrive.sim.driving.perception import Perception
 from antdrive.sim.driving.replanning import ReplanPolicy
@@ -19,18 +20,21 @@ from antdrive.worlds.errors import FieldError, InputError
 Settings = TypeVar("Settings", PurePursuit, Avoidance, ReplanPolicy)
 
 
-def rebuilt(record: DriveRecord, planner: Planner | None = None) -> Scenario:
+def rebuilt(record: DriveRecord, planner: Planner | str | None = None) -> Scenario:
     """The scenario that a log's record describes. It gives the same drive, bit for bit, with the same versions.
 
     Args:
         record: the record of a log
-        planner: the planner that was used; None: the registered one of the record's name, with the record's settings
+        planner: the planner that was used; FILE.py:CLASS or MODULE:CLASS: people's own, with the record's settings; None: the
+            registered one of the record's name, with the record's settings
 
     Raises:
         InputError: the planner or the controller is not one that can be found by its name, or has settings of its own.
     """
     name = record.planner.name
-    if planner is None:
+    if isinstance(planner, str):
+        planner = _own_planner(planner, name, record.planner.settings)
+    elif planner is None:
         name, planner = _planner(name, record.planner.settings)
     if record.controller.name != PurePursuit.__name__:
         raise InputError(f"record.controller.name: {record.controller.name!r:.60} cannot be rebuilt, only PurePursuit")
@@ -77,14 +81,28 @@ def _planner(name: str, settings: Mapping[str, Any]) -> tuple[str, Planner]:
         of_class = [key for key, planner in known.items() if type(planner).__name__ == name]
         if not of_class:
             raise InputError(
-                f"record.planner.name: {name!r:.60} is not registered, so the run cannot be rebuilt; register the class "
-                f"under the entry point antdrive.planners, or give the planner from Python"
+                f"record.planner.name: {name!r:.60} is not registered, so the run cannot be rebuilt; say where its class is "
+                f"(--planner FILE.py:CLASS), or register it under the entry point antdrive.planners"
             )
         name = of_class[0]
-    kind = type(known[name])
+    return name, load_planner(name, **_options(type(known[name]), settings))
+
+
+def _own_planner(words: str, name: str, settings: Mapping[str, Any]) -> Planner:
+    """The planner of people's own file or module that a record names by its class."""
+    if record_name(words) not in (words, name):
+        raise InputError(f"planner: the log's planner is {name!r:.60}, not {record_name(words)!r:.60}")
+    if not is_own(words):
+        raise InputError(
+            f"planner: write FILE.py:CLASS or MODULE:CLASS, got {words!r:.60}; registered ones need no words"
+        )
+    return load_planner(words, **_options(own_object(words), settings))
+
+
+def _options(kind: Any, settings: Mapping[str, Any]) -> dict[str, Any]:
+    """A planner's options as they were."""
     hints = typing.get_type_hints(kind)
-    options = {key: _restored(hints.get(key), value) for key, value in settings.items()}
-    return name, load_planner(name, **options)
+    return {key: _restored(hints.get(key), value) for key, value in settings.items()}
 
 
 def _settings(kind: type[Settings], values: Mapping[str, Any] | None, key: str) -> Settings | None:

@@ -1,4 +1,4 @@
-"""What the scans of a log say: which ground was seen, and when each obstacle first was, from the true poses.
+"""What the scans of a log say: which ground was seen, and when each obstacle and mover first was, from the true poses.
 
 The log alone is read, and no map is made, so that none of this depends on where the robot believed to be.
 """
@@ -41,15 +41,17 @@ class Beams(NamedTuple):
 
 
 class Sighting(NamedTuple):
-    """A cylinder, when it was first seen, and when the robot was nearest to it.
+    """A cylinder or a mover, when it was first seen, and when the robot was nearest to it.
 
     Attributes:
-        obstacle: its place in `record.world.obstacles`
+        obstacle: its place in `record.world.obstacles`; that of a mover in `record.world.movers`
         seen_at: when a beam first met it [s]; infinite if none did
         seen_from: how far its surface was from the footprint then [m]; not a number if it was never seen
         nearest_at: when the robot was nearest [s]
         nearest: how far the surface was from the footprint then [m]
-        touched: whether the robot touched it
+        touched: whether the robot touched it, or a mover touched the robot
+        mover: whether it is a mover
+        followed_at: when the robot first followed a mover, as far as `tracks` tell [s]; infinite if it never did
     """
 
     obstacle: int
@@ -58,18 +60,26 @@ class Sighting(NamedTuple):
     nearest_at: float
     nearest: float
     touched: bool
+    mover: bool = False
+    followed_at: float = math.inf
 
     @property
     def passed(self) -> bool:
-        """Whether the robot touched the cylinder or came within 0.5 m of it."""
+        """Whether it was touched, or the robot came within 0.5 m of it."""
         return self.touched or self.nearest <= PASSED
+
+    @property
+    def name(self) -> str:
+        """What people call it."""
+        return f"{'mover' if self.mover else 'obstacle'} {self.obstacle}"
 
     def as_dict(self) -> dict[str, Any]:
         """The sighting as plain values, for JSON; what never was is null."""
         return {
-            "obstacle": self.obstacle,
+            "mover" if self.mover else "obstacle": self.obstacle,
             "seen_s": finite_or_none(self.seen_at),
             "seen_from_m": finite_or_none(self.seen_from),
+            **({"followed_s": finite_or_none(self.followed_at)} if self.mover else {}),
             "nearest_s": self.nearest_at,
             "nearest_m": self.nearest,
             "touched": self.touched,
@@ -109,9 +119,13 @@ def meet(rollout: Rollout, k: int, met: Floats) -> None:
         k: the scan's number
         met: when each cylinder of `record.world.obstacles` was first met (N,) [s]; infinite where it was not yet
     """
+    _meet(rollout, k, rollout.record.world.discs, met)
+
+
+def _meet(rollout: Rollout, k: int, discs: Floats, met: Floats) -> None:
+    """Note which discs (N, 3) a scan is the first to meet."""
     lidar, (eye, first, reaches) = lidar_of(rollout), beams_of(rollout, k)
     slack, now = 4 * lidar.sigma + lidar.resolution / 2 + ROUNDING, float(rollout.t[rollout.scan_rows[k]])
-    discs = rollout.record.world.discs
     kernels.first_meetings(eye, first, lidar.spacing, lidar.full_circle, reaches, discs, slack, now, met)
 
 
@@ -152,17 +166,83 @@ def sightings(rollout: Rollout, met: Floats) -> list[Sighting]:
     return sorted(found, key=lambda sight: (not sight.touched, sight.nearest))
 
 
+def movers_met(rollout: Rollout) -> list[Sighting]:
+    """First sight and nearest approach of every mover, in the order of the world.
+
+    Args:
+        rollout: a log with scans
+    """
+    record, rows = rollout.record, rollout.scan_rows
+    radii = np.array([mover.radius for mover in record.world.movers])
+    met = np.full(len(radii), math.inf)
+    for k, row in enumerate(rows.tolist()):
+        _meet(rollout, k, np.column_stack((rollout.movers[row], radii)), met)
+    touched = set((rollout.contacts[:, 1].astype(int) - len(record.world.obstacles)).tolist())
+    followed, found = _followed(rollout, radii), []
+    for j, radius in enumerate(radii.tolist()):
+        nearest_row, nearest = _approach(rollout, j, radius, slice(None))
+        seen_from = math.nan
+        if math.isfinite(met[j]):
+            then = int(np.searchsorted(rollout.t, met[j] - 1e-9))
+            _, seen_from = _approach(rollout, j, radius, slice(then, then + 1))
+        found.append(
+            Sighting(
+                j,
+                float(met[j]),
+                seen_from,
+                float(rollout.t[nearest_row]),
+                nearest,
+                j in touched,
+                mover=True,
+                followed_at=float(followed[j]),
+            )
+        )
+    return found
+
+
+def _approach(rollout: Rollout, mover: int, radius: float, rows: slice) -> tuple[int, float]:
+    """Among some rows, the one in which the footprint was nearest to a mover, from the first on, and how near [m]."""
+    poses = rollout.pose[rows].copy()
+    poses[:, :2] -= rollout.movers[rows, mover]  # as the mover sees the robot
+    row, away = np.zeros(1, dtype=np.int64), np.empty(1)
+    shape = shape_of(rollout.record.robot.footprint)
+    kernels.nearest_approaches(poses, *shape, np.array([[0.0, 0.0, radius]]), row, away)
+    return int(row[0]), float(away[0])
+
+
+def _followed(rollout: Rollout, radii: Floats) -> Floats:
+    """When the middle of a track first lay in each mover (M,) [s]; infinite where none did.
+
+    Tracks lie in the frame of the estimated pose, so they are laid as they lay from the robot.
+    """
+    first = np.full(len(radii), math.inf)
+    rows = rollout.tracks[:, 0].astype(np.int64)
+    believed, true = (rollout.estimate if len(rollout.estimate) else rollout.pose)[rows], rollout.pose[rows]
+    ahead = rollout.tracks[:, 2:4] - believed[:, :2]
+    turn = true[:, 2] - believed[:, 2]
+    cos, sin = np.cos(turn), np.sin(turn)
+    places = true[:, :2] + np.column_stack(
+        (cos * ahead[:, 0] - sin * ahead[:, 1], sin * ahead[:, 0] + cos * ahead[:, 1])
+    )
+    for j, radius in enumerate(radii.tolist()):
+        on = rows[np.hypot(*(places - rollout.movers[rows, j]).T) <= radius]
+        if len(on):
+            first[j] = rollout.t[on[0]]
+    return first
+
+
 def passed(rollout: Rollout) -> list[Sighting]:
-    """The cylinders that the robot touched or came within 0.5 m of, in the order in which it was nearest to them.
+    """What the robot touched or came within 0.5 m of, cylinders and movers, in the order in which it was nearest to them.
 
     Args:
         rollout: a log; one without scans has none
     """
     if not len(rollout.scans):
         return []
+    everything = sightings(rollout, first_meetings(rollout)) + movers_met(rollout)
     return sorted(
-        (sight for sight in sightings(rollout, first_meetings(rollout)) if sight.passed),
-        key=lambda sight: (sight.nearest_at, sight.obstacle),
+        (sight for sight in everything if sight.passed),
+        key=lambda sight: (sight.nearest_at, sight.mover, sight.obstacle),
     )
 
 

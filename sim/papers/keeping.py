@@ -22,7 +22,9 @@ from antdrive.sim.papers.experiments import Experiment
 from antdrive.sim.papers.trials import Trial
 from antdrive.worlds.files.atomic import written_whole
 
+JUDGING = ("claims", "kinds", "verdicts", "drawing", "films")  # modules on which no trial depends
 HISTORY = ("best", "iteration_best", "iteration_mean", "arrived")
+NUMBERS = ("optimum", "cpu_s", "total", "concentration")  # in the order of `Trial`
 NONE = -1  # the size of waypoints that a plan does not have
 
 
@@ -40,6 +42,7 @@ def trials_key(experiment: Experiment, seeds: int) -> str:
         "options": dict(experiment.options),
         "worlds": experiment.worlds,
         "work": experiment.work,
+        "movers": experiment.movers,
         "seeds": seeds,
         "code": code_hash(),
     }
@@ -48,11 +51,13 @@ def trials_key(experiment: Experiment, seeds: int) -> str:
 
 @functools.cache
 def code_hash() -> str:
-    """The hash of the source files of worlds, planners and papers' experiments."""
+    """The hash of the source files of worlds, planners and papers' experiments, but for those that only judge and draw."""
     found = hashlib.sha256()
     for package in (antdrive.worlds, antdrive.planners, antdrive.sim.papers):
         for folder in package.__path__:
             for path in sorted(Path(folder).rglob("*.py")):
+                if package is antdrive.sim.papers and path.stem in JUDGING:
+                    continue
                 found.update(path.read_bytes())
     return found.hexdigest()
 
@@ -71,7 +76,7 @@ def keep_trials(trials: Sequence[Trial], path: Path, key: str) -> None:
         "key": np.array(key),
         "seed": np.array([trial.seed for trial in trials]),
         "world": np.array([trial.world for trial in trials]),
-        "numbers": np.array([[trial.optimum, trial.cpu_s, trial.total] for trial in trials]).reshape(-1, 3),
+        "numbers": np.array([[getattr(trial, name) for name in NUMBERS] for trial in trials]).reshape(-1, len(NUMBERS)),
         "status": np.array([plan.status.name for plan in plans], dtype=np.str_),
         "work": np.array([plan.work for plan in plans]),
         "lengths": np.array([[plan.cost, _or_nan(plan.length)] for plan in plans]).reshape(-1, 2),

@@ -18,6 +18,11 @@ HAN_ANTS = (
     *((4, 6), (14, 12), (13, 11), (8, 10), (10, 10), (14, 10), (14, 4)),
     *((8, 14), (13, 14), (4, 10), (16, 14), (10, 16), (17, 10), (19, 18)),
 )
+#: Two walls of obstacles of radius 1 in the genetic algorithm's map, one from each side: no line with a single bend passes.
+TWO_WALLS = tuple(
+    [(6.0, y, 1.0) for y in (0.0, 2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0)]
+    + [(14.0, y, 1.0) for y in (6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0, 20.0)]
+)
 #: The six obstacles of its GA listing, radius 1, on points (0, 0) to (20, 20).
 HAN_GENES = ((3, 3), (10, 10), (14, 10), (14, 4), (8, 14), (6, 18))
 
@@ -27,10 +32,15 @@ def optimum(query: Query) -> float:
     return PLANNERS["astar"].plan(query, np.random.default_rng(0)).cost
 
 
-def han_ants() -> Query:
-    """han2007's map for ants, in the thesis' units, for a point robot."""
-    discs = tuple(Disc(float(x), float(y), 1.0) for x, y in HAN_ANTS)
-    return Query(rasterise(World("han2007-aco", (0.5, 0.5, 20.5, 20.5), discs), 1.0), (0, 0), (19, 19))
+def han_ants(*discs: tuple[float, float, float] | None) -> Query:
+    """han2007's map for ants, in the thesis' units, for a point robot: with the listing's obstacles, or with others.
+
+    Args:
+        discs: obstacles (x, y, radius) in the place of the listing's; a single None: no obstacle
+    """
+    listed = discs or tuple((float(x), float(y), 1.0) for x, y in HAN_ANTS)
+    found = tuple(Disc(*disc) for disc in listed if disc is not None)
+    return Query(rasterise(World("han2007-aco", (0.5, 0.5, 20.5, 20.5), found), 1.0), (0, 0), (19, 19))
 
 
 def han_genes(*discs: tuple[float, float, float]) -> Query:

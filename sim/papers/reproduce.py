@@ -15,15 +15,26 @@ from typing import Any
 import joblib
 import numpy as np
 
-from antdrive.sim.papers.claims import CLAIMS, Arm
+from antdrive.sim.papers.claims import CLAIMS
 from antdrive.sim.papers.experiments import PAPERS, Experiment
 from antdrive.sim.papers.keeping import keep_trials, kept_trials, trials_key
+from antdrive.sim.papers.kinds import Arm, Claim
+from antdrive.sim.papers.movers import drive_among
 from antdrive.sim.papers.trials import Trial, solve
-from antdrive.sim.papers.verdicts import VERDICT_HEADS, Verdict, judge, verdict_cells, verdict_facts
+from antdrive.sim.papers.verdicts import (
+    VERDICT_HEADS,
+    Verdict,
+    judge,
+    trials_at_hand,
+    trials_needed,
+    verdict_cells,
+    verdict_facts,
+)
 from antdrive.sim.statistics.bootstrap import medians_by_world
 from antdrive.worlds.errors import InputError
 from antdrive.worlds.files.atomic import written_whole
 
+MOST_SEEDS = 1000  # every claim can be decided with fewer
 TRIALS = "trials"  # the folder of the trials within that of the results
 
 
@@ -184,17 +195,52 @@ def _planned(experiment: Experiment, seeds: int) -> Iterator[Any]:
     planner = experiment.made or experiment.planner
     for seed in experiment.seeds(seeds):
         query = experiment.query(experiment.world(seed))
+        if experiment.movers:
+            yield joblib.delayed(drive_among)(planner, experiment.options, query, seed, experiment.movers)
+            continue
         yield joblib.delayed(solve)(planner, experiment.options, query, seed, experiment.work)
 
 
 def _verdicts(found: Sequence[tuple[Experiment, list[Trial]]]) -> list[Verdict]:
     """The verdicts on all claims whose experiments are among these."""
-    verdicts = []
+    known: dict[str, dict[Arm, list[Trial]]] = {}
+    for experiment, trials in found:
+        if experiment.name != "steps":
+            known.setdefault(experiment.paper, {})[Arm(experiment.map, experiment.name)] = trials
+    return [judge(claim, arms) for claim, arms in _judgeable(known)]
+
+
+def _judgeable(known: Mapping[str, dict[Arm, Any]]) -> Iterator[tuple[Claim, dict[Arm, Any]]]:
+    """The claims all of whose experiments are among these, with what is known of their paper's."""
     for claim in CLAIMS:
-        known = {Arm(e.map, e.name): trials for e, trials in found if e.paper == claim.paper and e.name != "steps"}
-        if claim.arms <= known.keys():
-            verdicts.append(judge(claim, known))
-    return verdicts
+        arms = known.get(claim.paper, {})
+        if claim.arms <= arms.keys():
+            yield claim, arms
+
+
+def too_few_seeds(papers: Sequence[str], seeds: int, *, quick: bool = False) -> str:
+    """One line on how many claims so few seeds cannot decide, and how many can; empty if they can decide all.
+
+    Args:
+        papers: short names, from `PAPERS`
+        seeds: how many seeds each experiment gets
+        quick: as in `reproduce`
+    """
+    experiments = [_hurried(e) if quick else e for paper in papers for e in PAPERS[paper]() if not (quick and e.slow)]
+
+    def undecided(count: int) -> tuple[int, int]:
+        known: dict[str, dict[Arm, int]] = {}
+        for e in experiments:
+            known.setdefault(e.paper, {})[Arm(e.map, e.name)] = len(e.seeds(count))
+        claims = list(_judgeable(known))
+        few = sum(trials_at_hand(claim.test, arms) < trials_needed(claim.test) for claim, arms in claims)
+        return few, len(claims)
+
+    few, total = undecided(seeds)
+    if not few:
+        return ""
+    enough = next(count for count in range(seeds, MOST_SEEDS) if not undecided(count)[0])
+    return f"seeds: {seeds} are too few to decide {few} of {total} claims, whatever they give; {enough} suffice"
 
 
 def check_papers(papers: Sequence[str]) -> None:

@@ -34,6 +34,8 @@ class Trial:
         optimum: the length of the shortest path with the same moves
         cpu_s: processor time of the plan [s]
         total: hasan's total cost of the path; inf if there is none
+        concentration: the share of the planner's field, for ants their pheromone, that lies on the path's cells; nan if
+            there is no path or no field
     """
 
     seed: int
@@ -42,6 +44,7 @@ class Trial:
     optimum: float
     cpu_s: float
     total: float
+    concentration: float = math.nan
 
     @property
     def length(self) -> float:
@@ -92,6 +95,18 @@ class Trial:
         return float(known.std()) if len(known) and np.isfinite(known).all() else math.inf
 
     @property
+    def early_unrest(self) -> float:
+        """The same of the first `LAST` iterations in which an ant arrived; inf if none did."""
+        known = self.result.history.iteration_best
+        known = known[np.isfinite(known)][:LAST]
+        return float(known.std()) if len(known) else math.inf
+
+    @property
+    def cpu_ms(self) -> float:
+        """Processor time of the plan, or of all decisions on the way [ms]."""
+        return 1000.0 * self.cpu_s
+
+    @property
     def work(self) -> float:
         """What the planner counts as its work: ant steps, cells propagated, chromosomes."""
         return float(self.result.work)
@@ -123,7 +138,16 @@ def solve(planner: str | Planner, options: Mapping[str, Any], query: Query, seed
     else:
         result = chosen.plan(query, rng)
     spent = time.process_time() - started
-    return Trial(seed, seed, result, maps.optimum(query), spent, total_cost(query, result))
+    return Trial(seed, seed, result, maps.optimum(query), spent, total_cost(query, result), concentration(result))
+
+
+def concentration(result: PlanResult) -> float:
+    """The share of a plan's field that lies on the cells of its path; nan without a path or a field."""
+    if not result.solved or result.field is None:
+        return math.nan
+    on_path = np.zeros(result.field.shape, dtype=np.bool_)
+    on_path[tuple(result.cells.T)] = True
+    return float(result.field[on_path].sum() / result.field.sum())
 
 
 def _until(states: Iterator[Iteration], work: float) -> Iterator[Iteration]:

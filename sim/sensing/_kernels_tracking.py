@@ -6,7 +6,7 @@ Arrays in, arrays out, nothing validated. Tracks are the rows of a table that ha
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,6 +21,11 @@ MATURE = 5  # a radius that was seen so often is known: what else is in a cluste
 ROUND = 0.03  # a cluster is round if it lies so near to a circle [m]
 CROOKED = 0.15  # and it is no part of a mover if it is farther off any [m]
 FRESH = 1 / 3  # this share of a mover lies on ground that was seen free, before it counts on a map of the robot's own
+ALL_FRESH = 0.9  # and this share of it, all the way, where only a part of it is seen
+FARTHER = 3.0  # such a part has to have come so many times as far
+FASTER = 0.3  # and to be faster than this [m/s]
+OFTEN = 0.25  # and to have been seen in this share of the scans
+ALIKE = 0.2  # and its radius, unless it was seen from edge to edge, to differ from the usual one by this share at most
 THROUGH = 3  # a track through which the beams have passed in so many scans is gone
 SURE = 0.4  # a track counts once its velocity is known so well, as a standard deviation [m/s]
 SLOW = 0.1  # what is slower has stopped [m/s]
@@ -48,6 +53,8 @@ TRACK = np.dtype(
         ("rested", np.float64),  # since when it has been where it stands [s]
         ("anchor_x", np.float64),  # where that is, or where it was first seen [m]
         ("anchor_y", np.float64),
+        ("free_x", np.float64),  # since when all of it stands on ground that was free [m]
+        ("free_y", np.float64),
     ]
 )
 
@@ -66,6 +73,7 @@ class TrackingRules(NamedTuple):
         spacing: angle between two beams [rad]
         first: angle of the first beam, seen from the lidar [rad]
         reach: the lidar's longest range [m]
+        rate: scans in a second [Hz]
         closed: whether the first beam is beside the last
         complete: whether all that stands is known; else the map is being made
     """
@@ -89,6 +97,7 @@ class TrackingRules(NamedTuple):
     spacing: float
     first: float
     reach: float
+    rate: float
     closed: bool
     complete: bool
 
@@ -206,7 +215,7 @@ def share_out(cluster: Array, view: View, rules: TrackingRules, tracks: Array, u
     nothing = cluster[:0]
     owners, last = 0, -1
     while True:  # the owners in the order of their rows
-        following = np.int64(-1)
+        following: Any = np.int64(-1)  # the compiler would treat a plain -1 as a type of its own
         for i in cluster:
             if view.owner[i] > last and (following < 0 or view.owner[i] < following):
                 following = view.owner[i]
@@ -292,7 +301,7 @@ def begin(
     track["vx"], track["vy"], track["mixed"], track["spread"] = 0.0, 0.0, 0.0, rules.speed * rules.speed / 4
     track["seen"], track["views"], track["weight"], track["through"] = 1, 0, 0.0, 0
     track["sure"], track["moves"] = False, False
-    track["anchor_x"], track["anchor_y"] = x, y
+    track["anchor_x"], track["anchor_y"], track["free_x"], track["free_y"] = x, y, x, y
 
 
 @kernel
@@ -401,7 +410,7 @@ def correct(track: Array, cluster: Array, view: View, rules: TrackingRules, usua
     track["last"] = view.time
     track["through"] = 0
     if not rules.complete:
-        judge(track, cluster, view, rules, whole and off <= ROUND and seen < 0.8 * rules.largest)
+        judge(track, cluster, view, rules, whole and off <= ROUND and seen < 0.8 * rules.largest, usual[0])
 
 
 @kernel
@@ -420,21 +429,51 @@ def filter_in(track: Array, x: float, y: float, variance: float) -> None:
 
 
 @kernel
-def judge(track: Array, cluster: Array, view: View, rules: TrackingRules, round_: bool) -> None:
+def judge(track: Array, cluster: Array, view: View, rules: TrackingRules, round_: bool, usual: float) -> None:
     """Whether a track moves, on a map that is being made: what stood at first, or has stood for long, is part of it."""
+    count = 0
+    for i in cluster:
+        count += 0 if view.explained[i] else 1
+    fresh = count / cluster.shape[0]
+    if fresh < ALL_FRESH or not track["sure"]:
+        track["free_x"], track["free_y"] = track["x"], track["y"]
     if track["views"] < rules.confirmed:  # a part of something seems to move as more of it comes into sight
         track["rested"], track["anchor_x"], track["anchor_y"] = view.time, track["x"], track["y"]
     away = math.hypot(track["x"] - track["anchor_x"], track["y"] - track["anchor_y"])
-    fresh = 0
-    for i in cluster:
-        fresh += 0 if view.explained[i] else 1
     if not track["moves"]:
-        track["moves"] = away >= rules.way and round_ and fresh / cluster.shape[0] >= FRESH
+        track["moves"] = away >= rules.way and round_ and fresh >= FRESH
+        track["moves"] = track["moves"] or crosses_free_ground(track, cluster, view, rules, usual)
     if track["moves"]:
         if away >= rules.way or math.hypot(track["vx"], track["vy"]) > SLOW:
             track["rested"], track["anchor_x"], track["anchor_y"] = view.time, track["x"], track["y"]
         elif view.time - track["rested"] > rules.settle:
             track["moves"] = False
+
+
+@kernel
+def crosses_free_ground(track: Array, cluster: Array, view: View, rules: TrackingRules, usual: float) -> bool:
+    """Whether a track of which perhaps only a part is seen has gone a long way over ground that was seen free.
+
+    Things that stand, seen through gaps between others, seem to move. So what is seen has to be a good part of a circle
+    of the track's size, and that size to be known: from views from edge to edge of it, or of other movers like it.
+    """
+    came = math.hypot(track["x"] - track["free_x"], track["y"] - track["free_y"])
+    due = (view.time - track["begun"]) * rules.rate
+    if came < FARTHER * rules.way or math.hypot(track["vx"], track["vy"]) < FASTER or track["seen"] < OFTEN * due:
+        return False
+    radius = track["radius"]
+    if track["views"] == 0 and abs(radius - usual) > ALIKE * usual:
+        return False
+    points, place = points_of(cluster, view), np.empty(2)
+    wide = max(points[:, 0].max() - points[:, 0].min(), points[:, 1].max() - points[:, 1].min())
+    if cluster.shape[0] < 2 * rules.least or wide < radius / 2 or radius >= 0.8 * rules.largest:
+        return False
+    centre_of(points, view.eye[0], view.eye[1], radius, place)
+    total = 0.0
+    for i in range(points.shape[0]):
+        off = math.hypot(points[i, 0] - place[0], points[i, 1] - place[1]) - radius
+        total += off * off
+    return bool(math.sqrt(total / points.shape[0]) <= (ROUND if track["views"] else ROUND / 2))
 
 
 @kernel

@@ -12,7 +12,7 @@ from antdrive.sim.sensing.mapping import OccupancyMap
 from antdrive.worlds import Floats, Pose
 
 BEAMS = 180  # of a scan that are matched, at most
-FAR = 8.0  # hits farther away are not matched [m]
+FAR = 8.0  # hits farther away are not matched, unless more is asked for [m]
 NEAR = 3  # how far partners are looked for, in grains of the map
 FEWEST = 25  # pairs below which a scan is not matched
 CHORD = 10  # beams between the two hits that tell how a surface lies
@@ -26,10 +26,11 @@ class ScanMatcher:
 
     Args:
         lidar: whose scans are matched
+        far: hits farther away are not matched [m]
     """
 
-    def __init__(self, lidar: Lidar) -> None:
-        self._lidar = lidar
+    def __init__(self, lidar: Lidar, far: float = FAR) -> None:
+        self._lidar, self._far = lidar, far
         angles = lidar.angles - lidar.yaw
         self._beams = np.column_stack((np.cos(angles), np.sin(angles)))
         self._every = max(1, round(lidar.beams / BEAMS))
@@ -46,7 +47,7 @@ class ScanMatcher:
         eye = np.array(lidar.pose_on(pose))
         first = seen.scans // seen.share % self._every
         x, y, yaw, pairs = _kernels_matching.match(
-            eye, self._beams, ranges, self._every, first, FAR, NEAR, FEWEST, seen.arrays
+            eye, self._beams, ranges, self._every, first, self._far, NEAR, FEWEST, seen.arrays
         )
         turn = math.remainder(yaw - float(eye[2]), 2 * math.pi)
         if pairs < FEWEST or math.hypot(x - eye[0], y - eye[1]) > MOST[0] or abs(turn) > MOST[1]:

@@ -132,6 +132,7 @@ class MoverTracker:
             spacing=lidar.spacing,
             first=float(lidar.angles[0]) - lidar.yaw,
             reach=float(lidar.max_range),
+            rate=float(lidar.rate),
             closed=bool(lidar.full_circle),
             complete=complete,
         )

@@ -7,7 +7,8 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.sim.driving.survey import MAP_CELL
+from antdrive.sim.driving.rescanning import forgetting_ticks
+from antdrive.sim.driving.survey import MAP_CELL, RECENT, horizon_of
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.scans import ranges_of
 from antdrive.sim.log.sights import Beams, beams_of, lidar_of, meet
@@ -19,27 +20,31 @@ from antdrive.worlds.types import Floats, Pose
 class Recollection:
     """The scans of a log, entered one after the other. Moments are asked for in increasing order.
 
-    The map is made anew at the poses that the robot believed in, so it is the robot's own, with one difference: a robot
-    that found no way forgets what it saw long ago, and here nothing is forgotten.
+    The map is made anew at the poses that the robot believed in, so it is the robot's own. A robot that found no way forgets
+    what it saw long ago; here that is forgotten only if asked for.
 
     Attributes:
         lidar: the robot's lidar
         map: what was hit and which ground was seen free, in the frame of the estimated poses
         met: when a beam first met each cylinder, in the order of `record.world.obstacles` (N,) [s]; infinite if none did yet
 
+    Args:
+        rollout: the log
+        forgetting: whether the map is made anew of the latest scans where the robot did so
+
     Raises:
         ValueError: the log has no scans.
     """
 
-    def __init__(self, rollout: Rollout) -> None:
-        lidar = self.lidar = lidar_of(rollout)
+    def __init__(self, rollout: Rollout, *, forgetting: bool = False) -> None:
+        self.lidar = lidar_of(rollout)
         self._rollout = rollout
         self._times = rollout.t[rollout.scan_rows]
         self._entered = 0
         self.met: Floats = np.full(len(rollout.record.world.obstacles), math.inf)
-        start = rollout.record.task.start
-        self.map = OccupancyMap(lidar, MAP_CELL, start[:2])
-        self.map.take_as_free(start[:2], rollout.record.robot.radius)
+        self.map = self._empty_map(rollout.record.task.start)
+        ticks = forgetting_ticks(rollout.record) if forgetting else ()
+        self._forgetting = [tick / rollout.record.control_hz for tick in ticks]
 
     @property
     def times(self) -> Floats:
@@ -73,14 +78,38 @@ class Recollection:
         Args:
             at: the moment [s]
         """
+        while self._forgetting and self._forgetting[0] <= at + 1e-9:
+            forgotten = self._forgetting.pop(0)
+            self._enter_until(forgotten)
+            self._forget(forgotten)
+        self._enter_until(at)
+
+    def _enter_until(self, at: float) -> None:
         last = int(np.searchsorted(self._times, at + 1e-9, side="right"))
         for k in range(self._entered, last):
             self._enter(k)
         self._entered = max(self._entered, last)
 
-    def _enter(self, k: int) -> None:
+    def _forget(self, at: float) -> None:
+        """Make the map anew of the latest scans, as the robot did: in the same control period, after the scan."""
+        self.map = self._empty_map(self._estimate(self._row(at)))
+        recent = math.ceil(RECENT * self.lidar.rate)
+        for k in range(max(0, self._entered - recent), self._entered):
+            self._insert(k)
+
+    def _empty_map(self, pose: Pose) -> OccupancyMap:
+        perception = self._rollout.record.perception
+        horizon = horizon_of(watching=perception is not None and perception.kind == "lidar")
+        seen = OccupancyMap(self.lidar, MAP_CELL, pose[:2], horizon)
+        seen.take_as_free(pose[:2], self._rollout.record.robot.radius)
+        return seen
+
+    def _insert(self, k: int) -> None:
         row, ranges = int(self._rollout.scan_rows[k]), ranges_of(self._rollout.scans[k])
         self.map.insert(self._estimate(row), ranges, self._of_movers(row, ranges))
+
+    def _enter(self, k: int) -> None:
+        self._insert(k)
         meet(self._rollout, k, self.met)
 
     def _of_movers(self, row: int, ranges: Floats) -> npt.NDArray[np.bool_] | None:
@@ -103,6 +132,10 @@ class Recollection:
         x, y, yaw = poses[row].tolist()
         return x, y, yaw
 
+    def _row(self, at: float) -> int:
+        """The last row of the log at or before a moment [s]."""
+        return min(max(0, int(np.searchsorted(self._rollout.t, at + 1e-9, side="right")) - 1), len(self._rollout.t) - 1)
+
     def drift(self, at: float) -> Floats:
         """Where the robot's map lies, if it is laid so that the robot is where it believes to be: (4,).
 
@@ -111,7 +144,7 @@ class Recollection:
         Args:
             at: the moment [s]
         """
-        row = min(max(0, int(np.searchsorted(self._rollout.t, at + 1e-9, side="right")) - 1), len(self._rollout.t) - 1)
+        row = self._row(at)
         x, y, yaw = self._rollout.pose[row].tolist()
         ex, ey, believed = self._estimate(row)
         cos, sin = math.cos(believed - yaw), math.sin(believed - yaw)

@@ -1,4 +1,4 @@
-"""Every tutorial runs as it is written and prints what it shows."""
+"""Every page with code runs as it is written and prints what it shows."""
 
 from __future__ import annotations
 
@@ -6,12 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from tools.pages import run_page
-
-PAGES = sorted((Path(__file__).resolve().parents[2] / "docs" / "tutorials").glob("*.md"))
+from tools.pages import ROOT, pages_with_code, run_page
 
 
 @pytest.mark.slow  # `make docs` runs them, too
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_a_tutorial_runs(page: Path) -> None:
+@pytest.mark.parametrize("page", pages_with_code(), ids=lambda page: str(page.relative_to(ROOT)))
+def test_a_page_runs(page: Path) -> None:
     assert run_page(page).problems == []

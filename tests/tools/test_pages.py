@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tools.pages import agrees, blocks_of, run_page
+from tools.pages import agrees, blocks_of, main, run_page
 
 FENCE = "```"
 
@@ -93,3 +93,43 @@ def test_longer_fences_and_directives_are_read_as_they_are() -> None:
         ("{note}", "```python\nno\n```\n"),
         ("python", "yes\n"),
     ]
+
+
+NEEDS = """
+<!-- before: mkdir made -->
+<!-- before: cp {root}/LICENSE made/licence.txt -->
+<!-- added to: made/licence.txt -->
+'''toml
+last = true
+'''
+
+<!-- run by: tests/a.py::test_b -->
+'''python
+1 / 0
+'''
+
+'''console
+$ sed -n $p made/licence.txt
+last = true
+'''
+
+'''sh
+pip install 'antdrive[campaigns]'
+'''
+"""
+
+
+def test_what_a_page_needs_is_there_before_its_blocks(tmp_path: Path) -> None:
+    assert run_page(page(tmp_path, NEEDS)).problems == []
+    (problem,) = run_page(page(tmp_path, NEEDS.replace("[campaigns]", "[nothing]"))).problems
+    assert "not one of antdrive[campaigns]" in problem
+
+
+def test_a_page_that_ran_is_left_out_until_it_changes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, kept = page(tmp_path, "'''python\nprint(1)\n'''\n"), tmp_path / "kept.json"
+    words = [str(path), "--kept", str(kept)]
+    said = []
+    for text in ("print(1)", "print(1)", "print(2)", "1 / 0", "1 / 0"):
+        path.write_text(f"{FENCE}python\n{text}\n{FENCE}\n")
+        said.append((main(words), capsys.readouterr().out != ""))
+    assert said == [(0, True), (0, False), (0, True), (1, True), (1, True)], "one with a fault is run again"

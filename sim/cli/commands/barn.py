@@ -9,7 +9,7 @@ import typer
 
 from antdrive.sim.cli import knowing, options
 from antdrive.sim.cli.compiling import compile_once
-from antdrive.sim.cli.console import campaign_bar, print_error, print_json, print_line, print_table
+from antdrive.sim.cli.console import bar, campaign_bar, print_error, print_json, print_line, print_table
 from antdrive.sim.cli.exits import FAILED, SUCCEEDED
 from antdrive.worlds.errors import InputError
 
@@ -28,6 +28,10 @@ WithMap = Annotated[
     typer.Option("--with-map", help="Drive each run with the map, too, and print what not knowing it costs."),
 ]
 Trials = Annotated[int, typer.Option(min=1, max=10_000, metavar="NUMBER", help="How often each world is driven.")]
+Films = Annotated[
+    bool,
+    typer.Option("--films", help="Film each run that did not arrive, into OUT/films; its cause is in the picture."),
+]
 Jobs = Annotated[
     int | None,
     typer.Option("--jobs", "-j", min=1, max=256, metavar="NUMBER", help="Processes.  [default: one per core]"),
@@ -50,6 +54,7 @@ def barn(
     trials: Trials = 10,
     jobs: Jobs = None,
     out: Out = Path("out/barn"),
+    films: Films = False,
     json: options.Json = False,
 ) -> int:
     """Drive the BARN challenge's worlds and print its table.
@@ -84,19 +89,32 @@ def barn(
     except KeyboardInterrupt:
         print_error(f"{out}: what is done is kept; go on with: antdrive {' '.join(sys.argv[1:])}")
         raise
+    filmed = _films(results, out / "films") if films else {}
     runs, fastest = challenge.by_map(results.table), challenge.reference_times(folder)
     found = list(challenge.lines(runs[map], fastest))
     known = list(challenge.lines(runs["given"], fastest))[-1] if with_map else None
     (price,) = prices(RunTable(results.table.to_pydict())) if with_map else (None,)
     if json:
-        print_json(_facts(results, found, known, price))
+        print_json(_facts(results, found, known, price, filmed))
     else:
-        _print(runs[map], found, known, price)
+        _print(runs[map], found, known, price, filmed)
     return SUCCEEDED if results.complete else FAILED
 
 
+def _films(results: "SweepResults", folder: Path) -> dict[str, Path]:
+    """Film what did not arrive; the films by the keys of the runs."""
+    from antdrive.sim.view.film.failures import film_failures
+
+    with bar("filming failures") as progress:
+        return film_failures(results.table.to_pylist(), results.folder, folder, progress=progress)
+
+
 def _facts(
-    results: "SweepResults", found: "list[BarnLine]", known: "BarnLine | None", price: "Price | None"
+    results: "SweepResults",
+    found: "list[BarnLine]",
+    known: "BarnLine | None",
+    price: "Price | None",
+    films: "dict[str, Path]",
 ) -> dict[str, object]:
     from antdrive.sim.campaigns.challenge import OURS, PUBLISHED
 
@@ -106,11 +124,18 @@ def _facts(
         "worlds": [vars(line) for line in found[:-1]],
         "all": vars(found[-1]),
         "published": [vars(entry) for entry in PUBLISHED],
+        "films": [str(path) for path in films.values()],
         **({"with_map": vars(known), "price_of_not_knowing": price.as_dict()} if known and price else {}),
     }
 
 
-def _print(runs: "pyarrow.Table", found: "list[BarnLine]", known: "BarnLine | None", price: "Price | None") -> None:
+def _print(
+    runs: "pyarrow.Table",
+    found: "list[BarnLine]",
+    known: "BarnLine | None",
+    price: "Price | None",
+    films: "dict[str, Path]",
+) -> None:
     from antdrive.sim.campaigns.challenge import OURS, PUBLISHED
 
     heads = ("world", "runs", "certified", "mean time [s]", "mean score")
@@ -133,10 +158,11 @@ def _print(runs: "pyarrow.Table", found: "list[BarnLine]", known: "BarnLine | No
     print_table(("published", "success [%]", "mean time [s]", "mean score", "where"), rows)
     print_line("")
     print_line(OURS)
-    for row in runs.select(["world", "seed", "succeeded", "outcome", "reason", "rollout"]).to_pylist():
+    for row in runs.select(["key", "world", "seed", "succeeded", "outcome", "reason", "rollout"]).to_pylist():
         if not row["succeeded"]:
             print_line(
-                f"  {row['world']}, seed {row['seed']}: {row['outcome']}  {row['reason'] or ''}  {row['rollout'] or ''}"
+                f"  {row['world']}, seed {row['seed']}: {row['outcome']}  {row['reason'] or ''}  "
+                f"{films.get(row['key'], row['rollout'] or '')}"
             )
 
 

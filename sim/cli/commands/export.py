@@ -19,6 +19,7 @@ def export_drive(
         typer.Option("--out", "-o", metavar="PATH", help="The .mcap file, or a new folder for rosbag2 and csv."),
     ],
     to: Annotated[str, typer.Option("--to", metavar="KIND", help="mcap, rosbag2 or csv.")] = "mcap",
+    force: Annotated[bool, typer.Option("--force", help="Replace an .mcap file and a layout that exist.")] = False,
     json: options.Json = False,
 ) -> int:
     """Export a drive for Foxglove, RViz and spreadsheets.
@@ -28,7 +29,7 @@ def export_drive(
     from antdrive.sim.export.exporting import export
 
     try:
-        files = export(log_at(rollout), to, out)
+        files = export(log_at(rollout), to, out, replace=force)
     except FieldError as error:
         raise InputError(f"--{error.key}: {error.problem}") from None
     written = {("layout" if file.name.endswith(".foxglove.json") else to): str(file) for file in files}

@@ -7,7 +7,7 @@ import typer
 
 from antdrive.sim.cli import options
 from antdrive.sim.cli.compiling import compile_once
-from antdrive.sim.cli.console import bar, print_files, print_json, print_line, print_table
+from antdrive.sim.cli.console import bar, print_error, print_files, print_json, print_line, print_table
 from antdrive.sim.cli.exits import SUCCEEDED
 from antdrive.sim.cli.write import check_folder, free_folder, suffixes, this_command, write_marker
 from antdrive.worlds.files.atomic import claimed
@@ -40,11 +40,11 @@ def reproduce(
     """Repeat a paper's experiments: printed against measured.
 
     Prints a table of what the paper printed beside what was measured, then each of the paper's claims with our figure, its
-    interval, and whether it holds; and draws the paper's figures. Claims are told apart from chance with 50 seeds. The same
-    command goes on where it was interrupted.
+    interval, whether it holds, and why; and draws the paper's figures. With 50 seeds every claim can be decided; a line says how
+    many cannot with fewer. The same command goes on where it was interrupted.
     """
     from antdrive.sim.papers.experiments import PAPERS
-    from antdrive.sim.papers.reproduce import HEADS, TRIALS, check_papers, row_cells
+    from antdrive.sim.papers.reproduce import HEADS, TRIALS, check_papers, row_cells, too_few_seeds
     from antdrive.sim.papers.reproduce import reproduce as repeat
     from antdrive.sim.papers.verdicts import VERDICT_HEADS, verdict_cells, verdict_facts
 
@@ -54,6 +54,7 @@ def reproduce(
     mark = "quick" if quick else f"{seeds}-seeds"
     folder = out or free_folder(Path("out") / f"reproduce-{paper}", MARKER, mark)
     check_folder(folder)
+    _warn_of_few(too_few_seeds(papers, seeds, quick=quick))
     compile_once()
     with claimed(folder), bar("planning") as progress:
         wanted: dict[str, Any] = {"suffixes": suffixes(vector), "jobs": jobs, "quick": quick, "films": films}
@@ -75,3 +76,9 @@ def reproduce(
             count = f"{found.kept} of {len(found.rows)}"
             print_line(f"{count} experiments were done before and were taken from {folder / TRIALS}")
     return SUCCEEDED
+
+
+def _warn_of_few(line: str) -> None:
+    """Say in one line that so few seeds cannot decide some claims; an empty line says nothing."""
+    if line:
+        print_error(line)

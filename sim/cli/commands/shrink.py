@@ -43,6 +43,15 @@ Seconds = Annotated[
     float,
     typer.Option(min=1.0, max=1e6, metavar="SECONDS", help="Time for the search [s]; a later call goes on from there."),
 ]
+OwnPlanner = Annotated[
+    str | None,
+    typer.Option(
+        "--planner",
+        "-p",
+        metavar="FILE.py:CLASS",
+        help="Where the class of a log's planner is, if it is not registered.",
+    ),
+]
 Film = Annotated[bool, typer.Option("--film/--no-film", help="Film the small failure.")]
 Jobs = Annotated[int, typer.Option(min=1, max=64, metavar="NUMBER", help="Processes; the result is the same.")]
 
@@ -55,6 +64,7 @@ def shrink(
         ),
     ],
     bound: While = None,
+    planner: OwnPlanner = None,
     seconds: Seconds = 60.0,
     out: options.Out = None,
     film: Film = True,
@@ -75,7 +85,9 @@ def shrink(
     from antdrive.sim.pipeline import run
     from antdrive.sim.regression.checking import RAISED
 
-    scenario, case = _of_a_test(failure) if "::" in failure else (_of_a_log(failure), None)
+    if planner is not None and "::" in failure:
+        raise InputError(f"--planner: is for logs; the suite says which planner {failure} has")
+    scenario, case = _of_a_test(failure) if "::" in failure else (_of_a_log(failure, planner), None)
     crossed = parse_bound(bound) if bound is not None else _bound_not_kept(case, scenario)
     name = f"{scenario_name(scenario.task.world.name)}-small"
     mark = fingerprint(scenario, str(crossed))
@@ -90,7 +102,9 @@ def shrink(
         note = f"shrunk from {scenario.task.world.name}: {shrunk.summary}"
         least = named(shrunk.scenario, name, note)
         small = least if shrunk.failure.outcome == RAISED else run(least)
-        handover = Handover(name, small, crossed, shrunk.failure.sentence, _planner_beside(case, folder))
+        handover = Handover(
+            name, small, crossed, shrunk.failure.sentence, _planner_beside(case, planner, scenario, folder)
+        )
         report, repeats = _write(shrunk, handover, folder, film, figures)
     if json:
         print_json(report)
@@ -126,7 +140,7 @@ def _bound_not_kept(case: "SuiteCase | None", scenario: "Scenario") -> "Bound | 
         return None
 
 
-def _of_a_log(words: str) -> "Scenario":
+def _of_a_log(words: str, planner: str | None) -> "Scenario":
     """The scenario of a log, rebuilt from its record."""
     from antdrive.sim.falsify.rebuild import rebuilt
     from antdrive.sim.log.rollout import read_record
@@ -138,16 +152,20 @@ def _of_a_log(words: str) -> "Scenario":
     if (log := Path(words) / "rollout.npz").is_file():
         words = str(log)
     try:
-        return rebuilt(read_record(words))
+        return rebuilt(read_record(words), planner)
     except InputError as error:
         raise error if str(error).startswith(words) else input_error(words, str(error)) from None
 
 
-def _planner_beside(case: "SuiteCase | None", folder: Path) -> "str | dict[str, Any] | None":
-    """A test's planner that is not registered, in the words of a suite in another folder; None for all others."""
-    from antdrive.sim.falsify.handover import planner_moved
+def _planner_beside(
+    case: "SuiteCase | None", own: str | None, scenario: "Scenario", folder: Path
+) -> "str | dict[str, Any] | None":
+    """A planner that is not registered, in the words of a suite in another folder; None for all others."""
+    from antdrive.sim.falsify.handover import own_planner_words, planner_moved
 
-    return None if case is None else planner_moved(case.entry.planner, case.suite.parent, folder)
+    if case is not None:
+        return planner_moved(case.entry.planner, case.suite.parent, folder)
+    return None if own is None else planner_moved(own_planner_words(scenario, own), Path.cwd(), folder.absolute())
 
 
 def _write(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -87,11 +88,11 @@ def _draw_reason(axes: Any, reason: str) -> None:
         "transform": axes.transAxes,
         "ha": "center",
         "va": "center",
-        "wrap": True,
+        "in_layout": False,  # a long reason must not squeeze the map
         "zorder": 9,
     }
     frame = {"fc": "white", "ec": hexed(BAD), "pad": 6}
-    axes.text(0.5, 0.5, reason, weight="bold", color=hexed(BAD), bbox=frame, **place)
+    axes.text(0.5, 0.5, textwrap.fill(reason, 46), weight="bold", color=hexed(BAD), bbox=frame, **place)
 
 
 def plan_figures(

@@ -127,7 +127,7 @@ class LogFacts:
         record: the log's record
         certificate: the log's, computed for the report
         metrics: the log's metrics by name
-        sights: the cylinders that a robot without a map passed, as the log's scans met them
+        sights: the cylinders and movers that a robot without a map passed, as the log's scans met them
         digest: of the log's content
         settings: the log's settings by the keys of result.json
         contradictions: what result.json says otherwise, a sentence each
@@ -449,12 +449,13 @@ def _sight_pairs(sights: Sequence[Sighting]) -> list[tuple[str, str]]:
     nearest = sorted(sights, key=lambda sight: (not sight.touched, sight.nearest))[:LISTED_SIGHTS]
     return [
         (
-            f"obstacle {sight.obstacle}",
+            sight.name,
             (
                 f"seen {sight.seen_at:.2f} s, {sight.seen_from:.2f} m; "
                 if math.isfinite(sight.seen_at)
                 else "never seen; "
             )
+            + (f"followed {sight.followed_at:.2f} s; " if math.isfinite(sight.followed_at) else "")
             + f"{'touched' if sight.touched else 'nearest'} {sight.nearest_at:.2f} s, {sight.nearest:.2f} m",
         )
         for sight in sorted(nearest, key=lambda sight: sight.nearest_at)

@@ -413,6 +413,7 @@ def test_merging_ants_get_through_a_maze() -> None:
     [
         (AntSystem, "alpha", -1.0), (AntSystem, "beta", -1.0), (AntSystem, "initial", 0.0), (AntSystem, "threads", 0),
         (AntSystem, "heuristic", "smell"), (AgeingAnts, "q_min", 0.0), (AgeingAnts, "q_max", 0.01),
+        (ExploringAnts, "depositors", "few"), (AntSystem, "ranks", 0),
         (ExploringAnts, "explorers", -1), (ExploringAnts, "elite", -1.0), (MaxMinAnts, "p_best", 1.0),
         (MaxMinAnts, "patience", 0), (MergingAnts, "scouts", -1), (MergingAnts, "settled", 0),
         (MergingAnts, "beta", 2.0), (MergingAnts, "heuristic", "step"),

@@ -110,10 +110,18 @@ def test_suganthi2019_5() -> None:
 
 def test_suganthi2019_7_and_8() -> None:
     best, other = [0, 3], [0, 1, 3]
-    planner = ExploringAnts(evaporation=0.3, elite=1.0)
-    trail = after(planner, SQUARE, [best, other], [math.sqrt(2), 2.0], np.ones((4, 8)))
-    assert trail[0, NORTH_EAST] == pytest.approx(2.114214)  # 0.7 + 2 / 1.414214
-    assert trail[0, EAST] == pytest.approx(1.2)  # 0.7 + 1 / 2
+    both = after(ExploringAnts(evaporation=0.3), SQUARE, [best, other], [math.sqrt(2), 2.0], np.ones((4, 8)))
+    assert both[0, NORTH_EAST] == pytest.approx(2.114214)  # 0.7 + 2 / 1.414214, as alpha is 1
+    assert both[0, EAST] == pytest.approx(1.2)  # 0.7 + 1 / 2
+    # One common ant, then an exploratory one: in eq. 7 only the common ant counts, and the best ant of either kind.
+    walks, lengths = [other, best, other], [2.0, math.sqrt(2), 2.0]
+    common = after(ExploringAnts(ants=1, evaporation=0.3), SQUARE, walks[:2], lengths[:2], np.ones((4, 8)))
+    assert common[0, NORTH_EAST] == pytest.approx(1.407107)  # 0.7 + 1 / 1.414214 of the elite alone
+    assert common[0, EAST] == pytest.approx(1.2)  # 0.7 + 1 / 2 of the common ant
+    everyone = ExploringAnts(ants=1, evaporation=0.3, depositors="all", elite=25.0)
+    trail = after(everyone, SQUARE, walks, lengths, np.ones((4, 8)))
+    assert trail[0, NORTH_EAST] == pytest.approx(19.084776)  # 0.7 + 26 / 1.414214
+    assert trail[0, EAST] == pytest.approx(1.7)  # 0.7 + 1 / 2 + 1 / 2
 
 
 # ibraheem2016
@@ -154,6 +162,19 @@ def test_lee2008_2_to_4() -> None:
     # rho, 0.99, is the share retained: 0.99 * 2 + 1 / 2.
     trail = after(AntSystem(ants=500, beta=2.0, evaporation=0.01), ROW, [[0, 1, 2]], [2.0], np.full((3, 8), 2.0))
     assert trail[0, EAST] == pytest.approx(2.48)
+
+
+def test_the_ranking_list_of_lee2008s_conventional_colony() -> None:
+    planner = AntSystem(evaporation=0.01, ranks=2)
+    walks = [[0, 1, 3], [0, 3], [0, 2, 3], [0, 1, 3]]
+    lengths = [2.0, math.sqrt(2), 4.0, math.inf]
+    trail = after(planner, SQUARE, walks, lengths, np.ones((4, 8)))
+    assert trail[0, NORTH_EAST] == pytest.approx(1.697107)  # 0.99 + 1 / 1.414214: the first rank
+    assert trail[0, EAST] == pytest.approx(1.24)  # 0.99 + 1/2 of 1 / 2: the second of two ranks
+    assert trail[0, NORTH] == pytest.approx(0.99)  # off the list
+    many = after(AntSystem(evaporation=0.01, ranks=10), SQUARE, walks, lengths, np.ones((4, 8)))
+    assert many[0, NORTH] == pytest.approx(0.99 + 0.8 / 4)  # the third of ten; the ant that did not arrive adds nothing
+    assert many[0, EAST] == pytest.approx(0.99 + 0.9 / 2)
 
 
 def test_lee2008_7_9_and_11() -> None:

@@ -18,8 +18,8 @@ from antdrive.planners import (
 )
 from antdrive.planners.colonies.mmas_dstar import PATIENCE
 from antdrive.sim.papers.maps import environments
+from antdrive.sim.papers.movers import Strollers, drive
 from antdrive.worlds import DIRECTIONS, Grid
-from benchmarks.moving import Strollers, drive
 from tests.planners.worlds_to_solve import catalogue, optimum, random_query, sealed
 
 CASES = {name[:2]: query for name, query in environments().items()}
@@ -48,7 +48,7 @@ def test_one_rule_arrives_in_all_six_of_hasans_cases(case: str, name: str, count
     for seed in range(3):
         movers = Strollers(query.grid, count, np.random.default_rng(seed), (query.start, query.goal))
         robot = robot_by(name, query)
-        assert drive(robot, query, movers)  # asserts that moves are allowed and cells are not occupied
+        assert drive(robot, query, movers)[-1] == query.goal  # raises if a move is not allowed or a cell is occupied
         stats = robot.stats
         assert stats.decisions == stats.steps + stats.waits
         assert stats.length >= optimum(query) - 1e-9

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 import tempfile
@@ -43,6 +44,14 @@ def imported(name: str, **settings: Any) -> ImportedRobot:
     return import_urdf(FIXTURES / name, **settings)
 
 
+def comments(found: ImportedRobot) -> dict[str, str]:
+    """What the file says of each value, beside it or above it."""
+    lines = found.text.splitlines()
+    beside = {line.split(":")[0]: line.partition("  # ")[2] for line in lines if "  # " in line}
+    above = {line.split(":")[0]: last[2:] for last, line in itertools.pairwise(lines) if last.startswith("# ")}
+    return beside | above
+
+
 def changed(tmp_path: Path, name: str, *changes: tuple[str, str]) -> Path:
     text = (FIXTURES / name).read_text()
     for old, new in changes:
@@ -79,27 +88,95 @@ def test_the_file_says_of_each_value_where_it_comes_from(tmp_path: Path) -> None
     kinds = {line.split(":")[0]: line.split("# ")[1].split(":")[0] for line in numbers}
     assert kinds == {
         "height": "computed", "mass": "given", "wheel_radius": "read", "track": "computed", "max_speed": "computed",
-        "max_yaw_rate": "computed", "max_acceleration": "assumed", "max_yaw_acceleration": "assumed",
+        "max_yaw_rate": "assumed", "max_acceleration": "assumed", "max_yaw_acceleration": "assumed",
         "max_lateral_acceleration": "assumed", "max_wheel_speed": "read", "wheel_torque": "read",
     }  # fmt: skip
-    assert set(yaml.safe_load(found.text)) == {"schema", "name", "source", "footprint", *kinds}
+    assert set(yaml.safe_load(found.text)) == {"schema", "name", "source", "footprint", "noise", *kinds}
+
+
+def test_the_noise_is_assumed_as_in_the_catalogue() -> None:
+    found = imported("burger.urdf")
+    assert found.robot.noise == load_robot("turtlebot3-burger").noise
+    assert "# assumed: as in the catalogue; measure the robot's own\nnoise: {pose_xy" in found.text
 
 
 def test_limits_come_from_the_drive_plugin_where_there_is_one() -> None:
     found = imported("waffle.urdf")
     assert (found.robot.max_speed, found.robot.max_yaw_rate) == (0.26, 1.82)
-    assert "max_speed: 0.26                 # read: the drive plugin" in found.text
+    assert comments(found)["max_speed"] == "read: <max_linear_velocity> of the drive plugin"
 
 
 def test_limits_that_contradict_each_other_are_resolved_or_refused(tmp_path: Path) -> None:
     slow = ('<axis xyz="0 1 0"/>', '<axis xyz="0 1 0"/><limit effort="2" velocity="5"/>')
     found = import_urdf(changed(tmp_path, "waffle.urdf", slow))
     assert found.robot.max_speed == pytest.approx(5 * 0.033)
-    assert "limit of joint wheel_left_joint; the drive plugin says 0.26" in found.text
+    assert comments(found)["max_speed"] == (
+        "computed: the velocity limit of joint wheel_left_joint, 5 rad/s; <max_linear_velocity> of the drive plugin is 0.26"
+    )
     with pytest.raises(
         InputError, match=r"max_wheel_speed: 7 rad/s on a robot of 1 kg .* but max_speed is 9; raise max_wheel_speed"
     ):
         imported("burger.urdf", given={"max_speed": 9.0})
+
+
+def limited(tmp_path: Path, words: str) -> ImportedRobot:
+    """The burger with a limit on both wheels."""
+    path = changed(tmp_path, "burger.urdf")
+    path.write_text(path.read_text().replace('<axis xyz="0 0 1"/>', f'<axis xyz="0 0 1"/><limit {words}/>'))
+    return import_urdf(path)
+
+
+@pytest.mark.parametrize(
+    ("words", "key", "value", "says"),
+    [
+        ('velocity="6.67"', "max_speed", 0.22011, "computed: the velocity limit of joint wheel_left_joint, 6.67 rad/s, "),
+        ('velocity="6.67"', "max_wheel_speed", 6.67, "read: the velocity limit of joint wheel_left_joint, 6.67 rad/s"),
+        ('velocity="200"', "max_speed", 6.6, "computed: the velocity limit of joint wheel_left_joint, 200 rad/s, times"),
+        ('velocity="200"', "max_yaw_rate", 3.14, "assumed: half a turn a second; the velocity limit of joint"),
+        ('velocity="400"', "max_speed", 0.5, "assumed: the velocity limit of joint wheel_left_joint, 400 rad/s would be 13.2"),
+        ('velocity="400"', "max_wheel_speed", 400.0, "read: the velocity limit of joint wheel_left_joint, 400 rad/s"),
+        ('velocity="99999"', "max_wheel_speed", 18.182, "assumed: 1.2 times what the speeds need; the velocity limit of"),
+        ("", "max_speed", 0.5, "assumed: the file has no limit"),
+        ('effort="0.3"', "wheel_torque", 0.3, "read: the effort limit of joint wheel_left_joint, 0.3 N m"),
+        ('effort="0.0001"', "wheel_torque", 0.066, "assumed: 4 times what 1 m/s2 need; the effort limit of joint wheel_left"),
+        ('effort="1e6"', "wheel_torque", 1e6, "read: the effort limit of joint wheel_left_joint, 1000000 N m"),
+        ("", "wheel_torque", 0.066, "assumed: 4 times what 1 m/s2 need"),
+        ('effort="0.01"', "max_acceleration", 0.545455, "computed: nine tenths of what motors and grip reach"),
+    ],
+)  # fmt: skip
+def test_no_limit_of_a_joint_is_left_out_without_a_word(
+    tmp_path: Path, words: str, key: str, value: float, says: str
+) -> None:
+    found = limited(tmp_path, words)
+    assert getattr(found.robot, key) == pytest.approx(value, rel=1e-4)
+    assert comments(found)[key].startswith(says)
+
+
+def test_a_limit_below_any_robots_is_refused_and_not_replaced(tmp_path: Path) -> None:
+    with pytest.raises(
+        InputError, match=r"max_speed: must be at least 0\.05, got 0\.0165 \(computed: the velocity limit"
+    ):
+        limited(tmp_path, 'velocity="0.5"')
+
+
+def test_what_the_drive_plugin_says_otherwise_stands_beside_what_is_used(tmp_path: Path) -> None:
+    plugin = (
+        "<gazebo><plugin><left_joint>wheel_left_joint</left_joint><right_joint>wheel_right_joint</right_joint>"
+        "<wheel_separation>0.2</wheel_separation><wheel_diameter>0.0661</wheel_diameter>"
+        "<max_linear_acceleration>0.4</max_linear_acceleration><max_wheel_torque>0.02</max_wheel_torque></plugin></gazebo></robot>"
+    )
+    found = import_urdf(changed(tmp_path, "burger.urdf", ("</robot>", plugin)))
+    says = comments(found)
+    assert says["track"].endswith("; <wheel_separation> of the drive plugin is 0.2")
+    assert says["wheel_radius"] == "read: cylinder of link wheel_left_link", "it agrees"
+    assert (found.robot.max_acceleration, found.robot.wheel_torque) == (0.4, 0.02)
+    assert says["max_acceleration"] == "read: <max_linear_acceleration> of the drive plugin"
+    assert says["wheel_torque"] == "read: <max_wheel_torque> of the drive plugin"
+
+
+def test_links_without_a_mass_are_named(tmp_path: Path) -> None:
+    found = import_urdf(changed(tmp_path, "waffle.urdf", ('<mass value="0.03"/>', "")))
+    assert comments(found)["mass"] == "computed: sum of the masses of base_link; left, right have none"
 
 
 def test_a_robot_that_turns_by_skidding_is_asked_for_its_axle() -> None:
@@ -131,6 +208,13 @@ JOINT = '<joint name="{}" type="{}"><parent link="base_link"/><child link="{}"/>
         ("burger.urdf", (('value="0.83"', 'value="nan"'),), "must be 1 numbers"),
         ("burger.urdf", (("<robot name", "<!DOCTYPE robot><robot name"),), "declares a document type"),
         ("burger.urdf", (('value="0.83"', 'value="2e8"'),), "must be 1 numbers"),
+        ("burger.urdf", (('value="0.83"', 'value="-0.83"'),), "link base_link: mass must be at least 0, got -0.83"),
+        ("burger.urdf", (('radius="0.033"', 'radius="-0.033"'),),
+         "link wheel_left_link: the radius of a <cylinder> must be greater than 0, got -0.033"),
+        ("burger.urdf", (('<origin xyz="-0.032 0 0.070"/>', '<origin xyz="-0.032 0 0.030"/>'),),
+         "the collision geometry of link base_link lies lower than its wheels (wheel_left_joint by 0.0"),
+        ("burger.urdf", (('type="continuous"', 'type="revolute"'),),
+         "wheel_left_joint, wheel_right_joint: revolute, with a range of 0 rad; the joint of a driven wheel is continuous"),
         ("burger.urdf", (('value="0.83"', 'value="2e5"'),), "as imported"),
     ],
 )  # fmt: skip
@@ -216,7 +300,7 @@ def test_wheels_can_be_told_by_joint_or_link() -> None:
     back = imported("burger.urdf", left="wheel_right_link", right="wheel_left_link").robot  # it drives backwards
     assert back.footprint.bounds == pytest.approx((-0.037, -0.089, 0.101, 0.089), abs=1e-4)
     with pytest.raises(
-        InputError, match="scan: does not turn freely about a level axis; joints that do: wheel_left_joint, wh"
+        InputError, match="scan: does not turn freely about a level axis; joints that could drive: wheel_left_joint, wh"
     ):
         imported("burger.urdf", left="scan", right="wheel_right_link")
     with pytest.raises(InputError, match="wheel: no such joint or link"):
@@ -255,6 +339,32 @@ def test_a_mesh_is_read_with_its_scale(tmp_path: Path) -> None:
     assert import_urdf(path).robot.footprint.bounds == pytest.approx((-0.264, -0.2, 0.136, 0.2), abs=1e-4)
 
 
+@pytest.mark.parametrize(("unit", "scale"), [('<unit meter="0.001" name="millimetre"/>', 1.0), ("", 0.001)])
+def test_the_unit_of_a_collada_mesh_counts(tmp_path: Path, unit: str, scale: float) -> None:
+    """A box of 400 x 300 x 100 units, as few tags as COLLADA allows."""
+    pytest.importorskip("trimesh")
+    pytest.importorskip("collada")
+    corners = " ".join(f"{x} {y} {z}" for x in (-200, 200) for y in (-150, 150) for z in (-50, 50))
+    faces = "0 1 3 0 3 2 4 6 7 4 7 5 0 4 5 0 5 1 2 3 7 2 7 6 0 2 6 0 6 4 1 5 7 1 7 3"
+    (tmp_path / "body.dae").write_text(
+        '<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><asset>'
+        f"<created>2020-01-01T00:00:00</created><modified>2020-01-01T00:00:00</modified>{unit}</asset>"
+        '<library_geometries><geometry id="g"><mesh><source id="p"><float_array id="pa" count="24">'
+        f'{corners}</float_array><technique_common><accessor source="#pa" count="8" stride="3"><param name="X" type="float"/>'
+        '<param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source><vertices id="v">'
+        '<input semantic="POSITION" source="#p"/></vertices><triangles count="12">'
+        '<input semantic="VERTEX" source="#v" offset="0"/>'
+        f"<p>{faces}</p></triangles></mesh></geometry></library_geometries>"
+        '<library_visual_scenes><visual_scene id="s"><node id="n">'
+        '<instance_geometry url="#g"/></node></visual_scene></library_visual_scenes>'
+        '<scene><instance_visual_scene url="#s"/></scene>'
+        "</COLLADA>"
+    )
+    mesh = f'<mesh filename="body.dae" scale="{scale} {scale} {scale}"/>'
+    path = changed(tmp_path, "waffle.urdf", ('<box size="0.281 0.306 0.119"/>', mesh))
+    assert import_urdf(path).robot.footprint.bounds == pytest.approx((-0.264, -0.1525, 0.136, 0.1525), abs=1e-3)
+
+
 def test_masses_and_torques_that_a_file_lacks_are_assumed(tmp_path: Path) -> None:
     path = changed(tmp_path, "waffle.urdf", ('<mass value="1.74"/>', ""), ('<mass value="0.03"/>', ""))
     found = import_urdf(path)
@@ -268,7 +378,7 @@ def test_any_limits_of_the_joints_give_a_robot_that_reaches_what_it_promises(
 ) -> None:
     """Whatever the rounding does: a robot whose motors fall short by the last digit would be refused."""
     text = (FIXTURES / "waffle.urdf").read_text().partition("<gazebo>")[0] + "</robot>"
-    body = f'<box size="{2.5 * max(radius, track)} {2 * track} {3 * radius}"/>'
+    body = f'<box size="{2.5 * max(radius, track)} {2 * track} 0.1"/>'
     for old, new in (
         ('<box size="0.281 0.306 0.119"/>', body),
         ('radius="0.033"', f'radius="{radius!r}"'),
@@ -350,3 +460,39 @@ def test_what_xacro_cannot_expand_is_refused_in_one_line(tmp_path: Path, inside:
     assert message.isprintable()
     assert message.count(says) == 1
     assert "\\n" not in message
+
+
+def test_xacro_takes_arguments_and_finds_packages_beside_the_file(tmp_path: Path) -> None:
+    pytest.importorskip("xacrodoc")
+    text = (FIXTURES / "burger.urdf").read_text()
+    top = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="$(arg name)">'
+    body = text.partition("<robot")[2].partition(">")[2].partition("</robot>")[0]
+    (tmp_path / "parts" / "urdf").mkdir(parents=True)
+    (tmp_path / "parts" / "urdf" / "all.xacro").write_text(
+        f'<robot xmlns:xacro="http://www.ros.org/wiki/xacro">{body}</robot>'
+    )
+    (tmp_path / "mine" / "urdf").mkdir(parents=True)
+    path = tmp_path / "mine" / "urdf" / "mine.urdf.xacro"
+    path.write_text(f'{top}<xacro:include filename="$(find parts)/urdf/all.xacro"/></robot>')
+    with pytest.raises(InputError, match="Undefined substitution argument name; give it with --arg NAME=VALUE"):
+        import_urdf(path)
+    found = import_urdf(path, arguments={"name": "two"})
+    assert found.robot.name == "two"
+    (tmp_path / "parts").rename(tmp_path / "elsewhere")
+    with pytest.raises(InputError, match="Package not found: parts; say where it is with --package NAME=FOLDER"):
+        import_urdf(path, arguments={"name": "two"})
+    assert import_urdf(path, arguments={"name": "two"}, packages={"parts": tmp_path / "elsewhere"}).robot == found.robot
+    with pytest.raises(InputError, match=r"--arg name: burger\.urdf is no \.xacro, and has no arguments"):
+        imported("burger.urdf", arguments={"name": "two"})
+
+
+def test_meshes_of_a_package_are_found_where_it_is_said_to_be(tmp_path: Path) -> None:
+    pytest.importorskip("trimesh")
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere" / "body.obj").write_text(
+        "v -0.2 -0.2 0.1\nv 0.2 -0.2 0.1\nv 0.2 0.2 0.1\nv -0.2 0.2 0.1\nf 1 2 3\nf 1 3 4\n"
+    )
+    mesh = ('<box size="0.281 0.306 0.119"/>', '<mesh filename="package://waffle/body.obj"/>')
+    path = changed(tmp_path, "waffle.urdf", mesh)
+    found = import_urdf(path, packages={"waffle": tmp_path / "elsewhere"})
+    assert found.robot.footprint.bounds == pytest.approx((-0.264, -0.2, 0.136, 0.2), abs=1e-4)

@@ -17,8 +17,9 @@ from antdrive.sim.driving.rescanning import forgetting_ticks
 from antdrive.sim.driving.survey import Senses, Survey
 from antdrive.sim.falsify.rebuild import rebuilt
 from antdrive.sim.log.record import ReplanRecord
-from antdrive.sim.sensing import Scanner
+from antdrive.sim.sensing import OccupancyMap, Scanner
 from antdrive.sim.unknown import exploration_of, told
+from antdrive.sim.view.recollection import Recollection
 from antdrive.worlds import Disc, Task, World, generate, load_task
 from antdrive.worlds.errors import FieldError
 
@@ -154,6 +155,24 @@ def test_the_map_is_forgotten_where_plans_failed(log: Rollout) -> None:
     assert list(forgetting_ticks(dataclasses.replace(log.record, replans=timed[:6]))) == []
 
 
+def own_map(log: Rollout) -> OccupancyMap:
+    """The map that the robot of a log had at last."""
+    again = rescanning.Rescanning(log)
+    for row in range(0, len(log.t), log.record.physics_hz // log.record.control_hz):
+        tick = row * log.record.control_hz // log.record.physics_hz
+        estimate = tuple(log.estimate[row].tolist()) if len(log.estimate) else tuple(log.pose[row].tolist())
+        again.look(tick, tuple(log.pose[row].tolist()), estimate)
+        again.plan(tick, estimate)
+    return again._survey.map
+
+
+def cells_of(known: OccupancyMap) -> set[tuple[int, int]]:
+    """The cells that hold hits, by their places."""
+    rows, cols = np.nonzero(known.occupied)
+    x, y = known.origin
+    return set(zip(np.round(x / known.cell + cols).tolist(), np.round(y / known.cell + rows).tolist(), strict=True))
+
+
 def test_a_drive_that_forgot_its_map_can_be_replayed(jackal: RobotSpec, monkeypatch: pytest.MonkeyPatch) -> None:
     """A corridor that a row of posts closes, 1 m out of sight from the start."""
     assert jackal.lidar is not None
@@ -165,6 +184,12 @@ def test_a_drive_that_forgot_its_map_can_be_replayed(jackal: RobotSpec, monkeypa
     assert done.outcome is Outcome.TIMED_OUT, (done.outcome, done.reason)
     assert len(list(forgetting_ticks(done.rollout.record))) > 1
     assert replay(done.rollout).problems == ()
+    kept, forgot = Recollection(done.rollout), Recollection(done.rollout, forgetting=True)
+    for recollection in (kept, forgot):
+        recollection.advance(4.0)
+    own = cells_of(own_map(done.rollout))
+    rounded = len(own) // 50  # a log has millimetres
+    assert len(cells_of(forgot.map) ^ own) <= rounded < len(cells_of(kept.map) ^ own)
     monkeypatch.setattr(rescanning, "PATIENCE", 10**6)  # as if it had forgotten nothing
     (problem,) = replay(done.rollout).problems
     assert "estimate" in problem
@@ -184,6 +209,15 @@ def test_a_robot_that_looks_the_other_way_turns_round(jackal: RobotSpec) -> None
     assert done.succeeded, (done.outcome, done.reason)
     assert done.rollout is not None
     assert done.scenario.as_dict()["cell_m"] == done.rollout.record.cell == 0.05
+
+
+@pytest.mark.parametrize(("cell", "short"), [(None, True), (0.3, False)])
+def test_colonies_plan_on_cells_that_leave_gaps_open(jackal: RobotSpec, cell: float | None, short: bool) -> None:
+    """The gap leaves 0.12 m for the robot's middle: no row of cells of 0.3 m lies there, and the way round is long."""
+    posts = tuple(Disc(3.0, y, 0.075) for y in (*np.linspace(0.05, 2.0, 14), *np.linspace(3.0, 3.9, 7)))
+    task = dataclasses.replace(TASK, world=dataclasses.replace(ROOM, obstacles=posts), cell=0.3)
+    _, answer = exploration_of(scenario(jackal, task, "mmas", cell=cell, noise=0.0)).plan(task.start)
+    assert (answer.solved and answer.cost < 1.5 * 4.4) == short, answer.cost
 
 
 def test_what_no_beam_has_met_changes_nothing(jackal: RobotSpec, log: Rollout) -> None:

@@ -1,7 +1,9 @@
 """Exported scans, read back and laid out through the exported transforms, end on what stands in the world."""
 
+import dataclasses
 import math
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,7 +25,10 @@ def log(made_up_drive: Callable[..., Rollout]) -> Rollout:
 
 @pytest.fixture(scope="module")
 def said(log: Rollout, tmp_path_factory: pytest.TempPathFactory) -> list[tuple[str, int, Any]]:
-    place = tmp_path_factory.mktemp("scans")
+    return read(log, tmp_path_factory.mktemp("scans"))
+
+
+def read(log: Rollout, place: Path) -> list[tuple[str, int, Any]]:
     log.save(place / "rollout.npz")
     export(place / "rollout.npz", "mcap", place / "drive.mcap")
     with (place / "drive.mcap").open("rb") as file:
@@ -66,3 +71,56 @@ def test_scans_end_on_cylinders_and_walls(log: Rollout, said: list[tuple[str, in
         base = moving[at].transform
         assert off_surfaces(log, placed(base, placed(fixed["base_scan"].transform, seen))) < 2e-3
         assert off_surfaces(log, placed(base, seen)) > 0.03  # without the lidar's own place on the robot
+
+
+def middles(grid: Any, value: int) -> Any:
+    """The middles of a grid's cells that have a value, in the grid's frame, as complex numbers."""
+    info = grid.info
+    rows, cols = np.nonzero(np.array(grid.data).reshape(info.height, info.width) == value)
+    q, at = info.origin.orientation, info.origin.position
+    return (cols + 0.5 + 1j * (rows + 0.5)) * info.resolution * complex(q.w, q.z) ** 2 + complex(at.x, at.y)
+
+
+def within_cylinders(log: Rollout, points: Any) -> float:
+    """How deep the deepest of the points lies in a cylinder [m]."""
+    discs = log.record.world.discs
+    return float((discs[:, 2] - np.abs(points[:, None] - (discs[:, 0] + 1j * discs[:, 1]))).max())
+
+
+def test_the_map_of_a_robot_without_one_is_what_it_had_seen(log: Rollout, said: list[tuple[str, int, Any]]) -> None:
+    maps = [(at, message) for topic, at, message in said if topic == "/map"]
+    assert [at for at, _ in maps] == [0, *(round(at * 1e9) for at in [*np.arange(1.0, log.t[-1]), log.t[-1]])]
+    known = [int((np.array(grid.data) >= 0).sum()) for _, grid in maps]
+    assert known == sorted(known)
+    assert known[0] < known[-1]
+    diagonal = maps[0][1].info.resolution / math.sqrt(2)
+    for _, grid in maps:
+        assert grid.header.frame_id == "robot_map"
+        hit, free = middles(grid, 100), middles(grid, 0)
+        assert len(hit) > 50
+        assert off_surfaces(log, hit) < diagonal + 0.001
+        assert within_cylinders(log, free) < 2 * diagonal
+    size = maps[-1][1].info
+    assert 6.0 <= size.width * size.resolution <= 6.2  # the room of 6 x 4 m and the cells of its walls
+    assert within_cylinders(log, middles(maps[-1][1], -1)) > 2 * diagonal, "a robot cannot see into cylinders"
+
+
+def test_the_map_lies_so_that_the_robot_is_where_it_believes_to_be(log: Rollout, tmp_path: Path) -> None:
+    turned = np.exp(0.2j)
+    away = (log.pose[:, 0] + 1j * log.pose[:, 1]) * turned + (0.5 - 0.3j)
+    drifted = dataclasses.replace(log, estimate=np.column_stack([away.real, away.imag, log.pose[:, 2] + 0.2]))
+    said = read(drifted, tmp_path)
+    at, grid = next((at, m) for topic, at, m in said if topic == "/map" and at)
+    lies = next(
+        t.transform
+        for topic, when, m in said
+        if topic == "/tf" and when == at
+        for t in m.transforms
+        if t.child_frame_id == "robot_map"
+    )
+    hit = middles(grid, 100)
+    assert off_surfaces(log, placed(lies, hit)) < 1.2 * grid.info.resolution
+    assert off_surfaces(log, hit) > 0.2
+    (route,) = [m for topic, _, m in said if topic == "/plan"]
+    assert {route.header.frame_id} == {"robot_map"}
+    assert [p.pose.position.x for p in route.poses] == log.route[:, 0].tolist()

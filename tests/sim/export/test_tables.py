@@ -78,6 +78,23 @@ def test_wrong_names_are_refused(log: tuple[Rollout, Path], tmp_path: Path) -> N
         export(log[1], "mcap", tmp_path / "drive.bag")
     with pytest.raises(InputError, match="name a folder"):
         export(log[1], "csv", tmp_path / "drive.csv")
+    with pytest.raises(InputError, match=r"drive\.mcap: name a folder: rosbag2 is several files; .* with --to mcap"):
+        export(log[1], "rosbag2", tmp_path / "drive.mcap")
+
+
+def test_a_bag_and_its_layout_are_replaced_only_when_asked(log: tuple[Rollout, Path], tmp_path: Path) -> None:
+    pytest.importorskip("rosbags.rosbag2", reason="rosbags is not installed")
+    bag, layout = tmp_path / "drive.mcap", tmp_path / "drive.foxglove.json"
+    layout.write_text("mine")
+    with pytest.raises(
+        InputError, match=r"drive\.foxglove\.json: exists; name another file, or replace it with --force"
+    ):
+        export(log[1], "mcap", bag)
+    assert not bag.exists()
+    assert export(log[1], "mcap", bag, replace=True) == [bag, layout]
+    layout.unlink()
+    with pytest.raises(InputError, match=r"drive\.mcap: exists"):
+        export(log[1], "mcap", bag)
 
 
 def test_without_the_packages_it_says_what_to_install(

@@ -9,7 +9,7 @@ import pytest
 from antdrive.robots import load_robot
 from antdrive.robots.footprint import footprint_clearance
 from antdrive.sim import METRICS, Rollout
-from antdrive.sim.log.sights import PASSED, first_meetings, passed, seen_ground, sightings
+from antdrive.sim.log.sights import PASSED, first_meetings, movers_met, passed, seen_ground, sightings
 from antdrive.worlds import Disc, World
 from tests.sim.view.scanned import scanned
 
@@ -19,9 +19,9 @@ def log(made_up_drive) -> Rollout:
     return scanned(made_up_drive(size=(6.0, 4.0), obstacles=40))
 
 
-def visible(log: Rollout, k: int, points: np.ndarray) -> np.ndarray:
+def visible(log: Rollout, k: int, points: np.ndarray, *others: np.ndarray) -> np.ndarray:
     """Whether the lidar sees places from where scan k was taken: nothing stands on the line, and it is in the field of view."""
-    lidar, discs = log.record.robot.lidar, log.record.world.discs
+    lidar, discs = log.record.robot.lidar, (*log.record.world.discs, *others)
     assert lidar is not None
     x, y, yaw = lidar.pose_on(tuple(log.pose[log.scan_rows[k]]))
     to = points - (x, y)
@@ -100,3 +100,48 @@ def test_passed_is_what_came_within_half_a_metre(log: Rollout, made_up_drive) ->
     far = everything[-1]._replace(touched=True)
     assert far.passed  # whatever was touched was passed
     assert passed(made_up_drive()) == []
+
+
+def test_movers_are_first_seen_where_they_come_into_sight_and_passed_where_they_are_nearest(made_up_drive) -> None:
+    drive = made_up_drive(size=(6.0, 4.0), obstacles=40, movers=2)
+    to = drive.pose[:, :2] - (4.5, 2.0)
+    nearer = drive.movers[:, 1] - to / 6 - (0.0, 0.3)
+    turned = np.stack([drive.movers[:, 0], nearer], axis=1)
+    log = scanned(dataclasses.replace(drive, movers=turned))
+    rows, found = log.scan_rows, movers_met(log)
+    assert min(sight.seen_at for sight in found) == 0 < max(sight.seen_at for sight in found)  # behind the other
+    for j, sight in enumerate(found):
+        angles = np.linspace(0.0, 2 * np.pi, 200)
+        rim = 0.121 * np.column_stack([np.cos(angles), np.sin(angles)])
+        seen = []  # how many places on the rim the lidar sees; two beams are less than 10 of them apart
+        for k, row in enumerate(rows):
+            towards = log.pose[row, :2] - log.movers[row, j]
+            other = np.append(log.movers[row, 1 - j], 0.12)
+            seen.append(int(visible(log, k, log.movers[row, j] + rim[rim @ towards > 0.0144], other).sum()))
+        first = int(np.searchsorted(log.t[rows], sight.seen_at))
+        assert np.argmax(np.array(seen) > 0) <= first <= np.argmax(np.array(seen) > 10), (seen, first)
+        apart = np.hypot(*(log.pose[:, :2] - log.movers[:, j]).T) - 0.18 - 0.12
+        assert sight.nearest == pytest.approx(apart.min())
+        assert sight.nearest_at == log.t[apart.argmin()]
+        assert sight.seen_from == pytest.approx(apart[np.searchsorted(log.t, sight.seen_at)])
+    assert {j for j, sight in enumerate(found) if sight.passed} == {s.obstacle for s in passed(log) if s.mover}
+    assert [sight.followed_at for sight in found] == [math.inf, math.inf]
+
+
+def test_a_mover_is_followed_from_its_first_track_on(made_up_drive) -> None:
+    """The estimate is 0.4 m and a quarter turn off, so that tracks lie elsewhere than movers."""
+    log = scanned(made_up_drive(size=(6.0, 4.0), movers=2))
+    x, y, yaw = log.pose.T
+    log = dataclasses.replace(log, estimate=np.column_stack([-y + 0.4, x, yaw + np.pi / 2]))
+    at = log.scan_rows[[2, 3, 5]]
+    (x, y), noise = log.movers[at, 1].T, (0.05, -0.05)
+    tracks = np.zeros((3, 7), dtype=np.float32)
+    tracks[:, 0], tracks[:, 1], tracks[:, 2], tracks[:, 3] = at, 4, -y + 0.4 + noise[0], x + noise[1]
+    tracks[0, 2] += 0.2  # not yet the mover
+    first, second = movers_met(dataclasses.replace(log, tracks=tracks))
+    assert math.isinf(first.followed_at)
+    assert second.followed_at == log.t[at[1]]
+    plain = second.as_dict()
+    assert (plain["mover"], plain["followed_s"], "obstacle" in plain) == (1, second.followed_at, False)
+    touched = np.array([[200.0, len(log.record.world.obstacles) + 1, -0.001, 9.0]])
+    assert [sight.touched for sight in movers_met(dataclasses.replace(log, contacts=touched))] == [False, True]

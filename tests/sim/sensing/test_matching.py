@@ -36,6 +36,23 @@ def test_a_pose_that_has_drifted_is_corrected(off: tuple[float, float, float], j
     assert abs(yaw - POSE[2]) < 0.002
 
 
+def test_walls_that_are_far_away_hold_a_pose_where_that_is_asked_for(jackal: RobotSpec) -> None:
+    """In the middle of a hall of 24 m nothing is nearer than 11 m."""
+    assert jackal.lidar is not None
+    hall, here = World("hall", (-12.0, -12.0, 12.0, 12.0)), (0.5, -0.4, 0.3)
+    scanner, rng = Scanner.of(jackal.lidar, hall), np.random.default_rng(0)
+    seen = OccupancyMap(jackal.lidar, 0.05, here[:2], horizon=16.0)
+    for _ in range(8):
+        seen.insert(here, scanner.scan(here, rng=rng))
+    drifted, ranges = (0.512, -0.4, 0.303), scanner.scan(here, rng=rng)
+    assert ScanMatcher(jackal.lidar).corrected(seen, drifted, ranges) == drifted
+    pose = drifted
+    for _ in range(3):
+        pose = ScanMatcher(jackal.lidar, far=15.0).corrected(seen, pose, ranges)
+    assert math.dist(pose[:2], here[:2]) < 0.006
+    assert abs(pose[2] - here[2]) < 0.001
+
+
 def test_an_empty_map_corrects_nothing(jackal: RobotSpec) -> None:
     assert jackal.lidar is not None
     _, ranges = looked(jackal)

@@ -70,6 +70,20 @@ def test_two_movers_keep_their_own_tracks_where_they_pass(jackal: RobotSpec) -> 
     assert np.hypot(*(found.velocities[order] - velocity).T).max() < 0.2
 
 
+def test_a_mover_that_is_never_seen_from_edge_to_edge_counts_when_it_has_come_a_long_way(jackal: RobotSpec) -> None:
+    """One mover hides a side of another all the time. What stands half hidden behind the first is no mover."""
+    assert jackal.lidar is not None
+    start, velocity = np.array([[2.2, -0.45], [3.6, -0.1]]), np.array([[-0.3, 0.06], [-0.8, 0.0]])
+    radii = np.array([0.3, 0.3])
+    found, where, _ = watched(jackal.lidar, start, velocity, radii, 0.9)
+    assert len(found.radii) == 2
+    order = np.argsort(found.positions[:, 0])
+    assert np.hypot(*(found.positions[order] - where).T).max() < 0.1
+    assert np.hypot(*(found.velocities[order] - velocity).T).max() < 0.2
+    stands, *_ = watched(jackal.lidar, start, velocity * [[1.0], [0.0]], radii, 0.9)
+    assert len(stands.radii) == 1
+
+
 def test_a_slow_lidar_all_around_follows_as_well(turtlebot: RobotSpec) -> None:
     assert turtlebot.lidar is not None
     found, where, _ = watched(turtlebot.lidar, np.array([[-2.0, -1.0]]), np.array([[0.4, 0.2]]), np.array([0.3]), 2.0)

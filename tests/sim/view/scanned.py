@@ -18,7 +18,8 @@ def scanned(drive: Rollout, **changes: float) -> Rollout:
     rows = np.arange(0, len(drive.t), round(drive.record.physics_hz / exact.rate), dtype=np.int32)
     scanner = Scanner.of(exact, drive.record.world)
     x, y, yaw = drive.pose.T
-    scans = [millimetres(scanner.scan((float(x[k]), float(y[k]), float(yaw[k])))) for k in rows]
+    radii = np.array([mover.radius for mover in drive.record.world.movers])
+    scans = [millimetres(scanner.scan((float(x[k]), float(y[k]), float(yaw[k])), drive.movers[k], radii)) for k in rows]
     record = dataclasses.replace(
         drive.record,
         robot=dataclasses.replace(drive.record.robot, lidar=exact),

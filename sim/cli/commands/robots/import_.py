@@ -26,11 +26,23 @@ Picture = Annotated[
 Left = Annotated[str | None, typer.Option(metavar="NAME", help="Joint or link of the left driven wheel.")]
 Right = Annotated[str | None, typer.Option(metavar="NAME", help="Joint or link of the right driven wheel.")]
 Below = Annotated[
-    float,
+    float | None,
     typer.Option(
         min=0.0,
         metavar="METRES",
-        help="Leave collision geometry that lies higher above the floor out of the footprint.  [default: none]",
+        help="Leave collision geometry that lies higher above the floor out of the footprint [m].  [default: none is left out]",
+    ),
+]
+Arguments = Annotated[
+    list[str] | None,
+    typer.Option("--arg", metavar="NAME=VALUE", help="Value of an argument of a .xacro. May be repeated."),
+]
+Packages = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--package",
+        metavar="NAME=FOLDER",
+        help="Where a ROS package is.  [default: a folder of its name beside FILE or above it] May be repeated.",
     ),
 ]
 Kind = Annotated[str, typer.Option(metavar="KIND", help="disc, rectangle, polygon, or auto: the first that fits.")]
@@ -51,15 +63,18 @@ def import_robot(
     figure: Picture = None,
     left: Left = None,
     right: Right = None,
-    below: Below = math.inf,
+    below: Below = None,
     footprint: Kind = "auto",
     wheel_radius: WheelRadius = None,
     given: Given = None,
     meshes: Meshes = None,
     without_meshes: WithoutMeshes = False,
+    arguments: Arguments = None,
+    packages: Packages = None,
     json: options.Json = False,
 ) -> int:
     """Write the robot file of a differential-drive robot in URDF; a comment says where each value comes from."""
+    from antdrive.robots.importing.expanding import checked_packages
     from antdrive.robots.importing.urdf import import_urdf, require_writable
     from antdrive.worlds.files.atomic import written_whole
 
@@ -77,11 +92,13 @@ def import_robot(
         path,
         left=left,
         right=right,
-        below=below,
+        below=math.inf if below is None else below,
         footprint=footprint,
         meshes=meshes,
         without_meshes=without_meshes,
         given=values,
+        arguments=dict(pair(word, "--arg") for word in arguments or ()),
+        packages=checked_packages(dict(pair(word, "--package") for word in packages or ())),
     )
     files = {"robot": str(target)}
     if figure is not None:

@@ -92,6 +92,16 @@ def test_a_run_reports_replans_and_avoidance_which_can_be_switched_off(antdrive:
     assert json.loads(out)["metrics"]["replans"] == json.loads(out)["metrics"]["avoiding_s"] == 0
 
 
+def test_noise_of_a_robot_whose_file_has_none_is_said_to_change_nothing(antdrive: Call, small: Path) -> None:
+    text = antdrive("robots", "turtlebot")[1]
+    Path("bare.yaml").write_text("".join(line for line in text.splitlines(True) if not line.startswith("noise")))
+    words = ("run", small, "-p", "astar", "--no-figures", "--out", "o", "--noise", "1")
+    assert (
+        "noise 1 changes nothing: the file of turtlebot has no noise section" in antdrive(*words, "-r", "bare.yaml")[1]
+    )
+    assert "changes nothing" not in antdrive(*words)[1]
+
+
 def test_without_figures_a_run_writes_its_log_and_result(antdrive: Call, small: Path) -> None:
     assert antdrive("run", small, "-p", "astar", "--no-figures", "--out", "bare")[0] == 0
     assert sorted(path.name for path in Path("bare").iterdir()) == ["result.json", "rollout.npz"]

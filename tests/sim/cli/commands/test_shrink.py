@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from antdrive.planners import load_planner
 from antdrive.sim import Run, run
 from antdrive.sim.regression import Baseline, load_suite
 from antdrive.worlds import Disc, load_task
@@ -82,6 +83,30 @@ def test_a_planner_from_a_file_goes_with_the_suite(antdrive: Call, tmp_path: Pat
     assert json.loads(out)["repeats"]
     (case,) = load_suite(tmp_path / "deep" / "small" / "empty-small.drive.yaml")
     assert case.entry.planner == {"file": "../../own.py", "name": "Mine"}
+
+
+def test_the_log_of_a_planner_from_a_file_is_shrunk_with_that_file(
+    antdrive: Call, refused: Refused, collided_run: Run, tmp_path: Path
+) -> None:
+    (tmp_path / "own.py").write_text(
+        "from dataclasses import dataclass\nfrom antdrive.planners.graph.search import AStar\n"
+        "@dataclass(frozen=True)\nclass Mine(AStar):\n    calm: float = 1.0\nclass Other(AStar):\n    pass\n"
+    )
+    mine = load_planner("own.py:Mine", calm=0.5)
+    rollout = run(replace(collided_run.scenario, planner=mine, planner_name="Mine")).rollout
+    assert rollout is not None
+    rollout.save(tmp_path / "log.npz")
+    assert "--planner FILE.py:CLASS" in refused("shrink", "log.npz")
+    assert "the log's planner is 'Mine', not 'Other'" in refused("shrink", "log.npz", "-p", "own.py:Other")
+    assert "write FILE.py:CLASS or MODULE:CLASS, got 'Mine'" in refused("shrink", "log.npz", "-p", "Mine")
+    assert "--planner: is for logs" in refused("shrink", "a.drive.yaml::a", "-p", "own.py:Mine")
+    code, out, err = antdrive(
+        "shrink", "log.npz", "-p", "own.py:Mine", "--out", "deep/small", "--no-film", "--no-figures", "--json"
+    )
+    assert (code, err) == (0, "")
+    assert json.loads(out)["repeats"]
+    (case,) = load_suite(next((tmp_path / "deep" / "small").glob("*.drive.yaml")))
+    assert case.entry.planner == {"name": "../../own.py:Mine", "calm": 0.5}
 
 
 def test_a_test_that_fails_by_its_bound_is_shrunk_until_it_would_keep_it(antdrive: Call, small: Path) -> None:

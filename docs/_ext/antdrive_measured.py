@@ -1,0 +1,105 @@
+"""When the figures of a table came in: below each table of measurements stand the commit and the day, as git knows them.
+
+A table's commit is the newest one that changed a row of it. Where git does not know, in an archive or in a clone without
+its history, nothing is written.
+"""
+
+from __future__ import annotations
+
+import datetime
+import re
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
+
+#: Pages with tables of measurements.
+PAGES = re.compile(r"benchmarks|papers/\w+")
+BLAMED = re.compile(r"^(?P<commit>[0-9a-f]{40}) \d+ (?P<line>\d+)")
+RULE = re.compile(r"^\|[\s:|-]+\|\s*$")
+
+
+class Change(NamedTuple):
+    """Who changed a line last.
+
+    Attributes:
+        time: of the commit, in seconds since 1970
+        commit: its hash; only zeros where the line is not committed
+    """
+
+    time: int
+    commit: str
+
+
+def git(folder: Path, *words: str) -> str:
+    """What git prints; empty where there is no git, no repository or no such file in it."""
+    try:
+        done = subprocess.run(["git", *words], cwd=folder, capture_output=True, text=True, check=False)
+    except OSError:
+        return ""
+    return done.stdout if done.returncode == 0 else ""
+
+
+def changes_of(page: Path) -> dict[int, Change]:
+    """For each line of a file, from 1, who changed it last; nothing where git cannot know."""
+    if git(page.parent, "rev-parse", "--is-shallow-repository").strip() != "false":
+        return {}
+    found: dict[int, Change] = {}
+    times: dict[str, int] = {}
+    commit, line = "", 0
+    for text in git(page.parent, "blame", "-w", "--porcelain", "--", page.name).splitlines():
+        begins = BLAMED.match(text)
+        if begins:
+            commit, line = begins["commit"], int(begins["line"])
+        elif text.startswith("committer-time "):
+            times[commit] = int(text.split()[1])
+        elif text.startswith("\t"):
+            found[line] = Change(times[commit], commit)
+    return found
+
+
+def tables_of(lines: list[str]) -> Iterator[tuple[int, int]]:
+    """The numbers, from 1, of the first and the last row of each table's figures."""
+    for number, line in enumerate(lines, start=1):
+        if RULE.match(line) and number > 1 and lines[number - 2].startswith("|"):
+            last = number
+            while last < len(lines) and lines[last].startswith("|"):
+                last += 1
+            if last > number:
+                yield number + 1, last
+
+
+def dated(text: str, changes: dict[int, Change]) -> str:
+    """A page's text with a line below each table that says where its figures are from.
+
+    Args:
+        text: the page, in Markdown
+        changes: for each of its lines who changed it last
+    """
+    lines = text.splitlines()
+    for first, last in reversed(list(tables_of(lines))):
+        rows = [changes.get(number) for number in range(first, last + 1)]
+        if None in rows:
+            continue
+        newest = max(row for row in rows if row)
+        if newest.commit.strip("0"):
+            day = datetime.datetime.fromtimestamp(newest.time, datetime.timezone.utc).date()
+            said = f"Figures of commit `{newest.commit[:7]}`, {day.isoformat()}."
+            lines[last:last] = ["", "{.antdrive-measured}", said]
+    return "\n".join(lines) + "\n"
+
+
+def page_read(app: Sphinx, docname: str, source: list[str]) -> None:
+    """Date the tables of a page."""
+    path = Path(app.env.doc2path(docname))
+    if PAGES.fullmatch(docname) and path.suffix == ".md":
+        source[0] = dated(source[0], changes_of(path))
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    """Date tables when pages are read, before anything changes their lines."""
+    app.connect("source-read", page_read, priority=100)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,0 +1,70 @@
+"""
+A campaign's profile
+====================
+
+A campaign drives every combination of worlds, planners and seeds. A performance profile (Dolan and Moré 2002) sums it
+up: for each planner the share of instances that it solves at no more than x times the best planner's value.
+"""
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from antdrive import sweep
+from antdrive.sim.statistics.profiles import performance_profiles
+
+campaign = {
+    "worlds": [{"generate": "forest", "seeds": 6}],
+    "planners": ["astar", {"name": "aco-han", "ants": [10, 100]}, "maco"],
+    "routes": "none",
+}
+with tempfile.TemporaryDirectory() as folder:
+    results = sweep(campaign, Path(folder), jobs=1)
+    table = results.table.select(
+        ["world", "planner", "certified", "driven_length_m"]
+    ).to_pylist()
+print(f"{results.size} runs, {results.succeeded} of them certified at the goal")
+
+# %%
+# The profile of driven lengths
+# -----------------------------
+# Where a curve begins on the left is the share of worlds in which no other planner's drive was shorter. A failed run is
+# never solved, so it holds its curve down for good. The shortest plan is not always the shortest drive: the robot rounds
+# corners, so of two plans of equal length the one with more corners is driven shorter.
+
+worlds = sorted({row["world"] for row in table})
+planners = list(dict.fromkeys(row["planner"] for row in table))
+lengths = {
+    (row["world"], row["planner"]): row["driven_length_m"]
+    for row in table
+    if row["certified"]
+}
+cost = np.array(
+    [
+        [lengths.get((world, planner), np.nan) for planner in planners]
+        for world in worlds
+    ]
+)
+
+figure = Figure(figsize=(6.4, 3.8), layout="constrained")
+axes = figure.add_subplot(label="profile")
+for planner, curve in zip(planners, performance_profiles(cost), strict=True):
+    axes.step(
+        [1.0, *curve.x, 1.1],
+        [0.0, *curve.share, curve.at(1.1)],
+        where="post",
+        label=planner,
+        lw=2,
+    )
+axes.set(
+    xlim=(0.998, 1.1),
+    ylim=(0, 1.02),
+    xlabel="driven length, times the best",
+    ylabel="share of worlds",
+)
+_ = axes.legend(frameon=False)
+
+# %%
+# ``antdrive report FOLDER -o page.html`` makes a page with these profiles, tests and intervals; see :doc:`/how-to/campaigns`.

@@ -1,0 +1,45 @@
+"""
+Ants that age (Ibraheem 2016)
+=============================
+
+Ibraheem and Ajeil (2016) let ants deposit less pheromone the older they are, in the hope of fewer early
+commitments. Here their colony and the ant system search a map of 20 × 20 cells with ten obstacles.
+"""
+
+from antdrive import Scenario, film, plan, run
+from antdrive.sim import plan_figure
+from antdrive.sim.papers.films import paper_scenario
+from antdrive.sim.view.figures.paper_figures import history_figure
+
+ageing = paper_scenario("ibraheem2016")
+
+# %%
+# Both on the same map
+# --------------------
+# Lines are medians of six seeds, bands the range. :doc:`The paper's page </papers/ibraheem2016>` has every claim with its
+# verdict.
+
+runs = {
+    name: [plan(Scenario.of(ageing.task, name, seed=seed))[1] for seed in range(6)]
+    for name in ("maco", "as")
+}
+for name, found in runs.items():
+    print(f"{name:>4}: {', '.join(f'{one.cost:.1f}' for one in found)} m")
+iterations = history_figure(
+    {name: [one.history for one in found] for name, found in runs.items()}
+)
+
+# %%
+# Where the pheromone lies in the end
+# -----------------------------------
+
+grid, found = plan(ageing)
+trail = plan_figure(ageing.task, grid, found, ageing.robot)
+
+# %%
+# The drive
+# ---------
+
+result = run(ageing)
+print(result.outcome.value)
+film(result.rollout, "ageing.mp4", camera="top", size=(480, 480), speed=5)

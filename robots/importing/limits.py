@@ -1,0 +1,164 @@
+"""The limits of a robot out of URDF: what the drive plugin and the joints say, what follows from it, and what is assumed.
+
+A limit that is not used is named in the comment of the value that stands in its place.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from antdrive.robots.feasible import GRAVITY, yaw_inertia_of
+from antdrive.robots.importing.model import UrdfModel
+from antdrive.robots.importing.wheels import DrivenWheel
+from antdrive.robots.outline import Footprint
+from antdrive.robots.spec import ROBOT_RANGE
+
+ACCELERATION, YAW_ACCELERATION = 1.0, 8.0  # that are assumed where the motors allow them [m/s^2], [rad/s^2]
+SPEED, YAW_RATE = 0.5, 2.0  # that are assumed where the file has no limits [m/s], [rad/s]
+MOST_YAW_RATE = 3.14  # that is taken where only the wheels limit it: half a turn a second [rad/s]
+SPARE = 0.9  # the share of what the motors could do that is used
+FRICTION = 1.5  # of wheels
+LEAST_DRIVE = 0.05  # the least acceleration that makes an effort limit a motor's [m/s^2]
+
+Found = dict[str, tuple[float, str]]  # values of a robot's file, and where they come from
+
+
+class _Limit(NamedTuple):
+    """The lower of the limits that the wheels' joints have; inf where they have none."""
+
+    value: float
+    where: str
+
+
+def add_speeds(
+    model: UrdfModel, wheels: tuple[DrivenWheel, DrivenWheel], found: Found, given: Mapping[str, float]
+) -> None:
+    """Add the limits of the speeds, and of the wheels' speed.
+
+    Args:
+        model: the robot
+        wheels: those that drive it
+        found: wheel_radius and track are there already
+        given: keys that people gave, and that stay
+    """
+    radius, track = found["wheel_radius"][0], found["track"][0]
+    limit = _lowest(wheels, "velocity", "rad/s")
+    turning = seven_digits(limit.value)
+    reach = turning * radius
+    fastest = ROBOT_RANGE["max_speed"][1]
+    usable = reach <= fastest  # what is faster stands for no limit
+    for key, tags, most, assumed in (
+        ("max_speed", ("max_linear_velocity", "max_linear_speed"), reach, SPEED),
+        ("max_yaw_rate", ("max_angular_velocity", "max_angular_speed"), 2 * reach / track, YAW_RATE),
+    ):
+        tag, told = model.drive_number(*tags)
+        if key in given:
+            continue
+        if told and told > most:
+            found[key] = _five(most), f"computed: {limit.where}; <{tag}> of the drive plugin is {told:g}"
+        elif told:
+            found[key] = told, f"read: <{tag}> of the drive plugin"
+        elif not usable:
+            beyond = (
+                f"{limit.where} would be {reach:.4g} m/s, which is none"
+                if reach < math.inf
+                else "the file has no limit"
+            )
+            found[key] = assumed, f"assumed: {beyond}"
+        elif key == "max_yaw_rate" and most > MOST_YAW_RATE:
+            found[key] = MOST_YAW_RATE, f"assumed: half a turn a second; {limit.where} allows {most:.4g}"
+        else:
+            found[key] = (
+                _five(most),
+                f"computed: {limit.where}, times the wheels' radius"
+                + (" over half the track" if key == "max_yaw_rate" else ""),
+            )
+    if "max_wheel_speed" in given:
+        return
+    needs = 1.2 * max(found["max_speed"][0], found["max_yaw_rate"][0] * track / 2) / radius
+    if turning <= ROBOT_RANGE["max_wheel_speed"][1]:
+        found["max_wheel_speed"] = turning, f"read: {limit.where}"
+    else:
+        instead = f"; {limit.where} is none" if turning < math.inf else ""
+        found["max_wheel_speed"] = needs, f"assumed: 1.2 times what the speeds need{instead}"
+
+
+def add_forces(
+    model: UrdfModel,
+    wheels: tuple[DrivenWheel, DrivenWheel],
+    outline: Footprint,
+    found: Found,
+    given: Mapping[str, float],
+) -> None:
+    """Add the motors' torque, and the accelerations that they and the wheels' grip allow.
+
+    Args:
+        model: the robot
+        wheels: those that drive it
+        outline: its footprint
+        found: mass, wheel_radius and track are there already
+        given: keys that people gave, and that stay
+    """
+    mass, radius, track = (found[key][0] for key in ("mass", "wheel_radius", "track"))
+    if "wheel_torque" not in given:
+        found["wheel_torque"] = _torque(model, wheels, mass, radius)
+    inertia = yaw_inertia_of(mass, outline)
+    force = min(found["wheel_torque"][0] / radius, given.get("wheel_friction", FRICTION) * mass * GRAVITY / 2)
+    for key, tags, most, usual in (
+        ("max_acceleration", ("max_linear_acceleration",), 2 * force / mass, ACCELERATION),
+        ("max_yaw_acceleration", ("max_angular_acceleration",), force * track / inertia, YAW_ACCELERATION),
+    ):
+        if key in given:
+            continue
+        usable, (tag, told) = SPARE * most, model.drive_number(*tags)
+        wanted, how = (told, f"read: <{tag}> of the drive plugin") if told else (usual, "assumed")
+        less = f"; <{tag}> of the drive plugin is {told:g}" if told else ""
+        found[key] = (
+            (wanted, how)
+            if wanted <= usable
+            else (usable, f"computed: nine tenths of what motors and grip reach{less}")
+        )
+    if "max_lateral_acceleration" not in given:
+        found["max_lateral_acceleration"] = ACCELERATION, "assumed"
+
+
+def _torque(model: UrdfModel, wheels: tuple[DrivenWheel, DrivenWheel], mass: float, radius: float) -> tuple[float, str]:
+    limit, (tag, told) = (
+        _lowest(wheels, "effort", "N m"),
+        model.drive_number("max_wheel_torque", "wheelTorque", "torque"),
+    )
+    if told:
+        limit = min(limit, _Limit(told, f"<{tag}> of the drive plugin"))
+    weakest, strongest = mass * LEAST_DRIVE * radius, ROBOT_RANGE["wheel_torque"][1]
+    if weakest < limit.value <= strongest:
+        return limit.value, f"read: {limit.where}"
+    why = ""
+    if limit.value <= weakest:
+        why = f"; {limit.where} would not move {mass:.4g} kg"
+    elif limit.value < math.inf:
+        why = f"; {limit.where} is none"
+    return 2 * mass * ACCELERATION * radius, f"assumed: 4 times what {ACCELERATION:g} m/s2 need{why}"
+
+
+def _lowest(wheels: tuple[DrivenWheel, DrivenWheel], key: str, unit: str) -> _Limit:
+    """The lower of a limit of the two joints, and what it is called."""
+    value, name = min((getattr(wheel.joint, key) or math.inf, wheel.joint.name) for wheel in wheels)
+    return _Limit(value, f"the {key} limit of joint {name}, {value:.7g} {unit}")
+
+
+def seven_digits(value: float) -> float:
+    """A number as the file will have it, in seven digits, so that what follows from it is exactly reached.
+
+    Args:
+        value: the number
+    """
+    return float(f"{value:.7g}")
+
+
+def _five(value: float) -> float:
+    """The largest number of five digits that is not above a value."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - 4)
+    near = float(f"{value:.5g}")
+    return near if near <= value else float(f"{near - unit:.5g}")

@@ -1,0 +1,173 @@
+"""Every block of code on every page is run: by the build of the site, or by a test that the page names."""
+
+from __future__ import annotations
+
+import importlib
+import re
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import yaml
+from markdown_it import MarkdownIt
+
+from antdrive.robots.files import robot_from_text
+from antdrive.sim.campaigns import expand, make_campaign
+from antdrive.worlds import load_task, save_task
+from tools.pages import RUN, TESTED, Block, blocks_of, pages_with_code
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = [
+    *ROOT.glob("*.md"),
+    *(page for page in (ROOT / "docs").rglob("*.md") if not {"_build", "_gallery"} & set(page.parts)),
+    *(ROOT / "examples").rglob("*.md"),
+]
+BLOCKS = [(page.relative_to(ROOT).as_posix(), block) for page in PAGES for block in blocks_of(page.read_text())]
+#: The only blocks that nobody runs. Whoever adds one has a reason that nothing here can remove.
+NOT_RUN = [
+    ("docs/explanation/unknown-worlds.md", "they need the worlds of the BARN challenge"),
+    ("docs/how-to/campaigns.md", "they need a cluster with Slurm"),
+    ("docs/how-to/campaigns.md", "they need several machines"),
+    ("docs/tutorials/first-drive.md", "they set up what the page runs in"),
+    ("examples/campaigns/README.md", "they need the worlds of the BARN challenge"),
+    ("examples/plugin_planner/README.md", "they install a package; a test announces the planner without"),
+]
+#: Diagrams and lists; every other block of text is what the block of Python before it printed.
+PLAIN = ["CONTRIBUTING.md", "docs/explanation/architecture.md", "docs/how-to/regression-tests.md"]
+
+
+def fault(page: str, block: Block) -> str:
+    """Why nobody runs a block; empty if somebody does, or if there is nothing to run."""
+    if block.language == "text" or block.language.startswith("{"):
+        return ""
+    if not block.language:
+        return "has no language; `text` is what is no code"
+    if block.marks or page in TESTED or block.language in (*RUN, "before"):
+        return ""
+    return f"is {block.language} without a file: <!-- file: NAME --> before it writes it where the next block finds it"
+
+
+def test_every_block_has_somebody_who_runs_it() -> None:
+    faults = [f"{page}:{block.line} {wrong}" for page, block in BLOCKS if (wrong := fault(page, block))]
+    assert faults == []
+    assert len(BLOCKS) >= 90
+
+
+def code_of(text: str) -> list[tuple[str, int]]:
+    """The kind of each block of code in Markdown, fenced, indented or in a list, and the number of its first line."""
+    blocks = [token for token in MarkdownIt().parse(text) if token.type in ("fence", "code_block") and token.map]
+    return [(token.type, token.map[0] + 1) for token in blocks if token.map]
+
+
+def test_the_runner_finds_every_block_that_markdown_has() -> None:
+    for page in PAGES:
+        text = page.read_text()
+        found = [("fence", block.line - 1) for block in blocks_of(text) if block.language != "before"]
+        assert found == code_of(text), page
+
+
+def test_only_these_blocks_are_neither_code_nor_what_code_printed() -> None:
+    plain = [page for page, block in BLOCKS if block.language == "text" and not block.follows]
+    assert sorted(plain) == PLAIN
+
+
+def test_a_block_that_the_runner_would_not_find_is_noticed() -> None:
+    text = "- list\n\n  ```python\n  1 / 0\n  ```\n\nText:\n\n    1 / 0\n\n~~~python\n1 / 0\n~~~\n"
+    assert blocks_of(text) == []
+    assert code_of(text) == [("fence", 3), ("code_block", 9), ("fence", 11)]
+
+
+def test_a_block_that_nobody_runs_is_noticed() -> None:
+    text = "```\nx\n```\n\n```yaml\na: 1\n```\n\n<!-- file: a.yaml -->\n```yaml\na: 1\n```\n"
+    assert [bool(fault("a.md", block)) for block in blocks_of(text)] == [True, True, False]
+
+
+def test_nothing_else_is_left_out() -> None:
+    found = sorted((page, block.marks["not run"]) for page, block in BLOCKS if "not run" in block.marks)
+    assert found == NOT_RUN
+
+
+def test_the_build_runs_all_pages_with_code_but_those_that_tests_run() -> None:
+    built = {page.relative_to(ROOT).as_posix() for page in pages_with_code()}
+    runnable = {page for page, block in BLOCKS if block.language in RUN and not block.marks}
+    assert runnable <= built | set(TESTED)
+    assert "python -m tools.pages --all" in (ROOT / "Makefile").read_text()
+
+
+def test_the_tests_that_pages_name_exist() -> None:
+    named = [block.marks["run by"] for _, block in BLOCKS if "run by" in block.marks]
+    assert named
+    for one in [*named, *TESTED.values()]:
+        file, _, name = one.partition("::")
+        assert (ROOT / file).exists(), one
+        assert f"def {name}" in (ROOT / file).read_text(), one
+
+
+def block_of(page: str, test: str, language: str = "yaml") -> str:
+    """The text of the block of a page that a test runs."""
+    (text,) = [
+        block.text
+        for name, block in BLOCKS
+        if name == page and block.language == language and block.marks.get("run by", "").endswith(f"::{test}")
+    ]
+    return text
+
+
+def test_each_footprint_of_the_page_is_one() -> None:
+    text = block_of("docs/reference/robots.md", "test_each_footprint_of_the_page_is_one")
+    lines = text.splitlines()
+    data = yaml.safe_load((ROOT / "robots" / "catalog" / "turtlebot3-burger.yaml").read_text())
+    for line in lines:
+        robot_from_text(yaml.safe_dump({**data, **yaml.safe_load(line)}), "mine.yaml", "mine")
+    assert len(lines) == 4
+
+
+def test_the_campaign_file_of_the_guide_expands(tmp_path: Path) -> None:
+    """Whole it has millions of runs, so each key is expanded with all that it lists beside one value of every other."""
+    test = "test_the_campaign_file_of_the_guide_expands"
+    data = yaml.safe_load(block_of("docs/how-to/campaigns.md", test))
+    (tmp_path / "worlds").mkdir()
+    save_task(load_task("gate"), tmp_path / "worlds" / "mine.yaml")
+    make_campaign(data, tmp_path)  # every key is known and every value has its form
+    imported = [one for one in data["worlds"] if "import" in one]
+    few = {"schema": 1, "worlds": ["gate"], "planners": ["astar"], "seeds": 1}
+    numbers = {
+        "worlds": 22,
+        "tasks": 30,
+        "planners": 10,
+        "robots": 2,
+        "routes": 2,
+        "noise": 2,
+        "margin": 2,
+        "seeds": 10,
+        "settings": 4,
+    }
+    assert len(imported) == 2
+    for key, number in numbers.items():
+        listed = [one for one in data[key] if one not in imported] if key == "worlds" else data[key]
+        assert len(expand(make_campaign({**few, key: listed}, tmp_path)).jobs) == number, key
+    assert set(data) == {*few, *numbers, "note", "run_limit", "rollouts"}
+
+
+@pytest.fixture
+def marked(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], str]:
+    monkeypatch.syspath_prepend(str(ROOT / "docs" / "_ext"))
+    found: Callable[[str], str] = importlib.import_module("antdrive_marks").marked
+    return found
+
+
+def test_the_site_shows_files_names_and_why_a_block_was_not_run(marked: Callable[[str], str]) -> None:
+    shown = marked(
+        "Text.\n\n<!-- file: a.yaml -->\n```yaml\na: 1\n```\n\n<!-- not run: they need a cluster -->\n```sh\nx\n```\n"
+    )
+    assert "```{code-block} yaml\n:caption: a.yaml\n\na: 1\n```" in shown
+    assert "does not run these lines: they need a cluster.\n\n```sh" in shown
+
+
+def test_films_of_the_gallery_have_names_of_their_own() -> None:
+    """Examples run at the same time in one folder."""
+    examples = list((ROOT / "docs" / "gallery").glob("*.py"))
+    films = Counter(film for path in examples for film in re.findall(r'"([\w-]+\.mp4)"', path.read_text()))
+    assert len(examples) >= 12
+    assert [film for film, count in films.items() if count > 1] == []

@@ -1,0 +1,80 @@
+"""Every planner of the registry has a page that explains it: idea, equations, picture, options, weaknesses, when to choose it."""
+
+from __future__ import annotations
+
+import importlib.util
+import inspect
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from antdrive.planners import PLANNERS
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = ROOT / "docs" / "explanation" / "planners"
+
+EXPLAINED = {
+    name: page
+    for page in sorted(PAGES.glob("*.md"))
+    for names in re.findall(r"^\.\. planner:: (.+)$", page.read_text(), re.MULTILINE)
+    for name in names.split()
+}
+
+
+def docstrings() -> Any:
+    """The module of the site that reads docstrings; it is no package's."""
+    spec = importlib.util.spec_from_file_location("docstrings", ROOT / "docs" / "_ext" / "antdrive_docstrings.py")
+    assert spec
+    assert spec.loader
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def attributes(text: str) -> dict[str, str]:
+    """The entries of a section `Attributes:`, read by another rule than the site's."""
+    found: dict[str, str] = {}
+    for block in re.findall(r"^ +Attributes:\n((?: {8}.*\n?|\n)+)", text, re.MULTILINE):
+        for entry in re.split(r"^ {8}(?=\w+: )", block, flags=re.MULTILINE)[1:]:
+            name, _, meaning = entry.partition(": ")
+            found[name] = " ".join(meaning.split())
+    return found
+
+
+@pytest.mark.parametrize("name", PLANNERS)
+def test_a_planner_is_explained(name: str) -> None:
+    assert name in EXPLAINED, f"add `.. planner:: {name}` to a page in docs/explanation/planners"
+    page = EXPLAINED[name]
+    text = page.read_text()
+    heads = re.findall(r"^## (.+)$", text, re.MULTILINE)
+    assert heads[0] == "The idea"
+    assert heads[-1] == "When to choose it"
+    assert re.search(r"^\$\$\n.+?\n\$\$$", text, re.MULTILINE | re.DOTALL), "has no equation"
+    assert "```{drawn} " in text, "has no picture"
+    assert re.search(r"`(python -m benchmarks\.|antdrive reproduce )\w+", text), "says not what measures the weaknesses"
+    assert f"\n{page.stem}\n" in (PAGES / "index.md").read_text(), "is not in the toctree"
+
+
+@pytest.mark.parametrize("name", PLANNERS)
+def test_a_planner_has_a_row_in_the_table(name: str) -> None:
+    rows = [line for line in (PAGES / "index.md").read_text().splitlines() if line.startswith("| [`")]
+    assert any(f"`{name}`" in row.split("|")[1] for row in rows), f"add {name} to docs/explanation/planners/index.md"
+
+
+@pytest.mark.parametrize("kind", {type(planner) for planner in PLANNERS.values()}, ids=lambda kind: kind.__name__)
+def test_a_planner_knows_its_weaknesses_and_every_option_is_described(kind: type) -> None:
+    assert "Known weakness" in (kind.__doc__ or "")
+    assert docstrings().weaknesses_of(kind)
+    wanted: dict[str, str] = {}
+    for base in reversed(kind.__mro__):
+        wanted |= attributes(inspect.getsource(base).split('"""')[1] if base.__module__.startswith("antdrive") else "")
+    assert docstrings().described(kind) == wanted
+
+
+def test_the_lines_that_draw_pictures_are_python() -> None:
+    for page in PAGES.glob("*.md"):
+        for code in re.findall(r"^```\{drawn\} .+?\n(.*?)^```$", page.read_text(), re.MULTILINE | re.DOTALL):
+            compile(code, page.name, "exec")
+            assert re.search(r"^figure = ", code, re.MULTILINE), f"{page.name}: leaves no `figure`"
