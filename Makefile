@@ -51,10 +51,11 @@ test-slow: $(VENV)/.dev $(VENV)/.warm
 	@$(BIN)/python -m pytest --numprocesses 2 --dist loadgroup -m ''
 
 # What pages show runs again when they or the packages change. Both halves use as many processes as there are cores.
-SOURCES := $(wildcard */*.py */*/*.py */*/*/*.py */*/*/*/*.py)
+DEPTHS := * */* */*/* */*/*/*
+SOURCES := $(foreach folder,worlds planners robots sim,$(wildcard $(foreach depth,$(DEPTHS),$(folder)/$(depth).py $(folder)/$(depth).yaml)))
 CORES := $(shell nproc)
 
-docs/_build/.pages: $(VENV)/.docs $(VENV)/.warm $(SOURCES) $(wildcard docs/*.md docs/*/*.md docs/*/*/*.md examples/*/*.md)
+docs/_build/.pages: $(VENV)/.docs $(VENV)/.warm $(SOURCES) tools/pages.py $(wildcard docs/*.md docs/*/*.md docs/*/*/*.md examples/*/*.md)
 	@$(BIN)/python -m tools.pages --all --jobs $(CORES) --kept docs/_build/pages.json
 	@mkdir -p docs/_build && touch $@
 

@@ -35,7 +35,14 @@ extensions = [
     "antdrive_tables",
 ]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
-exclude_patterns = ["_build", "_ext", "gallery", "_gallery/sg_execution_times.rst", "sg_execution_times.rst"]
+exclude_patterns = [
+    "_build",
+    "_ext",
+    "_templates",
+    "gallery",
+    "_gallery/sg_execution_times.rst",
+    "sg_execution_times.rst",
+]
 # Each is written by sphinx-gallery; none says anything that its page does not.
 suppress_warnings = ["config.cache"]
 
@@ -102,6 +109,7 @@ html_theme = "pydata_sphinx_theme"
 html_title = "antdrive"
 html_context = {"default_mode": "auto"}  # without it the theme writes an error to the console on the first visit
 html_static_path = ["_static"]
+templates_path = ["_templates"]
 html_css_files = ["antdrive.css"]
 html_copy_source = False
 html_show_sourcelink = False

@@ -120,11 +120,13 @@ class Scenario:
             ) from None
         if self.map == "none" and self.robot.lidar is None:
             raise FieldError(
-                "map", f"none: {self.robot.name} has no lidar; add one to its file, or drive jackal or turtlebot"
+                "map",
+                f"none: {self.robot.name} has no lidar; add one to its file, or drive jackal or turtlebot4",
             )
         if self.perception.kind == "lidar" and self.robot.lidar is None:
             raise FieldError(
-                "sees", f"lidar: {self.robot.name} has no lidar; add one to its file, or drive jackal or turtlebot"
+                "sees",
+                f"lidar: {self.robot.name} has no lidar; add one to its file, or drive jackal or turtlebot4",
             )
         if self.perception.kind == "lidar" and self.map == "given" and self.localisation == "odometry":
             raise FieldError("sees", "lidar: with a given map the pose must not drift; localise by fixes or true")

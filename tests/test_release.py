@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -12,10 +13,23 @@ import yaml
 from tools.dist import built, version_of
 
 ROOT = Path(__file__).parent.parent
+VERSION = version_of((ROOT / "pyproject.toml").read_text())
+DATED = re.findall(r"^## (\d\S*) - (\d{4}-\d\d-\d\d)$", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)
 
 
 def parsed(path: Path) -> Any:
     return yaml.safe_load(path.read_text())
+
+
+def test_the_version_is_the_same_everywhere() -> None:
+    citation = parsed(ROOT / "CITATION.cff")
+    assert (citation["version"], str(citation["date-released"])) == (VERSION, DATED[0][1])
+    assert DATED[0][0] == VERSION
+
+
+def test_the_changelog_has_dated_sections_below_what_is_unreleased() -> None:
+    heads = re.findall(r"^## (.+)$", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)
+    assert heads == ["Unreleased", *(f"{version} - {date}" for version, date in DATED)]
 
 
 def test_the_version_is_read_from_the_project_and_nowhere_else() -> None:

@@ -30,7 +30,7 @@ class SweepCase:
         planner: what the campaign calls the planner with its options, such as "aco-han ants=50"
         planner_name: the planner's registered name
         planner_source: what `load_planner` takes for it
-        planner_version: what the planner's code is, such as "antdrive 0.1.0" or "mine 1.0 5f3a09c2"
+        planner_version: what the planner's code is, such as "antdrive 0.2.0" or "mine 1.0 5f3a09c2"
         given: the options that the campaign sets, by name
         options: all of the planner's options by name, as plain values
         robot: the robot

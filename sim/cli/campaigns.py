@@ -1,17 +1,26 @@
-"""From the words of `antdrive sweep` to a campaign."""
+"""From the words of `antdrive sweep` to a campaign, and what it prints of one."""
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from antdrive.sim.cli.console import print_line, print_table
 from antdrive.worlds.errors import InputError
 
 if TYPE_CHECKING:
     from antdrive.sim.campaigns.campaign import Campaign
     from antdrive.sim.campaigns.expanding import Expansion
+    from antdrive.sim.campaigns.results import SweepResults
 
+MEDIANS = {
+    "driven_length_m": "length m",
+    "duration_s": "duration s",
+    "min_clearance_m": "least clearance m",
+    "plan_s": "planning ms",
+}
 SOURCE = "the options"  # what errors call a campaign that no file describes
 
 
@@ -168,3 +177,35 @@ def _number(option: str, text: str) -> float | int:
         return int(text) if text.lstrip("+-").isdigit() else float(text)
     except ValueError:
         raise InputError(f"{option} {text}: must be a number") from None
+
+
+def print_sweep(results: SweepResults) -> None:
+    """Print how the runs of a campaign ended, what was measured in those that succeeded, and where more is said.
+
+    Args:
+        results: of the campaign
+    """
+    print_line(f"{results.size} runs, {results.made} of them made now; {results.succeeded} succeeded, certified")
+    print_table(("outcome", "runs"), ((name, str(count)) for name, count in results.outcomes.items()))
+    print_line()
+    print_line("medians of the runs that succeeded (least to most)")
+    print_table(("planner", "runs", *MEDIANS.values()), _medians(results))
+    print_line(f"  table    {results.path}")
+    report = shlex.join(["antdrive", "report", str(results.folder), "-o", str(results.folder / "report.html")])
+    print_line(f"  charts, intervals and all runs: {report}")
+
+
+def _medians(results: SweepResults) -> Iterator[tuple[str, ...]]:
+    """For each planner the number of runs that succeeded, and median and extremes of what was measured in them."""
+    import numpy as np
+
+    rows = [row for row in results.table.select(["planner", "succeeded", *MEDIANS]).to_pylist() if row["succeeded"]]
+    for planner in dict.fromkeys(row["planner"] for row in rows):
+        own = [row for row in rows if row["planner"] == planner]
+        factors = [1000.0 if unit.endswith(" ms") else 1.0 for unit in MEDIANS.values()]
+        columns = [
+            factor * np.array([row[name] for row in own], dtype=float)
+            for name, factor in zip(MEDIANS, factors, strict=True)
+        ]
+        told = (f"{np.median(found):.3g} ({found.min():.3g} to {found.max():.3g})" for found in columns)
+        yield planner, str(len(own)), *told

@@ -20,9 +20,21 @@ TaskName = Annotated[
 ]
 Start = Annotated[
     str | None,
-    typer.Option(metavar="X,Y,YAW", help="Another start [m, m, rad].  [default: the task's]"),
+    typer.Option(
+        metavar="X,Y,YAW", help="Another start, in the frame of the world file [m, m, rad].  [default: the task's]"
+    ),
 ]
-Goal = Annotated[str | None, typer.Option(metavar="X,Y", help="Another goal [m].  [default: the task's]")]
+Goal = Annotated[
+    str | None,
+    typer.Option(metavar="X,Y", help="Another goal, in the frame of the world file [m].  [default: the task's]"),
+]
+Frame = Annotated[
+    str,
+    typer.Option(
+        metavar="NAME",
+        help="world, or map: --start and --goal are places in the map that the world was made from, as exports have them.",
+    ),
+]
 Planner = Annotated[
     str,
     typer.Option(

@@ -62,6 +62,7 @@ def task_facts(task: Task) -> dict[str, Any]:
         "goal": list(task.goal),
         "goal_tolerance": task.goal_tolerance,
         "cell": task.cell,
+        **({"frame": list(task.frame)} if any(task.frame) else {}),
         "obstacles": len(task.world.obstacles),
         "movers": len(task.world.movers),
     }

@@ -11,8 +11,15 @@ if TYPE_CHECKING:
     from antdrive.worlds import Disc
 
 
-def numbers(option: str, text: str | None, count: int) -> tuple[float, ...] | None:
-    """As many finite numbers as asked for, from text such as "1.5,2,0"; None stays None."""
+def numbers(option: str, text: str | None, count: int, form: str = "") -> tuple[float, ...] | None:
+    """As many finite numbers as asked for, from text such as "1.5,2,0"; None stays None.
+
+    Args:
+        option: what the text was given for
+        text: the text
+        count: how many numbers
+        form: what they are, such as "X,Y,YAW", for the message
+    """
     if text is None:
         return None
     try:
@@ -20,7 +27,8 @@ def numbers(option: str, text: str | None, count: int) -> tuple[float, ...] | No
     except ValueError:
         values = ()
     if len(values) != count or not all(abs(value) <= 1e6 for value in values):
-        raise InputError(f"{option} {text}: write {count} numbers separated by commas, none beyond a million")
+        asked = f"{form}: " if form else ""
+        raise InputError(f"{option} {text}: write {asked}{count} numbers separated by commas, none beyond a million")
     return values
 
 

@@ -14,10 +14,13 @@ if TYPE_CHECKING:
     from antdrive.sim.scenario import Scenario
     from antdrive.worlds import Task
 
+FRAMES = WORLD_FRAME, MAP_FRAME = "world", "map"  # of the places that people give
 GROUPS = ("planner", "controller")  # what `--set GROUP.KEY=VALUE` can set
 
 
-def chosen_task(world: str, task: str | None, start: str | None, goal: str | None) -> str | Task:
+def chosen_task(
+    world: str, task: str | None, start: str | None, goal: str | None, frame: str = WORLD_FRAME
+) -> str | Task:
     """The world with the start and goal that options give; its name where they give none.
 
     Args:
@@ -25,34 +28,45 @@ def chosen_task(world: str, task: str | None, start: str | None, goal: str | Non
         task: `--task`
         start: `--start`
         goal: `--goal`
+        frame: `--frame`: whether start and goal are places in the world file's frame, or in that of its map
 
     Raises:
         InputError: there is no such task, or the place is not in free ground; the message names the option.
     """
+    if frame not in FRAMES:
+        raise InputError(f"--frame {frame}: choose from {', '.join(FRAMES)}")
     if task is None and start is None and goal is None:
         return world
     import dataclasses
 
     from antdrive.sim.cli.parse import numbers
     from antdrive.worlds import load_task
+    from antdrive.worlds.plane import out_of_map
 
-    ends = {"start": numbers("--start", start, 3), "goal": numbers("--goal", goal, 2)}
+    ends = {"start": numbers("--start", start, 3, "X,Y,YAW"), "goal": numbers("--goal", goal, 2, "X,Y")}
+    given: dict[str, Any] = {key: value for key, value in ends.items() if value is not None}
     try:
-        given: dict[str, Any] = {key: value for key, value in ends.items() if value is not None}
-        return dataclasses.replace(load_task(world, task), **given)
+        found = load_task(world, task)
+        if frame == MAP_FRAME:
+            given = {key: tuple(out_of_map(found.frame, [value])[0].tolist()) for key, value in given.items()}
+        return dataclasses.replace(found, **given)
     except FieldError as error:
-        raise InputError(f"--{error.key}: {error.problem}") from None
+        there = " (places are in the world's frame)" if frame == MAP_FRAME and any(found.frame) else ""
+        raise InputError(f"--{error.key}: {error.problem}{there}") from None
 
 
-def ends_words(task: str | None, start: str | None, goal: str | None) -> list[str]:
+def ends_words(task: str | None, start: str | None, goal: str | None, frame: str = WORLD_FRAME) -> list[str]:
     """The words of a command that give the same start and goal.
 
     Args:
         task: `--task`
         start: `--start`
         goal: `--goal`
+        frame: `--frame`
     """
     given = {"--task": task, "--start": start, "--goal": goal}
+    if frame != WORLD_FRAME and (start is not None or goal is not None):
+        given["--frame"] = frame
     return [f"{option}={value}" for option, value in given.items() if value is not None]
 
 

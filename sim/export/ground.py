@@ -20,7 +20,7 @@ Mask = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
-class Ground:
+class GroundGrid:
     """An occupancy grid.
 
     Attributes:
@@ -36,7 +36,7 @@ class Ground:
     cells: npt.NDArray[np.int8]
 
 
-def planned_ground(rollout: Rollout) -> Ground:
+def planned_ground(rollout: Rollout) -> GroundGrid:
     """The grid that the drive was planned on, in the frame of the map: free where the robot's centre may be.
 
     Args:
@@ -46,7 +46,7 @@ def planned_ground(rollout: Rollout) -> Ground:
     free = free_cells(record.task.world, record.cell, record.inflate)
     x0, y0, _, _ = record.task.world.bounds
     x, y, yaw = in_map(record.task.frame, [(x0, y0, 0.0)])[0].tolist()
-    return Ground(float(rollout.t[0]), record.cell, (x, y, yaw), np.where(free, FREE, OCCUPIED).astype(np.int8))
+    return GroundGrid(float(rollout.t[0]), record.cell, (x, y, yaw), np.where(free, FREE, OCCUPIED).astype(np.int8))
 
 
 def free_cells(world: World, cell: float, inflate: float) -> Mask:
@@ -71,10 +71,10 @@ def free_cells(world: World, cell: float, inflate: float) -> Mask:
         across, along = x[left[i] : right[i]] - cx, y[low[i] : high[i]] - cy
         apart2 = across * across + (along * along)[:, None]
         free[low[i] : high[i], left[i] : right[i]] &= apart2 > radii[i] * radii[i]
-    return free
+    return np.asarray(free)
 
 
-def known_ground(rollout: Rollout) -> Iterator[Ground]:
+def known_ground(rollout: Rollout) -> Iterator[GroundGrid]:
     """What a robot without a map had seen, in the frame of its estimated poses: at first, every second, and at last.
 
     Args:
@@ -92,4 +92,4 @@ def known_ground(rollout: Rollout) -> Iterator[Ground]:
         part = np.s_[rows[0] : rows[-1] + 1, cols[0] : cols[-1] + 1]
         cells = np.where(occupied[part], OCCUPIED, np.where(free[part], FREE, UNKNOWN)).astype(np.int8)
         x, y, cell = *seen.map.origin, seen.map.cell
-        yield Ground(at, cell, (x + cols[0] * cell, y + rows[0] * cell, 0.0), cells)
+        yield GroundGrid(at, cell, (x + cols[0] * cell, y + rows[0] * cell, 0.0), cells)

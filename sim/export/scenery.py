@@ -9,7 +9,7 @@ import numpy as np
 
 from antdrive.sim.export.description import description, wheel_places
 from antdrive.sim.export.frames import BASE, IDENTITY, LIDAR, MAP, ODOM, ROBOT_MAP, mover_frame
-from antdrive.sim.export.ground import Ground, known_ground, planned_ground
+from antdrive.sim.export.ground import GroundGrid, known_ground, planned_ground
 from antdrive.sim.export.libraries import message_types
 from antdrive.sim.export.topics import Floats, Topic, nanoseconds
 from antdrive.sim.log.rollout import Rollout
@@ -89,7 +89,7 @@ def _maps(rollout: Rollout) -> list[Topic]:
     return [_message("/map", kind, times, [_grid(ground, frame) for ground in found], latched=True)] if found else []
 
 
-def _grid(ground: Ground, frame: str) -> Any:
+def _grid(ground: GroundGrid, frame: str) -> Any:
     rows, columns = ground.cells.shape
     info = _of(
         "nav_msgs/msg/MapMetaData",

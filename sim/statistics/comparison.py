@@ -122,7 +122,9 @@ def pairs_of(paired: PairedRuns, against: str | None = None) -> list[tuple[int, 
     """
     labels = paired.planners
     if len(labels) < 2:
-        raise FieldError("planners", f"{labels[0]} alone; two are needed for a comparison")
+        raise FieldError(
+            "planners", f"{labels[0]} alone; two are needed for a comparison, antdrive report is about one, too"
+        )
     if against is not None and against not in labels:
         raise FieldError("against", f"unknown planner {against!r}; choose from {', '.join(labels)}")
     chosen = [

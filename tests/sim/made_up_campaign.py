@@ -82,7 +82,7 @@ def made_up_columns(
                         "grid_optimum_m": optimum,
                         "rollout": None if good else f"rollouts/{len(rows):08x}.npz",
                         "command": f"antdrive run world-{w:03}.yaml --planner {name} --robot turtlebot --seed {s}",
-                        "antdrive": "0.1.0",
+                        "antdrive": "0.2.0",
                         "attempts": 1,
                     }
                 )

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
 import yaml
@@ -167,6 +169,10 @@ def _tasks_in(text: str, source: str, stem: str) -> Mapping[str | None, Task]:
     document = parse_document(text, source)
     if isinstance(document.data, dict):
         document.data.setdefault("name", "".join(filter(str.isprintable, stem))[:200] or "world")
+    return _tasks_in_document(document)
+
+
+def _tasks_in_document(document: Document) -> dict[str | None, Task]:
     entry = check(WorldFile, document)
     own = _to_task(document, entry)
     found: dict[str | None, Task] = {None: own}
@@ -189,16 +195,23 @@ def _named_tasks(document: Document, entry: WorldFile, own: Task) -> dict[str | 
     return found
 
 
-def save_task(task: Task, path: str | Path) -> None:
+def save_task(task: Task, path: str | Path, tasks: Mapping[str, Task] = MappingProxyType({})) -> None:
     """Write a task as a world file, whole or not at all.
+
+    Args:
+        task: the world with its own start and goal
+        path: the file
+        tasks: other starts and goals in the same world, by name
 
     Raises:
         InputError: the file cannot be written, or a world file cannot hold the task, such as one with an empty name or
             with too many obstacles.
     """
     data = task_to_dict(task)
-    _to_task(Document("task", data))
-    text = _to_yaml(task)
+    if tasks:
+        data["tasks"] = [{"name": name, **ends_to_dict(other)} for name, other in tasks.items()]
+    _tasks_in_document(Document("task", data))
+    text = _to_yaml(data)
     size = len(text.encode())
     values = count_values(data)
     if size > MAX_BYTES or values > MAX_VALUES:
@@ -210,6 +223,19 @@ def save_task(task: Task, path: str | Path) -> None:
         )
     with written_whole(path) as part:
         part.write_text(text, encoding="utf-8")
+
+
+def ends_to_dict(task: Task) -> dict[str, Any]:
+    """The start and the goal of a task as plain data.
+
+    Args:
+        task: the task
+    """
+    return {
+        "start": [float(v) for v in task.start],
+        "goal": [float(v) for v in task.goal],
+        "goal_tolerance": float(task.goal_tolerance),
+    }
 
 
 def task_to_dict(task: Task) -> dict[str, Any]:
@@ -278,9 +304,9 @@ def _to_mover(document: Document, index: int, entry: MoverEntry) -> Mover:
         raise document.field_error(error, "movers", index) from None
 
 
-def _to_yaml(task: Task) -> str:
-    data = task_to_dict(task)
-    lists = {key: data.pop(key) for key in ("obstacles", "movers") if key in data}
+def _to_yaml(data: dict[str, Any]) -> str:
+    data = dict(data)
+    lists = {key: data.pop(key) for key in ("obstacles", "movers", "tasks") if key in data}
     lines = []
     for key, value in data.items():
         if isinstance(value, list | float):
@@ -289,7 +315,9 @@ def _to_yaml(task: Task) -> str:
             lines.append(yaml.safe_dump({key: value}, allow_unicode=True, width=100))
     for key, entries in lists.items():
         lines.append(f"{key}:\n" if entries else f"{key}: []\n")
-        lines += [f"  - {_flow(entry)}\n" for entry in entries]
+        # A string of JSON is one of YAML, whatever is in a name.
+        quoted = [{**entry, "name": json.dumps(entry["name"])} if "name" in entry else entry for entry in entries]
+        lines += [f"  - {_flow(entry)}\n" for entry in quoted]
     return "".join(lines)
 
 

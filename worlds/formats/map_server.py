@@ -9,19 +9,21 @@ the lowest. The other modes differ little: in `scale`, pixels that are not opaqu
 from __future__ import annotations
 
 import dataclasses
+import json
 import os
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 
-from antdrive.worlds.errors import input_error
+from antdrive.worlds.errors import FieldError, input_error
 from antdrive.worlds.files.atomic import written_whole
-from antdrive.worlds.files.checks import check, yaml_number
+from antdrive.worlds.files.checks import OneLine, check, yaml_number
 from antdrive.worlds.files.document import read_document
 from antdrive.worlds.files.world_file import Coordinate, Size
 from antdrive.worlds.formats.cellmap import CellMap, Cells, cell_map, file_task
@@ -38,14 +40,26 @@ FREE, OCCUPIED = 254, 0  # the shades that map_saver writes
 Share = Annotated[float, Field(ge=0, le=1)]
 
 
+class KeptTask(BaseModel):
+    """Another start and goal, which `export_map_server` adds to a map."""
+
+    model_config = ConfigDict(strict=True, extra="ignore", allow_inf_nan=False, frozen=True)
+
+    name: OneLine = Field(min_length=1, max_length=100)
+    start: list[Coordinate] = Field(min_length=3, max_length=3, description="write [x, y, yaw] in metres and radians")
+    goal: list[Coordinate] = Field(min_length=2, max_length=2, description="write [x, y] in metres")
+    goal_tolerance: Size = 0.25
+
+
 class KeptEnds(BaseModel):
-    """Start, goal and tolerance, which `export_map_server` adds to a map for `import_map_server`."""
+    """Start, goal and tolerance, and other tasks, which `export_map_server` adds to a map for `import_map_server`."""
 
     model_config = ConfigDict(strict=True, extra="ignore", allow_inf_nan=False, frozen=True)
 
     start: list[Coordinate] = Field(min_length=3, max_length=3, description="write [x, y, yaw] in metres and radians")
     goal: list[Coordinate] = Field(min_length=2, max_length=2, description="write [x, y] in metres")
     goal_tolerance: Size = 0.25
+    tasks: list[KeptTask] = Field([], max_length=10_000)
 
 
 class MapFile(BaseModel):
@@ -141,6 +155,28 @@ def import_map_server(
     return dataclasses.replace(task, frame=served.frame)
 
 
+def kept_tasks(path: str | os.PathLike[str], task: Task) -> dict[str, Task]:
+    """The other tasks that `export_map_server` added to a map, by name; empty for a map that antdrive did not write.
+
+    Args:
+        path: the YAML file
+        task: what `import_map_server` made of it
+
+    Raises:
+        InputError: the file is wrong, or a task does not lie in the world.
+    """
+    document = read_document(path)
+    entry = check(MapFile, document)
+    found = {}
+    for i, kept in enumerate(entry.antdrive.tasks if entry.antdrive else ()):
+        start, goal = _out_of_map(task.frame, kept.start), _out_of_map(task.frame, kept.goal)
+        try:
+            found[kept.name] = dataclasses.replace(task, start=start, goal=goal, goal_tolerance=kept.goal_tolerance)
+        except FieldError as error:
+            raise document.field_error(error, "antdrive", "tasks", i) from None
+    return found
+
+
 def _out_of_map(frame: Pose, end: Any) -> Any:
     return None if end is None else tuple(out_of_map(frame, [end])[0].tolist())
 
@@ -208,17 +244,25 @@ def _levels(path: Path, average_alpha: bool) -> tuple[Floats, Cells]:
     return (layers if average_alpha else layers[..., :-1]).mean(axis=2), layers[..., -1] == 255
 
 
-def export_map_server(task: Task, path: str | Path, *, resolution: float | None = None) -> Path:
+def export_map_server(
+    task: Task,
+    path: str | Path,
+    *,
+    resolution: float | None = None,
+    tasks: Mapping[str, Task] = MappingProxyType({}),
+) -> Path:
     """Write a world as a map of map_server: a YAML file, and a PGM image of the same name beside it.
 
     A cell is occupied when a disc or a wall reaches into it by more than a nanometre; no cell is unknown. Heights are
-    lost. Start, goal and tolerance are kept under the key `antdrive`, which map_server ignores and
-    `import_map_server` reads.
+    lost. Start, goal and tolerance, and other tasks, are kept under the key `antdrive`, which map_server ignores and
+    `import_map_server` reads. The map covers the world's bounds; positions in it are those in the map that the world
+    was made from.
 
     Args:
         task: the world to write
         path: the YAML file
         resolution: side of a cell [m]; by default the task's own
+        tasks: other starts and goals in the same world, by name
 
     Returns:
         The image's path.
@@ -242,16 +286,27 @@ def export_map_server(task: Task, path: str | Path, *, resolution: float | None 
         "negate: 0\n"
         "occupied_thresh: 0.65\n"
         "free_thresh: 0.196\n"
-        "antdrive:\n"
-        f"  start: {_yaml_list(in_map(task.frame, [task.start])[0].tolist())}\n"
-        f"  goal: {_yaml_list(in_map(task.frame, [task.goal])[0].tolist())}\n"
-        f"  goal_tolerance: {yaml_number(task.goal_tolerance)}\n"
+        "antdrive:\n" + "".join(f"  {line}\n" for line in _ends(task))
     )
+    if tasks:
+        text += "  tasks:\n"
+        text += "".join(
+            f"    - {{name: {json.dumps(name)}, {', '.join(_ends(other))}}}\n" for name, other in tasks.items()
+        )
     with written_whole(image) as part:
         part.write_bytes(b"P5\n%d %d\n255\n" % (cols, rows) + picture.tobytes())
     with written_whole(target) as part:
         part.write_text(text, encoding="utf-8", newline="\n")
     return image
+
+
+def _ends(task: Task) -> tuple[str, ...]:
+    """The start, the goal and the tolerance of a task in its map, as keys and values of YAML."""
+    return (
+        f"start: {_yaml_list(in_map(task.frame, [task.start])[0].tolist())}",
+        f"goal: {_yaml_list(in_map(task.frame, [task.goal])[0].tolist())}",
+        f"goal_tolerance: {yaml_number(task.goal_tolerance)}",
+    )
 
 
 def _yaml_list(values: Iterable[float]) -> str:

@@ -86,6 +86,7 @@ def compare(
     task: options.TaskName = None,
     start: options.Start = None,
     goal: options.Goal = None,
+    frame: options.Frame = "world",
     smoothing: options.Smoothing = "clearance",
     noise: options.Noise = 0.0,
     out: options.Out = None,
@@ -111,7 +112,7 @@ def compare(
     check_worlds(worlds)
     entrants = entrants_of(planner, settings)
     rest = {"margin": margin, "cell": cell, "smoothing": smoothing, "noise": noise}
-    tasks = {world: chosen_task(world, task, start, goal) for world in worlds}
+    tasks = {world: chosen_task(world, task, start, goal, frame) for world in worlds}
     scenarios = _scenarios(worlds, tasks, entrants, robot, seed, rest)
     cases = [(world, number) for world in worlds for number in range(seed, seed + seeds)]
     default, mark = _default_folder(scenarios, cases)
@@ -119,7 +120,7 @@ def compare(
     _make_ready(folder, video)
     with claimed(folder):
         facts = {"fingerprint": mark, "command": this_command()}
-        runs, logs = _drive(scenarios, cases, folder, robot, figures, facts, ends_words(task, start, goal))
+        runs, logs = _drive(scenarios, cases, folder, robot, figures, facts, ends_words(task, start, goal, frame))
         files = {run.label: run.facts["folder"] for run in runs} if len(cases) == 1 else {"folder": str(folder)}
         files |= _views(logs, folder, video, speed, figures)
         told = {"differences": differences(runs), "same": same_drives(runs, smoothing)}

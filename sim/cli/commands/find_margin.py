@@ -31,6 +31,7 @@ def find_margin(
     task: options.TaskName = None,
     start: options.Start = None,
     goal: options.Goal = None,
+    frame: options.Frame = "world",
     planner: options.Planner = "astar",
     settings: options.Settings = None,
     robot: options.Robot = "turtlebot",
@@ -60,7 +61,7 @@ def find_margin(
     from antdrive.sim.log.margin import find_margin as search
     from antdrive.sim.pipeline import run as drive
 
-    chosen = _chosen(world, kind, task, start, goal)
+    chosen = _chosen(world, kind, task, start, goal, frame)
     base = make_scenario(chosen, planner, settings, robot, cell=cell, smoothing=smoothing, noise=noise)
     base = base if max_speed is None else _slowed(base, max_speed)
     tasks = {n: base.task if kind is None else _generated(kind, n) for n in range(seed, seed + seeds)}
@@ -80,13 +81,15 @@ def find_margin(
     return FAILED if smallest is None else SUCCEEDED
 
 
-def _chosen(world: str | None, kind: str | None, task: str | None, start: str | None, goal: str | None) -> "str | Task":
+def _chosen(
+    world: str | None, kind: str | None, task: str | None, start: str | None, goal: str | None, frame: str
+) -> "str | Task":
     """The world of every drive; for random worlds a stand-in."""
     if (world is None) == (kind is None):
         raise InputError("find-margin: name a world, or a kind of random worlds with --generate forest|barn")
     if world is not None:
-        return chosen_task(world, task, start, goal)
-    if ends_words(task, start, goal):
+        return chosen_task(world, task, start, goal, frame)
+    if ends_words(task, start, goal, frame):
         raise InputError(
             "--task, --start, --goal: random worlds have their own starts and goals; name a world for others"
         )

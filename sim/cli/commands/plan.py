@@ -31,6 +31,7 @@ def plan(
     task: options.TaskName = None,
     start: options.Start = None,
     goal: options.Goal = None,
+    frame: options.Frame = "world",
     out: Annotated[
         Path | None, typer.Option("--out", "-o", metavar="FOLDER", help="Draw the plan's figures into this folder.")
     ] = None,
@@ -45,7 +46,7 @@ def plan(
     from antdrive.sim.pipeline import plan as make_plan
 
     scenario = make_scenario(
-        chosen_task(world, task, start, goal), planner, settings, robot, seed=seed, margin=margin, cell=cell
+        chosen_task(world, task, start, goal, frame), planner, settings, robot, seed=seed, margin=margin, cell=cell
     )
     compile_once()
     with planning(f"planning with {planner}"), keep_best():

@@ -75,6 +75,7 @@ def run(
     task: options.TaskName = None,
     start: options.Start = None,
     goal: options.Goal = None,
+    frame: options.Frame = "world",
     smoothing: options.Smoothing = "clearance",
     noise: options.Noise = 0.0,
     unseen: Unseen = None,
@@ -100,7 +101,7 @@ def run(
     knows: dict[str, Any] = {"map": map, "localisation": localisation, "odometry": odometry}
     hidden = tuple(disc(text) for text in unseen or ())
     scenario = make_scenario(
-        chosen_task(world, task, start, goal), planner, settings, robot,
+        chosen_task(world, task, start, goal, frame), planner, settings, robot,
         seed=seed, margin=margin, cell=cell, smoothing=smoothing, noise=noise, unseen=hidden, time_limit=time_limit,
         **knows, **among_movers(avoid, replan, sees),
     )  # fmt: skip

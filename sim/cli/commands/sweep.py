@@ -11,7 +11,7 @@ import typer
 
 from antdrive.sim.cli import knowing
 from antdrive.sim.cli.compiling import compile_once
-from antdrive.sim.cli.console import campaign_bar, print_error, print_json, print_line, print_table
+from antdrive.sim.cli.console import campaign_bar, print_error, print_json, print_line
 from antdrive.sim.cli.exits import SUCCEEDED
 from antdrive.worlds.errors import InputError
 
@@ -135,7 +135,7 @@ def sweep(
     done, whatever came out of them.
     """
     from antdrive.sim.campaigns.expanding import expand
-    from antdrive.sim.cli.campaigns import campaign_from
+    from antdrive.sim.cli.campaigns import campaign_from, print_sweep
 
     if out is None and not dry_run:
         raise InputError("--out: missing; name the folder for the results")
@@ -156,7 +156,7 @@ def sweep(
     if json:
         print_json(_facts(results))
     else:
-        _print(results)
+        print_sweep(results)
     return SUCCEEDED
 
 
@@ -225,9 +225,3 @@ def _facts(results: "SweepResults") -> dict[str, Any]:
         "succeeded": results.succeeded,
         "outcomes": results.outcomes,
     }
-
-
-def _print(results: "SweepResults") -> None:
-    print_line(f"{results.size} runs, {results.made} of them made now; {results.succeeded} succeeded, certified")
-    print_table(("outcome", "runs"), ((name, str(count)) for name, count in results.outcomes.items()))
-    print_line(f"  {results.path}")

@@ -60,7 +60,8 @@ def robot_figure(
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
         axes.set_xlabel("ahead of the axle [m]")
         axes.set_ylabel("to the left [m]")
-        axes.set_title(f"{robot.name}: {footprint_text(robot)}", fontsize=9, loc="left", wrap=True)
+        title = f"{robot.name}: {footprint_text(robot)}".replace("; ", "\n")
+        axes.set_title(title, fontsize=9, loc="left", wrap=True)
         figure.legend(handles=handles, loc="outside lower center", ncols=2)
         return finished(figure, target, dpi)
 

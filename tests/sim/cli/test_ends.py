@@ -42,13 +42,26 @@ def test_plan_and_show_take_them_too(antdrive: Call, office: Path) -> None:
     assert (shown["goal"], shown["tasks"]) == ([3.4, 2.4], ["dock"])
 
 
+def test_places_in_the_map_mean_the_same_as_those_in_the_world(antdrive: Call, office: Path) -> None:
+    """A world that lies in its map turned by a quarter to the left, with its origin at (10, -2)."""
+    office.write_text(OFFICE + "frame: [10, -2, 1.5707963267948966]\n")
+    words = ("plan", office, "-p", "astar", "--json")
+    there = antdrive(*words, "--start", "0.6,2.4,0", "--goal", "3.4,2.4")[1]
+    in_map = antdrive(*words, "--start", "7.6,-1.4,1.5707963267948966", "--goal", "7.6,1.4", "--frame", "map")[1]
+    assert json.loads(there)["cells"] == json.loads(in_map)["cells"]
+    shown = antdrive("worlds", "show", office)[1]
+    assert "frame m, m, rad    [10.0, -2.0, 1.5707963267948966]" in shown
+    assert "goal in its map    [9.4, 1.4]" in shown
+
+
 def test_each_run_of_a_comparison_says_how_to_repeat_it(antdrive: Call, office: Path) -> None:
     code, _, _ = antdrive(
-        "compare", office, "-p", "astar", "-p", "tangent", "--task", "dock", "--no-figures", "--out", "c"
-    )
+        "compare", office, "-p", "astar", "-p", "tangent", "--task", "dock", "--start", "0.6,1,0", "--frame", "map",
+        "--no-figures", "--out", "c",
+    )  # fmt: skip
     assert code == 0
     command = json.loads(Path("c/astar/result.json").read_text())["command"]
-    assert "--task=dock" in command
+    assert "--task=dock --start=0.6,1,0 --frame=map" in command
 
 
 def test_a_sweep_drives_the_tasks_of_a_file(antdrive: Call, office: Path) -> None:
@@ -62,8 +75,9 @@ def test_a_sweep_drives_the_tasks_of_a_file(antdrive: Call, office: Path) -> Non
     ("words", "error"),
     [
         (("run", "--task", "dok"), "no task 'dok'; did you mean dock?"),
-        (("run", "--start", "1,2"), "--start 1,2: write 3 numbers separated by commas"),
+        (("run", "--start", "1,2"), "--start 1,2: write X,Y,YAW: 3 numbers separated by commas"),
         (("plan", "--goal", "9,9"), "--goal: (9, 9) is out of bounds"),
+        (("plan", "--goal", "1,1", "--frame", "robot"), "--frame robot: choose from world, map"),
         (("run", "--start", "0.1,1,0"), "office: start: turtlebot at (0.1, 1)"),
     ],
 )

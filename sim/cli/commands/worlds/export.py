@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from antdrive.sim.cli import options
-from antdrive.sim.cli.console import print_files, print_json
+from antdrive.sim.cli.console import print_files, print_json, print_line
 from antdrive.sim.cli.exits import SUCCEEDED
 from antdrive.worlds.errors import InputError
 
@@ -41,16 +41,16 @@ def export_world(
 ) -> int:
     """Write a world for another program.
 
-    FILE's suffix decides the format. SDF keeps everything. In a map, every cell that a cylinder reaches into is
-    blocked; importing the map again gives a similar world, not the same. A .map gets a .scen file beside it with
-    the path from start to goal, if there is one on its cells.
+    FILE's suffix decides the format. SDF keeps the world, its start and its goal. In a map, every cell that a cylinder
+    reaches into is blocked; importing the map again gives a similar world, not the same. A .yaml keeps the world's
+    other tasks, too. A .map gets a .scen file beside it with the path from start to goal, if there is one on its cells.
     """
-    from antdrive.worlds import export_map_server, export_sdf, load_task
+    from antdrive.worlds import export_map_server, export_sdf, load_task, load_tasks
 
     suffix = out.suffix.lower()
     if suffix not in SUFFIXES:
         raise InputError(f"--out {out}: worlds are written as .sdf, .world, .yaml (map_server) or .map (MovingAI)")
-    task = load_task(world)
+    task, tasks = load_task(world), load_tasks(world)
     if out.exists() and Path(world).exists() and out.samefile(world):
         raise InputError(f"--out {out}: is the world itself; choose another name")
     if suffix in SDF:
@@ -61,11 +61,14 @@ def export_world(
     elif suffix == ".map":
         files = {"map": str(out), **_export_movingai(task, out, resolution)}
     else:
-        files = {"map": str(out), "image": str(export_map_server(task, out, resolution=resolution))}
+        files = {"map": str(out), "image": str(export_map_server(task, out, resolution=resolution, tasks=tasks))}
+        tasks = {}
     if json:
-        print_json({"world": task.world.name, "files": files})
+        print_json({"world": task.world.name, "files": files, **({"without_tasks": list(tasks)} if tasks else {})})
     else:
         print_files(files)
+        if tasks:
+            print_line(f"  without the tasks {', '.join(tasks)}: {suffix} has no place for them, .yaml has")
     return SUCCEEDED
 
 

@@ -102,8 +102,8 @@ def import_world(
         with bar("converting") as progress, watch_conversion(progress):
             tasks = import_file(
                 path,
-                start=numbers("--start", start, 3),
-                goal=numbers("--goal", goal, 2),
+                start=numbers("--start", start, 3, "X,Y,YAW"),
+                goal=numbers("--goal", goal, 2, "X,Y"),
                 bounds=numbers("--bounds", bounds, 4),
                 cell=cell,
                 barn=barn,
@@ -117,7 +117,7 @@ def import_world(
         raise InputError(f"--{error.key.replace('_', '-')}: {error.problem}") from None
     is_set = file_format is IMPORTS["dynabarn"]
     files = _targets(path, out or Path(path.stem), tasks) if is_set else [_target(path, out)]
-    _write(tasks, files)
+    _write(tasks, files, path if file_format is IMPORTS["map_server"] else None)
     if json:
         found = [{**task_facts(task), "files": {"world": str(file)}} for task, file in zip(tasks, files, strict=True)]
         print_json({"worlds": found} if is_set else found[0])
@@ -146,11 +146,13 @@ def _targets(path: Path, folder: Path, tasks: "Sequence[Task]") -> list[Path]:
     return files
 
 
-def _write(tasks: "Sequence[Task]", files: Sequence[Path]) -> None:
+def _write(tasks: "Sequence[Task]", files: Sequence[Path], served: Path | None) -> None:
+    """Write the worlds; that of a map that antdrive wrote with the other tasks that are in its file."""
     from antdrive.worlds import save_task
+    from antdrive.worlds.formats.map_server import kept_tasks
 
     for task, file in zip(tasks, files, strict=True):
-        save_task(task, file)
+        save_task(task, file, kept_tasks(served, task) if served is not None else {})
 
 
 def _print(tasks: "Sequence[Task]", files: Sequence[Path], *, is_map: bool) -> None:

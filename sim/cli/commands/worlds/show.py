@@ -11,7 +11,14 @@ from antdrive.sim.cli.exits import SUCCEEDED
 from antdrive.sim.cli.output import task_facts
 from antdrive.sim.cli.scenario import chosen_task
 
-UNITS = {"bounds": " m", "start": " m, m, rad", "goal": " m", "goal_tolerance": " m", "cell": " m"}
+UNITS = {
+    "frame": " m, m, rad",
+    "bounds": " m",
+    "start": " m, m, rad",
+    "goal": " m",
+    "goal_tolerance": " m",
+    "cell": " m",
+}
 
 
 def show_world(
@@ -21,6 +28,7 @@ def show_world(
     task: options.TaskName = None,
     start: options.Start = None,
     goal: options.Goal = None,
+    frame: options.Frame = "world",
     out: Annotated[
         Path | None, typer.Option("--out", "-o", metavar="FILE", help="Draw the world: .png, .svg or .pdf.")
     ] = None,
@@ -30,8 +38,9 @@ def show_world(
     from antdrive.planners import Query, load_planner, reachable
     from antdrive.robots import list_robots, load_robot, overlap_at
     from antdrive.worlds import load_task, load_tasks, rasterise, task_to_dict
+    from antdrive.worlds.plane import in_map
 
-    given, spec = chosen_task(world, task, start, goal), load_robot(robot)
+    given, spec = chosen_task(world, task, start, goal, frame), load_robot(robot)
     shown = load_task(given) if isinstance(given, str) else given
     grid = rasterise(shown.world, shown.cell, spec.radius + margin)
     query, named = Query.between(grid, shown), list(load_tasks(world))
@@ -50,6 +59,10 @@ def show_world(
         return SUCCEEDED
     for key, value in task_facts(shown).items():
         print_line(f"{key + UNITS.get(key, ''):18} {value}")
+    if any(shown.frame):
+        for key, pose in {"start": shown.start, "goal": shown.goal}.items():
+            there = in_map(shown.frame, [pose])[0].round(4).tolist()
+            print_line(f"{key + ' in its map':18} {there}")
     print_line(f"{'passable':18} {'yes' if passable else 'no'}, for {spec.name} with a margin of {margin:g} m")
     for name, overlap in starts.items():
         print_line(f"{'start for ' + name:18} {overlap or 'free'}")

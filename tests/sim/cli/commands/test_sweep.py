@@ -38,7 +38,18 @@ def test_a_dry_run_says_how_many_runs_there_are_and_writes_nothing(antdrive: Cal
 def test_a_campaign_is_run_once_and_then_goes_on_with_what_is_new(antdrive: Call, campaign: Path) -> None:
     code, out, _ = antdrive("sweep", campaign, "-o", "out", "--jobs", "1")
     assert code == 0
-    assert out.splitlines()[0] == "3 runs, 3 of them made now; 3 succeeded, certified"
+    lines = out.splitlines()
+    assert lines[0] == "3 runs, 3 of them made now; 3 succeeded, certified"
+    shown = {
+        line.split("  ")[0]: line for line in lines[lines.index("medians of the runs that succeeded (least to most)") :]
+    }
+    rows = read_results("out").table.to_pylist()
+    (astar,) = [row for row in rows if row["planner"] == "astar"]
+    length, duration = (f"{astar[key]:.3g}" for key in ("driven_length_m", "duration_s"))
+    assert f"{length} ({length} to {length})  {duration} ({duration} to {duration})" in " ".join(
+        shown["astar"].split("   ")
+    )
+    assert lines[-1] == "  charts, intervals and all runs: antdrive report out -o out/report.html"
     made = canonical_bytes("out")
     code, out, _ = antdrive("sweep", campaign, "-o", "out", "--seeds", "2", "--dry-run", "--json")
     assert (json.loads(out)["runs"], json.loads(out)["missing"]) == (6, 3)
