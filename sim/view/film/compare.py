@@ -104,7 +104,7 @@ class SplitScreen:
         titles: Sequence[str] | None = None,
         mark: Mark | None = None,
     ) -> None:
-        cols, rows = _arrangement(len(rollouts), size)
+        cols, rows = _arrangement(len(rollouts), size, _proportion(rollouts) if camera == "oblique" else 1.0)
         wide, high = (size[0] // cols) // 2 * 2, (size[1] // rows) // 2 * 2
         self._size = size
         self._corners = [((k % cols) * wide, (k // cols) * high) for k in range(len(rollouts))]
@@ -187,12 +187,18 @@ def _title(log: Rollout, one_world: bool) -> str:
     return planner if one_world else f"{planner} · {log.record.task.world.name}"
 
 
-def _arrangement(count: int, size: tuple[int, int]) -> tuple[int, int]:
-    """Columns and rows of tiles whose pictures are as close to 4:3 as possible, with few empty tiles."""
+def _proportion(rollouts: Sequence[Rollout]) -> float:
+    """Width over height of the widest world, at least 1."""
+    bounds = [log.record.task.world.bounds for log in rollouts]
+    return max(1.0, *((xmax - xmin) / (ymax - ymin) for xmin, ymin, xmax, ymax in bounds))
+
+
+def _arrangement(count: int, size: tuple[int, int], proportion: float) -> tuple[int, int]:
+    """Columns and rows of tiles, with few empty ones, whose pictures suit a world of this width over height."""
 
     def cost(cols: int) -> float:
         rows = -(-count // cols)
-        return abs(float(np.log(size[0] / cols / (size[1] / rows) / 1.2))) + 0.4 * (cols * rows - count)
+        return abs(float(np.log(size[0] / cols / (size[1] / rows) / (1.2 * proportion)))) + 0.4 * (cols * rows - count)
 
     cols = min(range(1, count + 1), key=cost)
     return cols, -(-count // cols)

@@ -83,3 +83,21 @@ def test_titles_replace_the_planners_names(drives):
         differs = (named.frame(0.1) != plain.frame(0.1)).any(axis=-1)
     assert differs[:30].any()
     assert not differs[60:].any()
+
+
+def test_oblique_views_of_a_wide_world_stand_above_each_other(drives):
+    def corners(camera, high):
+        logs = [replace(log, record=replace(log.record, task=_task(log, high))) for log in drives]
+        with SplitScreen(logs, camera, SIZE) as screen:
+            return screen._corners
+
+    assert corners("oblique", 1.0) == [(0, 0), (320, 0)]
+    assert corners("oblique", 0.5) == [(0, 0), (0, 180)]
+    assert corners("top", 0.5) == [(0, 0), (320, 0)]
+
+
+def _task(log, high):
+    """The log's task in a world whose height is `high` times its width."""
+    task = log.record.task
+    xmin, ymin, xmax, _ = task.world.bounds
+    return replace(task, world=replace(task.world, bounds=(xmin, ymin, xmax, ymin + high * (xmax - xmin))))
