@@ -25,7 +25,7 @@ from joblib import Parallel, delayed
 from antdrive.planners import Query, load_planner, plan_in_time
 from antdrive.robots import load_robot
 from antdrive.sim import Outcome, Perception, ReplanPolicy, Rollout, Scenario, run
-from antdrive.sim.log.sights import movers_met
+from antdrive.sim.log.sights import followed_rows
 from antdrive.worlds import (
     Cruising,
     Disc,
@@ -43,7 +43,8 @@ from benchmarks.planners import table
 
 DYNABARN = Path(__file__).parent.parent.parent / "shared" / "data" / "dynabarn" / "dynabarn10.json"
 CLASSES = {"easy": range(20), "medium": range(20, 40), "hard": range(40, 60)}
-JUMP = 0.3  # a mover that gets so far between two rows of a log has jumped [m]
+LATELY = 1.0  # what a mover did in this time before a contact is said [s]
+JUMP, TURN = 0.3, 0.7  # a mover that gets so far between two rows of a log has jumped [m]; a turn that is said [rad]
 START_INTERVAL = 7.3  # between the moments at which drives in one world start [s]
 KNOWN, BY_LIDAR = Perception(kind="motions"), Perception(kind="lidar")
 POLICIES: dict[str, dict[str, Any]] = {
@@ -108,16 +109,23 @@ def drive(
 
 
 def warning(log: Rollout) -> str:
-    """Of a drive without a map that ended in a contact with a mover: since when the robot followed it, and whether it jumped."""
+    """Of a drive without a map that ended in a contact with a mover: for how long the robot had followed it, and what it did."""
     if not len(log.contacts) or not len(log.scans):
         return ""
     row, mover = int(log.contacts[0, 0]), int(log.contacts[0, 1]) - len(log.record.world.obstacles)
     if not 0 <= mover < log.movers.shape[1]:
         return ""
-    now, followed = float(log.t[row]), movers_met(log)[mover].followed_at
-    jumps = np.flatnonzero(np.hypot(*np.diff(log.movers[: row + 1, mover], axis=0).T) > JUMP)
-    words = f"followed {now - followed:.1f} s before" if followed <= now else "not followed before"
-    return f"{words}, jumped {now - log.t[jumps[-1]]:.1f} s before" if len(jumps) else words
+    scans = log.scan_rows[log.scan_rows < row]
+    lost = np.flatnonzero(~np.isin(scans, followed_rows(log)[mover]))
+    words = [f"followed for {log.t[row] - log.t[scans[lost[-1]]] if len(lost) else log.t[row]:.1f} s"]
+    way = np.diff(log.movers[max(0, row - round(LATELY * log.record.physics_hz)) : row + 1, mover], axis=0)
+    jumped = np.hypot(*way.T) > JUMP
+    headings = np.unwrap(np.arctan2(way[:, 1], way[:, 0]))
+    if jumped.any():
+        words.append("it had just jumped")
+    elif abs(headings[-1] - headings[0]) > TURN:
+        words.append(f"it had just turned by {math.degrees(abs(headings[-1] - headings[0])):.0f} degrees")
+    return ", ".join(words)
 
 
 def columns(results: Sequence[Result]) -> list[str]:

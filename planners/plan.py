@@ -110,7 +110,6 @@ def _entrance(grid: Grid, task: Task, point: Point, within: float) -> tuple[Cell
     from antdrive.worlds.geometry import point_clearance, segment_clearance
 
     row, col = grid.cell_at(*point)
-    rows, cols = grid.shape
     own = float(point_clearance(task.world, [point])[0])
     if grid.free[row, col]:  # no centre is nearer than that of the cell around the point
         centre = grid.xy([(row, col)])

@@ -49,6 +49,7 @@ RUN = ("python", "console", "sh")  # languages that run
 #: Pages whose blocks tests run, each with the tests' file.
 TESTED = {
     "README.md": "tests/test_readme.py",
+    "examples/bridges/README.md": "tests/examples/test_bridges.py",
     "examples/regression_suite/README.md": "tests/examples/test_regression_suite.py",
 }
 COMPILING = "antdrive: compiling the planners"  # what only the first command of an installation says

@@ -9,9 +9,10 @@ from __future__ import annotations
 import os
 import re
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from sphinx.application import Sphinx
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
 
 ROOT = Path(__file__).resolve().parents[2]
 #: Files of the repository that a page includes.
@@ -19,6 +20,7 @@ PAGES = {
     "README.md": "index",
     "CONTRIBUTING.md": "explanation/contributing",
     "CHANGELOG.md": "reference/changelog",
+    "examples/bridges/README.md": "how-to/bridges-example",
     "examples/campaigns/README.md": "how-to/campaign-files",
     "examples/regression_suite/README.md": "how-to/regression-example",
 }

@@ -35,9 +35,10 @@ class MaxMinDStar(GridPlanner):
     front of a wall. The author chose other exponents for such maps; here `exponents` is the rule for all of
     them, and it always arrives. The result's `reason` reports what it did.
 
-    Known weaknesses, measured (docs/papers/hasan.md): alpha must be raised in five of the paper's six
-    environments, and paths are up to 11 per cent longer than the shortest. With a quarter of 50 x 50 cells
-    blocked they are 1.8 per cent longer in the median and 44 per cent at worst.
+    Known weaknesses, measured (docs/papers/hasan.md): with alpha 1 and beta 1 alpha must be raised in five of
+    the paper's six environments, with the exponents that the paper gives for each in none; paths are up to 11
+    per cent longer than the shortest. With a quarter of 50 x 50 cells blocked they are 1.8 per cent longer in
+    the median and 44 per cent at worst.
 
     Attributes:
         alpha: exponent of the pheromone to begin with; in the paper 1 to 26, depending on the environment

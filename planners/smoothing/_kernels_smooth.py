@@ -305,7 +305,7 @@ def deepest_entry(count: int, contacts: Contacts, links: Array, discs: Array, bo
                 continue
             for k in range(box * TOGETHER, min(discs.shape[0], (box + 1) * TOGETHER)):
                 q = discs[k, 2] - most
-                if q <= 0.0 or k == before or k == after:
+                if q <= 0.0 or k in (before, after):
                     continue
                 away2 = segment_distance2(discs[k, 0], discs[k, 1], ax, ay, bx, by)
                 if away2 < q * q:

@@ -16,18 +16,33 @@ def near_polyline(xy: Array, discs: Array, distance: float) -> Array:
     """The discs whose surface is within a distance of a polyline, in their order."""
     out = np.empty_like(discs)
     count = 0
+    links = xy.shape[0] - 1
+    blocks = np.empty(((links + BLOCK - 1) // BLOCK, 4))  # rectangles around so many links each
+    for b in range(blocks.shape[0]):
+        some = xy[BLOCK * b : min(BLOCK * (b + 1), links) + 1]
+        blocks[b, 0], blocks[b, 1] = some[:, 0].min() - ROUNDING, some[:, 0].max() + ROUNDING
+        blocks[b, 2], blocks[b, 3] = some[:, 1].min() - ROUNDING, some[:, 1].max() + ROUNDING
     for j in range(discs.shape[0]):
         reach = distance + discs[j, 2]
-        for i in range(xy.shape[0] - 1):
-            ax, ay = xy[i, 0], xy[i, 1]
-            dx, dy = xy[i + 1, 0] - ax, xy[i + 1, 1] - ay
-            px, py = discs[j, 0] - ax, discs[j, 1] - ay
-            if max(abs(px), abs(py)) > reach + abs(dx) + abs(dy):
+        near = False
+        for b in range(blocks.shape[0]):
+            if discs[j, 0] < blocks[b, 0] - reach or discs[j, 0] > blocks[b, 1] + reach:
                 continue
-            length2 = dx * dx + dy * dy
-            t = min(1.0, max(0.0, (px * dx + py * dy) / length2)) if length2 > 0.0 else 0.0
-            ex, ey = px - t * dx, py - t * dy
-            if ex * ex + ey * ey <= reach * reach:
+            if discs[j, 1] < blocks[b, 2] - reach or discs[j, 1] > blocks[b, 3] + reach:
+                continue
+            for i in range(BLOCK * b, min(BLOCK * (b + 1), links)):
+                ax, ay = xy[i, 0], xy[i, 1]
+                dx, dy = xy[i + 1, 0] - ax, xy[i + 1, 1] - ay
+                px, py = discs[j, 0] - ax, discs[j, 1] - ay
+                if max(abs(px), abs(py)) > reach + abs(dx) + abs(dy):
+                    continue
+                length2 = dx * dx + dy * dy
+                t = min(1.0, max(0.0, (px * dx + py * dy) / length2)) if length2 > 0.0 else 0.0
+                ex, ey = px - t * dx, py - t * dy
+                if ex * ex + ey * ey <= reach * reach:
+                    near = True
+                    break
+            if near:
                 out[count] = discs[j]
                 count += 1
                 break

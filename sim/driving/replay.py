@@ -16,10 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from antdrive.robots import Twist
+from antdrive.robots import NoiseModel, Twist
 from antdrive.sim.driving.localising import OdometryModel, noise_model_of
 from antdrive.sim.driving.recorder import Ending, Recorder
 from antdrive.sim.driving.rescanning import Rescanning
+from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.physics.engine import Engine
 from antdrive.worlds.errors import FieldError
@@ -130,6 +131,7 @@ def _other_senses(rollout: Rollout) -> Iterator[str]:
         if model is not None:
             found.append((*estimate, *model.actuate(Twist(*rollout.command[row + 1].tolist()))))
     if again is not None:
+        _look_once_more(rollout, again, model)
         yield from again.problems()
     if not found:
         return
@@ -141,6 +143,20 @@ def _other_senses(rollout: Rollout) -> Iterator[str]:
         if wrong.any():
             t = rollout.t[rows[int(wrong.argmax())]]
             yield f"replay: {name} is not what the noise of seed {record.seed} makes of the log, from t = {t:.3f} s"
+
+
+def _look_once_more(rollout: Rollout, again: Rescanning, model: NoiseModel | None) -> None:
+    """Take the scan of the period in which the robot decided that its drive was over; other drives end without one."""
+    record, last = rollout.record, len(rollout.t) - 1
+    tick, rest = divmod(last, record.physics_hz // record.control_hz)
+    decided = rollout.outcome is Outcome.SUCCEEDED or last in rollout.scan_rows
+    if rest or len(rollout.contacts) or not decided:
+        return
+    x, y, yaw = rollout.pose[last].tolist()
+    estimate = x, y, yaw
+    if model is not None:
+        estimate = model.estimate_pose((x, y, yaw), Twist(*rollout.twist[last].tolist()))
+    again.look(tick, (x, y, yaw), estimate)
 
 
 def _most(values: Floats) -> float:

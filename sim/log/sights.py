@@ -178,7 +178,7 @@ def movers_met(rollout: Rollout) -> list[Sighting]:
     for k, row in enumerate(rows.tolist()):
         _meet(rollout, k, np.column_stack((rollout.movers[row], radii)), met)
     touched = set((rollout.contacts[:, 1].astype(int) - len(record.world.obstacles)).tolist())
-    followed, found = _followed(rollout, radii), []
+    followed, found = followed_rows(rollout), []
     for j, radius in enumerate(radii.tolist()):
         nearest_row, nearest = _approach(rollout, j, radius, slice(None))
         seen_from = math.nan
@@ -194,7 +194,7 @@ def movers_met(rollout: Rollout) -> list[Sighting]:
                 nearest,
                 j in touched,
                 mover=True,
-                followed_at=float(followed[j]),
+                followed_at=float(rollout.t[followed[j][0]]) if len(followed[j]) else math.inf,
             )
         )
     return found
@@ -210,12 +210,14 @@ def _approach(rollout: Rollout, mover: int, radius: float, rows: slice) -> tuple
     return int(row[0]), float(away[0])
 
 
-def _followed(rollout: Rollout, radii: Floats) -> Floats:
-    """When the middle of a track first lay in each mover (M,) [s]; infinite where none did.
+def followed_rows(rollout: Rollout) -> list[npt.NDArray[np.int64]]:
+    """The rows in which the middle of a track lay in each mover, in the order of the world.
 
     Tracks lie in the frame of the estimated pose, so they are laid as they lay from the robot.
+
+    Args:
+        rollout: the log of a robot that follows movers in its scans
     """
-    first = np.full(len(radii), math.inf)
     rows = rollout.tracks[:, 0].astype(np.int64)
     believed, true = (rollout.estimate if len(rollout.estimate) else rollout.pose)[rows], rollout.pose[rows]
     ahead = rollout.tracks[:, 2:4] - believed[:, :2]
@@ -224,11 +226,10 @@ def _followed(rollout: Rollout, radii: Floats) -> Floats:
     places = true[:, :2] + np.column_stack(
         (cos * ahead[:, 0] - sin * ahead[:, 1], sin * ahead[:, 0] + cos * ahead[:, 1])
     )
-    for j, radius in enumerate(radii.tolist()):
-        on = rows[np.hypot(*(places - rollout.movers[rows, j]).T) <= radius]
-        if len(on):
-            first[j] = rollout.t[on[0]]
-    return first
+    return [
+        rows[np.hypot(*(places - rollout.movers[rows, j]).T) <= mover.radius]
+        for j, mover in enumerate(rollout.record.world.movers)
+    ]
 
 
 def passed(rollout: Rollout) -> list[Sighting]:

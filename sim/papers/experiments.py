@@ -281,8 +281,14 @@ def lee2008() -> list[Experiment]:
         ("as", "as, stepping back", {**conventional, **back}, 1.0),
         ("as", "as, no list", {**conventional, "ranks": None}, 1.0),
         ("pfaco", "pfaco, to the letter", {"form": "letter", "memory": "none"}, 1.0),
+        ("as", "as, cut short", {**conventional, **back, "shortcut": True}, 1.0),
+        ("pfaco", "pfaco, cut short", {**back, "shortcut": True}, 1.0),
     ]
     brief = [(planner, f"{label}, a tenth", options, 0.1) for planner, label, options, _ in usual[:4]]
+    long = [
+        (planner, f"{label}, ten times", options, 10.0) for planner, label, options, _ in usual[:4] if planner == "as"
+    ]
+    others = {1: brief, 3: long}
     found = []
     for number, (shape, goal, *values, moves, seconds) in printed.items():
         work = 3e6 * (seconds[0] / printed[3][5][0] + seconds[1] / printed[3][5][1]) / 2
@@ -302,9 +308,10 @@ def lee2008() -> list[Experiment]:
                 worlds=CANDIDATES,
                 comparable=True,
                 work=round(share * work, -4),
-                slow=number > 3,
+                slow=number > 3 or share > 1,
+                most_seeds=20 if share > 1 else 10_000,
             )
-            for planner, label, options, share in (*usual, *(brief if number == 1 else ()))
+            for planner, label, options, share in (*usual, *others.get(number, ()))
         ]
     return found
 

@@ -261,7 +261,7 @@ def _wider(test: Wider, found: Found) -> Judged:
         [_quartile_range(first, row) - _quartile_range(second, row) for row in rows], [0.025, 0.975]
     )
     interval = Interval(float(low), float(high))
-    ours = f"ranges differ by {_with_interval(value, interval, test.quantity)}"
+    ours = f"ranges differ by {_with_interval(value, interval, test.quantity, endless=ENDLESS_TEXT)}"
     decision, reason = _decided(low > 0, high <= 0, len(first), value, interval, 0.0)
     return Judged(decision, value, interval, ours, _joined(reason, "ranges between quartiles, bootstrapped"))
 
@@ -299,7 +299,11 @@ def _undecided(value: float, interval: Interval, bound: float) -> str:
     if abs(bound - value) < 1e-9 or not abs(towards) < NO_PATH / 10:
         return words
     times = (towards / abs(bound - value)) ** 2
-    return f"{words}; some {times:.2g} times as many maps and seeds would tell" if 1 < times < MANY else words
+    return (
+        f"{words}; some {times:{'.0f' if times > 10 else '.1f'}} times as many maps and seeds would tell"
+        if 1 < times < MANY
+        else words
+    )
 
 
 def _joined(*words: str) -> str:
@@ -343,7 +347,7 @@ def _share(pairs: Sequence[tuple[Arm, Arm]], quantity: str, found: Found) -> Sha
     signs = np.sign(difference)
     value, interval = 100 * float(signs.mean()), means_by_world(100 * signs[:, None], _alone(world))[0]
     less, more = int((signs < 0).sum()), int((signs > 0).sum())
-    points = f"{value:+.0f} points [{interval.low:.0f}, {interval.high:.0f}]"
+    points = f"{value:+.0f} points [{_written(interval.low, 0)}, {_written(interval.high, 0)}]"
     middle = _with_interval(*_median(difference, world), quantity, endless=ENDLESS_TEXT)
     return Share(
         value,
@@ -423,10 +427,15 @@ def _with_interval(value: float, interval: Interval, quantity: str, endless: str
     def number(one: float) -> str:
         if math.isnan(one):
             return "–"
-        return f"{one:.{digits}f}" if abs(one) < NO_PATH / 10 else (endless if one > 0 else f"−{endless}")
+        return _written(one, digits) if abs(one) < NO_PATH / 10 else (endless if one > 0 else f"−{endless}")
 
     unit = unit if abs(value) < NO_PATH / 10 else ""
     return f"{number(value)}{unit} [{number(interval.low)}, {number(interval.high)}]"
+
+
+def _written(value: float, digits: int) -> str:
+    """A number without a sign where it is rounded to 0."""
+    return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
 #: The headings of the table of claims; the verdict comes first, as a terminal may cut the lines.

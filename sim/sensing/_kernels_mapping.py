@@ -17,6 +17,7 @@ from antdrive.worlds._kernels import Array, kernel
 GRAINS = 2
 HIT, MISS, MOST = 0.85, 0.4, 3.5  # steps of the log-odds and their upper limit (Hornung et al. 2013, section 4)
 SLACK = 1e-4  # added to the radius of discs; boxes are kept in single precision [m]
+EDGE = 1e-6  # beams end so far inside of the map's edge [cells]
 BESIDE = 1e-9  # a point so far from the sides of a cell lies in it, whatever the rounding [cells]
 THINNEST = 0.005  # the least radius of a disc [m]
 
@@ -32,7 +33,8 @@ class MapArrays(NamedTuple):
         slot: the row of an occupied cell in the lists (R, C)
         count: the number of occupied cells (1,)
         frame: x and y of the lower left corner, and a cell's side (3,) [m]
-        cells: row and column of an occupied cell, and the scan in which it became occupied; 0: it had not been seen before (K, 3)
+        cells: row and column of an occupied cell, the scan in which it became occupied, 0: it had not been seen before, and the
+            scan in which a beam last crossed it (K, 4)
         odds: log-odds of its grains, row by row (K, GRAINS * GRAINS); 0: nothing was hit there
         stamp: the scan that a grain was last hit in, or looked at: whether it is seen through (K, GRAINS * GRAINS)
         box: the least x and y and the largest x and y of a grain's hits (K, GRAINS * GRAINS, 4) [m]
@@ -140,7 +142,7 @@ def occupy(row: int, col: int, scan: int, m: MapArrays) -> None:
     """Put a cell without hits on the list of occupied ones."""
     at = m.count[0]
     m.count[0] = at + 1
-    m.cells[at, 0], m.cells[at, 1], m.cells[at, 2] = row, col, scan if m.free[row, col] else 0
+    m.cells[at, 0], m.cells[at, 1], m.cells[at, 2], m.cells[at, 3] = row, col, scan if m.free[row, col] else 0, 0
     m.slot[row, col], m.occupied[row, col], m.free[row, col] = at, True, False
     for k in range(GRAINS * GRAINS):
         m.odds[at, k], m.stamp[at, k] = 0.0, 0
@@ -152,14 +154,17 @@ def enter_ways(
 ) -> int:
     """Enter the free ways of every `turns`-th beam, each from its `begin` on.
 
-    A beam goes through columns of cells or, if it is steep, through rows: *lanes*. Where it leaves a lane follows from the
-    lane's number, so that no step waits for the one before (as in J. Bresenham, IBM Systems Journal 4, 1965, but for all
-    cells that the beam meets).
+    A beam goes through columns of cells or, if it is steep, through rows: *lanes*. The *place* within a lane where it goes on to
+    the next follows from the lane's number, so that no step waits for the one before (as in J. Bresenham, IBM Systems Journal
+    4, 1965, but for all cells that a beam meets). Both are counted in the beam's direction.
     """
     ranges, beams, x, y, cos, sin = fan.ranges, fan.beams, fan.eye[0], fan.eye[1], fan.eye[2], fan.eye[3]
     left, low, cell = m.frame[0], m.frame[1], m.frame[2]
     rows, cols = m.free.shape
-    free = m.free.reshape(rows * cols)
+    # Arrays of a record are taken out of it once: each time costs as much as several cells.
+    occupied, free = m.occupied.reshape(rows * cols), m.free.reshape(rows * cols)
+    cells, slot = m.cells, m.slot.reshape(rows * cols)
+    crossed, crossings = np.empty((m.count[0], 3), dtype=np.int32), 0
     for i in range(turn, beams.shape[0], turns):
         rest = min(ranges[i], trust) - begin[i]  # inf: nothing there; -inf: something too near to be measured
         if not rest > 0.0:
@@ -169,114 +174,99 @@ def enter_ways(
         row, col = int(math.floor(sy)), int(math.floor(sx))
         if not (0 <= row < rows and 0 <= col < cols):
             continue
-        # Lanes and cells within a lane are counted in the beam's direction: from the map's other end where that is negative.
-        right, up = ux >= 0.0, uy >= 0.0
-        px, py = sx if right else cols - sx, sy if up else rows - sy
-        c, r = col if right else cols - 1 - col, row if up else rows - 1 - row
-        to_c, to_r = 1 if right else -1, cols if up else -cols
-        flat = abs(ux) >= abs(uy)
-        along, beside = (px, py) if flat else (py, px)
-        lane, place, lanes, places = (c, r, cols, rows) if flat else (r, c, rows, cols)
-        to_lane, to_place = (to_c, to_r) if flat else (to_r, to_c)
-        large, small = max(abs(ux), abs(uy)), min(abs(ux), abs(uy))
-        # The beam leaves the lane that is k farther at the distance (first + k) * cell / large, and the place there at `leaves`.
-        first, slope = lane + 1 - along, small / large
-        left_behind = min(int(math.ceil(rest * large / cell - first)), lanes - 1 - lane)
-        leaves = beside + first * slope
-        at = row * cols + col
-        for k in range(left_behind):
-            if not free[at]:
-                count = enter_cell(at, i, rest, sx, sy, ux, uy, scan, fan, m, changed, count)
-            then = int(math.floor(leaves + k * slope))
-            if then > place:
-                place += 1
-                if place == places:
-                    break
-                at += to_place
-                if not free[at]:
-                    count = enter_cell(at, i, rest, sx, sy, ux, uy, scan, fan, m, changed, count)
-            at += to_lane
-        if place == places:
-            continue
-        if not free[at]:
-            count = enter_cell(at, i, rest, sx, sy, ux, uy, scan, fan, m, changed, count)
-        in_lane = int(math.floor(leaves + max(left_behind, 0) * slope)) > place
-        if in_lane and place + 1 < places and (place + 1 - beside) * cell < rest * small:
-            at += to_place
-            if not free[at]:
-                count = enter_cell(at, i, rest, sx, sy, ux, uy, scan, fan, m, changed, count)
-    return count
+        right, up, flat = ux >= 0.0, uy >= 0.0, abs(ux) >= abs(uy)
+        px, c, to_c, corner_c = (sx, col, 1, 0) if right else (cols - sx, cols - 1 - col, -1, cols - 1)
+        py, r, to_r, corner_r = (sy, row, cols, 0) if up else (rows - sy, rows - 1 - row, -cols, (rows - 1) * cols)
+        along, beside, lane, place = (px, py, c, r) if flat else (py, px, r, c)
+        to_lane, to_place, lanes, places = (to_c, to_r, cols, rows) if flat else (to_r, to_c, rows, cols)
+        large, small = max(abs(ux), abs(uy)) / cell, min(abs(ux), abs(uy)) / cell
+        # What lies beyond the map is left out.
+        end = min(rest, (lanes - EDGE - along) / large)
+        if end * small > places - EDGE - beside:
+            end = (places - EDGE - beside) / small
+        first, slope = lane + 1 - along, small / large  # the beam leaves lane + k at the distance (first + k) / large
+        leaves = beside + first * slope  # and its place there is `leaves` + k * slope
+        line = corner_c + corner_r + lane * to_lane
+        ahead = int(math.ceil(end * large - first))  # lanes that the beam leaves
+        for k in range(ahead + 1):
+            then = int(leaves + k * slope)
+            if k >= ahead:
+                then = place + 1 if place + 1 - beside < end * small else place
+            if free[np.uint64(line + place * to_place)] & free[np.uint64(line + then * to_place)]:
+                place, line = then, line + to_lane
+                continue
+            for p in range(place, then + 1):
+                at = line + p * to_place
+                if free[at]:
+                    continue
+                c, r = (lane + k, p) if flat else (p, lane + k)
+                col, row = c if right else cols - 1 - c, r if up else rows - 1 - r
+                if not occupied[at]:
+                    free[at] = True
+                    changed[count, 0], changed[count, 1] = row, col
+                    count += 1
+                elif (first + k - 1) / large < rest and cells[slot[at], 3] != scan:
+                    # Distances along the beam to the sides of the cell through which it may leave.
+                    to_x = ((col + 1 - sx) if ux > 0.0 else (sx - col)) * cell / abs(ux) if ux != 0.0 else math.inf
+                    to_y = ((row + 1 - sy) if uy > 0.0 else (sy - row)) * cell / abs(uy) if uy != 0.0 else math.inf
+                    if min(to_x, to_y) + 0.5 * cell < rest:  # else the beam ends here or close behind
+                        cells[slot[at], 3] = scan
+                        crossed[crossings, 0], crossed[crossings, 1], crossed[crossings, 2] = row, col, i
+                        crossings += 1
+            place, line = then, line + to_lane
+    return see_through(crossed[:crossings], scan, fan, m, changed, count)
 
 
 @kernel
-def enter_cell(
-    at: int, beam: int, rest: float, sx: float, sy: float, ux: float, uy: float, scan: int, fan: Fan, m: MapArrays,
-    changed: Array, count: int,
-) -> int:  # fmt: skip
-    """Enter that a beam crosses a cell that was not seen free; the rows written to `changed`.
+def see_through(crossed: Array, scan: int, fan: Fan, m: MapArrays, changed: Array, count: int) -> int:
+    """Lower the log-odds of those grains of occupied cells whose hits the scan has passed by on both sides.
 
-    `rest` is the beam's length from (sx, sy) on, in cells, and (ux, uy) its direction.
+    A grain that the scan has met is left alone. `crossed` has the row and the column of each cell, and a beam that crosses it.
     """
-    rows, cols = m.free.shape
-    row, col = at // cols, at % cols
-    if not m.occupied[row, col]:
-        m.free[row, col] = True
-        changed[count, 0], changed[count, 1] = row, col
-        return count + 1
-    # Distances along the beam to the sides of the cell through which it may leave.
-    cell = m.frame[2]
-    to_x = ((col + 1 - sx) if ux > 0.0 else (sx - col)) * cell / abs(ux) if ux != 0.0 else math.inf
-    to_y = ((row + 1 - sy) if uy > 0.0 else (sy - row)) * cell / abs(uy) if uy != 0.0 else math.inf
-    if min(to_x, to_y) + 0.5 * cell < rest:  # else the beam ends here or close behind
-        return see_through(row, col, scan, beam, fan, m, changed, count)
+    slot, odds, stamp, box = m.slot, m.odds, m.stamp, m.box
+    eye, beams, ranges, closed, behind = fan.eye, fan.beams, fan.ranges, fan.closed, m.frame[2]
+    for j in range(crossed.shape[0]):
+        at = slot[crossed[j, 0], crossed[j, 1]]
+        left, lowered = False, False
+        for k in range(GRAINS * GRAINS):
+            if odds[at, k] <= 0.0:
+                continue
+            if stamp[at, k] != scan:
+                stamp[at, k] = scan
+                dx = 0.5 * (box[at, k, 0] + box[at, k, 2]) - eye[0]
+                dy = 0.5 * (box[at, k, 1] + box[at, k, 3]) - eye[1]
+                if seen_beyond(dx, dy, behind, crossed[j, 2], eye, beams, ranges, closed):
+                    odds[at, k] -= MISS
+                    lowered = True
+            if odds[at, k] > 0.0:
+                left = True
+            else:
+                odds[at, k] = 0.0
+        if lowered and not left:
+            vacate(crossed[j, 0], crossed[j, 1], m)
+            changed[count, 0], changed[count, 1] = crossed[j, 0], crossed[j, 1]
+            count += 1
     return count
 
 
 @kernel
-def see_through(row: int, col: int, scan: int, beam: int, fan: Fan, m: MapArrays, changed: Array, count: int) -> int:
-    """Lower the log-odds of those grains of an occupied cell whose hits the scan has passed by on both sides.
-
-    A grain that the scan has met, or has been compared with, is left alone. `beam` is one that crosses the cell.
-    """
-    odds, stamp, at = m.odds, m.stamp, m.slot[row, col]
-    left = False
-    lowered = False
-    for k in range(GRAINS * GRAINS):
-        if odds[at, k] <= 0.0:
-            continue
-        if stamp[at, k] != scan:
-            stamp[at, k] = scan
-            if seen_beyond(m.box, at, k, m.frame[2], beam, fan):
-                odds[at, k] -= MISS
-                lowered = True
-        if odds[at, k] > 0.0:
-            left = True
-        else:
-            odds[at, k] = 0.0
-    if lowered and not left:
-        vacate(row, col, m)
-        changed[count, 0], changed[count, 1] = row, col
-        count += 1
-    return count
-
-
-@kernel
-def seen_beyond(box: Array, at: int, k: int, behind: float, beam: int, fan: Fan) -> bool:
-    """Whether both beams beside the middle of a grain's hits end at least `behind` farther away.
+def seen_beyond(
+    dx: float, dy: float, behind: float, beam: int, eye: Array, beams: Array, ranges: Array, closed: bool
+) -> bool:
+    """Whether both beams beside the middle of a grain's hits, at (dx, dy) from the lidar, end at least `behind` farther away.
 
     A beam that passes beside an obstacle says nothing about it: its neighbour on the other side has met the obstacle.
     `beam` is one that passes close by, from which the two are looked for.
     """
-    dx, dy = 0.5 * (box[at, k, 0] + box[at, k, 2]) - fan.eye[0], 0.5 * (box[at, k, 1] + box[at, k, 3]) - fan.eye[1]
-    ahead, left = fan.eye[2] * dx + fan.eye[3] * dy, fan.eye[2] * dy - fan.eye[3] * dx
-    ranges, beams, count = fan.ranges, fan.beams, fan.ranges.shape[0]
+    ahead, left = eye[2] * dx + eye[3] * dy, eye[2] * dy - eye[3] * dx
+    count = ranges.shape[0]
     far2 = (math.sqrt(dx * dx + dy * dy) + behind) ** 2
     side = beams[beam, 0] * left - beams[beam, 1] * ahead
     step = 1 if side >= 0.0 else -1
     last = beam
     while True:  # beams on the way to the middle; all beams lie within half a turn of it
         other = last + step
-        if fan.closed:
+        if closed:
             other %= count
         elif not 0 <= other < count:
             return False
@@ -298,7 +288,7 @@ def vacate(row: int, col: int, m: MapArrays) -> None:
     if gap == last:
         return
     m.slot[m.cells[last, 0], m.cells[last, 1]] = gap
-    for k in range(3):
+    for k in range(4):
         m.cells[gap, k] = m.cells[last, k]
     for k in range(GRAINS * GRAINS):
         m.odds[gap, k], m.stamp[gap, k] = m.odds[last, k], m.stamp[last, k]

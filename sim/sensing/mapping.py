@@ -241,7 +241,7 @@ class OccupancyMap:
                 slot=slot,
                 count=np.zeros(1, dtype=np.int64),
                 frame=frame,
-                cells=np.zeros((LISTED, 3), dtype=np.int32),
+                cells=np.zeros((LISTED, 4), dtype=np.int32),
                 odds=np.zeros((LISTED, grains), dtype=np.float32),
                 stamp=np.zeros((LISTED, grains), dtype=np.int32),
                 box=np.zeros((LISTED, grains, 4), dtype=np.float32),

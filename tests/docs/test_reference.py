@@ -57,3 +57,15 @@ def test_the_tutorials_pages_are_listed() -> None:
     _, _, listed = text.partition("```{toctree}\n")
     pages = [line for line in listed.partition("```")[0].splitlines() if line and not line.startswith(":")]
     assert sorted(pages) == sorted(path.stem for path in (DOCS / "tutorials").glob("*.md") if path.stem != "index")
+
+
+def test_every_page_outside_docs_that_the_site_links_to_is_a_page_of_the_site(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(DOCS / "_ext"))
+    pages: dict[str, str] = importlib.import_module("antdrive_links").PAGES
+    shown = [path for path in DOCS.rglob("*.md") if not {"_build", "_gallery"} & set(path.parts)]
+    for path in [*shown, *(ROOT / page for page in pages if page != "README.md")]:
+        for target in re.findall(r"\]\(([^)#\s:]+\.md)[^)]*\)", path.read_text()):
+            file = (path.parent / target).resolve()
+            assert file.is_relative_to(DOCS) or file.relative_to(ROOT).as_posix() in pages, (path, target)
+    for page in pages.values():
+        assert (DOCS / f"{page}.md").exists(), page

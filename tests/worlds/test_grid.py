@@ -39,6 +39,35 @@ def test_moves_are_as_defined(world, cell, inflate):
     assert (bits(grid)[sure] == expected[sure].astype(bool)).all()
 
 
+@pytest.mark.parametrize(("cell", "radius", "on_lattice"), [(0.05, 0.4, False), (0.25, 0.75, True), (0.25, 0.5, True)])
+def test_moves_are_as_defined_where_discs_are_much_larger_than_cells(cell, radius, on_lattice):
+    """150 columns; on the lattice of centres many lie exactly on a rim, and all numbers here have no rounding errors."""
+    rng, step = np.random.default_rng(5), cell / 2
+    wide, high = 150 * cell, 24 * cell
+    centres = np.column_stack((rng.uniform(0, wide, 40), rng.uniform(-high, 2 * high, 40)))
+    centres = np.round(centres / step) * step if on_lattice else centres
+    world = World("wide", (0.0, -8.0, wide, high), tuple(Disc(x, y, radius - 0.25 * cell) for x, y in centres.tolist()))
+    grid = rasterise(world, cell, 0.25 * cell)
+    rows, cols = grid.shape
+    at = grid.xy(np.argwhere(np.ones(grid.shape))).reshape(rows, cols, 2)
+    inside = np.all((at - world.bounds[:2] > grid.inflate) & (world.bounds[2:] - at > grid.inflate), axis=-1)
+    off = at[..., None, :] - centres
+    free = inside & np.all((off**2).sum(axis=-1) > radius**2, axis=-1)
+    assert (grid.free == free).all()
+    for bit, (dr, dc) in enumerate(DIRECTIONS[:4]):
+        step_to = np.array([dc, dr]) * cell
+        along = np.clip(-(off @ step_to) / (step_to @ step_to), 0.0, 1.0)
+        away = ((off + along[..., None] * step_to) ** 2).sum(axis=-1).min(axis=-1)
+        there = np.zeros_like(free)
+        there[: rows - dr, max(0, -dc) : cols - max(0, dc)] = free[dr:, max(0, dc) : cols + min(0, dc)]
+        moves = free & there & (away > radius**2)
+        if dr and dc:  # both neighbours are free
+            moves[:-1] &= free[1:]
+            moves[:, max(0, -dc) : cols - max(0, dc)] &= free[:, max(0, dc) : cols + min(0, dc)]
+        sure = np.abs(away - radius**2) > (0 if on_lattice and not (dr and dc) else 1e-9)
+        assert (bits(grid)[..., bit] == moves)[sure].all()
+
+
 @settings(max_examples=40)
 @given(worlds(), st.floats(0.4, 1.5), st.floats(0.0, 0.6))
 def test_a_cell_is_free_when_the_robot_fits_at_its_centre(world, cell, inflate):

@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from antdrive.worlds.errors import FieldError, InputError, input_error
 from antdrive.worlds.limits import MAX_CELLS
+from antdrive.worlds.plane import in_map
 from antdrive.worlds.types import Bounds, Floats, Point, Pose
 from antdrive.worlds.world import Disc, Task, World
 
@@ -58,11 +59,13 @@ class CellMap:
         free: which cells are free (R, C), rows along +y, read-only
         resolution: side of a cell [m]
         origin: lower left corner of cell (0, 0): x, y [m]
+        frame: where the frame of the cells lies in the map that people know, for messages: x, y [m] and yaw [rad]
     """
 
     free: Cells
     resolution: float
     origin: Point = (0.0, 0.0)
+    frame: Pose = (0.0, 0.0, 0.0)
 
     @property
     def bounds(self) -> Bounds:
@@ -225,11 +228,7 @@ def map_task(
     """
     if start is None or goal is None:
         missing = " and ".join(key for key, end in (("start", start), ("goal", goal)) if end is None)
-        xmin, ymin, xmax, ymax = cells.bounds
-        raise input_error(
-            missing,
-            f"maps have none; give it on free ground, within x {xmin:g} to {xmax:g} and y {ymin:g} to {ymax:g} m",
-        )
+        raise input_error(missing, f"maps have none; give it on free ground, within {_span(cells)}")
     used, joined = _reachable(cells, start, goal)
     found = cover(used, overhang)
     if len(found.discs) > MAX_DISCS:
@@ -289,14 +288,22 @@ def _reachable(cells: CellMap, start: Pose, goal: Point) -> tuple[CellMap, bool]
 
 def _free_cell(cells: CellMap, key: str, x: float, y: float) -> tuple[int, int]:
     spot = cells.cell_at(x, y)
+    there_x, there_y = in_map(cells.frame, [(x, y)])[0].tolist()
     if spot is None:
-        xmin, ymin, xmax, ymax = cells.bounds
-        raise input_error(
-            key, f"({x:g}, {y:g}) is not on the map, which spans x {xmin:g} to {xmax:g} and y {ymin:g} to {ymax:g} m"
-        )
+        raise input_error(key, f"({there_x:g}, {there_y:g}) is not on the map, which spans {_span(cells)}")
     if not cells.free[spot]:
-        raise input_error(key, f"({x:g}, {y:g}) is on a blocked cell, in row {spot[0]} from below and column {spot[1]}")
+        raise input_error(
+            key, f"({there_x:g}, {there_y:g}) is on a blocked cell, in row {spot[0]} from below and column {spot[1]}"
+        )
     return spot
+
+
+def _span(cells: CellMap) -> str:
+    """The box around the cells in the map that people know."""
+    x0, y0, x1, y1 = cells.bounds
+    corners = in_map(cells.frame, [(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
+    (xmin, ymin), (xmax, ymax) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+    return f"x {xmin:g} to {xmax:g} and y {ymin:g} to {ymax:g} m"
 
 
 def _cropped(cells: CellMap) -> CellMap:

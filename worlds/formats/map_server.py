@@ -206,7 +206,7 @@ def read_map(path: str | os.PathLike[str], *, unknown_is_free: bool = False) -> 
     cells.setflags(write=False)
     x, y, yaw = entry.origin
     frame, corner = ((x, y, yaw), (0.0, 0.0)) if yaw else ((0.0, 0.0, 0.0), (x, y))
-    found = CellMap(cells, entry.resolution, corner)
+    found = CellMap(cells, entry.resolution, corner, frame)
     return ServedMap(found, int((~free & ~occupied).sum()), entry.antdrive, frame)
 
 

@@ -120,7 +120,9 @@ def test_ctrl_c_while_planning_ends_a_command_that_plans_many_times(
 
     with watch(stop):
         code, out, err = antdrive(*(str(small) if word == "WORLD" else word for word in words))
-    assert (code, out, err) == (130, "", "antdrive: interrupted\n")
+    *notes, last = err.splitlines()
+    assert (code, out, last) == (130, "", "antdrive: interrupted")
+    assert len(notes) == (words[0] == "reproduce"), "one seed is too few for its claims, it says"
     assert not list((tmp_path / "out").rglob("*.*"))
 
 

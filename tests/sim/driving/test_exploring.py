@@ -133,6 +133,12 @@ def test_a_forged_scan_is_refused(log: Rollout) -> None:
     (problem,) = replay(dataclasses.replace(log, scans=scans)).problems
     assert problem.startswith("replay: scans are not what")
     assert f"t = {log.t[log.scan_rows[50]]:.3f} s" in problem
+    scans, last = log.scans.copy(), int(log.scan_rows[-1])
+    assert last == len(log.t) - 1, "the robot took a scan when it saw that it had arrived"
+    scans[-1, 300] += 10
+    (ending,) = replay(dataclasses.replace(log, scans=scans)).problems
+    assert f"t = {log.t[last]:.3f} s" in ending
+    assert replay(dataclasses.replace(log, scans=log.scans[:-1], scan_rows=log.scan_rows[:-1])).problems == (ending,)
     fewer = dataclasses.replace(log, scans=np.delete(log.scans, 50, axis=0), scan_rows=np.delete(log.scan_rows, 50))
     assert replay(fewer).problems == (problem,)
     none = dataclasses.replace(log, scans=log.scans[:0], scan_rows=log.scan_rows[:0])

@@ -15,6 +15,7 @@ from antdrive.sim.falsify.rebuild import rebuilt
 from antdrive.sim.log.certificate import certify
 from antdrive.sim.log.record import PerceptionRecord
 from antdrive.sim.sensing import KnownGround, Scanner
+from antdrive.sim.unknown import exploration_of
 from antdrive.worlds import Disc, Keyframed, Task, World
 from antdrive.worlds.errors import FieldError
 
@@ -105,6 +106,12 @@ def test_a_robot_without_a_map_follows_movers_too(jackal: RobotSpec) -> None:
     off = np.hypot(*(tracks[:, 2:4] - there).T)
     assert np.median(off) < 0.1
     assert rebuilt(done.rollout.record).perception == LIDAR
+
+
+def test_the_map_reaches_farther_among_movers(jackal: RobotSpec) -> None:
+    told = scenario(jackal, map="none", localisation="matching", perception=Perception(), unseen=())
+    watching = dataclasses.replace(told, perception=LIDAR)
+    assert [exploration_of(s).survey.map.horizon for s in (told, watching)] == [10.0, 16.0]
 
 
 def test_an_empty_world_is_watched_as_well(turtlebot: RobotSpec) -> None:

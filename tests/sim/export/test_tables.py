@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -95,6 +96,16 @@ def test_a_bag_and_its_layout_are_replaced_only_when_asked(log: tuple[Rollout, P
     layout.unlink()
     with pytest.raises(InputError, match=r"drive\.mcap: exists"):
         export(log[1], "mcap", bag)
+
+
+def test_a_drive_with_a_map_is_exported_without_compiled_code(log: tuple[Rollout, Path], tmp_path: Path) -> None:
+    pytest.importorskip("rosbags.rosbag2", reason="rosbags is not installed")
+    words = (
+        f"import sys; from antdrive.sim.export.exporting import export; export({str(log[1])!r}, 'mcap', 'drive.mcap')"
+    )
+    code = f"{words}; print(sorted({{'numba', 'scipy', 'matplotlib', 'pybullet'}} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.stdout, done.stderr) == ("[]\n", "")
 
 
 def test_without_the_packages_it_says_what_to_install(

@@ -72,6 +72,33 @@ def test_free_ground_was_crossed_by_a_beam_and_no_beam_ended_there(
     assert not np.any(grid.seen_free & grid.occupied)
 
 
+def crossed(start: npt.NDArray[np.float64], angle: float, length: float, grow: float, shape: tuple[int, int]) -> Floats:
+    """How long a beam is within each cell of 5 cm [m]: where it enters and leaves each square, grown on all sides."""
+    enters, leaves = np.zeros(shape), np.full(shape, length)
+    for axis, direction in ((1, math.cos(angle)), (0, math.sin(angle))):
+        low = (np.arange(shape[axis]) * 0.05 - grow - start[1 - axis]).reshape((-1, 1) if axis == 0 else (1, -1))
+        high = low + 0.05 + 2 * grow
+        if abs(direction) < 1e-12:
+            leaves = np.where((low <= 0) & (high >= 0), leaves, -1.0)
+            continue
+        sides = low / direction, high / direction
+        enters, leaves = np.maximum(enters, np.minimum(*sides)), np.minimum(leaves, np.maximum(*sides))
+    return leaves - enters
+
+
+@hypothesis.settings(max_examples=30)
+@hypothesis.given(st.floats(0.01, 2.99), st.floats(0.01, 1.99), st.floats(-4, 4), st.floats(0.3, 6.0))
+def test_a_beam_frees_the_cells_that_it_crosses_and_no_others(x: float, y: float, yaw: float, length: float) -> None:
+    """Also where it leaves the map. Cells of which it cuts a nanometre may be either."""
+    one = Lidar(beams=3, field_of_view=3.0, min_range=0.01, max_range=8.0, rate=10.0, resolution=0.0, sigma=0.0)
+    grid = OccupancyMap(one, 0.05, horizon=0.02, bounds=(0.0, 0.0, 3.0, 2.0))
+    grid.trust = 8.0
+    grid.insert((x, y, yaw), np.array([length, -math.inf, -math.inf]))
+    less, more = (crossed(np.array([x, y]), yaw - 1.5, length, grow, grid.seen_free.shape) for grow in (-1e-9, 1e-9))
+    assert grid.seen_free[less > 0].all()
+    assert not grid.seen_free[more < 0].any()
+
+
 def test_a_beam_that_is_left_out_near_the_lidar_leaves_no_ground_unseen() -> None:
     grid = OccupancyMap(EYE, 0.05)
     grid.insert((0, 0, 0), np.full(EYE.beams, np.inf))

@@ -1,5 +1,6 @@
 """Movers seen through a lidar alone are found, measured and followed; what stands still is not."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -14,6 +15,7 @@ from antdrive.sim.sensing import (
     Scanner,
     TrackedMovers,
     TrackingPolicy,
+    _kernels_tracking,
 )
 from antdrive.worlds import Disc, Floats, World
 
@@ -184,3 +186,27 @@ def test_a_pillar_that_is_passed_does_not_move(jackal: RobotSpec) -> None:
         ranges = scanner.scan(pose, rng=rng)
         grid.insert(pose, ranges, tracker.update(MappedGround(grid, 100), pose, ranges, k / 50))
         assert not len(tracker.movers().radii), k
+
+
+def test_there_is_room_for_however_many_tracks_a_scan_begins(jackal: RobotSpec) -> None:
+    """A fence of 80 thin posts around the robot, on a map that is empty: each is an unknown thing of its own."""
+    assert jackal.lidar is not None
+    angle = np.linspace(-2.2, 2.2, 80)
+    fence = np.column_stack((4.0 * np.cos(angle), 4.0 * np.sin(angle), np.full(80, 0.05)))
+    lidar = dataclasses.replace(jackal.lidar, beams=4000, x=0.0)
+    empty = KnownGround(lidar, World("empty", (-9.0, -9.0, 9.0, 9.0)))
+    tracker, scanner = MoverTracker(lidar, TrackingPolicy(gap=0.1)), Scanner(lidar, fence)
+    for k in range(12):
+        tracker.update(empty, (0.0, 0.0, 0.0), scanner.scan((0.0, 0.0, 0.0)), k / 50)
+    assert tracker.found == 80
+    found = tracker.movers()
+    assert len(found.radii) == 80
+    assert np.hypot(*(found.positions - fence[:, :2]).T).max() < 0.03
+    assert found.numbers.tolist() == list(range(80))
+
+
+def test_a_distance_is_rounded_as_python_rounds_it() -> None:
+    """Python's `math.hypot` is exact to half a unit in the last place, which the C library's is not."""
+    pairs = np.random.default_rng(0).uniform(-10, 10, (3000, 2)).tolist()
+    assert [_kernels_tracking.distance_between(x, y) for x, y in pairs] == [math.hypot(x, y) for x, y in pairs]
+    assert _kernels_tracking.distance_between(0.0, 0.0) == 0.0

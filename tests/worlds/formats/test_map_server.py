@@ -200,6 +200,11 @@ def test_a_turned_map_becomes_an_upright_world_that_knows_how_it_lies(tmp_path: 
     turned = import_map_server(
         tmp_path / "turned.yaml", start=(start.real, start.imag, 0.5), goal=(goal.real, goal.imag)
     )
+    with pytest.raises(
+        InputError,
+        match=r"goal: \(20, 30\) is not on the map, which spans x 0\.442327 to 5\.68424 and y -3 to 2\.24192",
+    ):
+        import_map_server(tmp_path / "turned.yaml", start=(start.real, start.imag, 0.5), goal=(20.0, 30.0))
     assert turned.world.bounds == upright.world.bounds
     assert turned.start == pytest.approx(upright.start)
     assert turned.goal == pytest.approx(upright.goal)
