@@ -1,6 +1,6 @@
 """Compile every kernel once, into the cache that `antdrive.worlds.kernel_cache` describes.
 
-Compiling takes about half a minute on two cores. The command line does it before the first command that plans, drives or
+Compiling takes about half a minute on two idle cores. The command line does it before the first command that plans, drives or
 films (`is_warm` tells it whether that is due), and `antdrive warm` does it on request.
 """
 

@@ -19,6 +19,6 @@ def compile_once() -> None:
     if is_warm() or cache_folder() is None:
         return
     if not sys.stderr.isatty():
-        print_error("compiling the planners, once for this installation; this takes about half a minute")
+        print_error("compiling the planners, once for this installation; this takes a minute or two")
     with bar("compiling the planners, once") as progress:
         warm(progress=progress)

@@ -25,7 +25,7 @@ def compile_in_turn(say: Callable[[str], None]) -> None:
         return
     with _turn(folder):
         if not is_warm():
-            say("compiling the planners, once for this installation; this takes about half a minute")
+            say("compiling the planners, once for this installation; this takes a minute or two")
             warm()
 
 

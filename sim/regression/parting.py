@@ -37,14 +37,14 @@ class Parting:
     def sentence(self) -> str:
         """The parting in words."""
         (x, y), (x0, y0) = self.now, self.then
-        rule = f"{_rule(self.limiter)} limits the speed then"
+        rule = f"{_rule(self.limiter)} keeps the robot below its top speed then"
         if self.limiter != self.limiter_then:
             rule += f", in the baseline {_rule(self.limiter_then)} did"
         return f"the drives part at t = {self.t:.1f} s, at ({x:.2f}, {y:.2f}) instead of ({x0:.2f}, {y0:.2f}); {rule}"
 
 
 def _rule(name: str) -> str:
-    """A rule's name as the subject of a sentence; at cruise no rule limits the speed."""
+    """A rule's name as the subject of a sentence; at cruise there is none."""
     return "no rule" if name == "cruise" else f"the rule {name!r}"
 
 

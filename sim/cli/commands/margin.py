@@ -24,6 +24,10 @@ def margin(
     Planning keeps the margin free around the robot. Reports how much of it the drive used up, where, and why:
     rounding, cutting corners, tracking, slip or localisation. For a margin that --margin auto chose, it also compares the
     loss that was predicted with that of this drive.
+
+    "Used at most" is the most that a cause took of the margin anywhere in the drive, and where. "At the tightest place" is
+    each cause's share of the margin less the least room left, which is their sum: positive where it brought the robot
+    closer to the obstacle, negative where it took the robot away from it.
     """
     from antdrive.sim.log.margin import budget
     from antdrive.sim.log.rollout import Rollout
@@ -36,7 +40,7 @@ def margin(
     place = f"({spent.x:.2f}, {spent.y:.2f}), t = {spent.t:.2f} s"
     print_line(f"{rollout}: margin {spent.margin:.3f} m, least room left around the disc {spent.left:.4f} m at {place}")
     print_table(
-        ("cause", "used at most m", "at", "used at the tightest place m"),
+        ("cause", "used at most m", "at", "at the tightest place m"),
         (
             (
                 share.cause,
@@ -49,6 +53,8 @@ def margin(
     )
     if spent.largest.metres:
         print_line(f"the largest loss is due to {spent.largest.cause}")
+    else:
+        print_line("nothing was used: the robot never came closer to an obstacle than the margin")
     if prediction is not None:
         loss = prediction["footprint_loss_m"]
         drive = "this drive had movers or unseen obstacles" if loss is None else f"the footprint lost {loss:.4f} m"

@@ -58,14 +58,16 @@ def show_world(
         print_json({**task_to_dict(shown), **facts})
         return SUCCEEDED
     for key, value in task_facts(shown).items():
-        print_line(f"{key + UNITS.get(key, ''):18} {value}")
+        print_line(f"{key + UNITS.get(key, ''):18} {'-' if value is None else value}")
     if any(shown.frame):
         for key, pose in {"start": shown.start, "goal": shown.goal}.items():
             there = in_map(shown.frame, [pose])[0].round(4).tolist()
             print_line(f"{key + ' in its map':18} {there}")
     print_line(f"{'passable':18} {'yes' if passable else 'no'}, for {spec.name} with a margin of {margin:g} m")
+    print_line(f"{'start is free for':18} {', '.join(name for name, overlap in starts.items() if not overlap) or '-'}")
     for name, overlap in starts.items():
-        print_line(f"{'start for ' + name:18} {overlap or 'free'}")
+        if overlap:
+            print_line(f"start for {name} {overlap}")
     if named:
         print_line(f"{'tasks':18} {', '.join(named)}")
     print_files({} if out is None else {"figure": str(out)})

@@ -25,6 +25,15 @@ def test_the_margin_of_a_noisy_drive_is_broken_down_by_cause(antdrive: Call, sma
     code, out, _ = antdrive("margin", facts["files"]["rollout"])
     assert code == 0
     assert "localisation" in out
+    assert "the largest loss is due to" in out
+    assert "nothing was used" not in out
+
+
+def test_a_drive_that_kept_the_margin_is_said_to_have_used_nothing(antdrive: Call) -> None:
+    assert antdrive("run", "empty", "--out", "r")[0] == 0
+    _, out, _ = antdrive("margin", "r")
+    assert "nothing was used: the robot never came closer to an obstacle than the margin" in out
+    assert "the largest loss is due to" not in out
 
 
 def test_a_missing_log_is_one_line_and_exit_code_2(refused: Refused) -> None:

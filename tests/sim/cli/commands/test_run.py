@@ -177,9 +177,12 @@ def test_a_start_that_overlaps_an_obstacle_is_refused_by_name(refused: Refused, 
     assert "overlaps unseen[0]" in refused("run", "empty", "--unseen", "1,1,0.5", "--unseen", "3,3,0.5")
     _, out, _ = antdrive("worlds", "show", "tight.yaml")
     assert "passable           no" in out
-    for robot in list_robots():
-        assert f"start for {robot}" in out
     assert "start for turtlebot overlaps obstacles[0] at" in out
+    (line,) = [line for line in out.splitlines() if line.startswith("start is free for  ")]
+    free = line.removeprefix("start is free for  ").split(", ")
+    for robot in list_robots():
+        assert (f"start for {robot} overlaps" in out) != (robot in free)
+    assert f"start is free for  {', '.join(list_robots())}" in antdrive("worlds", "show", "gate")[1]
     starts = json.loads(antdrive("worlds", "show", "gate", "--json")[1])["starts"]
     assert starts == dict.fromkeys(list_robots(), "")
 
