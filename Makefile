@@ -32,6 +32,7 @@ $(VENV)/.dev: $(VENV)/.core
 	@touch $@
 
 $(VENV)/.docs: $(VENV)/.core
+	@$(BIN)/python -c 'import sys; sys.exit("The site needs Python 3.11, as Sphinx does. With python3.11 on the path: make clean docs" if sys.version_info < (3, 11) else 0)'
 	@echo "Installing what the site needs"
 	@$(PIP) install --editable '.[docs]'
 	@touch $@
@@ -50,13 +51,14 @@ test: $(VENV)/.dev $(VENV)/.warm
 test-slow: $(VENV)/.dev $(VENV)/.warm
 	@$(BIN)/python -m pytest --numprocesses 2 --dist loadgroup -m ''
 
-# What pages show runs again when they or the packages change. Both halves use as many processes as there are cores.
+# What pages show runs again when they or the packages change. Both halves use a process for each core, four at most.
 DEPTHS := * */* */*/* */*/*/*
 SOURCES := $(foreach folder,worlds planners robots sim,$(wildcard $(foreach depth,$(DEPTHS),$(folder)/$(depth).py $(folder)/$(depth).yaml)))
-CORES := $(shell nproc)
+# `make docs JOBS=1` uses fewer.
+JOBS ?= $(shell cores=$$(nproc 2>/dev/null || echo 2); [ "$$cores" -le 4 ] && echo "$$cores" || echo 4)
 
 docs/_build/.pages: $(VENV)/.docs $(VENV)/.warm $(SOURCES) tools/pages.py $(wildcard docs/*.md docs/*/*.md docs/*/*/*.md examples/*/*.md)
-	@$(BIN)/python -m tools.pages --all --jobs $(CORES) --kept docs/_build/pages.json
+	@$(BIN)/python -m tools.pages --all --jobs $(JOBS) --kept docs/_build/pages.json
 	@mkdir -p docs/_build && touch $@
 
 docs/_build/.gallery: $(VENV)/.docs $(VENV)/.warm $(SOURCES)
@@ -64,7 +66,7 @@ docs/_build/.gallery: $(VENV)/.docs $(VENV)/.warm $(SOURCES)
 	@mkdir -p docs/_build && touch $@
 
 docs: docs/_build/.pages docs/_build/.gallery
-	@$(BIN)/python -m sphinx --builder html --fail-on-warning --keep-going --nitpicky --quiet --jobs $(CORES) -d docs/_build/doctrees docs docs/_build/html
+	@$(BIN)/python -m sphinx --builder html --fail-on-warning --keep-going --nitpicky --quiet --jobs $(JOBS) -d docs/_build/doctrees docs docs/_build/html
 	@$(BIN)/python -m tools.site docs/_build/html
 
 # `build` makes the sdist, and the wheel from the sdist.

@@ -1,7 +1,7 @@
 """What physics makes of commands and of contacts: `python -m benchmarks.physics`.
 
-Steady turns, straight stops and passes beside a cylinder, at several rates and with both robots of the README. A pass is
-straight, so that the closed form tells whether the robot should touch the cylinder, and by how much.
+Steady turns, straight stops and passes beside a cylinder, at several rates and with both robots of the README. The
+poses of the same drive without the cylinder tell, in the closed form, whether the robot should touch it, and by how much.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 from antdrive import Disc, RobotSpec, World, load_robot
 from antdrive.robots.footprint import footprint_clearance
 from antdrive.sim import Engine
+from antdrive.worlds.types import Pose
 
 ROBOTS = ("turtlebot", "jackal")
 RATES = (60, 120, 240, 1000)  # physics steps per second
@@ -85,27 +86,58 @@ def stop(robot: RobotSpec, hz: int, *, at_once: bool) -> tuple[float, float]:
         return engine.state().x - begin, first**2 / (2 * robot.max_acceleration)
 
 
+def drive_on(robot: RobotSpec, hz: int, speed: float) -> list[Pose]:
+    """The poses of a straight drive with nothing in its way."""
+    poses = []
+    with Engine(OPEN, robot, physics_hz=hz) as engine:
+        engine.place((0.0, 0.0, 0.0))
+        speed_up(engine, robot, speed, 0.0)
+        for _ in range(math.ceil(5.0 / speed * hz)):
+            engine.step()
+            poses.append(engine.state().pose)
+    return poses
+
+
 class Pass(NamedTuple):
-    """A straight pass beside a cylinder: whether physics felt a contact, and the deepest overlap in the closed form [mm]."""
+    """A straight pass beside a cylinder: whether physics felt a contact, and how deep the robot is in it if nothing stops it.
+
+    Attributes:
+        felt: whether physics reported a contact
+        overlap: the deepest overlap in the closed form, of the poses without the cylinder [mm]; below 0: what stays between them
+    """
 
     felt: bool
     overlap: float
 
+    @property
+    def missed(self) -> bool:
+        """Whether the closed form has an overlap that physics did not feel."""
+        return self.overlap > 0 and not self.felt
 
-def drive_past(robot: RobotSpec, hz: int, speed: float, clearance: float) -> Pass:
-    """Drive past a cylinder that the undisturbed robot would pass at `clearance` [m]."""
+    @property
+    def false(self) -> bool:
+        """Whether physics felt a contact where the closed form has none."""
+        return self.overlap <= 0 and self.felt
+
+
+def drive_past(robot: RobotSpec, hz: int, speed: float, clearance: float, undisturbed: list[Pose]) -> Pass:
+    """Drive past a cylinder that a robot on the x axis would pass at `clearance` [m].
+
+    Args:
+        robot: the robot
+        hz: physics steps per second
+        speed: of the pass [m/s]
+        clearance: between the cylinder and a robot that is exactly on the x axis [m]
+        undisturbed: poses of the same drive without the cylinder
+    """
     half = robot.footprint.bounds[3]
     world = World("pass", (-5, -5, 10, 5), (Disc(3.0, half + clearance + 0.3, 0.3),))
-    felt, overlap = False, 0.0
+    overlap = -1e3 * float(footprint_clearance(world, robot.footprint, undisturbed).min())
     with Engine(world, robot, physics_hz=hz) as engine:
         engine.place((0.0, 0.0, 0.0))
         speed_up(engine, robot, speed, 0.0)
-        for _ in range(math.ceil(5.0 / speed * hz)):
-            felt |= bool(engine.step())
-            overlap = max(overlap, -float(footprint_clearance(world, robot.footprint, [engine.state().pose])[0]))
-            if felt:
-                break
-    return Pass(felt, 1e3 * overlap)
+        felt = any(engine.step() for _ in undisturbed)
+    return Pass(felt, overlap)
 
 
 def head_on(robot: RobotSpec, hz: int, speed: float) -> float:
@@ -119,7 +151,8 @@ def head_on(robot: RobotSpec, hz: int, speed: float) -> float:
         return -1e3 * float(footprint_clearance(world, robot.footprint, [engine.state().pose])[0])
 
 
-def main() -> None:
+def print_turns() -> None:
+    """Print how well commands are followed."""
     print("| robot | physics [Hz] | speed | yaw rate | sideways [mm/s] | stop as in the file / v²/2a | zero at once |")
     print("|---|---|---|---|---|---|---|")
     for name, hz in itertools.product(ROBOTS, RATES):
@@ -133,21 +166,33 @@ def main() -> None:
             f"| `{name}` | {hz} | {turn.speed:.2f} mm/s, {turn.speed_share:.3%} | {turn.yaw_rate:.2f} mrad/s, "
             f"{turn.yaw_share:.3%} | {turn.sideways:.2f} | {way:.3f} / {ideal:.3f} m | {hard:.3f} m |"
         )
+
+
+def print_passes() -> None:
+    """Print what physics feels of passes, beside what the closed form says of them."""
     print(
-        "\n| robot | physics [Hz] | passes | overlap, not felt | felt without overlap | deepest overlap when felt [mm] |"
+        "| robot | physics [Hz] | passes | overlap, not felt | felt without overlap | deepest overlap when felt [mm] |"
     )
     print("|---|---|---|---|---|---|")
     for name, hz in itertools.product(ROBOTS, RATES):
         robot = load_robot(name)
         missed = false = count = 0
-        deepest = 0.0
-        for share, depth in itertools.product((0.25, 0.5, 1.0), DEPTHS):
-            found = drive_past(robot, hz, share * robot.max_speed, depth / 1e3)
-            count += 1
-            missed += depth < 0 and not found.felt
-            false += depth > 0 and found.felt
+        for share in (0.25, 0.5, 1.0):
+            speed = share * robot.max_speed
+            undisturbed = drive_on(robot, hz, speed)
+            for depth in DEPTHS:
+                found = drive_past(robot, hz, speed, depth / 1e3, undisturbed)
+                count += 1
+                missed += found.missed
+                false += found.false
         deepest = max(head_on(robot, hz, share * robot.max_speed) for share in (0.25, 0.5, 1.0))
         print(f"| `{name}` | {hz} | {count} | {missed} | {false} | {deepest:.1f} |")
+
+
+def main() -> None:
+    print_turns()
+    print()
+    print_passes()
 
 
 if __name__ == "__main__":

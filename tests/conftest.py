@@ -11,7 +11,9 @@ from antdrive.robots import RobotSpec, load_robot
 from antdrive.sim import Run, Scenario, run
 from antdrive.worlds import Disc, Task, World
 
-hypothesis.settings.register_profile("repeatable", derandomize=True, deadline=None)
+hypothesis.settings.register_profile(
+    "repeatable", derandomize=True, deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow]
+)
 hypothesis.settings.load_profile("repeatable")
 
 SHARED = Path(__file__).parent.parent.parent / "shared" / "data"

@@ -74,3 +74,18 @@ def test_where_nothing_can_be_fetched_it_says_how_to_get_a_python(tmp_path: Path
     done = find(tmp_path, pip=pip, install=install)
     assert (done.returncode, done.stdout) == (1, "")
     assert "apt-get install python3.11" in done.stderr
+
+
+@pytest.mark.parametrize(("fits", "made"), [(True, ["test", "docs"]), (False, ["test"])], ids=["3.11", "3.10"])
+def test_integration_builds_the_site_where_python_is_new_enough(tmp_path: Path, fits: bool, made: list[str]) -> None:
+    """A stand-in for the Python of .venv ends as 3.11 or 3.10 would on the question of the version."""
+    (tmp_path / "bin").mkdir()
+    command(tmp_path / "bin" / "make", '#!/bin/sh\necho "make $*"\n')
+    (tmp_path / ".venv" / "bin").mkdir(parents=True)
+    command(tmp_path / ".venv" / "bin" / "python", f"#!/bin/sh\nexit {int(fits)}\n")
+    (tmp_path / ".ci").mkdir()
+    shutil.copy(SCRIPT.parent.parent / ".ci" / "run", tmp_path / ".ci" / "run")
+    environment = {"PATH": f"{tmp_path / 'bin'}:{os.environ['PATH']}"}
+    done = subprocess.run([tmp_path / ".ci" / "run"], env=environment, capture_output=True, text=True, check=True)
+    assert [line.removeprefix("make ") for line in done.stdout.splitlines() if line.startswith("make ")] == made
+    assert ("needs Python 3.11" in done.stdout) is not fits

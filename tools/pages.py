@@ -10,7 +10,8 @@ Blocks of a page run from top to bottom in one empty folder, Python's in one nam
 - `yaml`, `toml` and others: written to FILE after a comment `<!-- file: FILE -->`, or added to its end after
   `<!-- added to: FILE -->`; a `python` block after such a comment is, too, and is not run by itself.
 
-`...` in an output stands for anything. More comments say what a page needs:
+`...` in an output stands for anything. A page that runs for 20 minutes is ended and named. More comments
+say what a page needs:
 
 - `<!-- before: COMMAND -->` runs a command that the page does not show, for what its readers have already. `{root}` is
   the folder of the repository.
@@ -33,9 +34,11 @@ import json
 import os
 import re
 import shlex
+import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import warnings
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -54,6 +57,7 @@ TESTED = {
 }
 COMPILING = "antdrive: compiling the planners"  # what only the first command of an installation says
 WIDTH = "100"  # of the terminal that commands believe in
+LIMIT = 1200.0  # how long a page may run [s]: it ends what hangs, while the slowest page takes one minute
 
 
 @dataclasses.dataclass
@@ -199,17 +203,20 @@ class Page:
         path: the page
         problems: what did not run or printed something else, each with its line
         printed: what was printed, by the number of the line at which the page shows it
+        line: the first line of the block or the command that runs
     """
 
     path: Path
     problems: list[str] = dataclasses.field(default_factory=list)
     printed: dict[int, tuple[str, str]] = dataclasses.field(default_factory=dict)
+    line: int = 0
 
     def run(self) -> Page:
         """Run all blocks."""
         space: dict[str, Any] = {"__name__": "__main__"}
         output: str | None = None
         for block in blocks_of(self.path.read_text(encoding="utf-8")):
+            self.line = block.line
             if "not run" in block.marks or "run by" in block.marks:
                 output = None
             elif "file" in block.marks or "added to" in block.marks:
@@ -235,7 +242,8 @@ class Page:
 
     def run_shell(self, block: Block) -> None:
         """Run a block of commands."""
-        for command, shown, line in commands_of(block):
+        for command, shown, self.line in commands_of(block):
+            line = self.line
             right, printed = run_command(command)
             if not right:
                 self.problems.append(f"{self.path}:{line}: {command}: did not end as the page says\n{printed}")
@@ -257,20 +265,53 @@ class Page:
         self.path.write_text("".join(lines), encoding="utf-8")
 
 
-def run_page(path: Path) -> Page:
+class OutOfTime(BaseException):
+    """A page has run for too long. No `except Exception` of what it runs takes it for a fault of its own."""
+
+
+@contextlib.contextmanager
+def limited(seconds: float) -> Iterator[None]:
+    """End what runs within by `OutOfTime`, commands included. Other threads than the main one have no such limit.
+
+    Args:
+        seconds: how long it may run [s]
+    """
+
+    def end(*_: object) -> None:
+        raise OutOfTime
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGALRM, end)
+    running = signal.setitimer(signal.ITIMER_REAL, seconds)  # that of a test, for example
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, *running)
+        signal.signal(signal.SIGALRM, before)
+
+
+def run_page(path: Path, limit: float = LIMIT) -> Page:
     """Run a page in an empty folder, which is gone afterwards.
 
     Args:
         path: the page, in Markdown
+        limit: how long it may run [s]
     """
     path, before = path.resolve(), Path.cwd()
+    page = Page(path)
     os.environ.update(COLUMNS=WIDTH, MPLBACKEND="agg")
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
         try:
-            return Page(path).run()
+            with limited(limit):
+                page.run()
+        except OutOfTime:
+            page.problems.append(f"{path}:{page.line}: still runs {limit:g} s after the page began")
         finally:
             os.chdir(before)
+    return page
 
 
 def pages_with_code(root: Path = ROOT) -> list[Path]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+from antdrive_sources import note_sources
 from antdrive_tables import table, told
 from docutils import nodes
 from docutils.statemachine import StringList
@@ -46,6 +47,7 @@ class Commands(TyperDirective):
 
     def generate_nodes(self, name: str, command: Any, parent: Any) -> list[nodes.section]:
         """The sections of a command and its subcommands."""
+        note_sources(self.state.document.settings.env)
         sections = super().generate_nodes(name, command, parent)
         context = Context(command, info_name=name, parent=parent)
         usage = " ".join([context.command_path, *command.collect_usage_pieces(context)])

@@ -1,14 +1,16 @@
-"""When the figures of a table came in: below each table of measurements stand the commit and the day, as git knows them.
+"""When the rows of a table were last edited: below each table of measurements stand the commit and the day, as git knows them.
 
-A table's commit is the newest one that changed a row of it. Where git does not know, in an archive or in a clone without
-its history, nothing is written.
+A table's commit is the newest one that changed a row of it; other rows may be older. In an archive and in a clone without
+its history nothing is written. Where git fails for another reason, the build says why and goes on.
 """
 
 from __future__ import annotations
 
 import datetime
+import functools
 import re
 import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -35,17 +37,35 @@ class Change(NamedTuple):
 
 
 def git(folder: Path, *words: str) -> str:
-    """What git prints; empty where there is no git, no repository or no such file in it."""
+    """What git prints; empty, with a line on the build's log, where it fails."""
     try:
         done = subprocess.run(["git", *words], cwd=folder, capture_output=True, text=True, check=False)
-    except OSError:
+    except OSError as error:
+        told(f"git: {error.strerror}")
         return ""
-    return done.stdout if done.returncode == 0 else ""
+    if done.returncode:
+        told(f"git {words[0]}: {' '.join(done.stderr.split()) or f'exit code {done.returncode}'}")
+        return ""
+    return done.stdout
+
+
+@functools.cache
+def told(reason: str) -> None:
+    """Say once why tables have no dates; no warning of Sphinx, which would end the build."""
+    print(f"Tables of measurements have no dates: {reason}", file=sys.stderr)
+
+
+def repository_of(folder: Path) -> Path | None:
+    """The nearest folder above that has a `.git`."""
+    return next((one for one in (folder, *folder.parents) if (one / ".git").exists()), None)
 
 
 def changes_of(page: Path) -> dict[int, Change]:
     """For each line of a file, from 1, who changed it last; nothing where git cannot know."""
-    if git(page.parent, "rev-parse", "--is-shallow-repository").strip() != "false":
+    if (
+        repository_of(page.parent) is None
+        or git(page.parent, "rev-parse", "--is-shallow-repository").strip() != "false"
+    ):
         return {}
     found: dict[int, Change] = {}
     times: dict[str, int] = {}
@@ -73,7 +93,7 @@ def tables_of(lines: list[str]) -> Iterator[tuple[int, int]]:
 
 
 def dated(text: str, changes: dict[int, Change]) -> str:
-    """A page's text with a line below each table that says where its figures are from.
+    """A page's text with a line below each table that says when its rows were last edited.
 
     Args:
         text: the page, in Markdown
@@ -87,7 +107,7 @@ def dated(text: str, changes: dict[int, Change]) -> str:
         newest = max(row for row in rows if row)
         if newest.commit.strip("0"):
             day = datetime.datetime.fromtimestamp(newest.time, datetime.timezone.utc).date()
-            said = f"Figures of commit `{newest.commit[:7]}`, {day.isoformat()}."
+            said = f"Rows last edited in commit `{newest.commit[:7]}`, {day.isoformat()}."
             lines[last:last] = ["", "{.antdrive-measured}", said]
     return "\n".join(lines) + "\n"
 
@@ -97,6 +117,10 @@ def page_read(app: Sphinx, docname: str, source: list[str]) -> None:
     path = Path(app.env.doc2path(docname))
     if PAGES.fullmatch(docname) and path.suffix == ".md":
         source[0] = dated(source[0], changes_of(path))
+        repository = repository_of(path.parent)
+        commits = repository / ".git" / "logs" / "HEAD" if repository else None
+        if commits and commits.exists():
+            app.env.note_dependency(commits, docname=docname)  # rows get their date when they are committed
 
 
 def setup(app: Sphinx) -> dict[str, Any]:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import hashlib
-import importlib
 import io
 import os
 import re
@@ -20,6 +19,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from antdrive_docstrings import described, weaknesses_of
+from antdrive_sources import note_sources
 from antdrive_tables import parsed, table, told
 from docutils import nodes
 from docutils.parsers.rst import Directive, directives
@@ -56,7 +56,7 @@ class Options(Directive):
         env = self.state.document.settings.env
         first, *others = (PLANNERS[name] for name in self.arguments[0].split())
         kind = type(first)
-        env.note_dependency(importlib.import_module(kind.__module__).__file__)
+        note_sources(env)  # options stand in the classes above it, too
         lines = []
         for weakness in weaknesses_of(kind):
             lines += [".. admonition:: Known weaknesses", "", f"   {linked(weakness, env.docname)}", ""]
@@ -92,6 +92,7 @@ class Drawn(Directive):
     def run(self) -> list[nodes.Node]:
         """Run the content in an empty folder, and show its figure."""
         env = self.state.document.settings.env
+        note_sources(env)
         code = "\n".join(self.content)
         name = f"{PICTURES}/{hashlib.sha256(f'{env.docname} {code}'.encode()).hexdigest()[:16]}.png"
         figure = drawn_by(code, env.docname)

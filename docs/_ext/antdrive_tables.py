@@ -8,6 +8,7 @@ import json
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, ClassVar
 
+from antdrive_sources import note_sources
 from docutils import nodes
 from docutils.parsers.rst import Directive
 from docutils.statemachine import StringList
@@ -205,7 +206,8 @@ class Table(Directive):
 
 
 def parsed(directive: Directive, lines: list[str]) -> list[nodes.Node]:
-    """What lines of reST make."""
+    """What lines of reST make. They say what the packages know, so the page is read again when these change."""
+    note_sources(directive.state.document.settings.env)
     container = nodes.container()
     directive.state.nested_parse(StringList(lines, source="<table>"), directive.content_offset, container)
     return list(container.children)

@@ -62,7 +62,7 @@ def add_speeds(
             found[key] = told, f"read: <{tag}> of the drive plugin"
         elif not usable:
             beyond = (
-                f"{limit.where} would be {reach:.4g} m/s, which is none"
+                f"{limit.where} would be {reach:.4g} m/s, {_beyond('max_speed', 'm/s')}"
                 if reach < math.inf
                 else "the file has no limit"
             )
@@ -81,7 +81,7 @@ def add_speeds(
     if turning <= ROBOT_RANGE["max_wheel_speed"][1]:
         found["max_wheel_speed"] = turning, f"read: {limit.where}"
     else:
-        instead = f"; {limit.where} is none" if turning < math.inf else ""
+        instead = f"; {limit.where} is {_beyond('max_wheel_speed', 'rad/s')}" if turning < math.inf else ""
         found["max_wheel_speed"] = needs, f"assumed: 1.2 times what the speeds need{instead}"
 
 
@@ -138,8 +138,13 @@ def _torque(model: UrdfModel, wheels: tuple[DrivenWheel, DrivenWheel], mass: flo
     if limit.value <= weakest:
         why = f"; {limit.where} would not move {mass:.4g} kg"
     elif limit.value < math.inf:
-        why = f"; {limit.where} is none"
+        why = f"; {limit.where} is {_beyond('wheel_torque', 'N m')}"
     return 2 * mass * ACCELERATION * radius, f"assumed: 4 times what {ACCELERATION:g} m/s2 need{why}"
+
+
+def _beyond(key: str, unit: str) -> str:
+    """What is said of a limit that no robot's file could hold."""
+    return f"above the {ROBOT_RANGE[key][1]:g} {unit} that a robot's file may say, and is not used"
 
 
 def _lowest(wheels: tuple[DrivenWheel, DrivenWheel], key: str, unit: str) -> _Limit:

@@ -251,7 +251,10 @@ def _joint(path: Path, element: ET.Element) -> UrdfJoint:
     parent, child = ("" if end is None else end.get("link", "") for end in ends)
     limit = element.find("limit")
     lower, upper = (_number(path, limit, key, 0.0) for key in ("lower", "upper"))
-    velocity, effort = (_number(path, limit, key, 0.0) for key in ("velocity", "effort"))
+    velocity, effort = (
+        _at_least_0(path, f"joint {name}", f"the limit's {key}", _number(path, limit, key, 0.0))
+        for key in ("velocity", "effort")
+    )
     axis = _numbers(path, element.find("axis"), "xyz", (1.0, 0.0, 0.0))
     if not np.any(axis):
         raise input_error(str(path), f"joint {name}", "its axis is 0 0 0")

@@ -98,10 +98,26 @@ def test_the_build_runs_all_pages_with_code_but_those_that_tests_run() -> None:
 def test_the_tests_that_pages_name_exist() -> None:
     named = [block.marks["run by"] for _, block in BLOCKS if "run by" in block.marks]
     assert named
-    for one in [*named, *TESTED.values()]:
-        file, _, name = one.partition("::")
-        assert (ROOT / file).exists(), one
-        assert f"def {name}" in (ROOT / file).read_text(), one
+    assert [one for one in named if not defines(one)] == []
+    for page, file in TESTED.items():
+        folder = page.removesuffix("README.md").rstrip("/")
+        text = (ROOT / file).read_text()
+        assert "README.md" in text, f"{file} does not read {page}"
+        assert all(f'"{part}"' in text for part in folder.split("/") if part), f"{file} does not read {page}"
+
+
+def defines(test: str) -> bool:
+    """Whether there is a test `FILE::NAME`."""
+    file, _, name = test.partition("::")
+    path = ROOT / file
+    return path.exists() and re.search(rf"^def {re.escape(name)}\(", path.read_text(), re.MULTILINE) is not None
+
+
+def test_a_test_that_does_not_exist_is_noticed() -> None:
+    here = "tests/docs/test_blocks.py"
+    assert defines(f"{here}::test_a_test_that_does_not_exist_is_noticed")
+    for wrong in (f"{here}::test_a_test_that_does_not_exist", here, "tests/docs/nowhere.py::test_a"):
+        assert not defines(wrong), wrong
 
 
 def block_of(page: str, test: str, language: str = "yaml") -> str:

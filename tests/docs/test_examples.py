@@ -1,10 +1,12 @@
-"""The lines after `>>>` in docstrings, which the pages of the API show, run."""
+"""The lines after `>>>` in docstrings, which the pages of the API show, run and print what stands below them."""
 
 from __future__ import annotations
 
+import contextlib
 import doctest
 import importlib
 import inspect
+import io
 import json
 from pathlib import Path
 from typing import Any
@@ -60,5 +62,22 @@ def test_the_example_of_a_docstring_runs(
     }
     space |= {name: getattr(antdrive.sim, name) for name in antdrive.sim.__all__}
     space |= {name: getattr(antdrive.sim.regression, name) for name in antdrive.sim.regression.__all__}
-    for example in doctest.DocTestParser().get_examples(EXAMPLES[place]):
-        exec(compile(example.source, place, "single"), space)
+    assert faults(EXAMPLES[place], space) == []
+
+
+def faults(text: str, space: dict[str, Any]) -> list[str]:
+    """Run the examples of a docstring; what printed something else than stands below it. `...` stands for anything."""
+    found = []
+    for example in doctest.DocTestParser().get_examples(text):
+        out = io.StringIO()
+        with contextlib.redirect_stdout(out):
+            exec(compile(example.source, "<docstring>", "single"), space)
+        shown = example.want
+        if shown and not doctest.OutputChecker().check_output(shown, out.getvalue(), doctest.ELLIPSIS):
+            found.append(f"{example.source.strip()} shows {shown.strip()}, but printed was {out.getvalue().strip()}")
+    return found
+
+
+def test_an_output_that_is_not_what_stands_below_is_noticed() -> None:
+    assert faults(">>> a = 1\n>>> a + 1\n2\n>>> a / 3\n0.33...\n>>> a\n", {}) == []
+    assert faults(">>> 1 + 1\n3\n", {}) == ["1 + 1 shows 3, but printed was 2"]

@@ -1,14 +1,17 @@
-"""Tables of measurements name the command that measures them, and the site says when their figures came in."""
+"""Tables of measurements name the command that measures them, and the site says when their rows were last edited."""
 
 from __future__ import annotations
 
 import importlib
+import os
 import re
 import subprocess
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from antdrive.sim.cli.app import COMMANDS
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMAND = re.compile(r"`(?:python -m (?P<module>[\w.]+)|make (?P<target>[\w-]+)|antdrive (?P<command>[\w-]+))[^`]*`")
@@ -36,9 +39,23 @@ def test_a_section_with_a_table_names_a_command_that_exists(head: str) -> None:
     commands = list(COMMAND.finditer(SECTIONS[head]))
     assert commands, "which command measures it again?"
     for found in commands:
-        if found["module"]:
-            path = ROOT / found["module"].replace(".", "/")
-            assert path.with_suffix(".py").exists() or (path / "__main__.py").exists(), found[0]
+        assert exists(found), found[0]
+
+
+def exists(found: re.Match[str]) -> bool:
+    """Whether there is the module, the target of make or the command of antdrive."""
+    if found["target"]:
+        return re.search(rf"^{found['target']}:", (ROOT / "Makefile").read_text(), re.MULTILINE) is not None
+    if found["command"]:
+        return found["command"] in {*COMMANDS, "worlds", "robots"}
+    path = ROOT / found["module"].replace(".", "/")
+    return path.with_suffix(".py").exists() or (path / "__main__.py").exists()
+
+
+@pytest.mark.parametrize("wrong", ["make nonsense", "antdrive nonsense", "python -m benchmarks.nonsense"])
+def test_a_command_that_does_not_exist_is_noticed(wrong: str) -> None:
+    (found,) = COMMAND.finditer(f"`{wrong} --jobs 2`")
+    assert not exists(found)
 
 
 @pytest.fixture
@@ -48,7 +65,8 @@ def measured(monkeypatch: pytest.MonkeyPatch) -> Any:
 
 
 def git(folder: Path, *words: str, day: str = "2026-01-01") -> str:
-    env = {f"GIT_{who}_{key}": value for who in ("AUTHOR", "COMMITTER") for key, value in
+    env = {"PATH": os.environ["PATH"], "GIT_CONFIG_NOSYSTEM": "1"}
+    env |= {f"GIT_{who}_{key}": value for who in ("AUTHOR", "COMMITTER") for key, value in
            {"NAME": "a", "EMAIL": "a@b.example", "DATE": f"{day}T12:00:00+00:00"}.items()}  # fmt: skip
     done = subprocess.run(
         ["git", *words], cwd=folder, env={**env, "HOME": str(folder)}, capture_output=True, text=True, check=True
@@ -71,10 +89,23 @@ def test_a_table_has_the_newest_commit_of_its_rows(measured: Any, tmp_path: Path
     git(tmp_path, "commit", "-qam", "second", day="2026-02-03")
     new = git(tmp_path, "rev-parse", "HEAD")
     text = measured.dated(page.read_text(), measured.changes_of(page))
-    assert f"| 3 | 44 |\n\n{{.antdrive-measured}}\nFigures of commit `{new[:7]}`, 2026-02-03.\n\nProse" in text
-    assert text.endswith(f"| 5 |\n\n{{.antdrive-measured}}\nFigures of commit `{old[:7]}`, 2026-01-01.\n")
+    assert f"| 3 | 44 |\n\n{{.antdrive-measured}}\nRows last edited in commit `{new[:7]}`, 2026-02-03.\n\nProse" in text
+    assert text.endswith(f"| 5 |\n\n{{.antdrive-measured}}\nRows last edited in commit `{old[:7]}`, 2026-01-01.\n")
     page.write_text(PAGE.replace("| 5 |", "| 55 |"))
     assert measured.dated(page.read_text(), measured.changes_of(page))[-7:] == "| 55 |\n", "not committed"
+
+
+def test_a_fault_of_git_is_told_once_and_an_archive_is_none(
+    measured: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = tmp_path / "page.md"
+    page.write_text(PAGE)
+    assert measured.changes_of(page) == {}
+    assert capsys.readouterr().err == "", "no repository"
+    (tmp_path / ".git").write_text("gitdir: nowhere\n")
+    assert measured.changes_of(page) == measured.changes_of(page) == {}
+    assert capsys.readouterr().err.startswith("Tables of measurements have no dates: git rev-parse: fatal: ")
+    measured.told.cache_clear()
 
 
 def test_a_clone_without_its_history_says_nothing(measured: Any, tmp_path: Path) -> None:

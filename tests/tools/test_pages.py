@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 
 import pytest
@@ -79,6 +80,22 @@ def test_update_writes_what_was_printed_and_the_page_is_right_then(tmp_path: Pat
 
 def test_a_text_that_does_not_follow_is_no_output(tmp_path: Path) -> None:
     assert run_page(page(tmp_path, "'''python\nprint(1)\n'''\n\nA tree:\n\n'''text\nworlds/\n'''\n")).problems == []
+
+
+@pytest.mark.parametrize(
+    "block",
+    [
+        "python\ntry:\n    while True:\n        pass\nexcept Exception:\n    pass",
+        "sh\npython -c 'import time; time.sleep(600)'",
+    ],
+    ids=["in this process", "a command"],
+)
+def test_a_page_that_hangs_is_ended_and_named(tmp_path: Path, block: str) -> None:
+    before = signal.getsignal(signal.SIGALRM)
+    path = page(tmp_path, f"'''python\nprint(1)\n'''\n\n'''{block}\n'''\n\n'''python\n1 / 0\n'''\n")
+    (problem,) = run_page(path, limit=0.5).problems
+    assert problem == f"{path}:6: still runs 0.5 s after the page began"
+    assert signal.getsignal(signal.SIGALRM) is before
 
 
 def test_three_dots_stand_for_anything_and_nothing_else_does() -> None:

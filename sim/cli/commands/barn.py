@@ -89,15 +89,17 @@ def barn(
     except KeyboardInterrupt:
         print_error(f"{out}: what is done is kept; go on with: antdrive {' '.join(sys.argv[1:])}")
         raise
-    filmed = _films(results, out / "films") if films else {}
     runs, fastest = challenge.by_map(results.table), challenge.reference_times(folder)
     found = list(challenge.lines(runs[map], fastest))
     known = list(challenge.lines(runs["given"], fastest))[-1] if with_map else None
     (price,) = prices(RunTable(results.table.to_pydict())) if with_map else (None,)
+    if not json:
+        _print(found, known, price)  # before the films, which take long and may fail
+    filmed = _films(results, out / "films") if films else {}
     if json:
         print_json(_facts(results, found, known, price, filmed))
     else:
-        _print(runs[map], found, known, price, filmed)
+        _print_failures(runs[map], filmed)
     return SUCCEEDED if results.complete else FAILED
 
 
@@ -129,13 +131,7 @@ def _facts(
     }
 
 
-def _print(
-    runs: "pyarrow.Table",
-    found: "list[BarnLine]",
-    known: "BarnLine | None",
-    price: "Price | None",
-    films: "dict[str, Path]",
-) -> None:
+def _print(found: "list[BarnLine]", known: "BarnLine | None", price: "Price | None") -> None:
     from antdrive.sim.campaigns.challenge import OURS, PUBLISHED
 
     heads = ("world", "runs", "certified", "mean time [s]", "mean score")
@@ -158,6 +154,9 @@ def _print(
     print_table(("published", "success [%]", "mean time [s]", "mean score", "where"), rows)
     print_line("")
     print_line(OURS)
+
+
+def _print_failures(runs: "pyarrow.Table", films: "dict[str, Path]") -> None:
     for row in runs.select(["key", "world", "seed", "succeeded", "outcome", "reason", "rollout"]).to_pylist():
         if not row["succeeded"]:
             print_line(

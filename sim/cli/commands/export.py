@@ -26,8 +26,10 @@ def export_drive(
 
     mcap and rosbag2 hold ROS 2 messages, without ROS; they need antdrive[ros].
     """
-    from antdrive.sim.export.exporting import export
+    from antdrive.sim.export.exporting import EXPORTS, export
 
+    if force and to in EXPORTS and to != "mcap":
+        raise InputError(f"--force: is for --to mcap; {to} makes a new folder and replaces none")
     try:
         files = export(log_at(rollout), to, out, replace=force)
     except FieldError as error:

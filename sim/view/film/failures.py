@@ -21,10 +21,10 @@ def film_failures(
     size: tuple[int, int] = SIZE,
     progress: Callable[[float], None] | None = None,
 ) -> dict[str, Path]:
-    """Film every run that did not arrive and whose log was kept; the films by the keys of the runs.
+    """Film every run that did not arrive and whose log is there; the films, earlier ones among them, by the keys of the runs.
 
     The line below the picture names the run, how it ended, and why. A drive longer than 30 s is shown in
-    30 s. A film that is newer than its log is not made again.
+    30 s. A film that is newer than its log, or whose log is gone, is not made again.
 
     Args:
         rows: of a campaign's table
@@ -42,13 +42,15 @@ def film_failures(
         log = Path(logs) / row["rollout"]
         name = f"{row['world']}-{row['planner']}-{row['robot']}-{row['seed']}-{row['key'][:8]}.mp4"
         path = Path(folder) / "".join(c if c.isalnum() or c in "-_." else "_" for c in name)
-        if not path.exists() or path.stat().st_mtime < log.stat().st_mtime:
+        kept = log.exists()
+        if kept and (not path.exists() or path.stat().st_mtime < log.stat().st_mtime):
             cause = ": ".join(text for text in (row["outcome"], row["reason"]) if text)
             path.parent.mkdir(parents=True, exist_ok=True)
             drive = Rollout.load(log)
             speed = max(1.0, float(drive.t[-1]) / LONGEST)
             film(drive, path, size=size, speed=speed, note=f"seed {row['seed']}, {cause}")
-        films[row["key"]] = path
+        if kept or path.exists():
+            films[row["key"]] = path
         if progress is not None:
             progress((k + 1) / len(failed))
     return films

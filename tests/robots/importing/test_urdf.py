@@ -133,9 +133,13 @@ def limited(tmp_path: Path, words: str) -> ImportedRobot:
         ('velocity="6.67"', "max_wheel_speed", 6.67, "read: the velocity limit of joint wheel_left_joint, 6.67 rad/s"),
         ('velocity="200"', "max_speed", 6.6, "computed: the velocity limit of joint wheel_left_joint, 200 rad/s, times"),
         ('velocity="200"', "max_yaw_rate", 3.14, "assumed: half a turn a second; the velocity limit of joint"),
-        ('velocity="400"', "max_speed", 0.5, "assumed: the velocity limit of joint wheel_left_joint, 400 rad/s would be 13.2"),
+        ('velocity="400"', "max_speed", 0.5,
+         "assumed: the velocity limit of joint wheel_left_joint, 400 rad/s would be 13.2 m/s, above the 10 m/s that "
+         "a robot's file may say, and is not used"),
         ('velocity="400"', "max_wheel_speed", 400.0, "read: the velocity limit of joint wheel_left_joint, 400 rad/s"),
-        ('velocity="99999"', "max_wheel_speed", 18.182, "assumed: 1.2 times what the speeds need; the velocity limit of"),
+        ('velocity="99999"', "max_wheel_speed", 18.182,
+         "assumed: 1.2 times what the speeds need; the velocity limit of joint wheel_left_joint, 99999 rad/s is above the "
+         "10000 rad/s that a robot's file may say, and is not used"),
         ("", "max_speed", 0.5, "assumed: the file has no limit"),
         ('effort="0.3"', "wheel_torque", 0.3, "read: the effort limit of joint wheel_left_joint, 0.3 N m"),
         ('effort="0.0001"', "wheel_torque", 0.066, "assumed: 4 times what 1 m/s2 need; the effort limit of joint wheel_left"),
@@ -157,6 +161,14 @@ def test_a_limit_below_any_robots_is_refused_and_not_replaced(tmp_path: Path) ->
         InputError, match=r"max_speed: must be at least 0\.05, got 0\.0165 \(computed: the velocity limit"
     ):
         limited(tmp_path, 'velocity="0.5"')
+
+
+@pytest.mark.parametrize("key", ["velocity", "effort"])
+def test_a_negative_limit_is_refused_with_joint_and_key(tmp_path: Path, key: str) -> None:
+    with pytest.raises(InputError, match=rf"joint wheel_\w+_joint: the limit's {key} must be at least 0, got -5$"):
+        limited(tmp_path, f'{key}="-5"')
+    none = limited(tmp_path, f'{key}="0"')
+    assert none.robot == limited(tmp_path, "").robot  # 0 is how files say that there is none
 
 
 def test_what_the_drive_plugin_says_otherwise_stands_beside_what_is_used(tmp_path: Path) -> None:

@@ -54,3 +54,12 @@ def test_the_line_below_the_picture_is_the_cause(
     film_failures([row("x", "a.npz")], tmp_path, tmp_path)
     assert [text for _, text, _ in notes[:2]] == ["seed 3, collided: movers[3] at 1 m/s", "seed 3, collided"]
     assert [speed for *_, speed in notes] == [1.0, 1.0, pytest.approx(2.0, rel=0.02)]
+
+
+def test_a_log_that_is_gone_leaves_the_film_that_was_made_of_it(made_up_drive, tmp_path: Path) -> None:
+    log = made_up_drive(collide=True).save(tmp_path / "a.npz")
+    rows, done = [row("x", "a.npz"), row("y", "gone.npz")], list[float]()
+    films = film_failures(rows, tmp_path, tmp_path / "films", size=(320, 180), progress=done.append)
+    assert (list(films), done) == (["x"], [0.5, 1.0])
+    log.unlink()
+    assert film_failures(rows, tmp_path, tmp_path / "films", size=(320, 180)) == films
