@@ -23,7 +23,8 @@ def test_every_command_works_and_the_bag_lies_in_the_map(antdrive: Call, tmp_pat
         words = shlex.split(command, comments=True)[1:]
         words += ["--jobs", "1"] if words[0] == "sweep" else []
         code, out, err = antdrive(*words)
-        assert (code, err) == (0, ""), (command, err)
+        faults = [line for line in err.splitlines() if "compiling the planners, once" not in line]
+        assert (code, faults) == (0, []), (command, err)
         said[words[0], words[1]] = out
     cart = load_robot(tmp_path / "cart.yaml")
     assert cart.footprint.bounds == pytest.approx((-0.27, -0.18, 0.15, 0.18))

@@ -86,6 +86,7 @@ def test_a_suite_can_express_every_setting_of_a_scenario() -> None:
         "seed": "seeds",
         "planner_name": "planner",
         "calibration": "margin",
+        "frame": "start",  # suites have places of the world itself
     }
     assert all(keys[field.name] in ScenarioEntry.model_fields for field in fields(Scenario))
     about_files = {"settings", "out", "video", "prelude", "vector", "figures", "gui", "json"}
