@@ -180,7 +180,7 @@ class ExploringAnts(AntSystem):
 
     Known weaknesses, measured on the same page: exploratory ants wander, which makes an iteration up to ten
     times as long as that of `AntSystem`; where they deposit like common ants, they keep paths long unless the
-    elite is heavy (`elite=25`). At 50 x 50 cells paths are 8 per cent longer than the shortest.
+    elite is heavy (`elite=25`). At 50 x 50 cells paths are 7 per cent longer than the shortest.
 
     Attributes:
         ants: the number of common ants

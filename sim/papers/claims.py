@@ -304,6 +304,20 @@ SUGANTHI2019 = (
     *_suganthi_speed("ours", "iaco"),
     *_suganthi_speed("a = 25", "iaco, a = 25"),
     *(
+        Claim(
+            paper="suganthi2019",
+            source="§V, Table 2",
+            sentence=f"At {size} {name} finds the shortest path",
+            printed=length,
+            test=Within(arms_on((size,), arm), 0.0),
+        )
+        for size, length, name, arm in (
+            ("10×10", "13.899", "ACO", "as"),
+            ("20×20", "28.627", "ACO", "as"),
+            ("10×10", "13.899", "PFACO", "pfaco"),
+        )
+    ),
+    *(
         claim
         for size, lengths in zip(SIZES[1:], ("38.627 > 28.627", "59.355 > 42.184", "109.761 > 94.326"), strict=True)
         for claim in (
@@ -472,6 +486,7 @@ LEE2008 = (
     *_lee_shorter(BACK, "as, stepping back", "pfaco, stepping back"),
     *_lee_faster(BACK, "as, stepping back", "pfaco, stepping back"),
     *_lee_shorter(CUT, "as, cut short", "pfaco, cut short"),
+    *_lee_faster(CUT, "as, cut short", "pfaco, cut short"),
     *_lee_shorter(NO_LIST, "as, no list", "pfaco"),
     *_lee_shorter(LETTER, "as", "pfaco, to the letter"),
     *(

@@ -260,7 +260,10 @@ def _wider(test: Wider, found: Found) -> Judged:
     low, high = np.quantile(
         [_quartile_range(first, row) - _quartile_range(second, row) for row in rows], [0.025, 0.975]
     )
-    interval = Interval(float(low), float(high))
+    value, low, high = (
+        round(float(one), 9) for one in (value, low, high)
+    )  # differences of equal ranges are not quite 0
+    interval = Interval(low, high)
     ours = f"ranges differ by {_with_interval(value, interval, test.quantity, endless=ENDLESS_TEXT)}"
     decision, reason = _decided(low > 0, high <= 0, len(first), value, interval, 0.0)
     return Judged(decision, value, interval, ours, _joined(reason, "ranges between quartiles, bootstrapped"))
@@ -301,7 +304,7 @@ def _undecided(value: float, interval: Interval, bound: float) -> str:
     times = (towards / abs(bound - value)) ** 2
     return (
         f"{words}; some {times:{'.0f' if times > 10 else '.1f'}} times as many maps and seeds would tell"
-        if 1 < times < MANY
+        if 1.1 < times < MANY
         else words
     )
 
