@@ -309,7 +309,7 @@ class _Shapes:
         radius = length = None
         if shape.tag == "box":
             size = _numbers(self._path, shape, "size", (0.0, 0.0, 0.0))
-            _at_least_0(self._path, f"link {link}", "the size of a <box>", float(size.min()))
+            _greater_than_0(self._path, f"link {link}", "the size of a <box>", float(size.min()))
             half = size / 2
             points = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half
         elif shape.tag == "cylinder":

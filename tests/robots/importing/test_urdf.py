@@ -215,6 +215,8 @@ JOINT = '<joint name="{}" type="{}"><parent link="base_link"/><child link="{}"/>
         ("burger.urdf", (('<box size="0.138 0.140 0.143"/>', '<mesh filename="package://a/b.stl"/>'),),
          "link base_link: mesh package://a/b.stl is not found; say where with --meshes FOLDER"),
         ("burger.urdf", (("0 -0.080 0.023", "0 -0.120 0.023"),), ""),  # the axle's middle is not the root's
+        ("burger.urdf", (("<box size", "<box dimensions"),),
+         "link base_link: the size of a <box> must be greater than 0, got 0"),
         ("burger.urdf", (("<box size", "<cone size"),), "link base_link: unknown geometry <cone>"),
         ("burger.urdf", (('<link name="scan">', "<link>"),), "a <link> has no name"),
         ("burger.urdf", (('value="0.83"', 'value="nan"'),), "must be 1 numbers"),
