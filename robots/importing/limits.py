@@ -26,7 +26,7 @@ Found = dict[str, tuple[float, str]]  # values of a robot's file, and where they
 
 
 class _Limit(NamedTuple):
-    """The lower of the limits that the wheels' joints have; inf where they have none."""
+    """A limit of a file, and where it stands; inf where there is none."""
 
     value: float
     where: str
@@ -125,21 +125,25 @@ def add_forces(
 
 
 def _torque(model: UrdfModel, wheels: tuple[DrivenWheel, DrivenWheel], mass: float, radius: float) -> tuple[float, str]:
-    limit, (tag, told) = (
-        _lowest(wheels, "effort", "N m"),
-        model.drive_number("max_wheel_torque", "wheelTorque", "torque"),
-    )
+    """The lowest limit that moves the robot and that its file may hold, beside all others by name."""
+    limits = [_lowest(wheels, "effort", "N m")]
+    tag, told = model.drive_number("max_wheel_torque", "wheelTorque", "torque")
     if told:
-        limit = min(limit, _Limit(told, f"<{tag}> of the drive plugin"))
+        limits.append(_Limit(told, f"<{tag}> of the drive plugin, {told:.7g} N m"))
     weakest, strongest = mass * LEAST_DRIVE * radius, ROBOT_RANGE["wheel_torque"][1]
-    if weakest < limit.value <= strongest:
-        return limit.value, f"read: {limit.where}"
-    why = ""
-    if limit.value <= weakest:
-        why = f"; {limit.where} would not move {mass:.4g} kg"
-    elif limit.value < math.inf:
-        why = f"; {limit.where} is {_beyond('wheel_torque', 'N m')}"
-    return 2 * mass * ACCELERATION * radius, f"assumed: 4 times what {ACCELERATION:g} m/s2 need{why}"
+    limits = sorted(limit for limit in limits if limit.value < math.inf)
+    used = next((limit for limit in limits if weakest < limit.value <= strongest), None)
+    beside = ""
+    for limit in limits:
+        if limit.value <= weakest:
+            beside += f"; {limit.where} would not move {mass:.4g} kg"
+        elif limit.value > strongest:
+            beside += f"; {limit.where} is {_beyond('wheel_torque', 'N m')}"
+        elif limit is not used:
+            beside += f"; {limit.where} is more"
+    if used is not None:
+        return used.value, f"read: {used.where}{beside}"
+    return 2 * mass * ACCELERATION * radius, f"assumed: 4 times what {ACCELERATION:g} m/s2 need{beside}"
 
 
 def _beyond(key: str, unit: str) -> str:

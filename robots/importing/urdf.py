@@ -122,7 +122,13 @@ def _checked(given: Mapping[str, float]) -> dict[str, float]:
     for key in given:
         if key not in keys:
             raise InputError(f"--set {key}: no such number in a robot file; choose from {', '.join(keys)}")
-    for key in ("mass", "wheel_radius", "track"):  # limits are computed from these before the file is checked
+    for key in (
+        "mass",
+        "wheel_radius",
+        "track",
+        "wheel_torque",
+        "wheel_friction",
+    ):  # limits are computed from these before the file is checked
         value = given.get(key, 1.0)
         if not 0 < value < math.inf:
             raise InputError(f"{key}: must be a number greater than 0, got {value:g}")

@@ -91,10 +91,9 @@ def attachments_of(rollout: Rollout, log: Path) -> dict[str, tuple[str, bytes]]:
 
 def _to_mcap(rollout: Rollout, log: Path, target: Path) -> list[Path]:
     layout = _layout_beside(target)
-    with written_whole(target) as part:
+    with written_whole(layout) as beside, written_whole(target) as part:  # both or none
         write_mcap(part, topics_of(rollout), attachments_of(rollout, log))
-    with written_whole(layout) as part:
-        part.write_text(_layout(rollout), encoding="utf-8")
+        beside.write_text(_layout(rollout), encoding="utf-8")
     return [target, layout]
 
 

@@ -163,6 +163,28 @@ def test_a_limit_below_any_robots_is_refused_and_not_replaced(tmp_path: Path) ->
         limited(tmp_path, 'velocity="0.5"')
 
 
+@pytest.mark.parametrize(
+    ("effort", "plugin", "torque", "beside"),
+    [
+        (0.0001, 5, 5.0, "0.0001 N m would not move"),
+        (3, 1e9, 3.0, "<max_wheel_torque> of the drive plugin, 1e+09 N m is above"),
+        (3, 2, 2.0, "the effort limit of joint wheel_left_joint, 3 N m is more"),
+    ],
+)
+def test_the_lowest_torque_that_can_be_used_is_and_the_other_is_named(
+    tmp_path: Path, effort: float, plugin: float, torque: float, beside: str
+) -> None:
+    plugged = (
+        "<gazebo><plugin><left_joint>wheel_left_joint</left_joint><right_joint>wheel_right_joint</right_joint>"
+        f"<max_wheel_torque>{plugin}</max_wheel_torque></plugin></gazebo></robot>"
+    )
+    found = import_urdf(changed(tmp_path, "burger.urdf", ('effort="1.4"', f'effort="{effort}"'), ("</robot>", plugged)))
+    how = comments(found)["wheel_torque"]
+    assert found.robot.wheel_torque == torque
+    assert how.startswith("read: ")
+    assert beside in how
+
+
 @pytest.mark.parametrize("key", ["velocity", "effort"])
 def test_a_negative_limit_is_refused_with_joint_and_key(tmp_path: Path, key: str) -> None:
     with pytest.raises(InputError, match=rf"joint wheel_\w+_joint: the limit's {key} must be at least 0, got -5$"):
@@ -183,7 +205,9 @@ def test_what_the_drive_plugin_says_otherwise_stands_beside_what_is_used(tmp_pat
     assert says["wheel_radius"] == "read: cylinder of link wheel_left_link", "it agrees"
     assert (found.robot.max_acceleration, found.robot.wheel_torque) == (0.4, 0.02)
     assert says["max_acceleration"] == "read: <max_linear_acceleration> of the drive plugin"
-    assert says["wheel_torque"] == "read: <max_wheel_torque> of the drive plugin"
+    assert says["wheel_torque"] == (
+        "read: <max_wheel_torque> of the drive plugin, 0.02 N m; the effort limit of joint wheel_left_joint, 1.4 N m is more"
+    )
 
 
 def test_links_without_a_mass_are_named(tmp_path: Path) -> None:

@@ -84,7 +84,7 @@ def import_robot(
         read = numbers(f"--set {key}", text, 1)
         assert read is not None
         values[key] = read[0]
-    target = out or Path(f"{path.stem}.yaml")
+    target = out or Path(f"{path.name.removesuffix('.xacro').removesuffix('.urdf')}.yaml")
     require_writable(target, path)
     if out is None and target.exists():
         raise InputError(f"{target}: exists; give --out to say where the robot goes")

@@ -3,6 +3,8 @@
 import json
 from pathlib import Path
 
+import pytest
+
 from antdrive.robots import load_robot
 from tests.sim.cli.calling import Call
 
@@ -82,3 +84,10 @@ def test_what_cannot_be_imported_is_said_in_one_line_and_nothing_is_written(antd
     assert not target.exists()
     code, _, error = antdrive("robots", "import", str(URDF / "burger.urdf"), "-o", str(URDF / "burger.urdf"))
     assert (code, "is the file to import" in error) == (2, True)
+
+
+def test_a_xacro_file_gives_its_first_name_to_the_robot(antdrive: Call, tmp_path: Path) -> None:
+    pytest.importorskip("xacrodoc", reason="xacrodoc is not installed")
+    code, _, error = antdrive("robots", "import", str(URDF / "warehouse.urdf.xacro"))
+    assert (code, error) == (0, "")
+    assert (tmp_path / "warehouse.yaml").exists()
