@@ -10,6 +10,7 @@ import numpy as np
 from antdrive.sim.export.cdr import CdrLayout
 from antdrive.sim.export.frames import BASE, ESTIMATE, LIDAR, ODOM, ROBOT_MAP, mover_frame
 from antdrive.sim.export.topics import Floats, Stamps, Topic, nanoseconds
+from antdrive.sim.log.frames import frame_at
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.scans import ranges_of
 
@@ -67,13 +68,7 @@ def scans(rollout: Rollout) -> list[Topic]:
 
 def _own_maps(rollout: Rollout) -> Floats:
     """Where the robot's own map lies in each row, x, y [m] and yaw [rad] (N, 3): so that the robot is where it believes to be."""
-    found = np.zeros((len(rollout.t), 3))
-    if len(rollout.estimate):
-        found[:, 2] = rollout.pose[:, 2] - rollout.estimate[:, 2]
-        cos, sin = np.cos(found[:, 2]), np.sin(found[:, 2])
-        x, y = rollout.estimate[:, :2].T
-        found[:, :2] = rollout.pose[:, :2] - np.column_stack([cos * x - sin * y, sin * x + cos * y])
-    return found
+    return frame_at(rollout.estimate, rollout.pose) if len(rollout.estimate) else np.zeros((len(rollout.t), 3))
 
 
 def transforms(topic: str, stamps: Stamps, frames: Sequence[tuple[str, str]], poses: Floats, z: float = 0.0) -> Topic:

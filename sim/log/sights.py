@@ -14,6 +14,7 @@ import numpy.typing as npt
 from antdrive.robots.footprint import shape_of
 from antdrive.robots.lidar import Lidar
 from antdrive.sim.log import _kernels_sights as kernels
+from antdrive.sim.log.frames import frame_at, laid
 from antdrive.sim.log.record import finite_or_none
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.scans import ranges_of
@@ -220,12 +221,7 @@ def followed_rows(rollout: Rollout) -> list[npt.NDArray[np.int64]]:
     """
     rows = rollout.tracks[:, 0].astype(np.int64)
     believed, true = (rollout.estimate if len(rollout.estimate) else rollout.pose)[rows], rollout.pose[rows]
-    ahead = rollout.tracks[:, 2:4] - believed[:, :2]
-    turn = true[:, 2] - believed[:, 2]
-    cos, sin = np.cos(turn), np.sin(turn)
-    places = true[:, :2] + np.column_stack(
-        (cos * ahead[:, 0] - sin * ahead[:, 1], sin * ahead[:, 0] + cos * ahead[:, 1])
-    )
+    places = laid(rollout.tracks[:, 2:4].astype(np.float64), frame_at(believed, true))
     return [
         rows[np.hypot(*(places - rollout.movers[rows, j]).T) <= mover.radius]
         for j, mover in enumerate(rollout.record.world.movers)

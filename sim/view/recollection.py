@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from antdrive.sim.driving.rescanning import forgetting_ticks
 from antdrive.sim.driving.survey import MAP_CELL, RECENT, horizon_of
+from antdrive.sim.log.frames import frame_at
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.scans import ranges_of
 from antdrive.sim.log.sights import Beams, beams_of, lidar_of, meet
@@ -145,10 +146,8 @@ class Recollection:
             at: the moment [s]
         """
         row = self._row(at)
-        x, y, yaw = self._rollout.pose[row].tolist()
-        ex, ey, believed = self._estimate(row)
-        cos, sin = math.cos(believed - yaw), math.sin(believed - yaw)
-        return np.array([cos, sin, ex - cos * x + sin * y, ey - sin * x - cos * y])
+        x, y, turn = frame_at(self._rollout.pose[[row]], np.array([self._estimate(row)]))[0].tolist()
+        return np.array([math.cos(turn), math.sin(turn), x, y])
 
 
 def laid_in_world(points: Floats, drift: Floats) -> Floats:
