@@ -96,7 +96,7 @@ def suite_entry(scenario: Scenario, robot: str) -> dict[str, Any]:
     """
     plain: dict[str, Any] = {
         "robot": robot,
-        "planner": _planner(scenario),
+        "planner": planner_words(scenario),
         "smoothing": scenario.smoothing,
         "margin": float(scenario.margin),
         "noise": float(scenario.noise),
@@ -210,21 +210,15 @@ def run_if_planned(scenario: Scenario) -> Run | str:
         return str(error)
 
 
-def _planner(scenario: Scenario) -> str | dict[str, Any]:
-    """The planner's name, with the options that differ from those of that name."""
-    name = scenario.planner_label
-    options = _changed(scenario.planner, list_planners().get(name))
-    return {"name": name, **options} if options else name
-
-
-def own_planner_words(scenario: Scenario, name: str) -> str | dict[str, Any]:
-    """People's own planner in the words of a suite, with the options that differ from those of its class.
+def planner_words(scenario: Scenario, own: str | None = None) -> str | dict[str, Any]:
+    """A scenario's planner in the words of a suite: its name, with the options that differ from those of that name.
 
     Args:
         scenario: the scenario that has the planner
-        name: FILE.py:CLASS or MODULE:CLASS, as seen from the working directory
+        own: FILE.py:CLASS or MODULE:CLASS, as seen from the working directory; None: the planner is registered
     """
-    options = _changed(scenario.planner, load_planner(name))
+    name = own or scenario.planner_label
+    options = _changed(scenario.planner, load_planner(own) if own else list_planners().get(name))
     return {"name": name, **options} if options else name
 
 

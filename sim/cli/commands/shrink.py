@@ -161,11 +161,11 @@ def _planner_beside(
     case: "SuiteCase | None", own: str | None, scenario: "Scenario", folder: Path
 ) -> "str | dict[str, Any] | None":
     """A planner that is not registered, in the words of a suite in another folder; None for all others."""
-    from antdrive.sim.falsify.handover import own_planner_words, planner_moved
+    from antdrive.sim.falsify.handover import planner_moved, planner_words
 
     if case is not None:
         return planner_moved(case.entry.planner, case.suite.parent, folder)
-    return None if own is None else planner_moved(own_planner_words(scenario, own), Path.cwd(), folder.absolute())
+    return None if own is None else planner_moved(planner_words(scenario, own), Path.cwd(), folder.absolute())
 
 
 def _write(
