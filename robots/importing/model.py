@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 import tempfile
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -81,7 +83,7 @@ class UrdfModel:
         places: the frame of each link in that of the root (4, 4)
         pieces: its collision geometry
         masses: the mass of each link that has one [kg]
-        drive: what a Gazebo plugin for differential drives says, by tag
+        drive: what a Gazebo plugin that drives wheels says, by tag; what it says of several wheels is left out
         left_out: meshes that were not found
     """
 
@@ -161,18 +163,20 @@ def read_model(
         for name, link in links.items()
         for mass in link.findall("inertial/mass")
     }
-    plugins = [plugin for plugin in root.findall("gazebo/plugin") if _drives_two_wheels(plugin)]
-    drive = {element.tag: (element.text or "").strip() for plugin in plugins for element in plugin}
     return UrdfModel(
-        path, root.get("name", path.stem), joints, places, tuple(pieces), masses, drive, tuple(reader.left_out)
+        path, root.get("name", path.stem), joints, places, tuple(pieces), masses, _drive(root), tuple(reader.left_out)
     )
 
 
-def _drives_two_wheels(plugin: ET.Element) -> bool:
-    """Whether a Gazebo plugin names one left and one right joint; those of vehicles that skid name several."""
-    return any(
-        len(plugin.findall(f"left{end}")) == len(plugin.findall(f"right{end}")) == 1 for end in ("_joint", "Joint")
-    )
+def _drive(root: ET.Element) -> dict[str, str]:
+    """What plugins that drive wheels say, by tag. A tag that a plugin repeats, such as the left wheels of a vehicle that
+    skids, is left out: it names no one wheel."""
+    drive: dict[str, str] = {}
+    for plugin in root.findall("gazebo/plugin"):
+        tags = Counter(element.tag for element in plugin)
+        if any(re.fullmatch(r"left\w*joint", tag, re.IGNORECASE) for tag in tags):
+            drive |= {element.tag: (element.text or "").strip() for element in plugin if tags[element.tag] == 1}
+    return drive
 
 
 def _root_element(path: Path, arguments: Mapping[str, str], packages: Mapping[str, Path]) -> ET.Element:
