@@ -45,7 +45,7 @@ def add_speeds(
         given: keys that people gave, and that stay
     """
     radius, track = found["wheel_radius"][0], found["track"][0]
-    limit = _lowest(wheels, "velocity", "rad/s")
+    limit = min(_lowest(wheels, "velocity", "rad/s"), _lowest_commanded(wheels))
     turning = seven_digits(limit.value)
     reach = turning * radius
     for key, tags, most, assumed, unit in (
@@ -168,6 +168,12 @@ def _lowest(wheels: tuple[DrivenWheel, DrivenWheel], key: str, unit: str) -> _Li
     """The lower of a limit of the two joints, and what it is called."""
     value, name = min((getattr(wheel.joint, key) or math.inf, wheel.joint.name) for wheel in wheels)
     return _Limit(value, f"the {key} limit of joint {name}, {value:.7g} {unit}")
+
+
+def _lowest_commanded(wheels: tuple[DrivenWheel, DrivenWheel]) -> _Limit:
+    """The lower limit of what <ros2_control> lets the two joints be given."""
+    value, name = min((wheel.joint.commanded or math.inf, wheel.joint.name) for wheel in wheels)
+    return _Limit(value, f"the limit of joint {name} in <ros2_control>, {value:.7g} rad/s")
 
 
 def seven_digits(value: float) -> float:

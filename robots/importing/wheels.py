@@ -55,11 +55,10 @@ def driven_wheels(
     """
     if (left is None) != (right is None):
         raise InputError("--left, --right: give both or none")
-    plugin = [model.drive.get(f"{side}_joint") or model.drive.get(f"{side}Joint") for side in ("left", "right")]
     if left is not None and right is not None:
         names: tuple[str, str] | None = (left, right)
     else:
-        names = (plugin[0], plugin[1]) if plugin[0] and plugin[1] else None
+        names = _named_in_file(model)
     if names is not None:
         pair = (
             _wheel(model, _joint_called(model, names[0]), radius),
@@ -68,8 +67,19 @@ def driven_wheels(
         if not _on_one_axle(*pair):
             why = _unlike(pair) or f"{names[0]} and {names[1]} are no two wheels on one axle"
             raise input_error(str(model.source), why)
-        return pair
+        return pair if left is not None or _from_plugin(model) else _in_order(model, pair)
     return _in_order(model, _only_pair(model, radius))
+
+
+def _named_in_file(model: UrdfModel) -> tuple[str, str] | None:
+    """The joints that the drive plugin drives, left first, or the only two that <ros2_control> does; None: to be found."""
+    commanded = [joint.name for joint in model.joints.values() if joint.commanded is not None]
+    return _from_plugin(model) or ((commanded[0], commanded[1]) if len(commanded) == 2 else None)
+
+
+def _from_plugin(model: UrdfModel) -> tuple[str, str] | None:
+    left, right = (model.drive.get(f"{side}_joint") or model.drive.get(f"{side}Joint") for side in ("left", "right"))
+    return (left, right) if left and right else None
 
 
 def _joint_called(model: UrdfModel, name: str) -> UrdfJoint:

@@ -207,6 +207,48 @@ def test_wheels_of_different_radii_are_named_with_both(tmp_path: Path) -> None:
             assert says in str(caught.value)
 
 
+CONTROL = (
+    '<ros2_control name="all" type="system">'
+    '<joint name="{}"><command_interface name="velocity">{}</command_interface><state_interface name="velocity"/></joint>'
+    '<joint name="{}"><command_interface name="velocity"/></joint></ros2_control></robot>'
+)
+
+
+def test_ros2_control_names_the_driven_wheels_and_their_limit(tmp_path: Path) -> None:
+    """Of four wheels on two axles those that it drives by speed; the right one comes first in the file."""
+    most = '<param name="min">-9</param><param name="max">5</param>'
+    control = CONTROL.format("rear_right_wheel", most, "rear_left_wheel")
+    text = re.sub(r"<gazebo>.*</gazebo>", "", (FIXTURES / "husky.urdf").read_text(), flags=re.DOTALL)
+    path = tmp_path / "driven.urdf"
+    path.write_text(text.replace("</robot>", control))
+    found = import_urdf(path)
+    assert found.robot.footprint.bounds == pytest.approx((-0.239, -0.335, 0.751, 0.335), abs=1e-3)
+    assert (found.robot.max_wheel_speed, found.robot.max_speed) == (5.0, pytest.approx(5 * 0.1651))
+    assert comments(found)["max_wheel_speed"] == "read: the limit of joint rear_right_wheel in <ros2_control>, 5 rad/s"
+    for joint, limit, says in (
+        ("rear_wrong_wheel", most, "<ros2_control> drives joint 'rear_wrong_wheel', which there is not"),
+        (
+            "rear_right_wheel",
+            '<param name="max">-5</param>',
+            "max in <ros2_control> must be a number above 0, got '-5'",
+        ),
+        ("rear_right_wheel", '<param name="max">fast</param>', "must be a number above 0, got 'fast'"),
+        ("front_left_wheel", "", "front_left_wheel and rear_left_wheel are no two wheels on one axle"),
+    ):
+        path.write_text(text.replace("</robot>", CONTROL.format(joint, limit, "rear_left_wheel")))
+        with pytest.raises(InputError, match=re.escape(says)):
+            import_urdf(path)
+
+
+def test_a_wheel_that_is_a_little_askew_adds_no_corners(tmp_path: Path) -> None:
+    """Quarter turns are often written 1.57, which tilts a wheel by 0.8 mrad."""
+    straight, askew = (
+        import_urdf(changed(tmp_path, "burger.urdf", ("-1.5707963", turn))) for turn in ("-1.5707963", "-1.57")
+    )
+    assert len(askew.robot.footprint.corners) == len(straight.robot.footprint.corners) == 8
+    assert askew.robot.footprint.bounds == pytest.approx(straight.robot.footprint.bounds, abs=1e-4)
+
+
 def test_a_limit_below_any_robots_is_refused_and_not_replaced(tmp_path: Path) -> None:
     with pytest.raises(
         InputError, match=r"max_speed: must be at least 0\.05, got 0\.0165 \(computed: the velocity limit"
