@@ -21,7 +21,8 @@ from antdrive.worlds.formats.xml import parse_xml
 from antdrive.worlds.optional import optional
 from antdrive.worlds.types import Floats
 
-CIRCLE = np.exp(2j * math.pi * np.arange(96) / 96) / math.cos(math.pi / 96)  # around a circle of radius 1
+# Around a circle of radius 1, with sides ahead, behind, to the left and to the right: it is as long and as wide as the circle.
+CIRCLE = np.exp(2j * math.pi * (np.arange(96) + 0.5) / 96) / math.cos(math.pi / 96)
 MOST_LINKS = 10_000
 
 
