@@ -205,6 +205,7 @@ def legend_entries(
     *,
     planning: bool = False,
     replans: bool = False,
+    beams: bool = False,
     sight: bool = False,
     followed: bool = False,
 ) -> list[LegendEntry]:
@@ -216,7 +217,8 @@ def legend_entries(
         pixel: the width of a pixel in the middle of the picture [m]
         planning: the picture shows planning, not a drive
         replans: the robot replanned during the run
-        sight: the picture shows what the robot has seen
+        beams: the picture shows what the lidar sees
+        sight: it shows what a robot without a map has seen
         followed: it shows the movers that the robot follows with its lidar
     """
     if planning:
@@ -230,9 +232,10 @@ def legend_entries(
         found.append(LegendEntry("zone", ZONE, f"inflated by {scene.inflate:.2f} m"))
     if scene.unseen.any():
         found.append(LegendEntry("dot", UNSEEN, "placed after planning"))
+    if beams:
+        found.append(LegendEntry("zone", BEAM, "beams of the lidar"))
     if sight:
         found += [
-            LegendEntry("zone", BEAM, "beams of the lidar"),
             LegendEntry("dot", HIT, "hit, on the robot's map"),
             LegendEntry("hatch", HATCH, "never seen"),
         ]

@@ -30,9 +30,8 @@ from antdrive.sim.view.film.overlay import (
     legend_rows,
 )
 from antdrive.sim.view.film.replay import ReplanEvent, Replay
-from antdrive.sim.view.film.sight import SightPainter
+from antdrive.sim.view.film.sight import FanPainter, SightPainter
 from antdrive.sim.view.film.text import Sprite, burst, label
-from antdrive.sim.view.recollection import Recollection
 from antdrive.sim.view.scene import Scene
 from antdrive.sim.view.style import CONTACT, GOAL, ROUTE, START, VERDICTS, Colour
 
@@ -75,10 +74,9 @@ class Shot:
         self.scene = scene = Scene.of(rollout)
         self.outcome = rollout.outcome
         self._follows = camera == "follow"
-        self._sight = None
         self._follows_movers = not planning and len(rollout.tracks) > 0
-        if not planning and len(rollout.scans):
-            self._sight = SightPainter(Recollection(rollout), scene)
+        self._sight = SightPainter(rollout, scene) if not planning and not scene.mapped and len(rollout.scans) else None
+        self._fan = self._sight or (FanPainter(rollout) if not planning and len(rollout.scans) else None)
         replans = not planning and any(event.caption for event in self.replay.replans)
         legend = self._lay_out(rollout, camera, size, planning=planning, replans=replans, bare=bare)
         planner = rollout.record.planner.name
@@ -86,14 +84,14 @@ class Shot:
         fields = PLAN_FIELDS if planning else DRIVE_FIELDS
         self._band = Band(self._layout, scene.name, subtitle, None if planning else note, legend, fields)
         fine = 3 if size[0] * size[1] <= 400_000 and not self._follows else 2
-        fixed = not (planning or self.replay.replans or self._sight)  # a route that changes is drawn in every frame
+        fixed = not (planning or self.replay.replans or self._fan)  # a route that changes is drawn in every frame
         self._compositor = Compositor(
             scene,
             self._camera,
             route=rollout.route[: None if fixed else 0],
             fine=fine,
             moving_camera=self._follows,
-            sight=self._sight,
+            sight=self._fan,
         )
         self._replan_caption = REPLAN_CAPTION * speed
         self._route, self._replans_shown = rollout.route, 0
@@ -105,7 +103,11 @@ class Shot:
         self, rollout: Rollout, camera: str, size: tuple[int, int], *, planning: bool, replans: bool, bare: bool
     ) -> LegendRows:
         """Choose layout, camera and legend: a card in a corner or, if it would cover the world, rows of the band."""
-        sight, followed = self._sight is not None, self._follows_movers
+        shows = {
+            "beams": self._fan is not None,
+            "sight": self._sight is not None,
+            "followed": self._follows_movers,
+        }
         for rows in range(1 + MOST_LEGEND_ROWS):
             layout = Layout.of(size, rows)
             if rows > 1 and layout.height > MOST_BAND * size[1]:
@@ -113,9 +115,7 @@ class Shot:
             self._layout = layout
             self._camera = self._aim(camera, rollout, (size[0], size[1] - (0 if bare else layout.height)))
             step, pixel = grid_step(self._camera), self._camera.pixel
-            entries = legend_entries(
-                self.scene, step, pixel, planning=planning, replans=replans, sight=sight, followed=followed
-            )
+            entries = legend_entries(self.scene, step, pixel, planning=planning, replans=replans, **shows)
             legend = legend_rows(entries, layout)
             self._legend = None if rows or bare else legend_card(entries, layout)
             if bare or (legend.whole if self._legend is None else self._fits_beside_world(self._legend)):
@@ -125,7 +125,7 @@ class Shot:
     def __enter__(self) -> Shot:
         self._compositor.__enter__()
         self._add_labels()
-        if self.replay.replans or self._sight:
+        if self.replay.replans or self._fan:
             self._show_route(0)
         return self
 
@@ -173,8 +173,8 @@ class Shot:
             compositor.set_camera(self._camera.moved(*replay.camera_target(at)))
         self.extend_trail(at)
         count = replay.replan_count(at)
-        if self._sight is not None:
-            self._sight.advance(at)
+        if self._fan is not None:
+            self._fan.advance(at)
         if count != self._replans_shown or self._sight is not None:
             self._show_route(count)
         followed = self._followed(at) if self._follows_movers else None
