@@ -21,7 +21,8 @@ say what a page needs:
 `--all` runs every page with code (`pages_with_code`), `--jobs 2` two at a time. `--kept FILE` keeps what ran without a
 fault and leaves a page out while it and the code are as they were then. `--update` writes what was printed into the
 page, apart from outputs with `...` that agree. `--times FILE` writes how long each page ran into the last column of FILE's
-table of pages: processor time, which other work on the machine does not change much.
+table of pages: processor time, which other work on the machine does not change much, with a process for each command, as
+in a reader's shell.
 """
 
 from __future__ import annotations
@@ -58,6 +59,7 @@ TESTED = {
 }
 COMPILING = "antdrive: compiling the planners"  # what only the first command of an installation says
 WIDTH = "100"  # of the terminal that commands believe in
+APART = "ANTDRIVE_PAGES_APART"  # the environment's variable with which each command gets a process of its own
 LIMIT = 1200.0  # how long a page may run [s]: it ends what hangs, while the slowest page takes one minute
 
 
@@ -156,6 +158,8 @@ def declared(wanted: str) -> tuple[int, str]:
 
 def run_words(words: list[str]) -> tuple[int, str]:
     """Run a command; its exit code and what it printed."""
+    if words[0] == "antdrive" and os.environ.get(APART):
+        words = ["python", "-m", *words]
     if words[0] == "antdrive":
         out = io.StringIO()
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):
@@ -396,6 +400,8 @@ def main(words: list[str]) -> int:
     kept = json.loads(given.kept.read_text()) if given.kept and given.kept.exists() else {}
     keys = {page.resolve(): digest_of([page]) + code for page in pages}
     failed, times = False, {}
+    if given.times:
+        os.environ[APART] = "yes"
     for page, took in run_pages([path for path, key in keys.items() if kept.get(str(path)) != key], given.jobs):
         if given.update:
             page.update()
@@ -409,6 +415,7 @@ def main(words: list[str]) -> int:
             kept[str(page.path)] = keys[page.path]
             given.kept.parent.mkdir(parents=True, exist_ok=True)
             given.kept.write_text(json.dumps(kept))
+    os.environ.pop(APART, None)
     if given.times and not failed:
         given.times.write_text(with_times(given.times.read_text(encoding="utf-8"), times), encoding="utf-8")
     return int(failed)
