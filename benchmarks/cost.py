@@ -28,8 +28,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from tools.shared_data import BARN
+
 HERE = Path(__file__).parent.parent
-BARN = HERE.parent / "shared" / "data" / "barn" / "barn50.tar.xz"
 SIZES = ((640, 480), (1280, 720))
 MOVERS = (0, 6, 24)
 PLANNER, ROBOT = "astar", "jackal"
