@@ -19,8 +19,8 @@ from antdrive.robots import RobotSpec, list_robots, load_robot
 from antdrive.robots.importing.urdf import import_urdf
 from antdrive.sim import Scenario, run
 from antdrive.worlds import Task, import_barn
-from benchmarks.drives import BARN
 from benchmarks.planners import table
+from tools.shared_data import BARN
 
 URDF = Path(__file__).parent.parent / "tests" / "robots" / "importing" / "urdf"
 WORLD = "world_0.world"
