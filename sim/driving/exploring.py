@@ -30,6 +30,7 @@ from antdrive.planners.plan import Cell
 from antdrive.robots import PurePursuit, RobotSpec, TrackedPath
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex
 from antdrive.sim.driving import _kernels_hits
+from antdrive.sim.driving.own_map import PATIENCE
 from antdrive.sim.driving.replanning import STRAYED, Replan, ReplanPolicy
 from antdrive.sim.driving.survey import Survey
 from antdrive.sim.log.scans import scans_logged
@@ -49,7 +50,6 @@ CORRIDOR = 1.2  # a route is smoothed among what lies within this distance of th
 SAMPLES = 0.06  # spacing of the places on a route at which speed limits and lookaheads are worked out [m]
 SPARE = 0.25  # the controller knows what lies this much farther away than its longest arcs lead [m]
 INTERVAL = 0.15  # the shortest time between two plans [s]
-PATIENCE = 3  # plans in a row that find no path before the robot no longer believes what it saw long ago
 LOOK_AT_ROUTE = 0.1  # spacing of the points of a route that are looked at [m]
 FORGIVING = 0.005  # the arcs of a disc may come this much closer to what was hit than in a known world [m]
 CORNERED = 0.1  # and those of a rectangle by this share more of what its corners stand out [m/m]
