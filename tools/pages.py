@@ -4,8 +4,8 @@ Blocks of a page run from top to bottom in one empty folder, Python's in one nam
 
 - `python`: what it prints is compared with a block `text` that follows directly.
 - `console`: lines that begin with `$ ` are commands, the others what they print. `|| echo ...` says that a command must
-  fail, `> FILE` writes to a file. Commands are `antdrive`, which runs in this process, `python`, `pytest`, and some of
-  the shell's.
+  fail, with exit code 1 or with the one that `echo "exit code 2"` names; `> FILE` writes to a file. Commands are
+  `antdrive`, which runs in this process, `python`, `pytest`, and some of the shell's.
 - `sh`: every line is a command, and its output does not matter.
 - `yaml`, `toml` and others: written to FILE after a comment `<!-- file: FILE -->`, or added to its end after
   `<!-- added to: FILE -->`; a `python` block after such a comment is, too, and is not run by itself.
@@ -184,12 +184,14 @@ def run_command(command: str) -> tuple[bool, str]:
     head, fails, said = line.partition("||")
     head, _, target = head.partition(" > ")
     code, printed = run_words(shlex.split(head))
+    named = re.search(r"exit code (\d)", said)
+    right = (int(named[1]) if named else 1) if fails else 0
     if target:
         Path(target.strip()).write_text(printed)
         printed = ""
-    if fails and code == 1:
+    if fails and code == right:
         printed += " ".join(shlex.split(said)[1:]) + "\n"
-    return code == (1 if fails else 0), printed
+    return code == right, printed
 
 
 def write(block: Block) -> None:

@@ -56,6 +56,12 @@ def test_a_page_runs_from_top_to_bottom_and_wrong_input_is_no_failed_drive(tmp_p
     assert "nowhere.yaml" in problems[0]
 
 
+def test_a_page_may_name_the_exit_code_with_which_a_command_must_fail(tmp_path: Path) -> None:
+    text = '```console\n$ antdrive schema nonsense || echo "exit code {0}"\n...exit code {0}\n```\n'
+    assert run_page(page(tmp_path, text.format(2))).problems == []
+    assert len(run_page(page(tmp_path, text.format(3))).problems) == 1
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [
