@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import inspect
 import json
+import re
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, ClassVar
 
@@ -65,8 +66,9 @@ def rows_of(schema: Mapping[str, Any]) -> Iterable[Row]:
 
 
 def told(text: str) -> str:
-    """A description as reST: its line breaks are spaces, its asterisks no emphasis."""
-    return " ".join(text.split()).replace("*", "\\*").replace("|", "\\|")
+    """A description as reST: its line breaks are spaces, its asterisks no emphasis, and "K. Han" begins no list."""
+    words = " ".join(text.split()).replace("*", "\\*").replace("|", "\\|")
+    return re.sub(r"^(\w+)([.)]) ", r"\1\\\2 ", words)
 
 
 def schema_of(kind: str) -> dict[str, Any]:
