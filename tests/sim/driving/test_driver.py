@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from antdrive.planners import Query, load_planner, smooth
-from antdrive.robots import PurePursuit, PursuitState, RobotSpec, Twist, load_robot
+from antdrive.robots import LIMITERS, AvoidanceState, PurePursuit, PursuitState, RobotSpec, Twist, load_robot
 from antdrive.sim import Outcome, Perception
 from antdrive.sim.driving.blocking import blocked_cells, covered_discs
 from antdrive.sim.driving.driver import STUCK_PROGRESS, STUCK_TIME, Driver, StuckClock, _brake
@@ -99,6 +99,24 @@ def test_standing_at_the_routes_end_ends_the_drive_by_the_distance_to_the_goal(t
         assert ending is not None
         assert ending.outcome is outcome
         assert ("0.300 m from the goal" in ending.reason) == (outcome is Outcome.STUCK)
+
+
+def test_a_robot_that_avoids_a_mover_at_the_goal_stops_there_even_where_sight_holds_its_speed(
+    turtlebot: RobotSpec,
+) -> None:
+    """Local avoidance goes on for ever, and slowly, because the robot sees too little there."""
+    alone = driver(turtlebot)
+    calm: Any = SimpleNamespace(
+        prediction_times=np.arange(3.0), step=1.0, avoid=lambda *_, **__: (Twist(0.5, 0.0), True, AvoidanceState())
+    )
+    caution: Any = SimpleNamespace(limit=lambda *_: (Twist(0.005, 0.0), True))
+    nobody = Predictor(Trajectories.of(HALL, TASK.start[:2]), Perception(), 60)
+    robot = Driver(PurePursuit(), alone.tracked, TASK, turtlebot, 60, calm, nobody, None, caution)
+    at_goal = (*TASK.goal, 0.0)
+    robot.pursuit = PursuitState(arc=robot.tracked.length - 0.5)
+    endings = [robot.decide(tick, at_goal, State(*at_goal, 0.0, 0.0)) for tick in range(2)]
+    assert robot.pursuit.limiter != LIMITERS.index("avoid")
+    assert [ending and ending.outcome for ending in endings] == [None, Outcome.SUCCEEDED]
 
 
 class OneReplan:
