@@ -80,6 +80,9 @@ class PotentialFieldAnts(IterativePlanner):
         backtrack: whether an ant in a dead end steps back until it finds another way; otherwise it starts
             again
         shortcut: whether paths are cut short where they pass next to an earlier part of themselves
+
+    Raises:
+        FieldError: an option is out of range; names it and what would be right.
     """
 
     ants: int = 500

@@ -36,7 +36,7 @@ from antdrive.sim.driving.movers_ahead import MoversAhead
 from antdrive.sim.driving.replanning import STRAYED, Replan, ReplanPolicy
 from antdrive.sim.driving.survey import Survey
 from antdrive.sim.driving.traffic import Zone
-from antdrive.sim.log.scans import millimetres
+from antdrive.sim.log.scans import scans_logged
 from antdrive.worlds import Bounds, Disc, Floats, Grid, Pose, Route, Task, World, point_clearance, rasterise
 from antdrive.worlds.world import PointWorld
 
@@ -396,12 +396,10 @@ class Exploration:
             per_tick: rows of the log in a control period
             rows: of the log
         """
-        scans = [scan for scan in self.survey.scans if scan.tick * per_tick < rows]
         seen = [(tick, discs) for tick, discs in self._seen if tick * per_tick < rows]
         tables = [np.column_stack((np.full(len(discs), tick * per_tick), discs)) for tick, discs in seen]
         return {
-            "scans": millimetres(np.array([scan.ranges for scan in scans])),
-            "scan_rows": np.array([scan.tick * per_tick for scan in scans], dtype=np.int32),
+            **scans_logged(((scan.tick, scan.ranges) for scan in self.survey.scans), per_tick, rows),
             "seen": np.concatenate(tables).astype(np.float32) if tables else np.empty((0, 4), dtype=np.float32),
         }
 

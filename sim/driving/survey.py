@@ -83,8 +83,7 @@ class Senses:
             tick: the number of the control period
             last: the control period of the scan before
         """
-        per_tick = self.scanner.lidar.rate / self.hz
-        return last < 0 or (tick != last and math.floor(tick * per_tick) != math.floor((tick - 1) * per_tick))
+        return last < 0 or (tick != last and self.scanner.lidar.due(tick, self.hz))
 
     def ranges(self, tick: int, pose: Pose) -> Floats:
         """A scan (beams,) [m].

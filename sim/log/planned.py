@@ -167,7 +167,9 @@ def _check_movers_known(rollout: Rollout) -> Iterator[str]:
         yield f"record.perception: must {'not ' if moving else ''}be null {'among' if moving else 'without'} movers"
     if len(rollout.tracks) and not watching:
         yield "tracks: must be empty, since the robot did not look for movers with its lidar"
-    elif len(rollout.tracks) and not (rollout.tracks[:, 6] > 0).all():
+    if len(rollout.scans) and not (watching or record.exploring):
+        yield "scans: must be empty, since the robot did not use its lidar"
+    if watching and len(rollout.tracks) and not (rollout.tracks[:, 6] > 0).all():
         yield "tracks: radii must be greater than 0"
     for key in ("avoidance", "replanning"):
         if getattr(record, key) is not None and not moving and not (key == "replanning" and record.exploring):

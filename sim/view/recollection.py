@@ -12,7 +12,7 @@ from antdrive.sim.driving.survey import MAP_CELL, RECENT, horizon_of
 from antdrive.sim.log.frames import frame_at
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.scans import ranges_of
-from antdrive.sim.log.sights import Beams, beams_of, lidar_of, meet
+from antdrive.sim.log.sights import lidar_of, meet
 from antdrive.sim.sensing.mapping import OccupancyMap
 from antdrive.sim.sensing.tracking import SKIN
 from antdrive.worlds.types import Floats, Pose
@@ -122,11 +122,6 @@ class Recollection:
         points = self.map.endpoints(self._estimate(row), ranges)
         away = np.hypot(*(points[:, None] - movers[:, 2:4]).transpose(2, 0, 1)) - movers[:, 6]
         return np.asarray((away <= SKIN).any(axis=1))  # not a number where a beam met nothing
-
-    @property
-    def beams(self) -> Beams:
-        """The last scan that was entered."""
-        return beams_of(self._rollout, max(0, self._entered - 1))
 
     def _estimate(self, row: int) -> Pose:
         poses = self._rollout.estimate if len(self._rollout.estimate) else self._rollout.pose
