@@ -31,6 +31,7 @@ STUCK_TIME = 8.0  # a robot without progress for this long is stuck [s]
 STUCK_PROGRESS = 0.02  # what counts as progress along the route [m]
 GOAL_SHARE = 0.95  # a robot that avoids a mover may stop early within this fraction of the goal's tolerance
 DRIFTING_SHARE = 0.6  # and within this one, if it finds movers and its way by its lidar, and where it is by odometry
+BLIND_SHARE = 0.3  # of its top speed such a robot backs off where its lidar does not look, unless a mover is met then
 AVOIDING = LIMITERS.index("avoid")
 EXPLORING_LIMITERS = (*LIMITERS, "sight")  # the rules where the robot has no map
 OUT_OF_SIGHT = EXPLORING_LIMITERS.index("sight")
@@ -86,6 +87,8 @@ class Driver:
         self._avoidance, self._predictor, self._monitor = avoidance, predictor, monitor
         self._caution = caution
         self._drifts = isinstance(monitor, Exploration) and monitor.survey.watch is not None
+        blind = self._drifts and robot.lidar is not None and not robot.lidar.full_circle
+        self._backwards = BLIND_SHARE * robot.max_speed if blind else math.inf
         self._avoidance_state = AvoidanceState()
         self._avoids = False  # whether the last command avoided a mover, even if sight then held its speed
         self._clock = StuckClock()
@@ -207,6 +210,7 @@ class Driver:
             movers,
             radii,
             speed_limit=speed_limit,
+            backwards=self._backwards,
         )
         self._avoids = avoids or stopping
         if self._avoids:
