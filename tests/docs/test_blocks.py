@@ -26,7 +26,6 @@ PAGES = [
 BLOCKS = [(page.relative_to(ROOT).as_posix(), block) for page in PAGES for block in blocks_of(page.read_text())]
 #: The only blocks that nobody runs. Whoever adds one has a reason that nothing here can remove.
 NOT_RUN = [
-    ("docs/explanation/unknown-worlds.md", "they need the worlds of the BARN challenge"),
     ("docs/how-to/barn.md", "they need the worlds of the BARN challenge"),
     ("docs/how-to/barn.md", "they need the worlds of the BARN challenge"),
     ("docs/how-to/cluster.md", "they need a cluster with Slurm"),
