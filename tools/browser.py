@@ -41,8 +41,9 @@ PROBE = """async () => {
     const name = film.getAttribute("src");
     film.muted = true;
     try { await film.play(); } catch (error) { wrong.push(`${name}: does not play: ${error.message}`); continue; }
-    for (let k = 0; k < 100 && !(film.currentTime > 0.1); k++) await wait(50);
-    if (film.readyState < 3 || !(film.currentTime > 0.1)) wrong.push(`${name}: stands still at ${film.currentTime} s`);
+    const runs = () => film.readyState >= 3 && film.currentTime > 0.1;
+    for (let k = 0; k < 200 && !runs(); k++) await wait(50);
+    if (!runs()) wrong.push(`${name}: stands still at ${film.currentTime} s`);
     film.pause();
   }
   const wide = document.documentElement.scrollWidth;

@@ -2,7 +2,8 @@
 
 README and pages are read where no build has run, so these pictures are kept in the repository; the figures and films of the
 gallery are made by each build of the site. Names choose some of them: `python -m tools.pictures plaza report`. The report's
-picture needs a Chromium. `FROM_PAPERS` are copied from what `antdrive reproduce PAPER` writes.
+picture needs a Chromium. `FROM_PAPERS` are copied from what `antdrive reproduce PAPER` writes, and `BY_HAND` show other
+programs.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ from antdrive.worlds.world import Disc
 PICTURES = Path(__file__).resolve().parents[1] / "docs" / "pictures"
 SIZE = (1120, 630)  # of most of them [px]
 FROM_PAPERS = ("hasan-maps.png", "ibraheem2016-history.png", "lee2008-maps.png")
+BY_HAND = ("foxglove.webp",)
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 
