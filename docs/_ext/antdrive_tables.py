@@ -168,7 +168,7 @@ def worlds() -> list[str]:
         rows.append(
             (
                 f"``{name}``",
-                f"{wide:g} × {high:g} m",
+                f"{wide:g}\u00a0×\u00a0{high:g}\u00a0m",
                 str(len(world.obstacles)),
                 str(len(world.movers)),
                 told(world.source or ""),

@@ -12,11 +12,10 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from antdrive.robots import RobotSpec
-from antdrive.sim.driving.exploring import PATIENCE
 from antdrive.sim.driving.lookout import Glances
+from antdrive.sim.driving.own_map import forgetting_ticks
 from antdrive.sim.driving.survey import Senses, Survey
 from antdrive.sim.driving.watching import Watch
-from antdrive.sim.log.record import DriveRecord, ReplanRecord
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.scans import millimetres
 from antdrive.worlds import Floats, Pose, Task, Trajectories, World
@@ -161,21 +160,3 @@ def _other_scans(rollout: Rollout, taken: Iterable[tuple[int, Floats]]) -> Itera
             continue
         yield f"replay: scans are not what the lidar measures from the logged poses, from t = {rollout.t[row]:.3f} s"
         return
-
-
-def forgetting_ticks(record: DriveRecord) -> Iterator[int]:
-    """The control periods in which a robot without a map forgot what it had seen: after some plans in a row found no path.
-
-    Args:
-        record: of the log
-    """
-    failures = 0
-    for replan in record.replans:
-        if failures >= PATIENCE:
-            failures = 0
-            yield _tick(record, replan)
-        failures = 0 if replan.solved else failures + 1
-
-
-def _tick(record: DriveRecord, replan: ReplanRecord) -> int:
-    return round(replan.t * record.control_hz)
