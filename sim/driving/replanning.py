@@ -38,7 +38,7 @@ from antdrive.sim.driving.blockage import Blockage
 from antdrive.sim.driving.blocking import blocked_cells, close_route, covered_discs, with_obstacles
 from antdrive.sim.driving.perception import Predictor
 from antdrive.sim.driving.schedule import Schedule
-from antdrive.sim.driving.traffic import Zone, traffic_of
+from antdrive.sim.driving.traffic import Traffic, Zone
 from antdrive.worlds import Disc, Floats, Grid, Pose, Route, Task, rasterise
 from antdrive.worlds.errors import FieldError
 
@@ -165,7 +165,7 @@ class ReplanMonitor:
         self._replanned_at = -math.inf
         self._waiting_since = math.nan
         learns = policy.around_movers and predictor.guesses and not self._timed
-        self._traffic = traffic_of(predictor, robot, task.world.bounds, hz) if learns else None
+        self._traffic = Traffic(predictor, robot.radius, task.world.bounds, hz) if learns else None
         self.blockage = Blockage(
             self._task, grid, predictor, hz, interval=policy.min_interval, patience=policy.patience, keeps=keeps
         )

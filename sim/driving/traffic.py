@@ -135,20 +135,6 @@ class TrackedTraffic(Traffic):
         return float((2 * (radii + self._radius) * speeds)[counts].sum())
 
 
-def traffic_of(predictor: Predictor, robot: RobotSpec, bounds: Bounds, hz: int) -> Traffic:
-    """What learns where movers roam: from what is told of them, or from what the robot's lidar shows.
-
-    Args:
-        predictor: what the robot perceives
-        robot: the robot
-        bounds: the world's walls [m]
-        hz: control periods per simulated second
-    """
-    if isinstance(predictor, TrackedPredictor):
-        return TrackedTraffic(predictor, robot, hz)
-    return Traffic(predictor, robot.radius, bounds, hz)
-
-
 class Zone:
     """A box that movers roam, grown by their radius and the grid's inflation, with ways kept open into it.
 

@@ -15,7 +15,7 @@ from antdrive.robots import RobotSpec
 from antdrive.sim import Perception, ReplanPolicy, Scenario, run
 from antdrive.sim.driving.movers_ahead import SLACK, MoversAhead
 from antdrive.sim.driving.replanning import OBSTRUCTED, TRAFFIC, WAITED
-from antdrive.sim.driving.traffic import FADING, FAST, TrackedTraffic, Traffic, traffic_of
+from antdrive.sim.driving.traffic import FADING, FAST, TrackedTraffic
 from antdrive.sim.driving.watching import TrackedPredictor
 from antdrive.sim.sensing import TrackedMovers
 from antdrive.sim.unknown import exploration_of
@@ -48,9 +48,7 @@ class Seen:
 
 def traffic_seen(robot: RobotSpec) -> tuple[TrackedTraffic, Seen]:
     watch: Any = Seen()
-    traffic = traffic_of(TrackedPredictor(watch, LIDAR, 60), robot, HALL.bounds, 60)
-    assert isinstance(traffic, TrackedTraffic)
-    return traffic, watch
+    return TrackedTraffic(TrackedPredictor(watch, LIDAR, 60), robot, 60), watch
 
 
 def ahead(robot: RobotSpec, hits: Floats | None = None, **policy: float) -> tuple[MoversAhead, Seen]:
@@ -102,14 +100,6 @@ def test_the_rate_counts_fast_movers_in_reach_on_the_ground_in_sight(jackal: Rob
         watch.see([], tick=tick)
         traffic.look(tick, POSE[:2])
     assert traffic.rate(0, POSE[:2]) == pytest.approx(expected * math.exp(-1), rel=1e-3)
-
-
-def test_what_is_told_of_movers_makes_traffic_as_before(jackal: RobotSpec) -> None:
-    world = dataclasses.replace(HALL, movers=(Keyframed(radius=0.4, keyframes=((0.0, 4.0, 3.0), (5.0, 4.0, 9.0))),))
-    scenario = Scenario(task=dataclasses.replace(TASK, world=world), planner=load_planner("astar"), robot=jackal)  # type: ignore[call-arg]
-    from antdrive.sim.driving.perception import Predictor
-
-    assert type(traffic_of(Predictor(scenario.trajectories, Perception(), 60), jackal, HALL.bounds, 60)) is Traffic
 
 
 @settings(max_examples=25)
@@ -236,4 +226,3 @@ def test_a_robot_without_a_map_drives_round_busy_ground(jackal: RobotSpec) -> No
     assert done.succeeded, (done.outcome, done.reason)
     middle = done.rollout.pose[np.abs(done.rollout.pose[:, 0] - 8.0) < 2.0]
     assert np.abs(middle[:, 1] - 9.0).min() > 4.0
-    assert "traffic" in {replan.trigger for replan in done.rollout.record.replans}
