@@ -28,7 +28,7 @@ from antdrive.planners import (
 )
 from antdrive.planners.plan import Cell
 from antdrive.robots import PurePursuit, RobotSpec, TrackedPath
-from antdrive.robots.control._kernels_obstacles import ObstacleIndex
+from antdrive.robots.control.pursuit import unsorted
 from antdrive.sim.driving import _kernels_hits
 from antdrive.sim.driving.replanning import STRAYED, Replan, ReplanPolicy
 from antdrive.sim.driving.survey import Survey
@@ -50,6 +50,7 @@ SAMPLES = 0.06  # spacing of the places on a route at which speed limits and loo
 SPARE = 0.25  # the controller knows what lies this much farther away than its longest arcs lead [m]
 INTERVAL = 0.15  # the shortest time between two plans [s]
 PATIENCE = 3  # plans in a row that find no path before the robot no longer believes what it saw long ago
+COVERS = 1e-3  # what was hit so near to the robot or to its goal covers it [m]
 LOOK_AT_ROUTE = 0.1  # spacing of the points of a route that are looked at [m]
 FORGIVING = 0.005  # the arcs of a disc may come this much closer to what was hit than in a known world [m]
 CORNERED = 0.1  # and those of a rectangle by this share more of what its corners stand out [m/m]
@@ -180,9 +181,8 @@ class Exploration:
         key = self.survey.map, len(self.survey.scans), pose, bounds
         if self._known_as[0] == key:
             return self._known_as[1]
-        discs = self.survey.discs(bounds)
-        for point in (pose[:2], self._task.goal):  # what covers the robot or the goal is an error of the map
-            discs = discs[np.hypot(discs[:, 0] - point[0], discs[:, 1] - point[1]) > discs[:, 2] + 1e-3]
+        ends = np.array((pose[:2], self._task.goal))
+        discs = _kernels_hits.beside(self.survey.discs(bounds), ends, COVERS)  # what covers one is an error of the map
         known = dataclasses.replace(self._task, world=_world(bounds, discs), start=pose)
         self._known_as = key, known
         return known
@@ -219,7 +219,7 @@ class Exploration:
         robot = self._robot
         self._indexed = -1  # the path knows the obstacles along the route, and is to know those near the robot
         tolerance = self._task.goal_tolerance
-        tracked = self._controller.prepare(route, world, robot, margin, 1 / self._hz, tolerance, SAMPLES)
+        tracked = self._controller.prepare(route, world, robot, margin, 1 / self._hz, tolerance, SAMPLES, indexed=False)
         foot, tuning = robot.footprint, tracked.tuning
         give = FORGIVING + CORNERED * (robot.radius - min(foot.half_length, foot.half_width) - foot.rounding)
         return dataclasses.replace(
@@ -242,8 +242,7 @@ class Exploration:
         x, y, _ = pose
         near = self._controller.lookahead_max + tracked.tuning.lookahead_clearance + SPARE
         discs = self.survey.discs((x - near, y - near, x + near, y + near))
-        index = ObstacleIndex(discs, np.array([0, len(discs)]), tracked.obstacles.bounds, 1e6)
-        return tracked.among(index)
+        return tracked.among(unsorted(discs, tracked.obstacles.bounds))
 
     def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
         """Why a new route is due now; empty if none is.
