@@ -122,16 +122,38 @@ def segment_clearance(ax: float, ay: float, bx: float, by: float, discs: Array, 
 @kernel
 def boxed_clearance(ax: float, ay: float, bx: float, by: float, discs: Array, boxes: Array, bounds: Array) -> float:
     """`segment_clearance` of a segment among discs with the rectangles around them."""
-    best = min(wall_distance(ax, ay, bounds), wall_distance(bx, by, bounds))
-    mx, my, half = 0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * math.hypot(bx - ax, by - ay) + ROUNDING
+    return clearance_up_to(math.inf, ax, ay, bx, by, discs, boxes, bounds)
+
+
+@kernel
+def clearance_up_to(
+    most: float, ax: float, ay: float, bx: float, by: float, discs: Array, boxes: Array, bounds: Array
+) -> float:
+    """The same, or `most` if that is less: what is farther away is hardly looked at."""
+    best = min(most, min(wall_distance(ax, ay, bounds), wall_distance(bx, by, bounds)))
+    x_min, x_max, y_min, y_max = min(ax, bx), max(ax, bx), min(ay, by), max(ay, by)
     for b in range(boxes.shape[0]):
-        if is_beyond(best + half, mx, my, boxes[b]):
+        dx = max(max(boxes[b, 0] - x_max, x_min - boxes[b, 2]), 0.0)
+        dy = max(max(boxes[b, 1] - y_max, y_min - boxes[b, 3]), 0.0)
+        reach = best + ROUNDING
+        if reach >= 0.0 and dx * dx + dy * dy > reach * reach:
             continue
         for j in range(b * TOGETHER, min(discs.shape[0], (b + 1) * TOGETHER)):
-            dx, dy, reach = discs[j, 0] - mx, discs[j, 1] - my, best + discs[j, 2] + half
-            if dx * dx + dy * dy > reach * reach:
+            x, y, reach = discs[j, 0], discs[j, 1], best + discs[j, 2] + ROUNDING
+            dx, dy = max(max(x_min - x, x - x_max), 0.0), max(max(y_min - y, y - y_max), 0.0)
+            if reach < 0.0 or dx * dx + dy * dy > reach * reach:
                 continue
-            best = min(best, math.sqrt(segment_distance2(discs[j, 0], discs[j, 1], ax, ay, bx, by)) - discs[j, 2])
+            best = min(best, math.sqrt(segment_distance2(x, y, ax, ay, bx, by)) - discs[j, 2])
+    return best
+
+
+@kernel
+def polyline_clearance(xy: Array, discs: Array, bounds: Array) -> float:
+    """The least clearance of the segments of a polyline (N, 2), N >= 2."""
+    boxes = boxes_around(discs)
+    best = math.inf
+    for i in range(xy.shape[0] - 1):
+        best = clearance_up_to(best, xy[i, 0], xy[i, 1], xy[i + 1, 0], xy[i + 1, 1], discs, boxes, bounds)
     return best
 
 
@@ -167,8 +189,10 @@ def rasterise(
     for j in range(discs.shape[0]):
         grazes[j] = block_cells(discs[j, 0], discs[j, 1], discs[j, 2] + inflate, x0, y0, cell, cols, blocked)
     for r in range(rows):
-        for c in range(cols):
-            free[r, c] = free[r, c] and not blocked[r, c >> 6] >> np.uint64(c & 63) & ONE
+        for word in range(blocked.shape[1]):
+            bits = blocked[r, word]
+            for c in range(64 * word, min(64 * (word + 1), cols)):
+                free[r, c] &= (bits >> np.uint64(c & 63)) & ONE == 0
     for j in range(discs.shape[0]):
         if grazes[j]:
             close_rim(discs[j, 0], discs[j, 1], discs[j, 2] + inflate, x0, y0, cell, free, closed)
@@ -212,6 +236,10 @@ def block_cells(
         half = math.sqrt(radius2 - dy * dy)
         c_lo = max(0, int(math.floor((cx - half - x0) * per)))
         c_hi = min(cols - 1, int(math.ceil((cx + half - x0) * per)))
+        if c_lo <= c_hi and c_lo >> 6 == c_hi >> 6:
+            mask = cells_of(c_lo >> 6, c_lo, c_hi)
+            if blocked[r, c_lo >> 6] & mask == mask:
+                continue
         while c_lo <= c_hi:
             d2 = (x0 + c_lo * cell - cx) * (x0 + c_lo * cell - cx) + dy * dy
             if d2 <= radius2:
@@ -307,24 +335,23 @@ def close_rim(
 
 @kernel
 def allowed_moves(free: Array, closed: Array, moves: Array) -> None:
-    """Fill `moves` (all 0 before) with the masks of allowed moves; a diagonal needs both orthogonal neighbours free."""
+    """Fill `moves` with the masks of allowed moves; a diagonal needs both orthogonal neighbours free.
+
+    Without branches, so that many cells are taken at once.
+    """
     rows, cols = free.shape
+    wide = np.zeros((rows + 1, cols + 2), dtype=np.uint8)  # the free cells, with others around them
+    first = np.zeros((rows + 1, cols + 2), dtype=np.uint8)  # their moves E, NE, N and NW, with a row below
     for r in range(rows):
         for c in range(cols):
-            if not free[r, c]:
-                continue
-            shut = closed[r, c]
-            east, north = c + 1 < cols and free[r, c + 1], r + 1 < rows and free[r + 1, c]
-            if east and not shut & 1:
-                moves[r, c] |= 1
-                moves[r, c + 1] |= 16
-            if north:
-                if east and free[r + 1, c + 1] and not shut & 2:
-                    moves[r, c] |= 2
-                    moves[r + 1, c + 1] |= 32
-                if not shut & 4:
-                    moves[r, c] |= 4
-                    moves[r + 1, c] |= 64
-                if c > 0 and free[r, c - 1] and free[r + 1, c - 1] and not shut & 8:
-                    moves[r, c] |= 8
-                    moves[r + 1, c - 1] |= 128
+            wide[r, c + 1] = free[r, c]
+    for r in range(rows):
+        for c in range(cols):
+            here, east, north = wide[r, c + 1], wide[r, c + 2], wide[r + 1, c + 1]
+            diagonal = 2 * (east & wide[r + 1, c + 2]) | 8 * (wide[r, c] & wide[r + 1, c])
+            able = east | 4 * north | north * diagonal
+            first[r + 1, c + 1] = np.uint8(here * able) & ~closed[r, c]
+    for r in range(rows):
+        for c in range(cols):
+            below = (first[r, c] & 2) | (first[r, c + 1] & 4) | (first[r, c + 2] & 8)
+            moves[r, c] = first[r + 1, c + 1] | np.uint8(((first[r + 1, c] & 1) | below) << 4)

@@ -67,4 +67,5 @@ def polyline_clearance(world: World, xy: npt.ArrayLike) -> float:
     line = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
     if len(line) == 1:
         return float(point_clearance(world, line)[0])
-    return float(segment_clearance(world, line[:-1], line[1:]).min())
+    bounds = np.asarray(world.bounds, dtype=np.float64)
+    return float(_kernels.polyline_clearance(np.ascontiguousarray(line), world.discs, bounds))

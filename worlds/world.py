@@ -168,7 +168,8 @@ class PointWorld(World):
         Raises:
             FieldError: a value is not finite, or a radius is not positive.
         """
-        for row in np.flatnonzero(~(np.isfinite(discs).all(axis=1) & (discs[:, 2] > 0)))[:1].tolist():
+        if not (np.isfinite(discs).all() and (discs[:, 2] > 0).all()):
+            row = np.flatnonzero(~(np.isfinite(discs).all(axis=1) & (discs[:, 2] > 0)))[0]
             Disc(*discs[row].tolist())
         world = cls(name, bounds)
         del world.__dict__["obstacles"]
@@ -226,8 +227,7 @@ class Task:
         if not (xmin <= x <= xmax and ymin <= y <= ymax):
             raise FieldError(key, f"({x:g}, {y:g}) is out of bounds {list(self.world.bounds)}")
         discs = self.world.discs
-        # Distances of many at once may round otherwise, so they only say which cylinders are worth a look.
-        near = np.hypot(x - discs[:, 0], y - discs[:, 1]) <= discs[:, 2] * (1 + 1e-9)
+        near = (np.abs(x - discs[:, 0]) <= discs[:, 2]) & (np.abs(y - discs[:, 1]) <= discs[:, 2])
         for i in np.flatnonzero(near).tolist():
             disc = self.world.obstacles[i]
             if math.hypot(x - disc.x, y - disc.y) <= disc.radius:

@@ -17,8 +17,8 @@ from antdrive.worlds._kernels import (
     ROUNDING,
     TOGETHER,
     Array,
-    boxed_clearance,
     boxes_around,
+    clearance_up_to,
     doubled,
     doubled_rows,
     inline,
@@ -34,6 +34,7 @@ DEEP = 2e-10  # m: what enters a disc by less than this only touches it
 NOT_INSIDE = (
     1e-3  # m: a disc whose centre is farther away than radii allow by this is not within another, whatever the rounding
 )
+STRIPS = 64  # of the plane, by which segments are sorted
 LOOSE = -1e-11  # rad: a contact whose sweep is less than this does not bend the string
 NONE, OFF, HIT = range(3)  # events while a link turns: it reaches its target, leaves its disc, or meets another disc
 
@@ -191,18 +192,19 @@ def outermost(discs: Array) -> Array:
     """Which discs (N, 3) do not lie within another; of equal discs only the first is kept."""
     n = discs.shape[0]
     keep = np.ones(n, dtype=np.bool_)
-    order = np.argsort(discs[:, 0])  # so that those whose centres have nearly the same x are side by side
-    x = discs[order, 0]
+    axis = 1 if n > 0 and np.ptp(discs[:, 1]) > np.ptp(discs[:, 0]) else 0  # along which most discs are far apart
+    order = np.argsort(discs[:, axis])  # so that those whose centres have nearly the same place on it are side by side
+    x = discs[order, axis]
     largest = 0.0
     for i in range(n):
         largest = max(largest, discs[i, 2])
     for i in range(n):
         reach = largest - discs[i, 2] + NOT_INSIDE
-        for at in range(np.searchsorted(x, discs[i, 0] - 1.01 * reach), n):
+        for at in range(np.searchsorted(x, discs[i, axis] - 1.01 * reach), n):
             j = order[at]
-            if x[at] > discs[i, 0] + 1.01 * reach:
+            if x[at] > discs[i, axis] + 1.01 * reach:
                 break
-            if i == j or not keep[j] or abs(discs[i, 0] - discs[j, 0]) > discs[j, 2] - discs[i, 2] + NOT_INSIDE:
+            if i == j or not keep[j] or abs(x[at] - discs[i, axis]) > discs[j, 2] - discs[i, 2] + NOT_INSIDE:
                 continue
             inside = math.hypot(discs[i, 0] - discs[j, 0], discs[i, 1] - discs[j, 1]) + discs[i, 2] - discs[j, 2]
             if inside <= DEEP and (i > j or inside < -DEEP):
@@ -234,6 +236,21 @@ def insert(count: int, i: int, contacts: Contacts, k: int, t: float, a: float) -
 def past(x: float, y: float, cx: float, cy: float, bx: float, by: float, turn: float) -> float:
     """The angle from (bx, by) to (x, y) about a centre (cx, cy), in the sense of `turn` [rad]."""
     return (turn * (math.atan2(y - cy, x - cx) - math.atan2(by - cy, bx - cx))) % TURN
+
+
+@inline
+def wedge_of(bx: float, by: float, turn: float, sweep: float) -> tuple[float, float, float, float, float]:
+    """The directions at which an arc about the origin begins and ends, and its turn; 0 if it is no less than a quarter."""
+    cos, sin = math.cos(sweep), turn * math.sin(sweep)
+    return bx, by, cos * bx - sin * by, sin * bx + cos * by, turn if sweep < 1.5 else 0.0
+
+
+@inline
+def outside(x: float, y: float, wedge: tuple[float, float, float, float, float]) -> bool:
+    """Whether (x, y) surely lies in a direction that an arc does not sweep; never for one of a quarter or more."""
+    bx, by, ex, ey, turn = wedge
+    least = -GRAZE * (abs(bx) + abs(by)) * (abs(x) + abs(y))  # far more than what rounding can do
+    return bool(turn * (bx * y - by * x) < least or turn * (x * ey - y * ex) < least)
 
 
 @kernel
@@ -314,11 +331,12 @@ def deepest_entry(count: int, contacts: Contacts, links: Array, discs: Array, bo
         if i == count or sweep[i] <= 0.0:
             continue
         x, y, r = discs[after, 0], discs[after, 1], discs[after, 2]
+        wedge = wedge_of(bx - x, by - y, turn[i], sweep[i])
         for box in range(boxes.shape[0]):
             if is_beyond(r + ROUNDING, x, y, boxes[box]):
                 continue
             for k in range(box * TOGETHER, min(discs.shape[0], (box + 1) * TOGETHER)):
-                if k == after:
+                if k == after or outside(discs[k, 0] - x, discs[k, 1] - y, wedge):
                     continue
                 depth = discs[k, 2] - abs(math.hypot(discs[k, 0] - x, discs[k, 1] - y) - r)
                 if depth > most and past(discs[k, 0], discs[k, 1], x, y, bx, by, turn[i]) < sweep[i]:
@@ -400,7 +418,7 @@ def string_clearance(string: String, built: Array, bounds: Array) -> float:
     boxes = boxes_around(built)
     best = np.inf
     for i in range(links.shape[0]):
-        best = min(best, boxed_clearance(links[i, 0], links[i, 1], links[i, 2], links[i, 3], built, boxes, bounds))
+        best = clearance_up_to(best, links[i, 0], links[i, 1], links[i, 2], links[i, 3], built, boxes, bounds)
     for i in range(len(disc)):
         if sweep[i] <= 0.0:
             continue
@@ -410,10 +428,13 @@ def string_clearance(string: String, built: Array, bounds: Array) -> float:
             px, py = x + r * math.cos(0.5 * math.pi * quarter), y + r * math.sin(0.5 * math.pi * quarter)
             if past(px, py, x, y, bx, by, turn[i]) < sweep[i]:
                 best = min(best, wall_distance(px, py, bounds))
+        wedge = wedge_of(bx - x, by - y, turn[i], sweep[i])
         for box in range(boxes.shape[0]):
             if is_beyond(r + best + ROUNDING, x, y, boxes[box]):
                 continue
             for k in range(box * TOGETHER, min(built.shape[0], (box + 1) * TOGETHER)):
+                if outside(built[k, 0] - x, built[k, 1] - y, wedge):
+                    continue
                 gap = abs(math.hypot(built[k, 0] - x, built[k, 1] - y) - r) - built[k, 2]
                 if gap < best and past(built[k, 0], built[k, 1], x, y, bx, by, turn[i]) < sweep[i]:
                     best = gap
@@ -473,8 +494,9 @@ def string_points(string: String, built: Array, bounds: Array, clearance: float,
             stretch = r / math.cos(half)
             cx, cy = x + stretch * math.cos(a1), y + stretch * math.sin(a1)
             if half > 1e-5 and waiting < 60:
-                c = boxed_clearance(x + r * math.cos(a0), y + r * math.sin(a0), cx, cy, built, boxes, bounds)
-                c = min(c, boxed_clearance(cx, cy, x + r * math.cos(a2), y + r * math.sin(a2), built, boxes, bounds))
+                ax, ay, bx, by = x + r * math.cos(a0), y + r * math.sin(a0), x + r * math.cos(a2), y + r * math.sin(a2)
+                c = clearance_up_to(clearance, ax, ay, cx, cy, built, boxes, bounds)
+                c = clearance_up_to(c, cx, cy, bx, by, built, boxes, bounds)
                 if c < clearance - 5e-10:
                     cuts[waiting] = at + half
                     waiting += 1
@@ -535,11 +557,22 @@ def room_to_grow(xy: Array, discs: Array, box: Array, ends: Array, most: float, 
                 continue
             if crosses(xy, x, y, bx, by):
                 out[i] = share * gap
-        for j in range(i + 1, n):
+    axis = 0 if np.ptp(xy[:, 0]) > np.ptp(xy[:, 1]) else 1  # along which most discs are far apart
+    order = np.argsort(discs[:, axis])
+    widest = 0.0
+    for i in range(n):
+        widest = max(widest, discs[i, 2])
+    for a in range(n):
+        for b in range(a + 1, n):
+            i, j = min(order[a], order[b]), max(order[a], order[b])
+            if discs[order[b], axis] - discs[order[a], axis] > discs[order[a], 2] + widest + 2.05 * most:
+                break
+            x, y, r = discs[i, 0], discs[i, 1], discs[i, 2]
             reach = r + discs[j, 2] + 2.05 * max(out[i], out[j])  # 2.05 > 1 / share
-            if abs(discs[j, 0] - x) > reach or abs(discs[j, 1] - y) > reach:
+            dx, dy, touching = discs[j, 0] - x, discs[j, 1] - y, r + discs[j, 2] - 2.0 * ROUNDING
+            if abs(dx) > reach or abs(dy) > reach or (touching > 0.0 and dx * dx + dy * dy < touching * touching):
                 continue
-            gap = math.hypot(discs[j, 0] - x, discs[j, 1] - y) - r - discs[j, 2]
+            gap = math.hypot(dx, dy) - r - discs[j, 2]
             if gap < -1e-9 or share * gap >= max(out[i], out[j]):
                 continue
             if crosses(xy, x, y, discs[j, 0], discs[j, 1]):
@@ -568,22 +601,55 @@ def encloses(there: Array, back: Array, points: Array) -> bool:
     """Whether the loop along one polyline and back along another winds around any of the points (N, 2+)."""
     y_min, y_max = min(there[:, 1].min(), back[:, 1].min()), max(there[:, 1].max(), back[:, 1].max())
     x_max = max(there[:, 0].max(), back[:, 0].max())
+    starts, listed = by_strip(there, back, y_min, y_max)
     for k in range(points.shape[0]):
         x, y = points[k, 0], points[k, 1]
         if x > x_max + ROUNDING or y < y_min or y > y_max:
             continue
         winding = 0
-        for part in range(2):
-            xy = there if part == 0 else back
-            sign = 1 if part == 0 else -1
-            for i in range(xy.shape[0] - 1):
-                up, down = xy[i, 1] <= y < xy[i + 1, 1], xy[i + 1, 1] <= y < xy[i, 1]
-                if up or down:
-                    side = (xy[i + 1, 0] - xy[i, 0]) * (y - xy[i, 1]) - (x - xy[i, 0]) * (xy[i + 1, 1] - xy[i, 1])
-                    if up and side > 0.0:
-                        winding += sign
-                    elif down and side < 0.0:
-                        winding -= sign
+        strip = strip_of(y, y_min, y_max)
+        for at in range(starts[strip], starts[strip + 1]):
+            i = listed[at]
+            xy, i, sign = (there, i, 1) if i >= 0 else (back, -1 - i, -1)
+            up, down = xy[i, 1] <= y < xy[i + 1, 1], xy[i + 1, 1] <= y < xy[i, 1]
+            if up or down:
+                side = (xy[i + 1, 0] - xy[i, 0]) * (y - xy[i, 1]) - (x - xy[i, 0]) * (xy[i + 1, 1] - xy[i, 1])
+                if up and side > 0.0:
+                    winding += sign
+                elif down and side < 0.0:
+                    winding -= sign
         if winding != 0:
             return True
     return False
+
+
+@inline
+def strip_of(y: float, y_min: float, y_max: float) -> int:
+    """The number of the strip of the plane that holds y: never less for a larger y."""
+    return int((STRIPS - 1) * ((y - y_min) / max(y_max - y_min, ROUNDING)))
+
+
+@kernel
+def by_strip(there: Array, back: Array, y_min: float, y_max: float) -> tuple[Array, Array]:
+    """The segments of two polylines by the strips that they meet: each strip's first place in the list, and the list.
+
+    The segments of the second polyline are counted down from -1.
+    """
+    starts = np.zeros(STRIPS + 1, dtype=np.int64)
+    listed, fill = np.empty(0, dtype=np.int64), starts
+    for filling in range(2):  # first the segments of each strip are counted, then entered where its count says
+        for part in range(2):
+            xy = there if part == 0 else back
+            for i in range(xy.shape[0] - 1):
+                low, high = min(xy[i, 1], xy[i + 1, 1]), max(xy[i, 1], xy[i + 1, 1])
+                for strip in range(strip_of(low, y_min, y_max), strip_of(high, y_min, y_max) + 1):
+                    if filling:
+                        listed[fill[strip]] = i if part == 0 else -1 - i
+                        fill[strip] += 1
+                    else:
+                        starts[strip + 1] += 1
+        if not filling:
+            starts = np.cumsum(starts)
+            fill = starts.copy()
+            listed = np.empty(starts[-1], dtype=np.int64)
+    return starts, listed

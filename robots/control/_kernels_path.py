@@ -121,6 +121,28 @@ def within_reach(x: float, y: float, reach: float, discs: Array, out: Array) -> 
     return out[:count]
 
 
+@inline
+def beside_route(
+    ax: float, ay: float, end: float, k: int, distance: float, xy: Array, arc: Array, discs: Array
+) -> Array:
+    """Those discs, moved to the front, whose surfaces may be within a distance of a line from one place of the route to another.
+
+    The places lie between (ax, ay) on segment k and arc length `end`; the rectangle around them holds all such lines.
+    """
+    bx, by, last = point_at(end, k, xy, arc)
+    x_min, x_max, y_min, y_max = min(ax, bx), max(ax, bx), min(ay, by), max(ay, by)
+    for i in range(k + 1, last + 1):
+        x_min, x_max = min(x_min, xy[i, 0]), max(x_max, xy[i, 0])
+        y_min, y_max = min(y_min, xy[i, 1]), max(y_max, xy[i, 1])
+    count = 0
+    for j in range(discs.shape[0]):
+        x, y, far = discs[j, 0], discs[j, 1], distance + discs[j, 2]
+        if x_min - far <= x <= x_max + far and y_min - far <= y <= y_max + far:
+            discs[count, 0], discs[count, 1], discs[count, 2] = x, y, discs[j, 2]
+            count += 1
+    return discs[:count]
+
+
 @kernel
 def clear_lookaheads(
     xy: Array, arc: Array, obstacles: ObstacleIndex, clearance: float, spacing: float, low: float, high: float,
@@ -143,6 +165,7 @@ def clear_lookaheads(
             kept = np.empty((2 * known.shape[0], 3))
         discs = within_reach(ax, ay, high + clearance + ROUNDING, known, kept)
         required = min(clearance, segment_clearance(ax, ay, ax, ay, discs, bounds))
+        discs = beside_route(ax, ay, min(s + high, arc[-1]), k, required + ROUNDING, xy, arc, discs)
         clear, kk, length = low, k, low
         while length < high:
             length = min(length + step, high)

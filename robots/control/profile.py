@@ -179,6 +179,8 @@ def _blended(s: Floats, places: Floats, headings: Floats, blend: float) -> tuple
         beyond = t - inside
         return heading, first + heading * beyond, second + first * beyond + heading * beyond**2 / 2
 
-    before, here, after = at(s - blend), at(s), at(s + blend)
-    change, curvature, heading = ((a - 2 * h + b) / blend**2 for a, h, b in zip(after, here, before, strict=True))
+    change, curvature, heading = (
+        (after - 2 * here + before) / blend**2
+        for before, here, after in (np.split(found, 3) for found in at(np.concatenate((s - blend, s, s + blend))))
+    )
     return heading, curvature, change

@@ -22,12 +22,13 @@ from antdrive.robots.control._kernels_path import PathSamples
 from antdrive.robots.control._kernels_pursuit import MotionLimits, PursuitTuning
 from antdrive.robots.control.profile import SpeedProfile, speed_profile
 from antdrive.robots.spec import RobotSpec
-from antdrive.worlds import Floats, Pose, Route, World, point_clearance
+from antdrive.worlds import Bounds, Floats, Pose, Route, World, point_clearance
 from antdrive.worlds.errors import FieldError
 from antdrive.worlds.reuse import Keyed, by_geometry, reused
 
 SPACING = 0.02  # distance between the samples along a route [m]
 SQUARE = 0.5  # least side of the squares that the obstacles are sorted into [m]
+EVERYTHING = 1e6  # side of a square that holds all obstacles [m]
 MAX_SQUARES = 250_000  # in larger worlds the squares are larger instead
 
 #: The rules that can limit the robot's speed. Logs hold a rule's index.
@@ -191,6 +192,7 @@ class PurePursuit:
         period: float,
         tolerance: float = math.inf,
         spacing: float = SPACING,
+        indexed: bool = True,
     ) -> TrackedPath:
         """Prepare a route for tracking.
 
@@ -202,10 +204,11 @@ class PurePursuit:
             period: control period [s]
             tolerance: goal tolerance [m]; where it is small, the robot stops closer to the route's end
             spacing: distance between the samples at which lookaheads and speed limits are worked out [m]
+            indexed: whether the obstacles are sorted by place; that pays where the robot drives among them for long
         """
         tuning = self._tuning(route, robot, margin, period, min(self.goal_distance, tolerance / 2))
         tuning = tuning._replace(spacing=spacing)
-        obstacles = self._index(world, tuning.lookahead_clearance)
+        obstacles = self._index(world, tuning.lookahead_clearance) if indexed else unsorted(world.discs, world.bounds)
         lookahead: Floats = np.empty(int(route.arc[-1] / spacing) + 2)
         _kernels_path.clear_lookaheads(
             route.xy, route.arc, obstacles, tuning.lookahead_clearance, spacing, self.lookahead_min,
@@ -311,6 +314,16 @@ class PurePursuit:
             speed[int(stop / spacing) : int(stop / spacing) + 2] = 0.0
         _kernels_path.brake_backwards(speed, spacing, self.braking * robot.max_acceleration)
         return speed
+
+
+def unsorted(discs: Floats, bounds: Bounds | Floats) -> ObstacleIndex:
+    """Obstacles that all lie in one square.
+
+    Args:
+        discs: x, y and radius of each (N, 3) [m]
+        bounds: the walls' inner faces: x_min, y_min, x_max, y_max [m]
+    """
+    return ObstacleIndex(discs, np.array([0, len(discs)]), np.asarray(bounds, dtype=np.float64), EVERYTHING)
 
 
 @reused(16)

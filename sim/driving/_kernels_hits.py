@@ -50,6 +50,22 @@ def near_polyline(xy: Array, discs: Array, distance: float) -> Array:
 
 
 @kernel
+def beside(discs: Array, points: Array, distance: float) -> Array:
+    """The discs whose surface is farther than a distance from all points, in their order."""
+    out = np.empty_like(discs)
+    count = 0
+    for j in range(discs.shape[0]):
+        out[count, 0], out[count, 1], out[count, 2] = discs[j, 0], discs[j, 1], discs[j, 2]
+        clear = True
+        for i in range(points.shape[0]):
+            dx, dy, reach = discs[j, 0] - points[i, 0], discs[j, 1] - points[i, 1], discs[j, 2] + distance
+            if max(abs(dx), abs(dy)) <= reach and math.hypot(dx, dy) <= reach:
+                clear = False
+        count += 1 if clear else 0
+    return out[:count].copy()
+
+
+@kernel
 def hit_within(
     points: Array, needed: Array, ahead: Array, tolerance: float, blur: float, x0: float, y0: float, yaw: float,
     beams: Array, ranges: Array,

@@ -29,7 +29,7 @@ from antdrive.planners import (
 )
 from antdrive.planners.plan import Cell
 from antdrive.robots import PurePursuit, RobotSpec, TrackedPath
-from antdrive.robots.control._kernels_obstacles import ObstacleIndex
+from antdrive.robots.control.pursuit import unsorted
 from antdrive.sim.driving import _kernels_hits
 from antdrive.sim.driving.blocking import blocked_cells
 from antdrive.sim.driving.movers_ahead import MoversAhead
@@ -54,6 +54,7 @@ CORRIDOR = 1.2  # a route is smoothed among what lies within this distance of th
 SAMPLES = 0.06  # spacing of the places on a route at which speed limits and lookaheads are worked out [m]
 SPARE = 0.25  # the controller knows what lies this much farther away than its longest arcs lead [m]
 INTERVAL = 0.15  # the shortest time between two plans [s]
+COVERS = 1e-3  # what was hit so near to the robot or to its goal covers it [m]
 LOOK_AT_ROUTE = 0.1  # spacing of the points of a route that are looked at [m]
 FORGIVING = 0.005  # the arcs of a disc may come this much closer to what was hit than in a known world [m]
 CORNERED = 0.1  # and those of a rectangle by this share more of what its corners stand out [m/m]
@@ -250,8 +251,8 @@ class Exploration:
         discs = self.survey.discs(bounds)
         if self._movers is not None:
             discs = self._movers.without_trails(discs, pose)
-        for point in (pose[:2], self._task.goal):  # what covers the robot or the goal is an error of the map
-            discs = discs[np.hypot(discs[:, 0] - point[0], discs[:, 1] - point[1]) > discs[:, 2] + 1e-3]
+        ends = np.array((pose[:2], self._task.goal))
+        discs = _kernels_hits.beside(discs, ends, COVERS)  # what covers one of them is an error of the map
         known = dataclasses.replace(self._task, world=_world(bounds, discs), start=pose)
         self._known_as = key, known
         return known
@@ -291,7 +292,7 @@ class Exploration:
         robot = self._robot
         self._indexed = -1  # the path knows the obstacles along the route, and is to know those near the robot
         tolerance = self._task.goal_tolerance
-        tracked = self._controller.prepare(route, world, robot, margin, 1 / self._hz, tolerance, SAMPLES)
+        tracked = self._controller.prepare(route, world, robot, margin, 1 / self._hz, tolerance, SAMPLES, indexed=False)
         foot, tuning = robot.footprint, tracked.tuning
         give = FORGIVING + CORNERED * (robot.radius - min(foot.half_length, foot.half_width) - foot.rounding)
         return dataclasses.replace(
@@ -314,8 +315,7 @@ class Exploration:
         x, y, _ = pose
         near = self._controller.lookahead_max + tracked.tuning.lookahead_clearance + SPARE
         discs = self.survey.discs((x - near, y - near, x + near, y + near))
-        index = ObstacleIndex(discs, np.array([0, len(discs)]), tracked.obstacles.bounds, 1e6)
-        return tracked.among(index)
+        return tracked.among(unsorted(discs, tracked.obstacles.bounds))
 
     def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
         """Why a new route is due now; empty if none is.

@@ -225,6 +225,17 @@ def test_a_path_may_be_sampled_more_coarsely(turtlebot: RobotSpec) -> None:
     )
 
 
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 10_000))
+def test_obstacles_that_are_not_sorted_by_place_prepare_the_same_path(turtlebot: RobotSpec, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    posts = tuple(Disc(*rng.uniform(-3, 5, 2).tolist(), 0.1) for _ in range(60))
+    world = World("posts", (-20, -20, 20, 20), posts)
+    ways = [PurePursuit().prepare(STAIRCASE, world, turtlebot, 0.05, DT, indexed=indexed) for indexed in (True, False)]
+    for sorted_by_place, unsorted in zip(*(way.samples for way in ways), strict=True):
+        assert np.array_equal(sorted_by_place, unsorted, equal_nan=True)
+
+
 @given(st.integers(0, 10_000))
 def test_discs_that_are_left_out_change_no_clearance(seed: int) -> None:
     """The oracle samples the segment."""

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from antdrive.sim.driving._kernels_hits import hit_within, point_at
+from antdrive.sim.driving._kernels_hits import beside, hit_within, point_at
 
 
 @settings(max_examples=60, deadline=None)
@@ -27,3 +27,13 @@ def test_a_point_of_a_route_is_interpolated() -> None:
     xy, arc = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0]]), np.array([0.0, 2.0, 3.0])
     for at in (-1.0, 0.0, 0.5, 2.0, 2.25, 3.0, 9.0):
         assert point_at(xy, arc, at) == (np.interp(at, arc, xy[:, 0]), np.interp(at, arc, xy[:, 1]))
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 10_000))
+def test_what_covers_a_place_is_left_out(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    discs = np.column_stack((rng.uniform(-1, 1, (30, 2)), rng.uniform(0, 0.5, 30)))
+    places = rng.uniform(-1, 1, (2, 2))
+    clear = np.all([np.hypot(*(discs[:, :2] - place).T) > discs[:, 2] + 0.1 for place in places], axis=0)
+    assert np.array_equal(beside(discs, places, 0.1), discs[clear])
