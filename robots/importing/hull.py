@@ -11,6 +11,7 @@ from antdrive.worlds.types import Point
 MOST_OUTLINE = 12  # corners of an outline that was computed
 STEP = 1e-5  # of the numbers of an outline that was computed [m]
 LOOSE = 1e-8  # what turns such as 1.5707963, which stand for a quarter, may move a corner by [m]
+ALIKE = 1e-4  # how far the left and the right of an outline may be from mirror images of each other [m]
 CHEAP = 1e-4  # the share of its area that an outline may gain for a corner less
 LIKE = 0.97  # the share of a disc or rectangle that an outline fills which counts as one
 
@@ -37,6 +38,7 @@ def fewer_corners(corners: list[Point], most: int) -> list[Point]:
     """A polygon around a convex one with no more than `most` corners: the edges that cost the least area are left out.
 
     Edges that cost next to nothing are left out in any case: a wheel whose quarter turn is written 1.57 is a little askew.
+    What is the same on the left as on the right stays so: edges are left out together with their mirror images.
 
     Args:
         corners: counter-clockwise [m]
@@ -44,20 +46,62 @@ def fewer_corners(corners: list[Point], most: int) -> list[Point]:
     """
     corners = list(corners)
     cheap = CHEAP * sum(_area((0.0, 0.0), a, b) for a, b in zip(corners, corners[1:] + corners[:1], strict=True))
+    symmetric = all(_nearest(corners, (x, -y)) is not None for x, y in corners)
     while len(corners) > 4:
-        best: tuple[float, int, Point] | None = None
-        for k in range(len(corners)):
-            a, b, c, d = (corners[(k + j) % len(corners)] for j in range(4))
-            tip = _meeting(a, b, d, c)
-            if tip is not None and (best is None or _area(b, tip, c) < best[0]):
-                best = (_area(b, tip, c), k, tip)
-        if best is None or (len(corners) <= most and best[0] > cheap):
+        costs = [_cost(corners, k) for k in range(len(corners))]
+        affordable = [k for k, cost in enumerate(costs) if cost < math.inf and (len(corners) > most or cost <= cheap)]
+        ways = (_left_out(corners, k, symmetric) for k in sorted(affordable, key=lambda k: costs[k]))
+        fewer = next((way for way in ways if way is not None), None)
+        if fewer is not None:
+            corners = fewer
+        elif symmetric and len(corners) > most:
+            symmetric = False  # no pair can be left out
+        else:
             break
-        _, k, tip = best
-        gone = corners[(k + 2) % len(corners)]
-        corners[(k + 1) % len(corners)] = tip
-        corners.remove(gone)
     return corners
+
+
+def _around_edge(corners: list[Point], k: int) -> tuple[Point, Point, Point, Point]:
+    """The corner before the edge from corner k, its two ends, and the corner after it."""
+    a, b, c, d = (corners[(k + j) % len(corners)] for j in (-1, 0, 1, 2))
+    return a, b, c, d
+
+
+def _cost(corners: list[Point], k: int) -> float:
+    """The area that a polygon gains without the edge from corner k; inf where it cannot do without."""
+    a, b, c, d = _around_edge(corners, k)
+    tip = _meeting(a, b, d, c)
+    return math.inf if tip is None else _area(b, tip, c)
+
+
+def _left_out(corners: list[Point], k: int, symmetric: bool) -> list[Point] | None:
+    """The corners without the edge from corner k; None where that is impossible.
+
+    Args:
+        corners: of a convex polygon, counter-clockwise [m]
+        k: the corner with which the edge begins
+        symmetric: whether the mirror image of the edge goes with it
+    """
+    n, (a, b, c, d) = len(corners), _around_edge(corners, k)
+    tip = _meeting(a, b, d, c)
+    if tip is None:
+        return None
+    fewer = [tip if corner is b else corner for corner in corners if corner is not c]
+    if not symmetric:
+        return fewer
+    twin = _nearest(corners, (c[0], -c[1])), _nearest(corners, (b[0], -b[1]))
+    if twin == (k, (k + 1) % n):  # it is its own mirror image
+        return fewer
+    if None in twin or set(twin) & {k, (k + 1) % n} or n < 6:
+        return None
+    first = corners[twin[0] or 0]
+    return _left_out(fewer, next(j for j, corner in enumerate(fewer) if corner is first), False)
+
+
+def _nearest(corners: list[Point], place: Point) -> int | None:
+    """The corner at a place; None where there is none."""
+    k = min(range(len(corners)), key=lambda j: math.dist(corners[j], place))
+    return k if math.dist(corners[k], place) <= ALIKE else None
 
 
 def footprint_around(points: Iterable[Point], kind: str = "auto") -> Footprint:

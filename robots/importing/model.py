@@ -15,12 +15,14 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from antdrive.robots.importing.expanding import expanded
+from antdrive.robots.importing.sensors import UrdfSensor, lidar_sensors
 from antdrive.worlds.errors import InputError, input_error
 from antdrive.worlds.formats.xml import parse_xml
 from antdrive.worlds.optional import optional
 from antdrive.worlds.types import Floats
 
-CIRCLE = np.exp(2j * math.pi * np.arange(96) / 96) / math.cos(math.pi / 96)  # around a circle of radius 1
+# Around a circle of radius 1, with sides ahead, behind, to the left and to the right: it is as long and as wide as the circle.
+CIRCLE = np.exp(2j * math.pi * (np.arange(96) + 0.5) / 96) / math.cos(math.pi / 96)
 MOST_LINKS = 10_000
 
 
@@ -88,6 +90,7 @@ class UrdfModel:
         masses: the mass of each link that has one [kg]
         drive: what a Gazebo plugin that drives wheels says, by tag; what it says of several wheels is left out
         left_out: meshes that were not found
+        lidars: the lidars that Gazebo would simulate
     """
 
     source: Path
@@ -98,6 +101,7 @@ class UrdfModel:
     masses: dict[str, float]
     drive: dict[str, str]
     left_out: tuple[str, ...]
+    lidars: tuple[UrdfSensor, ...] = ()
 
     def above(self, link: str) -> Iterator[UrdfJoint]:
         """The joints between a link and the root, from the link on.
@@ -167,8 +171,9 @@ def read_model(
         for name, link in links.items()
         for mass in link.findall("inertial/mass")
     }
+    lidars, left_out = lidar_sensors(root, places), tuple(reader.left_out)
     return UrdfModel(
-        path, root.get("name", path.stem), joints, places, tuple(pieces), masses, _drive(root), tuple(reader.left_out)
+        path, root.get("name", path.stem), joints, places, tuple(pieces), masses, _drive(root), left_out, lidars
     )
 
 

@@ -3,6 +3,8 @@
 Ground is seen free in cells. Hits are kept finer, in grains (GRAINS by GRAINS to a cell), each with its log-odds and with the
 box around the points that were measured in it. Grains are kept in a list of the occupied cells, those of a cell side by side: so
 all hits of a map lie in a few hundred kilobytes, however large the map is, and stay in the processor's cache.
+
+Kernels that Python calls get a map as the plain tuple of its arrays: a call with a named tuple takes 1 to 4 us longer.
 """
 
 from __future__ import annotations
@@ -12,13 +14,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from antdrive.worlds._kernels import Array, kernel
+from antdrive.worlds._kernels import Array, inline, kernel
 
 GRAINS = 2
+SQUARE, SHIFT = 8, 3  # cells along the side of a square of cells, and its logarithm to base 2
 HIT, MISS, MOST = 0.85, 0.4, 3.5  # steps of the log-odds and their upper limit (Hornung et al. 2013, section 4)
 SLACK = 1e-4  # added to the radius of discs; boxes are kept in single precision [m]
 EDGE = 1e-6  # beams end so far inside of the map's edge [cells]
-BESIDE = 1e-9  # a point so far from the sides of a cell lies in it, whatever the rounding [cells]
 THINNEST = 0.005  # the least radius of a disc [m]
 
 
@@ -29,6 +31,7 @@ class MapArrays(NamedTuple):
 
     Attributes:
         free: which cells were seen free (R, C)
+        unseen: how many cells of each square of SQUARE x SQUARE are not free (R / SQUARE, C / SQUARE, rounded up)
         occupied: which cells hold hits (R, C); no cell is both
         slot: the row of an occupied cell in the lists (R, C)
         count: the number of occupied cells (1,)
@@ -41,6 +44,7 @@ class MapArrays(NamedTuple):
     """
 
     free: Array
+    unseen: Array
     occupied: Array
     slot: Array
     count: Array
@@ -55,13 +59,13 @@ class Fan(NamedTuple):
     """A scan as it lies in the map.
 
     Attributes:
-        eye: where the lidar is: x, y, and the cosine and sine of its yaw (4,)
+        eye: where the lidar is: x, y, and the cosine and sine of its yaw
         beams: directions of the beams, seen from the lidar (B, 2)
         ranges: what they measured (B,) [m]
         closed: whether the first beam is beside the last
     """
 
-    eye: Array
+    eye: tuple[float, float, float, float]
     beams: Array
     ranges: Array
     closed: bool
@@ -81,17 +85,27 @@ def begins(beams: int, spacing: float, cell: float, out: Array) -> None:
 
 
 @kernel
+def count_unseen(free: Array, unseen: Array) -> None:
+    """Count the cells of each square that are not free."""
+    unseen[:] = 0
+    for row in range(free.shape[0]):
+        for col in range(free.shape[1]):
+            unseen[row >> SHIFT, col >> SHIFT] += 0 if free[row, col] else 1
+
+
+@kernel
 def insert(
-    fan: Fan, begin: Array, turn: int, turns: int, left_out: Array, horizon: float, trust: float, scan: int,
-    m: MapArrays, changed: Array,
+    x: float, y: float, cos: float, sin: float, beams: Array, ranges: Array, closed: bool, begin: Array, turn: int,
+    turns: int, left_out: Array, horizon: float, trust: float, scan: int, arrays: tuple[Array, ...], changed: Array,
 ) -> int:  # fmt: skip
-    """Enter a scan; the number of rows written to `changed`.
+    """Enter a scan from (x, y) and the cosine and sine of a yaw; the number of rows written to `changed`.
 
     As a whole, with the free ways of every `turns`-th beam from beam `turn` on; or, where `turn` is less than 0, only its hits
     in cells that are not occupied.
 
     Hits farther than `horizon` are not entered, nor those of beams in `left_out`; ground is seen free up to `trust`.
     """
+    fan, m = Fan((x, y, cos, sin), beams, ranges, closed), MapArrays(*arrays)
     count = enter_hits(fan, turn >= 0, left_out, horizon, scan, m, changed)
     return enter_ways(fan, begin, turn, turns, trust, scan, m, changed, count) if turn >= 0 else count
 
@@ -99,42 +113,50 @@ def insert(
 @kernel
 def enter_hits(fan: Fan, whole: bool, left_out: Array, horizon: float, scan: int, m: MapArrays, changed: Array) -> int:
     """Enter the measured points."""
-    ranges, beams, x, y, cos, sin = fan.ranges, fan.beams, fan.eye[0], fan.eye[1], fan.eye[2], fan.eye[3]
-    occupied, odds, stamp, box, left, low, cell = m.occupied, m.odds, m.stamp, m.box, m.frame[0], m.frame[1], m.frame[2]
-    rows, cols = occupied.shape
-    per = 1.0 / cell
+    odds, stamp, box, slot = m.odds, m.stamp, m.box, m.slot
+    occupied = m.occupied.reshape(m.occupied.size)
+    found, at = np.empty((4, left_out.shape[0])), np.empty(left_out.shape[0], dtype=np.int64)
+    locate(fan, left_out, horizon, m, found, at)
     count = 0
-    for i in range(beams.shape[0]):
-        if left_out[i] or not 0.0 < ranges[i] <= horizon:
+    for i in range(at.shape[0]):
+        if at[i] < 0 or (occupied[at[i]] and not whole):
             continue
-        px = x + ranges[i] * (cos * beams[i, 0] - sin * beams[i, 1])
-        py = y + ranges[i] * (sin * beams[i, 0] + cos * beams[i, 1])
-        u, v = (px - left) * per, (py - low) * per
-        if not whole and 1.0 <= u < cols - 1.0 and 1.0 <= v < rows - 1.0:
-            row, col = int(v), int(u)
-            if occupied[row, col] and BESIDE < u - col < 1.0 - BESIDE and BESIDE < v - row < 1.0 - BESIDE:
-                continue  # most of them; the quotient, which rounds otherwise, is not needed
-        u, v = (px - left) / cell, (py - low) / cell
-        if not (0.0 <= u < cols and 0.0 <= v < rows):
-            continue
-        row, col = int(v), int(u)
-        if not occupied[row, col]:
+        row, col = int(found[3, i]), int(found[2, i])
+        if not occupied[at[i]]:
             occupy(row, col, scan, m)
             changed[count, 0], changed[count, 1] = row, col
             count += 1
-        elif not whole:
-            continue
-        at, k = m.slot[row, col], GRAINS * int(GRAINS * (v - row)) + int(GRAINS * (u - col))
+        px, py, u, v = found[0, i], found[1, i], found[2, i], found[3, i]
+        place, k = slot[row, col], GRAINS * int(GRAINS * (v - row)) + int(GRAINS * (u - col))
         qx, qy = np.float32(px), np.float32(py)
-        if odds[at, k] > 0.0:
-            box[at, k, 0], box[at, k, 1] = min(box[at, k, 0], qx), min(box[at, k, 1], qy)
-            box[at, k, 2], box[at, k, 3] = max(box[at, k, 2], qx), max(box[at, k, 3], qy)
+        if odds[place, k] > 0.0:
+            box[place, k, 0], box[place, k, 1] = min(box[place, k, 0], qx), min(box[place, k, 1], qy)
+            box[place, k, 2], box[place, k, 3] = max(box[place, k, 2], qx), max(box[place, k, 3], qy)
         else:
-            box[at, k, 0], box[at, k, 1], box[at, k, 2], box[at, k, 3] = qx, qy, qx, qy
-        if stamp[at, k] != scan:
-            stamp[at, k] = scan
-            odds[at, k] = min(MOST, odds[at, k] + HIT)
+            box[place, k, 0], box[place, k, 1], box[place, k, 2], box[place, k, 3] = qx, qy, qx, qy
+        if stamp[place, k] != scan:
+            stamp[place, k] = scan
+            odds[place, k] = min(MOST, odds[place, k] + HIT)
     return count
+
+
+@inline
+def locate(fan: Fan, left_out: Array, horizon: float, m: MapArrays, found: Array, at: Array) -> None:
+    """Where the beams end: x, y [m], column and row [cells] (4, B), and the number of the cell (B,), -1 for none.
+
+    Without branches, so that several beams are taken at once.
+    """
+    ranges, beams, x, y, cos, sin = fan.ranges, fan.beams, fan.eye[0], fan.eye[1], fan.eye[2], fan.eye[3]
+    left, low, cell = m.frame[0], m.frame[1], m.frame[2]
+    rows, cols = m.occupied.shape
+    for i in range(at.shape[0]):
+        px = x + ranges[i] * (cos * beams[i, 0] - sin * beams[i, 1])
+        py = y + ranges[i] * (sin * beams[i, 0] + cos * beams[i, 1])
+        u, v = (px - left) / cell, (py - low) / cell
+        entered = (not left_out[i]) & (ranges[i] > 0.0) & (ranges[i] <= horizon)
+        entered &= (u >= 0.0) & (u < cols) & (v >= 0.0) & (v < rows)
+        found[0, i], found[1, i], found[2, i], found[3, i] = px, py, u, v
+        at[i] = int(v if entered else 0.0) * cols + int(u if entered else 0.0) if entered else -1
 
 
 @kernel
@@ -143,7 +165,10 @@ def occupy(row: int, col: int, scan: int, m: MapArrays) -> None:
     at = m.count[0]
     m.count[0] = at + 1
     m.cells[at, 0], m.cells[at, 1], m.cells[at, 2], m.cells[at, 3] = row, col, scan if m.free[row, col] else 0, 0
-    m.slot[row, col], m.occupied[row, col], m.free[row, col] = at, True, False
+    m.slot[row, col], m.occupied[row, col] = at, True
+    if m.free[row, col]:
+        m.free[row, col] = False
+        m.unseen[row >> SHIFT, col >> SHIFT] += 1
     for k in range(GRAINS * GRAINS):
         m.odds[at, k], m.stamp[at, k] = 0.0, 0
 
@@ -156,13 +181,14 @@ def enter_ways(
 
     A beam goes through columns of cells or, if it is steep, through rows: *lanes*. The *place* within a lane where it goes on to
     the next follows from the lane's number, so that no step waits for the one before (as in J. Bresenham, IBM Systems Journal
-    4, 1965, but for all cells that a beam meets). Both are counted in the beam's direction.
+    4, 1965, but for all cells that a beam meets). Both are counted in the beam's direction. Squares of cells that are free
+    already are passed in one step.
     """
     ranges, beams, x, y, cos, sin = fan.ranges, fan.beams, fan.eye[0], fan.eye[1], fan.eye[2], fan.eye[3]
     left, low, cell = m.frame[0], m.frame[1], m.frame[2]
     rows, cols = m.free.shape
     # Arrays of a record are taken out of it once: each time costs as much as several cells.
-    occupied, free = m.occupied.reshape(rows * cols), m.free.reshape(rows * cols)
+    occupied, free, unseen = m.occupied.reshape(rows * cols), m.free.reshape(rows * cols), m.unseen
     cells, slot = m.cells, m.slot.reshape(rows * cols)
     crossed, crossings = np.empty((m.count[0], 3), dtype=np.int32), 0
     for i in range(turn, beams.shape[0], turns):
@@ -188,33 +214,55 @@ def enter_ways(
         leaves = beside + first * slope  # and its place there is `leaves` + k * slope
         line = corner_c + corner_r + lane * to_lane
         ahead = int(math.ceil(end * large - first))  # lanes that the beam leaves
-        for k in range(ahead + 1):
-            then = int(leaves + k * slope)
-            if k >= ahead:
-                then = place + 1 if place + 1 - beside < end * small else place
-            if free[np.uint64(line + place * to_place)] & free[np.uint64(line + then * to_place)]:
-                place, line = then, line + to_lane
-                continue
-            for p in range(place, then + 1):
-                at = line + p * to_place
-                if free[at]:
+        forward, sideways = (right, up) if flat else (up, right)
+        k = 0
+        while k <= ahead:
+            at = lane + k if forward else lanes - 1 - lane - k
+            square = k + (
+                SQUARE - (at & (SQUARE - 1)) if forward else (at & (SQUARE - 1)) + 1
+            )  # the lane where the next square begins
+            if square <= ahead:
+                then = int(leaves + (square - 1) * slope)
+                begins, ends = (place, then) if sideways else (places - 1 - place, places - 1 - then)
+                if all_free(at >> SHIFT, begins >> SHIFT, ends >> SHIFT, flat, unseen):
+                    place, line, k = then, line + (square - k) * to_lane, square
                     continue
-                c, r = (lane + k, p) if flat else (p, lane + k)
-                col, row = c if right else cols - 1 - c, r if up else rows - 1 - r
-                if not occupied[at]:
-                    free[at] = True
-                    changed[count, 0], changed[count, 1] = row, col
-                    count += 1
-                elif (first + k - 1) / large < rest and cells[slot[at], 3] != scan:
-                    # Distances along the beam to the sides of the cell through which it may leave.
-                    to_x = ((col + 1 - sx) if ux > 0.0 else (sx - col)) * cell / abs(ux) if ux != 0.0 else math.inf
-                    to_y = ((row + 1 - sy) if uy > 0.0 else (sy - row)) * cell / abs(uy) if uy != 0.0 else math.inf
-                    if min(to_x, to_y) + 0.5 * cell < rest:  # else the beam ends here or close behind
-                        cells[slot[at], 3] = scan
-                        crossed[crossings, 0], crossed[crossings, 1], crossed[crossings, 2] = row, col, i
-                        crossings += 1
-            place, line = then, line + to_lane
+            for k in range(k, min(square, ahead + 1)):  # noqa: B020
+                then = int(leaves + k * slope)
+                if k == ahead:
+                    then = place + 1 if place + 1 - beside < end * small else place
+                if free[np.uint64(line + place * to_place)] & free[np.uint64(line + then * to_place)]:
+                    place, line = then, line + to_lane
+                    continue
+                for p in range(place, then + 1):
+                    at = line + p * to_place
+                    if free[at]:
+                        continue
+                    c, r = (lane + k, p) if flat else (p, lane + k)
+                    col, row = c if right else cols - 1 - c, r if up else rows - 1 - r
+                    if not occupied[at]:
+                        free[at] = True
+                        unseen[row >> SHIFT, col >> SHIFT] -= 1
+                        changed[count, 0], changed[count, 1] = row, col
+                        count += 1
+                    elif (first + k - 1) / large < rest and cells[slot[at], 3] != scan:
+                        # Distances along the beam to the sides of the cell through which it may leave.
+                        to_x = ((col + 1 - sx) if ux > 0.0 else (sx - col)) * cell / abs(ux) if ux != 0.0 else math.inf
+                        to_y = ((row + 1 - sy) if uy > 0.0 else (sy - row)) * cell / abs(uy) if uy != 0.0 else math.inf
+                        if min(to_x, to_y) + 0.5 * cell < rest:  # else the beam ends here or close behind
+                            cells[slot[at], 3] = scan
+                            crossed[crossings, 0], crossed[crossings, 1], crossed[crossings, 2] = row, col, i
+                            crossings += 1
+                place, line = then, line + to_lane
+            k += 1
     return see_through(crossed[:crossings], scan, fan, m, changed, count)
+
+
+@inline
+def all_free(lane: int, first: int, last: int, flat: bool, unseen: Array) -> bool:
+    """Whether the squares `first` to `last`, at most three, of a lane of squares are free."""
+    squares = unseen[:, lane] if flat else unseen[lane]
+    return bool(squares[first] | squares[(first + last) >> 1] | squares[last] == 0)
 
 
 @kernel
@@ -283,6 +331,7 @@ def seen_beyond(
 def vacate(row: int, col: int, m: MapArrays) -> None:
     """Take an occupied cell off the list; it is then free ground."""
     m.occupied[row, col], m.free[row, col] = False, True
+    m.unseen[row >> SHIFT, col >> SHIFT] -= 1
     m.count[0] -= 1
     last, gap = m.count[0], m.slot[row, col]
     if gap == last:
@@ -297,8 +346,9 @@ def vacate(row: int, col: int, m: MapArrays) -> None:
 
 
 @kernel
-def forget(x: float, y: float, radius: float, m: MapArrays, changed: Array) -> int:
+def forget(x: float, y: float, radius: float, arrays: tuple[Array, ...], changed: Array) -> int:
     """Make the occupied cells whose hits all lie within `radius` of (x, y) free again; the rows written to `changed`."""
+    m = MapArrays(*arrays)
     count = 0
     i = 0
     while i < m.count[0]:
@@ -319,8 +369,9 @@ def forget(x: float, y: float, radius: float, m: MapArrays, changed: Array) -> i
 
 
 @kernel
-def take_as_free(x: float, y: float, radius: float, m: MapArrays, changed: Array) -> int:
-    """Make the unknown cells whose squares meet a disc free; the rows written to `changed`."""
+def take_as_free(x: float, y: float, radius: float, arrays: tuple[Array, ...], changed: Array) -> int:
+    """Make the unknown cells that meet a disc free; the rows written to `changed`."""
+    m = MapArrays(*arrays)
     cell = m.frame[2]
     rows, cols = m.free.shape
     count = 0
@@ -334,34 +385,54 @@ def take_as_free(x: float, y: float, radius: float, m: MapArrays, changed: Array
             dy = max(max(south - y, y - south - cell), 0.0)
             if dx * dx + dy * dy <= radius * radius and not m.free[row, col] and not m.occupied[row, col]:
                 m.free[row, col] = True
+                m.unseen[row >> SHIFT, col >> SHIFT] -= 1
                 changed[count, 0], changed[count, 1] = row, col
                 count += 1
     return count
 
 
 @kernel
-def discs_within(m: MapArrays, x_min: float, y_min: float, x_max: float, y_max: float) -> Array:
+def discs_within(x_min: float, y_min: float, x_max: float, y_max: float, arrays: tuple[Array, ...]) -> Array:
     """A disc (x, y, radius) around the hits of every grain whose cell meets a rectangle (D, 3) [m]."""
-    cells, left, low, cell = m.cells, m.frame[0], m.frame[1], m.frame[2]
+    m = MapArrays(*arrays)
+    cells, odds, box, cell = m.cells, m.odds, m.box, m.frame[2]
+    rows, cols = m.free.shape
+    col_low, col_high = meeting(x_min, x_max, m.frame[0], cell, cols)
+    row_low, row_high = meeting(y_min, y_max, m.frame[1], cell, rows)
     met = np.empty(m.count[0], dtype=np.int32)
     near, count = 0, 0
     for i in range(m.count[0]):
-        x, y = left + cells[i, 1] * cell, low + cells[i, 0] * cell
-        if x > x_max or y > y_max or x + cell < x_min or y + cell < y_min:
-            continue
         met[near] = i
-        near += 1
+        within = (row_low <= cells[i, 0]) & (cells[i, 0] <= row_high)
+        near += within & (col_low <= cells[i, 1]) & (cells[i, 1] <= col_high)
+    for j in range(near):
         for k in range(GRAINS * GRAINS):
-            count += 1 if m.odds[i, k] > 0.0 else 0
+            count += 1 if odds[met[j], k] > 0.0 else 0
     out = np.empty((count, 3))
     count = 0
     for j in range(near):
         i = met[j]
         for k in range(GRAINS * GRAINS):
-            if m.odds[i, k] > 0.0:
-                out[count, 0], out[count, 1], out[count, 2] = grain_disc(m.box, i, k)
+            if odds[i, k] > 0.0:
+                out[count, 0], out[count, 1], out[count, 2] = grain_disc(box, i, k)
                 count += 1
     return out
+
+
+@kernel
+def meeting(low: float, high: float, begin: float, cell: float, count: int) -> tuple[int, int]:
+    """The first and the last of `count` cells in a row from `begin` on that meet an interval."""
+    last = int(min(max((high - begin) / cell, -1.0), count * 1.0))
+    while last < count - 1 and begin + (last + 1) * cell <= high:
+        last += 1
+    while last >= 0 and begin + last * cell > high:
+        last -= 1
+    first = int(min(max((low - begin) / cell, 0.0), count * 1.0))
+    while first > 0 and begin + (first - 1) * cell + cell >= low:
+        first -= 1
+    while first < count and begin + first * cell + cell < low:
+        first += 1
+    return first, last
 
 
 @kernel
@@ -375,11 +446,12 @@ def grain_disc(box: Array, at: int, k: int) -> tuple[float, float, float]:
 
 
 @kernel
-def explained(points: Array, scan: int, settle: int, m: MapArrays, out: Array) -> None:
+def explained(points: Array, scan: int, settle: int, arrays: tuple[Array, ...], out: Array) -> None:
     """out[i] = whether point i lies in or beside a cell that has been occupied for `settle` scans, or was never seen free.
 
     A point outside the map is explained; so is one in ground that was never seen.
     """
+    m = MapArrays(*arrays)
     cell = m.frame[2]
     rows, cols = m.free.shape
     for i in range(points.shape[0]):

@@ -14,16 +14,19 @@ SETTLED = 1.0  # log-odds from which on a place of the map is matched with: two 
 
 
 @kernel
-def match(eye: Array, beams: Array, ranges: Array, every: int, first: int, far: float, near: int, fewest: int,
-          m: MapArrays) -> tuple[float, float, float, int]:  # fmt: skip
-    """The lidar's pose, moved so that hits lie on the nearest hits of the map: x, y, yaw, and the number of pairs.
+def match(
+    x: float, y: float, yaw: float, beams: Array, ranges: Array, every: int, first: int, far: float, near: int,
+    fewest: int, arrays: tuple[Array, ...],
+) -> tuple[float, float, float, int]:  # fmt: skip
+    """The lidar's pose (x, y, yaw), moved so that hits lie on the nearest hits of the map: x, y, yaw, and the number of pairs.
 
     Every `every`-th beam from beam `first` counts if its range is at most `far`; partners are looked for within `near` grains.
     With fewer pairs than `fewest` the pose stays. In each round the best rigid motion for the pairs has a closed form (K. S.
     Arun, T. S. Huang and S. D. Blostein, *Least-squares fitting of two 3-D point sets*, IEEE PAMI 9, 1987); the whole is the
     iterative closest point of P. J. Besl and N. D. McKay, IEEE PAMI 14, 1992.
     """
-    x, y, yaw = eye[0], eye[1], eye[2]
+    m = MapArrays(*arrays)
+    eye = x, y, yaw
     pairs = 0
     for _ in range(ROUNDS):
         cos, sin = math.cos(yaw), math.sin(yaw)

@@ -13,11 +13,12 @@ GIVE = 2e-3  # a disc that the footprint overlaps already is shrunk to this dist
 
 
 @kernel
-def clear_way(pose: Array, speed: float, yaw_rate: float, shape: Array, limit: float, m: MapArrays) -> float:
-    """How far the robot gets on the arc of a twist [m], at most `limit`; for a turn on the spot in radians.
-
-    `shape` holds half length, half width and rounding of a rounded rectangle.
-    """
+def clear_way(
+    x0: float, y0: float, yaw: float, speed: float, yaw_rate: float, half_length: float, half_width: float,
+    rounding: float, limit: float, arrays: tuple[Array, ...],
+) -> float:  # fmt: skip
+    """How far a rounded rectangle gets on the arc of a twist from a pose [m], at most `limit`; for a turn on the spot [rad]."""
+    pose, shape, m = (x0, y0, yaw), (half_length, half_width, rounding), MapArrays(*arrays)
     radius = math.hypot(shape[0], shape[1]) + shape[2]
     cell = m.frame[2]
     turns = speed == 0.0
@@ -65,7 +66,9 @@ def clear_way(pose: Array, speed: float, yaw_rate: float, shape: Array, limit: f
 
 
 @kernel
-def within_map(pose: Array, forward: float, bend: float, radius: float, limit: float, m: MapArrays) -> float:
+def within_map(
+    pose: tuple[float, float, float], forward: float, bend: float, radius: float, limit: float, m: MapArrays
+) -> float:
     """How far the disc around the robot stays on the map; what lies beyond was not seen."""
     cell = m.frame[2]
     rows, cols = m.free.shape
@@ -109,7 +112,9 @@ def on_the_way(ahead: float, left: float, forward: float, bend: float, reach: fl
 
 
 @kernel
-def contact(ahead: float, left: float, size: float, forward: float, bend: float, shape: Array, limit: float) -> float:
+def contact(
+    ahead: float, left: float, size: float, forward: float, bend: float, shape: tuple[float, float, float], limit: float
+) -> float:
     """How far the robot gets before it meets a disc at (ahead, left), at most `limit`.
 
     Steps are as long as the distance allows (conservative advancement). A disc that the robot overlaps at first is taken for

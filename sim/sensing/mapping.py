@@ -78,7 +78,8 @@ class OccupancyMap:
         self.cell, self.horizon = cell, min(horizon, lidar.max_range)
         self.trust = min(self.horizon, cell / lidar.spacing)
         self.scans = self.layouts = 0
-        self._lidar, self._grows = lidar, bounds is None
+        self._spare = 0  # so many more occupied cells the lists surely have room for
+        self._lidar, self._grows, self._closed = lidar, bounds is None, lidar.full_circle
         angles = lidar.angles - lidar.yaw
         self.beams = np.column_stack((np.cos(angles), np.sin(angles)))
         self._begin = np.empty(lidar.beams)
@@ -115,8 +116,13 @@ class OccupancyMap:
 
     @property
     def arrays(self) -> kernels.MapArrays:
-        """The arrays of the map, for kernels."""
+        """The arrays of the map by their names."""
         return self._arrays
+
+    @property
+    def plain(self) -> tuple[Any, ...]:
+        """The same arrays, for kernels."""
+        return self._plain
 
     def insert(self, pose: Pose, ranges: Floats, left_out: Mask | None = None) -> Cells:
         """Enter a scan, and return the cells that became free, occupied, or free again (K, 2): row, col.
@@ -129,16 +135,18 @@ class OccupancyMap:
         x, y, yaw = self._lidar.pose_on(pose)
         if self._grows:
             self._make_room(x, y)
-        self._lengthen_lists()
-        turn = self.scans // self.share % self.turns if self.whole else -1
+        if self._spare < len(ranges):
+            self._lengthen_lists()
+        number, rest = divmod(self.scans, self.share)
+        turn = -1 if rest else number % self.turns
         turns = self.turns if self.scans else 1
         self.scans += 1
         mask = self._none if left_out is None else np.ascontiguousarray(left_out)
-        eye = np.array((x, y, math.cos(yaw), math.sin(yaw)))
-        fan = kernels.Fan(eye, self.beams, ranges, self._lidar.full_circle)
         count = kernels.insert(
-            fan, self._begin, turn, turns, mask, self.horizon, self.trust, self.scans, self._arrays, self._changed
-        )
+            x, y, math.cos(yaw), math.sin(yaw), self.beams, ranges, self._closed, self._begin, turn, turns, mask,
+            self.horizon, self.trust, self.scans, self._plain, self._changed,
+        )  # fmt: skip
+        self._spare -= count
         return self._changed[:count].copy()
 
     def endpoints(self, pose: Pose, ranges: Floats) -> Floats:
@@ -165,7 +173,7 @@ class OccupancyMap:
             settle: after how many scans what has come counts as standing
         """
         out = np.empty(len(points), dtype=np.bool_)
-        kernels.explained(np.ascontiguousarray(points), self.scans, settle, self._arrays, out)
+        kernels.explained(np.ascontiguousarray(points), self.scans, settle, self._plain, out)
         return out
 
     def discs(self, within: Bounds | None = None) -> Floats:
@@ -174,7 +182,7 @@ class OccupancyMap:
         Args:
             within: only those of cells that meet this rectangle [m]; None: all
         """
-        found: Floats = kernels.discs_within(self._arrays, *(within or EVERYWHERE))
+        found: Floats = kernels.discs_within(*(within or EVERYWHERE), self._plain)
         return found
 
     def forget(self, place: Point, radius: float) -> Cells:
@@ -184,7 +192,7 @@ class OccupancyMap:
             place: x, y [m]
             radius: how far around it [m]
         """
-        count = kernels.forget(*place, radius, self._arrays, self._changed)
+        count = kernels.forget(*place, radius, self._plain, self._changed)
         return self._changed[:count].copy()
 
     def take_as_free(self, place: Point, radius: float) -> Cells:
@@ -194,7 +202,7 @@ class OccupancyMap:
             place: x, y [m]
             radius: how far around it [m]
         """
-        count = kernels.take_as_free(*place, radius, self._arrays, self._changed)
+        count = kernels.take_as_free(*place, radius, self._plain, self._changed)
         return self._changed[:count].copy()
 
     def _make_room(self, x: float, y: float) -> None:
@@ -209,6 +217,7 @@ class OccupancyMap:
         self._lay_out(x0, y0, rows, cols, more, old)
         new, count = self._arrays, int(old.count[0])
         new.free[more[1] : more[1] + rows, more[0] : more[0] + cols] = old.free
+        kernels.count_unseen(new.free, new.unseen)
         new.cells[:count, :2] += (more[1], more[0])
         listed = new.cells[:count, 0], new.cells[:count, 1]
         new.occupied[listed], new.slot[listed] = True, np.arange(count)
@@ -233,10 +242,13 @@ class OccupancyMap:
         frame = np.array([x0 - west * self.cell, y0 - south * self.cell, self.cell])
         free, occupied = _zeros(shape, dtype=np.bool_), _zeros(shape, dtype=np.bool_)
         slot = _zeros(shape, dtype=np.int32)
+        unseen = np.empty([math.ceil(side / kernels.SQUARE) for side in shape], dtype=np.uint8)
+        kernels.count_unseen(free, unseen)
         if old is None:
             grains = kernels.GRAINS * kernels.GRAINS
             self._arrays: kernels.MapArrays = kernels.MapArrays(
                 free=free,
+                unseen=unseen,
                 occupied=occupied,
                 slot=slot,
                 count=np.zeros(1, dtype=np.int64),
@@ -247,7 +259,8 @@ class OccupancyMap:
                 box=np.zeros((LISTED, grains, 4), dtype=np.float32),
             )
         else:
-            self._arrays = old._replace(free=free, occupied=occupied, slot=slot, frame=frame)
+            self._arrays = old._replace(free=free, unseen=unseen, occupied=occupied, slot=slot, frame=frame)
+        self._plain = tuple(self._arrays)
         self._changed = _zeros((shape[0] * shape[1], 2), dtype=np.int32)
         (x, y), far = self.origin, self.horizon
         self._room = x + far, x + shape[1] * self.cell - far, y + far, y + shape[0] * self.cell - far
@@ -255,15 +268,17 @@ class OccupancyMap:
 
     def _lengthen_lists(self) -> None:
         """Make the lists of occupied cells longer where a scan could fill them."""
-        missing = int(self._arrays.count[0]) + self._lidar.beams - len(self._arrays.cells)
-        if missing <= 0:
-            return
-        lists = {name: getattr(self._arrays, name) for name in ("cells", "odds", "stamp", "box")}
-        longer = {
-            name: np.concatenate((rows, np.zeros((max(missing, len(rows)), *rows.shape[1:]), dtype=rows.dtype)))
-            for name, rows in lists.items()
-        }
-        self._arrays = self._arrays._replace(**longer)
+        held, room = int(self._arrays.count[0]), len(self._arrays.cells)
+        missing = held + self._lidar.beams - room
+        if missing > 0:
+            room += max(missing, room)
+            lists = {name: getattr(self._arrays, name) for name in ("cells", "odds", "stamp", "box")}
+            longer = {name: np.zeros((room, *rows.shape[1:]), dtype=rows.dtype) for name, rows in lists.items()}
+            for name, rows in lists.items():
+                longer[name][: len(rows)] = rows
+            self._arrays = self._arrays._replace(**longer)
+            self._plain = tuple(self._arrays)
+        self._spare = room - held
 
 
 def _zeros(shape: tuple[int, ...], dtype: npt.DTypeLike) -> npt.NDArray[Any]:

@@ -44,12 +44,12 @@ class ScanMatcher:
             ranges: the scan (beams,) [m]
         """
         lidar = self._lidar
-        eye = np.array(lidar.pose_on(pose))
+        eye = lidar.pose_on(pose)
         first = seen.scans // seen.share % self._every
         x, y, yaw, pairs = _kernels_matching.match(
-            eye, self._beams, ranges, self._every, first, self._far, NEAR, FEWEST, seen.arrays
+            *eye, self._beams, ranges, self._every, first, self._far, NEAR, FEWEST, seen.plain
         )
-        turn = math.remainder(yaw - float(eye[2]), 2 * math.pi)
+        turn = math.remainder(yaw - eye[2], 2 * math.pi)
         if pairs < FEWEST or math.hypot(x - eye[0], y - eye[1]) > MOST[0] or abs(turn) > MOST[1]:
             return pose
         heading = pose[2] + turn

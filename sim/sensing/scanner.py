@@ -39,14 +39,15 @@ class Scanner:
     ) -> None:
         self.lidar = lidar
         rows = np.ascontiguousarray(discs, dtype=np.float64).reshape(-1, 3)
-        self._discs = rows if heights is None else rows[np.asarray(heights) >= lidar.height]
+        rows = rows if heights is None else rows[np.asarray(heights) >= lidar.height]
+        self._discs = np.ascontiguousarray(rows.T)
         self._bounds = np.asarray(() if bounds is None else bounds, dtype=np.float64)
         self._movers = None if mover_heights is None else np.asarray(mover_heights) >= lidar.height
         angles = lidar.angles - lidar.yaw
-        self._beams = np.column_stack((np.cos(angles), np.sin(angles)))
-        self._first = float(angles[0])
+        self._beams = np.stack((np.cos(angles), np.sin(angles)))
+        self._first, self._spacing = float(angles[0]), lidar.spacing
         self._limits = np.array((lidar.min_range, lidar.max_range, lidar.resolution, lidar.sigma))
-        self._silence, self._none = np.zeros(lidar.beams), np.empty((0, 3))
+        self._silence, self._none = np.zeros(lidar.beams), np.empty((3, 0))
         self._sorted_at = (np.inf, np.inf)
 
     @classmethod
@@ -82,17 +83,16 @@ class Scanner:
             self._sort(eye[:2])
         movers = self._none
         if mover_positions is not None and mover_radii is not None and len(mover_radii):
-            movers = np.column_stack((mover_positions, mover_radii))
-            movers = np.ascontiguousarray(movers if self._movers is None else movers[self._movers])
+            found = np.column_stack((mover_positions, mover_radii))
+            movers = np.ascontiguousarray((found if self._movers is None else found[self._movers]).T)
         noise = self._silence if rng is None else rng.standard_normal(self.lidar.beams)
         out = np.empty(self.lidar.beams)
         _kernels_rays.scan(
-            np.array(eye), self._beams, self.lidar.spacing, self._first, self._limits, self._discs, movers, self._bounds,
-            noise, out,
+            *eye, self._beams, self._spacing, self._first, self._limits, self._discs, movers, self._bounds, noise, out
         )  # fmt: skip
         return out
 
     def _sort(self, eye: Point) -> None:
         """Put near discs first: rays that they end need not be looked at again."""
-        away = np.hypot(self._discs[:, 0] - eye[0], self._discs[:, 1] - eye[1]) - self._discs[:, 2]
-        self._discs, self._sorted_at = self._discs[np.argsort(away, kind="stable")], eye
+        away = np.hypot(self._discs[0] - eye[0], self._discs[1] - eye[1]) - self._discs[2]
+        self._discs, self._sorted_at = np.take(self._discs, np.argsort(away, kind="stable"), axis=1), eye

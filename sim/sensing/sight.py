@@ -44,4 +44,4 @@ def clear_turn(seen: OccupancyMap, pose: Pose, yaw_rate: float, footprint: Footp
 
 def _clear(seen: OccupancyMap, pose: Pose, speed: float, yaw_rate: float, footprint: Footprint, limit: float) -> float:
     shape = footprint.half_length, footprint.half_width, footprint.rounding
-    return float(_kernels_sight.clear_way(pose, speed, yaw_rate, shape, limit, seen.arrays))
+    return float(_kernels_sight.clear_way(*pose, speed, yaw_rate, *shape, limit, seen.plain))

@@ -69,17 +69,12 @@ def import_sdf(
     models = read_models(world, frame)
     if models.unsupported and not skip_unsupported:
         raise input_error(str(file), _about_unsupported(models))
-    if any(frame):
-        start, goal = (end if end is None else tuple(out_of_map(frame, [end])[0].tolist()) for end in (start, goal))
-    start = start or kept.numbers("start", 3)
-    goal = goal or kept.numbers("goal", 2)
+    start = _in_world(frame, start) or kept.numbers("start", 3)
+    goal = _in_world(frame, goal) or kept.numbers("goal", 2)
     bounds = bounds or kept.numbers("bounds", 4)
     if bounds is None:
-        if not models.discs:
-            raise input_error(str(file), "holds no upright cylinder; give the bounds")
-        bounds = _bounds_around(models.discs, start, goal)
-    if goal is None:
-        goal = bounds[2] - MARGIN / 2, bounds[3] - MARGIN / 2
+        bounds = _bounds_around(file, models.discs, start, goal)
+    goal = goal or (bounds[2] - MARGIN / 2, bounds[3] - MARGIN / 2)
     if start is None:
         x, y = bounds[0] + MARGIN / 2, bounds[1] + MARGIN / 2
         start = x, y, math.atan2(goal[1] - y, goal[0] - x)
@@ -95,6 +90,11 @@ def import_sdf(
         )
     except FieldError as error:
         raise input_error(str(file), str(error)) from None
+
+
+def _in_world(frame: Pose, end: Any) -> Any:
+    """A start or a goal in the file's coordinates as it is in the world's frame."""
+    return tuple(out_of_map(frame, [end])[0].tolist()) if end is not None and any(frame) else end
 
 
 def _world_element(file: Path) -> ET.Element:
@@ -154,8 +154,10 @@ def _about_unsupported(models: Models) -> str:
     return f"only static models of upright cylinders can be imported; leave out or skip {names}"
 
 
-def _bounds_around(discs: list[Disc], start: Pose | None, goal: Point | None) -> Bounds:
-    """Bounds with `MARGIN` around the cylinders and the given ends."""
+def _bounds_around(file: Path, discs: list[Disc], start: Pose | None, goal: Point | None) -> Bounds:
+    """Bounds with `MARGIN` around the cylinders, of which there must be one, and the given ends."""
+    if not discs:
+        raise input_error(str(file), "holds no upright cylinder; give the bounds")
     spots = [(d.x, d.y, d.radius) for d in discs]
     spots += [(end[0], end[1], 0.0) for end in (start, goal) if end is not None]
     return (

@@ -575,6 +575,30 @@ def test_no_corner_of_a_turned_box_is_outside_of_the_footprint(
     assert max(-xmin, -ymin, xmax, ymax) <= reach + 3e-5, "outwards, but by little"
 
 
+@given(st.lists(st.tuples(st.floats(-1, 1), st.floats(0, 1)), min_size=3, max_size=40), st.floats(0.2, 0.8))
+def test_a_robot_with_two_equal_sides_has_a_footprint_with_two_equal_sides(
+    some: list[tuple[float, float]], at: float
+) -> None:
+    ring = [(at + 0.4 * math.cos(k / 30 * math.pi), 0.4 * math.sin(k / 30 * math.pi)) for k in range(31)]
+    both = [(x, side * y) for x, y in some + ring for side in (-1, 1)]
+    foot = footprint_around(both, "polygon")
+    assert most_outside(written(foot), both) <= 1e-8
+    assert len(foot.corners) <= 12
+    for x, y in foot.corners:
+        assert min(math.dist((x, -y), corner) for corner in foot.corners) <= 1e-4
+
+
+def test_a_cylinder_is_as_long_and_as_wide_as_its_diameter(tmp_path: Path) -> None:
+    path = changed(
+        tmp_path, "burger.urdf", ('<box size="0.138 0.140 0.143"/>', '<cylinder radius="0.2" length="0.143"/>')
+    )
+    for kind in ("rectangle", "polygon"):
+        bounds = import_urdf(path, footprint=kind).robot.footprint.bounds
+        assert (bounds[2] - bounds[0], bounds[3] - bounds[1]) == pytest.approx(
+            (0.4, 0.4), rel=0.06 if kind == "polygon" else 1e-4
+        )
+
+
 @given(st.integers(13, 90), st.floats(0.3, 1.0))
 def test_fewer_corners_cost_little(count: int, squash: float) -> None:
     ellipse = [(math.cos(2 * math.pi * k / count), squash * math.sin(2 * math.pi * k / count)) for k in range(count)]

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from antdrive.robots import Lidar, RobotSpec
 from antdrive.sim.sensing import OccupancyMap, Scanner
+from antdrive.sim.sensing._kernels_mapping import SQUARE
 from antdrive.worlds import Floats, Pose
 
 EYE = Lidar(beams=240, field_of_view=4.7, min_range=0.1, max_range=6.0, rate=10.0, resolution=0.01, sigma=0.003, x=0.1)
@@ -282,3 +283,30 @@ def test_every_beam_has_its_turn(jackal: RobotSpec) -> None:
         for found in (grid, every):
             found.insert(pose, scanner.scan(pose))
     assert np.array_equal(grid.seen_free, every.seen_free)
+
+
+def test_free_squares_are_passed_without_a_difference(jackal: RobotSpec) -> None:
+    """The oracle is the same map whose squares all count as not free, so that beams walk through every cell."""
+    assert jackal.lidar is not None
+    rng = np.random.default_rng(5)
+    discs = np.column_stack((rng.uniform(-6, 6, (40, 2)), rng.uniform(0.05, 0.4, 40)))
+    scanner = Scanner(jackal.lidar, discs[np.hypot(discs[:, 0], discs[:, 1]) > 1.0])
+    quick, walked = (OccupancyMap(jackal.lidar, share=1, horizon=8.0) for _ in range(2))
+    for number in range(40):
+        pose = (0.15 * number, 0.05 * number, 0.1 * number)
+        ranges = scanner.scan(pose, rng=rng)
+        walked.arrays.unseen[:] = 200
+        assert np.array_equal(quick.insert(pose, ranges), walked.insert(pose, ranges))
+        if number == 20:
+            for found in (quick, walked):
+                found.forget((1.5, 0.5), 1.0)
+                found.take_as_free((0.0, 8.0), 2.0)
+    assert np.array_equal(quick.seen_free, walked.seen_free)
+    assert np.array_equal(quick.arrays.odds, walked.arrays.odds)
+    (rows, cols), side = quick.seen_free.shape, SQUARE
+    padded = np.zeros((-(-rows // side) * side, -(-cols // side) * side), dtype=bool)
+    padded[:rows, :cols] = ~quick.seen_free
+    counted = padded.reshape(len(padded) // side, side, -1, side).sum(axis=(1, 3))
+    assert np.array_equal(quick.arrays.unseen, counted)
+    assert quick.layouts > 1
+    assert (counted == 0).sum() > 100

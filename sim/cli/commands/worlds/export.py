@@ -1,5 +1,6 @@
 """`antdrive worlds export`."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -47,7 +48,7 @@ def export_world(
     other tasks, too. A .map gets a .scen file beside it with the path from start to goal, if there is one on its cells.
     A world that was made from a map is written where it lies in that map, but for a .map, which has no coordinates.
     """
-    from antdrive.worlds import export_map_server, export_sdf, load_task, load_tasks
+    from antdrive.worlds import load_task, load_tasks
     from antdrive.worlds.formats.checks import require_new
 
     suffix = out.suffix.lower()
@@ -60,8 +61,23 @@ def export_world(
         raise InputError("--resolution: an SDF world has no cells")
     beside = _beside(out)
     require_new((out, *([] if beside is None else [beside])), replace=force)
-    facts: dict[str, Any] = {"world": task.world.name}
-    lost = []
+    facts, lost = _write(task, tasks, out, resolution)
+    if json:
+        print_json({"world": task.world.name, **facts})
+        return SUCCEEDED
+    print_files(facts["files"])
+    for what in lost:
+        print_line(f"  without {what}")
+    return SUCCEEDED
+
+
+def _write(
+    task: "Task", tasks: "Mapping[str, Task]", out: Path, resolution: float | None
+) -> tuple[dict[str, Any], list[str]]:
+    """Write a world's files; facts about them, and what they have no place for."""
+    from antdrive.worlds import export_map_server, export_sdf
+
+    suffix, facts, lost = out.suffix.lower(), dict[str, Any](), list[str]()
     if suffix in SDF:
         export_sdf(task, out)
         facts["files"] = {"sdf": str(out)}
@@ -75,18 +91,12 @@ def export_world(
                 f"its place: .map has no coordinates, and its lower left corner is at ({x:.6g}, {y:.6g}){turned}"
             )
     else:
-        image = export_map_server(task, out, resolution=resolution, tasks=tasks, replace=force)
-        facts["files"], tasks = {"map": str(out), "image": str(image)}, {}
+        image = export_map_server(task, out, resolution=resolution, tasks=tasks, replace=True)  # as was checked
+        return {"files": {"map": str(out), "image": str(image)}}, lost
     if tasks:
         facts["without_tasks"] = list(tasks)
         lost.append(f"the tasks {', '.join(tasks)}: {suffix} has no place for them, .yaml has")
-    if json:
-        print_json(facts)
-        return SUCCEEDED
-    print_files(facts["files"])
-    for what in lost:
-        print_line(f"  without {what}")
-    return SUCCEEDED
+    return facts, lost
 
 
 def _beside(out: Path) -> Path | None:
