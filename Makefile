@@ -1,5 +1,5 @@
 # make demo   plan, drive, certify and film one world
-# make test   the whole test suite (make test-slow: the long ones too)
+# make test   all tests but the long ones (make test-slow: the long ones too)
 # make docs   the site, with everything that its pages show: docs/_build/html/index.html
 # make dist   wheel and sdist in dist/, checked in a fresh environment outside the checkout
 # Everything else that these need they set up themselves, in .venv.

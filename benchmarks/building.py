@@ -1,15 +1,20 @@
 """A building of 40 x 30 m as a map of 0.05 m a pixel: what each stage of its use costs, and the loop among 10,000 cylinders.
 
-python -m benchmarks.building            # a table for docs/benchmarks.md
-python -m benchmarks.building --map DIR  # only write the map, to look at it
+python -m benchmarks.building               # tables for docs/benchmarks.md
+python -m benchmarks.building --only tasks  # 30 random tasks in it, with the campaign's statistics
+python -m benchmarks.building --map DIR     # only write the map, to look at it
 """
 
 from __future__ import annotations
 
 import argparse
 import itertools
+import os
 import resource
+import shlex
 import statistics
+import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -96,14 +101,19 @@ def write_map(folder: Path) -> Path:
 
 
 def stage(name: str, work: Callable[[], T]) -> T:
-    """Do some work and print its time and the most memory that the process has held so far."""
-    started = time.perf_counter()
+    """Do some work and print its time, its processor time, and the most memory that the process has held so far."""
+    started, used = time.perf_counter(), processor_time()
     result = work()
-    seconds = time.perf_counter() - started
-    print(
-        f"{name:44} {seconds:8.2f} s   {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:7.0f} MB", flush=True
-    )
+    seconds, used = time.perf_counter() - started, processor_time() - used
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(f"{name:44} {seconds:8.2f} s   {used:8.2f} s of processor time   {memory:7.0f} MB", flush=True)
     return result
+
+
+def processor_time() -> float:
+    """Of this process and of the children that have ended [s]."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
 
 
 def stages(folder: Path) -> None:
@@ -147,6 +157,19 @@ def stages(folder: Path) -> None:
     print(f"  {made.frames} frames")
 
 
+def tasks(folder: Path, number: int, apart: float, jobs: int) -> None:
+    """Drive random tasks in the building with one command, and print what its report says."""
+    world = folder / "building.world.yaml"
+    save_task(import_map_server(write_map(folder), start=START, goal=GOAL), world)
+    command = [
+        "antdrive", "sweep", "--world", str(world), "-p", "astar", "--tasks", f"{number}:{apart:g}",
+        "--jobs", str(jobs), "-o", str(folder / "tasks"), "--report", str(folder / "tasks.md"),
+    ]  # fmt: skip
+    print(f"$ {shlex.join(command).replace(str(folder) + os.sep, '')}", flush=True)
+    stage("all of it", lambda: subprocess.run([sys.executable, "-m", *command], check=True))
+    print((folder / "tasks.md").read_text(encoding="utf-8"))
+
+
 def task_among(count: int) -> Task:
     """An 18 m drive among `count` thin cylinders in a hall of 40 x 30 m."""
     rng = np.random.default_rng(0)
@@ -159,7 +182,7 @@ def task_among(count: int) -> Task:
 
 
 def loop(counts: tuple[int, ...] = (400, 10_000)) -> None:
-    """Print what a step of the drive loop costs among many cylinders, and how much of that is physics."""
+    """Print what a step of the drive loop costs among many cylinders, in processor time."""
     robot, controller = load_robot("turtlebot"), PurePursuit()
     x = np.linspace(1, 19, 73)
     route = Route(np.stack([x, 15 + 0.4 * np.sin((x - 1) * np.pi / 3)], axis=1))
@@ -171,11 +194,11 @@ def loop(counts: tuple[int, ...] = (400, 10_000)) -> None:
         built.append((count, task, tracked, Engine(task.world, robot).__enter__()))
     for turn in range(ROUNDS + 1):
         for count, task, tracked, engine in built:
-            started = time.perf_counter()
+            started = time.process_time()
             log = drive(engine, controller, tracked, task, time_limit=120)
             assert log.outcome.name == "SUCCEEDED", log.outcome
             if turn:
-                costs[count].append((time.perf_counter() - started) / (len(log.t) - 1) * 1e6)
+                costs[count].append((time.process_time() - started) / (len(log.t) - 1) * 1e6)
     first = costs[counts[0]]
     print("\ncylinders   us/step   / the first")
     for count, values in costs.items():
@@ -188,16 +211,20 @@ def loop(counts: tuple[int, ...] = (400, 10_000)) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--map", type=Path)
-    parser.add_argument("--only", choices=("stages", "loop"))
+    parser.add_argument("--only", choices=("stages", "tasks", "loop"))
+    parser.add_argument("--jobs", type=int, default=2, help="processes that drive the tasks")
     asked = parser.parse_args()
     if asked.map is not None:
         asked.map.mkdir(parents=True, exist_ok=True)
         print(write_map(asked.map))
         return
-    if asked.only != "loop":
-        with tempfile.TemporaryDirectory() as folder:
+    parts = (asked.only,) if asked.only else ("stages", "tasks", "loop")
+    with tempfile.TemporaryDirectory() as folder:
+        if "stages" in parts:
             stages(Path(folder))
-    if asked.only != "stages":
+        if "tasks" in parts:
+            tasks(Path(folder), 30, 10.0, asked.jobs)
+    if "loop" in parts:
         loop()
 
 

@@ -29,7 +29,6 @@ from pathlib import Path
 from typing import Any
 
 HERE = Path(__file__).parent.parent
-BARN = HERE.parent / "shared" / "data" / "barn" / "barn50.tar.xz"
 SIZES = ((640, 480), (1280, 720))
 MOVERS = (0, 6, 24)
 PLANNER, ROBOT = "astar", "jackal"
@@ -175,7 +174,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--against", type=Path, help="root of another checkout of antdrive")
     parser.add_argument("--worlds", type=Path, help="folder of world files; default: BARN's worlds")
-    parser.add_argument("--barn", type=Path, default=BARN, help="folder or archive of BARN's world_*.world files")
+    parser.add_argument("--barn", type=Path, help="folder or archive of BARN's world_*.world files")
     parser.add_argument("--count", type=int, default=50, help="how many of the worlds; 0: no drives")
     parser.add_argument("--seconds", type=float, default=10.0, help="length of each film; 0: no films [s]")
     parser.add_argument("--rounds", type=int, default=3, help="films of each kind")
@@ -185,13 +184,16 @@ def main() -> None:
     if options.serve:
         serve()
         return
+    from tools.shared_data import BARN  # the process of an older checkout, which serves, may not have it
+
+    barn = options.barn or BARN
     with contextlib.ExitStack() as stack:
         folder = options.worlds or Path(stack.enter_context(tempfile.TemporaryDirectory()))
         if options.worlds is None:
-            write_barn(options.barn, folder)
+            write_barn(barn, folder)
         worlds = sorted(folder.glob("*.yaml"))[: options.count]
         if options.count and not worlds:
-            raise SystemExit(f"no worlds in {options.worlds or options.barn}; give --worlds or --barn")
+            raise SystemExit(f"no worlds in {options.worlds or barn}; give --worlds or --barn")
         roots = {"here": HERE} | ({"there": options.against.resolve()} if options.against else {})
         checkouts = {}
         for name, root in roots.items():

@@ -30,8 +30,7 @@ from antdrive.sim import Scenario, run
 from antdrive.sim.log.metrics import measure, tracking_error
 from antdrive.worlds import generate, import_barn, rasterise
 from benchmarks.planners import table
-
-BARN = Path(__file__).parent.parent.parent / "shared" / "data" / "barn" / "barn50.tar.xz"
+from tools.shared_data import BARN
 
 
 class Result(NamedTuple):

@@ -40,8 +40,8 @@ from antdrive.worlds import (
     rasterise,
 )
 from benchmarks.planners import table
+from tools.shared_data import DYNABARN
 
-DYNABARN = Path(__file__).parent.parent.parent / "shared" / "data" / "dynabarn" / "dynabarn10.json"
 CLASSES = {"easy": range(20), "medium": range(20, 40), "hard": range(40, 60)}
 LATELY = 1.0  # what a mover did in this time before a contact is said [s]
 JUMP, TURN = 0.3, 0.7  # a mover that gets so far between two rows of a log has jumped [m]; a turn that is said [rad]

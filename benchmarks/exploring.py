@@ -33,9 +33,9 @@ from antdrive.sim.driving.exploring import Exploration
 from antdrive.sim.driving.survey import Senses
 from antdrive.sim.sensing import OccupancyMap
 from antdrive.sim.sensing.matching import ScanMatcher
-from benchmarks.cost import BARN
 from benchmarks.drives import barn_tasks
 from benchmarks.planners import table
+from tools.shared_data import BARN
 
 WORLDS = ("world_0", "world_138", "world_186", "world_24", "world_288", "world_66")
 PERIOD = "loop"

@@ -1,81 +1,98 @@
-"""How long the export of 10 s of driving among movers takes, with 50 scans of 720 beams a second, and from the command line.
+"""How long exports take: of drives of a jackal, whose lidar has 720 beams 50 times a second, with a map and without one.
 
 python -m benchmarks.export
+
+Times are processor time, of the function and of the whole command; where a drive did not use its lidar, `--scans` takes the
+scans at export. In a process that has exported before, packages and compiled code are loaded.
 """
 
 from __future__ import annotations
 
-import dataclasses
+import argparse
 import resource
 import statistics
 import subprocess
 import sys
 import tempfile
-import time
+from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
+from antdrive.sim import Perception, Rollout, Scenario, run
 
-from antdrive.sim import Rollout, Scenario, run
-from antdrive.sim.export.bags import write_mcap
-from antdrive.sim.export.exporting import attachments_of, export, topics_of
-from antdrive.sim.export.samples import laser_scans
-from antdrive.sim.export.topics import nanoseconds
+KINDS = ("mcap", "rosbag2", "csv")
+#: The scenarios' settings by what a row of the table is called.
+DRIVES = {
+    "with a map, movers by lidar": ("plaza-moving", "dstar-lite", {"perception": Perception(kind="lidar")}),
+    "with a map, movers told": ("plaza-moving", "dstar-lite", {}),
+    "without a map": ("forest", "astar", {"map": "none", "localisation": "true"}),
+}
+#: Exports a log several times in one process and prints the processor time of each [s].
+TIMED = """
+import sys, time
+from pathlib import Path
+from antdrive.sim.export.exporting import export
+log, kind, folder, times, suffix = sys.argv[1:]
+for turn in range(int(times)):
+    started = time.process_time()
+    export(log, kind, Path(folder) / f"{kind}-{turn}{suffix}")
+    print(time.process_time() - started)
+"""
 
-ROUNDS, SECONDS, BEAMS, RATE = 7, 10, 720, 50
+
+def in_one_process(log: Path, kind: str, folder: Path, times: int) -> list[float]:
+    """The processor time of each of several exports in a fresh process [s]."""
+    suffix = ".mcap" if kind == "mcap" else ""
+    words = [sys.executable, "-c", TIMED, str(log), kind, str(folder), str(times), suffix]
+    return [float(line) for line in subprocess.run(words, check=True, capture_output=True, text=True).stdout.split()]
 
 
-def first_seconds(log: Rollout) -> Rollout:
-    """The log up to SECONDS."""
-    rows = SECONDS * log.record.physics_hz + 1
-    replans = tuple(replan for replan in log.record.replans if replan.t < SECONDS)
-    names = ("t", "pose", "twist", "command", "clearance", "limiter", "movers")
-    cut = {name: getattr(log, name)[:rows] for name in names}
-    return dataclasses.replace(log, record=dataclasses.replace(log.record, replans=replans), **cut)
-
-
-def processor_time(log: Path, target: Path) -> float:
-    """What one call of the command takes, start of the interpreter and imports included [s]."""
+def by_command(log: Path, kind: str, target: Path) -> float:
+    """The processor time of a call of the command, start of the interpreter and imports included [s]."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    words = [sys.executable, "-m", "antdrive", "export", str(log), "-o", str(target)]
+    words = [sys.executable, "-m", "antdrive", "export", str(log), "--to", kind, "-o", str(target)]
     subprocess.run(words, check=True, capture_output=True)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
+def messages(log: Path) -> tuple[int, int]:
+    """How many messages and scans the bag of a log has."""
+    from antdrive.sim.export.exporting import topics_of
+    from antdrive.sim.export.scans import Scans
+
+    rollout = Rollout.load(log)
+    scans = Scans.of(rollout)
+    return sum(len(topic.stamps) for topic in topics_of(rollout, scans)), len(scans.rows)
+
+
+def rows(folder: Path, rounds: int) -> Iterator[list[str]]:
+    """The rows of the table."""
+    for name, (world, planner, settings) in DRIVES.items():
+        log = run(Scenario.of(world, planner, "jackal", **settings)).rollout
+        assert log is not None
+        file = log.save(folder / f"{name}.npz")
+        many, scans = messages(file)
+        for kind in KINDS:
+            first, later, command = [], [], []
+            for turn in range(rounds):
+                place = folder / f"{name} {kind} {turn}"
+                place.mkdir()
+                once, *again = in_one_process(file, kind, place, 4)
+                first.append(once)
+                later += again
+                command.append(by_command(file, kind, place / ("by-command.mcap" if kind == "mcap" else "by-command")))
+            size = f"{log.t[-1]:.1f} s, {many:,} messages, {scans} scans"
+            yield [name, size, kind, *(f"{statistics.median(found):.2f} s" for found in (first, later, command))]
+
+
 def main() -> None:
-    done = run(Scenario.of("plaza-moving", "dstar-lite"))
-    assert done.rollout is not None
-    log = first_seconds(done.rollout)
-    ranges = np.random.default_rng(0).uniform(0.2, 10.0, (SECONDS * RATE, BEAMS))
-    stamps = nanoseconds(np.arange(len(ranges)) / RATE)
-    values = {"angle_min": -np.pi, "angle_max": np.pi, "angle_increment": 0.01, "time_increment": 0.0}
-    values |= {"scan_time": 1 / RATE, "range_min": 0.1, "range_max": 12.0}
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rounds", type=int, default=5, help="medians of so many fresh processes")
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        file = log.save(folder / "rollout.npz")
-        for kind, suffix in (("mcap", ".mcap"), ("csv", "")):
-            times = []
-            for turn in range(ROUNDS + 1):
-                started = time.perf_counter()
-                export(file, kind, folder / f"{kind}-{turn}{suffix}")
-                times.append(time.perf_counter() - started)
-            print(f"{kind}: {statistics.median(times[1:]):.2f} s, the first {times[0]:.2f} s")
-        times = []
-        for _ in range(ROUNDS):
-            started = time.perf_counter()
-            read = Rollout.load(file)
-            topics = [*topics_of(read), laser_scans("/scan", stamps, ranges, values)]
-            write_mcap(folder / "scans.mcap", topics, attachments_of(read, file))
-            times.append(time.perf_counter() - started)
-        messages = sum(len(topic.stamps) for topic in topics)
-        unknown = run(Scenario.of("forest", "astar", "jackal", map="none", localisation="true")).rollout
-        assert unknown is not None
-        scanned = unknown.save(folder / "scanned.npz")
-        for what, log_file in (("with a map", file), ("without one, with its scans and maps", scanned)):
-            spent = [processor_time(log_file, folder / f"{number}-{log_file.stem}.mcap") for number in range(ROUNDS)]
-            print(f"mcap from the command line, a drive {what}: {statistics.median(spent):.2f} s of processor time")
-        print(f"mcap with {len(ranges)} scans: {statistics.median(times):.2f} s for {messages} messages")
+        print("| drive | size | to | the first in a process | later ones | the command |")
+        print("|---|---|---|---|---|---|")
+        for row in rows(Path(name), parser.parse_args().rounds):
+            print(f"| {' | '.join(row)} |", flush=True)
 
 
 if __name__ == "__main__":

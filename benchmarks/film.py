@@ -1,7 +1,8 @@
 """Measure how many frames per second a film is rendered and encoded with: `python -m benchmarks.film`.
 
 For comparison, the table shows the rate at which the same renderer draws full frames, without painted ground and without a
-file. With `--memory`, measure the peak memory of films of ten seconds and of five minutes instead, each in its own process.
+file. With `--memory`, measure the peak memory of films of ten seconds and of five minutes instead, each in its own process;
+with `--sight`, what it costs to show what a robot without a map has seen.
 """
 
 from __future__ import annotations
@@ -25,12 +26,14 @@ from antdrive.sim.view.film.camera import camera_for
 from antdrive.sim.view.film.compositor import drawn_height, merged_by_colour, still_meshes
 from antdrive.sim.view.film.meshes import robot_parts
 from antdrive.sim.view.film.parallel import process_count
+from antdrive.sim.view.film.shot import Shot
 from antdrive.sim.view.film.tiny_renderer import add_mesh, render
 from antdrive.sim.view.film.video import film
 from antdrive.sim.view.scene import Scene
 
 ROUNDS = 3
 SIZES = ((640, 480), (1280, 720))
+FRAMES = 40  # of each camera and round, evenly over a drive
 SECONDS = 10.0  # length of the filmed part of the run [s]
 
 
@@ -110,10 +113,35 @@ def peak(path: str, camera: str, seconds: float) -> None:
     print(own + child)
 
 
+def sight() -> None:
+    """Print the processor time of a frame of a drive without a map, with what the robot has seen and without."""
+    import dataclasses
+
+    log = run(Scenario.of("forest", "astar", "jackal", map="none", localisation="matching", noise=1.0, seed=1)).rollout
+    assert log is not None
+    plain = dataclasses.replace(log, scans=log.scans[:0], scan_rows=log.scan_rows[:0])
+    moments = np.linspace(0.0, float(log.t[-1]), FRAMES)
+    print("| camera | with what it has seen | without |\n|---|---|---|")
+    for camera in ("top", "oblique", "follow"):
+        costs = {True: [], False: []}
+        for _ in range(ROUNDS):
+            for seen in costs:
+                with Shot(log if seen else plain, camera=camera, size=SIZES[-1]) as shot:
+                    for at in moments:
+                        started = time.process_time()
+                        shot.frame(float(at))
+                        costs[seen].append(1000 * (time.process_time() - started))
+        print(f"| `{camera}` | {np.median(costs[True]):.0f} ms | {np.median(costs[False]):.0f} ms |")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--memory", action="store_true", help="measure peak memory instead of the rate")
+    parser.add_argument("--sight", action="store_true", help="measure frames that show what the robot has seen instead")
     options = parser.parse_args()
+    if options.sight:
+        sight()
+        return
     log = run(Scenario.of("forest")).rollout
     assert log is not None
     if not options.memory:

@@ -32,11 +32,11 @@ from w9_pathfinding.pf import AStar as W9AStar
 from antdrive.planners import Query, load_planner
 from antdrive.worlds import Disc, Grid, World, rasterise
 from antdrive.worlds.formats.movingai import import_movingai_map, import_movingai_problems
+from tools.shared_data import MOVINGAI as ARCHIVE
 
 Cell = tuple[int, int]
 Solve = Callable[[Cell, Cell], Any]  # the peer's own kind of path
 
-ARCHIVE = Path(__file__).parents[2] / "shared" / "data" / "movingai" / "movingai_dev.tar.xz"
 MOVINGAI = {
     "512² game (AR0011SR)": "AR0011SR",
     "512² random 25 %": "random512-25-0",

@@ -29,8 +29,8 @@ from antdrive.sim.statistics.price import Ratio, prices
 from antdrive.sim.statistics.runs import RunTable
 from antdrive.sim.view.film.failures import film_failures
 from antdrive.worlds.files.atomic import written_whole
-from benchmarks.cost import BARN
 from benchmarks.planners import table
+from tools.shared_data import BARN
 
 HEADS = ("", "certified", "score", "time [s]", "contacts", "seen [m²]", "time x", "length x", "wall [s]")
 

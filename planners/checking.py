@@ -50,6 +50,9 @@ def blaming(planner: Planner, name: str = "") -> Iterator[None]:
     Args:
         planner: whose code runs within
         name: what errors call the planner; empty: its class
+
+    Raises:
+        PlannerError: something was raised within; names its kind and the line.
     """
     try:
         yield

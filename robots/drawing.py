@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from antdrive.worlds.drawing import card
 
 if TYPE_CHECKING:  # a robot draws itself with this module
+    from antdrive.robots.lidar import Lidar
     from antdrive.robots.spec import RobotSpec
 
 WIDTH = 240  # of a drawing [px]
@@ -83,8 +84,19 @@ def facts_of(robot: RobotSpec) -> dict[str, str]:
         "speed": f"up to {robot.max_speed:g} m/s, {robot.max_yaw_rate:g} rad/s",
         "acceleration": f"up to {robot.max_acceleration:g} m/s², {robot.max_yaw_acceleration:g} rad/s²; "
         f"lateral {robot.max_lateral_acceleration:g} m/s²",
+        **({} if robot.lidar is None else {"lidar": lidar_text(robot.lidar)}),
         "noise": noisy if noise.nonzero else "none",
     }
+
+
+def lidar_text(lidar: Lidar) -> str:
+    """A lidar in words: beams, view, rate, and where it is."""
+    view = "all around" if lidar.full_circle else f"{math.degrees(lidar.field_of_view):.4g}°"
+    where = f"{abs(lidar.x):.3g} m {'ahead of' if lidar.x >= 0 else 'behind'} the axle" if lidar.x else "over the axle"
+    return (
+        f"{lidar.beams} beams {view}, {lidar.rate:g} Hz, {lidar.min_range:g} to {lidar.max_range:g} m; {where}, "
+        f"{lidar.height:g} m high"
+    )
 
 
 def footprint_text(robot: RobotSpec) -> str:

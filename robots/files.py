@@ -168,6 +168,8 @@ def load_robot(robot: str | os.PathLike[str]) -> RobotSpec:
     if not os.path.lexists(path):
         hint = suggest(path.stem, known)
         raise input_error(os.fspath(robot), f"no such file and no such robot in the catalogue; {hint}")
+    if path.suffix.lower() in (".urdf", ".xacro"):
+        raise input_error(str(path), f"is no robot file; make one of it with antdrive robots import {path}")
     return _robot_in(read_yaml(path), os.fspath(path), path.stem)
 
 

@@ -98,3 +98,13 @@ class Lidar:
         x, y, yaw = robot
         cos, sin = math.cos(yaw), math.sin(yaw)
         return x + cos * self.x - sin * self.y, y + sin * self.x + cos * self.y, yaw + self.yaw
+
+    def due(self, tick: int, hz: int) -> bool:
+        """Whether a scan is due in a control period.
+
+        Args:
+            tick: the number of the control period
+            hz: control periods per second
+        """
+        per_tick = self.rate / hz
+        return tick == 0 or math.floor(tick * per_tick) != math.floor((tick - 1) * per_tick)

@@ -286,8 +286,8 @@ def run(
     wall = time.perf_counter() - started
     rollout = _record(s, grid, answer, route, log, monitor.log if monitor else [], limit, wall)
     per_tick, rows = s.physics_hz // s.control_hz, len(log.t)
-    if exploration:
-        rollout = dataclasses.replace(rollout, **exploration.logged(per_tick, rows))
+    if scanning := exploration or lookout:
+        rollout = dataclasses.replace(rollout, **scanning.logged(per_tick, rows))
     if watch:
         rollout = dataclasses.replace(rollout, tracks=watch.logged(per_tick, rows))
     return Run(s, grid, answer, rollout, certify(rollout))

@@ -12,6 +12,7 @@ from antdrive.planners.anyangle.tangent import shortest
 from antdrive.planners.graph.search import reachable
 from antdrive.robots.placing import name_of
 from antdrive.worlds import Grid, Task, point_clearance, rasterise
+from antdrive.worlds.plane import place_name
 
 if TYPE_CHECKING:
     from antdrive.sim.scenario import Scenario
@@ -49,12 +50,12 @@ def _narrowest_place(s: Scenario) -> str:
     passage = widest_passage(task, s.inflate)
     if passage is None:
         return "not even a point gets through"
-    x, y = passage.at
+    at = place_name(task.frame, *passage.at)
     ends = ((task.start[:2], "the start has no more room"), (task.goal, "the goal has no more room"))
     where = " and ".join(name_of(task.world, k) for k in passage.between)
     where = f"between {where}" if where else next(says for end, says in ends if end == passage.at)
     return (
-        f"the widest disc that passes has a radius of {passage.radius:.3g} m, at ({x:.2f}, {y:.2f}), {where}; "
+        f"the widest disc that passes has a radius of {passage.radius:.3g} m, at {at}, {where}; "
         f"{_what_it_takes(s, passage.radius)}"
     )
 
@@ -87,9 +88,9 @@ def _narrowest_cell(s: Scenario, grid: Grid) -> str:
     free = rasterise(s.task.world, grid.cell, low)
     cells = PLANNERS["astar"].plan(Query.between(free, s.task), np.random.default_rng(0)).cells
     room = point_clearance(s.task.world, free.xy(cells))
-    x, y = free.xy(cells)[int(room.argmin())].tolist()
+    at = place_name(s.task.frame, *free.xy(cells)[int(room.argmin())].tolist())
     return (
-        f"on these cells, the widest disc that passes has a radius of about {low:.2g} m, near ({x:.2f}, {y:.2f}); "
+        f"on these cells, the widest disc that passes has a radius of about {low:.2g} m, near {at}; "
         f"{_what_it_takes(s, low)}"
     )
 

@@ -23,6 +23,7 @@ from antdrive.sim.log.streams import random_stream
 from antdrive.worlds import Disc, Task, Trajectories, World, load_task
 from antdrive.worlds.drawing import card, world_svg
 from antdrive.worlds.errors import FieldError
+from antdrive.worlds.plane import place_name
 
 PHYSICS_HZ = (60, 10_000)  # slower physics jolts the robot
 SLOWEST_CONTROL = 10  # [Hz]
@@ -102,8 +103,8 @@ class Scenario:
         self._check_rates()
         overlap = overlap_at(self.task.world, self.robot, self.task.start, self.unseen)
         if overlap:
-            x, y, _ = self.task.start
-            raise FieldError("start", f"{self.robot.name} at ({x:g}, {y:g}) {overlap}; move the start away from it")
+            at = place_name(self.task.frame, *self.task.start[:2], "g")
+            raise FieldError("start", f"{self.robot.name} at {at} {overlap}; move the start away from it")
 
     def _check_sensing(self) -> None:
         """Refuse unknown kinds of maps and localisation, and a robot without a map that has no lidar."""
@@ -306,6 +307,7 @@ class Scenario:
             "control_hz": self.control_hz,
             "time_limit_s": self.time_limit or task.time_limit,
             "task": {"start": list(task.start), "goal": list(task.goal), "goal_tolerance_m": task.goal_tolerance},
+            **({"frame": list(task.frame)} if any(task.frame) else {}),
             "settings": {key: value for key, value in changed.items() if value != {}},
         }
 

@@ -7,6 +7,7 @@ import math
 from antdrive.sim.driving.caution import Caution
 from antdrive.sim.driving.exploring import Exploration
 from antdrive.sim.driving.lookout import Lookout
+from antdrive.sim.driving.movers_ahead import MoversAhead
 from antdrive.sim.driving.perception import Predictor
 from antdrive.sim.driving.replanning import ReplanPolicy
 from antdrive.sim.driving.rescanning import survey_of
@@ -30,6 +31,10 @@ def exploration_of(s: Scenario) -> Exploration:
         watching=s.watching,
         hz=s.control_hz,
     )
+    movers = None
+    if survey.watch is not None and s.replanning is not None and s.replanning.around_movers:
+        predictor = TrackedPredictor(survey.watch, s.effective_perception, s.control_hz)
+        movers = MoversAhead(predictor, survey, s.replanning, s.robot, s.task.goal, s.inflate, s.control_hz)
     return Exploration(
         s.planner,
         survey,
@@ -42,6 +47,7 @@ def exploration_of(s: Scenario) -> Exploration:
         smoothing=s.smoothing,
         cell=s.planning_cell,
         hz=s.control_hz,
+        movers=movers,
     )
 
 

@@ -1,7 +1,6 @@
 """Robots, tasks and runs that many tests share."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import hypothesis
 import pytest
@@ -15,8 +14,6 @@ hypothesis.settings.register_profile(
     "repeatable", derandomize=True, deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow]
 )
 hypothesis.settings.load_profile("repeatable")
-
-SHARED = Path(__file__).parent.parent.parent / "shared" / "data"
 
 
 @pytest.fixture(scope="session")

@@ -8,6 +8,7 @@ import dataclasses
 import importlib
 import inspect
 import re
+import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -98,6 +99,39 @@ def undescribed_parameters(function: Any) -> list[str]:
     doc = inspect.getdoc(function) or ""
     names = [name for name in inspect.signature(function).parameters if name not in PLAIN and not name.startswith("_")]
     return [name for name in names if not re.search(rf"\b{name}\b", doc)]
+
+
+def untold_errors(function: Any, doc: str) -> set[str]:
+    """The names of what a function's own lines raise, if its docstring has no part on errors."""
+    tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
+    raised = {
+        node.exc.func for node in ast.walk(tree) if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call)
+    }
+    names = {function.id for function in raised if isinstance(function, ast.Name)} - {"NotImplementedError"}
+    return set() if "Raises:" in doc else names
+
+
+def test_public_functions_and_records_tell_what_they_raise() -> None:
+    untold = {}
+    for name, thing in public():
+        members = vars(thing).items() if inspect.isclass(thing) else [("", thing)]
+        for key, member in members:
+            function = member.__func__ if isinstance(member, classmethod | staticmethod) else member
+            if inspect.isfunction(function) and "<string>" not in function.__code__.co_filename:
+                of_class = key == "__post_init__"
+                if key.startswith("_") and not of_class:
+                    continue
+                untold[f"{name}.{key}"] = untold_errors(function, inspect.getdoc(thing if of_class else function) or "")
+    assert {name: errors for name, errors in untold.items() if errors} == {}
+
+
+def test_an_error_that_is_not_told_is_noticed() -> None:
+    def half(ants: int) -> None:
+        if ants < 1:
+            raise ValueError("ants")
+
+    assert untold_errors(half, "Half of the ants.") == {"ValueError"}
+    assert untold_errors(half, "Half of the ants.\n\nRaises:\n    ValueError: fewer than one.") == set()
 
 
 @pytest.mark.parametrize(("name", "thing"), public(), ids=[name for name, _ in public()])

@@ -4,8 +4,8 @@ Blocks of a page run from top to bottom in one empty folder, Python's in one nam
 
 - `python`: what it prints is compared with a block `text` that follows directly.
 - `console`: lines that begin with `$ ` are commands, the others what they print. `|| echo ...` says that a command must
-  fail, `> FILE` writes to a file. Commands are `antdrive`, which runs in this process, `python`, `pytest`, and some of
-  the shell's.
+  fail, with exit code 1 or with the one that `echo "exit code 2"` names; `> FILE` writes to a file. Commands are
+  `antdrive`, which runs in this process, `python`, `pytest`, and some of the shell's.
 - `sh`: every line is a command, and its output does not matter.
 - `yaml`, `toml` and others: written to FILE after a comment `<!-- file: FILE -->`, or added to its end after
   `<!-- added to: FILE -->`; a `python` block after such a comment is, too, and is not run by itself.
@@ -20,7 +20,9 @@ say what a page needs:
 
 `--all` runs every page with code (`pages_with_code`), `--jobs 2` two at a time. `--kept FILE` keeps what ran without a
 fault and leaves a page out while it and the code are as they were then. `--update` writes what was printed into the
-page, apart from outputs with `...` that agree.
+page, apart from outputs with `...` that agree. `--times FILE` writes how long each page ran into the last column of FILE's
+table of pages: processor time, which other work on the machine does not change much, with a process for each command, as
+in a reader's shell.
 """
 
 from __future__ import annotations
@@ -40,7 +42,7 @@ import sys
 import tempfile
 import threading
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -57,6 +59,7 @@ TESTED = {
 }
 COMPILING = "antdrive: compiling the planners"  # what only the first command of an installation says
 WIDTH = "100"  # of the terminal that commands believe in
+APART = "ANTDRIVE_PAGES_APART"  # the environment's variable with which each command gets a process of its own
 LIMIT = 1200.0  # how long a page may run [s]: it ends what hangs, while the slowest page takes one minute
 
 
@@ -155,6 +158,8 @@ def declared(wanted: str) -> tuple[int, str]:
 
 def run_words(words: list[str]) -> tuple[int, str]:
     """Run a command; its exit code and what it printed."""
+    if words[0] == "antdrive" and os.environ.get(APART):
+        words = ["python", "-m", *words]
     if words[0] == "antdrive":
         out = io.StringIO()
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):
@@ -179,12 +184,14 @@ def run_command(command: str) -> tuple[bool, str]:
     head, fails, said = line.partition("||")
     head, _, target = head.partition(" > ")
     code, printed = run_words(shlex.split(head))
+    named = re.search(r"exit code (\d)", said)
+    right = (int(named[1]) if named else 1) if fails else 0
     if target:
         Path(target.strip()).write_text(printed)
         printed = ""
-    if fails and code == 1:
+    if fails and code == right:
         printed += " ".join(shlex.split(said)[1:]) + "\n"
-    return code == (1 if fails else 0), printed
+    return code == right, printed
 
 
 def write(block: Block) -> None:
@@ -362,6 +369,23 @@ def run_pages(paths: list[Path], jobs: int) -> Iterator[tuple[Page, float]]:
     )
 
 
+def with_times(text: str, took: Mapping[str, float]) -> str:
+    """A page's text with times in the last cells of the rows of its tables that link to pages.
+
+    Args:
+        text: the page with the tables, in Markdown
+        took: how long each page ran, by its file's name [s]
+    """
+
+    def row(line: str) -> str:
+        name = re.match(r"\| \[[^\]]+\]\((?P<name>[\w-]+\.md)\) \|", line)
+        if name is None or name["name"] not in took:
+            return line
+        return f"{line[: line.rstrip(' |').rindex('|')]}| {max(1, round(took[name['name']]))} s |"
+
+    return "".join(f"{row(line)}\n" for line in text.splitlines())
+
+
 def main(words: list[str]) -> int:
     """Run pages; 1 if one is wrong."""
     asked = argparse.ArgumentParser(prog="python -m tools.pages", description="Run the code of pages.")
@@ -370,13 +394,16 @@ def main(words: list[str]) -> int:
     asked.add_argument("--jobs", type=int, default=1, help="pages at a time")
     asked.add_argument("--kept", type=Path, help="file that keeps what ran without a fault")
     asked.add_argument("--update", action="store_true", help="write what was printed into the pages")
+    asked.add_argument("--times", type=Path, help="page with a table of these pages, for the times they ran")
     given = asked.parse_args(words)
     pages = [*given.pages, *(pages_with_code() if given.all else [])]
     files = (path for folder in CODE for path in (ROOT / folder).rglob("*") if path.suffix in (".py", ".yaml"))
     code = digest_of(sorted(files))
     kept = json.loads(given.kept.read_text()) if given.kept and given.kept.exists() else {}
     keys = {page.resolve(): digest_of([page]) + code for page in pages}
-    failed = False
+    failed, times = False, {}
+    if given.times:
+        os.environ[APART] = "yes"
     for page, took in run_pages([path for path, key in keys.items() if kept.get(str(path)) != key], given.jobs):
         if given.update:
             page.update()
@@ -385,10 +412,14 @@ def main(words: list[str]) -> int:
         sys.stdout.write(said + "\n")
         sys.stdout.flush()
         failed |= bool(page.problems)
+        times[page.path.name] = took
         if given.kept and not page.problems:
             kept[str(page.path)] = keys[page.path]
             given.kept.parent.mkdir(parents=True, exist_ok=True)
             given.kept.write_text(json.dumps(kept))
+    os.environ.pop(APART, None)
+    if given.times and not failed:
+        given.times.write_text(with_times(given.times.read_text(encoding="utf-8"), times), encoding="utf-8")
     return int(failed)
 
 

@@ -78,3 +78,19 @@ def out_of_map(frame: Pose, points: npt.ArrayLike) -> Floats:
     x, y, yaw = frame
     cosine, sine = math.cos(yaw), math.sin(yaw)
     return in_map((-x * cosine - y * sine, x * sine - y * cosine, -yaw), points)
+
+
+def place_name(frame: Pose, x: float, y: float, digits: str = ".2f") -> str:
+    """A place of a world in words; where the world lies in a map, in the frames of both.
+
+    Args:
+        frame: the world's pose in its map: x, y [m] and yaw [rad]
+        x: where [m]
+        y: where [m]
+        digits: the format of the numbers
+    """
+    here = f"({x:{digits}}, {y:{digits}})"
+    if not any(frame):
+        return here
+    there = in_map(frame, [(x, y)])[0].tolist()
+    return f"{here} in the world, ({there[0]:{digits}}, {there[1]:{digits}}) in its map"

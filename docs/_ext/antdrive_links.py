@@ -22,6 +22,7 @@ PAGES = {
     "CHANGELOG.md": "reference/changelog",
     "examples/bridges/README.md": "how-to/bridges-example",
     "examples/campaigns/README.md": "how-to/campaign-files",
+    "examples/plugin_planner/README.md": "how-to/ship-a-planner",
     "examples/regression_suite/README.md": "how-to/regression-example",
 }
 LINK = re.compile(r"(\]\()([^)#\s:]+)(#[^)\s]*)?(\))")

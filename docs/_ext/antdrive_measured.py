@@ -1,5 +1,8 @@
 """When the rows of a table were last edited: below each table of measurements stand the commit and the day, as git knows them.
 
+On pages of measurements (`PAGES`) these are all tables. Elsewhere it is a table after a comment
+`<!-- measured by: COMMAND | MACHINE -->`, and command and machine stand below it, too.
+
 A table's commit is the newest one that changed a row of it; other rows may be older. In an archive and in a clone without
 its history nothing is written. Where git fails for another reason, the build says why and goes on.
 """
@@ -21,6 +24,7 @@ if TYPE_CHECKING:
 #: Pages with tables of measurements.
 PAGES = re.compile(r"benchmarks|papers/\w+")
 BLAMED = re.compile(r"^(?P<commit>[0-9a-f]{40}) \d+ (?P<line>\d+)")
+MARK = re.compile(r"^<!-- measured by: (?P<command>[^|]+?) \| (?P<machine>.+?) -->$")
 RULE = re.compile(r"^\|[\s:|-]+\|\s*$")
 
 
@@ -92,31 +96,42 @@ def tables_of(lines: list[str]) -> Iterator[tuple[int, int]]:
                 yield number + 1, last
 
 
-def dated(text: str, changes: dict[int, Change]) -> str:
+def mark_before(lines: list[str], first: int) -> re.Match[str] | None:
+    """The comment before a table whose first row of figures has this number."""
+    above = (line.strip() for line in reversed(lines[: first - 3]))
+    return MARK.match(next((line for line in above if line), ""))
+
+
+def dated(text: str, changes: dict[int, Change], every: bool = True) -> str:
     """A page's text with a line below each table that says when its rows were last edited.
 
     Args:
         text: the page, in Markdown
         changes: for each of its lines who changed it last
+        every: of every table; else of those with a comment that names command and machine
     """
     lines = text.splitlines()
     for first, last in reversed(list(tables_of(lines))):
-        rows = [changes.get(number) for number in range(first, last + 1)]
-        if None in rows:
+        mark = mark_before(lines, first)
+        if not (every or mark):
             continue
-        newest = max(row for row in rows if row)
-        if newest.commit.strip("0"):
+        said = [f"`{mark['command']}` measures it again. Measured on {mark['machine']}."] if mark else []
+        rows = [changes.get(number) for number in range(first, last + 1)]
+        newest = None if None in rows else max(row for row in rows if row)
+        if newest and newest.commit.strip("0"):
             day = datetime.datetime.fromtimestamp(newest.time, datetime.timezone.utc).date()
-            said = f"Rows last edited in commit `{newest.commit[:7]}`, {day.isoformat()}."
-            lines[last:last] = ["", "{.antdrive-measured}", said]
+            said.append(f"Rows last edited in commit `{newest.commit[:7]}`, {day.isoformat()}.")
+        if said:
+            lines[last:last] = ["", "{.antdrive-measured}", " ".join(said)]
     return "\n".join(lines) + "\n"
 
 
 def page_read(app: Sphinx, docname: str, source: list[str]) -> None:
     """Date the tables of a page."""
     path = Path(app.env.doc2path(docname))
-    if PAGES.fullmatch(docname) and path.suffix == ".md":
-        source[0] = dated(source[0], changes_of(path))
+    every = PAGES.fullmatch(docname) is not None
+    if path.suffix == ".md" and (every or "<!-- measured by: " in source[0]):
+        source[0] = dated(source[0], changes_of(path), every)
         repository = repository_of(path.parent)
         commits = repository / ".git" / "logs" / "HEAD" if repository else None
         if commits and commits.exists():

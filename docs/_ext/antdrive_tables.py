@@ -1,10 +1,11 @@
-"""Tables that the code knows: keys of files from their schemas, metrics, outcomes, exit codes, planners and worlds."""
+"""Tables that the code knows: keys of files from their schemas, exit codes, planners and worlds."""
 
 from __future__ import annotations
 
 import ast
 import inspect
 import json
+import re
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, ClassVar
 
@@ -65,8 +66,9 @@ def rows_of(schema: Mapping[str, Any]) -> Iterable[Row]:
 
 
 def told(text: str) -> str:
-    """A description as reST: its line breaks are spaces, its asterisks no emphasis."""
-    return " ".join(text.split()).replace("*", "\\*").replace("|", "\\|")
+    """A description as reST: its line breaks are spaces, its asterisks no emphasis, and "K. Han" begins no list."""
+    words = " ".join(text.split()).replace("*", "\\*").replace("|", "\\|")
+    return re.sub(r"^(\w+)([.)]) ", r"\1\\\2 ", words)
 
 
 def schema_of(kind: str) -> dict[str, Any]:
@@ -136,21 +138,6 @@ def exit_codes() -> list[str]:
     return table(("exit code", "meaning"), rows)
 
 
-def outcomes() -> list[str]:
-    """Each outcome with its sentence and the exit code of `antdrive run`."""
-    from antdrive.sim import Outcome
-
-    return table(("outcome", "sentence"), [(f"``{one.key}``", one.value) for one in Outcome])
-
-
-def metrics() -> list[str]:
-    """Each metric with unit, better direction and definition."""
-    from antdrive.sim import METRICS
-
-    rows = [(f"``{one.name}``", one.unit, one.better, told(one.definition)) for one in METRICS.values()]
-    return table(("metric", "unit", "better", "definition"), rows)
-
-
 def planners() -> list[str]:
     """Each planner with its options and their defaults, from the registry."""
     from antdrive.planners import PLANNERS
@@ -181,7 +168,7 @@ def worlds() -> list[str]:
         rows.append(
             (
                 f"``{name}``",
-                f"{wide:g} × {high:g} m",
+                f"{wide:g}\u00a0×\u00a0{high:g}\u00a0m",
                 str(len(world.obstacles)),
                 str(len(world.movers)),
                 told(world.source or ""),
@@ -191,12 +178,12 @@ def worlds() -> list[str]:
 
 
 TABLES: dict[str, Callable[[], list[str]]] = {
-    "exit-codes": exit_codes, "outcomes": outcomes, "metrics": metrics, "planners": planners, "worlds": worlds,
+    "exit-codes": exit_codes, "planners": planners, "worlds": worlds,
 }  # fmt: skip
 
 
 class Table(Directive):
-    """`.. known:: metrics`: a table of what the code knows."""
+    """`.. known:: planners`: a table of what the code knows."""
 
     required_arguments = 1
 

@@ -22,7 +22,7 @@ print(result.outcome.value)
 print(
     f"{result.metrics['duration_s']:.1f} s, {result.metrics['replans']:.0f} new routes on the way"
 )
-film(result.rollout, "crowded-lidar.mp4", camera="top", size=(480, 480), speed=3)
+film(result.rollout, "crowded-lidar.mp4", camera="top", size=(480, 360), speed=3)
 
 # %%
 # What it had seen

@@ -55,6 +55,9 @@ class Hybrid(ViaPointPlanner):
         degrees_per_point: a corner of the pulled line gets one via point for every so many degrees it turns
             by [deg]
         max_shift: the longest move of a via point in a mutation [cells]
+
+    Raises:
+        FieldError: an option is out of range; names it and what would be right.
     """
 
     iterations: int = 200

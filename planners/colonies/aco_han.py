@@ -51,6 +51,9 @@ class AcoHan(Colony):
             ants deposit
         revisit: the weight of a cell that the ant has already visited
         min_weight: the least weight of an unvisited cell; 0 is the equation to the letter
+
+    Raises:
+        FieldError: an option is out of range; names it and what would be right.
     """
 
     ants: int = 500

@@ -56,6 +56,9 @@ class AntSystem(Colony):
         ranks: paths in the ranking list of an iteration: its best `ranks` ants deposit, the first all of eq. 4
             and each later one a share of 1 / `ranks` less; None: all ants that arrive deposit all of eq. 4.
             Section V of lee2008 gives its conventional colony such a list of 100 and leaves open what it does
+
+    Raises:
+        FieldError: an option is out of range; names it and what would be right.
     """
 
     alpha: float = 1.0
@@ -193,6 +196,9 @@ class ExploringAnts(AntSystem):
         heuristic: as in `AntSystem`
         backtrack: as in `Colony`; open in the paper, which only says that ants in deadlock are a difficulty
         shortcut: as in `Colony`; open in the paper
+
+    Raises:
+        FieldError: an option is out of range; names it and what would be right.
     """
 
     ants: int = 25

@@ -262,7 +262,7 @@ class Colony(IterativePlanner):
 
         Args:
             graph: the graph that ants walk on
-            trail: the trails as they are now
+            trail: the trails as they are now, on cells (cells,) or on arcs (cells, 8)
             heuristic: the result of `heuristic_values`
             weights: the table to fill (cells, 8); 0 for moves that are not allowed
             context: the kind of ant, and a random number for rules that draw one per iteration
@@ -270,7 +270,12 @@ class Colony(IterativePlanner):
 
     @abc.abstractmethod
     def update(self, trail: Floats, state: IterationState) -> None:
-        """Evaporate and deposit: change `trail` in place after the iteration that `state` describes."""
+        """Evaporate and deposit: change `trail` in place after the iteration that `state` describes.
+
+        Args:
+            trail: the trails, on cells (cells,) or on arcs (cells, 8)
+            state: the iteration, with its tours
+        """
 
     def daemon_action(self, graph: ColonyGraph, tours: Walks, best: Walks | None) -> Walks | None:
         """One more tour, made centrally after the ants have walked; None if there is none.

@@ -58,6 +58,9 @@ class MergingAnts(MaxMinAnts):
         iterations: iterations at most
         settled: the colony stops after this many iterations without a better tour; where tours are short,
             after 0.6 times their length in cells, but not before 20
+
+    Raises:
+        FieldError: an option is out of range; names it and what would be right.
     """
 
     ants: int = 25

@@ -12,6 +12,7 @@ from antdrive.worlds._kernels import Array, kernel, segment_clearance
 # The rules that can limit the speed, as indices into pursuit.LIMITERS.
 CRUISE, CURVATURE, ROUTE, YAW_RATE, GOAL, ROTATE, CREEP, BRAKING, DONE, CLEARANCE = range(10)
 
+HARDEST = 1.4  # times its acceleration: how hard a robot may slow down to turn at top speed; certificates allow 1.5
 YAW_RATE_TIME = 0.2  # the yaw rate of a curve must be reachable within this time [s]
 END_LOOKAHEAD = 0.35  # near the goal, the lookahead is at most this share of the remaining route
 TURN_CLEARANCE = 0.005  # a rectangle that turns on the spot keeps this, or nearly what it has [m]
@@ -116,11 +117,18 @@ def clip(value: float, low: float, high: float) -> float:
 
 
 @kernel
-def keep_wheels_within(v: float, w: float, half_track: float, rim_speed: float) -> tuple[float, float]:
-    """Speed and yaw rate, scaled together so that no wheel's rim exceeds `rim_speed` [m/s]."""
-    rim = abs(v) + abs(w) * half_track
-    if rim > rim_speed:
-        v, w = v * rim_speed / rim, w * rim_speed / rim
+def keep_wheels_within(v: float, w: float, last: float, period: float, limits: MotionLimits) -> tuple[float, float]:
+    """Speed and yaw rate, scaled together so that no wheel's rim is faster than it may be.
+
+    Where that would be too hard a braking from the speed `last`, the turn gives way: a robot whose top speed is that of its
+    wheels cannot both turn in and keep to its acceleration.
+    """
+    rim = abs(v) + abs(w) * limits.half_track
+    if rim > limits.rim_speed:
+        v, w = v * limits.rim_speed / rim, w * limits.rim_speed / rim
+        slowest = min(abs(last) - HARDEST * limits.acceleration * period, limits.rim_speed)
+        if abs(v) < slowest:
+            v, w = math.copysign(slowest, v), math.copysign((limits.rim_speed - slowest) / limits.half_track, w)
     return v, w
 
 
@@ -139,7 +147,7 @@ def reachable_twist(
     change = limits.acceleration * period
     new_v = clip(speed, v - change, v + change)
     new_w = reachable_yaw_rate(yaw_rate, w, period, limits)
-    return keep_wheels_within(new_v, new_w, limits.half_track, limits.rim_speed)
+    return keep_wheels_within(new_v, new_w, v, period, limits)
 
 
 @kernel
@@ -373,7 +381,7 @@ def full_braking(
     steered = reachable_yaw_rate(curvature * new_v, w, period, limits)
     if stopping_clearance(x, y, yaw, new_v, steered, deceleration, period, discs, bounds) <= clear:
         return new_v, held
-    return keep_wheels_within(new_v, steered, limits.half_track, limits.rim_speed)
+    return keep_wheels_within(new_v, steered, v, period, limits)
 
 
 @kernel
@@ -417,7 +425,7 @@ def pursue(
     else:
         wanted = curvature * new_v
     new_w = reachable_yaw_rate(wanted, w, period, limits)
-    new_v, new_w = keep_wheels_within(new_v, new_w, limits.half_track, limits.rim_speed)
+    new_v, new_w = keep_wheels_within(new_v, new_w, v, period, limits)
 
     # Whatever the rules above allow, the arc on which the robot can still stop must be clear.
     required = min(tuning.stopping_clearance, clearance)

@@ -102,6 +102,7 @@ class Avoidance:
         places: Floats,
         radii: Floats,
         speed_limit: float = math.inf,
+        backwards: float = math.inf,
     ) -> tuple[Twist, bool, AvoidanceState]:
         """The next command, whether avoidance changed it, and the state for the next period.
 
@@ -116,8 +117,10 @@ class Avoidance:
             places: the movers' predicted places at the `prediction_times` (K + 1, M, 2) [m]
             radii: their radii (M,) [m]
             speed_limit: the speed that the schedule of a timed plan allows [m/s]
+            backwards: the highest speed backwards, as long as no mover is met at it, for a robot that does not see what
+                is behind it [m/s]
         """
-        candidates = self._candidates(robot, state, speed_limit)
+        candidates = self._candidates(robot, state, speed_limit, backwards)
         situation = (
             *pose, *last, before.arc, before.turning, candidates, tracked.samples, tracked.obstacles,
             tracked.limits, tracked.tuning._replace(period=self.step),
@@ -126,26 +129,13 @@ class Avoidance:
         chosen, contact = kernels.choose(*situation)
         if chosen == 0 and contact == math.inf:
             return wanted, False, AvoidanceState()
-        limits, period = tracked.limits, tracked.tuning.period
-        stopping = abs(last.speed) / limits.acceleration
+        if contact < math.inf and backwards < robot.max_speed:
+            return self.avoid(tracked, robot, pose, last, before, wanted, state, places, radii, speed_limit)
+        stopping = abs(last.speed) / tracked.limits.acceleration
         if contact < max(stopping, self._too_late(tracked, pose, places[0], radii)):
             chosen = kernels.best_escape(*situation)
-        candidate = candidates[chosen]
-        if chosen < 0:
-            # The robot cannot avoid the contact, so it stops: a contact while standing is attributed to the mover.
-            speed, yaw_rate, state = 0.0, 0.0, AvoidanceState()
-        elif candidate[kernels.KIND] == kernels.FOLLOW_ROUTE:
-            slowest = last.speed - limits.acceleration * period
-            speed = min(wanted.speed, max(float(candidate[kernels.SPEED]), slowest))
-            yaw_rate = wanted.yaw_rate * (speed / wanted.speed if wanted.speed > 0 else 1.0)
-            return Twist(speed, yaw_rate), True, AvoidanceState()
-        else:
-            first = candidate[kernels.DURATION] > 1e-9
-            speed = float(candidate[kernels.SPEED if first else kernels.NEXT_SPEED])
-            yaw_rate = float(candidate[kernels.YAW_RATE if first else kernels.NEXT_YAW_RATE])
-            remaining = max(0.0, float(candidate[kernels.DURATION]) - period)
-            state = AvoidanceState(tuple(candidate.tolist()), remaining)
-        return Twist(*reachable_twist(speed, yaw_rate, *last, period, limits)), True, state
+        twist, state = _carried_out(candidates[chosen] if chosen >= 0 else None, wanted, last, tracked)
+        return twist, True, state
 
     def _too_late(self, tracked: TrackedPath, pose: Pose, places: Floats, radii: Floats) -> float:
         """A contact sooner than this counts as unavoidable [s]: 0 unless a mover is within the least clearance."""
@@ -153,9 +143,14 @@ class Avoidance:
         close = away.min(initial=math.inf) < tracked.tuning.robot_radius + self.min_clearance
         return 2 * self.step if close else 0.0
 
-    def _candidates(self, robot: RobotSpec, state: AvoidanceState, speed_limit: float) -> Floats:
+    def _candidates(
+        self, robot: RobotSpec, state: AvoidanceState, speed_limit: float, backwards: float = math.inf
+    ) -> Floats:
         """The robot's candidates (N, 6): row 0 keeps the speed limit, row 1 is the last decision."""
         table = _candidate_table(robot.max_speed, robot.max_yaw_rate, robot.max_lateral_acceleration)
+        if backwards < robot.max_speed:
+            slowest = table[:, [kernels.SPEED, kernels.NEXT_SPEED]].min(axis=1)
+            table = table[slowest >= -backwards - 1e-9]
         if not state.candidate and speed_limit >= robot.max_speed:
             return table
         table = table.copy()
@@ -164,6 +159,28 @@ class Avoidance:
             table[1] = state.candidate
             table[1, kernels.DURATION] = state.remaining
         return table
+
+
+def _carried_out(
+    candidate: Floats | None, wanted: Twist, last: Twist, tracked: TrackedPath
+) -> tuple[Twist, AvoidanceState]:
+    """The command that carries a candidate out, and what avoidance remembers of it; None: nothing avoids a contact."""
+    limits, period = tracked.limits, tracked.tuning.period
+    if candidate is None:
+        # The robot stops: a contact while standing is attributed to the mover.
+        speed, yaw_rate, state = 0.0, 0.0, AvoidanceState()
+    elif candidate[kernels.KIND] == kernels.FOLLOW_ROUTE:
+        slowest = last.speed - limits.acceleration * period
+        speed = min(wanted.speed, max(float(candidate[kernels.SPEED]), slowest))
+        yaw_rate = wanted.yaw_rate * (speed / wanted.speed if wanted.speed > 0 else 1.0)
+        return Twist(speed, yaw_rate), AvoidanceState()
+    else:
+        first = candidate[kernels.DURATION] > 1e-9
+        speed = float(candidate[kernels.SPEED if first else kernels.NEXT_SPEED])
+        yaw_rate = float(candidate[kernels.YAW_RATE if first else kernels.NEXT_YAW_RATE])
+        remaining = max(0.0, float(candidate[kernels.DURATION]) - period)
+        state = AvoidanceState(tuple(candidate.tolist()), remaining)
+    return Twist(*reachable_twist(speed, yaw_rate, *last, period, limits)), state
 
 
 _NOT_NEGATIVE = (

@@ -20,6 +20,7 @@ SPEED, YAW_RATE = 0.5, 2.0  # that are assumed where the file has no limits [m/s
 MOST_YAW_RATE = 3.14  # that is taken where only the wheels limit it: half a turn a second [rad/s]
 SPARE = 0.9  # the share of what the motors could do that is used
 FRICTION = 1.5  # of wheels
+NO_LIMIT = "assumed: the file has no limit"
 LEAST_DRIVE = 0.05  # the least acceleration that makes an effort limit a motor's [m/s^2]
 
 Found = dict[str, tuple[float, str]]  # values of a robot's file, and where they come from
@@ -44,36 +45,28 @@ def add_speeds(
         given: keys that people gave, and that stay
     """
     radius, track = found["wheel_radius"][0], found["track"][0]
-    limit = _lowest(wheels, "velocity", "rad/s")
+    limit = min(_lowest(wheels, "velocity", "rad/s"), _lowest_commanded(wheels))
     turning = seven_digits(limit.value)
     reach = turning * radius
-    fastest = ROBOT_RANGE["max_speed"][1]
-    usable = reach <= fastest  # what is faster stands for no limit
-    for key, tags, most, assumed in (
-        ("max_speed", ("max_linear_velocity", "max_linear_speed"), reach, SPEED),
-        ("max_yaw_rate", ("max_angular_velocity", "max_angular_speed"), 2 * reach / track, YAW_RATE),
+    for key, tags, most, assumed, unit in (
+        ("max_speed", ("max_linear_velocity", "max_linear_speed"), reach, SPEED, "m/s"),
+        ("max_yaw_rate", ("max_angular_velocity", "max_angular_speed"), 2 * reach / track, YAW_RATE, "rad/s"),
     ):
         tag, told = model.drive_number(*tags)
         if key in given:
             continue
+        beside = ""
+        if told and told > ROBOT_RANGE[key][1]:  # what is faster stands for no limit
+            beside, told = f"<{tag}> of the drive plugin, {told:.7g} {unit}, is {_beyond(key, unit)}", None
         if told and told > most:
             found[key] = _five(most), f"computed: {limit.where}; <{tag}> of the drive plugin is {told:g}"
         elif told:
             found[key] = told, f"read: <{tag}> of the drive plugin"
-        elif not usable:
-            beyond = (
-                f"{limit.where} would be {reach:.4g} m/s, {_beyond('max_speed', 'm/s')}"
-                if reach < math.inf
-                else "the file has no limit"
-            )
-            found[key] = assumed, f"assumed: {beyond}"
-        elif key == "max_yaw_rate" and most > MOST_YAW_RATE:
-            found[key] = MOST_YAW_RATE, f"assumed: half a turn a second; {limit.where} allows {most:.4g}"
         else:
+            value, how = _of_joints(key, limit, reach, most, assumed)
             found[key] = (
-                _five(most),
-                f"computed: {limit.where}, times the wheels' radius"
-                + (" over half the track" if key == "max_yaw_rate" else ""),
+                value,
+                f"assumed: {beside}" if how == NO_LIMIT and beside else "; ".join(filter(None, (how, beside))),
             )
     if "max_wheel_speed" in given:
         return
@@ -83,6 +76,26 @@ def add_speeds(
     else:
         instead = f"; {limit.where} is {_beyond('max_wheel_speed', 'rad/s')}" if turning < math.inf else ""
         found["max_wheel_speed"] = needs, f"assumed: 1.2 times what the speeds need{instead}"
+
+
+def _of_joints(key: str, limit: _Limit, reach: float, most: float, assumed: float) -> tuple[float, str]:
+    """A limit of the speeds as it follows from the joints' alone, and how.
+
+    Args:
+        key: of the robot's file
+        limit: the joints'
+        reach: the speed of a wheel's rim at that limit [m/s]
+        most: the value that it allows
+        assumed: the value that stands for no limit
+    """
+    if reach == math.inf:
+        return assumed, NO_LIMIT
+    if reach > ROBOT_RANGE["max_speed"][1]:
+        return assumed, f"assumed: {limit.where} would be {reach:.4g} m/s, {_beyond('max_speed', 'm/s')}"
+    if key == "max_yaw_rate" and most > MOST_YAW_RATE:
+        return MOST_YAW_RATE, f"assumed: half a turn a second; {limit.where} allows {most:.4g}"
+    how = f"computed: {limit.where}, times the wheels' radius"
+    return _five(most), how + (" over half the track" if key == "max_yaw_rate" else "")
 
 
 def add_forces(
@@ -155,6 +168,12 @@ def _lowest(wheels: tuple[DrivenWheel, DrivenWheel], key: str, unit: str) -> _Li
     """The lower of a limit of the two joints, and what it is called."""
     value, name = min((getattr(wheel.joint, key) or math.inf, wheel.joint.name) for wheel in wheels)
     return _Limit(value, f"the {key} limit of joint {name}, {value:.7g} {unit}")
+
+
+def _lowest_commanded(wheels: tuple[DrivenWheel, DrivenWheel]) -> _Limit:
+    """The lower limit of what <ros2_control> lets the two joints be given."""
+    value, name = min((wheel.joint.commanded or math.inf, wheel.joint.name) for wheel in wheels)
+    return _Limit(value, f"the limit of joint {name} in <ros2_control>, {value:.7g} rad/s")
 
 
 def seven_digits(value: float) -> float:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import re
 import tempfile
+from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 from xml.etree import ElementTree as ET
@@ -13,12 +15,14 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from antdrive.robots.importing.expanding import expanded
+from antdrive.robots.importing.sensors import UrdfSensor, lidar_sensors
 from antdrive.worlds.errors import InputError, input_error
 from antdrive.worlds.formats.xml import parse_xml
 from antdrive.worlds.optional import optional
 from antdrive.worlds.types import Floats
 
-CIRCLE = np.exp(2j * math.pi * np.arange(96) / 96) / math.cos(math.pi / 96)  # around a circle of radius 1
+# Around a circle of radius 1, with sides ahead, behind, to the left and to the right: it is as long and as wide as the circle.
+CIRCLE = np.exp(2j * math.pi * (np.arange(96) + 0.5) / 96) / math.cos(math.pi / 96)
 MOST_LINKS = 10_000
 
 
@@ -36,6 +40,8 @@ class UrdfJoint:
         velocity: the limit of its speed [rad/s]; None where the file has none
         effort: the limit of its torque [N m]; None where the file has none
         range: how far it turns, from its lower to its upper limit [rad]; inf where it turns freely
+        commanded: the greatest speed that <ros2_control> lets it be given, inf without a limit [rad/s]; None where it is not
+            driven by speed there
     """
 
     name: str
@@ -47,6 +53,7 @@ class UrdfJoint:
     velocity: float | None
     effort: float | None
     range: float
+    commanded: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,8 +88,9 @@ class UrdfModel:
         places: the frame of each link in that of the root (4, 4)
         pieces: its collision geometry
         masses: the mass of each link that has one [kg]
-        drive: what a Gazebo plugin for differential drives says, by tag
+        drive: what a Gazebo plugin that drives wheels says, by tag; what it says of several wheels is left out
         left_out: meshes that were not found
+        lidars: the lidars that Gazebo would simulate
     """
 
     source: Path
@@ -93,6 +101,7 @@ class UrdfModel:
     masses: dict[str, float]
     drive: dict[str, str]
     left_out: tuple[str, ...]
+    lidars: tuple[UrdfSensor, ...] = ()
 
     def above(self, link: str) -> Iterator[UrdfJoint]:
         """The joints between a link and the root, from the link on.
@@ -148,7 +157,8 @@ def read_model(
     if not 0 < len(links) <= MOST_LINKS:
         raise input_error(str(path), f"has {len(links)} links; a robot has 1 to {MOST_LINKS}")
     found = [_joint(path, element) for element in root.findall("joint")]
-    places, joints = _placed(path, set(links), found)
+    commanded = _commanded(path, root, {joint.name for joint in found})
+    places, joints = _placed(path, set(links), [replace(joint, commanded=commanded.get(joint.name)) for joint in found])
     reader = _Shapes(path, meshes, without_meshes, packages)
     pieces = [
         piece
@@ -161,18 +171,43 @@ def read_model(
         for name, link in links.items()
         for mass in link.findall("inertial/mass")
     }
-    plugins = [plugin for plugin in root.findall("gazebo/plugin") if _drives_two_wheels(plugin)]
-    drive = {element.tag: (element.text or "").strip() for plugin in plugins for element in plugin}
+    lidars, left_out = lidar_sensors(root, places), tuple(reader.left_out)
     return UrdfModel(
-        path, root.get("name", path.stem), joints, places, tuple(pieces), masses, drive, tuple(reader.left_out)
+        path, root.get("name", path.stem), joints, places, tuple(pieces), masses, _drive(root), left_out, lidars
     )
 
 
-def _drives_two_wheels(plugin: ET.Element) -> bool:
-    """Whether a Gazebo plugin names one left and one right joint; those of vehicles that skid name several."""
-    return any(
-        len(plugin.findall(f"left{end}")) == len(plugin.findall(f"right{end}")) == 1 for end in ("_joint", "Joint")
-    )
+def _commanded(path: Path, root: ET.Element, joints: set[str]) -> dict[str, float]:
+    """The joints that <ros2_control> drives by their speed, and the greatest speed that each may be given [rad/s]."""
+    found = {}
+    for joint in root.findall("ros2_control/joint"):
+        name = _named(path, joint)
+        for interface in joint.findall("command_interface"):
+            if interface.get("name") != "velocity":
+                continue
+            if name not in joints:
+                raise input_error(str(path), f"<ros2_control> drives joint {name!r}, which there is not")
+            most = next((param.text for param in interface.findall("param") if param.get("name") == "max"), None)
+            try:
+                found[name] = math.inf if most is None else float(most)
+            except ValueError:
+                found[name] = math.nan
+            if not found[name] > 0:
+                raise input_error(
+                    str(path), f"joint {name}", f"max in <ros2_control> must be a number above 0, got {most!r}"
+                )
+    return found
+
+
+def _drive(root: ET.Element) -> dict[str, str]:
+    """What plugins that drive wheels say, by tag. A tag that a plugin repeats, such as the left wheels of a vehicle that
+    skids, is left out: it names no one wheel."""
+    drive: dict[str, str] = {}
+    for plugin in root.findall("gazebo/plugin"):
+        tags = Counter(element.tag for element in plugin)
+        if any(re.fullmatch(r"left\w*joint", tag, re.IGNORECASE) for tag in tags):
+            drive |= {element.tag: (element.text or "").strip() for element in plugin if tags[element.tag] == 1}
+    return drive
 
 
 def _root_element(path: Path, arguments: Mapping[str, str], packages: Mapping[str, Path]) -> ET.Element:
@@ -286,10 +321,7 @@ def _placed(path: Path, links: set[str], found: list[UrdfJoint]) -> tuple[dict[s
         for joint in ready:
             place = places[joint.parent] @ joint.place
             places[joint.child] = place
-            facts = (joint.velocity, joint.effort, joint.range)
-            joints[joint.name] = UrdfJoint(
-                joint.name, joint.kind, joint.parent, joint.child, place, place[:3, :3] @ joint.axis, *facts
-            )
+            joints[joint.name] = replace(joint, place=place, axis=place[:3, :3] @ joint.axis)
     return places, joints
 
 

@@ -15,7 +15,9 @@ from antdrive.robots.files import RobotFile, footprint_to_dict, robot_from_text
 from antdrive.robots.importing.hull import footprint_around
 from antdrive.robots.importing.limits import Found, add_forces, add_speeds, seven_digits
 from antdrive.robots.importing.model import UrdfModel, read_model
+from antdrive.robots.importing.sensors import found_lidar, lidar_entry
 from antdrive.robots.importing.wheels import DrivenWheel, driven_wheels
+from antdrive.robots.lidar import Lidar
 from antdrive.robots.spec import Footprint, RobotSpec
 from antdrive.worlds.errors import InputError, input_error
 from antdrive.worlds.types import Floats
@@ -107,7 +109,7 @@ def import_urdf(
     what = f"{kind} around the collision geometry of {_few(names)}, and around the wheels"
     what += "" if math.isinf(below) else f", below {below:g} m"
     values = _values(model, wheels, outline, floor, given)
-    text = _text(model, path, outline, what, values)
+    text = _text(model, path, outline, what, values, found_lidar(model.lidars, frame, floor))
     return ImportedRobot(
         _robot_in(text, path, values),
         text,
@@ -213,8 +215,16 @@ def _mass(model: UrdfModel, box: float) -> tuple[float, str]:
     return sum(model.masses.values()), f"computed: sum of the masses of {_few(heavy)}{without}"
 
 
-def _text(model: UrdfModel, path: Path, outline: Footprint, what: str, values: list[_Value]) -> str:
+def _text(
+    model: UrdfModel,
+    path: Path,
+    outline: Footprint,
+    what: str,
+    values: list[_Value],
+    sight: tuple[Lidar | None, str],
+) -> str:
     """The robot's file."""
+    lidar, seen = sight
     name = "".join(c for c in model.name if c.isprintable()).strip() or path.stem
     rows = [("schema: 1", ""), (f"name: {_quoted(name[:200])}", "read: the robot's name")]
     rows.append((f"source: {_quoted(f'imported from {path.name}')}", ""))
@@ -224,6 +234,8 @@ def _text(model: UrdfModel, path: Path, outline: Footprint, what: str, values: l
         foot = {"length": round(length, 9), "width": round(width, 9), "centre": [round(v, 9) for v in centre]}
     rows.append((f"footprint: {_flow(foot)}", f"computed: {what}"))
     rows += [(f"{value.key}: {_rounded(value)}", value.how) for value in values]
+    if lidar is not None:
+        rows.append((f"lidar: {_flow(lidar_entry(lidar))}", seen))
     rows.append((f"noise: {NOISE}", "assumed: as in the catalogue; measure the robot's own"))
     lines = []
     for text, how in rows:
@@ -234,6 +246,8 @@ def _text(model: UrdfModel, path: Path, outline: Footprint, what: str, values: l
             lines += [f"# {comment}", text]
         else:
             lines.append(f"{text:30}  # {comment}")
+    if lidar is None and seen:
+        lines.append(f"# no lidar: {''.join(c if c.isprintable() else '?' for c in seen)}")
     if model.left_out:
         left = "; ".join("".join(c if c.isprintable() else "?" for c in mesh) for mesh in model.left_out)
         lines.append(f"# left out, because they were not found: {left}")

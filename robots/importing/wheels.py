@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -54,20 +55,31 @@ def driven_wheels(
     """
     if (left is None) != (right is None):
         raise InputError("--left, --right: give both or none")
-    plugin = [model.drive.get(f"{side}_joint") or model.drive.get(f"{side}Joint") for side in ("left", "right")]
     if left is not None and right is not None:
         names: tuple[str, str] | None = (left, right)
     else:
-        names = (plugin[0], plugin[1]) if plugin[0] and plugin[1] else None
+        names = _named_in_file(model)
     if names is not None:
         pair = (
             _wheel(model, _joint_called(model, names[0]), radius),
             _wheel(model, _joint_called(model, names[1]), radius),
         )
         if not _on_one_axle(*pair):
-            raise input_error(str(model.source), f"{names[0]} and {names[1]} are no two wheels on one axle")
-        return pair
+            why = _unlike(pair) or f"{names[0]} and {names[1]} are no two wheels on one axle"
+            raise input_error(str(model.source), why)
+        return pair if left is not None or _from_plugin(model) else _in_order(model, pair)
     return _in_order(model, _only_pair(model, radius))
+
+
+def _named_in_file(model: UrdfModel) -> tuple[str, str] | None:
+    """The joints that the drive plugin drives, left first, or the only two that <ros2_control> does; None: to be found."""
+    commanded = [joint.name for joint in model.joints.values() if joint.commanded is not None]
+    return _from_plugin(model) or ((commanded[0], commanded[1]) if len(commanded) == 2 else None)
+
+
+def _from_plugin(model: UrdfModel) -> tuple[str, str] | None:
+    left, right = (model.drive.get(f"{side}_joint") or model.drive.get(f"{side}Joint") for side in ("left", "right"))
+    return (left, right) if left and right else None
 
 
 def _joint_called(model: UrdfModel, name: str) -> UrdfJoint:
@@ -105,9 +117,11 @@ def _only_pair(model: UrdfModel, radius: float | None) -> tuple[DrivenWheel, Dri
             where, f"its wheels carry {len(rollers)} rollers, such as {rollers[0]}: this is no differential drive"
         )
     wheels = [_wheel(model, joint, radius) for joint in fixed if _stands(model, joint)]
+    pairs = [pair for pair in itertools.combinations(wheels, 2) if _on_one_axle(*pair)]
+    if not pairs and (unlike := _unlike([_wheel(model, joint, radius) for joint in fixed if _is_round(model, joint)])):
+        raise input_error(where, unlike)
     if len(wheels) < 2:
         raise input_error(where, _too_few(model, fixed, wheels))
-    pairs = [pair for pair in itertools.combinations(wheels, 2) if _on_one_axle(*pair)]
     if not pairs:
         names = ", ".join(wheel.joint.name for wheel in wheels)
         raise input_error(
@@ -163,6 +177,11 @@ def _stands(model: UrdfModel, joint: UrdfJoint) -> bool:
     return _bottom(model, joint) <= lowest + 0.25 * size
 
 
+def _is_round(model: UrdfModel, joint: UrdfJoint) -> bool:
+    """Whether what a joint turns has a cylinder or a sphere as collision geometry."""
+    return any(piece.link == joint.child and piece.radius is not None for piece in model.pieces)
+
+
 def _wheel(model: UrdfModel, joint: UrdfJoint, radius: float | None) -> DrivenWheel:
     own: list[CollisionPiece] = [piece for piece in model.pieces if piece.link == joint.child]
     if not own:
@@ -190,12 +209,29 @@ def _wheel(model: UrdfModel, joint: UrdfJoint, radius: float | None) -> DrivenWh
 
 def _on_one_axle(a: DrivenWheel, b: DrivenWheel) -> bool:
     """Whether two wheels of one size turn about one line."""
+    return _turn_about_one_line(a, b) and abs(a.radius - b.radius) <= SAME * a.radius
+
+
+def _turn_about_one_line(a: DrivenWheel, b: DrivenWheel) -> bool:
     apart = b.centre - a.centre
     away = float(np.linalg.norm(apart))
     if away < max(a.radius, b.radius) / 2 or abs(abs(float(a.joint.axis @ b.joint.axis)) - 1) > SAME:
         return False
     beside = apart - (apart @ a.joint.axis) * a.joint.axis
-    return float(np.linalg.norm(beside)) <= SAME * away and abs(a.radius - b.radius) <= SAME * a.radius
+    return float(np.linalg.norm(beside)) <= SAME * away
+
+
+def _unlike(wheels: Sequence[DrivenWheel]) -> str:
+    """What is wrong with two wheels of different radii that face each other; empty if there are none.
+
+    Wheels of different size that stand on one floor have their middles at different heights, so heights do not count.
+    """
+    for a, b in itertools.combinations(wheels, 2):
+        level = replace(b, centre=np.array([*b.centre[:2], a.centre[2]]))
+        if _turn_about_one_line(a, level) and abs(a.radius - b.radius) > SAME * a.radius:
+            radii = " and ".join(f"{wheel.radius:.4g} m (link {wheel.joint.child})" for wheel in (a, b))
+            return f"its wheels have different radii, {radii}; the two driven wheels of a differential drive are alike"
+    return ""
 
 
 def _in_order(model: UrdfModel, pair: tuple[DrivenWheel, DrivenWheel]) -> tuple[DrivenWheel, DrivenWheel]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -179,11 +179,12 @@ def _number(option: str, text: str) -> float | int:
         raise InputError(f"{option} {text}: must be a number") from None
 
 
-def print_sweep(results: SweepResults) -> None:
+def print_sweep(results: SweepResults, reports: Sequence[str] = ()) -> None:
     """Print how the runs of a campaign ended, what was measured in those that succeeded, and where more is said.
 
     Args:
         results: of the campaign
+        reports: files with more, if they were asked for; without, the command that makes one is printed
     """
     print_line(f"{results.size} runs, {results.made} of them made now; {results.succeeded} succeeded, certified")
     print_table(("outcome", "runs"), ((name, str(count)) for name, count in results.outcomes.items()))
@@ -191,6 +192,10 @@ def print_sweep(results: SweepResults) -> None:
     print_line("medians of the runs that succeeded (least to most)")
     print_table(("planner", "runs", *MEDIANS.values()), _medians(results))
     print_line(f"  table    {results.path}")
+    for file in reports:
+        print_line(f"  report   {file}")
+    if reports:
+        return
     report = shlex.join(["antdrive", "report", str(results.folder), "-o", str(results.folder / "report.html")])
     print_line(f"  charts, intervals and all runs: {report}")
 

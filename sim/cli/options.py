@@ -83,7 +83,7 @@ Margin = Annotated[
         parser=parse_margin,
         metavar="METRES|auto",
         help="Distance that the plan keeps from obstacles, beyond the robot's radius [m]. auto: the least that this robot, "
-        "noise and smoothing are predicted to need, from some hundred short drives, once.",
+        "noise and smoothing are predicted to need, from 80 short drives for each margin that is tried, once.",
     ),
 ]
 CellSize = Annotated[

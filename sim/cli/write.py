@@ -156,7 +156,7 @@ def _write_figures(run: Run, folder: Path, log: str, endings: Sequence[str]) -> 
         if run.certificate is not None:
             files["certificate" + end] = str(folder / f"certificate{suffix}")
             certificate_figure(run.rollout, run.certificate, files["certificate" + end])
-        if len(run.rollout.scans):
+        if run.rollout.record.exploring and len(run.rollout.scans):
             from antdrive.sim.view.figures.sight_figure import sight_figure
 
             files["sight" + end] = str(folder / f"sight{suffix}")

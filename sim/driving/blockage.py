@@ -14,6 +14,7 @@ from antdrive.sim.driving.blocking import covered_discs, with_obstacles
 from antdrive.sim.driving.gaps import STILL, NarrowGaps
 from antdrive.sim.driving.perception import Predictor
 from antdrive.worlds import Floats, Grid, Pose, Task, rasterise
+from antdrive.worlds.plane import place_name
 
 LOOK = 1.0  # predictions are checked this often for a mover that sets out again [s]
 
@@ -136,7 +137,7 @@ class Blockage:
         order = self._standing[np.argsort(np.hypot(*(positions[self._standing] - pose[:2]).T), kind="stable")]
         alone = (m for m in order.tolist() if self._way(tick, pose, order[order != m]))
         mover = next(alone, int(order[0]))
-        x, y = positions[mover].tolist()
+        at = place_name(self._task.frame, *positions[mover].tolist())
         narrow = mover in self.gaps.noted(tick, pose[:2]) and self._way(tick, pose, order, narrow=True)
         closes = (
             f"leaves a gap too narrow for local avoidance, which keeps the robot's centre {self.gaps.keeps:.3g} m from it"
@@ -144,6 +145,6 @@ class Blockage:
             else "closes the way"
         )
         return (
-            f"{self._predictor.name_of(mover)} stands still at ({x:.2f}, {y:.2f}) and {closes}; "
+            f"{self._predictor.name_of(mover)} stands still at {at} and {closes}; "
             f"no route to the goal for {self._patience:g} s, in {self.failures} attempts"
         )

@@ -8,6 +8,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from antdrive.robots import TrackedPath
 from antdrive.sim.driving.perception import Predictor
 from antdrive.worlds import Disc, Floats, Grid, Task
 
@@ -56,6 +57,22 @@ def blocked_cells(grid: Grid, discs: list[Disc]) -> npt.NDArray[np.bool_]:
         near = np.hypot(x[None, c0:c1] - disc.x, y[r0:r1, None] - disc.y) <= reach
         blocked[r0:r1, c0:c1] |= near
     return blocked & grid.free
+
+
+def close_route(discs: list[Disc], tracked: TrackedPath, arc: float, reach: float, inflate: float) -> bool:
+    """Whether a disc comes closer than `inflate` [m] to the route within `reach` [m] beyond an arc length on it [m]."""
+    ahead = np.arange(arc, min(arc + reach, tracked.length), 0.1)
+    if not discs or not len(ahead):
+        return False
+    movers = np.array([(disc.x, disc.y, disc.radius) for disc in discs])
+    gaps = np.hypot(*np.moveaxis(points_at(tracked, ahead)[:, None] - movers[None, :, :2], -1, 0)) - movers[:, 2]
+    return bool((gaps < inflate).any())
+
+
+def points_at(tracked: TrackedPath, arcs: Floats) -> Floats:
+    """The points (N, 2) of a route at arc lengths (N,) [m]."""
+    route = tracked.route
+    return np.stack([np.interp(arcs, route.arc, route.xy[:, k]) for k in (0, 1)], axis=1)
 
 
 def with_obstacles(task: Task, discs: list[Disc]) -> Task:

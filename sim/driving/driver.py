@@ -31,6 +31,7 @@ STUCK_TIME = 8.0  # a robot without progress for this long is stuck [s]
 STUCK_PROGRESS = 0.02  # what counts as progress along the route [m]
 GOAL_SHARE = 0.95  # a robot that avoids a mover may stop early within this fraction of the goal's tolerance
 DRIFTING_SHARE = 0.6  # and within this one, if it finds movers and its way by its lidar, and where it is by odometry
+BLIND_SHARE = 0.3  # of its top speed such a robot backs off where its lidar does not look, unless a mover is met then
 AVOIDING = LIMITERS.index("avoid")
 EXPLORING_LIMITERS = (*LIMITERS, "sight")  # the rules where the robot has no map
 OUT_OF_SIGHT = EXPLORING_LIMITERS.index("sight")
@@ -86,7 +87,10 @@ class Driver:
         self._avoidance, self._predictor, self._monitor = avoidance, predictor, monitor
         self._caution = caution
         self._drifts = isinstance(monitor, Exploration) and monitor.survey.watch is not None
+        blind = self._drifts and robot.lidar is not None and not robot.lidar.full_circle
+        self._backwards = BLIND_SHARE * robot.max_speed if blind else math.inf
         self._avoidance_state = AvoidanceState()
+        self._avoids = False  # whether the last command avoided a mover, even if sight then held its speed
         self._clock = StuckClock()
         self._patience = round(STUCK_TIME * control_hz)
         self._full_turn = round(2 * math.pi / robot.max_yaw_rate * control_hz)
@@ -127,13 +131,13 @@ class Driver:
             self.command = _brake(last, self._robot, self._hz)
         speed_limit = self._keep_to_schedule(tick, last)
         if self._avoidance is not None and self._predictor is not None:
-            stopping = before.limiter == AVOIDING and self._stops_at_goal(pose, last)
+            stopping = self._avoids and self._stops_at_goal(pose, last)
             if stopping and _standing(state):
                 return self._arrival(state)
             self._avoid_movers(tick, pose, last, before, speed_limit, stopping)
         self._keep_within_sight(pose, last)
         ending = self._end_of_route(tick, pose, state)
-        waiting = self.pursuit.limiter == AVOIDING or speed_limit < WAITING_SPEED
+        waiting = self._avoids or speed_limit < WAITING_SPEED
         self._clock = self._clock.after(self.pursuit, waiting)
         return ending
 
@@ -150,7 +154,7 @@ class Driver:
     def _replan_if_triggered(self, tick: int, pose: Pose, state: State) -> None:
         """Go on along a new path, if one is due and there is one."""
         assert self._monitor is not None
-        waiting = self.pursuit.limiter == AVOIDING and abs(state.speed) < WAITING_SPEED
+        waiting = self._avoids and abs(state.speed) < WAITING_SPEED
         trigger = self._monitor.trigger(tick, pose, waiting, self.tracked, self.pursuit.arc)
         if trigger:
             self._follow(self._monitor.replan(tick, pose, trigger))
@@ -206,8 +210,10 @@ class Driver:
             movers,
             radii,
             speed_limit=speed_limit,
+            backwards=self._backwards,
         )
-        if avoids or stopping:
+        self._avoids = avoids or stopping
+        if self._avoids:
             self.pursuit = self.pursuit._replace(turning=before.turning, limiter=AVOIDING)
 
     def _end_of_route(self, tick: int, pose: Pose, state: State) -> Ending | None:

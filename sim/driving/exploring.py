@@ -24,16 +24,21 @@ from antdrive.planners import (
     blaming,
     capabilities_of,
     checked,
+    replanner_for,
     smooth,
 )
 from antdrive.planners.plan import Cell
 from antdrive.robots import PurePursuit, RobotSpec, TrackedPath
 from antdrive.robots.control.pursuit import unsorted
 from antdrive.sim.driving import _kernels_hits
+from antdrive.sim.driving.blocking import blocked_cells
+from antdrive.sim.driving.movers_ahead import MoversAhead
+from antdrive.sim.driving.own_map import PATIENCE
 from antdrive.sim.driving.replanning import STRAYED, Replan, ReplanPolicy
 from antdrive.sim.driving.survey import Survey
-from antdrive.sim.log.scans import millimetres
-from antdrive.worlds import Bounds, Floats, Grid, Pose, Route, Task, World, point_clearance, rasterise
+from antdrive.sim.driving.traffic import Zone
+from antdrive.sim.log.scans import scans_logged
+from antdrive.worlds import Bounds, Disc, Floats, Grid, Pose, Route, Task, World, point_clearance, rasterise
 from antdrive.worlds.world import PointWorld
 
 DISCOVERED = "discovered"
@@ -49,7 +54,6 @@ CORRIDOR = 1.2  # a route is smoothed among what lies within this distance of th
 SAMPLES = 0.06  # spacing of the places on a route at which speed limits and lookaheads are worked out [m]
 SPARE = 0.25  # the controller knows what lies this much farther away than its longest arcs lead [m]
 INTERVAL = 0.15  # the shortest time between two plans [s]
-PATIENCE = 3  # plans in a row that find no path before the robot no longer believes what it saw long ago
 COVERS = 1e-3  # what was hit so near to the robot or to its goal covers it [m]
 LOOK_AT_ROUTE = 0.1  # spacing of the points of a route that are looked at [m]
 FORGIVING = 0.005  # the arcs of a disc may come this much closer to what was hit than in a known world [m]
@@ -107,7 +111,9 @@ class Exploration:
         smoothing: str,
         cell: float,
         hz: int,
+        movers: MoversAhead | None = None,
     ) -> None:
+        self._movers = movers
         self.survey, self.wrong, self.log = survey, "", list[Replan]()
         self._planner, self._task, self._rng = planner, task, rng
         self._robot, self._controller, self._policy = robot, controller, policy
@@ -127,13 +133,18 @@ class Exploration:
 
     # ---- plans
 
-    def plan(self, pose: Pose) -> tuple[Grid, PlanResult]:
-        """The grid and the plan from a pose, through what is known; with less margin where there is no path otherwise."""
+    def plan(self, pose: Pose, avoided: list[Disc] | None = None) -> tuple[Grid, PlanResult]:
+        """The grid and the plan from a pose, through what is known; with less margin where there is no path otherwise.
+
+        Args:
+            pose: where the robot is
+            avoided: what the plan keeps off, beside what stands
+        """
         straight = math.dist(pose[:2], self._task.goal)
         best: tuple[Grid, PlanResult] | None = None
         for growth in GROWTH:
             for share in MARGINS:
-                grid, answer = found = self._planned(pose, self._bounds(growth, pose), share * self._margin)
+                grid, answer = found = self._planned(pose, self._bounds(growth, pose), share * self._margin, avoided)
                 if answer.status is PlanStatus.INVALID:
                     return found
                 if best is None or answer.cost < best[1].cost / DETOUR:
@@ -146,21 +157,77 @@ class Exploration:
         assert best is not None
         return best
 
-    def _planned(self, pose: Pose, bounds: Bounds, margin: float) -> tuple[Grid, PlanResult]:
+    def _planned(
+        self, pose: Pose, bounds: Bounds, margin: float, avoided: list[Disc] | None = None
+    ) -> tuple[Grid, PlanResult]:
         """The grid and the plan from a pose, within bounds and with a margin [m]."""
         task = self._known(pose, bounds)
         grid = rasterise(task.world, self._cell, self._robot.radius + margin)
-        return grid, self._ask(task, grid)
+        if not avoided:
+            return grid, self._ask(task, grid)
+        return grid, self._ask_around(task, grid, avoided)
 
-    def route(self, pose: Pose, grid: Grid, answer: PlanResult) -> tuple[Route, TrackedPath]:
-        """The route of a plan, smoothed, and the same prepared for the controller."""
+    def _plan_around(self, tick: int, pose: Pose) -> tuple[Grid, PlanResult, list[Disc]]:
+        """The grid and the plan from a pose that keeps off the movers that are followed; and what the plan keeps off."""
+        movers = self._movers
+        if movers is None:
+            return (*self.plan(pose), [])
+        if movers.heavy(tick, pose):
+            task = self._known(pose, movers.bounds(self._bounds(GROWTH[0], pose)))
+            grid = rasterise(task.world, self._cell, self._robot.radius + self._margin)
+            longest = self._policy.max_detour * math.dist(pose[:2], self._task.goal)
+            for zone in movers.zones(tick, pose, grid):
+                # Movers that are far away will have moved on: they must not close the only way to the goal.
+                near = movers.discs(tick, pose, zone)
+                answer = self._ask_around(task, grid, near + zone.discs, zone)
+                if answer.cost <= longest:
+                    return grid, answer, near + zone.discs
+        discs = movers.discs(tick, pose)
+        if discs:
+            grid, answer = self.plan(pose, discs)
+            if answer.solved:
+                return grid, answer, discs
+        return (*self.plan(pose), [])
+
+    def _ask_around(self, task: Task, grid: Grid, discs: list[Disc], zone: Zone | None = None) -> PlanResult:
+        """A plan that keeps off discs, and out of a zone."""
+        planner = self._planner
+        if capabilities_of(planner).needs_world:
+            task = dataclasses.replace(task, world=_with(task.world, discs))
+            return self._ask(task, rasterise(task.world, grid.cell, grid.inflate))
+        query = Query.between(grid, task)
+        blocked = blocked_cells(grid, discs)
+        if zone is not None:
+            blocked |= zone.blocked
+        blocked[query.start] = blocked[query.goal] = False
+        if query.unreachable:
+            return PlanResult(status=PlanStatus.NO_PATH, reason=query.unreachable)
+        # Movers change so many cells that a search is repaired no faster than made anew.
+        replanner = replanner_for(planner, query, self._rng)
+        with blaming(planner):
+            replanner.block(np.argwhere(blocked))
+            answer = replanner.result()
+        return self._checked(query, answered(planner, answer))
+
+    def route(
+        self, pose: Pose, grid: Grid, answer: PlanResult, avoided: list[Disc] | None = None
+    ) -> tuple[Route, TrackedPath]:
+        """The route of a plan, smoothed, and the same prepared for the controller.
+
+        Args:
+            pose: where the plan begins
+            grid: the plan's grid
+            answer: the plan
+            avoided: what the plan keeps off, beside what stands
+        """
         bounds = _bounds_of(grid)
         task = self._known(pose, bounds)
         self._seen.append((self._tick, task.world.discs))
         line = np.vstack([[pose[:2]], grid.xy(answer.line), [self._task.goal]])
         discs = _kernels_hits.near_polyline(line, task.world.discs, grid.inflate + CORRIDOR)
         near = dataclasses.replace(task, world=_world(bounds, discs))
-        route = smooth(answer, grid, near, kind=self._smoothing)
+        around = dataclasses.replace(near, world=_with(near.world, avoided)) if avoided else near
+        route = smooth(answer, grid, around, kind=self._smoothing)
         tracked = self._prepare(route, near.world, grid.inflate - self._robot.radius)
         self._watch(route, near.world, grid.inflate)
         return route, tracked
@@ -181,8 +248,11 @@ class Exploration:
         key = self.survey.map, len(self.survey.scans), pose, bounds
         if self._known_as[0] == key:
             return self._known_as[1]
+        discs = self.survey.discs(bounds)
+        if self._movers is not None:
+            discs = self._movers.without_trails(discs, pose)
         ends = np.array((pose[:2], self._task.goal))
-        discs = _kernels_hits.beside(self.survey.discs(bounds), ends, COVERS)  # what covers one is an error of the map
+        discs = _kernels_hits.beside(discs, ends, COVERS)  # what covers one is an error of the map
         known = dataclasses.replace(self._task, world=_world(bounds, discs), start=pose)
         self._known_as = key, known
         return known
@@ -196,6 +266,9 @@ class Exploration:
             answer = self._repaired(query)
         else:
             answer = ask(planner, query, self._rng)
+        return self._checked(query, answer)
+
+    def _checked(self, query: Query, answer: PlanResult) -> PlanResult:
         plan = checked(query, answer)
         if plan.status is PlanStatus.INVALID:
             self.wrong = self.wrong or plan.reason
@@ -255,6 +328,8 @@ class Exploration:
             arc: how far the robot has got along the path [m]
         """
         now = tick / self._hz
+        if self._movers is not None:
+            self._movers.look(tick, pose, waiting)
         if self.lost:
             return LOST if now - self._planned_at >= INTERVAL else ""
         self._note_way(now, pose, waiting, tracked.backwards)
@@ -265,6 +340,10 @@ class Exploration:
             return ""
         if now - self._rest[0] > STALL_TIME:
             return STALLED
+        if self._movers is not None and now - self._planned_at >= self._policy.min_interval:
+            due = self._movers.trigger(tick, pose, tracked, arc)
+            if due:
+                return due
         if self._looked == self.survey.whole:
             return ""
         self._looked = self.survey.whole
@@ -298,10 +377,10 @@ class Exploration:
         if self._failures >= PATIENCE:
             self._failures = 0
             self.survey.forget(pose)
-        grid, plan = self.plan(pose)
+        grid, plan, avoided = self._plan_around(tick, pose)
         route, tracked = None, None
         if plan.solved and len(plan.cells) and not self.wrong:
-            route, tracked = self.route(pose, grid, plan)
+            route, tracked = self.route(pose, grid, plan, avoided)
         cost, xy = (plan.cost, route.xy) if route else (math.inf, np.empty((0, 2)))
         self.log.append(Replan(now, trigger, route is not None, cost, plan.work, xy, time.perf_counter() - started))
         self.lost = route is None
@@ -317,12 +396,10 @@ class Exploration:
             per_tick: rows of the log in a control period
             rows: of the log
         """
-        scans = [scan for scan in self.survey.scans if scan.tick * per_tick < rows]
         seen = [(tick, discs) for tick, discs in self._seen if tick * per_tick < rows]
         tables = [np.column_stack((np.full(len(discs), tick * per_tick), discs)) for tick, discs in seen]
         return {
-            "scans": millimetres(np.array([scan.ranges for scan in scans])),
-            "scan_rows": np.array([scan.tick * per_tick for scan in scans], dtype=np.int32),
+            **scans_logged(((scan.tick, scan.ranges) for scan in self.survey.scans), per_tick, rows),
             "seen": np.concatenate(tables).astype(np.float32) if tables else np.empty((0, 4), dtype=np.float32),
         }
 
@@ -370,6 +447,12 @@ class Exploration:
 
 def _world(bounds: Bounds, discs: Floats) -> World:
     return PointWorld.of("seen", bounds, discs)
+
+
+def _with(world: World, discs: list[Disc]) -> World:
+    """A world of points with more obstacles."""
+    more = np.array([(disc.x, disc.y, disc.radius) for disc in discs]).reshape(-1, 3)
+    return _world(world.bounds, np.concatenate((world.discs, more)))
 
 
 def _bounds_of(grid: Grid) -> Bounds:

@@ -35,10 +35,10 @@ from antdrive.planners import (
 )
 from antdrive.robots import PurePursuit, RobotSpec, TrackedPath
 from antdrive.sim.driving.blockage import Blockage
-from antdrive.sim.driving.blocking import blocked_cells, covered_discs, with_obstacles
+from antdrive.sim.driving.blocking import blocked_cells, close_route, covered_discs, with_obstacles
 from antdrive.sim.driving.perception import Predictor
 from antdrive.sim.driving.schedule import Schedule
-from antdrive.sim.driving.traffic import Traffic, Zone
+from antdrive.sim.driving.traffic import Zone, traffic_of
 from antdrive.worlds import Disc, Floats, Grid, Pose, Route, Task, rasterise
 from antdrive.worlds.errors import FieldError
 
@@ -165,7 +165,7 @@ class ReplanMonitor:
         self._replanned_at = -math.inf
         self._waiting_since = math.nan
         learns = policy.around_movers and predictor.guesses and not self._timed
-        self._traffic = Traffic(predictor, robot.radius, task.world.bounds, hz) if learns else None
+        self._traffic = traffic_of(predictor, robot, task.world.bounds, hz) if learns else None
         self.blockage = Blockage(
             self._task, grid, predictor, hz, interval=policy.min_interval, patience=policy.patience, keeps=keeps
         )
@@ -323,23 +323,12 @@ class ReplanMonitor:
         zones = self._zones(tick, pose)
         if not zones:
             return False
-        ahead = np.arange(arc, tracked.length, 0.5 * self._grid.cell)
-        points = np.stack([np.interp(ahead, tracked.route.arc, tracked.route.xy[:, k]) for k in (0, 1)], axis=1)
-        return any(zones[-1].blocked[self._grid.cell_at(x, y)] for x, y in points.tolist())
+        return zones[-1].crossed(tracked, arc)
 
     def _obstructed(self, tick: int, pose: Pose, tracked: TrackedPath, arc: float) -> bool:
         """Whether a mover will soon cover a point of the route ahead."""
         discs = self._discs(tick, pose)
-        if not discs:
-            return False
-        ahead = np.arange(arc, min(arc + self.policy.obstruction_range, tracked.length), 0.1)
-        if not len(ahead):
-            return False
-        route = tracked.route
-        points = np.stack([np.interp(ahead, route.arc, route.xy[:, k]) for k in (0, 1)], axis=1)
-        movers = np.array([(disc.x, disc.y, disc.radius) for disc in discs])
-        gaps = np.hypot(*np.moveaxis(points[:, None] - movers[None, :, :2], -1, 0)) - movers[:, 2]
-        return bool((gaps < self._grid.inflate).any())
+        return close_route(discs, tracked, arc, self.policy.obstruction_range, self._grid.inflate)
 
 
 def _point_at(route: Route, arc: float) -> tuple[float, float]:

@@ -2,7 +2,7 @@
 
 Nothing is planned or decided, so the replay depends on physics alone. The noise of a noisy robot is drawn again from the
 record's seed: it must turn the logged commands into the logged targets, and the logged poses into the logged estimates. The
-scans of a robot without a map are taken and matched again, too.
+scans that are in the log are taken again, too, and those of a robot without a map matched.
 On the machine and with the versions that wrote a
 log it gives the same bits; elsewhere rounding differs, and `ROUNDING` says how much is allowed.
 """
@@ -19,7 +19,7 @@ import numpy as np
 from antdrive.robots import NoiseModel, Twist
 from antdrive.sim.driving.localising import OdometryModel, noise_model_of
 from antdrive.sim.driving.recorder import Ending, Recorder
-from antdrive.sim.driving.rescanning import Rescanning
+from antdrive.sim.driving.rescanning import Relooking, Rescanning, rescanning_of
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.physics.engine import Engine
@@ -103,7 +103,7 @@ def replay(rollout: Rollout) -> ReplayCheck:
 def _other_senses(rollout: Rollout) -> Iterator[str]:
     """What of a log is not as the seed's noise and the lidar make it: estimates, targets of the motors, scans."""
     record = rollout.record
-    again = Rescanning(rollout) if record.exploring and len(rollout.scans) else None
+    again = rescanning_of(rollout)
     if record.exploring and again is None:
         yield "replay: the log of a robot without a map has no scans"
         return
@@ -127,7 +127,8 @@ def _other_senses(rollout: Rollout) -> Iterator[str]:
             estimate = again.look(tick, (x, y, yaw), estimate)
             if isinstance(model, OdometryModel):
                 model.correct(estimate)
-            again.plan(tick, model.pose_after_delay() if model is not None else estimate)
+            if isinstance(again, Rescanning):
+                again.plan(tick, model.pose_after_delay() if model is not None else estimate)
         if model is not None:
             found.append((*estimate, *model.actuate(Twist(*rollout.command[row + 1].tolist()))))
     if again is not None:
@@ -145,7 +146,7 @@ def _other_senses(rollout: Rollout) -> Iterator[str]:
             yield f"replay: {name} is not what the noise of seed {record.seed} makes of the log, from t = {t:.3f} s"
 
 
-def _look_once_more(rollout: Rollout, again: Rescanning, model: NoiseModel | None) -> None:
+def _look_once_more(rollout: Rollout, again: Rescanning | Relooking, model: NoiseModel | None) -> None:
     """Take the scan of the period in which the robot decided that its drive was over; other drives end without one."""
     record, last = rollout.record, len(rollout.t) - 1
     tick, rest = divmod(last, record.physics_hz // record.control_hz)

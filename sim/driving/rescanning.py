@@ -1,23 +1,24 @@
 """Take the scans of a logged drive again, and match them again: what its lidar saw, and where the robot believed it was.
 
 Scans follow from the true poses, the world and the record's seed; estimates that scans correct follow from them and from the
-odometry of the same seed. The map is made anew, and where the robot forgot it, it is forgotten at the same time.
+odometry of the same seed. The map of a robot that was given none is made anew, and where the robot forgot it, it is forgotten
+at the same time.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
 from antdrive.robots import RobotSpec
-from antdrive.sim.driving.exploring import PATIENCE
+from antdrive.sim.driving.lookout import Glances
+from antdrive.sim.driving.own_map import forgetting_ticks
 from antdrive.sim.driving.survey import Senses, Survey
 from antdrive.sim.driving.watching import Watch
-from antdrive.sim.log.record import DriveRecord, ReplanRecord
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.scans import millimetres
-from antdrive.worlds import Pose, Task, Trajectories, World
+from antdrive.worlds import Floats, Pose, Task, Trajectories, World
 
 
 def survey_of(
@@ -63,7 +64,6 @@ class Rescanning:
     def __init__(self, rollout: Rollout) -> None:
         record = rollout.record
         self._rollout = rollout
-        self._per_tick = record.physics_hz // record.control_hz
         self._survey = survey_of(
             record.robot,
             record.task,
@@ -99,32 +99,64 @@ class Rescanning:
 
     def problems(self) -> Iterator[str]:
         """The first scan of the log that is not as the lidar takes it, in a sentence; none if all are."""
-        rows, logged = self._rollout.scan_rows, self._rollout.scans
-        taken = {scan.tick * self._per_tick: scan.ranges for scan in self._survey.scans}
-        last = max(taken)
-        for row in sorted({*taken, *(row for row in rows.tolist() if row <= last)}):
-            at = np.flatnonzero(rows == row)
-            if row in taken and len(at) == 1 and np.array_equal(millimetres(taken[row]), logged[at[0]]):
-                continue
-            yield (
-                f"replay: scans are not what the lidar measures from the logged poses, from t = {self._rollout.t[row]:.3f} s"
-            )
-            return
+        return _other_scans(self._rollout, ((scan.tick, scan.ranges) for scan in self._survey.scans))
 
 
-def forgetting_ticks(record: DriveRecord) -> Iterator[int]:
-    """The control periods in which a robot without a map forgot what it had seen: after some plans in a row found no path.
+class Relooking:
+    """The scans of a logged drive with a map, taken again period by period.
 
     Args:
-        record: of the log
+        rollout: the log of a robot that looked for movers with its lidar, with scans
     """
-    failures = 0
-    for replan in record.replans:
-        if failures >= PATIENCE:
-            failures = 0
-            yield _tick(record, replan)
-        failures = 0 if replan.solved else failures + 1
+
+    def __init__(self, rollout: Rollout) -> None:
+        record = rollout.record
+        assert record.robot.lidar is not None
+        senses = Senses.of(
+            record.robot.lidar,
+            record.world,
+            rollout.trajectories(),
+            seed=record.seed,
+            noisy=record.noise > 0,
+            hz=record.control_hz,
+        )
+        self._rollout, self._glances = rollout, Glances(senses)
+
+    def look(self, tick: int, pose: Pose, estimate: Pose) -> Pose:
+        """Take a scan if one is due in a control period; the estimated pose, which no scan corrects.
+
+        Args:
+            tick: the number of the control period
+            pose: the logged true pose
+            estimate: where the robot believes it is
+        """
+        self._glances.scan(tick, pose)
+        return estimate
+
+    def problems(self) -> Iterator[str]:
+        """The first scan of the log that is not as the lidar takes it, in a sentence; none if all are."""
+        return _other_scans(self._rollout, self._glances.taken)
 
 
-def _tick(record: DriveRecord, replan: ReplanRecord) -> int:
-    return round(replan.t * record.control_hz)
+def rescanning_of(rollout: Rollout) -> Rescanning | Relooking | None:
+    """What takes the scans of a log again; None where it has none.
+
+    Args:
+        rollout: the log
+    """
+    if not len(rollout.scans):
+        return None
+    return Rescanning(rollout) if rollout.record.exploring else Relooking(rollout)
+
+
+def _other_scans(rollout: Rollout, taken: Iterable[tuple[int, Floats]]) -> Iterator[str]:
+    """The first scan of a log that is not one of those that were taken again in control periods, in a sentence."""
+    rows, logged, per_tick = rollout.scan_rows, rollout.scans, rollout.record.physics_hz // rollout.record.control_hz
+    again = {tick * per_tick: ranges for tick, ranges in taken}
+    last = max(again, default=-1)
+    for row in sorted({*again, *(row for row in rows.tolist() if row <= last)}):
+        at = np.flatnonzero(rows == row)
+        if row in again and len(at) == 1 and np.array_equal(millimetres(again[row]), logged[at[0]]):
+            continue
+        yield f"replay: scans are not what the lidar measures from the logged poses, from t = {rollout.t[row]:.3f} s"
+        return

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from antdrive.robots import RobotSpec
 from antdrive.robots.lidar import Lidar
 from antdrive.sim.driving import _kernels_hits
+from antdrive.sim.driving.own_map import MAP_CELL, RECENT, horizon_of
 from antdrive.sim.driving.watching import Watch
 from antdrive.sim.log.streams import random_stream
 from antdrive.sim.sensing.mapping import OccupancyMap
@@ -21,12 +22,9 @@ from antdrive.sim.sensing.scanner import Scanner
 from antdrive.sim.sensing.sight import clear_distance, clear_turn
 from antdrive.worlds import Bounds, Floats, Point, Pose, Trajectories, World
 
-MAP_CELL = 0.05  # side of the map's cells [m]
-RECENT = 1.0  # scans of this time are kept where the map is made anew [s]
 TOLERANCE = 0.008  # a route may lose this much of its clearance without being planned anew [m]
 BLUR = 0.02  # and this much more for each metre of distance [m/m]
 FAR_AMONG_MOVERS = 15.0  # scans are matched up to this far where movers, which are no marks, hide what is near [m]
-HORIZON, HORIZON_AMONG_MOVERS = 10.0, 16.0  # hits farther away are not entered in the map [m]
 PAD = 0.01  # the robot keeps this from what was hit and from what was not seen: rounding of ranges, and of cells [m]
 
 
@@ -83,8 +81,7 @@ class Senses:
             tick: the number of the control period
             last: the control period of the scan before
         """
-        per_tick = self.scanner.lidar.rate / self.hz
-        return last < 0 or (tick != last and math.floor(tick * per_tick) != math.floor((tick - 1) * per_tick))
+        return last < 0 or (tick != last and self.scanner.lidar.due(tick, self.hz))
 
     def ranges(self, tick: int, pose: Pose) -> Floats:
         """A scan (beams,) [m].
@@ -97,15 +94,6 @@ class Senses:
         if not movers:
             return self.scanner.scan(pose, rng=self.rng)
         return self.scanner.scan(pose, movers.positions(np.array([tick / self.hz]))[0], movers.radii, self.rng)
-
-
-def horizon_of(*, watching: bool) -> float:
-    """How far away a hit may be that is entered in a robot's map [m].
-
-    Args:
-        watching: whether the robot looks for movers in its scans
-    """
-    return HORIZON_AMONG_MOVERS if watching else HORIZON
 
 
 class Survey:

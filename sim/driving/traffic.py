@@ -11,10 +11,16 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from antdrive.robots import RobotSpec, TrackedPath
+from antdrive.sim.driving.blocking import points_at
 from antdrive.sim.driving.perception import Predictor
+from antdrive.sim.driving.watching import TrackedPredictor
 from antdrive.worlds import Bounds, Disc, Floats, Grid
 
 MIXING = 2.0  # after this time a mover's place counts as a new sample of where movers go [s]
+MEMORY = 2.0  # how much traffic a lidar shows is a mean over about this time [s]
+FADING = 30.0  # and the most that it showed fades within about this time [s]
+FAST = 0.75  # movers that are found by lidar count as traffic from this share of the robot's top speed on
 SOON = 0.1  # speeds are those of the predictions this far ahead [s]
 STRAY = 0.1  # a mover is expected this far beyond the box, but no farther [m]
 MIN_RADIUS = 0.01  # smaller discs are left out [m]
@@ -44,10 +50,14 @@ class Traffic:
     def look(self, tick: int, robot: tuple[float, float]) -> None:
         """Take note of the movers that the robot perceives in a tick from a position [m]."""
         perceived, places = self._predictor.perceived(tick, robot)
-        if len(perceived):
-            self.samples += len(perceived) / (MIXING * self._hz) if self.samples else len(perceived)
-            np.minimum(self.box[:2], places[perceived].min(axis=0), out=self.box[:2])
-            np.maximum(self.box[2:], places[perceived].max(axis=0), out=self.box[2:])
+        self._note(places[perceived], 1 / self._hz)
+
+    def _note(self, places: Floats, period: float) -> None:
+        """Take note of places of movers (N, 2) [m], a period [s] after the last ones."""
+        if len(places):
+            self.samples += len(places) * period / MIXING if self.samples else len(places)
+            np.minimum(self.box[:2], places.min(axis=0), out=self.box[:2])
+            np.maximum(self.box[2:], places.max(axis=0), out=self.box[2:])
 
     def grown(self, by: float) -> bool:
         """Whether a side of the box has moved outwards by more than this [m] since the last `zones`."""
@@ -62,6 +72,10 @@ class Traffic:
         speeds = np.hypot(*(places[1] - places[0]).T) / SOON
         return float((2 * (radii + self._radius) * speeds).sum() / self._area)
 
+    def widest(self, tick: int, robot: tuple[float, float]) -> float:
+        """The largest radius of the movers that the robot perceives from a position [m]."""
+        return float(self._predictor.predict(tick, robot, np.zeros(1))[1].max(initial=0.0))
+
     def zones(self, tick: int, robot: tuple[float, float], goal: tuple[float, float], grid: Grid) -> list[Zone]:
         """The ground that movers roam, as far as the robot can tell from a position [m]: as estimated, and as seen.
 
@@ -69,10 +83,70 @@ class Traffic:
         everywhere in theirs equally often.
         """
         self._noted = self.box.copy()
-        radius = float(self._predictor.predict(tick, robot, np.zeros(1))[1].max(initial=0.0))
+        radius = self.widest(tick, robot)
         unseen = (self.box[2:] - self.box[:2]) / (self.samples + 1)
         larger = np.concatenate((self.box[:2] - unseen, self.box[2:] + unseen))
         return [Zone(box, radius, robot, goal, grid) for box in (larger, self.box.copy())]
+
+
+class TrackedTraffic(Traffic):
+    """Where a robot has met movers with its lidar, and how many fast ones there are on the ground in sight.
+
+    Places of movers that are hidden are guesses, so they do not count. How much traffic there is in the whole world cannot be
+    seen; the ground that was in sight lately stands for it.
+
+    Args:
+        predictor: what the robot follows
+        robot: the robot
+        hz: control periods per simulated second
+    """
+
+    def __init__(self, predictor: TrackedPredictor, robot: RobotSpec, hz: int) -> None:
+        super().__init__(predictor, robot.radius, (0.0, 0.0, 1.0, 1.0), hz)
+        self._tracks, self._fast = predictor, FAST * robot.max_speed
+        self._last, self._lately, self._most = -1, 0.0, 0.0
+
+    def look(self, tick: int, robot: tuple[float, float]) -> None:
+        """Take note of the movers that the last scan met, if it is a new one, from a position [m]."""
+        watch = self._tracks.watch
+        if watch.tick == self._last:
+            return
+        period = (watch.tick - self._last) / self._hz
+        self._last = watch.tick
+        self._note(self._tracks.sighted(tick), period)
+        kept = math.exp(-period / MEMORY)
+        self._lately *= kept
+        if watch.sight:
+            self._lately += (1 - kept) * self._sweep(tick, robot, watch.reach) / watch.sight
+        self._most = max(self._lately, self._most * math.exp(-period / FADING))
+
+    def rate(self, tick: int, robot: tuple[float, float]) -> float:
+        """How many fast movers a second would meet a robot that stands anywhere on ground that is in sight [1/s].
+
+        Movers that are out of sight for a while are there still, so the most that was seen counts, and fades.
+        """
+        return self._most
+
+    def _sweep(self, tick: int, robot: tuple[float, float], reach: float) -> float:
+        """The ground on which fast movers within reach [m] would touch the robot, in a second [m^2/s]."""
+        places, radii = self._predictor.predict(tick, robot, np.array([0.0, 1.0]))
+        speeds = np.hypot(*(places[1] - places[0]).T)
+        counts = (np.hypot(*(places[0] - robot).T) - radii <= reach) & (speeds >= self._fast)
+        return float((2 * (radii + self._radius) * speeds)[counts].sum())
+
+
+def traffic_of(predictor: Predictor, robot: RobotSpec, bounds: Bounds, hz: int) -> Traffic:
+    """What learns where movers roam: from what is told of them, or from what the robot's lidar shows.
+
+    Args:
+        predictor: what the robot perceives
+        robot: the robot
+        bounds: the world's walls [m]
+        hz: control periods per simulated second
+    """
+    if isinstance(predictor, TrackedPredictor):
+        return TrackedTraffic(predictor, robot, hz)
+    return Traffic(predictor, robot.radius, bounds, hz)
 
 
 class Zone:
@@ -95,7 +169,8 @@ class Zone:
     def __init__(
         self, box: Floats, radius: float, robot: tuple[float, float], goal: tuple[float, float], grid: Grid
     ) -> None:
-        self._box, reach, half = box, radius + grid.inflate, OPENING * grid.cell
+        self._box, self._grid = box, grid
+        reach, half = radius + grid.inflate, OPENING * grid.cell
         here, there = np.array(robot), np.array(goal)
         inside = float(_depth(here, box, reach))
         self._ways = [(here, here, inside + half)] if inside > 0 else []
@@ -114,6 +189,11 @@ class Zone:
     def holds(self, disc: Disc) -> bool:
         """Whether a predicted disc is where movers go. One that is not will have turned before it gets there."""
         return bool(_depth(np.array([disc.x, disc.y]), self._box, STRAY) > 0)
+
+    def crossed(self, tracked: TrackedPath, arc: float) -> bool:
+        """Whether a route leads through blocked cells beyond an arc length on it [m]."""
+        points = points_at(tracked, np.arange(arc, tracked.length, 0.5 * self._grid.cell))
+        return any(self.blocked[self._grid.cell_at(x, y)] for x, y in points.tolist())
 
     def _off_ways(self, points: Floats) -> Floats:
         """How far points (..., 2) are from the ways that are kept open [m]."""

@@ -12,6 +12,7 @@ from antdrive.sim.sensing.mapping import OccupancyMap
 from antdrive.sim.sensing.tracking import MoverTracker, TrackedMovers
 from antdrive.worlds import Floats, Pose, Trajectories, World
 
+FINE = 0.05  # the side of a map's cells [m]
 STANDS = 0.08  # a mover that is slower than this, as far as scans tell, stands still [m/s]
 
 
@@ -21,6 +22,8 @@ class Watch:
     Attributes:
         tracker: finds and follows them
         tick: the control period of the last scan
+        sight: the ground that its beams crossed within `reach` [m^2]
+        reach: up to where beams lie no farther apart than a cell of a map [m]
 
     Args:
         lidar: the robot's lidar
@@ -31,7 +34,8 @@ class Watch:
 
     def __init__(self, lidar: Lidar, hz: int, pose_xy: float = 0.0, pose_yaw: float = 0.0) -> None:
         self.tracker, self.tick = MoverTracker(lidar, None, pose_xy, pose_yaw), 0
-        self._hz = hz
+        self.sight, self.reach = 0.0, min(lidar.max_range, FINE / lidar.spacing)
+        self._hz, self._spacing = hz, lidar.spacing
         self._settle = max(2, round(self.tracker.policy.settle * lidar.rate))
         self._log: list[tuple[int, TrackedMovers]] = []
 
@@ -46,6 +50,8 @@ class Watch:
         """
         theirs = self.tracker.update(ground, pose, ranges, tick / self._hz)
         self.tick = tick
+        crossed = np.clip(ranges, 0.0, self.reach)
+        self.sight = float(0.5 * self._spacing * (crossed * crossed).sum())
         self._log.append((tick, self.tracker.movers()))
         return theirs
 
@@ -98,8 +104,10 @@ class TrackedPredictor(Predictor):
 
     Movers are counted as they are found. In arrays of all movers those that are not followed any more have no place.
 
-    Args:
+    Attributes:
         watch: what the scans tell
+
+    Args:
         perception: how far the robot looks for movers
         hz: control periods per second
     """
@@ -107,7 +115,7 @@ class TrackedPredictor(Predictor):
     def __init__(self, watch: Watch, perception: Perception, hz: int) -> None:
         nothing = World("nothing", (0.0, 0.0, 1.0, 1.0))
         super().__init__(Trajectories.of(nothing, (0.5, 0.5)), perception, hz)
-        self._watch = watch
+        self.watch = watch
 
     def predict(self, tick: int, robot: tuple[float, float], ahead: Floats) -> tuple[Floats, Floats]:
         """Predict the movers that the robot follows.
@@ -127,9 +135,14 @@ class TrackedPredictor(Predictor):
     def perceived(self, tick: int, robot: tuple[float, float]) -> tuple[npt.NDArray[np.int64], Floats]:
         """The numbers (P,) of the movers that are followed, and where all are by their numbers (M, 2) [m]; nan: not known."""
         found, places, _ = self._followed(tick)
-        everywhere = np.full((self._watch.tracker.found, 2), np.nan)
+        everywhere = np.full((self.watch.tracker.found, 2), np.nan)
         everywhere[found.numbers] = places
         return found.numbers[self._near(places, found.radii, robot)], everywhere
+
+    def sighted(self, tick: int) -> Floats:
+        """Where the movers are in a tick that the last scan met (N, 2) [m]: not those that are hidden."""
+        found, places, _ = self._followed(tick)
+        return places[found.met]
 
     def within_range(self, tick: int, robot: tuple[float, float]) -> npt.NDArray[np.int64]:
         """The numbers (M,) of the movers that a robot at a position [m] follows in a tick."""
@@ -138,7 +151,7 @@ class TrackedPredictor(Predictor):
 
     def radius_of(self, mover: int) -> float:
         """The radius of a mover that is followed [m]."""
-        found = self._watch.tracker.movers()
+        found = self.watch.tracker.movers()
         return float(found.radii[found.numbers == mover][0])
 
     def name_of(self, mover: int) -> str:
@@ -147,9 +160,9 @@ class TrackedPredictor(Predictor):
 
     def _followed(self, tick: int) -> tuple[TrackedMovers, Floats, Floats]:
         """The movers at the last scan, where they are in a tick (M, 2) [m], and their velocities (M, 2) [m/s]."""
-        found = self._watch.tracker.movers()
+        found = self.watch.tracker.movers()
         velocities = np.where(np.hypot(*found.velocities.T)[:, None] < STANDS, 0.0, found.velocities)
-        return found, found.positions + (tick - self._watch.tick) / self._hz * velocities, velocities
+        return found, found.positions + (tick - self.watch.tick) / self._hz * velocities, velocities
 
     def _near(self, places: Floats, radii: Floats, robot: tuple[float, float]) -> npt.NDArray[np.bool_]:
         return np.asarray(np.hypot(*(places - robot).T) - radii <= self._perception.range)

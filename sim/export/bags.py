@@ -15,13 +15,16 @@ VERSION = 9  # of rosbag2's metadata
 FOREVER = {"sec": 9223372036, "nsec": 854775807}  # how ROS writes "no limit"
 
 
-def write_mcap(path: Path, topics: Sequence[Topic], attachments: Mapping[str, tuple[str, bytes]]) -> None:
+def write_mcap(
+    path: Path, topics: Sequence[Topic], attachments: Mapping[str, tuple[str, bytes]], notes: Mapping[str, str]
+) -> None:
     """Write an MCAP file.
 
     Args:
         path: the file
         topics: its messages
         attachments: files to keep inside, as media type and content by name
+        notes: words about the file by what they are about, kept as the metadata `antdrive`
     """
     mcap, types = library("mcap.writer"), message_types()
     with path.open("wb") as file:
@@ -45,15 +48,17 @@ def write_mcap(path: Path, topics: Sequence[Topic], attachments: Mapping[str, tu
             writer.add_message(channels[of], at, topics[of].payloads[number], at, number)
         for name, (media_type, content) in attachments.items():
             writer.add_attachment(0, 0, name, media_type, content)
+        writer.add_metadata("antdrive", dict(notes))
         writer.finish()
 
 
-def metadata(file: str, topics: Sequence[Topic]) -> str:
+def metadata(file: str, topics: Sequence[Topic], notes: Mapping[str, str]) -> str:
     """The text of a rosbag2 folder's metadata.yaml.
 
     Args:
         file: the name of the MCAP file in the folder
         topics: the messages in that file
+        notes: words about the bag by what they are about
     """
     begin = min(int(topic.stamps[0]) for topic in topics)
     end = max(int(topic.stamps[-1]) for topic in topics)
@@ -83,7 +88,7 @@ def metadata(file: str, topics: Sequence[Topic]) -> str:
         "compression_format": "",
         "compression_mode": "",
         "files": [{"path": file, **span}],
-        "custom_data": None,
+        "custom_data": {f"antdrive_{about}": words for about, words in notes.items()},
         "ros_distro": "jazzy",
     }
     return yaml.dump({"rosbag2_bagfile_information": content}, Dumper=_WithoutAliases, sort_keys=False)

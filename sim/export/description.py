@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from xml.sax.saxutils import quoteattr
 
 from antdrive.robots.spec import RobotSpec
 from antdrive.sim.export.frames import BASE
 
 GAP = 0.005  # height of the body above the floor [m]
 WHEEL_WIDTH = 0.3  # in wheel radii
+#: How XML writes the characters that an attribute cannot hold. The standard library's function loads all of urllib.
+ESCAPES = {ord(c): f"&#{ord(c)};" for c in '&<>"\n\r\t'}
 BODY_COLOUR, WHEEL_COLOUR = "0.16 0.44 0.72 1", "0.15 0.15 0.15 1"
 
 
@@ -36,7 +37,7 @@ def description(robot: RobotSpec) -> str:
     body, x, y = _body(robot)
     origin = f'<origin xyz="{x!r} {y!r} {GAP + robot.height / 2!r}"/>'
     parts = [
-        f"<robot name={quoteattr(robot.name)}>",
+        f'<robot name="{robot.name.translate(ESCAPES)}">',
         f'<link name="{BASE}">',
         f"<visual>{origin}<geometry>{body}</geometry>{_colour('body', BODY_COLOUR)}</visual>",
         f"<collision>{origin}<geometry>{body}</geometry></collision>",

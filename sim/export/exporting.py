@@ -13,6 +13,7 @@ import numpy as np
 from antdrive.sim.export.bags import metadata, write_mcap
 from antdrive.sim.export.layout import foxglove_layout
 from antdrive.sim.export.samples import samples
+from antdrive.sim.export.scans import Scans
 from antdrive.sim.export.scenery import scenery
 from antdrive.sim.export.tables import write_tables
 from antdrive.sim.export.topics import Topic
@@ -25,7 +26,7 @@ from antdrive.worlds.files.world_file import save_task
 LAYOUT = ".foxglove.json"
 
 
-def export(log: str | Path, to: str, path: str | Path, *, replace: bool = False) -> list[Path]:
+def export(log: str | Path, to: str, path: str | Path, *, replace: bool = False, scans: bool = True) -> list[Path]:
     """Export a log; the files or the folder are written whole or not at all.
 
     Args:
@@ -33,6 +34,7 @@ def export(log: str | Path, to: str, path: str | Path, *, replace: bool = False)
         to: a key of `EXPORTS`: mcap, rosbag2 or csv
         path: the file of an mcap, or the folder to make
         replace: whether an mcap and its layout may replace files that exist; folders are never replaced
+        scans: whether a bag has what the robot's lidar would have measured, where the log holds no scans
 
     Returns:
         What was written.
@@ -53,17 +55,18 @@ def export(log: str | Path, to: str, path: str | Path, *, replace: bool = False)
         if file.exists():
             raise input_error(str(file), "exists; name another file, or replace it with --force")
     rollout = Rollout.load(source)
-    return EXPORTS[to](rollout, source, target)
+    return EXPORTS[to](rollout, source, target, scans)
 
 
-def topics_of(rollout: Rollout) -> list[Topic]:
+def topics_of(rollout: Rollout, scans: Scans) -> list[Topic]:
     """All messages of a drive. At the first stamp the fixed transforms come first, on both of their topics.
 
     Args:
         rollout: the log
+        scans: of that drive
     """
     static, few = scenery(rollout)
-    many = samples(rollout)
+    many = samples(rollout, scans)
     moving = many[0]
     stamps = np.concatenate([static.stamps, moving.stamps])
     tf = Topic(moving.name, moving.kind, stamps, [*static.payloads, *moving.payloads])
@@ -89,27 +92,34 @@ def attachments_of(rollout: Rollout, log: Path) -> dict[str, tuple[str, bytes]]:
     }
 
 
-def _to_mcap(rollout: Rollout, log: Path, target: Path) -> list[Path]:
+def _to_mcap(rollout: Rollout, log: Path, target: Path, again: bool) -> list[Path]:
     layout = _layout_beside(target)
+    scans = Scans.of(rollout, again=again)
     with written_whole(layout) as beside, written_whole(target) as part:  # both or none
-        write_mcap(part, topics_of(rollout), attachments_of(rollout, log))
+        write_mcap(part, topics_of(rollout, scans), attachments_of(rollout, log), _notes(scans))
         beside.write_text(_layout(rollout), encoding="utf-8")
     return [target, layout]
 
 
-def _to_rosbag2(rollout: Rollout, log: Path, target: Path) -> list[Path]:
+def _to_rosbag2(rollout: Rollout, log: Path, target: Path, again: bool) -> list[Path]:
     with folder_written_whole(target) as folder:
-        topics, bag = topics_of(rollout), f"{target.name}.mcap"
-        write_mcap(folder / bag, topics, attachments_of(rollout, log))
-        (folder / "metadata.yaml").write_text(metadata(bag, topics), encoding="utf-8")
+        scans = Scans.of(rollout, again=again)
+        topics, notes, bag = topics_of(rollout, scans), _notes(scans), f"{target.name}.mcap"
+        write_mcap(folder / bag, topics, attachments_of(rollout, log), notes)
+        (folder / "metadata.yaml").write_text(metadata(bag, topics, notes), encoding="utf-8")
         (folder / f"{target.name}{LAYOUT}").write_text(_layout(rollout), encoding="utf-8")
     return [target]
 
 
-def _to_csv(rollout: Rollout, log: Path, target: Path) -> list[Path]:
+def _to_csv(rollout: Rollout, log: Path, target: Path, again: bool) -> list[Path]:
     with folder_written_whole(target) as folder:
         write_tables(rollout, folder)
     return [target]
+
+
+def _notes(scans: Scans) -> dict[str, str]:
+    """What a reader of a bag has to know of its messages."""
+    return {"scans": scans.source}
 
 
 def _layout_beside(target: Path) -> Path:
@@ -121,6 +131,6 @@ def _layout(rollout: Rollout) -> str:
 
 
 #: How to export a log, by what it becomes.
-EXPORTS: Mapping[str, Callable[[Rollout, Path, Path], list[Path]]] = MappingProxyType(
+EXPORTS: Mapping[str, Callable[[Rollout, Path, Path, bool], list[Path]]] = MappingProxyType(
     {"mcap": _to_mcap, "rosbag2": _to_rosbag2, "csv": _to_csv}
 )

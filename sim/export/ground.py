@@ -82,7 +82,7 @@ def known_ground(rollout: Rollout) -> Iterator[GroundGrid]:
     """
     from antdrive.sim.view.recollection import Recollection
 
-    seen = Recollection(rollout, forgetting=True)
+    seen = Recollection(rollout, forgetting=True, meeting=False)
     end = float(rollout.t[-1])
     times = [*np.arange(float(rollout.t[0]), end, PERIOD).tolist(), end]
     for at in times:

@@ -4,15 +4,24 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from antdrive.sim.export.frames import MAP
 from antdrive.sim.log.rollout import Rollout
 from antdrive.worlds.plane import in_map
+from antdrive.worlds.types import Floats
 
-SHOWN = ("/map", "/plan", "/obstacles", "/movers", "/contacts", "/scan", "/robot_description")
+#: The topics of the scene with their settings, where the programs' own would not do: without intensities scans have no colour.
+SHOWN: dict[str, dict[str, Any]] = {
+    "/map": {"colorMode": "custom", "minColor": "#f2f4f8ff", "maxColor": "#c3cedeff", "unknownColor": "#a9b0bcff"},
+    "/plan": {"type": "line", "lineWidth": 0.05, "gradient": ["#182242ff", "#182242ff"]},
+    "/obstacles": {},
+    "/movers": {},
+    "/contacts": {},
+    "/scan": {"colorMode": "flat", "flatColor": "#0a6fd6ff", "colorField": "range", "pointSize": 4},
+    "/robot_description": {},
+}
 TITLES = ("foxglovePanelTitle", "lichtblickPanelTitle")  # what each of the two programs calls a panel's title
-MARGIN = 1.15  # how much more than the world the picture shows
+MARGIN = 1.1  # how much more than the world the picture shows
+ASPECT = 0.75  # width over height of the scene's panel, at least: in a window of 1400 x 900 beside an open side bar
 SCENE, CLEARANCE, SPEEDS, LIMITER = "3D!drive", "Plot!clearance", "Plot!speeds", "StateTransitions!limiter"
 
 
@@ -27,7 +36,7 @@ def foxglove_layout(rollout: Rollout) -> dict[str, Any]:
     low, high = corners.min(axis=0), corners.max(axis=0)
     return {
         "configById": {
-            SCENE: _scene(((low + high) / 2).tolist(), float(MARGIN * np.max(high - low))),
+            SCENE: _scene(((low + high) / 2).tolist(), _height(high - low)),
             CLEARANCE: _plot("Clearance [m]", {"/clearance.data": "clearance"}),
             SPEEDS: _plot("Speed [m/s]", {"/cmd_vel.linear.x": "commanded", "/odom.twist.twist.linear.x": "measured"}),
             LIMITER: {
@@ -60,6 +69,11 @@ def foxglove_layout(rollout: Rollout) -> dict[str, Any]:
     }
 
 
+def _height(size: Floats) -> float:
+    """How much the picture shows from bottom to top, so that a rectangle of a size (2,) is in it [m]."""
+    return float(MARGIN * max(size[0] / ASPECT, size[1]))
+
+
 def _scene(middle: list[float], height: float) -> dict[str, Any]:
     """The scene from straight above, x to the right."""
     return {
@@ -77,11 +91,14 @@ def _scene(middle: list[float], height: float) -> dict[str, Any]:
         },
         "followMode": "follow-none",
         "followTf": MAP,
-        "scene": {"transforms": {"editable": False, "axisScale": 0}, "enableStats": False},
+        "scene": {
+            # axisScale is what axisSize was called before, and still is in Lichtblick.
+            "transforms": {"editable": False, "showLabel": False, "axisScale": 0, "axisSize": 0, "lineWidth": 0},
+            "enableStats": False,
+        },
         "transforms": {},
-        "topics": {topic: {"visible": True} for topic in SHOWN},
+        "topics": {topic: {"visible": True, **settings} for topic, settings in SHOWN.items()},
         "layers": {},
-        "imageMode": {},
     }
 
 

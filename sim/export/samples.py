@@ -1,4 +1,4 @@
-"""The topics that have a message for every row of a log: transforms, odometry, commands and numbers to plot."""
+"""The topics with many messages: transforms, odometry, commands and numbers to plot for every row of a log, and scans."""
 
 from __future__ import annotations
 
@@ -6,20 +6,22 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from antdrive.sim.export.cdr import CdrLayout
 from antdrive.sim.export.frames import BASE, ESTIMATE, LIDAR, ODOM, ROBOT_MAP, mover_frame
+from antdrive.sim.export.scans import Scans
 from antdrive.sim.export.topics import Floats, Stamps, Topic, nanoseconds
 from antdrive.sim.log.frames import frame_at
 from antdrive.sim.log.rollout import Rollout
-from antdrive.sim.log.scans import ranges_of
 
 
-def samples(rollout: Rollout) -> list[Topic]:
-    """The topics with a message for each row of a log.
+def samples(rollout: Rollout, scans: Scans) -> list[Topic]:
+    """The topics with a message for each row of a log or for each scan.
 
     Args:
         rollout: the log
+        scans: of that drive
     """
     stamps = nanoseconds(rollout.t)
     frames = [(ODOM, BASE), *((ODOM, mover_frame(i)) for i in range(rollout.movers.shape[1]))]
@@ -38,21 +40,21 @@ def samples(rollout: Rollout) -> list[Topic]:
     ]
     if len(rollout.estimate):
         topics.append(odometry("/estimate", ESTIMATE, stamps, rollout.estimate, rollout.twist))
-    return [*topics, *scans(rollout)]
+    return [*topics, *scan_topics(rollout, scans)]
 
 
-def scans(rollout: Rollout) -> list[Topic]:
-    """What the robot's lidar saw; empty for a log without scans.
+def scan_topics(rollout: Rollout, scans: Scans) -> list[Topic]:
+    """What the robot's lidar saw; empty where there are no scans.
 
     Ranges are as REP 117 has them: +inf where nothing was in range, -inf where something was too near to measure.
 
     Args:
         rollout: the log
+        scans: of that drive
     """
     lidar = rollout.record.robot.lidar
-    if lidar is None or not len(rollout.scans):
+    if lidar is None or not len(scans.rows):
         return []
-    ranges = ranges_of(rollout.scans)
     first = float(lidar.angles[0]) - lidar.yaw
     values = {
         "angle_min": first,
@@ -63,7 +65,7 @@ def scans(rollout: Rollout) -> list[Topic]:
         "range_min": lidar.min_range,
         "range_max": lidar.max_range,
     }
-    return [laser_scans("/scan", nanoseconds(rollout.t[rollout.scan_rows]), ranges, values)]
+    return [laser_scans("/scan", nanoseconds(rollout.t[scans.rows]), scans.ranges, values)]
 
 
 def _own_maps(rollout: Rollout) -> Floats:
@@ -141,7 +143,7 @@ def numbers(topic: str, kind: str, number: str, stamps: Stamps, values: Any) -> 
     return Topic(topic, kind, stamps, layout.messages({"data": values}))
 
 
-def laser_scans(topic: str, stamps: Stamps, ranges: Floats, values: dict[str, float]) -> Topic:
+def laser_scans(topic: str, stamps: Stamps, ranges: npt.NDArray[np.floating], values: dict[str, float]) -> Topic:
     """Scans of a planar lidar.
 
     Args:

@@ -74,6 +74,7 @@ def logged_settings(rollout: Rollout) -> dict[str, Any]:
         "cell_m": record.cell,
         "physics_hz": record.physics_hz,
         "control_hz": record.control_hz,
+        **({"frame": list(task.frame)} if any(task.frame) else {}),
         "task": plain_value({"start": task.start, "goal": task.goal, "goal_tolerance_m": task.goal_tolerance}),
     }
 

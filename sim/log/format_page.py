@@ -1,6 +1,6 @@
-"""The tables of `docs/reference/rollout-format.md`, generated from the code: `python -m antdrive.sim.log.format_page PAGE.md`.
+"""Tables of the reference, generated from the code: `python -m antdrive.sim.log.format_page docs/reference/*.md`.
 
-A test checks that the page agrees with the code.
+Arrays and record of a log, outcomes, metrics: each has its place on one page. A test checks that the pages agree with the code.
 """
 
 from __future__ import annotations
@@ -18,24 +18,28 @@ from antdrive.sim.log.rollout import Rollout
 
 
 def with_tables(page: str) -> str:
-    """A page with its tables as they must be. Each stands between `<!-- table NAME -->` and `<!-- end -->`.
+    """A page with those tables that it has as they must be. Each stands between `<!-- table NAME -->` and `<!-- end -->`.
 
     Args:
         page: the page's text
     """
-    for name, table in _tables().items():
+    for name, table in tables().items():
         start, end = f"<!-- table {name} -->\n", "<!-- end -->"
-        before, _, rest = page.partition(start)
-        _, _, after = rest.partition(end)
-        page = f"{before}{start}{table}{end}{after}"
+        before, found, rest = page.partition(start)
+        if found:
+            page = f"{before}{start}{table}{end}{rest.partition(end)[2]}"
     return page
 
 
-def _tables() -> dict[str, str]:
+def tables() -> dict[str, str]:
+    """Each table by its name, in Markdown."""
+    codes = {Outcome.SUCCEEDED: "0 if the log proves it, else 1"}
     return {
         "arrays": _table(("array", "shape", "dtype", "content"), _arrays()),
         "record": _table(("key", "JSON", "content"), ((f"`{key}`", kind, text) for key, kind, text in record_keys())),
-        "outcomes": _table(("outcome", "sentence"), ((f"`{outcome.key}`", outcome.value) for outcome in Outcome)),
+        "outcomes": _table(
+            ("outcome", "sentence", "exit code"), ((f"`{one.key}`", one.value, codes.get(one, "1")) for one in Outcome)
+        ),
         "metrics": _table(
             ("metric", "unit", "better", "definition"),
             ((f"`{metric.name}`", metric.unit, metric.better, metric.definition) for metric in METRICS.values()),
@@ -59,5 +63,5 @@ def _table(heads: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
 
 
 if __name__ == "__main__":
-    target = Path(sys.argv[1])
-    target.write_text(with_tables(target.read_text(encoding="utf-8")), encoding="utf-8")
+    for target in map(Path, sys.argv[1:]):
+        target.write_text(with_tables(target.read_text(encoding="utf-8")), encoding="utf-8")

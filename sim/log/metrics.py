@@ -240,7 +240,7 @@ def explored_m2(rollout: Rollout) -> float:
 
     A cell counts if the beam nearest to its middle in direction got farther. Not a number for a robot that had a map.
     """
-    if not len(rollout.scans):
+    if not (rollout.record.exploring and len(rollout.scans)):
         return math.nan
     from antdrive.sim.log.sights import seen_ground  # its kernels; collecting tests needs the names of metrics only
 

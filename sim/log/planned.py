@@ -19,7 +19,9 @@ from antdrive.worlds.types import Floats
 
 NEAR = 1.5  # cells between a route's end and a point that has room, at most
 JUST_ROOM = 1e-6  # a goal with no more room than the inflation and this may count as one with too little [m]
-ROUTE_SLACK = 0.012  # smoothing keeps the inflation to a centimetre, and replans are rounded to 0.1 mm [m]
+ROUTE_SLACK = (
+    0.012  # smoothed routes keep the inflation, replans are logged rounded to 0.1 mm; the rest is allowance [m]
+)
 SAME_LENGTH = 1e-6  # lengths that are computed twice agree to this share
 AWAY_TIME = 0.5  # a robot is no farther off its route than its radius and what it drives in this time [s]
 POINT_SPACING = 0.05  # of the points of a route whose clearance is looked at [m]
@@ -167,7 +169,9 @@ def _check_movers_known(rollout: Rollout) -> Iterator[str]:
         yield f"record.perception: must {'not ' if moving else ''}be null {'among' if moving else 'without'} movers"
     if len(rollout.tracks) and not watching:
         yield "tracks: must be empty, since the robot did not look for movers with its lidar"
-    elif len(rollout.tracks) and not (rollout.tracks[:, 6] > 0).all():
+    if len(rollout.scans) and not (watching or record.exploring):
+        yield "scans: must be empty, since the robot did not use its lidar"
+    if watching and len(rollout.tracks) and not (rollout.tracks[:, 6] > 0).all():
         yield "tracks: radii must be greater than 0"
     for key in ("avoidance", "replanning"):
         if getattr(record, key) is not None and not moving and not (key == "replanning" and record.exploring):

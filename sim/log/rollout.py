@@ -58,8 +58,9 @@ class Rollout:
         estimate: the estimated pose (T, 3) of a noisy robot, x, y [m] and yaw [rad]; (0, 3) for a perfect robot
         actuated: forward speed [m/s] and yaw rate [rad/s] that the motors of a noisy robot were set to (T, 2), after
             delay and slip; (0, 2) for a perfect robot, whose motors are set to `command`
-        scans: the lidar's ranges of a robot without a map (S, beams) [mm]; 0 where nothing was in range, 1 where something
-            was too near to measure. This array and the next two are left out of files and of the digest where they are empty
+        scans: the lidar's ranges of a robot that uses it, since it has no map or looks for movers (S, beams) [mm]; 0 where
+            nothing was in range, 1 where something was too near to measure. This array and the next two are left out of files
+            and of the digest where they are empty
         scan_rows: the row of each scan (S,)
         seen: what plans on the way were made around, as discs (K, 4): the row of the plan, x, y and radius [m], in the frame of
             the estimated poses

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 import numpy.typing as npt
 
@@ -29,3 +31,18 @@ def ranges_of(scans: npt.NDArray[np.uint16]) -> Floats:
     """
     ranges: Floats = np.where(scans == NOTHING, np.inf, np.where(scans == TOO_NEAR, -np.inf, scans / 1000.0))
     return ranges
+
+
+def scans_logged(taken: Iterable[tuple[int, Floats]], per_tick: int, rows: int) -> dict[str, npt.NDArray[np.generic]]:
+    """The arrays `scans` and `scan_rows` of a log.
+
+    Args:
+        taken: the control period and the ranges (beams,) [m] of each scan
+        per_tick: rows of the log in a control period
+        rows: of the log
+    """
+    kept = [(tick * per_tick, ranges) for tick, ranges in taken if tick * per_tick < rows]
+    return {
+        "scans": millimetres(np.array([ranges for _, ranges in kept]) if kept else np.empty((0, 0))),
+        "scan_rows": np.array([row for row, _ in kept], dtype=np.int32),
+    }

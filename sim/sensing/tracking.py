@@ -33,12 +33,14 @@ class TrackedMovers(NamedTuple):
         velocities: their velocities (T, 2) [m/s]
         radii: their radii (T,) [m]
         numbers: their numbers (T,), in the order in which they were found; a number is never used again
+        met: whether the last scan met them (T,), or they are expected where they are hidden
     """
 
     positions: Floats
     velocities: Floats
     radii: Floats
     numbers: npt.NDArray[np.int64]
+    met: npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,7 +110,7 @@ class MoverTracker:
         self._time = -math.inf
         self._found = 0
         self._usual = np.array((self.policy.smallest, 0.0))
-        self._now: TrackedMovers = _listed(self._tracks[:0])
+        self._now: TrackedMovers = _listed(self._tracks[:0], self._time)
 
     def _rules_where(self, complete: bool) -> kernels.TrackingRules:
         policy, lidar = self.policy, self._lidar
@@ -172,7 +174,7 @@ class MoverTracker:
             view, self._rules[ground.complete], self._tracks, self._count, self._found, self._usual
         )
         tracks = self._tracks[: self._count]
-        self._now = _listed(tracks[tracks["sure"] & (tracks["moves"] | ground.complete)])
+        self._now = _listed(tracks[tracks["sure"] & (tracks["moves"] | ground.complete)], self._time)
         out, mine = np.zeros(len(ranges), dtype=np.bool_), np.empty(len(points), dtype=np.bool_)
         kernels.on_movers(points, self._now.positions, self._now.radii, mine)
         out[hits.beams[mine]] = True
@@ -204,10 +206,11 @@ class MoverTracker:
             self._tracks = longer
 
 
-def _listed(tracks: npt.NDArray[np.void]) -> TrackedMovers:
+def _listed(tracks: npt.NDArray[np.void], time: float) -> TrackedMovers:
     return TrackedMovers(
         np.column_stack((tracks["x"], tracks["y"])),
         np.column_stack((tracks["vx"], tracks["vy"])),
         tracks["radius"].copy(),
         tracks["number"].copy(),
+        tracks["last"] == time,
     )

@@ -7,12 +7,11 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.sim.driving.rescanning import forgetting_ticks
-from antdrive.sim.driving.survey import MAP_CELL, RECENT, horizon_of
+from antdrive.sim.driving.own_map import MAP_CELL, RECENT, forgetting_ticks, horizon_of
 from antdrive.sim.log.frames import frame_at
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.scans import ranges_of
-from antdrive.sim.log.sights import Beams, beams_of, lidar_of, meet
+from antdrive.sim.log.sights import lidar_of, meet
 from antdrive.sim.sensing.mapping import OccupancyMap
 from antdrive.sim.sensing.tracking import SKIN
 from antdrive.worlds.types import Floats, Pose
@@ -32,16 +31,17 @@ class Recollection:
     Args:
         rollout: the log
         forgetting: whether the map is made anew of the latest scans where the robot did so
+        meeting: whether `met` is kept
 
     Raises:
         ValueError: the log has no scans.
     """
 
-    def __init__(self, rollout: Rollout, *, forgetting: bool = False) -> None:
+    def __init__(self, rollout: Rollout, *, forgetting: bool = False, meeting: bool = True) -> None:
         self.lidar = lidar_of(rollout)
         self._rollout = rollout
         self._times = rollout.t[rollout.scan_rows]
-        self._entered = 0
+        self._entered, self._meeting = 0, meeting
         self.met: Floats = np.full(len(rollout.record.world.obstacles), math.inf)
         self.map = self._empty_map(rollout.record.task.start)
         ticks = forgetting_ticks(rollout.record) if forgetting else ()
@@ -111,7 +111,8 @@ class Recollection:
 
     def _enter(self, k: int) -> None:
         self._insert(k)
-        meet(self._rollout, k, self.met)
+        if self._meeting:
+            meet(self._rollout, k, self.met)
 
     def _of_movers(self, row: int, ranges: Floats) -> npt.NDArray[np.bool_] | None:
         """Which beams of a scan met movers that the robot followed, and left out of its map (beams,); None: no such movers."""
@@ -122,11 +123,6 @@ class Recollection:
         points = self.map.endpoints(self._estimate(row), ranges)
         away = np.hypot(*(points[:, None] - movers[:, 2:4]).transpose(2, 0, 1)) - movers[:, 6]
         return np.asarray((away <= SKIN).any(axis=1))  # not a number where a beam met nothing
-
-    @property
-    def beams(self) -> Beams:
-        """The last scan that was entered."""
-        return beams_of(self._rollout, max(0, self._entered - 1))
 
     def _estimate(self, row: int) -> Pose:
         poses = self._rollout.estimate if len(self._rollout.estimate) else self._rollout.pose

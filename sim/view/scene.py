@@ -66,6 +66,7 @@ class Scene:
         mapped: whether the robot had a map, and kept a distance from all obstacles from the start
         mover_radii: one per mover [m]
         movers: one position per mover [m]: at the run's end, or at t = 0 for a plan that was not driven
+        movers_at: when they are there [s]
         tracks: polylines (N, 2) that movers follow [m]; a mover that jumps has several
     """
 
@@ -82,6 +83,7 @@ class Scene:
     mapped: bool = True
     mover_radii: tuple[float, ...] = ()
     movers: tuple[Point, ...] = ()
+    movers_at: float = 0.0
     tracks: tuple[Floats, ...] = ()
 
     @classmethod
@@ -103,6 +105,7 @@ class Scene:
             mapped=not record.exploring,
             mover_radii=tuple(mover.radius for mover in world.movers),
             movers=tuple((float(x), float(y)) for x, y in rollout.movers[-1]) if len(rollout.movers) else (),
+            movers_at=float(rollout.t[-1]) if len(rollout.t) else 0.0,
             tracks=mover_tracks(rollout.movers),
         )
 
@@ -133,6 +136,11 @@ class Scene:
             movers=tuple((x, y) for x, y in positions[0].tolist()),
             tracks=mover_tracks(positions),
         )
+
+    @property
+    def movers_said(self) -> str:
+        """What a legend says of movers: a picture shows them at one moment."""
+        return f"moving obstacle, at {self.movers_at:.1f} s"
 
     @property
     def has_zones(self) -> bool:

@@ -95,6 +95,39 @@ def test_a_table_has_the_newest_commit_of_its_rows(measured: Any, tmp_path: Path
     assert measured.dated(page.read_text(), measured.changes_of(page))[-7:] == "| 55 |\n", "not committed"
 
 
+MARKED = "Text.\n\n| a |\n|---|\n| 1 |\n\n<!-- measured by: make bench | two cores -->\n| b |\n|---|\n| 2 |\n"
+
+
+def test_elsewhere_a_marked_table_has_its_command_and_machine_too(measured: Any) -> None:
+    changes = {number: measured.Change(0, "a" * 40) for number in range(1, 11)}
+    head, _, foot = measured.dated(MARKED, changes, every=False).partition("| 2 |\n")
+    assert head + "| 2 |\n" == MARKED, "a table without a mark is left alone"
+    assert foot == (
+        "\n{.antdrive-measured}\n`make bench` measures it again. Measured on two cores."
+        " Rows last edited in commit `aaaaaaa`, 1970-01-01.\n"
+    )
+    assert measured.dated(MARKED, {}, every=False).endswith("again. Measured on two cores.\n"), "an archive"
+
+
+MARKS = {
+    (page.relative_to(ROOT).as_posix(), command)
+    for page in sorted((ROOT / "docs").rglob("*.md"))
+    if not {"_build", "_gallery"} & set(page.parts)
+    for command in re.findall(r"^<!-- measured by: (.+?) \|", page.read_text(), re.MULTILINE)
+}
+
+
+def test_there_are_marks() -> None:
+    assert len(MARKS) >= 3
+
+
+@pytest.mark.parametrize(("page", "command"), sorted(MARKS))
+def test_a_mark_names_a_command_that_exists(page: str, command: str) -> None:
+    found = COMMAND.fullmatch(f"`{command}`")
+    assert found
+    assert exists(found)
+
+
 def test_a_fault_of_git_is_told_once_and_an_archive_is_none(
     measured: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -11,7 +11,7 @@ import pytest
 
 from antdrive.planners import PLANNERS, capabilities_of
 from antdrive.sim.campaigns import expand, load_campaign
-from tests.conftest import SHARED
+from tools.shared_data import BARN
 
 FOLDER = Path(__file__).parent.parent.parent / "examples" / "campaigns"
 SIZES = dict(re.findall(r"^\| `([\w.-]+)` \|.*\| ([^|]+) \|$", (FOLDER / "README.md").read_text(), re.MULTILINE))
@@ -32,12 +32,11 @@ def test_a_campaign_has_the_runs_that_the_readme_says(name: str) -> None:
 
 @pytest.mark.parametrize(("name", "each"), [("barn.yaml", 6), ("barn-planners.yaml", 170)])
 def test_a_barn_campaign_reads_the_worlds_beside_it(name: str, each: int, tmp_path: Path) -> None:
-    archive = SHARED / "barn" / "barn50.tar.xz"
-    if not archive.exists():
-        pytest.skip("needs ../shared/data/barn/barn50.tar.xz")
+    if not BARN.exists():
+        pytest.skip("needs BARN's worlds (docs/how-to/data.md)")
     shutil.copy(FOLDER / name, tmp_path)
     (tmp_path / "barn").mkdir()
-    with tarfile.open(archive) as tar:
+    with tarfile.open(BARN) as tar:
         for member in [member for member in tar.getnames() if member.endswith(".world")][:3]:
             tar.extract(member, tmp_path / "barn", filter="data")
     expansion = expand(load_campaign(tmp_path / name))

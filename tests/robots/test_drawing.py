@@ -29,6 +29,9 @@ def test_a_robot_is_shown_as_a_drawing_and_a_table(name: str, request: pytest.Fi
     assert f"{robot.max_speed:g} m/s" in rows["speed"]
     assert f"{robot.mass:g} kg" in rows["body"]
     assert "slip ±2 %" in rows["noise"]
+    turtlebots = "360 beams all around, 5 Hz, 0.16 to 8 m; over the axle, 0.17 m high"
+    jackals = "720 beams 270°, 50 Hz, 0.1 to 30 m; 0.055 m ahead of the axle, 0.24 m high"
+    assert rows["lidar"] == (turtlebots if name == "turtlebot" else jackals)
 
 
 def test_the_footprint_is_drawn_to_scale(turtlebot: RobotSpec, jackal: RobotSpec) -> None:

@@ -210,3 +210,12 @@ def test_robots_that_antdrive_is_not_meant_for_cannot_be_made_in_python_either(
 ) -> None:
     with pytest.raises(ValueError, match=says):
         dataclasses.replace(jackal, **{key: value})
+
+
+@pytest.mark.parametrize("name", ["mine.urdf", "mine.urdf.xacro"])
+def test_a_urdf_file_is_no_robot_file_and_the_message_says_what_makes_one_of_it(tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    path.write_text("<robot/>")
+    with pytest.raises(InputError) as caught:
+        load_robot(path)
+    assert str(caught.value) == f"{path}: is no robot file; make one of it with antdrive robots import {path}"

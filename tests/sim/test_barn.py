@@ -12,18 +12,17 @@ from antdrive.sim import Scenario, run
 from antdrive.sim.log.metrics import barn as barn_score
 from antdrive.sim.log.metrics import tracking_error
 from antdrive.worlds import import_barn
-from tests.conftest import SHARED
+from tools.shared_data import BARN
 
-ARCHIVE = SHARED / "barn" / "barn50.tar.xz"
 WORLDS = range(0, 300, 6)
 
-pytestmark = pytest.mark.skipif(not ARCHIVE.exists(), reason="needs BARN's worlds in ../shared/data")
+pytestmark = pytest.mark.skipif(not BARN.exists(), reason="needs BARN's worlds (docs/how-to/data.md)")
 
 
 @pytest.fixture(scope="module")
 def barn(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("barn")
-    with tarfile.open(ARCHIVE) as archive:
+    with tarfile.open(BARN) as archive:
         archive.extractall(folder, filter="data")
     return folder
 

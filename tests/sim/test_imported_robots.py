@@ -11,18 +11,17 @@ from antdrive.planners import load_planner
 from antdrive.robots.importing.urdf import import_urdf
 from antdrive.sim import Outcome, Scenario, run
 from antdrive.worlds import Task, import_barn
-from tests.conftest import SHARED
+from tools.shared_data import BARN
 
-ARCHIVE = SHARED / "barn" / "barn50.tar.xz"
 URDF = Path(__file__).parents[1] / "robots" / "importing" / "urdf"
 
-pytestmark = pytest.mark.skipif(not ARCHIVE.exists(), reason="needs BARN's worlds in ../shared/data")
+pytestmark = pytest.mark.skipif(not BARN.exists(), reason="needs BARN's worlds (docs/how-to/data.md)")
 
 
 @pytest.fixture(scope="module")
 def barn_0(tmp_path_factory: pytest.TempPathFactory) -> Task:
     folder = tmp_path_factory.mktemp("barn")
-    with tarfile.open(ARCHIVE) as archive:
+    with tarfile.open(BARN) as archive:
         archive.extract("world_0.world", folder, filter="data")
     return import_barn(folder / "world_0.world")
 

@@ -10,8 +10,8 @@ import pytest
 
 from antdrive.sim.papers.claims import CLAIMS
 from antdrive.sim.papers.experiments import PAPERS
-from tests.conftest import SHARED
 from tools.papers import claims_table, counts_table, missing, replaced
+from tools.shared_data import data_folder
 
 PAGES = Path(__file__).parent.parent.parent / "docs" / "papers"
 #: By paper, where it prints figures that are used here, and which.
@@ -58,7 +58,7 @@ def known(paper: str) -> set[str]:
 
 def texts() -> Iterator[tuple[str, str]]:
     for paper, number in FILES.items():
-        (path,) = (SHARED.parent / "seeds").glob(f"{number}_*.txt")
+        (path,) = (data_folder().parent / "seeds").glob(f"{number}_*.txt")
         yield paper, path.read_text(encoding="utf-8")
 
 
@@ -71,7 +71,9 @@ def test_the_figures_of_claims_and_experiments_are_those_of_the_papers_tables() 
             assert experiment.printed is None or experiment.printed in values, experiment.name
 
 
-@pytest.mark.skipif(not (SHARED.parent / "seeds").exists(), reason="needs the papers' texts in ../shared/seeds")
+@pytest.mark.skipif(
+    not (data_folder().parent / "seeds").exists(), reason="needs the papers' texts beside the folder of data"
+)
 def test_every_figure_stands_in_its_papers_text() -> None:
     for paper, text in texts():
         lost = known(paper) - figures(text.replace("45. 1127", "45.1127"))

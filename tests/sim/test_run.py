@@ -552,4 +552,4 @@ def test_a_result_tells_every_setting_and_the_page_documents_every_key(
     documented = set(
         re.findall(r"`(\w+)`", " ".join(row.split("|")[1] for row in page.splitlines() if row.startswith("| `")))
     )
-    assert documented == set(run(small_scenario).as_dict()) | {"fingerprint", "files", "command", "sights"}
+    assert documented == set(run(small_scenario).as_dict()) | {"fingerprint", "files", "command", "frame", "sights"}

@@ -56,6 +56,12 @@ def test_a_page_runs_from_top_to_bottom_and_wrong_input_is_no_failed_drive(tmp_p
     assert "nowhere.yaml" in problems[0]
 
 
+def test_a_page_may_name_the_exit_code_with_which_a_command_must_fail(tmp_path: Path) -> None:
+    text = '```console\n$ antdrive schema nonsense || echo "exit code {0}"\n...exit code {0}\n```\n'
+    assert run_page(page(tmp_path, text.format(2))).problems == []
+    assert len(run_page(page(tmp_path, text.format(3))).problems) == 1
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [
@@ -150,3 +156,20 @@ def test_a_page_that_ran_is_left_out_until_it_changes(tmp_path: Path, capsys: py
         path.write_text(f"{FENCE}python\n{text}\n{FENCE}\n")
         said.append((main(words), capsys.readouterr().out != ""))
     assert said == [(0, True), (0, False), (0, True), (1, True), (1, True)], "one with a fault is run again"
+
+
+def test_times_stand_in_the_last_column_of_the_rows_of_their_pages(tmp_path: Path) -> None:
+    index = tmp_path / "index.md"
+    index.write_text("| lesson | takes |\n|---|---|\n| [One](one.md) | – |\n| [Two](two.md) | 7 s |\n\n[One](one.md)\n")
+    (tmp_path / "one.md").write_text("```python\nprint(1)\n```\n")
+    assert main([str(tmp_path / "one.md"), "--times", str(index)]) == 0
+    assert index.read_text().splitlines()[2:] == [
+        "| [One](one.md) | 1 s |",
+        "| [Two](two.md) | 7 s |",
+        "",
+        "[One](one.md)",
+    ]
+    (tmp_path / "one.md").write_text("```python\n1 / 0\n```\n")
+    index.write_text("| [One](one.md) | – |\n")
+    assert main([str(tmp_path / "one.md"), "--times", str(index)]) == 1
+    assert index.read_text() == "| [One](one.md) | – |\n", "no time of a page that does not run"

@@ -27,6 +27,7 @@ Size = Annotated[float, Field(gt=0, le=MAX_COORDINATE)]
 Pair = Annotated[list[Coordinate], Field(min_length=2, max_length=2)]
 Keyframe = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
 
+OF_OTHERS = (".sdf", ".world", ".map")  # the suffixes of other programs' worlds, which are imported
 _CATALOG = Path(__file__).parent.with_name("catalog")
 _RULES = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
 
@@ -160,6 +161,8 @@ def _tasks_of(world: str | os.PathLike[str]) -> Mapping[str | None, Task]:
     if not os.path.lexists(path):
         hint = suggest(path.stem, known)
         raise input_error(os.fspath(world), f"no such file, nor a world of the catalogue; {hint}")
+    if path.suffix.lower() in OF_OTHERS:
+        raise input_error(str(path), f"is no world file; make one of it with antdrive worlds import {path}")
     return _tasks_in(read_yaml(path), os.fspath(path), path.stem)
 
 
@@ -168,6 +171,8 @@ def _tasks_in(text: str, source: str, stem: str) -> Mapping[str | None, Task]:
     """The tasks in the text of a world file."""
     document = parse_document(text, source)
     if isinstance(document.data, dict):
+        if {"image", "resolution", "origin"} <= document.data.keys():
+            raise document.error((), f"is a map of map_server; make a world of it with antdrive worlds import {source}")
         document.data.setdefault("name", "".join(filter(str.isprintable, stem))[:200] or "world")
     return _tasks_in_document(document)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 from antdrive.worlds.errors import input_error
@@ -21,3 +22,18 @@ def require_no_movers(task: Task, path: str | Path) -> None:
     if task.world.movers:
         problem = f"cannot hold {task.world.name}'s movers; export a world in which nothing moves"
         raise input_error(str(path), problem)
+
+
+def require_new(files: Iterable[Path], *, replace: bool) -> None:
+    """Refuse to write over files that exist.
+
+    Args:
+        files: what is to be written
+        replace: whether that is allowed
+
+    Raises:
+        InputError: one of them exists.
+    """
+    taken = None if replace else next((file for file in files if file.exists()), None)
+    if taken is not None:
+        raise input_error(str(taken), "exists; name another file, or replace it with --force")

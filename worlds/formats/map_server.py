@@ -27,7 +27,7 @@ from antdrive.worlds.files.checks import OneLine, check, yaml_number
 from antdrive.worlds.files.document import read_document
 from antdrive.worlds.files.world_file import Coordinate, Size
 from antdrive.worlds.formats.cellmap import CellMap, Cells, cell_map, file_task
-from antdrive.worlds.formats.checks import require_no_movers
+from antdrive.worlds.formats.checks import require_new, require_no_movers
 from antdrive.worlds.limits import MAX_CELLS
 from antdrive.worlds.plane import in_map, out_of_map
 from antdrive.worlds.types import Floats, Point, Pose
@@ -250,6 +250,7 @@ def export_map_server(
     *,
     resolution: float | None = None,
     tasks: Mapping[str, Task] = MappingProxyType({}),
+    replace: bool = False,
 ) -> Path:
     """Write a world as a map of map_server: a YAML file, and a PGM image of the same name beside it.
 
@@ -263,15 +264,17 @@ def export_map_server(
         path: the YAML file
         resolution: side of a cell [m]; by default the task's own
         tasks: other starts and goals in the same world, by name
+        replace: whether files that exist may be replaced; the image may be that of another map
 
     Returns:
         The image's path.
 
     Raises:
-        InputError: a file cannot be written, the world has movers, or the resolution is not usable.
+        InputError: a file exists or cannot be written, the world has movers, or the resolution is not usable.
     """
     require_no_movers(task, path)
     target = Path(path)
+    require_new((target, target.with_suffix(".pgm")), replace=replace)
     cells = cell_map(task.world, task.cell if resolution is None else resolution)
     rows, cols = cells.free.shape
     picture = np.where(cells.free[::-1], FREE, OCCUPIED).astype(np.uint8)

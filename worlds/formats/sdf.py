@@ -16,6 +16,7 @@ from antdrive.worlds.files.atomic import written_whole
 from antdrive.worlds.formats.checks import require_no_movers
 from antdrive.worlds.formats.sdf_models import Models, read_models
 from antdrive.worlds.formats.xml import parse_xml
+from antdrive.worlds.plane import out_of_map
 from antdrive.worlds.types import Bounds, Point, Pose
 from antdrive.worlds.world import Disc, Task, World
 
@@ -45,13 +46,14 @@ def import_sdf(
     Poses of models, links and collisions are composed; those in <state> replace the models' own, as in Gazebo.
     A cylinder's height is that of its top above z = 0. Ground planes, models without collision geometry and
     everything below the floor are ignored. A world that `export_sdf` wrote brings its own values for everything
-    that is left out here.
+    that is left out here; one that lies in a map is imported with its `frame`.
 
     Args:
         path: the SDF file
-        start: the robot's first pose [m, m, rad]; by default at the lower left, towards the goal
-        goal: [m]; by default at the upper right
-        bounds: the walls' inner faces [m]; by default with 1 m of room around the cylinders and the given ends
+        start: the robot's first pose in the file's coordinates [m, m, rad]; by default at the lower left, towards the goal
+        goal: in the file's coordinates [m]; by default at the upper right
+        bounds: the walls' inner faces, in the world's own frame [m]; by default with 1 m of room around the cylinders and
+            the given ends
         cell: the task's grid resolution [m]; by default 0.25
         goal_tolerance: how close to the goal the robot must stop [m]; by default 0.25
         skip_unsupported: leave out moving and included models and collision shapes other than upright cylinders,
@@ -63,18 +65,16 @@ def import_sdf(
     file = Path(path)
     world = _world_element(file)
     kept = _KeptTask.take(file, world)
-    models = read_models(world)
+    frame = kept.numbers("frame", 3) or (0.0, 0.0, 0.0)
+    models = read_models(world, frame)
     if models.unsupported and not skip_unsupported:
         raise input_error(str(file), _about_unsupported(models))
-    start = start or kept.numbers("start", 3)
-    goal = goal or kept.numbers("goal", 2)
+    start = _in_world(frame, start) or kept.numbers("start", 3)
+    goal = _in_world(frame, goal) or kept.numbers("goal", 2)
     bounds = bounds or kept.numbers("bounds", 4)
     if bounds is None:
-        if not models.discs:
-            raise input_error(str(file), "holds no upright cylinder; give the bounds")
-        bounds = _bounds_around(models.discs, start, goal)
-    if goal is None:
-        goal = bounds[2] - MARGIN / 2, bounds[3] - MARGIN / 2
+        bounds = _bounds_around(file, models.discs, start, goal)
+    goal = goal or (bounds[2] - MARGIN / 2, bounds[3] - MARGIN / 2)
     if start is None:
         x, y = bounds[0] + MARGIN / 2, bounds[1] + MARGIN / 2
         start = x, y, math.atan2(goal[1] - y, goal[0] - x)
@@ -86,9 +86,15 @@ def import_sdf(
             kept.number("goal_tolerance", TOLERANCE) if goal_tolerance is None else goal_tolerance,
             kept.number("cell", CELL) if cell is None else cell,
             kept.number("time_limit", None),
+            frame=frame,
         )
     except FieldError as error:
         raise input_error(str(file), str(error)) from None
+
+
+def _in_world(frame: Pose, end: Any) -> Any:
+    """A start or a goal in the file's coordinates as it is in the world's frame."""
+    return tuple(out_of_map(frame, [end])[0].tolist()) if end is not None and any(frame) else end
 
 
 def _world_element(file: Path) -> ET.Element:
@@ -148,8 +154,10 @@ def _about_unsupported(models: Models) -> str:
     return f"only static models of upright cylinders can be imported; leave out or skip {names}"
 
 
-def _bounds_around(discs: list[Disc], start: Pose | None, goal: Point | None) -> Bounds:
-    """Bounds with `MARGIN` around the cylinders and the given ends."""
+def _bounds_around(file: Path, discs: list[Disc], start: Pose | None, goal: Point | None) -> Bounds:
+    """Bounds with `MARGIN` around the cylinders, of which there must be one, and the given ends."""
+    if not discs:
+        raise input_error(str(file), "holds no upright cylinder; give the bounds")
     spots = [(d.x, d.y, d.radius) for d in discs]
     spots += [(end[0], end[1], 0.0) for end in (start, goal) if end is not None]
     return (
@@ -163,8 +171,9 @@ def _bounds_around(discs: list[Disc], start: Pose | None, goal: Point | None) ->
 def export_sdf(task: Task, path: str | Path) -> None:
     """Write a world for Gazebo (SDF 1.6): static cylinders, the bounds as four walls, a floor and a sun.
 
-    Name, bounds, start and goal are kept in an element `antdrive:task`, which Gazebo ignores. `import_sdf` reads it and
-    returns an equal task, every number to the last bit.
+    Everything is where it is in the map that the world was made from: models have the pose of the world's `frame`, and
+    their links the places in the world. Name, frame, bounds, start and goal are kept in an element `antdrive:task`, which
+    Gazebo ignores. `import_sdf` reads it and returns an equal task, every number to the last bit.
 
     Raises:
         InputError: the file cannot be written, or the world has movers.
@@ -177,9 +186,9 @@ def export_sdf(task: Task, path: str | Path) -> None:
         _task_element(task),
         '<light name="sun" type="directional"><cast_shadows>true</cast_shadows><pose>0 0 10 0 0 0</pose>'
         "<direction>-0.5 0.1 -0.9</direction></light>",
-        _model("ground_plane", "0 0 0", ["<plane><normal>0 0 1</normal><size>1000 1000</size></plane>"]),
-        _model(WALLS, "0 0 0", *_walls(task)),
-        *(_cylinder(i, disc) for i, disc in enumerate(task.world.obstacles)),
+        _model("ground_plane", None, "0 0 0", ["<plane><normal>0 0 1</normal><size>1000 1000</size></plane>"]),
+        _model(WALLS, task.frame, "0 0 0", *_walls(task)),
+        *(_cylinder(i, task.frame, disc) for i, disc in enumerate(task.world.obstacles)),
         "</world>",
         "</sdf>",
     ]
@@ -196,6 +205,8 @@ def _task_element(task: Task) -> str:
         "goal_tolerance": repr(float(task.goal_tolerance)),
         "cell": repr(float(task.cell)),
     }
+    if any(task.frame):
+        values["frame"] = _numbers(task.frame)
     if task.time_limit is not None:
         values["time_limit"] = repr(float(task.time_limit))
     if task.world.source is not None:
@@ -204,22 +215,30 @@ def _task_element(task: Task) -> str:
     return f"<{TASK_TAG} xmlns:antdrive={quoteattr(NAMESPACE)} {attributes}/>"
 
 
-def _model(name: str, pose: str, *parts: Sequence[str]) -> str:
-    """A static model; each part is a shape and, where it differs from the model's, its pose."""
+def _model(name: str, frame: Pose | None, place: str, *parts: Sequence[str]) -> str:
+    """A static model; each part is a shape and, where it differs from the model's, its pose.
+
+    Args:
+        name: the model's
+        frame: the pose of the frame in which the place is; None: that of the <world>
+        place: x, y, z
+        parts: shapes, and their poses
+    """
     bodies = []
-    for n, (shape, *place) in enumerate(parts):
-        inside = "".join(f"<pose>{p}</pose>" for p in place) + f"<geometry>{shape}</geometry>"
+    for n, (shape, *at) in enumerate(parts):
+        inside = "".join(f"<pose>{p}</pose>" for p in at) + f"<geometry>{shape}</geometry>"
         bodies.append(f'<collision name="c{n}">{inside}</collision><visual name="v{n}">{inside}</visual>')
-    return (
-        f'<model name="{name}"><static>true</static><pose>{pose} 0 0 0</pose>'
-        f'<link name="link">{"".join(bodies)}</link></model>'
-    )
+    pose, link = f"<pose>{place} 0 0 0</pose>", ""
+    if frame is not None and any(frame):
+        x, y, yaw = (float(v) for v in frame)
+        pose, link = f"<pose>{x!r} {y!r} 0 0 0 {yaw!r}</pose>", pose
+    return f'<model name="{name}"><static>true</static>{pose}<link name="link">{link}{"".join(bodies)}</link></model>'
 
 
-def _cylinder(number: int, disc: Disc) -> str:
+def _cylinder(number: int, frame: Pose, disc: Disc) -> str:
     x, y, radius, height = (float(v) for v in (disc.x, disc.y, disc.radius, disc.height))
     shape = f"<cylinder><radius>{radius!r}</radius><length>{height!r}</length></cylinder>"
-    return _model(f"obstacle_{number}", f"{x!r} {y!r} {height / 2!r}", [shape])
+    return _model(f"obstacle_{number}", frame, f"{x!r} {y!r} {height / 2!r}", [shape])
 
 
 def _walls(task: Task) -> Iterable[tuple[str, str]]:

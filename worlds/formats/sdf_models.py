@@ -9,7 +9,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from antdrive.worlds.types import Floats
+from antdrive.worlds.types import Floats, Pose
 from antdrive.worlds.world import Disc
 
 MAX_TILT = 1e-3  # how far the axis of an upright cylinder may lean [rad]
@@ -32,7 +32,7 @@ class Models:
     unsupported: list[str] = field(default_factory=list)
 
 
-def read_models(world: ET.Element) -> Models:
+def read_models(world: ET.Element, frame: Pose = (0.0, 0.0, 0.0)) -> Models:
     """The models of a <world>.
 
     Ground planes and models without collision geometry are ignored. Where the world has a <state>, Gazebo starts from
@@ -41,13 +41,15 @@ def read_models(world: ET.Element) -> Models:
 
     Args:
         world: the <world> element
+        frame: the pose in the <world> of the frame in which the cylinders are wanted [m, m, rad]
     """
     found = Models()
+    wanted = _Wanted(frame)
     states = {s.get("name", ""): s for s in world.findall("state/model")}
     for model in world.findall("model"):
         name = model.get("name", "without a name")
         try:
-            found.discs.extend(_cylinders(model, np.eye(4), False, states.get(name)))
+            found.discs.extend(_cylinders(model, wanted, False, states.get(name)))
         except Unsupported as reason:
             found.unsupported.append(f"{name} ({reason})")
     for include in world.iter("include"):
@@ -59,17 +61,35 @@ def read_models(world: ET.Element) -> Models:
     return found
 
 
-def _cylinders(model: ET.Element, frame: Floats, static: bool, state: ET.Element | None) -> list[Disc]:
-    """The cylinders of a model and of the models in it; `frame` (4, 4) is the pose of the model around it."""
+class _Wanted:
+    """Poses of a <world> as they are in another frame."""
+
+    def __init__(self, frame: Pose) -> None:
+        x, y, yaw = frame
+        self._same = not any(frame)
+        self._frame = _matrix(x, y, 0.0, 0.0, 0.0, yaw)
+        self._back = np.linalg.inv(self._frame)
+
+    def __matmul__(self, pose: Floats) -> Floats:
+        """A pose (4, 4), in the other frame. A model that has that frame's own pose is at its origin to the last bit."""
+        if self._same:
+            return pose
+        return np.eye(4) if np.array_equal(pose, self._frame) else np.asarray(self._back @ pose)
+
+
+def _cylinders(model: ET.Element, frame: Floats | _Wanted, static: bool, state: ET.Element | None) -> list[Disc]:
+    """The cylinders of a model and of the models in it; `frame` is the pose (4, 4) of the model around it, or the world's."""
     static = static or (model.findtext("static") or "").strip().lower() in ("1", "true")
     if model.get("placement_frame"):
         raise Unsupported("has a placement_frame")
     pose = frame @ _pose(model)
     scale, links = np.ones(3), {}
     if state is not None:
-        pose = _pose(state) if state.find("pose") is not None else pose
+        pose = frame @ _pose(state) if state.find("pose") is not None else pose
         scale = _numbers(state.findtext("scale") or "1 1 1", 3, "scale")
-        links = {link.get("name"): _pose(link) for link in state.findall("link") if link.find("pose") is not None}
+        links = {
+            link.get("name"): frame @ _pose(link) for link in state.findall("link") if link.find("pose") is not None
+        }
     discs: list[Disc] = []
     for link in model.findall("link"):
         link_pose = links.get(link.get("name"), pose @ _pose(link))
@@ -119,6 +139,11 @@ def _pose(element: ET.Element) -> Floats:
     x, y, z, *angles = _numbers(pose.text or "", 6, "pose")
     if (pose.get("degrees") or "").lower() in ("1", "true"):
         angles = [math.radians(a) for a in angles]
+    return _matrix(x, y, z, *angles)
+
+
+def _matrix(x: float, y: float, z: float, *angles: float) -> Floats:
+    """The (4, 4) transform of a place [m] and of roll, pitch and yaw about the fixed axes [rad]."""
     (sr, cr), (sp, cp), (sy, cy) = ((math.sin(a), math.cos(a)) for a in angles)
     return np.array(
         [

@@ -20,6 +20,13 @@ def export_drive(
     ],
     to: Annotated[str, typer.Option("--to", metavar="KIND", help="mcap, rosbag2 or csv.")] = "mcap",
     force: Annotated[bool, typer.Option("--force", help="Replace an .mcap file and a layout that exist.")] = False,
+    scans: Annotated[
+        bool,
+        typer.Option(
+            "--scans/--no-scans",
+            help="Whether a bag has what the robot's lidar would have measured, where the log holds no scans.",
+        ),
+    ] = True,
     json: options.Json = False,
 ) -> int:
     """Export a drive for Foxglove, RViz and spreadsheets.
@@ -31,7 +38,7 @@ def export_drive(
     if force and to in EXPORTS and to != "mcap":
         raise InputError(f"--force: is for --to mcap; {to} makes a new folder and replaces none")
     try:
-        files = export(log_at(rollout), to, out, replace=force)
+        files = export(log_at(rollout), to, out, replace=force, scans=scans)
     except FieldError as error:
         raise InputError(f"--{error.key}: {error.problem}") from None
     written = {("layout" if file.name.endswith(".foxglove.json") else to): str(file) for file in files}

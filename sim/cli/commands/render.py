@@ -25,7 +25,14 @@ def render(
         typer.Option("--out", "-o", metavar="FILE", help="The film: .mp4, .gif or .webp; .png writes one frame."),
     ],
     camera: Annotated[str, typer.Option(metavar="NAME", help="Camera: oblique, top or follow.")] = "oblique",
-    size: Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="Size of the picture [px].")] = "1280x720",
+    size: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WIDTHxHEIGHT",
+            help="Size of the picture [px]. Of several drives from above as much of the default as their worlds fill.",
+            show_default="1280x720",
+        ),
+    ] = None,
     fps: Annotated[int, typer.Option(min=1, max=240, metavar="NUMBER", help="Frames per second.")] = 30,
     speed: options.Speed = 1.0,
     at: Annotated[
@@ -42,19 +49,20 @@ def render(
     from antdrive.sim.log.rollout import Rollout
 
     logs = [Rollout.load(log_at(path)) for path in rollouts]
-    shape, one_frame = parse_size(size), at is not None or out.suffix.lower() == ".png"
+    shape = {} if size is None else {"size": parse_size(size)}
+    one_frame = at is not None or out.suffix.lower() == ".png"
     if len(logs) > 1 and (prelude or one_frame):
         raise InputError(f"--out {out}: several rollouts give a film, without a prelude")
     compile_once()
     if one_frame:
         from antdrive.sim.view.film.video import still
 
-        still(logs[0], out, at, camera=camera, size=shape, note=caption(logs[0]))
+        still(logs[0], out, at, camera=camera, **shape, note=caption(logs[0]))
         facts: dict[str, Any] = {"file": str(out), "frames": 1}
     elif len(logs) > 1:
-        facts = write_comparison_film(logs, out, camera=camera, size=shape, fps=fps, speed=speed)
+        facts = write_comparison_film(logs, out, camera=camera, **shape, fps=fps, speed=speed)
     else:
-        facts = write_film(logs[0], out, camera=camera, size=shape, fps=fps, speed=speed, prelude=prelude)
+        facts = write_film(logs[0], out, camera=camera, **shape, fps=fps, speed=speed, prelude=prelude)
     if json:
         print_json(facts)
     else:

@@ -27,7 +27,7 @@ def reproduce(
     quick: Annotated[
         bool,
         typer.Option(
-            "--quick", help="A look: six seeds, a tenth of lee2008's ant steps, two maps in place of each picture."
+            "--quick", help="A look: six seeds, fewer ant steps, two maps for each picture, no slow experiment."
         ),
     ] = False,
     jobs: Annotated[int, typer.Option(min=1, max=256, metavar="NUMBER", help="Number of processes.")] = 1,

@@ -101,6 +101,12 @@ Again = Annotated[
 DryRun = Annotated[
     bool, typer.Option("--dry-run", help="Say how many runs there are and how many are missing; run nothing.")
 ]
+Report = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE", help="Write the campaign's statistics too, as `antdrive report` does: .html, .md, .tex or .csv."
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else.")]
 
 
@@ -126,6 +132,7 @@ def sweep(
     retry_crashed: Retry = False,
     again: Again = None,
     dry_run: DryRun = False,
+    report: Report = None,
     json: Json = False,
 ) -> int:
     """Drive every combination of a campaign.
@@ -139,7 +146,7 @@ def sweep(
 
     if out is None and not dry_run:
         raise InputError("--out: missing; name the folder for the results")
-    _check(keep, dask, jobs)
+    _check(keep, dask, jobs, report, dry_run)
     knows = {"map": map, "localisation": localisation, "odometry": odometry}
     asked = campaign_from(
         campaign, worlds=world, generate=generate, planners=planner, robots=robot, seeds=seeds, routes=smoothing,
@@ -153,15 +160,31 @@ def sweep(
     results = _run(asked, expansion, out, jobs=jobs, dask=dask, keep=cast("Keep | None", keep), **options)
     for note in results.notes:
         print_error(note)
+    files = _reported(out, report)
     if json:
-        print_json(_facts(results))
+        print_json({**_facts(results), **({"report": files[0]} if files else {})})
     else:
-        print_sweep(results)
+        print_sweep(results, files)
     return SUCCEEDED
 
 
-def _check(keep: str | None, dask: str | None, jobs: int | None) -> None:
+def _reported(folder: Path, report: Path | None) -> list[str]:
+    """Write the campaign's report, if one is wanted; the files."""
+    if report is None:
+        return []
+    from antdrive.sim.campaigns.reporting import report_campaign
+
+    return [str(path) for path in report_campaign(folder, report)]
+
+
+def _check(keep: str | None, dask: str | None, jobs: int | None, report: Path | None, dry_run: bool) -> None:
     """Refuse options that mean nothing."""
+    if report is not None:
+        from antdrive.sim.view.campaign.page import check_suffix
+
+        check_suffix(report)
+        if dry_run:
+            raise InputError("--report: has no effect with --dry-run, which runs nothing")
     from antdrive.sim.campaigns.running import Keep as Kinds
 
     if keep is not None and keep not in get_args(Kinds):

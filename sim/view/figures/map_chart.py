@@ -171,7 +171,7 @@ def draw_legend(axes: Any, handles: list[Any], scene: Scene) -> None:
     if scene.unseen.any():
         known.append(Patch(fc=hexed(UNSEEN), label="placed after planning"))
     if scene.mover_radii:
-        known.append(Patch(fc=hexed(MOVER), label="moving obstacle"))
+        known.append(Patch(fc=hexed(MOVER), label=scene.movers_said))
     if scene.has_zones:
         pale = tuple(1 - 0.22 * (1 - channel / 255) for channel in ZONE)
         known.append(Patch(fc=pale, ec=hexed(ZONE), lw=0.5, label=f"inflated by {scene.inflate:.2f} m"))

@@ -32,6 +32,8 @@ Floats = npt.NDArray[np.float64]
 FILES = {"plan": "plan", "tour": "tour", "history": "history", "bars": "field-bars", "contours": "field-contours"}
 #: Bars per side. In a larger field each bar stands for several cells and is as high as the highest of them.
 MAX_BARS = 40
+#: Letters of a reason per inch, and the height of its lines [inches].
+LETTERS, LINE = 13.0, 0.165
 
 
 def plan_figure(
@@ -59,7 +61,9 @@ def plan_figure(
     with styled():
         wide, high = map_size(scene)
         wide += 0.9 if plan.field is not None else 0.0
-        figure = new_figure(wide + (4.6 if iterations else 0.6), high + 0.9)
+        wide_all = wide + (4.6 if iterations else 0.6)
+        reason = [] if len(plan.cells) else textwrap.wrap(plan.reason or plan.status.value, round(LETTERS * wide_all))
+        figure = new_figure(wide_all, high + 0.9 + (0.4 + LINE * len(reason) if reason else 0.0))
         areas = figure.add_gridspec(1, 2 if iterations else 1, width_ratios=[wide, 4.2] if iterations else [1])
         chart = figure.add_subplot(areas[0, 0], label="map")
         if plan.field is not None:
@@ -70,8 +74,8 @@ def plan_figure(
             cells, line = grid.xy(plan.cells), grid.xy(plan.line)
             handles += chart.plot(*cells.T, ".", ms=3.4, color=hexed(ROUTE), label="planned cells", zorder=5)
             handles += chart.plot(*line.T, "-", lw=1.9, color=hexed(SHELL), label="planned path", zorder=6)
-        else:
-            _draw_reason(chart, plan.reason or plan.status.value)
+        if reason:  # below the map, where it covers nothing of what it speaks of
+            figure.supxlabel("\n".join(reason), x=0.012, ha="left", fontsize=9, weight="bold", color=hexed(BAD))
         draw_legend(chart, handles, scene)
         if iterations:
             draw_history(figure.add_subplot(areas[0, 1], label="history"), plan.history)
@@ -80,19 +84,6 @@ def plan_figure(
         title = f"{scene.name}   ·   {length}   ·   {plan.work:,} {plan.work_unit}"
         figure.suptitle(title, x=0.012, ha="left", fontsize=12, weight="bold")
         return finished(figure, target, dpi)
-
-
-def _draw_reason(axes: Any, reason: str) -> None:
-    """Write in the middle of the map why there is no path."""
-    place: dict[str, Any] = {
-        "transform": axes.transAxes,
-        "ha": "center",
-        "va": "center",
-        "in_layout": False,  # a long reason must not squeeze the map
-        "zorder": 9,
-    }
-    frame = {"fc": "white", "ec": hexed(BAD), "pad": 6}
-    axes.text(0.5, 0.5, textwrap.fill(reason, 46), weight="bold", color=hexed(BAD), bbox=frame, **place)
 
 
 def plan_figures(

@@ -25,6 +25,7 @@ from antdrive.sim.view.style import (
     HATCH,
     HIT,
     INK,
+    MOVER,
     MUTED,
     OBSTACLE,
     PALE,
@@ -123,6 +124,8 @@ def _draw_known(axes: Any, scene: Scene, rollout: Rollout, seen: Recollection, l
         Patch(fc=hexed(HIT), label="hits on its map"),
         Patch(fc=hexed(PALE), ec=hexed(HATCH), hatch="////", lw=0, label="ground never seen"),
     ]
+    if scene.mover_radii:
+        known.append(Patch(fc=hexed(MOVER), label=scene.movers_said))
     handles += known
     place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "ncols": 3, "borderaxespad": 0.2}
     axes.legend(handles=handles, handlelength=1.6, columnspacing=1.2, **place)

@@ -158,8 +158,17 @@ def camera_for(name: str, low: npt.ArrayLike, high: npt.ArrayLike, height: float
     corners = np.array([(x, y, z) for x in (x0, x1) for y in (y0, y1) for z in (0.0, height)])
     tilt, fov = _TILT[name], _FOV[name]
     shape = (x1 - x0) / ((y1 - y0) * math.sin(math.radians(tilt)))
-    turned = name != "follow" and shape < 0.75 and size[0] > size[1]
-    return Camera.framing(corners, size, tilt=tilt, fov=fov, turned=turned)
+    return Camera.framing(corners, size, tilt=tilt, fov=fov, turned=name != "follow" and turns(shape, size))
+
+
+def turns(shape: float, size: tuple[int, int]) -> bool:
+    """Whether cameras of a wide picture look along -x: at ground that is long in y.
+
+    Args:
+        shape: the ground's width over its height, as the camera sees it
+        size: width and height of the picture [px]
+    """
+    return shape < 0.75 and size[0] > size[1]
 
 
 def _axes(tilt: float, turned: bool) -> tuple[Floats, Floats, Floats]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -15,10 +16,12 @@ from PIL import Image, ImageDraw
 
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.view.film import _kernels_paint as kernels
+from antdrive.sim.view.film.camera import turns
 from antdrive.sim.view.film.encoder import encoding, known_suffix
 from antdrive.sim.view.film.shot import Shot
 from antdrive.sim.view.film.text import fitted, font, pill, text_width
 from antdrive.sim.view.film.video import HOLD, FilmInfo, check_options, frame_times
+from antdrive.sim.view.scene import Scene
 from antdrive.sim.view.style import BAND, CALM, INK, MUTED, VERDICTS, planner_style
 from antdrive.worlds.errors import InputError
 from antdrive.worlds.files.atomic import written_whole
@@ -26,6 +29,9 @@ from antdrive.worlds.files.atomic import written_whole
 Picture = npt.NDArray[np.uint8]  # (H, W, 3)
 
 MAX_RUNS = 6
+FULL = (1280, 720)  # of a film whose size nobody chose [px]
+LEAST_TILE = 360  # its least width, for the words in its head [px]
+FILLED = 0.92  # the part of a picture's sides that the world takes, seen from above
 
 
 def compare_film(
@@ -33,7 +39,7 @@ def compare_film(
     path: str | Path,
     *,
     camera: str = "oblique",
-    size: tuple[int, int] = (1280, 720),
+    size: tuple[int, int] | None = None,
     fps: float = 30.0,
     speed: float = 1.0,
     titles: Sequence[str] | None = None,
@@ -46,7 +52,8 @@ def compare_film(
         rollouts: the logs of the runs
         path: the file to write; its suffix chooses the format: .mp4 (H.264), .gif or .webp
         camera: `oblique`, `top` or `follow`
-        size: width and height, even numbers from 160 to 4096 [px]
+        size: width and height, even numbers from 160 to 4096 [px]; None: 1280 x 720, from above only as much of it as
+            the worlds fill
         fps: frames per second, at most 240
         speed: how many times as fast as the runs the film is
         titles: the name of each run's tile; None: its planner's name
@@ -59,10 +66,11 @@ def compare_film(
     """
     target = Path(path)
     known_suffix(target)
-    check_options(camera, size, fps, speed)
+    check_options(camera, size or FULL, fps, speed)
     if not 2 <= len(rollouts) <= MAX_RUNS:
         raise InputError(f"compare: needs 2 to {MAX_RUNS} runs, got {len(rollouts)}")
     started = time.perf_counter()
+    size = size or fitting_size(rollouts, camera)
     times = frame_times(max(float(log.t[-1] - log.t[0]) for log in rollouts), fps, speed)
     total = len(times) + round(2 * HOLD * fps)
     with (
@@ -104,7 +112,7 @@ class SplitScreen:
         titles: Sequence[str] | None = None,
         mark: Mark | None = None,
     ) -> None:
-        cols, rows = _arrangement(len(rollouts), size, _proportion(rollouts) if camera == "oblique" else 1.0)
+        cols, rows = _tiling(rollouts, camera, size)
         wide, high = (size[0] // cols) // 2 * 2, (size[1] // rows) // 2 * 2
         self._size = size
         self._corners = [((k % cols) * wide, (k // cols) * high) for k in range(len(rollouts))]
@@ -137,8 +145,7 @@ class Tile:
     def __init__(
         self, rollout: Rollout, camera: str, size: tuple[int, int], name: str, mark: Mark | None = None
     ) -> None:
-        self._unit = max(11, round(min(size[0] / 30, size[1] / 22)))
-        self._head = 2 * round(1.55 * self._unit)
+        self._unit, self._head = _head_of(size)
         self.shot = Shot(rollout, camera=camera, size=(size[0], size[1] - self._head), bare=True)
         self._name, self._mark = name, mark
         self._colour = planner_style(rollout.record.planner.name)[0]
@@ -185,6 +192,63 @@ class Tile:
 def _title(log: Rollout, one_world: bool) -> str:
     planner = log.record.planner.name
     return planner if one_world else f"{planner} · {log.record.task.world.name}"
+
+
+def fitting_size(rollouts: Sequence[Rollout], camera: str) -> tuple[int, int]:
+    """The size of a film that shows the worlds as large as `FULL` does; from above it has no empty ground beside them."""
+    if camera != "top":
+        return FULL
+    extents = [_extent(log) for log in rollouts]
+    cols, rows = _tiling(rollouts, camera, FULL)
+    full = (FULL[0] // cols - 2, FULL[1] // rows - 2)
+    scale, head = _scale(extents, full), _head_of(full)[1]
+    shapes = [shape[::-1] if turns(shape[0] / shape[1], (full[0], full[1] - head)) else shape for shape in extents]
+    need = [max(sides) * scale / FILLED + 2 for sides in zip(*shapes, strict=True)]
+    wide, high = max(need[0], LEAST_TILE), need[1] + head
+    return _even(cols * wide, FULL[0]), _even(rows * high, FULL[1])
+
+
+def _even(length: float, most: int) -> int:
+    """The next even number, from 160 to `most`."""
+    return min(max(2 * math.ceil(length / 2), 160), most)
+
+
+def _head_of(tile: tuple[int, int]) -> tuple[int, int]:
+    """The height of small text in a tile of this size, and of its head [px]."""
+    unit = max(11, round(min(tile[0] / 30, tile[1] / 22)))
+    return unit, 2 * round(1.55 * unit)
+
+
+def _tiling(rollouts: Sequence[Rollout], camera: str, size: tuple[int, int]) -> tuple[int, int]:
+    """Columns and rows of tiles."""
+    count = len(rollouts)
+    if camera != "top":
+        return _arrangement(count, size, _proportion(rollouts) if camera == "oblique" else 1.0)
+    extents = [_extent(log) for log in rollouts]
+
+    def scale(cols: int) -> float:
+        return _scale(extents, (size[0] // cols - 2, size[1] // -(-count // cols) - 2))
+
+    cols = max(range(1, count + 1), key=scale)
+    return cols, -(-count // cols)
+
+
+def _extent(log: Rollout) -> tuple[float, float]:
+    """Width and height of the ground that a camera from above shows of a run [m]."""
+    low, high = Scene.of(log).region(np.vstack([log.pose[:, :2], log.route]))
+    wide, tall = (high - low).tolist()
+    return wide, tall
+
+
+def _scale(extents: Sequence[tuple[float, float]], tile: tuple[int, int]) -> float:
+    """How large a tile shows the largest of the worlds [px/m]."""
+    view = (tile[0], tile[1] - _head_of(tile)[1])
+
+    def of(extent: tuple[float, float]) -> float:
+        wide, tall = extent[::-1] if turns(extent[0] / extent[1], view) else extent
+        return min(view[0] / wide, view[1] / tall)
+
+    return FILLED * min(map(of, extents))
 
 
 def _proportion(rollouts: Sequence[Rollout]) -> float:

@@ -22,7 +22,7 @@ from antdrive.sim.view.film.camera import Camera
 from antdrive.sim.view.film.ground import dashes, kerb_width, paint_ground
 from antdrive.sim.view.film.meshes import Mesh, Part, cylinder, join, kerb, robot_height, robot_parts
 from antdrive.sim.view.film.raycast import Solids
-from antdrive.sim.view.film.sight import SightPainter
+from antdrive.sim.view.film.sight import FanPainter, SightPainter
 from antdrive.sim.view.film.text import glow
 from antdrive.sim.view.film.tiny_renderer import Box, add_mesh, merged, overlap, render
 from antdrive.sim.view.film.triangles import Solid, draw_solids, placed
@@ -62,7 +62,7 @@ class Backdrop:
         pixels: the picture (H, W, 3)
         visible: the fraction of each pixel that shows ground (H, W)
         depth: depth of the bodies in clip space, 1 where there is none, at the resolution they were rendered in
-        bodies: at the same resolution the number of the obstacle in sight, -1 for ground; empty unless sight is painted
+        bodies: at the same resolution the number of the obstacle in sight, -1 for ground; empty where none is painted pale
     """
 
     camera: Camera
@@ -85,7 +85,7 @@ class Compositor:
         route: a polyline (N, 2) [m] that stays on the ground; for a route that changes, use `show_route`
         fine: each pixel is the mean of fine x fine rendered ones
         moving_camera: the camera will move, so the backdrop is cast by rays
-        sight: what a robot without a map has seen; None: it had a map
+        sight: what the lidar sees, of a robot without a map also what it has seen; None: the log has no scans
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class Compositor:
         route: Floats,
         fine: int = 2,
         moving_camera: bool = False,
-        sight: SightPainter | None = None,
+        sight: FanPainter | None = None,
     ) -> None:
         self.scene = scene
         self.camera = camera
@@ -187,7 +187,8 @@ class Compositor:
         places = np.asarray(movers, dtype=np.float64).reshape(-1, 2)
         frame = self._canvas.copy()
         if self._sight is not None:
-            self._sight.cover(frame, self.backdrop, self._inverse, self.fine)
+            if isinstance(self._sight, SightPainter):
+                self._sight.cover(frame, self.backdrop, self._inverse, self.fine)
             self._sight.lay_fan(frame, self.backdrop, self._forward, self._inverse)
             for label in self._labels:
                 self._put_label(frame, *label)
@@ -201,7 +202,7 @@ class Compositor:
         for box in merged([b for b in boxes if b is not None]):
             inside = [body for body, b in zip(bodies, boxes, strict=True) if b is not None and overlap(b, box)]
             self._put_bodies(frame, box, [solid for body in inside for solid in body])
-        if self._sight is not None:
+        if isinstance(self._sight, SightPainter):
             self._sight.put_hits(frame, self.backdrop)
         if followed is not None:
             self._draw_followed(frame, followed)
@@ -268,7 +269,7 @@ class Compositor:
             self._load(camera.sees(self._centres, self._radii))
             image, depth, seg = render(self._still, camera, None, self.fine, self._light)
         bodies = np.empty((0, 0), dtype=np.int32)
-        if self._sight is not None:  # TinyRenderer draws many obstacles as one body
+        if isinstance(self._sight, SightPainter):  # TinyRenderer draws many obstacles as one body
             bodies = seg if self._moving_camera else self._solids.render(camera, self.fine, self._light)[2]
         width, height = camera.size
         visible = np.empty((height, width), dtype=np.float32)

@@ -46,6 +46,9 @@ SLOWED = (f"SLOW ×1/{SLOW_MOTION:g}", BAD)
 DRIVE_FIELDS = ("TIME", "SPEED", "CLEARANCE", "MINIMUM")
 PLAN_FIELDS = ("ITERATION", "BEST PATH", "MEAN PATH", "ARRIVED")
 
+#: The heights of a row of the legend in the band, and of its edge [units].
+LEGEND_ROW, LEGEND_EDGE = 1.5, 0.4
+
 Values: TypeAlias = list[tuple[str, bool]]  # each number as text, and whether it is shown in red
 
 
@@ -84,24 +87,24 @@ class Layout:
         width: of the frame [px]
         unit: height of small text [px]
         wide: names, numbers and outcome stand beside each other in the band
-        card: the legend is a card in the picture's corner; otherwise it is a row of the band
+        rows: how many rows of the band the legend has; 0: it is a card in the picture's corner
         height: of the band [px]
     """
 
     width: int
     unit: int
     wide: bool
-    card: bool
+    rows: int
     height: int
 
     @classmethod
-    def of(cls, size: tuple[int, int], card: bool) -> Layout:
-        """The layout for a frame of a size (width, height) [px]."""
+    def of(cls, size: tuple[int, int], rows: int) -> Layout:
+        """The layout for a frame of a size (width, height) [px] with a legend of so many rows."""
         width, height = size
         wide = width >= 1.5 * height and width >= 900
         unit = max(8, round(min(height / 46, width / (82 if wide else 56))))
-        rows = (4.7 if wide else 7.8) + (0.0 if card else 1.9)
-        return cls(width, unit, wide, card, 2 * round(rows * unit / 2))
+        units = (4.7 if wide else 7.8) + (LEGEND_EDGE + LEGEND_ROW * rows if rows else 0.0)
+        return cls(width, unit, wide, rows, 2 * round(units * unit / 2))
 
 
 class Band:
@@ -112,7 +115,7 @@ class Band:
         title: the first line
         subtitle: the second line
         note: a line below the numbers
-        entries: the legend's entries, for a layout without a card
+        legend: the legend's rows, for a layout without a card
         names: of the four numbers
     """
 
@@ -122,7 +125,7 @@ class Band:
         title: str,
         subtitle: str,
         note: str | None,
-        entries: list[LegendEntry],
+        legend: LegendRows,
         names: tuple[str, ...] = DRIVE_FIELDS,
     ) -> None:
         self.layout = layout
@@ -148,8 +151,8 @@ class Band:
         )
         for (x, y), name in zip(self._fields, names, strict=True):
             draw.text((x, y), name, font=font(round(0.82 * unit), True), fill=MUTED)
-        if not layout.card:
-            _legend_row(draw, entries, layout)
+        if layout.rows:
+            _draw_rows(draw, legend, layout)
 
     def draw(self, values: Values, verdict: tuple[str, Colour]) -> Picture:
         """The band (h, W, 3) of one frame, with its four numbers and a label."""
@@ -202,6 +205,7 @@ def legend_entries(
     *,
     planning: bool = False,
     replans: bool = False,
+    beams: bool = False,
     sight: bool = False,
     followed: bool = False,
 ) -> list[LegendEntry]:
@@ -213,7 +217,8 @@ def legend_entries(
         pixel: the width of a pixel in the middle of the picture [m]
         planning: the picture shows planning, not a drive
         replans: the robot replanned during the run
-        sight: the picture shows what the robot has seen
+        beams: the picture shows what the lidar sees
+        sight: it shows what a robot without a map has seen
         followed: it shows the movers that the robot follows with its lidar
     """
     if planning:
@@ -227,9 +232,10 @@ def legend_entries(
         found.append(LegendEntry("zone", ZONE, f"inflated by {scene.inflate:.2f} m"))
     if scene.unseen.any():
         found.append(LegendEntry("dot", UNSEEN, "placed after planning"))
+    if beams:
+        found.append(LegendEntry("zone", BEAM, "beams of the lidar"))
     if sight:
         found += [
-            LegendEntry("zone", BEAM, "beams of the lidar"),
             LegendEntry("dot", HIT, "hit, on the robot's map"),
             LegendEntry("hatch", HATCH, "never seen"),
         ]
@@ -255,24 +261,63 @@ def legend_card(entries: list[LegendEntry], layout: Layout) -> Sprite:
     return np.array(image)
 
 
-def _legend_row(draw: ImageDraw.ImageDraw, entries: list[LegendEntry], layout: Layout) -> None:
-    """Draw the legend as the last row of a band."""
-    unit = layout.unit
-    middle = layout.height - 1.15 * unit
-    draw.line([(unit, middle - 1.05 * unit), (layout.width - unit, middle - 1.05 * unit)], fill=(226, 230, 237))
-    size = max(7, round(0.9 * unit))
-    while True:
-        keys = [round(entry.width or (2.2 if entry.kind in _WIDE_KINDS else 1.0) * size) for entry in entries]
-        widths = [key + 0.5 * size + text_width(entry.text, size) for key, entry in zip(keys, entries, strict=True)]
-        gap = (layout.width - 2 * unit - sum(widths)) / max(1, len(entries) - 1)
-        if gap >= size or size <= 7:
+class LegendRows(NamedTuple):
+    """The legend's entries in rows of the band.
+
+    Attributes:
+        size: of the text [px]
+        rows: the entries of each row, from the left
+        whole: whether every entry has a place
+    """
+
+    size: int
+    rows: list[list[LegendEntry]]
+    whole: bool
+
+
+def legend_rows(entries: list[LegendEntry], layout: Layout) -> LegendRows:
+    """The entries in the rows that a layout has, in the largest text with which they fit.
+
+    In a picture too small for all of them the last ones are left out.
+    """
+    found = LegendRows(0, [], False)
+    for size in range(max(8, round(0.9 * layout.unit)), max(7, round(0.75 * layout.unit)) - 1, -1):
+        room = float(layout.width - 2 * layout.unit)
+        rows: list[list[LegendEntry]] = [[]] if layout.rows else []
+        left = room
+        for entry in entries:
+            wide = sum(_entry_width(entry, size))
+            if rows and rows[-1] and wide > left:
+                rows.append([])
+                left = room
+            if rows:
+                rows[-1].append(entry)
+            left -= wide + size
+        found = LegendRows(size, rows[: layout.rows], len(rows) <= layout.rows)
+        if found.whole:
             break
-        size -= 1
-    x, gap = float(unit), min(gap, 2.5 * size)
-    for entry, key, width in zip(entries, keys, widths, strict=True):
-        _draw_sample(draw, entry, round(x), middle, key, size)
-        draw.text((x + key + 0.5 * size, middle), entry.text, font=font(size), fill=INK, anchor="lm")
-        x += width + gap
+    return found
+
+
+def _entry_width(entry: LegendEntry, size: int) -> tuple[float, float]:
+    """How wide an entry's sample and its text with the space before it are, for text of a size [px]."""
+    sample = round(entry.width or (2.2 if entry.kind in _WIDE_KINDS else 1.0) * size)
+    return sample, 0.5 * size + text_width(entry.text, size)
+
+
+def _draw_rows(draw: ImageDraw.ImageDraw, legend: LegendRows, layout: Layout) -> None:
+    """Draw the legend as the last rows of a band."""
+    unit, size = layout.unit, legend.size
+    top = layout.height - (LEGEND_EDGE + LEGEND_ROW * layout.rows - 0.05) * unit
+    draw.line([(unit, top - 0.25 * unit), (layout.width - unit, top - 0.25 * unit)], fill=(226, 230, 237))
+    for number, row in enumerate(legend.rows):
+        widths = [_entry_width(entry, size) for entry in row]
+        gap = (layout.width - 2 * unit - sum(map(sum, widths))) / max(1, len(row) - 1)
+        x, middle = float(unit), top + (number + 0.5) * LEGEND_ROW * unit
+        for entry, (sample, text) in zip(row, widths, strict=True):
+            _draw_sample(draw, entry, round(x), middle, round(sample), size)
+            draw.text((x + sample + 0.5 * size, middle), entry.text, font=font(size), fill=INK, anchor="lm")
+            x += sample + text + min(gap, 2.5 * size)
 
 
 def _draw_sample(draw: ImageDraw.ImageDraw, entry: LegendEntry, x: int, y: float, wide: int, size: int) -> None:

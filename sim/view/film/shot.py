@@ -21,16 +21,17 @@ from antdrive.sim.view.film.overlay import (
     SLOWED,
     Band,
     Layout,
+    LegendRows,
     Reading,
     Values,
     banner,
     legend_card,
     legend_entries,
+    legend_rows,
 )
 from antdrive.sim.view.film.replay import ReplanEvent, Replay
-from antdrive.sim.view.film.sight import SightPainter
+from antdrive.sim.view.film.sight import FanPainter, SightPainter
 from antdrive.sim.view.film.text import Sprite, burst, label
-from antdrive.sim.view.recollection import Recollection
 from antdrive.sim.view.scene import Scene
 from antdrive.sim.view.style import CONTACT, GOAL, ROUTE, START, VERDICTS, Colour
 
@@ -38,6 +39,8 @@ Floats = npt.NDArray[np.float64]
 Picture = npt.NDArray[np.uint8]  # (H, W, 3)
 
 FLASH = 0.45  # the picture's border flashes this long after a contact [s]
+MOST_LEGEND_ROWS = 4
+MOST_BAND = 0.34  # of the picture's height, for a legend of several rows
 REPLAN_CAPTION = 1.5  # the cause of a replan is shown this long [s]
 
 
@@ -71,48 +74,58 @@ class Shot:
         self.scene = scene = Scene.of(rollout)
         self.outcome = rollout.outcome
         self._follows = camera == "follow"
-        self._sight = None
         self._follows_movers = not planning and len(rollout.tracks) > 0
-        if not planning and len(rollout.scans):
-            self._sight = SightPainter(Recollection(rollout), scene)
+        self._sight = SightPainter(rollout, scene) if not planning and not scene.mapped and len(rollout.scans) else None
+        self._fan = self._sight or (FanPainter(rollout) if not planning and len(rollout.scans) else None)
         replans = not planning and any(event.caption for event in self.replay.replans)
-        # The legend is a card in the picture's corner or, if that would cover the world, a row of the band.
-        for card in (True, False):
-            self._layout = layout = Layout.of(size, card)
-            band = 0 if bare else layout.height
-            self._camera = self._aim(camera, rollout, (size[0], size[1] - band))
-            step, pixel = grid_step(self._camera), self._camera.pixel
-            sight = self._sight is not None
-            entries = legend_entries(
-                scene, step, pixel, planning=planning, replans=replans, sight=sight, followed=self._follows_movers
-            )
-            self._legend = legend_card(entries, layout) if card and not bare else None
-            if self._legend is not None and self._fits_beside_world(self._legend):
-                break
+        legend = self._lay_out(rollout, camera, size, planning=planning, replans=replans, bare=bare)
         planner = rollout.record.planner.name
         subtitle = f"planner {planner}  ·  robot {scene.robot.name}"
         fields = PLAN_FIELDS if planning else DRIVE_FIELDS
-        self._band = Band(layout, scene.name, subtitle, None if planning else note, entries, fields)
+        self._band = Band(self._layout, scene.name, subtitle, None if planning else note, legend, fields)
         fine = 3 if size[0] * size[1] <= 400_000 and not self._follows else 2
-        fixed = not (planning or self.replay.replans or self._sight)  # a route that changes is drawn in every frame
+        fixed = not (planning or self.replay.replans or self._fan)  # a route that changes is drawn in every frame
         self._compositor = Compositor(
             scene,
             self._camera,
             route=rollout.route[: None if fixed else 0],
             fine=fine,
             moving_camera=self._follows,
-            sight=self._sight,
+            sight=self._fan,
         )
         self._replan_caption = REPLAN_CAPTION * speed
         self._route, self._replans_shown = rollout.route, 0
-        self._legend_width = 0 if self._legend is None else self._legend.shape[1] + 2 * layout.unit  # [px]
-        self._banner = banner(self.outcome, layout, max(size[0] - self._legend_width, size[0] // 2))
+        self._legend_width = 0 if self._legend is None else self._legend.shape[1] + 2 * self._layout.unit  # [px]
+        self._banner = banner(self.outcome, self._layout, max(size[0] - self._legend_width, size[0] // 2))
         self.shown = 0.0  # the trail reaches to this moment [s]
+
+    def _lay_out(
+        self, rollout: Rollout, camera: str, size: tuple[int, int], *, planning: bool, replans: bool, bare: bool
+    ) -> LegendRows:
+        """Choose layout, camera and legend: a card in a corner or, if it would cover the world, rows of the band."""
+        shows = {
+            "beams": self._fan is not None,
+            "sight": self._sight is not None,
+            "followed": self._follows_movers,
+        }
+        for rows in range(1 + MOST_LEGEND_ROWS):
+            layout = Layout.of(size, rows)
+            if rows > 1 and layout.height > MOST_BAND * size[1]:
+                break
+            self._layout = layout
+            self._camera = self._aim(camera, rollout, (size[0], size[1] - (0 if bare else layout.height)))
+            step, pixel = grid_step(self._camera), self._camera.pixel
+            entries = legend_entries(self.scene, step, pixel, planning=planning, replans=replans, **shows)
+            legend = legend_rows(entries, layout)
+            self._legend = None if rows or bare else legend_card(entries, layout)
+            if bare or (legend.whole if self._legend is None else self._fits_beside_world(self._legend)):
+                break
+        return legend
 
     def __enter__(self) -> Shot:
         self._compositor.__enter__()
         self._add_labels()
-        if self.replay.replans or self._sight:
+        if self.replay.replans or self._fan:
             self._show_route(0)
         return self
 
@@ -160,8 +173,8 @@ class Shot:
             compositor.set_camera(self._camera.moved(*replay.camera_target(at)))
         self.extend_trail(at)
         count = replay.replan_count(at)
-        if self._sight is not None:
-            self._sight.advance(at)
+        if self._fan is not None:
+            self._fan.advance(at)
         if count != self._replans_shown or self._sight is not None:
             self._show_route(count)
         followed = self._followed(at) if self._follows_movers else None

@@ -1,4 +1,4 @@
-"""What a robot without a map has seen, in the pictures of a film: beams, hits, ground and obstacles never seen."""
+"""What a robot's lidar sees, in the pictures of a film: beams, and without a map hits, ground and obstacles never seen."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.log.sights import beams_of, lidar_of
 from antdrive.sim.view import _kernels_seen as kernels
 from antdrive.sim.view.film import _kernels_paint as painting
 from antdrive.sim.view.recollection import Recollection, containers, laid_in_world
@@ -26,22 +28,65 @@ DRAWN_BEAMS = 90  # in a full circle, at most
 HATCHING = 9.0  # distance between the lines of the hatching [px]
 
 
-class SightPainter:
-    """Paints what a robot had seen into frames. Moments are asked for in increasing order.
+class FanPainter:
+    """Paints the beams of the last scan into frames.
 
     Args:
-        recollection: what it had seen
+        rollout: a log with scans
+    """
+
+    def __init__(self, rollout: Rollout) -> None:
+        self._rollout, self._lidar = rollout, lidar_of(rollout)
+        self._times = rollout.t[rollout.scan_rows]
+        self._last = 0
+
+    def advance(self, at: float) -> None:
+        """Go on to a moment [s]."""
+        self._last = max(0, int(np.searchsorted(self._times, at + 1e-9, side="right")) - 1)
+
+    def lay_fan(
+        self,
+        frame: Picture,
+        backdrop: Backdrop,
+        forward: npt.NDArray[np.floating[Any]],
+        inverse: npt.NDArray[np.floating[Any]],
+    ) -> None:
+        """Lay the beams of the last scan on the ground.
+
+        Args:
+            frame: the picture, before the robot is drawn
+            backdrop: what stands still
+            forward: the map from the ground to pixels (3, 3)
+            inverse: the map from pixels to the ground (3, 3)
+        """
+        lidar, (eye, first, reaches) = self._lidar, beams_of(self._rollout, self._last)
+        every = max(1, round(2 * np.pi / lidar.spacing / DRAWN_BEAMS))
+        style = np.array([TINT, BEAMS, backdrop.camera.pixel])
+        closed, colour = lidar.full_circle, np.array(BEAM, dtype=np.float64)
+        visible = backdrop.visible
+        kernels.lay_fan(
+            frame, visible, forward, inverse, eye, first, lidar.spacing, closed, reaches, every, style, colour
+        )
+
+
+class SightPainter(FanPainter):
+    """Paints what a robot without a map had seen into frames. Moments are asked for in increasing order.
+
+    Args:
+        rollout: a log with scans
         scene: what stands in the world
     """
 
-    def __init__(self, recollection: Recollection, scene: Scene) -> None:
-        self._recollection, self._scene = recollection, scene
-        self._drift = recollection.drift(0.0)
+    def __init__(self, rollout: Rollout, scene: Scene) -> None:
+        super().__init__(rollout)
+        self._recollection, self._scene = Recollection(rollout), scene
+        self._drift = self._recollection.drift(0.0)
         self._discs = np.empty((0, 3))
         self._around = containers(scene.obstacles)
 
     def advance(self, at: float) -> None:
         """Go on to a moment [s]."""
+        super().advance(at)
         recollection = self._recollection
         recollection.advance(at)
         self._drift = recollection.drift(at)
@@ -72,30 +117,6 @@ class SightPainter:
         unmet = np.isinf(self._recollection.met)[self._around]
         if unmet.any():
             kernels.pale_bodies(frame, visible, backdrop.bodies, fine, unmet, tints[0], PALENESS)
-
-    def lay_fan(
-        self,
-        frame: Picture,
-        backdrop: Backdrop,
-        forward: npt.NDArray[np.floating[Any]],
-        inverse: npt.NDArray[np.floating[Any]],
-    ) -> None:
-        """Lay the beams of the last scan on the ground.
-
-        Args:
-            frame: the picture, before the robot is drawn
-            backdrop: what stands still
-            forward: the map from the ground to pixels (3, 3)
-            inverse: the map from pixels to the ground (3, 3)
-        """
-        lidar, (eye, first, reaches) = self._recollection.lidar, self._recollection.beams
-        every = max(1, round(2 * np.pi / lidar.spacing / DRAWN_BEAMS))
-        style = np.array([TINT, BEAMS, backdrop.camera.pixel])
-        closed, colour = lidar.full_circle, np.array(BEAM, dtype=np.float64)
-        visible = backdrop.visible
-        kernels.lay_fan(
-            frame, visible, forward, inverse, eye, first, lidar.spacing, closed, reaches, every, style, colour
-        )
 
     def put_hits(self, frame: Picture, backdrop: Backdrop) -> None:
         """Put the hits on the robot's map over everything, at the height of the beams.

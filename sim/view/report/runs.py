@@ -127,7 +127,8 @@ class LogFacts:
         record: the log's record
         certificate: the log's, computed for the report
         metrics: the log's metrics by name
-        sights: the cylinders and movers that a robot without a map passed, as the log's scans met them
+        sights: the cylinders and movers that a robot which used its lidar passed, as the log's scans met them
+        scans: how many scans the log holds
         digest: of the log's content
         settings: the log's settings by the keys of result.json
         contradictions: what result.json says otherwise, a sentence each
@@ -137,6 +138,7 @@ class LogFacts:
     certificate: Certificate
     metrics: Mapping[str, float]
     sights: tuple[Sighting, ...]
+    scans: int
     digest: str
     settings: Mapping[str, Any]
     contradictions: tuple[str, ...]
@@ -307,6 +309,9 @@ class ReportedRun:
         record = self.log.record.as_dict()
         keys = ("noise", "margin", "inflate", "cell", "physics_hz", "control_hz", "time_limit")
         settings = {"route": record["smoothing"]["made"], **{key: record[key] for key in keys}}
+        lidar = self.log.record.robot.lidar
+        if self.log.scans and lidar is not None:
+            settings["scans"] = f"{self.log.scans} of {lidar.beams} beams"
         certificate = {k: v for k, v in self.log.certificate.as_dict().items() if k != "problems"}
         return [
             ("Metrics", _pairs(self.metrics)),
@@ -354,7 +359,8 @@ def facts_of(rollout: Rollout, result: Mapping[str, Any], name: str) -> LogFacts
     except ValueError as error:
         raise input_error(name, str(error)) from None
     claims = tuple(shown(claim) for claim in false_claims(result, rollout, digest))
-    return LogFacts(rollout.record, certificate, metrics, sights, digest, logged_settings(rollout), claims)
+    scans = len(rollout.scans)
+    return LogFacts(rollout.record, certificate, metrics, sights, scans, digest, logged_settings(rollout), claims)
 
 
 def made_run(run: Run) -> ReportedRun:

@@ -35,9 +35,9 @@ from antdrive.worlds import (
     rasterise,
 )
 from tests.planners.worlds_to_solve import catalogue as small_worlds
+from tools.shared_data import BARN
 
 RNG = np.random.default_rng(0)  # nothing that counts is drawn from it
-BARN = Path(__file__).parents[4] / "shared" / "data" / "barn" / "barn50.tar.xz"
 SMOOTHED = ("taut", "clearance")
 
 
@@ -318,7 +318,7 @@ def _barn() -> Iterator[Task]:
             yield import_barn(Path(folder) / f"world_{n}.world")
 
 
-@pytest.mark.skipif(not BARN.exists(), reason="BARN's worlds are not in ../shared/data")
+@pytest.mark.skipif(not BARN.exists(), reason="needs BARN's worlds (docs/how-to/data.md)")
 @pytest.mark.parametrize("cell", [0.15, 0.05])
 def test_barn_in_the_best_corridor_is_the_optimum(cell: float) -> None:
     """With 0.363 m of clearance: Jackal's radius and 3 cm."""

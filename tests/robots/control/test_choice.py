@@ -102,3 +102,12 @@ def test_the_limit_of_a_candidate_is_no_less_than_it_is_worth(tracked: TrackedPa
                 assert worth <= limit[n]
                 tight += limit[n] < worth + 0.3
     assert tight > 50  # the limits are worth having
+
+
+def test_no_candidate_goes_backwards_faster_than_it_may() -> None:
+    whole = AVOIDANCE._candidates(ROBOT, AvoidanceState(), math.inf)
+    for share in (0.0, 0.3, 0.6, 1.0):
+        table = AVOIDANCE._candidates(ROBOT, AvoidanceState(), math.inf, share * ROBOT.max_speed)
+        fast = whole[:, [kernels.SPEED, kernels.NEXT_SPEED]].min(axis=1) < -share * ROBOT.max_speed - 1e-9
+        assert np.array_equal(table, whole[~fast])
+        assert fast.any() == (share < 1.0)

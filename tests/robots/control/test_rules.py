@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
+from antdrive.robots import list_robots, load_robot
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex, arc_clearance, index_discs, nearby
 from antdrive.robots.control._kernels_path import brake_backwards, carrot_at, clear_lookaheads, point_at, project
 from antdrive.robots.control._kernels_pursuit import (
@@ -22,6 +23,7 @@ from antdrive.robots.control._kernels_pursuit import (
     brake_for_goal,
     keep_wheels_within,
     reachable_twist,
+    reachable_yaw_rate,
     should_rotate,
     slow_for_clearance,
     slow_for_curvature,
@@ -37,11 +39,60 @@ CORNER_ARC = np.array([0.0, 1.0, 2.0])
 
 @given(v=st.floats(-3, 3), w=st.floats(-6, 6), half_track=st.floats(0.05, 0.4), fastest=st.floats(0.1, 2))
 def test_saturated_wheels_keep_the_curvature(v: float, w: float, half_track: float, fastest: float) -> None:
-    new_v, new_w = keep_wheels_within(v, w, half_track, fastest)
+    limits = LIMITS._replace(half_track=half_track, rim_speed=fastest)
+    new_v, new_w = keep_wheels_within(v, w, 0.0, 0.1, limits)
     assert abs(new_v) + abs(new_w) * half_track <= fastest * (1 + 1e-12)
     assert new_v * w == pytest.approx(v * new_w, abs=1e-9)
     if abs(v) + abs(w) * half_track <= fastest:
         assert (new_v, new_w) == (v, w)
+
+
+def saturated(
+    share: float, turn: float, wanted: float, limits: MotionLimits, period: float
+) -> tuple[float, float, float]:
+    """The speed before, and speed and yaw rate after, of a robot that turns in with wheels at `share` of what they reach."""
+    w = turn * share * limits.rim_speed / limits.half_track
+    v = share * limits.rim_speed - abs(w) * limits.half_track
+    return v, *reachable_twist(v, wanted, v, w, period, limits)
+
+
+@given(
+    share=st.just(1.0) | st.floats(0, 1), turn=st.floats(-1, 1), wanted=st.floats(-9, 9), half_track=st.floats(0.05, 0.4),
+    acceleration=st.floats(0.1, 3), yaw_acceleration=st.floats(0.5, 20),
+)  # fmt: skip
+@example(share=1.0, turn=0.0, wanted=9.0, half_track=0.2, acceleration=1.0, yaw_acceleration=8.0)
+def test_wheels_at_their_limit_do_not_make_a_robot_brake_harder_than_certificates_allow(
+    share: float, turn: float, wanted: float, half_track: float, acceleration: float, yaw_acceleration: float
+) -> None:
+    limits = LIMITS._replace(
+        half_track=half_track, acceleration=acceleration, yaw_acceleration=yaw_acceleration, yaw_rate=99.0
+    )
+    v, new_v, new_w = saturated(share, turn, wanted, limits, 1 / 60)
+    assert abs(new_v) + abs(new_w) * half_track <= limits.rim_speed * (1 + 1e-12)
+    assert v - new_v <= 1.4 * acceleration / 60 * (1 + 1e-9) + 1e-12
+
+
+@given(
+    name=st.sampled_from(sorted(list_robots())), share=st.floats(0, 1), turn=st.floats(-1, 1), wanted=st.floats(-9, 9)
+)
+@example(name="turtlebot3-waffle", share=1.0, turn=0.0, wanted=9.0)  # of all of them it has the least room
+def test_the_catalogues_robots_turn_in_with_both_speeds_scaled_together(
+    name: str, share: float, turn: float, wanted: float
+) -> None:
+    """Bit for bit: their wheels leave room enough for that, and so their drives are as they were."""
+    robot = load_robot(name)
+    limits = MotionLimits(
+        robot.max_speed, robot.max_yaw_rate, robot.max_acceleration, robot.max_yaw_acceleration,
+        robot.max_lateral_acceleration, robot.track / 2, robot.max_wheel_speed * robot.wheel_radius,
+    )  # fmt: skip
+    v, *found = saturated(share, turn, wanted, limits, 1 / 60)
+    w = turn * share * limits.rim_speed / limits.half_track
+    plain_w = reachable_yaw_rate(wanted, w, 1 / 60, limits)
+    rim = abs(v) + abs(plain_w) * limits.half_track
+    scaled = [v, plain_w]
+    if rim > limits.rim_speed:
+        scaled = [v * limits.rim_speed / rim, plain_w * limits.rim_speed / rim]
+    assert found == scaled
 
 
 def test_speed_in_curves_is_limited_by_lateral_acceleration_and_yaw_rate() -> None:

@@ -16,19 +16,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from antdrive.robots import Footprint, RobotSpec, load_robot
+from antdrive.robots.files import footprint_to_dict as written
 from antdrive.robots.importing.hull import convex_hull, fewer_corners, footprint_around
 from antdrive.robots.importing.urdf import ImportedRobot, import_urdf
 from antdrive.worlds import InputError
+from benchmarks.robots import SPECIFICATIONS, values_of
 
 FIXTURES = Path(__file__).parent / "urdf"
-#: What public specifications say: length, width, height, mass, wheel radius, track, and the kind of footprint.
-PUBLIC = {
-    "burger.urdf": (0.138, 0.178, 0.192, 1.0, 0.033, 0.160, "polygon"),
-    "waffle.urdf": (0.281, 0.306, 0.141, 1.8, 0.033, 0.287, "rectangle"),
-    "turtlebot4.urdf": (0.341, 0.341, 0.351, 3.9, 0.03575, 0.233, "disc"),
-    "pioneer3dx.urdf": (0.455, 0.381, 0.237, 9.0, 0.0975, 0.331, "polygon"),
-    "warehouse.urdf.xacro": (0.9, 0.6, 0.352, 70.0, 0.0625, 0.445, "rectangle"),
-}
+#: The kind of footprint that follows from the specification; its values are in benchmarks.robots.
+KINDS = {
+    "burger.urdf": "polygon", "waffle.urdf": "rectangle", "turtlebot4.urdf": "disc", "pioneer3dx.urdf": "polygon",
+    "warehouse.urdf.xacro": "rectangle",
+}  # fmt: skip
 CATALOGUE = {
     "burger.urdf": "turtlebot3-burger",
     "waffle.urdf": "turtlebot3-waffle",
@@ -53,7 +52,10 @@ def comments(found: ImportedRobot) -> dict[str, str]:
 
 
 def changed(tmp_path: Path, name: str, *changes: tuple[str, str]) -> Path:
+    """A fixture with changes. The burger loses its drive plugin, so that its wheels and limits are those of the geometry."""
     text = (FIXTURES / name).read_text()
+    if name == "burger.urdf":
+        text = re.sub(r"<gazebo>.*</gazebo>", "", text, flags=re.DOTALL)
     for old, new in changes:
         assert old in text
         text = text.replace(old, new)
@@ -62,19 +64,22 @@ def changed(tmp_path: Path, name: str, *changes: tuple[str, str]) -> Path:
     return path
 
 
-@pytest.mark.parametrize("name", PUBLIC)
-def test_what_is_imported_is_within_a_hundredth_of_the_public_dimensions(name: str) -> None:
-    robot = imported(name).robot
-    xmin, ymin, xmax, ymax = robot.footprint.bounds
+@pytest.mark.parametrize("name", KINDS)
+def test_what_is_imported_is_within_a_hundredth_of_all_public_values(name: str) -> None:
+    found, specified = imported(name), SPECIFICATIONS[name]
+    robot, values = found.robot, values_of(found.robot)
+    assert {key: values[key] for key in specified} == pytest.approx(specified, rel=0.01)
+    assert {"length", "width", "height", "mass", "wheel_radius", "track", "max_speed", "max_yaw_rate"} <= set(specified)
     kind = "disc" if robot.footprint.rounding else "rectangle" if robot.footprint.box else "polygon"
-    found = (xmax - xmin, ymax - ymin, robot.height, robot.mass, robot.wheel_radius, robot.track)
-    assert found == pytest.approx(PUBLIC[name][:-1], rel=0.01)
-    assert kind == PUBLIC[name][-1]
+    assert kind == KINDS[name]
     ours = load_robot(CATALOGUE[name])
     assert robot.footprint.bounds == pytest.approx(ours.footprint.bounds, abs=0.01 * ours.radius)
-    assert (robot.track, robot.wheel_radius, robot.mass) == pytest.approx(
-        (ours.track, ours.wheel_radius, ours.mass), rel=0.01
+    shared = ("track", "wheel_radius", "mass", "height", "max_speed", "max_yaw_rate")
+    assert [getattr(robot, key) for key in shared] == pytest.approx([getattr(ours, key) for key in shared], rel=0.01)
+    outside = most_outside(
+        yaml.safe_load(found.text)["footprint"], [point for piece in found.pieces for point in piece]
     )
+    assert outside <= 1e-8, "no footprint is smaller than the collision geometry"
 
 
 def test_the_file_says_of_each_value_where_it_comes_from(tmp_path: Path) -> None:
@@ -87,8 +92,8 @@ def test_the_file_says_of_each_value_where_it_comes_from(tmp_path: Path) -> None
     assert len(numbers) == 11
     kinds = {line.split(":")[0]: line.split("# ")[1].split(":")[0] for line in numbers}
     assert kinds == {
-        "height": "computed", "mass": "given", "wheel_radius": "read", "track": "computed", "max_speed": "computed",
-        "max_yaw_rate": "assumed", "max_acceleration": "assumed", "max_yaw_acceleration": "assumed",
+        "height": "computed", "mass": "given", "wheel_radius": "read", "track": "computed", "max_speed": "read",
+        "max_yaw_rate": "read", "max_acceleration": "assumed", "max_yaw_acceleration": "assumed",
         "max_lateral_acceleration": "assumed", "max_wheel_speed": "read", "wheel_torque": "read",
     }  # fmt: skip
     assert set(yaml.safe_load(found.text)) == {"schema", "name", "source", "footprint", "noise", *kinds}
@@ -154,6 +159,94 @@ def test_no_limit_of_a_joint_is_left_out_without_a_word(
     found = limited(tmp_path, words)
     assert getattr(found.robot, key) == pytest.approx(value, rel=1e-4)
     assert comments(found)[key].startswith(says)
+
+
+@pytest.mark.parametrize(
+    ("tag", "told", "velocity", "key", "value", "says"),
+    [
+        ("max_linear_velocity", 50, "", "max_speed", 0.5, "assumed: <max_linear_velocity> of the drive plugin, 50 m/s, is above "
+         "the 10 m/s that a robot's file may say, and is not used"),
+        ("max_linear_velocity", 50, 'velocity="7"', "max_speed", 0.231, "computed: the velocity limit of joint "
+         "wheel_left_joint, 7 rad/s, times the wheels' radius; <max_linear_velocity> of the drive plugin, 50 m/s, is above"),
+        ("max_linear_velocity", 12, 'velocity="400"', "max_speed", 0.5, "assumed: the velocity limit of joint wheel_left_joint, "
+         "400 rad/s would be 13.2 m/s, above the 10 m/s that a robot's file may say, and is not used; <max_linear_velocity>"),
+        ("max_linear_velocity", 10, "", "max_speed", 10.0, "read: <max_linear_velocity> of the drive plugin"),
+        ("max_angular_velocity", 99, "", "max_yaw_rate", 2.0, "assumed: <max_angular_velocity> of the drive plugin, 99 rad/s, "
+         "is above the 50 rad/s that a robot's file may say, and is not used"),
+    ],
+)  # fmt: skip
+def test_a_speed_that_stands_for_no_limit_is_not_used_but_named(
+    tmp_path: Path, tag: str, told: float, velocity: str, key: str, value: float, says: str
+) -> None:
+    plugin = (
+        "<gazebo><plugin><left_joint>wheel_left_joint</left_joint><right_joint>wheel_right_joint</right_joint>"
+        f"<{tag}>{told}</{tag}></plugin></gazebo></robot>"
+    )
+    limit = f'<axis xyz="0 0 1"/><limit {velocity}/>'
+    found = import_urdf(changed(tmp_path, "burger.urdf", ("</robot>", plugin), ('<axis xyz="0 0 1"/>', limit)))
+    assert getattr(found.robot, key) == pytest.approx(value)
+    assert comments(found)[key].startswith(says)
+
+
+def test_wheels_of_different_radii_are_named_with_both(tmp_path: Path) -> None:
+    """Wherever their axle is: at one height, or with both on the floor; and where the file names them itself."""
+    text = (FIXTURES / "burger.urdf").read_text()
+    plain, plugin = changed(tmp_path, "burger.urdf").read_text(), text[text.index("<gazebo>") :]
+    says = "have different radii, 0.033 m (link wheel_left_link) and 0.02 m (link wheel_right_link)"
+    for height in (0.023, 0.010):
+        for start in (
+            plain.removesuffix("</robot>\n"),
+            plain.removesuffix("</robot>\n") + plugin.removesuffix("</robot>\n"),
+        ):
+            first, last = start.split('<link name="wheel_right_link">')
+            last = last.replace('radius="0.033"', 'radius="0.02"').replace("-0.080 0.023", f"-0.080 {height}")
+            path = tmp_path / "unlike.urdf"
+            path.write_text(f'{first}<link name="wheel_right_link">{last}</robot>')
+            with pytest.raises(InputError) as caught:
+                import_urdf(path)
+            assert says in str(caught.value)
+
+
+CONTROL = (
+    '<ros2_control name="all" type="system">'
+    '<joint name="{}"><command_interface name="velocity">{}</command_interface><state_interface name="velocity"/></joint>'
+    '<joint name="{}"><command_interface name="velocity"/></joint></ros2_control></robot>'
+)
+
+
+def test_ros2_control_names_the_driven_wheels_and_their_limit(tmp_path: Path) -> None:
+    """Of four wheels on two axles those that it drives by speed; the right one comes first in the file."""
+    most = '<param name="min">-9</param><param name="max">5</param>'
+    control = CONTROL.format("rear_right_wheel", most, "rear_left_wheel")
+    text = re.sub(r"<gazebo>.*</gazebo>", "", (FIXTURES / "husky.urdf").read_text(), flags=re.DOTALL)
+    path = tmp_path / "driven.urdf"
+    path.write_text(text.replace("</robot>", control))
+    found = import_urdf(path)
+    assert found.robot.footprint.bounds == pytest.approx((-0.239, -0.335, 0.751, 0.335), abs=1e-3)
+    assert (found.robot.max_wheel_speed, found.robot.max_speed) == (5.0, pytest.approx(5 * 0.1651))
+    assert comments(found)["max_wheel_speed"] == "read: the limit of joint rear_right_wheel in <ros2_control>, 5 rad/s"
+    for joint, limit, says in (
+        ("rear_wrong_wheel", most, "<ros2_control> drives joint 'rear_wrong_wheel', which there is not"),
+        (
+            "rear_right_wheel",
+            '<param name="max">-5</param>',
+            "max in <ros2_control> must be a number above 0, got '-5'",
+        ),
+        ("rear_right_wheel", '<param name="max">fast</param>', "must be a number above 0, got 'fast'"),
+        ("front_left_wheel", "", "front_left_wheel and rear_left_wheel are no two wheels on one axle"),
+    ):
+        path.write_text(text.replace("</robot>", CONTROL.format(joint, limit, "rear_left_wheel")))
+        with pytest.raises(InputError, match=re.escape(says)):
+            import_urdf(path)
+
+
+def test_a_wheel_that_is_a_little_askew_adds_no_corners(tmp_path: Path) -> None:
+    """Quarter turns are often written 1.57, which tilts a wheel by 0.8 mrad."""
+    straight, askew = (
+        import_urdf(changed(tmp_path, "burger.urdf", ("-1.5707963", turn))) for turn in ("-1.5707963", "-1.57")
+    )
+    assert len(askew.robot.footprint.corners) == len(straight.robot.footprint.corners) == 8
+    assert askew.robot.footprint.bounds == pytest.approx(straight.robot.footprint.bounds, abs=1e-4)
 
 
 def test_a_limit_below_any_robots_is_refused_and_not_replaced(tmp_path: Path) -> None:
@@ -222,6 +315,7 @@ def test_a_robot_that_turns_by_skidding_is_asked_for_its_axle() -> None:
         imported("husky.urdf")
     robot = imported("husky.urdf", left="rear_left_wheel", right="rear_right_wheel").robot
     assert robot.footprint.bounds == pytest.approx((-0.239, -0.335, 0.751, 0.335), abs=1e-3)
+    assert (robot.max_speed, robot.max_yaw_rate) == (1.0, 2.0), "as the plugin of all four wheels says"
 
 
 JOINT = '<joint name="{}" type="{}"><parent link="base_link"/><child link="{}"/><origin xyz="{}"/><axis xyz="0 0 1"/>{}</joint>'
@@ -440,13 +534,69 @@ def test_any_limits_of_the_joints_give_a_robot_that_reaches_what_it_promises(
 points = st.tuples(st.floats(-1, 1), st.floats(-1, 1))
 
 
+def most_outside(footprint: dict[str, Any], some: list[tuple[float, float]]) -> float:
+    """How far the outermost of some points lies outside a footprint as it stands in a robot's file [m]."""
+    x, y = np.array(some).T
+    if "radius" in footprint:
+        cx, cy = footprint.get("centre", (0.0, 0.0))
+        return float((np.hypot(x - cx, y - cy) - footprint["radius"]).max())
+    if "polygon" not in footprint:
+        (cx, cy), length, width = footprint.get("centre", (0.0, 0.0)), footprint["length"], footprint["width"]
+        return float(np.maximum(abs(x - cx) - length / 2, abs(y - cy) - width / 2).max())
+    corners = np.array(footprint["polygon"])
+    edges = np.roll(corners, -1, axis=0) - corners
+    outwards = np.column_stack([edges[:, 1], -edges[:, 0]]) / np.hypot(*edges.T)[:, None]
+    return float(((np.array(some)[:, None] - corners) * outwards).sum(axis=2).max())
+
+
 @given(st.lists(points, min_size=3, max_size=60), st.sampled_from(["auto", "disc", "rectangle", "polygon"]))
 def test_a_footprint_holds_every_point_that_it_was_made_around(some: list[tuple[float, float]], kind: str) -> None:
     ring = [(0.3 * math.cos(k), 0.2 * math.sin(k)) for k in range(7)]
     foot = footprint_around(some + ring, kind)
-    assert min(foot.depth(x, y) for x, y in some + ring) >= -3e-5
+    assert most_outside(written(foot), some + ring) <= 1e-8
     assert len(foot.corners) <= 12
     foot.require_convex()
+
+
+@given(
+    st.tuples(st.floats(0.05, 0.5), st.floats(0.05, 0.5)), st.floats(-0.05, 0.05), st.floats(-0.05, 0.05), st.floats(-3, 3),
+    st.sampled_from(["auto", "disc", "rectangle", "polygon"]),
+)  # fmt: skip
+def test_no_corner_of_a_turned_box_is_outside_of_the_footprint(
+    size: tuple[float, float], x: float, y: float, yaw: float, kind: str
+) -> None:
+    """A few corners of any digits: a corner that is rounded to the nearest is too far inside for half of them."""
+    box = [(x + a * math.cos(yaw) - b * math.sin(yaw), y + a * math.sin(yaw) + b * math.cos(yaw))
+           for a in (-size[0], size[0]) for b in (-size[1], size[1])]  # fmt: skip
+    foot = footprint_around(box, kind)
+    assert most_outside(written(foot), box) <= 1e-8
+    xmin, ymin, xmax, ymax = foot.bounds
+    reach = max(math.hypot(*corner) for corner in box)
+    assert max(-xmin, -ymin, xmax, ymax) <= reach + 3e-5, "outwards, but by little"
+
+
+@given(st.lists(st.tuples(st.floats(-1, 1), st.floats(0, 1)), min_size=3, max_size=40), st.floats(0.2, 0.8))
+def test_a_robot_with_two_equal_sides_has_a_footprint_with_two_equal_sides(
+    some: list[tuple[float, float]], at: float
+) -> None:
+    ring = [(at + 0.4 * math.cos(k / 30 * math.pi), 0.4 * math.sin(k / 30 * math.pi)) for k in range(31)]
+    both = [(x, side * y) for x, y in some + ring for side in (-1, 1)]
+    foot = footprint_around(both, "polygon")
+    assert most_outside(written(foot), both) <= 1e-8
+    assert len(foot.corners) <= 12
+    for x, y in foot.corners:
+        assert min(math.dist((x, -y), corner) for corner in foot.corners) <= 1e-4
+
+
+def test_a_cylinder_is_as_long_and_as_wide_as_its_diameter(tmp_path: Path) -> None:
+    path = changed(
+        tmp_path, "burger.urdf", ('<box size="0.138 0.140 0.143"/>', '<cylinder radius="0.2" length="0.143"/>')
+    )
+    for kind in ("rectangle", "polygon"):
+        bounds = import_urdf(path, footprint=kind).robot.footprint.bounds
+        assert (bounds[2] - bounds[0], bounds[3] - bounds[1]) == pytest.approx(
+            (0.4, 0.4), rel=0.06 if kind == "polygon" else 1e-4
+        )
 
 
 @given(st.integers(13, 90), st.floats(0.3, 1.0))

@@ -13,9 +13,7 @@ from antdrive.sim.campaigns.campaign import make_campaign
 from antdrive.sim.campaigns.challenge import by_map, campaign_data, lines, reference_times, score, unpacked
 from antdrive.sim.campaigns.expanding import expand
 from antdrive.worlds.errors import InputError
-from tests.conftest import SHARED
-
-ARCHIVE = SHARED / "barn" / "barn50.tar.xz"
+from tools.shared_data import BARN
 
 
 @pytest.mark.parametrize(
@@ -59,9 +57,9 @@ def test_a_folder_without_worlds_is_refused(tmp_path: Path) -> None:
         unpacked(tmp_path, tmp_path / "out")
 
 
-@pytest.mark.skipif(not ARCHIVE.exists(), reason="needs BARN's worlds in ../shared/data")
+@pytest.mark.skipif(not BARN.exists(), reason="needs BARN's worlds (docs/how-to/data.md)")
 def test_the_worlds_of_the_archive_become_a_campaign(tmp_path: Path) -> None:
-    folder = unpacked(ARCHIVE.parent, tmp_path)
+    folder = unpacked(BARN.parent, tmp_path)
     settings = {"noise": 1.0, "map": "none", "localisation": "matching", "odometry": 1.0}
     data = campaign_data(folder, 2, "astar", "jackal", settings)
     assert len(data["worlds"]) == 50
@@ -76,7 +74,7 @@ def test_the_worlds_of_the_archive_become_a_campaign(tmp_path: Path) -> None:
     times = reference_times(folder)
     assert min(times.values()) == pytest.approx(5.14, abs=0.01)
     assert max(times.values()) == pytest.approx(6.84, abs=0.01)
-    with tarfile.open(ARCHIVE) as archive:
+    with tarfile.open(BARN) as archive:
         assert len(times) == sum(name.endswith(".npy") for name in archive.getnames())
 
 

@@ -1,4 +1,4 @@
-"""What docs/how-to/campaigns.md shows is right: the file, the columns, the line that reads the table."""
+"""What the pages about campaigns show is right: the file, the columns, the line that reads the table, the manifest."""
 
 from __future__ import annotations
 
@@ -10,10 +10,13 @@ import pytest
 from antdrive.sim.campaigns import make_campaign, sweep
 from antdrive.sim.campaigns.campaign import CampaignFile
 from antdrive.sim.campaigns.rows import GRID, RESULT
+from antdrive.sim.campaigns.store import read_manifest
 from antdrive.sim.log.metrics import METRICS
 from antdrive.worlds.files.document import parse_document
 
-TEXT = (Path(__file__).parent.parent.parent.parent / "docs" / "how-to" / "campaigns.md").read_text()
+DOCS = Path(__file__).parents[3] / "docs"
+TEXT = (DOCS / "how-to" / "campaigns.md").read_text()
+FOLDER = (DOCS / "reference" / "formats" / "campaign-folder.md").read_text()
 
 
 def test_the_file_that_the_page_shows_has_every_key_and_is_right() -> None:
@@ -25,7 +28,13 @@ def test_the_file_that_the_page_shows_has_every_key_and_is_right() -> None:
 
 def test_the_page_names_every_column() -> None:
     names = {*GRID, *RESULT} - set(METRICS) | {"plan_s", "drive_wall_s"}
-    assert [name for name in names if f"`{name}`" not in TEXT and not name.startswith("version.")] == []
+    assert [name for name in names if f"`{name}`" not in FOLDER and not name.startswith("version.")] == []
+
+
+def test_the_page_names_every_key_of_the_manifest(tmp_path: Path) -> None:
+    sweep({"worlds": "empty", "planners": "astar"}, tmp_path / "out", jobs=0)
+    table = FOLDER.partition("`manifest.json` has these keys:")[2].partition("\n## ")[0]
+    assert re.findall(r"^\| `(\w+)` \|", table, flags=re.MULTILINE) == list(read_manifest(tmp_path / "out"))
 
 
 def test_the_line_for_pandas_reads_the_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -54,6 +54,22 @@ def test_places_in_the_map_mean_the_same_as_those_in_the_world(antdrive: Call, o
     assert "goal in its map    [9.4, 1.4]" in shown
 
 
+def test_answers_name_places_in_both_frames(antdrive: Call, refused: Refused, office: Path) -> None:
+    posts = "obstacles:\n  - {x: 2, y: 0.7, radius: 0.65}\n  - {x: 2, y: 2.3, radius: 0.65}\n"
+    office.write_text(OFFICE + posts + "frame: [10, -2, 1.5707963267948966]\n")
+    code, out, _ = antdrive("plan", office, "-p", "astar", "--goal", "8.5,1.4", "--frame", "map")
+    assert code == 1
+    assert "at (2.00, 1.50) in the world, (8.50, 0.00) in its map, between obstacles[0]" in out
+    said = refused("run", office, "--start", "7.6,-1.9,0", "--frame", "map")
+    assert "start: turtlebot at (0.1, 2.4) in the world, (7.6, -1.9) in its map" in said
+    office.write_text(OFFICE + "frame: [10, -2, 1.5707963267948966]\n")
+    result = json.loads(antdrive("run", office, "-p", "astar", "--no-figures", "--json", "--out", "r")[1])
+    assert (result["frame"], result["task"]["goal"]) == ([10.0, -2.0, 1.5707963267948966], [3.4, 0.6])
+    assert antdrive("verify", "r")[0] == 0
+    Path("r/result.json").write_text(json.dumps({**result, "frame": [10, -2, 1.5]}))
+    assert "result.json: frame: differs from the log" in antdrive("verify", "r")[1]
+
+
 def test_each_run_of_a_comparison_says_how_to_repeat_it(antdrive: Call, office: Path) -> None:
     code, _, _ = antdrive(
         "compare", office, "-p", "astar", "-p", "tangent", "--task", "dock", "--start", "0.6,1,0", "--frame", "map",

@@ -1,5 +1,6 @@
 """The parts of a control period, without physics."""
 
+import itertools
 import math
 from types import SimpleNamespace
 from typing import Any
@@ -10,12 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from antdrive.planners import Query, load_planner, smooth
-from antdrive.robots import PurePursuit, PursuitState, RobotSpec, Twist, load_robot
-from antdrive.sim import Outcome, Perception
+from antdrive.robots import LIMITERS, AvoidanceState, PurePursuit, PursuitState, RobotSpec, Twist, load_robot
+from antdrive.sim import Outcome, Perception, Scenario
 from antdrive.sim.driving.blocking import blocked_cells, covered_discs
-from antdrive.sim.driving.driver import STUCK_PROGRESS, STUCK_TIME, Driver, StuckClock, _brake
+from antdrive.sim.driving.driver import BLIND_SHARE, STUCK_PROGRESS, STUCK_TIME, Driver, StuckClock, _brake
 from antdrive.sim.driving.perception import Predictor
 from antdrive.sim.physics.engine import State
+from antdrive.sim.unknown import exploration_of
 from antdrive.worlds import Cruising, Disc, Grid, Keyframed, Task, Trajectories, World, rasterise
 
 HALL = World("hall", (0.0, 0.0, 9.0, 6.0), (Disc(4.5, 4.5, 0.5),))
@@ -99,6 +101,48 @@ def test_standing_at_the_routes_end_ends_the_drive_by_the_distance_to_the_goal(t
         assert ending is not None
         assert ending.outcome is outcome
         assert ("0.300 m from the goal" in ending.reason) == (outcome is Outcome.STUCK)
+
+
+def test_a_robot_that_avoids_a_mover_at_the_goal_stops_there_even_where_sight_holds_its_speed(
+    turtlebot: RobotSpec,
+) -> None:
+    """Local avoidance goes on for ever, and slowly, because the robot sees too little there."""
+    alone = driver(turtlebot)
+    calm: Any = SimpleNamespace(
+        prediction_times=np.arange(3.0), step=1.0, avoid=lambda *_, **__: (Twist(0.5, 0.0), True, AvoidanceState())
+    )
+    caution: Any = SimpleNamespace(limit=lambda *_: (Twist(0.005, 0.0), True))
+    nobody = Predictor(Trajectories.of(HALL, TASK.start[:2]), Perception(), 60)
+    robot = Driver(PurePursuit(), alone.tracked, TASK, turtlebot, 60, calm, nobody, None, caution)
+    at_goal = (*TASK.goal, 0.0)
+    robot.pursuit = PursuitState(arc=robot.tracked.length - 0.5)
+    endings = [robot.decide(tick, at_goal, State(*at_goal, 0.0, 0.0)) for tick in range(2)]
+    assert robot.pursuit.limiter != LIMITERS.index("avoid")
+    assert [ending and ending.outcome for ending in endings] == [None, Outcome.SUCCEEDED]
+
+
+def test_a_robot_without_a_map_backs_off_slowly_where_its_lidar_does_not_look(
+    jackal: RobotSpec, turtlebot: RobotSpec
+) -> None:
+    """`jackal` sees 270 degrees, `turtlebot` all round. A robot that is told of movers knows what is behind it."""
+    told = Predictor(Trajectories.of(HALL, TASK.start[:2]), Perception(), 60)
+    for robot, perception in itertools.product((jackal, turtlebot), (Perception(kind="lidar"), Perception())):
+        planner = load_planner("astar")
+        unknown = Scenario(
+            task=TASK, planner=planner, robot=robot, map="none", perception=perception, planner_name="astar"
+        )
+        asked: list[float] = []
+
+        def avoid(*_: Any, backwards: float, asked: list[float] = asked, **__: Any) -> Any:
+            asked.append(backwards)
+            return Twist(0.0, 0.0), False, AvoidanceState()
+
+        noted: Any = SimpleNamespace(prediction_times=np.arange(3.0), step=1.0, avoid=avoid)
+        path, monitor = driver(robot).tracked, exploration_of(unknown)
+        still = State(*TASK.start, 0.0, 0.0)
+        Driver(PurePursuit(), path, TASK, robot, 60, noted, told, monitor).decide(0, TASK.start, still)
+        slow = robot is jackal and perception.kind == "lidar"
+        assert asked == [BLIND_SHARE * robot.max_speed if slow else math.inf]
 
 
 class OneReplan:

@@ -12,8 +12,8 @@ from antdrive.robots import RobotSpec, Twist
 from antdrive.sim import Outcome, Rollout, Run, Scenario, run
 from antdrive.sim.driving import rescanning
 from antdrive.sim.driving.caution import Caution
+from antdrive.sim.driving.own_map import forgetting_ticks
 from antdrive.sim.driving.replay import replay
-from antdrive.sim.driving.rescanning import forgetting_ticks
 from antdrive.sim.driving.survey import Senses, Survey
 from antdrive.sim.falsify.rebuild import rebuilt
 from antdrive.sim.log.record import ReplanRecord
@@ -190,7 +190,7 @@ def test_a_drive_that_forgot_its_map_can_be_replayed(jackal: RobotSpec, monkeypa
     own = cells_of(own_map(done.rollout))
     rounded = len(own) // 50  # a log has millimetres
     assert len(cells_of(forgot.map) ^ own) <= rounded < len(cells_of(kept.map) ^ own)
-    monkeypatch.setattr(rescanning, "PATIENCE", 10**6)  # as if it had forgotten nothing
+    monkeypatch.setattr("antdrive.sim.driving.own_map.PATIENCE", 10**6)  # as if it had forgotten nothing
     (problem,) = replay(done.rollout).problems
     assert "estimate" in problem
 

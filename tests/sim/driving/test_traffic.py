@@ -25,9 +25,8 @@ from antdrive.worlds import (
     import_dynabarn,
     rasterise,
 )
-from tests.conftest import SHARED
+from tools.shared_data import DYNABARN
 
-DYNABARN = SHARED / "dynabarn" / "dynabarn10.json"
 HALL = World("hall", (0.0, 0.0, 16.0, 12.0))
 TASK = Task(HALL, (1.0, 6.0, 0.0), (15.0, 6.0), cell=0.25)
 GRID = rasterise(HALL, 0.25, 0.25)
@@ -194,7 +193,7 @@ def test_a_robot_that_knows_the_motions_or_may_not_go_far_round_goes_through(
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not DYNABARN.exists(), reason="needs DynaBARN's worlds in ../shared/data")
+@pytest.mark.skipif(not DYNABARN.exists(), reason="needs DynaBARN's worlds (docs/how-to/data.md)")
 def test_nearly_all_drives_in_the_hard_worlds_of_dynabarn_arrive(jackal: RobotSpec) -> None:
     """Moments that benchmarks.dynamic does not use. A mover that jumps onto the robot ends one of the six drives."""
     hard = [task for task in import_dynabarn(DYNABARN) if int(task.world.name.split("-")[1]) >= 40]

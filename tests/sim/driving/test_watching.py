@@ -10,10 +10,14 @@ import pytest
 from antdrive.planners import load_planner
 from antdrive.robots import RobotSpec
 from antdrive.sim import Outcome, Perception, Rollout, Run, Scenario, run
+from antdrive.sim.driving.replay import replay
 from antdrive.sim.driving.watching import TrackedPredictor, Watch
 from antdrive.sim.falsify.rebuild import rebuilt
 from antdrive.sim.log.certificate import certify
+from antdrive.sim.log.metrics import measure
 from antdrive.sim.log.record import PerceptionRecord
+from antdrive.sim.log.scans import ranges_of
+from antdrive.sim.log.sights import passed
 from antdrive.sim.sensing import KnownGround, Scanner
 from antdrive.sim.unknown import exploration_of
 from antdrive.worlds import Disc, Keyframed, Task, World
@@ -87,7 +91,7 @@ def test_a_mover_that_no_beam_meets_changes_nothing(jackal: RobotSpec, log: Roll
     other = run(scenario(jackal, hidden)).rollout
     assert other is not None
     assert other.movers.shape[1] == 2
-    for name in ("pose", "twist", "command", "limiter", "tracks"):
+    for name in ("pose", "twist", "command", "limiter", "scans", "tracks"):
         assert np.array_equal(getattr(other, name), getattr(log, name)), name
     seen = dataclasses.replace(HIDDEN, keyframes=tuple((t, x, y + 1.2) for t, x, y in HIDDEN.keyframes))
     outside = dataclasses.replace(TASK, world=dataclasses.replace(HALL, movers=(CROSSING, seen)))
@@ -152,3 +156,42 @@ def test_a_lidar_is_needed_and_a_pose_that_fits_the_map(jackal: RobotSpec) -> No
     assert caught.value.key == "sees"
     with pytest.raises(FieldError, match="localise by fixes or true"):
         scenario(jackal, localisation="odometry")
+
+
+def test_the_scans_of_a_robot_with_a_map_are_in_its_log(log: Rollout, jackal: RobotSpec) -> None:
+    assert jackal.lidar is not None
+    assert log.scans.shape[1] == jackal.lidar.beams
+    assert (len(log.scans) - 1) / log.t[log.scan_rows[-1]] == pytest.approx(jackal.lidar.rate, rel=0.01)
+    k, rows = 30, log.scan_rows
+    exact = dataclasses.replace(jackal.lidar, resolution=0.0)
+    radii = np.array([mover.radius for mover in log.record.world.movers])
+    expected = Scanner.of(exact, log.record.world).scan(tuple(log.pose[rows[k]].tolist()), log.movers[rows[k]], radii)
+    assert np.abs(ranges_of(log.scans[k]) - expected).max() < 0.0056  # half the resolution, and rounding
+    assert np.isnan(measure(log)["explored_m2"])  # it had a map
+    assert {sight.obstacle for sight in passed(log) if sight.mover} == {0}
+
+
+def test_replays_take_the_scans_of_a_robot_with_a_map_again(log: Rollout) -> None:
+    assert replay(log).problems == ()
+    scans = log.scans.copy()
+    scans[40, 300] += 10
+    (problem,) = replay(dataclasses.replace(log, scans=scans)).problems
+    assert problem == (
+        "replay: scans are not what the lidar measures from the logged poses, "
+        f"from t = {log.t[log.scan_rows[40]]:.3f} s"
+    )
+    fewer = dataclasses.replace(log, scans=np.delete(log.scans, 40, axis=0), scan_rows=np.delete(log.scan_rows, 40))
+    assert replay(fewer).problems == (problem,)
+    none = dataclasses.replace(log, scans=log.scans[:0], scan_rows=log.scan_rows[:0])  # as older logs are
+    assert replay(none).problems == ()
+    told = dataclasses.replace(log.record, perception=PerceptionRecord(kind="velocities", range_m=None))
+    forged = dataclasses.replace(log, record=told, tracks=log.tracks[:0])
+    assert "scans: must be empty, since the robot did not use its lidar" in certify(forged).problems
+
+
+def test_a_replay_draws_the_noise_of_scans_again(jackal: RobotSpec) -> None:
+    noisy = run(scenario(jackal, noise=1.0, time_limit=0.7)).rollout
+    assert noisy is not None
+    assert len(noisy.scans) > 30
+    assert replay(noisy).problems == ()
+    assert "scans" in replay(dataclasses.replace(noisy, scans=noisy.scans + np.uint16(2))).problems[0]

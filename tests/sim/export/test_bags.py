@@ -13,14 +13,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
 from antdrive.sim.export.exporting import export
 from antdrive.sim.export.ground import free_cells
 from antdrive.sim.export.libraries import message_types
+from antdrive.sim.export.scans import LEFT_OUT, TAKEN_AGAIN
 from antdrive.sim.log.record import ReplanRecord
 from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.sensing import Scanner
 from antdrive.worlds.files.world_file import load_task
 from antdrive.worlds.grid import rasterise
 from antdrive.worlds.world import Disc, World
@@ -231,6 +234,29 @@ def test_the_robot_is_described_with_its_footprint(said: list[Said], log: Rollou
     assert children == {"left_wheel", "right_wheel"}
 
 
+def test_a_lidar_that_the_drive_did_not_use_measures_at_export(folder: Path, said: list[Said], log: Rollout) -> None:
+    lidar, record = log.record.robot.lidar, log.record
+    assert lidar is not None
+    scans, rows = of(said, "/scan"), range(0, len(log.t), round(record.physics_hz / lidar.rate))
+    assert [entry.at for entry in scans] == [round(log.t[row] * 1e9) for row in rows]
+    scanner, radii = Scanner.of(lidar, record.world), np.array([mover.radius for mover in record.world.movers])
+    for entry, row in zip(scans, rows, strict=True):
+        expected = scanner.scan(tuple(log.pose[row].tolist()), log.movers[row], radii)
+        assert np.allclose(entry.message.ranges, expected, rtol=1e-6)
+    with (folder / "drive.mcap").open("rb") as file:
+        (note,) = mcap_reader.make_reader(file).iter_metadata()
+    assert (note.name, note.metadata) == ("antdrive", {"scans": TAKEN_AGAIN})
+    about = yaml.safe_load((folder / "bag" / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    assert about["custom_data"] == {"antdrive_scans": TAKEN_AGAIN}
+
+
+def test_scans_are_taken_at_export_only_if_asked_for(folder: Path) -> None:
+    export(folder / "rollout.npz", "mcap", folder / "none.mcap", scans=False)
+    assert "/scan" not in {entry.topic for entry in by_mcap(folder / "none.mcap")}
+    with (folder / "none.mcap").open("rb") as file:
+        assert [note.metadata for note in mcap_reader.make_reader(file).iter_metadata()] == [{"scans": LEFT_OUT}]
+
+
 def test_late_subscribers_get_what_is_sent_once(folder: Path) -> None:
     once = {"/tf_static", "/map", "/robot_description", "/obstacles", "/movers", "/plan"}
     for path in (folder / "bag", folder / "drive.mcap"):
@@ -268,7 +294,7 @@ def test_the_layout_shows_topics_that_exist(folder: Path, said: list[Said]) -> N
         value = of(said, path.split(".")[0])[0].message
         for name in path.split(".")[1:]:
             value = getattr(value, name)
-    assert set(panels["3D!drive"]["topics"]) - {"/scan"} <= topics
+    assert set(panels["3D!drive"]["topics"]) <= topics
 
 
 #: The keys of each panel's configuration, after the types in Foxglove's last open release and in Lichtblick.

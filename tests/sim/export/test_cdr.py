@@ -15,6 +15,7 @@ from antdrive.robots.lidar import Lidar
 from antdrive.sim.export import samples
 from antdrive.sim.export.cdr import CdrLayout
 from antdrive.sim.export.libraries import message_types
+from antdrive.sim.export.scans import Scans
 from antdrive.sim.export.topics import Topic
 
 pytest.importorskip("rosbags", reason="rosbags is not installed")
@@ -111,7 +112,7 @@ def log_with_scans(beams: int, field_of_view: float) -> Any:
 @pytest.mark.parametrize(("beams", "around", "step"), [(3, math.pi, math.pi / 2), (4, 2 * math.pi, math.pi / 2)])
 def test_scans(beams: int, around: float, step: float) -> None:
     log = log_with_scans(beams, around)
-    (topic,) = samples.scans(log)
+    (topic,) = samples.scan_topics(log, Scans.of(log))
     ranges = (log.scans * 1e-3).astype(np.float32)
     ranges[0, :2] = np.inf, -np.inf  # REP 117: nothing in range, too near to measure
     expected = [
@@ -136,9 +137,9 @@ def test_scans(beams: int, around: float, step: float) -> None:
 def test_a_log_without_scans_has_no_topic_for_them() -> None:
     log = log_with_scans(3, math.pi)
     log.scans = np.empty((0, 0), dtype=np.uint16)
-    assert samples.scans(log) == []
+    assert samples.scan_topics(log, Scans.of(log, again=False)) == []
     log.record.robot.lidar = None
-    assert samples.scans(log) == []
+    assert samples.scan_topics(log, Scans.of(log)) == []
 
 
 def test_a_number_out_of_place_would_be_seen() -> None:

@@ -36,3 +36,8 @@ def test_the_body_stands_where_the_footprint_does(
         assert [float(v) for v in body.attrib["size"].split()[:2]] == pytest.approx([0.4, 0.4])
     else:
         assert body.attrib[size[0]] == size[1]
+
+
+def test_any_name_of_a_robot_can_be_read_again(turtlebot: RobotSpec) -> None:
+    name = 'a <robot> & "another"\n\tone'
+    assert ElementTree.fromstring(description(dataclasses.replace(turtlebot, name=name))).get("name") == name

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from antdrive.sim.export.exporting import export
+from antdrive.sim.export.scans import LOGGED, Scans
 from antdrive.sim.log.rollout import Rollout
 from tests.sim.view.scanned import scanned
 
@@ -71,6 +72,19 @@ def test_scans_end_on_cylinders_and_walls(log: Rollout, said: list[tuple[str, in
         base = moving[at].transform
         assert off_surfaces(log, placed(base, placed(fixed["base_scan"].transform, seen))) < 2e-3
         assert off_surfaces(log, placed(base, seen)) > 0.03  # without the lidar's own place on the robot
+
+
+def test_scans_taken_at_export_are_those_that_the_drive_would_have_taken(
+    log: Rollout, said: Any, tmp_path: Path
+) -> None:
+    mapped = dataclasses.replace(log.record, sensing=None)
+    assert Scans.of(dataclasses.replace(log, record=mapped)).source == LOGGED
+    bare = dataclasses.replace(log, record=mapped, scans=log.scans[:0], scan_rows=log.scan_rows[:0])
+    taken, logged = ([(at, m.ranges) for name, at, m in s if name == "/scan"] for s in (read(bare, tmp_path), said))
+    assert [at for at, _ in taken] == [at for at, _ in logged]
+    again, before = (np.array([ranges for _, ranges in found]) for found in (taken, logged))
+    assert np.array_equal(np.isinf(again), np.isinf(before))
+    assert np.nanmax(np.abs(np.subtract(again, before, where=np.isfinite(before), out=np.zeros_like(again)))) < 0.00051
 
 
 def middles(grid: Any, value: int) -> Any:

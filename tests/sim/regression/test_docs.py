@@ -14,6 +14,7 @@ from antdrive.sim.regression.suite import ScenarioEntry, load_suite, suite_schem
 
 ROOT = Path(__file__).parents[3]
 PAGE = (ROOT / "docs" / "how-to" / "regression-tests.md").read_text()
+REFERENCE = ROOT / "docs" / "reference"
 
 
 def block(language: str) -> str:
@@ -22,8 +23,9 @@ def block(language: str) -> str:
 
 
 def test_the_tolerances_are_those_of_the_table_of_metrics() -> None:
+    page = (REFERENCE / "regression.md").read_text()
     for name, metric in METRICS.items():
-        row = re.search(rf"^\| `{name}` \| (\w+) \| (.*) \|$", PAGE, flags=re.MULTILINE)
+        row = re.search(rf"^\| `{name}` \| (\w+) \| (.*) \|$", page, flags=re.MULTILINE)
         if metric.tolerance is None:
             assert row is None
             continue
@@ -34,7 +36,7 @@ def test_the_tolerances_are_those_of_the_table_of_metrics() -> None:
 
 
 def test_every_key_of_a_suite_is_explained() -> None:
-    table = PAGE.split("| key | meaning |")[1].split("\n\n")[0]
+    table = (REFERENCE / "formats" / "suite.md").read_text().split("| key | meaning |")[1].split("\n\n")[0]
     assert {key for key in ScenarioEntry.model_fields if f"`{key}`" not in table} == {"note"}
     properties = suite_schema()["$defs"]["ScenarioEntry"]["properties"]
     assert all(entry.get("description") for entry in properties.values())

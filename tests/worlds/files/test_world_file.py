@@ -406,3 +406,22 @@ def test_how_a_world_lies_in_its_map_is_kept(tmp_path):
     save_task(task, tmp_path / "w.yaml")
     assert load_task(tmp_path / "w.yaml") == task
     assert "frame" not in task_to_dict(TASK)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "what"),
+    [
+        ("w.sdf", "<sdf/>", "is no world file; make one of it"),
+        ("w.world", "<sdf/>", "is no world file; make one of it"),
+        ("w.map", "type octile", "is no world file; make one of it"),
+        ("w.yaml", "image: w.pgm\nresolution: 0.1\norigin: [0, 0, 0]\n", "is a map of map_server; make a world of it"),
+    ],
+)
+def test_a_world_of_another_program_is_named_with_what_imports_it(
+    tmp_path: Path, name: str, text: str, what: str
+) -> None:
+    path = tmp_path / name
+    path.write_text(text)
+    with pytest.raises(InputError) as caught:
+        load_task(path)
+    assert str(caught.value) == f"{path}: {what} with antdrive worlds import {path}"

@@ -9,14 +9,13 @@ import pytest
 
 from antdrive.worlds import import_barn, point_clearance, rasterise
 from tests.worlds.oracles import passable
-
-BARN = Path(__file__).parents[4] / "shared" / "data" / "barn" / "barn50.tar.xz"
+from tools.shared_data import BARN
 
 
 @pytest.fixture(scope="module")
 def barn_worlds(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     if not BARN.exists():
-        pytest.skip(f"the BARN worlds are not there ({BARN.name})")
+        pytest.skip("needs BARN's worlds (docs/how-to/data.md)")
     folder = tmp_path_factory.mktemp("barn")
     with tarfile.open(BARN) as archive:
         archive.extractall(folder, filter="data")

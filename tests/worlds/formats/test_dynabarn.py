@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from antdrive.worlds import InputError, Trajectories, import_dynabarn, load_task, save_task
+from tools.shared_data import DYNABARN
 
-DYNABARN = Path(__file__).parents[4] / "shared" / "data" / "dynabarn" / "dynabarn10.json"
 MOVER = {"radius": 0.5, "length": 1.0, "period": 8.0, "loop": "teleport",
          "keyframes_t_x_y": [[0.0, 5.0, 1.0], [8.0, 5.0, 9.0]]}  # fmt: skip
 ONE = {"name": "one", "bounds": [-12, -12, 12, 12], "start": [11, 0, 3.14], "goal": [-9, 0], "goal_tolerance": 1.0,
@@ -22,7 +22,7 @@ def written(folder: Path, content) -> Path:
     return path
 
 
-@pytest.mark.skipif(not DYNABARN.exists(), reason="needs ../shared/data/dynabarn")
+@pytest.mark.skipif(not DYNABARN.exists(), reason="needs DynaBARN's worlds (docs/how-to/data.md)")
 def test_the_ten_worlds_follow_the_protocol(tmp_path):
     tasks = import_dynabarn(DYNABARN)
     assert [task.world.name for task in tasks] == [f"dynabarn-{i:02}" for i in (0, 4, 8, 12, 20, 24, 28, 40, 44, 48)]
@@ -44,7 +44,7 @@ def test_the_ten_worlds_follow_the_protocol(tmp_path):
             np.testing.assert_allclose(moving.positions(when)[calm, k], expected[calm], atol=1e-9)
 
 
-@pytest.mark.skipif(not DYNABARN.exists(), reason="needs ../shared/data/dynabarn")
+@pytest.mark.skipif(not DYNABARN.exists(), reason="needs DynaBARN's worlds (docs/how-to/data.md)")
 def test_speeds_are_those_of_their_class():
     for task in import_dynabarn(DYNABARN):
         number = int(task.world.name[-2:])

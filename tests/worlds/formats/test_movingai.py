@@ -20,8 +20,8 @@ from antdrive.worlds import (
     import_movingai_task,
     rasterise,
 )
+from tools.shared_data import MOVINGAI
 
-ARCHIVE = Path(__file__).parents[4] / "shared" / "data" / "movingai" / "movingai_dev.tar.xz"
 MAPS = ("AR0011SR", "Paris_1_256", "maze512-8-0", "random512-25-0")
 SEARCHES = ("astar", "dijkstra", "dstar-lite", "dstar")
 
@@ -145,10 +145,10 @@ def test_a_movingai_task_takes_a_problems_ends_at_the_centres_of_their_cells(tmp
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    if not ARCHIVE.exists():
-        pytest.skip("the MovingAI maps are not in ../shared/data")
+    if not MOVINGAI.exists():
+        pytest.skip("needs the MovingAI maps (docs/how-to/data.md)")
     path = tmp_path_factory.mktemp("movingai")
-    with tarfile.open(ARCHIVE) as tar:
+    with tarfile.open(MOVINGAI) as tar:
         tar.extractall(path, filter="data")
     return path
 

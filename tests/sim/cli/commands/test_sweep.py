@@ -51,6 +51,9 @@ def test_a_campaign_is_run_once_and_then_goes_on_with_what_is_new(antdrive: Call
     )
     assert lines[-1] == "  charts, intervals and all runs: antdrive report out -o out/report.html"
     made = canonical_bytes("out")
+    code, out, _ = antdrive("sweep", campaign, "-o", "out", "--report", "all.md")
+    assert (code, out.splitlines()[-1]) == (0, "  report   all.md")
+    assert "| astar | 100.0 | 20.7 to 100.0 | 1 | 1 | 1 |" in Path("all.md").read_text()
     code, out, _ = antdrive("sweep", campaign, "-o", "out", "--seeds", "2", "--dry-run", "--json")
     assert (json.loads(out)["runs"], json.loads(out)["missing"]) == (6, 3)
     assert canonical_bytes("out") == made
@@ -149,6 +152,8 @@ def test_a_folder_with_other_files_is_left_alone(refused: Refused, campaign: Pat
         (["campaign.yaml", "-o", "out", "--dask", "local:2", "-j", "2"], "--jobs: has no effect with --dask"),
         (["campaign.yaml", "-o", "out", "--again", "x"], "--again x: no such planner or outcome; choose from astar"),
         (["campaign.yaml", "-o", "out", "--run-limit", "0"], "run_limit: must be greater than 0, got 0"),
+        (["campaign.yaml", "-o", "out", "--report", "all.doc"], "all.doc"),
+        (["campaign.yaml", "-o", "out", "--report", "a.md", "--dry-run"], "--report: has no effect with --dry-run"),
         (["nowhere.yaml", "-o", "out"], "nowhere.yaml: no such file"),
     ],
 )

@@ -101,6 +101,16 @@ def test_movers_and_their_tracks_are_drawn(made_up_drive, planned, tmp_path):
     assert near(picture, amber) > near(plain, amber) + 100
 
 
+def test_the_legend_says_when_movers_are_where_they_are_drawn(made_up_drive, planned):
+    drive = made_up_drive(movers=1)
+    task, grid, plan = planned
+    mover = Keyframed(radius=0.2, keyframes=((0.0, 0.5, 3.0), (5.0, 2.5, 3.5)))
+    moving = dataclasses.replace(task, world=dataclasses.replace(task.world, movers=(mover,)))
+    for figure, at in ((overview(drive), drive.t[-1]), (plan_figure(moving, grid, plan, ROBOT), 0.0)):
+        named = [text.get_text() for text in panels(figure)["map"].get_legend().get_texts()]
+        assert f"moving obstacle, at {at:.1f} s" in named
+
+
 def test_a_rectangular_robot_and_planned_cells_are_drawn(made_up_drive, tmp_path):
     drive = made_up_drive(square=True)
     overview(drive, tmp_path / "square.png", cells=np.array([(0.5, 1.5), (0.75, 1.5)]), dpi=60)

@@ -7,7 +7,7 @@ from PIL import Image
 
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import ComponentRecord
-from antdrive.sim.view.film.compare import Mark, SplitScreen, compare_film
+from antdrive.sim.view.film.compare import FULL, LEAST_TILE, Mark, SplitScreen, compare_film, fitting_size
 from antdrive.sim.view.style import VERDICTS, planner_style
 from antdrive.worlds import InputError
 
@@ -94,6 +94,30 @@ def test_oblique_views_of_a_wide_world_stand_above_each_other(drives):
     assert corners("oblique", 1.0) == [(0, 0), (320, 0)]
     assert corners("oblique", 0.5) == [(0, 0), (0, 180)]
     assert corners("top", 0.5) == [(0, 0), (320, 0)]
+
+
+@pytest.mark.parametrize(("high", "count"), [(0.5, 2), (3.0, 2), (0.5, 5)])
+def test_a_film_from_above_has_no_empty_ground_beside_the_worlds(drives, high, count):
+    logs = [replace(log, record=replace(log.record, task=_task(log, high))) for log in (drives * 3)[:count]]
+    size = fitting_size(logs, "top")
+    assert all(160 <= side <= most and side % 2 == 0 for side, most in zip(size, FULL, strict=True))
+    with SplitScreen(logs, "top", size) as screen:
+        shot = screen._tiles[0].shot
+        assert len(screen._corners) == count
+    x0, y0, x1, y1 = logs[0].record.task.world.bounds
+    seen = np.ptp(shot._camera.pixels([(x0, y0, 0.0), (x1, y1, 0.0)]), axis=0)
+    wide, tall = seen / shot._camera.size
+    assert tall > 0.8
+    assert wide > 0.8 or shot._camera.size[0] < LEAST_TILE
+    assert fitting_size(logs, "oblique") == FULL
+
+
+def test_a_film_without_a_size_fits_its_worlds(drives, tmp_path):
+    logs = [replace(log, record=replace(log.record, task=_task(log, 0.5))) for log in drives]
+    info = compare_film(logs, tmp_path / "c.gif", fps=1, camera="top")
+    assert info.size == fitting_size(logs, "top") < FULL
+    with Image.open(info.path) as picture:
+        assert picture.size == info.size
 
 
 def _task(log, high):

@@ -1,5 +1,6 @@
 """Pictures of a robot without a map: what it has not seen looks different until it has."""
 
+import dataclasses
 import math
 from collections.abc import Callable
 from typing import Any
@@ -109,7 +110,7 @@ def test_the_legend_names_what_is_painted(log: Rollout) -> None:
     scene = Scene.of(log)
     assert not scene.has_zones
     plain = {entry.text for entry in legend_entries(scene, 0.5, 0.01)}
-    named = {entry.text for entry in legend_entries(scene, 0.5, 0.01, sight=True)}
+    named = {entry.text for entry in legend_entries(scene, 0.5, 0.01, beams=True, sight=True)}
     assert named - plain == {"beams of the lidar", "hit, on the robot's map", "never seen"}
     assert not any("inflated" in text for text in named)
 
@@ -129,3 +130,23 @@ def test_movers_that_are_followed_have_rings_and_nothing_else_changes(log: Rollo
     assert min(red, blue) > green + 25
     followed = {entry.text for entry in legend_entries(Scene.of(log), 0.5, 0.01, followed=True)}
     assert "mover by lidar, 1.5 s ahead" in followed
+
+
+def test_of_a_robot_with_a_map_only_the_beams_are_painted(
+    log: Rollout, spots: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mapped = dataclasses.replace(log, record=dataclasses.replace(log.record, sensing=None))
+    at = float(log.t[-1])
+    fan = picture(mapped, "top", 0.0, at)
+    bare = picture(dataclasses.replace(mapped, scans=log.scans[:0], scan_rows=log.scan_rows[:0]), "top", at)
+    assert np.array_equal(picture(mapped, "top", at), fan)
+    monkeypatch.setattr(sight.FanPainter, "lay_fan", lambda *_: None)
+    changed = np.abs(fan - picture(mapped, "top", at)).max(axis=-1) > 4
+    rows, cols = np.nonzero(changed)
+    assert len(rows) > 1000
+    eye, ahead = (np.array(spots([log.pose[log.scan_rows[-1], :2] + off])).reshape(2) for off in (0.0, [1.0, 0.0]))
+    assert np.hypot(rows - eye[0], cols - eye[1]).max() < 2.6 * math.dist(eye, ahead)  # the lidar's range is 2.5 m
+    red, _, blue = (fan - bare)[changed].mean(axis=0)
+    assert red < blue - 12
+    bodies = spots(log.record.world.discs[:, :2])
+    assert np.array_equal(fan[bodies], bare[bodies])  # none is pale

@@ -12,7 +12,7 @@ from PIL import Image
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import ReplanRecord
 from antdrive.sim.view.film import encoder, video
-from antdrive.sim.view.film.overlay import Layout
+from antdrive.sim.view.film.overlay import Layout, _entry_width, legend_entries, legend_rows
 from antdrive.sim.view.film.shot import Shot
 from antdrive.sim.view.film.video import film, frame_times, still
 from antdrive.sim.view.scene import Scene
@@ -110,12 +110,29 @@ def test_every_camera_shows_robot_and_goal(drive, tmp_path):
 
 @pytest.mark.parametrize("size", [(640, 480), (1280, 720), (320, 240), (480, 640)])
 def test_the_band_fits_every_size(drive, size):
-    for card in (True, False):
-        layout = Layout.of(size, card)
+    for rows in (0, 1):
+        layout = Layout.of(size, rows)
         assert layout.height % 2 == 0
         assert layout.height < 0.35 * size[1]
     with Shot(drive, camera="top", size=size, note="certified: min clearance 0.043 m") as shot:
         assert shot.frame(0.5).shape == (size[1], size[0], 3)
+
+
+@pytest.mark.parametrize("size", [(480, 360), (640, 480), (1280, 720), (320, 240), (160, 160)])
+def test_a_legend_stays_within_its_rows(drive, size):
+    entries = legend_entries(Scene.of(drive), 0.5, 0.02, replans=True, sight=True, followed=True)
+    whole = False
+    for rows in range(1, 5):
+        layout = Layout.of(size, rows)
+        legend = legend_rows(entries, layout)
+        shown = [entry for row in legend.rows for entry in row]
+        assert shown == entries[: len(shown)]
+        assert legend.whole == (shown == entries)
+        for row in legend.rows:
+            wide = sum(sum(_entry_width(entry, legend.size)) for entry in row) + legend.size * (len(row) - 1)
+            assert wide <= layout.width - 2 * layout.unit or len(row) == 1
+        whole |= legend.whole and layout.height < 0.35 * size[1]
+    assert whole == (size[0] > 320), "a very small picture cannot name everything"
 
 
 @pytest.mark.parametrize("outcome", list(Outcome))

@@ -1,0 +1,149 @@
+"""Robots out of URDF and of the catalogue: what was imported beside public specifications, and who drives through BARN's world 0.
+
+python -m benchmarks.robots            # tables for docs/benchmarks.md; the drives need the archive of BARN (`--barn`)
+python -m benchmarks.robots --values   # only what was imported
+"""
+
+from __future__ import annotations
+
+import argparse
+import tarfile
+import tempfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from antdrive.planners import load_planner
+from antdrive.robots import RobotSpec, list_robots, load_robot
+from antdrive.robots.importing.urdf import import_urdf
+from antdrive.sim import Scenario, run
+from antdrive.worlds import Task, import_barn
+from benchmarks.planners import table
+from tools.shared_data import BARN
+
+URDF = Path(__file__).parent.parent / "tests" / "robots" / "importing" / "urdf"
+WORLD = "world_0.world"
+#: What public specifications say of the robots that the URDF files are made after [m, kg, m/s, rad/s, m/s2, rad/s2, N m]. A
+#: value that no specification has is left out. The sources are those of the catalogue's robots of the same name.
+SPECIFICATIONS: Mapping[str, Mapping[str, float]] = MappingProxyType(
+    {
+        "burger.urdf": {
+            "length": 0.138, "width": 0.178, "height": 0.192, "mass": 1.0, "wheel_radius": 0.033, "track": 0.160,
+            "max_speed": 0.22, "max_yaw_rate": 2.84, "wheel_torque": 1.4,
+        },
+        "waffle.urdf": {
+            "length": 0.281, "width": 0.306, "height": 0.141, "mass": 1.8, "wheel_radius": 0.033, "track": 0.287,
+            "max_speed": 0.26, "max_yaw_rate": 1.82, "max_wheel_speed": 8.06, "wheel_torque": 2.7,
+        },
+        "turtlebot4.urdf": {
+            "length": 0.341, "width": 0.339, "height": 0.351, "mass": 3.9, "wheel_radius": 0.03575, "track": 0.233,
+            "max_speed": 0.31, "max_yaw_rate": 1.90, "max_acceleration": 0.9, "max_yaw_acceleration": 7.725,
+            "max_wheel_speed": 12.867,
+        },
+        "pioneer3dx.urdf": {
+            "length": 0.455, "width": 0.381, "height": 0.237, "mass": 9.0, "wheel_radius": 0.0975, "track": 0.331,
+            "swing radius": 0.267, "max_speed": 1.2, "max_yaw_rate": 5.236,
+        },
+        "warehouse.urdf.xacro": {
+            "length": 0.9, "width": 0.6, "height": 0.352, "mass": 70.0, "wheel_radius": 0.0625, "track": 0.445,
+            "max_speed": 1.5, "max_yaw_rate": 1.5, "max_acceleration": 2.0, "max_yaw_acceleration": 2.5,
+        },
+        "husky.urdf": {
+            "length": 0.990, "width": 0.670, "height": 0.39, "mass": 50.0, "wheel_radius": 0.1651, "track": 0.5708,
+            "max_speed": 1.0, "max_yaw_rate": 2.0, "max_acceleration": 3.0, "max_yaw_acceleration": 6.0,
+        },
+    }
+)  # fmt: skip
+#: What the import asks for where a file leaves it open: a vehicle with two axles turns about one of them.
+TOLD: Mapping[str, Mapping[str, Any]] = MappingProxyType(
+    {"husky.urdf": {"left": "rear_left_wheel", "right": "rear_right_wheel"}}
+)
+UNITS = {
+    "length": "m", "width": "m", "height": "m", "mass": "kg", "wheel_radius": "m", "track": "m", "swing radius": "m",
+    "max_speed": "m/s", "max_yaw_rate": "rad/s", "max_acceleration": "m/s²", "max_yaw_acceleration": "rad/s²",
+    "max_wheel_speed": "rad/s", "wheel_torque": "N m",
+}  # fmt: skip
+
+
+def imported(name: str) -> RobotSpec:
+    """The robot in one of the URDF files."""
+    return import_urdf(URDF / name, **TOLD.get(name, {})).robot
+
+
+def values_of(robot: RobotSpec) -> dict[str, float]:
+    """The values of a robot that specifications have, in `UNITS`."""
+    xmin, ymin, xmax, ymax = robot.footprint.bounds
+    sizes = {"length": xmax - xmin, "width": ymax - ymin, "swing radius": robot.radius}
+    return {key: sizes[key] if key in sizes else float(getattr(robot, key)) for key in UNITS}
+
+
+def value_rows() -> Iterator[tuple[str, ...]]:
+    """For each value what was imported, what the specification says, and how far the two are apart."""
+    found = {name: values_of(imported(name)) for name in SPECIFICATIONS}
+    for key, unit in UNITS.items():
+        cells = []
+        for name, specified in SPECIFICATIONS.items():
+            if key in specified:
+                said, is_ = specified[key], found[name][key]
+                off = round(100 * (is_ / said - 1), 2) + 0.0  # no -0.0
+                cells.append(f"{is_:.5g} / {said:.5g}: {off:.2f} %")
+            else:
+                cells.append("–")
+        yield (f"{key} [{unit}]", *cells)
+
+
+def barn_0(archive: Path) -> Task:
+    """The first of BARN's worlds."""
+    with tempfile.TemporaryDirectory() as folder:
+        with tarfile.open(archive) as packed:
+            packed.extract(WORLD, folder, filter="data")
+        return import_barn(Path(folder) / WORLD)
+
+
+def drive_rows(task: Task, reasons: dict[str, list[str]]) -> Iterator[tuple[str, ...]]:
+    """How each robot gets through a world, without noise and with that of its file.
+
+    Args:
+        task: the world
+        reasons: is given the robots that did not arrive, by why
+    """
+    robots = {f"{name}, imported": imported(name) for name in SPECIFICATIONS}
+    robots |= {name: load_robot(name) for name in list_robots()}
+    for name, robot in robots.items():
+        cells = []
+        for noise in (0.0, 1.0):
+            done = run(
+                Scenario(task=task, planner=load_planner("astar"), planner_name="astar", robot=robot, noise=noise)
+            )
+            if done.certificate is not None:
+                m, least = done.metrics, done.certificate.min_clearance
+                cells += ["certified" if done.succeeded else done.outcome.key, f"{m['duration_s']:.1f}", f"{least:.3f}"]
+            else:
+                cells += [done.outcome.key, "–", "–"]
+            if not done.succeeded and name not in reasons.setdefault(done.reason, []):
+                reasons[done.reason].append(name)
+        yield name, f"{robot.radius:.3f}", *cells
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--values", action="store_true", help="drive nothing")
+    parser.add_argument("--barn", type=Path, default=BARN, metavar="FILE", help="the archive of BARN's worlds")
+    asked = parser.parse_args()
+    if not (asked.values or asked.barn.exists()):
+        parser.error(f"--barn {asked.barn}: no such file; name BARN's archive, or give --values")
+    for line in table(("imported / specified", *SPECIFICATIONS), value_rows()):
+        print(line)
+    if asked.values:
+        return
+    reasons: dict[str, list[str]] = {}
+    heads = ("robot", "radius m", "noise 0", "time s", "least clearance m", "noise 1", "time s", "least clearance m")
+    for line in table(heads, drive_rows(barn_0(asked.barn), reasons)):
+        print(line, flush=True)
+    for reason, names in reasons.items():
+        print(f"- {' and '.join(names)}: {reason}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,39 @@
+"""The map that a robot makes itself: its sizes, and when a logged drive made it anew. No compiled code is loaded for it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from antdrive.sim.log.record import DriveRecord, ReplanRecord
+
+MAP_CELL = 0.05  # side of the map's cells [m]
+HORIZON, HORIZON_AMONG_MOVERS = 10.0, 16.0  # hits farther away are not entered in the map [m]
+RECENT = 1.0  # scans of this time are kept where the map is made anew [s]
+PATIENCE = 3  # plans in a row that find no path before the robot no longer believes what it saw long ago
+
+
+def horizon_of(*, watching: bool) -> float:
+    """How far away a hit may be that is entered in a robot's map [m].
+
+    Args:
+        watching: whether the robot looks for movers in its scans
+    """
+    return HORIZON_AMONG_MOVERS if watching else HORIZON
+
+
+def forgetting_ticks(record: DriveRecord) -> Iterator[int]:
+    """The control periods in which a robot without a map forgot what it had seen: after some plans in a row found no path.
+
+    Args:
+        record: of the log
+    """
+    failures = 0
+    for replan in record.replans:
+        if failures >= PATIENCE:
+            failures = 0
+            yield _tick(record, replan)
+        failures = 0 if replan.solved else failures + 1
+
+
+def _tick(record: DriveRecord, replan: ReplanRecord) -> int:
+    return round(replan.t * record.control_hz)

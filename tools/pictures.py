@@ -1,0 +1,132 @@
+"""Make the pictures that pages show from the repository: `python -m tools.pictures` writes `docs/pictures`.
+
+README and pages are read where no build has run, so these pictures are kept in the repository; the figures and films of the
+gallery are made by each build of the site. Names choose some of them: `python -m tools.pictures plaza report`. The report's
+picture needs a Chromium. `FROM_PAPERS` are copied from what `antdrive reproduce PAPER` writes, and `BY_HAND` show other
+programs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from antdrive.sim.cli.write import caption
+from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.pipeline import run
+from antdrive.sim.scenario import Scenario
+from antdrive.sim.view.film.compare import SplitScreen
+from antdrive.sim.view.film.prelude import planning_frames
+from antdrive.sim.view.film.video import STILLS, still
+from antdrive.sim.view.report.report import write_report
+from antdrive.worlds.world import Disc
+
+PICTURES = Path(__file__).resolve().parents[1] / "docs" / "pictures"
+SIZE = (1120, 630)  # of most of them [px]
+FROM_PAPERS = ("hasan-maps.png", "ibraheem2016-history.png", "lee2008-maps.png")
+BY_HAND = ("foxglove.webp",)
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+
+
+def drive(world: str, planner: str, **settings: Any) -> Rollout:
+    """The log of a drive."""
+    log = run(Scenario.of(world, planner, **settings)).rollout
+    assert log is not None
+    return log
+
+
+def saved(picture: Any, path: Path) -> None:
+    """Write a picture (H, W, 3) as `still` writes them."""
+    from PIL import Image
+
+    Image.fromarray(picture).save(path, format="webp", **STILLS[".webp"])
+
+
+def film(path: Path) -> None:
+    """A frame of the film of `make demo`."""
+    log = drive("forest", "ants")
+    still(log, path, 15.6, size=(1280, 720), note=caption(log))
+
+
+def plaza(path: Path) -> None:
+    """A robot that has just found a new route among movers."""
+    log = drive("plaza-moving", "dstar-lite")
+    found = next(replan.t for replan in log.record.replans if replan.t > 3.0)
+    still(log, path, found + 0.3, size=SIZE, note=caption(log))
+
+
+def unknown(path: Path) -> None:
+    """What a robot without a map has seen."""
+    log = drive("forest", "astar", robot="jackal", map="none", localisation="matching", noise=1.0, seed=1)
+    still(log, path, 3.2, size=(960, 540), note=caption(log))
+
+
+def pheromone(path: Path) -> None:
+    """Pheromone on the ground, iteration 30 of 50."""
+    frames = planning_frames(drive("forest", "aco-han"), {"camera": "oblique", "size": SIZE}, 50)
+    saved(next(itertools.islice(frames, 29, None)), path)
+
+
+def comparison(path: Path) -> None:
+    """Four planners in the same forest."""
+    logs = [drive("forest", name, smoothing="none") for name in ("astar", "aco-han", "ants", "tangent")]
+    with SplitScreen(logs, "oblique", SIZE) as screen:
+        for at in (6.0, 12.0):
+            picture = screen.frame(at)
+    saved(picture, path)
+
+
+def report(path: Path) -> None:
+    """The upper part of a report on six runs, as a browser shows it."""
+    from PIL import Image
+
+    scenarios = [
+        Scenario.of("plaza-moving", "dstar-lite"),
+        Scenario.of("empty", "astar", unseen=(Disc(3.0, 3.0, 0.2),)),
+        Scenario.of("forest", "aco-han"),
+        Scenario.of("forest", "ants"),
+        Scenario.of("forest", "astar", smoothing="none"),
+        Scenario.of("no-path", "astar"),
+    ]
+    browser = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if browser is None:
+        sys.exit(f"report: needs a browser on the path, one of {', '.join(BROWSERS)}")
+    with tempfile.TemporaryDirectory() as folder:
+        page, shot = Path(folder) / "report.html", Path(folder) / "report.png"
+        write_report(map(run, scenarios), page, title="Ants against searches")
+        words = ["--headless", "--no-sandbox", "--hide-scrollbars", "--window-size=1400,1060", f"--screenshot={shot}"]
+        subprocess.run([browser, *words, page.as_uri()], check=True, capture_output=True)  # noqa: S603 (a browser of the path)
+        with Image.open(shot) as picture:
+            picture.convert("RGB").save(path, format="webp", **STILLS[".webp"])
+
+
+#: What makes each picture, by the name of its file.
+MADE: Mapping[str, Callable[[Path], None]] = MappingProxyType(
+    {made.__name__: made for made in (film, plaza, unknown, pheromone, comparison, report)}
+)
+
+
+def main(words: list[str]) -> int:
+    """Make the pictures that words name, or all."""
+    asked = argparse.ArgumentParser(prog="python -m tools.pictures", description="Make the pictures of pages.")
+    asked.add_argument("names", nargs="*", metavar="NAME", help=f"some of {', '.join(MADE)}; all by default")
+    given = asked.parse_args(words)
+    unknown_names = set(given.names) - set(MADE)
+    if unknown_names:
+        asked.error(f"{min(unknown_names)}: no such picture; choose from {', '.join(MADE)}")
+    for name in given.names or MADE:
+        MADE[name](PICTURES / f"{name}.webp")
+        sys.stdout.write(f"docs/pictures/{name}.webp\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
