@@ -116,3 +116,29 @@ def test_without_caution_the_same_commands_end_in_walls() -> None:
         robot = robot_of(shape)
         poses = driven(robot, world, (1.8, 1.8, 0.0), [Twist(0.5, 0.3)], 20, 160, blind=True)
         assert footprint_clearance(world, robot.footprint, poses).min() < 0
+
+
+@pytest.mark.parametrize("beside", [0.275, None])
+def test_a_robot_that_forgets_its_map_turns_over_no_post_that_it_has_seen(beside: float | None) -> None:
+    """Posts within the circle of the turn, beside a rectangle whose lidar looks ahead only and last saw them long ago."""
+    jackal = load_robot("jackal")
+    assert jackal.lidar is not None
+    robot = dataclasses.replace(jackal, lidar=dataclasses.replace(jackal.lidar, field_of_view=math.pi))
+    posts = tuple(Disc(2.88, 2.0 + side * beside, 0.03) for side in (-1, 1)) if beside else ()
+    world, start, here = World("gate", (0.0, 0.0, 8.0, 4.0), posts), (1.5, 2.0, 0.0), (3.0, 2.0, 0.0)
+    assert robot.lidar is not None
+    survey = Survey(Senses(Scanner.of(robot.lidar, world), None, None, 50), robot, start, (7.0, 2.0))
+    for tick in range(210):
+        x = min(3.0, 1.5 + 0.01 * tick)
+        survey.look(tick, (x, 2.0, 0.0), (x, 2.0, 0.0))
+    known = survey.clear_turn(here, 1.0, math.pi)
+    survey.forget(here)
+    turn = survey.clear_turn(here, 1.0, math.pi)
+    if beside is None:
+        assert turn == known == math.pi
+        return
+    assert turn <= known
+    angles = np.linspace(0.0, math.pi, 400)
+    gaps = footprint_clearance(world, robot.footprint, [(3.0, 2.0, angle) for angle in angles])
+    assert gaps[angles <= turn].min() > 0
+    assert gaps.min() < 0  # a whole turn would touch a post
