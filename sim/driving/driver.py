@@ -68,6 +68,7 @@ class Driver:
         tracked: the path that the robot follows now
         pursuit: the controller's state: how far the robot has got, and what limited its speed
         command: the twist that was commanded last
+        avoids: whether that twist avoids a mover, even if sight then held its speed
     """
 
     def __init__(
@@ -90,7 +91,7 @@ class Driver:
         blind = self._drifts and robot.lidar is not None and not robot.lidar.full_circle
         self._backwards = BLIND_SHARE * robot.max_speed if blind else math.inf
         self._avoidance_state = AvoidanceState()
-        self._avoids = False  # whether the last command avoided a mover, even if sight then held its speed
+        self.avoids = False
         self._clock = StuckClock()
         self._patience = round(STUCK_TIME * control_hz)
         self._full_turn = round(2 * math.pi / robot.max_yaw_rate * control_hz)
@@ -131,13 +132,13 @@ class Driver:
             self.command = _brake(last, self._robot, self._hz)
         speed_limit = self._keep_to_schedule(tick, last)
         if self._avoidance is not None and self._predictor is not None:
-            stopping = self._avoids and self._stops_at_goal(pose, last)
+            stopping = self.avoids and self._stops_at_goal(pose, last)
             if stopping and _standing(state):
                 return self._arrival(state)
             self._avoid_movers(tick, pose, last, before, speed_limit, stopping)
         self._keep_within_sight(pose, last)
         ending = self._end_of_route(tick, pose, state)
-        waiting = self._avoids or speed_limit < WAITING_SPEED
+        waiting = self.avoids or speed_limit < WAITING_SPEED
         self._clock = self._clock.after(self.pursuit, waiting)
         return ending
 
@@ -154,7 +155,7 @@ class Driver:
     def _replan_if_triggered(self, tick: int, pose: Pose, state: State) -> None:
         """Go on along a new path, if one is due and there is one."""
         assert self._monitor is not None
-        waiting = self._avoids and abs(state.speed) < WAITING_SPEED
+        waiting = self.avoids and abs(state.speed) < WAITING_SPEED
         trigger = self._monitor.trigger(tick, pose, waiting, self.tracked, self.pursuit.arc)
         if trigger:
             self._follow(self._monitor.replan(tick, pose, trigger))
@@ -212,8 +213,8 @@ class Driver:
             speed_limit=speed_limit,
             backwards=self._backwards,
         )
-        self._avoids = avoids or stopping
-        if self._avoids:
+        self.avoids = avoids or stopping
+        if self.avoids:
             self.pursuit = self.pursuit._replace(turning=before.turning, limiter=AVOIDING)
 
     def _end_of_route(self, tick: int, pose: Pose, state: State) -> Ending | None:

@@ -71,16 +71,16 @@ class Watcher:
 
 
 @pytest.mark.parametrize(
-    ("limiter", "speed", "waits"),
+    ("avoids", "speed", "waits"),
     [
-        (AVOIDING, 0.0, True), (AVOIDING, 0.9 * WAITING_SPEED, True), (AVOIDING, -0.9 * WAITING_SPEED, True),
-        (AVOIDING, WAITING_SPEED, False), (AVOIDING, -1.1 * WAITING_SPEED, False), (0, 0.0, False),
+        (True, 0.0, True), (True, 0.9 * WAITING_SPEED, True), (True, -0.9 * WAITING_SPEED, True),
+        (True, WAITING_SPEED, False), (True, -1.1 * WAITING_SPEED, False), (False, 0.0, False),
     ],
 )  # fmt: skip
-def test_a_robot_waits_if_it_stands_to_give_way(turtlebot: RobotSpec, limiter: int, speed: float, waits: bool) -> None:
+def test_a_robot_waits_if_it_stands_to_give_way(turtlebot: RobotSpec, avoids: bool, speed: float, waits: bool) -> None:
     monitor = Watcher()
     robot = driver(turtlebot, monitor)
-    robot.pursuit = PursuitState(limiter=limiter)
+    robot.avoids = avoids
     robot.decide(0, TASK.start, State(*TASK.start, speed, 0.0))
     assert monitor.waiting == [waits]
 
