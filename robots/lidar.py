@@ -89,6 +89,14 @@ class Lidar:
         first = -math.pi if self.full_circle else -self.field_of_view / 2
         return np.asarray(self.yaw + first + self.spacing * np.arange(self.beams), dtype=np.float64)
 
+    def at(self, hz: int) -> Lidar:
+        """The lidar on a robot of so many control periods a second, which takes one scan in each of them at most.
+
+        Args:
+            hz: control periods per second
+        """
+        return self if self.rate <= hz else dataclasses.replace(self, rate=float(hz))
+
     def pose_on(self, robot: Pose) -> Pose:
         """The lidar's own pose on a robot: x, y [m] and yaw [rad].
 

@@ -89,7 +89,10 @@ class SettingsEntry(BaseModel):
     )
     localisation: str = Field("fixes", description="how the robot knows its pose: fixes, odometry, matching or true")
     odometry: float = Field(1.0, ge=0, description="the factor on the errors of odometry")
-    sees: str = Field("velocities", description="what the robot perceives of movers: KIND or KIND:METRES")
+    sees: str | None = Field(
+        None,
+        description="what the robot perceives of movers: KIND or KIND:METRES; by default velocities, without a map lidar",
+    )
     avoid: Switch = Field(
         True,
         description="how the robot avoids movers: true, false or none (not at all), or settings such as {horizon: 2.0}",

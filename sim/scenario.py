@@ -16,7 +16,7 @@ from antdrive.robots.odometry import Odometry
 from antdrive.sim.calibration.choice import choose_margin
 from antdrive.sim.calibration.prediction import Calibration
 from antdrive.sim.calibration.trial import Conditions
-from antdrive.sim.driving.perception import Perception
+from antdrive.sim.driving.perception import Perception, usual_perception
 from antdrive.sim.driving.replanning import ReplanPolicy
 from antdrive.sim.log.record import LOCALISATIONS, MAPS, SensingRecord, settings_of
 from antdrive.sim.log.streams import random_stream
@@ -27,6 +27,7 @@ from antdrive.worlds.plane import place_name
 
 PHYSICS_HZ = (60, 10_000)  # slower physics jolts the robot
 SLOWEST_CONTROL = 10  # [Hz]
+DRIFTING = "odometry", "matching"  # localisation without fixes
 FINE = 0.05  # without a map, plans are made on cells of this side at most [m]
 
 CONTROLLER, PERCEPTION, AVOIDANCE, REPLANNING = PurePursuit(), Perception(), Avoidance(), ReplanPolicy()
@@ -47,7 +48,7 @@ class Scenario:
         seed: the seed of all random numbers
         controller: follows the route
         noise: the factor on the robot's documented noise in sensing and acting; 0: a perfect robot
-        perception: what the robot perceives of movers
+        perception: what the robot perceives of movers; None: their velocities, without a map only what its lidar finds
         avoidance: how the robot avoids movers; None: not at all
         replanning: when the robot looks for a new route in a world with movers; None: never
         unseen: obstacles that neither the planner nor the controller knows of
@@ -75,7 +76,7 @@ class Scenario:
     seed: int = 0
     controller: PurePursuit = field(default_factory=PurePursuit)
     noise: float = 0.0
-    perception: Perception = field(default_factory=Perception)
+    perception: Perception | None = None
     avoidance: Avoidance | None = field(default_factory=Avoidance)
     replanning: ReplanPolicy | None = field(default_factory=ReplanPolicy)
     unseen: tuple[Disc, ...] = ()
@@ -124,13 +125,21 @@ class Scenario:
                 "map",
                 f"none: {self.robot.name} has no lidar; add one to its file, or drive jackal or turtlebot4",
             )
-        if self.perception.kind == "lidar" and self.robot.lidar is None:
+        kind = self.known_perception.kind
+        if kind == "lidar" and self.robot.lidar is None:
             raise FieldError(
                 "sees",
                 f"lidar: {self.robot.name} has no lidar; add one to its file, or drive jackal or turtlebot4",
             )
-        if self.perception.kind == "lidar" and self.map == "given" and self.localisation == "odometry":
+        if kind == "lidar" and self.map == "given" and self.localisation == "odometry":
             raise FieldError("sees", "lidar: with a given map the pose must not drift; localise by fixes or true")
+        drifts = self.map == "none" and self.localisation in DRIFTING
+        if drifts and self.task.world.movers and kind != "lidar":
+            raise FieldError(
+                "sees",
+                f"{kind}: the pose drifts with localisation {self.localisation}, and movers that are told would be "
+                "elsewhere in the robot's frame; write lidar, or localise by fixes or true",
+            )
         if self.map == "given" and self.localisation == "matching":
             raise FieldError("localisation", "matching: needs map none; with a given map the robot makes none")
         can = capabilities_of(self.planner)
@@ -159,7 +168,11 @@ class Scenario:
             ("task", Task, "a Task, such as load_task gives"),
             ("robot", RobotSpec, "a RobotSpec, such as load_robot gives"),
             ("controller", PurePursuit, "a PurePursuit"),
-            ("perception", Perception, "a Perception, such as Perception(kind='positions')"),
+            (
+                "perception",
+                (Perception, type(None)),
+                "a Perception, such as Perception(kind='positions'), or None for the usual one",
+            ),
             ("avoidance", (Avoidance, type(None)), "an Avoidance, or None for no avoidance"),
             ("replanning", (ReplanPolicy, type(None)), "a ReplanPolicy, or None for no replanning"),
             ("unseen", tuple, "a tuple of Disc"),
@@ -196,7 +209,7 @@ class Scenario:
         seed: int = 0,
         controller: PurePursuit = CONTROLLER,
         noise: float = 0.0,
-        perception: Perception = PERCEPTION,
+        perception: Perception | None = None,
         avoidance: Avoidance | None = AVOIDANCE,
         replanning: ReplanPolicy | None = REPLANNING,
         unseen: tuple[Disc, ...] = (),
@@ -287,7 +300,8 @@ class Scenario:
             "avoidance": AVOIDANCE,
             "replanning": REPLANNING,
         }
-        changed: dict[str, Any] = {key: _changed(getattr(self, key), default) for key, default in defaults.items()}
+        values = {key: getattr(self, key) for key in defaults} | {"perception": self.known_perception}
+        changed: dict[str, Any] = {key: _changed(values[key], default) for key, default in defaults.items()}
         if self.sensing is not None:
             changed |= settings_of(self.sensing)
         if self.unseen:
@@ -369,7 +383,12 @@ class Scenario:
     @property
     def effective_perception(self) -> Perception:
         """What the robot perceives of movers: their motions, if the planner is given them."""
-        return Perception(kind="motions") if self.timed else self.perception
+        return Perception(kind="motions") if self.timed else self.known_perception
+
+    @property
+    def known_perception(self) -> Perception:
+        """What the robot perceives of movers as asked for; the usual where nobody asked."""
+        return self.perception or usual_perception(self.map, movers=bool(self.task.world.movers))
 
     @property
     def effective_avoidance(self) -> Avoidance | None:

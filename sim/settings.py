@@ -91,7 +91,9 @@ def _replanning(fail: Fail, entry: SettingsEntry) -> ReplanPolicy | None:
     return dataclasses.replace(policy, around_movers=False) if entry.replan is False else policy
 
 
-def _perception(fail: Fail, sees: str) -> Perception:
+def _perception(fail: Fail, sees: str | None) -> Perception | None:
+    if sees is None:
+        return None
     kind, mark, metres = sees.partition(":")
     if kind not in get_args(PerceptionKind):
         raise fail("sees", f"unknown kind {kind!r}; choose from {', '.join(get_args(PerceptionKind))}")

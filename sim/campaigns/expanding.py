@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import itertools
 import shlex
@@ -19,6 +20,7 @@ from antdrive.sim.campaigns.grid_tasks import campaign_tasks
 from antdrive.sim.campaigns.grid_worlds import NamedTask, campaign_worlds
 from antdrive.sim.campaigns.job import Job, SweepCase, key_of
 from antdrive.sim.campaigns.rows import setting_columns
+from antdrive.sim.driving.perception import usual_perception
 from antdrive.sim.entries import SettingsEntry, has_flags, option_text, setting_words
 from antdrive.sim.log.binding import canonical_hash
 from antdrive.sim.settings import scenario_fields
@@ -54,7 +56,7 @@ class NamedSettings:
     """One combination of route, noise, margin and settings.
 
     Attributes:
-        fields: fields of `Scenario` by name; the margin may be "auto"
+        fields: fields of `Scenario` by name; the margin may be "auto", and perception None until the world is known
         columns: what tables say of them, by column
         words: the words of `antdrive run` for them; None where it has no flags for all
         place: where in the campaign the settings are written
@@ -64,6 +66,17 @@ class NamedSettings:
     columns: Mapping[str, Any]
     words: tuple[str, ...] | None
     place: Location
+
+    def among(self, movers: bool) -> NamedSettings:
+        """The settings with what robots perceive in a world with movers, or without; so keys name what is driven.
+
+        Args:
+            movers: whether the world has movers
+        """
+        if self.fields["perception"] is not None:
+            return self
+        fields = {**self.fields, "perception": usual_perception(self.fields.get("map", "given"), movers)}
+        return dataclasses.replace(self, fields=fields, columns=setting_columns(fields))
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,12 +206,14 @@ def _check(
 ) -> None:
     """Refuse, before any work, settings that a robot cannot have and starts where one has no room."""
     obstructed = list({one.fields["unseen"]: one for one in reversed(settings)}.values())
+    moving = [n for n, task in enumerate(tasks) if task.task.world.movers]
+    whole = {0, *moving[:1]}  # what robots may perceive depends on whether there are movers
     for robot in robots:
         for n, task in enumerate(tasks):
-            for one in settings if n == 0 else obstructed:
+            for one in settings if n in whole else obstructed:
                 margin = 0.0 if one.fields["margin"] == "auto" else None
                 try:
-                    _case(task, robot, one, planner).scenario(0, margin)
+                    _case(task, robot, one.among(n in moving), planner).scenario(0, margin)
                 except FieldError as error:
                     place = _PLACES.get(error.key, (*one.place, error.key))
                     where = task.place if error.key == "start" and not campaign.tasks else place
@@ -218,7 +233,8 @@ def _cases(
         word = task.catalogue or f"{WORLDS}/{_file_name(task)}-{content[:8]}.yaml"
         if task.catalogue is None:
             files[word] = task.task
-        for robot, one, planner in itertools.product(robots, settings, planners):
+        known = [one.among(bool(task.task.world.movers)) for one in settings]
+        for robot, one, planner in itertools.product(robots, known, planners):
             yield _case(task, robot, one, planner, word, content)
 
 

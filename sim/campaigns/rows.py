@@ -128,7 +128,7 @@ def setting_columns(fields: Mapping[str, Any]) -> dict[str, Any]:
         "margin_asked": margin if margin == "auto" else str(float(margin)),
         **{key: fields.get(key, usual) for key, usual in SENSING.items()},
         "controller": _changes(fields["controller"], PurePursuit()),
-        "sees": sees.kind if math.isinf(sees.range) else f"{sees.kind}:{sees.range:g}",
+        "sees": None if sees is None else sees.kind if math.isinf(sees.range) else f"{sees.kind}:{sees.range:g}",
         "avoid": _changes(fields["avoidance"], Avoidance()),
         "replan": _changes(fields["replanning"], ReplanPolicy()),
         "unseen": " ".join(f"{disc.x:g},{disc.y:g},{disc.radius:g}" for disc in fields["unseen"]) or "none",

@@ -18,7 +18,7 @@ def print_run(run: Run, files: dict[str, str]) -> None:
     print_line(
         f"{s.task.world.name}: {s.robot.name} with {s.planner_name}: {run.outcome.value}" + in_brackets(run.reason)
     )
-    if s.noise and not s.robot.noise.nonzero and s.map == "given" and s.perception.kind != "lidar":
+    if s.noise and not s.robot.noise.nonzero and s.map == "given" and s.known_perception.kind != "lidar":
         print_line(f"  noise {s.noise:g} changes nothing: the file of {s.robot.name} has no noise section")
     if s.chosen is not None:
         print_line(f"  {chosen_margin(s.chosen)}")

@@ -125,12 +125,16 @@ def make_controller(values: dict[str, str]) -> PurePursuit:
         raise InputError(f"controller.{error}") from None
 
 
-def among_movers(avoid: bool, replan: bool, sees: str) -> dict[str, Any]:
+def among_movers(avoid: bool, replan: bool, sees: str | None) -> dict[str, Any]:
     """The fields of a scenario that say how the robot drives among movers."""
     from antdrive.sim.driving.replanning import ReplanPolicy
 
     avoidance = {} if avoid else {"avoidance": None}  # the default is a record of weights
-    return {"perception": make_perception(sees), "replanning": ReplanPolicy(around_movers=replan), **avoidance}
+    return {
+        "perception": make_perception(sees) if sees else None,
+        "replanning": ReplanPolicy(around_movers=replan),
+        **avoidance,
+    }
 
 
 def make_perception(text: str) -> Perception:

@@ -66,6 +66,7 @@ def drive(
     survey = monitor.survey if isinstance(monitor, Exploration) else lookout
     log = Recorder(engine, task.start, noisy=noise_model is not None)
     ending = Ending(Outcome.COLLIDED) if log.touched else None
+    tick = 0
     for tick in range(round(time_limit * control_hz)):
         if ending:
             break
@@ -75,7 +76,14 @@ def drive(
     if log.touched:
         engine.command(0.0, 0.0)
         log.advance(round(AFTER_CONTACT * engine.physics_hz), Twist(0.0, 0.0), driver.pursuit.limiter)
-    return log.finish(ending or Ending(Outcome.TIMED_OUT))
+    return log.finish(_explained(ending or Ending(Outcome.TIMED_OUT), monitor, tick))
+
+
+def _explained(ending: Ending, monitor: ReplanMonitor | Exploration | None, tick: int) -> Ending:
+    """How the drive ends; where a robot without a map did not get on, whether it had found no way."""
+    if not isinstance(monitor, Exploration) or ending.outcome not in (Outcome.STUCK, Outcome.TIMED_OUT):
+        return ending
+    return Ending(ending.outcome, "; ".join(filter(None, (ending.reason, monitor.no_way(tick)))))
 
 
 def _control_period(

@@ -62,6 +62,7 @@ TURNING = 0.015  # a rectangle that turns on the spot keeps this much more from 
 STALL_TIME = 2.5  # a robot that does not move for this long tries something else [s]
 STALL_DISTANCE = 0.06  # [m]
 TRAIL = 0.05  # spacing of the points of the driven track [m]
+LATELY = 30.0  # what plans found no longer ago than this is said of a drive that ends without a way [s]
 BACK_OFF = (0.4, 0.8, 1.5)  # how far the robot backs off, the first time and then [m]
 
 
@@ -123,7 +124,7 @@ class Exploration:
         self._arcs = np.empty(0)
         self._looked = self._indexed = 0
         self._planned_at = -math.inf
-        self.lost, self._failures = False, 0
+        self.lost, self._failures, self._gave_up_at = False, 0, -math.inf
         self._trail: list[tuple[float, float]] = []
         self._rest = (0.0, task.start[:2])
         self._stalls, self._stalled_at = 0, task.start[:2]
@@ -385,9 +386,21 @@ class Exploration:
         self.log.append(Replan(now, trigger, route is not None, cost, plan.work, xy, time.perf_counter() - started))
         self.lost = route is None
         self._failures = self._failures + 1 if self.lost else 0
+        if self._failures >= PATIENCE:
+            self._gave_up_at = now
         if self.lost:
             self._rest = now, pose[:2]
         return tracked
+
+    def no_way(self, tick: int) -> str:
+        """That the robot planned in vain, several times in a row and not long ago, in words; empty if it did not.
+
+        Args:
+            tick: the number of the control period
+        """
+        if tick / self._hz - self._gave_up_at > LATELY:
+            return ""
+        return f"no way through what was seen, last at t = {self._gave_up_at:.1f} s"
 
     def logged(self, per_tick: int, rows: int) -> dict[str, Any]:
         """The arrays of a log about what was seen, by the names of `Rollout`.

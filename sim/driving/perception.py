@@ -41,6 +41,16 @@ class Perception:
             raise FieldError("range", f"must be greater than 0, got {self.range:g}")
 
 
+def usual_perception(map: str, movers: bool) -> Perception:
+    """What a robot perceives of movers where nobody says it by name: without a map nothing but what its lidar finds.
+
+    Args:
+        map: what the robot knows of the world: given or none
+        movers: whether the world has movers
+    """
+    return Perception(kind="lidar") if map == "none" and movers else Perception()
+
+
 class Predictor:
     """Predicts the movers of one drive from what the robot perceives of them.
 

@@ -62,7 +62,7 @@ class Senses:
 
     @classmethod
     def of(cls, lidar: Lidar, world: World, trajectories: Trajectories, *, seed: int, noisy: bool, hz: int) -> Senses:
-        """A lidar in a world, whose noise is drawn from a drive's seed.
+        """A lidar in a world, whose noise is drawn from a drive's seed; it scans once in a control period at most.
 
         Args:
             lidar: the robot's lidar
@@ -72,7 +72,9 @@ class Senses:
             noisy: whether ranges have noise
             hz: control periods per second
         """
-        return cls(Scanner.of(lidar, world), trajectories or None, random_stream(seed, "lidar") if noisy else None, hz)
+        return cls(
+            Scanner.of(lidar.at(hz), world), trajectories or None, random_stream(seed, "lidar") if noisy else None, hz
+        )
 
     def due(self, tick: int, last: int) -> bool:
         """Whether a scan is due in a control period, after one in an earlier period; a negative one: after none.

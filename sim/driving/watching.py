@@ -33,6 +33,7 @@ class Watch:
     """
 
     def __init__(self, lidar: Lidar, hz: int, pose_xy: float = 0.0, pose_yaw: float = 0.0) -> None:
+        lidar = lidar.at(hz)
         self.tracker, self.tick = MoverTracker(lidar, None, pose_xy, pose_yaw), 0
         self.sight, self.reach = 0.0, min(lidar.max_range, FINE / lidar.spacing)
         self._hz, self._spacing = hz, lidar.spacing

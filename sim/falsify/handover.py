@@ -17,6 +17,7 @@ import yaml
 from antdrive.planners import PlannerError, list_planners, load_planner
 from antdrive.robots import Avoidance, PurePursuit, RobotSpec, list_robots, load_robot
 from antdrive.robots.files import footprint_to_dict
+from antdrive.sim.driving.perception import usual_perception
 from antdrive.sim.driving.replanning import ReplanPolicy
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.pipeline import Run, run
@@ -115,7 +116,9 @@ def suite_entry(scenario: Scenario, robot: str) -> dict[str, Any]:
     for key, usual in (("physics_hz", 240), ("control_hz", 60)):
         if getattr(scenario, key) != usual:
             plain[key] = getattr(scenario, key)
-    return plain | (_among_movers(scenario) if scenario.task.world.movers else {})
+    if scenario.sensing is not None:
+        plain |= dataclasses.asdict(scenario.sensing)
+    return plain | (_among_movers(scenario) if scenario.among_movers or scenario.exploring else {})
 
 
 def planner_moved(given: str | Mapping[str, Any], home: Path, folder: Path) -> str | dict[str, Any] | None:
@@ -233,8 +236,8 @@ def _changed(settings: Any, usual: Any) -> dict[str, Any]:
 def _among_movers(scenario: Scenario) -> dict[str, Any]:
     """How the robot drives among movers, where it is not the usual way."""
     plain: dict[str, Any] = {}
-    perception = scenario.perception
-    if perception.kind != "velocities" or math.isfinite(perception.range):
+    perception = scenario.known_perception
+    if perception != usual_perception(scenario.map, movers=bool(scenario.task.world.movers)):
         reach = f":{perception.range!r}" if math.isfinite(perception.range) else ""
         plain["sees"] = perception.kind + reach
     for key, settings, usual in (
@@ -242,8 +245,6 @@ def _among_movers(scenario: Scenario) -> dict[str, Any]:
         ("replan", scenario.replanning, ReplanPolicy()),
     ):
         plain[key] = "none" if settings is None else _changed(settings, usual) or True
-    if scenario.sensing is not None:
-        plain |= dataclasses.asdict(scenario.sensing)
     return {key: value for key, value in plain.items() if value is not True}
 
 

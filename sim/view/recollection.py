@@ -38,7 +38,7 @@ class Recollection:
     """
 
     def __init__(self, rollout: Rollout, *, forgetting: bool = False, meeting: bool = True) -> None:
-        self.lidar = lidar_of(rollout)
+        self.lidar = lidar_of(rollout).at(rollout.record.control_hz)
         self._rollout = rollout
         self._times = rollout.t[rollout.scan_rows]
         self._entered, self._meeting = 0, meeting

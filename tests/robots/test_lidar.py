@@ -44,6 +44,16 @@ def test_turtlebot_sees_all_around(turtlebot: RobotSpec) -> None:
     assert lidar.angles[-1] == pytest.approx(math.pi - lidar.spacing)
 
 
+@pytest.mark.parametrize(("rate", "hz", "taken"), [(1000.0, 60, 60), (50.0, 60, 50), (60.0, 60, 60), (90.0, 30, 30)])
+def test_a_robot_takes_one_scan_in_a_control_period_at_most(tmp_path: Path, rate: float, hz: int, taken: int) -> None:
+    lidar = changed(tmp_path, rate=rate).lidar
+    assert lidar is not None
+    assert lidar.at(hz).rate == taken
+    due = [lidar.due(tick, hz) for tick in range(10 * hz)]
+    assert due == [lidar.at(hz).due(tick, hz) for tick in range(10 * hz)]
+    assert sum(due) == pytest.approx(10 * taken, abs=1)
+
+
 def test_a_file_places_the_lidar(tmp_path: Path) -> None:
     lidar = changed(tmp_path, x=0.1, yaw=0.5).lidar
     assert lidar is not None

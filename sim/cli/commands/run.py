@@ -53,11 +53,12 @@ Replan = Annotated[
     ),
 ]
 Sees = Annotated[
-    str,
+    str | None,
     typer.Option(
         metavar="KIND[:METRES]",
         help="What the robot perceives of movers: positions, velocities, motions (their whole future), or lidar: nothing but "
-        "what its lidar shows; with METRES, only of movers within that range [m].",
+        "what its lidar shows; with METRES, only of movers within that range [m].  "
+        "[default: velocities; with --map none lidar]",
     ),
 ]
 Video = Annotated[Path | None, typer.Option(metavar="FILE", help="Film the drive: .mp4, .gif or .webp.")]
@@ -82,7 +83,7 @@ def run(
     time_limit: TimeLimit = None,
     avoid: Avoid = True,
     replan: Replan = True,
-    sees: Sees = "velocities",
+    sees: Sees = None,
     map: knowing.Map = "given",
     localisation: knowing.Localisation = "fixes",
     odometry: knowing.Odometry = 1.0,

@@ -373,6 +373,22 @@ def test_runs_with_a_map_have_the_keys_that_they_always_had() -> None:
     assert other.key != plain.key
 
 
+def test_keys_name_what_robots_perceive_of_movers() -> None:
+    """Without a map movers are found by lidar unless the campaign says otherwise; a world without movers has its old key."""
+
+    def keys(**settings: str) -> dict[str, tuple[str, str]]:
+        data = {"worlds": ["empty", "plaza-moving"], "planners": "astar", "robots": "jackal", "settings": settings}
+        return {row["world"]: (row["key"], row["sees"]) for row in map(grid_row, expand(make_campaign(data)).jobs)}
+
+    alone, told, watching = keys(map="none"), keys(map="none", sees="velocities"), keys(map="none", sees="lidar")
+    assert alone == {"empty": told["empty"], "plaza-moving": watching["plaza-moving"]}
+    assert [one[1] for one in alone.values()] == ["velocities", "lidar"]
+    assert watching["empty"] != told["empty"]
+    assert keys() == keys(sees="velocities")
+    with pytest.raises(InputError, match="sees: plaza-moving with jackal: velocities: the pose drifts"):
+        keys(map="none", localisation="odometry", sees="velocities")
+
+
 def test_the_schema_names_every_key() -> None:
     schema = campaign_schema()
     assert set(schema["properties"]) >= {

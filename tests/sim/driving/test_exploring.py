@@ -15,6 +15,7 @@ from antdrive.sim.driving.caution import Caution
 from antdrive.sim.driving.own_map import forgetting_ticks
 from antdrive.sim.driving.replay import replay
 from antdrive.sim.driving.survey import Senses, Survey
+from antdrive.sim.driving.watching import Watch
 from antdrive.sim.falsify.rebuild import rebuilt
 from antdrive.sim.log.record import ReplanRecord
 from antdrive.sim.sensing import OccupancyMap, Scanner
@@ -183,6 +184,7 @@ def test_a_drive_that_forgot_its_map_can_be_replayed(jackal: RobotSpec, monkeypa
     assert done.rollout is not None
     assert done.outcome is Outcome.TIMED_OUT, (done.outcome, done.reason)
     assert len(list(forgetting_ticks(done.rollout.record))) > 1
+    assert done.reason.startswith("no way through what was seen, last at t = ")
     assert replay(done.rollout).problems == ()
     kept, forgot = Recollection(done.rollout), Recollection(done.rollout, forgetting=True)
     for recollection in (kept, forgot):
@@ -250,6 +252,36 @@ def test_nothing_that_stands_is_touched_in_random_forests(
     assert done.rollout is not None
     assert not len(done.rollout.contacts), done.reason
     assert done.succeeded, (done.outcome, done.reason)
+
+
+def test_plans_that_failed_long_ago_are_no_reason(jackal: RobotSpec) -> None:
+    """Before the third of them in a row, and half a minute after it, nothing is said."""
+    exploration = exploration_of(scenario(jackal, noise=0.0))
+    walls = tuple(Disc(0.8 + 0.5 * math.cos(a), 0.8 + 0.5 * math.sin(a), 0.1) for a in np.arange(0, 6.3, 0.2))
+    closed = np.array([(disc.x, disc.y, disc.radius) for disc in walls])
+    exploration.survey.discs = lambda bounds: closed  # type: ignore[method-assign]
+    said = []
+    for tick in (60, 90, 120):
+        assert exploration.replan(tick, TASK.start, "no way") is None
+        said.append(exploration.no_way(tick))
+    assert said == ["", "", "no way through what was seen, last at t = 2.0 s"]
+    assert exploration.no_way(120 + 30 * 60)
+    assert not exploration.no_way(121 + 30 * 60)
+
+
+@pytest.mark.parametrize(("rate", "share"), [(1000.0, 5), (60.0, 5), (50.0, 4), (10.0, 1)])
+def test_a_map_counts_the_scans_that_are_taken(jackal: RobotSpec, rate: float, share: int) -> None:
+    """At 60 control periods a second a lidar of 1000 Hz takes 60 scans, of which 12 are entered as a whole."""
+    assert jackal.lidar is not None
+    robot = dataclasses.replace(jackal, lidar=dataclasses.replace(jackal.lidar, rate=rate))
+    survey = exploration_of(scenario(robot)).survey
+    assert survey.map.share == share
+    for tick in range(1, 61):
+        survey.look(tick, TASK.start, TASK.start)
+    assert len(survey.scans) == pytest.approx(min(rate, 60), abs=1)
+    assert survey.whole == pytest.approx(min(rate, 60) / share, abs=1)
+    assert survey._recent == min(rate, 60)
+    assert Watch(robot.lidar, 60)._settle == 2 * min(rate, 60)  # type: ignore[arg-type]
 
 
 def test_the_robot_can_stop_on_ground_that_it_has_seen(jackal: RobotSpec) -> None:

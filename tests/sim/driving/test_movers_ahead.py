@@ -204,7 +204,7 @@ def test_plans_lead_round_busy_ground_and_off_movers(jackal: RobotSpec, planner:
 def test_a_policy_may_leave_movers_to_local_avoidance(jackal: RobotSpec) -> None:
     for policy in (None, ReplanPolicy(around_movers=False)):
         assert exploration_of(unknown(jackal, replanning=policy))._movers is None
-    assert exploration_of(unknown(jackal, perception=Perception()))._movers is None
+    assert exploration_of(unknown(jackal, localisation="fixes", perception=Perception()))._movers is None
 
 
 @pytest.mark.slow

@@ -113,7 +113,7 @@ def test_a_robot_without_a_map_follows_movers_too(jackal: RobotSpec) -> None:
 
 
 def test_the_map_reaches_farther_among_movers(jackal: RobotSpec) -> None:
-    told = scenario(jackal, map="none", localisation="matching", perception=Perception(), unseen=())
+    told = scenario(jackal, map="none", perception=Perception(), unseen=())
     watching = dataclasses.replace(told, perception=LIDAR)
     assert [exploration_of(s).survey.map.horizon for s in (told, watching)] == [10.0, 16.0]
 
@@ -156,6 +156,43 @@ def test_a_lidar_is_needed_and_a_pose_that_fits_the_map(jackal: RobotSpec) -> No
     assert caught.value.key == "sees"
     with pytest.raises(FieldError, match="localise by fixes or true"):
         scenario(jackal, localisation="odometry")
+
+
+def test_a_robot_without_a_map_is_told_of_movers_only_by_name(jackal: RobotSpec) -> None:
+    nobody = dataclasses.replace(TASK, world=dataclasses.replace(HALL, movers=()))
+    given, alone, still = (
+        scenario(jackal, task, map=map, perception=None, unseen=())
+        for task, map in ((TASK, "given"), (TASK, "none"), (nobody, "none"))
+    )
+    assert [s.effective_perception.kind for s in (given, alone, still)] == ["velocities", "lidar", "velocities"]
+    assert [s.watching for s in (given, alone, still)] == [False, True, False]
+    assert alone.as_dict() == dataclasses.replace(alone, perception=LIDAR).as_dict()
+    assert dataclasses.replace(alone, perception=Perception()).effective_perception == Perception()
+    for drifting in ("odometry", "matching"):
+        assert dataclasses.replace(alone, localisation=drifting).watching
+        with pytest.raises(FieldError, match=f"velocities: the pose drifts with localisation {drifting}") as caught:
+            dataclasses.replace(alone, localisation=drifting, perception=Perception())
+        assert caught.value.key == "sees"
+        assert not dataclasses.replace(still, localisation=drifting, perception=Perception()).watching
+
+
+def test_without_a_map_a_mover_that_no_beam_meets_changes_nothing(jackal: RobotSpec) -> None:
+    """It is behind posts beside the robot, and comes towards it: a robot that is told of it evades."""
+    closet = tuple(Disc(0.1 + 0.14 * k, 1.4, 0.075) for k in range(22)) + tuple(
+        Disc(3.1, 1.4 - 0.14 * k, 0.075) for k in range(11)
+    )
+    mover = Keyframed(radius=0.2, keyframes=((0.0, 1.8, 0.25), (0.8, 1.8, 1.1)), loop="pingpong")
+    other = dataclasses.replace(mover, keyframes=((0.0, 2.6, 0.4), (1.0, 2.6, 0.5)))
+    logs = []
+    for hidden in (mover, other):
+        task = dataclasses.replace(TASK, world=dataclasses.replace(HALL, obstacles=closet, movers=(hidden,)))
+        logs.append(run(scenario(jackal, task, map="none", perception=None, unseen=(), time_limit=1.0)).rollout)
+    one, two = logs
+    assert one is not None
+    assert two is not None
+    assert not np.array_equal(one.movers, two.movers)
+    for name in ("pose", "twist", "command", "limiter", "scans", "tracks"):
+        assert np.array_equal(getattr(one, name), getattr(two, name)), name
 
 
 def test_the_scans_of_a_robot_with_a_map_are_in_its_log(log: Rollout, jackal: RobotSpec) -> None:

@@ -32,6 +32,7 @@ SCENARIOS: dict[str, dict[str, Any]] = {
     "settings": {"margin": 0.0, "noise": 1 / 3, "smoothing": "none", "controller": PurePursuit(lookahead_time=0.5)},
     "unseen": {"unseen": (Disc(2.0, 2.6, 0.1, 0.5), Disc(3.0, 2.6, 0.1)), "time_limit": 12.5, "cell": 0.21},
     "rates": {"physics_hz": 120, "control_hz": 30},
+    "unknown": {"map": "none", "localisation": "matching", "odometry": 2.0, "replanning": ReplanPolicy(patience=5.0)},
 }
 MOVERS: dict[str, dict[str, Any]] = {
     "sees": {"perception": Perception(kind="positions", range=1 / 3)},
