@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from antdrive.robots.lidar import Lidar
 from antdrive.robots.spec import Footprint, RobotSpec
 from antdrive.worlds.errors import FieldError
 
 GRAVITY = 9.81  # [m/s^2]
+ROUNDED = 1e-3  # a lidar on the footprint's edge may be this far outside: files round places [m]
 
 
 def require_feasible(robot: RobotSpec) -> None:
@@ -15,7 +17,8 @@ def require_feasible(robot: RobotSpec) -> None:
         robot: the robot that a file describes
 
     Raises:
-        FieldError: the wheels are higher than the body, turn too slowly, or cannot push as hard as promised.
+        FieldError: the wheels are higher than the body, turn too slowly, or cannot push as hard as promised, or the
+            lidar is not on the robot.
     """
     if 2 * robot.wheel_radius > robot.height:
         raise FieldError(
@@ -23,6 +26,8 @@ def require_feasible(robot: RobotSpec) -> None:
             f"wheels of {robot.wheel_radius:g} m are higher than the body of {robot.height:g} m; "
             f"at most {robot.height / 2:.3g} m fits",
         )
+    if robot.lidar is not None:
+        require_on_robot(robot.lidar, robot.footprint)
     rim = robot.max_wheel_speed * robot.wheel_radius
     _require_reached("max_wheel_speed", f"{robot.max_wheel_speed:g} rad/s", robot, "max_speed", rim, "m/s")
     turn = 2 * rim / robot.track
@@ -38,6 +43,25 @@ def require_feasible(robot: RobotSpec) -> None:
     held = robot.wheel_friction * GRAVITY
     what = f"a friction of {robot.wheel_friction:g}"
     _require_reached("wheel_friction", what, robot, "max_lateral_acceleration", held, "m/s2")
+
+
+def require_on_robot(lidar: Lidar, foot: Footprint) -> None:
+    """Refuse a lidar beside the robot: nothing would notice what it strikes, and it would look through what it stands in.
+
+    Args:
+        lidar: the lidar
+        foot: the robot's footprint
+
+    Raises:
+        FieldError: the lidar is outside; the key is the coordinate that is farther from the axle's centre.
+    """
+    outside = -foot.depth(lidar.x, lidar.y)
+    if outside > ROUNDED:
+        key = "x" if abs(lidar.x) >= abs(lidar.y) else "y"
+        raise FieldError(
+            f"lidar.{key}",
+            f"the lidar at ({lidar.x:g}, {lidar.y:g}) is {outside:.3g} m outside the footprint; it must be on the robot",
+        )
 
 
 def yaw_inertia(robot: RobotSpec) -> float:

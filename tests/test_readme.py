@@ -64,8 +64,14 @@ def test_the_commands_work(home: Path, monkeypatch: pytest.MonkeyPatch, capsys: 
     lines = [line.split("#")[0].strip() for block in blocks("sh") for line in block.splitlines()]
     commands = [(shlex.split(line.split("||")[0]), "||" in line) for line in lines if line.startswith("antdrive")]
     assert {fails for _, fails in commands} == {True, False}
+    printed = ""
     for command, fails in commands:
-        assert exit_code(command, monkeypatch) == fails, (command, *capsys.readouterr())
+        code, (out, err) = exit_code(command, monkeypatch), capsys.readouterr()
+        assert code == fails, (command, out, err)
+        printed += out
+    answers = [line[2:].split("...")[0] for block in blocks("sh") for line in block.splitlines() if line[:1] == "#"]
+    assert answers
+    assert [answer for answer in answers if answer not in printed] == []
 
 
 @pytest.mark.parametrize("target", ["demo", "test"])

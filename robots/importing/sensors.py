@@ -10,7 +10,9 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
+from antdrive.robots.feasible import require_on_robot
 from antdrive.robots.lidar import Lidar
+from antdrive.robots.outline import Footprint
 from antdrive.worlds.errors import FieldError
 from antdrive.worlds.types import Floats
 
@@ -51,18 +53,22 @@ def lidar_sensors(root: ET.Element, places: Mapping[str, Floats]) -> tuple[UrdfS
     )
 
 
-def found_lidar(sensors: tuple[UrdfSensor, ...], frame: Floats, floor: float) -> tuple[Lidar | None, str]:
+def found_lidar(
+    sensors: tuple[UrdfSensor, ...], frame: Floats, floor: float, foot: Footprint
+) -> tuple[Lidar | None, str]:
     """The first lidar that a robot's file can hold, and where it comes from; none, and why, where there is no such.
 
     Args:
         sensors: lidars of the URDF file
         frame: the robot's origin and axes, seen from above, in the root's frame: origin, x and y as rows (3, 2)
         floor: the height of the floor in the root's frame [m]
+        foot: the robot's footprint, on which a lidar must be
     """
     problems = []
     for k, sensor in enumerate(sensors):
         try:
             lidar, assumed = _lidar(sensor, frame, floor)
+            require_on_robot(lidar, foot)
         except FieldError as error:
             problems.append(f"{sensor.name} is not used: {error}")
             continue

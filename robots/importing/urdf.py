@@ -109,7 +109,7 @@ def import_urdf(
     what = f"{kind} around the collision geometry of {_few(names)}, and around the wheels"
     what += "" if math.isinf(below) else f", below {below:g} m"
     values = _values(model, wheels, outline, floor, given)
-    text = _text(model, path, outline, what, values, found_lidar(model.lidars, frame, floor))
+    text = _text(model, path, outline, what, values, found_lidar(model.lidars, frame, floor, outline))
     return ImportedRobot(
         _robot_in(text, path, values),
         text,

@@ -96,7 +96,9 @@ def unpacked(source: Path, folder: Path) -> Path:
                     raise input_error(str(archives[0]), "holds more than the challenge's worlds")
                 archive.extractall(folder, members, filter="data")
         except (tarfile.TarError, OSError, EOFError) as error:
-            raise input_error(str(archives[0]), f"no archive that can be read ({error})") from None
+            raise input_error(
+                str(archives[0]), f"no archive that can be read ({' '.join(str(error).split())})"
+            ) from None
     if not any(found.rglob(WORLDS)):
         raise input_error(str(source), f"no {WORLDS} here; name the folder of the challenge's worlds, or their archive")
     return found

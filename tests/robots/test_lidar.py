@@ -70,6 +70,8 @@ def test_a_file_places_the_lidar(tmp_path: Path) -> None:
         ({"field_of_view": 360.0}, "lidar.field_of_view: must be at most 6.28"),
         ({"range": 3.0}, "lidar.range: unknown key"),
         ({"rate": None}, "lidar.rate: must be a number"),
+        ({"x": 20.0}, "lidar.x: the lidar at (20, 0) is 19.8 m outside the footprint; it must be on the robot"),
+        ({"x": 0.1, "y": -0.2}, "lidar.y: the lidar at (0.1, -0.2) is 0.0436 m outside the footprint"),
     ],
 )
 def test_an_error_is_one_line_with_the_key(tmp_path: Path, wrong: dict[str, object], expected: str) -> None:

@@ -71,7 +71,6 @@ def barn(
     if with_map and map != "none":
         raise InputError("--with-map: is for --map none; with the map there is nothing to compare")
     parquet_library()
-    out.mkdir(parents=True, exist_ok=True)
     folder = challenge.unpacked(source, out / "worlds")
     given = map == "given"
     settings = {

@@ -77,6 +77,10 @@ def test_a_lidar_looks_where_the_middle_of_its_view_is(tmp_path: Path, joint: st
         ({"far": "wide"}, "max: must be a number, got 'wide'"),
         ({"far": "0.1"}, "min_range: must be below max_range, 0.1, got 0.12"),
         ({"samples": "1"}, "beams: must be between 3 and 10000, got 1"),
+        (
+            {"pose": "<pose>3 0 0 0 0 0</pose>"},
+            "lidar.x: the lidar at (2.968, 0) is 2.93 m outside the footprint; it must be on the robot",
+        ),
         ({"tag": "beam"}, "scan: has no horizontal samples"),
     ],
 )

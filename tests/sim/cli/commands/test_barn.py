@@ -50,6 +50,15 @@ def test_the_table_is_printed_whatever_becomes_of_the_films(
     assert ["world_0", "2", "1", "10.00"] in [line.split()[:4] for line in out.splitlines()]
 
 
+def test_a_folder_without_worlds_leaves_nothing_behind(
+    tmp_path: Path, antdrive: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, _, err = antdrive("barn", tmp_path)
+    assert (code, "no world_*.world here" in err) == (2, True)
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_failure_is_listed_with_its_film_or_its_log(
     driven: Path, antdrive: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
