@@ -8,12 +8,18 @@ from antdrive.robots import RobotSpec, Twist
 from antdrive.sim.driving.survey import Survey
 from antdrive.worlds import Pose
 
-SLOWEST = 0.02  # slower commands turn on the spot [m/s]
+SLOWEST = 0.02  # of slower commands the turn counts, too, where `SHORT` is taken off [m/s]
 SHORT = 0.01  # what can be seen of a way is taken for shorter by this [m], [rad]
+ON_THE_SPOT = 1e-6  # arcs of a smaller radius than this are turns on the spot [m]
+STILL = Twist(0.0, 0.0)
 
 
 class Caution:
-    """Keeps the distance in which the robot can stop within what it has seen.
+    """Keeps the way in which the robot can stop within what it has seen.
+
+    Every command is checked, however slow: a robot that creeps gets to an obstacle as well. A command is let through, or slowed
+    down on its own arc, only if the robot can then stop on the arc, over ground that it has seen. Otherwise the robot brakes
+    as hard as it can on the arc that it is on, which was checked in the control period before.
 
     Args:
         survey: what the robot has seen
@@ -33,44 +39,53 @@ class Caution:
             last: the command before
             command: what the controller wants
         """
-        if abs(command.speed) < SLOWEST:
-            return self._turn(pose, last, command)
-        allowed = self._allowed(pose, command)
-        if abs(command.speed) <= allowed:
+        share = self._allowed(pose, command)
+        if share >= 1:
             return command, False
-        slowest = max(0.0, abs(last.speed) - self._robot.max_acceleration * self._period)
-        if allowed >= slowest or last.speed * command.speed <= 0:
-            return _slower(command, max(allowed, slowest)), True
-        return _slower(last, slowest), True
-
-    def _turn(self, pose: Pose, last: Twist, command: Twist) -> tuple[Twist, bool]:
-        """A command to turn on the spot, slower where the footprint would sweep over ground that was not seen."""
-        rate, brake = abs(command.yaw_rate), self._robot.max_yaw_acceleration
-        if rate == 0.0 or abs(last.speed) > SLOWEST:
-            return command, False
-        needed = rate * self._reaction + rate * rate / (2 * brake)
-        clear = self._survey.clear_turn(pose, command.yaw_rate, needed + SHORT) - SHORT
-        if clear >= needed:
-            return command, False
-        allowed = max(self._stoppable(clear, brake), abs(last.yaw_rate) - brake * self._period)
-        return command._replace(yaw_rate=math.copysign(min(rate, allowed), command.yaw_rate)), True
+        slower, kept = _scaled(command, share), self._braked(last)
+        if kept == STILL or _slows_no_more(slower, kept):
+            return slower, True
+        return kept, True
 
     def _allowed(self, pose: Pose, command: Twist) -> float:
-        """The highest speed along the command's arc from which the robot stops on ground that it has seen [m/s]."""
-        speed, brake = abs(command.speed), self._robot.max_acceleration
-        needed = speed * self._reaction + speed * speed / (2 * brake)
-        clear = self._survey.clear_distance(pose, *command, needed + SHORT) - SHORT
-        if clear >= needed:
-            return speed
-        return self._stoppable(clear, brake)
+        """The largest share of a command with which the robot stops on ground that it has seen, at most 1."""
+        speed, rate = abs(command.speed), abs(command.yaw_rate)
+        if command == STILL:
+            return 1.0
+        stop = self._stopping_time(command)
+        going = (
+            self._reaction + stop / 2
+        )  # on the way until it stands, the robot gets as far as at full speed in this time
+        if speed <= ON_THE_SPOT * rate:
+            clear = self._survey.clear_turn(pose, command.yaw_rate, rate * going + SHORT) - SHORT
+            seen = clear / rate
+        else:
+            short = SHORT if speed >= SLOWEST else SHORT * speed / max(speed, rate)
+            seen = (self._survey.clear_distance(pose, *command, speed * going + short) - short) / speed
+        if seen >= going * (1 - 1e-12):
+            return 1.0
+        # The share s for which s (reaction + s stop / 2) = seen, in a form that loses no digits where `stop` is short.
+        reaction, seen = self._reaction, max(seen, 0.0)
+        return 2 * seen / (math.sqrt(reaction**2 + 2 * seen * stop) + reaction)
 
-    def _stoppable(self, clear: float, brake: float) -> float:
-        """The speed from which a robot that reacts late stops in a way; for turns with angles."""
-        return brake * (math.sqrt(self._reaction**2 + 2 * max(clear, 0.0) / brake) - self._reaction)
+    def _stopping_time(self, twist: Twist) -> float:
+        """How long the robot takes to stop on the arc of a twist [s]."""
+        robot = self._robot
+        return max(abs(twist.speed) / robot.max_acceleration, abs(twist.yaw_rate) / robot.max_yaw_acceleration)
+
+    def _braked(self, last: Twist) -> Twist:
+        """The next command of a robot that brakes as hard as it can on its arc."""
+        stop = self._stopping_time(last)
+        return _scaled(last, 1 - self._period / stop) if stop > self._period else STILL
 
 
-def _slower(twist: Twist, speed: float) -> Twist:
-    """A twist on the same arc at another speed."""
-    if twist.speed == 0.0:
-        return Twist(0.0, 0.0)
-    return Twist(math.copysign(speed, twist.speed), twist.yaw_rate * speed / abs(twist.speed))
+def _scaled(twist: Twist, share: float) -> Twist:
+    """A twist on the same arc, slower."""
+    return Twist(twist.speed * share, twist.yaw_rate * share) if share > 0 else STILL
+
+
+def _slows_no_more(twist: Twist, kept: Twist) -> bool:
+    """Whether a twist goes the same way as one that brakes, and at least as fast."""
+    if kept.speed:
+        return twist.speed * math.copysign(1.0, kept.speed) >= abs(kept.speed)
+    return twist.yaw_rate * math.copysign(1.0, kept.yaw_rate) >= abs(kept.yaw_rate)

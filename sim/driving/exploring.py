@@ -57,7 +57,7 @@ INTERVAL = 0.15  # the shortest time between two plans [s]
 COVERS = 1e-3  # what was hit so near to the robot or to its goal covers it [m]
 LOOK_AT_ROUTE = 0.1  # spacing of the points of a route that are looked at [m]
 FORGIVING = 0.005  # the arcs of a disc may come this much closer to what was hit than in a known world [m]
-CORNERED = 0.1  # and those of a rectangle by this share more of what its corners stand out [m/m]
+CORNERED = 0.1  # and those of other shapes by this share more of what their corners stand out [m/m]
 TURNING = 0.015  # a rectangle that turns on the spot keeps this much more from what was hit than in a known world [m]
 STALL_TIME = 2.5  # a robot that does not move for this long tries something else [s]
 STALL_DISTANCE = 0.06  # [m]
@@ -295,7 +295,7 @@ class Exploration:
         tolerance = self._task.goal_tolerance
         tracked = self._controller.prepare(route, world, robot, margin, 1 / self._hz, tolerance, SAMPLES, indexed=False)
         foot, tuning = robot.footprint, tracked.tuning
-        give = FORGIVING + CORNERED * (robot.radius - min(foot.half_length, foot.half_width) - foot.rounding)
+        give = FORGIVING + CORNERED * (robot.radius - foot.inner_radius)
         return dataclasses.replace(
             tracked,
             tuning=tuning._replace(

@@ -191,10 +191,13 @@ class Survey:
     def forget(self, pose: Pose) -> None:
         """Make the map anew of the latest scans: what was seen before may be elsewhere in a frame that drifts.
 
+        What the robot covers when it turns stays free as far as it was seen free. Hits there become ground that was not seen:
+        open to plans, but the robot does not move over it before it has looked again.
+
         Args:
-            pose: where the robot believes it is; what it covers when it turns there is taken for free
+            pose: where the robot believes it is
         """
-        self.map = self._empty_map(pose)
+        self.map = self.map.renewed(pose[:2], self._radius, self._goal)
         for scan in self.scans[-self._recent :]:
             self.map.insert(scan.estimate, scan.ranges, scan.movers)
 

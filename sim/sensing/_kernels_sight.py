@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from antdrive.robots._kernels_footprint import polygon_distance
 from antdrive.sim.sensing._kernels_mapping import GRAINS, MapArrays, grain_disc
 from antdrive.worlds._kernels import Array, kernel
 
@@ -15,11 +16,16 @@ GIVE = 2e-3  # a disc that the footprint overlaps already is shrunk to this dist
 @kernel
 def clear_way(
     x0: float, y0: float, yaw: float, speed: float, yaw_rate: float, half_length: float, half_width: float,
-    rounding: float, limit: float, arrays: tuple[Array, ...],
+    rounding: float, corners: Array, limit: float, arrays: tuple[Array, ...],
 ) -> float:  # fmt: skip
-    """How far a rounded rectangle gets on the arc of a twist from a pose [m], at most `limit`; for a turn on the spot [rad]."""
+    """How far a footprint gets on the arc of a twist from a pose [m], at most `limit`; for a turn on the spot [rad].
+
+    It is a rounded rectangle; where there are `corners` (K, 2), they are those of the polygon in its place.
+    """
     pose, shape, m = (x0, y0, yaw), (half_length, half_width, rounding), MapArrays(*arrays)
     radius = math.hypot(shape[0], shape[1]) + shape[2]
+    for k in range(corners.shape[0]):
+        radius = max(radius, math.hypot(corners[k, 0], corners[k, 1]) + rounding)
     cell = m.frame[2]
     turns = speed == 0.0
     if turns and yaw_rate == 0.0:
@@ -54,14 +60,14 @@ def clear_way(
             if not on_the_way(ahead, left, forward, bend, radius + 1.5 * cell, best):
                 continue
             if not m.occupied[row, col]:
-                best = contact(ahead, left, math.sqrt(0.5) * cell, forward, bend, shape, best)
+                best = contact(ahead, left, math.sqrt(0.5) * cell, forward, bend, shape, corners, best)
                 continue
             at = m.slot[row, col]
             for k in range(GRAINS * GRAINS):
                 if m.odds[at, k] > 0.0:
                     gx, gy, size = grain_disc(m.box, at, k)
                     dx, dy = gx - pose[0], gy - pose[1]
-                    best = contact(cos * dx + sin * dy, cos * dy - sin * dx, size, forward, bend, shape, best)
+                    best = contact(cos * dx + sin * dy, cos * dy - sin * dx, size, forward, bend, shape, corners, best)
     return best
 
 
@@ -113,8 +119,9 @@ def on_the_way(ahead: float, left: float, forward: float, bend: float, reach: fl
 
 @kernel
 def contact(
-    ahead: float, left: float, size: float, forward: float, bend: float, shape: tuple[float, float, float], limit: float
-) -> float:
+    ahead: float, left: float, size: float, forward: float, bend: float, shape: tuple[float, float, float], corners: Array,
+    limit: float,
+) -> float:  # fmt: skip
     """How far the robot gets before it meets a disc at (ahead, left), at most `limit`.
 
     Steps are as long as the distance allows (conservative advancement). A disc that the robot overlaps at first is taken for
@@ -130,9 +137,12 @@ def contact(
             x = forward * sin / bend if bent else forward * done
             y = forward * (1.0 - cos) / bend if bent else 0.5 * forward * turn * done
         dx, dy = ahead - x, left - y
-        qx, qy = abs(cos * dx + sin * dy) - shape[0], abs(cos * dy - sin * dx) - shape[1]
-        out_x, out_y = max(qx, 0.0), max(qy, 0.0)
-        gap = math.sqrt(out_x * out_x + out_y * out_y) + min(max(qx, qy), 0.0) - shape[2]
+        if corners.shape[0] > 0:
+            gap = polygon_distance(cos * dx + sin * dy, cos * dy - sin * dx, corners) - shape[2]
+        else:
+            qx, qy = abs(cos * dx + sin * dy) - shape[0], abs(cos * dy - sin * dx) - shape[1]
+            out_x, out_y = max(qx, 0.0), max(qy, 0.0)
+            gap = math.sqrt(out_x * out_x + out_y * out_y) + min(max(qx, qy), 0.0) - shape[2]
         if done == 0.0 and gap - size < GIVE:
             size = gap - GIVE
         away = gap - size

@@ -205,6 +205,41 @@ class OccupancyMap:
         count = kernels.take_as_free(*place, radius, self._plain, self._changed)
         return self._changed[:count].copy()
 
+    def renewed(self, place: Point, radius: float, goal: Point | None = None) -> OccupancyMap:
+        """An empty map with the same cells, but for what this one has seen free around a place; hits there are unknown ground.
+
+        Args:
+            place: around which the map is laid out, x, y [m]
+            radius: how far around it free ground stays free [m]
+            goal: where the robot is to go [m]; None: for no way
+        """
+        cell, half = self.cell, self.horizon + ROOM
+        x, y = (
+            low + cell * math.floor((at - half - low) / cell) + half for at, low in zip(place, self.origin, strict=True)
+        )
+        new = OccupancyMap(self._lidar, cell, (x, y), self.horizon, share=self.share, goal=goal)
+        new._take_over(self, place, radius)
+        return new
+
+    def _take_over(self, other: OccupancyMap, place: Point, radius: float) -> None:
+        """Free the cells that meet a disc and are free on another map with the same cells."""
+        low, span = np.subtract(place, radius), math.ceil(2 * radius / self.cell) + 1
+        cols, rows = np.floor((low - self.origin) / self.cell).astype(np.int64)[:, None] + np.arange(span)
+        across, up = np.round(np.subtract(self.origin, other.origin) / self.cell).astype(np.int64)
+        rows, cols = (
+            side[(side >= 0) & (side < most) & (side + shift >= 0) & (side + shift < far)]
+            for side, most, shift, far in zip(
+                (rows, cols), self._arrays.free.shape, (up, across), other._arrays.free.shape, strict=True
+            )
+        )
+        sides = zip((cols, rows), self.origin, place, strict=True)
+        dx, dy = (
+            np.maximum(np.abs(low + (side + 0.5) * self.cell - at) - 0.5 * self.cell, 0) for side, low, at in sides
+        )
+        within = dx**2 + dy[:, None] ** 2 <= radius * radius
+        self._arrays.free[np.ix_(rows, cols)] = within & other._arrays.free[np.ix_(rows + up, cols + across)]
+        kernels.count_unseen(self._arrays.free, self._arrays.unseen)
+
     def _make_room(self, x: float, y: float) -> None:
         """Grow where the horizon around the lidar would leave the map."""
         x_low, x_high, y_low, y_high = self._room

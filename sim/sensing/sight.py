@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import functools
+
+from antdrive.robots.footprint import shape_of
 from antdrive.robots.spec import Footprint
 from antdrive.sim.sensing import _kernels_sight
 from antdrive.sim.sensing.mapping import OccupancyMap
-from antdrive.worlds import Pose
+from antdrive.worlds import Floats, Pose
 
 
 def clear_distance(
@@ -44,4 +47,9 @@ def clear_turn(seen: OccupancyMap, pose: Pose, yaw_rate: float, footprint: Footp
 
 def _clear(seen: OccupancyMap, pose: Pose, speed: float, yaw_rate: float, footprint: Footprint, limit: float) -> float:
     shape = footprint.half_length, footprint.half_width, footprint.rounding
-    return float(_kernels_sight.clear_way(*pose, speed, yaw_rate, *shape, limit, seen.plain))
+    return float(_kernels_sight.clear_way(*pose, speed, yaw_rate, *shape, _corners(footprint), limit, seen.plain))
+
+
+@functools.lru_cache(maxsize=16)
+def _corners(footprint: Footprint) -> Floats:
+    return shape_of(footprint)[1]

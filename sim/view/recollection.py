@@ -93,7 +93,7 @@ class Recollection:
 
     def _forget(self, at: float) -> None:
         """Make the map anew of the latest scans, as the robot did: in the same control period, after the scan."""
-        self.map = self._empty_map(self._estimate(self._row(at)))
+        self.map = self.map.renewed(self._estimate(self._row(at))[:2], self._rollout.record.robot.radius)
         recent = math.ceil(RECENT * self.lidar.rate)
         for k in range(max(0, self._entered - recent), self._entered):
             self._insert(k)

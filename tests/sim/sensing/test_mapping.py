@@ -198,6 +198,30 @@ def test_ground_under_the_robot_can_be_taken_as_free() -> None:
     assert len(grid.take_as_free((0.0, 0.0), 0.3)) == 0
 
 
+@pytest.mark.parametrize("place", [(0.31, -0.77), (9.2, -1.03), (40.0, 0.0)])
+def test_a_renewed_map_knows_the_free_ground_around_a_place_and_nothing_else(place: tuple[float, float]) -> None:
+    old, radius = OccupancyMap(EYE), 0.6
+    for x in (0.0, 8.0):
+        old.insert((x, 0.0, 0.1), Scanner(EYE, POSTS).scan((x, 0.0, 0.1)))
+    new = old.renewed(place, radius, goal=(9.0, -2.0))
+    free = np.argwhere(new.seen_free)
+    centres = (free[:, ::-1] + 0.5) * new.cell + new.origin
+    # The cells are the same ones, so a centre is one of the old map, too; those that meet the disc lie close to it.
+    rows, cols = np.nonzero(old.seen_free)
+    known = np.column_stack((cols + 0.5, rows + 0.5)) * old.cell + old.origin
+    beyond = np.maximum(np.abs(known - place) - old.cell / 2, 0)
+    expected = known[np.hypot(*beyond.T) <= radius]
+    assert {*map(tuple, np.round(centres, 6).tolist())} == {*map(tuple, np.round(expected, 6).tolist())}
+    assert (len(free) > 0) == (place[0] < 10)
+    assert not new.occupied.any()
+    squares = np.add.reduceat(
+        np.add.reduceat(~new.seen_free, np.arange(0, new.seen_free.shape[0], SQUARE)),
+        np.arange(0, new.seen_free.shape[1], SQUARE),
+        axis=1,
+    )
+    assert np.array_equal(new.arrays.unseen, squares)
+
+
 def test_a_mover_can_be_forgotten_and_its_beams_left_out() -> None:
     scanner, grid = Scanner(EYE, np.empty((0, 3))), OccupancyMap(EYE)
     where, radii = np.array([[1.5, 0.0]]), np.array([0.3])

@@ -126,3 +126,21 @@ def test_a_robot_may_leave_what_it_overlaps_but_not_come_nearer() -> None:
 def test_nothing_is_gained_by_standing() -> None:
     assert clear_distance(seen([]), (0.0, 0.0, 0.0), 0.0, 1.0, BOX, 1.0) == 0.0
     assert clear_distance(seen([]), (0.0, 0.0, 0.0), 0.0, 0.0, BOX, 1.0) == 1.0
+
+
+def test_footprints_off_the_axle_are_swept_as_they_are() -> None:
+    """The same rectangle reaches 5 cm farther ahead where it is shifted, and no farther than that behind."""
+    grid = seen([], [(1.0, 0.1), (-1.0, 0.1)])
+    shifted, triangle = (
+        Footprint.rectangle(0.5, 0.4, (0.05, 0.0)),
+        Footprint.polygon([(0.3, 0.0), (-0.2, 0.3), (-0.2, -0.3)]),
+    )
+    centred = [clear_distance(grid, (0.0, 0.0, 0.0), way, 0.0, BOX, 2.0) for way in (1.0, -1.0)]
+    off = [clear_distance(grid, (0.0, 0.0, 0.0), way, 0.0, shifted, 2.0) for way in (1.0, -1.0)]
+    assert np.subtract(off, centred) == pytest.approx([-0.05, 0.05], abs=2e-3)
+    # The triangle's slanted side is at x = 0.3 - 0.1 * 5 / 3 where y = 0.1; a disc meets it nearer to its tip.
+    x, _, size = grid.discs()[0]
+    way = clear_distance(grid, (0.0, 0.0, 0.0), 1.0, 0.0, triangle, 2.0)
+    assert way == pytest.approx(x - 0.3 + (0.1 * 0.5 - size * math.hypot(0.5, 0.3)) / 0.3, abs=5e-3)
+    assert clear_turn(seen([], [(0.0, 0.25)]), (0.0, 0.0, 0.0), 1.0, triangle, math.pi) < math.pi / 2
+    assert clear_turn(seen([], [(0.0, 0.5)]), (0.0, 0.0, 0.0), 1.0, triangle, math.pi) == math.pi

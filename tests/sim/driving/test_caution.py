@@ -1,0 +1,144 @@
+"""A robot that never outruns its sight touches nothing that stands, whatever is commanded: exact kinematics, exact scans."""
+
+import dataclasses
+import math
+
+import hypothesis
+import numpy as np
+import pytest
+from hypothesis import strategies as st
+
+from antdrive.robots import Footprint, Lidar, RobotSpec, Twist, footprint_clearance, load_robot
+from antdrive.sim.driving.caution import Caution
+from antdrive.sim.driving.survey import Senses, Survey
+from antdrive.sim.sensing import Scanner
+from antdrive.worlds import Disc, Floats, Pose, World
+
+EYE = Lidar(beams=360, field_of_view=2 * math.pi, min_range=0.05, max_range=3.0, rate=20.0)
+SHAPES = {
+    "a disc": Footprint.disc(0.2),
+    "a rectangle": Footprint.rectangle(0.5, 0.4),
+    "a rectangle off the axle": Footprint.rectangle(0.5, 0.4, (0.08, -0.03)),
+    "a disc off the axle": Footprint.disc(0.2, (-0.05, 0.02)),
+    "a polygon": Footprint.polygon([(0.35, 0.02), (0.1, 0.2), (-0.2, 0.15), (-0.25, -0.15), (0.1, -0.17)]),
+}
+
+
+def robot_of(shape: str, lidar: Lidar = EYE) -> RobotSpec:
+    return dataclasses.replace(load_robot("turtlebot"), footprint=SHAPES[shape], lidar=lidar)
+
+
+def after(pose: Pose, twist: Twist, period: float) -> Pose:
+    """The pose at the end of a control period in which a twist was kept exactly."""
+    x, y, yaw = pose
+    turn = twist.yaw_rate * period
+    chord = twist.speed * period * (math.sin(turn / 2) / (turn / 2) if abs(turn) > 1e-9 else 1.0)
+    return x + chord * math.cos(yaw + turn / 2), y + chord * math.sin(yaw + turn / 2), yaw + turn
+
+
+def driven(
+    robot: RobotSpec, world: World, start: Pose, wanted: list[Twist], hz: int, held: int, *, blind: bool = False
+) -> Floats:
+    """Poses of a robot that is commanded each twist for some periods, as far as it accelerates, and limited by its sight."""
+    assert robot.lidar is not None
+    survey = Survey(Senses(Scanner.of(robot.lidar, world), None, None, hz), robot, start, (start[0] + 2.0, start[1]))
+    caution = Caution(survey, robot, hz, 1 / hz + 1 / robot.lidar.rate)
+    most, sharpest = robot.max_acceleration / hz, robot.max_yaw_acceleration / hz
+    pose, last, poses = start, Twist(0.0, 0.0), []
+    for tick in range(len(wanted) * held):
+        want = wanted[tick // held]
+        survey.look(tick, pose, pose)
+        speed = min(max(want.speed, last.speed - most), last.speed + most)
+        rate = min(max(want.yaw_rate, last.yaw_rate - sharpest), last.yaw_rate + sharpest)
+        last = Twist(speed, rate) if blind else caution.limit(pose, last, Twist(speed, rate))[0]
+        pose = after(pose, last, 1 / hz)
+        poses.append(pose)
+    return np.array(poses)
+
+
+@pytest.mark.parametrize("hz", [20, 240])
+@pytest.mark.parametrize("speed", [0.015, 0.04, -0.015])
+def test_a_robot_that_creeps_stops_before_what_it_has_seen(speed: float, hz: int) -> None:
+    """At 240 Hz the robot gains less than 5 mm/s in a control period."""
+    robot, away = robot_of("a disc"), math.copysign(0.2 + 0.2 + 0.08, speed)
+    world = World("post", (0.0, 0.0, 4.0, 4.0), (Disc(2.0 + away, 2.0, 0.2),))
+    poses = driven(robot, world, (2.0, 2.0, 0.0), [Twist(speed, 0.0)], hz, held=10 * hz)
+    left = footprint_clearance(world, robot.footprint, poses)[-1]
+    assert 0.01 < left < 0.04  # it came near, and stopped
+
+
+@pytest.mark.parametrize("shape", sorted(SHAPES))
+def test_every_footprint_stops_before_a_post(shape: str) -> None:
+    robot = robot_of(shape)
+    world = World("post", (0.0, 0.0, 6.0, 4.0), (Disc(3.5, 2.1, 0.05),))
+    poses = driven(robot, world, (1.0, 2.0, 0.0), [Twist(0.6, 0.0)], hz=20, held=160)
+    left = footprint_clearance(world, robot.footprint, poses)
+    assert left.min() > 0.01
+    assert left[-1] < 0.05
+    assert 2.5 < poses[-1, 0] < 3.5
+
+
+FORWARD = dataclasses.replace(EYE, field_of_view=4.2, beams=240, rate=10.0)
+speeds = st.one_of(st.sampled_from([0.0, 0.01, -0.01, 0.8, -0.8]), st.floats(-0.8, 0.8))
+rates = st.one_of(st.sampled_from([0.0, 2.5, -2.5]), st.floats(-2.5, 2.5))
+posts = st.lists(st.tuples(st.floats(0.05, 1.2), st.floats(-math.pi, math.pi), st.floats(0.08, 0.4)), max_size=5)
+
+
+@hypothesis.settings(max_examples=120)
+@hypothesis.given(
+    st.sampled_from(sorted(SHAPES)),
+    st.sampled_from([EYE, FORWARD]),
+    posts,
+    st.floats(-math.pi, math.pi),
+    st.lists(st.builds(Twist, speeds, rates), min_size=1, max_size=12),
+    st.sampled_from([(10, 8), (20, 16), (60, 40), (240, 120)]),
+)
+def test_nothing_that_stands_is_touched_whatever_is_commanded(
+    shape: str,
+    lidar: Lidar,
+    posts: list[tuple[float, float, float]],
+    yaw: float,
+    wanted: list[Twist],
+    rate: tuple[int, int],
+) -> None:
+    """Posts stand anywhere beyond the circle in which the robot turns at the start, in a room whose walls are near."""
+    robot, (hz, held) = robot_of(shape, lidar), rate
+    places = [(robot.radius + away + size, angle, size) for away, angle, size in posts]
+    discs = tuple(Disc(1.8 + far * math.cos(angle), 1.8 + far * math.sin(angle), size) for far, angle, size in places)
+    world = World("any", (0.0, 0.0, 3.6, 3.6), discs)
+    poses = driven(robot, world, (1.8, 1.8, yaw), wanted, hz, held)
+    assert footprint_clearance(world, robot.footprint, poses).min() > 0
+
+
+def test_without_caution_the_same_commands_end_in_walls() -> None:
+    world = World("room", (0.0, 0.0, 3.6, 3.6))
+    for shape in SHAPES:
+        robot = robot_of(shape)
+        poses = driven(robot, world, (1.8, 1.8, 0.0), [Twist(0.5, 0.3)], 20, 160, blind=True)
+        assert footprint_clearance(world, robot.footprint, poses).min() < 0
+
+
+@pytest.mark.parametrize("beside", [0.275, None])
+def test_a_robot_that_forgets_its_map_turns_over_no_post_that_it_has_seen(beside: float | None) -> None:
+    """Posts within the circle of the turn, beside a rectangle whose lidar looks ahead only and last saw them long ago."""
+    jackal = load_robot("jackal")
+    assert jackal.lidar is not None
+    robot = dataclasses.replace(jackal, lidar=dataclasses.replace(jackal.lidar, field_of_view=math.pi))
+    posts = tuple(Disc(2.88, 2.0 + side * beside, 0.03) for side in (-1, 1)) if beside else ()
+    world, start, here = World("gate", (0.0, 0.0, 8.0, 4.0), posts), (1.5, 2.0, 0.0), (3.0, 2.0, 0.0)
+    assert robot.lidar is not None
+    survey = Survey(Senses(Scanner.of(robot.lidar, world), None, None, 50), robot, start, (7.0, 2.0))
+    for tick in range(210):
+        x = min(3.0, 1.5 + 0.01 * tick)
+        survey.look(tick, (x, 2.0, 0.0), (x, 2.0, 0.0))
+    known = survey.clear_turn(here, 1.0, math.pi)
+    survey.forget(here)
+    turn = survey.clear_turn(here, 1.0, math.pi)
+    if beside is None:
+        assert turn == known == math.pi
+        return
+    assert turn <= known
+    angles = np.linspace(0.0, math.pi, 400)
+    gaps = footprint_clearance(world, robot.footprint, [(3.0, 2.0, angle) for angle in angles])
+    assert gaps[angles <= turn].min() > 0
+    assert gaps.min() < 0  # a whole turn would touch a post
