@@ -5,8 +5,9 @@ from __future__ import annotations
 import itertools
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, Field, PlainValidator, WithJsonSchema
@@ -197,20 +198,25 @@ def load_campaign(path: str | os.PathLike[str]) -> Campaign:
     return _checked(read_document(path), Path(path).parent)
 
 
-def make_campaign(data: Mapping[str, Any], folder: str | os.PathLike[str] = ".", source: str = "campaign") -> Campaign:
+def make_campaign(
+    data: Mapping[str, Any],
+    folder: str | os.PathLike[str] = ".",
+    source: str = "campaign",
+    options: Mapping[str, str] = MappingProxyType({}),
+) -> Campaign:
     """A campaign from plain data with the keys of a campaign file; `schema` may be left out.
 
     Args:
         data: mappings, lists, numbers and texts; also tuples, ranges, paths, and numbers and arrays of numpy
         folder: where relative paths begin
         source: what messages call the data
+        options: the options of a command that keys, also those of settings, come from; messages name them instead
 
     Raises:
         InputError: something in the data is wrong.
     """
-    return _checked(
-        Document(source, {"schema": 1, **{key: _plain(value) for key, value in data.items()}}), Path(folder)
-    )
+    plain = {"schema": 1, **{key: _plain(value) for key, value in data.items()}}
+    return _checked(_Asked(source, plain, options=options), Path(folder))
 
 
 def _plain(value: Any) -> Any:
@@ -272,6 +278,18 @@ def _alternatives(document: Document, key: str, value: Any, place: Location) -> 
     if not found:
         raise document.error((*place, key), "must have at least one value, got an empty list")
     return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Asked(Document):
+    """Data some of which options of a command hold, whose errors name these."""
+
+    options: Mapping[str, str] = field(default_factory=dict)
+
+    def error(self, location: Location, problem: str) -> InputError:
+        key = next((step for step in location if isinstance(step, str) and step != "settings"), None)
+        option = self.options.get(key) if key else None
+        return InputError(f"{option}: {problem}") if option else super().error(location, problem)
 
 
 @dataclass(frozen=True, eq=False)

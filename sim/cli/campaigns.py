@@ -21,6 +21,17 @@ MEDIANS = {
     "min_clearance_m": "least clearance m",
     "plan_s": "planning ms",
 }
+#: The options that a campaign's keys come from, in errors.
+OPTIONS = {
+    "robots": "--robot",
+    "routes": "--smoothing",
+    "noise": "--noise",
+    "margin": "--margin",
+    "seeds": "--seeds",
+    "map": "--map",
+    "localisation": "--localisation",
+    "odometry": "--odometry",
+}
 SOURCE = "the options"  # what errors call a campaign that no file describes
 
 
@@ -43,7 +54,7 @@ def campaign_from(path: Path | None, **words: Any) -> Campaign:
         for key, option in (("worlds", "--world"), ("planners", "--planner")):
             if key not in given:
                 raise InputError(f"{option}: missing; name a campaign file, or at least one world and one planner")
-        return make_campaign(given, ".", SOURCE)
+        return make_campaign(given, ".", SOURCE, OPTIONS)
     file = load_campaign(path)
     # Paths in options begin where the command runs, those in the file beside the file.
     if "planners" in given:

@@ -138,6 +138,11 @@ class Scene:
         )
 
     @property
+    def unseen_said(self) -> str:
+        """What legends call the obstacles of `--unseen`: without a map the planner knew of no obstacle at first."""
+        return "placed after planning" if self.mapped else "not in the world file"
+
+    @property
     def movers_said(self) -> str:
         """What a legend says of movers: a picture shows them at one moment."""
         return f"moving obstacle, at {self.movers_at:.1f} s"

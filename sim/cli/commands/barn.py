@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from antdrive.sim.cli import knowing, options
+from antdrive.sim.cli.campaigns import OPTIONS
 from antdrive.sim.cli.compiling import compile_once
 from antdrive.sim.cli.console import bar, campaign_bar, print_error, print_json, print_line, print_table
 from antdrive.sim.cli.exits import FAILED, SUCCEEDED
@@ -80,7 +81,7 @@ def barn(
         "odometry": odometry,
     }
     data = challenge.campaign_data(folder, trials, planner, robot, settings, with_map=with_map)
-    campaign = make_campaign(data, source="barn")
+    campaign = make_campaign(data, source="barn", options={**OPTIONS, "seeds": "--trials", "planners": "--planner"})
     compile_once()
     try:
         with campaign_bar("driving") as progress:

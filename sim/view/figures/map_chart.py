@@ -169,7 +169,7 @@ def draw_legend(axes: Any, handles: list[Any], scene: Scene) -> None:
     """Draw the map's legend above its upper left corner: `handles`, then obstacles, movers and zones."""
     known = [Patch(fc=hexed(OBSTACLE), label="obstacle")]
     if scene.unseen.any():
-        known.append(Patch(fc=hexed(UNSEEN), label="placed after planning"))
+        known.append(Patch(fc=hexed(UNSEEN), label=scene.unseen_said))
     if scene.mover_radii:
         known.append(Patch(fc=hexed(MOVER), label=scene.movers_said))
     if scene.has_zones:

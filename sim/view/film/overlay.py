@@ -231,7 +231,7 @@ def legend_entries(
     if scene.has_zones:
         found.append(LegendEntry("zone", ZONE, f"inflated by {scene.inflate:.2f} m"))
     if scene.unseen.any():
-        found.append(LegendEntry("dot", UNSEEN, "placed after planning"))
+        found.append(LegendEntry("dot", UNSEEN, scene.unseen_said))
     if beams:
         found.append(LegendEntry("zone", BEAM, "beams of the lidar"))
     if sight:

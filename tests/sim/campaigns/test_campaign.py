@@ -363,6 +363,18 @@ def test_a_list_of_settings_is_a_list_of_grids() -> None:
             make_campaign({"worlds": "empty", "planners": "astar", "settings": wrong})
 
 
+def test_errors_name_the_options_that_keys_come_from() -> None:
+    data = {"worlds": "empty", "planners": "astar", "robots": "jackal", "seeds": [0]}
+    options = {"map": "--map", "seeds": "--trials"}
+    for settings in ({"map": "no"}, [{"map": "given"}, {"map": "no"}]):
+        with pytest.raises(InputError, match=r"^--map: empty with jackal: unknown 'no'; choose from given, none$"):
+            expand(make_campaign({**data, "settings": settings}, options=options))
+    with pytest.raises(InputError, match="--trials: must be whole numbers"):
+        make_campaign({**data, "seeds": [0.5]}, options=options)
+    with pytest.raises(InputError, match=r"^campaign: settings\.cell: must be"):
+        make_campaign({**data, "settings": {"cell": -1.0}}, options=options)
+
+
 def test_runs_with_a_map_have_the_keys_that_they_always_had() -> None:
     data = {"worlds": "empty", "planners": "astar", "robots": "jackal"}
     (plain,) = expand(make_campaign(data)).jobs

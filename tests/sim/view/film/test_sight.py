@@ -113,6 +113,10 @@ def test_the_legend_names_what_is_painted(log: Rollout) -> None:
     named = {entry.text for entry in legend_entries(scene, 0.5, 0.01, beams=True, sight=True)}
     assert named - plain == {"beams of the lidar", "hit, on the robot's map", "never seen"}
     assert not any("inflated" in text for text in named)
+    hidden = [dataclasses.replace(scene, mapped=mapped, unseen=np.ones_like(scene.unseen)) for mapped in (True, False)]
+    given, none = ({entry.text for entry in legend_entries(one, 0.5, 0.01)} for one in hidden)
+    assert "placed after planning" in given - none
+    assert none - plain == {"not in the world file"}
 
 
 def test_movers_that_are_followed_have_rings_and_nothing_else_changes(log: Rollout) -> None:
