@@ -59,18 +59,6 @@ def test_a_folder_without_worlds_leaves_nothing_behind(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_error_names_the_option(tmp_path: Path, antdrive: Call, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With a campaign in the place of the challenge's, whose worlds are not part of the project."""
-    data = {"worlds": "empty", "planners": "astar", "robots": "husky", "settings": [{"map": "none"}]}
-    monkeypatch.setattr("antdrive.sim.campaigns.challenge.campaign_data", lambda *_words, **_settings: data)
-    (tmp_path / "world_0.world").touch()
-    code, _, err = antdrive("barn", tmp_path, "--out", tmp_path / "out")
-    assert (code, err.splitlines()[-1].split("; ")[0]) == (
-        2,
-        "antdrive: --map: empty with husky: none: husky has no lidar",
-    )
-
-
 def test_a_failure_is_listed_with_its_film_or_its_log(
     driven: Path, antdrive: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
