@@ -6,13 +6,13 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.robots.lidar import Lidar
+from antdrive.sim.driving.own_map import MAP_CELL
 from antdrive.sim.driving.perception import Perception, Predictor
 from antdrive.sim.sensing.ground import Ground, MappedGround
 from antdrive.sim.sensing.mapping import OccupancyMap
 from antdrive.sim.sensing.tracking import MoverTracker, TrackedMovers
 from antdrive.worlds import Floats, Pose, Trajectories, World
 
-FINE = 0.05  # the side of a map's cells [m]
 STANDS = 0.08  # a mover that is slower than this, as far as scans tell, stands still [m/s]
 
 
@@ -35,7 +35,7 @@ class Watch:
     def __init__(self, lidar: Lidar, hz: int, pose_xy: float = 0.0, pose_yaw: float = 0.0) -> None:
         lidar = lidar.at(hz)
         self.tracker, self.tick = MoverTracker(lidar, None, pose_xy, pose_yaw), 0
-        self.sight, self.reach = 0.0, min(lidar.max_range, FINE / lidar.spacing)
+        self.sight, self.reach = 0.0, min(lidar.max_range, MAP_CELL / lidar.spacing)
         self._hz, self._spacing = hz, lidar.spacing
         self._settle = max(2, round(self.tracker.policy.settle * lidar.rate))
         self._log: list[tuple[int, TrackedMovers]] = []
