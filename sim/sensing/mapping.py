@@ -38,8 +38,8 @@ class OccupancyMap:
     than a cell is wide; a thing thinner than that may stand between two of them. A single hit makes a cell occupied, and it
     is free again when the beams on both sides of its hits have ended beyond them: at the ninth time, for what was hit often.
 
-    Every `share`-th scan is entered as a whole. Of the others only the hits in cells that are not occupied are entered: what
-    comes into sight is on the map at once; that ground is free, and where within a cell its hits lie, with the next whole scan.
+    Every `share`-th scan is entered as a whole. Of the others only the places of the hits are entered: where something stands
+    is on the map at once; that ground is free, or free again, with the next whole scan.
     The free ways are those of every `turns`-th beam, in turn, and of all beams of the first scan.
 
     Attributes:
