@@ -243,6 +243,8 @@ class Driver:
         knows = math.dist(pose[:2], task.goal) > task.goal_tolerance
         if monitor is None or not knows:
             return ending
+        if isinstance(monitor, Exploration) and (monitor.lost or self._looks):
+            return None  # it looks for a way already, and no longer than a robot may make no progress
         if self._follow(monitor.replan(tick, pose, MISSED)) or monitor.may_wait:
             return None
         return self._wrong_plan(tick) if monitor.wrong else ending

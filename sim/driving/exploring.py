@@ -94,7 +94,6 @@ class Exploration:
     """
 
     schedule = None
-    may_wait = False
     blockage = Unblocked()
 
     def __init__(
@@ -128,6 +127,11 @@ class Exploration:
         self._tick = 0
         self._seen: list[tuple[int, Floats]] = []
         self._known_as: tuple[tuple[Any, ...], Task] = (), task
+
+    @property
+    def may_wait(self) -> bool:
+        """Whether the robot stays where it is for a while: it has no way, and tries again."""
+        return self.lost
 
     @property
     def look(self) -> Look | None:

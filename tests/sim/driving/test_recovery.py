@@ -10,11 +10,14 @@ import pytest
 from hypothesis import strategies as st
 
 from antdrive.planners import load_planner
-from antdrive.robots import RobotSpec, Twist
+from antdrive.robots import PursuitState, RobotSpec, Twist
 from antdrive.sim import Outcome, Run, Scenario, run
+from antdrive.sim.driving.driver import Driver
 from antdrive.sim.driving.own_map import LOOKED, forgetting_ticks
 from antdrive.sim.driving.recovery import Look, Recovery
 from antdrive.sim.driving.replay import replay
+from antdrive.sim.physics.engine import State
+from antdrive.sim.unknown import caution_of, exploration_of
 from antdrive.worlds import Disc, Task, World
 
 HALL = (0.0, 0.0, 8.0, 8.0)
@@ -84,6 +87,23 @@ def test_what_a_look_has_shown_is_not_forgotten_at_once(jackal: RobotSpec) -> No
         for k, trigger in enumerate(["no way"] * 3 + [LOOKED, "no way"])
     ]
     assert list(forgetting_ticks(SimpleNamespace(replans=replans, control_hz=hz))) == [5]  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("lost", [True, False])
+def test_a_robot_that_has_no_way_where_its_route_ends_looks_for_one_for_a_while(jackal: RobotSpec, lost: bool) -> None:
+    """It has backed off, stands at the end of that route, 3 m from the goal, and planned in vain."""
+    task = Task(World("hall", HALL), HERE, (7.0, 4.0), goal_tolerance=0.25, cell=0.1)
+    s = Scenario(task=task, planner=load_planner("astar"), planner_name="astar", robot=jackal, map="none")
+    exploration = exploration_of(s)
+    _, tracked = exploration.route(HERE, *exploration.plan(HERE))
+    robot = Driver(s.controller, tracked, task, jackal, 60, None, None, exploration, caution_of(s, exploration))
+    asked = []
+    exploration.replan = lambda tick, pose, trigger: asked.append(trigger)  # type: ignore[method-assign, assignment, return-value]
+    exploration.lost = lost
+    robot.pursuit = PursuitState(arc=tracked.length)
+    ending = robot._end_of_route(0, HERE, State(*HERE, 0.0, 0.0))
+    assert (ending is None) == lost
+    assert asked == ([] if lost else ["missed the goal"])
 
 
 @hypothesis.settings(max_examples=60)
