@@ -100,8 +100,8 @@ def insert(
 ) -> int:  # fmt: skip
     """Enter a scan from (x, y) and the cosine and sine of a yaw; the number of rows written to `changed`.
 
-    As a whole, with the free ways of every `turns`-th beam from beam `turn` on; or, where `turn` is less than 0, only its hits
-    in cells that are not occupied.
+    As a whole, with the free ways of every `turns`-th beam from beam `turn` on; or, where `turn` is less than 0, only where its
+    hits lie.
 
     Hits farther than `horizon` are not entered, nor those of beams in `left_out`; ground is seen free up to `trust`.
     """
@@ -112,31 +112,36 @@ def insert(
 
 @kernel
 def enter_hits(fan: Fan, whole: bool, left_out: Array, horizon: float, scan: int, m: MapArrays, changed: Array) -> int:
-    """Enter the measured points."""
-    odds, stamp, box, slot = m.odds, m.stamp, m.box, m.slot
-    occupied = m.occupied.reshape(m.occupied.size)
+    """Enter the measured points: all of them in the boxes of their grains, those of whole scans in the log-odds.
+
+    What was hit may come nearer to the robot between two whole scans by as much as a cell: the robot must know at once.
+    """
+    size = m.odds.size
+    odds, stamp, box = m.odds.reshape(size), m.stamp.reshape(size), m.box.reshape(size, 4)
+    occupied, slot = m.occupied.reshape(m.occupied.size), m.slot.reshape(m.slot.size)
     found, at = np.empty((4, left_out.shape[0])), np.empty(left_out.shape[0], dtype=np.int64)
     locate(fan, left_out, horizon, m, found, at)
     count = 0
     for i in range(at.shape[0]):
-        if at[i] < 0 or (occupied[at[i]] and not whole):
+        if at[i] < 0:
             continue
-        row, col = int(found[3, i]), int(found[2, i])
-        if not occupied[at[i]]:
+        cell = np.uint64(at[i])  # a signed index costs a comparison each time
+        x, y, u, v = found[0, i], found[1, i], found[2, i], found[3, i]
+        row, col = int(v), int(u)
+        if not occupied[cell]:
             occupy(row, col, scan, m)
             changed[count, 0], changed[count, 1] = row, col
             count += 1
-        px, py, u, v = found[0, i], found[1, i], found[2, i], found[3, i]
-        place, k = slot[row, col], GRAINS * int(GRAINS * (v - row)) + int(GRAINS * (u - col))
-        qx, qy = np.float32(px), np.float32(py)
-        if odds[place, k] > 0.0:
-            box[place, k, 0], box[place, k, 1] = min(box[place, k, 0], qx), min(box[place, k, 1], qy)
-            box[place, k, 2], box[place, k, 3] = max(box[place, k, 2], qx), max(box[place, k, 3], qy)
+        k = np.uint64(GRAINS * (GRAINS * slot[cell] + int(GRAINS * (v - row))) + int(GRAINS * (u - col)))
+        px, py, first = np.float32(x), np.float32(y), odds[k] <= 0.0
+        if first:
+            box[k, 0], box[k, 1], box[k, 2], box[k, 3] = px, py, px, py
         else:
-            box[place, k, 0], box[place, k, 1], box[place, k, 2], box[place, k, 3] = qx, qy, qx, qy
-        if stamp[place, k] != scan:
-            stamp[place, k] = scan
-            odds[place, k] = min(MOST, odds[place, k] + HIT)
+            box[k, 0], box[k, 1] = min(box[k, 0], px), min(box[k, 1], py)
+            box[k, 2], box[k, 3] = max(box[k, 2], px), max(box[k, 3], py)
+        if (first or whole) and stamp[k] != scan:
+            stamp[k] = scan
+            odds[k] = min(MOST, odds[k] + HIT)
     return count
 
 
@@ -369,8 +374,13 @@ def forget(x: float, y: float, radius: float, arrays: tuple[Array, ...], changed
 
 
 @kernel
-def take_as_free(x: float, y: float, radius: float, arrays: tuple[Array, ...], changed: Array) -> int:
-    """Make the unknown cells that meet a disc free; the rows written to `changed`."""
+def take_as_free(
+    x: float, y: float, radius: float, discs: Array, walls: Array, arrays: tuple[Array, ...], changed: Array
+) -> int:
+    """Make the unknown cells that meet a disc free, but for those that meet one of `discs` (N, 3) or reach beyond `walls`.
+
+    `walls` are x_min, y_min, x_max, y_max. The number of rows written to `changed` is returned.
+    """
     m = MapArrays(*arrays)
     cell = m.frame[2]
     rows, cols = m.free.shape
@@ -381,14 +391,26 @@ def take_as_free(x: float, y: float, radius: float, arrays: tuple[Array, ...], c
         last = int(math.floor((x + radius - m.frame[0]) / cell))
         for col in range(max(0, first), min(cols - 1, last) + 1):
             west, south = m.frame[0] + col * cell, m.frame[1] + row * cell
-            dx = max(max(west - x, x - west - cell), 0.0)
-            dy = max(max(south - y, y - south - cell), 0.0)
-            if dx * dx + dy * dy <= radius * radius and not m.free[row, col] and not m.occupied[row, col]:
+            known = m.free[row, col] or m.occupied[row, col]
+            if known or not square_meets(west, south, cell, x, y, radius):
+                continue
+            blocked = west < walls[0] or south < walls[1] or west + cell > walls[2] or south + cell > walls[3]
+            for k in range(discs.shape[0]):
+                blocked = blocked or square_meets(west, south, cell, discs[k, 0], discs[k, 1], discs[k, 2])
+            if not blocked:
                 m.free[row, col] = True
                 m.unseen[row >> SHIFT, col >> SHIFT] -= 1
                 changed[count, 0], changed[count, 1] = row, col
                 count += 1
     return count
+
+
+@kernel
+def square_meets(west: float, south: float, side: float, x: float, y: float, radius: float) -> bool:
+    """Whether a square, given by its lower left corner, meets a disc."""
+    dx = max(max(west - x, x - west - side), 0.0)
+    dy = max(max(south - y, y - south - side), 0.0)
+    return bool(dx * dx + dy * dy <= radius * radius)
 
 
 @kernel

@@ -16,10 +16,11 @@ import numpy.typing as npt
 
 from antdrive.robots.lidar import Lidar
 from antdrive.sim.sensing import _kernels_mapping as kernels
-from antdrive.worlds import Bounds, Floats, Point, Pose
+from antdrive.worlds import Bounds, Floats, Point, Pose, World
 from antdrive.worlds.errors import require_positive
 
 EVERYWHERE = (-math.inf, -math.inf, math.inf, math.inf)
+_NONE = np.empty((0, 3))
 Cells = npt.NDArray[np.int32]
 Mask = npt.NDArray[np.bool_]
 
@@ -37,8 +38,8 @@ class OccupancyMap:
     than a cell is wide; a thing thinner than that may stand between two of them. A single hit makes a cell occupied, and it
     is free again when the beams on both sides of its hits have ended beyond them: at the ninth time, for what was hit often.
 
-    Every `share`-th scan is entered as a whole. Of the others only the hits in cells that are not occupied are entered: what
-    comes into sight is on the map at once; that ground is free, and where within a cell its hits lie, with the next whole scan.
+    Every `share`-th scan is entered as a whole. Of the others only the places of the hits are entered: where something stands
+    is on the map at once; that ground is free, or free again, with the next whole scan.
     The free ways are those of every `turns`-th beam, in turn, and of all beams of the first scan.
 
     Attributes:
@@ -195,14 +196,16 @@ class OccupancyMap:
         count = kernels.forget(*place, radius, self._plain, self._changed)
         return self._changed[:count].copy()
 
-    def take_as_free(self, place: Point, radius: float) -> Cells:
+    def take_as_free(self, place: Point, radius: float, world: World | None = None) -> Cells:
         """Take unknown ground for free, such as that under the robot, and return the cells (K, 2).
 
         Args:
             place: x, y [m]
             radius: how far around it [m]
+            world: cells that meet one of its cylinders or walls stay unknown; None: none do
         """
-        count = kernels.take_as_free(*place, radius, self._plain, self._changed)
+        discs, walls = (_NONE, EVERYWHERE) if world is None else (world.discs, world.bounds)
+        count = kernels.take_as_free(*place, radius, discs, np.array(walls), self._plain, self._changed)
         return self._changed[:count].copy()
 
     def renewed(self, place: Point, radius: float, goal: Point | None = None) -> OccupancyMap:

@@ -8,10 +8,10 @@ import numpy.typing as npt
 import pytest
 from hypothesis import strategies as st
 
-from antdrive.robots import Lidar, RobotSpec
-from antdrive.sim.sensing import OccupancyMap, Scanner
+from antdrive.robots import Footprint, Lidar, RobotSpec
+from antdrive.sim.sensing import OccupancyMap, Scanner, clear_distance
 from antdrive.sim.sensing._kernels_mapping import SQUARE
-from antdrive.worlds import Floats, Pose
+from antdrive.worlds import Disc, Floats, Pose, World
 
 EYE = Lidar(beams=240, field_of_view=4.7, min_range=0.1, max_range=6.0, rate=10.0, resolution=0.01, sigma=0.003, x=0.1)
 POSTS = np.array([[2.0, 0.4, 0.3], [1.0, -1.2, 0.2], [3.5, 1.5, 0.4]])
@@ -31,12 +31,13 @@ poses = st.lists(st.tuples(st.floats(-8, 8), st.floats(-8, 8), st.floats(-4, 4))
 
 
 @hypothesis.settings(max_examples=15)
-@hypothesis.given(worlds, poses, st.sampled_from([0.03, 0.05, 0.1, 0.25]), st.integers(0, 9))
+@hypothesis.given(worlds, poses, st.sampled_from([0.03, 0.05, 0.1, 0.25]), st.sampled_from([1, 3]), st.integers(0, 9))
 def test_every_hit_lies_in_a_disc_whose_size_is_bounded(
-    found: list[tuple[float, ...]], ways: list[Pose], cell: float, seed: int
+    found: list[tuple[float, ...]], ways: list[Pose], cell: float, share: int, seed: int
 ) -> None:
+    """Those of the first scan, which is entered as a whole, and those of the scans between whole ones."""
     scanner, rng = Scanner(EYE, np.array(found)), np.random.default_rng(seed)
-    grid = OccupancyMap(EYE, cell, horizon=4.0)
+    grid = OccupancyMap(EYE, cell, horizon=4.0, share=share)
     for pose in ways:
         ranges = scanner.scan(pose, rng=rng)
         grid.insert(pose, ranges)
@@ -198,6 +199,21 @@ def test_ground_under_the_robot_can_be_taken_as_free() -> None:
     assert len(grid.take_as_free((0.0, 0.0), 0.3)) == 0
 
 
+def test_ground_on_which_something_stands_is_not_taken_as_free() -> None:
+    post, wall = (0.22, 0.1, 0.07), -0.17
+    world = World("corner", (wall, -5.0, 5.0, 5.0), (Disc(*post),))
+    taken, whole = OccupancyMap(EYE), OccupancyMap(EYE)
+    whole.take_as_free((0.0, 0.0), 0.3)
+    taken.take_as_free((0.0, 0.0), 0.3, world)
+    rows, cols = np.nonzero(whole.seen_free)
+    inside = np.linspace(0.0, 1.0, 21) * taken.cell  # points of a cell, from its corner
+    x, y = np.meshgrid(inside, inside)
+    for row, col in zip(rows, cols, strict=True):
+        px, py = taken.origin[0] + col * taken.cell + x, taken.origin[1] + row * taken.cell + y
+        stands = (np.hypot(px - post[0], py - post[1]) <= post[2]).any() or (px < wall - 1e-9).any()
+        assert taken.seen_free[row, col] != stands, (row, col)
+
+
 @pytest.mark.parametrize("place", [(0.31, -0.77), (9.2, -1.03), (40.0, 0.0)])
 def test_a_renewed_map_knows_the_free_ground_around_a_place_and_nothing_else(place: tuple[float, float]) -> None:
     old, radius = OccupancyMap(EYE), 0.6
@@ -276,7 +292,7 @@ def test_a_map_laid_out_for_the_way_holds_what_one_that_grows_holds(jackal: Robo
     assert np.count_nonzero(grown.seen_free) == np.count_nonzero(ready.seen_free)
 
 
-def test_between_whole_scans_only_what_comes_into_sight_is_entered(jackal: RobotSpec) -> None:
+def test_between_whole_scans_only_hits_are_entered(jackal: RobotSpec) -> None:
     assert jackal.lidar is not None
     post, late = np.array([[2.0, 0.0, 0.2]]), np.array([[2.0, 0.0, 0.2], [1.0, 0.5, 0.1]])
     grid = OccupancyMap(jackal.lidar)
@@ -284,16 +300,33 @@ def test_between_whole_scans_only_what_comes_into_sight_is_entered(jackal: Robot
     for number in range(9):  # the second post comes between two whole scans
         scanner = Scanner(jackal.lidar, post if number < 2 else late)
         ranges = scanner.scan((0.0, 0.0, 0.0), rng=np.random.default_rng(number))
-        whole, free, hits = grid.whole, grid.seen_free.copy(), grid.arrays.odds.sum()
+        whole, free, odds = grid.whole, grid.seen_free.copy(), grid.arrays.odds.copy()
         changed = grid.insert((0.0, 0.0, 0.0), ranges)
-        ends = grid.endpoints((0.0, 0.0, 0.0), ranges)[np.isfinite(ranges)]
         assert whole == (number % 4 == 0)
-        if whole:
-            assert np.all(inside(ends, grid.discs()))
-            continue
-        assert all(grid.occupied[cell_of(grid, x, y)] for x, y in ends.tolist())
-        assert not np.any(grid.seen_free & ~free)
-        assert (len(changed) > 0) == (grid.arrays.odds.sum() > hits)
+        assert np.all(inside(grid.endpoints((0.0, 0.0, 0.0), ranges)[np.isfinite(ranges)], grid.discs()))
+        assert number != 2 or len(changed) > 0
+        if not whole:
+            assert not np.any(grid.seen_free & ~free)
+            assert np.all((grid.arrays.odds == odds) | (odds == 0.0))  # a hit counts where there was none
+
+
+@pytest.mark.parametrize("grain", [0.0, 0.025])
+def test_what_comes_nearer_within_a_cell_is_known_before_the_next_whole_scan(grain: float) -> None:
+    """A thing that moves towards the robot within a cell: within the grain that was hit first, or into the one before it."""
+    eye = Lidar(beams=9, field_of_view=0.02, min_range=0.1, max_range=6.0, rate=50.0)
+    grid, here = OccupancyMap(eye, bounds=(-1.0, -1.0, 3.0, 1.0)), (0.0, 0.02, 0.0)
+    grid.take_as_free(here[:2], 1.2)
+    far, near = 1.049, 1.027 - grain
+    ways = []
+    for ranges in (np.full(9, far), np.full(9, near)):
+        whole = grid.whole
+        changed = grid.insert(here, ranges)
+        ways.append(clear_distance(grid, here, 1.0, 0.0, Footprint.disc(0.2), 1.5))
+    assert not whole
+    assert len(changed) == 0
+    assert ways == pytest.approx([far - 0.2, near - 0.2], abs=0.012)
+    assert np.all(inside(grid.endpoints(here, ranges), grid.discs()))
+    assert ways[1] <= near - 0.2
 
 
 def test_every_beam_has_its_turn(jackal: RobotSpec) -> None:
