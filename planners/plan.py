@@ -129,14 +129,11 @@ def _entrance(grid: Grid, task: Task, point: Point, within: float) -> tuple[Cell
     # A point may itself lie closer to a disc than the inflation; then the line must not come closer than the
     # point.
     needed = min(grid.inflate, own)
-    # Cylinders that no line comes as close to as that change nothing.
-    discs = task.world.discs
-    beside = discs[np.hypot(*(discs[:, :2] - point).T) - discs[:, 2] <= needed + distance.max() + 1e-6]
     order = np.argsort(distance, kind="stable")
     order = order[distance[order] <= within]
     for first in range(0, len(order), ENDS_TOGETHER):
         some = order[first : first + ENDS_TOGETHER]
-        clear = segment_clearance(task.world, centres[some], ends[some], beside) >= needed - 1e-9
+        clear = segment_clearance(task.world, centres[some], ends[some]) >= needed - 1e-9
         if clear.any():
             at_row, at_col = near[some[clear.argmax()]].tolist()
             return (at_row, at_col), True

@@ -94,6 +94,8 @@ def point_clearances(points: Array, discs: Array, bounds: Array, out: Array) -> 
     for i in range(points.shape[0]):
         x, y = points[i, 0], points[i, 1]
         best = wall_distance(x, y, bounds)
+        if i > 0:  # from the point before, clearance cannot have grown by more than the way
+            best = min(best, out[i - 1] + math.hypot(x - points[i - 1, 0], y - points[i - 1, 1]) + ROUNDING)
         for b in range(boxes.shape[0]):
             if is_beyond(best + ROUNDING, x, y, boxes[b]):
                 continue
@@ -162,7 +164,15 @@ def segment_clearances(starts: Array, ends: Array, discs: Array, bounds: Array, 
     """out[i] = clearance of the segment starts[i]..ends[i]."""
     boxes = boxes_around(discs)
     for i in range(starts.shape[0]):
-        out[i] = boxed_clearance(starts[i, 0], starts[i, 1], ends[i, 0], ends[i, 1], discs, boxes, bounds)
+        ax, ay, bx, by = starts[i, 0], starts[i, 1], ends[i, 0], ends[i, 1]
+        most = math.inf
+        if i > 0:  # from the segment before, clearance cannot have grown by more than the ends have moved
+            begun, ended = (
+                math.hypot(ax - starts[i - 1, 0], ay - starts[i - 1, 1]),
+                math.hypot(bx - ends[i - 1, 0], by - ends[i - 1, 1]),
+            )
+            most = out[i - 1] + max(begun, ended) + ROUNDING
+        out[i] = clearance_up_to(most, ax, ay, bx, by, discs, boxes, bounds)
 
 
 @kernel
@@ -179,20 +189,17 @@ def rasterise(
     for c in range(cols):
         x = x0 + c * cell
         within[c] = min(x - bounds[0], bounds[2] - x) > inflate
-    for r in range(rows):
-        y = y0 + r * cell
-        inside = min(y - bounds[1], bounds[3] - y) > inflate
-        for c in range(cols):
-            free[r, c] = inside and within[c]
     grazes = np.empty(discs.shape[0], dtype=np.bool_)
     blocked = np.zeros((rows, cols // 64 + 1), dtype=np.uint64)  # a bit for each cell
     for j in range(discs.shape[0]):
         grazes[j] = block_cells(discs[j, 0], discs[j, 1], discs[j, 2] + inflate, x0, y0, cell, cols, blocked)
     for r in range(rows):
+        y = y0 + r * cell
+        inside = min(y - bounds[1], bounds[3] - y) > inflate
         for word in range(blocked.shape[1]):
             bits = blocked[r, word]
             for c in range(64 * word, min(64 * (word + 1), cols)):
-                free[r, c] &= (bits >> np.uint64(c & 63)) & ONE == 0
+                free[r, c] = inside & within[c] & ((bits >> np.uint64(c & 63)) & ONE == 0)
     for j in range(discs.shape[0]):
         if grazes[j]:
             close_rim(discs[j, 0], discs[j, 1], discs[j, 2] + inflate, x0, y0, cell, free, closed)
