@@ -16,6 +16,7 @@ ONE, ALL = np.uint64(1), np.uint64(2**64 - 1)
 SQRT2 = math.sqrt(2.0)
 GRAZE = 1e-12  # how far off a distance may be by rounding, as a share of the coordinates; a thousand times what it is
 TOGETHER = 8  # discs in one rectangle
+APART = 8  # of so many discs in a row one comes first
 SPARE = 1e-6  # so many cells are added to a range of cells, whatever the rounding
 ROUNDING = 1e-6  # a disc is left out only if it is this much too far away to matter, so that no result changes [m]
 # Directions by bit: E, NE, N, NW, W, SW, S, SE as (row, column) steps; row grows with y.
@@ -122,16 +123,13 @@ def segment_clearance(ax: float, ay: float, bx: float, by: float, discs: Array, 
 
 
 @kernel
-def boxed_clearance(ax: float, ay: float, bx: float, by: float, discs: Array, boxes: Array, bounds: Array) -> float:
-    """`segment_clearance` of a segment among discs with the rectangles around them."""
-    return clearance_up_to(math.inf, ax, ay, bx, by, discs, boxes, bounds)
-
-
-@kernel
 def clearance_up_to(
     most: float, ax: float, ay: float, bx: float, by: float, discs: Array, boxes: Array, bounds: Array
 ) -> float:
-    """The same, or `most` if that is less: what is farther away is hardly looked at."""
+    """`segment_clearance` of a segment among discs with the rectangles around them, or `most` if that is less.
+
+    What is farther away than `most` is hardly looked at.
+    """
     best = min(most, min(wall_distance(ax, ay, bounds), wall_distance(bx, by, bounds)))
     x_min, x_max, y_min, y_max = min(ax, bx), max(ax, bx), min(ay, by), max(ay, by)
     for b in range(boxes.shape[0]):
@@ -167,10 +165,8 @@ def segment_clearances(starts: Array, ends: Array, discs: Array, bounds: Array, 
         ax, ay, bx, by = starts[i, 0], starts[i, 1], ends[i, 0], ends[i, 1]
         most = math.inf
         if i > 0:  # from the segment before, clearance cannot have grown by more than the ends have moved
-            begun, ended = (
-                math.hypot(ax - starts[i - 1, 0], ay - starts[i - 1, 1]),
-                math.hypot(bx - ends[i - 1, 0], by - ends[i - 1, 1]),
-            )
+            begun = math.hypot(ax - starts[i - 1, 0], ay - starts[i - 1, 1])
+            ended = math.hypot(bx - ends[i - 1, 0], by - ends[i - 1, 1])
             most = out[i - 1] + max(begun, ended) + ROUNDING
         out[i] = clearance_up_to(most, ax, ay, bx, by, discs, boxes, bounds)
 
@@ -191,8 +187,10 @@ def rasterise(
         within[c] = min(x - bounds[0], bounds[2] - x) > inflate
     grazes = np.empty(discs.shape[0], dtype=np.bool_)
     blocked = np.zeros((rows, cols // 64 + 1), dtype=np.uint64)  # a bit for each cell
-    for j in range(discs.shape[0]):
-        grazes[j] = block_cells(discs[j, 0], discs[j, 1], discs[j, 2] + inflate, x0, y0, cell, cols, blocked)
+    # Neighbours in the list often are neighbours in the world: between two that have come first, others add little.
+    for first in range(APART):
+        for j in range(first, discs.shape[0], APART):
+            grazes[j] = block_cells(discs[j, 0], discs[j, 1], discs[j, 2] + inflate, x0, y0, cell, cols, blocked)
     for r in range(rows):
         y = y0 + r * cell
         inside = min(y - bounds[1], bounds[3] - y) > inflate
