@@ -3,15 +3,17 @@
 Prints Markdown. What a folder holds is not driven again, so that an interrupted measurement goes on with the same command.
 With `--films` each drive that did not arrive is filmed into the folder `films` of its results.
 
-- ablations: BARN's worlds, `jackal`, noise and `--localisation matching`; the lidar's range and beams, the errors of odometry,
-  or the planner differ from those of the first row. *Price*: ratio of the arrival times, and of the lengths, to the same drives
-  with the map (geometric mean, 95 % interval over worlds). `dstar-lite` repairs its search, `ants` go on with their pheromone.
+- ablations: BARN's worlds, `jackal`, noise and `--localisation matching`; the lidar's range, beams and field of view, the errors
+  of odometry, or the planner differ from those of the first row. *Price*: ratio of the arrival times, and of the lengths, to the
+  same drives with the map (geometric mean, 95 % interval over worlds). `dstar-lite` repairs its search, `ants` go on with their
+  pheromone.
 - contacts: random forests and worlds of BARN's automaton, half of each, with both robots: contacts while driving.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import statistics
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -58,6 +60,7 @@ VARIANTS = (
     Variant("as it is"),
     *(Variant(f"range {far:g} m", {"max_range": far}) for far in (10.0, 5.0, 2.5)),
     *(Variant(f"{beams} beams", {"beams": beams}) for beams in (180, 60)),
+    *(Variant(f"field of view {view} degrees", {"field_of_view": math.radians(view)}) for view in (180, 90, 57)),
     *(Variant(f"odometry x {factor:g}", odometry=factor) for factor in (0.0, 5.0)),
     *(Variant(f"odometry x {f:g} without matching", odometry=f, localisation="odometry") for f in (1.0, 5.0)),
     *(Variant(planner, planner=planner) for planner in ("dstar-lite", "ants")),

@@ -15,7 +15,7 @@ from antdrive.robots import (
     TrackedPath,
     Twist,
 )
-from antdrive.sim.driving.caution import Caution
+from antdrive.sim.driving.caution import SLOWEST, Caution
 from antdrive.sim.driving.exploring import Exploration
 from antdrive.sim.driving.perception import Predictor
 from antdrive.sim.driving.recorder import Ending
@@ -32,7 +32,7 @@ STUCK_PROGRESS = 0.02  # what counts as progress along the route [m]
 GOAL_SHARE = 0.95  # a robot that avoids a mover may stop early within this fraction of the goal's tolerance
 DRIFTING_SHARE = 0.6  # and within this one, if it finds movers and its way by its lidar, and where it is by odometry
 BLIND_SHARE = 0.3  # of its top speed such a robot backs off where its lidar does not look, unless a mover is met then
-AVOIDING = LIMITERS.index("avoid")
+AVOIDING, ROTATING = LIMITERS.index("avoid"), LIMITERS.index("rotate")
 EXPLORING_LIMITERS = (*LIMITERS, "sight")  # the rules where the robot has no map
 OUT_OF_SIGHT = EXPLORING_LIMITERS.index("sight")
 
@@ -128,17 +128,17 @@ class Driver:
             self.tracked = self._monitor.refreshed(self.tracked, pose)
         last, before = self.command, self.pursuit
         self.command, self.pursuit = self._pursue(pose, last, before)
-        if isinstance(self._monitor, Exploration) and self._monitor.lost:
-            self.command = _brake(last, self._robot, self._hz)
+        if isinstance(self._monitor, Exploration):
+            self._look_round(pose, last, self._monitor)
         speed_limit = self._keep_to_schedule(tick, last)
         if self._avoidance is not None and self._predictor is not None:
             stopping = self.avoids and self._stops_at_goal(pose, last)
             if stopping and _standing(state):
                 return self._arrival(state)
             self._avoid_movers(tick, pose, last, before, speed_limit, stopping)
-        self._keep_within_sight(pose, last)
+        self._keep_within_sight(tick, pose, last)
         ending = self._end_of_route(tick, pose, state)
-        waiting = self.avoids or speed_limit < WAITING_SPEED
+        waiting = self.avoids or speed_limit < WAITING_SPEED or self._looks
         self._clock = self._clock.after(self.pursuit, waiting)
         return ending
 
@@ -168,13 +168,29 @@ class Driver:
         self._clock = self._clock._replace(farthest=0.0)
         return True
 
-    def _keep_within_sight(self, pose: Pose, last: Twist) -> None:
+    @property
+    def _looks(self) -> bool:
+        """Whether the robot looks round."""
+        return isinstance(self._monitor, Exploration) and self._monitor.look is not None
+
+    def _look_round(self, pose: Pose, last: Twist, exploration: Exploration) -> None:
+        """Turn on the spot where the robot is to look round, once it stands; stop where it has no way."""
+        if exploration.look is not None and not last.speed:
+            self.command = exploration.look.command(pose, last)
+            self.pursuit = self.pursuit._replace(limiter=ROTATING)
+        elif exploration.look is not None or exploration.lost:
+            self.command = _brake(last, self._robot, self._hz)
+
+    def _keep_within_sight(self, tick: int, pose: Pose, last: Twist) -> None:
         """Slow down where the robot could not stop on ground that it has seen."""
         if self._caution is None:
             return
         self.command, slowed = self._caution.limit(pose, last, self.command)
         if slowed:
             self.pursuit = self.pursuit._replace(limiter=OUT_OF_SIGHT)
+        if isinstance(self._monitor, Exploration):
+            stands = abs(self.command.speed) < SLOWEST and abs(self.command.yaw_rate) < SLOWEST
+            self._monitor.note_sight(tick, holds=slowed and stands)
 
     def _keep_to_schedule(self, tick: int, last: Twist) -> float:
         """Slow the command down to the schedule, if there is one. Returns the speed that it allows [m/s]."""
@@ -223,10 +239,12 @@ class Driver:
         if left > self.tracked.goal_distance or not _standing(state) or any(self.command):
             return None
         ending, monitor, task = self._arrival(state), self._monitor, self._task
-        # A robot whose estimate is at the goal does not know that it missed it, and stays.
+        # The robot goes by its estimate: one that is at the goal by it stays, even if it missed it, and one that is not goes on.
         knows = math.dist(pose[:2], task.goal) > task.goal_tolerance
-        if monitor is None or ending.outcome is Outcome.SUCCEEDED or not knows:
+        if monitor is None or not knows:
             return ending
+        if isinstance(monitor, Exploration) and (monitor.lost or self._looks):
+            return None  # it looks for a way already, and no longer than a robot may make no progress
         if self._follow(monitor.replan(tick, pose, MISSED)) or monitor.may_wait:
             return None
         return self._wrong_plan(tick) if monitor.wrong else ending

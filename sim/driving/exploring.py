@@ -33,7 +33,8 @@ from antdrive.robots.control.pursuit import unsorted
 from antdrive.sim.driving import _kernels_hits
 from antdrive.sim.driving.blocking import blocked_cells
 from antdrive.sim.driving.movers_ahead import MoversAhead
-from antdrive.sim.driving.own_map import PATIENCE
+from antdrive.sim.driving.own_map import LOOKED, PATIENCE
+from antdrive.sim.driving.recovery import TRAIL, Look, Recovery
 from antdrive.sim.driving.replanning import STRAYED, Replan, ReplanPolicy
 from antdrive.sim.driving.survey import Survey
 from antdrive.sim.driving.traffic import Zone
@@ -43,7 +44,9 @@ from antdrive.worlds.world import PointWorld
 
 DISCOVERED = "discovered"
 STALLED = "stalled"
+HELD = "held by sight"
 BACKED = "backed off"
+MADE_ROOM = "made room"
 LOST = "no way"
 
 GROWTH = (4.0, 16.0)  # how far beyond start and goal plans may lead, then if there is no path [m]
@@ -59,11 +62,7 @@ LOOK_AT_ROUTE = 0.1  # spacing of the points of a route that are looked at [m]
 FORGIVING = 0.005  # the arcs of a disc may come this much closer to what was hit than in a known world [m]
 CORNERED = 0.1  # and those of other shapes by this share more of what their corners stand out [m/m]
 TURNING = 0.015  # a rectangle that turns on the spot keeps this much more from what was hit than in a known world [m]
-STALL_TIME = 2.5  # a robot that does not move for this long tries something else [s]
-STALL_DISTANCE = 0.06  # [m]
-TRAIL = 0.05  # spacing of the points of the driven track [m]
 LATELY = 30.0  # what plans found no longer ago than this is said of a drive that ends without a way [s]
-BACK_OFF = (0.4, 0.8, 1.5)  # how far the robot backs off, the first time and then [m]
 
 
 class Unblocked:
@@ -95,7 +94,6 @@ class Exploration:
     """
 
     schedule = None
-    may_wait = False
     blockage = Unblocked()
 
     def __init__(
@@ -125,12 +123,20 @@ class Exploration:
         self._looked = self._indexed = 0
         self._planned_at = -math.inf
         self.lost, self._failures, self._gave_up_at = False, 0, -math.inf
-        self._trail: list[tuple[float, float]] = []
-        self._rest = (0.0, task.start[:2])
-        self._stalls, self._stalled_at = 0, task.start[:2]
+        self._recovery = Recovery(survey, robot, task.start, hz)
         self._tick = 0
         self._seen: list[tuple[int, Floats]] = []
         self._known_as: tuple[tuple[Any, ...], Task] = (), task
+
+    @property
+    def may_wait(self) -> bool:
+        """Whether the robot stays where it is for a while: it has no way, and tries again."""
+        return self.lost
+
+    @property
+    def look(self) -> Look | None:
+        """The turn with which the robot looks round now; None: it does not."""
+        return self._recovery.look
 
     # ---- plans
 
@@ -332,16 +338,21 @@ class Exploration:
         now = tick / self._hz
         if self._movers is not None:
             self._movers.look(tick, pose, waiting)
+        recovery = self._recovery
+        if recovery.look is not None:
+            return LOOKED if recovery.look.done else ""
         if self.lost:
             return LOST if now - self._planned_at >= INTERVAL else ""
-        self._note_way(now, pose, waiting, tracked.backwards)
-        if tracked.backwards:
-            done = tracked.length - arc < 2 * TRAIL or now - self._rest[0] > STALL_TIME
-            return BACKED if done else ""
+        recovery.note_way(now, pose, waiting=waiting, backwards=tracked.backwards)
+        if tracked.route is recovery.route:
+            over = tracked.length - arc < 2 * TRAIL or recovery.stalled(now)
+            return (BACKED if tracked.backwards else MADE_ROOM) if over else ""
         if now - self._planned_at < INTERVAL:
             return ""
-        if now - self._rest[0] > STALL_TIME:
+        if recovery.stalled(now):
             return STALLED
+        if recovery.held(now, pose):
+            return HELD
         if self._movers is not None and now - self._planned_at >= self._policy.min_interval:
             due = self._movers.trigger(tick, pose, tracked, arc)
             if due:
@@ -355,7 +366,7 @@ class Exploration:
         return DISCOVERED if self._discovered(pose, arc) else ""
 
     def replan(self, tick: int, pose: Pose, trigger: str) -> TrackedPath | None:
-        """A new path from a pose [m, m, rad], prepared for the controller; None if there is none.
+        """A new path from a pose [m, m, rad], prepared for the controller; None if there is none, or the robot looks round first.
 
         Args:
             tick: the number of the control period
@@ -364,19 +375,13 @@ class Exploration:
         """
         now, started = tick / self._hz, time.perf_counter()
         self._planned_at, self._tick = now, tick
-        if trigger == STALLED:
-            self._rest = now, pose[:2]
-            self._stalls = self._stalls + 1 if math.dist(self._stalled_at, pose[:2]) < 1.0 else 1
-            self._stalled_at = pose[:2]
-            back = self._back_off(pose) if self._stalls > 1 else None
-            if back is not None:
-                self.log.append(
-                    Replan(now, trigger, True, back.length, 0, back.route.xy, time.perf_counter() - started)
-                )
-                return back
-        if trigger == BACKED:
-            self._rest = now, pose[:2]
-        if self._failures >= PATIENCE:
+        if trigger in (STALLED, HELD, BACKED, MADE_ROOM, LOOKED):
+            recovers, way = self._recovered(now, pose, trigger)
+            if way is not None:
+                self.log.append(Replan(now, trigger, True, way.length, 0, way.route.xy, time.perf_counter() - started))
+            if recovers:
+                return way
+        if self._failures >= PATIENCE and trigger != LOOKED:
             self._failures = 0
             self.survey.forget(pose)
         grid, plan, avoided = self._plan_around(tick, pose)
@@ -387,11 +392,39 @@ class Exploration:
         self.log.append(Replan(now, trigger, route is not None, cost, plan.work, xy, time.perf_counter() - started))
         self.lost = route is None
         self._failures = self._failures + 1 if self.lost else 0
+        if self.lost:
+            self._recovery.rests(now, pose)
         if self._failures >= PATIENCE:
             self._gave_up_at = now
-        if self.lost:
-            self._rest = now, pose[:2]
+            self._recovery.begin_look(pose)
         return tracked
+
+    def _recovered(self, now: float, pose: Pose, trigger: str) -> tuple[bool, TrackedPath | None]:
+        """Whether a robot that did not get on does something else than to plan anew, and the way that it then follows."""
+        recovery = self._recovery
+        if trigger == LOOKED:
+            recovery.end_look(now, pose)
+            return False, None
+        if trigger in (BACKED, MADE_ROOM):
+            recovery.rests(now, pose)
+        if trigger == STALLED:
+            recovery.note_stall(now, pose)
+        if recovery.begin_look(pose) or trigger == HELD:
+            return True, None
+        found = recovery.way(pose) if trigger == STALLED else None
+        if found is None:
+            return False, None
+        way = self._prepare(found, _world(self._bounds(GROWTH[1], pose), np.empty((0, 3))), 0.0)
+        return True, dataclasses.replace(way, backwards=recovery.backwards)
+
+    def note_sight(self, tick: int, *, holds: bool) -> None:
+        """Note whether the robot stands because its sight does not let it go on.
+
+        Args:
+            tick: the number of the control period
+            holds: whether it does
+        """
+        self._recovery.note_sight(tick / self._hz, holds=holds)
 
     def no_way(self, tick: int) -> str:
         """That the robot planned in vain, several times in a row and not long ago, in words; empty if it did not.
@@ -431,32 +464,6 @@ class Exploration:
         first = int(arc / LOOK_AT_ROUTE)
         ahead, needed = self._ahead[first:], self._needed[first:]
         return len(ahead) > 0 and self.survey.hit_within(ahead, needed, self._arcs[first:] - arc)
-
-    # ---- recovery
-
-    def _note_way(self, now: float, pose: Pose, waiting: bool, backwards: bool) -> None:
-        if waiting or math.dist(self._rest[1], pose[:2]) > STALL_DISTANCE:
-            self._rest = now, pose[:2]
-        if not backwards and (not self._trail or math.dist(self._trail[-1], pose[:2]) >= TRAIL):
-            self._trail.append(pose[:2])
-
-    def _back_off(self, pose: Pose) -> TrackedPath | None:
-        """The way back along the driven track."""
-        wanted = BACK_OFF[min(self._stalls - 2, len(BACK_OFF) - 1)]
-        points, length = [pose[:2]], 0.0
-        while self._trail and length < wanted:
-            point = self._trail.pop()
-            step = math.dist(points[-1], point)
-            if step > 0.5 * TRAIL:
-                points.append(point)
-                length += step
-        if length < 2 * TRAIL:
-            return None
-        discs = np.empty((0, 3))
-        route = Route(np.array(points))
-        return dataclasses.replace(
-            self._prepare(route, _world(self._bounds(GROWTH[1], pose), discs), 0.0), backwards=True
-        )
 
 
 def _world(bounds: Bounds, discs: Floats) -> World:

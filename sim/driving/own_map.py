@@ -6,9 +6,12 @@ from collections.abc import Iterator
 
 from antdrive.sim.log.record import DriveRecord, ReplanRecord
 
+LOOKED = "looked round"  # why a route is planned after the robot has looked round
+
 MAP_CELL = 0.05  # side of the map's cells [m]
 HORIZON, HORIZON_AMONG_MOVERS = 10.0, 16.0  # hits farther away are not entered in the map [m]
 RECENT = 1.0  # scans of this time are kept where the map is made anew [s]
+PAD = 0.01  # the robot keeps this from what was hit and from what was not seen: rounding of ranges, and of cells [m]
 PATIENCE = 3  # plans in a row that find no path before the robot no longer believes what it saw long ago
 
 
@@ -21,6 +24,17 @@ def horizon_of(*, watching: bool) -> float:
     return HORIZON_AMONG_MOVERS if watching else HORIZON
 
 
+def turning_room(radius: float) -> float:
+    """How far around a robot ground is to be free, so that it may turn on the spot in its own sight [m].
+
+    Half a cell is more than the circle around a cell, by which ground that was not seen counts, stands out of it.
+
+    Args:
+        radius: of the circle that the robot covers when it turns [m]
+    """
+    return radius + PAD + 0.5 * MAP_CELL
+
+
 def forgetting_ticks(record: DriveRecord) -> Iterator[int]:
     """The control periods in which a robot without a map forgot what it had seen: after some plans in a row found no path.
 
@@ -29,7 +43,7 @@ def forgetting_ticks(record: DriveRecord) -> Iterator[int]:
     """
     failures = 0
     for replan in record.replans:
-        if failures >= PATIENCE:
+        if failures >= PATIENCE and replan.trigger != LOOKED:
             failures = 0
             yield _tick(record, replan)
         failures = 0 if replan.solved else failures + 1

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from antdrive.robots import RobotSpec
 from antdrive.robots.lidar import Lidar
 from antdrive.sim.driving import _kernels_hits
-from antdrive.sim.driving.own_map import MAP_CELL, RECENT, horizon_of
+from antdrive.sim.driving.own_map import MAP_CELL, PAD, RECENT, horizon_of, turning_room
 from antdrive.sim.driving.watching import Watch
 from antdrive.sim.log.streams import random_stream
 from antdrive.sim.sensing.mapping import OccupancyMap
@@ -25,7 +25,6 @@ from antdrive.worlds import Bounds, Floats, Point, Pose, Trajectories, World
 TOLERANCE = 0.008  # a route may lose this much of its clearance without being planned anew [m]
 BLUR = 0.02  # and this much more for each metre of distance [m/m]
 FAR_AMONG_MOVERS = 15.0  # scans are matched up to this far where movers, which are no marks, hide what is near [m]
-PAD = 0.01  # the robot keeps this from what was hit and from what was not seen: rounding of ranges, and of cells [m]
 
 
 class Scan(NamedTuple):
@@ -50,12 +49,14 @@ class Senses:
 
     Attributes:
         scanner: the lidar in the true world
+        world: what stands in it
         trajectories: the true motions of the movers; None where there are none
         rng: where the noise of ranges comes from; None: no noise
         hz: control periods per second
     """
 
     scanner: Scanner
+    world: World
     trajectories: Trajectories | None
     rng: np.random.Generator | None
     hz: int
@@ -72,9 +73,8 @@ class Senses:
             noisy: whether ranges have noise
             hz: control periods per second
         """
-        return cls(
-            Scanner.of(lidar.at(hz), world), trajectories or None, random_stream(seed, "lidar") if noisy else None, hz
-        )
+        rng = random_stream(seed, "lidar") if noisy else None
+        return cls(Scanner.of(lidar.at(hz), world), world, trajectories or None, rng, hz)
 
     def due(self, tick: int, last: int) -> bool:
         """Whether a scan is due in a control period, after one in an earlier period; a negative one: after none.
@@ -101,16 +101,18 @@ class Senses:
 class Survey:
     """The robot's knowledge. It takes a scan when one is due, and builds a map of it.
 
-    True poses and the true world are used for nothing but the ranges of scans.
+    True poses and the true world are used for the ranges of scans, and for nothing else but this: the robot is told which of the
+    ground that it covers when it turns at the start is free. Whoever puts it down sees that.
 
     Attributes:
+        lidar: what it surveys with
         map: what was hit, and which ground was seen free
         scans: all scans so far
         whole: how many of them were entered as a whole, with the ground that is free
         watch: what follows the movers in the scans; None: nothing does
 
     Args:
-        start: the first pose, from which odometry counts; what the robot covers when it turns there is taken for free
+        start: the first pose, from which odometry counts
         goal: where the robot is to go; the map is laid out for the way there [m]
         matching: whether scans correct the estimated pose by what is on the map
         watch: follows the movers in the scans, which are then no part of the map; None: they are part of it
@@ -126,15 +128,15 @@ class Survey:
         matching: bool = False,
         watch: Watch | None = None,
     ) -> None:
-        self._senses, self._lidar = senses, senses.scanner.lidar
+        self._senses, self.lidar = senses, senses.scanner.lidar
         foot = robot.footprint
         self._footprint = dataclasses.replace(foot, rounding=foot.rounding + PAD)
-        self._radius = robot.radius + 2 * PAD  # a turn on the spot sweeps over this
+        self._turning_room = turning_room(robot.radius)
         self._goal = goal
         self.watch = watch
         self.map = self._empty_map(start)
-        self._recent = math.ceil(RECENT * self._lidar.rate)
-        self._matcher = ScanMatcher(self._lidar, FAR if watch is None else FAR_AMONG_MOVERS) if matching else None
+        self._recent = math.ceil(RECENT * self.lidar.rate)
+        self._matcher = ScanMatcher(self.lidar, FAR if watch is None else FAR_AMONG_MOVERS) if matching else None
         self.scans: list[Scan] = []
         self.whole = 0
 
@@ -184,7 +186,7 @@ class Survey:
             ahead: how far along the route each is (N,) [m]; the farther, the less exact is what is seen there
         """
         scan = self.scans[-1]
-        x, y, yaw = self._lidar.pose_on(scan.estimate)
+        x, y, yaw = self.lidar.pose_on(scan.estimate)
         ranges = scan.ranges if scan.movers is None else np.where(scan.movers, np.inf, scan.ranges)
         return bool(_kernels_hits.hit_within(points, needed, ahead, TOLERANCE, BLUR, x, y, yaw, self.map.beams, ranges))
 
@@ -197,14 +199,14 @@ class Survey:
         Args:
             pose: where the robot believes it is
         """
-        self.map = self.map.renewed(pose[:2], self._radius, self._goal)
+        self.map = self.map.renewed(pose[:2], self._turning_room, self._goal)
         for scan in self.scans[-self._recent :]:
             self.map.insert(scan.estimate, scan.ranges, scan.movers)
 
     def _empty_map(self, pose: Pose) -> OccupancyMap:
         horizon = horizon_of(watching=self.watch is not None)
-        seen = OccupancyMap(self._lidar, MAP_CELL, pose[:2], horizon, goal=self._goal)
-        seen.take_as_free(pose[:2], self._radius)
+        seen = OccupancyMap(self.lidar, MAP_CELL, pose[:2], horizon, goal=self._goal)
+        seen.take_as_free(pose[:2], self._turning_room, self._senses.world)
         return seen
 
     def clear_distance(self, pose: Pose, speed: float, yaw_rate: float, longest: float) -> float:

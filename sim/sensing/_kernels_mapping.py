@@ -374,8 +374,13 @@ def forget(x: float, y: float, radius: float, arrays: tuple[Array, ...], changed
 
 
 @kernel
-def take_as_free(x: float, y: float, radius: float, arrays: tuple[Array, ...], changed: Array) -> int:
-    """Make the unknown cells that meet a disc free; the rows written to `changed`."""
+def take_as_free(
+    x: float, y: float, radius: float, discs: Array, walls: Array, arrays: tuple[Array, ...], changed: Array
+) -> int:
+    """Make the unknown cells that meet a disc free, but for those that meet one of `discs` (N, 3) or reach beyond `walls`.
+
+    `walls` are x_min, y_min, x_max, y_max. The number of rows written to `changed` is returned.
+    """
     m = MapArrays(*arrays)
     cell = m.frame[2]
     rows, cols = m.free.shape
@@ -386,14 +391,26 @@ def take_as_free(x: float, y: float, radius: float, arrays: tuple[Array, ...], c
         last = int(math.floor((x + radius - m.frame[0]) / cell))
         for col in range(max(0, first), min(cols - 1, last) + 1):
             west, south = m.frame[0] + col * cell, m.frame[1] + row * cell
-            dx = max(max(west - x, x - west - cell), 0.0)
-            dy = max(max(south - y, y - south - cell), 0.0)
-            if dx * dx + dy * dy <= radius * radius and not m.free[row, col] and not m.occupied[row, col]:
+            known = m.free[row, col] or m.occupied[row, col]
+            if known or not square_meets(west, south, cell, x, y, radius):
+                continue
+            blocked = west < walls[0] or south < walls[1] or west + cell > walls[2] or south + cell > walls[3]
+            for k in range(discs.shape[0]):
+                blocked = blocked or square_meets(west, south, cell, discs[k, 0], discs[k, 1], discs[k, 2])
+            if not blocked:
                 m.free[row, col] = True
                 m.unseen[row >> SHIFT, col >> SHIFT] -= 1
                 changed[count, 0], changed[count, 1] = row, col
                 count += 1
     return count
+
+
+@kernel
+def square_meets(west: float, south: float, side: float, x: float, y: float, radius: float) -> bool:
+    """Whether a square, given by its lower left corner, meets a disc."""
+    dx = max(max(west - x, x - west - side), 0.0)
+    dy = max(max(south - y, y - south - side), 0.0)
+    return bool(dx * dx + dy * dy <= radius * radius)
 
 
 @kernel

@@ -16,10 +16,11 @@ import numpy.typing as npt
 
 from antdrive.robots.lidar import Lidar
 from antdrive.sim.sensing import _kernels_mapping as kernels
-from antdrive.worlds import Bounds, Floats, Point, Pose
+from antdrive.worlds import Bounds, Floats, Point, Pose, World
 from antdrive.worlds.errors import require_positive
 
 EVERYWHERE = (-math.inf, -math.inf, math.inf, math.inf)
+_NONE = np.empty((0, 3))
 Cells = npt.NDArray[np.int32]
 Mask = npt.NDArray[np.bool_]
 
@@ -195,14 +196,16 @@ class OccupancyMap:
         count = kernels.forget(*place, radius, self._plain, self._changed)
         return self._changed[:count].copy()
 
-    def take_as_free(self, place: Point, radius: float) -> Cells:
+    def take_as_free(self, place: Point, radius: float, world: World | None = None) -> Cells:
         """Take unknown ground for free, such as that under the robot, and return the cells (K, 2).
 
         Args:
             place: x, y [m]
             radius: how far around it [m]
+            world: cells that meet one of its cylinders or walls stay unknown; None: none do
         """
-        count = kernels.take_as_free(*place, radius, self._plain, self._changed)
+        discs, walls = (_NONE, EVERYWHERE) if world is None else (world.discs, world.bounds)
+        count = kernels.take_as_free(*place, radius, discs, np.array(walls), self._plain, self._changed)
         return self._changed[:count].copy()
 
     def renewed(self, place: Point, radius: float, goal: Point | None = None) -> OccupancyMap:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.sim.driving.own_map import MAP_CELL, RECENT, forgetting_ticks, horizon_of
+from antdrive.sim.driving.own_map import MAP_CELL, RECENT, forgetting_ticks, horizon_of, turning_room
 from antdrive.sim.log.frames import frame_at
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.scans import ranges_of
@@ -93,16 +93,18 @@ class Recollection:
 
     def _forget(self, at: float) -> None:
         """Make the map anew of the latest scans, as the robot did: in the same control period, after the scan."""
-        self.map = self.map.renewed(self._estimate(self._row(at))[:2], self._rollout.record.robot.radius)
+        record = self._rollout.record
+        here = self._estimate(self._row(at))[:2]
+        self.map = self.map.renewed(here, turning_room(record.robot.radius), record.task.goal)
         recent = math.ceil(RECENT * self.lidar.rate)
         for k in range(max(0, self._entered - recent), self._entered):
             self._insert(k)
 
     def _empty_map(self, pose: Pose) -> OccupancyMap:
-        perception = self._rollout.record.perception
-        horizon = horizon_of(watching=perception is not None and perception.kind == "lidar")
-        seen = OccupancyMap(self.lidar, MAP_CELL, pose[:2], horizon)
-        seen.take_as_free(pose[:2], self._rollout.record.robot.radius)
+        record = self._rollout.record
+        horizon = horizon_of(watching=record.perception is not None and record.perception.kind == "lidar")
+        seen = OccupancyMap(self.lidar, MAP_CELL, pose[:2], horizon, goal=record.task.goal)
+        seen.take_as_free(pose[:2], turning_room(record.robot.radius), record.world)
         return seen
 
     def _insert(self, k: int) -> None:

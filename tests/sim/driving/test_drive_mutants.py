@@ -85,19 +85,20 @@ def test_a_robot_waits_if_it_stands_to_give_way(turtlebot: RobotSpec, avoids: bo
     assert monitor.waiting == [waits]
 
 
+@pytest.mark.parametrize(("true", "outcome"), [(0.4, Outcome.STUCK), (0.1, Outcome.SUCCEEDED)])
 @pytest.mark.parametrize(("off", "knows"), [(0.0, False), (0.25, False), (0.26, True), (0.4, True)])
-def test_a_robot_looks_for_a_new_route_to_a_goal_that_it_knows_it_missed(
-    turtlebot: RobotSpec, off: float, knows: bool
+def test_a_robot_looks_for_a_new_route_to_a_goal_that_it_believes_it_missed(
+    turtlebot: RobotSpec, off: float, knows: bool, true: float, outcome: Outcome
 ) -> None:
-    """It stands 0.4 m from the goal, and estimates that it is `off` from it."""
+    """It stands `true` from the goal, and estimates that it is `off` from it. What is true ends no drive for it."""
     monitor, (x, y) = Watcher(), TASK.goal
     robot = driver(turtlebot, monitor)
     endings = []
     for tick in range(9):  # the command comes to rest first
         robot.pursuit = PursuitState(arc=robot.tracked.length)
-        endings.append(robot.decide(tick, (x - off, y, 0.0), State(x - 0.4, y, 0.0, 0.0, 0.0)))
+        endings.append(robot.decide(tick, (x - off, y, 0.0), State(x - true, y, 0.0, 0.0, 0.0)))
     assert bool(monitor.replans) is knows
-    assert any(ending is not None and ending.outcome is Outcome.STUCK for ending in endings) is not knows
+    assert any(ending is not None and ending.outcome is outcome for ending in endings) is not knows
 
 
 @pytest.mark.parametrize("control_hz", [7, 50, 480])

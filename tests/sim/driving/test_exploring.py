@@ -286,7 +286,7 @@ def test_a_map_counts_the_scans_that_are_taken(jackal: RobotSpec, rate: float, s
 
 def test_the_robot_can_stop_on_ground_that_it_has_seen(jackal: RobotSpec) -> None:
     assert jackal.lidar is not None
-    senses = Senses(Scanner.of(jackal.lidar, ROOM), None, None, 60)
+    senses = Senses(Scanner.of(jackal.lidar, ROOM), ROOM, None, None, 60)
     survey = Survey(senses, jackal, TASK.start, TASK.goal)
     survey.look(0, TASK.start, TASK.start)
     caution = Caution(survey, jackal, 60, 0.1)
@@ -294,7 +294,7 @@ def test_the_robot_can_stop_on_ground_that_it_has_seen(jackal: RobotSpec) -> Non
     assert free == (Twist(1.0, 0.0), False)  # stops within 0.35 m, sees 2 m
     back, slowed = caution.limit(TASK.start, Twist(0.0, 0.0), Twist(-0.5, 0.0))
     assert slowed  # nobody has looked behind the robot, and a wall is 0.8 m from its centre
-    assert back.speed > -0.3
+    assert back.speed > -0.4
     near = (2.4, 0.8, 0.0)
     stop, slowed = caution.limit(near, Twist(1.0, 0.0), Twist(1.0, 0.0))
     assert slowed

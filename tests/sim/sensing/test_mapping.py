@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from antdrive.robots import Footprint, Lidar, RobotSpec
 from antdrive.sim.sensing import OccupancyMap, Scanner, clear_distance
 from antdrive.sim.sensing._kernels_mapping import SQUARE
-from antdrive.worlds import Floats, Pose
+from antdrive.worlds import Disc, Floats, Pose, World
 
 EYE = Lidar(beams=240, field_of_view=4.7, min_range=0.1, max_range=6.0, rate=10.0, resolution=0.01, sigma=0.003, x=0.1)
 POSTS = np.array([[2.0, 0.4, 0.3], [1.0, -1.2, 0.2], [3.5, 1.5, 0.4]])
@@ -197,6 +197,21 @@ def test_ground_under_the_robot_can_be_taken_as_free() -> None:
     assert len(found) == grid.seen_free.sum()
     assert 0.09 * math.pi < len(found) * 0.05**2 < 0.38**2 * math.pi
     assert len(grid.take_as_free((0.0, 0.0), 0.3)) == 0
+
+
+def test_ground_on_which_something_stands_is_not_taken_as_free() -> None:
+    post, wall = (0.22, 0.1, 0.07), -0.17
+    world = World("corner", (wall, -5.0, 5.0, 5.0), (Disc(*post),))
+    taken, whole = OccupancyMap(EYE), OccupancyMap(EYE)
+    whole.take_as_free((0.0, 0.0), 0.3)
+    taken.take_as_free((0.0, 0.0), 0.3, world)
+    rows, cols = np.nonzero(whole.seen_free)
+    inside = np.linspace(0.0, 1.0, 21) * taken.cell  # points of a cell, from its corner
+    x, y = np.meshgrid(inside, inside)
+    for row, col in zip(rows, cols, strict=True):
+        px, py = taken.origin[0] + col * taken.cell + x, taken.origin[1] + row * taken.cell + y
+        stands = (np.hypot(px - post[0], py - post[1]) <= post[2]).any() or (px < wall - 1e-9).any()
+        assert taken.seen_free[row, col] != stands, (row, col)
 
 
 @pytest.mark.parametrize("place", [(0.31, -0.77), (9.2, -1.03), (40.0, 0.0)])
