@@ -252,7 +252,8 @@ class Exploration:
 
     def _known(self, pose: Pose, bounds: Bounds) -> Task:
         """The task as it is known, from a pose."""
-        key = self.survey.map, len(self.survey.scans), pose, bounds
+        # A grid gives its bounds back but for rounding.
+        key = self.survey.map, len(self.survey.scans), pose, tuple(round(side, 9) for side in bounds)
         if self._known_as[0] == key:
             return self._known_as[1]
         discs = self.survey.discs(bounds)
