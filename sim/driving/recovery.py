@@ -60,14 +60,16 @@ class Look:
         self._yaw = pose[2]
         self._periods -= 1
         self._still = self._still + 1 if abs(last.yaw_rate) < STOPPED else 0
-        if (self._still and (abs(self._left) < TURNED or self._still > HELD_TIME * self._hz)) or self._periods < 0:
-            if not self._turns or self._periods < 0:
+        if self._still and (abs(self._left) < TURNED or self._still > HELD_TIME * self._hz):
+            if self._turns:
+                self._left, self._still = self._turns.pop(0), 1
+            else:
                 self.done = True
-                return Twist(0.0, 0.0)
-            self._left, self._still = self._turns.pop(0), 1
         hardest = self._robot.max_yaw_acceleration
         # Within one control period less, so that the robot does not turn too far before it brakes.
         rate = min(self._rate, math.sqrt(2 * hardest * abs(self._left)), abs(self._left) * self._hz)
+        if self._periods < 0 or self.done:
+            self.done, rate = True, 0.0
         wanted, step = math.copysign(rate, self._left), hardest / self._hz
         return Twist(0.0, min(max(wanted, last.yaw_rate - step), last.yaw_rate + step))
 

@@ -164,7 +164,7 @@ class Survey:
         """The estimated pose, corrected by a scan; among movers by what stands, and by nothing that slides along a wall."""
         if self.watch is None:
             return matcher.corrected(self.map, estimate, ranges)
-        standing = self.watch.standing(estimate, ranges, tick)
+        standing = self.watch.standing(self.map, estimate, ranges, tick)
         corrected = matcher.corrected(self.map, estimate, standing)
         near = np.where(standing <= FAR_AMONG_MOVERS, standing, np.inf)
         return sliding_left_out(estimate, corrected, self.map.endpoints(estimate, near))

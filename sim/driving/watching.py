@@ -67,15 +67,17 @@ class Watch:
         """
         return self.read(MappedGround(seen, self._settle), pose, ranges, tick)
 
-    def standing(self, pose: Pose, ranges: Floats, tick: int) -> Floats:
+    def standing(self, seen: OccupancyMap, pose: Pose, ranges: Floats, tick: int) -> Floats:
         """A scan that was not read yet without what may move (beams,) [m]: nothing is in range there.
 
         Args:
+            seen: the map of the earlier scans
             pose: the robot's estimated pose
             ranges: the scan (beams,) [m]
             tick: the control period in which it was taken
         """
-        return np.where(self.tracker.suspected(pose, ranges, tick / self._hz), np.inf, ranges)
+        ground = MappedGround(seen, self._settle)
+        return np.where(self.tracker.suspected(ground, pose, ranges, tick / self._hz), np.inf, ranges)
 
     def logged(self, per_tick: int, rows: int) -> npt.NDArray[np.float32]:
         """The movers that were followed, as the array `tracks` of a log has them (K, 7).

@@ -507,19 +507,26 @@ def seen_through(track: Array, view: View, rules: TrackingRules) -> bool:
 
 
 @kernel
-def suspects(tracks: Array, count: int, dt: float, time: float, settle: float, points: Array, out: Array) -> None:
-    """out[i] = whether point i may lie on something that moves, at `time`, `dt` after the last scan."""
+def suspects(
+    tracks: Array, count: int, dt: float, time: float, settle: float, points: Array, explained: Array, out: Array
+) -> None:
+    """out[i] = whether point i may lie on something that moves, at `time`, `dt` after the last scan.
+
+    An explained point does only on what is known to move or has only just come into sight: small posts that a robot drives past
+    seem to creep.
+    """
     out[:] = False
     for k in range(count):
         track = tracks[k]
-        slow = math.hypot(track["vx"], track["vy"]) <= SLOW
-        if not track["moves"] and not time - track["begun"] < settle / 2 and slow:
+        surely = track["moves"] or time - track["begun"] < settle / 2
+        if not surely and math.hypot(track["vx"], track["vy"]) <= SLOW:
             continue
         x, y = track["x"] + dt * track["vx"], track["y"] + dt * track["vy"]
         reach = track["radius"] + CLAIM + 2 * math.sqrt(track["variance"])
         for i in range(points.shape[0]):
             dx, dy = points[i, 0] - x, points[i, 1] - y
-            if abs(dx) <= reach and abs(dy) <= reach and math.hypot(dx, dy) <= reach:
+            near = abs(dx) <= reach and abs(dy) <= reach and math.hypot(dx, dy) <= reach
+            if near and (surely or not explained[i]):
                 out[i] = True
 
 

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from antdrive.robots.lidar import Lidar
 from antdrive.sim.sensing import _kernels_tracking as kernels
-from antdrive.sim.sensing.ground import Ground, ends
+from antdrive.sim.sensing.ground import Ground
 from antdrive.worlds import Floats, Pose
 from antdrive.worlds.errors import FieldError, require_positive
 
@@ -180,21 +180,22 @@ class MoverTracker:
         out[hits.beams[mine]] = True
         return out
 
-    def suspected(self, pose: Pose, ranges: Floats, time: float) -> npt.NDArray[np.bool_]:
+    def suspected(self, ground: Ground, pose: Pose, ranges: Floats, time: float) -> npt.NDArray[np.bool_]:
         """Which beams of a scan that was not read yet may have met something that moves (beams,): no marks to steer by.
 
         Args:
+            ground: what stands still, as known before this scan; what it explains moves only if it was seen to move
             pose: the robot's estimated pose
             ranges: the scan (beams,) [m]
             time: when it was taken [s]
         """
-        out = np.zeros(len(ranges), dtype=np.bool_)
-        measured = np.flatnonzero(np.isfinite(ranges))
-        points = ends(self._lidar, pose, ranges, measured)
+        hits = ground.hits(pose, ranges)
+        points, explained = np.ascontiguousarray(hits.points), np.ascontiguousarray(hits.explained)
         mine = np.empty(len(points), dtype=np.bool_)
         dt = time - self._time if self._count else 0.0
-        kernels.suspects(self._tracks, self._count, dt, float(time), self.policy.settle, points, mine)
-        out[measured] = mine
+        kernels.suspects(self._tracks, self._count, dt, float(time), self.policy.settle, points, explained, mine)
+        out = np.zeros(len(ranges), dtype=np.bool_)
+        out[hits.beams[mine]] = True
         return out
 
     def _make_room(self, points: int) -> None:

@@ -144,8 +144,9 @@ def test_a_look_that_is_not_let_turn_ends(turtlebot: RobotSpec) -> None:
         periods += 1
         assert periods < 200
     moving = Look([2.0], 0.0, 1.0, turtlebot, 60)
-    for _ in range(60 * 10):
-        moving.command((0.0, 0.0, 0.0), Twist(0.0, 0.5))  # movers turn the robot to and fro
+    hardest = turtlebot.max_yaw_acceleration / 60
+    for _ in range(60 * 10):  # movers turn the robot to and fro
+        assert abs(moving.command((0.0, 0.0, 0.0), Twist(0.0, 1.0)).yaw_rate - 1.0) <= hardest + 1e-12
     assert moving.done
 
 
