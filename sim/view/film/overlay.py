@@ -275,7 +275,7 @@ def legend_entries(
     if sight:
         found += [
             LegendEntry("dot", HIT, "hit, on the robot's map"),
-            LegendEntry("hatch", HATCH, "never seen"),
+            LegendEntry("hatch", HATCH, "not known to be free"),
         ]
     if scene.mover_radii:
         found.append(LegendEntry("dot", MOVER, "moving obstacle" if followed else "moving obstacle, 1.5 s ahead"))
