@@ -49,7 +49,7 @@ class Published:
 
 
 COPIED = "the organisers' report on the BARN challenge at ICRA 2026, which we have not seen itself"
-LICS = "github.com/LiCS-KI-BARN-2025/barn-challenge-2025; the method: Damanik et al. 2024, arXiv 2406.14947"
+LICS = "the team's published log, whose address we did not keep; the method: Damanik et al. 2024, arXiv 2406.14947"
 DWA = "github.com/Daffan/the-barn-challenge, res/dwa_out.txt"
 
 #: The results that the table is shown beside.
