@@ -18,7 +18,7 @@ from antdrive.planners.graph.sipp import TimedPlan
 from antdrive.planners.plan import Cell, History, Planner, PlannerError, PlanResult, PlanStatus, Query, path_cost
 from antdrive.worlds import Floats
 from antdrive.worlds.ends import end_reach, longest_line
-from antdrive.worlds.errors import InputError
+from antdrive.worlds.errors import InputError, Terminated
 from antdrive.worlds.plane import polyline_length, segment_lengths, wrap_angle
 
 RELATIVE = 1e-9  # how far a cost may be off, as a fraction
@@ -45,7 +45,7 @@ def ask(planner: Planner, query: Query, rng: np.random.Generator, name: str = ""
 
 @contextlib.contextmanager
 def blaming(planner: Planner, name: str = "") -> Iterator[None]:
-    """Whatever is raised within becomes a `PlannerError`, but for `InputError` and Ctrl-C.
+    """Whatever is raised within becomes a `PlannerError`, but for `InputError`, Ctrl-C and SIGTERM.
 
     Args:
         planner: whose code runs within
@@ -56,7 +56,7 @@ def blaming(planner: Planner, name: str = "") -> Iterator[None]:
     """
     try:
         yield
-    except (InputError, PlannerError):
+    except (InputError, PlannerError, Terminated):
         raise
     except (Exception, SystemExit) as error:  # another package's planner may raise anything, and call exit()
         says = f"{type(error).__name__}: {error}".strip().removesuffix(":")

@@ -16,7 +16,7 @@ from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any
 
-from antdrive.worlds.errors import InputError, input_error
+from antdrive.worlds.errors import InputError, Terminated, input_error
 
 DIGITS = 8  # hexadecimal digits of a file's hash
 FROM_FILE = "_antdrive_own_"  # what the names of modules begin with that were loaded from a file
@@ -90,7 +90,7 @@ def object_in(source: str, word: str, folder: Path | None = None, *, is_file: bo
     """
     try:
         module = _from_file(source, folder) if is_file else _from_module(source, folder)
-    except InputError:
+    except (InputError, Terminated):
         raise
     except SystemExit as error:
         problem = f"{source}: ends the program while it is imported (exit code {error.code}); guard what it runs"

@@ -79,12 +79,12 @@ class Query:
         """
         from antdrive.worlds.geometry import point_clearance  # imports the compiler
 
-        room = float(point_clearance(task.world, [task.goal])[0])
-        start, can_leave = _entrance(grid, task, task.start[:2], math.inf)
+        own, room = point_clearance(task.world, [task.start[:2], task.goal]).tolist()
+        start, can_leave = _entrance(grid, task, task.start[:2], math.inf, own)
         # If the goal is closer to an obstacle than the inflation, the robot stops at a free cell within the goal
         # tolerance. It stops a little short of that cell's centre, or beside it, hence the allowance.
         within = task.goal_tolerance - min(0.02, task.goal_tolerance / 2)
-        goal, can_arrive = _entrance(grid, task, task.goal, math.inf if room >= grid.inflate else within)
+        goal, can_arrive = _entrance(grid, task, task.goal, math.inf if room >= grid.inflate else within, room)
         ends = {"the start": can_leave, "the goal": can_arrive}
         unreachable = "; ".join(
             f"no free cell near {end} can be reached from it" for end, usable in ends.items() if not usable
@@ -102,15 +102,14 @@ class Query:
         return None
 
 
-def _entrance(grid: Grid, task: Task, point: Point, within: float) -> tuple[Cell, bool]:
+def _entrance(grid: Grid, task: Task, point: Point, within: float, own: float) -> tuple[Cell, bool]:
     """The nearest free cell within `within` [m] whose centre a clear straight line joins to the point, and True.
 
-    If there is none, the cell that holds the point, and False.
+    If there is none, the cell that holds the point, and False. `own` is the point's clearance [m].
     """
-    from antdrive.worlds.geometry import point_clearance, segment_clearance
+    from antdrive.worlds.geometry import segment_clearance
 
     row, col = grid.cell_at(*point)
-    own = float(point_clearance(task.world, [point])[0])
     if grid.free[row, col]:  # no centre is nearer than that of the cell around the point
         centre = grid.xy([(row, col)])
         off = np.abs(centre[0] - point)
@@ -129,17 +128,16 @@ def _entrance(grid: Grid, task: Task, point: Point, within: float) -> tuple[Cell
     # A point may itself lie closer to a disc than the inflation; then the line must not come closer than the
     # point.
     needed = min(grid.inflate, own)
-    # Cylinders that no line comes as close to as that change nothing.
-    discs = task.world.discs
-    beside = discs[np.hypot(*(discs[:, :2] - point).T) - discs[:, 2] <= needed + distance.max() + 1e-6]
     order = np.argsort(distance, kind="stable")
     order = order[distance[order] <= within]
-    for first in range(0, len(order), ENDS_TOGETHER):
-        some = order[first : first + ENDS_TOGETHER]
-        clear = segment_clearance(task.world, centres[some], ends[some], beside) >= needed - 1e-9
+    first, last = 0, 1  # most ends can be joined to the nearest one
+    while first < len(order):
+        some = order[first:last]
+        clear = segment_clearance(task.world, centres[some], ends[some]) >= needed - 1e-9
         if clear.any():
             at_row, at_col = near[some[clear.argmax()]].tolist()
             return (at_row, at_col), True
+        first, last = last, last + ENDS_TOGETHER
     return (row, col), False
 
 

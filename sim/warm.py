@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from antdrive.worlds.kernel_cache import cache_folder, sources_stamp
+from antdrive.worlds.processes import delayed
 
 if TYPE_CHECKING:
     from antdrive.sim.scenario import Scenario
@@ -46,7 +47,7 @@ def warm(jobs: int = -1, progress: Callable[[float], None] | None = None) -> Non
         jobs: processes; -1 means one for each core.
         progress: called with the fraction that is done.
     """
-    from joblib import Parallel, delayed
+    from joblib import Parallel
 
     from antdrive.planners import PLANNERS
 

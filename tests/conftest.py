@@ -1,5 +1,6 @@
 """Robots, tasks and runs that many tests share."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import hypothesis
@@ -14,6 +15,14 @@ hypothesis.settings.register_profile(
     "repeatable", derandomize=True, deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow]
 )
 hypothesis.settings.load_profile("repeatable")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def kernels_are_compiled_when_called() -> Iterator[None]:
+    """`make test` compiles all kernels before. Without it a test compiles those that it calls, not all in its first command."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("antdrive.sim.warm.is_warm", lambda: True)
+        yield
 
 
 @pytest.fixture(scope="session")

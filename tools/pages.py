@@ -306,7 +306,7 @@ def run_page(path: Path, limit: float = LIMIT) -> Page:
         path: the page, in Markdown
         limit: how long it may run [s]
     """
-    path, before = path.resolve(), Path.cwd()
+    path, before, variables = path.resolve(), Path.cwd(), dict(os.environ)
     page = Page(path)
     os.environ.update(COLUMNS=WIDTH, MPLBACKEND="agg")
     with tempfile.TemporaryDirectory() as folder:
@@ -318,6 +318,8 @@ def run_page(path: Path, limit: float = LIMIT) -> Page:
             page.problems.append(f"{path}:{page.line}: still runs {limit:g} s after the page began")
         finally:
             os.chdir(before)
+            os.environ.clear()
+            os.environ.update(variables)
     return page
 
 

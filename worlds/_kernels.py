@@ -16,6 +16,7 @@ ONE, ALL = np.uint64(1), np.uint64(2**64 - 1)
 SQRT2 = math.sqrt(2.0)
 GRAZE = 1e-12  # how far off a distance may be by rounding, as a share of the coordinates; a thousand times what it is
 TOGETHER = 8  # discs in one rectangle
+APART = 8  # of so many discs in a row one comes first
 SPARE = 1e-6  # so many cells are added to a range of cells, whatever the rounding
 ROUNDING = 1e-6  # a disc is left out only if it is this much too far away to matter, so that no result changes [m]
 # Directions by bit: E, NE, N, NW, W, SW, S, SE as (row, column) steps; row grows with y.
@@ -94,6 +95,8 @@ def point_clearances(points: Array, discs: Array, bounds: Array, out: Array) -> 
     for i in range(points.shape[0]):
         x, y = points[i, 0], points[i, 1]
         best = wall_distance(x, y, bounds)
+        if i > 0:  # from the point before, clearance cannot have grown by more than the way
+            best = min(best, out[i - 1] + math.hypot(x - points[i - 1, 0], y - points[i - 1, 1]) + ROUNDING)
         for b in range(boxes.shape[0]):
             if is_beyond(best + ROUNDING, x, y, boxes[b]):
                 continue
@@ -120,16 +123,13 @@ def segment_clearance(ax: float, ay: float, bx: float, by: float, discs: Array, 
 
 
 @kernel
-def boxed_clearance(ax: float, ay: float, bx: float, by: float, discs: Array, boxes: Array, bounds: Array) -> float:
-    """`segment_clearance` of a segment among discs with the rectangles around them."""
-    return clearance_up_to(math.inf, ax, ay, bx, by, discs, boxes, bounds)
-
-
-@kernel
 def clearance_up_to(
     most: float, ax: float, ay: float, bx: float, by: float, discs: Array, boxes: Array, bounds: Array
 ) -> float:
-    """The same, or `most` if that is less: what is farther away is hardly looked at."""
+    """`segment_clearance` of a segment among discs with the rectangles around them, or `most` if that is less.
+
+    What is farther away than `most` is hardly looked at.
+    """
     best = min(most, min(wall_distance(ax, ay, bounds), wall_distance(bx, by, bounds)))
     x_min, x_max, y_min, y_max = min(ax, bx), max(ax, bx), min(ay, by), max(ay, by)
     for b in range(boxes.shape[0]):
@@ -162,7 +162,13 @@ def segment_clearances(starts: Array, ends: Array, discs: Array, bounds: Array, 
     """out[i] = clearance of the segment starts[i]..ends[i]."""
     boxes = boxes_around(discs)
     for i in range(starts.shape[0]):
-        out[i] = boxed_clearance(starts[i, 0], starts[i, 1], ends[i, 0], ends[i, 1], discs, boxes, bounds)
+        ax, ay, bx, by = starts[i, 0], starts[i, 1], ends[i, 0], ends[i, 1]
+        most = math.inf
+        if i > 0:  # from the segment before, clearance cannot have grown by more than the ends have moved
+            begun = math.hypot(ax - starts[i - 1, 0], ay - starts[i - 1, 1])
+            ended = math.hypot(bx - ends[i - 1, 0], by - ends[i - 1, 1])
+            most = out[i - 1] + max(begun, ended) + ROUNDING
+        out[i] = clearance_up_to(most, ax, ay, bx, by, discs, boxes, bounds)
 
 
 @kernel
@@ -179,20 +185,19 @@ def rasterise(
     for c in range(cols):
         x = x0 + c * cell
         within[c] = min(x - bounds[0], bounds[2] - x) > inflate
+    grazes = np.empty(discs.shape[0], dtype=np.bool_)
+    blocked = np.zeros((rows, cols // 64 + 1), dtype=np.uint64)  # a bit for each cell
+    # Neighbours in the list often are neighbours in the world: between two that have come first, others add little.
+    for first in range(APART):
+        for j in range(first, discs.shape[0], APART):
+            grazes[j] = block_cells(discs[j, 0], discs[j, 1], discs[j, 2] + inflate, x0, y0, cell, cols, blocked)
     for r in range(rows):
         y = y0 + r * cell
         inside = min(y - bounds[1], bounds[3] - y) > inflate
-        for c in range(cols):
-            free[r, c] = inside and within[c]
-    grazes = np.empty(discs.shape[0], dtype=np.bool_)
-    blocked = np.zeros((rows, cols // 64 + 1), dtype=np.uint64)  # a bit for each cell
-    for j in range(discs.shape[0]):
-        grazes[j] = block_cells(discs[j, 0], discs[j, 1], discs[j, 2] + inflate, x0, y0, cell, cols, blocked)
-    for r in range(rows):
         for word in range(blocked.shape[1]):
             bits = blocked[r, word]
             for c in range(64 * word, min(64 * (word + 1), cols)):
-                free[r, c] &= (bits >> np.uint64(c & 63)) & ONE == 0
+                free[r, c] = inside & within[c] & ((bits >> np.uint64(c & 63)) & ONE == 0)
     for j in range(discs.shape[0]):
         if grazes[j]:
             close_rim(discs[j, 0], discs[j, 1], discs[j, 2] + inflate, x0, y0, cell, free, closed)

@@ -9,6 +9,10 @@ class InputError(ValueError):
     """Something that a person wrote is wrong; the message is one line that says where, and what would be right."""
 
 
+class Terminated(SystemExit):
+    """The process was told to end (SIGTERM) while other people's code ran in it; that code is not to blame."""
+
+
 class FieldError(ValueError):
     """A record's field or a function's argument has a value that it cannot have.
 

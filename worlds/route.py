@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,7 +49,7 @@ class Route:
         xy.setflags(write=False)
         object.__setattr__(self, "xy", xy)
 
-    @property
+    @functools.cached_property
     def arc(self) -> Floats:
         """The length along the route at each point, shape (N,) [m], from 0."""
         return arc_lengths(self.xy)

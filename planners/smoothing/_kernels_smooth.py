@@ -24,6 +24,7 @@ from antdrive.worlds._kernels import (
     inline,
     is_beyond,
     kernel,
+    polyline_clearance,
     segment_distance2,
     wall_distance,
 )
@@ -453,6 +454,21 @@ def with_point(xy: Array, curvature: Array, size: int, x: float, y: float, bend:
     return xy, curvature, size + 1
 
 
+@inline
+def discs_beside(x: float, y: float, reach: float, discs: Array, boxes: Array, out: Array) -> Array:
+    """The discs whose surfaces are within reach of a point, in their order; `out` has room for all."""
+    count = 0
+    for box in range(boxes.shape[0]):
+        if is_beyond(reach + ROUNDING, x, y, boxes[box]):
+            continue
+        for k in range(box * TOGETHER, min(discs.shape[0], (box + 1) * TOGETHER)):
+            dx, dy, far = discs[k, 0] - x, discs[k, 1] - y, reach + discs[k, 2] + ROUNDING
+            if dx * dx + dy * dy <= far * far:
+                out[count, 0], out[count, 1], out[count, 2] = discs[k, 0], discs[k, 1], discs[k, 2]
+                count += 1
+    return out[:count]
+
+
 @kernel
 def string_points(string: String, built: Array, bounds: Array, clearance: float, bulge: float) -> tuple[Array, Array]:
     """A string as a polyline (M, 2) and the curvature from each of its points on (M,).
@@ -462,6 +478,7 @@ def string_points(string: String, built: Array, bounds: Array, clearance: float,
     """
     (disc, turn, sweep), links, discs = string
     boxes = boxes_around(built)
+    beside = np.empty_like(built)
     xy = np.empty((256, 2), dtype=np.float64)
     curvature = np.zeros(256, dtype=np.float64)
     size = 0
@@ -480,6 +497,8 @@ def string_points(string: String, built: Array, bounds: Array, clearance: float,
         begin = math.atan2(links[i, 3] - y, links[i, 2] - x)
         widest = 2.0 * math.acos(r / (r + bulge))
         even = sweep[i] / math.ceil(sweep[i] / widest)
+        near = discs_beside(x, y, r + bulge + clearance, built, boxes, beside)
+        around = boxes_around(near)
         at = 0.0
         waiting = 0  # entries of `cuts`
         pieces = 0  # of even size that have been begun
@@ -495,8 +514,8 @@ def string_points(string: String, built: Array, bounds: Array, clearance: float,
             cx, cy = x + stretch * math.cos(a1), y + stretch * math.sin(a1)
             if half > 1e-5 and waiting < 60:
                 ax, ay, bx, by = x + r * math.cos(a0), y + r * math.sin(a0), x + r * math.cos(a2), y + r * math.sin(a2)
-                c = clearance_up_to(clearance, ax, ay, cx, cy, built, boxes, bounds)
-                c = clearance_up_to(c, cx, cy, bx, by, built, boxes, bounds)
+                c = clearance_up_to(clearance, ax, ay, cx, cy, near, around, bounds)
+                c = clearance_up_to(c, cx, cy, bx, by, near, around, bounds)
                 if c < clearance - 5e-10:
                     cuts[waiting] = at + half
                     waiting += 1
@@ -560,8 +579,15 @@ def room_to_grow(xy: Array, discs: Array, box: Array, ends: Array, most: float, 
     axis = 0 if np.ptp(xy[:, 0]) > np.ptp(xy[:, 1]) else 1  # along which most discs are far apart
     order = np.argsort(discs[:, axis])
     widest = 0.0
+    away = np.empty(n)  # of the centres from the polyline
     for i in range(n):
         widest = max(widest, discs[i, 2])
+        away2 = math.inf
+        for k in range(xy.shape[0] - 1):
+            away2 = min(
+                away2, segment_distance2(discs[i, 0], discs[i, 1], xy[k, 0], xy[k, 1], xy[k + 1, 0], xy[k + 1, 1])
+            )
+        away[i] = math.sqrt(away2)
     for a in range(n):
         for b in range(a + 1, n):
             i, j = min(order[a], order[b]), max(order[a], order[b])
@@ -569,6 +595,8 @@ def room_to_grow(xy: Array, discs: Array, box: Array, ends: Array, most: float, 
                 break
             x, y, r = discs[i, 0], discs[i, 1], discs[i, 2]
             reach = r + discs[j, 2] + 2.05 * max(out[i], out[j])  # 2.05 > 1 / share
+            if reach < away[i] + away[j] - ROUNDING:  # a line between the centres that crosses the polyline is longer
+                continue
             dx, dy, touching = discs[j, 0] - x, discs[j, 1] - y, r + discs[j, 2] - 2.0 * ROUNDING
             if abs(dx) > reach or abs(dy) > reach or (touching > 0.0 and dx * dx + dy * dy < touching * touching):
                 continue
@@ -578,6 +606,55 @@ def room_to_grow(xy: Array, discs: Array, box: Array, ends: Array, most: float, 
             if crosses(xy, x, y, discs[j, 0], discs[j, 1]):
                 out[i] = min(out[i], max(share * gap, 0.0))
                 out[j] = min(out[j], max(share * gap, 0.0))
+
+
+@kernel
+def fault(string: String, xy: Array, line: Array, built: Array, bounds: Array, least: float, longest: float) -> int:
+    """What is wrong with a string and the polyline `xy` that is drawn for it, as an index into `smooth.FAULTS`.
+
+    They must come no closer than `least`, be no longer than `longest`, and pass all discs as `line` does.
+    """
+    length = 0.0
+    for i in range(1, xy.shape[0]):
+        length += math.hypot(xy[i, 0] - xy[i - 1, 0], xy[i, 1] - xy[i - 1, 1])
+    if length > longest:
+        return 1
+    if min(string_clearance(string, built, bounds), polyline_clearance(xy, built, bounds)) < least:
+        return 2
+    return 3 if encloses(line, xy, built) else 0
+
+
+@kernel
+def widest(
+    contacts: Contacts, discs: Array, room: Array, extra: float, line: Array, built: Array, bounds: Array,
+    clearance: float, slack: float, longest: float, bulge: float,
+) -> tuple[bool, Array, Array]:  # fmt: skip
+    """The drawn string with the most clearance that has no fault: whether there is one, its points and its curvature.
+
+    All discs (N, 3) grow by the same fraction of `extra`, each by at most its `room`; bisection finds the largest fraction.
+    """
+    ends = np.empty((2, 2))
+    ends[0], ends[1] = line[0], line[-1]
+    found, best, curvature = False, np.empty((0, 2)), np.empty(0)
+    wider = discs.copy()
+    low, high, part = 0.0, 1.0, 1.0
+    for _ in range(11):
+        for i in range(discs.shape[0]):
+            wider[i, 2] = discs[i, 2] + min(room[i], part * extra)
+        settled, disc, turn, sweep, links = settle(contacts, wider, ends)
+        string = String(Contacts(disc, turn, sweep), links, wider)
+        fits = settled and string_length(string) <= longest
+        if fits:
+            xy, bends = string_points(string, built, bounds, clearance, bulge)
+            fits = fault(string, xy, line, built, bounds, clearance - slack, longest) == 0
+            if fits:
+                found, best, curvature, low = True, xy, bends, part
+                if part == 1.0:
+                    break
+        if not fits:
+            high = part
+        part = 0.5 * (low + high)
+    return found, best, curvature
 
 
 @kernel

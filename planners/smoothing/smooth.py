@@ -26,7 +26,7 @@ import numpy.typing as npt
 from antdrive.planners.anyangle.tangent import Arc, Line, TangentPath
 from antdrive.planners.plan import PlanResult
 from antdrive.planners.smoothing.cells import route_along
-from antdrive.worlds import Bounds, Floats, Route, Task, World, polyline_clearance, segment_clearance
+from antdrive.worlds import Bounds, Floats, Route, Task, World, segment_clearance
 from antdrive.worlds.errors import FieldError
 from antdrive.worlds.plane import polyline_length
 
@@ -35,6 +35,14 @@ if TYPE_CHECKING:  # importing a grid loads the compiler
 
 #: The kinds of smoothing: the plan's own line, that line pulled taut, or taut with more clearance where there is room.
 SMOOTHINGS: tuple[str, ...] = ("none", "taut", "clearance")
+
+#: What may be wrong with a smoothed line, by the numbers of the kernel `fault`.
+FAULTS: tuple[str, ...] = (
+    "",
+    "the smoothed line would be longer than the plan's",
+    "the smoothed line would come closer than the clearance",
+    "the smoothed line would pass an obstacle on its other side",
+)
 
 SLACK = 1e-9  # how much too close or too long a line may be, by rounding [m]
 SHRINK = 2e-9  # strings are first pulled among discs that are smaller by this, which the plan's line surely clears [m]
@@ -161,7 +169,7 @@ class TautString:
         """Its length [m]."""
         from antdrive.planners.smoothing import _kernels_smooth as kernels
 
-        return float(kernels.string_length(self._compiled))
+        return float(kernels.string_length(self.compiled))
 
     @property
     def path(self) -> TangentPath:
@@ -181,18 +189,18 @@ class TautString:
         from antdrive.planners.smoothing import _kernels_smooth as kernels
 
         box = np.asarray(world.bounds, dtype=np.float64)
-        return float(kernels.string_clearance(self._compiled, world.discs, box))
+        return float(kernels.string_clearance(self.compiled, world.discs, box))
 
     def drawn(self, world: World, inflate: float, bulge: float) -> tuple[Floats, Floats]:
         """A polyline (M, 2) [m] whose corners stand off the arcs by at most `bulge`, and its curvature (M,)."""
         from antdrive.planners.smoothing import _kernels_smooth as kernels
 
         box = np.asarray(world.bounds, dtype=np.float64)
-        xy, curvature = kernels.string_points(self._compiled, world.discs, box, inflate, bulge)
+        xy, curvature = kernels.string_points(self.compiled, world.discs, box, inflate, bulge)
         return xy, curvature
 
     @property
-    def _compiled(self) -> Any:
+    def compiled(self) -> Any:
         """The record that kernels take."""
         from antdrive.planners.smoothing import _kernels_smooth as kernels
 
@@ -273,49 +281,25 @@ def _fault(string: TautString, xy: Floats, line: Floats, world: World, inflate: 
     """The reason why a smoothed line cannot be used; empty if it can."""
     from antdrive.planners.smoothing import _kernels_smooth as kernels
 
-    if polyline_length(xy) > longest + SLACK:
-        return "the smoothed line would be longer than the plan's"
-    if min(string.clearance(world), polyline_clearance(world, xy)) < inflate - SLACK:
-        return "the smoothed line would come closer than the clearance"
-    if kernels.encloses(line, xy, world.discs):
-        return "the smoothed line would pass an obstacle on its other side"
-    return ""
+    box = np.asarray(world.bounds, dtype=np.float64)
+    return FAULTS[kernels.fault(string.compiled, xy, line, world.discs, box, inflate - SLACK, longest + SLACK)]
 
 
 def _with_clearance(
     taut: TautString, xy: Floats, world: World, inflate: float, extra: float, longest: float, bulge: float
 ) -> Piece | None:
-    """The line with the most clearance that is no longer than `longest`; None if there is no room or length for more.
-
-    All discs grow by the same fraction of `extra`, each by at most its room; bisection finds the largest fraction.
-    """
+    """The line with the most clearance that is no longer than `longest`; None if there is no room or length for more."""
     from antdrive.planners.smoothing import _kernels_smooth as kernels
 
     near = np.flatnonzero(kernels.near_polyline(xy, taut.discs, 2.0 * extra))
     discs = np.ascontiguousarray(taut.discs[near])
-    disc = np.searchsorted(near, taut.disc)
+    contacts = kernels.Contacts(np.searchsorted(near, taut.disc), taut.turn, taut.sweep)
     xmin, ymin, xmax, ymax = world.bounds
     box = np.array([xmin + inflate, ymin + inflate, xmax - inflate, ymax - inflate])
-    ends = np.ascontiguousarray(xy[[0, -1]])
     room = np.empty(len(discs))
-    kernels.room_to_grow(xy, discs, box, ends, extra, room)
-
-    def grown(part: float) -> Piece | None:
-        wider = discs.copy()
-        wider[:, 2] += np.minimum(room, part * extra)
-        string = _settled(disc, taut.turn, taut.sweep, wider, ends)
-        if string is None or string.length > longest + SLACK:
-            return None
-        drawn = string.drawn(world, inflate, bulge)
-        return None if _fault(string, drawn[0], xy, world, inflate, longest) else Piece(*drawn, "clearance")
-
-    best = grown(1.0)
-    low, high = 0.0, 1.0
-    for _ in range(0 if best else 10):
-        middle = 0.5 * (low + high)
-        piece = grown(middle)
-        if piece is None:
-            high = middle
-        else:
-            best, low = piece, middle
-    return best
+    kernels.room_to_grow(xy, discs, box, np.ascontiguousarray(xy[[0, -1]]), extra, room)
+    found, wide, curvature = kernels.widest(
+        contacts, discs, room, extra, xy, world.discs, np.asarray(world.bounds, dtype=np.float64), inflate, SLACK,
+        longest + SLACK, bulge,
+    )  # fmt: skip
+    return Piece(wide, curvature, "clearance") if found else None

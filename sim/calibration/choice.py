@@ -17,6 +17,7 @@ from antdrive.sim.calibration.trial import Conditions, Loss, loss_on_course
 from antdrive.worlds.errors import InputError
 from antdrive.worlds.files.atomic import written_whole
 from antdrive.worlds.kernel_cache import cache_folder
+from antdrive.worlds.processes import delayed
 
 DRIVES = 80  # courses that each margin is tried on
 JOBS = 2  # processes at most
@@ -64,7 +65,7 @@ def _driving(
     conditions: Conditions, jobs: int, progress: Callable[[int, float], None] | None
 ) -> Callable[[float], list[Loss]]:
     """A function that drives every course with a margin and returns the losses."""
-    from joblib import Parallel, delayed
+    from joblib import Parallel
     from joblib.parallel import get_active_backend
 
     # Within a process of somebody else's pool joblib would start threads, and one process of PyBullet is one thread.

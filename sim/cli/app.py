@@ -44,7 +44,7 @@ from antdrive.sim.cli.commands.worlds.list import list_worlds
 from antdrive.sim.cli.commands.worlds.show import show_world
 from antdrive.sim.cli.console import print_error, print_line
 from antdrive.sim.cli.exits import BROKEN_PIPE, FAULT, INTERRUPTED, SUCCEEDED, TERMINATED, WRONG_INPUT
-from antdrive.worlds.errors import FieldError, InputError, input_error
+from antdrive.worlds.errors import FieldError, InputError, Terminated, input_error
 
 #: The commands by name, in the order in which `antdrive --help` lists them. Each returns its exit code.
 COMMANDS: Mapping[str, Callable[..., int]] = MappingProxyType(
@@ -98,7 +98,7 @@ DEBUG = "--debug"  # is taken wherever it stands, so that it can be added to a c
 
 def main() -> None:
     """Run the command line; the exit code says how it ended."""
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(TERMINATED))  # ends like Ctrl-C: temporary files are removed
+    signal.signal(signal.SIGTERM, _terminate)
     try:
         code = _exit_code_of([word for word in sys.argv[1:] if word != DEBUG])
     except BrokenPipeError as error:
@@ -110,6 +110,11 @@ def main() -> None:
             _print_fault(error, debug=DEBUG in sys.argv[1:])
         code = BROKEN_PIPE if unread else FAULT
     sys.exit(code)
+
+
+def _terminate(*_: object) -> None:
+    """End as by Ctrl-C, so that temporary files are removed."""
+    raise Terminated(TERMINATED)
 
 
 def _exit_code_of(words: list[str]) -> int:
@@ -133,9 +138,9 @@ def _exit_code_of(words: list[str]) -> int:
     except _USAGE_ERROR as error:
         _print_usage_error(error)
         code = WRONG_INPUT
+    except Terminated:
+        raise
     except SystemExit as error:
-        if error.code == TERMINATED:
-            raise
         if isinstance(error.__context__, BrokenPipeError):  # typer ends the program for it
             raise error.__context__ from None
         print_error("internal error: what was called ended the program; a planner must not call exit()")

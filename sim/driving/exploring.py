@@ -56,6 +56,7 @@ DETOUR = 1.15  # a way with less margin must be shorter by this factor
 CORRIDOR = 1.2  # a route is smoothed among what lies within this distance of the plan, beyond the inflation [m]
 SAMPLES = 0.06  # spacing of the places on a route at which speed limits and lookaheads are worked out [m]
 SPARE = 0.25  # the controller knows what lies this much farther away than its longest arcs lead [m]
+KEPT = 4  # searches that are kept for repair: two margins within near and wide bounds
 INTERVAL = 0.15  # the shortest time between two plans [s]
 COVERS = 1e-3  # what was hit so near to the robot or to its goal covers it [m]
 LOOK_AT_ROUTE = 0.1  # spacing of the points of a route that are looked at [m]
@@ -252,7 +253,8 @@ class Exploration:
 
     def _known(self, pose: Pose, bounds: Bounds) -> Task:
         """The task as it is known, from a pose."""
-        key = self.survey.map, len(self.survey.scans), pose, bounds
+        # A grid gives its bounds back but for rounding.
+        key = self.survey.map, len(self.survey.scans), pose, tuple(round(side, 9) for side in bounds)
         if self._known_as[0] == key:
             return self._known_as[1]
         discs = self.survey.discs(bounds)
@@ -288,6 +290,8 @@ class Exploration:
             replanner, goal = self._replanners.get(key, (None, None))
             if replanner is None or goal != query.goal:
                 replanner = planner.replanner(query, self._rng)  # type: ignore[attr-defined]
+                if len(self._replanners) >= KEPT:  # bounds follow a robot that has left them
+                    del self._replanners[next(iter(self._replanners))]
                 self._replanners[key] = replanner, query.goal
             else:
                 replanner.change(grid)

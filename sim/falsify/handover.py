@@ -30,6 +30,7 @@ from antdrive.sim.scenario import Scenario
 from antdrive.worlds import save_task
 from antdrive.worlds.errors import InputError
 from antdrive.worlds.files.atomic import written_whole
+from antdrive.worlds.processes import delayed
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +173,7 @@ def suite_elsewhere(suite: Path) -> list[str]:
     Args:
         suite: the suite's file
     """
-    from joblib import Parallel, delayed
+    from joblib import Parallel
 
     return list(Parallel(2)(delayed(_fingerprint_from)(suite.resolve(), k) for k in range(len(load_suite(suite)))))
 
@@ -195,7 +196,7 @@ def scenario_name(text: str) -> str:
 
 def run_elsewhere(scenarios: Sequence[Scenario]) -> list[str]:
     """The fingerprints of scenarios that are run in other processes."""
-    from joblib import Parallel, delayed
+    from joblib import Parallel
 
     return list(Parallel(2)(delayed(_fingerprint)(scenario) for scenario in scenarios))
 

@@ -25,6 +25,7 @@ from antdrive.sim.scenario import Scenario
 from antdrive.worlds.errors import FieldError, InputError
 from antdrive.worlds.files.atomic import written_whole
 from antdrive.worlds.files.world_file import task_to_dict
+from antdrive.worlds.processes import delayed
 
 JOURNAL_EVERY = 2.0  # the journal is written at most this often, apart from its last state [s]
 
@@ -167,7 +168,7 @@ class Trials:
         if len(candidates) == 1 or not is_importable_elsewhere(candidates[0].planner):
             found = [failure_in(candidate, self._bound, drive=drive) for candidate in candidates]
         else:
-            from joblib import Parallel, delayed
+            from joblib import Parallel
 
             found = Parallel(self._jobs)(
                 delayed(failure_in)(candidate, self._bound, drive=drive) for candidate in candidates

@@ -33,6 +33,7 @@ from antdrive.sim.papers.verdicts import (
 from antdrive.sim.statistics.bootstrap import medians_by_world
 from antdrive.worlds.errors import InputError
 from antdrive.worlds.files.atomic import written_whole
+from antdrive.worlds.processes import delayed
 
 MOST_SEEDS = 1000  # every claim can be decided with fewer
 TRIALS = "trials"  # the folder of the trials within that of the results
@@ -196,9 +197,9 @@ def _planned(experiment: Experiment, seeds: int) -> Iterator[Any]:
     for seed in experiment.seeds(seeds):
         query = experiment.query(experiment.world(seed))
         if experiment.movers:
-            yield joblib.delayed(drive_among)(planner, experiment.options, query, seed, experiment.movers)
+            yield delayed(drive_among)(planner, experiment.options, query, seed, experiment.movers)
             continue
-        yield joblib.delayed(solve)(planner, experiment.options, query, seed, experiment.work)
+        yield delayed(solve)(planner, experiment.options, query, seed, experiment.work)
 
 
 def _verdicts(found: Sequence[tuple[Experiment, list[Trial]]]) -> list[Verdict]:

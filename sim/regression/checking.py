@@ -30,6 +30,7 @@ from antdrive.sim.regression.judging import Judgement, judge, unfulfilled
 from antdrive.sim.regression.scenarios import run_command, scenario_of
 from antdrive.sim.regression.suite import ScenarioEntry, SuiteCase, load_suite, shown_path
 from antdrive.worlds.errors import FieldError, InputError, input_error
+from antdrive.worlds.processes import delayed
 
 #: Which baselines are written: none, only those that are missing, or all.
 Update: TypeAlias = Literal["", "new", "all"]
@@ -205,9 +206,7 @@ def _check_in_turn(
         return
     import joblib
 
-    calls = (
-        joblib.delayed(_check_by_name)(str(case.suite), case.id, str(Path.cwd()), update, results) for case in cases
-    )
+    calls = (delayed(_check_by_name)(str(case.suite), case.id, str(Path.cwd()), update, results) for case in cases)
     made = joblib.Parallel(n_jobs=jobs, return_as="generator")(calls)
     for case, result in zip(cases, made, strict=True):
         # The suite has changed since it was read.

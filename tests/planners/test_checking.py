@@ -28,6 +28,7 @@ from antdrive.planners import (
     path_cost,
 )
 from antdrive.worlds import Cruising, Disc, Grid, InputError, Task, Trajectories, World, rasterise
+from antdrive.worlds.errors import Terminated
 from tests.planners.worlds_to_solve import catalogue
 
 QUERY = catalogue()["trap"]
@@ -257,6 +258,6 @@ def test_a_planner_error_gets_to_another_process() -> None:
 
 
 def test_what_is_wrong_with_the_query_and_ctrl_c_pass() -> None:
-    for error in (InputError("query: has no task"), KeyboardInterrupt()):
+    for error in (InputError("query: has no task"), KeyboardInterrupt(), Terminated(143)):
         with pytest.raises(type(error)):
             ask(Broken(error), QUERY, RNG(0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 from pathlib import Path
 
@@ -97,11 +98,12 @@ def test_a_text_that_does_not_follow_is_no_output(tmp_path: Path) -> None:
     ids=["in this process", "a command"],
 )
 def test_a_page_that_hangs_is_ended_and_named(tmp_path: Path, block: str) -> None:
-    before = signal.getsignal(signal.SIGALRM)
+    before, variables = signal.getsignal(signal.SIGALRM), dict(os.environ)
     path = page(tmp_path, f"'''python\nprint(1)\n'''\n\n'''{block}\n'''\n\n'''python\n1 / 0\n'''\n")
     (problem,) = run_page(path, limit=0.5).problems
     assert problem == f"{path}:6: still runs 0.5 s after the page began"
     assert signal.getsignal(signal.SIGALRM) is before
+    assert dict(os.environ) == variables
 
 
 def test_three_dots_stand_for_anything_and_nothing_else_does() -> None:

@@ -49,6 +49,17 @@ def test_segment_clearance_is_the_least_along_the_segment(world, a, b):
     assert segment_clearance(world, [a], [b])[0] == pytest.approx(clearance_of_segment(world, a, b), abs=1e-7)
 
 
+@settings(max_examples=50)
+@given(worlds(), st.lists(st.tuples(points, points), min_size=2, max_size=6))
+def test_clearances_asked_for_together_are_those_asked_for_one_by_one(world, ends):
+    """Bit for bit: each is looked for from that of the one before."""
+    starts, stops = (np.array(side, dtype=float) for side in zip(*ends, strict=True))
+    one_by_one = [point_clearance(world, [start])[0] for start in starts]
+    assert point_clearance(world, starts).tolist() == one_by_one
+    one_by_one = [segment_clearance(world, [a], [b])[0] for a, b in zip(starts, stops, strict=True)]
+    assert segment_clearance(world, starts, stops).tolist() == one_by_one
+
+
 @given(worlds(), points, points, st.floats(0, 1))
 def test_no_point_of_a_segment_has_less_clearance_than_the_segment(world, a, b, t):
     between = (a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]))

@@ -108,6 +108,19 @@ def test_removing_an_obstacle_closes_nothing(seed):
     assert not (before.moves & ~after.moves).any()
 
 
+def test_the_order_of_obstacles_changes_nothing() -> None:
+    """As many in a heap as a lidar's hits on a wall."""
+    rng = np.random.default_rng(4)
+    x = np.sort(rng.uniform(0.5, 5.5, 200))
+    discs = [Disc(*values) for values in zip(x, 2 + 0.3 * np.sin(x), rng.uniform(0.005, 0.02, 200), strict=True)]
+    one, other = (
+        rasterise(World("wall", (0.0, 0.0, 6.0, 4.0), tuple(some)), 0.05, 0.3)
+        for some in (discs, [discs[k] for k in rng.permutation(200)])
+    )
+    assert np.array_equal(one.free, other.free)
+    assert np.array_equal(one.moves, other.moves)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_a_mirrored_world_has_the_mirrored_moves(seed):
     world = crowd(seed)

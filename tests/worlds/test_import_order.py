@@ -7,7 +7,7 @@ import pytest
 
 WORLDS = Path(__file__).parents[2] / "worlds"
 ORDER = [
-    "errors", "types", "limits", "optional", "plane", "drawing", "kernel_cache", "_kernels_compiler", "_kernels",
+    "errors", "types", "limits", "optional", "processes", "plane", "drawing", "kernel_cache", "_kernels_compiler", "_kernels",
     "movers", "motions", "world", "reuse", "geometry", "grid", "ends", "route", "trajectories",
     "files.atomic", "files.reading", "files.document", "files.checks", "files.world_file",
     "formats._kernels_cover", "formats.checks", "formats.cellmap", "formats.xml", "formats.sdf_models", "formats.sdf",

@@ -29,30 +29,30 @@ def measure(**environment: str) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.fixture(scope="module")
-def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A cache with the kernels that one measurement needs."""
+def filled(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """A cache with the kernels that one measurement needs, and what it printed."""
     folder = tmp_path_factory.mktemp("cache")
-    measure(NUMBA_CACHE_DIR=str(folder))
-    return folder
+    done = measure(NUMBA_CACHE_DIR=str(folder))
+    assert (done.returncode, done.stderr) == (0, "")
+    return folder, done.stdout
 
 
 @pytest.mark.parametrize(
     "damage", [b"", b"\x80", b"nonsense", None], ids=["empty", "cut short", "nonsense", "another class"]
 )
-def test_a_damaged_entry_is_compiled_again(filled: Path, tmp_path: Path, damage: bytes | None) -> None:
-    shutil.copytree(filled, tmp_path, dirs_exist_ok=True)
-    first = measure()
+def test_a_damaged_entry_is_compiled_again(filled: tuple[Path, str], tmp_path: Path, damage: bytes | None) -> None:
+    folder, printed = filled
+    shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
     entries = list(tmp_path.rglob("*.nbc"))
-    assert first.returncode == 0, first.stderr
     assert entries
     for entry in entries:
         entry.write_bytes(entry.read_bytes().replace(b"numba", b"nunba") if damage is None else damage)
     again = measure(NUMBA_CACHE_DIR=str(tmp_path))
-    assert (again.returncode, again.stdout, again.stderr) == (0, first.stdout, "")
+    assert (again.returncode, again.stdout, again.stderr) == (0, printed, "")
 
 
-def test_an_entry_is_used_again(tmp_path: Path) -> None:
-    measure(NUMBA_CACHE_DIR=str(tmp_path))
+def test_an_entry_is_used_again(filled: tuple[Path, str], tmp_path: Path) -> None:
+    shutil.copytree(filled[0], tmp_path, dirs_exist_ok=True)
     before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.nb*")}
     measure(NUMBA_CACHE_DIR=str(tmp_path))
     assert before
@@ -161,7 +161,7 @@ def test_the_first_folder_that_can_be_written_is_chosen(monkeypatch: pytest.Monk
     assert kernel_cache.cache_folder() is None
 
 
-def test_kernels_work_where_nothing_can_be_written(tmp_path: Path) -> None:
+def test_kernels_work_where_nothing_can_be_written(filled: tuple[Path, str], tmp_path: Path) -> None:
     """A copy of the package in a folder that is read-only, without a home and without a folder for temporary files."""
     code = (
         "import antdrive.worlds.kernel_cache as k\n"
@@ -172,7 +172,7 @@ def test_kernels_work_where_nothing_can_be_written(tmp_path: Path) -> None:
         "k._private_folder = lambda: None\n" + MEASURE
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=tmp_path)
-    assert (done.returncode, done.stdout, done.stderr) == (0, measure().stdout, "")
+    assert (done.returncode, done.stdout, done.stderr) == (0, filled[1], "")
 
 
 def test_the_stamp_covers_every_kernel_file() -> None:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.view.film.shot import Shot
+from antdrive.worlds.processes import delayed
 
 Picture = npt.NDArray[np.uint8]  # (H, W, 3)
 Floats = npt.NDArray[np.float64]
@@ -39,7 +40,7 @@ def render_frames(rollout: Rollout, setting: dict[str, Any], times: Floats, jobs
     film = uuid.uuid4().hex
     with joblib.Parallel(n_jobs=jobs) as pool:
         for k in range(0, len(chunks), jobs):
-            work = [joblib.delayed(_render)(film, rollout, setting, times, *chunk) for chunk in chunks[k : k + jobs]]
+            work = [delayed(_render)(film, rollout, setting, times, *chunk) for chunk in chunks[k : k + jobs]]
             for rendered in pool(work):
                 yield from rendered
 

@@ -337,14 +337,12 @@ def test_a_bare_grid_is_refused() -> None:
         Tangent(bulge=0.0)
 
 
-def test_a_forest_of_400_discs_is_quick() -> None:
+def test_in_a_forest_of_400_discs_a_tenth_of_all_tangents_is_checked() -> None:
     task = forest(
         np.random.default_rng(1), size=40, count=400, radius=(0.3, 0.7), clearance=1, spacing=0.1, robot_radius=0.25
     )
     query = Query.between(rasterise(task.world, 0.25, 0.3), task)
-    Tangent().plan(query, RNG)
-    seconds = min(Tangent().plan(query, RNG).wall_s for _ in range(3))
-    assert seconds < 0.25
+    assert 0 < Tangent().plan(query, RNG).work < 4 * math.comb(400, 2) / 10
 
 
 def test_a_lattice_of_discs_that_all_touch_is_solved() -> None:

@@ -1,7 +1,8 @@
 """Calling the command line in this process, in an empty folder."""
 
+import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -13,18 +14,24 @@ from tests.sim.cli.calling import Call, Refused
 
 
 @pytest.fixture
-def antdrive(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Call:
-    """Call `antdrive` with some words: its exit code, stdout and stderr."""
+def antdrive(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path, request: pytest.FixtureRequest
+) -> Iterator[Call]:
+    """Call `antdrive` with some words: its exit code, stdout and stderr. The report of a failed test shows how calls ended."""
     monkeypatch.chdir(tmp_path)
+    before = signal.getsignal(signal.SIGTERM)
 
     def call(*words: str | Path) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", ["antdrive", *map(str, words)])
         with pytest.raises(SystemExit) as ended:
             main()
         out, err = capsys.readouterr()
-        return int(ended.value.code or 0), out, err
+        code = int(ended.value.code or 0)
+        request.node.add_report_section("call", f"antdrive {words[0] if words else ''}", f"exit code {code}\n{err}")
+        return code, out, err
 
-    return call
+    yield call
+    signal.signal(signal.SIGTERM, before)  # `main` has set its own, which would fail a later test instead of ending all
 
 
 @pytest.fixture

@@ -66,7 +66,7 @@ def test_python_m_antdrive_is_the_command_and_prints_nothing_else(small: Path, t
     command = [sys.executable, "-m", "antdrive", "run", str(small), "--json", "--out", str(tmp_path / "r")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0
-    assert done.stderr == ""
+    assert [line for line in done.stderr.splitlines() if "compiling the planners, once" not in line] == []
     assert json.loads(done.stdout)["succeeded"]
 
 

@@ -6,6 +6,7 @@ from typing import Any
 import pyarrow
 import pytest
 
+from antdrive.sim.campaigns import campaign, sweeping
 from antdrive.sim.campaigns.results import SweepResults
 from antdrive.worlds.errors import InputError
 from tests.sim.cli.calling import Call
@@ -33,8 +34,9 @@ def driven(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, compiled: list[str])
     def sweep(_campaign: object, folder: Path, **_settings: Any) -> SweepResults:
         return SweepResults(folder, pyarrow.Table.from_pylist([{**RUN, **end} for end in ENDS]), 2)
 
-    monkeypatch.setattr("antdrive.sim.campaigns.campaign.make_campaign", lambda data, **_words: data)
-    monkeypatch.setattr("antdrive.sim.campaigns.sweeping.sweep", sweep)
+    # Both modules are imported above: one that is first imported here would keep what the other is given for the test.
+    monkeypatch.setattr(campaign, "make_campaign", lambda data, **_words: data)
+    monkeypatch.setattr(sweeping, "sweep", sweep)
     return tmp_path
 
 
