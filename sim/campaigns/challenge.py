@@ -33,7 +33,8 @@ class Published:
 
     Attributes:
         who: the entry
-        where: which worlds, how often, and where the figure comes from
+        where: which worlds, how often, and how the figure came about
+        source: where it can be looked up
         score: mean score
         success: share of runs that arrived; not a number where it is not known
         seconds: mean time of a run that arrived [s]; not a number where it is not known
@@ -41,17 +42,22 @@ class Published:
 
     who: str
     where: str
+    source: str
     score: float
     success: float = math.nan
     seconds: float = math.nan
 
 
+COPIED = "the organisers' report on the BARN challenge at ICRA 2026, which we have not seen itself"
+LICS = "the team's published log, whose address we did not keep; the method: Damanik et al. 2024, arXiv 2406.14947"
+DWA = "github.com/Daffan/the-barn-challenge, res/dwa_out.txt"
+
 #: The results that the table is shown beside.
 PUBLISHED = (
-    Published("IN2 BOT, 2026", "hidden worlds, 50 x 10, the organisers' report as others copied it", 0.4975),
-    Published("EW-Glab, 2026", "hidden worlds, the same report", 0.4880),
-    Published("LiCS-KI, 1.5 m/s", "the 50 public worlds x 10, its own log, rescored", 0.4889, 0.98, 7.69),
-    Published("DWA, 0.5 m/s", "the 50 public worlds x 10, the organisers' log, rescored", 0.1586, 0.85),
+    Published("IN2 BOT, 2026", "hidden worlds, 50 x 10, copied by others, not checked", COPIED, 0.4975),
+    Published("EW-Glab, 2026", "hidden worlds, copied by others, not checked", COPIED, 0.4880),
+    Published("LiCS-KI, 1.5 m/s", "the 50 public worlds x 10, its own log, rescored", LICS, 0.4889, 0.98, 7.69),
+    Published("DWA, 0.5 m/s", "the 50 public worlds x 10, the organisers' log, rescored", DWA, 0.1586, 0.85),
 )
 
 

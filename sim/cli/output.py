@@ -23,7 +23,8 @@ def print_run(run: Run, files: dict[str, str]) -> None:
     if s.chosen is not None:
         print_line(f"  {chosen_margin(s.chosen)}")
     if run.rollout is not None and run.certificate is not None:
-        facts = run.as_dict()["metrics"]
+        result = run.as_dict()
+        facts = result["metrics"]
         print_line(
             f"  drove {facts['driven_length_m']:.2f} m in {facts['duration_s']:.1f} s "
             f"(route {facts['route_length_m']:.2f} m); tracking error at most {facts['tracking_error_max_m']:.3f} m"
@@ -36,7 +37,21 @@ def print_run(run: Run, files: dict[str, str]) -> None:
         print_line(f"  {run.certificate.sentence}")
         for problem in run.certificate.problems:
             print_line(f"    {problem}")
+        for sight in result.get("sights", ()):
+            if sight.get("obstacle", -1) >= len(s.task.world.obstacles) and not sight["touched"]:
+                print_line(f"  {_discovery(sight)}")
     print_files(files)
+
+
+def _discovery(sight: dict[str, Any]) -> str:
+    """When the robot first saw an obstacle of `--unseen`, and how near it came to it."""
+    seen = (
+        "never seen"
+        if sight["seen_s"] is None
+        else (f"first seen at t = {sight['seen_s']:.1f} s, {sight['seen_from_m']:.2f} m away")
+    )
+    near = f"nearest {sight['nearest_m']:.2f} m, at t = {sight['nearest_s']:.1f} s"
+    return f"obstacle {sight['obstacle']}, not in the world file: {seen}; {near}"
 
 
 def chosen_margin(chosen: Calibration) -> str:

@@ -138,7 +138,7 @@ def write_run(run: Run, folder: Path, *, vector: bool = False, figures: bool = T
         from antdrive.sim.view.figures.plan_figures import plan_figure
 
         s = run.scenario
-        plan_figure(s.task, run.grid, run.plan, s.robot, folder / "overview.png")
+        plan_figure(s.task, run.grid, run.plan, s.robot, folder / "overview.png", mapped=not s.exploring)
         files["figure"] = str(folder / "overview.png")
     return files
 
@@ -161,7 +161,8 @@ def _write_figures(run: Run, folder: Path, log: str, endings: Sequence[str]) -> 
 
             files["sight" + end] = str(folder / f"sight{suffix}")
             sight_figure(run.rollout, files["sight" + end])
-    made = plan_figures(s.task, run.grid, run.plan, s.robot, folder, name=s.planner_name, suffixes=endings)
+    known: dict[str, Any] = {"name": s.planner_name, "suffixes": endings, "mapped": not s.exploring}
+    made = plan_figures(s.task, run.grid, run.plan, s.robot, folder, **known)
     return files | {name: str(path) for name, path in made.items()}
 
 

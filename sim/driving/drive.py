@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from antdrive.robots import Avoidance, NoiseModel, PurePursuit, TrackedPath, Twist
 from antdrive.sim.driving.caution import Caution
-from antdrive.sim.driving.driver import STUCK_TIME, Driver
+from antdrive.sim.driving.driver import Driver
 from antdrive.sim.driving.exploring import Exploration
 from antdrive.sim.driving.localising import OdometryModel
 from antdrive.sim.driving.lookout import Lookout
@@ -116,5 +116,5 @@ def _control_period(
     if log.touched:
         return Ending(Outcome.COLLIDED)
     if driver.stuck:
-        return Ending(Outcome.STUCK, f"no progress along the route for {STUCK_TIME:g} s")
+        return Ending(Outcome.STUCK, driver.why_stuck)
     return None

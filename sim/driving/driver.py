@@ -44,11 +44,13 @@ class StuckClock(NamedTuple):
         farthest: the farthest that the robot has got along the route [m]
         driving: control periods since then in which the robot was to drive, not rotate
         turning: control periods since then in which the robot rotated in place
+        held: how many of all these its sight limited the robot's speed
     """
 
     farthest: float = 0.0
     driving: int = 0
     turning: int = 0
+    held: int = 0
 
     def after(self, pursuit: PursuitState, waiting: bool) -> StuckClock:
         """The clock after one more control period."""
@@ -56,9 +58,18 @@ class StuckClock(NamedTuple):
             return StuckClock(pursuit.arc)
         if waiting:
             return self
+        held = self.held + (pursuit.limiter == OUT_OF_SIGHT)
         if pursuit.turning:
-            return StuckClock(self.farthest, self.driving, self.turning + 1)
-        return StuckClock(self.farthest, self.driving + 1, self.turning)
+            return StuckClock(self.farthest, self.driving, self.turning + 1, held)
+        return StuckClock(self.farthest, self.driving + 1, self.turning, held)
+
+    @property
+    def reason(self) -> str:
+        """What is said of a robot that has made no progress for too long."""
+        why = f"no progress along the route for {STUCK_TIME:g} s"
+        if 2 * self.held > self.driving + self.turning:
+            return f"{why}; its sight held it: it had seen no free ground where it was to go"
+        return why
 
 
 class Driver:
@@ -103,6 +114,11 @@ class Driver:
         return clock.driving >= self._patience or clock.turning >= self._patience + self._full_turn
 
     @property
+    def why_stuck(self) -> str:
+        """Why the robot makes no progress."""
+        return self._clock.reason
+
+    @property
     def fraction(self) -> float:
         """The fraction of the route that is done."""
         return self.pursuit.arc / self.tracked.length
@@ -134,7 +150,7 @@ class Driver:
         if self._avoidance is not None and self._predictor is not None:
             stopping = self.avoids and self._stops_at_goal(pose, last)
             if stopping and _standing(state):
-                return self._arrival(state)
+                return self._arrival(pose, state)
             self._avoid_movers(tick, pose, last, before, speed_limit, stopping)
         self._keep_within_sight(tick, pose, last)
         ending = self._end_of_route(tick, pose, state)
@@ -238,7 +254,7 @@ class Driver:
         left = self.tracked.length - self.pursuit.arc
         if left > self.tracked.goal_distance or not _standing(state) or any(self.command):
             return None
-        ending, monitor, task = self._arrival(state), self._monitor, self._task
+        ending, monitor, task = self._arrival(pose, state), self._monitor, self._task
         # The robot goes by its estimate: one that is at the goal by it stays, even if it missed it, and one that is not goes on.
         knows = math.dist(pose[:2], task.goal) > task.goal_tolerance
         if monitor is None or not knows:
@@ -254,16 +270,19 @@ class Driver:
         assert self._monitor is not None
         return Ending(Outcome.INVALID_PLAN, f"on the way, at t = {tick / self._hz:g} s: {self._monitor.wrong}")
 
-    def _arrival(self, state: State) -> Ending:
-        """How the drive ends if the robot stops here without a contact."""
-        task = self._task
-        left = math.dist((state.x, state.y), task.goal)
+    def _arrival(self, pose: Pose, state: State) -> Ending:
+        """How the drive ends if the robot stops here, where it believes that it is at a pose, without a contact."""
+        task, true = self._task, (state.x, state.y)
+        left, believed = math.dist(true, task.goal), math.dist(pose[:2], task.goal)
         if left <= task.goal_tolerance:
             return Ending(Outcome.SUCCEEDED)
-        return Ending(
-            Outcome.STUCK,
-            f"the route ends here, {left:.3f} m from the goal; the tolerance is {task.goal_tolerance:g} m",
-        )
+        why = f"the route ends here, {left:.3f} m from the goal; the tolerance is {task.goal_tolerance:g} m"
+        if believed <= task.goal_tolerance:
+            why = (
+                f"the robot believed that it was at the goal, {believed:.2f} m from it, but was {left:.3f} m from it "
+                f"(the tolerance is {task.goal_tolerance:g} m): its estimate was wrong by {math.dist(pose[:2], true):.2f} m"
+            )
+        return Ending(Outcome.STUCK, why)
 
     def _stops_at_goal(self, pose: Pose, command: Twist) -> bool:
         """Whether a robot that brakes now stops within the goal's tolerance."""

@@ -109,12 +109,19 @@ def driven_length_m(rollout: Rollout) -> float:
 
 
 def gap_to_grid_optimum(rollout: Rollout) -> float:
-    """Planned length over the shortest path on the same grid, minus 1; below 0 where an any-angle line is shorter."""
+    """Planned length over the shortest path on the same grid, minus 1; below 0 where an any-angle line is shorter.
+
+    Only with the map: not a number for a robot without one, whose first plan is made before it has seen the world.
+    """
+    if rollout.record.exploring:
+        return math.nan
     return _over(path_length_m(rollout), rollout.record.plan.grid_optimum_m)
 
 
 def gap_to_euclidean_optimum(rollout: Rollout) -> float:
-    """Length of the route over the exact shortest path among the inflated discs, minus 1."""
+    """Length of the route over the exact shortest path among the inflated discs, minus 1. Only with the map, too."""
+    if rollout.record.exploring:
+        return math.nan
     return _over(route_length_m(rollout), rollout.record.plan.euclidean_optimum_m)
 
 
@@ -238,7 +245,8 @@ def avoiding_s(rollout: Rollout) -> float:
 def explored_m2(rollout: Rollout) -> float:
     """Ground within the walls that the lidar of a robot without a map saw, from the true poses, in cells of 0.1 m.
 
-    A cell counts if the beam nearest to its middle in direction got farther. Not a number for a robot that had a map.
+    A cell counts if the beam nearest to its middle in direction got farther, however far away it is: the ground on the robot's
+    own map is less, since there beams must not be farther apart than its cells. Not a number for a robot that had a map.
     """
     if not (rollout.record.exploring and len(rollout.scans)):
         return math.nan

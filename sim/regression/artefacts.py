@@ -153,7 +153,7 @@ def write_artefacts(
     if rollout is None:
         s = run.scenario
         files["overview"] = str(folder / "overview.png")
-        plan_figure(s.task, run.grid, run.plan, s.robot, files["overview"])
+        plan_figure(s.task, run.grid, run.plan, s.robot, files["overview"], mapped=not s.exploring)
     else:
         files["rollout"] = str(rollout.save(folder / "rollout.npz"))
         files["overview"] = str(folder / "overview.png")

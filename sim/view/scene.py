@@ -110,11 +110,12 @@ class Scene:
         )
 
     @classmethod
-    def planned(cls, task: Task, robot: RobotSpec, inflate: float) -> Scene:
+    def planned(cls, task: Task, robot: RobotSpec, inflate: float, *, mapped: bool = True) -> Scene:
         """The scene of a plan that was not driven.
 
         Args:
             inflate: how far the planner kept its path from obstacles [m]
+            mapped: whether the robot had a map
         """
         discs = [(disc.x, disc.y, disc.radius, disc.height) for disc in task.world.obstacles]
         # The motion of wandering movers depends on a run's seed.
@@ -132,6 +133,7 @@ class Scene:
             inflate=inflate,
             margin=max(0.0, inflate - robot.radius),
             robot=Body.of(robot),
+            mapped=mapped,
             mover_radii=tuple(trajectories.radii.tolist()),
             movers=tuple((x, y) for x, y in positions[0].tolist()),
             tracks=mover_tracks(positions),
@@ -143,6 +145,11 @@ class Scene:
         return "placed after planning" if self.mapped else "not in the world file"
 
     @property
+    def route_said(self) -> str:
+        """What legends call the first route."""
+        return "route" if self.mapped else "first route, before the world was seen"
+
+    @property
     def movers_said(self) -> str:
         """What a legend says of movers: a picture shows them at one moment."""
         return f"moving obstacle, at {self.movers_at:.1f} s"
@@ -151,6 +158,18 @@ class Scene:
     def has_zones(self) -> bool:
         """Whether there is ground around the obstacles that plans keep off from the start."""
         return self.mapped and self.inflate > 0
+
+    def around(self, way: Floats) -> Bounds:
+        """The part of the plane that a map shows [m]: the world, and what a robot without a map planned first.
+
+        Args:
+            way: the first plan or route (N, 2) [m]; it may lead out of the world
+        """
+        if self.mapped or not len(way):
+            return self.bounds
+        (x0, y0), (x1, y1) = way.min(axis=0).tolist(), way.max(axis=0).tolist()
+        low_x, low_y, high_x, high_y = self.bounds
+        return min(low_x, x0), min(low_y, y0), max(high_x, x1), max(high_y, y1)
 
     def region(self, points: Floats) -> tuple[Floats, Floats]:
         """The corners (2,), (2,) [m] of the part of the world to show: around start, goal and points (N, 2).

@@ -35,7 +35,7 @@ CONTACT: Colour = (214, 34, 44)
 FOLLOWED: Colour = (176, 36, 148)  # a mover as the robot believes it to be
 BEAM: Colour = (20, 140, 214)
 HIT: Colour = (0, 62, 148)
-PALE: Colour = (222, 226, 232)  # ground and obstacles never seen
+PALE: Colour = (222, 226, 232)  # ground not known to be free, and obstacles never seen
 HATCH: Colour = (186, 194, 206)
 
 # Text and the band below a film's picture.

@@ -152,6 +152,8 @@ def _print(found: "list[BarnLine]", known: "BarnLine | None", price: "Price | No
         for entry in PUBLISHED
     )
     print_table(("published", "success [%]", "mean time [s]", "mean score", "where"), rows)
+    for source in dict.fromkeys(entry.source for entry in PUBLISHED):
+        print_line(f"  {', '.join(entry.who for entry in PUBLISHED if entry.source == source)}: {source}")
     print_line("")
     print_line(OURS)
 

@@ -18,6 +18,7 @@ from antdrive.sim.view.scene import Scene
 from antdrive.sim.view.style import INK, MUTED, hexed
 from antdrive.worlds.errors import InputError
 from antdrive.worlds.files.atomic import written_whole
+from antdrive.worlds.types import Bounds
 
 SUFFIXES = (".png", ".pdf", ".svg")
 
@@ -57,12 +58,29 @@ def new_figure(width: float, height: float) -> Figure:
     return figure
 
 
-def map_size(scene: Scene) -> tuple[float, float]:
-    """The width and height of a scene's map in a figure [inches]."""
-    x0, y0, x1, y1 = scene.bounds
+def map_size(scene: Scene, shown: Bounds | None = None) -> tuple[float, float]:
+    """The width and height of a scene's map in a figure [inches].
+
+    Args:
+        scene: what is drawn
+        shown: the part of the plane that is shown [m]; None: the world
+    """
+    x0, y0, x1, y1 = shown or scene.bounds
     shape = (y1 - y0) / (x1 - x0)
     high = float(np.clip(5.6 * shape, 3.9, 6.4))
     return float(np.clip(high / shape, 3.2, 7.0)), high
+
+
+def frame_map(axes: Any, shown: Bounds) -> None:
+    """Show a part of the plane, with some room around it.
+
+    Args:
+        axes: with the map
+        shown: xmin, ymin, xmax, ymax [m]
+    """
+    x0, y0, x1, y1 = shown
+    room = 0.02 * max(x1 - x0, y1 - y0)
+    axes.set(xlim=(x0 - room, x1 + room), ylim=(y0 - room, y1 + room))
 
 
 def checked(path: str | Path | None) -> Path | None:
@@ -145,5 +163,5 @@ def panels(figure: Figure) -> dict[str, Axes]:
 #: The names that the axes of figures have.
 PANELS = (
     *("map", "clearance", "speed", "limiters", "distance", "readings"),
-    *("explored", "first sights", "history", "field", "lengths", "with elitism", "without elitism"),
+    *("known ground", "first sights", "history", "field", "lengths", "with elitism", "without elitism"),
 )

@@ -21,6 +21,8 @@ LIMITER_COLOURS = (
     *("#d55e00", "#5b6576", "#f0e442", "#7a4b9e", "#1b2333", "#a3d9c9"),
 )
 
+MOST_LIMITERS = 6  # in a row of the legend
+
 
 def draw_clearance(axes: Any, scene: Scene, rollout: Rollout) -> None:
     """Draw clearance over time, with the planned margin, the minimum, and the first contact."""
@@ -46,12 +48,12 @@ def draw_clearance(axes: Any, scene: Scene, rollout: Rollout) -> None:
 
 def draw_speed(axes: Any, scene: Scene, rollout: Rollout) -> None:
     """Draw commanded and measured speed over time."""
-    axes.set(title="speed [m/s]")
+    axes.set_title("speed [m/s]", pad=20)  # above its legend
     axes.plot(rollout.t, rollout.command[:, 0], color=hexed(SHELL), lw=2.4, alpha=0.55, label="commanded")
     axes.plot(rollout.t, rollout.twist[:, 0], color=hexed(ROUTE), lw=1.0, label="measured")
     axes.axhline(scene.robot.max_speed, color=hexed(MUTED), lw=0.9, ls="--", label="robot's top speed")
     axes.tick_params(labelbottom=False)
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=3, borderaxespad=0.2, handlelength=1.4)
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 0.98), ncols=3, borderaxespad=0.2, handlelength=1.4)
 
 
 def draw_limiters(axes: Any, rollout: Rollout) -> None:
@@ -75,7 +77,7 @@ def draw_limiters(axes: Any, rollout: Rollout) -> None:
         handles=handles,
         loc="lower left",
         bbox_to_anchor=(0.0, 0.95),
-        ncols=len(handles),
+        ncols=min(len(handles), MOST_LIMITERS),
         handlelength=0.9,
         columnspacing=1.0,
         borderaxespad=0.1,

@@ -12,6 +12,7 @@ from matplotlib.patches import Circle, Patch, Polygon, Rectangle
 from matplotlib.path import Path
 
 from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.view.figures.canvas import frame_map
 from antdrive.sim.view.scene import Scene, contact_point
 from antdrive.sim.view.style import (
     BAD,
@@ -49,8 +50,8 @@ def draw_map(axes: Any, scene: Scene, *, floor: bool = True) -> None:
         floor: draw grid lines and filled zones; False leaves the ground free for a field below
     """
     x0, y0, x1, y1 = scene.bounds
-    room = 0.02 * max(x1 - x0, y1 - y0)
-    axes.set(xlim=(x0 - room, x1 + room), ylim=(y0 - room, y1 + room), xlabel="x [m]", ylabel="y [m]")
+    frame_map(axes, scene.bounds)
+    axes.set(xlabel="x [m]", ylabel="y [m]")
     axes.set_aspect("equal", adjustable="box")
     axes.spines[:].set_visible(False)
     axes.grid(floor)
@@ -136,7 +137,7 @@ def draw_driven(figure: Any, axes: Any, scene: Scene, rollout: Rollout, cells: F
         handles += axes.plot(*cells.T, ".", ms=2.6, color=hexed(MUTED), label="planned cells", zorder=4.6)
     if len(rollout.route) > 1:
         style = {"ls": (0, (4, 2.5)), "lw": 1.0, "color": hexed(ROUTE)}
-        handles += axes.plot(*rollout.route.T, **style, label="route", zorder=4.8)
+        handles += axes.plot(*rollout.route.T, **style, label=scene.route_said, zorder=4.8)
         for k, (_, line) in enumerate(rollout.legs()[1:]):
             drawn = axes.plot(*line.T, **{**style, "lw": 0.7, "alpha": 0.45}, label="new routes", zorder=4.7)
             handles += drawn if k == 0 else []
@@ -167,7 +168,7 @@ def draw_driven(figure: Any, axes: Any, scene: Scene, rollout: Rollout, cells: F
 
 def draw_legend(axes: Any, handles: list[Any], scene: Scene) -> None:
     """Draw the map's legend above its upper left corner: `handles`, then obstacles, movers and zones."""
-    known = [Patch(fc=hexed(OBSTACLE), label="obstacle")]
+    known = [Patch(fc=hexed(OBSTACLE), label="obstacle" if scene.mapped else "obstacle, on no map")]
     if scene.unseen.any():
         known.append(Patch(fc=hexed(UNSEEN), label=scene.unseen_said))
     if scene.mover_radii:

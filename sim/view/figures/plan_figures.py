@@ -13,12 +13,12 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from antdrive.sim.view.figures.canvas import checked, finished, map_size, new_figure, styled
+from antdrive.sim.view.figures.canvas import checked, finished, frame_map, map_size, new_figure, styled
 from antdrive.sim.view.figures.curves import draw_history
 from antdrive.sim.view.figures.map_chart import FIELD, draw_field, draw_legend, draw_map
 from antdrive.sim.view.figures.paper_figures import history_figure
 from antdrive.sim.view.scene import Scene
-from antdrive.sim.view.style import BAD, ROUTE, SHELL, hexed
+from antdrive.sim.view.style import BAD, MUTED, ROUTE, SHELL, hexed
 
 if TYPE_CHECKING:
     from antdrive.planners.plan import PlanResult
@@ -34,10 +34,19 @@ FILES = {"plan": "plan", "tour": "tour", "history": "history", "bars": "field-ba
 MAX_BARS = 40
 #: Letters of a reason per inch, and the height of its lines [inches].
 LETTERS, LINE = 13.0, 0.165
+#: What is said of a plan that was made without a map.
+FIRST = "First plan of a robot without a map, from its first scan: what it has not seen counts as free."
 
 
 def plan_figure(
-    task: Task, grid: Grid, plan: PlanResult, robot: RobotSpec, path: str | Path | None = None, *, dpi: float = 160
+    task: Task,
+    grid: Grid,
+    plan: PlanResult,
+    robot: RobotSpec,
+    path: str | Path | None = None,
+    *,
+    mapped: bool = True,
+    dpi: float = 160,
 ) -> Figure:
     """Draw a plan on the map, over the planner's field; an iterative planner gets path lengths by iteration, too.
 
@@ -47,6 +56,7 @@ def plan_figure(
         plan: the planner's result, with a path or the reason why there is none
         robot: the robot to draw at the start
         path: the file to write; its suffix chooses PNG, PDF or SVG; None: no file
+        mapped: whether the robot has a map; the first plan of one without is made before it has seen the world
         dpi: pixels per inch
 
     Returns:
@@ -56,14 +66,17 @@ def plan_figure(
         InputError: a suffix that is none of .png, .pdf, .svg.
     """
     target = checked(path)
-    scene = Scene.planned(task, robot, grid.inflate)
+    scene = Scene.planned(task, robot, grid.inflate, mapped=mapped)
+    cells, line = (grid.xy(plan.cells), grid.xy(plan.line)) if len(plan.cells) else (np.empty((0, 2)),) * 2
+    shown = scene.around(line)
     iterations = len(plan.history)
     with styled():
-        wide, high = map_size(scene)
+        wide, high = map_size(scene, shown)
         wide += 0.9 if plan.field is not None else 0.0
         wide_all = wide + (4.6 if iterations else 0.6)
-        reason = [] if len(plan.cells) else textwrap.wrap(plan.reason or plan.status.value, round(LETTERS * wide_all))
-        figure = new_figure(wide_all, high + 0.9 + (0.4 + LINE * len(reason) if reason else 0.0))
+        said = _said_below(plan, mapped=mapped)
+        below = textwrap.wrap(said, round(LETTERS * wide_all)) if said else []
+        figure = new_figure(wide_all, high + 0.9 + (0.4 + LINE * len(below) if below else 0.0))
         areas = figure.add_gridspec(1, 2 if iterations else 1, width_ratios=[wide, 4.2] if iterations else [1])
         chart = figure.add_subplot(areas[0, 0], label="map")
         if plan.field is not None:
@@ -71,11 +84,12 @@ def plan_figure(
         draw_map(chart, scene, floor=plan.field is None)
         handles: list[Any] = []
         if len(plan.cells):
-            cells, line = grid.xy(plan.cells), grid.xy(plan.line)
             handles += chart.plot(*cells.T, ".", ms=3.4, color=hexed(ROUTE), label="planned cells", zorder=5)
             handles += chart.plot(*line.T, "-", lw=1.9, color=hexed(SHELL), label="planned path", zorder=6)
-        if reason:  # below the map, where it covers nothing of what it speaks of
-            figure.supxlabel("\n".join(reason), x=0.012, ha="left", fontsize=9, weight="bold", color=hexed(BAD))
+        frame_map(chart, shown)
+        if below:  # the map, where it covers nothing of what it speaks of
+            colour = hexed(MUTED if len(plan.cells) else BAD)
+            figure.supxlabel("\n".join(below), x=0.012, ha="left", fontsize=9, weight="bold", color=colour)
         draw_legend(chart, handles, scene)
         if iterations:
             draw_history(figure.add_subplot(areas[0, 1], label="history"), plan.history)
@@ -84,6 +98,13 @@ def plan_figure(
         title = f"{scene.name}   ·   {length}   ·   {plan.work:,} {plan.work_unit}"
         figure.suptitle(title, x=0.012, ha="left", fontsize=12, weight="bold")
         return finished(figure, target, dpi)
+
+
+def _said_below(plan: PlanResult, *, mapped: bool) -> str:
+    """What is said below the map: why there is no path, or that the robot had not seen the world when it planned."""
+    if not len(plan.cells):
+        return plan.reason or plan.status.value
+    return "" if mapped else FIRST
 
 
 def plan_figures(
@@ -95,6 +116,7 @@ def plan_figures(
     *,
     name: str,
     suffixes: Sequence[str],
+    mapped: bool = True,
 ) -> dict[str, Path]:
     """Draw every figure of a plan: with the field, alone, by iteration, and its field as bars and as contours.
 
@@ -106,6 +128,7 @@ def plan_figures(
         folder: where the figures go
         name: the planner's name
         suffixes: the formats, for example (".png", ".pdf")
+        mapped: whether the robot has a map
 
     Returns:
         The files' paths by the name of the figure; formats after the first are named like `plan pdf`.
@@ -115,15 +138,15 @@ def plan_figures(
     for suffix in suffixes:
         end = "" if suffix == suffixes[0] else f" {suffix[1:]}"
         files = {key: folder / f"{stem}{suffix}" for key, stem in FILES.items()}
-        plan_figure(task, grid, plan, robot, files["plan"])
+        plan_figure(task, grid, plan, robot, files["plan"], mapped=mapped)
         drawn = ["plan"]
         if len(plan.history):
-            plan_figure(task, grid, bare, robot, files["tour"])
+            plan_figure(task, grid, bare, robot, files["tour"], mapped=mapped)
             history_figure({name: [plan.history]}, files["history"])
             drawn += ["tour", "history"]
         if plan.field is not None:
             bars_figure(grid, plan.field, files["bars"])
-            contours_figure(task, grid, plan, robot, files["contours"])
+            contours_figure(task, grid, plan, robot, files["contours"], mapped=mapped)
             drawn += ["bars", "contours"]
         found |= {key + end: files[key] for key in drawn}
     return found
@@ -158,11 +181,18 @@ def bars_figure(grid: Grid, field: Floats, path: str | Path | None = None, *, dp
 
 
 def contours_figure(
-    task: Task, grid: Grid, plan: PlanResult, robot: RobotSpec, path: str | Path | None = None, *, dpi: float = 160
+    task: Task,
+    grid: Grid,
+    plan: PlanResult,
+    robot: RobotSpec,
+    path: str | Path | None = None,
+    *,
+    mapped: bool = True,
+    dpi: float = 160,
 ) -> Figure:
     """Draw a planner's field as contours on the map, with the planned path."""
     target = checked(path)
-    scene = Scene.planned(task, robot, grid.inflate)
+    scene = Scene.planned(task, robot, grid.inflate, mapped=mapped)
     assert plan.field is not None
     values = np.where(grid.free, np.asarray(plan.field, dtype=np.float64), np.nan)
     x = grid.origin[0] + grid.cell * np.arange(grid.shape[1])
@@ -181,6 +211,7 @@ def contours_figure(
                 bar.outline.set_visible(False)
         draw_map(axes, scene, floor=False)
         line = grid.xy(plan.line) if plan.solved else np.empty((0, 2))
+        frame_map(axes, scene.around(line))
         handles: list[Any] = []
         if len(line):
             handles = axes.plot(*line.T, "-", lw=1.9, color=hexed(SHELL), label="planned path", zorder=6)

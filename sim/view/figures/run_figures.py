@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from antdrive.sim.log.certificate import Certificate, in_metres
 from antdrive.sim.log.metrics import tracking_error
 from antdrive.sim.log.rollout import Rollout
-from antdrive.sim.view.figures.canvas import checked, finished, map_size, new_figure, styled
+from antdrive.sim.view.figures.canvas import checked, finished, frame_map, map_size, new_figure, styled
 from antdrive.sim.view.figures.curves import draw_clearance, draw_limiters, draw_speed
 from antdrive.sim.view.figures.map_chart import draw_driven, draw_legend, draw_map
 from antdrive.sim.view.scene import Scene
@@ -46,12 +46,14 @@ def overview(
     scene = Scene.of(rollout)
     target = checked(path)
     with styled():
-        wide, high = map_size(scene)
+        shown = scene.around(rollout.route)
+        wide, high = map_size(scene, shown)
         figure = new_figure(wide + 5.6, high + 0.9)
         grid = figure.add_gridspec(3, 2, width_ratios=[wide, 5.2], height_ratios=[1.0, 1.0, 0.11])
         chart = figure.add_subplot(grid[:, 0], label="map")
         draw_map(chart, scene)
         draw_driven(figure, chart, scene, rollout, cells)
+        frame_map(chart, shown)
         clearance = figure.add_subplot(grid[0, 1], label="clearance")
         draw_clearance(clearance, scene, rollout)
         draw_speed(figure.add_subplot(grid[1, 1], sharex=clearance, label="speed"), scene, rollout)

@@ -14,7 +14,7 @@ from matplotlib.patches import Circle, Patch
 
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.sights import Sighting, sightings
-from antdrive.sim.view.figures.canvas import checked, finished, map_size, new_figure, styled
+from antdrive.sim.view.figures.canvas import checked, finished, frame_map, map_size, new_figure, styled
 from antdrive.sim.view.figures.map_chart import draw_map
 from antdrive.sim.view.recollection import Recollection, containers
 from antdrive.sim.view.scene import Scene
@@ -42,7 +42,7 @@ CURVE = 160  # points of the curve of explored ground
 
 
 def sight_figure(rollout: Rollout, path: str | Path | None = None, *, dpi: float = 160) -> Figure:
-    """Draw what a robot without a map knew: explored ground and hits, route and drive, and its first sights of obstacles.
+    """Draw what a robot without a map knew: the ground on its map and hits, route and drive, and its first sights of obstacles.
 
     The map is the robot's own, in the frame of its estimated poses, over the world as it was: where hits lie beside obstacles,
     the estimate had drifted.
@@ -67,12 +67,14 @@ def sight_figure(rollout: Rollout, path: str | Path | None = None, *, dpi: float
         explored.append(seen.explored)
     listed = sorted(sightings(rollout, seen.met)[:LISTED], key=lambda sight: sight.nearest_at)
     with styled():
-        wide, high = map_size(scene)
+        shown = scene.around(rollout.route)
+        wide, high = map_size(scene, shown)
         figure = new_figure(wide + 5.4, high + 0.9)
         areas = figure.add_gridspec(2, 2, width_ratios=[wide, 5.0], height_ratios=[1.0, 1.6])
         chart: Any = figure.add_subplot(areas[:, 0], label="map")
         _draw_known(chart, scene, rollout, seen, listed)
-        curve: Any = figure.add_subplot(areas[0, 1], label="explored")
+        frame_map(chart, shown)
+        curve: Any = figure.add_subplot(areas[0, 1], label="known ground")
         curve.plot(moments, explored, color=hexed(BEAM), lw=1.8)
         curve.set(title="ground on the robot's map [m²]", ylim=(0, None), xlim=(0, max(float(rollout.t[-1]), 1e-3)))
         curve.set_title(f"{explored[-1]:.1f} m² at the end", loc="right", fontsize=9, weight="normal")
@@ -122,7 +124,7 @@ def _draw_known(axes: Any, scene: Scene, rollout: Rollout, seen: Recollection, l
         Patch(fc=hexed(OBSTACLE), label="obstacle, seen"),
         Patch(fc=hexed(PALE), ec=hexed(OBSTACLE), label="obstacle, never seen"),
         Patch(fc=hexed(HIT), label="hits on its map"),
-        Patch(fc=hexed(PALE), ec=hexed(HATCH), hatch="////", lw=0, label="ground never seen"),
+        Patch(fc=hexed(PALE), ec=hexed(HATCH), hatch="////", lw=0, label="ground not known to be free"),
     ]
     if scene.mover_radii:
         known.append(Patch(fc=hexed(MOVER), label=scene.movers_said))
@@ -139,11 +141,12 @@ def _draw_sights(axes: Any, rollout: Rollout, listed: list[Sighting]) -> None:
         start = min(sight.seen_at, sight.nearest_at)
         axes.plot([start, sight.nearest_at], [row, row], color=hexed(BEAM), lw=3.0, alpha=0.55, solid_capstyle="butt")
         axes.plot(sight.nearest_at, row, "X" if sight.touched else "o", ms=6 if sight.touched else 4, color=colour)
-        words = "never seen" if np.isinf(sight.seen_at) else f"seen at {sight.seen_from:.1f} m"
+        words = "never seen" if np.isinf(sight.seen_at) else f"first seen {sight.seen_from:.1f} m away"
+        words += ", touched" if sight.touched else f", nearest {sight.nearest:.2f} m"
         axes.text(
             sight.nearest_at,
             row,
-            f"  {words}, passed at {sight.nearest:.2f} m",
+            f"  {words}",
             va="center",
             fontsize=7,
             color=hexed(INK),

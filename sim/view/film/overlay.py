@@ -12,7 +12,7 @@ from PIL import Image, ImageDraw
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.view.film import _kernels_paint as kernels
 from antdrive.sim.view.film.replay import SLOW_MOTION
-from antdrive.sim.view.film.text import Sprite, fitted, font, pill, plate, text_width
+from antdrive.sim.view.film.text import Sprite, fitted, font, pill, plate, text_width, wrapped
 from antdrive.sim.view.scene import Scene
 from antdrive.sim.view.style import (
     BAD,
@@ -48,6 +48,13 @@ PLAN_FIELDS = ("ITERATION", "BEST PATH", "MEAN PATH", "ARRIVED")
 
 #: The heights of a row of the legend in the band, and of its edge [units].
 LEGEND_ROW, LEGEND_EDGE = 1.5, 0.4
+
+#: The height of a line of a note that has no room beside the numbers [units], how many it has at most, and its font [units].
+NOTE_LINE, MOST_NOTES, NOTE_FONT = 1.2, 3, 0.86
+#: The most of a picture's height that the band takes, for a legend of several rows or a long note.
+MOST_BAND = 0.34
+#: The same of the lines of a reason below the outcome.
+MOST_REASONS, REASON_FONT = 4, 1.05
 
 Values: TypeAlias = list[tuple[str, bool]]  # each number as text, and whether it is shown in red
 
@@ -89,6 +96,7 @@ class Layout:
         wide: names, numbers and outcome stand beside each other in the band
         rows: how many rows of the band the legend has; 0: it is a card in the picture's corner
         height: of the band [px]
+        note: the lines of a note that has no room beside the numbers
     """
 
     width: int
@@ -96,15 +104,43 @@ class Layout:
     wide: bool
     rows: int
     height: int
+    note: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, size: tuple[int, int], rows: int) -> Layout:
-        """The layout for a frame of a size (width, height) [px] with a legend of so many rows."""
+    def of(cls, size: tuple[int, int], rows: int, note: str = "") -> Layout:
+        """The layout for a frame of a size (width, height) [px] with a legend of so many rows and a note."""
         width, height = size
         wide = width >= 1.5 * height and width >= 900
         unit = max(8, round(min(height / 46, width / (82 if wide else 56))))
-        units = (4.7 if wide else 7.8) + (LEGEND_EDGE + LEGEND_ROW * rows if rows else 0.0)
-        return cls(width, unit, wide, rows, 2 * round(units * unit / 2))
+        plain = cls(width, unit, wide, rows, 0)
+        most = min(MOST_NOTES, int((MOST_BAND * height / unit - plain.numbers_units) / NOTE_LINE))
+        lines: list[str] = []
+        if most > 0 and text_width(note, plain.small, True) > plain.note_room:
+            lines = wrapped(note, width - 2 * unit, plain.small, True, most=most)
+        units = plain.numbers_units + NOTE_LINE * len(lines) + (LEGEND_EDGE + LEGEND_ROW * rows if rows else 0.0)
+        return cls(width, unit, wide, rows, 2 * round(units * unit / 2), tuple(lines))
+
+    @property
+    def numbers_units(self) -> float:
+        """The height of names and numbers [units]."""
+        return 4.7 if self.wide else 7.8
+
+    @property
+    def small(self) -> int:
+        """The size of a note's font [px]."""
+        return round(NOTE_FONT * self.unit)
+
+    @property
+    def fields(self) -> tuple[int, int]:
+        """Where the first of the four numbers stands, and how far it is to the next one [px]."""
+        pad = self.unit
+        return (round(0.36 * self.width), 8 * self.unit) if self.wide else (pad, (self.width - pad) // 4)
+
+    @property
+    def note_room(self) -> int:
+        """The room for a note beside the numbers [px]."""
+        first, column = self.fields
+        return self.width - first - 4 * column - self.unit if self.wide else self.width // 2
 
 
 class Band:
@@ -133,11 +169,10 @@ class Band:
         self._blank = Image.new("RGB", (width, layout.height), BAND)
         draw = ImageDraw.Draw(self._blank)
         draw.line([(0, 0), (width, 0)], fill=(210, 216, 225), width=max(1, unit // 8))
-        pad, big, small = unit, round(1.35 * unit), round(0.86 * unit)
-        numbers, column = (round(0.36 * width), 8 * unit) if wide else (pad, (width - pad) // 4)
+        pad, big, small = unit, round(1.35 * unit), layout.small
+        numbers, column = layout.fields
         self._fields = [(numbers + k * column, round((0.75 if wide else 4.25) * unit)) for k in range(4)]
-        note_room = width - self._fields[3][0] - column - pad if wide else width // 2
-        shown = fitted(note or "", note_room, small, True)
+        shown = "" if layout.note else fitted(note or "", layout.note_room, small, True)
         room = numbers - 2 * pad if wide else width - _widest_verdict(unit) - 3 * pad
         subroom = room if wide else width - text_width(shown, small, True) - 3 * pad
         draw.text((pad, 0.6 * unit), fitted(title, room, big, True), font=font(big, True), fill=INK)
@@ -149,6 +184,9 @@ class Band:
             fill=CALM,
             anchor="rm",
         )
+        for k, line in enumerate(layout.note):
+            middle = (layout.numbers_units - 0.1 + (k + 0.5) * NOTE_LINE) * unit
+            draw.text((pad, middle), line, font=font(small, True), fill=CALM, anchor="lm")
         for (x, y), name in zip(self._fields, names, strict=True):
             draw.text((x, y), name, font=font(round(0.82 * unit), True), fill=MUTED)
         if layout.rows:
@@ -237,7 +275,7 @@ def legend_entries(
     if sight:
         found += [
             LegendEntry("dot", HIT, "hit, on the robot's map"),
-            LegendEntry("hatch", HATCH, "never seen"),
+            LegendEntry("hatch", HATCH, "not known to be free"),
         ]
     if scene.mover_radii:
         found.append(LegendEntry("dot", MOVER, "moving obstacle" if followed else "moving obstacle, 1.5 s ahead"))
@@ -350,12 +388,18 @@ def _draw_sample(draw: ImageDraw.ImageDraw, entry: LegendEntry, x: int, y: float
             draw.line([(end, y - 0.35 * size), (end, y + 0.35 * size)], fill=colour, width=line)
 
 
-def banner(outcome: Outcome, layout: Layout, room: int) -> Sprite:
-    """The outcome as a sentence, for the end of a film, at most 0.86 of `room` wide [px]."""
+def banner(outcome: Outcome, layout: Layout, room: int, reason: str = "") -> Sprite:
+    """The outcome as a sentence and its reason, for the end of a film, at most 0.86 of `room` wide [px].
+
+    A robot is stuck for one of several reasons: where one is given, it stands for the general sentence.
+    """
     name, colour = VERDICTS[outcome]
-    sentence = outcome.value[0].upper() + outcome.value[1:]
+    sentence = "stuck" if reason and outcome is Outcome.STUCK else outcome.value
+    sentence = sentence[0].upper() + sentence[1:]
     size = round(1.5 * layout.unit)
     text = f"{name[0]}  {sentence}" if name[0] in "✓✕" else sentence
     while size > 8 and text_width(text, size, True) > 0.86 * room:
         size -= 1
-    return pill(text, size, colour)
+    small = min(size, round(REASON_FONT * layout.unit))
+    lines = wrapped(reason, round(0.86 * room) - 2 * round(0.75 * size), small, most=MOST_REASONS)
+    return pill(text, size, colour, lines, small)

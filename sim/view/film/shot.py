@@ -16,6 +16,7 @@ from antdrive.sim.view.film.meshes import robot_height
 from antdrive.sim.view.film.overlay import (
     DRIVE_FIELDS,
     DRIVING,
+    MOST_BAND,
     PLAN_FIELDS,
     PLANNING,
     SLOWED,
@@ -40,7 +41,6 @@ Picture = npt.NDArray[np.uint8]  # (H, W, 3)
 
 FLASH = 0.45  # the picture's border flashes this long after a contact [s]
 MOST_LEGEND_ROWS = 4
-MOST_BAND = 0.34  # of the picture's height, for a legend of several rows
 REPLAN_CAPTION = 1.5  # the cause of a replan is shown this long [s]
 
 
@@ -78,7 +78,7 @@ class Shot:
         self._sight = SightPainter(rollout, scene) if not planning and not scene.mapped and len(rollout.scans) else None
         self._fan = self._sight or (FanPainter(rollout) if not planning and len(rollout.scans) else None)
         replans = not planning and any(event.caption for event in self.replay.replans)
-        legend = self._lay_out(rollout, camera, size, planning=planning, replans=replans, bare=bare)
+        legend = self._lay_out(rollout, camera, size, note or "", planning=planning, replans=replans, bare=bare)
         planner = rollout.record.planner.name
         subtitle = f"planner {planner}  ·  robot {scene.robot.name}"
         fields = PLAN_FIELDS if planning else DRIVE_FIELDS
@@ -96,11 +96,20 @@ class Shot:
         self._replan_caption = REPLAN_CAPTION * speed
         self._route, self._replans_shown = rollout.route, 0
         self._legend_width = 0 if self._legend is None else self._legend.shape[1] + 2 * self._layout.unit  # [px]
-        self._banner = banner(self.outcome, self._layout, max(size[0] - self._legend_width, size[0] // 2))
+        room = max(size[0] - self._legend_width, size[0] // 2)
+        self._banner = banner(self.outcome, self._layout, room, rollout.record.reason)
         self.shown = 0.0  # the trail reaches to this moment [s]
 
     def _lay_out(
-        self, rollout: Rollout, camera: str, size: tuple[int, int], *, planning: bool, replans: bool, bare: bool
+        self,
+        rollout: Rollout,
+        camera: str,
+        size: tuple[int, int],
+        note: str,
+        *,
+        planning: bool,
+        replans: bool,
+        bare: bool,
     ) -> LegendRows:
         """Choose layout, camera and legend: a card in a corner or, if it would cover the world, rows of the band."""
         shows = {
@@ -109,7 +118,7 @@ class Shot:
             "followed": self._follows_movers,
         }
         for rows in range(1 + MOST_LEGEND_ROWS):
-            layout = Layout.of(size, rows)
+            layout = Layout.of(size, rows, note)
             if rows > 1 and layout.height > MOST_BAND * size[1]:
                 break
             self._layout = layout

@@ -1,4 +1,4 @@
-"""What a robot's lidar sees, in the pictures of a film: beams, and without a map hits, ground and obstacles never seen."""
+"""What a robot's lidar sees, in a film: beams, and without a map hits, ground not known to be free, obstacles never seen."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 Picture = npt.NDArray[np.uint8]  # (H, W, 3)
 
-VEIL, LINES = 0.62, 0.75  # how much of ground that was never seen is covered by the veil, and by its hatching
+VEIL, LINES = 0.62, 0.75  # how much of ground not known to be free is covered by the veil, and by its hatching
 PALENESS = 0.80  # of obstacles that were never seen
 TINT, BEAMS = 0.13, 0.30  # strength of the fan of beams and of its lines
 DRAWN_BEAMS = 90  # in a full circle, at most
@@ -98,7 +98,7 @@ class SightPainter(FanPainter):
         return laid_in_world(points, self._drift)
 
     def cover(self, frame: Picture, backdrop: Backdrop, inverse: npt.NDArray[np.floating[Any]], fine: int) -> None:
-        """Hatch the ground that was never seen, and pale the obstacles that no beam has met.
+        """Hatch the ground that is not known to be free, and pale the obstacles that no beam has met.
 
         Args:
             frame: the picture, before the robot is drawn

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TypeAlias
@@ -40,6 +41,28 @@ def fitted(text: str, width: int, size: int, bold: bool = False) -> str:
     return text.rstrip() + "…"
 
 
+def wrapped(text: str, width: int, size: int, bold: bool = False, *, most: int) -> list[str]:
+    """The text in lines no wider than `width` [px], broken between words; what is left over is cut off with an ellipsis.
+
+    Args:
+        text: the text
+        width: of a line [px]
+        size: of the font [px]
+        bold: whether it is bold
+        most: so many lines at most
+    """
+    lines: list[str] = []
+    words = text.split()
+    while words and len(lines) < most:
+        count = 1
+        while count < len(words) and text_width(" ".join(words[: count + 1]), size, bold) <= width:
+            count += 1
+        last = len(lines) + 1 == most
+        lines.append(fitted(" ".join(words if last else words[:count]), width, size, bold))
+        words = words[count:]
+    return lines
+
+
 def label(text: str, size: int, colour: Colour = INK, *, bold: bool = True) -> Sprite:
     """A text with a soft white rim, readable on any background."""
     rim = max(2, size // 7)
@@ -58,13 +81,25 @@ def label(text: str, size: int, colour: Colour = INK, *, bold: bool = True) -> S
     return np.asarray(image)
 
 
-def pill(text: str, size: int, colour: Colour) -> Sprite:
-    """White text on a coloured plate with round ends."""
-    pad_x, pad_y = round(0.75 * size), round(0.36 * size)
-    wide, high = text_width(text, size, True) + 2 * pad_x, round(1.2 * size) + 2 * pad_y
-    image = plate(wide, high, colour, 255, radius=high // 2)
+def pill(text: str, size: int, colour: Colour, more: Sequence[str] = (), small: int = 0) -> Sprite:
+    """White text on a coloured plate with round ends.
+
+    Args:
+        text: in bold
+        size: of its font [px]
+        colour: of the plate
+        more: lines below the text, in a smaller font
+        small: the size of that font [px]
+    """
+    pad_x, pad_y, line = round(0.75 * size), round(0.36 * size), round(1.35 * small)
+    wide = max(text_width(text, size, True), *(text_width(row, small) for row in more), 0) + 2 * pad_x
+    head = round(1.2 * size) + 2 * pad_y
+    image = plate(wide, head + line * len(more), colour, 255, radius=head // 2)
     draw = ImageDraw.Draw(image)
-    draw.text((wide / 2, high / 2), text, font=font(size, True), fill=(255, 255, 255, 255), anchor="mm")
+    draw.text((wide / 2, head / 2), text, font=font(size, True), fill=(255, 255, 255, 255), anchor="mm")
+    for k, row in enumerate(more):
+        place = wide / 2, head - pad_y + (k + 0.5) * line
+        draw.text(place, row, font=font(small), fill=(255, 255, 255, 255), anchor="mm")
     return np.asarray(image)
 
 

@@ -46,7 +46,7 @@ FIGURE_CAPTIONS: Mapping[str, str] = {
     "then-and-now.png": "The baseline's drive and this one: where they part, their clearances, and the distance between them",
     "overview.png": "Map with the driven path; clearance, speed, and the rule that limited the speed",
     "certificate.png": "Driven path against route, and the certificate",
-    "sight.png": "What the robot knew: explored ground, hits, and its first sights of the obstacles it came near",
+    "sight.png": "What the robot knew: the ground on its map, hits, and its first sights of the obstacles it came near",
     "plan.png": "Plan with the planner's field, and path lengths by iteration",
     "field-contours.png": "The planner's field as contours",
     "field-bars.png": "The planner's field as bars",
@@ -184,7 +184,7 @@ def _drawn(run: Run) -> list[Attachment]:
         if run.rollout is not None:
             overview(run.rollout, path)
         else:
-            plan_figure(s.task, run.grid, run.plan, s.robot, path)
+            plan_figure(s.task, run.grid, run.plan, s.robot, path, mapped=not s.exploring)
         return [_embedded(path, FIGURE_CAPTIONS["overview.png"])]
 
 

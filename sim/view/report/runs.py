@@ -68,10 +68,16 @@ FACTS = 5  # columns before those of settings that differ
 #: What the less obvious columns mean.
 COLUMN_NOTES = (
     ("path", "length of the planned path, before smoothing"),
-    ("gap", "how much longer the smoothed route is than the shortest path among the inflated obstacles"),
+    (
+        "gap",
+        "how much longer the smoothed route is than the shortest path among the inflated obstacles; only with the map",
+    ),
     ("min clearance", "smallest distance to an obstacle at any logged pose"),
     ("planning", "wall time of the plan, with the kernels loaded"),
-    ("explored", "ground that the lidar of a robot without a map saw"),
+    (
+        "explored",
+        "ground that the lidar of a robot without a map saw, near or far; on the robot's own map there is less",
+    ),
     ("proved", "distance that the certificate guarantees between logged poses, too"),
 )
 
@@ -271,6 +277,11 @@ class ReportedRun:
             return "Not certified collision-free."
         verdict = certificate.verdict[:1].upper() + certificate.verdict[1:]
         return f"{verdict}: at least {certificate.bound:.4f} m of clearance, between logged poses, too."
+
+    @property
+    def heading(self) -> dict[str, str]:
+        """What tells the run from the others, by the keys of `SETTING_COLUMNS`: settings, not what came of them."""
+        return {key: value for key, value in self.differing.items() if value and key != EXPLORED}
 
     @property
     def metrics(self) -> Mapping[str, Any]:

@@ -21,13 +21,16 @@ from tests.sim.driving.test_driver import TASK, driver
 
 
 def test_the_stuck_clock_begins_at_zero() -> None:
-    assert StuckClock() == (0.0, 0, 0)
-    assert StuckClock(farthest=1.0, driving=5, turning=5).after(PursuitState(arc=3.0), waiting=False) == (3.0, 0, 0)
+    assert StuckClock() == (0.0, 0, 0, 0)
+    assert StuckClock(farthest=1.0, driving=5, turning=5).after(PursuitState(arc=3.0), waiting=False) == (3.0, 0, 0, 0)
 
 
 def test_a_robot_at_the_very_tolerance_has_arrived(turtlebot: RobotSpec) -> None:
     x, y = TASK.goal
-    assert driver(turtlebot)._arrival(State(x - TASK.goal_tolerance, y, 0.0, 0.0, 0.0)).outcome is Outcome.SUCCEEDED
+    assert (
+        driver(turtlebot)._arrival((x, y, 0.0), State(x - TASK.goal_tolerance, y, 0.0, 0.0, 0.0)).outcome
+        is Outcome.SUCCEEDED
+    )
 
 
 class Cautious:

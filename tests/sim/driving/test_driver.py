@@ -14,7 +14,15 @@ from antdrive.planners import Query, load_planner, smooth
 from antdrive.robots import LIMITERS, AvoidanceState, PurePursuit, PursuitState, RobotSpec, Twist, load_robot
 from antdrive.sim import Outcome, Perception, Scenario
 from antdrive.sim.driving.blocking import blocked_cells, covered_discs
-from antdrive.sim.driving.driver import BLIND_SHARE, STUCK_PROGRESS, STUCK_TIME, Driver, StuckClock, _brake
+from antdrive.sim.driving.driver import (
+    BLIND_SHARE,
+    OUT_OF_SIGHT,
+    STUCK_PROGRESS,
+    STUCK_TIME,
+    Driver,
+    StuckClock,
+    _brake,
+)
 from antdrive.sim.driving.perception import Predictor
 from antdrive.sim.physics.engine import State
 from antdrive.sim.unknown import exploration_of
@@ -53,6 +61,23 @@ def test_waiting_for_a_mover_does_not_count_as_being_stuck() -> None:
 def test_turning_on_the_spot_has_a_count_of_its_own() -> None:
     clock = StuckClock(farthest=1.0, driving=9, turning=4)
     assert clock.after(PursuitState(arc=1.0, turning=True), waiting=False) == StuckClock(1.0, 9, 5)
+
+
+def test_that_sight_held_the_robot_is_said_where_it_did_so_for_most_of_the_time() -> None:
+    """Progress begins the count anew; a robot that waits counts as nothing."""
+    held, free = PursuitState(limiter=OUT_OF_SIGHT), PursuitState()
+    for states, said in (
+        ([held] * 6 + [free] * 5, True),
+        ([held] * 5 + [free] * 5, False),
+        ([held] * 5 + [held._replace(turning=True)] * 2 + [free] * 6, True),
+        ([held] * 9 + [free._replace(arc=1.0)] + [free._replace(arc=1.0)] * 3, False),
+    ):
+        clock = StuckClock()
+        for state in states:
+            clock = clock.after(state, waiting=False)
+        assert ("its sight held it" in clock.reason) is said, states
+        assert clock.reason.startswith("no progress along the route for 8 s")
+        assert clock.after(held, waiting=True) == clock
 
 
 def test_a_robot_that_does_not_move_is_stuck_after_the_stuck_time(turtlebot: RobotSpec) -> None:
@@ -100,7 +125,19 @@ def test_standing_at_the_routes_end_ends_the_drive_by_the_distance_to_the_goal(t
             ending = ending or at_end.decide(tick, (x, y, 0.0), State(x, y - distance, 0.0, 0.0, 0.0))
         assert ending is not None
         assert ending.outcome is outcome
-        assert ("0.300 m from the goal" in ending.reason) == (outcome is Outcome.STUCK)
+        assert ending.reason == (
+            ""
+            if outcome is Outcome.SUCCEEDED
+            else "the robot believed that it was at the goal, 0.00 m from it, but was 0.300 m from it "
+            "(the tolerance is 0.25 m): its estimate was wrong by 0.30 m"
+        )
+
+
+def test_a_robot_that_knows_where_it_is_is_told_how_far_from_the_goal_its_route_ends(turtlebot: RobotSpec) -> None:
+    x, y = TASK.goal
+    for off in (-0.3, 0.4):  # what it believes lies outside the tolerance, too
+        ending = driver(turtlebot)._arrival((x, y + off, 0.0), State(x, y - 0.3, 0.0, 0.0, 0.0))
+        assert ending.reason == "the route ends here, 0.300 m from the goal; the tolerance is 0.25 m"
 
 
 def test_a_robot_that_avoids_a_mover_at_the_goal_stops_there_even_where_sight_holds_its_speed(

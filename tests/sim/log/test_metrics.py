@@ -10,7 +10,7 @@ import pytest
 from antdrive.robots import LIMITERS
 from antdrive.sim import METRICS, Outcome, Rollout, measure
 from antdrive.sim.log.metrics import AVOIDING, tracking_error
-from antdrive.sim.log.record import PlanRecord, ReplanRecord
+from antdrive.sim.log.record import PlanRecord, ReplanRecord, SensingRecord
 from antdrive.worlds import Task, World
 from tests.sim.records import made_up_record
 
@@ -137,6 +137,14 @@ def test_where_there_is_no_optimum_there_is_no_gap_and_no_score() -> None:
     assert math.isnan(METRICS["gap_to_grid_optimum"](log))
     assert math.isnan(METRICS["gap_to_euclidean_optimum"](log))
     assert METRICS["spl"](log) == METRICS["barn"](log) == 0
+
+
+def test_the_first_plan_of_a_robot_without_a_map_is_not_held_against_the_optimum_of_a_world_it_had_not_seen() -> None:
+    blind = with_record(straight(), sensing=SensingRecord(map="none", localisation="true", odometry=1.0))
+    for name in ("gap_to_grid_optimum", "gap_to_euclidean_optimum"):
+        assert math.isnan(METRICS[name](blind))
+        assert math.isfinite(METRICS[name](straight()))
+    assert METRICS["spl"](blind) == METRICS["spl"](straight())  # the drive is
 
 
 def test_a_run_that_never_drove_has_no_metrics() -> None:

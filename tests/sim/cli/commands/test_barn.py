@@ -50,6 +50,7 @@ def test_the_table_is_printed_whatever_becomes_of_the_films(
     code, out, err = antdrive("barn", driven, "--films")
     assert (code, err.splitlines()[-1]) == (2, "antdrive: films: cannot be written (No space left on device)")
     assert ["world_0", "2", "1", "10.00"] in [line.split()[:4] for line in out.splitlines()]
+    assert "  DWA, 0.5 m/s: github.com/Daffan/the-barn-challenge, res/dwa_out.txt" in out.splitlines()
 
 
 def test_a_folder_without_worlds_leaves_nothing_behind(

@@ -116,3 +116,20 @@ def test_a_long_reason_covers_nothing_of_the_map(planned):
     assert words.get_text().replace("\n", " ") == reason.strip()
     assert words.get_window_extent().y1 < map_.get_tightbbox().y0
     assert words.get_window_extent().x1 < figure.bbox.x1
+
+
+def test_the_first_plan_of_a_robot_without_a_map_is_said_to_be_one_and_lies_in_the_picture(planned):
+    """It leads through a cylinder that was not seen, and out of the world."""
+    task, _, _ = planned
+    wider = rasterise(World("seen", (-4.0, -4.0, 9.0, 8.0)), 0.25, 0.23)
+    cells = np.array([wider.cell_at(*task.start[:2]), wider.cell_at(1.5, -3.0), wider.cell_at(*task.goal)])
+    plan = PlanResult(status=PlanStatus.SOLVED, cells=cells)
+    blind, known = (plan_figure(task, wider, plan, load_robot("turtlebot"), mapped=mapped) for mapped in (False, True))
+    (x, y), axes = wider.xy(cells).T, panels(blind)["map"]
+    assert axes.get_xlim()[0] < x.min() < x.max() < axes.get_xlim()[1]
+    assert axes.get_ylim()[0] < y.min() < y.max() < axes.get_ylim()[1]
+    assert blind._supxlabel.get_text().replace("\n", " ") == module.FIRST
+    assert known._supxlabel is None
+    words = [{text.get_text() for text in panels(one)["map"].get_legend().get_texts()} for one in (blind, known)]
+    assert "obstacle, on no map" in words[0]
+    assert "obstacle" in words[1]

@@ -11,6 +11,7 @@ import pytest
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.sights import sightings
 from antdrive.sim.view.figures.canvas import panels
+from antdrive.sim.view.figures.run_figures import overview
 from antdrive.sim.view.figures.sight_figure import LISTED, sight_figure
 from antdrive.sim.view.recollection import Recollection
 from antdrive.worlds import Disc
@@ -25,15 +26,44 @@ def log(made_up_drive: Any) -> Rollout:
 def test_the_figure_shows_the_map_and_the_first_sights(log: Rollout, tmp_path: Path) -> None:
     figure = sight_figure(log, tmp_path / "sight.png", dpi=60)
     named = panels(figure)
-    assert set(named) == {"map", "explored", "first sights"}
+    assert set(named) == {"map", "known ground", "first sights"}
     seen = Recollection(log)
     seen.advance(log.t[-1])
-    _, explored = named["explored"].lines[0].get_data()
+    _, explored = named["known ground"].lines[0].get_data()
     assert float(np.asarray(explored)[-1]) == pytest.approx(seen.explored)
     assert len(named["first sights"].get_yticklabels()) == LISTED
     listed = {label.get_text() for label in named["first sights"].get_yticklabels()}
     assert listed <= {text.get_text() for text in named["map"].texts}
     assert (tmp_path / "sight.png").stat().st_size < 400_000
+
+
+def test_an_overview_calls_the_first_route_one_and_shows_all_of_it(log: Rollout) -> None:
+    away = dataclasses.replace(log, route=np.array([[1.0, 2.0], [2.0, -1.5], [5.0, 2.0]]))
+    for figure in (overview(away), sight_figure(away)):
+        assert panels(figure)["map"].get_ylim()[0] < -1.5
+    words = {text.get_text() for text in panels(overview(away))["map"].get_legend().get_texts()}
+    assert {"first route, before the world was seen", "obstacle, on no map"} <= words
+
+
+def test_nothing_is_passed_that_the_robot_only_came_nearest_to(log: Rollout) -> None:
+    said = " ".join(text.get_text() for text in panels(sight_figure(log))["first sights"].texts)
+    assert "first seen" in said
+    assert "nearest" in said
+    assert "passed" not in said
+
+
+def test_the_words_beside_the_curves_lie_in_the_picture_and_on_nothing_else(log: Rollout) -> None:
+    """Every rule limited the speed in turn."""
+    count = len(log.record.limiters)
+    busy = dataclasses.replace(log, limiter=(np.arange(len(log.t)) % count).astype(np.uint8))
+    figure = overview(busy)
+    figure.draw_without_rendering()
+    named = panels(figure)
+    for name in ("speed", "limiters"):
+        box = named[name].get_legend().get_window_extent()
+        assert box.x1 <= figure.bbox.x1
+    title = named["speed"].title.get_window_extent()
+    assert not title.overlaps(named["speed"].get_legend().get_window_extent())
 
 
 def test_the_same_log_gives_the_same_file(log: Rollout, tmp_path: Path) -> None:

@@ -111,7 +111,7 @@ def test_the_legend_names_what_is_painted(log: Rollout) -> None:
     assert not scene.has_zones
     plain = {entry.text for entry in legend_entries(scene, 0.5, 0.01)}
     named = {entry.text for entry in legend_entries(scene, 0.5, 0.01, beams=True, sight=True)}
-    assert named - plain == {"beams of the lidar", "hit, on the robot's map", "never seen"}
+    assert named - plain == {"beams of the lidar", "hit, on the robot's map", "not known to be free"}
     assert not any("inflated" in text for text in named)
     hidden = [dataclasses.replace(scene, mapped=mapped, unseen=np.ones_like(scene.unseen)) for mapped in (True, False)]
     given, none = ({entry.text for entry in legend_entries(one, 0.5, 0.01)} for one in hidden)

@@ -11,9 +11,10 @@ from PIL import Image
 
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import ReplanRecord
-from antdrive.sim.view.film import encoder, video
-from antdrive.sim.view.film.overlay import Layout, _entry_width, legend_entries, legend_rows
+from antdrive.sim.view.film import encoder, overlay, video
+from antdrive.sim.view.film.overlay import Layout, _entry_width, banner, legend_entries, legend_rows
 from antdrive.sim.view.film.shot import Shot
+from antdrive.sim.view.film.text import text_width
 from antdrive.sim.view.film.video import film, frame_times, still
 from antdrive.sim.view.scene import Scene
 from antdrive.sim.view.style import VERDICTS
@@ -116,6 +117,48 @@ def test_the_band_fits_every_size(drive, size):
         assert layout.height < 0.35 * size[1]
     with Shot(drive, camera="top", size=size, note="certified: min clearance 0.043 m") as shot:
         assert shot.frame(0.5).shape == (size[1], size[0], 3)
+
+
+DRIFTED = (
+    "the robot believed that it was at the goal, 0.01 m from it, but was 1.411 m from it (the tolerance is 1 m): "
+    "its estimate was wrong by 1.42 m"
+)
+
+
+@pytest.mark.parametrize("size", [(960, 540), (640, 480), (1280, 720), (480, 640)])
+def test_a_cause_that_has_no_room_beside_the_numbers_has_lines_of_its_own(drive, size):
+    note = f"seed 0, stuck: {DRIFTED}"
+    layout = Layout.of(size, 1, note)
+    assert " ".join(layout.note) == note
+    assert all(text_width(line, layout.small, True) <= size[0] - 2 * layout.unit for line in layout.note)
+    assert Layout.of(size, 1).height < layout.height < 0.4 * size[1]
+    assert Layout.of(size, 1, "seed 0") == Layout.of(size, 1)
+    with Shot(drive, camera="top", size=size, note=note) as shot:
+        assert shot.frame(0.5).shape == (size[1], size[0], 3)
+
+
+def test_a_picture_too_small_for_a_note_cuts_it_off():
+    layout = Layout.of((320, 240), 0, 9 * DRIFTED)
+    assert layout.height < 0.36 * 240
+    assert layout.note[-1].endswith("…")
+    assert Layout.of((160, 160), 0, DRIFTED).note == ()
+
+
+def test_the_sentence_at_the_end_names_the_reason_and_does_not_contradict_it(monkeypatch):
+    drawn = []
+    monkeypatch.setattr(overlay, "pill", lambda text, size, colour, more=(), small=0: drawn.append((text, list(more))))
+    layout = Layout.of((960, 540), 1)
+    banner(Outcome.STUCK, layout, 960, DRIFTED)
+    banner(Outcome.STUCK, layout, 960)
+    banner(Outcome.TIMED_OUT, layout, 960, "no way through what was seen, last at t = 7.9 s")
+    (stuck, why), general, timed_out = drawn
+    assert (stuck, " ".join(why)) == ("Stuck", DRIFTED)
+    assert general == ("Stopped making progress", [])
+    assert timed_out[0].startswith("The time limit passed")
+    assert timed_out[1] == ["no way through what was seen, last at t = 7.9 s"]
+    monkeypatch.undo()
+    assert banner(Outcome.STUCK, layout, 960, DRIFTED).shape[0] > banner(Outcome.STUCK, layout, 960).shape[0]
+    assert banner(Outcome.STUCK, layout, 960, DRIFTED).shape[1] <= 0.9 * 960
 
 
 @pytest.mark.parametrize("size", [(480, 360), (640, 480), (1280, 720), (320, 240), (160, 160)])

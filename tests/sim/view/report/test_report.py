@@ -14,6 +14,7 @@ import pytest
 
 from antdrive.sim.view.figures.run_figures import overview
 from antdrive.sim.view.report.report import EMBEDDED_BYTES, write_report
+from antdrive.sim.view.report.runs import ReportedRun
 from antdrive.worlds import InputError
 
 BROWSER = next(
@@ -440,3 +441,8 @@ def test_a_run_that_a_test_drove_says_why_the_test_failed(small_run, tmp_path, k
     assert text.count("test failed") == (1 if kind == "html" else 4)
     assert "9 s, in the baseline 5 s: 4 s longer" in html.unescape(text).replace("\\", "")
     assert "longer <script>" not in text
+
+
+def test_the_heading_of_a_run_lists_settings_and_not_what_came_of_them() -> None:
+    run = ReportedRun(None, {}, None, 0, differing={"map": "none", "explored_m2": "94.7", "options": ""})
+    assert run.heading == {"map": "none"}
