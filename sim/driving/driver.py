@@ -201,12 +201,13 @@ class Driver:
         """Slow down where the robot could not stop on ground that it has seen."""
         if self._caution is None:
             return
-        self.command, slowed = self._caution.limit(pose, last, self.command)
+        wanted = self.command
+        self.command, slowed = self._caution.limit(pose, last, wanted)
         if slowed:
             self.pursuit = self.pursuit._replace(limiter=OUT_OF_SIGHT)
         if isinstance(self._monitor, Exploration):
             stands = abs(self.command.speed) < SLOWEST and abs(self.command.yaw_rate) < SLOWEST
-            self._monitor.note_sight(tick, holds=slowed and stands)
+            self._monitor.note_sight(tick, wanted if slowed and stands else None)
 
     def _keep_to_schedule(self, tick: int, last: Twist) -> float:
         """Slow the command down to the schedule, if there is one. Returns the speed that it allows [m/s]."""

@@ -28,7 +28,7 @@ from antdrive.planners import (
     smooth,
 )
 from antdrive.planners.plan import Cell
-from antdrive.robots import PurePursuit, RobotSpec, TrackedPath
+from antdrive.robots import PurePursuit, RobotSpec, TrackedPath, Twist
 from antdrive.robots.control.pursuit import unsorted
 from antdrive.sim.driving import _kernels_hits
 from antdrive.sim.driving.blocking import blocked_cells
@@ -412,7 +412,9 @@ class Exploration:
             recovery.rests(now, pose)
         if trigger == STALLED:
             recovery.note_stall(now, pose)
-        if recovery.begin_look(pose) or trigger == HELD:
+        if (trigger != STALLED or recovery.misses_sight(pose)) and recovery.begin_look(pose):
+            return True, None
+        if trigger == HELD:
             return True, None
         found = recovery.way(pose) if trigger == STALLED else None
         if found is None:
@@ -420,14 +422,14 @@ class Exploration:
         way = self._prepare(found, _world(self._bounds(GROWTH[1], pose), np.empty((0, 3))), 0.0)
         return True, dataclasses.replace(way, backwards=recovery.backwards)
 
-    def note_sight(self, tick: int, *, holds: bool) -> None:
+    def note_sight(self, tick: int, held: Twist | None) -> None:
         """Note whether the robot stands because its sight does not let it go on.
 
         Args:
             tick: the number of the control period
-            holds: whether it does
+            held: what it was to do then; None: it goes on
         """
-        self._recovery.note_sight(tick / self._hz, holds=holds)
+        self._recovery.note_sight(tick / self._hz, held)
 
     def no_way(self, tick: int) -> str:
         """That the robot planned in vain, several times in a row and not long ago, in words; empty if it did not.

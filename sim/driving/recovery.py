@@ -26,6 +26,8 @@ SPARE_TURN = 0.1  # so much of the turn that is free is left [rad]
 TURNED = 0.02  # a heading is reached so near to it [rad]
 VIEWS = 3  # scans that are entered as a whole while a direction is in view, times the turns of the beams
 PATIENT = 2.0  # a look that takes longer than it needs by this factor is given up: movers keep the robot from it
+WAY = 1.0  # so far ahead the ground is asked for that holds the robot [m], [rad]
+WORTH_SEEING = 0.1  # ground that was not seen holds the robot if it could otherwise go on so much farther [m], [rad]
 STOPPED = 0.01  # a robot that turns more slowly than this has stopped [rad/s]
 
 
@@ -100,6 +102,7 @@ class Recovery:
         self._trail: list[tuple[float, float]] = []
         self._rest = (0.0, start[:2])
         self._held_since = math.inf
+        self._wanted: Twist | None = None
         self._stalls, self._stalled_at = 0, start[:2]
         self._looked_at = (math.inf, math.inf)
 
@@ -117,17 +120,18 @@ class Recovery:
         if not backwards and (not self._trail or math.dist(self._trail[-1], pose[:2]) >= TRAIL):
             self._trail.append(pose[:2])
 
-    def note_sight(self, now: float, *, holds: bool) -> None:
+    def note_sight(self, now: float, held: Twist | None) -> None:
         """Note whether the robot stands because its sight does not let it go on.
 
         Args:
             now: the time [s]
-            holds: whether it does
+            held: what it was to do then; None: it goes on
         """
-        if not holds:
+        if held is None:
             self._held_since = math.inf
         elif self._held_since == math.inf:
             self._held_since = now
+        self._wanted = held
 
     def rests(self, now: float, pose: Pose) -> None:
         """Count from now on how long the robot has not moved.
@@ -147,15 +151,28 @@ class Recovery:
         return now - self._rest[0] > STALL_TIME
 
     def held(self, now: float, pose: Pose) -> bool:
-        """Whether its sight has held the robot for long, at a place where it has not looked round; or will, from the start on.
+        """Whether ground that was not seen has held the robot for long where it has not looked round, or will from the start on.
 
         Args:
             now: the time [s]
             pose: where the robot believes it is
         """
-        never = self._looked_at[0] == math.inf
-        blinkered = self._survey.lidar.field_of_view < NARROW
-        return (now - self._held_since > HELD_TIME or (never and blinkered)) and self._may_look(pose)
+        if not self._may_look(pose):
+            return False
+        if self._looked_at[0] == math.inf and self._survey.lidar.field_of_view < NARROW:
+            return True
+        return now - self._held_since > HELD_TIME and self.misses_sight(pose)
+
+    def misses_sight(self, pose: Pose) -> bool:
+        """Whether the robot stands because it has not seen the ground ahead, not because something was hit there.
+
+        Args:
+            pose: where the robot believes it is
+        """
+        if self._wanted is None:
+            return False
+        seen, open_ = (self._survey.clear_way(pose, self._wanted, WAY, daring=daring) for daring in (False, True))
+        return open_ > seen + WORTH_SEEING
 
     def begin_look(self, pose: Pose) -> bool:
         """Begin to look round; whether there is anything to look at that the robot has not looked at from here.

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.robots import RobotSpec
+from antdrive.robots import RobotSpec, Twist
 from antdrive.robots.lidar import Lidar
 from antdrive.sim.driving import _kernels_hits
 from antdrive.sim.driving.own_map import MAP_CELL, PAD, RECENT, horizon_of, turning_room
@@ -24,6 +24,7 @@ from antdrive.worlds import Bounds, Floats, Point, Pose, Trajectories, World
 
 TOLERANCE = 0.008  # a route may lose this much of its clearance without being planned anew [m]
 BLUR = 0.02  # and this much more for each metre of distance [m/m]
+SHARPEST = 0.05  # arcs of a smaller radius than this are nearly turns on the spot [m]
 FAR_AMONG_MOVERS = 15.0  # scans are matched up to this far where movers, which are no marks, hide what is near [m]
 
 
@@ -229,3 +230,16 @@ class Survey:
             farthest: no more is asked for [rad]
         """
         return clear_turn(self.map, pose, yaw_rate, self._footprint, farthest)
+
+    def clear_way(self, pose: Pose, twist: Twist, farthest: float, *, daring: bool = False) -> float:
+        """How far the robot can go with a twist over ground that it has seen free [m]; for what is nearly a turn [rad].
+
+        Args:
+            pose: where it is
+            twist: not 0
+            farthest: no more is asked for [m], [rad]
+            daring: whether ground that was not seen counts as free
+        """
+        if abs(twist.speed) <= SHARPEST * abs(twist.yaw_rate):
+            return clear_turn(self.map, pose, twist.yaw_rate, self._footprint, farthest, daring=daring)
+        return clear_distance(self.map, pose, *twist, self._footprint, farthest, daring=daring)

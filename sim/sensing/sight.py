@@ -12,7 +12,14 @@ from antdrive.worlds import Floats, Pose
 
 
 def clear_distance(
-    seen: OccupancyMap, pose: Pose, speed: float, yaw_rate: float, footprint: Footprint, limit: float
+    seen: OccupancyMap,
+    pose: Pose,
+    speed: float,
+    yaw_rate: float,
+    footprint: Footprint,
+    limit: float,
+    *,
+    daring: bool = False,
 ) -> float:
     """How far the footprint, swept along the arc of a twist, stays on ground that was seen free, at most `limit` [m].
 
@@ -26,13 +33,16 @@ def clear_distance(
         yaw_rate: counter-clockwise [rad/s]
         footprint: the robot's footprint
         limit: how far is far enough [m]
+        daring: whether ground that was not seen counts as free, so that only hits end the way
     """
     if speed == 0.0:
         return 0.0 if yaw_rate else limit
-    return _clear(seen, pose, speed, yaw_rate, footprint, limit)
+    return _clear(seen, pose, speed, yaw_rate, footprint, limit, daring)
 
 
-def clear_turn(seen: OccupancyMap, pose: Pose, yaw_rate: float, footprint: Footprint, limit: float) -> float:
+def clear_turn(
+    seen: OccupancyMap, pose: Pose, yaw_rate: float, footprint: Footprint, limit: float, *, daring: bool = False
+) -> float:
     """How far the robot can turn on the spot over ground that was seen free, at most `limit` [rad]; as `clear_distance`.
 
     Args:
@@ -41,13 +51,17 @@ def clear_turn(seen: OccupancyMap, pose: Pose, yaw_rate: float, footprint: Footp
         yaw_rate: counter-clockwise [rad/s]; only its sign counts
         footprint: the robot's footprint
         limit: how far is far enough [rad]
+        daring: whether ground that was not seen counts as free
     """
-    return _clear(seen, pose, 0.0, yaw_rate, footprint, limit)
+    return _clear(seen, pose, 0.0, yaw_rate, footprint, limit, daring)
 
 
-def _clear(seen: OccupancyMap, pose: Pose, speed: float, yaw_rate: float, footprint: Footprint, limit: float) -> float:
+def _clear(
+    seen: OccupancyMap, pose: Pose, speed: float, yaw_rate: float, footprint: Footprint, limit: float, daring: bool
+) -> float:
     shape = footprint.half_length, footprint.half_width, footprint.rounding
-    return float(_kernels_sight.clear_way(*pose, speed, yaw_rate, *shape, _corners(footprint), limit, seen.plain))
+    arrays = tuple(seen.arrays._replace(free=~seen.occupied)) if daring else seen.plain
+    return float(_kernels_sight.clear_way(*pose, speed, yaw_rate, *shape, _corners(footprint), limit, arrays))
 
 
 @functools.lru_cache(maxsize=16)

@@ -22,6 +22,7 @@ from antdrive.worlds import Disc, Task, World
 
 HALL = (0.0, 0.0, 8.0, 8.0)
 HERE = (4.0, 4.0, 0.0)
+FORWARD = Twist(0.5, 0.0)
 
 
 def driven(robot: RobotSpec, task: Task, **settings: object) -> Run:
@@ -150,14 +151,15 @@ def test_a_look_that_is_not_let_turn_ends(turtlebot: RobotSpec) -> None:
     assert moving.done
 
 
-def survey_of(robot: RobotSpec, left: float, right: float) -> SimpleNamespace:
-    """A survey that sees so much free ground for turns."""
+def survey_of(robot: RobotSpec, left: float, right: float, open_: float = 1.0) -> SimpleNamespace:
+    """A survey that sees so much free ground for turns, and none ahead, where nothing was hit for so far."""
     turns = {1.0: left, -1.0: right}
     return SimpleNamespace(
         lidar=robot.lidar,
         map=SimpleNamespace(share=1, turns=1),
         clear_turn=lambda pose, side, farthest: min(turns[side], farthest),
         clear_distance=lambda pose, speed, rate, longest: 0.0,
+        clear_way=lambda pose, twist, farthest, daring: open_ if daring else 0.0,
     )
 
 
@@ -184,18 +186,34 @@ def test_a_look_goes_both_ways_where_one_is_not_free(
 def test_a_robot_looks_round_once_at_a_place(jackal: RobotSpec, turtlebot: RobotSpec) -> None:
     recovery = Recovery(survey_of(jackal, 9.0, 9.0), jackal, HERE, 60)  # type: ignore[arg-type]
     assert not recovery.held(0.0, HERE)  # it sees enough to begin with
-    recovery.note_sight(1.0, holds=True)
-    recovery.note_sight(1.4, holds=True)
+    recovery.note_sight(1.0, FORWARD)
+    recovery.note_sight(1.4, FORWARD)
     assert [recovery.held(now, HERE) for now in (1.4, 1.6)] == [False, True]
     assert recovery.begin_look(HERE)
     recovery.end_look(3.0, HERE)
-    recovery.note_sight(3.0, holds=True)
+    recovery.note_sight(3.0, FORWARD)
     assert not recovery.held(9.0, HERE)
     assert not recovery.begin_look((4.2, 4.0, 1.0))
     assert recovery.held(9.0, (4.4, 4.0, 1.0))
-    recovery.note_sight(9.1, holds=False)
+    recovery.note_sight(9.1, None)
     assert not recovery.held(9.2, (4.4, 4.0, 1.0))
     around = Recovery(survey_of(turtlebot, 9.0, 9.0), turtlebot, HERE, 60)  # type: ignore[arg-type]
-    around.note_sight(1.0, holds=True)
+    around.note_sight(1.0, FORWARD)
     assert not around.held(9.0, HERE)  # its lidar sees all around
     assert not around.begin_look(HERE)
+    before_a_post = Recovery(survey_of(jackal, 9.0, 9.0, 0.05), jackal, HERE, 60)  # type: ignore[arg-type]
+    before_a_post.note_sight(1.0, FORWARD)
+    assert not before_a_post.held(9.0, HERE)  # there is nothing to see
+
+
+def test_ground_that_was_not_seen_is_told_from_what_was_hit(jackal: RobotSpec) -> None:
+    """The robot looks ahead: a post in front of it was hit, and behind it there is ground that was not seen."""
+    task = Task(World("hall", HALL, (Disc(4.8, 4.0, 0.2),)), HERE, (7.0, 4.0), goal_tolerance=0.25, cell=0.1)
+    s = Scenario(task=task, planner=load_planner("astar"), planner_name="astar", robot=jackal, map="none")
+    exploration = exploration_of(s)
+    survey, recovery = exploration.survey, exploration._recovery
+    for twist, unseen in ((FORWARD, False), (Twist(-0.5, 0.0), True), (Twist(0.001, 1.0), False)):
+        recovery.note_sight(0.0, twist)
+        seen, open_ = survey.clear_way(HERE, twist, 1.0), survey.clear_way(HERE, twist, 1.0, daring=True)
+        assert seen <= open_
+        assert recovery.misses_sight(HERE) == unseen, (twist, seen, open_)
