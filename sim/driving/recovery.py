@@ -24,8 +24,8 @@ OVERLAP = 0.2  # so much more than what its lidar does not see is turned through
 WORTH = 0.3  # less than this is not worth a look [rad]
 SPARE_TURN = 0.1  # so much of the turn that is free is left [rad]
 TURNED = 0.02  # a heading is reached so near to it [rad]
-VIEWS = 3  # scans that are entered as a whole while a direction is in view, times the turns of the beams
-PATIENT = 2.0  # a look that takes longer than it needs by this factor is given up: movers keep the robot from it
+VIEWS = 3  # every direction stays in view until so many scans have entered the free way of each of their beams
+PATIENT = 2.0  # a look that takes longer than it needs by this factor is given up: movers, or its sight, keep the robot from it
 WAY = 1.0  # so far ahead the ground is asked for that holds the robot [m], [rad]
 WORTH_SEEING = 0.1  # ground that was not seen holds the robot if it could otherwise go on so much farther [m], [rad]
 STOPPED = 0.01  # a robot that turns more slowly than this has stopped [rad/s]
@@ -61,7 +61,7 @@ class Look:
         self._left -= math.remainder(pose[2] - self._yaw, 2 * math.pi)
         self._yaw = pose[2]
         self._periods -= 1
-        self._still = self._still + 1 if abs(last.yaw_rate) < STOPPED else 0
+        self._still = self._still + 1 if abs(last.yaw_rate) < min(STOPPED, 0.5 * self._rate) else 0
         if self._still and (abs(self._left) < TURNED or self._still > HELD_TIME * self._hz):
             if self._turns:
                 self._left, self._still = self._turns.pop(0), 1
@@ -220,7 +220,7 @@ class Recovery:
             pose: where the robot believes it is
         """
         tries = self._stalls - 2 if self._held_since == math.inf else self._stalls - 1
-        if tries < 0:
+        if not 0 <= tries <= len(LENGTHS):
             return None
         length = LENGTHS[min(tries, len(LENGTHS) - 1)]
         points = self._back(pose, length)

@@ -44,6 +44,11 @@ class Scan(NamedTuple):
     movers: npt.NDArray[np.bool_] | None = None
 
 
+def discs_at_start(movers: Trajectories) -> Floats:
+    """Where movers are at first, as discs (M, 3): x, y, radius [m]."""
+    return np.column_stack((movers.positions(np.zeros(1))[0], movers.radii))
+
+
 @dataclass(frozen=True, eq=False)
 class Senses:
     """What a robot is surveying with.
@@ -76,6 +81,11 @@ class Senses:
         """
         rng = random_stream(seed, "lidar") if noisy else None
         return cls(Scanner.of(lidar.at(hz), world), world, trajectories or None, rng, hz)
+
+    @property
+    def movers_at_start(self) -> Floats | None:
+        """Where the movers are at first, as discs (M, 3) [m]; None where there are none."""
+        return discs_at_start(self.trajectories) if self.trajectories else None
 
     def due(self, tick: int, last: int) -> bool:
         """Whether a scan is due in a control period, after one in an earlier period; a negative one: after none.
@@ -207,7 +217,7 @@ class Survey:
     def _empty_map(self, pose: Pose) -> OccupancyMap:
         horizon = horizon_of(watching=self.watch is not None)
         seen = OccupancyMap(self.lidar, MAP_CELL, pose[:2], horizon, goal=self._goal)
-        seen.take_as_free(pose[:2], self._turning_room, self._senses.world)
+        seen.take_as_free(pose[:2], self._turning_room, self._senses.world, self._senses.movers_at_start)
         return seen
 
     def clear_distance(self, pose: Pose, speed: float, yaw_rate: float, longest: float) -> float:

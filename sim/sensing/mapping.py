@@ -196,15 +196,20 @@ class OccupancyMap:
         count = kernels.forget(*place, radius, self._plain, self._changed)
         return self._changed[:count].copy()
 
-    def take_as_free(self, place: Point, radius: float, world: World | None = None) -> Cells:
+    def take_as_free(
+        self, place: Point, radius: float, world: World | None = None, movers: Floats | None = None
+    ) -> Cells:
         """Take unknown ground for free, such as that under the robot, and return the cells (K, 2).
 
         Args:
             place: x, y [m]
             radius: how far around it [m]
             world: cells that meet one of its cylinders or walls stay unknown; None: none do
+            movers: discs of what moves there now (N, 3) [m]; cells that they meet stay unknown, too. None: there are none
         """
         discs, walls = (_NONE, EVERYWHERE) if world is None else (world.discs, world.bounds)
+        if movers is not None:
+            discs = np.concatenate((discs, movers))
         count = kernels.take_as_free(*place, radius, discs, np.array(walls), self._plain, self._changed)
         return self._changed[:count].copy()
 

@@ -104,7 +104,8 @@ class Recollection:
         record = self._rollout.record
         horizon = horizon_of(watching=record.perception is not None and record.perception.kind == "lidar")
         seen = OccupancyMap(self.lidar, MAP_CELL, pose[:2], horizon, goal=record.task.goal)
-        seen.take_as_free(pose[:2], turning_room(record.robot.radius), record.world)
+        movers = np.column_stack((self._rollout.movers[0], [mover.radius for mover in record.world.movers]))
+        seen.take_as_free(pose[:2], turning_room(record.robot.radius), record.world, movers)
         return seen
 
     def _insert(self, k: int) -> None:

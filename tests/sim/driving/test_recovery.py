@@ -18,7 +18,7 @@ from antdrive.sim.driving.recovery import Look, Recovery
 from antdrive.sim.driving.replay import replay
 from antdrive.sim.physics.engine import State
 from antdrive.sim.unknown import caution_of, exploration_of
-from antdrive.worlds import Disc, Task, World
+from antdrive.worlds import Cruising, Disc, Task, World
 
 HALL = (0.0, 0.0, 8.0, 8.0)
 HERE = (4.0, 4.0, 0.0)
@@ -30,7 +30,7 @@ def driven(robot: RobotSpec, task: Task, **settings: object) -> Run:
     return run(Scenario(task=task, planner=load_planner("astar"), planner_name="astar", robot=robot, **given))  # type: ignore[arg-type]
 
 
-def blinkered(robot: RobotSpec, field_of_view: float = 1.0) -> RobotSpec:
+def narrowed(robot: RobotSpec, field_of_view: float = 1.0) -> RobotSpec:
     assert robot.lidar is not None
     return dataclasses.replace(robot, lidar=dataclasses.replace(robot.lidar, field_of_view=field_of_view))
 
@@ -44,7 +44,7 @@ def triggers(done: Run) -> list[str]:
 def test_a_robot_with_a_narrow_lidar_looks_round_first(robot: str, request: pytest.FixtureRequest) -> None:
     """It sees 57 degrees, and has to go round a post to a goal behind it."""
     task = Task(World("hall", HALL, (Disc(2.6, 4.2, 0.3),)), HERE, (1.2, 4.6), goal_tolerance=0.25, cell=0.1)
-    done = driven(blinkered(request.getfixturevalue(robot)), task)
+    done = driven(narrowed(request.getfixturevalue(robot)), task)
     assert done.succeeded, (done.outcome, done.reason, triggers(done))
     assert done.rollout is not None
     assert triggers(done)[0] == LOOKED
@@ -63,6 +63,16 @@ def test_a_robot_that_cannot_turn_where_it_stands_makes_room_ahead(jackal: Robot
     assert done.rollout.pose[:, 0].max() > 4.2
     assert "stalled" in triggers(done)
     assert LOOKED in triggers(done)  # after it has made room: it had not seen what is behind it
+
+
+def test_a_robot_is_told_of_a_mover_in_the_circle_of_its_first_turn(jackal: RobotSpec) -> None:
+    """It stands behind the robot, where its lidar does not look, on the shorter way round to the goal."""
+    creeping = Cruising(radius=0.1, position=(3.61, 4.0), velocity=(0.0, 0.001))
+    task = Task(World("hall", HALL, movers=(creeping,)), HERE, (1.0, 4.0), goal_tolerance=0.25, cell=0.1)
+    done = driven(jackal, task, noise=0.0, time_limit=4.0)
+    assert done.rollout is not None
+    assert not len(done.rollout.contacts), done.reason
+    assert np.ptp(done.rollout.pose[:, 2]) > 0.1  # it began to turn
 
 
 def test_a_robot_that_is_boxed_in_looks_round_before_it_gives_up(jackal: RobotSpec) -> None:
