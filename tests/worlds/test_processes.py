@@ -26,6 +26,7 @@ def seems_to_grow(number: int) -> int:
 
 def workers_are_ended(delayed: Callable[..., Any]) -> bool:
     """Whether joblib says so while two workers make twenty calls, all of which wait from the beginning."""
+    get_reusable_executor().shutdown(wait=True)  # workers of tests before this one may look no more
     with warnings.catch_warnings(record=True) as found:
         warnings.simplefilter("always")
         calls = [delayed(seems_to_grow)(number) for number in range(20)]
