@@ -64,7 +64,9 @@ PLANS: dict[str, Plan] = {
     "planners/anyangle/_kernels_lines.py": Plan((_PLANNERS, f"{_LINES}test_lines.py"), 5, plain=True),
     "planners/anyangle/_kernels_ga.py": Plan((_PLANNERS, f"{_LINES}test_ga_han.py"), 4),
     "planners/anyangle/_kernels_tangent.py": Plan((f"{_LINES}test_tangent.py",), 4),
-    "planners/smoothing/_kernels_smooth.py": Plan(("tests/planners/smoothing/test_smooth.py",), 4),
+    "planners/smoothing/_kernels_smooth.py": Plan(
+        ("tests/planners/smoothing/test_safety_nets.py", "tests/planners/smoothing/test_smooth.py"), 4
+    ),
     "planners/smoothing/smooth.py": Plan(
         ("tests/planners/smoothing/test_safety_nets.py", "tests/planners/smoothing/test_smooth.py"), 6
     ),
