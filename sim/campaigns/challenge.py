@@ -48,7 +48,7 @@ class Published:
     seconds: float = math.nan
 
 
-COPIED = "the organisers' report on the BARN challenge at ICRA 2026, which we have not seen itself"
+COPIED = "the organisers' report on the BARN challenge at ICRA 2026, which we have not read"
 LICS = "the team's published log, whose address we did not keep; the method: Damanik et al. 2024, arXiv 2406.14947"
 DWA = "github.com/Daffan/the-barn-challenge, res/dwa_out.txt"
 
