@@ -27,21 +27,18 @@ def point_clearance(world: World, points: npt.ArrayLike) -> Floats:
     return out
 
 
-def segment_clearance(world: World, starts: npt.ArrayLike, ends: npt.ArrayLike, discs: Floats | None = None) -> Floats:
+def segment_clearance(world: World, starts: npt.ArrayLike, ends: npt.ArrayLike) -> Floats:
     """The clearance of each straight segment, shape (N,) [m].
 
     Args:
         world: the obstacles and walls; movers do not count
         starts: the segments' first points (N, 2) [m]
         ends: the segments' last points (N, 2) [m]
-        discs: those of the obstacles that matter (D, 3): x, y, radius [m]; None: all
     """
     a = np.ascontiguousarray(starts, dtype=np.float64).reshape(-1, 2)
     b = np.ascontiguousarray(ends, dtype=np.float64).reshape(-1, 2)
     out = np.empty(len(a))
-    _kernels.segment_clearances(
-        a, b, world.discs if discs is None else discs, np.asarray(world.bounds, dtype=np.float64), out
-    )
+    _kernels.segment_clearances(a, b, world.discs, np.asarray(world.bounds, dtype=np.float64), out)
     return out
 
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from antdrive.robots import RobotSpec, Twist
-from antdrive.robots.lidar import FULL_CIRCLE, Lidar
+from antdrive.robots.lidar import FULL_CIRCLE
 from antdrive.sim.driving.survey import Survey
 from antdrive.worlds import Pose, Route
 
@@ -79,8 +79,9 @@ class Look:
 class Recovery:
     """Notes where the robot does not get on, and says what it does then.
 
-    A robot whose lidar does not see all around looks round first. Then, or after it has found a new route in vain, it backs off
-    along its own track; one that has not come from anywhere goes ahead, as far as it sees free ground, to have room for a turn.
+    A robot that has found a new route in vain, or that its sight holds, backs off along its own track; one that has not come from
+    anywhere goes ahead, as far as it sees free ground, to have room for a turn. Where its lidar does not see all around, it then
+    looks round, and so it does as soon as ground that it has not seen holds it.
 
     Attributes:
         look: the turn with which the robot looks round now; None: it does not
@@ -183,12 +184,11 @@ class Recovery:
         if not self._may_look(pose):
             return False
         self._looked_at = pose[:2]
-        lidar = self._survey.lidar
-        turns = list(self._turns(lidar, pose))
+        turns = list(self._turns(pose))
         if not turns:
             return False
-        whole = self._survey.map
-        rate = lidar.field_of_view * lidar.rate / (VIEWS * whole.share * whole.turns)
+        lidar, seen = self._survey.lidar, self._survey.map
+        rate = lidar.field_of_view * lidar.rate / (VIEWS * seen.share * seen.turns)
         self.look = Look(turns, pose[2], min(rate, self._robot.max_yaw_rate), self._robot, self._hz)
         return True
 
@@ -203,7 +203,7 @@ class Recovery:
         self.rests(now, pose)
 
     def note_stall(self, now: float, pose: Pose) -> None:
-        """Note a stall: whether it is another one at the same place.
+        """Note a stall, and how many there were at this place.
 
         Args:
             now: the time [s]
@@ -248,9 +248,9 @@ class Recovery:
     def _may_look(self, pose: Pose) -> bool:
         return not self._survey.lidar.full_circle and math.dist(self._looked_at, pose[:2]) >= ELSEWHERE
 
-    def _turns(self, lidar: Lidar, pose: Pose) -> Iterator[float]:
+    def _turns(self, pose: Pose) -> Iterator[float]:
         """The turns with which the lidar sees all around, as far as they are free."""
-        needed = FULL_CIRCLE - lidar.field_of_view + OVERLAP
+        needed = FULL_CIRCLE - self._survey.lidar.field_of_view + OVERLAP
         left, right = (
             min(needed, self._survey.clear_turn(pose, side, needed + SPARE_TURN) - SPARE_TURN) for side in (1.0, -1.0)
         )

@@ -44,11 +44,6 @@ class Scan(NamedTuple):
     movers: npt.NDArray[np.bool_] | None = None
 
 
-def discs_at_start(movers: Trajectories) -> Floats:
-    """Where movers are at first, as discs (M, 3): x, y, radius [m]."""
-    return np.column_stack((movers.positions(np.zeros(1))[0], movers.radii))
-
-
 @dataclass(frozen=True, eq=False)
 class Senses:
     """What a robot is surveying with.
@@ -84,8 +79,9 @@ class Senses:
 
     @property
     def movers_at_start(self) -> Floats | None:
-        """Where the movers are at first, as discs (M, 3) [m]; None where there are none."""
-        return discs_at_start(self.trajectories) if self.trajectories else None
+        """Where the movers are at first, as discs (M, 3): x, y, radius [m]; None where there are none."""
+        movers = self.trajectories
+        return np.column_stack((movers.positions(np.zeros(1))[0], movers.radii)) if movers else None
 
     def due(self, tick: int, last: int) -> bool:
         """Whether a scan is due in a control period, after one in an earlier period; a negative one: after none.
