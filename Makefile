@@ -23,7 +23,7 @@ $(VENV)/.core: pyproject.toml tools/find-python
 
 $(VENV)/.warm: $(VENV)/.core $(wildcard */_kernels*.py */*/_kernels*.py */*/*/_kernels*.py)
 	@echo "Compiling the kernels, once"
-	@$(BIN)/python -m antdrive.sim.warm
+	@$(BIN)/python -m antdrive.cli.warm
 	@touch $@
 
 $(VENV)/.dev: $(VENV)/.core

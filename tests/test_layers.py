@@ -155,7 +155,7 @@ def test_every_exported_name_exists_and_hides_no_module(package: str) -> None:
 )
 def test_light_commands_import_nothing_heavy(words: list[str]) -> None:
     code = (
-        "import sys; from antdrive.sim.cli.app import main\n"
+        "import sys; from antdrive.cli.app import main\n"
         f"sys.argv = ['antdrive', *{words!r}]\n"
         "try: main()\n"
         "except SystemExit: pass\n"

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from antdrive.sim.cli.app import main
+from antdrive.cli.app import main
 
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text()

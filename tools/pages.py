@@ -137,7 +137,7 @@ def commands_of(block: Block) -> Iterator[tuple[str, str, int]]:
 
 def run_antdrive(words: list[str]) -> int:
     """Call the command line in this process; its exit code."""
-    from antdrive.sim.cli.app import main
+    from antdrive.cli.app import main
 
     before, sys.argv = sys.argv, words
     try:

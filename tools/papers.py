@@ -13,9 +13,9 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from antdrive.sim.papers.claims import CLAIMS
-from antdrive.sim.papers.kinds import Claim
-from antdrive.worlds.files.atomic import written_whole
+from antdrive.base.atomic import written_whole
+from antdrive.runs.papers.claims import CLAIMS
+from antdrive.runs.papers.kinds import Claim
 
 PAGES = Path(__file__).parent.parent / "docs" / "papers"
 HEADS = ("claim", "reading", "printed", "ours", "verdict", "why", "source")

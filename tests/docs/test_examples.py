@@ -13,10 +13,10 @@ from typing import Any
 
 import pytest
 
+import antdrive.runs.suites
 import antdrive.sim
-import antdrive.sim.regression
 from antdrive.sim import Run, Scenario
-from antdrive.sim.view.report.runs import REQUIRED
+from antdrive.views.report.runs import REQUIRED
 from tests.docs.test_reference import PACKAGES
 
 
@@ -61,7 +61,7 @@ def test_the_example_of_a_docstring_runs(
         "robot": small_scenario.robot,
     }
     space |= {name: getattr(antdrive.sim, name) for name in antdrive.sim.__all__}
-    space |= {name: getattr(antdrive.sim.regression, name) for name in antdrive.sim.regression.__all__}
+    space |= {name: getattr(antdrive.runs.suites, name) for name in antdrive.runs.suites.__all__}
     assert faults(EXAMPLES[place], space) == []
 
 

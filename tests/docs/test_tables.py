@@ -6,8 +6,8 @@ import dataclasses
 import re
 from pathlib import Path
 
+from antdrive.runs.suites.baseline import Baseline
 from antdrive.sim.driving.driver import EXPLORING_LIMITERS
-from antdrive.sim.regression.baseline import Baseline
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"

@@ -263,7 +263,7 @@ class Server:
 
 def stamp_of(root: Path) -> str:
     """The stamp that the cache of machine code has in a project."""
-    code = "from antdrive.worlds.kernel_cache import sources_stamp; print(sources_stamp())"
+    code = "from antdrive.base.kernel_cache import sources_stamp; print(sources_stamp())"
     environment = {**os.environ, "PYTHONPATH": str(root)}
     command = [sys.executable, "-c", code]
     done = subprocess.run(command, cwd=root, env=environment, capture_output=True, text=True, check=True)  # noqa: S603
