@@ -13,7 +13,7 @@ import antdrive
 from antdrive.worlds import load_task, save_task
 
 ROOT = Path(__file__).parent.parent
-FOLDERS = ("worlds", "planners", "robots", "sim")
+FOLDERS = ("worlds", "planners", "robots", "sim", "runs", "views", "cli")
 
 
 def python(*words: str, cwd: Path, path: Path) -> subprocess.CompletedProcess[str]:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
-PACKAGES = ("worlds", "planners", "robots", "sim")
+PACKAGES = ("base", "worlds", "planners", "robots", "sim", "runs", "views", "cli")
 
 
 def sources(root: Path = ROOT) -> list[Path]:

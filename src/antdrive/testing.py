@@ -5,6 +5,7 @@ The pytest plugin that comes with antdrive collects suites, `*.drive.yaml`, and 
 
 from typing import Any
 
+from antdrive.cli import testing
 from antdrive.runs import suites
 
 # Their types are listed in testing.pyi; each is imported when it is first used.
@@ -18,7 +19,7 @@ __all__ = [*_OFFERED]
 def __getattr__(name: str) -> Any:
     if name not in _OFFERED:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(regression, name)
+    return getattr(testing if name in testing.__all__ else suites, name)
 
 
 def __dir__() -> list[str]:

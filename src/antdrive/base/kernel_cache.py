@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 _ROOT = Path(__file__).parent.parent  # the package antdrive
-PACKAGES = ("worlds", "planners", "robots", "sim")
+PACKAGES = ("base", "worlds", "planners", "robots", "sim", "views")
 
 
 def sources_stamp() -> str:
@@ -71,7 +71,7 @@ def cache_folder() -> Path | None:
 def default_folders() -> tuple[Path, Path]:
     """The folders that numba tries by itself, as far as antdrive's kernels are concerned."""
     user = Path(os.environ.get("XDG_CACHE_HOME") or Path(os.path.expanduser("~")) / ".cache")
-    return _ROOT / "worlds" / "__pycache__", user / "numba"
+    return _ROOT / "base" / "__pycache__", user / "numba"
 
 
 def _writable(folder: Path) -> bool:

@@ -17,13 +17,6 @@ import pybullet  # noqa: F401
 import pytest
 
 # pytester forgets what a run of pytest has imported, so that the next run would import all of it again.
-import antdrive.cli.testing.fixture
-import antdrive.cli.testing.summary
-import antdrive.cli.testing.unused
-import antdrive.cli.warm  # noqa: F401
-import antdrive.views.figures.plan_figures
-import antdrive.views.figures.run_figures
-import antdrive.views.figures.then_and_now
 from antdrive import list_robots
 
 # What the compiler loads when it first compiles must not be forgotten either: it cannot be loaded twice.

@@ -62,7 +62,7 @@ def barn(
 
     Exit code 0: all runs are done, whatever came out of them. The same command goes on after an interruption.
     """
-    from antdrive.runs import barn
+    from antdrive.runs import barn as challenge
     from antdrive.runs.campaigns.campaign import make_campaign
     from antdrive.runs.campaigns.extras import parquet_library
     from antdrive.runs.campaigns.sweeping import sweep
