@@ -25,9 +25,6 @@ def written_whole(path: str | Path) -> Iterator[Path]:
 
     What processes that were killed left of earlier attempts at this file is removed.
 
-    Args:
-        path: the file to write
-
     Raises:
         InputError: the folder cannot be written to.
     """
@@ -57,9 +54,6 @@ def written_whole(path: str | Path) -> Iterator[Path]:
 @contextmanager
 def folder_written_whole(path: str | Path) -> Iterator[Path]:
     """A context with a temporary folder, which becomes `path` when the block succeeds and is removed when it fails.
-
-    Args:
-        path: the folder to make; it must not exist, or be empty
 
     Raises:
         InputError: there is something, or the folder cannot be written to.
@@ -92,9 +86,6 @@ def _umask() -> int:
 @contextmanager
 def claimed(folder: str | Path) -> Iterator[None]:
     """A context in which no other process may claim the folder. A claim ends with its process, however that ends.
-
-    Args:
-        folder: is made if it does not exist
 
     Raises:
         InputError: another process has claimed the folder, or it cannot be written to.

@@ -38,10 +38,6 @@ OneLine = Annotated[str, AfterValidator(_printable)]
 def check(model: type[Model], document: Document) -> Model:
     """The document as a checked model.
 
-    Args:
-        model: the pydantic model that says which keys and values are valid
-        document: the data to check
-
     Raises:
         InputError: something in the document is wrong. Of several faults the first is reported, unknown keys first.
     """
@@ -58,24 +54,14 @@ def check(model: type[Model], document: Document) -> Model:
 
 
 def suggest(word: str, choices: Iterable[str]) -> str:
-    """A hint at what a wrong word should have been: the one choice that is close, or else all choices.
-
-    Args:
-        word: the wrong word
-        choices: the valid words
-    """
+    """A hint at what a wrong word should have been: the one choice that is close, or else all choices."""
     valid = list(choices)
     close = difflib.get_close_matches(word, valid, n=1)
     return f"did you mean {close[0]}?" if close else f"choose from {', '.join(valid)}"
 
 
 def show(value: Any, limit: int = 40) -> str:
-    """A value as people would write it in a file, shortened to fit into an error message.
-
-    Args:
-        value: plain data
-        limit: the longest text
-    """
+    """A value as people would write it in a file, shortened to fit into an error message."""
     if isinstance(value, Mapping):
         return "a mapping"
     if isinstance(value, list) and len(value) > 6:
@@ -90,11 +76,7 @@ def show(value: Any, limit: int = 40) -> str:
 
 
 def yaml_number(value: float) -> str:
-    """The shortest text that YAML 1.1 reads back as this number; it requires a decimal point and the exponent's sign.
-
-    Args:
-        value: any number, also infinite or not a number
-    """
+    """The shortest text that YAML 1.1 reads back as this number; it requires a decimal point and the exponent's sign."""
     if not math.isfinite(value):
         return ".nan" if math.isnan(value) else (".inf" if value > 0 else "-.inf")
     text = repr(float(value))

@@ -45,32 +45,18 @@ class Document:
     lines: Mapping[Location, int] = field(default_factory=dict)
 
     def error(self, location: Location, problem: str) -> InputError:
-        """The error for a value: source, line where known, key and problem.
-
-        Args:
-            location: the path to the value
-            problem: what is wrong and what would be right
-        """
+        """The error for a value: source, line where known, key and problem."""
         line = next((self.lines[p] for p in _prefixes(location) if p in self.lines), None)
         place = self.source if line is None else f"{self.source}:{line}"
         return input_error(place, *([_key(location)] if location else []), problem)
 
     def field_error(self, error: FieldError, *above: str | int) -> InputError:
-        """The error for a record's field that was read from this document.
-
-        Args:
-            error: the record's own error
-            above: the path to the record, where it is not the whole document
-        """
+        """The error for a record's field that was read from this document."""
         return self.error((*above, *_location(error.key)), error.problem)
 
 
 def count_values(data: Any) -> int:
-    """How many values plain data hold: each mapping, list and scalar, as MAX_VALUES counts them.
-
-    Args:
-        data: mappings, lists, numbers and texts
-    """
+    """How many values plain data hold: each mapping, list and scalar, as MAX_VALUES counts them."""
     inner = data.values() if isinstance(data, Mapping) else data if isinstance(data, list | tuple) else ()
     return 1 + sum(map(count_values, inner))
 
@@ -120,10 +106,6 @@ def _read_text(path: str | os.PathLike[str], kind: str) -> str:
 
 def parse_document(text: str, source: str) -> Document:
     """The YAML in a text: mappings, lists, decimal numbers, text, true, false and null, nothing else.
-
-    Args:
-        text: the YAML
-        source: what error messages call the text
 
     Raises:
         InputError: the text is not YAML, repeats a key, is nested too deeply, or has aliases that stand for too much.

@@ -42,20 +42,12 @@ class FieldError(ValueError):
 
 
 def input_error(*parts: str) -> InputError:
-    """An InputError on one line of printable characters.
-
-    Args:
-        parts: place, key and problem, as far as known; they are joined by colons
-    """
+    """An InputError on one line of printable characters."""
     return InputError("".join(c if c.isprintable() else repr(c)[1:-1] for c in ": ".join(parts)))
 
 
 def require_positive(key: str, value: float) -> None:
     """Refuse a value that is not a finite number above 0.
-
-    Args:
-        key: what the error calls the value
-        value: the value to check
 
     Raises:
         FieldError: the value is 0, negative, infinite or not a number.
@@ -66,10 +58,6 @@ def require_positive(key: str, value: float) -> None:
 
 def require_finite(key: str, value: float) -> None:
     """Refuse a value that is infinite or not a number.
-
-    Args:
-        key: what the error calls the value
-        value: the value to check
 
     Raises:
         FieldError: the value is not finite.

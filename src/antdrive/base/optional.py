@@ -11,11 +11,6 @@ from antdrive.base.errors import InputError
 def optional(module: str, extra: str, purpose: str) -> Any:
     """A module of an optional package.
 
-    Args:
-        module: its full name, such as "scipy.stats"
-        extra: the extra of antdrive that installs its package
-        purpose: what it is needed for, in words
-
     Raises:
         InputError: it is not installed.
     """

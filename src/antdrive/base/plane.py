@@ -23,11 +23,7 @@ def wrap_angle(angle: Angle) -> Angle:
 
 
 def segment_lengths(xy: npt.ArrayLike) -> Floats:
-    """The length of each segment of a polyline, shape (N - 1,).
-
-    Args:
-        xy: the polyline's points (N, 2)
-    """
+    """The length of each segment of a polyline, shape (N - 1,)."""
     steps = np.diff(np.asarray(xy, dtype=np.float64).reshape(-1, 2), axis=0)
     return np.asarray(np.hypot(*steps.T))
 
@@ -51,12 +47,7 @@ def polyline_length(xy: npt.ArrayLike) -> float:
 
 
 def in_map(frame: Pose, points: npt.ArrayLike) -> Floats:
-    """Points (N, 2) or poses (N, 3) of the world in the frame of its map; the same numbers, bit for bit, where the two agree.
-
-    Args:
-        frame: the world's pose in its map: x, y [m] and yaw [rad]
-        points: x, y [m] and, for poses, yaw [rad]
-    """
+    """Points (N, 2) or poses (N, 3) of the world in the frame of its map; the same numbers, bit for bit, where the two agree."""
     found = np.array(points, dtype=np.float64)
     x, y, yaw = frame
     if (x, y, yaw) == (0.0, 0.0, 0.0):
@@ -69,26 +60,14 @@ def in_map(frame: Pose, points: npt.ArrayLike) -> Floats:
 
 
 def out_of_map(frame: Pose, points: npt.ArrayLike) -> Floats:
-    """Points (N, 2) or poses (N, 3) of a map in the frame of a world that was made from it: the inverse of `in_map`.
-
-    Args:
-        frame: the world's pose in its map: x, y [m] and yaw [rad]
-        points: x, y [m] and, for poses, yaw [rad]
-    """
+    """Points (N, 2) or poses (N, 3) of a map in the frame of a world that was made from it: the inverse of `in_map`."""
     x, y, yaw = frame
     cosine, sine = math.cos(yaw), math.sin(yaw)
     return in_map((-x * cosine - y * sine, x * sine - y * cosine, -yaw), points)
 
 
 def place_name(frame: Pose, x: float, y: float, digits: str = ".2f") -> str:
-    """A place of a world in words; where the world lies in a map, in the frames of both.
-
-    Args:
-        frame: the world's pose in its map: x, y [m] and yaw [rad]
-        x: where [m]
-        y: where [m]
-        digits: the format of the numbers
-    """
+    """A place of a world in words; where the world lies in a map, in the frames of both."""
     here = f"({x:{digits}}, {y:{digits}})"
     if not any(frame):
         return here

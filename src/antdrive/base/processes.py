@@ -14,9 +14,6 @@ def delayed(function: Callable[..., R]) -> Callable[..., Any]:
     Where psutil is installed, joblib takes workers that have grown by 300 MB for leaking, ends them and warns of it in a
     thread. Ours grow by as much when they compile kernels, or load them and films, and a program whose warnings are errors,
     as tests often have it, would wait for that thread for ever.
-
-    Args:
-        function: what the worker calls; must be picklable
     """
     import joblib
 

@@ -11,11 +11,6 @@ from antdrive.base.errors import input_error
 def read_bytes(path: str | os.PathLike[str], max_bytes: int, kind: str = "a file") -> bytes:
     """The content of a file that people name.
 
-    Args:
-        path: the file
-        max_bytes: a larger file is refused before it is read whole
-        kind: what the file should be, for the error message
-
     Raises:
         InputError: the file is missing, a folder, too large, or may not be read.
     """

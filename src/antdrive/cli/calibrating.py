@@ -15,11 +15,7 @@ USUAL_TRIALS = 4  # margins that a calibration tries, as a rule
 
 
 def with_chosen_margin(scenario: Scenario) -> Scenario:
-    """The scenario with a margin chosen by calibration: with a bar on a terminal, else with a line.
-
-    Args:
-        scenario: all but the margin
-    """
+    """The scenario with a margin chosen by calibration: with a bar on a terminal, else with a line."""
     from antdrive.runs.margins.choice import DRIVES, known_margin
 
     if known_margin(scenario.conditions) is not None:

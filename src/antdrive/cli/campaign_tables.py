@@ -53,20 +53,12 @@ MARKS = ("manifest.json", "grid.parquet")
 
 
 def is_campaign(folder: Path) -> bool:
-    """Whether a folder is that of a campaign.
-
-    Args:
-        folder: the folder
-    """
+    """Whether a folder is that of a campaign."""
     return all((folder / name).is_file() for name in MARKS)
 
 
 def campaigns_of_words(words: Sequence[str], context: typer.Context) -> list[Path]:
     """The campaigns' folders that `antdrive compare` was given, if they are.
-
-    Args:
-        words: the worlds named
-        context: of the command, to see which options were given
 
     Raises:
         InputError: options that do not go together.
@@ -101,17 +93,7 @@ def compare_campaigns(
     where: Sequence[str] | None,
     json: bool,
 ) -> int:
-    """Print success of each planner and the comparison of each pair.
-
-    Args:
-        folders: of the campaigns
-        planners: labels of those to compare; all without
-        metrics: to compare besides success
-        against: label of the planner that each other one is compared with
-        allow: MEASURE=DIFFERENCE by which a planner may be worse than that one
-        where: COLUMN=VALUE of the runs to take
-        json: print one JSON object
-    """
+    """Print success of each planner and the comparison of each pair."""
     from antdrive.views.campaign.reporting import summarise_campaign
 
     words: dict[str, Any] = {"allow": _allowed(allow, against), "where": _conditions(where), "strict": True}
@@ -138,17 +120,7 @@ def report_campaigns(
     against: str | None,
     **words: Any,
 ) -> int:
-    """Write the report of a campaign, or of several.
-
-    Args:
-        folders: of the campaigns
-        out: the file to write
-        json: print one JSON object
-        allow: MEASURE=DIFFERENCE by which a planner may be worse than `against`
-        where: COLUMN=VALUE of the runs to take
-        against: label of the planner that each other one is compared with
-        words: the rest of what `report_campaign` takes
-    """
+    """Write the report of a campaign, or of several."""
     from antdrive.views.campaign.reporting import report_campaign
 
     words |= {"allow": _allowed(allow, against), "where": _conditions(where), "against": against}

@@ -38,10 +38,6 @@ SOURCE = "the options"  # what errors call a campaign that no file describes
 def campaign_from(path: Path | None, **words: Any) -> Campaign:
     """The campaign in a file, with the keys that options give in place of the file's.
 
-    Args:
-        path: the file; None: the options say everything
-        words: what the options hold, by the campaign's keys and `generate`; None: not given
-
     Raises:
         InputError: something is wrong; the message names the file and the key, or the option.
     """
@@ -97,12 +93,7 @@ def _with_settings(of_file: Any, given: dict[str, Any]) -> Any:
 
 
 def size_lines(expansion: Expansion, missing: int) -> Iterator[str]:
-    """How large a campaign is, in words.
-
-    Args:
-        expansion: its runs
-        missing: how many of them its folder lacks
-    """
+    """How large a campaign is, in words."""
     counts = expansion.counts.items()
     yield " x ".join(f"{count} {name if count != 1 else _one(name)}" for name, count in counts)
     left_out = f"; {expansion.duplicates} combinations that mean the same as others are left out"
@@ -191,12 +182,7 @@ def _number(option: str, text: str) -> float | int:
 
 
 def print_sweep(results: SweepResults, reports: Sequence[str] = ()) -> None:
-    """Print how the runs of a campaign ended, what was measured in those that succeeded, and where more is said.
-
-    Args:
-        results: of the campaign
-        reports: files with more, if they were asked for; without, the command that makes one is printed
-    """
+    """Print how the runs of a campaign ended, what was measured in those that succeeded, and where more is said."""
     print_line(f"{results.size} runs, {results.made} of them made now; {results.succeeded} succeeded, certified")
     print_table(("outcome", "runs"), ((name, str(count)) for name, count in results.outcomes.items()))
     print_line()

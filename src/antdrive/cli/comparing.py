@@ -47,9 +47,6 @@ class Entrant:
 def check_worlds(words: Sequence[str]) -> None:
     """Check that there are worlds of these names, before anything is said about planners, which a campaign needs none of.
 
-    Args:
-        words: names of worlds in the catalogue, or world files
-
     Raises:
         InputError: there is no such world.
     """
@@ -67,10 +64,6 @@ def check_worlds(words: Sequence[str]) -> None:
 
 def entrants_of(planners: Sequence[str] | None, settings: Sequence[str] | None) -> list[Entrant]:
     """The planners of `--planner NAME` or `--planner LABEL=NAME`, with the options of `--set GROUP.KEY=VALUE`.
-
-    Args:
-        planners: the words of every `--planner`
-        settings: the words of every `--set`; a group is a label, `planner` for all of them, or `controller`
 
     Raises:
         InputError: not two to six different labels, or a group that is none.
@@ -100,26 +93,13 @@ def entrants_of(planners: Sequence[str] | None, settings: Sequence[str] | None) 
 
 
 def mark_of(scenarios: Mapping[str, Scenario], cases: Sequence[tuple[str, int]]) -> str:
-    """Eight hexadecimal digits that differ between comparisons.
-
-    Args:
-        scenarios: by label and world, with the first seed
-        cases: the worlds' names and the seeds
-    """
+    """Eight hexadecimal digits that differ between comparisons."""
     facts = [f"{key} {fingerprint(scenario)}" for key, scenario in scenarios.items()]
     return hashlib.sha256(repr((facts, list(cases))).encode()).hexdigest()[:8]
 
 
 def repeating(scenario: Scenario, entrant: Entrant, world: str, robot: str, ends: Sequence[str] = ()) -> str:
-    """The `antdrive run` that repeats one of the compared runs.
-
-    Args:
-        scenario: what was run
-        entrant: its planner, as given
-        world: as it was given
-        robot: as it was given
-        ends: the words that give its start and goal, where it is not the world's own
-    """
+    """The `antdrive run` that repeats one of the compared runs."""
     given = {
         "--planner": entrant.name,
         "--robot": robot,
@@ -156,12 +136,7 @@ class Compared:
 
     @classmethod
     def of(cls, label: str, run: Run) -> Compared:
-        """What a comparison keeps of a run.
-
-        Args:
-            label: of the planner
-            run: the run
-        """
+        """What a comparison keeps of a run."""
         s, log = run.scenario, run.rollout
         # `drive_digest` covers the planned cells, too, which smoothing may make one route of.
         driven = () if log is None else (log.pose, log.twist, log.command, log.contacts, log.route)
@@ -180,9 +155,6 @@ def differences(runs: Sequence[Compared]) -> list[dict[str, Any]]:
     """For each planner but the first, how its drives differ from the first one's with the same world and seed.
 
     Only pairs in which both succeeded are compared; of each metric the median difference, the least and the most.
-
-    Args:
-        runs: all runs, those of the first planner first among those of a world and seed
     """
     first = runs[0].label
     reference = {(run.world, run.seed): run for run in runs if run.label == first}
@@ -205,11 +177,7 @@ def differences(runs: Sequence[Compared]) -> list[dict[str, Any]]:
 
 
 def difference_cells(entry: Mapping[str, Any]) -> tuple[str, ...]:
-    """One entry of `differences` as a row of a table.
-
-    Args:
-        entry: what `differences` gives for a planner
-    """
+    """One entry of `differences` as a row of a table."""
     share = f"{entry['succeeded']}/{entry['runs']}"
     values = [entry[name] for name in COMPARED]
     texts = ["-" if v is None else f"{v[0]:+.3f} ({v[1]:+.3f} to {v[2]:+.3f})" for v in values]
@@ -217,12 +185,7 @@ def difference_cells(entry: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def same_drives(runs: Sequence[Compared], smoothing: str) -> list[str]:
-    """A sentence for every group of planners whose drives are the same, bit for bit.
-
-    Args:
-        runs: all runs
-        smoothing: how plans became routes
-    """
+    """A sentence for every group of planners whose drives are the same, bit for bit."""
     groups: dict[tuple[str, bool], list[str]] = {}
     cases: dict[tuple[str, int], dict[str, list[Compared]]] = {}
     for run in runs:

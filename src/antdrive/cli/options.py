@@ -61,11 +61,7 @@ Seed = Annotated[int, typer.Option(min=0, max=2**63 - 1, metavar="NUMBER", help=
 
 
 def parse_margin(text: str | float) -> float | Literal["auto"]:
-    """The margin that an option's text means [m].
-
-    Args:
-        text: a number from 0 to 100, or auto
-    """
+    """The margin that an option's text means [m]."""
     if text == "auto":
         return "auto"
     try:

@@ -12,14 +12,7 @@ if TYPE_CHECKING:
 
 
 def numbers(option: str, text: str | None, count: int, form: str = "") -> tuple[float, ...] | None:
-    """As many finite numbers as asked for, from text such as "1.5,2,0"; None stays None.
-
-    Args:
-        option: what the text was given for
-        text: the text
-        count: how many numbers
-        form: what they are, such as "X,Y,YAW", for the message
-    """
+    """As many finite numbers as asked for, from text such as "1.5,2,0"; None stays None."""
     if text is None:
         return None
     try:

@@ -23,13 +23,6 @@ def chosen_task(
 ) -> str | Task:
     """The world with the start and goal that options give; its name where they give none.
 
-    Args:
-        world: as it was given
-        task: `--task`
-        start: `--start`
-        goal: `--goal`
-        frame: `--frame`: whether start and goal are places in the world file's frame, or in that of its map
-
     Raises:
         InputError: there is no such task, or the place is not in free ground; the message names the option.
     """
@@ -56,14 +49,7 @@ def chosen_task(
 
 
 def ends_words(task: str | None, start: str | None, goal: str | None, frame: str = WORLD_FRAME) -> list[str]:
-    """The words of a command that give the same start and goal.
-
-    Args:
-        task: `--task`
-        start: `--start`
-        goal: `--goal`
-        frame: `--frame`
-    """
+    """The words of a command that give the same start and goal."""
     given = {"--task": task, "--start": start, "--goal": goal}
     if frame != WORLD_FRAME and (start is not None or goal is not None):
         given["--frame"] = frame

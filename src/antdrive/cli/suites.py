@@ -69,14 +69,6 @@ def drive_suites(
 ) -> list[CheckResult]:
     """Drive and judge all tests that the words name, with a progress bar.
 
-    Args:
-        suites: the words
-        only: a pattern for scenarios' names
-        jobs: number of processes; None: one per core
-        update: which baselines to write
-        results: where logs, pictures and films are written
-        show: is called with each result as soon as it is there, in the order of the tests
-
     Raises:
         InputError: there is no such suite or test, or something in a suite is wrong.
     """
@@ -103,12 +95,7 @@ def drive_suites(
 
 
 def print_result(result: CheckResult, words: str) -> None:
-    """Print what came out of one test.
-
-    Args:
-        result: what came out
-        words: what is said about a test that passed and changed no baseline
-    """
+    """Print what came out of one test."""
     if result.passed:
         print_line(f"{result.address}: {result.accepted or words}")
         _print_lines(result.gains)
@@ -118,11 +105,7 @@ def print_result(result: CheckResult, words: str) -> None:
 
 
 def unused_baselines(suites: list[str]) -> list[str]:
-    """The baselines beside the suites that words name which belong to no test.
-
-    Args:
-        suites: the words
-    """
+    """The baselines beside the suites that words name which belong to no test."""
     from antdrive.cli.testing.unused import unused_of_suite
     from antdrive.runs.suites import load_suite, select
     from antdrive.runs.suites.suite import shown_path
@@ -132,14 +115,7 @@ def unused_baselines(suites: list[str]) -> list[str]:
 
 
 def print_summary(results: list[CheckResult], json: bool, unused: Sequence[str] = (), *, strict: bool = False) -> int:
-    """Print how many tests passed, and unused baselines; the exit code, which is that of the worst test.
-
-    Args:
-        results: one for each test
-        json: print one JSON object instead of text
-        unused: baselines that belong to no test
-        strict: whether these are a failure
-    """
+    """Print how many tests passed, and unused baselines; the exit code, which is that of the worst test."""
     from antdrive.cli.testing.checking import FAULT as INTERNAL
     from antdrive.cli.testing.checking import WRONG_INPUT as WRONG
     from antdrive.cli.testing.summary import films_left_out

@@ -41,12 +41,7 @@ def is_warm() -> bool:
 
 
 def warm(jobs: int = -1, progress: Callable[[float], None] | None = None) -> None:
-    """Plan with every planner, drive once and film it, so that every kernel is in the cache.
-
-    Args:
-        jobs: processes; -1 means one for each core.
-        progress: called with the fraction that is done.
-    """
+    """Plan with every planner, drive once and film it, so that every kernel is in the cache."""
     from joblib import Parallel
 
     from antdrive.planners import PLANNERS

@@ -66,13 +66,7 @@ def default_folder(scenario: Scenario) -> Path:
 
 
 def free_folder(folder: Path, marker: str, own: str) -> Path:
-    """The folder itself, unless its marker shows results of something else; then one with the fingerprint in its name.
-
-    Args:
-        folder: where results go by default
-        marker: the file in it that holds the fingerprint of what its results are of
-        own: the fingerprint of what is to be written
-    """
+    """The folder itself, unless its marker shows results of something else; then one with the fingerprint in its name."""
     try:
         found = json.loads((folder / marker).read_text(encoding="utf-8"))
     except FileNotFoundError:
@@ -84,12 +78,7 @@ def free_folder(folder: Path, marker: str, own: str) -> Path:
 
 
 def write_marker(path: Path, facts: Mapping[str, Any]) -> None:
-    """Write the file that says what a folder's results are of.
-
-    Args:
-        path: the file
-        facts: what it says, with the key `fingerprint`
-    """
+    """Write the file that says what a folder's results are of."""
     from antdrive.base.atomic import written_whole
 
     with written_whole(path) as temporary:
@@ -97,12 +86,7 @@ def write_marker(path: Path, facts: Mapping[str, Any]) -> None:
 
 
 def fingerprint(scenario: Scenario, *more: object) -> str:
-    """Eight hexadecimal digits that differ between scenarios: of SHA-256 over all of its fields.
-
-    Args:
-        scenario: the scenario
-        more: what is asked for beside it, such as the budget of a search
-    """
+    """Eight hexadecimal digits that differ between scenarios: of SHA-256 over all of its fields."""
     import dataclasses
 
     from antdrive.sim.log.record import settings_of

@@ -233,14 +233,6 @@ def require(
 ) -> None:
     """Refuse an option outside its range.
 
-    Args:
-        key: name of the option
-        value: its value
-        at_least: smallest value allowed
-        above: the value must be greater than this
-        at_most: largest value allowed
-        below: the value must be less than this
-
     Raises:
         ValueError: the value is out of range; the message names the key and the range.
     """

@@ -37,12 +37,7 @@ class Rehearsed(Protocol):
 
 @contextlib.contextmanager
 def kernels_loaded(planner: Rehearsed, query: Query) -> Iterator[None]:
-    """A context for timed planning, with the planner's kernels loaded before it begins.
-
-    Args:
-        planner: what plans in the context
-        query: what it will be asked; what kernels get from it is of the same types on the tiny grid
-    """
+    """A context for timed planning, with the planner's kernels loaded before it begins."""
     if _within.get():
         yield
         return
@@ -55,12 +50,7 @@ def kernels_loaded(planner: Rehearsed, query: Query) -> Iterator[None]:
 
 
 def load_kernels(planner: Rehearsed, query: Query) -> None:
-    """Plan on a tiny grid, unless this planner with these options has done so in this process.
-
-    Args:
-        planner: whose kernels are loaded
-        query: the kind of query that it will be asked
-    """
+    """Plan on a tiny grid, unless this planner with these options has done so in this process."""
     shorter = planner.rehearsal()
     writeable = query.grid.free.flags.writeable
     kind = (bool(query.motions), query.task is not None, writeable)
@@ -79,14 +69,7 @@ def _rehearse(planner: Rehearsed, query: Query) -> None:
 
 
 def tiny_query(made_of: type[Query], motions: bool, task: bool, writeable: bool = False) -> Query:
-    """A query on 12 x 12 cells around a cylinder, of the same types as those of worlds.
-
-    Args:
-        made_of: the class of queries
-        motions: whether it has the motions of a mover
-        task: whether it has its task
-        writeable: whether the grid's arrays may be written to
-    """
+    """A query on 12 x 12 cells around a cylinder, of the same types as those of worlds."""
     from antdrive.worlds import Cruising, Disc, Task, Trajectories, World, rasterise
 
     mover = Cruising(radius=0.1, position=(0.2, 2.8), velocity=(0.1, 0.0))

@@ -28,11 +28,7 @@ _ASIDE: dict[Path, dict[str, ModuleType]] = {}
 
 
 def is_own(name: str) -> bool:
-    """Whether a planner's name is that of a file or module, and not a registered one.
-
-    Args:
-        name: what people call the planner
-    """
+    """Whether a planner's name is that of a file or module, and not a registered one."""
     return ":" in name
 
 
@@ -64,9 +60,6 @@ class OwnCodeError(InputError):
 def own_object(name: str) -> Any:
     """What a file or module of people's own calls by the name behind the last colon.
 
-    Args:
-        name: FILE.py:CLASS or MODULE:CLASS
-
     Raises:
         InputError: there is no such file, module or class, or it cannot be imported.
     """
@@ -78,12 +71,6 @@ def object_in(source: str, word: str, folder: Path | None = None, *, is_file: bo
     """What a file or module of people's own calls by a name.
 
     A file is read again when its content has changed. Folders may have modules of the same name.
-
-    Args:
-        source: the file or module
-        word: the name in it
-        folder: what the file is relative to, and where modules are looked for as well; None: the working directory
-        is_file: whether the source is a file, not a module
 
     Raises:
         OwnCodeError: there is no such file, module or name, or it cannot be imported.
@@ -103,20 +90,13 @@ def object_in(source: str, word: str, folder: Path | None = None, *, is_file: bo
 
 
 def is_importable_elsewhere(planner: object) -> bool:
-    """Whether other processes can import a planner's class; those of files and modules beside a suite only this one can.
-
-    Args:
-        planner: the planner
-    """
+    """Whether other processes can import a planner's class; those of files and modules beside a suite only this one can."""
     home = type(planner).__module__
     return not home.startswith(FROM_FILE) and home not in _OWNERS
 
 
 def own_version(name: str) -> str:
     """What the code of a file or module is: its name and the beginning of its hash.
-
-    Args:
-        name: FILE.py:CLASS or MODULE:CLASS
 
     Raises:
         InputError: the file cannot be read.
@@ -128,11 +108,7 @@ def own_version(name: str) -> str:
 
 
 def module_hash(name: str) -> str:
-    """The beginning of the hash of a module's file; empty where it has none.
-
-    Args:
-        name: of a module that is imported
-    """
+    """The beginning of the hash of a module's file; empty where it has none."""
     file = getattr(sys.modules.get(name), "__file__", None)
     return _hash(Path(file).read_bytes()) if file is not None and Path(file).is_file() else ""
 
@@ -187,12 +163,7 @@ class _Source(importlib.machinery.SourceFileLoader):
 
 
 def from_source(name: str, path: Path) -> ModuleType:
-    """A new module that runs a file as it is now, and is known by its name meanwhile and afterwards.
-
-    Args:
-        name: of the module
-        path: the file
-    """
+    """A new module that runs a file as it is now, and is known by its name meanwhile and afterwards."""
     spec = importlib.util.spec_from_loader(name, _Source(name, str(path)))
     assert spec is not None
     assert spec.loader is not None
@@ -219,10 +190,6 @@ def _importing_for(folder: Path, *, owned: bool) -> Iterator[None]:
     """A context in which modules are also looked for in the working directory and a folder, after all others.
 
     Modules of other folders are set aside where this folder has one of the same name.
-
-    Args:
-        folder: the folder
-        owned: whether what is imported from the folder meanwhile is for it alone
     """
     for name, owner in list(_OWNERS.items()):
         if owner != folder and _module_in(folder, name.partition(".")[0]) is not None:

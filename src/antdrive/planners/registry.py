@@ -72,11 +72,6 @@ def load_planner(name: str, /, **options: Any) -> Planner:
 def make_planner(made: Any, name: str, /, **options: Any) -> Planner:
     """The planner that people's own code defines, with options set.
 
-    Args:
-        made: an object with `plan`, or a class of such objects
-        name: what messages call it
-        options: the planner's options by name; values may be text
-
     Raises:
         InputError: it is no planner, its class cannot be called without arguments, or an option is wrong.
     """
@@ -130,11 +125,6 @@ def describe(planner: Planner) -> str:
 
 def parse(key: str, kind: Any, value: Any) -> Any:
     """The value of an option of a given type.
-
-    Args:
-        key: name of the option, for messages
-        kind: the type: int, float, bool, str, a Literal, or a union of one of these and None
-        value: the value, or text for it
 
     Raises:
         InputError: the value, or the text for it, is not of that type.

@@ -13,9 +13,6 @@ ROUNDED = 1e-3  # a lidar on the footprint's edge may be this far outside: files
 def require_feasible(robot: RobotSpec) -> None:
     """Refuse a robot whose wheels and motors cannot reach its own limits.
 
-    Args:
-        robot: the robot that a file describes
-
     Raises:
         FieldError: the wheels are higher than the body, turn too slowly, or cannot push as hard as promised, or the
             lidar is not on the robot.
@@ -47,10 +44,6 @@ def require_feasible(robot: RobotSpec) -> None:
 
 def require_on_robot(lidar: Lidar, foot: Footprint) -> None:
     """Refuse a lidar beside the robot: nothing would notice what it strikes, and it would look through what it stands in.
-
-    Args:
-        lidar: the lidar
-        foot: the robot's footprint
 
     Raises:
         FieldError: the lidar is outside; the key is the coordinate that is farther from the axle's centre.

@@ -176,11 +176,6 @@ def load_robot(robot: str | os.PathLike[str]) -> RobotSpec:
 def robot_from_text(text: str, source: str, stem: str) -> RobotSpec:
     """The robot in the text of a robot file.
 
-    Args:
-        text: the file's text
-        source: what errors call it
-        stem: the robot's name where the text has none
-
     Raises:
         InputError: something in it is wrong.
     """
@@ -238,11 +233,7 @@ def robot_to_dict(robot: RobotSpec) -> dict[str, Any]:
 
 
 def footprint_to_dict(footprint: Footprint) -> dict[str, Any]:
-    """A footprint as it stands in a robot's file.
-
-    Args:
-        footprint: a disc, a rectangle or a polygon without round corners
-    """
+    """A footprint as it stands in a robot's file."""
     corners = footprint.corners
     if footprint.is_disc or len(corners) == 1:
         return {"radius": footprint.rounding, **({"centre": list(corners[0])} if corners else {})}

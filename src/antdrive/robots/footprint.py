@@ -30,10 +30,6 @@ def footprint_clearance(world: World, footprint: Footprint, poses: npt.ArrayLike
 
 
 def shape_of(footprint: Footprint) -> tuple[Floats, Floats]:
-    """A footprint as kernels take it: half length, half width and rounding (3,), and a polygon's corners (K, 2) [m].
-
-    Args:
-        footprint: the robot's footprint
-    """
+    """A footprint as kernels take it: half length, half width and rounding (3,), and a polygon's corners (K, 2) [m]."""
     shape = np.array([footprint.half_length, footprint.half_width, footprint.rounding])
     return shape, np.array(footprint.corners, dtype=np.float64).reshape(-1, 2)

@@ -13,13 +13,7 @@ WALLS = ("the left wall", "the lower wall", "the right wall", "the upper wall")
 
 
 def gaps(world: World, robot: RobotSpec, poses: npt.ArrayLike) -> Floats:
-    """The distance from the robot's footprint to each obstacle and then each of `WALLS`, negative in it, (P, N + 4) [m].
-
-    Args:
-        world: the obstacles and walls; movers do not count
-        robot: the robot
-        poses: x, y and yaw of the robot's centre (P, 3) [m, rad]
-    """
+    """The distance from the robot's footprint to each obstacle and then each of `WALLS`, negative in it, (P, N + 4) [m]."""
     x, y, yaw = np.asarray(poses, dtype=np.float64).reshape(-1, 3, 1).swapaxes(0, 1)
     foot, discs = robot.footprint, world.discs
     cos, sin = np.cos(yaw), np.sin(yaw)
@@ -54,13 +48,7 @@ def _beyond_polygon(footprint: Footprint, x: Floats, y: Floats) -> Floats:
 
 
 def name_of(world: World, index: int, unseen: int = 0) -> str:
-    """What messages call an obstacle or a wall.
-
-    Args:
-        world: the obstacles and walls
-        index: the column of `gaps`
-        unseen: how many of the obstacles, the last ones, nobody knows of
-    """
+    """What messages call an obstacle or a wall."""
     count = len(world.obstacles)
     if index >= count:
         return WALLS[index - count]

@@ -83,10 +83,6 @@ class BarnLine:
 def unpacked(source: Path, folder: Path) -> Path:
     """The folder with the worlds of a folder, or of an archive, which is unpacked.
 
-    Args:
-        source: a folder with `world_N.world` files or with one archive of them, or the archive
-        folder: where an archive is unpacked
-
     Raises:
         InputError: there are no worlds.
     """
@@ -113,15 +109,7 @@ def unpacked(source: Path, folder: Path) -> Path:
 def campaign_data(
     folder: Path, trials: int, planner: str, robot: str, settings: Mapping[str, Any], *, with_map: bool = False
 ) -> dict[str, Any]:
-    """The campaign that drives every world a number of times, as plain data.
-
-    Args:
-        folder: with `world_N.world` files, in it or below
-        trials: how often each world is driven
-        planner: the planner's name
-        settings: of the runs, with the factor on noise
-        with_map: whether each run is made with the map, too, and with pose fixes unless the true pose is known
-    """
+    """The campaign that drives every world a number of times, as plain data."""
     files = sorted(folder.rglob(WORLDS), key=lambda path: (len(path.stem), path.stem))
     noise = settings["noise"]
     driven = [{key: value for key, value in settings.items() if key != "noise"}]
@@ -138,11 +126,7 @@ def campaign_data(
 
 
 def localisation_with_map(kind: str) -> str:
-    """How a robot with the map localises itself, beside one without it: it has pose fixes, unless it knows the true pose.
-
-    Args:
-        kind: how the robot without the map does
-    """
+    """How a robot with the map localises itself, beside one without it: it has pose fixes, unless it knows the true pose."""
     return "true" if kind == "true" else "fixes"
 
 
@@ -150,9 +134,6 @@ def reference_times(folder: Path) -> dict[str, float]:
     """The time of the challenge's own reference path at 2 m/s, by the name of the world [s].
 
     The path leads from the start through the field of cylinders, along the file's cells, and on to the goal.
-
-    Args:
-        folder: with `path_N.npy` files beside the worlds, in it or below
     """
     times = {}
     for path in folder.rglob("path_*.npy"):
@@ -167,33 +148,18 @@ def reference_times(folder: Path) -> dict[str, float]:
 
 
 def score(succeeded: bool, seconds: float, fastest: float) -> float:
-    """The challenge's score of one run.
-
-    Args:
-        succeeded: whether the robot arrived without contact
-        seconds: how long it took, by the challenge's clock [s]
-        fastest: the reference path's time at 2 m/s [s]
-    """
+    """The challenge's score of one run."""
     return fastest / min(max(seconds, 2 * fastest), 8 * fastest) if succeeded else 0.0
 
 
 def by_map(table: pyarrow.Table) -> dict[str, pyarrow.Table]:
-    """The runs of robots without a map, `none`, and with it, `given`.
-
-    Args:
-        table: a campaign's
-    """
+    """The runs of robots without a map, `none`, and with it, `given`."""
     maps = table["map"].to_pylist()
     return {kind: table.filter([one == kind for one in maps]) for kind in ("none", "given")}
 
 
 def lines(table: pyarrow.Table, fastest: Mapping[str, float]) -> Iterator[BarnLine]:
-    """The results, world by world, then those of all.
-
-    Args:
-        table: a campaign's
-        fastest: the reference path's time of worlds, by name [s]; other worlds keep the score of their optimum
-    """
+    """The results, world by world, then those of all."""
     rows = table.select(["world", "succeeded", "arrival_s", "barn"]).to_pylist()
     worlds = {row["world"]: [other for other in rows if other["world"] == row["world"]] for row in rows}
     for world in sorted(worlds, key=lambda name: (len(name), name)):

@@ -37,9 +37,6 @@ def _switch(value: Any) -> Any:
 def seed_list(value: Any) -> list[int]:
     """The seeds that people write as [0, 1, 2] or 0-9.
 
-    Args:
-        value: plain data
-
     Raises:
         ValueError: it is neither; the text says what would be right.
     """
@@ -108,21 +105,13 @@ class SettingsEntry(BaseModel):
 
 
 def has_flags(entry: SettingsEntry) -> bool:
-    """Whether `antdrive run` has flags for all of an entry's settings.
-
-    Args:
-        entry: the settings
-    """
+    """Whether `antdrive run` has flags for all of an entry's settings."""
     plain = isinstance(entry.replan, bool) and not isinstance(entry.avoid, dict)
     return plain and (entry.physics_hz, entry.control_hz) == (240, 60) and all(d.height == 1.0 for d in entry.unseen)
 
 
 def setting_words(entry: SettingsEntry) -> list[str]:
-    """The words of `antdrive run` for the settings of an entry that are not the defaults.
-
-    Args:
-        entry: settings for which `has_flags` is true
-    """
+    """The words of `antdrive run` for the settings of an entry that are not the defaults."""
     words = [
         word for key, value in entry.controller.items() for word in ("--set", f"controller.{key}={option_text(value)}")
     ]
@@ -134,11 +123,7 @@ def setting_words(entry: SettingsEntry) -> list[str]:
 
 
 def option_text(value: Any) -> str:
-    """A value as the command line takes it.
-
-    Args:
-        value: plain data
-    """
+    """A value as the command line takes it."""
     if isinstance(value, list):
         return ",".join(map(option_text, value))
     return str(value).lower() if isinstance(value, bool) else str(value)

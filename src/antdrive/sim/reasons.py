@@ -23,13 +23,7 @@ MOST_CELLS = 2_000_000  # of a grid that is made only to see whether it has a pa
 
 
 def no_path_reason(s: Scenario, grid: Grid, said: str) -> str:
-    """What the planner said about a world that it could not cross, for whom, and what would help.
-
-    Args:
-        s: the scenario
-        grid: the grid that was planned on
-        said: the planner's reason
-    """
+    """What the planner said about a world that it could not cross, for whom, and what would help."""
     robot = s.robot
     disc = f"a disc of {s.inflate:.3g} m (radius {robot.radius:.3g} + margin {s.margin:.3g})"
     says = f": {said}" if said else ""

@@ -27,10 +27,6 @@ SENSING: dict[str, Any] = {"map": "given", "localisation": "fixes", "odometry": 
 def scenario_fields(entry: SettingsEntry, fail: Fail) -> dict[str, Any]:
     """The fields of a scenario that an entry's settings stand for, by name.
 
-    Args:
-        entry: the settings
-        fail: makes the error for a key of the entry
-
     Raises:
         InputError: an unknown setting, or a value that it cannot have.
     """
@@ -53,11 +49,6 @@ def scenario_fields(entry: SettingsEntry, fail: Fail) -> dict[str, Any]:
 @reused(64)
 def generated(kind: str, seed: int, options: tuple[tuple[str, str], ...]) -> Task:
     """The random world that {generate: KIND, seed: SEED} with options stands for.
-
-    Args:
-        kind: a generator's name
-        seed: the seed
-        options: the generator's options by name, as text
 
     Raises:
         InputError: an unknown kind or option, a wrong value, or no such world was found.

@@ -64,11 +64,7 @@ def lookout_of(s: Scenario) -> Lookout | None:
 
 
 def predictor_of(s: Scenario, watch: Watch | None) -> Predictor | None:
-    """What predicts the movers for avoidance and replanning: from what the robot is told of them, or from its scans.
-
-    Args:
-        watch: what the scans tell, where the robot looks for movers
-    """
+    """What predicts the movers for avoidance and replanning: from what the robot is told of them, or from its scans."""
     if watch is not None:
         return TrackedPredictor(watch, s.effective_perception, s.control_hz)
     return Predictor(s.trajectories, s.effective_perception, s.control_hz) if s.trajectories else None

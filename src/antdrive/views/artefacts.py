@@ -57,12 +57,7 @@ class Results:
     root: Path = dataclasses.field(default_factory=Path.cwd)
 
     def of(self, file: Path, name: str) -> Path:
-        """The folder of one test.
-
-        Args:
-            file: the test's file
-            name: the test's name in it
-        """
+        """The folder of one test."""
         home = file.resolve().parent
         try:
             parts = home.relative_to(self.root.resolve()).parts
@@ -72,11 +67,7 @@ class Results:
         return self.folder.joinpath(*map(file_name, (*parts, stem, name)))
 
     def takes_film(self, *, failed: bool) -> bool:
-        """Whether a test gets a film. Of failed tests the first `MOST_FILMS` do, and each of them takes a place.
-
-        Args:
-            failed: whether the test failed
-        """
+        """Whether a test gets a film. Of failed tests the first `MOST_FILMS` do, and each of them takes a place."""
         if self.films != "failed":
             return self.films == "always"
         return failed and (self.places is None or any(_taken(self.places / str(k)) for k in range(MOST_FILMS)))
@@ -96,9 +87,6 @@ def file_name(name: str) -> str:
 
     Different names stay different, except for aisle[0] and aisle-0; a baseline holds the name of its test, so it is not taken
     for the other's.
-
-    Args:
-        name: a test's name
     """
     plain = re.sub(r"\[(\d+)\]$", r"-\1", name)
     if re.fullmatch(r"[\w.-]{1,120}", plain, re.ASCII):
@@ -108,11 +96,7 @@ def file_name(name: str) -> str:
 
 
 def default_folder(root: Path) -> Path:
-    """The folder of a project's results in the user's cache, or among the temporary files where that cannot be written.
-
-    Args:
-        root: the project's folder
-    """
+    """The folder of a project's results in the user's cache, or among the temporary files where that cannot be written."""
     name = f"{file_name(root.name or 'root')}-{zlib.crc32(str(root).encode()):08x}"
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path(os.path.expanduser("~")) / ".cache")
     for folder in (cache / "antdrive" / "results", Path(tempfile.gettempdir()) / f"antdrive-results-{_user()}"):
@@ -133,14 +117,6 @@ def write_artefacts(
     run: Run, folder: Path, baseline: Baseline | None, *, film: bool, faults: Sequence[str], commands: Sequence[str]
 ) -> dict[str, str]:
     """Write everything about a test into its folder; the files by what they are. Earlier files are removed first.
-
-    Args:
-        run: what was driven
-        folder: of this test alone
-        baseline: the earlier drive; None: there is none
-        film: whether to make a film
-        faults: why the test failed, a sentence each
-        commands: how to repeat the test
 
     Raises:
         InputError: the folder cannot be written to.
@@ -168,11 +144,6 @@ def write_artefacts(
 def write_traceback(folder: Path, error: BaseException, commands: Sequence[str]) -> dict[str, str]:
     """Write where an error arose, in place of what an earlier run wrote about the test; the files by what they are.
 
-    Args:
-        folder: of this test alone
-        error: what ended the test
-        commands: how to repeat the test
-
     Raises:
         InputError: the folder cannot be written to.
     """
@@ -183,11 +154,7 @@ def write_traceback(folder: Path, error: BaseException, commands: Sequence[str])
 
 
 def remove_artefacts(folder: Path) -> None:
-    """Remove what an earlier run wrote about a test; other files stay.
-
-    Args:
-        folder: of this test alone
-    """
+    """Remove what an earlier run wrote about a test; other files stay."""
     for name in FILES:
         with contextlib.suppress(OSError):
             (folder / name).unlink()
@@ -223,12 +190,7 @@ def _comparison(rollout: Rollout, baseline: Baseline | None, folder: Path, film:
 
 
 def drive_of(baseline: Baseline, now: Rollout) -> Rollout:
-    """A drive along a baseline's line, in the world of the present drive, for pictures: it has no commands and no contacts.
-
-    Args:
-        baseline: the earlier drive
-        now: the present drive
-    """
+    """A drive along a baseline's line, in the world of the present drive, for pictures: it has no commands and no contacts."""
     times = baseline.times
     samples = np.array(baseline.line, dtype=np.float64)
     pose = np.column_stack([samples[:, :2], np.unwrap(samples[:, 2])])

@@ -28,11 +28,6 @@ class Recollection:
         map: what was hit and which ground was seen free, in the frame of the estimated poses
         met: when a beam first met each cylinder, in the order of `record.world.obstacles` (N,) [s]; infinite if none did yet
 
-    Args:
-        rollout: the log
-        forgetting: whether the map is made anew of the latest scans where the robot did so
-        meeting: whether `met` is kept
-
     Raises:
         ValueError: the log has no scans.
     """
@@ -63,22 +58,14 @@ class Recollection:
         return np.asarray(self.map.seen_free | self.map.occupied)
 
     def known(self, points: Floats) -> npt.NDArray[np.bool_]:
-        """Whether places lie on ground that was seen free or hit (N,).
-
-        Args:
-            points: places in the frame of the estimated poses (N, 2) [m]
-        """
+        """Whether places lie on ground that was seen free or hit (N,)."""
         cols, rows = np.floor((points - self.map.origin) / self.map.cell).astype(np.int64).T
         high, wide = self.map.occupied.shape
         within = (rows >= 0) & (rows < high) & (cols >= 0) & (cols < wide)
         return np.asarray(within & self.seen[np.where(within, rows, 0), np.where(within, cols, 0)])
 
     def advance(self, at: float) -> None:
-        """Enter all scans up to a moment.
-
-        Args:
-            at: the moment [s]
-        """
+        """Enter all scans up to a moment."""
         while self._forgetting and self._forgetting[0] <= at + 1e-9:
             forgotten = self._forgetting.pop(0)
             self._enter_until(forgotten)
@@ -140,9 +127,6 @@ class Recollection:
         """Where the robot's map lies, if it is laid so that the robot is where it believes to be: (4,).
 
         The cosine and the sine of a turn, then x and y [m]: what they do to a point of the world gives its place on the map.
-
-        Args:
-            at: the moment [s]
         """
         row = self._row(at)
         x, y, turn = frame_at(self._rollout.pose[[row]], np.array([self._estimate(row)]))[0].tolist()
@@ -150,22 +134,13 @@ class Recollection:
 
 
 def laid_in_world(points: Floats, drift: Floats) -> Floats:
-    """Where places on the robot's map lie in the world (N, 2) [m].
-
-    Args:
-        points: places on the map (N, 2) [m]
-        drift: as `Recollection.drift` gives it (4,)
-    """
+    """Where places on the robot's map lie in the world (N, 2) [m]."""
     cos, sin, x, y = drift.tolist()
     return np.asarray((points - (x, y)) @ np.array([[cos, -sin], [sin, cos]]), dtype=np.float64)
 
 
 def containers(cylinders: Floats) -> npt.NDArray[np.intp]:
-    """For each of the cylinders (N, 4) one that it stands in, or itself: nobody sees what stands in another one.
-
-    Args:
-        cylinders: x, y, radius and height of each [m]
-    """
+    """For each of the cylinders (N, 4) one that it stands in, or itself: nobody sees what stands in another one."""
     found = np.arange(len(cylinders))
     for j, (x, y, radius, _) in enumerate(cylinders):
         room = cylinders[:, 2] - radius - np.hypot(cylinders[:, 0] - x, cylinders[:, 1] - y)

@@ -111,12 +111,7 @@ class Scene:
 
     @classmethod
     def planned(cls, task: Task, robot: RobotSpec, inflate: float, *, mapped: bool = True) -> Scene:
-        """The scene of a plan that was not driven.
-
-        Args:
-            inflate: how far the planner kept its path from obstacles [m]
-            mapped: whether the robot had a map
-        """
+        """The scene of a plan that was not driven."""
         discs = [(disc.x, disc.y, disc.radius, disc.height) for disc in task.world.obstacles]
         # The motion of wandering movers depends on a run's seed.
         shown = [mover for mover in task.world.movers if not isinstance(mover, Wandering)]
@@ -160,11 +155,7 @@ class Scene:
         return self.mapped and self.inflate > 0
 
     def around(self, way: Floats) -> Bounds:
-        """The part of the plane that a map shows [m]: the world, and what a robot without a map planned first.
-
-        Args:
-            way: the first plan or route (N, 2) [m]; it may lead out of the world
-        """
+        """The part of the plane that a map shows [m]: the world, and what a robot without a map planned first."""
         if self.mapped or not len(way):
             return self.bounds
         (x0, y0), (x1, y1) = way.min(axis=0).tolist(), way.max(axis=0).tolist()
@@ -188,13 +179,7 @@ class Scene:
 
 
 def contact_point(scene: Scene, pose: npt.ArrayLike, index: int, movers: Floats) -> tuple[float, float]:
-    """The point [m] on the surface of an obstacle, a mover or a wall that is nearest to the robot.
-
-    Args:
-        pose: the robot's x, y [m] and heading [rad]
-        index: as in a log's contacts: obstacles first, then movers, then the walls left, right, bottom, top
-        movers: the movers' positions (M, 2) [m]
-    """
+    """The point [m] on the surface of an obstacle, a mover or a wall that is nearest to the robot."""
     x, y, yaw = (float(value) for value in np.asarray(pose))
     foot = scene.robot.footprint
     discs = np.vstack([scene.obstacles[:, :3], np.column_stack([movers, scene.mover_radii])])

@@ -31,10 +31,6 @@ def check_display() -> None:
 def show(rollout: Rollout, *, hold: float = 3.0) -> None:
     """Replay a run in a window until it ends or the window is closed.
 
-    Args:
-        rollout: the run's log
-        hold: how long the last picture stays [s]
-
     Raises:
         InputError: there is no display, or the viewer did not open.
     """

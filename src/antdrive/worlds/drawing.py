@@ -29,16 +29,7 @@ def world_svg(
     lines: Iterable[tuple[Floats, str, bool]] = (),
     movers: Iterable[tuple[Floats, float]] = (),
 ) -> str:
-    """A world from above, as SVG.
-
-    Args:
-        bounds: the world's bounds [m]
-        discs: the obstacles (N, 3): x, y, radius [m]
-        start: the robot's first pose, drawn as an arrowhead
-        goal: x, y and tolerance [m]
-        lines: polylines: points (N, 2) [m], colour, whether dashed
-        movers: the way (N, 2) [m] and the radius [m] of each; drawn as a disc at the first point and a dotted line
-    """
+    """A world from above, as SVG."""
     x0, y0, x1, y1 = bounds
     scale = LONGER_SIDE / max(x1 - x0, y1 - y0)
     pen = 1.6 / scale
@@ -67,12 +58,7 @@ def world_svg(
 
 
 def path_svg(points: Floats, longer_side: int = 240) -> str:
-    """A polyline alone, x right and y up, as SVG.
-
-    Args:
-        points: the polyline (N, 2)
-        longer_side: of the picture [px]
-    """
+    """A polyline alone, x right and y up, as SVG."""
     (x0, y0), (x1, y1) = points.min(axis=0) - 1, points.max(axis=0) + 1
     pen = 2.0 * max(x1 - x0, y1 - y0) / longer_side
     line = _polyline(points, f'stroke="{LINE}" stroke-width="{pen:.3g}"')
@@ -101,13 +87,7 @@ def cells_svg(free: npt.NDArray[np.bool_]) -> str:
 
 
 def curve_svg(values: Floats, width: int = 240, height: int = 90) -> str:
-    """Values by iteration, as SVG; empty where fewer than two are finite.
-
-    Args:
-        values: one value for each iteration (N,); those that are not finite are left out
-        width: of the picture [px]
-        height: of the picture [px]
-    """
+    """Values by iteration, as SVG; empty where fewer than two are finite."""
     known = [(k, float(value)) for k, value in enumerate(values) if math.isfinite(value)]
     if len(known) < 2:
         return ""
@@ -124,13 +104,7 @@ def curve_svg(values: Floats, width: int = 240, height: int = 90) -> str:
 
 
 def card(picture: str, title: str, facts: Mapping[str, object]) -> str:
-    """A picture with a title and a table of facts below, as HTML.
-
-    Args:
-        picture: SVG
-        title: plain text
-        facts: names and values, in the order of the table
-    """
+    """A picture with a title and a table of facts below, as HTML."""
     rows = "".join(
         f'<tr><td style="color:#5b6576;text-align:left">{escape(str(key))}</td>'
         f'<td style="text-align:left">{escape(str(value))}</td></tr>'

@@ -17,30 +17,15 @@ def cells_beside(inflate: float, cell: float) -> int:
     """How many rows and columns away from its own cell an end may be joined to the grid.
 
     Getting to farther cells would take a plan of its own.
-
-    Args:
-        inflate: the robot's radius plus the margin [m]
-        cell: side of a cell [m]
     """
     return max(3, math.ceil(inflate / cell) + 1)
 
 
 def end_reach(inflate: float, cell: float) -> float:
-    """The farthest that the centre of such a cell can be from the end [m].
-
-    Args:
-        inflate: the robot's radius plus the margin [m]
-        cell: side of a cell [m]
-    """
+    """The farthest that the centre of such a cell can be from the end [m]."""
     return math.sqrt(2.0) * (cells_beside(inflate, cell) + 0.5) * cell
 
 
 def longest_line(cost: float, leads: float, cell: float) -> float:
-    """The greatest length of a line beside a path of cells [m].
-
-    Args:
-        cost: length of the cells [m]
-        leads: the distances of the first cell from the start and of the last from the goal, together [m]
-        cell: side of a cell [m]
-    """
+    """The greatest length of a line beside a path of cells [m]."""
     return cost + leads + DETOUR * cell

@@ -84,9 +84,6 @@ class Motion(ABC):
 def require_few_draws(motions: Iterable[Motion]) -> None:
     """Refuse wanderers that took too many draws together to find free first cells.
 
-    Args:
-        motions: the motions so far of a world's movers
-
     Raises:
         FieldError: there were more than MAX_DRAWS.
     """
@@ -98,14 +95,6 @@ def require_few_draws(motions: Iterable[Motion]) -> None:
 
 def motion_of(mover: Mover, index: int, bounds: Bounds, discs: Floats, robot: Point, seed: int) -> Motion:
     """The motion of one mover of a world.
-
-    Args:
-        mover: the mover as declared
-        index: its place in the world's list
-        bounds: the world's bounds [m]
-        discs: the world's obstacles (N, 3): x, y, radius [m]
-        robot: the robot's start, which a wanderer's random first cell keeps off [m]
-        seed: the run's random seed
 
     Raises:
         FieldError: a wanderer has no room in its first cell, or there is no free first cell.
@@ -119,12 +108,7 @@ def motion_of(mover: Mover, index: int, bounds: Bounds, discs: Floats, robot: Po
 
 
 def way_ahead(motion: Motion, seconds: float) -> Floats:
-    """Where a mover goes from a run's start on, up to its first jump (N, 2) [m]: a line to draw.
-
-    Args:
-        motion: the mover
-        seconds: how far ahead [s]
-    """
+    """Where a mover goes from a run's start on, up to its first jump (N, 2) [m]: a line to draw."""
     end = float(min(motion.jump_times(seconds), default=seconds))
     times = np.linspace(0.0, end, WAY_POINTS)
     return motion.at(times[:-1] if end < seconds else times)
@@ -308,11 +292,6 @@ class _WanderingMotion(Motion):
 
 def first_cell(mover: Wandering, bounds: Bounds, discs: Floats) -> Point:
     """The centre of the cell that holds the start of a wanderer that has one.
-
-    Args:
-        mover: a wanderer with a start
-        bounds: the world's bounds [m]
-        discs: the world's obstacles (N, 3): x, y, radius [m]
 
     Raises:
         FieldError: the start is out of bounds, or the mover would touch an obstacle or a wall there.

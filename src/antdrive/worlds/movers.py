@@ -164,9 +164,6 @@ _KEYS_BY_KIND = {
 def mover_from_dict(entry: Mapping[str, Any]) -> Mover:
     """The mover in plain data, as in a world file.
 
-    Args:
-        entry: the keys of a mover in a world file; a key whose value is None counts as left out
-
     Raises:
         FieldError: a key is missing, does not belong to this kind of mover, or has a wrong value.
     """
@@ -196,11 +193,7 @@ def mover_from_dict(entry: Mapping[str, Any]) -> Mover:
 
 
 def mover_to_dict(mover: Mover) -> dict[str, Any]:
-    """A mover as plain data with the keys of a world file, ready for JSON.
-
-    Args:
-        mover: the mover to describe
-    """
+    """A mover as plain data with the keys of a world file, ready for JSON."""
     body: dict[str, Any] = {"radius": float(mover.radius), "height": float(mover.height)}
     if mover.phase:
         body["phase"] = float(mover.phase)
@@ -218,12 +211,7 @@ def mover_to_dict(mover: Mover) -> dict[str, Any]:
 
 
 def later(mover: Mover, seconds: float) -> Mover:
-    """The same mover, further into its motion when a run starts.
-
-    Args:
-        mover: the mover
-        seconds: how much further [s]
-    """
+    """The same mover, further into its motion when a run starts."""
     return dataclasses.replace(mover, phase=mover.phase + seconds)
 
 

@@ -24,9 +24,6 @@ def reused(most: int) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """A decorator: the function's last results are kept and given again for equal arguments of the same types.
 
     The function must not depend on anything but its arguments, and nobody may change its results. Errors are not kept.
-
-    Args:
-        most: how many results are kept; the one that was not asked for the longest gives way
     """
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:

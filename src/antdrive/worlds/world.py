@@ -160,11 +160,6 @@ class PointWorld(World):
     def of(cls, name: str, bounds: Bounds, discs: Floats) -> PointWorld:
         """The world of so many cylinders.
 
-        Args:
-            name: what people call the world
-            bounds: the walls' inner faces: xmin, ymin, xmax, ymax [m]
-            discs: x, y and radius of each cylinder (N, 3) [m]
-
         Raises:
             FieldError: a value is not finite, or a radius is not positive.
         """

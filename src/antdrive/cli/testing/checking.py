@@ -240,18 +240,6 @@ def check_run(
 ) -> CheckResult:
     """Judge a run.
 
-    Args:
-        run: what was driven
-        demands: what the test demands
-        path: where its baseline is; None: it has none
-        address: the test, as commands name it
-        name: the test's name in its suite or file
-        update: which baselines to write
-        commands: how to repeat the test
-        accept: the command that writes its baseline; by default `antdrive accept`
-        folder: where to write log and pictures if the test fails; None: nowhere
-        results: of which tests a film is made; None: nothing is written
-
     Raises:
         InputError: the baseline is wrong, or it or the folder cannot be written.
     """
@@ -325,10 +313,6 @@ def _written(
 
 def own_baseline(path: Path, name: str) -> Baseline | None:
     """The baseline in a file, which must be that of the test; None if there is no such file.
-
-    Args:
-        path: the file
-        name: the test's name in its suite or file
 
     Raises:
         InputError: the file is no baseline, or that of another test.

@@ -13,9 +13,6 @@ def compile_in_turn(say: Callable[[str], None]) -> None:
     """Compile every kernel if this installation has not done so yet; processes that come at the same time wait for one of them.
 
     Nothing is done where no cache can be kept: then each process compiles what it calls.
-
-    Args:
-        say: is called with a sentence before the work
     """
     from antdrive.base.kernel_cache import cache_folder
     from antdrive.cli.warm import is_warm, warm

@@ -143,11 +143,7 @@ def drive(request: pytest.FixtureRequest) -> DriveFixture:
 
 
 def compile_first(config: pytest.Config) -> None:
-    """Compile the kernels before the first drive of an installation, and say so.
-
-    Args:
-        config: of this run of pytest
-    """
+    """Compile the kernels before the first drive of an installation, and say so."""
     if _COMPILED in config.stash:
         return
     config.stash[_COMPILED] = True
@@ -162,12 +158,7 @@ def compile_first(config: pytest.Config) -> None:
 
 
 def note(item: pytest.Item, result: CheckResult) -> None:
-    """Remember what came out of a drive, for reports.
-
-    Args:
-        item: the test that drove
-        result: what came out
-    """
+    """Remember what came out of a drive, for reports."""
     from antdrive.cli.testing.summary import properties
 
     item.stash.setdefault(_DROVE, []).append(result)

@@ -15,11 +15,7 @@ SHOWN = ("min_clearance_m", "duration_s", "driven_length_m")
 
 
 def properties(result: CheckResult) -> list[tuple[str, str]]:
-    """What a test report says about a drive, as names and texts; JUnit files hold them.
-
-    Args:
-        result: what came out of the drive
-    """
+    """What a test report says about a drive, as names and texts; JUnit files hold them."""
     facts = {
         "test": result.address,
         "case": result.case,
@@ -39,11 +35,7 @@ def properties(result: CheckResult) -> list[tuple[str, str]]:
 
 
 def drives_in(properties: Iterable[tuple[str, Any]]) -> Iterator[dict[str, str]]:
-    """The drives that a test report tells of; each begins with its test.
-
-    Args:
-        properties: the report's properties
-    """
+    """The drives that a test report tells of; each begins with its test."""
     found: dict[str, str] = {}
     for name, value in properties:
         if name == "drive.test":
@@ -57,13 +49,7 @@ def drives_in(properties: Iterable[tuple[str, Any]]) -> Iterator[dict[str, str]]
 
 
 def lines(drives: Sequence[Mapping[str, str]], unused: Sequence[str], strict: bool) -> Iterator[str]:
-    """What the terminal shows: baselines written, drives better than theirs, results, unused baselines.
-
-    Args:
-        drives: all drives of the run of pytest
-        unused: baselines that belong to no test
-        strict: whether unused baselines are a failure
-    """
+    """What the terminal shows: baselines written, drives better than theirs, results, unused baselines."""
     failed = sum(drive["passed"] == "false" for drive in drives)
     if drives:
         yield f"{len(drives) - failed} of {len(drives)} drives passed"
@@ -82,22 +68,12 @@ def lines(drives: Sequence[Mapping[str, str]], unused: Sequence[str], strict: bo
 
 
 def films_left_out(count: int, option: str) -> str:
-    """That failed drives have no film, because a run makes no more than a few, and what makes them.
-
-    Args:
-        count: of failed drives without a film
-        option: that films all
-    """
+    """That failed drives have no film, because a run makes no more than a few, and what makes them."""
     return f"{count} more failed drives have no film; the command that repeats a drive makes it, {option} makes all"
 
 
 def markdown(drives: Sequence[Mapping[str, str]], unused: Sequence[str]) -> str:
-    """A summary for the page of a CI run.
-
-    Args:
-        drives: all drives of the run of pytest
-        unused: baselines that belong to no test
-    """
+    """A summary for the page of a CI run."""
     failed = [drive for drive in drives if drive["passed"] == "false"]
     text = [f"### Drives: {len(drives) - len(failed)} of {len(drives)} passed", ""]
     if failed:
@@ -125,10 +101,6 @@ def markdown(drives: Sequence[Mapping[str, str]], unused: Sequence[str]) -> str:
 def save_junit(results: Sequence[CheckResult], path: Path) -> None:
     """Write the results of suites as JUnit XML, with the same properties as pytest's.
 
-    Args:
-        results: one for each test
-        path: the file
-
     Raises:
         InputError: the file cannot be written.
     """
@@ -154,13 +126,7 @@ def save_junit(results: Sequence[CheckResult], path: Path) -> None:
 
 
 def add_to_page(page: str, drives: Sequence[Mapping[str, str]], unused: Sequence[str]) -> str:
-    """Add a summary to the page of a CI run, the file that GITHUB_STEP_SUMMARY names; what is wrong with the file, if it is.
-
-    Args:
-        page: the file
-        drives: all drives of the run
-        unused: baselines that belong to no test
-    """
+    """Add a summary to the page of a CI run, the file that GITHUB_STEP_SUMMARY names; what is wrong with the file, if it is."""
     try:
         with open(page, "a", encoding="utf-8") as file:
             file.write(markdown(drives, unused))

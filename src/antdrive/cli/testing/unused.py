@@ -11,12 +11,7 @@ from antdrive.runs.suites.suite import BASELINES, SUFFIX, SuiteCase, baseline_fo
 
 
 def unused_of_suite(suite: Path, cases: Iterable[SuiteCase]) -> Iterator[Path]:
-    """The baselines in a suite's folder that belong to none of its tests, and those of suites and modules that are gone.
-
-    Args:
-        suite: the suite's file
-        cases: all its tests
-    """
+    """The baselines in a suite's folder that belong to none of its tests, and those of suites and modules that are gone."""
     suite = suite.resolve()  # as the tests' own paths are
     used = {case.baseline_path for case in cases if case.entry.baseline}
     if not suite.with_name(
@@ -30,12 +25,7 @@ def unused_of_suite(suite: Path, cases: Iterable[SuiteCase]) -> Iterator[Path]:
 
 
 def unused_of_module(module: Path, tests: Iterable[str]) -> Iterator[Path]:
-    """The baselines in the folder of a module of tests that belong to none of its tests.
-
-    Args:
-        module: the module's file
-        tests: the names of all its tests
-    """
+    """The baselines in the folder of a module of tests that belong to none of its tests."""
     names = tuple(tests)
     for path, case in _of_module(module):
         if not any(_belongs(case, name) for name in names):
@@ -43,12 +33,7 @@ def unused_of_module(module: Path, tests: Iterable[str]) -> Iterator[Path]:
 
 
 def unused_drives_of_module(module: Path, drives: Mapping[str, Collection[str]]) -> Iterator[Path]:
-    """The baselines in the folder of a module of tests that belong to drives which their tests no longer make.
-
-    Args:
-        module: the module's file
-        drives: the names of the drives that each test made, by the test's name; tests that ended early are left out
-    """
+    """The baselines in the folder of a module of tests that belong to drives which their tests no longer make."""
     for path, case in _of_module(module):
         owners = [name for name in drives if _belongs(case, name)]
         if owners and case not in drives[max(owners, key=len)]:

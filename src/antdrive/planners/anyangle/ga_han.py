@@ -62,14 +62,7 @@ class Incumbent:
         return True
 
     def report(self, population: Floats, lengths: Floats, *, arrived: int, work: int) -> Iteration:
-        """The state after a generation, whose shortest line is offered first.
-
-        Args:
-            population: the via points of feasible chromosomes [m] (P, n, 2); P may be 0
-            lengths: the lengths of their lines [m] (P,)
-            arrived: how many chromosomes count as arrived
-            work: how many chromosomes were rated
-        """
+        """The state after a generation, whose shortest line is offered first."""
         leads = self.ends.lead_length
         if len(lengths):
             first = int(lengths.argmin())

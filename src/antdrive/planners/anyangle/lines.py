@@ -54,10 +54,6 @@ def route_ends(query: Query, *, touching: bool = False) -> RouteEnds:
     A start with too little room is left on the straight line to the centre of its cell, which `Query.between`
     has found clear. A goal with too little room is not reached: the route ends at the centre of its cell. A
     goal with just the clearance is reached from that centre.
-
-    Args:
-        query: the query
-        touching: whether ends with just the clearance count as having room
     """
     (start, goal) = (_point(xy) for xy in query.grid.xy([query.start, query.goal]))
     if query.task is None:

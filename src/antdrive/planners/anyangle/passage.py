@@ -39,10 +39,6 @@ def widest_passage(task: Task, most: float) -> Passage | None:
     """The narrowest place on the way of the widest disc from the task's start to its goal.
 
     None if not even a point gets there, or in worlds of more than `MOST_OBSTACLES`.
-
-    Args:
-        task: the world, its start and its goal; movers do not count
-        most: a radius that is known not to pass [m]
     """
     world = task.world
     if len(world.obstacles) > MOST_OBSTACLES:

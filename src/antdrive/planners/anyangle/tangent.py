@@ -124,15 +124,6 @@ def shortest(
     None if there is no such path. Contact closes a gap: nothing passes between two discs exactly 2 `inflate`
     apart, or between such a disc and a wall. Both ends must have the clearance; having just the clearance
     suffices.
-
-    Args:
-        discs: x, y, radius of each [m] (N, 3)
-        bounds: the walls [m]
-        inflate: the clearance [m]
-        start: the path's first point [m]
-        goal: its last point [m]
-        expected: a length that the path probably does not exceed [m], which makes the search faster; a path that does is
-            found, too
     """
     from antdrive.planners.anyangle import _kernels_tangent
 

@@ -248,12 +248,7 @@ class ExploringAnts(AntSystem):
 
 
 def ranked(lengths: Floats, ranks: int) -> Floats:
-    """The share of its deposit that each ant makes (ants,): 1 for the best, 1 / ranks less with each rank, 0 off the list.
-
-    Args:
-        lengths: of the ants' tours, inf where an ant did not arrive (ants,); of equal ones the earlier ranks first
-        ranks: how many ranks there are
-    """
+    """The share of its deposit that each ant makes (ants,): 1 for the best, 1 / ranks less with each rank, 0 off the list."""
     rank = np.empty(len(lengths), dtype=np.int64)
     rank[np.argsort(lengths, kind="stable")] = np.arange(len(lengths))
     return np.maximum(1.0 - rank / ranks, 0.0)

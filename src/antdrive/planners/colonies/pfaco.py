@@ -282,13 +282,7 @@ class AntPool:
         return int(self.ranking.counts[ENTRIES])
 
     def run(self, trail: Floats, heuristic: Floats, alpha: float) -> tuple[Floats, int]:
-        """Run one iteration: the lengths of the walks that arrived [cells], and the steps of all ants together.
-
-        Args:
-            trail: the pheromone, changed in place (cells,)
-            heuristic: U_ij^beta (cells, 8)
-            alpha: the exponent of the pheromone
-        """
+        """Run one iteration: the lengths of the walks that arrived [cells], and the steps of all ants together."""
         from antdrive.planners.colonies import _kernels_pfaco
 
         planner, graph = self.planner, self.graph

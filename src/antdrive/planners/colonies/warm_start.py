@@ -59,14 +59,7 @@ class WarmStartedColony(CachedReplanner):
 
 
 def even_out(trail: Floats, shape: tuple[int, int], changed: npt.NDArray[np.int64], reach: int) -> None:
-    """Move trails near changed cells towards the strongest trail, by a share of 1 - d / (reach + 1).
-
-    Args:
-        trail: the trails (cells, 8), changed in place
-        shape: rows and columns of the grid
-        changed: flat indices of the changed cells (N,)
-        reach: largest distance d to the nearest changed cell at which trails still move [cells]
-    """
+    """Move trails near changed cells towards the strongest trail, by a share of 1 - d / (reach + 1)."""
     near = np.zeros(shape, dtype=np.bool_)
     near.ravel()[changed] = True
     share = near / (reach + 1.0)

@@ -78,12 +78,7 @@ class PotentialField(GridPlanner):
 
 
 def obstacle_distance(query: Query, reach: float = math.inf) -> Floats:
-    """Distance from each cell's centre to the nearest obstacle (R, C) [m].
-
-    Args:
-        query: the query; if it has no task, blocked cells count as obstacles
-        reach: distances beyond this may be infinite [m]
-    """
+    """Distance from each cell's centre to the nearest obstacle (R, C) [m]."""
     from antdrive.planners.graph import _kernels_apf
 
     grid = query.grid

@@ -134,12 +134,7 @@ class SteppingAgent(abc.ABC):
         self._cell = self._query.start
 
     def step(self, blocked: npt.ArrayLike) -> Cell | None:
-        """The cell to go to, an allowed move away, or None to wait.
-
-        Args:
-            blocked: cells (N, 2) that are blocked now, besides those of the grid. Cells that the grid blocks
-                and cells outside it may be among them; the robot's own cell has no effect.
-        """
+        """The cell to go to, an allowed move away, or None to wait."""
         if self.arrived:
             return None
         cells = np.asarray(blocked, dtype=np.int64).reshape(-1, 2)

@@ -318,12 +318,7 @@ class PurePursuit:
 
 
 def unsorted(discs: Floats, bounds: Bounds | Floats) -> ObstacleIndex:
-    """Obstacles that all lie in one square.
-
-    Args:
-        discs: x, y and radius of each (N, 3) [m]
-        bounds: the walls' inner faces: x_min, y_min, x_max, y_max [m]
-    """
+    """Obstacles that all lie in one square."""
     return ObstacleIndex(discs, np.array([0, len(discs)]), np.asarray(bounds, dtype=np.float64), EVERYTHING)
 
 

@@ -13,13 +13,7 @@ MOST_PACKAGES = 100  # that one file may refer to
 
 
 def package_folder(source: Path, name: str, packages: Mapping[str, Path]) -> Path | None:
-    """The folder of a package: as given, or one of that name beside the file or above it; None if there is none.
-
-    Args:
-        source: the file that refers to it
-        name: the package's name
-        packages: folders that were given, by package
-    """
+    """The folder of a package: as given, or one of that name beside the file or above it; None if there is none."""
     if name in packages:
         return packages[name]
     above = source.resolve().parents
@@ -28,11 +22,6 @@ def package_folder(source: Path, name: str, packages: Mapping[str, Path]) -> Pat
 
 def expanded(path: Path, arguments: Mapping[str, str], packages: Mapping[str, Path]) -> str:
     """The URDF text of a xacro file.
-
-    Args:
-        path: the file
-        arguments: values of its <xacro:arg> by name
-        packages: folders that were given, by package
 
     Raises:
         InputError: there is no such file, or it cannot be expanded.
@@ -89,9 +78,6 @@ def _in_one_line(error: Exception) -> str:
 
 def checked_packages(given: Mapping[str, str]) -> dict[str, Path]:
     """Folders of packages, as people gave them.
-
-    Args:
-        given: folders by package
 
     Raises:
         InputError: there is no such folder.

@@ -17,11 +17,7 @@ LIKE = 0.97  # the share of a disc or rectangle that an outline fills which coun
 
 
 def convex_hull(points: Iterable[Point]) -> list[Point]:
-    """The corners of the convex hull, counter-clockwise.
-
-    Args:
-        points: at least three that are not on one line [m]
-    """
+    """The corners of the convex hull, counter-clockwise."""
     ordered = sorted({(round(x, 7), round(y, 7)) for x, y in points})
     halves: list[list[Point]] = []
     for way in (ordered, ordered[::-1]):
@@ -39,10 +35,6 @@ def fewer_corners(corners: list[Point], most: int) -> list[Point]:
 
     Edges that cost next to nothing are left out in any case: a wheel whose quarter turn is written 1.57 is a little askew.
     What is the same on the left as on the right stays so: edges are left out together with their mirror images.
-
-    Args:
-        corners: counter-clockwise [m]
-        most: how many corners may remain
     """
     corners = list(corners)
     cheap = CHEAP * sum(_area((0.0, 0.0), a, b) for a, b in zip(corners, corners[1:] + corners[:1], strict=True))
@@ -75,13 +67,7 @@ def _cost(corners: list[Point], k: int) -> float:
 
 
 def _left_out(corners: list[Point], k: int, symmetric: bool) -> list[Point] | None:
-    """The corners without the edge from corner k; None where that is impossible.
-
-    Args:
-        corners: of a convex polygon, counter-clockwise [m]
-        k: the corner with which the edge begins
-        symmetric: whether the mirror image of the edge goes with it
-    """
+    """The corners without the edge from corner k; None where that is impossible."""
     n, (a, b, c, d) = len(corners), _around_edge(corners, k)
     tip = _meeting(a, b, d, c)
     if tip is None:
@@ -108,10 +94,6 @@ def footprint_around(points: Iterable[Point], kind: str = "auto") -> Footprint:
     """A footprint that holds all points: a disc or a rectangle where they nearly fill one, and else a polygon.
 
     Its numbers are multiples of a hundredth of a millimetre, rounded so that no point is outside by more than `LOOSE`.
-
-    Args:
-        points: in the robot's frame [m]
-        kind: disc, rectangle, polygon, or auto
     """
     held = list(points)
     hull = convex_hull(held)
@@ -132,12 +114,7 @@ def footprint_around(points: Iterable[Point], kind: str = "auto") -> Footprint:
 
 
 def _polygon_around(held: list[Point], corners: list[Point]) -> Footprint:
-    """A polygon with rounded corners, moved outwards until it holds all points.
-
-    Args:
-        held: the points [m]
-        corners: of a polygon that holds them but for rounding, counter-clockwise [m]
-    """
+    """A polygon with rounded corners, moved outwards until it holds all points."""
     out = 0.0
     while True:
         # The hull of rounded corners holds them all, although rounding may bend a nearly straight corner inwards.
@@ -148,12 +125,7 @@ def _polygon_around(held: list[Point], corners: list[Point]) -> Footprint:
 
 
 def _moved_out(corners: list[Point], distance: float) -> list[Point]:
-    """A convex polygon whose edges are moved outwards.
-
-    Args:
-        corners: counter-clockwise [m]
-        distance: [m]
-    """
+    """A convex polygon whose edges are moved outwards."""
     found = []
     for k, (x, y) in enumerate(corners):
         (ax, ay), (bx, by) = (

@@ -36,14 +36,7 @@ class _Limit(NamedTuple):
 def add_speeds(
     model: UrdfModel, wheels: tuple[DrivenWheel, DrivenWheel], found: Found, given: Mapping[str, float]
 ) -> None:
-    """Add the limits of the speeds, and of the wheels' speed.
-
-    Args:
-        model: the robot
-        wheels: those that drive it
-        found: wheel_radius and track are there already
-        given: keys that people gave, and that stay
-    """
+    """Add the limits of the speeds, and of the wheels' speed."""
     radius, track = found["wheel_radius"][0], found["track"][0]
     limit = min(_lowest(wheels, "velocity", "rad/s"), _lowest_commanded(wheels))
     turning = seven_digits(limit.value)
@@ -79,15 +72,7 @@ def add_speeds(
 
 
 def _of_joints(key: str, limit: _Limit, reach: float, most: float, assumed: float) -> tuple[float, str]:
-    """A limit of the speeds as it follows from the joints' alone, and how.
-
-    Args:
-        key: of the robot's file
-        limit: the joints'
-        reach: the speed of a wheel's rim at that limit [m/s]
-        most: the value that it allows
-        assumed: the value that stands for no limit
-    """
+    """A limit of the speeds as it follows from the joints' alone, and how."""
     if reach == math.inf:
         return assumed, NO_LIMIT
     if reach > ROBOT_RANGE["max_speed"][1]:
@@ -105,15 +90,7 @@ def add_forces(
     found: Found,
     given: Mapping[str, float],
 ) -> None:
-    """Add the motors' torque, and the accelerations that they and the wheels' grip allow.
-
-    Args:
-        model: the robot
-        wheels: those that drive it
-        outline: its footprint
-        found: mass, wheel_radius and track are there already
-        given: keys that people gave, and that stay
-    """
+    """Add the motors' torque, and the accelerations that they and the wheels' grip allow."""
     mass, radius, track = (found[key][0] for key in ("mass", "wheel_radius", "track"))
     if "wheel_torque" not in given:
         found["wheel_torque"] = _torque(model, wheels, mass, radius)
@@ -177,11 +154,7 @@ def _lowest_commanded(wheels: tuple[DrivenWheel, DrivenWheel]) -> _Limit:
 
 
 def seven_digits(value: float) -> float:
-    """A number as the file will have it, in seven digits, so that what follows from it is exactly reached.
-
-    Args:
-        value: the number
-    """
+    """A number as the file will have it, in seven digits, so that what follows from it is exactly reached."""
     return float(f"{value:.7g}")
 
 

@@ -104,22 +104,14 @@ class UrdfModel:
     lidars: tuple[UrdfSensor, ...] = ()
 
     def above(self, link: str) -> Iterator[UrdfJoint]:
-        """The joints between a link and the root, from the link on.
-
-        Args:
-            link: the link
-        """
+        """The joints between a link and the root, from the link on."""
         holders = {joint.child: joint for joint in self.joints.values()}
         while link in holders:
             yield holders[link]
             link = holders[link].parent
 
     def drive_number(self, *tags: str) -> tuple[str, float | None]:
-        """The first of some tags of the drive plugin that has a number greater than 0, and the number; None if none has.
-
-        Args:
-            tags: without brackets
-        """
+        """The first of some tags of the drive plugin that has a number greater than 0, and the number; None if none has."""
         for tag in tags:
             try:
                 value = float(self.drive.get(tag, ""))
@@ -139,13 +131,6 @@ def read_model(
     packages: Mapping[str, Path] = MappingProxyType({}),
 ) -> UrdfModel:
     """The robot in a URDF or xacro file.
-
-    Args:
-        path: the file; .xacro is expanded first
-        meshes: the folder in which meshes are looked for; by default beside the file and above it
-        without_meshes: leave out meshes that are not found, instead of refusing the file
-        arguments: values of a xacro file's arguments by name
-        packages: the folders of ROS packages by name, for those that are not found beside the file or above it
 
     Raises:
         InputError: the file cannot be read, or is no robot.

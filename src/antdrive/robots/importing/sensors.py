@@ -39,12 +39,7 @@ class UrdfSensor:
 
 
 def lidar_sensors(root: ET.Element, places: Mapping[str, Floats]) -> tuple[UrdfSensor, ...]:
-    """The lidars that Gazebo would simulate.
-
-    Args:
-        root: the <robot>
-        places: the frame of each link in that of the root (4, 4)
-    """
+    """The lidars that Gazebo would simulate."""
     return tuple(
         UrdfSensor(f"sensor {sensor.get('name', 'without a name')} of link {link}", places[link], sensor)
         for gazebo in root.findall("gazebo")
@@ -56,14 +51,7 @@ def lidar_sensors(root: ET.Element, places: Mapping[str, Floats]) -> tuple[UrdfS
 def found_lidar(
     sensors: tuple[UrdfSensor, ...], frame: Floats, floor: float, foot: Footprint
 ) -> tuple[Lidar | None, str]:
-    """The first lidar that a robot's file can hold, and where it comes from; none, and why, where there is no such.
-
-    Args:
-        sensors: lidars of the URDF file
-        frame: the robot's origin and axes, seen from above, in the root's frame: origin, x and y as rows (3, 2)
-        floor: the height of the floor in the root's frame [m]
-        foot: the robot's footprint, on which a lidar must be
-    """
+    """The first lidar that a robot's file can hold, and where it comes from; none, and why, where there is no such."""
     problems = []
     for k, sensor in enumerate(sensors):
         try:
@@ -117,11 +105,7 @@ def _lidar(sensor: UrdfSensor, frame: Floats, floor: float) -> tuple[Lidar, list
 
 
 def lidar_entry(lidar: Lidar) -> dict[str, str]:
-    """A lidar as it stands in a robot's file.
-
-    Args:
-        lidar: the lidar
-    """
+    """A lidar as it stands in a robot's file."""
     values = dataclasses.asdict(lidar)
     return {key: str(value) if key == "beams" else _decimal(value) for key, value in values.items()}
 

@@ -73,18 +73,6 @@ def import_urdf(
 ) -> ImportedRobot:
     """A differential-drive robot out of a URDF or xacro file.
 
-    Args:
-        path: the file
-        left: the joint or link of the left driven wheel; None: found by its axle
-        right: the same of the right one
-        below: collision geometry that lies higher above the floor is no part of the footprint [m]
-        footprint: its kind: disc, rectangle, polygon, or auto for the first of these that fits
-        meshes: the folder in which meshes are looked for; None: beside the file and above it
-        without_meshes: leave out meshes that are not found
-        given: values of the robot file by key, which replace what the file says
-        arguments: values of a xacro file's arguments by name
-        packages: the folders of ROS packages by name, for those that are not found beside the file or above it
-
     Raises:
         InputError: the file cannot be read, or describes no differential drive.
     """
@@ -275,10 +263,6 @@ def _few(names: list[str]) -> str:
 
 def require_writable(target: Path, source: Path) -> None:
     """Refuse to write a robot over the file that it comes from.
-
-    Args:
-        target: the robot file
-        source: the URDF file
 
     Raises:
         InputError: they are one file.

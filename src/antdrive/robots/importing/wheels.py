@@ -44,12 +44,6 @@ def driven_wheels(
 ) -> tuple[DrivenWheel, DrivenWheel]:
     """The left and the right driven wheel.
 
-    Args:
-        model: the robot
-        left: the joint or link of the left wheel; None: to be found
-        right: the same of the right wheel
-        radius: of both wheels [m]; None: as the file has it
-
     Raises:
         InputError: the robot is no differential drive, or it is not clear which wheels drive it.
     """

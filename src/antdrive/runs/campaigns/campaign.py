@@ -28,9 +28,6 @@ def _listed(value: Any) -> Any:
 def seeds_of(value: Any) -> list[int]:
     """The seeds that people write as a number of them, as [3, 7] or as 0-9.
 
-    Args:
-        value: plain data
-
     Raises:
         ValueError: it is none of these; the text says what would be right.
     """

@@ -40,13 +40,6 @@ def run_on_cluster(
 ) -> Generator[Finished, None, None]:
     """Make runs on a cluster; the results come in any order.
 
-    Args:
-        jobs: the runs
-        work: what to do with each
-        address: tcp://HOST:PORT of a scheduler, or local:N for N processes on this machine
-        limit: how long a run may take before its process is ended [s]; None: as long as it likes
-        tick: is called between looks at the results
-
     Raises:
         InputError: the address is wrong, the scheduler cannot be reached or is gone, or a run finds that the campaign cannot
             go on.
@@ -87,13 +80,7 @@ def _submit(client: Any, work: Work, chunk: list[Job], at_work: dict[Any, list[J
 
 
 def run_chunk(work: Work, jobs: Sequence[Job], limit: float | None = None) -> tuple[list[Finished], float]:
-    """Make runs one after the other; their results, and the time that they took [s].
-
-    Args:
-        work: what to do with a run
-        jobs: the runs
-        limit: how long a run may take before it ends this process [s]
-    """
+    """Make runs one after the other; their results, and the time that they took [s]."""
     started, finished = time.monotonic(), []
     for job in jobs:
         with _ended_after(limit):

@@ -68,11 +68,7 @@ class NamedSettings:
     place: Location
 
     def among(self, movers: bool) -> NamedSettings:
-        """The settings with what robots perceive in a world with movers, or without; so keys name what is driven.
-
-        Args:
-            movers: whether the world has movers
-        """
+        """The settings with what robots perceive in a world with movers, or without; so keys name what is driven."""
         if self.fields["perception"] is not None:
             return self
         fields = {**self.fields, "perception": usual_perception(self.fields.get("map", "given"), movers)}

@@ -100,11 +100,6 @@ def _at_option(campaign: Campaign, place: Location, text: str) -> InputError:
 def values_of(campaign: Campaign, place: Location, value: Any) -> list[Any]:
     """The values that an option takes: those of a list or of a range {from, to, step}, or one.
 
-    Args:
-        campaign: the campaign
-        place: where the value stands
-        value: plain data
-
     Raises:
         InputError: it is no list, range or plain value.
     """

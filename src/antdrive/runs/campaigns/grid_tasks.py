@@ -24,11 +24,6 @@ ROOM = 0.03  # the margin of drawn tasks where the campaign's margins are chosen
 def campaign_tasks(campaign: Campaign, worlds: Sequence[NamedTask], robots: Sequence[RobotSpec]) -> Iterator[NamedTask]:
     """The tasks of a campaign: each world with each of its starts and goals.
 
-    Args:
-        campaign: the campaign
-        worlds: its worlds with their own tasks
-        robots: its robots; drawn starts and goals have room for the largest of them
-
     Raises:
         InputError: a start or goal is impossible in a world, or too few were found.
     """

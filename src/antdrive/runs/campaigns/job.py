@@ -114,10 +114,5 @@ class Job(NamedTuple):
 
 
 def key_of(identity: str, seed: int) -> str:
-    """The key of a run: a SHA-256, cut to 32 hexadecimal digits.
-
-    Args:
-        identity: `SweepCase.identity`
-        seed: the run's seed
-    """
+    """The key of a run: a SHA-256, cut to 32 hexadecimal digits."""
     return hashlib.sha256(f"{identity}\n{seed}".encode()).hexdigest()[:KEY_DIGITS]

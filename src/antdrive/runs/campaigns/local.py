@@ -43,12 +43,7 @@ class _Worker:
 
 
 def run_here(jobs: Iterable[Job], work: Work) -> Generator[Finished, None, None]:
-    """Make runs in this process, without protection from runs that kill it.
-
-    Args:
-        jobs: the runs
-        work: what to do with each
-    """
+    """Make runs in this process, without protection from runs that kill it."""
     for job in jobs:
         yield work(job)
 
@@ -73,13 +68,6 @@ def run_locally(
     tick: Callable[[], None] = lambda: None,
 ) -> Generator[Finished, None, None]:
     """Make runs in worker processes; the results come in any order.
-
-    Args:
-        jobs: the runs
-        work: what to do with each; must be picklable
-        processes: how many workers
-        limit: how long a run may take before its process is ended [s]; None: as long as it likes
-        tick: is called about every second while nothing ends
 
     Raises:
         InputError: no worker can be started, or a run finds that the campaign cannot go on.
@@ -229,12 +217,7 @@ def _stop(workers: Iterable[_Worker]) -> None:
 
 
 def serve(pipe: Connection, work: Work) -> None:
-    """What a worker does: make the runs that it is handed until there is nobody to hand them.
-
-    Args:
-        pipe: brings lists of runs, and takes each result
-        work: what to do with a run
-    """
+    """What a worker does: make the runs that it is handed until there is nobody to hand them."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # where it could not be blocked
     with contextlib.suppress(EOFError, OSError):  # the parent has closed the pipe, or is dead
         pipe.send(None)

@@ -32,12 +32,6 @@ class MissingRuns:
 def missing_runs(jobs: Sequence[Job], folder: Path, *, retry_crashed: bool, again: Sequence[str]) -> MissingRuns:
     """The runs that a folder lacks, and those that are asked for again.
 
-    Args:
-        jobs: the campaign's runs
-        folder: its folder, or one that does not exist yet
-        retry_crashed: whether runs that crashed count as missing
-        again: planners and outcomes whose runs are to be made again
-
     Raises:
         InputError: a word of `again` is neither a planner of the campaign nor an outcome.
     """
@@ -60,12 +54,7 @@ def missing_runs(jobs: Sequence[Job], folder: Path, *, retry_crashed: bool, agai
 
 
 def changed_planners(jobs: Sequence[Job], folder: Path) -> Iterator[str]:
-    """A sentence for each planner whose earlier runs were made with another version of it, and do not count any more.
-
-    Args:
-        jobs: the campaign's runs
-        folder: its folder as the last command left it
-    """
+    """A sentence for each planner whose earlier runs were made with another version of it, and do not count any more."""
     former = former_grid(folder)
     if former is None or "planner_version" not in former.column_names:
         return

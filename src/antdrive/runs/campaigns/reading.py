@@ -21,11 +21,6 @@ Columns = Mapping[str, Sequence[Any]]
 def read_runs(folders: Sequence[Path], where: Mapping[str, str], planners: Sequence[str]) -> tuple[RunTable, int]:
     """The runs that are done so far, and how many of the chosen ones the campaigns have.
 
-    Args:
-        folders: of the campaigns; with several, logs are named relative to `common_folder`
-        where: take only runs with these values, by column
-        planners: labels of those to look at; all without
-
     Raises:
         InputError: a folder holds no campaign, or one is named twice.
         FieldError: no finished run, no such planner, or no run with these values.
@@ -46,11 +41,7 @@ def read_runs(folders: Sequence[Path], where: Mapping[str, str], planners: Seque
 
 
 def common_folder(folders: Sequence[Path]) -> Path:
-    """The folder to which the logs of all campaigns are relative: the campaign's own if there is one.
-
-    Args:
-        folders: of the campaigns
-    """
+    """The folder to which the logs of all campaigns are relative: the campaign's own if there is one."""
     return Path(os.path.commonpath([folder.resolve() for folder in folders]))
 
 

@@ -87,11 +87,7 @@ RESULT: Mapping[str, str] = {
 
 
 def grid_row(job: Job) -> dict[str, Any]:
-    """What a run is, by column.
-
-    Args:
-        job: the run
-    """
+    """What a run is, by column."""
     case, fields = job.case, job.case.fields
     x0, y0, x1, y1 = case.task.world.bounds
     margin = case.calibration.margin if case.calibration else fields["margin"]
@@ -116,11 +112,7 @@ def grid_row(job: Job) -> dict[str, Any]:
 
 
 def setting_columns(fields: Mapping[str, Any]) -> dict[str, Any]:
-    """What tables say of a run's settings, by column.
-
-    Args:
-        fields: fields of `Scenario` by name; the margin may be "auto"
-    """
+    """What tables say of a run's settings, by column."""
     sees, margin, limit = fields["perception"], fields["margin"], fields["time_limit"]
     return {
         "smoothing": fields["smoothing"],
@@ -148,13 +140,7 @@ def _changes(record: Any, default: Any) -> str:
 
 
 def run_row(key: str, run: Run, rollout: str | None) -> dict[str, Any]:
-    """What came out of a run that ended by itself, by column.
-
-    Args:
-        key: the run's key
-        run: the run
-        rollout: where its log is, relative to the campaign's folder; None: it was not kept
-    """
+    """What came out of a run that ended by itself, by column."""
     log, plan = run.rollout, run.plan
     row = _empty(key) | {
         "outcome": run.outcome.key,
@@ -177,23 +163,12 @@ def run_row(key: str, run: Run, rollout: str | None) -> dict[str, Any]:
 
 
 def fault_row(key: str, outcome: str, reason: str) -> dict[str, Any]:
-    """The row of a run that did not end by itself.
-
-    Args:
-        key: the run's key
-        outcome: `crashed`, `planner_fault` or `too_slow`
-        reason: what happened, in words
-    """
+    """The row of a run that did not end by itself."""
     return _empty(key) | {"outcome": outcome, "succeeded": False, "reason": reason}
 
 
 def slow_row(key: str, limit: float) -> dict[str, Any]:
-    """The row of a run that was ended because it took too long.
-
-    Args:
-        key: the run's key
-        limit: how long a run may take [s]
-    """
+    """The row of a run that was ended because it took too long."""
     return fault_row(key, TOO_SLOW, f"took longer than the campaign's run_limit of {limit:g} s")
 
 
@@ -208,20 +183,12 @@ def _version_columns() -> dict[str, str]:
 
 
 def result_table(rows: Sequence[Mapping[str, Any]]) -> pyarrow.Table:
-    """What came out of some runs as an Arrow table.
-
-    Args:
-        rows: as `run_row` and `fault_row` return them
-    """
+    """What came out of some runs as an Arrow table."""
     return parquet_library().Table.from_pylist(list(rows), schema=_schema(RESULT))
 
 
 def grid_table(jobs: Sequence[Job]) -> pyarrow.Table:
-    """What the runs of a campaign are as an Arrow table, with a column for each option that the campaign sets.
-
-    Args:
-        jobs: the runs
-    """
+    """What the runs of a campaign are as an Arrow table, with a column for each option that the campaign sets."""
     arrow, schema = parquet_library(), _schema(GRID)
     batches = (jobs[first : first + BATCH] for first in range(0, len(jobs), BATCH))
     tables = [arrow.Table.from_pylist([grid_row(job) for job in batch], schema=schema) for batch in batches]

@@ -89,9 +89,6 @@ class Driving:
 def prepare(job: Job) -> Scenario:
     """The scenario of a run. What runs in the same world can share within a process belongs here.
 
-    Args:
-        job: the run
-
     Raises:
         InputError: a planner or option does not exist here.
         FieldError: a setting is out of range.
@@ -100,11 +97,7 @@ def prepare(job: Job) -> Scenario:
 
 
 def log_path(key: str) -> str:
-    """Where the log of a run is, relative to the campaign's folder.
-
-    Args:
-        key: the run's key
-    """
+    """Where the log of a run is, relative to the campaign's folder."""
     return f"{LOGS}/{key[:2]}/{key}.npz"
 
 
@@ -114,10 +107,5 @@ def _bytes_of(log: Rollout) -> bytes:
 
 
 def again(finished: Finished, attempts: int) -> Finished:
-    """The same result, with the number of attempts that it took.
-
-    Args:
-        finished: the result of the last attempt
-        attempts: how many times the run was begun
-    """
+    """The same result, with the number of attempts that it took."""
     return dataclasses.replace(finished, row={**finished.row, "attempts": attempts})

@@ -51,12 +51,7 @@ class Store:
         self._parts = len(parts_in(folder))
 
     def begin(self, manifest: Mapping[str, Any], grid: pyarrow.Table) -> None:
-        """Write what is to be run.
-
-        Args:
-            manifest: the campaign and facts about it, as plain data
-            grid: a row for each run
-        """
+        """Write what is to be run."""
         write_table(grid, self.folder / GRID_FILE)
         text = json.dumps(manifest, indent=1, ensure_ascii=False)
         with written_whole(self.folder / MANIFEST) as part:
@@ -64,12 +59,7 @@ class Store:
         write_table(joined(self.folder), self.folder / TABLE)  # until there is another one at the end
 
     def add(self, row: Mapping[str, Any], log: bytes | None = None) -> None:
-        """Keep what came out of a run; it is on the disk after `FLUSH_EVERY` seconds, if `tick` is called that often.
-
-        Args:
-            row: as `run_row` and `fault_row` return it
-            log: the run's log, if it is to be written where the row says
-        """
+        """Keep what came out of a run; it is on the disk after `FLUSH_EVERY` seconds, if `tick` is called that often."""
         if log is not None:
             try:
                 with written_whole(self.folder / row["rollout"]) as part:
@@ -104,11 +94,7 @@ class Store:
         self._parts = 1
 
     def drop(self, keys: Set[str]) -> None:
-        """Forget what came out of some runs, so that they are made again.
-
-        Args:
-            keys: of the runs
-        """
+        """Forget what came out of some runs, so that they are made again."""
         old, table = parts_in(self.folder), _results(self.folder)
         names = table["key"].to_pylist()
         for i, path in enumerate(table["rollout"].to_pylist()):
@@ -148,21 +134,13 @@ def opened(folder: str | os.PathLike[str]) -> Iterator[Store]:
 
 
 def outcomes_in(folder: Path) -> dict[str, str]:
-    """How each run ended that was ever made in a folder, by key, also of campaigns that have changed since.
-
-    Args:
-        folder: a campaign's folder, or one that does not exist yet
-    """
+    """How each run ended that was ever made in a folder, by key, also of campaigns that have changed since."""
     results = _results(folder)
     return dict(zip(results["key"].to_pylist(), results["outcome"].to_pylist(), strict=True))
 
 
 def former_grid(folder: Path) -> pyarrow.Table | None:
-    """What the runs were of the campaign that a folder held before; None if it held none.
-
-    Args:
-        folder: a campaign's folder, or a new one
-    """
+    """What the runs were of the campaign that a folder held before; None if it held none."""
     return _read(folder / GRID_FILE) if (folder / GRID_FILE).exists() else None
 
 
@@ -185,11 +163,7 @@ def read_manifest(folder: str | Path) -> dict[str, Any]:
 
 
 def joined(folder: Path) -> pyarrow.Table:
-    """A row for each run of the campaign that is done, in the campaign's order.
-
-    Args:
-        folder: the campaign's folder
-    """
+    """A row for each run of the campaign that is done, in the campaign's order."""
     grid, results = _read(folder / GRID_FILE), _results(folder)
     places = {key: i for i, key in enumerate(results["key"].to_pylist())}
     keys = grid["key"].to_pylist()
@@ -217,10 +191,6 @@ def _after(names: Sequence[str], name: str) -> int:
 def write_table(table: pyarrow.Table, path: Path) -> None:
     """Write an Arrow table as Parquet, whole or not at all, and onto the disk.
 
-    Args:
-        table: the table
-        path: the file
-
     Raises:
         InputError: the file cannot be written.
     """
@@ -240,11 +210,7 @@ def write_table(table: pyarrow.Table, path: Path) -> None:
 
 
 def parts_in(folder: Path) -> list[Path]:
-    """The parts in a campaign's folder, in the order in which they were written.
-
-    Args:
-        folder: the campaign's folder
-    """
+    """The parts in a campaign's folder, in the order in which they were written."""
     return sorted(path for path in (folder / PARTS).glob("*.parquet") if not path.name.startswith(UNFINISHED))
 
 

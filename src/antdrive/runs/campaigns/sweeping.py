@@ -84,18 +84,6 @@ def run_expansion(
 ) -> SweepResults:
     """Make those runs of an expanded campaign that its folder does not hold yet.
 
-    Args:
-        campaign: the campaign
-        expansion: its runs
-        folder: where results are kept
-        jobs: number of processes; None: one per core; 0: this process
-        dask: the cluster that makes the runs instead
-        keep: which runs' logs are kept; None: as the campaign says
-        retry_crashed: whether runs are made again that crashed
-        again: planners, by label or name, and outcomes whose runs are made again; their present results are forgotten
-        progress: is called at first and after each run with the numbers of runs that are done and of all
-        work: what is done with a run; None: it is driven
-
     Raises:
         InputError: another process writes into the folder, or the scheduler is gone.
     """
@@ -154,9 +142,6 @@ def _engine(
 def calibrated(jobs: Iterable[Job]) -> list[Job]:
     """The runs, with a margin for those that leave it to be chosen; each robot and its settings are calibrated once.
 
-    Args:
-        jobs: the runs
-
     Raises:
         FieldError: no margin leaves the reserve.
     """
@@ -172,11 +157,7 @@ def calibrated(jobs: Iterable[Job]) -> list[Job]:
 
 
 def campaign_of(campaign: Campaign | str | os.PathLike[str] | Mapping[str, Any]) -> Campaign:
-    """A campaign from whatever stands for it.
-
-    Args:
-        campaign: a campaign, its file, or plain data
-    """
+    """A campaign from whatever stands for it."""
     if isinstance(campaign, Campaign):
         return campaign
     return make_campaign(campaign) if isinstance(campaign, Mapping) else load_campaign(campaign)

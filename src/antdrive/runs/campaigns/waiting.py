@@ -38,32 +38,19 @@ class Waiting:
         return self._length
 
     def measured(self, seconds: float, runs: int = 1) -> None:
-        """Take note of how long runs took.
-
-        Args:
-            seconds: the time of all of them [s]
-            runs: how many they were
-        """
+        """Take note of how long runs took."""
         weight = 1 - (1 - WEIGHT) ** runs
         each = seconds / runs
         self._mean = each if self._mean is None else (1 - weight) * self._mean + weight * each
 
     def put_back(self, jobs: Iterable[Job]) -> None:
-        """Put runs in front of all others.
-
-        Args:
-            jobs: runs that were handed out and not made
-        """
+        """Put runs in front of all others."""
         returned = list(jobs)
         self._first.extend(returned)
         self._length += len(returned)
 
     def chunk(self, world: str | None) -> list[Job]:
-        """The next runs for a process; none if no run waits.
-
-        Args:
-            world: the world of the process's last run; None: it had none
-        """
+        """The next runs for a process; none if no run waits."""
         found: list[Job] = []
         most = self._chunk_length()
         while self._length and len(found) < most:

@@ -15,12 +15,7 @@ Item = TypeVar("Item")
 def one_minimal(
     items: Sequence[Item], first: Callable[[Iterable[Sequence[Item]]], Sequence[Item] | None]
 ) -> Sequence[Item]:
-    """A sublist that keeps the property and loses it with any single one of its items.
-
-    Args:
-        items: a list that has the property
-        first: the first of some lists that has the property, or None
-    """
+    """A sublist that keeps the property and loses it with any single one of its items."""
     kept, parts = list(items), 2
     if kept and first([[]]) is not None:
         return []

@@ -28,12 +28,7 @@ def driven_line(rollout: Rollout) -> Floats:
 
 
 def line_distance(one: Floats, other: Floats) -> float:
-    """The mean distance between the points of two lines (N, 2) and (M, 2) that dynamic time warping pairs [m].
-
-    Args:
-        one: a line
-        other: another one
-    """
+    """The mean distance between the points of two lines (N, 2) and (M, 2) that dynamic time warping pairs [m]."""
     apart = np.hypot(one[:, None, 0] - other[None, :, 0], one[:, None, 1] - other[None, :, 1])
     rows, columns = apart.shape
     cost = np.full((rows + 1, columns + 1), np.inf)
@@ -48,11 +43,5 @@ def line_distance(one: Floats, other: Floats) -> float:
 
 
 def is_new(line: Floats, others: Sequence[Floats], least: float) -> bool:
-    """Whether a line is farther than a distance from all others.
-
-    Args:
-        line: the line (N, 2) [m]
-        others: the lines that are known [m]
-        least: the distance [m]
-    """
+    """Whether a line is farther than a distance from all others."""
     return all(line_distance(line, other) > least for other in others)

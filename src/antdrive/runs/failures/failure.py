@@ -96,10 +96,6 @@ def bound_broken_in(case: SuiteCase, done: Run) -> Bound | None:
 
     None where it breaks none: then the run itself is the failure, or there is none.
 
-    Args:
-        case: the test
-        done: its run
-
     Raises:
         InputError: the run differs from its baseline in what no other world can repeat; or the baseline is damaged.
     """
@@ -132,11 +128,7 @@ def failure_of_planner(error: PlannerError) -> Failure:
 
 
 def without_numbers(text: str) -> str:
-    """A reason without what differs from world to world: its numbers, and the names of single obstacles.
-
-    Args:
-        text: a sentence
-    """
+    """A reason without what differs from world to world: its numbers, and the names of single obstacles."""
     masked = re.sub(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?", "#", text)
     masked = re.sub(r"the (?:left|lower|right|upper) wall|(?:obstacles|movers|unseen)\[#\]", "#", masked)
     return re.sub(r" at \(#, #\)(?: with radius #)?", "", masked)

@@ -90,12 +90,7 @@ def write_suite(path: Path, handovers: Sequence[Handover]) -> Path:
 
 
 def suite_entry(scenario: Scenario, robot: str) -> dict[str, Any]:
-    """A scenario as plain data with the keys of a suite, without its world and what is expected.
-
-    Args:
-        scenario: the scenario
-        robot: the robot's name in the catalogue, or its file relative to the suite
-    """
+    """A scenario as plain data with the keys of a suite, without its world and what is expected."""
     plain: dict[str, Any] = {
         "robot": robot,
         "planner": planner_words(scenario),
@@ -126,11 +121,6 @@ def planner_moved(given: str | Mapping[str, Any], home: Path, folder: Path) -> s
     """The words of a suite for a planner in a file or module of people's own, as a suite in another folder writes them.
 
     None for a registered planner.
-
-    Args:
-        given: the words as a suite in `home` has them
-        home: the folder that files are relative to
-        folder: the folder of the other suite
     """
     if not is_own_entry(given):
         return None
@@ -144,12 +134,7 @@ def planner_moved(given: str | Mapping[str, Any], home: Path, folder: Path) -> s
 
 
 def expectation(failed: Run, bound: Bound | None = None) -> dict[str, Any]:
-    """What a suite expects of a scenario that is to fail as it did.
-
-    Args:
-        failed: the run that failed
-        bound: the metric's bound that it crosses, if that is its failure
-    """
+    """What a suite expects of a scenario that is to fail as it did."""
     expected: dict[str, Any] = {"outcome": failed.outcome.key}
     if failed.outcome is Outcome.SUCCEEDED:
         expected["certified"] = failed.succeeded
@@ -168,11 +153,7 @@ def fingerprint_of(done: Run) -> str:
 
 
 def suite_elsewhere(suite: Path) -> list[str]:
-    """The fingerprints of a suite's scenarios, read from its files and run in other processes; a fault of a file stands for one.
-
-    Args:
-        suite: the suite's file
-    """
+    """The fingerprints of a suite's scenarios, run in other processes; a fault of a file stands for one."""
     from joblib import Parallel
 
     return list(Parallel(2)(delayed(_fingerprint_from)(suite.resolve(), k) for k in range(len(load_suite(suite)))))
@@ -186,11 +167,7 @@ def _fingerprint_from(suite: Path, index: int) -> str:
 
 
 def scenario_name(text: str) -> str:
-    """A name that a suite takes for a scenario.
-
-    Args:
-        text: what it is made from, such as the name of a world
-    """
+    """A name that a suite takes for a scenario."""
     return re.sub(r"[^A-Za-z0-9_.-]", "_", text).lstrip("_.-")[:90] or "failure"
 
 
@@ -215,12 +192,7 @@ def run_if_planned(scenario: Scenario) -> Run | str:
 
 
 def planner_words(scenario: Scenario, own: str | None = None) -> str | dict[str, Any]:
-    """A scenario's planner in the words of a suite: its name, with the options that differ from those of that name.
-
-    Args:
-        scenario: the scenario that has the planner
-        own: FILE.py:CLASS or MODULE:CLASS, as seen from the working directory; None: the planner is registered
-    """
+    """A scenario's planner in the words of a suite: its name, with the options that differ from those of that name."""
     name = own or scenario.planner_label
     options = _changed(scenario.planner, load_planner(own) if own else list_planners().get(name))
     return {"name": name, **options} if options else name
@@ -250,13 +222,7 @@ def _among_movers(scenario: Scenario) -> dict[str, Any]:
 
 
 def _robot(robot: RobotSpec, folder: Path, robots: dict[str, RobotSpec]) -> str:
-    """The robot's name in the catalogue, or the file beside the suite that is written for it.
-
-    Args:
-        robot: the robot
-        folder: the suite's folder
-        robots: the robots that have files there so far, by the files' names; the robot is added
-    """
+    """The robot's name in the catalogue, or the file beside the suite that is written for it."""
     if robot.name in list_robots() and load_robot(robot.name) == robot:
         return robot.name
     plain = "".join(c if c.isalnum() or c in "-_." else "_" for c in robot.name)

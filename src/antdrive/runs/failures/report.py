@@ -66,12 +66,6 @@ def report(
 
     A suite and the worlds are written. Ctrl-C ends the shrinking; what is not shrunk by then is handed over as it was found.
 
-    Args:
-        hunt: the search
-        folder: where all is written, and journals, so that a failure is not shrunk twice
-        seconds: time to shrink each failure [s]; 0: they are left as they are
-        progress: is called with the fraction that is done
-
     Raises:
         InputError: a file cannot be written.
     """

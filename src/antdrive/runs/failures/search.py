@@ -23,11 +23,7 @@ Draw: TypeAlias = Callable[[], Scenario | None]
 
 
 def random_world(draw: Draw) -> Scenario | None:
-    """The next world, as it comes.
-
-    Args:
-        draw: draws a scenario
-    """
+    """The next world, as it comes."""
     return draw()
 
 
@@ -36,9 +32,6 @@ def guided_world(draw: Draw) -> Scenario | None:
 
     The winner of the UAV testing competition of 2025 chooses its tests in this way, with a simulator of low fidelity
     before each run of the real one (*Pseudo-random UAV test generation using low-fidelity path simulator*, 2025).
-
-    Args:
-        draw: draws a scenario
     """
     drawn = [scenario for scenario in (draw() for _ in range(REHEARSED)) if scenario is not None]
     return min(drawn, key=rehearsed_clearance, default=None)
@@ -55,9 +48,6 @@ def rehearsed_clearance(s: Scenario) -> float:
 
     The noise is that of the real run; infinite where no path is planned, minus infinity where the planner raises
     something: that is a failure as well.
-
-    Args:
-        s: the scenario
     """
     try:
         grid, answer = plan(s)

@@ -49,12 +49,7 @@ class WorldSpace:
         return 3 * self.count
 
     def task(self, point: Floats, name: str) -> Task:
-        """The world of a point (D,), with start and goal.
-
-        Args:
-            point: coordinates from 0 to 1
-            name: the world's name
-        """
+        """The world of a point (D,), with start and goal."""
         r = self.robot_radius
         length, width = self._metres(LENGTH * r), self._metres(WIDTH * r)
         low, high = self._range
@@ -81,11 +76,6 @@ class WorldSpace:
 
 
 def feasible(task: Task, clearance: float) -> bool:
-    """Whether a path exists from start to goal that keeps a clearance [m], by the exact shortest path.
-
-    Args:
-        task: the world, start and goal
-        clearance: between the robot's centre and every surface [m]
-    """
+    """Whether a path exists from start to goal that keeps a clearance [m], by the exact shortest path."""
     world = task.world
     return shortest(world.discs, world.bounds, clearance, task.start[:2], task.goal) is not None

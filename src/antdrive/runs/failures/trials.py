@@ -35,13 +35,7 @@ class OutOfTimeError(Exception):
 
 
 def failure_in(scenario: Scenario, bound: Bound | None = None, *, drive: bool = True) -> Failure | None:
-    """How a scenario fails when it is run; None if it does not, or cannot be run at all.
-
-    Args:
-        scenario: what to run
-        bound: what counts as failure; None: everything but a certified success
-        drive: whether to drive where there is a plan; else only failures of planning are found
-    """
+    """How a scenario fails when it is run; None if it does not, or cannot be run at all."""
     try:
         if drive:
             return failure_of(run(scenario), bound)
@@ -58,10 +52,6 @@ def room_in(scenario: Scenario, failure: Failure) -> float | None:
 
     That is the clearance that the scenario claims and, where the planner found no path, a cell's side more if a path exists
     with that: then the grid is no excuse. In worlds of more than `MOST_OBSTACLES` it is not looked for.
-
-    Args:
-        scenario: the failing scenario
-        failure: how it fails
     """
     task, claimed = scenario.task, scenario.inflate
     if len(task.world.obstacles) > MOST_OBSTACLES:

@@ -30,11 +30,6 @@ def choose_margin(
 
     Movers are no part of the prediction.
 
-    Args:
-        conditions: how the robot drives
-        jobs: processes that drive
-        progress: called after each drive with the number of drives so far and the margin that is being tried [m]
-
     Raises:
         FieldError: no margin leaves the reserve.
     """
@@ -46,11 +41,7 @@ def choose_margin(
 
 
 def known_margin(conditions: Conditions) -> Calibration | None:
-    """The calibration in the cache; None where there is none, or only a damaged one.
-
-    Args:
-        conditions: how the robot drives
-    """
+    """The calibration in the cache; None where there is none, or only a damaged one."""
     path = _path(conditions.key)
     if path is None:
         return None

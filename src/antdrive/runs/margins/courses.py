@@ -27,11 +27,6 @@ def course(robot: RobotSpec, inflate: float, rng: np.random.Generator) -> Task:
     """A task with a path that bends between pillars, each of which stands at the distance `inflate` from the path.
 
     The path leads through cells, and planning with that distance finds it or a shorter one.
-
-    Args:
-        robot: sets the scale of bends and pillars
-        inflate: the distance that planning keeps between the robot's centre and every surface [m]
-        rng: where all random numbers come from
     """
     cell = robot.radius * float(rng.uniform(*CELLS))
     cells = _bends(cell, SECONDS * robot.max_speed + RADII * robot.radius, rng)

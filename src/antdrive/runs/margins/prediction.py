@@ -54,10 +54,6 @@ def predicted_loss(losses: Sequence[float], probability: float = PROBABILITY) ->
     Haan 1974), fitted by probability-weighted moments (Hosking & Wallis 1987). Its shape is kept between that of a bounded and
     that of an exponential tail, the limit for sums of many small errors. At least the largest loss that occurred is predicted.
 
-    Args:
-        losses: one for each drive [m]
-        probability: of a larger loss
-
     Raises:
         FieldError: there are too few losses.
     """
@@ -87,12 +83,6 @@ def least_margin(
 
     The loss depends on the margin: with more of it a robot cuts corners more and drives faster. So margins are tried, each
     next one where the room that was left by the last ones, as a line, is the reserve.
-
-    Args:
-        losses_with: the losses of drives that were planned with a margin [m]
-        key: what the calibration holds for
-        radius: the robot's [m]
-        reserve: what must be left [m]
 
     Raises:
         FieldError: no margin leaves the reserve.

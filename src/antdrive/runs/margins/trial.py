@@ -82,11 +82,6 @@ def loss_on_course(conditions: Conditions, margin: float, seed: int) -> Loss:
     A loss is the margin minus the least distance from an obstacle that a certificate would prove. It exceeds the margin where
     the drive could not be certified. That of the footprint is negative where the footprint always was farther from
     obstacles than the disc that the plan was made for.
-
-    Args:
-        conditions: how the robot drives
-        margin: the margin that is planned with [m]
-        seed: of the course and the noise
     """
     c, robot = conditions, conditions.robot
     task = course(robot, robot.radius + margin, _rng(seed, "course"))
@@ -114,13 +109,7 @@ def loss_on_course(conditions: Conditions, margin: float, seed: int) -> Loss:
 
 
 def least_bound(log: Drive, radius: float, clearance: Floats) -> float:
-    """The clearance from standing obstacles that is certain at and between all rows of a drive [m].
-
-    Args:
-        log: the drive
-        radius: of the smallest disc around the footprint [m]
-        clearance: at each row (T,) [m]
-    """
+    """The clearance from standing obstacles that is certain at and between all rows of a drive [m]."""
     dt, speed = np.diff(log.t), np.abs(log.twist)
     speed = np.maximum(speed[:-1], speed[1:])
     turned = np.abs(wrap_angle(np.diff(log.pose[:, 2])))

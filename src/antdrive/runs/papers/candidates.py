@@ -55,12 +55,7 @@ class MoveCount:
 
 
 def move_counts(printed: float, digits: int = 3) -> list[MoveCount]:
-    """The moves that a printed length can stand for.
-
-    Args:
-        printed: the length [cells]
-        digits: the digits after its point; the last may be rounded or cut off
-    """
+    """The moves that a printed length can stand for."""
     found = []
     for diagonal in range(int(printed / SQRT2) + 1):
         straight = round(printed - SQRT2 * diagonal)
@@ -87,18 +82,6 @@ def candidate(
     It begins with random obstacles; then further ones are put onto the shortest path, as long as it does not become longer
     than wanted, until it is as long as wanted.
 
-    Args:
-        shape: rows and columns
-        start: the start cell
-        goal: the goal cell
-        moves: the moves of the shortest path
-        seed: of the obstacles
-        blocked: the share of cells that are blocked singly
-        blocks: how many rectangles there are at first
-        largest: the longest side of a rectangle [cells]
-        thin: whether rectangles are one cell wide
-        walls: walls across all columns at first, each with an opening of two cells
-
     Raises:
         FieldError: no such map was found.
     """
@@ -123,12 +106,6 @@ def winding_candidate(shape: tuple[int, int], moves: MoveCount, seed: int, *, la
 
     A path of the wanted moves is drawn first, and start and goal are its ends. Walls are then put across every way that
     is shorter, and never onto the path, until none is left.
-
-    Args:
-        shape: rows and columns
-        moves: the moves of the shortest path
-        seed: of path and walls
-        largest: the longest wall [cells]
 
     Raises:
         FieldError: no such map was found.

@@ -29,12 +29,7 @@ NONE = -1  # the size of waypoints that a plan does not have
 
 
 def trials_key(experiment: Experiment, seeds: int) -> str:
-    """What the trials of an experiment depend on, the source code included: a file with another key is not used.
-
-    Args:
-        experiment: the experiment
-        seeds: how many seeds are run
-    """
+    """What the trials of an experiment depend on, the source code included: a file with another key is not used."""
     facts = {
         "map": experiment.map,
         "name": experiment.name,
@@ -63,13 +58,7 @@ def code_hash() -> str:
 
 
 def keep_trials(trials: Sequence[Trial], path: Path, key: str) -> None:
-    """Write trials to a file; plans lose their fields, options and planning times.
-
-    Args:
-        trials: the trials
-        path: the file (.npz)
-        key: what they depend on
-    """
+    """Write trials to a file; plans lose their fields, options and planning times."""
     plans = [trial.result for trial in trials]
     lines = [plan.waypoints for plan in plans]
     arrays: dict[str, Any] = {
@@ -93,12 +82,7 @@ def keep_trials(trials: Sequence[Trial], path: Path, key: str) -> None:
 
 
 def kept_trials(path: Path, key: str) -> list[Trial] | None:
-    """The trials of a file; None if there is no such file, or it has another key or cannot be read.
-
-    Args:
-        path: the file
-        key: what the trials depend on
-    """
+    """The trials of a file; None if there is no such file, or it has another key or cannot be read."""
     try:
         with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
             if str(file["key"]) != key:

@@ -33,11 +33,7 @@ def optimum(query: Query) -> float:
 
 
 def han_ants(*discs: tuple[float, float, float] | None) -> Query:
-    """han2007's map for ants, in the thesis' units, for a point robot: with the listing's obstacles, or with others.
-
-    Args:
-        discs: obstacles (x, y, radius) in the place of the listing's; a single None: no obstacle
-    """
+    """han2007's map for ants, in the thesis' units, for a point robot: with the listing's obstacles, or with others."""
     listed = discs or tuple((float(x), float(y), 1.0) for x, y in HAN_ANTS)
     found = tuple(Disc(*disc) for disc in listed if disc is not None)
     return Query(rasterise(World("han2007-aco", (0.5, 0.5, 20.5, 20.5), found), 1.0), (0, 0), (19, 19))

@@ -34,14 +34,7 @@ class Strollers:
     """Movers of one cell each that go to a random free neighbouring cell in every step."""
 
     def __init__(self, grid: Grid, count: int, rng: np.random.Generator, away: tuple[Cell, ...]) -> None:
-        """Put movers on random free cells.
-
-        Args:
-            grid: the map
-            count: how many there are
-            rng: the source of their steps
-            away: cells on which none is put
-        """
+        """Put movers on random free cells."""
         self._grid, self._rng = grid, rng
         free = [tuple(map(int, cell)) for cell in np.argwhere(grid.free)]
         chosen = rng.permutation(len(free))
@@ -53,11 +46,7 @@ class Strollers:
         return np.array(self._cells, dtype=np.int64).reshape(-1, 2)
 
     def step(self, robot: Cell) -> None:
-        """Move each to a free neighbouring cell other than the robot's, if there is one.
-
-        Args:
-            robot: the robot's cell
-        """
+        """Move each to a free neighbouring cell other than the robot's, if there is one."""
         for n, (r, c) in enumerate(self._cells):
             moves = int(self._grid.moves[r, c])
             near = [(r + dr, c + dc) for k, (dr, dc) in enumerate(DIRECTIONS) if moves >> k & 1]
@@ -75,12 +64,7 @@ class TimedAgent:
     """
 
     def __init__(self, agent: OnlineAgent, spent: float) -> None:
-        """Time an agent.
-
-        Args:
-            agent: the agent
-            spent: the processor time that it took to make [s]
-        """
+        """Time an agent."""
         self._agent, self.cpu_s = agent, spent
 
     @property
@@ -94,11 +78,7 @@ class TimedAgent:
         return self._agent.arrived
 
     def step(self, blocked: npt.ArrayLike) -> Cell | None:
-        """The agent's decision.
-
-        Args:
-            blocked: cells (N, 2) that are blocked now
-        """
+        """The agent's decision."""
         started = time.process_time()
         to = self._agent.step(blocked)
         self.cpu_s += time.process_time() - started
@@ -109,13 +89,6 @@ def drive(
     robot: OnlineAgent | TimedAgent, query: Query, movers: Strollers, name: str = "", limit: int = DECISIONS
 ) -> list[Cell]:
     """The cells that a robot goes through, start included; the last is the goal if it arrives within the decisions.
-
-    Args:
-        robot: the robot at the start
-        query: the map with start and goal
-        movers: the movers, which step first
-        name: what errors call the planner; empty: its agent's class
-        limit: how many decisions there are
 
     Raises:
         PlannerError: the robot went into a mover, or made a move that is not allowed.
@@ -138,15 +111,7 @@ def drive(
 
 
 def drive_among(planner: str | Planner, options: Mapping[str, Any], query: Query, seed: int, count: int) -> Trial:
-    """Drive once, cell by cell, among movers; the trial's path is the one that was driven.
-
-    Args:
-        planner: its name, or itself
-        options: its parameters
-        query: the map with start and goal
-        seed: of the movers and of the planner's random numbers
-        count: how many movers there are
-    """
+    """Drive once, cell by cell, among movers; the trial's path is the one that was driven."""
     chosen = load_planner(planner, **options) if isinstance(planner, str) else planner
     movers = Strollers(query.grid, count, np.random.default_rng([seed, count]), (query.start, query.goal))
     started = time.process_time()

@@ -113,16 +113,6 @@ def reproduce(
     The trials of an experiment are written as soon as it is done. A second call with the same folder and seeds takes them
     from there, unless the source code has changed in between.
 
-    Args:
-        papers: short names, from `PAPERS`
-        folder: where the files go
-        seeds: how many seeds each experiment gets: 0, 1, ...
-        suffixes: the figures' formats, for example (".png", ".pdf")
-        jobs: the number of processes
-        quick: a tenth of the ant steps where an experiment counts them, two candidates of each map, and no slow experiments
-        films: whether to film a drive for each paper, the planning first
-        progress: called with the fraction of trials that is done
-
     Raises:
         InputError: an unknown paper.
     """
@@ -220,13 +210,7 @@ def _judgeable(known: Mapping[str, dict[Arm, Any]]) -> Iterator[tuple[Claim, dic
 
 
 def too_few_seeds(papers: Sequence[str], seeds: int, *, quick: bool = False) -> str:
-    """One line on how many claims so few seeds cannot decide, and how many can; empty if they can decide all.
-
-    Args:
-        papers: short names, from `PAPERS`
-        seeds: how many seeds each experiment gets
-        quick: as in `reproduce`
-    """
+    """One line on how many claims so few seeds cannot decide, and how many can; empty if they can decide all."""
     experiments = [_hurried(e) if quick else e for paper in papers for e in PAPERS[paper]() if not (quick and e.slow)]
 
     def undecided(count: int) -> tuple[int, int]:

@@ -115,14 +115,6 @@ class Trial:
 def solve(planner: str | Planner, options: Mapping[str, Any], query: Query, seed: int, work: float = math.inf) -> Trial:
     """Plan once.
 
-    Args:
-        planner: its name, or itself
-        options: its parameters
-        query: the map with start and goal
-        seed: of the planner's random numbers
-        work: where it is finite, the plan ends with the iteration in which the ants have taken so many steps, whatever
-            `iterations` says
-
     Raises:
         FieldError: `work` is finite and the planner has no iterations.
     """

@@ -91,12 +91,7 @@ class Judged(NamedTuple):
 
 
 def judge(claim: Claim, found: Found) -> Verdict:
-    """Test a claim.
-
-    Args:
-        claim: the claim
-        found: the trials of the experiments of its paper
-    """
+    """Test a claim."""
     decision, value, interval, ours, why = _judged(claim.test, found)
     why = "; ".join(filter(None, (why, claim.remark)))
     return Verdict(claim, decision, ours, why, value, interval.low, interval.high)
@@ -118,12 +113,7 @@ def _all_or_none(test: Arrive, trials: int) -> bool:
 
 
 def trials_at_hand(test: Test, sizes: Mapping[Arm, int]) -> int:
-    """How many trials, or pairs of them, a test counts.
-
-    Args:
-        test: the test
-        sizes: how many trials each arm has
-    """
+    """How many trials, or pairs of them, a test counts."""
     if isinstance(test, Mean):
         return sizes[test.arm]
     if isinstance(test, (Arrive, MayFail, Within)):

@@ -25,13 +25,7 @@ BLOCK = 4_000_000  # numbers held at once
 
 
 def resampled(world: Ints, resamples: int = RESAMPLES, seed: int = SEED) -> Iterator[Ints]:
-    """Blocks of rows (b, N) that say how often each run is drawn, `resamples` rows in total.
-
-    Args:
-        world: the index of each run's world, (N,)
-        resamples: number of samples
-        seed: of the random draws
-    """
+    """Blocks of rows (b, N) that say how often each run is drawn, `resamples` rows in total."""
     rng = np.random.default_rng(seed)
     names, inverse, sizes = np.unique(world, return_inverse=True, return_counts=True)
     members = np.split(np.argsort(inverse, kind="stable"), np.cumsum(sizes)[:-1])
@@ -53,16 +47,7 @@ def medians_by_world(
     counted: Flags | None = None,
     confidence: float = CONFIDENCE,
 ) -> list[Interval]:
-    """Percentile intervals for the median of each column of values (N, K), nan left out.
-
-    Args:
-        values: one column for each statistic
-        world: the index of each row's world, (N,)
-        resamples: number of samples
-        counted: the rows that each column's samples are drawn from, (N, K); all without. A row that is counted and nan is
-            drawn and left out; one that is not counted has no part in the sample.
-        confidence: the share of such intervals that hold the truth
-    """
+    """Percentile intervals for the median of each column of values (N, K), nan left out."""
     found = np.full((resamples, values.shape[1]), np.nan)
     for rows, columns in _columns_alike(values, counted):
         chosen = [_Sorted.of(values[rows, k]) for k in columns]
@@ -82,15 +67,7 @@ def means_by_world(
     counted: Flags | None = None,
     confidence: float = CONFIDENCE,
 ) -> list[Interval]:
-    """Percentile intervals for the mean of each column of values (N, K), nan left out.
-
-    Args:
-        values: one column for each statistic, such as 1 for success and 0 for failure
-        world: the index of each row's world, (N,)
-        resamples: number of samples
-        counted: the rows that each column's samples are drawn from, (N, K); all without
-        confidence: the share of such intervals that hold the truth
-    """
+    """Percentile intervals for the mean of each column of values (N, K), nan left out."""
     found = np.full((resamples, values.shape[1]), np.nan)
     for rows, columns in _columns_alike(values, counted):
         known = ~np.isnan(values[rows][:, columns])

@@ -113,10 +113,6 @@ class PairedComparison:
 def pairs_of(paired: PairedRuns, against: str | None = None) -> list[tuple[int, int]]:
     """The pairs of planners to compare, as indices.
 
-    Args:
-        paired: the runs
-        against: the label of a planner that is compared with each other one; every pair without
-
     Raises:
         FieldError: fewer than two planners, an unknown one, or no two with a run in common.
     """
@@ -140,12 +136,7 @@ def pairs_of(paired: PairedRuns, against: str | None = None) -> list[tuple[int, 
 
 
 def compare_success(paired: PairedRuns, pairs: Pairs) -> list[PairedComparison]:
-    """Compare success: exact McNemar, Newcombe's interval, and both again over whole worlds.
-
-    Args:
-        paired: the runs
-        pairs: indices of the planners to compare
-    """
+    """Compare success: exact McNemar, Newcombe's interval, and both again over whole worlds."""
     masks = [paired.counted(i, j) for i, j in pairs]
     raw = [paired.success[:, i].astype(float) - paired.success[:, j] for i, j in pairs]
     gaps = np.stack([np.where(mask, gap, np.nan) for mask, gap in zip(masks, raw, strict=True)], axis=1)
@@ -182,16 +173,7 @@ def compare_success(paired: PairedRuns, pairs: Pairs) -> list[PairedComparison]:
 def success_interval(
     paired: PairedRuns, mask: Flags, i: int, j: int, resampled: Interval, confidence: float = CONFIDENCE
 ) -> Interval:
-    """An interval for the difference of two planners' success that holds over runs and over worlds.
-
-    Args:
-        paired: the runs
-        mask: the instances that count, at least one, (N,)
-        i: index of the first planner
-        j: index of the second planner
-        resampled: the bootstrap interval over worlds
-        confidence: the share of such intervals that hold the true difference
-    """
+    """An interval for the difference of two planners' success that holds over runs and over worlds."""
     first, second = paired.success[mask, i], paired.success[mask, j]
     both, one, other = (int(found.sum()) for found in (first & second, first & ~second, ~first & second))
     interval = paired_difference(both, one, other, len(first) - both - one - other, confidence)
@@ -206,12 +188,6 @@ def success_interval(
 
 def compare_metric(paired: PairedRuns, pairs: Pairs, metric: str, better: Direction) -> list[PairedComparison]:
     """Compare a metric on the pairs in which both planners succeeded: Wilcoxon, median difference, rank biserial.
-
-    Args:
-        paired: the runs
-        pairs: indices of the planners to compare
-        metric: the column
-        better: whether lower or higher values are better
 
     Raises:
         FieldError: no run has a value of this metric.

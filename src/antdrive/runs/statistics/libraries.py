@@ -10,9 +10,6 @@ from antdrive.base.optional import optional
 def library(name: str) -> Any:
     """A module of scipy or statsmodels, imported when it is first needed.
 
-    Args:
-        name: the module's full name, such as "scipy.stats"
-
     Raises:
         InputError: it is not installed.
     """

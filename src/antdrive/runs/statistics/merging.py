@@ -16,9 +16,6 @@ def merged(tables: Mapping[str, RunTable]) -> RunTable:
 
     A planner of which two campaigns have a run of the same instance is a planner of its own in each: "astar @today".
 
-    Args:
-        tables: of the campaigns, by name
-
     Raises:
         FieldError: the tables describe runs by different columns.
     """

@@ -65,13 +65,6 @@ def not_worse(
 ) -> list[NonInferiority]:
     """A row for each planner but the reference.
 
-    Args:
-        paired: the runs
-        reference: label of the planner that the others are compared with
-        measure: "success" or a column
-        allowed: by how much a planner may be worse, above 0
-        better: whether lower or higher values are better
-
     Raises:
         FieldError: no difference, a measure without a better direction, or nothing to compare.
     """

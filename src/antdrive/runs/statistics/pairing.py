@@ -46,9 +46,6 @@ class PairedRuns:
     def of(cls, table: RunTable) -> PairedRuns:
         """Arrange a table.
 
-        Args:
-            table: of the runs
-
         Raises:
             FieldError: the table is empty, or a planner has two runs of one instance.
         """
@@ -85,9 +82,6 @@ class PairedRuns:
         """A column of the table by instance and planner, (N, P); nan without success.
 
         Wall-clock times of a drive that repeats with every seed are the median over its repetitions.
-
-        Args:
-            name: the column
         """
         values = np.where(self.success, self.table.numbers(name)[self.row], np.nan)
         return self._over_repetitions(values) if name in WALL_TIMES else values
@@ -105,19 +99,11 @@ class PairedRuns:
         return found
 
     def worlds_in(self, mask: Flags) -> int:
-        """The number of worlds among some instances.
-
-        Args:
-            mask: the instances, (N,)
-        """
+        """The number of worlds among some instances."""
         return len(np.unique(self.world[mask]))
 
     def several_in_worlds(self, mask: Flags) -> bool:
-        """Whether there are several worlds among some instances, and several instances in one of them.
-
-        Args:
-            mask: the instances, (N,)
-        """
+        """Whether there are several worlds among some instances, and several instances in one of them."""
         sizes = np.bincount(self.world[mask])
         return bool((sizes > 0).sum() > 1 and sizes.max() > 1)
 
@@ -126,10 +112,6 @@ class PairedRuns:
 
         Under settings where the seed changes no drive of any of them, the first seed stands for all: repetitions are no
         evidence.
-
-        Args:
-            planners: their indices
-            within: the instances to choose from, (N,); all without
         """
         chosen = list(planners)
         both: Flags = np.asarray(self.present[:, chosen].all(axis=1))
@@ -143,9 +125,6 @@ class PairedRuns:
 
     def select(self, planners: Sequence[str]) -> PairedRuns:
         """The runs of some planners only.
-
-        Args:
-            planners: their labels
 
         Raises:
             FieldError: no such planner among the runs.

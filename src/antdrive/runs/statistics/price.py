@@ -90,12 +90,7 @@ class Price:
 
 
 def prices(table: RunTable, *, any_robot: bool = False) -> list[Price]:
-    """The price for each planner, robot, localisation and factor of odometry that a table has drives without a map of.
-
-    Args:
-        table: of a campaign, with drives of both kinds
-        any_robot: whether drives with another robot are partners, too, such as the same robot with another lidar
-    """
+    """The price for each planner, robot, localisation and factor of odometry that a table has drives without a map of."""
     if "map" not in table:
         return []
     left_out = {*SENSING, DRIVEN, *(("robot", "robot_hash") if any_robot else ())}

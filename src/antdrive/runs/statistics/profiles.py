@@ -24,11 +24,7 @@ class StepCurve(NamedTuple):
     share: Floats
 
     def at(self, x: float) -> float:
-        """The curve's value.
-
-        Args:
-            x: the place
-        """
+        """The curve's value."""
         place = int(np.searchsorted(self.x, x, side="right"))
         return float(self.share[place - 1]) if place else 0.0
 
@@ -37,9 +33,6 @@ def performance_profiles(cost: Floats) -> list[StepCurve]:
     """For each planner the share of instances that it solves at no more than x times the best cost.
 
     Performance profiles after Dolan and Moré (2002). An instance that nobody solves counts as unsolved by all.
-
-    Args:
-        cost: of each instance and planner, (N, P), at least 0; nan where the planner failed
 
     Raises:
         FieldError: no instances, or a negative cost.
@@ -56,9 +49,6 @@ def performance_profiles(cost: Floats) -> list[StepCurve]:
 
 def distributions(values: Floats) -> list[StepCurve]:
     """For each planner the share of instances that it solves with a value of at most x.
-
-    Args:
-        values: of each instance and planner, (N, P); nan where the planner failed
 
     Raises:
         FieldError: no instances.

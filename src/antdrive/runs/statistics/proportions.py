@@ -26,11 +26,6 @@ class Interval(NamedTuple):
 def wilson(successes: int, total: int, confidence: float = CONFIDENCE) -> Interval:
     """Wilson's score interval for a proportion (Wilson 1927).
 
-    Args:
-        successes: how many succeeded
-        total: of how many, at least 1
-        confidence: the share of such intervals that hold the true proportion
-
     Raises:
         FieldError: no trials, or more successes than trials.
     """
@@ -46,13 +41,6 @@ def paired_difference(both: int, first: int, second: int, neither: int, confiden
     """An interval for the difference of two paired proportions (Newcombe 1998, method 10).
 
     It combines the Wilson intervals of the two proportions and takes their correlation into account.
-
-    Args:
-        both: pairs in which both succeeded
-        first: pairs in which only the first succeeded
-        second: pairs in which only the second succeeded
-        neither: pairs in which none succeeded
-        confidence: the share of such intervals that hold the true difference
     """
     n = both + first + second + neither
     p1, p2 = (both + first) / n, (both + second) / n

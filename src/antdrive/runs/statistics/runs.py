@@ -50,19 +50,11 @@ class RunTable:
         )
 
     def texts(self, name: str) -> list[str]:
-        """A column as text; empty where there is no value.
-
-        Args:
-            name: the column; one that the table lacks is empty
-        """
+        """A column as text; empty where there is no value."""
         return ["" if value is None else str(value) for value in self.columns.get(name, [None] * len(self))]
 
     def numbers(self, name: str) -> Floats:
-        """A column as numbers, (N,); nan where there is none.
-
-        Args:
-            name: the column; one that the table lacks is nan
-        """
+        """A column as numbers, (N,); nan where there is none."""
         values = self.columns.get(name, [None] * len(self))
         return np.array([value if isinstance(value, int | float) else np.nan for value in values], dtype=float)
 
@@ -77,10 +69,6 @@ class RunTable:
     def where(self, column: str, value: str) -> RunTable:
         """The runs with some values in a column.
 
-        Args:
-            column: its name; "ants" stands for "option.ants", too
-            value: one, several as "0,1", or a range of numbers as "10..20"; numbers are compared as numbers
-
         Raises:
             FieldError: no such column, or no run with this value.
         """
@@ -88,9 +76,6 @@ class RunTable:
 
     def of_planners(self, labels: Sequence[str]) -> RunTable:
         """The runs of some planners.
-
-        Args:
-            labels: of the planners
 
         Raises:
             FieldError: no such planner among the runs.
@@ -102,17 +87,9 @@ class RunTable:
         return self.take([k for k, label in enumerate(mine) if label in labels])
 
     def take(self, rows: Sequence[int]) -> RunTable:
-        """Some of the runs.
-
-        Args:
-            rows: their numbers
-        """
+        """Some of the runs."""
         return RunTable({name: [values[k] for k in rows] for name, values in self.columns.items()})
 
     def codes(self, name: str) -> npt.NDArray[np.int64]:
-        """Equal numbers for runs with equal texts in a column, (N,).
-
-        Args:
-            name: the column
-        """
+        """Equal numbers for runs with equal texts in a column, (N,)."""
         return np.unique(np.array(self.texts(name), dtype=object), return_inverse=True)[1].astype(np.int64)

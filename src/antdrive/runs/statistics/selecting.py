@@ -16,10 +16,6 @@ NONE = "none"  # stands for a run without a value
 def column_named(names: Iterable[str], column: str) -> str:
     """The full name of a column.
 
-    Args:
-        names: of all columns
-        column: its name; "ants" stands for "option.ants", too
-
     Raises:
         FieldError: there is none.
     """
@@ -33,11 +29,6 @@ def column_named(names: Iterable[str], column: str) -> str:
 def places_of(column: str, values: Sequence[Any], wanted: str) -> list[int]:
     """The rows whose value is wanted, at least one.
 
-    Args:
-        column: what errors call it
-        values: of the column
-        wanted: a value, several as "0,1", or a range of numbers as "10..20", "10.." or "..20"; "none" is no value
-
     Raises:
         FieldError: no row has such a value.
     """
@@ -48,12 +39,7 @@ def places_of(column: str, values: Sequence[Any], wanted: str) -> list[int]:
 
 
 def matching(values: Sequence[Any], wanted: str) -> list[int]:
-    """The rows whose value is wanted.
-
-    Args:
-        values: of the column
-        wanted: as `places_of` has it
-    """
+    """The rows whose value is wanted."""
     whole = [k for k, value in enumerate(values) if _text(value) == wanted]
     if whole:  # a name may hold a comma
         return whole
@@ -62,11 +48,7 @@ def matching(values: Sequence[Any], wanted: str) -> list[int]:
 
 
 def described(values: Sequence[Any]) -> str:
-    """The values of a column in a few words.
-
-    Args:
-        values: of the column
-    """
+    """The values of a column in a few words."""
     different = list(dict.fromkeys(values))
     numbers = [value for value in different if isinstance(value, int | float) and not isinstance(value, bool)]
     if len(numbers) > LISTED:

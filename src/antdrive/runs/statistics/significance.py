@@ -21,12 +21,7 @@ TIE = 1e-9  # differences that are smaller than this, relative to the values, ar
 
 
 def mcnemar(first: int, second: int) -> float:
-    """The exact p-value of McNemar's test (McNemar 1947): a two-sided binomial test of the pairs that disagree.
-
-    Args:
-        first: pairs in which only the first succeeded
-        second: pairs in which only the second succeeded
-    """
+    """The exact p-value of McNemar's test (McNemar 1947): a two-sided binomial test of the pairs that disagree."""
     if first + second == 0:
         return 1.0
     tables = library("statsmodels.stats.contingency_tables")
@@ -80,9 +75,6 @@ def flips_by_world(sums: Floats) -> Floats:
 
     If two planners are alike, exchanging their names in a world changes nothing, however much the runs in that world
     depend on each other. With signed ranks this is the test of Rosner, Glynn and Lee (2006).
-
-    Args:
-        sums: for each world and comparison the sum of its differences or signed ranks, (W, K); 0 where it has none
     """
     worlds, comparisons = sums.shape
     exact = worlds <= EXACT_WORLDS
@@ -109,13 +101,7 @@ def _random_signs(worlds: int) -> Iterator[Floats]:
 
 
 def sums_by_world(values: Floats, world: Ints, worlds: int) -> Floats:
-    """The sum of the values (N,) of each world, (W,).
-
-    Args:
-        values: one for each pair
-        world: the index of each pair's world
-        worlds: how many there are
-    """
+    """The sum of the values (N,) of each world, (W,)."""
     return np.bincount(world, weights=values, minlength=worlds).astype(float)
 
 
@@ -123,9 +109,6 @@ def holm(p_values: Floats) -> Floats:
     """Holm's adjusted p-values (Holm 1979), (K,); nan stays nan and does not count.
 
     The k-th smallest of m is multiplied by m + 1 - k, and none is below a smaller one's.
-
-    Args:
-        p_values: of all comparisons of a family
     """
     adjusted = np.full(len(p_values), np.nan)
     known = np.flatnonzero(~np.isnan(p_values))

@@ -66,9 +66,6 @@ def success_table(paired: PairedRuns) -> list[PlannerSuccess]:
     """A row for each planner, in the order of the runs.
 
     Shares are over the instances that every planner ran; where there is none, over each planner's own.
-
-    Args:
-        paired: the runs
     """
     outcomes = paired.table.texts("outcome")
     shared = paired.shared if paired.shared.any() else np.ones(len(paired.row), dtype=np.bool_)
@@ -105,10 +102,6 @@ def _over_worlds(paired: PairedRuns, mask: Flags, successes: int, resampled: Int
 
 def common_medians(paired: PairedRuns, metrics: Sequence[str]) -> tuple[int, dict[str, list[tuple[float, Interval]]]]:
     """The median of each metric and planner over the instances in which every planner succeeded.
-
-    Args:
-        paired: the runs
-        metrics: columns
 
     Returns:
         The number of those instances, and for each metric the medians of the planners with 95 % bootstrap intervals.

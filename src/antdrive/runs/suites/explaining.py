@@ -14,13 +14,7 @@ SAME = "world, robot and settings are those of the baseline"
 
 
 def explain(run: Run, judgement: Judgement, baseline: Baseline | None) -> Iterator[str]:
-    """The lines of a message about a failed test, without how to repeat it.
-
-    Args:
-        run: what was driven
-        judgement: what is wrong with it
-        baseline: the earlier drive; None if there is none
-    """
+    """The lines of a message about a failed test, without how to repeat it."""
     yield from judgement.faults
     if run.rollout is not None:
         touched = touched_in(run.rollout)
@@ -48,12 +42,7 @@ def _parting(run: Run, baseline: Baseline) -> Iterator[str]:
 
 
 def changes(run: Run, baseline: Baseline) -> Iterator[str]:
-    """What differs between the conditions of a run and those of its baseline, a line each.
-
-    Args:
-        run: the present run
-        baseline: the earlier drive
-    """
+    """What differs between the conditions of a run and those of its baseline, a line each."""
     present: Mapping[str, str] = run.rollout.record.versions if run.rollout else versions()
     others = [
         f"{name} {baseline.versions.get(name, 'none')} -> {version}"

@@ -77,12 +77,7 @@ def judge(run: Run, demands: Demands, baseline: Baseline | None) -> Judgement:
 
 
 def unfulfilled(run: Run, demands: Demands) -> Iterator[str]:
-    """What a run does not fulfil, whatever the baseline, a sentence each.
-
-    Args:
-        run: the run
-        demands: what its test demands
-    """
+    """What a run does not fulfil, whatever the baseline, a sentence each."""
     certified = run.certificate is not None and run.certificate.certified
     if run.outcome is not demands.outcome:
         reason = f" ({run.reason})" if run.reason else ""
@@ -167,12 +162,7 @@ def _compare(
 
 
 def limits(demands: Demands, baseline: Baseline) -> Iterator[Bound]:
-    """The bounds on metrics that a baseline sets: a drive that breaks one is worse than the baseline by more than its tolerance.
-
-    Args:
-        demands: what the test demands
-        baseline: the earlier drive
-    """
+    """The bounds on metrics that a baseline sets: breaking one is worse than the baseline by more than its tolerance."""
     for name in (*FIRST, *(name for name in METRICS if name not in FIRST)):
         better, tolerance, then = METRICS[name].better, demands.tolerance(name), baseline.metric(name)
         if better == "neither" or tolerance is None or name in WALL_CLOCK or not math.isfinite(then):

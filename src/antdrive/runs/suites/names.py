@@ -36,10 +36,6 @@ def check_names(case: SuiteCase) -> None:
 def world_path(case: SuiteCase, name: str) -> Path:
     """The file of a world that a test names.
 
-    Args:
-        case: the test
-        name: a name of the catalogue, or a path relative to the suite
-
     Raises:
         InputError: there is no such world.
     """
@@ -82,11 +78,7 @@ def planner_of(case: SuiteCase) -> tuple[Planner, str]:
 
 
 def is_own_entry(planner: str | Mapping[str, Any]) -> bool:
-    """Whether the words of a suite name a planner in a file or module.
-
-    Args:
-        planner: a name, or a mapping with a name and options
-    """
+    """Whether the words of a suite name a planner in a file or module."""
     name = planner if isinstance(planner, str) else planner.get("name")
     sources = () if isinstance(planner, str) else (key for key in SOURCES if key in planner)
     return any(sources) or (isinstance(name, str) and is_own(name))

@@ -70,13 +70,7 @@ def end_distance(baseline: Baseline, rollout: Rollout) -> float:
 
 
 def parting(baseline: Baseline, rollout: Rollout, apart: float = APART) -> Parting | None:
-    """Where a drive first is farther from its baseline than allowed; None if it nowhere is.
-
-    Args:
-        baseline: the earlier drive
-        rollout: the present one
-        apart: the distance that counts [m]
-    """
+    """Where a drive first is farther from its baseline than allowed; None if it nowhere is."""
     far = distances(baseline, rollout) > apart
     if not far.any():
         return None

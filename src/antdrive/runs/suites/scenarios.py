@@ -83,12 +83,7 @@ def robot_of(case: SuiteCase) -> RobotSpec:
 
 
 def run_command(case: SuiteCase, *, anywhere: bool = False) -> str | None:
-    """The `antdrive run` command that drives a test's scenario alone; None where only `antdrive check` can.
-
-    Args:
-        case: the test
-        anywhere: whether the command is to work in every folder, not in the working directory alone
-    """
+    """The `antdrive run` command that drives a test's scenario alone; None where only `antdrive check` can."""
     entry = case.entry
     planner = {"name": entry.planner} if isinstance(entry.planner, str) else dict(entry.planner)
     usual = entry.start is None and entry.goal is None

@@ -30,12 +30,6 @@ class Blockage:
         failures: failed searches in a row
         reason: which mover stands where, once the robot has no patience left; empty before
         gaps: the movers beside which there is too little room for local avoidance
-
-    Args:
-        task: start, goal and what stands in the world; without movers
-        interval: the shortest time between two searches [s]
-        patience: how long after the first failed search the robot gives up [s]
-        keeps: the distance that local avoidance keeps between the robot's centre and a mover's surface [m]
     """
 
     def __init__(
@@ -58,12 +52,7 @@ class Blockage:
         self._places = np.empty((0, 2))
 
     def pause(self, tick: int, robot: tuple[float, float]) -> bool:
-        """Whether a search now would only repeat the last one.
-
-        Args:
-            tick: the number of the control period
-            robot: the robot's position [m]
-        """
+        """Whether a search now would only repeat the last one."""
         if not self.failures:
             return False
         if not self._still_there(tick, robot):
@@ -93,21 +82,11 @@ class Blockage:
         self._due = min(now + wait, max(self._since + self._patience, now + self._interval))
 
     def may_pass(self, tick: int, robot: tuple[float, float]) -> bool:
-        """Whether the robot now passes through a gap at the safety margin that it waited before; not at the first failure.
-
-        Args:
-            tick: the number of the control period
-            robot: the robot's position [m]
-        """
+        """Whether the robot now passes through a gap at the safety margin that it waited before; not at the first failure."""
         return self.failures > 0 and self.gaps.may_pass(tick, robot, self.standing(tick, robot))
 
     def standing(self, tick: int, robot: tuple[float, float]) -> npt.NDArray[np.int64]:
-        """The movers (S,) that the robot perceives and predicts to stand still for as long as its patience lasts.
-
-        Args:
-            tick: the number of the control period
-            robot: the robot's position [m]
-        """
+        """The movers (S,) that the robot perceives and predicts to stand still for as long as its patience lasts."""
         perceived = self._predictor.within_range(tick, robot)
         ahead = np.linspace(0.0, self._patience, 1 + math.ceil(self._patience / LOOK))
         positions, _ = self._predictor.predict(tick, robot, ahead)

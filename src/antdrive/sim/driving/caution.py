@@ -20,25 +20,13 @@ class Caution:
     Every command is checked, however slow: a robot that creeps gets to an obstacle as well. A command is let through, or slowed
     down on its own arc, only if the robot can then stop on the arc, over ground that it has seen. Otherwise the robot brakes
     as hard as it can on the arc that it is on, which was checked in the control period before.
-
-    Args:
-        survey: what the robot has seen
-        robot: how hard it brakes
-        hz: control periods per second
-        reaction: how long the robot goes on as commanded after something comes into sight [s]
     """
 
     def __init__(self, survey: Survey, robot: RobotSpec, hz: int, reaction: float) -> None:
         self._survey, self._robot, self._period, self._reaction = survey, robot, 1 / hz, reaction
 
     def limit(self, pose: Pose, last: Twist, command: Twist) -> tuple[Twist, bool]:
-        """The command, slower where it leads out of sight; and whether it was.
-
-        Args:
-            pose: where the command takes effect
-            last: the command before
-            command: what the controller wants
-        """
+        """The command, slower where it leads out of sight; and whether it was."""
         share = self._allowed(pose, command)
         if share >= 1:
             return command, False

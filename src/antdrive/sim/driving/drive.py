@@ -41,21 +41,6 @@ def drive(
 ) -> Drive:
     """Drive along a path until the robot stands at its end, touches something, is stuck, or the time is over.
 
-    Args:
-        engine: the world and the robot in physics
-        controller: follows the path
-        tracked: the path, prepared by the controller
-        task: start, goal and goal tolerance
-        control_hz: control periods per simulated second; must divide the physics rate
-        time_limit: simulated time after which the drive ends [s]
-        noise_model: the robot's errors in sensing and acting; None: the robot senses and acts perfectly
-        avoidance: how the robot avoids the movers that `predictor` predicts; None: it does not
-        predictor: predicts the movers; None: the robot does not perceive them
-        monitor: finds new routes on the way; None: the robot keeps to its path
-        caution: keeps a robot without a map within its sight; None: the robot has a map
-        lookout: looks for movers with the lidar of a robot that has a map; None: the robot's lidar is not used
-        progress: is called with the fraction of the route that is done, about ten times per simulated second
-
     Raises:
         ValueError: the control rate does not divide the physics rate.
     """

@@ -127,11 +127,6 @@ class Driver:
     def decide(self, tick: int, pose: Pose, state: State) -> Ending | None:
         """Choose the command of one control period, or end the drive.
 
-        Args:
-            tick: the number of the control period
-            pose: the estimated pose for the moment when the command takes effect [m, m, rad]
-            state: the robot's true pose and its velocity
-
         Returns:
             How the drive ends now; None if it goes on.
         """

@@ -143,12 +143,7 @@ class Exploration:
     # ---- plans
 
     def plan(self, pose: Pose, avoided: list[Disc] | None = None) -> tuple[Grid, PlanResult]:
-        """The grid and the plan from a pose, through what is known; with less margin where there is no path otherwise.
-
-        Args:
-            pose: where the robot is
-            avoided: what the plan keeps off, beside what stands
-        """
+        """The grid and the plan from a pose, through what is known; with less margin where there is no path otherwise."""
         straight = math.dist(pose[:2], self._task.goal)
         best: tuple[Grid, PlanResult] | None = None
         for growth in GROWTH:
@@ -221,14 +216,7 @@ class Exploration:
     def route(
         self, pose: Pose, grid: Grid, answer: PlanResult, avoided: list[Disc] | None = None
     ) -> tuple[Route, TrackedPath]:
-        """The route of a plan, smoothed, and the same prepared for the controller.
-
-        Args:
-            pose: where the plan begins
-            grid: the plan's grid
-            answer: the plan
-            avoided: what the plan keeps off, beside what stands
-        """
+        """The route of a plan, smoothed, and the same prepared for the controller."""
         bounds = _bounds_of(grid)
         task = self._known(pose, bounds)
         self._seen.append((self._tick, task.world.discs))
@@ -330,15 +318,7 @@ class Exploration:
         return tracked.among(unsorted(discs, tracked.obstacles.bounds))
 
     def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
-        """Why a new route is due now; empty if none is.
-
-        Args:
-            tick: the number of the control period
-            pose: the robot's estimated pose [m, m, rad]
-            waiting: whether the robot waits for a mover
-            tracked: the path that the robot follows
-            arc: how far the robot has got along the path [m]
-        """
+        """Why a new route is due now; empty if none is."""
         now = tick / self._hz
         if self._movers is not None:
             self._movers.look(tick, pose, waiting)
@@ -370,13 +350,7 @@ class Exploration:
         return DISCOVERED if self._discovered(pose, arc) else ""
 
     def replan(self, tick: int, pose: Pose, trigger: str) -> TrackedPath | None:
-        """A new path from a pose [m, m, rad], prepared for the controller; None if there is none, or the robot looks round first.
-
-        Args:
-            tick: the number of the control period
-            pose: the robot's estimated pose [m, m, rad]
-            trigger: why a new route is due; goes into the log
-        """
+        """A new path from a pose, prepared for the controller; None: there is none, or the robot looks round first."""
         now, started = tick / self._hz, time.perf_counter()
         self._planned_at, self._tick = now, tick
         if trigger in (STALLED, HELD, BACKED, MADE_ROOM, LOOKED):
@@ -424,31 +398,17 @@ class Exploration:
         return True, dataclasses.replace(way, backwards=recovery.backwards)
 
     def note_sight(self, tick: int, held: Twist | None) -> None:
-        """Note whether the robot stands because its sight does not let it go on.
-
-        Args:
-            tick: the number of the control period
-            held: what it was to do then; None: it goes on
-        """
+        """Note whether the robot stands because its sight does not let it go on."""
         self._recovery.note_sight(tick / self._hz, held)
 
     def no_way(self, tick: int) -> str:
-        """That the robot planned in vain, several times in a row and not long ago, in words; empty if it did not.
-
-        Args:
-            tick: the number of the control period
-        """
+        """That the robot planned in vain, several times in a row and not long ago, in words; empty if it did not."""
         if tick / self._hz - self._gave_up_at > LATELY:
             return ""
         return f"no way through what was seen, last at t = {self._gave_up_at:.1f} s"
 
     def logged(self, per_tick: int, rows: int) -> dict[str, Any]:
-        """The arrays of a log about what was seen, by the names of `Rollout`.
-
-        Args:
-            per_tick: rows of the log in a control period
-            rows: of the log
-        """
+        """The arrays of a log about what was seen, by the names of `Rollout`."""
         seen = [(tick, discs) for tick, discs in self._seen if tick * per_tick < rows]
         tables = [np.column_stack((np.full(len(discs), tick * per_tick), discs)) for tick, discs in seen]
         return {

@@ -28,9 +28,6 @@ class NarrowGaps:
 
     Attributes:
         keeps: the distance that local avoidance keeps between the robot's centre and a mover's surface [m]
-
-    Args:
-        keeps: as the attribute; 0 where the robot does not avoid movers
     """
 
     def __init__(self, grid: Grid, predictor: Predictor, keeps: float) -> None:
@@ -45,15 +42,7 @@ class NarrowGaps:
     def note(
         self, tick: int, robot: tuple[float, float], tracked: TrackedPath, arc: float, standing: npt.NDArray[np.int64]
     ) -> None:
-        """Note the movers that the route ahead passes hardly farther away than avoidance keeps, or than was noted before.
-
-        Args:
-            tick: the number of the control period
-            robot: the robot's position, where it waits [m]
-            tracked: the path that it would follow
-            arc: how far along the path it is [m]
-            standing: the movers that stand still
-        """
+        """Note the movers that the route ahead passes hardly farther away than avoidance keeps, or than was noted before."""
         if self.keeps <= self._grid.inflate or not len(standing):
             return
         ahead = np.arange(arc, min(arc + LOOK_AHEAD, tracked.length), STEP)
@@ -72,12 +61,7 @@ class NarrowGaps:
                     self._refused.add(m)
 
     def noted(self, tick: int, robot: tuple[float, float]) -> npt.NDArray[np.int64]:
-        """The movers (N,) that the robot noted and that stand where they stood.
-
-        Args:
-            tick: the number of the control period
-            robot: the robot's position [m]
-        """
+        """The movers (N,) that the robot noted and that stand where they stood."""
         positions = self._predictor.perceived(tick, robot)[1]
         self._places = {m: at for m, at in self._places.items() if np.hypot(*(positions[m] - at)) <= STILL}
         self._passed &= self._places.keys()
@@ -85,13 +69,7 @@ class NarrowGaps:
         return np.array(sorted(self._places), dtype=np.int64)
 
     def discs(self, tick: int, ends: Floats, only: npt.NDArray[np.int64] | None = None) -> list[Disc]:
-        """The noted movers as discs, so much larger that a plan keeps from them what avoidance keeps.
-
-        Args:
-            tick: the number of the control period
-            ends: the robot's position and the goal (2, 2) [m], which they do not close
-            only: leave out other movers than these
-        """
+        """The noted movers as discs, so much larger that a plan keeps from them what avoidance keeps."""
         noted = self.noted(tick, (float(ends[0, 0]), float(ends[0, 1])))
         wanted = np.setdiff1d(noted if only is None else np.intersect1d(noted, only), list(self._passed))
         found: list[Disc] = []
@@ -101,13 +79,7 @@ class NarrowGaps:
         return found
 
     def may_pass(self, tick: int, robot: tuple[float, float], standing: npt.NDArray[np.int64]) -> bool:
-        """Allow the robot to pass the noted movers at the safety margin, if all movers have stood still since.
-
-        Args:
-            tick: the number of the control period
-            robot: the robot's position [m]
-            standing: the movers that stand still
-        """
+        """Allow the robot to pass the noted movers at the safety margin, if all movers have stood still since."""
         noted = np.setdiff1d(self.noted(tick, robot), [*self._passed, *self._refused])
         perceived, positions = self._predictor.perceived(tick, robot)
         if not len(noted) or not np.isin(perceived, standing).all():
@@ -120,12 +92,7 @@ class NarrowGaps:
         return True
 
     def closer(self, tick: int, robot: tuple[float, float]) -> Floats:
-        """How much closer than usual the robot may come to each mover that it perceives (P,) [m].
-
-        Args:
-            tick: the number of the control period
-            robot: the robot's position [m]
-        """
+        """How much closer than usual the robot may come to each mover that it perceives (P,) [m]."""
         perceived = self._predictor.within_range(tick, robot)
         if not self._passed:
             return np.zeros(len(perceived))

@@ -16,13 +16,7 @@ STEP = 2e-4  # no point of the footprint moves farther between two poses that ar
 
 
 def is_narrow(world: World, robot: RobotSpec, pose: Pose) -> bool:
-    """Whether a robot that fits at a pose could touch something if it turned there.
-
-    Args:
-        world: the obstacles and walls; movers do not count
-        robot: the robot
-        pose: x, y and yaw of its centre [m, rad]
-    """
+    """Whether a robot that fits at a pose could touch something if it turned there."""
     return not robot.footprint.is_disc and _room(world, pose) <= robot.radius
 
 
@@ -34,14 +28,6 @@ def cannot_leave(
     The controller's own commands are followed exactly, from rest, until the robot could turn freely. A way out that it does
     not take is no way out. It turns the shorter way round; a robot that is not centred on its axle turns the other way
     where the shorter is blocked and the longer is not.
-
-    Args:
-        tracked: the route that the robot is to follow
-        controller: follows it
-        world: the obstacles and walls; movers do not count
-        robot: the robot
-        start: its first pose [m, rad]
-        control_hz: control periods per second
     """
     if robot.footprint.corners and _gets_away(tracked, controller, world, robot, start, control_hz):
         return ""

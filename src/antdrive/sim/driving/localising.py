@@ -13,16 +13,7 @@ from antdrive.sim.sensing.dead_reckoning import DeadReckoning
 
 
 class OdometryModel(NoiseModel):
-    """The noise of a drive without pose fixes: encoders tell the speed, a gyro the yaw rate, and errors add up.
-
-    Args:
-        robot: its noise, scaled, and its track
-        noise: the factor on the robot's noise of wheels, encoders and commands
-        period: control period [s]
-        start: the pose at the start, which the robot knows
-        seed: the drive's seed
-        errors: the errors of odometry, scaled
-    """
+    """The noise of a drive without pose fixes: encoders tell the speed, a gyro the yaw rate, and errors add up."""
 
     def __init__(self, robot: RobotSpec, noise: float, period: float, start: Pose, seed: int, errors: Odometry) -> None:
         super().__init__(robot.noise.scaled(noise), robot.track, period, start, random_stream(seed, "noise"))
@@ -54,17 +45,7 @@ class TruePoseModel(NoiseModel):
 def noise_model_of(
     kind: str, robot: RobotSpec, noise: float, odometry: float, period: float, start: Pose, seed: int
 ) -> NoiseModel | None:
-    """The noise of one drive; None where the robot senses and acts perfectly.
-
-    Args:
-        kind: how the robot localises itself: fixes, odometry, matching (odometry that scans correct) or true
-        robot: its documented noise
-        noise: the factor on it
-        odometry: the factor on the errors of odometry, where the robot has nothing else
-        period: control period [s]
-        start: the pose at the start, which the robot knows
-        seed: the drive's seed
-    """
+    """The noise of one drive; None where the robot senses and acts perfectly."""
     if kind in ("odometry", "matching"):
         return OdometryModel(robot, noise, period, start, seed, Odometry().scaled(odometry))
     levels = robot.noise.scaled(noise)

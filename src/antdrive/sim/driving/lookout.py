@@ -16,9 +16,6 @@ class Glances:
 
     Attributes:
         taken: the control period and the ranges (beams,) [m] of each scan so far
-
-    Args:
-        senses: the lidar in the true world
     """
 
     def __init__(self, senses: Senses) -> None:
@@ -26,12 +23,7 @@ class Glances:
         self._senses = senses
 
     def scan(self, tick: int, pose: Pose) -> Floats | None:
-        """The ranges (beams,) [m] of the scan that is due in a control period; None: none is.
-
-        Args:
-            tick: the number of the control period
-            pose: the robot's true pose, from which the lidar sees
-        """
+        """The ranges (beams,) [m] of the scan that is due in a control period; None: none is."""
         if not self._senses.due(tick, self.taken[-1][0] if self.taken else -1):
             return None
         ranges = self._senses.ranges(tick, pose)
@@ -44,11 +36,6 @@ class Lookout:
 
     Attributes:
         watch: what the scans tell of movers
-
-    Args:
-        senses: the lidar in the true world
-        ground: the map that the robot was given
-        watch: what the scans tell of movers
     """
 
     def __init__(self, senses: Senses, ground: Ground, watch: Watch) -> None:
@@ -56,23 +43,12 @@ class Lookout:
         self._glances, self._ground = Glances(senses), ground
 
     def look(self, tick: int, pose: Pose, estimate: Pose) -> Pose:
-        """Take a scan if one is due in a control period; the estimated pose.
-
-        Args:
-            tick: the number of the control period
-            pose: the robot's true pose, from which the lidar sees
-            estimate: where the robot believes it is
-        """
+        """Take a scan if one is due in a control period; the estimated pose."""
         ranges = self._glances.scan(tick, pose)
         if ranges is not None:
             self.watch.read(self._ground, estimate, ranges, tick)
         return estimate
 
     def logged(self, per_tick: int, rows: int) -> dict[str, Any]:
-        """The arrays of a log that hold the scans, by the names of `Rollout`.
-
-        Args:
-            per_tick: rows of the log in a control period
-            rows: of the log
-        """
+        """The arrays of a log that hold the scans, by the names of `Rollout`."""
         return scans_logged(self._glances.taken, per_tick, rows)

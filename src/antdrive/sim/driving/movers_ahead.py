@@ -27,17 +27,7 @@ MOST = 1.0  # movers have a radius of at most this [m]
 
 
 class MoversAhead:
-    """When the movers that a robot without a map follows make a new route due, and what it keeps off.
-
-    Args:
-        predictor: what the robot follows
-        survey: what it has seen
-        policy: when to replan
-        robot: the robot
-        goal: where it is to go [m]
-        inflate: the robot's radius plus the margin [m]
-        hz: control periods per simulated second
-    """
+    """When the movers that a robot without a map follows make a new route due, and what it keeps off."""
 
     def __init__(
         self,
@@ -56,13 +46,7 @@ class MoversAhead:
         self._measure = rasterise(World("measure", (0.0, 0.0, 1.0, 1.0)), COARSE, inflate)
 
     def look(self, tick: int, pose: Pose, waiting: bool) -> None:
-        """Take note of what the robot sees in a control period.
-
-        Args:
-            tick: the number of the control period
-            pose: the robot's estimated pose [m, m, rad]
-            waiting: whether the robot waits for a mover
-        """
+        """Take note of what the robot sees in a control period."""
         self._traffic.look(tick, pose[:2])
         if not waiting:
             self._waiting_since = math.nan
@@ -70,14 +54,7 @@ class MoversAhead:
             self._waiting_since = tick / self._hz
 
     def trigger(self, tick: int, pose: Pose, tracked: TrackedPath, arc: float) -> str:
-        """Why movers make a new route due now; empty if they do not.
-
-        Args:
-            tick: the number of the control period
-            pose: the robot's estimated pose [m, m, rad]
-            tracked: the path that the robot follows
-            arc: how far the robot has got along the path [m]
-        """
+        """Why movers make a new route due now; empty if they do not."""
         policy = self._policy
         if tick / self._hz - self._waiting_since >= policy.max_wait:
             self._waiting_since = math.nan
@@ -92,22 +69,11 @@ class MoversAhead:
         return TRAFFIC if zones[-1].crossed(tracked, arc) else ""
 
     def heavy(self, tick: int, pose: Pose) -> bool:
-        """Whether there is so much traffic that the robot should go round the ground that movers roam.
-
-        Args:
-            tick: the number of the control period
-            pose: the robot's estimated pose [m, m, rad]
-        """
+        """Whether there is so much traffic that the robot should go round the ground that movers roam."""
         return self._traffic.rate(tick, pose[:2]) > self._policy.max_traffic
 
     def discs(self, tick: int, pose: Pose, within: Zone | None = None) -> list[Disc]:
-        """What movers will cover soon; they close neither the robot's position nor the goal.
-
-        Args:
-            tick: the number of the control period
-            pose: the robot's estimated pose [m, m, rad]
-            within: only what is near the robot, and where movers go; None: all
-        """
+        """What movers will cover soon; they close neither the robot's position nor the goal."""
         if not len(self._predictor.within_range(tick, pose[:2])):
             return []
         ends = np.array([pose[:2], self._goal])
@@ -118,13 +84,7 @@ class MoversAhead:
         return [disc for disc in soon if math.dist((disc.x, disc.y), pose[:2]) <= reach and within.holds(disc)]
 
     def zones(self, tick: int, pose: Pose, grid: Grid) -> list[Zone]:
-        """The ground that movers roam, largest first: all but a lane along the outermost walls that were seen, then as seen.
-
-        Args:
-            tick: the number of the control period
-            pose: the robot's estimated pose [m, m, rad]
-            grid: the grid on which the robot's route is planned
-        """
+        """The ground that movers roam, largest first: all but a lane along the outermost walls that were seen, then as seen."""
         zones = self._traffic.zones(tick, pose[:2], self._goal, grid)
         roamed, radius = self._traffic.box, self._traffic.widest(tick, pose[:2])
         lane = radius + 2 * self._inflate + SLACK
@@ -133,11 +93,7 @@ class MoversAhead:
         return [Zone(inner, radius, pose[:2], self._goal, grid), *zones]
 
     def bounds(self, least: Bounds) -> Bounds:
-        """Bounds that hold a way round the ground that movers roam, as far as it was seen.
-
-        Args:
-            least: what they hold at least: xmin, ymin, xmax, ymax [m]
-        """
+        """Bounds that hold a way round the ground that movers roam, as far as it was seen."""
         box, more = self._traffic.box, 2 * (MOST + self._inflate)
         lower, upper = self._outermost()
         x0, y0 = np.floor(np.minimum(lower, box[:2] - more)).tolist()
@@ -155,10 +111,6 @@ class MoversAhead:
         """What was hit, as discs (N, 3) [m], without what movers may have left behind where they roam.
 
         A mover that is as far away as ground is not seen free is no track yet, so its hits are entered in the map.
-
-        Args:
-            discs: what was hit (N, 3) [m]
-            pose: the robot's estimated pose [m, m, rad]
         """
         if not self._traffic.samples:
             return discs

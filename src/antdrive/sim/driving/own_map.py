@@ -16,11 +16,7 @@ PATIENCE = 3  # plans in a row that find no path before the robot no longer beli
 
 
 def horizon_of(*, watching: bool) -> float:
-    """How far away a hit may be that is entered in a robot's map [m].
-
-    Args:
-        watching: whether the robot looks for movers in its scans
-    """
+    """How far away a hit may be that is entered in a robot's map [m]."""
     return HORIZON_AMONG_MOVERS if watching else HORIZON
 
 
@@ -28,19 +24,12 @@ def turning_room(radius: float) -> float:
     """How far around a robot ground is to be free, so that it may turn on the spot in its own sight [m].
 
     Half a cell is more than the circle around a cell, by which ground that was not seen counts, stands out of it.
-
-    Args:
-        radius: of the circle that the robot covers when it turns [m]
     """
     return radius + PAD + 0.5 * MAP_CELL
 
 
 def forgetting_ticks(record: DriveRecord) -> Iterator[int]:
-    """The control periods in which a robot without a map forgot what it had seen: after some plans in a row found no path.
-
-    Args:
-        record: of the log
-    """
+    """The control periods in which a robot without a map forgot what it had seen: after some plans in a row found no path."""
     failures = 0
     for replan in record.replans:
         if failures >= PATIENCE and replan.trigger != LOOKED:

@@ -43,12 +43,7 @@ class Perception:
 
 
 def usual_perception(map: str, movers: bool) -> Perception:
-    """What a robot perceives of movers where nobody says it by name: without a map nothing but what its lidar finds.
-
-    Args:
-        map: what the robot knows of the world: given or none
-        movers: whether the world has movers
-    """
+    """What a robot perceives of movers where nobody says it by name: without a map nothing but what its lidar finds."""
     return Perception(kind="lidar") if map == "none" and movers else Perception()
 
 
@@ -71,11 +66,6 @@ class Predictor:
 
     def predict(self, tick: int, robot: tuple[float, float], ahead: Floats) -> tuple[Floats, Floats]:
         """Predict the movers that the robot perceives.
-
-        Args:
-            tick: the control period in which the prediction is made
-            robot: the robot's position [m]
-            ahead: times after the tick (K,) [s]
 
         Returns:
             The movers' positions (K, M, 2) [m] and radii (M,) [m].

@@ -93,14 +93,7 @@ class Recorder:
         self._errors[-1] = (estimate[0] - x, estimate[1] - y, turned)
 
     def advance(self, steps: int, command: Twist, limiter: int, actuated: Twist | None = None) -> None:
-        """Advance a number of physics steps; the rows show the command and the limiter in force.
-
-        Args:
-            steps: how many
-            command: the robot's command
-            limiter: what held its speed
-            actuated: what the motors were set to; None: the command
-        """
+        """Advance a number of physics steps; the rows show the command and the limiter in force."""
         in_force = (*command, limiter, *(actuated or command))
         engine, rows = self._engine, self._rows
         for _ in range(steps):

@@ -37,13 +37,6 @@ class Look:
 
     Attributes:
         done: whether it is over
-
-    Args:
-        turns: how far the robot turns, one after the other, counter-clockwise if positive [rad]
-        yaw: its heading at first [rad]
-        rate: how fast it turns at most [rad/s]
-        robot: how hard it accelerates
-        hz: control periods per second
     """
 
     def __init__(self, turns: list[float], yaw: float, rate: float, robot: RobotSpec, hz: int) -> None:
@@ -53,12 +46,7 @@ class Look:
         self.done = False
 
     def command(self, pose: Pose, last: Twist) -> Twist:
-        """The twist of the next control period, of a robot that turns or stands.
-
-        Args:
-            pose: where the robot believes it is
-            last: the command before, as sight and movers left it
-        """
+        """The twist of the next control period, of a robot that turns or stands."""
         self._left -= math.remainder(pose[2] - self._yaw, 2 * math.pi)
         self._yaw = pose[2]
         self._periods -= 1
@@ -88,12 +76,6 @@ class Recovery:
         look: the turn with which the robot looks round now; None: it does not
         route: the last way out that was found; None: none was
         backwards: whether that way leads back along the track
-
-    Args:
-        survey: what the robot has seen
-        robot: how fast it turns
-        start: its first pose
-        hz: control periods per second
     """
 
     def __init__(self, survey: Survey, robot: RobotSpec, start: Pose, hz: int) -> None:
@@ -109,26 +91,14 @@ class Recovery:
         self._looked_at = (math.inf, math.inf)
 
     def note_way(self, now: float, pose: Pose, *, waiting: bool, backwards: bool) -> None:
-        """Note where the robot is: whether it moves, and its track unless it follows that back.
-
-        Args:
-            now: the time [s]
-            pose: where the robot believes it is
-            waiting: whether it waits for a mover
-            backwards: whether it drives backwards along its track
-        """
+        """Note where the robot is: whether it moves, and its track unless it follows that back."""
         if waiting or math.dist(self._rest[1], pose[:2]) > STALL_DISTANCE:
             self.rests(now, pose)
         if not backwards and (not self._trail or math.dist(self._trail[-1], pose[:2]) >= TRAIL):
             self._trail.append(pose[:2])
 
     def note_sight(self, now: float, held: Twist | None) -> None:
-        """Note whether the robot stands because its sight does not let it go on.
-
-        Args:
-            now: the time [s]
-            held: what it was to do then; None: it goes on
-        """
+        """Note whether the robot stands because its sight does not let it go on."""
         if held is None:
             self._held_since = math.inf
         elif self._held_since == math.inf:
@@ -136,29 +106,15 @@ class Recovery:
         self._wanted = held
 
     def rests(self, now: float, pose: Pose) -> None:
-        """Count from now on how long the robot has not moved.
-
-        Args:
-            now: the time [s]
-            pose: where the robot believes it is
-        """
+        """Count from now on how long the robot has not moved."""
         self._rest = now, pose[:2]
 
     def stalled(self, now: float) -> bool:
-        """Whether the robot has not moved for long.
-
-        Args:
-            now: the time [s]
-        """
+        """Whether the robot has not moved for long."""
         return now - self._rest[0] > STALL_TIME
 
     def held(self, now: float, pose: Pose) -> bool:
-        """Whether ground that was not seen has held the robot for long where it has not looked round, or will from the start on.
-
-        Args:
-            now: the time [s]
-            pose: where the robot believes it is
-        """
+        """Whether ground that was not seen held the robot for long where it has not looked round, or will from the start on."""
         if not self._may_look(pose):
             return False
         if self._looked_at[0] == math.inf and self._survey.lidar.field_of_view < NARROW:
@@ -166,22 +122,14 @@ class Recovery:
         return now - self._held_since > HELD_TIME and self.misses_sight(pose)
 
     def misses_sight(self, pose: Pose) -> bool:
-        """Whether the robot stands because it has not seen the ground ahead, not because something was hit there.
-
-        Args:
-            pose: where the robot believes it is
-        """
+        """Whether the robot stands because it has not seen the ground ahead, not because something was hit there."""
         if self._wanted is None:
             return False
         seen, open_ = (self._survey.clear_way(pose, self._wanted, WAY, daring=daring) for daring in (False, True))
         return open_ > seen + WORTH_SEEING
 
     def begin_look(self, pose: Pose) -> bool:
-        """Begin to look round; whether there is anything to look at that the robot has not looked at from here.
-
-        Args:
-            pose: where the robot believes it is
-        """
+        """Begin to look round; whether there is anything to look at that the robot has not looked at from here."""
         if not self._may_look(pose):
             return False
         self._looked_at = pose[:2]
@@ -194,32 +142,18 @@ class Recovery:
         return True
 
     def end_look(self, now: float, pose: Pose) -> None:
-        """Go on after a look.
-
-        Args:
-            now: the time [s]
-            pose: where the robot believes it is
-        """
+        """Go on after a look."""
         self.look, self._held_since = None, math.inf
         self.rests(now, pose)
 
     def note_stall(self, now: float, pose: Pose) -> None:
-        """Note a stall, and how many there were at this place.
-
-        Args:
-            now: the time [s]
-            pose: where the robot believes it is
-        """
+        """Note a stall, and how many there were at this place."""
         self.rests(now, pose)
         self._stalls = self._stalls + 1 if math.dist(self._stalled_at, pose[:2]) < AGAIN else 1
         self._stalled_at = pose[:2]
 
     def way(self, pose: Pose) -> Route | None:
-        """A way out for a robot that stalls again, or that its sight holds: back along the track, else ahead. None: no way.
-
-        Args:
-            pose: where the robot believes it is
-        """
+        """A way out for a robot that stalls again, or that its sight holds: back along the track, else ahead. None: no way."""
         tries = self._stalls - 2 if self._held_since == math.inf else self._stalls - 1
         if not 0 <= tries <= len(LENGTHS):
             return None

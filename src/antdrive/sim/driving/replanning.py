@@ -131,12 +131,6 @@ class ReplanMonitor:
             and time
         blockage: whether movers that stand still close every way
         wrong: what is wrong with a plan that the planner has given on the way; empty if none was. The drive then ends
-
-    Args:
-        margin: distance kept free around the robot, on top of its radius [m]
-        smoothing: how plans become routes, one of `SMOOTHINGS`
-        hz: control periods per simulated second
-        keeps: the distance that local avoidance keeps between the robot's centre and a mover's surface [m]
     """
 
     def __init__(
@@ -181,15 +175,7 @@ class ReplanMonitor:
         self.schedule = Schedule.of(plan, route) if self._timed and isinstance(plan, TimedPlan) else None
 
     def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
-        """Why a new route is due now; empty if none is.
-
-        Args:
-            tick: the number of the control period
-            pose: the robot's estimated pose [m, m, rad]
-            waiting: whether the robot waits for a mover
-            tracked: the path that the robot follows
-            arc: how far the robot has got along the path [m]
-        """
+        """Why a new route is due now; empty if none is."""
         now, policy = tick / self._hz, self.policy
         if self._traffic is not None:
             self._traffic.look(tick, pose[:2])
@@ -213,13 +199,7 @@ class ReplanMonitor:
         return TRAFFIC if self._in_traffic(tick, pose, tracked, arc) else ""
 
     def replan(self, tick: int, pose: Pose, trigger: str) -> TrackedPath | None:
-        """A new path from a pose [m, m, rad], prepared for the controller; None if there is none.
-
-        Args:
-            tick: the number of the control period
-            pose: the robot's estimated pose [m, m, rad]
-            trigger: why a new route is due; goes into the log
-        """
+        """A new path from a pose [m, m, rad], prepared for the controller; None if there is none."""
         now = tick / self._hz
         self._replanned_at, self._waiting_since = now, math.nan
         started = time.perf_counter()

@@ -34,19 +34,7 @@ def survey_of(
     watching: bool,
     hz: int,
 ) -> Survey:
-    """The survey of a robot without a map, after the first look from the start.
-
-    Args:
-        robot: with a lidar
-        task: where the robot starts and is to go
-        world: all that stands and moves, also what the task's world lacks
-        trajectories: how the world's movers move
-        seed: the drive's seed
-        noisy: whether ranges have noise
-        matching: whether scans correct the estimated pose
-        watching: whether the robot looks for movers in the scans
-        hz: control periods per second
-    """
+    """The survey of a robot without a map, after the first look from the start."""
     assert robot.lidar is not None
     senses = Senses.of(robot.lidar, world, trajectories, seed=seed, noisy=noisy, hz=hz)
     watch = Watch(robot.lidar, hz) if watching else None
@@ -56,11 +44,7 @@ def survey_of(
 
 
 class Rescanning:
-    """The survey of a logged drive, made again period by period.
-
-    Args:
-        rollout: the log of a robot without a map, with scans
-    """
+    """The survey of a logged drive, made again period by period."""
 
     def __init__(self, rollout: Rollout) -> None:
         record = rollout.record
@@ -79,22 +63,11 @@ class Rescanning:
         self._forgetting = set(forgetting_ticks(record))
 
     def look(self, tick: int, pose: Pose, estimate: Pose) -> Pose:
-        """The estimated pose of a control period, corrected by the scan if one is due.
-
-        Args:
-            tick: the number of the control period
-            pose: the logged true pose
-            estimate: where odometry says that the robot is
-        """
+        """The estimated pose of a control period, corrected by the scan if one is due."""
         return self._survey.look(tick, pose, estimate)
 
     def plan(self, tick: int, pose: Pose) -> None:
-        """Forget the map where the robot did so before it planned.
-
-        Args:
-            tick: the number of the control period
-            pose: where the robot believed it would be when its next command takes effect
-        """
+        """Forget the map where the robot did so before it planned."""
         if tick in self._forgetting:
             self._survey.forget(pose)
 
@@ -104,11 +77,7 @@ class Rescanning:
 
 
 class Relooking:
-    """The scans of a logged drive with a map, taken again period by period.
-
-    Args:
-        rollout: the log of a robot that looked for movers with its lidar, with scans
-    """
+    """The scans of a logged drive with a map, taken again period by period."""
 
     def __init__(self, rollout: Rollout) -> None:
         record = rollout.record
@@ -124,13 +93,7 @@ class Relooking:
         self._rollout, self._glances = rollout, Glances(senses)
 
     def look(self, tick: int, pose: Pose, estimate: Pose) -> Pose:
-        """Take a scan if one is due in a control period; the estimated pose, which no scan corrects.
-
-        Args:
-            tick: the number of the control period
-            pose: the logged true pose
-            estimate: where the robot believes it is
-        """
+        """Take a scan if one is due in a control period; the estimated pose, which no scan corrects."""
         self._glances.scan(tick, pose)
         return estimate
 
@@ -140,11 +103,7 @@ class Relooking:
 
 
 def rescanning_of(rollout: Rollout) -> Rescanning | Relooking | None:
-    """What takes the scans of a log again; None where it has none.
-
-    Args:
-        rollout: the log
-    """
+    """What takes the scans of a log again; None where it has none."""
     if not len(rollout.scans):
         return None
     return Rescanning(rollout) if rollout.record.exploring else Relooking(rollout)

@@ -52,14 +52,7 @@ class Schedule:
 
 
 def slow_down(command: Twist, last: Twist, limit: float, max_change: float) -> Twist:
-    """A command slowed down to a speed limit on the same curve, as far as the robot can brake.
-
-    Args:
-        command: the command to slow down
-        last: the command of the previous control period
-        limit: the speed limit [m/s]
-        max_change: how much speed the robot can lose in a control period [m/s]
-    """
+    """A command slowed down to a speed limit on the same curve, as far as the robot can brake."""
     if command.speed <= 0:
         return command
     v = max(min(command.speed, limit), min(command.speed, last.speed - max_change))

@@ -65,16 +65,7 @@ class Senses:
 
     @classmethod
     def of(cls, lidar: Lidar, world: World, trajectories: Trajectories, *, seed: int, noisy: bool, hz: int) -> Senses:
-        """A lidar in a world, whose noise is drawn from a drive's seed; it scans once in a control period at most.
-
-        Args:
-            lidar: the robot's lidar
-            world: all that stands and moves
-            trajectories: how the world's movers move
-            seed: the drive's seed
-            noisy: whether ranges have noise
-            hz: control periods per second
-        """
+        """A lidar in a world, whose noise is drawn from a drive's seed; it scans once in a control period at most."""
         rng = random_stream(seed, "lidar") if noisy else None
         return cls(Scanner.of(lidar.at(hz), world), world, trajectories or None, rng, hz)
 
@@ -85,21 +76,11 @@ class Senses:
         return np.column_stack((movers.positions(np.zeros(1))[0], movers.radii)) if movers else None
 
     def due(self, tick: int, last: int) -> bool:
-        """Whether a scan is due in a control period, after one in an earlier period; a negative one: after none.
-
-        Args:
-            tick: the number of the control period
-            last: the control period of the scan before
-        """
+        """Whether a scan is due in a control period, after one in an earlier period; a negative one: after none."""
         return last < 0 or (tick != last and self.scanner.lidar.due(tick, self.hz))
 
     def ranges(self, tick: int, pose: Pose) -> Floats:
-        """A scan (beams,) [m].
-
-        Args:
-            tick: the number of the control period
-            pose: the robot's true pose
-        """
+        """A scan (beams,) [m]."""
         movers = self.trajectories
         if not movers:
             return self.scanner.scan(pose, rng=self.rng)
@@ -118,12 +99,6 @@ class Survey:
         scans: all scans so far
         whole: how many of them were entered as a whole, with the ground that is free
         watch: what follows the movers in the scans; None: nothing does
-
-    Args:
-        start: the first pose, from which odometry counts
-        goal: where the robot is to go; the map is laid out for the way there [m]
-        matching: whether scans correct the estimated pose by what is on the map
-        watch: follows the movers in the scans, which are then no part of the map; None: they are part of it
     """
 
     def __init__(
@@ -149,13 +124,7 @@ class Survey:
         self.whole = 0
 
     def look(self, tick: int, pose: Pose, estimate: Pose) -> Pose:
-        """Take a scan if one is due in a control period; the estimated pose, which the scan may correct.
-
-        Args:
-            tick: the number of the control period
-            pose: the robot's true pose, from which the lidar sees
-            estimate: where the robot believes it is
-        """
+        """Take a scan if one is due in a control period; the estimated pose, which the scan may correct."""
         if not self._senses.due(tick, self.scans[-1].tick if self.scans else -1):
             return estimate
         ranges = self._senses.ranges(tick, pose)
@@ -178,21 +147,11 @@ class Survey:
         return sliding_left_out(estimate, corrected, self.map.endpoints(estimate, near))
 
     def discs(self, bounds: Bounds) -> Floats:
-        """What was hit within bounds, as discs (N, 3) [m].
-
-        Args:
-            bounds: x_min, y_min, x_max, y_max [m]
-        """
+        """What was hit within bounds, as discs (N, 3) [m]."""
         return self.map.discs(bounds)
 
     def hit_within(self, points: Floats, needed: Floats, ahead: Floats) -> bool:
-        """Whether a beam of the last scan ended clearly nearer to a point of a route than the clearance that it needs.
-
-        Args:
-            points: places (N, 2) [m]
-            needed: the clearance of each (N,) [m]
-            ahead: how far along the route each is (N,) [m]; the farther, the less exact is what is seen there
-        """
+        """Whether a beam of the last scan ended clearly nearer to a point of a route than the clearance that it needs."""
         scan = self.scans[-1]
         x, y, yaw = self.lidar.pose_on(scan.estimate)
         ranges = scan.ranges if scan.movers is None else np.where(scan.movers, np.inf, scan.ranges)
@@ -203,9 +162,6 @@ class Survey:
 
         What the robot covers when it turns stays free as far as it was seen free. Hits there become ground that was not seen:
         open to plans, but the robot does not move over it before it has looked again.
-
-        Args:
-            pose: where the robot believes it is
         """
         self.map = self.map.renewed(pose[:2], self._turning_room, self._goal)
         for scan in self.scans[-self._recent :]:
@@ -218,35 +174,15 @@ class Survey:
         return seen
 
     def clear_distance(self, pose: Pose, speed: float, yaw_rate: float, longest: float) -> float:
-        """How far the robot can go on an arc over ground that it has seen free [m].
-
-        Args:
-            pose: where it is
-            speed: forward speed on the arc [m/s], not 0
-            yaw_rate: yaw rate on it [rad/s]
-            longest: no more is asked for [m]
-        """
+        """How far the robot can go on an arc over ground that it has seen free [m]."""
         return clear_distance(self.map, pose, speed, yaw_rate, self._footprint, longest)
 
     def clear_turn(self, pose: Pose, yaw_rate: float, farthest: float) -> float:
-        """How far the robot can turn on the spot over ground that it has seen free [rad].
-
-        Args:
-            pose: where it is
-            yaw_rate: counter-clockwise; only its sign counts
-            farthest: no more is asked for [rad]
-        """
+        """How far the robot can turn on the spot over ground that it has seen free [rad]."""
         return clear_turn(self.map, pose, yaw_rate, self._footprint, farthest)
 
     def clear_way(self, pose: Pose, twist: Twist, farthest: float, *, daring: bool = False) -> float:
-        """How far the robot can go with a twist over ground that it has seen free [m]; for what is nearly a turn [rad].
-
-        Args:
-            pose: where it is
-            twist: not 0
-            farthest: no more is asked for [m], [rad]
-            daring: whether ground that was not seen counts as free
-        """
+        """How far the robot can go with a twist over ground that it has seen free [m]; for what is nearly a turn [rad]."""
         if abs(twist.speed) <= SHARPEST * abs(twist.yaw_rate):
             return clear_turn(self.map, pose, twist.yaw_rate, self._footprint, farthest, daring=daring)
         return clear_distance(self.map, pose, *twist, self._footprint, farthest, daring=daring)

@@ -34,12 +34,6 @@ class Traffic:
     Attributes:
         box: the smallest box around all places of movers that were seen: xmin, ymin, xmax, ymax [m]
         samples: how many independent places of movers that makes, about
-
-    Args:
-        predictor: what the robot perceives
-        radius: the robot's circumscribed radius [m]
-        bounds: the world's walls [m]
-        hz: control periods per simulated second
     """
 
     def __init__(self, predictor: Predictor, radius: float, bounds: Bounds, hz: int) -> None:
@@ -95,11 +89,6 @@ class TrackedTraffic(Traffic):
 
     Places of movers that are hidden are guesses, so they do not count. How much traffic there is in the whole world cannot be
     seen; the ground that was in sight lately stands for it.
-
-    Args:
-        predictor: what the robot follows
-        robot: the robot
-        hz: control periods per simulated second
     """
 
     def __init__(self, predictor: TrackedPredictor, robot: RobotSpec, hz: int) -> None:
@@ -144,13 +133,6 @@ class Zone:
     Attributes:
         blocked: the free cells within it, off these ways (R, C)
         discs: discs along the edge of the box, which keep a smoothed route outside
-
-    Args:
-        box: xmin, ymin, xmax, ymax [m]
-        radius: the movers' largest radius [m]
-        robot: the robot's position [m]
-        goal: the goal [m]
-        grid: the grid on which the robot's route is planned
     """
 
     def __init__(

@@ -25,12 +25,6 @@ class Watch:
         tick: the control period of the last scan
         sight: the ground that its beams crossed within `reach` [m^2]
         reach: up to where beams lie no farther apart than a cell of a map [m]
-
-    Args:
-        lidar: the robot's lidar
-        hz: control periods per second
-        pose_xy: standard deviation of the estimated positions at which scans are taken [m]
-        pose_yaw: and of the headings [rad]
     """
 
     def __init__(self, lidar: Lidar, hz: int, pose_xy: float = 0.0, pose_yaw: float = 0.0) -> None:
@@ -42,14 +36,7 @@ class Watch:
         self._log: list[tuple[int, TrackedMovers]] = []
 
     def read(self, ground: Ground, pose: Pose, ranges: Floats, tick: int) -> npt.NDArray[np.bool_]:
-        """Read a scan; which beams met movers that are followed (beams,).
-
-        Args:
-            ground: what stands still, as far as the robot knows
-            pose: the robot's estimated pose
-            ranges: the scan (beams,) [m]
-            tick: the control period in which it was taken
-        """
+        """Read a scan; which beams met movers that are followed (beams,)."""
         theirs = self.tracker.update(ground, pose, ranges, tick / self._hz)
         self.tick = tick
         crossed = np.clip(ranges, 0.0, self.reach)
@@ -58,35 +45,16 @@ class Watch:
         return theirs
 
     def read_on_map(self, seen: OccupancyMap, pose: Pose, ranges: Floats, tick: int) -> npt.NDArray[np.bool_]:
-        """The same for a robot that makes its own map, before the scan is entered.
-
-        Args:
-            seen: the map of the earlier scans
-            pose: the robot's estimated pose
-            ranges: the scan (beams,) [m]
-            tick: the control period in which it was taken
-        """
+        """The same for a robot that makes its own map, before the scan is entered."""
         return self.read(MappedGround(seen, self._settle), pose, ranges, tick)
 
     def standing(self, seen: OccupancyMap, pose: Pose, ranges: Floats, tick: int) -> Floats:
-        """A scan that was not read yet without what may move (beams,) [m]: nothing is in range there.
-
-        Args:
-            seen: the map of the earlier scans
-            pose: the robot's estimated pose
-            ranges: the scan (beams,) [m]
-            tick: the control period in which it was taken
-        """
+        """A scan that was not read yet without what may move (beams,) [m]: nothing is in range there."""
         ground = MappedGround(seen, self._settle)
         return np.where(self.tracker.suspected(ground, pose, ranges, tick / self._hz), np.inf, ranges)
 
     def logged(self, per_tick: int, rows: int) -> npt.NDArray[np.float32]:
-        """The movers that were followed, as the array `tracks` of a log has them (K, 7).
-
-        Args:
-            per_tick: rows of the log in a control period
-            rows: of the log
-        """
+        """The movers that were followed, as the array `tracks` of a log has them (K, 7)."""
         tables = [
             np.column_stack(
                 (
@@ -110,10 +78,6 @@ class TrackedPredictor(Predictor):
 
     Attributes:
         watch: what the scans tell
-
-    Args:
-        perception: how far the robot looks for movers
-        hz: control periods per second
     """
 
     def __init__(self, watch: Watch, perception: Perception, hz: int) -> None:
@@ -123,11 +87,6 @@ class TrackedPredictor(Predictor):
 
     def predict(self, tick: int, robot: tuple[float, float], ahead: Floats) -> tuple[Floats, Floats]:
         """Predict the movers that the robot follows.
-
-        Args:
-            tick: the control period in which the prediction is made
-            robot: the robot's position [m]
-            ahead: times after the tick (K,) [s]
 
         Returns:
             The movers' positions (K, M, 2) [m] and radii (M,) [m].

@@ -27,9 +27,6 @@ LONGEST_PROBLEM = 300  # characters of a message
 def guarded_log(path: str | Path) -> Iterator[Archive]:
     """The archive of a log; whatever goes wrong inside becomes one line that names the file.
 
-    Args:
-        path: the file
-
     Raises:
         InputError: there is no such file, it is no regular file, it is not a rollout, or reading it fails.
     """
@@ -64,10 +61,6 @@ def guarded_log(path: str | Path) -> Iterator[Archive]:
 
 def read_array(archive: Archive, name: str) -> npt.NDArray[Any]:
     """An array of a log, without pickles and only as large as its member.
-
-    Args:
-        archive: the log's
-        name: the array's name
 
     Raises:
         KeyError: there is no such array.

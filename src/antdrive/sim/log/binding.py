@@ -47,22 +47,12 @@ def hashes_of(record: DriveRecord) -> dict[str, str]:
 
 
 def canonical_hash(value: Task | RobotSpec) -> str:
-    """The SHA-256 of a world with start and goal, or of a robot: the one that `hashes_of` finds in the log of its drives.
-
-    Args:
-        value: the task or the robot
-    """
+    """The SHA-256 of a world with start and goal, or of a robot: the one that `hashes_of` finds in the log of its drives."""
     return _sha256(_meaning(value))
 
 
 def differences(record: DriveRecord, *, task: Task | None = None, robot: RobotSpec | None = None) -> Iterator[str]:
-    """What in a record is not as in the given world and robot, a sentence each.
-
-    Args:
-        record: the record of a log
-        task: what the log should be about; None: any
-        robot: the robot that should have driven; None: any
-    """
+    """What in a record is not as in the given world and robot, a sentence each."""
     for name, found, wanted in (("world", record.task, task), ("robot", record.robot, robot)):
         if wanted is None:
             continue

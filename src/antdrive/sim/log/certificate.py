@@ -118,11 +118,7 @@ class Certificate:
 
 
 def in_metres(value: float) -> str:
-    """A distance as text, to a tenth of a millimetre, and finer for distances that would read as 0.
-
-    Args:
-        value: the distance [m]
-    """
+    """A distance as text, to a tenth of a millimetre, and finer for distances that would read as 0."""
     return f"{value:.4f} m" if abs(value) >= 5e-5 or value == 0 else f"{value:.1e} m"
 
 
@@ -233,11 +229,6 @@ def _polygon_to_walls(corners: tuple[Point, ...], pose: Floats, bounds: Bounds) 
 
 def _blocks(places: Floats, radius: float, discs: Floats) -> Iterator[tuple[npt.NDArray[np.int64], Floats]]:
     """Rows (B,), some at a time, and the discs (N, 3) one of which is the nearest to the footprint in each of them.
-
-    Args:
-        places: the axle's centre in each row (T, 2) [m]
-        radius: the footprint's circumscribed radius [m]
-        discs: x, y and radius of all discs (M, 3) [m]
 
     Raises:
         FieldError: more distances have to be computed than a minute is enough for.

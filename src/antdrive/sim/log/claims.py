@@ -19,9 +19,6 @@ SAME = 1e-9  # numbers that are written twice agree to this share
 def read_result(path: Path) -> Mapping[str, Any]:
     """The content of a `result.json`; empty if it is no object.
 
-    Args:
-        path: the file
-
     Raises:
         InputError: the file cannot be read.
     """
@@ -37,13 +34,7 @@ def read_result(path: Path) -> Mapping[str, Any]:
 
 
 def false_claims(result: Mapping[str, Any], rollout: Rollout, digest: str) -> Iterator[str]:
-    """A sentence for everything in a `result.json` that its log contradicts. Keys that it lacks are no contradiction.
-
-    Args:
-        result: the content of result.json
-        rollout: the log beside it
-        digest: of the log
-    """
+    """A sentence for everything in a `result.json` that its log contradicts. Keys that it lacks are no contradiction."""
     if result.get("digest") != digest:
         yield "result.json is about another log: its digest differs"
         return
@@ -53,11 +44,7 @@ def false_claims(result: Mapping[str, Any], rollout: Rollout, digest: str) -> It
 
 
 def logged_settings(rollout: Rollout) -> dict[str, Any]:
-    """What a log says about its run, by the keys of `result.json`.
-
-    Args:
-        rollout: the log
-    """
+    """What a log says about its run, by the keys of `result.json`."""
     record = rollout.record
     task = record.task
     return {

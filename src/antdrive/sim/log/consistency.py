@@ -167,12 +167,7 @@ def _check_targets(rollout: Rollout, end: int) -> Iterator[str]:
 
 
 def windowed(values: Floats, rows: int) -> Floats:
-    """The sum over each window of a number of values, (N - rows + 1,).
-
-    Args:
-        values: what is summed (N,), real or complex
-        rows: length of a window
-    """
+    """The sum over each window of a number of values, (N - rows + 1,)."""
     total = np.concatenate(([0], np.cumsum(values)))
     return np.asarray(total[rows:] - total[:-rows])
 

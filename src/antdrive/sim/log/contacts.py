@@ -56,20 +56,7 @@ def touches(
     footprint: Footprint,
     deceleration: float,
 ) -> list[Touch]:
-    """The touches among contact points, in the order of time.
-
-    Args:
-        contacts: contact points (K, 4), as in `Rollout.contacts`
-        pose: poses of the robot (T, 3)
-        twist: measured speeds of the robot (T, 2)
-        movers: centres of the movers (T, M, 2) [m]
-        jumps: whether each mover teleported between a row and the next (T - 1, M)
-        hz: rate of the rows [Hz]
-        discs: number of cylinders that stand still
-        radii: the movers' radii (M,) [m]
-        footprint: the robot's
-        deceleration: how hard the robot can brake [m/s^2]
-    """
+    """The touches among contact points, in the order of time."""
     attribution = _Attribution(pose, twist, movers, jumps, hz, radii, footprint, deceleration)
     found: list[Touch] = []
     last = -math.inf

@@ -18,11 +18,7 @@ from antdrive.sim.log.rollout import Rollout
 
 
 def with_tables(page: str) -> str:
-    """A page with those tables that it has as they must be. Each stands between `<!-- table NAME -->` and `<!-- end -->`.
-
-    Args:
-        page: the page's text
-    """
+    """A page with those tables that it has as they must be. Each stands between `<!-- table NAME -->` and `<!-- end -->`."""
     for name, table in tables().items():
         start, end = f"<!-- table {name} -->\n", "<!-- end -->"
         before, found, rest = page.partition(start)

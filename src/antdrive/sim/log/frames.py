@@ -8,12 +8,7 @@ from antdrive.base.types import Floats
 
 
 def frame_at(inner: Floats, outer: Floats) -> Floats:
-    """Where a frame lies in another one, if something has a pose in each: x, y and yaw of its origin (N, 3) [m, rad].
-
-    Args:
-        inner: the poses in the frame that is looked for (N, 3) [m, rad]
-        outer: the same poses in the other frame (N, 3) [m, rad]
-    """
+    """Where a frame lies in another one, if something has a pose in each: x, y and yaw of its origin (N, 3) [m, rad]."""
     turn = outer[:, 2] - inner[:, 2]
     cos, sin = np.cos(turn), np.sin(turn)
     x, y = inner[:, 0], inner[:, 1]
@@ -21,12 +16,7 @@ def frame_at(inner: Floats, outer: Floats) -> Floats:
 
 
 def laid(points: Floats, frames: Floats) -> Floats:
-    """Where points of frames lie in the frame around them (N, 2) [m].
-
-    Args:
-        points: a place in each frame (N, 2) [m]
-        frames: where each frame lies, as `frame_at` gives it (N, 3) [m, rad]
-    """
+    """Where points of frames lie in the frame around them (N, 2) [m]."""
     cos, sin = np.cos(frames[:, 2]), np.sin(frames[:, 2])
     x, y = points[:, 0], points[:, 1]
     return frames[:, :2] + np.column_stack([cos * x - sin * y, sin * x + cos * y])

@@ -168,13 +168,6 @@ def find_margin(
 
     Trials come as they are made; the smallest margin of those that are safe is the answer.
 
-    Args:
-        drive: runs the scenario with a margin [m] and a seed
-        seeds: the seeds that each margin is tried with
-        reserve: part of the margin that every drive must leave unused [m]
-        most: the largest margin to try [m]
-        resolution: margins are multiples of this [m]
-
     Raises:
         FieldError: a setting outside its range.
     """

@@ -43,11 +43,7 @@ class Tolerance:
     relative: float = 0.0
 
     def allowed(self, earlier: float) -> float:
-        """The allowance, in the metric's unit.
-
-        Args:
-            earlier: the earlier drive's value
-        """
+        """The allowance, in the metric's unit."""
         return self.absolute + self.relative * abs(earlier)
 
 

@@ -28,11 +28,7 @@ POINT_SPACING = 0.05  # of the points of a route whose clearance is looked at [m
 
 
 def contradictions(rollout: Rollout, end: int) -> Iterator[str]:
-    """Every way in which the plan contradicts the world, itself or the rows.
-
-    Args:
-        end: the rows before this one come before any contact
-    """
+    """Every way in which the plan contradicts the world, itself or the rows."""
     if rollout.record.exploring:  # its plans are right for what the robot had seen, in the frame of its odometry
         yield from _check_movers_known(rollout)
         yield from _check_replans(rollout)

@@ -408,11 +408,7 @@ def _missing_key(written: Any, found: Any) -> str:
 
 
 def plain_value(value: Any) -> Any:
-    """A value as JSON can hold it: records become mappings, arrays and tuples lists, other objects text.
-
-    Args:
-        value: a number, text, record, outcome, task, or a mapping or sequence of such
-    """
+    """A value as JSON can hold it: records become mappings, arrays and tuples lists, other objects text."""
     if isinstance(value, Outcome):
         return value.key
     if isinstance(value, Task):
@@ -435,11 +431,7 @@ def _says_nothing(field: dataclasses.Field[Any], value: Any) -> bool:
 
 
 def settings_of(values: Any) -> dict[str, Any]:
-    """Settings as the record keeps them: plain values, with null for an infinite number, which is "no limit".
-
-    Args:
-        values: a mapping or a record of settings
-    """
+    """Settings as the record keeps them: plain values, with null for an infinite number, which is "no limit"."""
 
     def finite(value: Any) -> Any:
         if isinstance(value, dict):
@@ -482,11 +474,7 @@ def record_keys() -> Iterator[tuple[str, str, str]]:
 
 
 def attributes_of(kind: type[Any]) -> dict[str, str]:
-    """The descriptions of a record's fields, from the Attributes section of its docstring.
-
-    Args:
-        kind: the record's class
-    """
+    """The descriptions of a record's fields, from the Attributes section of its docstring."""
     _, _, section = (inspect.getdoc(kind) or "").partition("Attributes:\n")
     section = section.split("\n\n")[0]
     entries = re.split(r"^    (\w+): ", section, flags=re.MULTILINE)[1:]

@@ -100,12 +100,7 @@ def lidar_of(rollout: Rollout) -> Lidar:
 
 
 def beams_of(rollout: Rollout, k: int) -> Beams:
-    """A scan of a log where it was taken.
-
-    Args:
-        rollout: a log with scans
-        k: the scan's number
-    """
+    """A scan of a log where it was taken."""
     lidar, ranges = lidar_of(rollout), ranges_of(rollout.scans[k])
     reaches = np.where(np.isposinf(ranges), lidar.max_range, np.maximum(ranges, 0.0))
     x, y, yaw = rollout.pose[rollout.scan_rows[k]].tolist()
@@ -113,13 +108,7 @@ def beams_of(rollout: Rollout, k: int) -> Beams:
 
 
 def meet(rollout: Rollout, k: int, met: Floats) -> None:
-    """Note which cylinders a scan is the first to meet.
-
-    Args:
-        rollout: a log with scans
-        k: the scan's number
-        met: when each cylinder of `record.world.obstacles` was first met (N,) [s]; infinite where it was not yet
-    """
+    """Note which cylinders a scan is the first to meet."""
     _meet(rollout, k, rollout.record.world.discs, met)
 
 
@@ -131,11 +120,7 @@ def _meet(rollout: Rollout, k: int, discs: Floats, met: Floats) -> None:
 
 
 def first_meetings(rollout: Rollout) -> Floats:
-    """When a beam first met each cylinder of `record.world.obstacles` (N,) [s]; infinite where none did.
-
-    Args:
-        rollout: a log with scans
-    """
+    """When a beam first met each cylinder of `record.world.obstacles` (N,) [s]; infinite where none did."""
     met = np.full(len(rollout.record.world.obstacles), math.inf)
     for k in range(len(rollout.scans)):
         if np.isfinite(met).all():
@@ -145,12 +130,7 @@ def first_meetings(rollout: Rollout) -> Floats:
 
 
 def sightings(rollout: Rollout, met: Floats) -> list[Sighting]:
-    """First sight and nearest approach of every cylinder, those that the robot came nearest to first.
-
-    Args:
-        rollout: the log
-        met: when each was first seen (N,) [s]
-    """
+    """First sight and nearest approach of every cylinder, those that the robot came nearest to first."""
     discs, shape = rollout.record.world.discs, shape_of(rollout.record.robot.footprint)
     touched = set(rollout.contacts[:, 1].astype(int).tolist())
     row, away = np.zeros(len(discs), dtype=np.int64), np.empty(len(discs))
@@ -168,11 +148,7 @@ def sightings(rollout: Rollout, met: Floats) -> list[Sighting]:
 
 
 def movers_met(rollout: Rollout) -> list[Sighting]:
-    """First sight and nearest approach of every mover, in the order of the world.
-
-    Args:
-        rollout: a log with scans
-    """
+    """First sight and nearest approach of every mover, in the order of the world."""
     record, rows = rollout.record, rollout.scan_rows
     radii = np.array([mover.radius for mover in record.world.movers])
     met = np.full(len(radii), math.inf)
@@ -215,9 +191,6 @@ def followed_rows(rollout: Rollout) -> list[npt.NDArray[np.int64]]:
     """The rows in which the middle of a track lay in each mover, in the order of the world.
 
     Tracks lie in the frame of the estimated pose, so they are laid as they lay from the robot.
-
-    Args:
-        rollout: the log of a robot that follows movers in its scans
     """
     rows = rollout.tracks[:, 0].astype(np.int64)
     believed, true = (rollout.estimate if len(rollout.estimate) else rollout.pose)[rows], rollout.pose[rows]
@@ -229,11 +202,7 @@ def followed_rows(rollout: Rollout) -> list[npt.NDArray[np.int64]]:
 
 
 def passed(rollout: Rollout) -> list[Sighting]:
-    """What the robot touched or came within 0.5 m of, cylinders and movers, in the order in which it was nearest to them.
-
-    Args:
-        rollout: a log; one without scans has none
-    """
+    """What the robot touched or came within 0.5 m of, cylinders and movers, in the order in which it was nearest to them."""
     if not len(rollout.scans):
         return []
     everything = sightings(rollout, first_meetings(rollout)) + movers_met(rollout)
@@ -248,9 +217,6 @@ def seen_ground(rollout: Rollout) -> tuple[npt.NDArray[np.bool_], float]:
 
     A cell was seen if the beam that was nearest to its middle in direction got farther than the middle. Ten scans a second
     count, and the last.
-
-    Args:
-        rollout: a log with scans
     """
     lidar = lidar_of(rollout)
     x0, y0, x1, y1 = rollout.record.world.bounds

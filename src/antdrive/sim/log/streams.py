@@ -8,10 +8,5 @@ import numpy as np
 
 
 def random_stream(seed: int, purpose: str) -> np.random.Generator:
-    """The random stream of a purpose; another purpose's draws do not change it.
-
-    Args:
-        seed: the run's seed
-        purpose: what the numbers are for, such as "noise"
-    """
+    """The random stream of a purpose; another purpose's draws do not change it."""
     return np.random.default_rng([seed, zlib.crc32(purpose.encode())])

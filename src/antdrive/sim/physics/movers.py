@@ -34,14 +34,6 @@ class MoverBodies:
     Attributes:
         bodies: PyBullet's body numbers by the index of the mover, for the movers that have a body now
         indices: the mover's index by PyBullet's body number, for every body that there ever was
-
-    Args:
-        trajectories: where the movers are
-        radius: the robot's circumscribed radius [m]
-        speed: more than the robot drives by itself [m/s]
-        where: tells where the robot is now, x and y [m]
-        hz: physics steps per simulated second
-        client: PyBullet's client number
     """
 
     def __init__(

@@ -21,16 +21,7 @@ BELOW = -1000.0  # where bodies wait that no cylinder needs [m]
 
 
 class NearBodies:
-    """The bodies around the robot.
-
-    Args:
-        obstacles: the world's cylinders
-        reach: how near to the robot's centre a cylinder's surface may be without a body [m]
-        size_of: radius and height of a cylinder as it is built [m]
-        build: makes the bodies of cylinders that are alike, given the first of them and their indices; the bodies' numbers
-        bodies: index of the cylinder by body number; this object keeps the entries of cylinders
-        number: of the physics client
-    """
+    """The bodies around the robot."""
 
     def __init__(
         self,
@@ -50,23 +41,13 @@ class NearBodies:
         self._centre = (math.inf, math.inf)
 
     def start(self, x: float, y: float) -> None:
-        """Make the bodies around a place, and no others, whatever was there before.
-
-        Args:
-            x: the robot's place [m]
-            y: the robot's place [m]
-        """
+        """Make the bodies around a place, and no others, whatever was there before."""
         self._release(list(self._made))
         self._centre = (math.inf, math.inf)
         self.follow(x, y)
 
     def follow(self, x: float, y: float) -> None:
-        """See to it that all cylinders in reach have bodies.
-
-        Args:
-            x: the robot's place [m]
-            y: the robot's place [m]
-        """
+        """See to it that all cylinders in reach have bodies."""
         if math.hypot(x - self._centre[0], y - self._centre[1]) <= HOLD:
             return
         self._centre = (x, y)

@@ -49,9 +49,6 @@ def robot_urdf(robot: RobotSpec, com_drop: float) -> str:
 
     A chassis that is neither a disc nor a rectangle is the mesh `CHASSIS_FILE`, which `chassis_mesh` gives.
 
-    Args:
-        com_drop: how far the centre of mass hangs below the axle's centre [m]
-
     Raises:
         FieldError: the footprint has round corners.
     """

@@ -40,12 +40,7 @@ class Ground(Protocol):
         """Whether all that is known to stand still is on it from the beginning."""
 
     def hits(self, pose: Pose, ranges: Floats) -> Hits:
-        """The hits of a scan.
-
-        Args:
-            pose: the robot's estimated pose
-            ranges: the scan (beams,) [m]
-        """
+        """The hits of a scan."""
 
 
 class KnownGround:
@@ -115,14 +110,7 @@ class MappedGround:
 
 
 def ends(lidar: Lidar, pose: Pose, ranges: Floats, beams: npt.NDArray[np.intp]) -> Floats:
-    """Where some beams of a scan end (N, 2) [m].
-
-    Args:
-        lidar: whose scan it is
-        pose: the robot's estimated pose
-        ranges: the scan (beams,) [m]
-        beams: the numbers of beams that have met something (N,)
-    """
+    """Where some beams of a scan end (N, 2) [m]."""
     x, y, yaw = lidar.pose_on(pose)
     angles = lidar.angles[beams] - lidar.yaw + yaw
     return np.column_stack((x + ranges[beams] * np.cos(angles), y + ranges[beams] * np.sin(angles)))

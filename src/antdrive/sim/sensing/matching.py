@@ -22,12 +22,7 @@ MOST = (0.02, 0.01)  # what one scan may correct; more is an error of the match 
 
 
 class ScanMatcher:
-    """Corrects a pose by laying a scan on the map.
-
-    Args:
-        lidar: whose scans are matched
-        far: hits farther away are not matched [m]
-    """
+    """Corrects a pose by laying a scan on the map."""
 
     def __init__(self, lidar: Lidar, far: float = FAR) -> None:
         self._lidar, self._far = lidar, far
@@ -36,13 +31,7 @@ class ScanMatcher:
         self._every = max(1, round(lidar.beams / BEAMS))
 
     def corrected(self, seen: OccupancyMap, pose: Pose, ranges: Floats) -> Pose:
-        """The pose, corrected; the pose itself where too little of the scan is on the map, or the map says too much else.
-
-        Args:
-            seen: the map, without the scan
-            pose: the estimated pose of the robot
-            ranges: the scan (beams,) [m]
-        """
+        """The pose, corrected; the pose itself where too little of the scan is on the map, or the map says too much else."""
         lidar = self._lidar
         eye = lidar.pose_on(pose)
         first = seen.scans // seen.share % self._every
@@ -62,11 +51,6 @@ def sliding_left_out(before: Pose, after: Pose, points: Floats) -> Pose:
 
     The normals of the surfaces that were hit tell in which directions they hold the pose: along the eigenvectors of their mean
     outer product whose eigenvalues are not small.
-
-    Args:
-        before: the estimated pose
-        after: the corrected one
-        points: where the beams ended, in their order (beams, 2) [m]; not a number where they are not matched
     """
     along = points[CHORD:] - points[:-CHORD]
     length = np.hypot(along[:, 0], along[:, 1])

@@ -31,11 +31,7 @@ class TextTable(NamedTuple):
 
 
 def success_cells(summary: CampaignSummary) -> TextTable:
-    """How often each planner succeeds, and its medians over the instances in which all do.
-
-    Args:
-        summary: of the campaign
-    """
+    """How often each planner succeeds, and its medians over the instances in which all do."""
     names = list(summary.medians)
     elsewhere = any(row.elsewhere for row in summary.success)
     over = any(not math.isnan(row.over_worlds.low) for row in summary.success)
@@ -62,12 +58,7 @@ def success_cells(summary: CampaignSummary) -> TextTable:
 
 
 def pair_cells(measure: str, comparisons: Sequence[PairedComparison]) -> TextTable:
-    """The comparison of each pair of planners by one measure.
-
-    Args:
-        measure: "success" or the name of a metric
-        comparisons: of the pairs
-    """
+    """The comparison of each pair of planners by one measure."""
     over = any(not math.isnan(row.p_worlds) for row in comparisons)
     unpaired = any(row.unpaired for row in comparisons)
     success = measure == SUCCESS
@@ -104,11 +95,7 @@ def _pair_row(row: PairedComparison, success: bool, over: bool, unpaired: bool) 
 
 
 def outcome_cells(summary: CampaignSummary) -> TextTable:
-    """How the runs of each planner ended: the most frequent outcome first.
-
-    Args:
-        summary: of the campaign
-    """
+    """How the runs of each planner ended: the most frequent outcome first."""
     total = Counter[str]()
     for row in summary.success:
         total.update(row.outcomes)
@@ -120,22 +107,14 @@ def outcome_cells(summary: CampaignSummary) -> TextTable:
 
 
 def all_cells(summary: CampaignSummary) -> list[TextTable]:
-    """Every table of a campaign.
-
-    Args:
-        summary: of the campaign
-    """
+    """Every table of a campaign."""
     pairs = (pair_cells(name, rows) for name, rows in summary.comparisons.items())
     allowed = [allowance_cells(summary)] if summary.allowances else []
     return [success_cells(summary), outcome_cells(summary), *pairs, *allowed]
 
 
 def allowance_cells(summary: CampaignSummary) -> TextTable:
-    """Which planners are not worse than another by more than was allowed.
-
-    Args:
-        summary: of the campaign
-    """
+    """Which planners are not worse than another by more than was allowed."""
     headings = ("planner", "against", "measure", "not worse", "allowed", "advantage", "95 % of all", "worlds", "needed")
     rows: list[tuple[str, ...]] = []
     for row in summary.allowances:
@@ -151,10 +130,6 @@ def allowance_cells(summary: CampaignSummary) -> TextTable:
 
 
 def success_note(row: PlannerSuccess) -> str:
-    """The outcomes of a planner's runs, in words, the most frequent first.
-
-    Args:
-        row: of the planner
-    """
+    """The outcomes of a planner's runs, in words, the most frequent first."""
     found = sorted(row.outcomes.items(), key=lambda item: (-item[1], item[0]))
     return ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in found)

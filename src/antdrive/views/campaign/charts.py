@@ -53,12 +53,7 @@ class Chart(NamedTuple):
 
 
 def campaign_charts(summary: CampaignSummary, styles: Sequence[LabelStyle]) -> list[Chart]:
-    """Every chart that the campaign has data for.
-
-    Args:
-        summary: of the campaign
-        styles: of the planners
-    """
+    """Every chart that the campaign has data for."""
     paired = summary.paired
     whole = paired.counted(*range(len(paired.planners)))
     charts = []

@@ -27,12 +27,7 @@ class LabelStyle(NamedTuple):
 
 
 def label_styles(labels: Sequence[str], names: Sequence[str]) -> list[LabelStyle]:
-    """The style of each label.
-
-    Args:
-        labels: of planners with their options
-        names: the planner of each label
-    """
+    """The style of each label."""
     counts, seen = Counter(names), Counter[str]()
     styles: list[LabelStyle] = []
     for name in names:

@@ -23,11 +23,7 @@ VALUES = 5  # of a setting that a note names
 
 
 def headline(summary: CampaignSummary) -> list[tuple[str, str]]:
-    """The headline numbers, each with its meaning.
-
-    Args:
-        summary: of the campaign
-    """
+    """The headline numbers, each with its meaning."""
     table, paired, rows = summary.table, summary.paired, summary.success
     runs, good = sum(row.runs for row in rows), int(paired.success.sum())
     done = ("run" if runs == 1 else "runs") if runs >= summary.size else f"of {summary.size:,} runs done"
@@ -63,11 +59,7 @@ def _best(rows: Sequence[PlannerSuccess], paired: PairedRuns) -> tuple[str, str]
 
 
 def notes_on(summary: CampaignSummary) -> list[str]:
-    """What a reader of the tables must know about this campaign, a sentence each.
-
-    Args:
-        summary: of the campaign
-    """
+    """What a reader of the tables must know about this campaign, a sentence each."""
     found: list[str] = []
     if len(summary.table) < summary.size:
         found.append(f"{summary.size - len(summary.table)} of {summary.size} runs are not done yet.")

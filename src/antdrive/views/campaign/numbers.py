@@ -10,11 +10,7 @@ NONE = "–"
 
 
 def percent(share: float) -> str:
-    """A share in percent, with one digit; 100.0 and 0.0 only where they are exact.
-
-    Args:
-        share: from -1 to 1
-    """
+    """A share in percent, with one digit; 100.0 and 0.0 only where they are exact."""
     if math.isnan(share):
         return NONE
     shown = f"{100 * share + 0.0:.1f}"
@@ -24,20 +20,12 @@ def percent(share: float) -> str:
 
 
 def percents(interval: Interval) -> str:
-    """An interval of shares in percent.
-
-    Args:
-        interval: of shares
-    """
+    """An interval of shares in percent."""
     return NONE if math.isnan(interval.low) else f"{percent(interval.low)} to {percent(interval.high)}"
 
 
 def short(value: float) -> str:
-    """A number with three significant digits.
-
-    Args:
-        value: the number
-    """
+    """A number with three significant digits."""
     if not math.isfinite(value):
         return NONE if math.isnan(value) else "∞"
     if value == 0:
@@ -48,21 +36,12 @@ def short(value: float) -> str:
 
 
 def with_interval(value: float, interval: Interval) -> str:
-    """A number with its interval in brackets.
-
-    Args:
-        value: the number
-        interval: its interval
-    """
+    """A number with its interval in brackets."""
     return f"{short(value)} ({short(interval.low)} to {short(interval.high)})"
 
 
 def probability(p: float) -> str:
-    """A p-value.
-
-    Args:
-        p: nan where there is no test
-    """
+    """A p-value."""
     if math.isnan(p):
         return NONE
     return "< 0.001" if p < 0.001 else f"{p:.3f}"

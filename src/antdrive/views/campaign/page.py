@@ -35,11 +35,6 @@ LATEX_PAGE = 40  # rows of a table that fit on a page
 def write_campaign_report(summary: CampaignSummary, folder: Path, out: Path) -> list[Path]:
     """Write a report about a campaign in the format of the file's suffix.
 
-    Args:
-        summary: of the campaign
-        folder: the campaign's folder, to which logs are linked
-        out: the file to write: .html, .md, .tex or .csv
-
     Returns:
         The files written: for .csv two, the second with the pairs.
 
@@ -52,9 +47,6 @@ def write_campaign_report(summary: CampaignSummary, folder: Path, out: Path) -> 
 
 def check_suffix(out: Path) -> None:
     """Refuse a file of a kind that is not written, before any work.
-
-    Args:
-        out: the file
 
     Raises:
         InputError: an unknown suffix.
@@ -123,11 +115,7 @@ def _latex_table(table: TextTable) -> list[str]:
 
 
 def latex_text(text: str) -> str:
-    """A text as LaTeX shows it.
-
-    Args:
-        text: any text
-    """
+    """A text as LaTeX shows it."""
     special = {
         "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "–": "--", "<": r"$<$",
         ">": r"$>$", "²": r"\textsuperscript{2}", "∞": r"$\infty$", "·": r"$\cdot$",

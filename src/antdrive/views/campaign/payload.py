@@ -26,13 +26,7 @@ SIGNIFICANT = 6  # digits of numbers in the page
 
 
 def page_data(table: RunTable, planners: Sequence[str], base: str) -> str:
-    """The runs as JSON that may stand in a script element.
-
-    Args:
-        table: the runs
-        planners: their labels in the order of the page
-        base: the campaign's folder, relative to the page, as a URL that ends with a slash
-    """
+    """The runs as JSON that may stand in a script element."""
     columns = [_column(name, table.columns[name]) for name in table.columns if name != "command"]
     columns.append({"name": "command", **_commands(table)})
     kept = [column for column in columns if column is not None]

@@ -73,16 +73,6 @@ def summarise(
 ) -> CampaignSummary:
     """Compute a campaign's tables.
 
-    Args:
-        table: the runs that are done
-        title: of the page
-        size: how many runs of these planners the campaign has; as many as are done without
-        metrics: to compare besides success; `DEFAULT_METRICS` without
-        against: the planner that each other one is compared with; every pair without
-        planners: labels of those to look at; all without
-        allow: by how much a planner may be worse than `against` and still count as not worse, by measure
-        strict: refuse where no two planners can be compared, instead of saying so in the summary
-
     Raises:
         FieldError: an unknown planner or metric, no runs, or nothing to compare.
     """
@@ -125,21 +115,12 @@ def _allowances(paired: PairedRuns, against: str | None, allow: Mapping[str, flo
 
 
 def known_metrics(paired: PairedRuns, names: Sequence[str]) -> list[str]:
-    """Those of the metrics that some successful run has.
-
-    Args:
-        paired: the runs
-        names: of metrics
-    """
+    """Those of the metrics that some successful run has."""
     return [name for name in names if np.isfinite(paired.values(name)).any()]
 
 
 def measure_title(name: str) -> str:
-    """What a measure is called in headings, with its unit.
-
-    Args:
-        name: "success" or the name of a metric
-    """
+    """What a measure is called in headings, with its unit."""
     if name not in METRICS:
         return name.replace("_", " ")
     unit = METRICS[name].unit

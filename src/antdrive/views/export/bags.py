@@ -18,14 +18,7 @@ FOREVER = {"sec": 9223372036, "nsec": 854775807}  # how ROS writes "no limit"
 def write_mcap(
     path: Path, topics: Sequence[Topic], attachments: Mapping[str, tuple[str, bytes]], notes: Mapping[str, str]
 ) -> None:
-    """Write an MCAP file.
-
-    Args:
-        path: the file
-        topics: its messages
-        attachments: files to keep inside, as media type and content by name
-        notes: words about the file by what they are about, kept as the metadata `antdrive`
-    """
+    """Write an MCAP file."""
     mcap, types = library("mcap.writer"), message_types()
     with path.open("wb") as file:
         writer = mcap.Writer(file)
@@ -53,13 +46,7 @@ def write_mcap(
 
 
 def metadata(file: str, topics: Sequence[Topic], notes: Mapping[str, str]) -> str:
-    """The text of a rosbag2 folder's metadata.yaml.
-
-    Args:
-        file: the name of the MCAP file in the folder
-        topics: the messages in that file
-        notes: words about the bag by what they are about
-    """
+    """The text of a rosbag2 folder's metadata.yaml."""
     begin = min(int(topic.stamps[0]) for topic in topics)
     end = max(int(topic.stamps[-1]) for topic in topics)
     span: dict[str, Any] = {

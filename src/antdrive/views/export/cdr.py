@@ -26,43 +26,25 @@ class CdrLayout:
         self._numbers: dict[str, tuple[int, np.dtype[np.generic], tuple[int, ...]]] = {}
 
     def number(self, name: str, kind: str, count: int | None = None) -> None:
-        """Add a number, or numbers in a row, that differ between messages; they are 0 unless `messages` is given them.
-
-        Args:
-            name: what `messages` calls it
-            kind: as numpy writes it, such as "f8" or "u4"
-            count: how many numbers; None: one
-        """
+        """Add a number, or numbers in a row, that differ between messages; they are 0 unless `messages` is given them."""
         dtype = np.dtype(f"<{kind}")
         self._align(dtype.itemsize if count != 0 else 1)
         self._numbers[name] = (len(self._constant), dtype, () if count is None else (count,))
         self._constant += bytes(dtype.itemsize * (1 if count is None else count))
 
     def length(self, count: int) -> None:
-        """Add the length of a sequence whose elements follow.
-
-        Args:
-            count: the length
-        """
+        """Add the length of a sequence whose elements follow."""
         self._align(4)
         self._constant += struct.pack("<I", count)
 
     def text(self, value: str) -> None:
-        """Add a text that is the same in all messages.
-
-        Args:
-            value: the text
-        """
+        """Add a text that is the same in all messages."""
         content = value.encode() + b"\0"
         self.length(len(content))
         self._constant += content
 
     def messages(self, values: dict[str, npt.NDArray[np.generic]]) -> list[memoryview]:
-        """The serialised messages.
-
-        Args:
-            values: the numbers of all messages by name, the first axis counting messages
-        """
+        """The serialised messages."""
         many = len(next(iter(values.values())))
         size = len(self._constant)
         buffer = np.tile(np.frombuffer(bytes(self._constant), dtype=np.uint8), (many, 1))

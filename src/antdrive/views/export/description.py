@@ -15,11 +15,7 @@ BODY_COLOUR, WHEEL_COLOUR = "0.16 0.44 0.72 1", "0.15 0.15 0.15 1"
 
 
 def wheel_places(robot: RobotSpec) -> dict[str, tuple[float, float, float]]:
-    """Where the wheels are in the robot's frame: x, y and z [m] by link.
-
-    Args:
-        robot: the robot
-    """
+    """Where the wheels are in the robot's frame: x, y and z [m] by link."""
     return {
         f"{side}_wheel": (0.0, sign * robot.track / 2, robot.wheel_radius)
         for side, sign in (("left", 1), ("right", -1))
@@ -30,9 +26,6 @@ def description(robot: RobotSpec) -> str:
     """The robot's shape as URDF text. The frame of the root link is on the floor, under the axle's centre.
 
     The body is the footprint, a cylinder or the box around it; the wheels stand inside it.
-
-    Args:
-        robot: the robot
     """
     body, x, y = _body(robot)
     origin = f'<origin xyz="{x!r} {y!r} {GAP + robot.height / 2!r}"/>'

@@ -29,13 +29,6 @@ LAYOUT = ".foxglove.json"
 def export(log: str | Path, to: str, path: str | Path, *, replace: bool = False, scans: bool = True) -> list[Path]:
     """Export a log; the files or the folder are written whole or not at all.
 
-    Args:
-        log: the log's file
-        to: a key of `EXPORTS`: mcap, rosbag2 or csv
-        path: the file of an mcap, or the folder to make
-        replace: whether an mcap and its layout may replace files that exist; folders are never replaced
-        scans: whether a bag has what the robot's lidar would have measured, where the log holds no scans
-
     Returns:
         What was written.
 
@@ -59,12 +52,7 @@ def export(log: str | Path, to: str, path: str | Path, *, replace: bool = False,
 
 
 def topics_of(rollout: Rollout, scans: Scans) -> list[Topic]:
-    """All messages of a drive. At the first stamp the fixed transforms come first, on both of their topics.
-
-    Args:
-        rollout: the log
-        scans: of that drive
-    """
+    """All messages of a drive. At the first stamp the fixed transforms come first, on both of their topics."""
     static, few = scenery(rollout)
     many = samples(rollout, scans)
     moving = many[0]
@@ -74,12 +62,7 @@ def topics_of(rollout: Rollout, scans: Scans) -> list[Topic]:
 
 
 def attachments_of(rollout: Rollout, log: Path) -> dict[str, tuple[str, bytes]]:
-    """The files that a bag keeps inside: media type and content by name.
-
-    Args:
-        rollout: the log
-        log: its file
-    """
+    """The files that a bag keeps inside: media type and content by name."""
     with tempfile.TemporaryDirectory() as folder:
         save_task(rollout.record.task, Path(folder) / "world.yaml")
         world = (Path(folder) / "world.yaml").read_bytes()

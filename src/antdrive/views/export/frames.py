@@ -14,9 +14,5 @@ IDENTITY = (0.0, 0.0, 0.0)  # the pose of a frame in itself
 
 
 def mover_frame(index: int) -> str:
-    """The frame of a mover.
-
-    Args:
-        index: the mover's, counted from 0
-    """
+    """The frame of a mover."""
     return f"mover_{index}"

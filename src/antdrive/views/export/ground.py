@@ -37,11 +37,7 @@ class GroundGrid:
 
 
 def planned_ground(rollout: Rollout) -> GroundGrid:
-    """The grid that the drive was planned on, in the frame of the map: free where the robot's centre may be.
-
-    Args:
-        rollout: the log of a robot with a map
-    """
+    """The grid that the drive was planned on, in the frame of the map: free where the robot's centre may be."""
     record = rollout.record
     free = free_cells(record.task.world, record.cell, record.inflate)
     x0, y0, _, _ = record.task.world.bounds
@@ -50,13 +46,7 @@ def planned_ground(rollout: Rollout) -> GroundGrid:
 
 
 def free_cells(world: World, cell: float, inflate: float) -> Mask:
-    """The cells that `antdrive.worlds.grid.rasterise` has as free (rows, cols), without loading compiled code for it.
-
-    Args:
-        world: the obstacles and walls
-        cell: side of a cell [m]
-        inflate: a cell is free where its middle is farther than this from everything [m]
-    """
+    """The cells that `antdrive.worlds.grid.rasterise` has as free (rows, cols), without loading compiled code for it."""
     xmin, ymin, xmax, ymax = world.bounds
     cols, rows = (max(1, math.ceil(side / cell - 1e-9)) for side in world.size)
     x, y = xmin + cell / 2 + np.arange(cols) * cell, ymin + cell / 2 + np.arange(rows) * cell
@@ -75,11 +65,7 @@ def free_cells(world: World, cell: float, inflate: float) -> Mask:
 
 
 def known_ground(rollout: Rollout) -> Iterator[GroundGrid]:
-    """What a robot without a map had seen, in the frame of its estimated poses: at first, every second, and at last.
-
-    Args:
-        rollout: the log, with scans
-    """
+    """What a robot without a map had seen, in the frame of its estimated poses: at first, every second, and at last."""
     from antdrive.views.recollection import Recollection
 
     seen = Recollection(rollout, forgetting=True, meeting=False)

@@ -26,11 +26,7 @@ SCENE, CLEARANCE, SPEEDS, LIMITER = "3D!drive", "Plot!clearance", "Plot!speeds",
 
 
 def foxglove_layout(rollout: Rollout) -> dict[str, Any]:
-    """The layout as plain data, for JSON.
-
-    Args:
-        rollout: the log
-    """
+    """The layout as plain data, for JSON."""
     x0, y0, x1, y1 = rollout.record.world.bounds
     corners = in_map(rollout.record.task.frame, [(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
     low, high = corners.min(axis=0), corners.max(axis=0)

@@ -11,9 +11,6 @@ from antdrive.base.optional import optional
 def library(name: str) -> Any:
     """A module of rosbags or mcap, imported when it is first needed.
 
-    Args:
-        name: the module's full name, such as "mcap.writer"
-
     Raises:
         InputError: it is not installed.
     """

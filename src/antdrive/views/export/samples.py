@@ -17,12 +17,7 @@ from antdrive.views.export.topics import Floats, Stamps, Topic, nanoseconds
 
 
 def samples(rollout: Rollout, scans: Scans) -> list[Topic]:
-    """The topics with a message for each row of a log or for each scan.
-
-    Args:
-        rollout: the log
-        scans: of that drive
-    """
+    """The topics with a message for each row of a log or for each scan."""
     stamps = nanoseconds(rollout.t)
     frames = [(ODOM, BASE), *((ODOM, mover_frame(i)) for i in range(rollout.movers.shape[1]))]
     still = np.zeros((*rollout.movers.shape[:2], 1))
@@ -47,10 +42,6 @@ def scan_topics(rollout: Rollout, scans: Scans) -> list[Topic]:
     """What the robot's lidar saw; empty where there are no scans.
 
     Ranges are as REP 117 has them: +inf where nothing was in range, -inf where something was too near to measure.
-
-    Args:
-        rollout: the log
-        scans: of that drive
     """
     lidar = rollout.record.robot.lidar
     if lidar is None or not len(scans.rows):
@@ -74,15 +65,7 @@ def _own_maps(rollout: Rollout) -> Floats:
 
 
 def transforms(topic: str, stamps: Stamps, frames: Sequence[tuple[str, str]], poses: Floats, z: float = 0.0) -> Topic:
-    """Messages that place frames within others.
-
-    Args:
-        topic: the topic's name
-        stamps: (N,) [ns]
-        frames: parent and child of each of K transforms
-        poses: x, y [m] and yaw [rad] of the children (N, K, 3)
-        z: height of the children [m]
-    """
+    """Messages that place frames within others."""
     layout = CdrLayout()
     layout.length(len(frames))
     values: dict[str, Any] = {}
@@ -95,15 +78,7 @@ def transforms(topic: str, stamps: Stamps, frames: Sequence[tuple[str, str]], po
 
 
 def odometry(topic: str, child: str, stamps: Stamps, pose: Floats, twist: Floats) -> Topic:
-    """Poses with speeds; covariances are 0, which ROS reads as unknown.
-
-    Args:
-        topic: the topic's name
-        child: the frame that the pose is of
-        stamps: (N,) [ns]
-        pose: x, y [m] and yaw [rad] (N, 3)
-        twist: forward speed [m/s] and yaw rate [rad/s] (N, 2)
-    """
+    """Poses with speeds; covariances are 0, which ROS reads as unknown."""
     layout = CdrLayout()
     _header(layout, ODOM)
     layout.text(child)
@@ -116,42 +91,21 @@ def odometry(topic: str, child: str, stamps: Stamps, pose: Floats, twist: Floats
 
 
 def twists(topic: str, stamps: Stamps, twist: Floats) -> Topic:
-    """Speeds.
-
-    Args:
-        topic: the topic's name
-        stamps: (N,) [ns]
-        twist: forward speed [m/s] and yaw rate [rad/s] (N, 2)
-    """
+    """Speeds."""
     layout = CdrLayout()
     layout.number("twist", "f8", 6)
     return Topic(topic, "geometry_msgs/msg/Twist", stamps, layout.messages({"twist": _twist6(twist)}))
 
 
 def numbers(topic: str, kind: str, number: str, stamps: Stamps, values: Any) -> Topic:
-    """Single numbers.
-
-    Args:
-        topic: the topic's name
-        kind: the message's type, of one number called data
-        number: the number's type, as numpy writes it
-        stamps: (N,) [ns]
-        values: (N,)
-    """
+    """Single numbers."""
     layout = CdrLayout()
     layout.number("data", number)
     return Topic(topic, kind, stamps, layout.messages({"data": values}))
 
 
 def laser_scans(topic: str, stamps: Stamps, ranges: npt.NDArray[np.floating], values: dict[str, float]) -> Topic:
-    """Scans of a planar lidar.
-
-    Args:
-        topic: the topic's name
-        stamps: (N,) [ns]
-        ranges: (N, B) [m]
-        values: the other numbers of a LaserScan, by name
-    """
+    """Scans of a planar lidar."""
     layout = CdrLayout()
     _header(layout, LIDAR)
     for name in values:

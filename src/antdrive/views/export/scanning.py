@@ -16,14 +16,7 @@ Whole = npt.NDArray[np.int64]
 
 
 def exact_scans(lidar: Lidar, world: World, poses: Floats, movers: Floats) -> npt.NDArray[np.float32]:
-    """What `antdrive.sim.sensing.Scanner` measures without noise, scan by scan (S, beams) [m].
-
-    Args:
-        lidar: the lidar
-        world: its cylinders, movers and walls
-        poses: the robot's poses (S, 3)
-        movers: where the movers are at each scan (S, M, 2) [m]
-    """
+    """What `antdrive.sim.sensing.Scanner` measures without noise, scan by scan (S, beams) [m]."""
     seen = world.discs[np.array([disc.height >= lidar.height for disc in world.obstacles], dtype=np.bool_)]
     tall = np.array([mover.height >= lidar.height for mover in world.movers], dtype=np.bool_)
     radii = np.array([mover.radius for mover in world.movers])[tall]

@@ -33,12 +33,7 @@ class Scans(NamedTuple):
 
     @classmethod
     def of(cls, rollout: Rollout, *, again: bool = True) -> Scans:
-        """The scans of a drive.
-
-        Args:
-            rollout: the log
-            again: whether scans are taken now where the log holds none and the robot has a lidar
-        """
+        """The scans of a drive."""
         if len(rollout.scans):
             return cls(LOGGED, rollout.scan_rows.astype(np.int64), ranges_of(rollout.scans))
         if rollout.record.robot.lidar is not None and again:

@@ -28,11 +28,7 @@ FLAT, LINE, SPOT = 0.01, 0.05, 0.1  # height of the goal, width of a line, size 
 
 
 def scenery(rollout: Rollout) -> tuple[Topic, list[Topic]]:
-    """The fixed transforms as sent at the first row, for the topic /tf too; and the other topics with few messages.
-
-    Args:
-        rollout: the log
-    """
+    """The fixed transforms as sent at the first row, for the topic /tf too; and the other topics with few messages."""
     start = float(rollout.t[0])
     static = _message("/tf_static", "tf2_msgs/msg/TFMessage", [start], [_static(rollout)], latched=True)
     latched: dict[str, tuple[str, Any]] = {

@@ -15,12 +15,7 @@ from antdrive.views.export.frames import IDENTITY
 
 
 def write_tables(rollout: Rollout, folder: Path) -> None:
-    """Write drive.csv with a line for each row of the log, plan.csv with the routes, and contacts.csv.
-
-    Args:
-        rollout: the log
-        folder: an existing folder
-    """
+    """Write drive.csv with a line for each row of the log, plan.csv with the routes, and contacts.csv."""
     _write(folder / "drive.csv", *_drive(rollout))
     _write(folder / "plan.csv", ("route", "from_s", "x_m", "y_m"), _plan(rollout))
     contacts = ((rollout.t[int(row)], int(thing), *rest) for row, thing, *rest in rollout.contacts.tolist())

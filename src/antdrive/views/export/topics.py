@@ -33,20 +33,12 @@ class Topic:
 
 
 def nanoseconds(t: npt.ArrayLike) -> Stamps:
-    """Times [s] as ROS counts them [ns].
-
-    Args:
-        t: times (N,) [s]
-    """
+    """Times [s] as ROS counts them [ns]."""
     return np.rint(np.atleast_1d(np.asarray(t, dtype=np.float64)) * 1e9).astype(np.int64)
 
 
 def in_order(topics: Sequence[Topic]) -> list[tuple[int, int]]:
-    """All messages by time, as (topic, message); at the same time, topics keep their order.
-
-    Args:
-        topics: all topics
-    """
+    """All messages by time, as (topic, message); at the same time, topics keep their order."""
     stamps = np.concatenate([topic.stamps for topic in topics])
     of = np.concatenate([np.full(len(topic.stamps), i) for i, topic in enumerate(topics)])
     number = np.concatenate([np.arange(len(topic.stamps)) for topic in topics])

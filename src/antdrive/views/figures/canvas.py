@@ -59,12 +59,7 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def map_size(scene: Scene, shown: Bounds | None = None) -> tuple[float, float]:
-    """The width and height of a scene's map in a figure [inches].
-
-    Args:
-        scene: what is drawn
-        shown: the part of the plane that is shown [m]; None: the world
-    """
+    """The width and height of a scene's map in a figure [inches]."""
     x0, y0, x1, y1 = shown or scene.bounds
     shape = (y1 - y0) / (x1 - x0)
     high = float(np.clip(5.6 * shape, 3.9, 6.4))
@@ -72,12 +67,7 @@ def map_size(scene: Scene, shown: Bounds | None = None) -> tuple[float, float]:
 
 
 def frame_map(axes: Any, shown: Bounds) -> None:
-    """Show a part of the plane, with some room around it.
-
-    Args:
-        axes: with the map
-        shown: xmin, ymin, xmax, ymax [m]
-    """
+    """Show a part of the plane, with some room around it."""
     x0, y0, x1, y1 = shown
     room = 0.02 * max(x1 - x0, y1 - y0)
     axes.set(xlim=(x0 - room, x1 + room), ylim=(y0 - room, y1 + room))
@@ -98,13 +88,7 @@ def checked(path: str | Path | None) -> Path | None:
 
 
 def write_figure(figure: Figure, target: Path, dpi: float) -> Path:
-    """Write a figure in the format of its suffix, whole or not at all; returns its path.
-
-    Args:
-        figure: what to write
-        target: the file
-        dpi: pixels per inch
-    """
+    """Write a figure in the format of its suffix, whole or not at all; returns its path."""
     kind = target.suffix.lower()[1:]
     # Without these entries, matplotlib writes its version or the date.
     empty: dict[str, Any] = {
@@ -118,13 +102,7 @@ def write_figure(figure: Figure, target: Path, dpi: float) -> Path:
 
 
 def finished(figure: Figure, target: Path | None, dpi: float) -> Figure:
-    """A figure as functions return it, written if there is a target.
-
-    Args:
-        figure: the figure
-        target: the file to write; None: none
-        dpi: pixels per inch
-    """
+    """A figure as functions return it, written if there is a target."""
     figure.set_dpi(dpi)
     if target is not None:
         write_figure(figure, target, dpi)

@@ -58,13 +58,6 @@ def convergence_figure(
 ) -> Figure:
     """Draw the best length so far while planners iterate, a panel for each map.
 
-    Args:
-        curves: by title of the panel, the planners' runs
-        path: the file to write; its suffix chooses PNG, PDF or SVG; None: no file
-        single: whether one run of each planner is drawn, as papers do, the median one of the first map; else the median of
-            all runs with its 95 % interval, bootstrapped over maps
-        dpi: pixels per inch
-
     Returns:
         The figure, which may be labelled and saved; `panels` gives its axes by name.
 

@@ -42,13 +42,7 @@ SPEEDS = LinearSegmentedColormap.from_list("speed", [hexed(stop) for stop in SPE
 
 
 def draw_map(axes: Any, scene: Scene, *, floor: bool = True) -> None:
-    """Draw walls, obstacles, inflated zones, movers with their tracks, start and goal.
-
-    Args:
-        axes: where to draw
-        scene: what to draw
-        floor: draw grid lines and filled zones; False leaves the ground free for a field below
-    """
+    """Draw walls, obstacles, inflated zones, movers with their tracks, start and goal."""
     x0, y0, x1, y1 = scene.bounds
     frame_map(axes, scene.bounds)
     axes.set(xlabel="x [m]", ylabel="y [m]")
@@ -123,15 +117,7 @@ def _draw_robot(axes: Any, scene: Scene, pose: tuple[float, float, float], colou
 
 
 def draw_driven(figure: Any, axes: Any, scene: Scene, rollout: Rollout, cells: Floats | None) -> None:
-    """Draw the route, the driven path coloured by speed, the robot at the end, and the first contact.
-
-    Args:
-        figure: gets the colour bar
-        axes: where to draw
-        scene: the run's scene
-        rollout: the run's log
-        cells: the centres of the planned cells (N, 2) [m], or None
-    """
+    """Draw the route, the driven path coloured by speed, the robot at the end, and the first contact."""
     handles: list[Any] = []
     if cells is not None and len(cells):
         handles += axes.plot(*cells.T, ".", ms=2.6, color=hexed(MUTED), label="planned cells", zorder=4.6)

@@ -31,14 +31,6 @@ def history_figure(
 ) -> Figure:
     """Draw the best path length so far by iteration for one or more planners.
 
-    Args:
-        histories: by planner, the history of each seed; of several seeds the median is drawn, and the range as
-            a band
-        path: the file to write; its suffix chooses PNG, PDF or SVG; None: no file
-        optimum: the shortest length on the same moves, drawn as a line
-        unit: of the lengths
-        dpi: pixels per inch
-
     Returns:
         The figure, which may be labelled and saved; `panels` gives its axes by name.
 
@@ -88,12 +80,6 @@ def maps_figure(
 ) -> Figure:
     """Draw paths on maps as the papers do: blocked cells black, the start a red square, the goal a blue one.
 
-    Args:
-        paths: by title, a map and the plans on it by planner; the first is drawn in blue, the second in red, further
-            ones in the planners' own colours
-        path: the file to write; its suffix chooses PNG, PDF or SVG; None: no file
-        dpi: pixels per inch
-
     Returns:
         The figure, which may be labelled and saved; `panels` gives its axes by name.
 
@@ -141,15 +127,6 @@ def ants_figure(
 ) -> Figure:
     """Draw path length by number of ants: every seed, the mean, and the values that a paper prints.
 
-    Args:
-        lengths: by number of ants, the path length of each seed
-        path: the file to write; its suffix chooses PNG, PDF or SVG; None: no file
-        planner: its name
-        optimum: the shortest length on the same moves
-        printed: by number of ants, the paper's value
-        unit: of the lengths
-        dpi: pixels per inch
-
     Returns:
         The figure, which may be labelled and saved; `panels` gives its axes by name.
 
@@ -188,14 +165,6 @@ def sweep_figure(
     dpi: float = 160,
 ) -> Figure:
     """Draw the mean path length by crossover and mutation probability, with and without elitism side by side.
-
-    Args:
-        pc: crossover probabilities (P,)
-        pm: mutation probabilities (M,)
-        lengths: with elitism (True) and without (False), the mean lengths (P, M); nan where no seed found a
-            path
-        path: the file to write; its suffix chooses PNG, PDF or SVG; None: no file
-        dpi: pixels per inch
 
     Returns:
         The figure, which may be labelled and saved; `panels` gives its axes by name.

@@ -120,16 +120,6 @@ def plan_figures(
 ) -> dict[str, Path]:
     """Draw every figure of a plan: with the field, alone, by iteration, and its field as bars and as contours.
 
-    Args:
-        task: the world with start and goal
-        grid: the grid that was planned on
-        plan: the planner's result
-        robot: the robot to draw at the start
-        folder: where the figures go
-        name: the planner's name
-        suffixes: the formats, for example (".png", ".pdf")
-        mapped: whether the robot has a map
-
     Returns:
         The files' paths by the name of the figure; formats after the first are named like `plan pdf`.
     """

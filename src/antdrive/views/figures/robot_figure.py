@@ -28,15 +28,7 @@ def robot_figure(
     above: Sequence[Floats] = (),
     dpi: float = 160,
 ) -> Figure:
-    """Draw a robot from above, heading right, in metres from the axle's centre.
-
-    Args:
-        robot: the robot
-        path: the file to write; None: none
-        pieces: points of each piece of collision geometry within the footprint (N, 2) [m]
-        above: points of each piece that lies above it (N, 2) [m]
-        dpi: pixels per inch
-    """
+    """Draw a robot from above, heading right, in metres from the axle's centre."""
     target = checked(path)
     with styled():
         outline = np.array(robot.footprint.outline(48))

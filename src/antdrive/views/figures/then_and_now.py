@@ -28,13 +28,6 @@ def then_and_now(
 ) -> Figure:
     """Draw two drives of the same scenario on one map, with their clearances and their distance over time.
 
-    Args:
-        then: the earlier drive
-        now: the present drive
-        path: the file to write; its suffix chooses PNG, PDF or SVG; None: no file
-        parted: when [s] and where x, y [m] the drives part; None if they do not
-        dpi: pixels per inch
-
     Returns:
         The figure, which may be labelled and saved; `panels` gives its axes by name.
 

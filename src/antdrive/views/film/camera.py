@@ -45,16 +45,7 @@ class Camera:
         turned: bool = False,
         pad: tuple[float, float, float, float] = (0.04, 0.04, 0.04, 0.04),
     ) -> Camera:
-        """The nearest camera that sees all points (N, 3) [m].
-
-        Args:
-            points: what must be in the picture
-            size: width and height of the picture [px]
-            tilt: angle between the line of sight and the ground [degrees]
-            fov: vertical field of view [degrees]
-            turned: look along -x instead of +y, so that a world long in y fills a wide picture
-            pad: the fractions of the picture to leave free on the left, right, top and bottom
-        """
+        """The nearest camera that sees all points (N, 3) [m]."""
         right, up, back = _axes(math.radians(tilt), turned)
         basis = np.array([right, up, back])
         seen = points @ basis.T
@@ -145,15 +136,7 @@ class Camera:
 
 
 def camera_for(name: str, low: npt.ArrayLike, high: npt.ArrayLike, height: float, size: tuple[int, int]) -> Camera:
-    """The camera of a name that sees a rectangle of the ground and the bodies on it.
-
-    Args:
-        name: one of `CAMERAS`
-        low: the rectangle's corner with the least x and y [m]
-        high: the opposite corner [m]
-        height: of the tallest body [m]
-        size: width and height of the picture [px]
-    """
+    """The camera of a name that sees a rectangle of the ground and the bodies on it."""
     (x0, y0), (x1, y1) = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
     corners = np.array([(x, y, z) for x in (x0, x1) for y in (y0, y1) for z in (0.0, height)])
     tilt, fov = _TILT[name], _FOV[name]
@@ -162,12 +145,7 @@ def camera_for(name: str, low: npt.ArrayLike, high: npt.ArrayLike, height: float
 
 
 def turns(shape: float, size: tuple[int, int]) -> bool:
-    """Whether cameras of a wide picture look along -x: at ground that is long in y.
-
-    Args:
-        shape: the ground's width over its height, as the camera sees it
-        size: width and height of the picture [px]
-    """
+    """Whether cameras of a wide picture look along -x: at ground that is long in y."""
     return shape < 0.75 and size[0] > size[1]
 
 

@@ -48,18 +48,6 @@ def compare_film(
 ) -> FilmInfo:
     """Film two to six runs side by side. A run that ends before the others keeps its last picture.
 
-    Args:
-        rollouts: the logs of the runs
-        path: the file to write; its suffix chooses the format: .mp4 (H.264), .gif or .webp
-        camera: `oblique`, `top` or `follow`
-        size: width and height, even numbers from 160 to 4096 [px]; None: 1280 x 720, from above only as much of it as
-            the worlds fill
-        fps: frames per second, at most 240
-        speed: how many times as fast as the runs the film is
-        titles: the name of each run's tile; None: its planner's name
-        mark: a place and a moment that are marked in every tile from then on
-        progress: called after each frame with the fraction that is done
-
     Raises:
         InputError: fewer than two runs or more than six, or an option that `film` refuses.
         OSError: the encoder could not write the film.

@@ -78,14 +78,6 @@ class Compositor:
     >>> with Compositor(scene, camera, route=rollout.route) as compositor:
     ...     compositor.extend_trail(points, speeds)
     ...     picture = compositor.frame(pose, wheels)
-
-    Args:
-        scene: what stands still
-        camera: where the pictures are taken from
-        route: a polyline (N, 2) [m] that stays on the ground; for a route that changes, use `show_route`
-        fine: each pixel is the mean of fine x fine rendered ones
-        moving_camera: the camera will move, so the backdrop is cast by rays
-        sight: what the lidar sees, of a robot without a map also what it has seen; None: the log has no scans
     """
 
     def __init__(
@@ -156,12 +148,7 @@ class Compositor:
         self._paint_trail(rows, colours)
 
     def show_route(self, route: Floats, replanned_at: Floats) -> None:
-        """Replace the route that later frames show.
-
-        Args:
-            route: the polyline (N, 2) [m]
-            replanned_at: where the robot was at each replan so far (M, 2) [m]; a dot marks each place
-        """
+        """Replace the route that later frames show."""
         half = 1.5 * self.camera.pixel
         dots = np.column_stack([replanned_at, replanned_at, np.full(len(replanned_at), 2.4 * half)])
         self._changing_route = (dashes(route, 7 * half, 5 * half, 0.9 * half), np.ascontiguousarray(dots))
@@ -174,15 +161,7 @@ class Compositor:
         velocities: npt.ArrayLike | None = None,
         followed: Floats | None = None,
     ) -> Picture:
-        """The picture (H, W, 3) with robot and movers.
-
-        Args:
-            pose: the robot's x, y [m] and heading [rad]
-            wheels: how far the left and the right wheel have turned [rad]
-            movers: the movers' positions (M, 2) [m]
-            velocities: the movers' velocities (M, 2) [m/s], to draw where they will be at constant velocity
-            followed: movers that the robot follows with its lidar (N, 5): x, y [m], their velocities [m/s], radius [m]
-        """
+        """The picture (H, W, 3) with robot and movers."""
         x, y, yaw = (float(value) for value in np.asarray(pose))
         places = np.asarray(movers, dtype=np.float64).reshape(-1, 2)
         frame = self._canvas.copy()
@@ -209,13 +188,7 @@ class Compositor:
         return frame
 
     def field_frame(self, grid: Grid, levels: Floats, path: Floats) -> Picture:
-        """The picture (H, W, 3) without a robot, with a planner's field on the ground and a path over it.
-
-        Args:
-            grid: the grid of the field
-            levels: the field (R, C), 0 to 1; NaN leaves a cell unpainted
-            path: a polyline (N, 2) [m]
-        """
+        """The picture (H, W, 3) without a robot, with a planner's field on the ground and a path over it."""
         frame = self.backdrop.pixels.copy()
         tints = field_colours(np.linspace(0, 1, 256))
         visible, (x, y) = self.backdrop.visible, grid.origin

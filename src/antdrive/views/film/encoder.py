@@ -71,11 +71,6 @@ def known_suffix(path: Path) -> str:
 def encoding(path: Path, size: tuple[int, int], fps: float) -> Iterator[Callable[[Picture], None]]:
     """A function that appends a frame (H, W, 3) to a film, which is complete when the `with` block ends.
 
-    Args:
-        path: the file; its suffix is one of `ENCODERS`
-        size: width and height of the frames [px]
-        fps: frames per second
-
     Raises:
         OSError: ffmpeg failed; the message quotes ffmpeg.
     """

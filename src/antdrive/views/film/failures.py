@@ -26,13 +26,6 @@ def film_failures(
     The line below the picture names the run, how it ended, and why. A drive longer than 30 s is shown in
     30 s. A film that is newer than its log, or whose log is gone, is not made again.
 
-    Args:
-        rows: of a campaign's table
-        logs: the campaign's folder, in which the logs are
-        folder: for the films
-        size: width and height of the films [px]
-        progress: called with the fraction of the films that is done
-
     Raises:
         InputError: a log that cannot be read, or a film that cannot be written.
     """

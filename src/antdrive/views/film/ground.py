@@ -22,16 +22,7 @@ SHADOW_DEPTH = 0.30  # how much light the deepest shadow takes away
 def paint_ground(
     camera: Camera, scene: Scene, route: Floats, ground: Mask, tall: Floats, sun: tuple[float, float]
 ) -> npt.NDArray[np.float32]:
-    """The ground (H, W, 3) as a camera sees it.
-
-    Args:
-        camera: where the picture is taken from
-        scene: what to paint
-        route: the planned polyline (N, 2) [m]
-        ground: which pixels show ground (H, W); the others stay unpainted
-        tall: the obstacles' heights (N,) [m], for their shadows
-        sun: how far the shadow of a body reaches in x and y per metre of its height
-    """
+    """The ground (H, W, 3) as a camera sees it."""
     width, height = camera.size
     brush = _Brush(camera, ground)
     under = kerb_width(scene) / 2  # the floor continues under the kerb, so that its edge is hidden
@@ -78,14 +69,7 @@ def grid_step(camera: Camera) -> float:
 
 
 def dashes(line: Floats, on: float, off: float, half: float) -> Floats:
-    """Capsules (M, 5) that draw a polyline (N, 2) dashed.
-
-    Args:
-        line: the polyline [m]
-        on: length of a dash [m]
-        off: length of a gap [m]
-        half: half the width of the line [m]
-    """
+    """Capsules (M, 5) that draw a polyline (N, 2) dashed."""
     steps = segment_lengths(line)
     arc = np.concatenate([[0.0], np.cumsum(steps)])
     starts = np.arange(0.0, arc[-1], on + off)

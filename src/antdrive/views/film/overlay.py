@@ -144,16 +144,7 @@ class Layout:
 
 
 class Band:
-    """The band below the picture. Everything that stays the same is drawn once.
-
-    Args:
-        layout: its sizes
-        title: the first line
-        subtitle: the second line
-        note: a line below the numbers
-        legend: the legend's rows, for a layout without a card
-        names: of the four numbers
-    """
+    """The band below the picture. Everything that stays the same is drawn once."""
 
     def __init__(
         self,
@@ -247,18 +238,7 @@ def legend_entries(
     sight: bool = False,
     followed: bool = False,
 ) -> list[LegendEntry]:
-    """The legend's lines: one for each kind of thing in the picture.
-
-    Args:
-        scene: what is in the picture
-        step: the distance between grid lines [m]
-        pixel: the width of a pixel in the middle of the picture [m]
-        planning: the picture shows planning, not a drive
-        replans: the robot replanned during the run
-        beams: the picture shows what the lidar sees
-        sight: it shows what a robot without a map has seen
-        followed: it shows the movers that the robot follows with its lidar
-    """
+    """The legend's lines: one for each kind of thing in the picture."""
     if planning:
         found = [LegendEntry("field", INK, "planner's field"), LegendEntry("line", SHELL, "best path so far")]
     else:

@@ -28,14 +28,7 @@ def process_count() -> int:
 
 
 def render_frames(rollout: Rollout, setting: dict[str, Any], times: Floats, jobs: int) -> Iterator[Picture]:
-    """The frames (H, W, 3) in order, the same for any number of processes; `jobs` x `CHUNK` are held at once.
-
-    Args:
-        rollout: the run
-        setting: the keyword arguments of `Shot`
-        times: the moments to show [s]
-        jobs: the number of processes
-    """
+    """The frames (H, W, 3) in order, the same for any number of processes; `jobs` x `CHUNK` are held at once."""
     chunks = [(first, min(first + CHUNK, len(times))) for first in range(0, len(times), CHUNK)]
     film = uuid.uuid4().hex
     with joblib.Parallel(n_jobs=jobs) as pool:

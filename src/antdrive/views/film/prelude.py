@@ -59,11 +59,6 @@ def check_field(rollout: Rollout) -> None:
 def planning_frames(rollout: Rollout, setting: dict[str, Any], count: int) -> Iterator[Picture]:
     """Frames (H, W, 3) of a run's planning, from the first to the last iteration.
 
-    Args:
-        rollout: the run
-        setting: the keyword arguments of `Shot`; a following camera is replaced by the oblique one
-        count: how many frames
-
     Raises:
         InputError: planning again led to another path.
     """

@@ -44,13 +44,7 @@ class Solids:
         )
 
     def render(self, camera: Camera, fine: int, light: tuple[float, float, float]) -> tuple[Any, Any, Any]:
-        """Picture (h, w, 4), depth (h, w) and body numbers (h, w), -1 for none, like `tiny_renderer.render`.
-
-        Args:
-            camera: where the picture is taken from
-            fine: how many times as many rows and columns as the camera's the picture has
-            light: direction to the lamp
-        """
+        """Picture (h, w, 4), depth (h, w) and body numbers (h, w), -1 for none, like `tiny_renderer.render`."""
         width, height = camera.size
         image = np.empty((height * fine, width * fine, 4), dtype=np.uint8)
         depth = np.ones(image.shape[:2], dtype=np.float32)

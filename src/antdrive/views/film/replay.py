@@ -86,11 +86,7 @@ class Replay:
         return float(self.t[-1] - self.t[0])
 
     def slow_motion(self, speed: float) -> tuple[float, float] | None:
-        """When slow motion around the first contact starts and ends [s]; None without a contact.
-
-        Args:
-            speed: how many times as fast as the run the film is
-        """
+        """When slow motion around the first contact starts and ends [s]; None without a contact."""
         if not len(self._contact_times):
             return None
         first = float(self._contact_times[0])

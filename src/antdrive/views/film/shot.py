@@ -45,17 +45,7 @@ REPLAN_CAPTION = 1.5  # the cause of a replan is shown this long [s]
 
 
 class Shot:
-    """The frames of a run as one camera sees it. Ask for moments in increasing order. Use it in a `with` block.
-
-    Args:
-        rollout: the run's log
-        camera: `oblique`, `top` or `follow`
-        size: width and height [px]
-        note: a line for the band below the picture
-        speed: how many times as fast as the run the film is; captions stay as long at any speed
-        planning: the frames show how the path was planned, not the drive
-        bare: no band and no legend
-    """
+    """The frames of a run as one camera sees it. Ask for moments in increasing order. Use it in a `with` block."""
 
     def __init__(
         self,
@@ -159,12 +149,7 @@ class Shot:
         return self._with_band(view, at, VERDICTS[self.outcome])
 
     def planning_frame(self, values: Values, draw: Callable[[Compositor], Picture]) -> Picture:
-        """A frame (H, W, 3) of planning.
-
-        Args:
-            values: the numbers of the band
-            draw: draws the picture
-        """
+        """A frame (H, W, 3) of planning."""
         view = draw(self._compositor)
         self._put_legend(view)
         return np.vstack([view, self._band.draw(values, PLANNING)])
@@ -204,14 +189,7 @@ class Shot:
         return found
 
     def put_label(self, view: Picture, text: str, x: float, y: float) -> None:
-        """Mark a place on the ground in a picture, with a text above it.
-
-        Args:
-            view: the picture, as `view` returned it
-            text: what is written there
-            x: where [m]
-            y: where [m]
-        """
+        """Mark a place on the ground in a picture, with a text above it."""
         size = 2 * round(1.1 * self._layout.unit)
         px, py = self._compositor.pixel(x, y)
         kernels.put_sprite(view, burst(size, CONTACT), round(px - size / 2), round(py - size / 2), 1.0)

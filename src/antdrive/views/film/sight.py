@@ -29,11 +29,7 @@ HATCHING = 9.0  # distance between the lines of the hatching [px]
 
 
 class FanPainter:
-    """Paints the beams of the last scan into frames.
-
-    Args:
-        rollout: a log with scans
-    """
+    """Paints the beams of the last scan into frames."""
 
     def __init__(self, rollout: Rollout) -> None:
         self._rollout, self._lidar = rollout, lidar_of(rollout)
@@ -51,14 +47,7 @@ class FanPainter:
         forward: npt.NDArray[np.floating[Any]],
         inverse: npt.NDArray[np.floating[Any]],
     ) -> None:
-        """Lay the beams of the last scan on the ground.
-
-        Args:
-            frame: the picture, before the robot is drawn
-            backdrop: what stands still
-            forward: the map from the ground to pixels (3, 3)
-            inverse: the map from pixels to the ground (3, 3)
-        """
+        """Lay the beams of the last scan on the ground."""
         lidar, (eye, first, reaches) = self._lidar, beams_of(self._rollout, self._last)
         every = max(1, round(2 * np.pi / lidar.spacing / DRAWN_BEAMS))
         style = np.array([TINT, BEAMS, backdrop.camera.pixel])
@@ -70,12 +59,7 @@ class FanPainter:
 
 
 class SightPainter(FanPainter):
-    """Paints what a robot without a map had seen into frames. Moments are asked for in increasing order.
-
-    Args:
-        rollout: a log with scans
-        scene: what stands in the world
-    """
+    """Paints what a robot without a map had seen into frames. Moments are asked for in increasing order."""
 
     def __init__(self, rollout: Rollout, scene: Scene) -> None:
         super().__init__(rollout)
@@ -98,14 +82,7 @@ class SightPainter(FanPainter):
         return laid_in_world(points, self._drift)
 
     def cover(self, frame: Picture, backdrop: Backdrop, inverse: npt.NDArray[np.floating[Any]], fine: int) -> None:
-        """Hatch the ground that is not known to be free, and pale the obstacles that no beam has met.
-
-        Args:
-            frame: the picture, before the robot is drawn
-            backdrop: what stands still, with the numbers of bodies
-            inverse: the map from pixels to the ground (3, 3)
-            fine: each pixel is the mean of fine x fine rendered ones
-        """
+        """Hatch the ground that is not known to be free, and pale the obstacles that no beam has met."""
         seen, pixel = self._recollection.map, backdrop.camera.pixel
         style = np.array([VEIL, LINES, HATCHING * pixel, pixel])
         tints = np.array([PALE, HATCH], dtype=np.float64)
@@ -119,12 +96,7 @@ class SightPainter(FanPainter):
             kernels.pale_bodies(frame, visible, backdrop.bodies, fine, unmet, tints[0], PALENESS)
 
     def put_hits(self, frame: Picture, backdrop: Backdrop) -> None:
-        """Put the hits on the robot's map over everything, at the height of the beams.
-
-        Args:
-            frame: the picture
-            backdrop: what stands still
-        """
+        """Put the hits on the robot's map over everything, at the height of the beams."""
         camera = backdrop.camera
         plane = camera.plane(min(self._recollection.lidar.height, 0.3))
         x, y, radius = self._discs.T

@@ -42,15 +42,7 @@ def fitted(text: str, width: int, size: int, bold: bool = False) -> str:
 
 
 def wrapped(text: str, width: int, size: int, bold: bool = False, *, most: int) -> list[str]:
-    """The text in lines no wider than `width` [px], broken between words; what is left over is cut off with an ellipsis.
-
-    Args:
-        text: the text
-        width: of a line [px]
-        size: of the font [px]
-        bold: whether it is bold
-        most: so many lines at most
-    """
+    """The text in lines no wider than `width` [px], broken between words; what is left over is cut off with an ellipsis."""
     lines: list[str] = []
     words = text.split()
     while words and len(lines) < most:
@@ -82,15 +74,7 @@ def label(text: str, size: int, colour: Colour = INK, *, bold: bool = True) -> S
 
 
 def pill(text: str, size: int, colour: Colour, more: Sequence[str] = (), small: int = 0) -> Sprite:
-    """White text on a coloured plate with round ends.
-
-    Args:
-        text: in bold
-        size: of its font [px]
-        colour: of the plate
-        more: lines below the text, in a smaller font
-        small: the size of that font [px]
-    """
+    """White text on a coloured plate with round ends."""
     pad_x, pad_y, line = round(0.75 * size), round(0.36 * size), round(1.35 * small)
     wide = max(text_width(text, size, True), *(text_width(row, small) for row in more), 0) + 2 * pad_x
     head = round(1.2 * size) + 2 * pad_y

@@ -34,15 +34,7 @@ def add_mesh(number: int, mesh: Mesh, colour: Colour) -> int:
 def render(
     number: int, camera: Camera, box: Box | None, fine: int, light: tuple[float, float, float]
 ) -> tuple[Any, Any, Any]:
-    """Render a PyBullet client's bodies: picture (h, w, 4), depth (h, w) and body numbers (h, w), -1 for none.
-
-    Args:
-        number: the client
-        camera: where the picture is taken from
-        box: the part of the camera's picture to render; None for all of it
-        fine: how many times as many rows and columns as the box's the picture has
-        light: direction to the lamp
-    """
+    """Render a PyBullet client's bodies: picture (h, w, 4), depth (h, w) and body numbers (h, w), -1 for none."""
     p = bullet()
     x0, y0, x1, y1 = box or (0, 0, *camera.size)
     view, projection = camera.matrices(box)

@@ -31,12 +31,7 @@ class Solid(NamedTuple):
 
 
 def placed(at: tuple[float, float, float], quaternion: tuple[float, float, float, float]) -> Floats:
-    """The place (3, 4) of a mesh that is turned, then moved.
-
-    Args:
-        at: the position [m]
-        quaternion: the rotation: x, y, z, w
-    """
+    """The place (3, 4) of a mesh that is turned, then moved."""
     x, y, z, w = quaternion
     return np.array(
         [
@@ -50,15 +45,7 @@ def placed(at: tuple[float, float, float], quaternion: tuple[float, float, float
 def draw_solids(
     solids: list[Solid], camera: Camera, box: Box, fine: int, light: tuple[float, float, float]
 ) -> tuple[Any, Any, Any]:
-    """Picture (h, w, 3), depth (h, w) and 0 where there is a body, else -1 (h, w), like `tiny_renderer.render`.
-
-    Args:
-        solids: what is drawn
-        camera: where the picture is taken from
-        box: the part of the camera's picture to draw
-        fine: how many times as many rows and columns as the box's the picture has
-        light: direction to the lamp
-    """
+    """Picture (h, w, 3), depth (h, w) and 0 where there is a body, else -1 (h, w), like `tiny_renderer.render`."""
     x0, y0, x1, y1 = box
     shape = (y1 - y0) * fine, (x1 - x0) * fine
     image, depth = np.zeros((*shape, 3), dtype=np.uint8), np.ones(shape, dtype=np.float32)

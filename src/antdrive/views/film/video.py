@@ -174,14 +174,7 @@ def still(
 
 
 def frame_times(duration: float, fps: float, speed: float, slow: tuple[float, float] | None = None) -> Floats:
-    """The moments of the run that frames show [s]; the first is 0, the last less than a frame before the end.
-
-    Args:
-        duration: the run's length [s]
-        fps: frames per second
-        speed: the film's speed relative to the run; 2 is twice as fast
-        slow: when slow motion starts and ends [s], if there is any
-    """
+    """The moments of the run that frames show [s]; the first is 0, the last less than a frame before the end."""
     if slow is None:
         return np.arange(int(duration * fps / speed + 1e-9) + 1, dtype=np.float64) * (speed / fps)
     run = np.array([0.0, *slow, duration])

@@ -29,13 +29,6 @@ def draw_figures(paper: str, found: Measured, folder: Path, seeds: int, suffixes
     """Draw a paper's figures; their paths by name.
 
     Length by iteration is drawn twice: `history` shows all seeds, with intervals, and `run` one run, as the papers do.
-
-    Args:
-        paper: the paper's short name
-        found: its experiments with their trials
-        folder: where the figures go
-        seeds: of the sweep over Pc and Pm
-        suffixes: the figures' formats
     """
     files: dict[str, str] = {}
     curves = _curves(found)

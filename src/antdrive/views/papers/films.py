@@ -51,11 +51,7 @@ SCENES: Mapping[str, FilmedExperiment] = MappingProxyType(
 
 
 def paper_scenario(paper: str) -> Scenario:
-    """The drive that a paper's film shows: its planner with its parameters, on the first of its maps.
-
-    Args:
-        paper: the paper's short name
-    """
+    """The drive that a paper's film shows: its planner with its parameters, on the first of its maps."""
     scene = SCENES[paper]
     experiment = next(e for e in PAPERS[paper]() if (e.map, e.name) == (scene.map, scene.name))
     if paper == "han2007":
@@ -71,12 +67,7 @@ def paper_scenario(paper: str) -> Scenario:
 
 
 def film_paper(paper: str, folder: Path) -> Path | None:
-    """Drive a paper's scenario and film it, the planning first where the planner shows it; None if no drive came about.
-
-    Args:
-        paper: the paper's short name
-        folder: where the film goes
-    """
+    """Drive a paper's scenario and film it, the planning first where the planner shows it; None if no drive came about."""
     scenario = paper_scenario(paper)
     result = run(scenario)
     if result.rollout is None:

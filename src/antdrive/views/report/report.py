@@ -142,11 +142,7 @@ def _text(runs: list[ReportedRun], title: str) -> str:
 
 
 def counted(runs: Sequence[ReportedRun]) -> str:
-    """How many runs ended in which way, such as "12 succeeded; 3 collided"; empty without runs.
-
-    Args:
-        runs: the runs to count
-    """
+    """How many runs ended in which way, such as "12 succeeded; 3 collided"; empty without runs."""
     numbers = Counter(run.outcome for run in runs)
     most, rest = numbers.most_common(MOST_OUTCOMES), sum(numbers.values())
     rest -= sum(count for _, count in most)

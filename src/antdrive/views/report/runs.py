@@ -356,11 +356,6 @@ def find_runs(folder: Path) -> Iterator[ReportedRun]:
 def facts_of(rollout: Rollout, result: Mapping[str, Any], name: str) -> LogFacts:
     """What a log says, computed from the log alone, and what the result beside it says otherwise.
 
-    Args:
-        rollout: the log
-        result: the content of result.json
-        name: of the log, for messages
-
     Raises:
         InputError: the record is of no drive.
     """
@@ -375,11 +370,7 @@ def facts_of(rollout: Rollout, result: Mapping[str, Any], name: str) -> LogFacts
 
 
 def made_run(run: Run) -> ReportedRun:
-    """A run made in Python, as reports show it. Its log is certified again.
-
-    Args:
-        run: what `antdrive.run` returned
-    """
+    """A run made in Python, as reports show it. Its log is certified again."""
     result, name = run.as_dict(), run.scenario.task.world.name
     return ReportedRun(None, result, None if run.rollout is None else facts_of(run.rollout, result, name), 0)
 
@@ -388,9 +379,6 @@ def note_differences(runs: Sequence[ReportedRun]) -> list[Column]:
     """Fill `differing` of every run; the columns that are needed for it.
 
     Options are compared between the runs of one planner: those of different planners differ anyway.
-
-    Args:
-        runs: all runs of the report
     """
     columns = []
     for key, column in SETTING_COLUMNS.items():
@@ -443,12 +431,7 @@ def number(value: Any) -> float | None:
 
 
 def shown(value: Any, longest: int = LONGEST) -> str:
-    """A value as text on one line of printable characters, cut to a length.
-
-    Args:
-        value: any value of JSON
-        longest: the most characters
-    """
+    """A value as text on one line of printable characters, cut to a length."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if value is None:

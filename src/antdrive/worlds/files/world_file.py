@@ -231,11 +231,7 @@ def save_task(task: Task, path: str | Path, tasks: Mapping[str, Task] = MappingP
 
 
 def ends_to_dict(task: Task) -> dict[str, Any]:
-    """The start and the goal of a task as plain data.
-
-    Args:
-        task: the task
-    """
+    """The start and the goal of a task as plain data."""
     return {
         "start": [float(v) for v in task.start],
         "goal": [float(v) for v in task.goal],

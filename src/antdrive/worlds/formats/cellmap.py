@@ -39,11 +39,7 @@ _report: ContextVar[Callable[[float], None]] = ContextVar("report", default=lamb
 
 @contextmanager
 def watch_conversion(report: Callable[[float], None]) -> Iterator[None]:
-    """A context in which the conversion of a map says how far it is.
-
-    Args:
-        report: is called with the share that is done
-    """
+    """A context in which the conversion of a map says how far it is."""
     token = _report.set(report)
     try:
         yield
@@ -147,11 +143,6 @@ def cover(cells: CellMap, overhang: float | None = None) -> Cover:
 
     Free cells stay separated where the map separates them: no way leads between or past the discs. Blocked cells that
     no free cell touches are left out.
-
-    Args:
-        cells: the map
-        overhang: how far discs may reach beyond blocked cells [m]; by default 0.207 cells, which the disc around a
-            single cell needs. A larger overhang needs fewer discs.
 
     Raises:
         InputError: the overhang is too small for the disc around a cell, or the map has too many cells.

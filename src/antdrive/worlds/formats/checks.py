@@ -12,10 +12,6 @@ from antdrive.worlds.world import Task
 def require_no_movers(task: Task, path: str | Path) -> None:
     """Refuse a task with movers, which no format but our own can hold.
 
-    Args:
-        task: the task to export
-        path: the file to write
-
     Raises:
         InputError: the world has movers.
     """
@@ -26,10 +22,6 @@ def require_no_movers(task: Task, path: str | Path) -> None:
 
 def require_new(files: Iterable[Path], *, replace: bool) -> None:
     """Refuse to write over files that exist.
-
-    Args:
-        files: what is to be written
-        replace: whether that is allowed
 
     Raises:
         InputError: one of them exists.

@@ -158,10 +158,6 @@ def import_map_server(
 def kept_tasks(path: str | os.PathLike[str], task: Task) -> dict[str, Task]:
     """The other tasks that `export_map_server` added to a map, by name; empty for a map that antdrive did not write.
 
-    Args:
-        path: the YAML file
-        task: what `import_map_server` made of it
-
     Raises:
         InputError: the file is wrong, or a task does not lie in the world.
     """
@@ -183,10 +179,6 @@ def _out_of_map(frame: Pose, end: Any) -> Any:
 
 def read_map(path: str | os.PathLike[str], *, unknown_is_free: bool = False) -> ServedMap:
     """The map that a YAML file describes.
-
-    Args:
-        path: the YAML file
-        unknown_is_free: whether unknown cells are free instead of blocked
 
     Raises:
         InputError: a file cannot be read or is wrong.

@@ -216,14 +216,7 @@ def _task_element(task: Task) -> str:
 
 
 def _model(name: str, frame: Pose | None, place: str, *parts: Sequence[str]) -> str:
-    """A static model; each part is a shape and, where it differs from the model's, its pose.
-
-    Args:
-        name: the model's
-        frame: the pose of the frame in which the place is; None: that of the <world>
-        place: x, y, z
-        parts: shapes, and their poses
-    """
+    """A static model; each part is a shape and, where it differs from the model's, its pose."""
     bodies = []
     for n, (shape, *at) in enumerate(parts):
         inside = "".join(f"<pose>{p}</pose>" for p in at) + f"<geometry>{shape}</geometry>"

@@ -38,10 +38,6 @@ def read_models(world: ET.Element, frame: Pose = (0.0, 0.0, 0.0)) -> Models:
     Ground planes and models without collision geometry are ignored. Where the world has a <state>, Gazebo starts from
     the poses in it, so they replace the models' own: a model's and a link's pose in the state are both in the world's
     frame, and the state's <scale> stretches the cylinders.
-
-    Args:
-        world: the <world> element
-        frame: the pose in the <world> of the frame in which the cylinders are wanted [m, m, rad]
     """
     found = Models()
     wanted = _Wanted(frame)

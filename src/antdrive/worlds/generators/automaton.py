@@ -20,13 +20,7 @@ HEIGHT = 0.5  # of a cylinder [m]
 
 
 def grow_field(rng: np.random.Generator, fill: float, rounds: int) -> Picture:
-    """A random field after smoothing, (30, 30), rows in the direction from start to goal.
-
-    Args:
-        rng: the source of randomness
-        fill: the probability that a cell is filled at first
-        rounds: how many rounds of smoothing follow
-    """
+    """A random field after smoothing, (30, 30), rows in the direction from start to goal."""
     field = rng.random((SIDE, SIDE)) < fill
     field[:, [0, -1]] = True
     for _ in range(rounds):
@@ -49,12 +43,7 @@ def _neighbours(field: Picture) -> npt.NDArray[np.int64]:
 
 
 def crossable(field: Picture, robot_radius: float) -> bool:
-    """Whether cells with room for the robot join the field's ends: a cheap test that every crossable field passes.
-
-    Args:
-        field: the filled cells
-        robot_radius: [m]
-    """
+    """Whether cells with room for the robot join the field's ends: a cheap test that every crossable field passes."""
     reach = math.floor((robot_radius / BARN_CELL) + 0.5)
     free = np.ones(field.shape, dtype=np.bool_)
     rows, cols = field.shape
@@ -78,11 +67,7 @@ def crossable(field: Picture, robot_radius: float) -> bool:
 
 
 def cylinders(field: Picture) -> tuple[Disc, ...]:
-    """The cylinders of a world: one for each filled cell of the field and of the walled runway before it.
-
-    Args:
-        field: the filled cells
-    """
+    """The cylinders of a world: one for each filled cell of the field and of the walled runway before it."""
     runway = np.zeros((RUNWAY, SIDE), dtype=np.bool_)
     runway[0] = True
     runway[:, [0, -1]] = True
