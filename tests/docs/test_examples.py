@@ -16,7 +16,7 @@ import pytest
 import antdrive.runs.suites
 import antdrive.sim
 from antdrive.sim import Run, Scenario
-from antdrive.views.report.runs import REQUIRED
+from antdrive.views.pages.runs import REQUIRED
 from tests.docs.test_reference import PACKAGES
 
 
