@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 import os
 import shlex
@@ -14,8 +15,8 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 from antdrive.base.errors import FieldError, InputError, input_error
-from antdrive.base.processes import delayed
 from antdrive.planners import PlannerError
+from antdrive.runs.pool import Pool
 from antdrive.runs.suites.baseline import Baseline
 from antdrive.runs.suites.demands import Demands
 from antdrive.runs.suites.explaining import explain
@@ -204,24 +205,26 @@ def _check_in_turn(
         for case in cases:
             yield _check_whatever_comes(case, update, results)
         return
-    import joblib
+    work = functools.partial(_check_by_name, str(Path.cwd()), update, results)
+    with Pool(jobs) as pool:
+        made = pool.results(work, [(str(case.suite), case.id) for case in cases])
+        for case, result in zip(cases, made, strict=True):
+            # A text: the suite has changed since it was read.
+            yield (
+                _unjudged(case, WRONG_INPUT, result, InputError(result), results) if isinstance(result, str) else result
+            )
 
-    calls = (delayed(_check_by_name)(str(case.suite), case.id, str(Path.cwd()), update, results) for case in cases)
-    made = joblib.Parallel(n_jobs=jobs, return_as="generator")(calls)
-    for case, result in zip(cases, made, strict=True):
-        # The suite has changed since it was read.
-        yield _unjudged(case, WRONG_INPUT, result, InputError(result), results) if isinstance(result, str) else result
 
-
-def _check_by_name(suite: str, name: str, folder: str, update: Update, results: Results | None) -> CheckResult | str:
+def _check_by_name(folder: str, update: Update, results: Results | None, name: tuple[str, str]) -> CheckResult | str:
     """The result of a test that another process names; a text says why there is no such test any more."""
     os.chdir(folder)
+    suite, test = name
     try:
-        found = next((case for case in load_suite(suite) if case.id == name), None)
+        found = next((case for case in load_suite(suite) if case.id == test), None)
     except InputError as error:
         return str(error)
     if found is None:
-        return f"{suite}: has no test {name} any more"
+        return f"{suite}: has no test {test} any more"
     return _check_whatever_comes(found, update, results)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import functools
 import math
 import re
 import statistics
@@ -12,12 +13,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import joblib
 import numpy as np
 
 from antdrive.base.atomic import written_whole
 from antdrive.base.errors import InputError
-from antdrive.base.processes import delayed
+from antdrive.planners import Planner, Query
 from antdrive.runs.papers.claims import CLAIMS
 from antdrive.runs.papers.experiments import PAPERS, Experiment
 from antdrive.runs.papers.keeping import keep_trials, kept_trials, trials_key
@@ -33,6 +33,7 @@ from antdrive.runs.papers.verdicts import (
     verdict_cells,
     verdict_facts,
 )
+from antdrive.runs.pool import Pool, processes_for
 from antdrive.runs.statistics.bootstrap import medians_by_world
 
 MOST_SEEDS = 1000  # every claim can be decided with fewer
@@ -160,14 +161,14 @@ def _all_trials(
     """The trials of each experiment, and how many experiments were in the folder already."""
     total, done, kept = sum(len(experiment.seeds(seeds)) for experiment in experiments), 0, 0
     found: list[list[Trial]] = []
-    with joblib.Parallel(n_jobs=jobs, return_as="generator") as parallel:
+    with Pool(processes_for(jobs)) as pool:
         for experiment in experiments:
             words = f"{experiment.paper} {experiment.map} {experiment.name}"
             path, key = folder / f"{re.sub(r'[^A-Za-z0-9×*]+', '-', words)}.npz", trials_key(experiment, seeds)
             trials = kept_trials(path, key)
             if trials is None:
                 trials = []
-                for trial in parallel(_planned(experiment, seeds)):
+                for trial in pool.results(*_planned(experiment, seeds)):
                     trials.append(dataclasses.replace(trial, world=experiment.world(trial.seed)))
                     if progress is not None:
                         progress((done + len(trials)) / total)
@@ -181,15 +182,21 @@ def _all_trials(
     return found, kept
 
 
-def _planned(experiment: Experiment, seeds: int) -> Iterator[Any]:
-    """The calls that plan an experiment; each map is made when its turn comes."""
-    planner = experiment.made or experiment.planner
-    for seed in experiment.seeds(seeds):
-        query = experiment.query(experiment.world(seed))
-        if experiment.movers:
-            yield delayed(drive_among)(planner, experiment.options, query, seed, experiment.movers)
-            continue
-        yield delayed(solve)(planner, experiment.options, query, seed, experiment.work)
+def _planned(
+    experiment: Experiment, seeds: int
+) -> tuple[Callable[[tuple[Query, int]], Trial], list[tuple[Query, int]]]:
+    """What plans an experiment once, and the queries that it is given with their seeds."""
+    asked = [(experiment.query(experiment.world(seed)), seed) for seed in experiment.seeds(seeds)]
+    return functools.partial(
+        _trial, experiment.made or experiment.planner, experiment.options, experiment.movers, experiment.work
+    ), asked
+
+
+def _trial(
+    planner: str | Planner, options: Mapping[str, Any], movers: Any, work: float, asked: tuple[Query, int]
+) -> Trial:
+    query, seed = asked
+    return drive_among(planner, options, query, seed, movers) if movers else solve(planner, options, query, seed, work)
 
 
 def _verdicts(found: Sequence[tuple[Experiment, list[Trial]]]) -> list[Verdict]:
