@@ -26,7 +26,7 @@ from antdrive.sim.scenario import Scenario
 from antdrive.views.film.compare import SplitScreen
 from antdrive.views.film.prelude import planning_frames
 from antdrive.views.film.video import STILLS, still
-from antdrive.views.report.report import write_report
+from antdrive.views.pages.report import write_report
 from antdrive.worlds.world import Disc
 
 PICTURES = Path(__file__).resolve().parents[1] / "docs" / "pictures"

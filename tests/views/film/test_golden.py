@@ -12,7 +12,7 @@ from PIL import Image
 
 from antdrive.views.film.camera import CAMERAS
 from antdrive.views.film.shot import Shot
-from tests.sim.conftest import _made_up_drive
+from tests.made_up_drive import _made_up_drive
 
 GOLDEN = Path(__file__).with_name("golden")
 SIZE = (320, 200)

@@ -11,12 +11,12 @@ from antdrive.runs.statistics.comparison import ALPHA, PairedComparison
 from antdrive.runs.statistics.price import prices
 from antdrive.runs.statistics.proportions import Interval
 from antdrive.runs.statistics.significance import FLIPS
-from antdrive.views.campaign.numbers import percent, percents
+from antdrive.views.pages.texts import percent, percents
 
 if TYPE_CHECKING:
     from antdrive.runs.statistics.pairing import PairedRuns
     from antdrive.runs.statistics.success import PlannerSuccess
-    from antdrive.views.campaign.summary import CampaignSummary
+    from antdrive.views.pages.summary import CampaignSummary
 
 NAMED = 3  # planners that a card names
 VALUES = 5  # of a setting that a note names

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
 from antdrive.base.errors import InputError, input_error
 from antdrive.sim.log.certificate import Certificate, certify
@@ -18,52 +18,57 @@ from antdrive.sim.log.record import DriveRecord
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.sights import Sighting, passed
 from antdrive.sim.pipeline import Run
-from antdrive.views.style import hexed, planner_style
+from antdrive.views.pages.texts import NONE, TextTable, number, shown
 
-LONGEST, LONGEST_COMMAND = 200, 4000  # characters of a text, of a command
+LONGEST_COMMAND = 4000  # characters
 UNDRIVEN = (Outcome.NO_PATH.key, Outcome.STOPPED.key)  # outcomes of runs that have no log
+CONTACT = (Outcome.COLLIDED.key, Outcome.INVALID_PLAN.key)  # outcomes with a red badge
 CLAIMED = (
-    "smoothing",
-    "noise",
-    "margin_m",
-    "margin_auto",
-    "cell_m",
-    "physics_hz",
-    "control_hz",
-    "time_limit_s",
-    "settings",
+    *(
+        "smoothing",
+        "noise",
+        "margin_m",
+        "margin_auto",
+        "cell_m",
+        "physics_hz",
+        "control_hz",
+        "time_limit_s",
+        "settings",
+    ),
 )
 REQUIRED = ("world", "planner", "robot", "seed", "outcome")  # keys of result.json
 
-
-class Column(NamedTuple):
-    """A column of the table.
-
-    Attributes:
-        title: its heading, with the unit
-        kind: `t` for text, `n` for numbers
-    """
-
-    title: str
-    kind: str
-
-
-COLUMNS = (
-    Column("world", "t"),
-    Column("planner", "t"),
-    Column("outcome", "t"),
-    Column("robot", "t"),
-    Column("seed", "n"),
-    Column("path [m]", "n"),
-    Column("driven [m]", "n"),
-    Column("gap [%]", "n"),
-    Column("time [s]", "n"),
-    Column("min clearance [m]", "n"),
-    Column("proved [m]", "n"),
-    Column("planning [ms]", "n"),
+#: Measured columns: the heading, and the digits after the point.
+MEASURED: Mapping[str, tuple[str, int]] = MappingProxyType(
+    {
+        "path_length_m": ("path [m]", 2),
+        "driven_length_m": ("driven [m]", 2),
+        "gap_percent": ("gap [%]", 1),
+        "duration_s": ("time [s]", 1),
+        "min_clearance_m": ("min clearance [m]", 3),
+        "proved_m": ("proved [m]", 3),
+        "planning_ms": ("planning [ms]", 2),
+    }
 )
-
-FACTS = 5  # columns before those of settings that differ
+#: Headings of the settings that get a column where they differ between the runs, by their keys in result.json.
+SETTINGS: Mapping[str, str] = MappingProxyType(
+    {
+        "options": "options",
+        "smoothing": "route",
+        "noise": "noise",
+        "margin_m": "margin [m]",
+        "cell_m": "cell [m]",
+        "control_hz": "control [Hz]",
+        "physics_hz": "physics [Hz]",
+        "map": "map",
+        "localisation": "pose by",
+        "explored_m2": "explored [m²]",
+    }
+)
+WORDS = ("world", "planner", "outcome", "robot", "options", "route", "map", "pose by")  # headings of texts
+EXPLORED = "explored_m2"
+SENSED = {"map": "given", "localisation": "fixes"}  # unless the log says otherwise
+LISTED_SIGHTS = 40  # of the cylinders that a robot passed those that it came nearest to
 
 #: What the less obvious columns mean.
 COLUMN_NOTES = (
@@ -80,28 +85,6 @@ COLUMN_NOTES = (
     ),
     ("proved", "distance that the certificate guarantees between logged poses, too"),
 )
-
-
-#: Settings that get a column where they differ between the runs, by their keys in result.json.
-SETTING_COLUMNS: Mapping[str, Column] = MappingProxyType(
-    {
-        "options": Column("options", "t"),
-        "smoothing": Column("route", "t"),
-        "noise": Column("noise", "n"),
-        "margin_m": Column("margin [m]", "n"),
-        "cell_m": Column("cell [m]", "n"),
-        "control_hz": Column("control [Hz]", "n"),
-        "physics_hz": Column("physics [Hz]", "n"),
-        "map": Column("map", "t"),
-        "localisation": Column("pose by", "t"),
-        "explored_m2": Column("explored [m²]", "n"),
-    }
-)
-
-
-EXPLORED = "explored_m2"
-SENSED = {"map": "given", "localisation": "fixes"}  # what robots know unless the log says otherwise
-LISTED_SIGHTS = 40  # of the cylinders that a robot passed those that it came nearest to
 
 
 @dataclass(frozen=True)
@@ -163,7 +146,7 @@ class ReportedRun:
         films: films, embedded or linked
         links: files beside the page
         pictures: figures beside the page, for the Markdown report
-        differing: settings that differ between the runs, as shown, by the keys of `SETTING_COLUMNS`
+        differing: settings that differ between the runs, as shown, by the keys of `SETTINGS`
     """
 
     folder: Path | None
@@ -212,20 +195,20 @@ class ReportedRun:
         return f"run-{self.number}"
 
     @property
-    def label(self) -> str:
-        """The text by which the first column is sorted."""
-        return f"{self.world} {self.planner} {self.robot} {self.seed}"
-
-    @property
     def claimed(self) -> bool:
         """Whether only result.json says that the robot drove."""
         return self.log is None and self.result["outcome"] not in UNDRIVEN
 
     @property
+    def ended(self) -> str:
+        """The outcome's key."""
+        key = self.log.record.outcome.key if self.log else shown(self.result["outcome"])
+        return f"{key}, claimed" if self.claimed else key
+
+    @property
     def outcome(self) -> str:
-        """The outcome's name in words."""
-        name = self.log.record.outcome.key if self.log else shown(self.result["outcome"])
-        return name.replace("_", " ") + (", claimed" if self.claimed else "")
+        """The outcome in words."""
+        return self.ended.replace("_", " ")
 
     @property
     def sentence(self) -> str:
@@ -240,16 +223,8 @@ class ReportedRun:
 
     @property
     def badge(self) -> str:
-        """The CSS class of the outcome's badge; a success that is not certified has its own."""
-        if self.log is None:
-            return "doubt"
-        name = self.log.record.outcome.key
-        return "doubt" if name == Outcome.SUCCEEDED.key and not self.succeeded else name
-
-    @property
-    def colour(self) -> str:
-        """The planner's colour as #rrggbb."""
-        return hexed(planner_style(self.planner)[0])
+        """The CSS class of the outcome's badge."""
+        return "good" if self.succeeded else "hit" if self.log and self.ended in CONTACT else ""
 
     @property
     def problems(self) -> list[str]:
@@ -280,7 +255,7 @@ class ReportedRun:
 
     @property
     def heading(self) -> dict[str, str]:
-        """What tells the run from the others, by the keys of `SETTING_COLUMNS`: settings, not what came of them."""
+        """What tells the run from the others, by the keys of `SETTINGS`: settings, not what came of them."""
         return {key: value for key, value in self.differing.items() if value and key != EXPLORED}
 
     @property
@@ -292,20 +267,14 @@ class ReportedRun:
         return claimed if isinstance(claimed, Mapping) else {}
 
     @property
-    def cells(self) -> list[tuple[str, str]]:
-        """The values of the numeric columns after the seed: each as a sort key and as shown."""
-        metrics, gap = self.metrics, number(self.metrics.get("gap_to_euclidean_optimum"))
-        planning = number(metrics.get("plan_s"))
-        values = (
-            (number(metrics.get("path_length_m")), 2),
-            (number(metrics.get("driven_length_m")), 2),
-            (None if gap is None else 100 * gap, 1),
-            (number(metrics.get("duration_s")), 1),
-            (number(metrics.get("min_clearance_m")), 3),
-            (number(self.log.certificate.bound) if self.log else None, 3),
-            (None if planning is None else 1000 * planning, 2),
-        )
-        return [("", "–") if v is None else (repr(v), f"{round(v, digits) + 0.0:.{digits}f}") for v, digits in values]
+    def measured(self) -> dict[str, float | None]:
+        """The values of the columns `MEASURED`."""
+        found = {key: number(self.metrics.get(key)) for key in MEASURED}
+        gap, planning = number(self.metrics.get("gap_to_euclidean_optimum")), number(self.metrics.get("plan_s"))
+        found["gap_percent"] = None if gap is None else 100 * gap
+        found["proved_m"] = number(self.log.certificate.bound) if self.log else None
+        found["planning_ms"] = None if planning is None else 1000 * planning
+        return found
 
     @property
     def details(self) -> list[tuple[str, list[tuple[str, str]]]]:
@@ -375,19 +344,52 @@ def made_run(run: Run) -> ReportedRun:
     return ReportedRun(None, result, None if run.rollout is None else facts_of(run.rollout, result, name), 0)
 
 
-def note_differences(runs: Sequence[ReportedRun]) -> list[Column]:
-    """Fill `differing` of every run; the columns that are needed for it.
+def note_differences(runs: Sequence[ReportedRun]) -> None:
+    """Fill `differing` of every run.
 
     Options are compared between the runs of one planner: those of different planners differ anyway.
     """
-    columns = []
-    for key, column in SETTING_COLUMNS.items():
+    for key in SETTINGS:
         texts = _option_texts(runs) if key == "options" else [_setting_text(run, key) for run in runs]
         if len(set(texts)) > 1 or (key == EXPLORED and texts[0]):
-            columns.append(column)
             for run, text in zip(runs, texts, strict=True):
                 run.differing[key] = text
-    return columns
+
+
+def run_columns(runs: Sequence[ReportedRun]) -> dict[str, list[Any]]:
+    """Return the values of the page's columns by name."""
+    found: dict[str, list[Any]] = {
+        "world": [run.world for run in runs],
+        "planner": [run.planner for run in runs],
+        "outcome": [run.ended for run in runs],
+        "test": ["test failed" if run.faults else None for run in runs],
+        "robot": [run.robot for run in runs],
+        "seed": _numeric([run.seed for run in runs]),
+        "reason": [run.reason or None for run in runs],
+    }
+    found |= {key: _numeric([run.differing[key] for run in runs]) for key in runs[0].differing}
+    return found | {key: [run.measured[key] for run in runs] for key in MEASURED}
+
+
+def _numeric(texts: list[str]) -> list[Any]:
+    """The texts as numbers, None for an empty one, if all of them are numbers; as they are otherwise."""
+    try:
+        return [None if text == "" else float(text) for text in texts]
+    except ValueError:
+        return list(texts)
+
+
+def run_table(runs: Sequence[ReportedRun]) -> TextTable:
+    """Return the runs as a table of text."""
+    headings = ["world", "planner", "outcome", "robot", "seed"]
+    headings += [SETTINGS[key] for key in (runs[0].differing if runs else ())]
+    rows = []
+    for run in runs:
+        ended = f"{'✅' if run.succeeded else '❌'} {run.outcome}{', test failed' if run.faults else ''}"
+        values = [NONE if v is None else f"{round(v, d) + 0.0:.{d}f}"
+                  for v, (_, d) in zip(run.measured.values(), MEASURED.values(), strict=True)]  # fmt: skip
+        rows.append((run.world, run.planner, ended, run.robot, run.seed, *run.differing.values(), *values))
+    return TextTable("Runs", (*headings, *(title for title, _ in MEASURED.values())), rows)
 
 
 def _setting_text(run: ReportedRun, key: str) -> str:
@@ -417,31 +419,6 @@ def _option_texts(runs: Sequence[ReportedRun]) -> list[str]:
         ", ".join(f"{key} {value}" for key, value in sorted(options.items()) if len(seen[run.planner][key]) > 1)
         for run, options in zip(runs, found, strict=True)
     ]
-
-
-def number(value: Any) -> float | None:
-    """A finite number; None for anything else."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return None
-    try:
-        found = float(value)
-    except OverflowError:
-        return None
-    return found if math.isfinite(found) else None
-
-
-def shown(value: Any, longest: int = LONGEST) -> str:
-    """A value as text on one line of printable characters, cut to a length."""
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if value is None:
-        return "–"
-    if isinstance(value, float):
-        return f"{value:.6g}"
-    text = repr(value) if isinstance(value, list | dict) else str(value)
-    text = "".join(c if c.isprintable() else " " for c in text[: 4 * longest])
-    text = " ".join(text.split())
-    return text if len(text) <= longest else f"{text[:longest]}…"
 
 
 def _sight_pairs(sights: Sequence[Sighting]) -> list[tuple[str, str]]:

@@ -1,33 +1,25 @@
-"""The tables of a campaign as headings and cells of text, for terminals, Markdown, LaTeX and CSV."""
+"""The tables of a campaign: as text for terminals and pages, as LaTeX and as CSV."""
 
 from __future__ import annotations
 
+import csv
 import math
+import re
 from collections import Counter
 from collections.abc import Sequence
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any
 
+from antdrive.base.atomic import written_whole
 from antdrive.runs.statistics.comparison import SUCCESS, PairedComparison
 from antdrive.runs.statistics.success import PlannerSuccess
-from antdrive.views.campaign.numbers import NONE, percent, percents, probability, short, with_interval
-from antdrive.views.campaign.summary import CampaignSummary, measure_title
+from antdrive.views.pages.rendering import write_text
+from antdrive.views.pages.summary import CampaignSummary, measure_title
+from antdrive.views.pages.texts import NONE, TextTable, percent, percents, probability, short, with_interval
 
 #: Headings of columns that hold words.
 WORDS = ("planner", "first", "second", "better", "lower", "against", "measure", "not worse")
-
-
-class TextTable(NamedTuple):
-    """A table of text.
-
-    Attributes:
-        title: what it shows
-        headings: of its columns
-        rows: its cells
-    """
-
-    title: str
-    headings: tuple[str, ...]
-    rows: list[tuple[str, ...]]
+LATEX_PAGE = 40  # rows of a table that fit on a page
 
 
 def success_cells(summary: CampaignSummary) -> TextTable:
@@ -133,3 +125,67 @@ def success_note(row: PlannerSuccess) -> str:
     """The outcomes of a planner's runs, in words, the most frequent first."""
     found = sorted(row.outcomes.items(), key=lambda item: (-item[1], item[0]))
     return ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in found)
+
+
+def write_csv(summary: CampaignSummary, out: Path) -> list[Path]:
+    """Plain numbers, for programs: shares between 0 and 1, an empty cell where there is none."""
+    names = list(summary.medians)
+    with written_whole(out) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream)
+        medians = [f"{name}{end}" for name in names for end in ("_median", "_low", "_high")]
+        outcomes = sorted({name for row in summary.success for name in row.outcomes})
+        counts = ["planner", "runs", "elsewhere", "counted", "succeeded"]
+        shares = ["share", "low", "high", "worlds_low", "worlds_high"]
+        writer.writerow([*counts, *shares, *medians, *(f"outcome.{name}" for name in outcomes)])
+        for k, row in enumerate(summary.success):
+            found = [value for name in names for value in (summary.medians[name][k][0], *summary.medians[name][k][1])]
+            counted = [row.planner, row.runs, row.elsewhere, row.counted, row.successes]
+            ended = [row.outcomes.get(name, 0) for name in outcomes]
+            writer.writerow(_cells([*counted, row.share, *row.interval, *row.over_worlds, *found, *ended]))
+    rows = [row for comparisons in summary.comparisons.values() for row in comparisons]
+    if not rows:
+        return [out]
+    other = out.with_name(f"{out.stem}-pairs{out.suffix}")
+    with written_whole(other) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream)
+        flat = [{**row.as_dict(), "low": row.interval.low, "high": row.interval.high} for row in rows]
+        keys = [key for key in flat[0] if key != "interval"]
+        writer.writerow(keys)
+        for one in flat:
+            writer.writerow(_cells([one[key] for key in keys]))
+    return [out, other]
+
+
+def _cells(values: Sequence[Any]) -> list[Any]:
+    return ["" if value != value else value for value in values]
+
+
+def write_latex(summary: CampaignSummary, out: Path) -> list[Path]:
+    """Write the tables for a paper."""
+    lines = ["% antdrive report; needs \\usepackage{booktabs} and, for long tables, \\usepackage{longtable}"]
+    for table in all_cells(summary):
+        lines += ["", f"% {latex_text(table.title)}", *_latex_table(table)]
+    lines += ["", *(f"% {latex_text(note)}" for note in summary.notes)]
+    return write_text(out, "\n".join(lines).rstrip() + "\n")
+
+
+def _latex_table(table: TextTable) -> list[str]:
+    def line(cells: Sequence[str]) -> str:
+        return " & ".join(latex_text(cell) for cell in cells) + r" \\"
+
+    align = "".join("l" if heading in WORDS else "r" for heading in table.headings)
+    environment = "longtable" if len(table.rows) > LATEX_PAGE else "tabular"
+    head = [f"\\begin{{{environment}}}{{{align}}}", r"\toprule", line(table.headings), r"\midrule"]
+    if environment == "longtable":
+        head.append(r"\endhead")
+    return [*head, *(line(row) for row in table.rows), r"\bottomrule", f"\\end{{{environment}}}"]
+
+
+def latex_text(text: str) -> str:
+    """A text as LaTeX shows it."""
+    special = {
+        "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "–": "--", "<": r"$<$",
+        ">": r"$>$", "²": r"\textsuperscript{2}", "∞": r"$\infty$", "·": r"$\cdot$",
+    }  # fmt: skip
+    text = re.sub(r"[\\~^–<>²∞·&%$#_{}]", lambda found: special.get(found[0], "\\" + found[0]), text)
+    return re.sub(r"(?<![\w.])-(?=\d)", "$-$", text)

@@ -5,23 +5,16 @@ import json
 import os
 import re
 import shutil
-import subprocess
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from antdrive.base import InputError
 from antdrive.views.figures.run_figures import overview
-from antdrive.views.report.report import EMBEDDED_BYTES, write_report
-from antdrive.views.report.runs import ReportedRun
-
-BROWSER = next(
-    (found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))),
-    None,
-)
-needs_browser = pytest.mark.skipif(BROWSER is None, reason="no chromium on this machine")
+from antdrive.views.pages.report import EMBEDDED_BYTES, write_report
+from antdrive.views.pages.runs import MEASURED, ReportedRun
+from tests.views.pages.browser import found_by, needs_browser, overflow_on_a_phone
 
 PROBE = """<script>
 window.faults = [];
@@ -29,7 +22,7 @@ window.onerror = (message) => { faults.push(String(message)); };
 const lost = (e) => { if (e.target !== window) faults.push("cannot load " + (e.target.src || e.target.href)); };
 window.addEventListener("error", lost, true);
 window.onload = async () => {
-  const rows = () => [...document.querySelectorAll("#runs tbody tr")].filter((r) => !r.hidden);
+  const rows = () => [...document.querySelectorAll("#runs tbody tr[data-row]")];
   const column = (k) => rows().map((r) => r.cells[k].textContent);
   const heads = [...document.querySelectorAll("#runs th button")], found = {};
   const named = (name) => heads.find((h) => h.textContent === name);
@@ -38,9 +31,9 @@ window.onload = async () => {
   named("driven [m]").click(); found.driven = column(6);
   const filter = document.querySelector("#filter");
   filter.value = "astar COLLIDED"; filter.dispatchEvent(new Event("input"));
-  found.filtered = column(0); found.sections = [...document.querySelectorAll("section")].filter((s) => !s.hidden).length;
+  found.filtered = column(0); found.sections = [...document.querySelectorAll("section.run")].filter((s) => !s.hidden).length;
   filter.value = "nothing at all"; filter.dispatchEvent(new Event("input"));
-  found.nothing = !document.querySelector("#none").hidden;
+  found.nothing = document.querySelector("#count").textContent;
   filter.value = ""; filter.dispatchEvent(new Event("input"));
   const outcome = document.querySelector("#outcome"); outcome.value = "succeeded, claimed";
   outcome.dispatchEvent(new Event("change"));
@@ -86,18 +79,7 @@ def runs(made_up_drive, tmp_path_factory):
     return folder
 
 
-def dumped(page: Path, *words: str) -> dict:
-    """What the probe in a page finds in a browser."""
-    common = ("--headless", "--no-sandbox", "--disable-gpu", "--autoplay-policy=no-user-gesture-required",
-              "--allow-file-access-from-files", "--virtual-time-budget=20000", "--dump-dom", *words)  # fmt: skip
-    done = subprocess.run([BROWSER, *common, page.as_uri()], capture_output=True, text=True, timeout=120, check=True)
-    return json.loads(html.unescape(re.search(r'<pre id="found">(.*?)</pre>', done.stdout, re.S).group(1)))
-
-
-def with_probe(page: Path) -> Path:
-    other = page.with_name("probed.html")
-    other.write_text(page.read_text().replace("<head>", "<head>" + PROBE, 1))
-    return other
+BROWSER_WORDS = ("--autoplay-policy=no-user-gesture-required", "--virtual-time-budget=20000")
 
 
 @needs_browser
@@ -105,14 +87,14 @@ def with_probe(page: Path) -> Path:
 def test_in_a_browser_it_sorts_filters_and_plays(runs, tmp_path, embed):
     page = (tmp_path if embed else runs) / "report.html"
     write_report(runs, page, embed_films=embed)
-    found = dumped(with_probe(page))
+    found = found_by(PROBE, page, *BROWSER_WORDS)
     assert found["faults"] == []
     assert found["up"] == ["<b>odd</b>", "astar", "mmas"]
     assert found["down"] == found["up"][::-1]
     assert found["driven"] == ["9.25", "10.50", "100.00"], "as numbers, not as text"
     assert found["filtered"] == ["made-up"]
     assert found["sections"] == 1
-    assert found["nothing"]
+    assert found["nothing"] == "0 of 3 runs"
     assert found["succeeded"] == 2
     assert found["pictures"]
     assert found["film"] == [320, 240, True, None]
@@ -121,14 +103,7 @@ def test_in_a_browser_it_sorts_filters_and_plays(runs, tmp_path, embed):
 @needs_browser
 def test_on_a_phone_the_page_is_as_wide_as_the_screen(runs, tmp_path):
     write_report(runs, tmp_path / "report.html")
-    with_probe(tmp_path / "report.html")
-    copy = "document.body.append(f.contentDocument.querySelector('#found').cloneNode(true))"
-    (tmp_path / "phone.html").write_text(
-        f"<script>onload = () => setTimeout(() => {{ {copy} }}, 18000)</script>"
-        "<iframe id=f width=390 height=800 src=probed.html></iframe>"
-    )
-    found = dumped(tmp_path / "phone.html")
-    assert found["overflow"] == 0
+    assert overflow_on_a_phone(PROBE, tmp_path / "report.html", *BROWSER_WORDS, wait=18_000) == 0
 
 
 def test_the_page_needs_no_network_and_escapes_its_content(runs, tmp_path):
@@ -148,7 +123,7 @@ def test_films_can_be_embedded(runs, tmp_path):
 
 
 def test_the_page_stays_small_by_linking_figures(runs, tmp_path, monkeypatch):
-    from antdrive.views.report import report as reporting
+    from antdrive.views.pages import report as reporting
 
     write_report(runs, tmp_path / "all.html")
     assert (tmp_path / "all.html").stat().st_size < 5_000_000
@@ -331,26 +306,31 @@ def test_files_that_cannot_be_read_are_one_line(small_run, tmp_path):
         write_report(tmp_path / "runs", tmp_path / "report.html")
 
 
+def columns_of(page):
+    """The values of the columns of a page, and the names of those that it shows."""
+    data = json.loads(re.search(r'id="data">(.*?)</script>', page, re.S)[1])
+    found = {c["name"]: c.get("numbers") or [c["texts"][k] for k in c.get("places", range(data["rows"]))]
+             for c in data["columns"]}  # fmt: skip
+    return found, data["shown"]
+
+
 def test_settings_that_differ_between_runs_get_columns(small_scenario, tmp_path):
     from antdrive.planners import load_planner
     from antdrive.sim import run
 
     write_run(run(small_scenario), tmp_path / "runs" / "a")
     same = reported(tmp_path / "runs", tmp_path)
-    assert '<button type="button">route</button>' not in same
+    assert columns_of(same)[1] == ["world", "planner", "outcome", "robot", "seed", *MEASURED]
     write_run(run(replace(small_scenario, smoothing="none", noise=0.5)), tmp_path / "runs" / "b")
     for name, ants in (("c", 20), ("d", 30)):
         planner = load_planner("as", ants=ants, iterations=3)
         write_run(run(replace(small_scenario, planner=planner, planner_name="as")), tmp_path / "runs" / name)
     (tmp_path / "runs" / "d" / "rollout.npz").unlink()  # a claim shows its settings, too
     text = reported(tmp_path / "runs", tmp_path)
-    for title in ("options", "route", "noise"):
-        assert f'<button type="button">{title}</button>' in text
-    assert '<button type="button">cell [m]</button>' not in text, "it is the same in all runs"
-    rows = [line for line in text.splitlines() if line.startswith("<tr data-outcome")]
-    cells = [re.findall(r"<td[^>]*>(?:<(?!/td)[^>]*>)*([^<]*)", row) for row in rows]
-    assert [row[5:8] for row in cells] == [
-        ["", "clearance", "0"], ["", "none", "0.5"], ["ants 20", "clearance", "0"], ["ants 30", "clearance", "0"],
+    columns, shown = columns_of(text)
+    assert shown[5:8] == ["options", "smoothing", "noise"], "not the cell: it is the same in all runs"
+    assert [columns[name] for name in shown[5:8]] == [
+        ["", "", "ants 20", "ants 30"], ["clearance", "none", "clearance", "clearance"], [0, 0.5, 0, 0],
     ]  # fmt: skip
     lines = [line for line in reported(tmp_path / "runs", tmp_path, "md").splitlines() if line.startswith("|")]
     assert len({line.count("|") for line in lines}) == 1
@@ -412,7 +392,7 @@ def test_runs_made_in_python_become_a_report_together_with_folders(small_run, co
     text = page.read_text()
     assert "2 / 3" in text
     assert text.count("data:image/webp") == 2
-    assert len(set(re.findall(r'<section id="(run-\d)"', text))) == 3
+    assert len(set(re.findall(r'<section class="run" id="(run-\d)"', text))) == 3
     assert antdrive.write_report(small_run, page, figures=False, films=True) == 1
     assert "data:image" not in page.read_text()
     assert page.read_text().count("data:video/mp4") == 1

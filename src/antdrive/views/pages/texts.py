@@ -1,12 +1,28 @@
-"""Numbers as reports show them: shares in percent, values with three digits, p-values."""
+"""Values as pages show them, and tables of them."""
 
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 from antdrive.runs.statistics.proportions import Interval
 
 NONE = "–"
+LONGEST = 200  # characters of a text
+
+
+class TextTable(NamedTuple):
+    """A table of text.
+
+    Attributes:
+        title: what it shows
+        headings: of its columns
+        rows: its cells
+    """
+
+    title: str
+    headings: tuple[str, ...]
+    rows: list[tuple[str, ...]]
 
 
 def percent(share: float) -> str:
@@ -45,3 +61,28 @@ def probability(p: float) -> str:
     if math.isnan(p):
         return NONE
     return "< 0.001" if p < 0.001 else f"{p:.3f}"
+
+
+def number(value: Any) -> float | None:
+    """Return a finite number; None for anything else."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    try:
+        found = float(value)
+    except OverflowError:
+        return None
+    return found if math.isfinite(found) else None
+
+
+def shown(value: Any, longest: int = LONGEST) -> str:
+    """A value as text on one line of printable characters, cut to a length."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if value is None:
+        return NONE
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    text = repr(value) if isinstance(value, list | dict) else str(value)
+    text = "".join(c if c.isprintable() else " " for c in text[: 4 * longest])
+    text = " ".join(text.split())
+    return text if len(text) <= longest else f"{text[:longest]}…"

@@ -16,9 +16,9 @@ from matplotlib.figure import Figure
 
 from antdrive.runs.statistics.pairing import PairedRuns
 from antdrive.runs.statistics.profiles import StepCurve, distributions, performance_profiles
-from antdrive.views.campaign.colours import LabelStyle
-from antdrive.views.campaign.summary import CampaignSummary, known_metrics, measure_title
 from antdrive.views.figures.canvas import new_figure, styled
+from antdrive.views.pages.colours import LabelStyle
+from antdrive.views.pages.summary import CampaignSummary, known_metrics, measure_title
 from antdrive.views.style import INK, MUTED, hexed
 
 Floats: TypeAlias = npt.NDArray[np.float64]

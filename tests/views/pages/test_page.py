@@ -1,10 +1,7 @@
 """A campaign's page: in a real browser it sorts, filters, opens runs and cells, and fits a phone; its charts are SVG."""
 
-import html
 import json
 import re
-import shutil
-import subprocess
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -13,17 +10,13 @@ import numpy as np
 import pytest
 
 from antdrive.runs.statistics.runs import RunTable
-from antdrive.views.campaign.charts import campaign_charts
-from antdrive.views.campaign.colours import _luminance, label_styles
-from antdrive.views.campaign.page import write_campaign_report
-from antdrive.views.campaign.payload import page_data
-from antdrive.views.campaign.summary import CampaignSummary, summarise
+from antdrive.views.pages.campaign import campaign_data, write_campaign_report
+from antdrive.views.pages.charts import campaign_charts
+from antdrive.views.pages.colours import _luminance, label_styles
+from antdrive.views.pages.summary import CampaignSummary, summarise
 from tests.runs.made_up_campaign import Skill, made_up_columns
+from tests.views.pages.browser import found_by, needs_browser, overflow_on_a_phone
 
-BROWSER = next(
-    (found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None
-)
-needs_browser = pytest.mark.skipif(BROWSER is None, reason="no chromium on this machine")
 ODD = "</script><b>&\u2028odd"
 PLANNERS = {
     "ants ants=10": Skill(0.6, 1.3, name="ants", options={"ants": 10}),
@@ -90,22 +83,9 @@ def page(summary: CampaignSummary, tmp_path_factory: pytest.TempPathFactory) -> 
     return write_campaign_report(summary, folder / "a campaign", folder / "page.html")[0]
 
 
-def dumped(page: Path, *words: str) -> dict[str, Any]:
-    """What the probe in a page finds in a browser."""
-    assert BROWSER is not None
-    probed = page.with_name("probed.html")
-    probed.write_text(page.read_text().replace("<head>", "<head>" + PROBE, 1))
-    common = ("--headless", "--no-sandbox", "--disable-gpu", "--dump-dom", "--window-size=1280,900", *words)
-    done = subprocess.run([BROWSER, *common, probed.as_uri()], capture_output=True, text=True, timeout=120, check=True)
-    text = re.search(r'<pre id="found">(.*?)</pre>', done.stdout, re.S)
-    assert text is not None, done.stdout[-500:]
-    found: dict[str, Any] = json.loads(html.unescape(text[1]))
-    return found
-
-
 @needs_browser
 def test_in_a_browser_it_sorts_filters_and_opens(page: Path, columns: dict[str, list[Any]]) -> None:
-    found = dumped(page)
+    found = found_by(PROBE, page)
     assert found["faults"] == []
     count, duration = len(columns["seed"]), columns["duration_s"]
     assert (found["sorted"], found["lines"] < 60, found["deep"] < 60) == ("ascending", True, True)
@@ -127,7 +107,7 @@ def test_in_a_browser_it_sorts_filters_and_opens(page: Path, columns: dict[str, 
 
 @needs_browser
 def test_in_a_browser_cells_show_failures_and_pairs_are_chosen(page: Path, columns: dict[str, list[Any]]) -> None:
-    found = dumped(page)
+    found = found_by(PROBE, page)
     names = sorted(set(columns["world"]), key=lambda name: (name != ODD, name))
     for line, world in zip(found["matrix"], names, strict=True):
         for cell, planner in zip(line, PLANNERS, strict=True):
@@ -145,7 +125,7 @@ def test_in_a_browser_cells_show_failures_and_pairs_are_chosen(page: Path, colum
 
 @needs_browser
 def test_the_page_follows_dark_mode(page: Path) -> None:
-    light, dark = dumped(page), dumped(page, "--force-dark-mode")
+    light, dark = found_by(PROBE, page), found_by(PROBE, page, "--force-dark-mode")
     assert light["paper"] == "rgb(255, 255, 255)"
     assert dark["paper"] == "rgb(20, 24, 31)"
     assert light["curve"] != dark["curve"], "curves are lighter on a dark page"
@@ -153,17 +133,7 @@ def test_the_page_follows_dark_mode(page: Path) -> None:
 
 @needs_browser
 def test_on_a_phone_the_page_is_as_wide_as_the_screen(page: Path) -> None:
-    dumped(page)
-    phone = page.with_name("phone.html")
-    copy = "document.body.append(f.contentDocument.querySelector('#found').cloneNode(true))"
-    phone.write_text(f'<iframe id=f width=390 height=800 src=probed.html onload="{copy}"></iframe>')
-    words = ("--headless", "--no-sandbox", "--disable-gpu", "--dump-dom", "--allow-file-access-from-files")
-    done = subprocess.run(
-        [BROWSER or "", *words, phone.as_uri()], capture_output=True, text=True, timeout=120, check=True
-    )
-    text = re.search(r'<pre id="found">(.*?)</pre>', done.stdout, re.S)
-    assert text is not None
-    assert json.loads(html.unescape(text[1]))["overflow"] <= 0
+    assert overflow_on_a_phone(PROBE, page) <= 0
 
 
 def test_nothing_in_the_page_is_fetched_and_no_text_becomes_markup(page: Path) -> None:
@@ -175,7 +145,7 @@ def test_nothing_in_the_page_is_fetched_and_no_text_becomes_markup(page: Path) -
 
 
 def test_the_data_come_back_as_they_are(columns: dict[str, list[Any]]) -> None:
-    text = page_data(RunTable(columns), list(PLANNERS), "x/")
+    text = campaign_data(RunTable(columns), list(PLANNERS), "x/")
     assert not set("<\u2028") & set(text)
     data = json.loads(text)
     found = {column["name"]: column for column in data["columns"]}

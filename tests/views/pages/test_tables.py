@@ -12,11 +12,11 @@ from hypothesis import given
 from antdrive.base import FieldError, InputError
 from antdrive.runs.statistics.proportions import Interval
 from antdrive.runs.statistics.runs import RunTable
-from antdrive.views.campaign.cells import all_cells, outcome_cells, pair_cells, success_cells
-from antdrive.views.campaign.headline import headline
-from antdrive.views.campaign.numbers import percent, percents, probability, short
-from antdrive.views.campaign.page import latex_text, write_campaign_report
-from antdrive.views.campaign.summary import CampaignSummary, measure_title, summarise
+from antdrive.views.pages.campaign import write_campaign_report
+from antdrive.views.pages.headline import headline
+from antdrive.views.pages.summary import CampaignSummary, measure_title, summarise
+from antdrive.views.pages.tables import all_cells, latex_text, outcome_cells, pair_cells, success_cells
+from antdrive.views.pages.texts import percent, percents, probability, short
 from tests.runs.made_up_campaign import Skill, made_up_columns, made_up_runs
 
 PLANNERS = {"good": Skill(0.95, 1.05), "poor_one": Skill(0.5, 1.3)}

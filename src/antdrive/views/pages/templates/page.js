@@ -7,7 +7,7 @@
   for (const raw of data.columns) {
     if (raw.numbers) {
       const keys = Float64Array.from(raw.numbers, (v) => (v === null ? NaN : v));
-      columns.set(raw.name, { numeric: true, keys, text: (row) => (raw.numbers[row] === null ? "–" : String(raw.numbers[row])) });
+      columns.set(raw.name, { numeric: true, keys, text: (row) => (raw.numbers[row] === null ? "–" : raw.digits === undefined ? String(raw.numbers[row]) : raw.numbers[row].toFixed(raw.digits)), digits: raw.digits });
       continue;
     }
     const places = raw.places || raw.texts.map((_, k) => k), order = raw.texts.map((_, k) => k).sort((a, b) => collator.compare(raw.texts[a], raw.texts[b]));
@@ -23,13 +23,18 @@
   const planners = columns.get("planner"), numbers = new Map(data.planners.map((label, k) => [label, k]));
   const chip = (label) => { const found = make("span", undefined, "chip"); found.style.background = `var(--planner-${numbers.get(label) ?? 0})`; return found; };
 
+  const sectionOf = (row) => data.sections && $(`#run-${row}`);
+
   // The runs: a sorted list of row numbers, of which only those in sight are in the document.
   const HEIGHT = 34, box = $("#runs"), body = $("tbody", box), heads = [];
-  const shown = (name, row) => { const value = text(name, row); return columns.get(name).numeric && /[._]/.test(name) && value !== "–" ? String(Number(Number(value).toPrecision(4))) : value; };
+  const shown = (name, row) => { const value = text(name, row); return columns.get(name).numeric && columns.get(name).digits === undefined && /[._]/.test(name) && value !== "–" ? String(Number(Number(value).toPrecision(4))) : value; };
   let sorted = Uint32Array.from({ length: data.rows }, (_, k) => k), visible = sorted, drawn = "";
   const cell = (name, row) => {
     const found = make("td", undefined, columns.get(name).numeric ? "n" : "");
-    if (name === "outcome") found.append(badge(row));
+    const section = name === "world" && sectionOf(row);
+    if (section) { const link = make("a", text(name, row)); link.href = `#${section.id}`; found.append(link); }
+    else if (name === "outcome") found.append(badge(row));
+    else if (name === "test") found.append(text(name, row) === "–" ? "" : make("span", text(name, row), "badge hit"));
     else if (name === "planner") found.append(chip(text(name, row)), text(name, row));
     else found.textContent = shown(name, row);
     return found;
@@ -59,7 +64,7 @@
       const limit = Number(found[3]), compare = { "<": (v) => v < limit, ">": (v) => v > limit, "<=": (v) => v <= limit, ">=": (v) => v >= limit, "=": (v) => v === limit }[found[2]];
       return (row) => compare(column.keys[row]);
     }
-    const fits = ["world", "task", "planner", "robot", "outcome", "reason", "key"].filter((name) => columns.has(name) && columns.get(name).texts).map((name) => {
+    const fits = [...new Set([...data.shown, "task", "robot", "reason", "key"])].filter((name) => columns.has(name) && columns.get(name).texts).map((name) => {
       const { lower, places } = columns.get(name), hit = Uint8Array.from(lower, (value) => value.includes(word) || value.replaceAll("_", " ").includes(word));
       return (row) => places[row] >= 0 && hit[places[row]];
     });
@@ -71,6 +76,7 @@
     if (outcome) tests.push(outcome === "failed" ? (row) => !good(row) : (row) => text("outcome", row) === outcome);
     visible = tests.length ? sorted.filter((row) => tests.every((fits) => fits(row))) : sorted;
     $("#count").textContent = `${visible.length.toLocaleString("en")} of ${data.rows.toLocaleString("en")} runs`;
+    if (data.sections) { const kept = new Set(visible); for (let row = 0; row < data.rows; row++) sectionOf(row).hidden = !kept.has(row); }
     box.scrollTop = 0;
     redraw();
   };
@@ -102,35 +108,38 @@
     for (const [name] of columns) if (!["command", "rollout", "reason"].includes(name) && text(name, row) !== "–") { const entry = make("div"); entry.append(make("dt", data.titles[name]), make("dd", text(name, row))); list.append(entry); }
     open(make("h3", `${text("world", row)} · ${text("planner", row)} · seed ${text("seed", row)}`), badge(row), make("p", sentence(row)), repeat(row), list);
   };
-  body.addEventListener("click", (event) => { const line = event.target.closest("tr[data-row]"); if (line) details(Number(line.dataset.row)); });
+  body.addEventListener("click", (event) => { const line = event.target.closest("tr[data-row]"); if (!line) return; const row = Number(line.dataset.row), section = sectionOf(row); if (section) section.scrollIntoView(); else details(row); });
 
   // World by planner: a deeper colour where more runs fail.
-  const worlds = columns.get("world"), labels = data.planners, cells = new Map();
-  for (let row = 0; row < data.rows; row++) { const key = `${worlds.places[row]}\n${text("planner", row)}`; if (!cells.has(key)) cells.set(key, []); cells.get(key).push(row); }
-  const failures = (world, label, rows) => {
-    const bad = rows.filter((row) => !good(row)), parts = [make("h3", `${world} · ${label}: ${bad.length} of ${rows.length} runs failed`)];
-    for (const row of bad.slice(0, 50)) { const part = make("section"), title = make("p", `Seed ${text("seed", row)}${columns.has("task") && text("task", row) !== "own" ? `, ${text("task", row)}` : ""}: `); title.append(badge(row)); part.append(title, make("p", sentence(row), "small"), repeat(row)); parts.push(part); }
-    if (bad.length > 50) parts.push(make("p", `${bad.length - 50} more: filter the table below.`));
-    if (bad.length) parts.splice(1, 0, make("p", "Commands are meant for the campaign's folder.", "small"));
-    open(...parts);
-  };
-  const head = make("tr"), grid = $("#matrix"); head.append(make("th", "world"));
-  for (const label of labels) { const found = make("th"); found.append(make("span", label)); head.append(found); }
-  grid.createTHead().append(head);
-  const lines = grid.createTBody(), share = (rows) => rows.filter(good).length / rows.length;
-  const rowsOf = (k, label) => cells.get(`${k}\n${label}`) || [];
-  for (const k of worlds.order.slice(0, 500)) {
-    const line = lines.insertRow(), name = make("th", worlds.texts[k]); name.scope = "row"; name.title = worlds.texts[k]; line.append(name);
-    for (const label of labels) {
-      const rows = rowsOf(k, label), place = line.insertCell();
-      if (!rows.length) { place.textContent = "–"; continue; }
-      const button = make("button", `${rows.filter(good).length}/${rows.length}`, share(rows) === 1 ? "full" : "");
-      button.type = "button"; button.setAttribute("aria-label", `${worlds.texts[k]}, ${label}: ${button.textContent} succeeded`);
-      button.style.background = `color-mix(in srgb, var(--heat) ${Math.round(85 * (1 - share(rows)))}%, var(--pale))`;
-      button.addEventListener("click", () => failures(worlds.texts[k], label, rows)); place.append(button);
+  const matrix = (grid) => {
+    const worlds = columns.get("world"), labels = data.planners, cells = new Map();
+    for (let row = 0; row < data.rows; row++) { const key = `${worlds.places[row]}\n${text("planner", row)}`; if (!cells.has(key)) cells.set(key, []); cells.get(key).push(row); }
+    const failures = (world, label, rows) => {
+      const bad = rows.filter((row) => !good(row)), parts = [make("h3", `${world} · ${label}: ${bad.length} of ${rows.length} runs failed`)];
+      for (const row of bad.slice(0, 50)) { const part = make("section"), title = make("p", `Seed ${text("seed", row)}${columns.has("task") && text("task", row) !== "own" ? `, ${text("task", row)}` : ""}: `); title.append(badge(row)); part.append(title, make("p", sentence(row), "small"), repeat(row)); parts.push(part); }
+      if (bad.length > 50) parts.push(make("p", `${bad.length - 50} more: filter the table below.`));
+      if (bad.length) parts.splice(1, 0, make("p", "Commands are meant for the campaign's folder.", "small"));
+      open(...parts);
+    };
+    const head = make("tr"); head.append(make("th", "world"));
+    for (const label of labels) { const found = make("th"); found.append(make("span", label)); head.append(found); }
+    grid.createTHead().append(head);
+    const lines = grid.createTBody(), share = (rows) => rows.filter(good).length / rows.length;
+    const rowsOf = (k, label) => cells.get(`${k}\n${label}`) || [];
+    for (const k of worlds.order.slice(0, 500)) {
+      const line = lines.insertRow(), name = make("th", worlds.texts[k]); name.scope = "row"; name.title = worlds.texts[k]; line.append(name);
+      for (const label of labels) {
+        const rows = rowsOf(k, label), place = line.insertCell();
+        if (!rows.length) { place.textContent = "–"; continue; }
+        const button = make("button", `${rows.filter(good).length}/${rows.length}`, share(rows) === 1 ? "full" : "");
+        button.type = "button"; button.setAttribute("aria-label", `${worlds.texts[k]}, ${label}: ${button.textContent} succeeded`);
+        button.style.background = `color-mix(in srgb, var(--heat) ${Math.round(85 * (1 - share(rows)))}%, var(--pale))`;
+        button.addEventListener("click", () => failures(worlds.texts[k], label, rows)); place.append(button);
+      }
     }
-  }
-  if (worlds.texts.length > 500) { const more = lines.insertRow().insertCell(); more.colSpan = labels.length + 1; more.textContent = `${worlds.texts.length - 500} more worlds are in the table of runs.`; }
+    if (worlds.texts.length > 500) { const more = lines.insertRow().insertCell(); more.colSpan = labels.length + 1; more.textContent = `${worlds.texts.length - 500} more worlds are in the table of runs.`; }
+  };
+  if ($("#matrix")) matrix($("#matrix"));
 
   // The pairs of one measure, of one planner, or those that are decided.
   const choosePairs = () => {

@@ -16,7 +16,7 @@ from antdrive.runs.statistics.proportions import Interval
 from antdrive.runs.statistics.runs import RunTable
 from antdrive.runs.statistics.success import PlannerSuccess, common_medians, success_table
 from antdrive.sim.log.metrics import METRICS
-from antdrive.views.campaign.headline import notes_on
+from antdrive.views.pages.headline import notes_on
 
 DEFAULT_METRICS = ("driven_length_m", "duration_s", "plan_s")
 TITLES = {"plan_s": "planning time", "drive_wall_s": "wall time of the drive", "path_length_m": "planned length"}

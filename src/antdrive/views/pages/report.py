@@ -1,4 +1,4 @@
-"""One page about many runs: a table to sort and filter; for each run its film, figures, numbers and command.
+"""The page of runs: a table to sort and filter; for each run its film, figures, numbers and command.
 
 The page works without a network. Figures are embedded up to a total size, the overview of every run first; the other
 figures and the films are linked. The text for pull requests has failures first and stays below 60 kB.
@@ -9,31 +9,32 @@ from __future__ import annotations
 import base64
 import io
 import os
-import re
 import tempfile
 import warnings
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from antdrive.base.atomic import written_whole
 from antdrive.base.errors import InputError
 from antdrive.sim.pipeline import Run
-from antdrive.views.report.runs import (
+from antdrive.views.pages.payload import json_column, page_data
+from antdrive.views.pages.rendering import rendered, write_text
+from antdrive.views.pages.runs import (
     COLUMN_NOTES,
-    COLUMNS,
-    FACTS,
-    SETTING_COLUMNS,
+    MEASURED,
+    SETTINGS,
+    WORDS,
     Attachment,
     ReportedRun,
     find_runs,
     made_run,
     note_differences,
-    shown,
+    run_columns,
+    run_table,
 )
+from antdrive.views.pages.texts import shown
 
 EMBEDDED_BYTES = 4_500_000  # of all embedded figures together, as base64
 MAX_PIXELS = 100_000_000  # of a figure
@@ -110,16 +111,40 @@ def write_report(
         run.number = place
     if not reported:
         raise InputError(f"{target}: no runs to write about")
+    note_differences(reported)
     name = title or (Path(given[0]).resolve().name if len(given) == 1 and not isinstance(given[0], Run) else "runs")
-    text = _page(reported, shown(name)) if page else _text(reported, shown(name))
-    with written_whole(target) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_text(target, _page(reported, shown(name)) if page else _text(reported, shown(name)))
     return len(reported)
 
 
 def _page(runs: list[ReportedRun], title: str) -> str:
     """The web page."""
-    return _rendered("report.html.j2", runs, title, outcomes=sorted({run.outcome for run in runs}))
+    from antdrive.views.pages.colours import label_styles
+
+    planners = sorted({run.planner for run in runs})
+    columns = [column for name, values in run_columns(runs).items() if (column := json_column(name, values))]
+    for column in columns:
+        if column["name"] in MEASURED:
+            column["digits"] = MEASURED[column["name"]][1]
+    titles = {column["name"]: _title(column["name"]) for column in columns if column["name"] != "reason"}
+    return rendered(
+        "page.html.j2",
+        title=title,
+        cards=_cards(runs),
+        planners=planners,
+        styles=label_styles(planners, planners),
+        number={name: k for k, name in enumerate(planners)},
+        runs=runs,
+        rows=len(runs),
+        settings=SETTINGS,
+        column_notes=COLUMN_NOTES,
+        data=page_data(columns, list(titles), titles, [run.succeeded for run in runs], planners, sections=True),
+    )
+
+
+def _title(name: str) -> str:
+    """Return the heading of a column."""
+    return MEASURED[name][0] if name in MEASURED else SETTINGS.get(name, name)
 
 
 def _text(runs: list[ReportedRun], title: str) -> str:
@@ -127,14 +152,18 @@ def _text(runs: list[ReportedRun], title: str) -> str:
     ordered = sorted(runs, key=lambda run: run.succeeded)
     rows, details = min(len(runs), MOST_ROWS), min(len(runs), MOST_DETAILS)
     while True:
-        text = _rendered(
-            "report.md.j2",
-            runs,
-            title,
-            rows=ordered[:rows],
-            detailed=ordered[:details],
+        text = rendered(
+            "page.md.j2",
+            title=title,
+            cards=_cards(runs),
+            tables=[run_table(ordered[:rows])] if rows else [],
+            words=WORDS,
+            most=rows,
             uncounted=counted(ordered[rows:]),
+            detailed=ordered[:details],
             undetailed=len(runs) - details,
+            settings=SETTINGS,
+            column_notes=COLUMN_NOTES,
         )
         if len(text.encode()) <= MARKDOWN_BYTES or not rows:
             return text
@@ -147,27 +176,6 @@ def counted(runs: Sequence[ReportedRun]) -> str:
     most, rest = numbers.most_common(MOST_OUTCOMES), sum(numbers.values())
     rest -= sum(count for _, count in most)
     return "; ".join([*(f"{count:,} {outcome}" for outcome, count in most), *([f"{rest:,} others"] * bool(rest))])
-
-
-def _rendered(template: str, runs: list[ReportedRun], title: str, **more: Any) -> str:
-    import jinja2
-
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).with_name("templates")),
-        undefined=jinja2.StrictUndefined,
-        autoescape=jinja2.select_autoescape(["html.j2"]),
-    )
-    environment.filters |= {"md": markdown_text, "fence": fence_for}
-    return environment.get_template(template).render(
-        title=title,
-        version=metadata.version("antdrive"),
-        runs=runs,
-        columns=[*COLUMNS[:FACTS], *note_differences(runs), *COLUMNS[FACTS:]],
-        settings=SETTING_COLUMNS,
-        notes=COLUMN_NOTES,
-        summary=_summary(runs),
-        **more,
-    )
 
 
 def _drawn(run: Run) -> list[Attachment]:
@@ -274,11 +282,11 @@ def _link(path: Path, base: Path) -> str:
     return quote(Path(os.path.relpath(path.resolve(), base.resolve())).as_posix())
 
 
-def _summary(runs: list[ReportedRun]) -> list[tuple[str, str]]:
+def _cards(runs: list[ReportedRun]) -> list[tuple[str, str]]:
     """The report's headline numbers, each with its meaning."""
     certified = sum(run.succeeded for run in runs)
     bounds = [run.log.certificate.bound for run in runs if run.log and run.succeeded]
-    driven = sum(float(value) for run in runs if run.log and (value := run.cells[1][0]))
+    driven = sum(value for run in runs if run.log and (value := run.measured["driven_length_m"]))
     worlds, planners = len({run.world for run in runs}), len({run.planner for run in runs})
     return [
         (f"{certified} / {len(runs)}", "reached the goal, certified collision-free"),
@@ -287,13 +295,3 @@ def _summary(runs: list[ReportedRun]) -> list[tuple[str, str]]:
         (str(worlds), "world" if worlds == 1 else "worlds"),
         (str(planners), "planner" if planners == 1 else "planners"),
     ]
-
-
-def markdown_text(value: object) -> str:
-    """A text that Markdown shows as it is, in tables and in HTML blocks, too."""
-    return re.sub(r"[&<>|`*_~\[\]\\@#]", lambda found: f"&#{ord(found[0])};", str(value))
-
-
-def fence_for(code: str) -> str:
-    """A code fence longer than any run of backticks in the code."""
-    return "`" * max(3, 1 + max(map(len, re.findall("`+", code)), default=0))
