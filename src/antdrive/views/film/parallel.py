@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+import functools
 import uuid
 from collections.abc import Iterator
 from typing import Any
 
-import joblib
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.base.processes import delayed
+from antdrive.runs.pool import Pool, cores
 from antdrive.sim.log.rollout import Rollout
 from antdrive.views.film.shot import Shot
 
@@ -24,17 +24,16 @@ MAX_PROCESSES = 8  # each takes some 150 MB
 
 def process_count() -> int:
     """How many processes render at once by default: one per available core, at most `MAX_PROCESSES`."""
-    return int(min(MAX_PROCESSES, joblib.cpu_count()))
+    return min(MAX_PROCESSES, cores())
 
 
 def render_frames(rollout: Rollout, setting: dict[str, Any], times: Floats, jobs: int) -> Iterator[Picture]:
     """The frames (H, W, 3) in order, the same for any number of processes; `jobs` x `CHUNK` are held at once."""
     chunks = [(first, min(first + CHUNK, len(times))) for first in range(0, len(times), CHUNK)]
-    film = uuid.uuid4().hex
-    with joblib.Parallel(n_jobs=jobs) as pool:
+    render = functools.partial(_render, uuid.uuid4().hex, rollout, setting, times)
+    with Pool(0 if jobs == 1 else jobs) as pool:
         for k in range(0, len(chunks), jobs):
-            work = [delayed(_render)(film, rollout, setting, times, *chunk) for chunk in chunks[k : k + jobs]]
-            for rendered in pool(work):
+            for rendered in pool.results(render, chunks[k : k + jobs]):
                 yield from rendered
 
 
@@ -42,7 +41,10 @@ def render_frames(rollout: Rollout, setting: dict[str, Any], times: Floats, jobs
 _shots: dict[str, Shot] = {}
 
 
-def _render(film: str, rollout: Rollout, setting: dict[str, Any], times: Floats, first: int, end: int) -> list[Picture]:
+def _render(
+    film: str, rollout: Rollout, setting: dict[str, Any], times: Floats, chunk: tuple[int, int]
+) -> list[Picture]:
+    first, end = chunk
     shot = _shots.get(film)
     if shot is None:
         _shots.clear()
