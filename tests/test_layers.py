@@ -19,7 +19,6 @@ MODULES = sorted(path for room in RANKS for path in (ROOT / room).rglob("*.py"))
 CLIMBING = {
     ("sim.scenario", "runs.margins"),
     ("runs.failures.failure", "cli.testing.checking"),
-    ("runs.papers.reproduce", "views.papers"),
 }
 #: Functions that still hide a package of their name.
 HIDING = {"views.film"}

@@ -17,7 +17,7 @@ import antdrive.runs.suites
 import antdrive.sim
 import antdrive.views
 from antdrive.sim import Run, Scenario
-from antdrive.views.report.runs import REQUIRED
+from antdrive.views.pages.runs import REQUIRED
 from tests.docs.test_reference import PACKAGES
 
 
