@@ -12,21 +12,17 @@ from antdrive.base.errors import Terminated, input_error
 from antdrive.cli.commands import COMMANDS, GROUPS
 from antdrive.cli.exits import BROKEN_PIPE, FAULT, SUCCEEDED, TERMINATED, WRONG_INPUT
 
-HELP = """Usage: antdrive [OPTIONS] COMMAND [ARGS]...
+ABOUT = """Plan paths, drive them in physics, certify the drives and film them.
 
-  Plan paths, drive them in physics, certify the drives and film them.
-
-  Exit codes: 0: success. 1: the drive or the plan failed, or a log proves
-  nothing. 2: wrong input. 3: a fault of a planner or of antdrive. 130, 143:
-  interrupted. 141: nobody reads what is printed.
-
-Options:
+Exit codes: 0: success. 1: the drive or the plan failed, or a log proves
+nothing. 2: wrong input. 3: a fault of a planner or of antdrive. 130, 143:
+interrupted. 141: nobody reads what is printed.
+"""
+OPTIONS = """Options:
   --version   Show the version and exit.
   --debug     Show the traceback of a fault, with exit code 3; may stand
               anywhere.
   -h, --help  Show this message and exit.
-
-Commands:
 """
 DEBUG = "--debug"  # is taken wherever it stands, so that it can be added to a command that failed
 
@@ -57,7 +53,9 @@ def _show_help(words: list[str]) -> int:
     """Print the list of commands; the exit code, which is that of wrong input where nobody asked for help."""
     summaries = {name: command.summary for name, command in COMMANDS.items()} | dict(GROUPS)
     width = max(map(len, summaries)) + 2
-    sys.stdout.write(HELP + "".join(f"  {name:{width}}{text}\n" for name, text in summaries.items()))
+    about = "".join(f"  {line}" if line.strip() else line for line in ABOUT.splitlines(keepends=True))
+    table = "".join(f"  {name:{width}}{text}\n" for name, text in summaries.items())
+    sys.stdout.write(f"Usage: antdrive [OPTIONS] COMMAND [ARGS]...\n\n{about}\n{OPTIONS}\nCommands:\n{table}")
     sys.stdout.flush()
     return SUCCEEDED if words else WRONG_INPUT
 

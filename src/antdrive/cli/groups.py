@@ -12,7 +12,7 @@ import typer.core
 import typer.main
 
 from antdrive.base.errors import FieldError, InputError, Terminated
-from antdrive.cli.app import DEBUG, print_fault
+from antdrive.cli.app import ABOUT, DEBUG, print_fault
 from antdrive.cli.commands import COMMANDS, GROUPS, ROBOTS, WORLDS, Command
 from antdrive.cli.console import print_error, print_line
 from antdrive.cli.exits import FAULT, INTERRUPTED, SUCCEEDED, WRONG_INPUT
@@ -102,7 +102,11 @@ TABLES: Mapping[str, Mapping[str, Command]] = {"worlds": WORLDS, "robots": ROBOT
 def application() -> Any:
     """The command line as typer runs it."""
     app = typer.Typer(
-        name="antdrive", no_args_is_help=True, context_settings={"help_option_names": ["-h", "--help"]}, **SETTINGS
+        name="antdrive",
+        help=ABOUT,
+        no_args_is_help=True,
+        context_settings={"help_option_names": ["-h", "--help"]},
+        **SETTINGS,
     )
     for name, kind in (("worlds", _Group), ("robots", _RobotsGroup)):
         group = typer.Typer(cls=kind, help=GROUPS[name], no_args_is_help=kind is _Group, **SETTINGS)

@@ -37,19 +37,18 @@ def render_frames(rollout: Rollout, setting: dict[str, Any], times: Floats, jobs
                 yield from rendered
 
 
-#: The shot that a worker process has open, under the id of its film. It is closed when the next film begins.
-_open: dict[str, Shot] = {}
+#: The shot of the film that a worker process renders, under the film's id.
+_shots: dict[str, Shot] = {}
 
 
 def _render(
     film: str, rollout: Rollout, setting: dict[str, Any], times: Floats, chunk: tuple[int, int]
 ) -> list[Picture]:
     first, end = chunk
-    shot = _open.get(film)
+    shot = _shots.get(film)
     if shot is None:
-        while _open:
-            _open.popitem()[1].__exit__(None, None, None)
-        shot = _open[film] = Shot(rollout, **setting).__enter__()
+        _shots.clear()
+        shot = _shots[film] = Shot(rollout, **setting)
     for at in times[:first][times[:first] > shot.shown]:
         shot.extend_trail(at)
     return [shot.frame(at) for at in times[first:end]]
