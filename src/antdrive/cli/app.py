@@ -8,23 +8,16 @@ import signal
 import sys
 from typing import TextIO
 
-from antdrive.base.errors import Terminated, input_error
-from antdrive.cli.commands import COMMANDS, GROUPS
+from antdrive.base.errors import Terminated
+from antdrive.cli.commands import ABOUT, COMMANDS, DEBUG, GROUPS
 from antdrive.cli.exits import BROKEN_PIPE, FAULT, SUCCEEDED, TERMINATED, WRONG_INPUT
 
-ABOUT = """Plan paths, drive them in physics, certify the drives and film them.
-
-Exit codes: 0: success. 1: the drive or the plan failed, or a log proves
-nothing. 2: wrong input. 3: a fault of a planner or of antdrive. 130, 143:
-interrupted. 141: nobody reads what is printed.
-"""
 OPTIONS = """Options:
   --version   Show the version and exit.
   --debug     Show the traceback of a fault, with exit code 3; may stand
               anywhere.
   -h, --help  Show this message and exit.
 """
-DEBUG = "--debug"  # is taken wherever it stands, so that it can be added to a command that failed
 
 
 def main() -> None:
@@ -39,6 +32,8 @@ def main() -> None:
             with open(os.devnull, "wb") as nowhere:
                 os.dup2(nowhere.fileno(), stream.fileno())
         if not unread:  # another pipe, such as that to a process of the program's own
+            from antdrive.cli.groups import print_fault
+
             print_fault(error)
         code = BROKEN_PIPE if unread else FAULT
     sys.exit(code)
@@ -71,20 +66,3 @@ def _is_unread(stream: TextIO) -> bool:
     poll = select.poll()
     poll.register(stream.fileno(), 0)  # errors are always told
     return any(event & (select.POLLERR | select.POLLHUP) for _, event in poll.poll(0))
-
-
-def print_fault(error: Exception) -> None:
-    """Print one line about a fault of a planner or of antdrive itself; with `--debug`, the traceback before it."""
-    import traceback
-
-    from antdrive.cli.console import print_error
-    from antdrive.planners import PlannerError
-
-    debug = DEBUG in sys.argv[1:]
-    if debug:
-        traceback.print_exception(error)
-    if isinstance(error, PlannerError):
-        says = str(error)
-    else:
-        says = str(input_error("internal error", type(error).__name__, *filter(None, [str(error)])))
-    print_error(says if debug else f"{says} (run again with {DEBUG} for the traceback)")

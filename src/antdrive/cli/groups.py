@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib
+import sys
+import traceback
 from collections import UserDict
 from collections.abc import Mapping
 from typing import Annotated, Any
@@ -11,9 +13,8 @@ import typer
 import typer.core
 import typer.main
 
-from antdrive.base.errors import FieldError, InputError, Terminated
-from antdrive.cli.app import ABOUT, DEBUG, print_fault
-from antdrive.cli.commands import COMMANDS, GROUPS, ROBOTS, WORLDS, Command
+from antdrive.base.errors import FieldError, InputError, Terminated, input_error
+from antdrive.cli.commands import ABOUT, COMMANDS, DEBUG, GROUPS, ROBOTS, WORLDS, Command
 from antdrive.cli.console import print_error, print_line
 from antdrive.cli.exits import FAULT, INTERRUPTED, SUCCEEDED, WRONG_INPUT
 
@@ -139,6 +140,21 @@ def _global_options(
     ] = False,
 ) -> None:
     pass
+
+
+def print_fault(error: Exception) -> None:
+    """Print one line about a fault of a planner or of antdrive itself; with `--debug`, the traceback before it."""
+
+    from antdrive.planners import PlannerError
+
+    debug = DEBUG in sys.argv[1:]
+    if debug:
+        traceback.print_exception(error)
+    if isinstance(error, PlannerError):
+        says = str(error)
+    else:
+        says = str(input_error("internal error", type(error).__name__, *filter(None, [str(error)])))
+    print_error(says if debug else f"{says} (run again with {DEBUG} for the traceback)")
 
 
 def _print_usage_error(error: Any) -> None:

@@ -24,6 +24,14 @@ class Command(NamedTuple):
     summary: str
 
 
+ABOUT = """Plan paths, drive them in physics, certify the drives and film them.
+
+Exit codes: 0: success. 1: the drive or the plan failed, or a log proves
+nothing. 2: wrong input. 3: a fault of a planner or of antdrive. 130, 143:
+interrupted. 141: nobody reads what is printed.
+"""
+DEBUG = "--debug"  # is taken wherever it stands, so that it can be added to a command that failed
+
 #: The commands by name, in the order in which `antdrive --help` lists them.
 COMMANDS: Mapping[str, Command] = MappingProxyType(
     {
