@@ -78,9 +78,9 @@ def pheromone(path: Path) -> None:
 def comparison(path: Path) -> None:
     """Four planners in the same forest."""
     logs = [drive("forest", name, smoothing="none") for name in ("astar", "aco-han", "ants", "tangent")]
-    with SplitScreen(logs, "oblique", SIZE) as screen:
-        for at in (6.0, 12.0):
-            picture = screen.frame(at)
+    screen = SplitScreen(logs, "oblique", SIZE)
+    for at in (6.0, 12.0):
+        picture = screen.frame(at)
     saved(picture, path)
 
 

@@ -5,19 +5,19 @@ from __future__ import annotations
 import csv
 import dataclasses
 import math
+import operator
 import re
 import statistics
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
-import joblib
 import numpy as np
 
 from antdrive.base.atomic import written_whole
 from antdrive.base.errors import InputError
-from antdrive.base.processes import delayed
 from antdrive.runs.papers.claims import CLAIMS, Arm, Claim
 from antdrive.runs.papers.experiments import PAPERS, Experiment
 from antdrive.runs.papers.keeping import keep_trials, kept_trials, trials_key
@@ -32,6 +32,7 @@ from antdrive.runs.papers.verdicts import (
     verdict_cells,
     verdict_facts,
 )
+from antdrive.runs.pool import Pool, processes_for
 from antdrive.runs.statistics.bootstrap import medians_by_world
 
 T = TypeVar("T")
@@ -133,14 +134,14 @@ def _all_trials(
     """The experiments with their trials, and for how many these were in the folder already."""
     total, done, kept = sum(len(experiment.seeds(seeds)) for experiment in experiments), 0, 0
     found: Measurements = []
-    with joblib.Parallel(n_jobs=jobs, return_as="generator") as parallel:
+    with Pool(processes_for(jobs)) as pool:
         for experiment in experiments:
             words = f"{experiment.paper} {experiment.map} {experiment.name}"
             path, key = folder / f"{re.sub(r'[^A-Za-z0-9×*]+', '-', words)}.npz", trials_key(experiment, seeds)
             trials = kept_trials(path, key)
             if trials is None:
                 trials = []
-                for trial in parallel(_planned(experiment, seeds)):
+                for trial in pool.results(operator.call, _planned(experiment, seeds)):
                     trials.append(dataclasses.replace(trial, world=experiment.world(trial.seed)))
                     if progress is not None:
                         progress((done + len(trials)) / total)
@@ -154,15 +155,15 @@ def _all_trials(
     return found, kept
 
 
-def _planned(experiment: Experiment, seeds: int) -> Iterator[Any]:
-    """The calls that plan an experiment; each map is made when its turn comes."""
+def _planned(experiment: Experiment, seeds: int) -> Iterator[Callable[[], Trial]]:
+    """The calls that plan an experiment."""
     planner = experiment.made or experiment.planner
     for seed in experiment.seeds(seeds):
         query = experiment.query(experiment.world(seed))
         if experiment.movers:
-            yield delayed(drive_among)(planner, experiment.options, query, seed, experiment.movers)
-            continue
-        yield delayed(solve)(planner, experiment.options, query, seed, experiment.work)
+            yield partial(drive_among, planner, experiment.options, query, seed, experiment.movers)
+        else:
+            yield partial(solve, planner, experiment.options, query, seed, experiment.work)
 
 
 def _judgeable(known: Mapping[tuple[str, str, str], T]) -> Iterator[tuple[Claim, dict[Arm, T]]]:

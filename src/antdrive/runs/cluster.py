@@ -16,12 +16,9 @@ from contextlib import contextmanager
 from typing import Any
 
 from antdrive.base.errors import input_error
-from antdrive.runs.campaigns.extras import cluster_library
-from antdrive.runs.campaigns.job import Job
-from antdrive.runs.campaigns.local import ATTEMPTS
-from antdrive.runs.campaigns.rows import CRASHED, fault_row, slow_row
-from antdrive.runs.campaigns.running import Finished, Work, again
-from antdrive.runs.campaigns.waiting import Waiting
+from antdrive.base.optional import optional
+from antdrive.runs.pool import ATTEMPTS, Done, Item, Result
+from antdrive.runs.waiting import Ticket, Waiting
 
 CHUNKS_EACH = 3  # chunks that are at a worker or on their way to it
 PATIENCE = 10.0  # how long a scheduler may be away before the campaign ends [s]
@@ -31,30 +28,30 @@ _LOCAL = re.compile(r"local:([1-9]\d{0,3})")
 
 
 def run_on_cluster(
-    jobs: Iterable[Job],
-    work: Work,
+    work: Callable[[Item], Result],
+    items: Iterable[Item],
     address: str,
     *,
     limit: float | None = None,
     tick: Callable[[], None] = lambda: None,
-) -> Generator[Finished, None, None]:
-    """Make runs on a cluster; the results come in any order.
+) -> Generator[Done[Item, Result], None, None]:
+    """Do the work for each item on a cluster; what comes of it, in order of arrival.
 
     Raises:
-        InputError: the address is wrong, the scheduler cannot be reached or is gone, or a run finds that the campaign cannot
-            go on.
+        InputError: the address is wrong, or the scheduler cannot be reached or is gone.
+        Exception: what the work raised.
     """
-    distributed = cluster_library()
+    distributed = optional("distributed", "cluster", "--dask spreads runs over machines with it")
     with _client(distributed, address) as client:
-        waiting, at_work, asked = Waiting(jobs, 1), dict[Any, list[Job]](), -math.inf
-        suspects: list[Job] = []
-        tried: Job | None = None
+        waiting, at_work, asked = Waiting(items, 1), dict[Any, list[Ticket[Item]]](), -math.inf
+        suspects: list[Ticket[Item]] = []
+        tried: Ticket[Item] | None = None
         since = math.inf  # when the run began that is tried alone
         while waiting or at_work or suspects:
             if time.monotonic() - asked > WORKERS_EVERY:
                 waiting.processes, asked = _workers(client, address), time.monotonic()
             while waiting and len(at_work) < CHUNKS_EACH * waiting.processes:
-                _submit(client, work, waiting.chunk(None), at_work, limit)
+                _submit(client, work, waiting.chunk(), at_work, limit)
             # Workers that die are held against all runs that they were handed: each is tried with nothing beside it.
             if not at_work:
                 tried, since = suspects.pop(), time.monotonic()
@@ -70,22 +67,32 @@ def run_on_cluster(
                 if _killed(future) and chunk != [tried]:
                     suspects += chunk
                 else:
-                    slow = limit is not None and time.monotonic() - since >= limit
-                    yield from _received(future, chunk, waiting, limit if slow else None)
+                    yield from _received(
+                        future, chunk, waiting, limit is not None and time.monotonic() - since >= limit
+                    )
 
 
-def _submit(client: Any, work: Work, chunk: list[Job], at_work: dict[Any, list[Job]], limit: float | None) -> None:
+def _submit(
+    client: Any,
+    work: Callable[[Item], Result],
+    chunk: list[Ticket[Item]],
+    at_work: dict[Any, list[Ticket[Item]]],
+    limit: float | None,
+) -> None:
     # As part of the function the runs are not searched for results of other tasks, which takes long.
-    at_work[client.submit(functools.partial(run_chunk, work, chunk, limit), pure=False)] = chunk
+    made = functools.partial(run_chunk, work, [ticket.item for ticket in chunk], limit)
+    at_work[client.submit(made, pure=False)] = chunk
 
 
-def run_chunk(work: Work, jobs: Sequence[Job], limit: float | None = None) -> tuple[list[Finished], float]:
+def run_chunk(
+    work: Callable[[Item], Result], items: Sequence[Item], limit: float | None = None
+) -> tuple[list[Result], float]:
     """Make runs one after the other; their results, and the time that they took [s]."""
-    started, finished = time.monotonic(), []
-    for job in jobs:
+    started, results = time.monotonic(), []
+    for item in items:
         with _ended_after(limit):
-            finished.append(work(job))
-    return finished, time.monotonic() - started
+            results.append(work(item))
+    return results, time.monotonic() - started
 
 
 @contextmanager
@@ -103,16 +110,17 @@ def _ended_after(limit: float | None) -> Iterator[None]:
         watch.cancel()
 
 
-def _received(future: Any, chunk: list[Job], waiting: Waiting, limit: float | None) -> Generator[Finished, None, None]:
-    """The results of a chunk; those of a chunk that killed its workers while it was alone, for the `limit` if there is one."""
+def _received(future: Any, chunk: list[Ticket[Item]], waiting: Waiting[Item], slow: bool) -> Iterator[Done[Item, Any]]:
+    """The results of a chunk. Where it killed its workers while it was alone, it may have been too slow."""
     if future.status == "finished":
-        finished, seconds = future.result()
+        results, seconds = future.result()
         waiting.measured(seconds, len(chunk))
-        yield from finished
+        for ticket, result in zip(chunk, results, strict=True):
+            yield Done(ticket.item, ticket.number, result)
     elif _killed(future):
-        for job in chunk:
-            crash = fault_row(job.key, CRASHED, "the processes that made it ended")
-            yield again(Finished(crash if limit is None else slow_row(job.key, limit)), ATTEMPTS)
+        for ticket in chunk:
+            died = "the processes that made it ended"
+            yield Done(ticket.item, ticket.number, died=died, slow=slow, attempts=ATTEMPTS)
     elif future.status == "error":
         raise future.exception()
     else:  # cancelled: the connection was lost for a while

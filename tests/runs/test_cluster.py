@@ -17,11 +17,11 @@ pytest.importorskip("distributed")
 
 from antdrive.base.errors import InputError
 from antdrive.runs.campaigns import canonical_bytes, make_campaign, read_results
-from antdrive.runs.campaigns.cluster import _received, run_chunk, run_on_cluster
 from antdrive.runs.campaigns.expanding import expand
-from antdrive.runs.campaigns.running import log_path
+from antdrive.runs.campaigns.running import finished_of, log_path
 from antdrive.runs.campaigns.sweeping import run_expansion, sweep
-from antdrive.runs.campaigns.waiting import Waiting
+from antdrive.runs.cluster import _received, run_chunk, run_on_cluster
+from antdrive.runs.waiting import Ticket, Waiting
 from tests.runs.campaigns.works import Deadly, Endless, Refusing
 
 pytestmark = [
@@ -76,14 +76,14 @@ def test_a_cluster_makes_the_same_table_as_processes_and_hands_logs_back(
 
 def test_a_run_that_kills_its_workers_is_recorded_and_no_other_is_lost() -> None:
     jobs = expand(make_campaign(CAMPAIGN)).jobs
-    rows = [finished.row for finished in run_on_cluster(jobs, Deadly((3,)), "local:2")]
+    rows = [finished_of(done, None).row for done in run_on_cluster(Deadly((3,)), jobs, "local:2")]
     assert Counter(row["key"] for row in rows) == Counter(job.key for job in jobs)
     assert {row["key"] for row in rows if row["outcome"] == "crashed"} == {job.key for job in jobs if job.seed == 3}
 
 
 def test_a_run_that_does_not_end_is_ended() -> None:
     jobs = expand(make_campaign({**CAMPAIGN, "worlds": ["empty"], "seeds": 6})).jobs
-    rows = [finished.row for finished in run_on_cluster(jobs, Endless((3,)), "local:2", limit=1.0)]
+    rows = [finished_of(done, 1.0).row for done in run_on_cluster(Endless((3,)), jobs, "local:2", limit=1.0)]
     assert Counter(row["key"] for row in rows) == Counter(job.key for job in jobs)
     assert {row["outcome"] for row in rows if row["key"] == jobs[3].key} == {"too_slow"}
     assert sum(row["outcome"] == "succeeded" for row in rows) == 5
@@ -97,13 +97,13 @@ def test_a_run_that_finds_no_room_ends_the_campaign() -> None:
         raised = error
     failed = SimpleNamespace(status="error", exception=lambda: raised)
     with pytest.raises(InputError, match="No space left on device"):
-        list(_received(failed, list(jobs), Waiting(jobs, 1), None))
+        list(_received(failed, [Ticket(0, jobs[0])], Waiting(jobs, 1), slow=False))
 
 
 def test_a_scheduler_that_is_gone_ends_the_campaign_which_goes_on_elsewhere(
     tmp_path: Path, scheduler: tuple[subprocess.Popen[bytes], str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("antdrive.runs.campaigns.cluster.PATIENCE", 1.0)
+    monkeypatch.setattr("antdrive.runs.cluster.PATIENCE", 1.0)
     process, address = scheduler
     campaign = make_campaign(CAMPAIGN)
     expansion = expand(campaign)
@@ -123,10 +123,10 @@ def test_a_scheduler_that_is_gone_ends_the_campaign_which_goes_on_elsewhere(
 @pytest.mark.parametrize("address", ["local:", "local:x", "local:0", "localhost:8786", "tcp://"])
 def test_a_wrong_address_is_refused(address: str) -> None:
     with pytest.raises(InputError, match="write local:N with a number of processes above 0, or tcp://HOST:PORT"):
-        next(run_on_cluster([], Deadly(), address))
+        next(run_on_cluster(Deadly(), [], address))
 
 
 def test_a_scheduler_that_does_not_answer_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("antdrive.runs.campaigns.cluster.PATIENCE", 0.5)
+    monkeypatch.setattr("antdrive.runs.cluster.PATIENCE", 0.5)
     with pytest.raises(InputError, match=r"^--dask: tcp://127\.0\.0\.1:1: no scheduler answers"):
-        next(run_on_cluster([], Deadly(), "tcp://127.0.0.1:1"))
+        next(run_on_cluster(Deadly(), [], "tcp://127.0.0.1:1"))

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections import Counter
-from types import SimpleNamespace
-from typing import Any, cast
+from collections.abc import Iterable
 
 from hypothesis import given
 from hypothesis import strategies as st
 
-from antdrive.runs.campaigns.job import Job
-from antdrive.runs.campaigns.waiting import CHUNK_SECONDS, LONGEST_CHUNK, Waiting
+from antdrive.runs.waiting import CHUNK_SECONDS, LONGEST_CHUNK, Waiting
+
+Run = tuple[str, int]  # the world, the seed
 
 
-def job(world: str, seed: int) -> Job:
-    return Job(f"{world}-{seed}", cast(Any, SimpleNamespace(world=world)), seed)
+def queue(runs: Iterable[Run], processes: int) -> Waiting[Run]:
+    return Waiting(runs, processes, lambda run: run[0])
 
 
 @given(
@@ -23,9 +23,9 @@ def job(world: str, seed: int) -> Job:
     st.lists(st.tuples(st.sampled_from([None, *"abc"]), st.floats(1e-4, 10), st.booleans()), max_size=40),
 )
 def test_every_run_is_handed_out_once_whatever_is_asked_measured_and_put_back(
-    runs: list[tuple[str, int]], processes: int, asked: list[tuple[str | None, float, bool]]
+    runs: list[Run], processes: int, asked: list[tuple[str | None, float, bool]]
 ) -> None:
-    waiting, made = Waiting((job(*run) for run in runs), processes), Counter[str]()
+    waiting, made = queue(runs, processes), Counter[Run]()
     left = len(runs)
     for world, seconds, back in [*asked, *[(None, 1e-3, False)] * len(runs)]:
         assert len(waiting) == left
@@ -34,15 +34,15 @@ def test_every_run_is_handed_out_once_whatever_is_asked_measured_and_put_back(
         if back:
             waiting.put_back(chunk)
             continue
-        made.update(one.key for one in chunk)
+        made.update(one.item for one in chunk)
         left -= len(chunk)
         if chunk:
             waiting.measured(seconds * len(chunk), len(chunk))
-    assert made == Counter(job(*run).key for run in runs)
+    assert made == Counter(runs)
 
 
 def test_chunks_take_two_seconds_and_shrink_at_the_end() -> None:
-    waiting = Waiting((job("a", seed) for seed in range(1000)), 2)
+    waiting = queue((("a", seed) for seed in range(1000)), 2)
     assert len(waiting.chunk(None)) == 1, "nothing is measured yet"
     waiting.measured(0.1)
     assert len(waiting.chunk(None)) == CHUNK_SECONDS / 0.1
@@ -54,7 +54,7 @@ def test_chunks_take_two_seconds_and_shrink_at_the_end() -> None:
 
 
 def test_runs_that_are_put_back_come_one_by_one_before_all_others() -> None:
-    waiting = Waiting((job("a", seed) for seed in range(9)), 1)
+    waiting = queue((("a", seed) for seed in range(9)), 1)
     waiting.measured(1e-3)
     first = waiting.chunk(None)
     waiting.put_back(first)
@@ -62,7 +62,7 @@ def test_runs_that_are_put_back_come_one_by_one_before_all_others() -> None:
 
 
 def test_a_process_goes_on_with_its_world_then_takes_a_fresh_one_then_helps() -> None:
-    runs = [job("a", seed) for seed in range(40)] + [job("b", 0), job("c", 0)]
-    waiting = Waiting(runs, 40)
-    worlds = [waiting.chunk(world)[0].case.world for world in (None, "a", None, "b", "b")]
+    runs = [*(("a", seed) for seed in range(40)), ("b", 0), ("c", 0)]
+    waiting = queue(runs, 40)
+    worlds = [waiting.chunk(world)[0].group for world in (None, "a", None, "b", "b")]
     assert worlds == ["a", "a", "b", "c", "a"]
