@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from antdrive.base.atomic import file_name
 from antdrive.base.errors import InputError
 from antdrive.cli.console import as_json, bar
 
@@ -95,11 +96,6 @@ def fingerprint(scenario: Scenario, *more: object) -> str:
     planner = fields.pop("planner")
     settings = settings_of(planner) if dataclasses.is_dataclass(planner) else type(planner).__qualname__
     return hashlib.sha256(repr((settings, fields, *more)).encode()).hexdigest()[:8]
-
-
-def file_name(name: str) -> str:
-    """A name with only the characters that every file system takes."""
-    return "".join(c if c.isalnum() or c in "-_." else "_" for c in name)
 
 
 def suffixes(vector: bool) -> tuple[str, ...]:

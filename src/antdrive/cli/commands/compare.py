@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from antdrive.base.atomic import claimed
+from antdrive.base.atomic import claimed, file_name
 from antdrive.base.errors import InputError
 from antdrive.cli import options
 from antdrive.cli.campaign_tables import Against, Allow, Metrics, Where, campaigns_of_words, compare_campaigns
@@ -29,7 +29,6 @@ from antdrive.cli.scenario import chosen_task, ends_words, make_scenario
 from antdrive.cli.write import (
     check_film,
     check_folder,
-    file_name,
     free_folder,
     this_command,
     write_comparison_film,

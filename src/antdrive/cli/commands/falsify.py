@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from antdrive.base.atomic import claimed
+from antdrive.base.atomic import claimed, file_name
 from antdrive.base.errors import InputError
 from antdrive.cli import options
 from antdrive.cli.compiling import compile_once
@@ -17,7 +17,6 @@ from antdrive.cli.scenario import make_scenario
 from antdrive.cli.write import (
     RUN_FILES,
     check_folder,
-    file_name,
     fingerprint,
     free_folder,
     this_command,

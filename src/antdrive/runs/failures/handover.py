@@ -15,7 +15,7 @@ from typing import Any
 
 import yaml
 
-from antdrive.base.atomic import written_whole
+from antdrive.base.atomic import file_name, written_whole
 from antdrive.base.errors import InputError
 from antdrive.planners import PlannerError, list_planners, load_planner
 from antdrive.robots import Avoidance, PurePursuit, RobotSpec, list_robots, load_robot
@@ -224,7 +224,7 @@ def _robot(robot: RobotSpec, folder: Path, robots: dict[str, RobotSpec]) -> str:
     """The robot's name in the catalogue, or the file beside the suite that is written for it."""
     if robot.name in list_robots() and load_robot(robot.name) == robot:
         return robot.name
-    plain = "".join(c if c.isalnum() or c in "-_." else "_" for c in robot.name)
+    plain = file_name(robot.name)
     names = (plain if k == 1 else f"{plain}-{k}" for k in itertools.count(1))
     name = next(name for name in names if robots.get(name, robot) == robot)
     if name not in robots:
