@@ -21,7 +21,7 @@ from antdrive.base.atomic import written_whole
 from antdrive.base.types import Floats
 from antdrive.robots.placing import gaps
 from antdrive.runs.suites.baseline import Baseline
-from antdrive.runs.suites.parting import parting
+from antdrive.runs.suites.divergence import divergence
 from antdrive.runs.suites.suite import SUFFIX
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import Run
@@ -174,7 +174,7 @@ def _comparison(rollout: Rollout, baseline: Baseline | None, folder: Path, film:
         return {"film": str(make_film(rollout, folder / "film.mp4", **options).path)}
     from antdrive.views.figures.then_and_now import then_and_now
 
-    then, found = drive_of(baseline, rollout), parting(baseline, rollout)
+    then, found = drive_of(baseline, rollout), divergence(baseline, rollout)
     place = None if found is None else (found.t, *found.then)
     files = {"then and now": str(folder / "then-and-now.png")}
     then_and_now(then, rollout, files["then and now"], parted=place)

@@ -116,8 +116,8 @@ def shrink(
 def _of_a_test(words: str) -> "tuple[Scenario, SuiteCase]":
     """A suite's test and its scenario."""
     from antdrive.cli.calibrating import with_chosen_margin
+    from antdrive.runs.suites.names import select
     from antdrive.runs.suites.scenarios import scenario_of
-    from antdrive.runs.suites.selecting import select
 
     cases = select([words])
     if len(cases) > 1:

@@ -19,7 +19,7 @@ from antdrive.planners import PlannerError
 from antdrive.runs.pool import Pool
 from antdrive.runs.suites.baseline import Baseline
 from antdrive.runs.suites.demands import Demands
-from antdrive.runs.suites.explaining import explain
+from antdrive.runs.suites.divergence import explain
 from antdrive.runs.suites.judging import RAISED, Judgement, judge, unfulfilled
 from antdrive.runs.suites.scenarios import run_command, scenario_of
 from antdrive.runs.suites.suite import ScenarioEntry, SuiteCase, load_suite, shown_path
@@ -252,7 +252,7 @@ def check_run(
         judgement, accepted = _without_baseline(run, demands, path, name, accept, update)
     else:
         judgement = judge(run, demands, baseline)
-    details = () if judgement.passed else tuple(explain(run, dataclasses.replace(judgement, faults=()), baseline))
+    details = () if judgement.passed else tuple(explain(run, baseline))
     files, unfilmed, problem = _written_or_why(run, judgement, baseline, folder, results, commands)
     details = (*details, *filter(None, [problem]))
     return CheckResult(

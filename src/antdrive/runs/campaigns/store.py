@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 
 from antdrive.base.atomic import claimed, written_whole
 from antdrive.base.errors import InputError, input_error
-from antdrive.runs.campaigns.extras import parquet_library
+from antdrive.base.optional import parquet_library
 from antdrive.runs.campaigns.rows import CRASHED, NOT_CANONICAL, result_schema, result_table
 
 if TYPE_CHECKING:

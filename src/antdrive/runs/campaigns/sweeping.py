@@ -13,9 +13,9 @@ from typing import Any, get_args
 
 from antdrive.base.atomic import written_whole
 from antdrive.base.errors import FieldError
+from antdrive.base.optional import parquet_library
 from antdrive.runs.campaigns.campaign import Campaign, load_campaign, make_campaign
 from antdrive.runs.campaigns.expanding import Expansion, expand
-from antdrive.runs.campaigns.extras import parquet_library
 from antdrive.runs.campaigns.job import Job, SweepCase
 from antdrive.runs.campaigns.missing import changed_planners, missing_runs
 from antdrive.runs.campaigns.results import SweepResults

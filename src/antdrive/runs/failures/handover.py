@@ -23,9 +23,9 @@ from antdrive.robots.files import footprint_to_dict
 from antdrive.runs.pool import Pool
 from antdrive.runs.suites.demands import Bound
 from antdrive.runs.suites.names import is_own_entry
+from antdrive.runs.suites.nearest import cause_of_contact, touched_first
 from antdrive.runs.suites.scenarios import scenario_of
 from antdrive.runs.suites.suite import load_suite
-from antdrive.runs.suites.touching import cause_of_contact, touched_first
 from antdrive.sim.driving.perception import usual_perception
 from antdrive.sim.driving.replanning import ReplanPolicy
 from antdrive.sim.log.outcome import Outcome

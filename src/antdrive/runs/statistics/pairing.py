@@ -10,8 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.errors import FieldError
-from antdrive.runs.statistics.columns import OF_WORLDS, PLACE, WALL_TIMES
-from antdrive.runs.statistics.runs import RunTable
+from antdrive.runs.statistics.runs import OF_WORLDS, PLACE, WALL_TIMES, RunTable
 
 Floats: TypeAlias = npt.NDArray[np.float64]
 Flags: TypeAlias = npt.NDArray[np.bool_]
