@@ -12,8 +12,6 @@ import xml.etree.ElementTree
 from pathlib import Path
 from types import SimpleNamespace
 
-import matplotlib.backends.backend_agg  # noqa: F401 - see below
-import matplotlib.figure
 import numba
 import pybullet  # noqa: F401
 import pytest

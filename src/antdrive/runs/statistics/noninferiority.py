@@ -6,20 +6,19 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.errors import FieldError
 from antdrive.base.optional import statistics_library
+from antdrive.base.types import Floats
 from antdrive.runs.statistics.bootstrap import RESAMPLES, means_by_world, medians_by_world
 from antdrive.runs.statistics.comparison import ALPHA, SUCCESS, Direction, pairs_of, success_interval
 from antdrive.runs.statistics.pairing import PairedRuns
 from antdrive.runs.statistics.proportions import Interval
 from antdrive.runs.statistics.significance import differences
-
-Floats: TypeAlias = npt.NDArray[np.float64]
 
 POWER = 0.8  # the chance with which the needed worlds show it, if the two are equally good
 TAIL_RESAMPLES = 20  # resamples beyond each end of an interval, at least

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.errors import FieldError
+from antdrive.base.types import Flags, Floats
 from antdrive.runs.statistics.selecting import column_named, places_of
 
 #: Where a run took place.
@@ -30,9 +31,6 @@ HASHES = ("world_hash", "robot_hash")
 #: Columns that differ between repetitions of one drive: their median over repetitions is taken.
 WALL_TIMES = ("plan_s", "drive_wall_s")
 
-
-Floats: TypeAlias = npt.NDArray[np.float64]
-Flags: TypeAlias = npt.NDArray[np.bool_]
 
 REQUIRED = ("world", "planner", "seed", "outcome", "succeeded")
 

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
 from antdrive.base.optional import statistics_library
-
-Floats: TypeAlias = npt.NDArray[np.float64]
-Ints: TypeAlias = npt.NDArray[np.int64]
+from antdrive.base.types import Floats, Ints
 
 EXACT_WORLDS = 16  # up to so many worlds, all 2^W flips are tried
 FLIPS = 99_999  # random flips above
