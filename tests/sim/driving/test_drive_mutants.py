@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from antdrive.sim.driving.recorder import Ending, Recorder
 
 from antdrive.robots import AvoidanceState, Footprint, PurePursuit, PursuitState, RobotSpec, Twist
 from antdrive.sim import Outcome
 from antdrive.sim.driving.drive import drive
 from antdrive.sim.driving.driver import AVOIDING, STUCK_TIME, WAITING_SPEED, Driver, StuckClock
 from antdrive.sim.driving.leaving import cannot_leave, is_narrow
-from antdrive.sim.driving.recorder import Ending, Recorder
 from antdrive.sim.physics.engine import Engine, State
 from antdrive.worlds import World
 from tests.sim.driving.test_driver import TASK, driver

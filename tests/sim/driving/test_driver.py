@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from antdrive.sim.unknown import exploration_of
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -25,7 +26,6 @@ from antdrive.sim.driving.driver import (
 )
 from antdrive.sim.driving.perception import Predictor
 from antdrive.sim.physics.engine import State
-from antdrive.sim.unknown import exploration_of
 from antdrive.worlds import Cruising, Disc, Grid, Keyframed, Task, Trajectories, World, rasterise
 
 HALL = World("hall", (0.0, 0.0, 9.0, 6.0), (Disc(4.5, 4.5, 0.5),))

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from antdrive.sim.unknown import exploration_of, told
 
 from antdrive.base.errors import FieldError
 from antdrive.planners import load_planner
@@ -20,7 +21,6 @@ from antdrive.sim.driving.survey import Senses, Survey
 from antdrive.sim.driving.watching import Watch
 from antdrive.sim.log.record import ReplanRecord
 from antdrive.sim.sensing import OccupancyMap, Scanner
-from antdrive.sim.unknown import exploration_of, told
 from antdrive.views.recollection import Recollection
 from antdrive.worlds import Disc, Task, World, generate, load_task
 

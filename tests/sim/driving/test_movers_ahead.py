@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from antdrive.sim.unknown import exploration_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -19,7 +20,6 @@ from antdrive.sim.driving.replanning import OBSTRUCTED, TRAFFIC, WAITED
 from antdrive.sim.driving.traffic import FADING, FAST, TrackedTraffic
 from antdrive.sim.driving.watching import TrackedPredictor
 from antdrive.sim.sensing import TrackedMovers
-from antdrive.sim.unknown import exploration_of
 from antdrive.worlds import Keyframed, Task, World, rasterise
 
 LIDAR = Perception(kind="lidar")

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import hypothesis
 import numpy as np
 import pytest
+from antdrive.sim.unknown import caution_of, exploration_of
 from hypothesis import strategies as st
 
 from antdrive.planners import load_planner
@@ -17,7 +18,6 @@ from antdrive.sim.driving.own_map import LOOKED, forgetting_ticks
 from antdrive.sim.driving.recovery import Look, Recovery
 from antdrive.sim.driving.replay import replay
 from antdrive.sim.physics.engine import State
-from antdrive.sim.unknown import caution_of, exploration_of
 from antdrive.worlds import Cruising, Disc, Task, World
 
 HALL = (0.0, 0.0, 8.0, 8.0)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from antdrive.sim.unknown import exploration_of
 
 from antdrive.base.errors import FieldError
 from antdrive.planners import load_planner
@@ -20,7 +21,6 @@ from antdrive.sim.log.record import PerceptionRecord
 from antdrive.sim.log.scans import ranges_of
 from antdrive.sim.log.sights import passed
 from antdrive.sim.sensing import KnownGround, Scanner
-from antdrive.sim.unknown import exploration_of
 from antdrive.worlds import Disc, Keyframed, Task, World
 
 # A closet of touching posts in the lower right corner, into which no beam gets.
