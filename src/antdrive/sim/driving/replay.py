@@ -120,7 +120,7 @@ def _other_senses(rollout: Rollout) -> Iterator[str]:
     # A period's first row is the last of the period before; a contact ends the control of the robot.
     touched = int(rollout.contacts[0, 0]) if len(rollout.contacts) else len(rollout.t)
     rows = range(0, min(touched, len(rollout.t) - 1), per_tick)
-    map, forgets = _map_of(rollout)
+    map, forgets = map_of(rollout)
     plant, reader = Logged(rollout), Reader(rollout, len(rows), forgets)
     periods = len(rows) + _decided_at_the_end(rollout, per_tick)
     drive(plant, reader, localiser, map, hz=record.control_hz, limit=periods / record.control_hz)
@@ -184,7 +184,7 @@ class Reader(Decider):
         return None
 
 
-def _map_of(rollout: Rollout) -> tuple[GivenMap | Scans | Survey, Mapping[int, Callable[[Pose], None]]]:
+def map_of(rollout: Rollout) -> tuple[GivenMap | Scans | Survey, Mapping[int, Callable[[Pose], None]]]:
     """What takes the scans of a log again, and in which control periods the map is reset."""
     record, lidar = rollout.record, rollout.record.robot.lidar
     if not len(rollout.scans):
