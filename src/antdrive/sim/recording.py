@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from antdrive.base.reuse import Keyed, reused
 from antdrive.planners import PLANNERS, PlanResult, Query
 from antdrive.sim.driving.plants import Drive
 from antdrive.sim.driving.replanning import Replan
@@ -28,7 +29,7 @@ from antdrive.sim.log.record import (
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.streams import random_stream
 from antdrive.worlds import Grid, Route, Task
-from antdrive.worlds.reuse import Keyed, by_geometry, reused
+from antdrive.worlds.world import by_geometry
 
 if TYPE_CHECKING:
     from antdrive.sim.compose import Parts

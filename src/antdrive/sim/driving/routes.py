@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from antdrive.base.reuse import Keyed, bits, reused
 from antdrive.planners import Planner, PlanResult, PlanStatus, Query, ask, checked, smooth
 from antdrive.robots import PurePursuit, RobotSpec, TrackedPath
 from antdrive.sim.driving.leaving import cannot_leave, is_narrow
@@ -15,7 +16,7 @@ from antdrive.sim.driving.parts import RouteGuide
 from antdrive.sim.log.streams import random_stream
 from antdrive.sim.reasons import no_path_reason
 from antdrive.worlds import Grid, MoverMotion, Route, Task, World, rasterise
-from antdrive.worlds.reuse import Keyed, bits, by_geometry, reused
+from antdrive.worlds.world import by_geometry
 
 
 @dataclass(eq=False, kw_only=True)
