@@ -23,16 +23,8 @@ extensions = [
     "sphinx_copybutton",
     "sphinx_design",
     "sphinx_gallery.gen_gallery",
-    "sphinxcontrib.typer",
     "antdrive_api",
-    "antdrive_commands",
-    "antdrive_films",
-    "antdrive_links",
-    "antdrive_marks",
-    "antdrive_math",
-    "antdrive_measured",
-    "antdrive_planners",
-    "antdrive_tables",
+    "antdrive_site",
 ]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 exclude_patterns = [
@@ -71,7 +63,7 @@ toc_object_entries_show_parents = "hide"
 nitpick_ignore_regex = [
     ("py:.*", r"(numpy|np|numpy\.typing|npt)\.[\w.]+"),
     ("py:.*", r"(matplotlib|pyarrow|pandas|pydantic|hypothesis|typer|distributed|dask)(\.[\w.]+)?"),
-    ("py:.*", r"Path|Figure|SearchStrategy|CampaignSummary|Ants|Ranking"),
+    ("py:.*", r"(antdrive\.views\.pages\.summary\.)?(Path|Figure|SearchStrategy|CampaignSummary|Ants|Ranking)"),
     ("py:.*", r"(typing|collections|pathlib|enum|os|types|abc|contextlib|dataclasses)\.[\w.]+"),
     # Arrays as compiled code takes them; no part of what is offered.
     ("py:class", r"antdrive\.[\w.]+\._kernels_\w+\.\w+"),
@@ -90,7 +82,7 @@ sphinx_gallery_conf = {
     "parallel": True,  # as many as --jobs says
     "gallery_dirs": "_gallery",
     "filename_pattern": r"\.py$",
-    "image_scrapers": ("antdrive_films.scrape",),
+    "image_scrapers": ("antdrive_site.scrape",),
     "reset_modules": (),
     "abort_on_example_error": True,
     "download_all_examples": False,

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, PlainValidator, WithJsonSchema
 
 from antdrive.base.checks import show
-from antdrive.worlds.files.world_file import DiscEntry
+from antdrive.worlds.world import Disc
 
 MAX_SEEDS = 100_000  # of one range
 RULES = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
@@ -78,9 +78,7 @@ class SettingsEntry(BaseModel):
 
     controller: dict[str, float] = Field({}, description="settings of the controller, such as {lookahead_time: 0.5}")
     cell: float | None = Field(None, gt=0, description="grid resolution [m]; by default the world's")
-    unseen: list[DiscEntry] = Field(
-        [], description="cylinders {x, y, radius} that neither planner nor controller knows of"
-    )
+    unseen: list[Disc] = Field([], description="cylinders {x, y, radius} that neither planner nor controller knows of")
     map: str = Field(
         "given", description="what the robot knows of the world: given, or none but for what its lidar sees"
     )

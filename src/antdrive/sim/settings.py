@@ -9,12 +9,12 @@ from typing import Any, TypeAlias, get_args
 
 from antdrive.base.checks import suggest
 from antdrive.base.errors import FieldError, InputError
+from antdrive.base.reuse import reused
 from antdrive.robots import Avoidance, PurePursuit
 from antdrive.sim.driving.perception import Perception, PerceptionKind
 from antdrive.sim.driving.replanning import ReplanPolicy
 from antdrive.sim.entries import SettingsEntry
-from antdrive.worlds import Disc, Task, generate
-from antdrive.worlds.reuse import reused
+from antdrive.worlds import Task, generate
 
 #: The error for a key, such as "planner.ants", and what is wrong with its value: file, line, key and problem.
 Fail: TypeAlias = Callable[[str, str], InputError]
@@ -37,7 +37,7 @@ def scenario_fields(entry: SettingsEntry, fail: Fail) -> dict[str, Any]:
         "perception": _perception(fail, entry.sees),
         "avoidance": avoiding,
         "replanning": _replanning(fail, entry),
-        "unseen": tuple(Disc(disc.x, disc.y, disc.radius, disc.height) for disc in entry.unseen),
+        "unseen": tuple(entry.unseen),
         "time_limit": entry.time_limit,
         "physics_hz": entry.physics_hz,
         "control_hz": entry.control_hz,
