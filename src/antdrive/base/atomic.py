@@ -19,11 +19,6 @@ LOCK = ".antdrive.lock"
 LONGEST_STEM = 100  # characters of a file's name that its temporary file repeats
 
 
-def file_name(text: str) -> str:
-    """Return a text as the name of a file: other characters than letters, digits, `-`, `_` and `.` become `_`."""
-    return "".join(c if c.isalnum() or c in "-_." else "_" for c in text)
-
-
 @contextmanager
 def written_whole(path: str | Path) -> Iterator[Path]:
     """A context with a temporary path, which replaces `path` when the block succeeds and is removed when it fails.

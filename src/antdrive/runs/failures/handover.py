@@ -7,7 +7,6 @@ import functools
 import itertools
 import math
 import os
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,17 +14,18 @@ from typing import Any
 
 import yaml
 
-from antdrive.base.atomic import file_name, written_whole
+from antdrive.base.atomic import written_whole
 from antdrive.base.errors import InputError
+from antdrive.base.files import file_name
 from antdrive.planners import PlannerError, list_planners, load_planner
 from antdrive.robots import Avoidance, PurePursuit, RobotSpec, list_robots, load_robot
 from antdrive.robots.files import footprint_to_dict
 from antdrive.runs.pool import Pool
 from antdrive.runs.suites.demands import Bound
 from antdrive.runs.suites.names import is_own_entry
+from antdrive.runs.suites.nearest import cause_of_contact, touched_first
 from antdrive.runs.suites.scenarios import scenario_of
 from antdrive.runs.suites.suite import load_suite
-from antdrive.runs.suites.touching import cause_of_contact, touched_first
 from antdrive.sim.driving.perception import usual_perception
 from antdrive.sim.driving.replanning import ReplanPolicy
 from antdrive.sim.log.outcome import Outcome
@@ -168,7 +168,7 @@ def _fingerprint_from(suite: Path, index: int) -> str:
 
 def scenario_name(text: str) -> str:
     """A name that a suite takes for a scenario."""
-    return re.sub(r"[^A-Za-z0-9_.-]", "_", text).lstrip("_.-")[:90] or "failure"
+    return file_name(text, ascii_only=True).lstrip("_.-")[:90] or "failure"
 
 
 def run_elsewhere(scenarios: Sequence[Scenario]) -> list[str]:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from antdrive.base.atomic import file_name
 from antdrive.base.errors import FieldError, InputError
+from antdrive.base.files import file_name
 from antdrive.cli import options
 from antdrive.cli.console import bar, print_files, print_json, print_line
 from antdrive.cli.exits import SUCCEEDED
