@@ -95,18 +95,13 @@ class MapFile(BaseModel):
 
 @dataclass(frozen=True, eq=False)
 class ServedMap:
-    """A map as map_server would serve it.
+    """A map as map_server would serve it."""
 
-    Attributes:
-        cells: the free cells; unknown cells are free only where that was asked for
-        unknown: how many cells are neither free nor occupied
-        ends: start and goal, where antdrive wrote the map
-        frame: where the frame of the cells lies in that of the map; not zero for a turned map, whose cells begin at (0, 0)
-    """
-
-    cells: CellMap
-    unknown: int
-    ends: KeptEnds | None
+    cells: CellMap  # the free cells; unknown cells are free only where that was asked for
+    unknown: int  # how many cells are neither free nor occupied
+    ends: KeptEnds | None  # start and goal, where antdrive wrote the map
+    # where the frame of the cells lies in that of the map; not zero for a turned map, whose cells begin at (0,
+    # 0)
     frame: Pose = (0.0, 0.0, 0.0)
 
 
