@@ -16,7 +16,7 @@ from antdrive.sim.driving.blocking import close_route, covered_discs
 from antdrive.sim.driving.replanning import OBSTRUCTED, TRAFFIC, WAITED, ReplanPolicy
 from antdrive.sim.driving.survey import Survey
 from antdrive.sim.driving.traffic import TrackedTraffic, Zone
-from antdrive.sim.driving.watching import TrackedPredictor
+from antdrive.sim.driving.watching import Tracked
 from antdrive.worlds import Disc, Grid, World, rasterise
 
 COARSE = 0.25  # side of the cells on which a route is held against the ground that movers roam [m]
@@ -31,7 +31,7 @@ class MoversAhead:
 
     def __init__(
         self,
-        predictor: TrackedPredictor,
+        predictor: Tracked,
         survey: Survey,
         policy: ReplanPolicy,
         robot: RobotSpec,

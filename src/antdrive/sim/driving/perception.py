@@ -47,8 +47,8 @@ def usual_perception(map: str, movers: bool) -> Perception:
     return Perception(kind="lidar") if map == "none" and movers else Perception()
 
 
-class Predictor:
-    """Predicts the movers of one drive from what the robot perceives of them.
+class Told:
+    """Movers by ground truth: positions, velocities or motions, within range.
 
     Attributes:
         trajectories: the movers' true motions

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from antdrive.base.files import file_name
 from antdrive.sim.log.rollout import Rollout
 from antdrive.views.film.video import film
 
@@ -30,7 +31,7 @@ def film_failures(
     for k, row in enumerate(failed):
         log = Path(logs) / row["rollout"]
         name = f"{row['world']}-{row['planner']}-{row['robot']}-{row['seed']}-{row['key'][:8]}.mp4"
-        path = Path(folder) / "".join(c if c.isalnum() or c in "-_." else "_" for c in name)
+        path = Path(folder) / file_name(name)
         kept = log.exists()
         if kept and (not path.exists() or path.stat().st_mtime < log.stat().st_mtime):
             cause = ": ".join(text for text in (row["outcome"], row["reason"]) if text)
