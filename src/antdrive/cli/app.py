@@ -45,6 +45,7 @@ from antdrive.cli.commands.worlds.list import list_worlds
 from antdrive.cli.commands.worlds.show import show_world
 from antdrive.cli.console import print_error, print_line
 from antdrive.cli.exits import BROKEN_PIPE, FAULT, INTERRUPTED, SUCCEEDED, TERMINATED, WRONG_INPUT
+from antdrive.sim.settings import GROUPS
 
 #: The commands by name, in the order in which `antdrive --help` lists them. Each returns its exit code.
 COMMANDS: Mapping[str, Callable[..., int]] = MappingProxyType(
@@ -177,11 +178,27 @@ def application() -> typer.Typer:
     robots = typer.Typer(help="List, print, show and import robots.", rich_markup_mode=None, cls=_RobotsGroup)
     for group, commands in ((app, COMMANDS), (worlds, WORLDS), (robots, ROBOTS)):
         for name, command in commands.items():
-            group.command(name)(command)
+            group.command(name, cls=_Command)(command)
     app.add_typer(worlds, name="worlds")
     app.add_typer(robots, name="robots")
     app.callback()(_global_options)
     return app
+
+
+class _Command(typer.core.TyperCommand):
+    """A command whose options `--help` lists in panels."""
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        panels: dict[str, list[tuple[str, str]]] = {"Arguments": [], "": []}
+        panels |= {name: [] for name in GROUPS}
+        for one in self.get_params(ctx):
+            panel = "Arguments" if one.param_type_name == "argument" else getattr(one, "rich_help_panel", None) or ""
+            if record := one.get_help_record(ctx):
+                panels[panel].append(record)
+        for name in ("Arguments", *GROUPS, ""):
+            if panels[name]:
+                with formatter.section(name or "Options"):
+                    formatter.write_dl(panels[name])
 
 
 class _RobotsGroup(typer.core.TyperGroup):

@@ -9,10 +9,10 @@ from antdrive.sim.driving.exploring import Exploration
 from antdrive.sim.driving.lookout import Lookout
 from antdrive.sim.driving.movers_ahead import MoversAhead
 from antdrive.sim.driving.perception import Predictor
-from antdrive.sim.driving.replanning import ReplanPolicy
 from antdrive.sim.driving.rescanning import survey_of
 from antdrive.sim.driving.survey import Senses
 from antdrive.sim.driving.watching import TrackedPredictor, Watch
+from antdrive.sim.policy import ReplanPolicy
 from antdrive.sim.scenario import Scenario
 from antdrive.sim.sensing.ground import KnownGround
 from antdrive.worlds import Task, World

@@ -14,8 +14,9 @@ from antdrive.base.plane import polyline_length
 from antdrive.planners import PLANNERS, Planner, Query, agent_for, blaming, capabilities_of, check_step, smooth
 from antdrive.robots import TrackedPath
 from antdrive.sim.driving.blocking import blocked_cells, covered_discs
-from antdrive.sim.driving.replanning import MISSED, Replan, ReplanMonitor, ReplanPolicy
+from antdrive.sim.driving.replanning import MISSED, Replan, ReplanMonitor
 from antdrive.sim.log.record import DECISION
+from antdrive.sim.policy import ReplanPolicy
 from antdrive.worlds import Route, segment_clearance
 
 DECISION_PAUSE = 0.2  # the shortest time between two decisions [s]

@@ -36,10 +36,11 @@ from antdrive.sim.driving.blocking import blocked_cells
 from antdrive.sim.driving.movers_ahead import MoversAhead
 from antdrive.sim.driving.own_map import LOOKED, PATIENCE
 from antdrive.sim.driving.recovery import TRAIL, Look, Recovery
-from antdrive.sim.driving.replanning import STRAYED, Replan, ReplanPolicy
+from antdrive.sim.driving.replanning import STRAYED, Replan
 from antdrive.sim.driving.survey import Survey
 from antdrive.sim.driving.traffic import Zone
 from antdrive.sim.log.scans import scans_logged
+from antdrive.sim.policy import ReplanPolicy
 from antdrive.worlds import Disc, Grid, Route, Task, World, point_clearance, rasterise
 from antdrive.worlds.world import PointWorld
 

@@ -8,7 +8,8 @@ import numpy.typing as npt
 from antdrive.base import Floats, Pose
 from antdrive.robots.lidar import Lidar
 from antdrive.sim.driving.own_map import MAP_CELL
-from antdrive.sim.driving.perception import Perception, Predictor
+from antdrive.sim.driving.perception import Predictor
+from antdrive.sim.policy import Perception
 from antdrive.sim.sensing.ground import Ground, MappedGround
 from antdrive.sim.sensing.mapping import OccupancyMap
 from antdrive.sim.sensing.tracking import MoverTracker, TrackedMovers
