@@ -15,17 +15,18 @@ import math
 import statistics
 import tarfile
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from joblib import Parallel, delayed
 
 from antdrive.planners import Query, load_planner, pull_taut
 from antdrive.planners.anyangle.tangent import shortest
 from antdrive.planners.smoothing._kernels_smooth import encloses
 from antdrive.robots import load_robot
+from antdrive.runs.pool import call_all
 from antdrive.sim import Scenario, run
 from antdrive.sim.log.metrics import measure, tracking_error
 from antdrive.worlds import generate, import_barn, rasterise
@@ -69,10 +70,6 @@ def drive(name: str, task: Any, planner: str, robot: str, **settings: Any) -> Re
     return Result(name, done.outcome.name, done.succeeded, len(log.contacts), measure(log), optimum, near)
 
 
-def all_of(jobs: int, calls: Iterable[Any]) -> list[Result]:
-    return list(Parallel(n_jobs=jobs)(calls))
-
-
 def percentile(values: Sequence[float], share: float) -> str:
     return f"{100 * float(np.percentile(values, share)):.2f} cm" if values else "–"
 
@@ -92,7 +89,7 @@ def barn_tasks(source: Path) -> dict[str, Any]:
         return {path.stem: import_barn(path) for path in files}
 
 
-def barn(jobs: int, source: Path, worlds: int) -> Iterator[str]:
+def barn(jobs: int | None, source: Path, worlds: int) -> Iterator[str]:
     """BARN's worlds, driven by the jackal."""
     tasks = barn_tasks(source)
     rows = []
@@ -102,7 +99,7 @@ def barn(jobs: int, source: Path, worlds: int) -> Iterator[str]:
         ("astar", "clearance", 1.0),
     ):  # fmt: skip
         given = {"smoothing": smoothing, "noise": noise}
-        got = all_of(jobs, (delayed(drive)(name, task, planner, "jackal", **given) for name, task in tasks.items()))
+        got = call_all((partial(drive, name, task, planner, "jackal", **given) for name, task in tasks.items()), jobs)
         driven = [r for r in got if r.metrics]
         ratios = [r.metrics["arrival_s"] / (r.optimum / 2.0) for r in driven if r.succeeded]
         rows.append(
@@ -127,7 +124,7 @@ def barn(jobs: int, source: Path, worlds: int) -> Iterator[str]:
     yield from table(heads, rows)
 
 
-def forests(jobs: int, source: Path, worlds: int) -> Iterator[str]:
+def forests(jobs: int | None, source: Path, worlds: int) -> Iterator[str]:
     """Random worlds, half of them from each generator."""
     rows, wrong = [], []
     kinds = {
@@ -136,7 +133,7 @@ def forests(jobs: int, source: Path, worlds: int) -> Iterator[str]:
     }
     for noise, (kind, tasks), robot in itertools.product((0.0, 1.0), kinds.items(), ("turtlebot", "jackal")):
         given = {"planner": "astar", "robot": robot, "noise": noise}
-        got = all_of(jobs, (delayed(drive)(t.world.name, t, seed=n, **given) for n, t in enumerate(tasks)))
+        got = call_all((partial(drive, t.world.name, t, seed=n, **given) for n, t in enumerate(tasks)), jobs)
         paths = [r for r in got if r.outcome != "NO_PATH"]
         good = sum(r.succeeded for r in paths)
         wrong += [f"{r.name}, {robot}, noise {noise:g}: {r.outcome.lower()}" for r in paths if not r.succeeded]
@@ -169,7 +166,7 @@ def forests(jobs: int, source: Path, worlds: int) -> Iterator[str]:
     yield ""
 
 
-def smooth(jobs: int, source: Path, worlds: int) -> Iterator[str]:
+def smooth(jobs: int | None, source: Path, worlds: int) -> Iterator[str]:
     """Taut routes compared with the exact shortest paths between the same ends."""
     gaps: dict[str, list[float]] = {"as by the optimum": [], "on other sides": []}
     for kind, n in itertools.product(("forest", "barn"), range(worlds // 2)):
@@ -200,7 +197,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("tables", nargs="*", help="tables to print; default: all")
     parser.add_argument("--worlds", type=int, default=1000, help="number of random worlds")
-    parser.add_argument("--jobs", type=int, default=-1, help="processes; -1: one per core")
+    parser.add_argument("--jobs", type=int, help="processes; by default one per core")
     parser.add_argument("--barn", type=Path, default=BARN, help="folder or archive of BARN's world_*.world files")
     arguments = parser.parse_args()
     makers = {f.__name__: f for f in (barn, forests, smooth)}

@@ -16,14 +16,15 @@ import itertools
 import math
 import statistics
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from joblib import Parallel, delayed
 
 from antdrive.planners import Query, load_planner, plan_in_time
 from antdrive.robots import load_robot
+from antdrive.runs.pool import call_all
 from antdrive.sim import Outcome, Perception, ReplanPolicy, Rollout, Scenario, run
 from antdrive.sim.log.sights import followed_rows
 from antdrive.worlds import (
@@ -167,10 +168,10 @@ def dynabarn(jobs: int, source: Path, quick: bool, only: str) -> Iterator[str]:
         if only not in policy:
             continue
         calls = (
-            delayed(drive)(name, task, **{"planner": "dstar-lite", "robot": "jackal", **settings})
+            partial(drive, name, task, **{"planner": "dstar-lite", "robot": "jackal", **settings})
             for name, task in cases
         )
-        got = list(Parallel(n_jobs=jobs)(calls))
+        got = call_all(calls, jobs)
         for kind, numbers in CLASSES.items():
             some = [r for r in got if int(r.name.split("-")[1].split("+")[0]) in numbers]
             rows.append([policy if kind == "easy" else "", kind, *columns(some)])
@@ -228,7 +229,7 @@ def random(jobs: int, source: Path, quick: bool, only: str) -> Iterator[str]:
     """Random worlds, driven by the turtlebot."""
     seeds, rows, wrong = range(20 if quick else 500), [], []
     for policy in ("neither", "avoid and replan"):
-        got = list(Parallel(n_jobs=jobs)(delayed(random_drive)(seed, POLICIES[policy]) for seed in seeds))
+        got = call_all((partial(random_drive, seed, POLICIES[policy]) for seed in seeds), jobs)
         proved = [r for r in got if r.proved]
         rows.append([policy, f"{len(proved)} with a proved path", *columns(proved)])
         rows.append(["", f"{len(got) - len(proved)} without", *columns([r for r in got if not r.proved])])
@@ -249,9 +250,9 @@ def hasan(jobs: int, source: Path, quick: bool, only: str) -> Iterator[str]:
     for planner in ("mmas-dstar", "dstar"):
         for name in names:
             calls = (
-                delayed(drive)(name, load_task(name), planner, "turtlebot", seed=k) for k in range(1 if quick else 5)
+                partial(drive, name, load_task(name), planner, "turtlebot", seed=k) for k in range(1 if quick else 5)
             )
-            rows.append([f"`{planner}`", name, *columns(list(Parallel(n_jobs=jobs)(calls)))])
+            rows.append([f"`{planner}`", name, *columns(call_all(calls, jobs))])
     yield from table(["planner", "case", *HEADS], rows)
 
 

@@ -22,13 +22,12 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from joblib import Parallel, delayed
-
 from antdrive.runs.failures.failure import failure_of
 from antdrive.runs.failures.handover import fingerprint_of
 from antdrive.runs.failures.hunt import Finding, Hunt, find_failures
 from antdrive.runs.failures.search import METHODS
 from antdrive.runs.failures.space import feasible
+from antdrive.runs.pool import Pool
 from antdrive.sim import Scenario, run
 from benchmarks.planners import table
 from benchmarks.resuming import append_line, current_commit, read_lines
@@ -81,10 +80,11 @@ class Search:
         return self.setup, self.method, self.seed, self.budget, self.obstacles
 
 
-def search(setup: str, method: str, seed: int, budget: int, obstacles: int) -> tuple[tuple[Any, ...], Hunt]:
+def search(key: tuple[Any, ...]) -> tuple[tuple[Any, ...], Hunt]:
     """The search of a key of `Search`, with the key."""
+    setup, method, seed, budget, obstacles = key
     hunt = find_failures(SETUPS[setup], budget=budget, seed=seed, method=method, obstacles=obstacles)
-    return (setup, method, seed, budget, obstacles), hunt
+    return key, hunt
 
 
 def as_line(asked: tuple[Any, ...], hunt: Hunt) -> Search:
@@ -106,15 +106,12 @@ def searched(arguments: argparse.Namespace, asked: Sequence[tuple[Any, ...]]) ->
     """The searches that are asked for: those of the file of results, and all others now, each a line as soon as it is over."""
     known = {one.key: one for one in (Search(**line) for line in read_lines(arguments.results))}
     missing = [key for key in asked if key not in known]
-    processes = max(2, arguments.jobs)  # one alone would be this process
-    made = Parallel(processes, return_as="generator_unordered", pre_dispatch=arguments.jobs, batch_size=1)(
-        delayed(search)(*key) for key in missing
-    )
-    for number, (key, hunt) in enumerate(made):
-        known[key] = as_line(key, hunt)
-        append_line(arguments.results, dataclasses.asdict(known[key]))
-        found = f"{known[key].driven} of {hunt.runs} driven, {len(hunt.findings)} failures"
-        print(f"{number + 1}/{len(missing)}", *key, found, file=sys.stderr, flush=True)
+    with Pool(arguments.jobs) as pool:
+        for number, (key, hunt) in enumerate(pool.results(search, missing, in_order=False)):
+            known[key] = as_line(key, hunt)
+            append_line(arguments.results, dataclasses.asdict(known[key]))
+            found = f"{known[key].driven} of {hunt.runs} driven, {len(hunt.findings)} failures"
+            print(f"{number + 1}/{len(missing)}", *key, found, file=sys.stderr, flush=True)
     return [known[key] for key in asked]
 
 

@@ -1,7 +1,6 @@
 """Measure how many frames per second a film is rendered and encoded with: `python -m benchmarks.film`.
 
-For comparison, the table shows the rate at which the same renderer draws full frames, without painted ground and without a
-file. With `--memory`, measure the peak memory of films of ten seconds and of five minutes instead, each in its own process;
+With `--memory`, measure the peak memory of films of ten seconds and of five minutes instead, each in its own process;
 with `--sight`, what it costs to show what a robot without a map has seen.
 """
 
@@ -19,45 +18,16 @@ from pathlib import Path
 import numpy as np
 
 from antdrive.sim.log.rollout import Rollout
-from antdrive.sim.physics.bullet import client
 from antdrive.sim.pipeline import run
 from antdrive.sim.scenario import Scenario
-from antdrive.views.film.camera import camera_for
-from antdrive.views.film.compositor import drawn_height, merged_by_colour, still_meshes
-from antdrive.views.film.meshes import robot_parts
 from antdrive.views.film.parallel import process_count
 from antdrive.views.film.shot import Shot
-from antdrive.views.film.tiny_renderer import add_mesh, render
 from antdrive.views.film.video import film
-from antdrive.views.scene import Scene
 
 ROUNDS = 3
 SIZES = ((640, 480), (1280, 720))
 FRAMES = 40  # of each camera and round, evenly over a drive
 SECONDS = 10.0  # length of the filmed part of the run [s]
-
-
-def bare_fps(rollout: Rollout, camera: str, size: tuple[int, int], *, fine: int = 1) -> float:
-    """The rate at which PyBullet's renderer alone draws full frames [1/s]."""
-    scene = Scene.of(rollout)
-    tall = np.minimum(scene.obstacles[:, 3], drawn_height(scene))
-    low, high = scene.region(np.vstack([rollout.pose[:, :2], rollout.route]))
-    view = camera_for(camera, low, high, float(tall.max()), size)
-    if camera == "follow":
-        reach = max(1.2, 7 * scene.robot.footprint.radius)
-        at = rollout.pose[len(rollout.pose) // 2]
-        view = camera_for(camera, (-reach, -0.6 * reach), (reach, 0.6 * reach), float(tall.max()), size).moved(*at[:2])
-    with client() as number:
-        for mesh, colour in merged_by_colour(still_meshes(scene, tall)):
-            add_mesh(number, mesh, colour)
-        for part in robot_parts(scene.robot):
-            add_mesh(number, part.mesh, part.colour)
-        best = np.inf
-        for _ in range(6):
-            started = time.perf_counter()
-            render(number, view, None, fine, (0.0, 0.0, 1.0))
-            best = min(best, time.perf_counter() - started)
-    return float(1 / best)
 
 
 def cut(rollout: Rollout, seconds: float) -> Rollout:
@@ -75,7 +45,7 @@ def cut(rollout: Rollout, seconds: float) -> Rollout:
 def speed(rollout: Rollout) -> None:
     count = len(rollout.record.world.obstacles)
     print(f"{count} cylinders; best of {ROUNDS}; a moving camera renders in {process_count()} processes")
-    print("camera    size        film fps   on one core   full frames, bare   2x2 finer, bare")
+    print("camera    size        film fps   on one core")
     with tempfile.TemporaryDirectory() as folder:
         for camera in ("top", "oblique", "follow"):
             for size in SIZES:
@@ -85,10 +55,7 @@ def speed(rollout: Rollout) -> None:
                         film(part, Path(folder) / "a.mp4", camera=camera, size=size, jobs=jobs) for _ in range(ROUNDS)
                     ]
                     rates.append(max(info.frames / info.wall_s for info in runs))
-                bare = [bare_fps(rollout, camera, size, fine=fine) for fine in (1, 2)]
-                print(
-                    f"{camera:8}  {size[0]:4}x{size[1]:<4} {rates[0]:9.0f} {rates[-1]:13.0f} {bare[0]:19.1f} {bare[1]:17.1f}"
-                )
+                print(f"{camera:8}  {size[0]:4}x{size[1]:<4} {rates[0]:9.0f} {rates[-1]:13.0f}")
 
 
 def memory(path: Path) -> None:
@@ -126,11 +93,11 @@ def sight() -> None:
         costs = {True: [], False: []}
         for _ in range(ROUNDS):
             for seen in costs:
-                with Shot(log if seen else plain, camera=camera, size=SIZES[-1]) as shot:
-                    for at in moments:
-                        started = time.process_time()
-                        shot.frame(float(at))
-                        costs[seen].append(1000 * (time.process_time() - started))
+                shot = Shot(log if seen else plain, camera=camera, size=SIZES[-1])
+                for at in moments:
+                    started = time.process_time()
+                    shot.frame(float(at))
+                    costs[seen].append(1000 * (time.process_time() - started))
         print(f"| `{camera}` | {np.median(costs[True]):.0f} ms | {np.median(costs[False]):.0f} ms |")
 
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import collections
+import functools
 import itertools
 import json
 import math
@@ -23,10 +24,10 @@ from typing import Any
 
 import numpy as np
 import yaml
-from joblib import Parallel, delayed
 from rich.progress import Progress
 
 from antdrive.planners import PLANNERS
+from antdrive.runs.pool import Pool, processes_for
 from antdrive.sim import Certificate, Rollout, Scenario, run
 from antdrive.worlds import Task, generate
 from antdrive.worlds.files.world_file import save_task
@@ -237,12 +238,13 @@ def main() -> None:
     todo = [n for n in wanted if n not in results]
     with Progress() as bar, path.open("a") as file:
         task = bar.add_task("drives", total=len(wanted), completed=len(wanted) - len(todo))
-        calls = (delayed(drive)(n, given.seed, given.margins) for n in todo)
-        for r in Parallel(n_jobs=given.jobs, return_as="generator_unordered")(calls):
-            results[r["n"]] = r
-            file.write(json.dumps(r) + "\n")
-            file.flush()
-            bar.advance(task)
+        made = functools.partial(drive, seed=given.seed, margins=given.margins)
+        with Pool(processes_for(given.jobs)) as pool:
+            for r in pool.results(made, todo, in_order=False):
+                results[r["n"]] = r
+                file.write(json.dumps(r) + "\n")
+                file.flush()
+                bar.advance(task)
     chosen = [results[n] for n in wanted]
     for keys in (("kind", "robot", "noise", "smoothing"), ("planner",)):
         print("\n".join(counted(keys, chosen)))

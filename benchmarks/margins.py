@@ -10,15 +10,16 @@ import argparse
 import itertools
 import math
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from joblib import Parallel, delayed
 
 from antdrive.planners import load_planner
 from antdrive.robots import load_robot
 from antdrive.runs.margins.choice import choose_margin, with_chosen_margin
 from antdrive.runs.margins.prediction import Calibration
+from antdrive.runs.pool import call_all
 from antdrive.sim import Outcome, Scenario, run
 from antdrive.worlds import generate
 from benchmarks.planners import table
@@ -82,7 +83,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--worlds", type=int, default=60, help="number of random worlds for each row")
     parser.add_argument("--robots", default="turtlebot,jackal", help="robots, separated by commas")
-    parser.add_argument("--jobs", type=int, default=-1, help="processes; -1: one per core")
+    parser.add_argument("--jobs", type=int, help="processes; by default one per core")
     parser.add_argument("--fixed", type=float, help="drive with this margin instead [m]; predictions are those of auto")
     arguments = parser.parse_args()
     rows, wrong = [], []
@@ -91,8 +92,8 @@ def main() -> None:
     ):
         calibration = choose_margin(scenario("forest", FIRST_SEED, robot, noise, smoothing).conditions)
         worlds = [(kind, FIRST_SEED + n) for n in range(arguments.worlds // 2) for kind in ("forest", "barn")]
-        calls = [delayed(drive)(*world, robot, noise, smoothing, arguments.fixed) for world in worlds]
-        drives = list(Parallel(arguments.jobs)(calls))
+        calls = [partial(drive, *world, robot, noise, smoothing, arguments.fixed) for world in worlds]
+        drives = call_all(calls, arguments.jobs)
         rows.append([robot, f"{noise:g}", smoothing, *row(calibration, drives)])
         print("|", " | ".join(rows[-1]), "|", flush=True)
         wrong += [

@@ -23,16 +23,8 @@ extensions = [
     "sphinx_copybutton",
     "sphinx_design",
     "sphinx_gallery.gen_gallery",
-    "sphinxcontrib.typer",
     "antdrive_api",
-    "antdrive_commands",
-    "antdrive_films",
-    "antdrive_links",
-    "antdrive_marks",
-    "antdrive_math",
-    "antdrive_measured",
-    "antdrive_planners",
-    "antdrive_tables",
+    "antdrive_site",
 ]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 exclude_patterns = [
@@ -80,7 +72,7 @@ nitpick_ignore_regex = [
     # Contents of files, whose keys the pages on formats describe.
     (
         "py:class",
-        r"antdrive\.sim\.(campaigns\.campaign|entries|regression\.suite)\.(\w+Entry|CampaignFile|RandomTasks)",
+        r"antdrive\.(runs\.campaigns\.campaign|sim\.entries|runs\.suites\.suite)\.(\w+Entry|CampaignFile|RandomTasks)",
     ),
 ]
 
@@ -90,7 +82,7 @@ sphinx_gallery_conf = {
     "parallel": True,  # as many as --jobs says
     "gallery_dirs": "_gallery",
     "filename_pattern": r"\.py$",
-    "image_scrapers": ("antdrive_films.scrape",),
+    "image_scrapers": ("antdrive_site.scrape",),
     "reset_modules": (),
     "abort_on_example_error": True,
     "download_all_examples": False,

@@ -10,6 +10,7 @@ from antdrive.planners import load_planner
 from antdrive.robots import RobotSpec, load_robot
 from antdrive.sim import Run, Scenario, run
 from antdrive.worlds import Disc, Task, World
+from tests.made_up_drive import made_up_drive as made_up_drive
 
 hypothesis.settings.register_profile(
     "repeatable", derandomize=True, deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow]

@@ -26,7 +26,7 @@ from antdrive.sim.scenario import Scenario
 from antdrive.views.film.compare import SplitScreen
 from antdrive.views.film.prelude import planning_frames
 from antdrive.views.film.video import STILLS, still
-from antdrive.views.report.report import write_report
+from antdrive.views.pages.report import write_report
 from antdrive.worlds.world import Disc
 
 PICTURES = Path(__file__).resolve().parents[1] / "docs" / "pictures"
@@ -78,9 +78,9 @@ def pheromone(path: Path) -> None:
 def comparison(path: Path) -> None:
     """Four planners in the same forest."""
     logs = [drive("forest", name, smoothing="none") for name in ("astar", "aco-han", "ants", "tangent")]
-    with SplitScreen(logs, "oblique", SIZE) as screen:
-        for at in (6.0, 12.0):
-            picture = screen.frame(at)
+    screen = SplitScreen(logs, "oblique", SIZE)
+    for at in (6.0, 12.0):
+        picture = screen.frame(at)
     saved(picture, path)
 
 

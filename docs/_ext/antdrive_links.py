@@ -1,18 +1,10 @@
-"""Links of Markdown pages to files of the repository that are outside docs/.
-
-Where a repository is shown on the web, such a link shows the file. Here it leads to the page that includes the file, or
-else to a copy of it.
-"""
+"""Markdown pages as the site reads them: links to files outside docs/ stay in the site, comments on blocks are visible."""
 
 from __future__ import annotations
 
 import os
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from sphinx.application import Sphinx
 
 ROOT = Path(__file__).resolve().parents[2]
 #: Files of the repository that a page includes.
@@ -25,11 +17,10 @@ PAGES = {
     "examples/plugin_planner/README.md": "how-to/ship-a-planner",
     "examples/regression_suite/README.md": "how-to/regression-example",
 }
-LINK = re.compile(r"(\]\()([^)#\s:]+)(#[^)\s]*)?(\))")
 
 
-def adapt(text: str, here: Path, docs: Path) -> str:
-    """A page's text with its links to files outside `docs` made links within the site.
+def adapted(text: str, here: Path, docs: Path) -> str:
+    """A page's text with links to files outside docs/ made links within the site, and with its comments on blocks visible.
 
     Args:
         text: the page, in Markdown
@@ -37,37 +28,17 @@ def adapt(text: str, here: Path, docs: Path) -> str:
         docs: the folder that the page is in, to which its new links are relative
     """
 
-    def changed(match: re.Match[str]) -> str:
-        target = Path(os.path.normpath(here.parent / match[2]))
-        anchor = match[3] or ""
+    def link(match: re.Match[str]) -> str:
+        target = Path(os.path.normpath(here.parent / match[1]))
         if not target.exists():
             return match[0]
-        inside = target.relative_to(ROOT).as_posix()
-        if inside in PAGES:
-            return f"{match[1]}{os.path.relpath(ROOT / 'docs' / PAGES[inside], docs)}.md{anchor}{match[4]}"
-        if target.is_dir():
-            target = target / "README.md"
-        return f"{match[1]}{os.path.relpath(target, docs)}{anchor}{match[4]}"
+        page = PAGES.get(os.path.relpath(target, ROOT))
+        target = ROOT / "docs" / f"{page}.md" if page else target / "README.md" if target.is_dir() else target
+        return f"]({os.path.relpath(target, docs)}{match[2] or ''})"
 
-    return LINK.sub(changed, text)
-
-
-def page_read(app: Sphinx, docname: str, source: list[str]) -> None:
-    """Adapt a page."""
-    path = Path(app.env.doc2path(docname))
-    if path.suffix == ".md":
-        source[0] = adapt(source[0], path, path.parent)
-
-
-def include_read(app: Sphinx, path: Path, stem: str, source: list[str]) -> None:
-    """Adapt a file that a page includes. MyST gives only the last part of the page's name."""
-    file = (Path(app.srcdir) / path).resolve()
-    if file.suffix == ".md":
-        source[0] = adapt(source[0], file, Path(app.env.doc2path(app.env.docname)).parent)
-
-
-def setup(app: Sphinx) -> dict[str, Any]:
-    """Adapt pages when they are read."""
-    app.connect("source-read", page_read)
-    app.connect("include-read", include_read)
-    return {"parallel_read_safe": True, "parallel_write_safe": True}
+    text = re.sub(r"\]\(([^)#\s:]+)(#[^)\s]*)?\)", link, text)
+    text = re.sub(
+        r"^<!-- file: (.+?) -->\n(```+)(\w+)\n", r"\2{code-block} \3\n:caption: \1\n\n", text, flags=re.MULTILINE
+    )
+    said = r"{.antdrive-not-run}\nThe build of this site does not run these lines: \1.\n\n"
+    return re.sub(r"^<!-- not run: (.+?) -->\n", said, text, flags=re.MULTILINE)

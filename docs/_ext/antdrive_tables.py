@@ -1,68 +1,20 @@
-"""Tables that the code knows: keys of files from their schemas, exit codes, planners and worlds."""
+"""What the code knows, as lines of reST: keys of files, commands, planners, worlds, exit codes, logs, metrics.
+
+Nothing here needs Sphinx; `antdrive_site` shows it where a page says `.. known:: NAME`.
+"""
 
 from __future__ import annotations
 
-import ast
+import dataclasses
 import inspect
 import json
 import re
-from collections.abc import Callable, Iterable, Mapping
-from typing import Any, ClassVar
-
-from antdrive_sources import note_sources
-from docutils import nodes
-from docutils.parsers.rst import Directive
-from docutils.statemachine import StringList
-from sphinx.application import Sphinx
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any
 
 Row = tuple[str, ...]
-
-
-def kind_of(schema: Mapping[str, Any]) -> str:
-    """What a value may be, in words."""
-    if "$ref" in schema:
-        return schema["$ref"].rpartition("/")[2].removesuffix("Entry").lower()
-    if "const" in schema:
-        return f"``{json.dumps(schema['const'])}``"
-    if "enum" in schema:
-        return " or ".join(f"``{value}``" for value in schema["enum"])
-    if "anyOf" in schema:
-        kinds = [kind_of(one) for one in schema["anyOf"] if one.get("type") != "null"]
-        return ", or ".join(dict.fromkeys(kinds))
-    kind = schema.get("type", "anything")
-    if kind == "array":
-        few, most = schema.get("minItems"), schema.get("maxItems")
-        count = f"{few} × " if few == most and few else ""
-        return f"list of {count}{kind_of(schema.get('items', {}))}"
-    if kind == "object":
-        return "mapping"
-    words = {"integer": "whole number", "string": "text", "boolean": "true or false"}
-    return words.get(kind, kind) + limits_of(schema)
-
-
-def limits_of(schema: Mapping[str, Any]) -> str:
-    """The limits of a number or the form of a text, in brackets; empty without any."""
-    signs = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusiveMaximum": "<"}
-    found = [f"{sign} {schema[key]:g}" for key, sign in signs.items() if key in schema and abs(schema[key]) < 1e6]
-    if "pattern" in schema:
-        found.append(f"like ``{schema['pattern']}``")
-    return f" ({', '.join(found)})" if found else ""
-
-
-def rows_of(schema: Mapping[str, Any]) -> Iterable[Row]:
-    """Key, kind, default and meaning of each key of an object in a schema."""
-    required = schema.get("required", [])
-    for key, value in schema["properties"].items():
-        default = (
-            "required"
-            if key in required
-            else ""
-            if value.get("default") is None
-            else f"``{json.dumps(value['default'])}``"
-        )
-        if "default" not in value and key not in required:
-            default = ""
-        yield f"``{key}``", kind_of(value), default, told(value.get("description", ""))
+TYPES = {"integer": "whole number", "string": "text", "boolean": "true or false", "object": "mapping"}
+SIGNS = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusiveMaximum": "<"}
 
 
 def told(text: str) -> str:
@@ -71,71 +23,106 @@ def told(text: str) -> str:
     return re.sub(r"^(\w+)([.)]) ", r"\1\\\2 ", words)
 
 
-def schema_of(kind: str) -> dict[str, Any]:
-    """The JSON Schema that `antdrive schema KIND` prints."""
+def table(heads: str, rows: Iterable[Row], widths: str = "") -> list[str]:
+    """A table with the heads that a text lists; no lines if there are no rows."""
+    lines = [".. list-table::", "   :header-rows: 1", *([f"   :widths: {widths}"] if widths else []), ""]
+    cells = [tuple(heads.split(", ")), *rows]
+    for row in cells:
+        lines += [f"   {'*' if i == 0 else ' '} - {cell}" for i, cell in enumerate(row)]
+    return [*lines, ""] if len(cells) > 1 else []
+
+
+def kind_of(schema: Mapping[str, Any]) -> str:
+    """What a value may be, in words."""
+    if "$ref" in schema:
+        return str(schema["$ref"]).rpartition("/")[2].removesuffix("Entry").lower()
+    if "const" in schema:
+        return f"``{json.dumps(schema['const'])}``"
+    if "enum" in schema:
+        return " or ".join(f"``{value}``" for value in schema["enum"])
+    if "anyOf" in schema:
+        return ", or ".join(dict.fromkeys(kind_of(one) for one in schema["anyOf"] if one.get("type") != "null"))
+    kind = schema.get("type", "anything")
+    if kind == "array":
+        few = schema.get("minItems")
+        count = f"{few} × " if few and few == schema.get("maxItems") else ""
+        return f"list of {count}{kind_of(schema.get('items', {}))}"
+    limits = [f"{sign} {schema[key]:g}" for key, sign in SIGNS.items() if abs(schema.get(key, 1e6)) < 1e6]
+    limits += [f"like ``{schema['pattern']}``"] if "pattern" in schema else []
+    return TYPES.get(kind, kind) + (f" ({', '.join(limits)})" if limits else "")
+
+
+def keys_of(schema: Mapping[str, Any]) -> list[str]:
+    """A table of the keys of an object in a schema."""
+
+    def row(key: str, value: Mapping[str, Any]) -> Row:
+        default = "" if value.get("default") is None else f"``{json.dumps(value['default'])}``"
+        required = key in schema.get("required", [])
+        return f"``{key}``", kind_of(value), "required" if required else default, told(value.get("description", ""))
+
+    rows = [row(key, value) for key, value in schema["properties"].items()]
+    return [told(schema.get("description", "")), "", *table("key, value, default, meaning", rows)]
+
+
+def keys(kind: str) -> list[str]:
+    """The keys of a kind of file, and those of each part that has keys of its own, named or written in place."""
     from antdrive.robots import robot_schema
     from antdrive.runs.campaigns import campaign_schema
     from antdrive.runs.suites import suite_schema
     from antdrive.worlds import task_schema
 
-    known: dict[str, Callable[[], dict[str, Any]]] = {
-        "world": task_schema, "robot": robot_schema, "suite": suite_schema, "campaign": campaign_schema,
-    }  # fmt: skip
-    return known[kind]()
-
-
-def parts_of(schema: Mapping[str, Any]) -> Iterable[tuple[str, Mapping[str, Any]]]:
-    """The objects within a schema that have keys of their own: those under `$defs`, and those written in place."""
-    for name, part in schema.get("$defs", {}).items():
-        yield name.removesuffix("Entry"), part
+    known = {"world": task_schema, "robot": robot_schema, "suite": suite_schema, "campaign": campaign_schema}
+    schema: dict[str, Any] = known[kind]()
+    lines = keys_of(schema)
+    parts = [(name.removesuffix("Entry"), part) for name, part in schema.get("$defs", {}).items()]
     for key, value in schema["properties"].items():
-        for part in [value, value.get("items", {}), *value.get("anyOf", [])]:
-            if part.get("type") == "object" and part.get("properties"):
-                yield key, part
+        parts += [(key, part) for part in (value, value.get("items", {}), *value.get("anyOf", []))]
+    for name, part in parts:
+        if part.get("type") == "object" and part.get("properties"):
+            lines += [f".. rubric:: {name.lower()}", "", *keys_of(part)]
+    return lines
 
 
-def table(heads: Row, rows: Iterable[Row], widths: tuple[int, ...] = ()) -> list[str]:
-    """A table as reST."""
-    widened = [f"   :widths: {' '.join(map(str, widths))}"] if widths else []
-    lines = [".. list-table::", "   :header-rows: 1", *widened, ""]
-    for row in (heads, *rows):
-        lines += [f"   {'*' if i == 0 else ' '} - {cell}" for i, cell in enumerate(row)]
-    return [*lines, ""]
+def commands() -> list[str]:
+    """Each command with what it does, its arguments and its options, as `--help` has them."""
+    import typer
+
+    from antdrive.cli.app import application
+
+    command = typer.main.get_command(application())
+    return list(_commands(command, command.make_context("antdrive", [], resilient_parsing=True), "="))
 
 
-class Schema(Directive):
-    """`.. file-keys:: world`: the keys of a kind of file."""
-
-    required_arguments = 1
-    option_spec: ClassVar[dict[str, Any]] = {}
-
-    def run(self) -> list[nodes.Node]:
-        """A table of the file's own keys, and one for each part with keys of its own."""
-        schema = schema_of(self.arguments[0])
-        heads = ("key", "value", "default", "meaning")
-        lines = [told(schema.get("description", "")), "", *table(heads, rows_of(schema))]
-        for name, part in parts_of(schema):
-            lines += [
-                f".. rubric:: {name.lower()}",
-                "",
-                told(part.get("description", "")),
-                "",
-                *table(heads, rows_of(part)),
-            ]
-        return parsed(self, lines)
+def _commands(command: Any, context: Any, line: str) -> Iterator[str]:
+    yield from (context.command_path, line * len(context.command_path), "")
+    yield from (f"``{' '.join([context.command_path, *command.collect_usage_pieces(context)])}``", "")
+    for paragraph in (command.help or "").split("\f")[0].split("\n\n"):
+        yield from (told(paragraph), "")
+    for kind in ("argument", "option"):
+        records = (one.get_help_record(context) for one in command.params if one.param_type_name == kind)
+        rows = [(f"``{' '.join(record[0].split())}``", told(record[1])) for record in records if record]
+        yield from table(f"{kind}, meaning", rows, "35 65")
+    for name in command.list_commands(context) if hasattr(command, "list_commands") else ():
+        inner = command.get_command(context, name)
+        yield from _commands(inner, type(context)(inner, info_name=name, parent=context), "-" if line == "=" else "~")
 
 
 def exit_codes() -> list[str]:
     """Each exit code with the comment that stands beside it in the code."""
     from antdrive.cli import exits
 
-    rows = []
-    for line in inspect.getsource(exits).splitlines():
-        code, _, meaning = line.partition("  # ")
-        parsed = ast.parse(code).body
-        if meaning and isinstance(parsed[0], ast.Assign):
-            rows.append((f"``{ast.literal_eval(parsed[0].value)}``", meaning))
-    return table(("exit code", "meaning"), rows)
+    lines = [line.split("  # ") for line in inspect.getsource(exits).splitlines() if "  # " in line]
+    return table("exit code, meaning", [(f"``{code.split(' = ')[1]}``", meaning) for code, meaning in lines])
+
+
+def described(kind: type) -> dict[str, str]:
+    """What the docstrings of a class and its bases say of each attribute; the class's own word counts most."""
+    found: dict[str, str] = {}
+    for base in reversed(kind.__mro__):
+        section = inspect.cleandoc(vars(base).get("__doc__") or "").partition("\nAttributes:\n")[2]
+        entries = re.split(r"^    (\w+): ", re.split(r"^\S", section, flags=re.MULTILINE)[0], flags=re.MULTILINE)[1:]
+        found |= {name: " ".join(text.split()) for name, text in zip(entries[::2], entries[1::2], strict=True)}
+    return found
 
 
 def planners() -> list[str]:
@@ -147,61 +134,98 @@ def planners() -> list[str]:
     for name, planner in PLANNERS.items():
         first = inspect.cleandoc(type(planner).__doc__ or "").partition("\n\n")[0]
         options = ", ".join(f"``{key}={value}``" for key, value in settings_of(planner).items())
-        lines += [
-            f"``{name}`` (:py:obj:`{type(planner).__name__}`)",
-            f"   {' '.join(first.split())}",
-            "",
-            f"   {options or 'No options.'}",
-            "",
-        ]
+        lines += [f"``{name}`` (:py:obj:`{type(planner).__name__}`)", f"   {' '.join(first.split())}", ""]
+        lines += [f"   {options or 'No options.'}", ""]
     return lines
+
+
+def planner(*names: str) -> list[str]:
+    """The weaknesses that a planner's docstring knows, its options, and what other planners of its class change.
+
+    Raises:
+        KeyError: an option is not described.
+    """
+    from antdrive.planners import PLANNERS
+    from antdrive.sim.log.record import settings_of
+
+    first, kind = PLANNERS[names[0]], type(PLANNERS[names[0]])
+    lines: list[str] = []
+    for weakness in weaknesses_of(kind):
+        text = re.sub(r"^Known weakness(es)?(, measured)?( \(([^)]*)\))?[:.]\s*", _source, weakness)
+        text = re.sub(r"`?docs/([\w/.-]+)\.md`?", r":doc:`/\1`", text)
+        lines += [".. admonition:: Known weaknesses", "", f"   {text}", ""]
+    meanings = described(kind)
+    rows = [(f"``{key}``", f"``{value}``", told(meanings[key])) for key, value in settings_of(first).items()]
+    lines += table("option, default, meaning", rows, "18 14 68")
+    for name in names[1:]:
+        values = {field.name: getattr(PLANNERS[name], field.name) for field in dataclasses.fields(PLANNERS[name])}
+        changed = [f"``{key}={value}``" for key, value in values.items() if value != getattr(first, key)]
+        lines += [f"``{name}`` is the same planner with {', '.join(changed)}.", ""]
+    return [*lines, f":py:obj:`{kind.__name__}` is the class in Python." + ("" if rows else " It has no options."), ""]
+
+
+def weaknesses_of(kind: type) -> list[str]:
+    """The paragraphs of a class's docstring that begin with "Known weakness"; "the same page" is named."""
+    text = inspect.cleandoc(kind.__doc__ or "")
+    page = next(iter(re.findall(r"docs/papers/\w+\.md", text)), "")
+    found = [" ".join(one.split()) for one in text.split("\n\n") if one.startswith("Known weakness")]
+    return [re.sub("measured on the same page[.:]", f"measured ({page}):", one) for one in found]
+
+
+def _source(match: re.Match[str]) -> str:
+    return f"Measured in {match[4]}: " if match[4] else "Measured: " if match[2] else ""
 
 
 def worlds() -> list[str]:
     """Each world of the catalogue with its size and what is in it."""
     from antdrive.worlds import list_worlds, load_task
 
-    rows = []
-    for name in list_worlds():
+    def row(name: str) -> Row:
         world = load_task(name).world
-        wide, high = world.size
-        rows.append(
-            (
-                f"``{name}``",
-                f"{wide:g}\u00a0×\u00a0{high:g}\u00a0m",
-                str(len(world.obstacles)),
-                str(len(world.movers)),
-                told(world.source or ""),
-            )
-        )
-    return table(("world", "size", "cylinders", "movers", "source"), rows)
+        size = "\u00a0×\u00a0".join(f"{side:g}" for side in world.size) + "\u00a0m"
+        return f"``{name}``", size, str(len(world.obstacles)), str(len(world.movers)), told(world.source or "")
+
+    return table("world, size, cylinders, movers, source", map(row, list_worlds()))
 
 
-TABLES: dict[str, Callable[[], list[str]]] = {
-    "exit-codes": exit_codes, "planners": planners, "worlds": worlds,
+def arrays() -> list[str]:
+    """Name, shape, dtype and content of each array of a log, from the docstring and annotations of `Rollout`."""
+    from antdrive.sim.log.rollout import Rollout
+
+    rows, contents = [], described(Rollout)
+    for field in dataclasses.fields(Rollout):
+        dtype = re.search(r"np\.(\w+)\]$", str(field.type))
+        shape = re.search(r"\((T|N|K|P|S)[\w, ]*\)", contents[field.name])
+        if dtype and shape:
+            rows.append((f"``{field.name}``", shape[0], dtype[1], told(contents[field.name])))
+    return table("array, shape, dtype, content", rows)
+
+
+def record() -> list[str]:
+    """Every key of a log's record."""
+    from antdrive.sim.log.record import record_keys
+
+    return table("key, JSON, content", ((f"``{key}``", kind, told(text)) for key, kind, text in record_keys()))
+
+
+def outcomes() -> list[str]:
+    """Every outcome of a drive."""
+    from antdrive.sim.log.outcome import Outcome
+
+    codes = {Outcome.SUCCEEDED: "0 if the log proves it, else 1"}
+    rows = [(f"``{one.key}``", one.value, codes.get(one, "1")) for one in Outcome]
+    return table("outcome, sentence, exit code", rows)
+
+
+def metrics() -> list[str]:
+    """Every metric."""
+    from antdrive.sim.log.metrics import METRICS
+
+    rows = [(f"``{one.name}``", one.unit, one.better, told(one.definition)) for one in METRICS.values()]
+    return table("metric, unit, better, definition", rows)
+
+
+KNOWN: dict[str, Callable[..., list[str]]] = {
+    "arrays": arrays, "commands": commands, "exit-codes": exit_codes, "keys": keys, "metrics": metrics, "outcomes": outcomes,
+    "planner": planner, "planners": planners, "record": record, "worlds": worlds,
 }  # fmt: skip
-
-
-class Table(Directive):
-    """`.. known:: planners`: a table of what the code knows."""
-
-    required_arguments = 1
-
-    def run(self) -> list[nodes.Node]:
-        """The table."""
-        return parsed(self, TABLES[self.arguments[0]]())
-
-
-def parsed(directive: Directive, lines: list[str]) -> list[nodes.Node]:
-    """What lines of reST make. They say what the packages know, so the page is read again when these change."""
-    note_sources(directive.state.document.settings.env)
-    container = nodes.container()
-    directive.state.nested_parse(StringList(lines, source="<table>"), directive.content_offset, container)
-    return list(container.children)
-
-
-def setup(app: Sphinx) -> dict[str, Any]:
-    """Register the directives."""
-    app.add_directive("file-keys", Schema)
-    app.add_directive("known", Table)
-    return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -60,7 +60,7 @@ def compiled(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """What was compiled: nothing at first, and nothing is cached yet. Compiling itself is left out."""
     done: list[str] = []
 
-    def warm(jobs: int = -1, progress: Callable[[float], None] | None = None) -> None:
+    def warm(jobs: int | None = None, progress: Callable[[float], None] | None = None) -> None:
         assert progress is not None
         progress(1.0)
         done.append("all")

@@ -22,7 +22,7 @@ def test_a_process_for_each_core_that_may_be_used(
 
     monkeypatch.setattr("joblib.cpu_count", lambda: cores)
     monkeypatch.setattr("antdrive.runs.suites.select", lambda words, only: [case] * 10)
-    monkeypatch.setattr("antdrive.runs.suites.check_cases", check_cases)
+    monkeypatch.setattr("antdrive.cli.testing.check_cases", check_cases)
     monkeypatch.setattr(suites, "compile_once", lambda: None)
     assert suites.drive_suites(["a"], None, asked, update="nothing", results=None) == []  # type: ignore[arg-type]
     assert found == [started]

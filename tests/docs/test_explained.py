@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
 import inspect
 import re
 from pathlib import Path
@@ -18,19 +18,15 @@ PAGES = ROOT / "docs" / "explanation" / "planners"
 EXPLAINED = {
     name: page
     for page in sorted(PAGES.glob("*.md"))
-    for names in re.findall(r"^\.\. planner:: (.+)$", page.read_text(), re.MULTILINE)
+    for names in re.findall(r"^\.\. known:: planner (.+)$", page.read_text(), re.MULTILINE)
     for name in names.split()
 }
 
 
-def docstrings() -> Any:
-    """The module of the site that reads docstrings; it is no package's."""
-    spec = importlib.util.spec_from_file_location("docstrings", ROOT / "docs" / "_ext" / "antdrive_docstrings.py")
-    assert spec
-    assert spec.loader
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+@pytest.fixture
+def tables(monkeypatch: pytest.MonkeyPatch) -> Any:
+    monkeypatch.syspath_prepend(str(ROOT / "docs" / "_ext"))
+    return importlib.import_module("antdrive_tables")
 
 
 def attributes(text: str) -> dict[str, str]:
@@ -45,7 +41,7 @@ def attributes(text: str) -> dict[str, str]:
 
 @pytest.mark.parametrize("name", PLANNERS)
 def test_a_planner_is_explained(name: str) -> None:
-    assert name in EXPLAINED, f"add `.. planner:: {name}` to a page in docs/explanation/planners"
+    assert name in EXPLAINED, f"add `.. known:: planner {name}` to a page in docs/explanation/planners"
     page = EXPLAINED[name]
     text = page.read_text()
     heads = re.findall(r"^## (.+)$", text, re.MULTILINE)
@@ -64,13 +60,13 @@ def test_a_planner_has_a_row_in_the_table(name: str) -> None:
 
 
 @pytest.mark.parametrize("kind", dict.fromkeys(map(type, PLANNERS.values())), ids=lambda kind: kind.__name__)
-def test_a_planner_knows_its_weaknesses_and_every_option_is_described(kind: type) -> None:
+def test_a_planner_knows_its_weaknesses_and_every_option_is_described(kind: type, tables: Any) -> None:
     assert "Known weakness" in (kind.__doc__ or "")
-    assert docstrings().weaknesses_of(kind)
+    assert tables.weaknesses_of(kind)
     wanted: dict[str, str] = {}
     for base in reversed(kind.__mro__):
         wanted |= attributes(inspect.getsource(base).split('"""')[1] if base.__module__.startswith("antdrive") else "")
-    assert docstrings().described(kind) == wanted
+    assert tables.described(kind) == wanted
 
 
 def test_the_lines_that_draw_pictures_are_python() -> None:

@@ -27,7 +27,6 @@ PACKAGES = {package_of(stub): stub for stub in STUBS}
 def test_every_package_that_offers_names_has_a_page_in_the_api() -> None:
     pages = {path.stem: path.read_text() for path in (DOCS / "reference" / "api").glob("*.md")}
     shown = {found for text in pages.values() for found in re.findall(r"^\.\. offered:: (\S+)$", text, re.MULTILINE)}
-    assert len(PACKAGES) >= 9
     assert shown == set(PACKAGES)
     listed = re.search(r"```\{toctree\}.*?```", pages.pop("index"), re.DOTALL)
     assert listed

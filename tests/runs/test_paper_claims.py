@@ -17,30 +17,14 @@ from antdrive.planners import PLANNERS, History, PlannerError, Query
 from antdrive.runs.papers import candidates
 from antdrive.runs.papers.baselines import FirstTouchDStar, total_cost
 from antdrive.runs.papers.candidates import MoveCount, candidate, move_counts, winding_candidate
-from antdrive.runs.papers.claims import CLAIMS
+from antdrive.runs.papers.claims import CLAIMS, SMALL_EFFECT, Arm, Claim
 from antdrive.runs.papers.experiments import PAPERS
 from antdrive.runs.papers.keeping import keep_trials, kept_trials, trials_key
-from antdrive.runs.papers.kinds import (
-    SMALL_EFFECT,
-    Arm,
-    Arrive,
-    Cases,
-    Claim,
-    Less,
-    LessGain,
-    MayFail,
-    Mean,
-    NoWorse,
-    Oftener,
-    Test,
-    Wider,
-    Within,
-)
 from antdrive.runs.papers.maps import TWO_WALLS, environments, optimum
 from antdrive.runs.papers.movers import Strollers, drive, drive_among
 from antdrive.runs.papers.reproduce import too_few_seeds
 from antdrive.runs.papers.trials import Trial, concentration, solve
-from antdrive.runs.papers.verdicts import FEWEST, Decision, judge, trials_needed, verdict_facts
+from antdrive.runs.papers.verdicts import FEWEST, RELATIONS, STATISTICS, Decision, judge, trials_needed, verdict_facts
 from antdrive.worlds import Grid
 
 ONE, TWO = Arm("m", "one"), Arm("m", "two")
@@ -56,24 +40,39 @@ def trials(values: Any, worlds: int = 0) -> list[Trial]:
     return made
 
 
-def verdict(test: Test, first: Any, second: Any = (), worlds: int = 0) -> Any:
-    claim = Claim(paper="lee2008", source="s", sentence="x", printed="p", test=test)
-    return judge(claim, {ONE: trials(first, worlds), TWO: trials(second, worlds)})
+def claim(statistic: str, relation: str, bound: float = 0.0, *, maps: int = 1, **facts: Any) -> Claim:
+    """A claim on arms ONE and TWO, or on ONE alone where the statistic is of a single planner."""
+    arms = (ONE,) if statistic in ("median", "mean", "arrived", "failed") else (ONE, TWO)
+    facts = {"cases": (arms,) * maps, **facts}
+    words = {"paper": "lee2008", "source": "s", "sentence": "x", "printed": "p"}
+    return Claim(statistic=statistic, relation=relation, bound=bound, **{**words, **facts})
+
+
+LESS, NO_MORE = claim("difference", "<"), claim("difference", "<=")
+OFTENER, NO_WORSE, WIDER = claim("balance", "<"), claim("balance", "<=", SMALL_EFFECT), claim("scatter", ">")
+
+
+def verdict(test: Claim, first: Any, second: Any = (), worlds: int = 0) -> Any:
+    return judge(test, {ONE: trials(first, worlds), TWO: trials(second, worlds)})
 
 
 def test_every_claim_names_experiments_of_its_paper() -> None:
     for paper, experiments in PAPERS.items():
         known = {Arm(e.map, e.name) for e in experiments() if e.name != "steps"}
-        claims = [claim for claim in CLAIMS if claim.paper == paper]
+        claims = [one for one in CLAIMS if one.paper == paper]
         assert claims
-        for claim in claims:
-            assert claim.arms <= known, claim.sentence
-            assert claim.printed
+        for one in claims:
+            assert one.arms <= known, one.sentence
+            assert one.printed
+            assert one.statistic in STATISTICS
+            assert one.relation in RELATIONS
+            quantities = {*dir(Trial), *Trial.__dataclass_fields__, ""}
+            assert quantities >= {*one.quantity}
         for experiment in experiments():
             assert len(experiment.seeds(7)) == 7 * experiment.rounds
             few = paper == "hasan" or experiment.name.endswith("ten times")
             assert len(experiment.seeds(50)) == (20 if few else 50 * experiment.rounds)
-        texts = [(claim.sentence, claim.reading) for claim in claims]
+        texts = [(one.sentence, one.reading) for one in claims]
         assert len(set(texts)) == len(texts)
         names = [(e.map, e.name) for e in experiments()]
         assert len(set(names)) == len(names)
@@ -84,7 +83,7 @@ def test_less_is_decided_by_the_interval_of_the_paired_difference(shift: float, 
     rng = np.random.default_rng(1)
     second = rng.uniform(5, 9, 50)
     first = second + shift + np.resize([-1.0, 1.0], 50) * rng.uniform(0.1, 1, 50)
-    found = verdict(Less(((ONE, TWO),)), first, second)
+    found = verdict(LESS, first, second)
     assert found.decision is decision
     assert found.low <= found.value <= found.high
     assert found.value == pytest.approx(np.median(first - second))
@@ -92,37 +91,38 @@ def test_less_is_decided_by_the_interval_of_the_paired_difference(shift: float, 
 
 def test_equal_values_refute_less_but_not_no_more() -> None:
     same = np.full(20, 3.0)
-    assert verdict(Less(((ONE, TWO),)), same, same).decision is Decision.REFUTED
-    assert verdict(Less(((ONE, TWO),), strict=False), same, same).decision is Decision.HOLDS
-    assert verdict(Less(((ONE, TWO),), margin=1.0, strict=False), same + 1.0, same).decision is Decision.HOLDS
-    assert verdict(Less(((ONE, TWO),), margin=1.0, strict=False), same + 1.1, same).decision is Decision.REFUTED
+    assert verdict(LESS, same, same).decision is Decision.REFUTED
+    assert verdict(NO_MORE, same, same).decision is Decision.HOLDS
+    assert verdict(claim("difference", "<=", 1.0), same + 1.0, same).decision is Decision.HOLDS
+    assert verdict(claim("difference", "<=", 1.0), same + 1.1, same).decision is Decision.REFUTED
 
 
 def test_oftener_counts_pairs_where_the_median_difference_is_zero() -> None:
     same, other = np.zeros(40), np.r_[np.ones(16), np.zeros(24)]
-    assert verdict(Less(((ONE, TWO),)), same, other).value == 0.0
-    found = verdict(Oftener(((ONE, TWO),)), same, other)
+    assert verdict(LESS, same, other).value == 0.0
+    found = verdict(OFTENER, same, other)
     assert found.decision is Decision.HOLDS
     assert found.value == pytest.approx(-40.0)
     assert "below in 16 of 40 pairs, above in 0: -40 points" in found.ours
-    assert verdict(Oftener(((ONE, TWO),)), other, same).decision is Decision.REFUTED
-    assert verdict(Oftener(((ONE, TWO),)), same, same).decision is Decision.REFUTED
+    assert verdict(OFTENER, other, same).decision is Decision.REFUTED
+    assert verdict(OFTENER, same, same).decision is Decision.REFUTED
     both = np.resize([-1.0, 1.0], 40)
-    assert verdict(Oftener(((ONE, TWO),)), both, np.zeros(40)).decision is Decision.OPEN
+    assert verdict(OFTENER, both, np.zeros(40)).decision is Decision.OPEN
 
 
 def test_a_margin_or_threshold_that_no_paper_prints_is_called_ours() -> None:
-    for claim in CLAIMS:
-        test, needs = claim.test, []
-        if isinstance(test, NoWorse):
+    for one in CLAIMS:
+        test, needs = (one.statistic, one.relation), []
+        if test == ("balance", "<="):
             needs.append(f"margin ours: {SMALL_EFFECT:g} points")
-        if isinstance(test, Less) and test.margin:
-            needs.append("margin ours" if test.margin != 2.3853 else "the margin is the printed difference")
-        if isinstance(test, Mean) or (isinstance(test, Within) and test.most):
+            assert one.bound == SMALL_EFFECT
+        if one.statistic == "difference" and one.bound:
+            needs.append("margin ours" if one.bound != 2.3853 else "the margin is the printed difference")
+        if one.statistic == "mean" or (one.statistic == "median" and one.bound):
             needs.append("margin ours")
-        if isinstance(test, Arrive) or getattr(test, "quantity", "") in ("near", "effort"):
+        if one.statistic == "arrived" or {"near", "effort"} & {*one.quantity}:
             needs.append("threshold ours")
-        assert all(words in claim.remark for words in needs), (claim.sentence, claim.remark)
+        assert all(words in one.remark for words in needs), (one.sentence, one.remark)
 
 
 def test_no_worse_lets_a_small_effect_pass_and_no_larger_one() -> None:
@@ -130,7 +130,7 @@ def test_no_worse_lets_a_small_effect_pass_and_no_larger_one() -> None:
 
     def share(longer: int, shorter: int) -> Any:
         first = np.r_[np.ones(longer), -np.ones(shorter), np.zeros(200 - longer - shorter)]
-        return verdict(NoWorse(((ONE, TWO),)), first, same)
+        return verdict(NO_WORSE, first, same)
 
     assert share(0, 0).decision is Decision.HOLDS
     assert share(20, 20).decision is Decision.HOLDS  # 0 points [-6, 6]
@@ -146,18 +146,13 @@ def test_the_gain_of_one_step_is_less_than_that_of_another() -> None:
     rng = np.random.default_rng(2)
     low, middle, high = (value + rng.normal(0, 1, 50) for value in (36.0, 39.0, 46.0))
     arms = {Arm("m", name): trials(values) for name, values in zip("abc", (high, middle, low), strict=True)}
-    claim = Claim(
-        paper="lee2008",
-        source="s",
-        sentence="x",
-        printed="p",
-        test=LessGain((Arm("m", "b"), Arm("m", "c")), (Arm("m", "a"), Arm("m", "b"))),
-    )
-    found = judge(claim, arms)
+    a, b, c = arms
+    gained = claim("gain", "<", quantity=("length",), cases=((b, c, a, b),))
+    found = judge(gained, arms)
     assert found.decision is Decision.HOLDS
     assert found.value == pytest.approx(-4.0, abs=0.8)  # gains of 3 and 7
-    assert claim.arms == set(arms)
-    turned = dataclasses.replace(claim, test=LessGain((Arm("m", "a"), Arm("m", "b")), (Arm("m", "b"), Arm("m", "c"))))
+    assert gained.arms == set(arms)
+    turned = dataclasses.replace(gained, cases=((a, b, b, c),))
     assert judge(turned, arms).decision is Decision.REFUTED
 
 
@@ -168,51 +163,50 @@ def test_two_quantities_of_the_same_runs_are_compared() -> None:
         best = 100 + np.r_[rng.normal(0, 5, 10), rng.normal(0, 1, 30)]
         result = SimpleNamespace(solved=True, line_length=100.0, history=SimpleNamespace(iteration_best=best))
         made.append(Trial(seed, 0, cast(Any, result), 100.0, 0.1, 0.0))
-    settles = Less(((ONE, ONE),), "unrest", against="early_unrest")
-    claim = Claim(paper="lee2008", source="s", sentence="x", printed="p", test=settles)
-    assert judge(claim, {ONE: made}).decision is Decision.HOLDS
-    back = dataclasses.replace(settles, quantity="early_unrest", against="unrest")
-    assert judge(dataclasses.replace(claim, test=back), {ONE: made}).decision is Decision.REFUTED
+    settles = claim("difference", "<", quantity=("unrest", "early_unrest"), cases=((ONE, ONE),))
+    assert judge(settles, {ONE: made}).decision is Decision.HOLDS
+    back = dataclasses.replace(settles, quantity=("early_unrest", "unrest"))
+    assert judge(back, {ONE: made}).decision is Decision.REFUTED
 
 
 def test_what_may_happen_is_borne_out_by_one_run_and_refuted_by_none() -> None:
-    assert verdict(MayFail((ONE,)), [1.0] * 9 + [math.nan]).decision is Decision.HOLDS
-    never = verdict(MayFail((ONE,)), [1.0] * 50)
+    assert verdict(claim("failed", ">"), [1.0] * 9 + [math.nan]).decision is Decision.HOLDS
+    never = verdict(claim("failed", ">"), [1.0] * 50)
     assert never.decision is Decision.OPEN
     assert "does not say that none may" in never.why
 
 
 def test_where_neither_gets_anywhere_nothing_can_be_told() -> None:
     none = np.full(20, math.nan)
-    for test in (Less(((ONE, TWO),), strict=False), Oftener(((ONE, TWO),)), NoWorse(((ONE, TWO),))):
+    for test in (NO_MORE, OFTENER, NO_WORSE):
         found = verdict(test, none, none)
         assert found.decision is Decision.OPEN
         assert found.why.startswith("neither ever gets there")
 
 
 def test_an_open_verdict_says_why() -> None:
-    few = verdict(Less(((ONE, TWO),)), np.zeros(5), np.ones(5))
+    few = verdict(LESS, np.zeros(5), np.ones(5))
     assert few.decision is Decision.OPEN
     assert few.why.startswith("5 trials, and with fewer than 6")
     # 0.2 below the margin, with an interval of about a half to each side: some six times as many.
-    wide = verdict(Less(((ONE, TWO),)), np.linspace(-1.2, 0.8, 21), np.zeros(21))
+    wide = verdict(LESS, np.linspace(-1.2, 0.8, 21), np.zeros(21))
     assert wide.decision is Decision.OPEN
     factor = float(wide.why.split("some ")[1].split(" times")[0])
     assert factor == pytest.approx(((wide.high - wide.value) / 0.2) ** 2, rel=0.1)
-    short = verdict(Arrive((ONE,), least=0.9), np.ones(20))
+    short = verdict(claim("arrived", ">=", 0.9), np.ones(20))
     assert short.decision is Decision.OPEN
     assert "20 runs, and the interval of fewer than 35" in short.why
 
 
 def test_the_trials_that_a_test_needs_are_the_fewest_with_which_it_can_hold() -> None:
-    test = Arrive((ONE,), least=0.9)
+    test = claim("arrived", ">=", 0.9)
     needed = trials_needed(test)
     assert needed == 35  # n / (n + 1.96^2) reaches 0.9
     assert verdict(test, np.ones(needed)).decision is Decision.HOLDS
     assert verdict(test, np.ones(needed - 1)).decision is Decision.OPEN
-    assert trials_needed(Less(((ONE, TWO),))) == FEWEST
-    assert verdict(Less(((ONE, TWO),)), np.zeros(FEWEST), np.ones(FEWEST)).decision is Decision.HOLDS
-    assert trials_needed(Cases(((ONE, TWO),), "gap", 1)) == 1
+    assert trials_needed(LESS) == FEWEST
+    assert verdict(LESS, np.zeros(FEWEST), np.ones(FEWEST)).decision is Decision.HOLDS
+    assert trials_needed(claim("wins", ">=", 1)) == 1
 
 
 def test_seeds_that_are_too_few_are_told_of_in_one_line() -> None:
@@ -228,9 +222,9 @@ def test_seeds_that_are_too_few_are_told_of_in_one_line() -> None:
 
 def test_a_path_is_less_than_none() -> None:
     none = np.full(20, math.nan)
-    assert verdict(Less(((ONE, TWO),)), np.full(20, 500.0), none).decision is Decision.HOLDS
-    assert verdict(Less(((ONE, TWO),)), none, np.full(20, 500.0)).decision is Decision.REFUTED
-    assert "no path" in verdict(Within((ONE,), 5.0), none).ours
+    assert verdict(LESS, np.full(20, 500.0), none).decision is Decision.HOLDS
+    assert verdict(LESS, none, np.full(20, 500.0)).decision is Decision.REFUTED
+    assert "no path" in verdict(claim("median", "<=", 5.0), none).ours
 
 
 def test_runs_of_one_map_do_not_count_as_maps() -> None:
@@ -238,53 +232,52 @@ def test_runs_of_one_map_do_not_count_as_maps() -> None:
     by_map = np.array([-1.0, 2.0, -1.5, 1.0, -0.5])
     first = np.resize(by_map, 100) + rng.normal(0, 0.01, 100)
     second = np.zeros(100)
-    apart = verdict(Less(((ONE, TWO),)), first, second)
-    together = verdict(Less(((ONE, TWO),)), first, second, worlds=5)
+    apart = verdict(LESS, first, second)
+    together = verdict(LESS, first, second, worlds=5)
     assert together.high - together.low >= apart.high - apart.low
     assert together.decision is Decision.OPEN
 
 
 def test_a_median_is_within_a_bound_or_beyond_it() -> None:
-    assert verdict(Within((ONE,), 10.0), np.linspace(4, 8, 30)).decision is Decision.HOLDS
-    assert verdict(Within((ONE,), 10.0), np.linspace(14, 18, 30)).decision is Decision.REFUTED
-    assert verdict(Within((ONE,), 10.0), np.linspace(5, 15, 30)).decision is Decision.OPEN
-    assert verdict(Within((ONE,), 10.0), np.linspace(4, 8, 5)).decision is Decision.OPEN  # too few
+    assert verdict(claim("median", "<=", 10.0), np.linspace(4, 8, 30)).decision is Decision.HOLDS
+    assert verdict(claim("median", "<=", 10.0), np.linspace(14, 18, 30)).decision is Decision.REFUTED
+    assert verdict(claim("median", "<=", 10.0), np.linspace(5, 15, 30)).decision is Decision.OPEN
+    assert verdict(claim("median", "<=", 10.0), np.linspace(4, 8, 5)).decision is Decision.OPEN  # too few
 
 
 def test_a_mean_is_the_printed_one_within_its_margin() -> None:
     values = np.linspace(-0.5, 0.5, 50)
-    assert verdict(Mean(ONE, 101.0, "length"), values).decision is Decision.HOLDS
-    assert verdict(Mean(ONE, 120.0, "length"), values).decision is Decision.REFUTED
-    assert verdict(Mean(ONE, 105.2, "length", margin=0.05), values).decision is Decision.OPEN
-    assert verdict(Mean(ONE, 101.0, "length"), np.full(9, math.nan)).decision is Decision.OPEN
+    assert verdict(claim("mean", "about", 101.0, quantity=("length",)), values).decision is Decision.HOLDS
+    assert verdict(claim("mean", "about", 120.0, quantity=("length",)), values).decision is Decision.REFUTED
+    assert verdict(claim("mean", "about", 105.2, quantity=("length",)), values).decision is Decision.OPEN
+    assert verdict(claim("mean", "about", 101.0, quantity=("length",)), np.full(9, math.nan)).decision is Decision.OPEN
 
 
 def test_arrivals_are_judged_by_wilsons_interval() -> None:
     few, most = np.resize([1.0, *[math.nan] * 24], 50), np.resize([math.nan, *[1.0] * 49], 50)
-    assert verdict(Arrive((ONE,), most=0.2), few).decision is Decision.HOLDS
-    assert verdict(Arrive((ONE,), most=0.2), most).decision is Decision.REFUTED
-    assert verdict(Arrive((ONE,), least=0.8), most).decision is Decision.HOLDS
-    assert verdict(Arrive((ONE,), least=0.97), most).decision is Decision.OPEN
-    assert verdict(Arrive((ONE,), most=0.2), few).value == 2 / 50
+    assert verdict(claim("arrived", "<=", 0.2), few).decision is Decision.HOLDS
+    assert verdict(claim("arrived", "<=", 0.2), most).decision is Decision.REFUTED
+    assert verdict(claim("arrived", ">=", 0.8), most).decision is Decision.HOLDS
+    assert verdict(claim("arrived", ">=", 0.97), most).decision is Decision.OPEN
+    assert verdict(claim("arrived", "<=", 0.2), few).value == 2 / 50
 
 
 def test_scatter_is_the_range_between_quartiles() -> None:
     rng = np.random.default_rng(0)
     calm, wild = rng.uniform(4, 6, 50), rng.uniform(0, 40, 50)
-    assert verdict(Wider((ONE, TWO)), wild, calm).decision is Decision.HOLDS
-    assert verdict(Wider((ONE, TWO)), calm, wild).decision is Decision.REFUTED
-    assert verdict(Wider((ONE, TWO)), calm, calm).decision is not Decision.HOLDS
+    assert verdict(WIDER, wild, calm).decision is Decision.HOLDS
+    assert verdict(WIDER, calm, wild).decision is Decision.REFUTED
+    assert verdict(WIDER, calm, calm).decision is not Decision.HOLDS
 
 
 def test_cases_are_counted() -> None:
-    pairs = ((ONE, TWO), (ONE, TWO))
-    assert verdict(Cases(pairs, "gap", 2), [1.0], [2.0]).decision is Decision.HOLDS
-    assert verdict(Cases(pairs, "gap", 2), [2.0], [2.0]).decision is Decision.REFUTED
-    assert verdict_facts(verdict(Cases(pairs, "gap", 2), [2.0], [2.0]))["verdict"] == "does not hold"
-    middle, least = Cases(pairs, "gap", 2), Cases(pairs, "gap", 2, best_run=True)
+    assert verdict(claim("wins", ">=", 2, maps=2), [1.0], [2.0]).decision is Decision.HOLDS
+    assert verdict(claim("wins", ">=", 2, maps=2), [2.0], [2.0]).decision is Decision.REFUTED
+    assert verdict_facts(verdict(claim("wins", ">=", 2, maps=2), [2.0], [2.0]))["verdict"] == "does not hold"
+    middle, least = claim("wins", ">=", 2, maps=2), claim("wins of best runs", ">=", 2, maps=2)
     assert verdict(middle, [0.0, 3.0, 3.0], [2.0, 2.0, 2.0]).decision is Decision.REFUTED
     assert verdict(least, [0.0, 3.0, 3.0], [2.0, 2.0, 2.0]).decision is Decision.HOLDS
-    timed = Cases(pairs, "cpu_ms", 2)
+    timed = claim("wins", ">=", 2, maps=2, quantity=("cpu_ms",))
     assert verdict(timed, [1.0] * 5, [1.0] * 5).decision is Decision.OPEN  # times of five runs tell nothing
     assert verdict(timed, [1.0] * 6, [1.0] * 6).decision is Decision.REFUTED
 

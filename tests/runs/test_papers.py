@@ -63,8 +63,8 @@ def test_a_papers_experiments_are_run_and_written_to_files(tmp_path, monkeypatch
     few = [e for e in PAPERS["han2007"]() if e.printed is not None and e.options.get("ants", 0) < 500]
     monkeypatch.setattr(reproduce, "PAPERS", {"han2007": lambda: few})
     seen = []
-    found = measure_again(["han2007"], tmp_path, seeds=2, suffixes=(".png",), progress=seen.append)
-    rows, files = found.rows, found.files
+    found = measure_again(["han2007"], tmp_path, seeds=2, progress=seen.append)
+    rows, files = found.rows, found.files | drawing.draw_figures("han2007", found.of("han2007"), tmp_path, 2, (".png",))
     assert seen[-1] == 1
     assert [row.printed for row in rows] == [45.357, 38.6223, 33.1798]
     for row in rows:
@@ -86,8 +86,7 @@ def test_a_papers_experiments_are_run_and_written_to_files(tmp_path, monkeypatch
     assert found.kept == 0
     lost = sorted((tmp_path / "trials").glob("*.npz"))[1]
     lost.unlink()
-    monkeypatch.setattr(drawing, "draw_figures", lambda *rest: {})
-    again = measure_again(["han2007"], tmp_path, seeds=2, suffixes=(".png",))
+    again = measure_again(["han2007"], tmp_path, seeds=2)
     assert again.kept == len(few) - 1
     timed = {"plan_s": 0.0}
     assert [vars(row) | timed for row in again.rows] == [vars(row) | timed for row in rows]
@@ -97,7 +96,7 @@ def test_a_papers_experiments_are_run_and_written_to_files(tmp_path, monkeypatch
 
 def test_an_unknown_paper_is_refused(tmp_path):
     with pytest.raises(InputError, match="unknown paper 'nobody'; choose from han2007"):
-        measure_again(["nobody"], tmp_path, seeds=1, suffixes=(".png",))
+        measure_again(["nobody"], tmp_path, seeds=1)
 
 
 def test_a_paper_is_filmed_with_its_planning(tmp_path, monkeypatch):

@@ -11,8 +11,8 @@ from antdrive.cli.console import print_files, print_json, print_line, print_tabl
 from antdrive.cli.exits import SUCCEEDED
 
 if TYPE_CHECKING:
-    from antdrive.views.campaign.cells import TextTable
-    from antdrive.views.campaign.summary import CampaignSummary
+    from antdrive.views.pages.summary import CampaignSummary
+    from antdrive.views.pages.texts import TextTable
 
 Metrics = Annotated[
     list[str] | None,
@@ -94,14 +94,14 @@ def compare_campaigns(
     json: bool,
 ) -> int:
     """Print success of each planner and the comparison of each pair."""
-    from antdrive.views.campaign.reporting import summarise_campaign
+    from antdrive.views.pages.campaign import summarise_campaign
 
     words: dict[str, Any] = {"allow": _allowed(allow, against), "where": _conditions(where), "strict": True}
     summary = summarise_campaign(folders, metrics=metrics or None, against=against, planners=planners, **words)
     if json:
         print_json(_plain(summary))
         return SUCCEEDED
-    from antdrive.views.campaign.cells import all_cells
+    from antdrive.views.pages.tables import all_cells
 
     for table in all_cells(summary):
         _print_table(table)
@@ -121,7 +121,7 @@ def report_campaigns(
     **words: Any,
 ) -> int:
     """Write the report of a campaign, or of several."""
-    from antdrive.views.campaign.reporting import report_campaign
+    from antdrive.views.pages.campaign import report_campaign
 
     words |= {"allow": _allowed(allow, against), "where": _conditions(where), "against": against}
     files = report_campaign(folders, out, **words)

@@ -72,10 +72,9 @@ def drive_suites(
     Raises:
         InputError: there is no such suite or test, or something in a suite is wrong.
     """
-    import joblib
-
     from antdrive.cli.calibrating import with_chosen_margin
     from antdrive.cli.testing import check_cases
+    from antdrive.runs.pool import cores
     from antdrive.runs.suites import scenario_of, select
 
     cases = select(suites, only)
@@ -84,7 +83,7 @@ def drive_suites(
         if case.given.get("margin") == "auto":  # chosen once and with a bar, not by each process
             with suppress(InputError, FieldError):  # is told as the fault of the test
                 scenario_of(case, with_chosen_margin)
-    processes = min(jobs or int(joblib.cpu_count()), len(cases))  # of a container, not of its host
+    processes = min(jobs or cores(), len(cases))
     found = []
     with bar("driving") as progress:
         for result in check_cases(cases, jobs=processes, update=update, results=results):

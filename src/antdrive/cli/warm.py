@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from antdrive.base.kernel_cache import cache_folder, sources_stamp
-from antdrive.base.processes import delayed
+from antdrive.runs.pool import Pool, cores
 
 if TYPE_CHECKING:
     from antdrive.sim.scenario import Scenario
@@ -40,21 +40,20 @@ def is_warm() -> bool:
     return os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0") or (marker is not None and marker.exists())
 
 
-def warm(jobs: int = -1, progress: Callable[[float], None] | None = None) -> None:
+def warm(jobs: int | None = None, progress: Callable[[float], None] | None = None) -> None:
     """Plan with every planner, drive once and film it, so that every kernel is in the cache."""
-    from joblib import Parallel
-
     from antdrive.planners import PLANNERS
 
     # The second round reads the cache, and compiles what two processes wrote at the same moment and one of them lost.
-    first = [delayed(_plan_with)(TOGETHER[0]), delayed(_drive_and_film)(), *map(delayed(_plan_with), TOGETHER[1:])]
-    second = [delayed(_plan_with)(list(PLANNERS)), delayed(_drive_and_film)()]
+    first = [TOGETHER[0], None, *TOGETHER[1:]]
+    second = [tuple(PLANNERS), None]
     done = 0
-    for tasks in (first, second):
-        for _ in Parallel(jobs, return_as="generator_unordered")(tasks):
-            done += 1
-            if progress is not None:
-                progress(done / (len(first) + len(second)))
+    with Pool(jobs or cores()) as pool:
+        for groups in (first, second):
+            for _ in pool.results(_compile, groups, in_order=False):
+                done += 1
+                if progress is not None:
+                    progress(done / (len(first) + len(second)))
     marker = _marker()
     if marker is not None:
         with contextlib.suppress(OSError):
@@ -73,6 +72,11 @@ def _scenario() -> Scenario:
     world = World("warm", (0.0, 0.0, 3.0, 3.0), (Disc(1.5, 1.5, 0.2),), movers=(mover,))
     task = Task(world, (0.75, 0.75, 0.0), (2.25, 2.25), cell=0.25)
     return Scenario(task=task, planner=PLANNERS["astar"], robot=load_robot("turtlebot"))
+
+
+def _compile(planners: Sequence[str] | None) -> None:
+    """Plan with planners; None: drive and film."""
+    _drive_and_film() if planners is None else _plan_with(planners)
 
 
 def _plan_with(names: Sequence[str]) -> None:

@@ -171,7 +171,6 @@ def _film_facts(info: FilmInfo) -> dict[str, Any]:
         "frames": info.frames,
         "size": list(info.size),
         "fps": info.fps,
-        "renderer": info.renderer,
     }
 
 

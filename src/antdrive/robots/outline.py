@@ -35,12 +35,23 @@ class Footprint:
 
     @classmethod
     def disc(cls, radius: float, centre: Point = (0.0, 0.0)) -> Footprint:
-        """A disc."""
+        """A disc.
+
+        Args:
+            radius: its radius [m]
+            centre: its centre, from the axle's centre [m]
+        """
         return cls(rounding=radius, corners=(centre,) if any(centre) else ())
 
     @classmethod
     def rectangle(cls, length: float, width: float, centre: Point = (0.0, 0.0)) -> Footprint:
-        """A rectangle."""
+        """A rectangle.
+
+        Args:
+            length: along the robot's heading [m]
+            width: across it [m]
+            centre: its centre, from the axle's centre [m]
+        """
         a, b, (x, y) = length / 2, width / 2, centre
         if not any(centre):
             return cls(half_length=a, half_width=b)
@@ -50,6 +61,9 @@ class Footprint:
     @classmethod
     def polygon(cls, points: Sequence[Sequence[float]]) -> Footprint:
         """A convex polygon.
+
+        Args:
+            points: its corners in order, either way round (K, 2) [m]
 
         Raises:
             FieldError: they are no convex polygon, or too many.
@@ -108,7 +122,12 @@ class Footprint:
         return xmax - xmin, ymax - ymin, ((xmin + xmax) / 2, (ymin + ymax) / 2)
 
     def depth(self, x: float, y: float) -> float:
-        """How deep within the footprint a point lies: its distance from the edge, negative outside [m]."""
+        """How deep within the footprint a point lies: its distance from the edge, negative outside [m].
+
+        Args:
+            x: ahead of the axle [m]
+            y: to the left of its centre [m]
+        """
         if self.corners:
             return self.rounding - _beyond(self.corners, (x, y))
         ahead, aside = self.half_length - abs(x), self.half_width - abs(y)
@@ -117,7 +136,12 @@ class Footprint:
         return self.rounding - math.hypot(min(ahead, 0.0), min(aside, 0.0))
 
     def nearest(self, x: float, y: float) -> Point:
-        """The point of the footprint without its rounding that is nearest to a point [m]."""
+        """The point of the footprint without its rounding that is nearest to a point [m].
+
+        Args:
+            x: ahead of the axle [m]
+            y: to the left of its centre [m]
+        """
         if not self.corners:
             a, b = self.half_length, self.half_width
             return min(max(x, -a), a), min(max(y, -b), b)
@@ -126,7 +150,11 @@ class Footprint:
         return min((_on_edge(a, b, (x, y)) for a, b in _around(self.corners)), key=lambda at: math.dist(at, (x, y)))
 
     def reach(self, direction: float) -> float:
-        """How far the footprint reaches from the axle's centre in a direction [m]."""
+        """How far the footprint reaches from the axle's centre in a direction [m].
+
+        Args:
+            direction: counter-clockwise from straight ahead [rad]
+        """
         low, high = 0.0, self.radius
         for _ in range(60):  # convex and around the axle's centre, so halving finds the edge
             middle = (low + high) / 2
@@ -135,7 +163,11 @@ class Footprint:
         return low
 
     def outline(self, steps: int = 16) -> list[Point]:
-        """Points on the outline, counter-clockwise [m]."""
+        """Points on the outline, counter-clockwise [m].
+
+        Args:
+            steps: how many each quarter turn of a round corner gets
+        """
         a, b, r = self.half_length, self.half_width, self.rounding
         corners = self.corners or ((a, b), (-a, b), (-a, -b), (a, -b))
         if not r:

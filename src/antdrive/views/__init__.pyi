@@ -1,5 +1,3 @@
-from .campaign.reporting import report_campaign as report_campaign
-from .campaign.reporting import summarise_campaign as summarise_campaign
 from .figures.canvas import panels as panels
 from .figures.canvas import save_figure as save_figure
 from .figures.plan_figures import plan_figure as plan_figure
@@ -10,4 +8,6 @@ from .figures.sight_figure import sight_figure as sight_figure
 from .film.video import FilmInfo as FilmInfo
 from .film.video import film as film
 from .film.video import still as still
-from .report.report import write_report as write_report
+from .pages.campaign import report_campaign as report_campaign
+from .pages.campaign import summarise_campaign as summarise_campaign
+from .pages.report import write_report as write_report

@@ -11,11 +11,14 @@ import numpy as np
 from antdrive.base.errors import InputError
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.physics.bullet import bullet
-from antdrive.views.film.compositor import drawn_height, merged_by_colour, part_pose, still_meshes
-from antdrive.views.film.meshes import robot_parts
+from antdrive.views.film.compositor import drawn_height, part_pose
+from antdrive.views.film.ground import kerb_width
+from antdrive.views.film.meshes import Mesh, cylinder, join, kerb, robot_parts
 from antdrive.views.film.replay import Replay
-from antdrive.views.film.tiny_renderer import add_mesh
 from antdrive.views.scene import Scene
+from antdrive.views.style import KERB, OBSTACLE, UNSEEN, Colour
+
+AT_ONCE = 400  # meshes in one body: PyBullet takes at most 131072 vertices
 
 
 def check_display() -> None:
@@ -26,6 +29,21 @@ def check_display() -> None:
     """
     if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
         raise InputError("--gui: no display (DISPLAY is not set); --video FILE.mp4 works without one")
+
+
+def add_mesh(number: int, mesh: Mesh, colour: Colour) -> int:
+    """Add a visible mesh to PyBullet client `number`; return its body number."""
+    p = bullet()
+    shape = p.createVisualShape(
+        p.GEOM_MESH,
+        vertices=mesh.vertices.tolist(),
+        normals=mesh.normals.tolist(),
+        indices=mesh.triangles.ravel().tolist(),
+        rgbaColor=[*(channel / 255 for channel in colour), 1.0],
+        physicsClientId=number,
+    )
+    body: int = p.createMultiBody(0, -1, shape, physicsClientId=number)
+    return body
 
 
 def show(rollout: Rollout, *, hold: float = 3.0) -> None:
@@ -43,8 +61,13 @@ def show(rollout: Rollout, *, hold: float = 3.0) -> None:
         p.configureDebugVisualizer(p.COV_ENABLE_GUI, 0, physicsClientId=number)
         scene, replay = Scene.of(rollout), Replay(rollout)
         tall = np.minimum(scene.obstacles[:, 3], drawn_height(scene))
-        for mesh, colour in merged_by_colour(still_meshes(scene, tall)):
-            add_mesh(number, mesh, colour)
+        width = kerb_width(scene)
+        add_mesh(number, join(*kerb(scene.bounds, width, 0.8 * width)), KERB)
+        discs = list(zip(scene.obstacles.tolist(), tall.tolist(), scene.unseen, strict=True))
+        for colour in (OBSTACLE, UNSEEN):
+            alike = [cylinder(r, 0.0, z, x=x, y=y) for (x, y, r, _), z, late in discs if late == (colour is UNSEEN)]
+            for k in range(0, len(alike), AT_ONCE):
+                add_mesh(number, join(*alike[k : k + AT_ONCE]), colour)
         robot = [(part, add_mesh(number, part.mesh, part.colour)) for part in robot_parts(scene.robot)]
         for a, b in zip(rollout.route[:-1], rollout.route[1:], strict=True):
             p.addUserDebugLine([*a, 0.01], [*b, 0.01], [0.1, 0.13, 0.26], 2, physicsClientId=number)

@@ -4,7 +4,6 @@ import dataclasses
 from pathlib import Path
 
 import pytest
-from joblib import Parallel, delayed
 
 from antdrive.base.errors import FieldError
 from antdrive.planners import load_planner
@@ -52,24 +51,3 @@ def test_plans_in_space_and_time_are_not_smoothed(turtlebot: RobotSpec) -> None:
 def test_words_are_no_margin(small_scenario: Scenario) -> None:
     with pytest.raises(FieldError, match="margin: must be a number, got 'wide'"):
         Scenario.of(small_scenario.task, margin="wide")
-
-
-def threads_within_a_pool(conditions: Conditions) -> int:
-    """How many threads drove in a process of a pool."""
-    import threading
-
-    used = set()
-
-    def drive(conditions: Conditions, margin: float, seed: int) -> Loss:
-        used.add(threading.get_ident())
-        return Loss(0.0, 0.0)
-
-    choice.loss_on_course = drive
-    choice._driving(conditions, 2, None)(0.05)
-    return len(used)
-
-
-@pytest.mark.slow
-def test_within_a_process_of_a_pool_one_thread_drives(small_scenario: Scenario) -> None:
-    calls = [delayed(threads_within_a_pool)(small_scenario.conditions) for _ in range(2)]
-    assert Parallel(2)(calls) == [1, 1]

@@ -24,9 +24,9 @@ def drives(made_up_drive):
 
 
 def test_tiles_show_the_same_moment_and_a_finished_run_keeps_its_last_picture(drives):
-    with SplitScreen(drives, "top", SIZE) as screen:
-        at = [screen.frame(t) for t in (0.3, 0.7, 0.8)]
-        alone = screen._tiles[1].shot.replay.pose(0.8)
+    screen = SplitScreen(drives, "top", SIZE)
+    at = [screen.frame(t) for t in (0.3, 0.7, 0.8)]
+    alone = screen._tiles[1].shot.replay.pose(0.8)
     assert all(picture.shape == (*SIZE[::-1], 3) for picture in at)
     left, right = np.s_[:, :318], np.s_[:, 320:]
     assert (at[1][left] == at[2][left]).all(), "over"
@@ -36,8 +36,8 @@ def test_tiles_show_the_same_moment_and_a_finished_run_keeps_its_last_picture(dr
 
 
 def test_each_run_has_its_planners_colour_and_its_outcome(drives):
-    with SplitScreen(drives, "top", SIZE) as screen:
-        end = screen.frame(np.inf)
+    screen = SplitScreen(drives, "top", SIZE)
+    end = screen.frame(np.inf)
     for k, log in enumerate(drives):
         colour = np.array(planner_style(log.record.planner.name)[0])
         assert np.abs(end[2, 320 * k + 2].astype(int) - colour).max() == 0
@@ -47,12 +47,12 @@ def test_each_run_has_its_planners_colour_and_its_outcome(drives):
 
 @pytest.mark.parametrize("count", [2, 3, 4, 5, 6])
 def test_up_to_six_runs_fit_into_the_frame(drives, count):
-    with SplitScreen((drives * 3)[:count], "oblique", SIZE) as screen:
-        assert len(set(screen._corners)) == count
-        for (x, y), tile in zip(screen._corners, screen._tiles, strict=True):
-            high, wide, _ = tile.frame(0.1).shape
-            assert x + wide <= SIZE[0]
-            assert y + high <= SIZE[1]
+    screen = SplitScreen((drives * 3)[:count], "oblique", SIZE)
+    assert len(set(screen._corners)) == count
+    for (x, y), tile in zip(screen._corners, screen._tiles, strict=True):
+        high, wide, _ = tile.frame(0.1).shape
+        assert x + wide <= SIZE[0]
+        assert y + high <= SIZE[1]
 
 
 def test_the_film_has_the_frames_it_claims(drives, tmp_path):
@@ -72,15 +72,15 @@ def test_one_or_seven_runs_are_refused(drives, tmp_path, count):
 def test_a_mark_is_in_every_tile_from_its_moment_on(drives):
     x, y = drives[1].pose[len(drives[1].pose) // 3, :2]
     mark = Mark(0.3, float(x), float(y), "here")
-    with SplitScreen(drives, "top", SIZE) as plain, SplitScreen(drives, "top", SIZE, mark=mark) as marked:
-        for at, shown in ((0.2, False), (0.4, True), (np.inf, True)):
-            differs = (plain.frame(at) != marked.frame(at)).any(axis=-1)
-            assert differs[:, :318].any() == differs[:, 320:].any() == shown
+    plain, marked = SplitScreen(drives, "top", SIZE), SplitScreen(drives, "top", SIZE, mark=mark)
+    for at, shown in ((0.2, False), (0.4, True), (np.inf, True)):
+        differs = (plain.frame(at) != marked.frame(at)).any(axis=-1)
+        assert differs[:, :318].any() == differs[:, 320:].any() == shown
 
 
 def test_titles_replace_the_planners_names(drives):
-    with SplitScreen(drives, "top", SIZE, ("then", "now")) as named, SplitScreen(drives, "top", SIZE) as plain:
-        differs = (named.frame(0.1) != plain.frame(0.1)).any(axis=-1)
+    named, plain = SplitScreen(drives, "top", SIZE, ("then", "now")), SplitScreen(drives, "top", SIZE)
+    differs = (named.frame(0.1) != plain.frame(0.1)).any(axis=-1)
     assert differs[:30].any()
     assert not differs[60:].any()
 
@@ -88,8 +88,8 @@ def test_titles_replace_the_planners_names(drives):
 def test_oblique_views_of_a_wide_world_stand_above_each_other(drives):
     def corners(camera, high):
         logs = [replace(log, record=replace(log.record, task=_task(log, high))) for log in drives]
-        with SplitScreen(logs, camera, SIZE) as screen:
-            return screen._corners
+        screen = SplitScreen(logs, camera, SIZE)
+        return screen._corners
 
     assert corners("oblique", 1.0) == [(0, 0), (320, 0)]
     assert corners("oblique", 0.5) == [(0, 0), (0, 180)]
@@ -101,9 +101,9 @@ def test_a_film_from_above_has_no_empty_ground_beside_the_worlds(drives, high, c
     logs = [replace(log, record=replace(log.record, task=_task(log, high))) for log in (drives * 3)[:count]]
     size = fitting_size(logs, "top")
     assert all(160 <= side <= most and side % 2 == 0 for side, most in zip(size, FULL, strict=True))
-    with SplitScreen(logs, "top", size) as screen:
-        shot = screen._tiles[0].shot
-        assert len(screen._corners) == count
+    screen = SplitScreen(logs, "top", size)
+    shot = screen._tiles[0].shot
+    assert len(screen._corners) == count
     x0, y0, x1, y1 = logs[0].record.task.world.bounds
     seen = np.ptp(shot._camera.pixels([(x0, y0, 0.0), (x1, y1, 0.0)]), axis=0)
     wide, tall = seen / shot._camera.size

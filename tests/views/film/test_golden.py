@@ -1,7 +1,6 @@
 """Stored pictures that somebody looked at and approved, one per camera.
 
-`python -m tests.views.film.test_golden` renders them anew. Fixed cameras use TinyRenderer and a moving camera uses ray
-casting, so a camera's picture is only ever compared with its own.
+`python -m tests.views.film.test_golden` renders them anew.
 """
 
 from pathlib import Path
@@ -12,7 +11,7 @@ from PIL import Image
 
 from antdrive.views.film.camera import CAMERAS
 from antdrive.views.film.shot import Shot
-from tests.sim.conftest import _made_up_drive
+from tests.made_up_drive import _made_up_drive
 
 GOLDEN = Path(__file__).with_name("golden")
 SIZE = (320, 200)
@@ -20,8 +19,8 @@ SIZE = (320, 200)
 
 def picture(camera, **changes):
     drive = _made_up_drive(collide=camera == "oblique", square=camera == "top", **changes)
-    with Shot(drive, camera=camera, size=SIZE, bare=True) as shot:
-        return shot.view(0.55).astype(int)
+    shot = Shot(drive, camera=camera, size=SIZE, bare=True)
+    return shot.view(0.55).astype(int)
 
 
 def differs(one, other):

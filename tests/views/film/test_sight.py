@@ -26,15 +26,15 @@ def log(made_up_drive) -> Rollout:
 
 
 def picture(log: Rollout, camera: str, *moments: float) -> np.ndarray:
-    with Shot(log, camera=camera, size=SIZE, bare=True) as shot:
-        return [shot.view(at) for at in moments][-1].astype(int)
+    shot = Shot(log, camera=camera, size=SIZE, bare=True)
+    return [shot.view(at) for at in moments][-1].astype(int)
 
 
 @pytest.fixture(scope="module")
 def spots(log: Rollout) -> Callable[[Any], tuple[Any, Any]]:
     """Rows and columns where places (N, 2) on the ground appear to the camera `top`."""
-    with Shot(log, camera="top", size=SIZE, bare=True) as shot:
-        camera = shot._camera
+    shot = Shot(log, camera="top", size=SIZE, bare=True)
+    camera = shot._camera
 
     def project(places: Any) -> tuple[Any, Any]:
         at = camera.pixels([(x, y, 0.0) for x, y in places])
@@ -91,9 +91,9 @@ def test_hits_are_where_the_map_has_them(log: Rollout, monkeypatch: pytest.Monke
     changed = np.abs(with_hits - picture(log, "top", 0.3)).max(axis=-1) > 40
     seen = Recollection(log)
     seen.advance(0.3)
-    with Shot(log, camera="top", size=SIZE, bare=True) as shot:
-        height = seen.lidar.height
-        spots = np.array([shot._compositor.pixel(x, y, height) for x, y, _ in seen.map.discs()])
+    shot = Shot(log, camera="top", size=SIZE, bare=True)
+    height = seen.lidar.height
+    spots = np.array([shot._compositor.pixel(x, y, height) for x, y, _ in seen.map.discs()])
     rows, cols = np.nonzero(changed)
     apart = np.hypot(cols[:, None] + 0.5 - spots[:, 0], rows[:, None] + 0.5 - spots[:, 1])
     assert len(rows) > 100
@@ -120,11 +120,11 @@ def test_the_legend_names_what_is_painted(log: Rollout) -> None:
 
 
 def test_movers_that_are_followed_have_rings_and_nothing_else_changes(log: Rollout) -> None:
-    with Shot(log, camera="top", size=SIZE, bare=True) as shot:
-        pose, movers = shot.replay.pose(0.0), np.array([[3.0, 2.0, 0.4, 0.0, 0.5]])
-        plain = shot._compositor.frame(pose).astype(int)
-        ringed = shot._compositor.frame(pose, followed=movers).astype(int)
-        x, y = (np.array(shot._compositor.pixel(*at)) for at in ((3.0, 2.0), (3.55, 2.0)))
+    shot = Shot(log, camera="top", size=SIZE, bare=True)
+    pose, movers = shot.replay.pose(0.0), np.array([[3.0, 2.0, 0.4, 0.0, 0.5]])
+    plain = shot._compositor.frame(pose).astype(int)
+    ringed = shot._compositor.frame(pose, followed=movers).astype(int)
+    x, y = (np.array(shot._compositor.pixel(*at)) for at in ((3.0, 2.0), (3.55, 2.0)))
     rows, cols = np.nonzero(np.abs(ringed - plain).max(axis=-1) > 20)
     away = np.hypot(cols + 0.5 - x[0], rows + 0.5 - x[1])
     ring = (away > 0.5 * math.dist(x, y)) & (np.abs(rows + 0.5 - x[1]) > 5)  # not the line ahead

@@ -12,10 +12,11 @@ from antdrive.sim.physics.bullet import bullet, client
 from antdrive.views.film.camera import Camera, camera_for
 from antdrive.views.film.compositor import part_pose
 from antdrive.views.film.meshes import Mesh, cylinder, robot_parts
-from antdrive.views.film.tiny_renderer import add_mesh, merged, overlap, render
-from antdrive.views.film.triangles import Solid, draw_solids, placed
+from antdrive.views.film.raycast import AMBIENT, DIFFUSE
+from antdrive.views.film.triangles import Solid, draw_solids, merged, overlap, placed
 from antdrive.views.scene import Body
 from antdrive.views.style import MOVER, Colour
+from antdrive.views.window import add_mesh
 
 LIGHT = (-0.62, -0.25, 0.74)
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
@@ -23,12 +24,36 @@ Pose = tuple[tuple[float, float, float], tuple[float, float, float, float]]
 
 
 def rendered(bodies: list[tuple[Mesh, Colour, Pose]], camera: Camera, box: tuple[int, int, int, int], fine: int):
-    p = bullet()
+    """What PyBullet's TinyRenderer draws: picture (h, w, 4), depth (h, w) and body numbers (h, w), -1 for none."""
+    p, (x0, y0, x1, y1), (wide, high) = bullet(), box, camera.size
+    across, down = (x0 + x1) / wide - 1, 1 - (y0 + y1) / high
+    projection = camera.projection.copy()
+    projection[0] = wide / (x1 - x0) * (camera.projection[0] - across * camera.projection[3])
+    projection[1] = high / (y1 - y0) * (camera.projection[1] - down * camera.projection[3])
+    width, height = (x1 - x0) * fine, (y1 - y0) * fine
     with client() as number:
         for mesh, colour, (at, turn) in bodies:
             body = add_mesh(number, mesh, colour)
             p.resetBasePositionAndOrientation(body, at, turn, physicsClientId=number)
-        return render(number, camera, box, fine, LIGHT)
+        _, _, image, depth, seg = p.getCameraImage(
+            width,
+            height,
+            camera.view.T.ravel().tolist(),
+            projection.T.ravel().tolist(),
+            lightDirection=LIGHT,
+            lightColor=[1, 1, 1],
+            lightAmbientCoeff=AMBIENT,
+            lightDiffuseCoeff=DIFFUSE,
+            lightSpecularCoeff=0.0,
+            shadow=0,
+            renderer=p.ER_TINY_RENDERER,
+            physicsClientId=number,
+        )
+    return (
+        np.reshape(np.asarray(image, dtype=np.uint8), (height, width, 4)),
+        np.array(depth, dtype=np.float32).reshape(height, width),
+        np.reshape(np.asarray(seg, dtype=np.int32), (height, width)),
+    )
 
 
 def drawn(bodies: list[tuple[Mesh, Colour, Pose]], camera: Camera, box: tuple[int, int, int, int], fine: int):

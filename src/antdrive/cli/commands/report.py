@@ -60,7 +60,7 @@ def report(
     for name, given in campaigns_only.items():
         if given:
             raise InputError(f"--{name}: is for the folder of a campaign; {other} is none")
-    from antdrive.views.report.report import write_report
+    from antdrive.views.pages.report import write_report
 
     count = write_report(folders, out, title=title, embed_films=embed_films)
     size = out.stat().st_size

@@ -1,7 +1,7 @@
 """`antdrive reproduce`."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -44,25 +44,34 @@ def reproduce(
     many cannot with fewer. The same command goes on where it was interrupted.
     """
     from antdrive.runs.papers.experiments import PAPERS
-    from antdrive.runs.papers.reproduce import HEADS, TRIALS, check_papers, row_cells, too_few_seeds
+    from antdrive.runs.papers.reproduce import HEADS, TRIALS, row_cells, too_few_seeds
     from antdrive.runs.papers.reproduce import reproduce as repeat
     from antdrive.runs.papers.verdicts import VERDICT_HEADS, verdict_cells, verdict_facts
+    from antdrive.views.papers.drawing import draw_figures
 
     papers = list(PAPERS) if paper == "all" else [paper]
-    check_papers(papers)
     seeds = min(seeds, QUICK_SEEDS) if quick else seeds
+    few = too_few_seeds(papers, seeds, quick=quick)
     mark = "quick" if quick else f"{seeds}-seeds"
     folder = out or free_folder(Path("out") / f"reproduce-{paper}", MARKER, mark)
     check_folder(folder)
-    _warn_of_few(too_few_seeds(papers, seeds, quick=quick))
+    if few:
+        print_error(few)
     compile_once()
     with claimed(folder), bar("planning") as progress:
-        wanted: dict[str, Any] = {"suffixes": suffixes(vector), "jobs": jobs, "quick": quick, "films": films}
-        found = repeat(papers, folder, seeds=seeds, progress=progress, **wanted)
+        found = repeat(papers, folder, seeds=seeds, jobs=jobs, quick=quick, progress=progress)
+        files = dict(found.files)
+        for one in papers:
+            files |= draw_figures(one, found.of(one), folder, 1 if quick else min(seeds, 10), suffixes(vector))
+            if films:
+                from antdrive.views.papers.films import film_paper
+
+                film = film_paper(one, folder)
+                files |= {} if film is None else {f"{one} film": str(film)}
         result = {
             "rows": [vars(row) for row in found.rows],
             "claims": [verdict_facts(verdict) for verdict in found.verdicts],
-            "files": found.files,
+            "files": files,
             "kept": found.kept,
         }
         write_marker(folder / MARKER, {"fingerprint": mark, "command": this_command(), **result})
@@ -71,14 +80,8 @@ def reproduce(
     else:
         print_table(HEADS, map(row_cells, found.rows))
         print_table(VERDICT_HEADS, map(verdict_cells, found.verdicts))
-        print_files(found.files)
+        print_files(files)
         if found.kept:
             count = f"{found.kept} of {len(found.rows)}"
             print_line(f"{count} experiments were done before and were taken from {folder / TRIALS}")
     return SUCCEEDED
-
-
-def _warn_of_few(line: str) -> None:
-    """Say in one line that so few seeds cannot decide some claims; an empty line says nothing."""
-    if line:
-        print_error(line)

@@ -79,10 +79,10 @@ def shrink(
     and digits, and moves start, goal and walls nearer. Writes the world, a suite with the scenario and how it fails, the log
     and a film. Exit code 0: the result fails in the same way, in another process too.
     """
-    from antdrive.cli.testing.checking import RAISED
     from antdrive.runs.failures.failure import parse_bound
     from antdrive.runs.failures.handover import Handover, scenario_name
     from antdrive.runs.failures.shrink import shrink as make_small
+    from antdrive.runs.suites.judging import RAISED
     from antdrive.sim.pipeline import run
 
     if planner is not None and "::" in failure:

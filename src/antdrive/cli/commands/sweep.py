@@ -157,7 +157,7 @@ def _reported(folder: Path, report: Path | None) -> list[str]:
     """Write the campaign's report, if one is wanted; the files."""
     if report is None:
         return []
-    from antdrive.views.campaign.reporting import report_campaign
+    from antdrive.views.pages.campaign import report_campaign
 
     return [str(path) for path in report_campaign(folder, report)]
 
@@ -165,7 +165,7 @@ def _reported(folder: Path, report: Path | None) -> list[str]:
 def _check(keep: str | None, dask: str | None, jobs: int | None, report: Path | None, dry_run: bool) -> None:
     """Refuse options that mean nothing."""
     if report is not None:
-        from antdrive.views.campaign.page import check_suffix
+        from antdrive.views.pages.campaign import check_suffix
 
         check_suffix(report)
         if dry_run:

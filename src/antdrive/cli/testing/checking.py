@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 import os
 import shlex
@@ -13,13 +14,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
-from antdrive.base.errors import FieldError, InputError, input_error
-from antdrive.base.processes import delayed
+from antdrive.base.errors import FieldError, InputError
 from antdrive.planners import PlannerError
+from antdrive.runs.pool import Pool
 from antdrive.runs.suites.baseline import Baseline
 from antdrive.runs.suites.demands import Demands
 from antdrive.runs.suites.explaining import explain
-from antdrive.runs.suites.judging import Judgement, judge, unfulfilled
+from antdrive.runs.suites.judging import RAISED, Judgement, judge, unfulfilled
 from antdrive.runs.suites.scenarios import run_command, scenario_of
 from antdrive.runs.suites.suite import ScenarioEntry, SuiteCase, load_suite, shown_path
 from antdrive.sim.pipeline import Run
@@ -34,8 +35,6 @@ from antdrive.views.artefacts import (
 
 #: Which baselines are written: none, only those that are missing, or all.
 Update: TypeAlias = Literal["", "new", "all"]
-#: The outcome of a test whose planner raised an error.
-RAISED = "planner_error"
 #: The outcomes of a test that could not be judged: what people wrote is wrong, or antdrive is.
 WRONG_INPUT, FAULT = "wrong_input", "internal_error"
 
@@ -204,24 +203,26 @@ def _check_in_turn(
         for case in cases:
             yield _check_whatever_comes(case, update, results)
         return
-    import joblib
+    work = functools.partial(_check_by_name, str(Path.cwd()), update, results)
+    with Pool(jobs) as pool:
+        made = pool.results(work, [(str(case.suite), case.id) for case in cases])
+        for case, result in zip(cases, made, strict=True):
+            # A text: the suite has changed since it was read.
+            yield (
+                _unjudged(case, WRONG_INPUT, result, InputError(result), results) if isinstance(result, str) else result
+            )
 
-    calls = (delayed(_check_by_name)(str(case.suite), case.id, str(Path.cwd()), update, results) for case in cases)
-    made = joblib.Parallel(n_jobs=jobs, return_as="generator")(calls)
-    for case, result in zip(cases, made, strict=True):
-        # The suite has changed since it was read.
-        yield _unjudged(case, WRONG_INPUT, result, InputError(result), results) if isinstance(result, str) else result
 
-
-def _check_by_name(suite: str, name: str, folder: str, update: Update, results: Results | None) -> CheckResult | str:
+def _check_by_name(folder: str, update: Update, results: Results | None, name: tuple[str, str]) -> CheckResult | str:
     """The result of a test that another process names; a text says why there is no such test any more."""
     os.chdir(folder)
+    suite, test = name
     try:
-        found = next((case for case in load_suite(suite) if case.id == name), None)
+        found = next((case for case in load_suite(suite) if case.id == test), None)
     except InputError as error:
         return str(error)
     if found is None:
-        return f"{suite}: has no test {name} any more"
+        return f"{suite}: has no test {test} any more"
     return _check_whatever_comes(found, update, results)
 
 
@@ -244,7 +245,7 @@ def check_run(
         InputError: the baseline is wrong, or it or the folder cannot be written.
     """
     started = time.perf_counter()
-    baseline = None if path is None or update == "all" else own_baseline(path, name)
+    baseline = None if path is None or update == "all" else Baseline.own(path, name)
     accepted = ""
     if path is not None and baseline is None:
         accept = accept or shlex.join(["antdrive", "accept", address])
@@ -311,19 +312,6 @@ def _written(
     return files, drove and results.films == "failed" and not filmed
 
 
-def own_baseline(path: Path, name: str) -> Baseline | None:
-    """The baseline in a file, which must be that of the test; None if there is no such file.
-
-    Raises:
-        InputError: the file is no baseline, or that of another test.
-    """
-    baseline = Baseline.load(path)
-    if baseline is not None and baseline.case != name:
-        problem = f"belongs to {baseline.case}, not to {name}; remove the file, and accept {name} anew"
-        raise input_error(shown_path(path), "case", problem)
-    return baseline
-
-
 def _without_baseline(
     run: Run, demands: Demands, path: Path, name: str, accept: str, update: Update
 ) -> tuple[Judgement, str]:
@@ -335,21 +323,8 @@ def _without_baseline(
     elif faults:
         faults.append("baseline: not accepted, because the drive is not what the test expects")
     else:
-        accepted = write_baseline(Baseline.of(run, name), path)
+        accepted = Baseline.of(run, name).renew(path)
     return Judgement(tuple(faults)), accepted
-
-
-def write_baseline(baseline: Baseline, path: Path) -> str:
-    """Write a baseline unless the file holds the same drive already; what was done.
-
-    Raises:
-        InputError: the file cannot be written.
-    """
-    if path.exists() and path.read_bytes() == baseline.to_text().encode():
-        return "unchanged"
-    existed = path.exists()
-    baseline.save(path)
-    return "renewed" if existed else "written"
 
 
 def _wall(run: Run) -> float:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import dataclasses
 import tempfile
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, Protocol, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 from antdrive.base.errors import InputError
 from antdrive.planners import PlannerError
 from antdrive.runs.campaigns.job import Job
-from antdrive.runs.campaigns.rows import CRASHED, PLANNER_FAULT, fault_row, run_row
+from antdrive.runs.campaigns.rows import CRASHED, PLANNER_FAULT, fault_row, run_row, slow_row
+from antdrive.runs.pool import Done
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import Run, run
 from antdrive.sim.scenario import Scenario
@@ -33,15 +34,8 @@ class Finished:
     log: bytes | None = None
 
 
-class Work(Protocol):
-    """What workers do with a run."""
-
-    def __call__(self, job: Job) -> Finished:
-        """Make the run; whatever goes wrong in it stands in the row.
-
-        Raises:
-            InputError: the campaign cannot go on, such as where logs cannot be written.
-        """
+#: What workers do with a run; whatever goes wrong in it stands in the row.
+Work: TypeAlias = Callable[[Job], Finished]
 
 
 @dataclass(frozen=True)
@@ -106,6 +100,13 @@ def _bytes_of(log: Rollout) -> bytes:
         return log.save(Path(folder) / "log.npz").read_bytes()
 
 
-def again(finished: Finished, attempts: int) -> Finished:
-    """The same result, with the number of attempts that it took."""
-    return dataclasses.replace(finished, row={**finished.row, "attempts": attempts})
+def finished_of(done: Done[Job, Finished], limit: float | None) -> Finished:
+    """What a pool says of a run, as a row, also where its process died or was ended for the `limit` [s]."""
+    if not done.died:
+        assert done.result is not None
+        row, log = done.result.row, done.result.log
+    elif done.slow and limit is not None:
+        row, log = slow_row(done.item.key, limit), None
+    else:
+        row, log = fault_row(done.item.key, CRASHED, done.died), None
+    return Finished({**row, "attempts": done.attempts}, log)

@@ -7,7 +7,7 @@ import dataclasses
 import hashlib
 import os
 import shutil
-from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, get_args
 
@@ -17,15 +17,15 @@ from antdrive.runs.campaigns.campaign import Campaign, load_campaign, make_campa
 from antdrive.runs.campaigns.expanding import Expansion, expand
 from antdrive.runs.campaigns.extras import parquet_library
 from antdrive.runs.campaigns.job import Job, SweepCase
-from antdrive.runs.campaigns.local import run_here, run_locally
 from antdrive.runs.campaigns.missing import changed_planners, missing_runs
 from antdrive.runs.campaigns.results import SweepResults
 from antdrive.runs.campaigns.rows import grid_table
-from antdrive.runs.campaigns.running import Driving, Finished, Keep, Work
+from antdrive.runs.campaigns.running import Driving, Finished, Keep, Work, finished_of
 from antdrive.runs.campaigns.store import Store, opened
 from antdrive.runs.margins.choice import choose_margin
 from antdrive.runs.margins.prediction import Calibration
 from antdrive.runs.margins.trial import Conditions
+from antdrive.runs.pool import Done, Pool, cores
 from antdrive.sim.pipeline import versions
 from antdrive.worlds import save_task
 
@@ -104,10 +104,11 @@ def run_expansion(
         shared = None if dask is not None and not dask.startswith("local:") else str(store.folder.resolve())
         driving = Driving(keep or campaign.entry.rollouts, shared)
         try:
-            engine = _engine(missing.jobs, work or driving, jobs, dask, limit=campaign.entry.run_limit, tick=store.tick)
-            with contextlib.closing(engine) as finished:
-                for one in finished:
-                    store.add(one.row, one.log)
+            limit = campaign.entry.run_limit
+            with _runs(missing.jobs, work or driving, jobs, dask, limit=limit, tick=store.tick) as runs:
+                for done in runs:
+                    finished = finished_of(done, limit)
+                    store.add(finished.row, finished.log)
                     made += 1
                     report(before + made, size)
         finally:
@@ -125,19 +126,19 @@ def _check(campaign: Campaign, jobs: int | None, dask: str | None, keep: str | N
         raise FieldError("jobs", "must be at least 1 with a run_limit: this process cannot end itself")
 
 
-def _engine(
+@contextlib.contextmanager
+def _runs(
     todo: Sequence[Job], work: Work, jobs: int | None, dask: str | None, **watched: Any
-) -> Generator[Finished, None, None]:
+) -> Iterator[Iterator[Done[Job, Finished]]]:
+    """A context in which the runs are made, by processes of this machine or on a cluster."""
     if dask is not None:
-        from antdrive.runs.campaigns.cluster import run_on_cluster
+        from antdrive.runs.cluster import run_on_cluster
 
-        return run_on_cluster(todo, work, dask, **watched)
-    if jobs == 0:
-        return run_here(todo, work)
-    import joblib
-
-    cores = int(joblib.cpu_count())  # of a container, not of its host
-    return run_locally(todo, work, min(jobs or cores, max(1, len(todo))), **watched)
+        with contextlib.closing(run_on_cluster(work, todo, dask, **watched)) as runs:
+            yield runs
+    else:
+        with Pool(cores() if jobs is None else jobs, **watched) as pool:
+            yield pool.each(work, todo, group=lambda job: job.case.world)
 
 
 def calibrated(jobs: Iterable[Job]) -> list[Job]:

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 from antdrive.base.checks import suggest
 from antdrive.base.errors import FieldError, input_error
-from antdrive.cli.testing.checking import RAISED, own_baseline
 from antdrive.planners import PlannerError
+from antdrive.runs.suites.baseline import Baseline
 from antdrive.runs.suites.demands import CYLINDER, UNSEEN, WALL, WALL_CLOCK, Bound
-from antdrive.runs.suites.judging import judge, limits, unfulfilled
+from antdrive.runs.suites.judging import RAISED, judge, limits, unfulfilled
 from antdrive.runs.suites.suite import SuiteCase
 from antdrive.runs.suites.touching import NOTHING, cause_of_contact, touched_first
 from antdrive.sim.log.metrics import METRICS
@@ -106,7 +106,7 @@ def bound_broken_in(case: SuiteCase, done: Run) -> Bound | None:
         return found
     if not case.entry.baseline or any(unfulfilled(done, demands)):
         return None
-    baseline = own_baseline(case.baseline_path, case.id)
+    baseline = Baseline.own(case.baseline_path, case.id)
     faults = () if baseline is None else judge(done, demands, baseline).faults
     if baseline is None or not faults:
         return None

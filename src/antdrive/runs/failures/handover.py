@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import itertools
 import os
 import re
@@ -15,10 +16,10 @@ import yaml
 
 from antdrive.base.atomic import written_whole
 from antdrive.base.errors import InputError
-from antdrive.base.processes import delayed
 from antdrive.planners import PlannerError, list_planners, load_planner
 from antdrive.robots import RobotSpec, list_robots, load_robot
 from antdrive.robots.files import footprint_to_dict
+from antdrive.runs.pool import Pool
 from antdrive.runs.suites.demands import Bound
 from antdrive.runs.suites.names import is_own_entry
 from antdrive.runs.suites.scenarios import scenario_of
@@ -135,9 +136,8 @@ def fingerprint_of(done: Run) -> str:
 
 def suite_elsewhere(suite: Path) -> list[str]:
     """The fingerprints of a suite's scenarios, run in other processes; a fault of a file stands for one."""
-    from joblib import Parallel
-
-    return list(Parallel(2)(delayed(_fingerprint_from)(suite.resolve(), k) for k in range(len(load_suite(suite)))))
+    with Pool(2) as pool:
+        return list(pool.results(functools.partial(_fingerprint_from, suite.resolve()), range(len(load_suite(suite)))))
 
 
 def _fingerprint_from(suite: Path, index: int) -> str:
@@ -154,9 +154,8 @@ def scenario_name(text: str) -> str:
 
 def run_elsewhere(scenarios: Sequence[Scenario]) -> list[str]:
     """The fingerprints of scenarios that are run in other processes."""
-    from joblib import Parallel
-
-    return list(Parallel(2)(delayed(_fingerprint)(scenario) for scenario in scenarios))
+    with Pool(2) as pool:
+        return list(pool.results(_fingerprint, scenarios))
 
 
 def _fingerprint(scenario: Scenario) -> str:

@@ -107,7 +107,7 @@ def shrink(
             trials.forget()
             small, complete = _smallest(scenario, trials)
     finally:
-        trials.save()
+        trials.close()
     return Shrunk(scenario, small, failure, complete, trials.made, len(trials.recalled))
 
 

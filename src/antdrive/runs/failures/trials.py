@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import hashlib
 import itertools
 import json
@@ -13,12 +14,12 @@ from typing import Any
 
 from antdrive.base.atomic import written_whole
 from antdrive.base.errors import FieldError, InputError
-from antdrive.base.processes import delayed
 from antdrive.planners import Planner, PlannerError
 from antdrive.planners.anyangle.passage import MOST_OBSTACLES
 from antdrive.planners.own_code import is_importable_elsewhere
 from antdrive.runs.failures.failure import Failure, failure_of, failure_of_planner
 from antdrive.runs.failures.space import feasible
+from antdrive.runs.pool import Pool
 from antdrive.runs.suites.demands import Bound
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.record import settings_of
@@ -84,7 +85,7 @@ class Trials:
         progress: Callable[[str, int], None] | None = None,
     ) -> None:
         self.stage, self.made, self.recalled = "", 0, set[str]()
-        self._room = room
+        self._room, self._pool = room, Pool(max(1, jobs))
         self._wanted, self._bound, self._jobs, self._progress = wanted, bound, max(1, jobs), progress
         self._deadline = time.monotonic() + seconds
         self._journal, self._written = journal, time.monotonic()
@@ -131,6 +132,11 @@ class Trials:
         self._known, self._latest = frozenset(), None
         self.save()
 
+    def close(self) -> None:
+        """End the processes, and write the journal."""
+        self._pool.close()
+        self.save()
+
     def save(self) -> None:
         """Write the journal, if there is one."""
         self._written = time.monotonic()
@@ -155,14 +161,11 @@ class Trials:
 
     def _run(self, candidates: list[Scenario]) -> Iterator[bool]:
         drive = self._wanted.outcome not in {outcome.key for outcome in ENDED_BY.values()}
+        tried = functools.partial(failure_in, bound=self._bound, drive=drive)
         if len(candidates) == 1 or not is_importable_elsewhere(candidates[0].planner):
-            found = [failure_in(candidate, self._bound, drive=drive) for candidate in candidates]
+            found = [tried(candidate) for candidate in candidates]
         else:
-            from joblib import Parallel
-
-            found = Parallel(self._jobs)(
-                delayed(failure_in)(candidate, self._bound, drive=drive) for candidate in candidates
-            )
+            found = list(self._pool.results(tried, candidates))
         return (
             failure == self._wanted and (self._room is None or feasible(candidate.task, self._room))
             for candidate, failure in zip(candidates, found, strict=True)

@@ -16,9 +16,9 @@ from pydantic import TypeAdapter
 from antdrive.base.atomic import written_whole
 from antdrive.base.errors import InputError
 from antdrive.base.kernel_cache import cache_folder
-from antdrive.base.processes import delayed
 from antdrive.runs.margins.prediction import Calibration, least_margin
 from antdrive.runs.margins.trial import Conditions, Loss, loss_on_course
+from antdrive.runs.pool import Pool, processes_for
 from antdrive.sim.scenario import MarginChoice, Scenario
 
 DRIVES = 80  # courses that each margin is tried on
@@ -37,7 +37,8 @@ def choose_margin(
     """
     found = known_margin(conditions)
     if found is None:
-        found = least_margin(_driving(conditions, jobs, progress), conditions.key, conditions.robot.radius)
+        with Pool(processes_for(jobs)) as pool:
+            found = least_margin(_driving(conditions, pool, progress), conditions.key, conditions.robot.radius)
         _keep(found)
     return found
 
@@ -83,20 +84,15 @@ def known_margin(conditions: Conditions) -> Calibration | None:
 
 
 def _driving(
-    conditions: Conditions, jobs: int, progress: Callable[[int, float], None] | None
+    conditions: Conditions, pool: Pool, progress: Callable[[int, float], None] | None
 ) -> Callable[[float], list[Loss]]:
     """A function that drives every course with a margin and returns the losses."""
-    from joblib import Parallel
-    from joblib.parallel import get_active_backend
-
-    # Within a process of somebody else's pool joblib would start threads, and one process of PyBullet is one thread.
-    jobs, done = (1 if get_active_backend()[0].nesting_level else jobs), 0
+    done = 0
 
     def losses_with(margin: float) -> list[Loss]:
         nonlocal done
         losses = []
-        drives = (delayed(loss_on_course)(conditions, margin, seed) for seed in range(DRIVES))
-        for loss in Parallel(jobs, return_as="generator")(drives):
+        for loss in pool.results(functools.partial(loss_on_course, conditions, margin), range(DRIVES)):
             losses.append(loss)
             done += 1
             if progress is not None:

@@ -34,15 +34,10 @@ APART, LATER = 3, 6  # cells of a winding path that are `LATER` moves or more ap
 
 @dataclass(frozen=True)
 class MoveCount:
-    """How many moves of each kind a path has.
+    """How many moves of each kind a path has."""
 
-    Attributes:
-        straight: moves of length 1
-        diagonal: moves of length sqrt(2)
-    """
-
-    straight: int
-    diagonal: int
+    straight: int  # of length 1
+    diagonal: int  # of length sqrt(2)
 
     @property
     def length(self) -> float:

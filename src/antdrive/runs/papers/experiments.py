@@ -18,45 +18,29 @@ from antdrive.runs.papers.candidates import MoveCount, candidate, winding_candid
 
 @dataclass(frozen=True, kw_only=True)
 class Experiment:
-    """One planner on one map, to be run with several seeds, and the value that the paper prints.
-
-    Attributes:
-        paper: the paper's short name
-        map: the map in words
-        planner: the planner's name
-        query: gives the map with start and goal for a number
-        printed: the paper's value; lengths in cells; None: the paper prints none
-        options: the planner's parameters
-        recreated: the paper shows its map as a picture only; random maps of the same size and kind take its place
-        comparable: the shortest path of the recreated maps is as long as the paper says, so that lengths compare
-        quantity: the value that is printed and measured: `length`, `steps` or another property of `Trial`
-        label: the planner with its setting, unique among the experiments of a map
-        worlds: how many different maps there are; 0: one for each seed
-        work: where it is finite, planning ends after so many ant steps
-        most_seeds: more seeds than this would tell nothing new
-        rounds: how many times as many seeds as asked for are run, where single runs differ widely
-        slow: takes seconds, its map or its plans, and is left out of a quick look
-        made: the planner itself, where it is not one of the registry
-        movers: how many obstacles move while the robot decides cell by cell; 0: the planner plans at once
-    """
+    """One planner on one map, to be run with several seeds, and the value that the paper prints."""
 
     paper: str
     map: str
     planner: str
-    query: Callable[[int], Query]
-    printed: float | None
-    options: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-    recreated: bool = True
-    comparable: bool = False
-    quantity: str = "length"
-    label: str = ""
-    worlds: int = 1
-    work: float = math.inf
-    most_seeds: int = 10_000
-    rounds: int = 1
-    slow: bool = False
-    made: Planner | None = None
-    movers: int = 0
+    query: Callable[[int], Query]  # gives the map with start and goal for a number
+    printed: float | None  # lengths in cells; None: the paper prints none
+    options: Mapping[str, Any] = dataclasses.field(default_factory=dict)  # the planner's parameters
+    recreated: bool = (
+        True  # the paper shows its map as a picture only; random maps of the same size and kind replace it
+    )
+    comparable: bool = (
+        False  # the shortest path of the recreated maps is as long as the paper says, so that lengths compare
+    )
+    quantity: str = "length"  # the value that is printed and measured: a property of `Trial`
+    label: str = ""  # the planner with its setting, unique among the experiments of a map
+    worlds: int = 1  # how many different maps there are; 0: one for each seed
+    work: float = math.inf  # where it is finite, planning ends after so many ant steps
+    most_seeds: int = 10_000  # more seeds than this would tell nothing new
+    rounds: int = 1  # how many times as many seeds as asked for are run, where single runs differ widely
+    slow: bool = False  # takes seconds, its map or its plans, and is left out of a quick look
+    made: Planner | None = None  # the planner itself, where it is not one of the registry
+    movers: int = 0  # how many obstacles move while the robot decides cell by cell; 0: the planner plans at once
 
     @property
     def name(self) -> str:

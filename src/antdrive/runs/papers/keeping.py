@@ -22,7 +22,7 @@ from antdrive.planners import History, PlanResult, PlanStatus
 from antdrive.runs.papers.experiments import Experiment
 from antdrive.runs.papers.trials import Trial
 
-JUDGING = ("claims", "kinds", "verdicts", "drawing", "films")  # modules on which no trial depends
+JUDGING = ("claims", "verdicts")  # modules on which no trial depends
 HISTORY = ("best", "iteration_best", "iteration_mean", "arrived")
 NUMBERS = ("optimum", "cpu_s", "total", "concentration")  # in the order of `Trial`
 NONE = -1  # the size of waypoints that a plan does not have

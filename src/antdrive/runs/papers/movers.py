@@ -57,11 +57,7 @@ class Strollers:
 
 
 class TimedAgent:
-    """An agent whose decisions are timed, the movers' steps left out.
-
-    Attributes:
-        cpu_s: processor time of its decisions so far [s]
-    """
+    """An agent whose decisions are timed, the movers' steps left out: `cpu_s` is their processor time so far [s]."""
 
     def __init__(self, agent: OnlineAgent, spent: float) -> None:
         """Time an agent."""

@@ -1,27 +1,26 @@
-"""Run the papers' experiments again: printed and measured values, the claims with their verdicts, the papers' figures."""
+"""Repeat the papers' experiments: printed and measured values, and the claims with their verdicts."""
 
 from __future__ import annotations
 
 import csv
 import dataclasses
 import math
+import operator
 import re
 import statistics
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-import joblib
 import numpy as np
 
 from antdrive.base.atomic import written_whole
 from antdrive.base.errors import InputError
-from antdrive.base.processes import delayed
-from antdrive.runs.papers.claims import CLAIMS
+from antdrive.runs.papers.claims import CLAIMS, Arm, Claim
 from antdrive.runs.papers.experiments import PAPERS, Experiment
 from antdrive.runs.papers.keeping import keep_trials, kept_trials, trials_key
-from antdrive.runs.papers.kinds import Arm, Claim
 from antdrive.runs.papers.movers import drive_among
 from antdrive.runs.papers.trials import Trial, solve
 from antdrive.runs.papers.verdicts import (
@@ -33,68 +32,52 @@ from antdrive.runs.papers.verdicts import (
     verdict_cells,
     verdict_facts,
 )
+from antdrive.runs.pool import Pool, processes_for
 from antdrive.runs.statistics.bootstrap import medians_by_world
 
+T = TypeVar("T")
 MOST_SEEDS = 1000  # every claim can be decided with fewer
 TRIALS = "trials"  # the folder of the trials within that of the results
 
 
+Measurements = list[tuple[Experiment, list[Trial]]]
+
+
 @dataclass(frozen=True)
 class ResultRow:
-    """An experiment's result over its seeds. Lengths are in cells.
-
-    Attributes:
-        paper: the paper's short name
-        map: the map in words
-        recreated: the map is not the paper's own
-        comparable: the shortest path is as long as the paper says, so that lengths compare with the printed one
-        planner: the planner's name, with its setting
-        quantity: the value that is printed and measured: `length`, `steps` or `total`
-        printed: the paper's value; None: it prints none
-        mean: of the seeds that found a path; nan if none did
-        best: of the seeds that found a path; nan if none did
-        arrived: how many seeds found a path
-        seeds: how many seeds were tried
-        optimum: length of the shortest path with the same moves, mean over the seeds' maps
-        gap: median of length / shortest - 1 of the seeds that found a path
-        gap_low: the lower end of its interval, bootstrapped over maps
-        gap_high: the upper end
-        plan_s: median processor time of planning [s]
-    """
+    """An experiment's result over its seeds. Lengths are in cells."""
 
     paper: str
     map: str
-    recreated: bool
-    comparable: bool
-    planner: str
-    quantity: str
-    printed: float | None
-    mean: float
+    recreated: bool  # the map is not the paper's own
+    comparable: bool  # the shortest path is as long as the paper says, so that lengths compare with the printed one
+    planner: str  # with its setting
+    quantity: str  # the value that is printed and measured: `length`, `steps` or `total`
+    printed: float | None  # the paper's value; None: it prints none
+    mean: float  # of the seeds that found a path; nan if none did
     best: float
-    arrived: int
+    arrived: int  # how many seeds found a path
     seeds: int
-    optimum: float
-    gap: float
-    gap_low: float
+    optimum: float  # length of the shortest path with the same moves, mean over the seeds' maps
+    gap: float  # median of length / shortest - 1 of the seeds that found a path
+    gap_low: float  # the ends of its interval, bootstrapped over maps
     gap_high: float
-    plan_s: float
+    plan_s: float  # median processor time of planning [s]
 
 
 @dataclass(frozen=True)
 class Reproduction:
-    """What `reproduce` found.
+    """What `reproduce` found."""
 
-    Attributes:
-        rows: a row for each experiment
-        verdicts: a verdict for each claim whose experiments were run
-        files: the paths of the files by name
-        kept: how many experiments were taken from the files of an earlier, interrupted command
-    """
+    measured: Measurements
+    rows: list[ResultRow]  # one for each experiment
+    verdicts: list[Verdict]  # one for each claim whose experiments were run
+    files: dict[str, str]  # by name
+    kept: int  # how many experiments were taken from the files of an earlier, interrupted command
 
-    rows: list[ResultRow]
-    verdicts: list[Verdict]
-    files: dict[str, str]
-    kept: int
+    def of(self, paper: str) -> Measurements:
+        """The experiments of one paper with their trials."""
+        return [(experiment, trials) for experiment, trials in self.measured if experiment.paper == paper]
 
 
 def reproduce(
@@ -102,13 +85,11 @@ def reproduce(
     folder: Path,
     *,
     seeds: int,
-    suffixes: Sequence[str],
     jobs: int = 1,
     quick: bool = False,
-    films: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> Reproduction:
-    """Run the experiments of papers again, judge the papers' claims, and write tables, CSV files and figures.
+    """Run the experiments of papers again, judge the papers' claims, and write tables and CSV files.
 
     The trials of an experiment are written as soon as it is done. A second call with the same folder and seeds takes them
     from there, unless the source code has changed in between.
@@ -116,34 +97,27 @@ def reproduce(
     Raises:
         InputError: an unknown paper.
     """
-    check_papers(papers)
-    experiments = [experiment for paper in papers for experiment in PAPERS[paper]()]
-    if quick:
-        experiments = [_hurried(experiment) for experiment in experiments if not experiment.slow]
-    found, kept = _all_trials(experiments, folder / TRIALS, seeds, jobs, progress)
-    rows = [_row(experiment, trials) for experiment, trials in zip(experiments, found, strict=True)]
-    verdicts = _verdicts(list(zip(experiments, found, strict=True)))
+    experiments = _experiments(papers, quick)
+    measured, kept = _all_trials(experiments, folder / TRIALS, seeds, jobs, progress)
+    rows = [_row(experiment, trials) for experiment, trials in measured]
+    arms = {(e.paper, e.map, e.name): trials for e, trials in measured if e.name != "steps"}
+    verdicts = [judge(claim, found) for claim, found in _judgeable(arms)]
     files = {
-        "table": str(_write_table(rows, folder / "table.md")),
-        "csv": str(_write_csv([vars(row) for row in rows], folder / "table.csv")),
-        "claims": str(_write_claims(verdicts, folder / "claims.md")),
-        "claims csv": str(_write_csv([verdict_facts(verdict) for verdict in verdicts], folder / "claims.csv")),
+        "table": _write_table(HEADS, map(row_cells, rows), folder / "table.md", NOTE),
+        "csv": _write_csv([vars(row) for row in rows], folder / "table.csv"),
+        "claims": _write_table(VERDICT_HEADS, map(verdict_cells, verdicts), folder / "claims.md"),
+        "claims csv": _write_csv([verdict_facts(verdict) for verdict in verdicts], folder / "claims.csv"),
     }
-    from antdrive.views.papers.drawing import draw_figures
+    return Reproduction(measured, rows, verdicts, files, kept)
 
+
+def _experiments(papers: Sequence[str], quick: bool) -> list[Experiment]:
+    """The experiments of these papers; for a quick look without the slow ones, and with fewer ant steps and maps."""
     for paper in papers:
-        chosen = [(e, trials) for e, trials in zip(experiments, found, strict=True) if e.paper == paper]
-        files |= draw_figures(paper, chosen, folder, 1 if quick else min(seeds, 10), suffixes)
-        if films:
-            files |= _filmed(paper, folder)
-    return Reproduction(rows, verdicts, files, kept)
-
-
-def _filmed(paper: str, folder: Path) -> dict[str, str]:
-    from antdrive.views.papers.films import film_paper
-
-    film = film_paper(paper, folder)
-    return {} if film is None else {f"{paper} film": str(film)}
+        if paper not in PAPERS:
+            raise InputError(f"reproduce: unknown paper {paper!r}; choose from {', '.join([*PAPERS, 'all'])}")
+    every = [experiment for paper in papers for experiment in PAPERS[paper]()]
+    return [_hurried(experiment) for experiment in every if not experiment.slow] if quick else every
 
 
 def _hurried(experiment: Experiment) -> Experiment:
@@ -156,18 +130,18 @@ def _all_trials(
     seeds: int,
     jobs: int,
     progress: Callable[[float], None] | None,
-) -> tuple[list[list[Trial]], int]:
-    """The trials of each experiment, and how many experiments were in the folder already."""
+) -> tuple[Measurements, int]:
+    """The experiments with their trials, and for how many these were in the folder already."""
     total, done, kept = sum(len(experiment.seeds(seeds)) for experiment in experiments), 0, 0
-    found: list[list[Trial]] = []
-    with joblib.Parallel(n_jobs=jobs, return_as="generator") as parallel:
+    found: Measurements = []
+    with Pool(processes_for(jobs)) as pool:
         for experiment in experiments:
             words = f"{experiment.paper} {experiment.map} {experiment.name}"
             path, key = folder / f"{re.sub(r'[^A-Za-z0-9×*]+', '-', words)}.npz", trials_key(experiment, seeds)
             trials = kept_trials(path, key)
             if trials is None:
                 trials = []
-                for trial in parallel(_planned(experiment, seeds)):
+                for trial in pool.results(operator.call, _planned(experiment, seeds)):
                     trials.append(dataclasses.replace(trial, world=experiment.world(trial.seed)))
                     if progress is not None:
                         progress((done + len(trials)) / total)
@@ -175,68 +149,48 @@ def _all_trials(
             else:
                 kept += 1
             done += len(trials)
-            found.append(trials)
+            found.append((experiment, trials))
     if progress is not None:
         progress(1.0)
     return found, kept
 
 
-def _planned(experiment: Experiment, seeds: int) -> Iterator[Any]:
-    """The calls that plan an experiment; each map is made when its turn comes."""
+def _planned(experiment: Experiment, seeds: int) -> Iterator[Callable[[], Trial]]:
+    """The calls that plan an experiment."""
     planner = experiment.made or experiment.planner
     for seed in experiment.seeds(seeds):
         query = experiment.query(experiment.world(seed))
         if experiment.movers:
-            yield delayed(drive_among)(planner, experiment.options, query, seed, experiment.movers)
-            continue
-        yield delayed(solve)(planner, experiment.options, query, seed, experiment.work)
+            yield partial(drive_among, planner, experiment.options, query, seed, experiment.movers)
+        else:
+            yield partial(solve, planner, experiment.options, query, seed, experiment.work)
 
 
-def _verdicts(found: Sequence[tuple[Experiment, list[Trial]]]) -> list[Verdict]:
-    """The verdicts on all claims whose experiments are among these."""
-    known: dict[str, dict[Arm, list[Trial]]] = {}
-    for experiment, trials in found:
-        if experiment.name != "steps":
-            known.setdefault(experiment.paper, {})[Arm(experiment.map, experiment.name)] = trials
-    return [judge(claim, arms) for claim, arms in _judgeable(known)]
-
-
-def _judgeable(known: Mapping[str, dict[Arm, Any]]) -> Iterator[tuple[Claim, dict[Arm, Any]]]:
-    """The claims all of whose experiments are among these, with what is known of their paper's."""
+def _judgeable(known: Mapping[tuple[str, str, str], T]) -> Iterator[tuple[Claim, dict[Arm, T]]]:
+    """The claims all of whose experiments are among these (paper, map, name), with what is known of them."""
     for claim in CLAIMS:
-        arms = known.get(claim.paper, {})
-        if claim.arms <= arms.keys():
-            yield claim, arms
+        places = {arm: (claim.paper, *arm) for arm in claim.arms}
+        if known.keys() >= set(places.values()):
+            yield claim, {arm: known[place] for arm, place in places.items()}
 
 
 def too_few_seeds(papers: Sequence[str], seeds: int, *, quick: bool = False) -> str:
-    """One line on how many claims so few seeds cannot decide, and how many can; empty if they can decide all."""
-    experiments = [_hurried(e) if quick else e for paper in papers for e in PAPERS[paper]() if not (quick and e.slow)]
+    """One line on how many claims so few seeds cannot decide, and how many can; empty if they can decide all.
+
+    Raises:
+        InputError: an unknown paper.
+    """
+    experiments = _experiments(papers, quick)
 
     def undecided(count: int) -> tuple[int, int]:
-        known: dict[str, dict[Arm, int]] = {}
-        for e in experiments:
-            known.setdefault(e.paper, {})[Arm(e.map, e.name)] = len(e.seeds(count))
-        claims = list(_judgeable(known))
-        few = sum(trials_at_hand(claim.test, arms) < trials_needed(claim.test) for claim, arms in claims)
-        return few, len(claims)
+        claims = list(_judgeable({(e.paper, e.map, e.name): len(e.seeds(count)) for e in experiments}))
+        return sum(trials_at_hand(claim, sizes) < trials_needed(claim) for claim, sizes in claims), len(claims)
 
     few, total = undecided(seeds)
     if not few:
         return ""
     enough = next(count for count in range(seeds, MOST_SEEDS) if not undecided(count)[0])
     return f"seeds: {seeds} are too few to decide {few} of {total} claims, whatever they give; {enough} suffice"
-
-
-def check_papers(papers: Sequence[str]) -> None:
-    """Check the short names of papers.
-
-    Raises:
-        InputError: an unknown paper; the message lists the known ones.
-    """
-    for paper in papers:
-        if paper not in PAPERS:
-            raise InputError(f"reproduce: unknown paper {paper!r}; choose from {', '.join([*PAPERS, 'all'])}")
 
 
 def _row(experiment: Experiment, trials: Sequence[Trial]) -> ResultRow:
@@ -269,17 +223,8 @@ def _row(experiment: Experiment, trials: Sequence[Trial]) -> ResultRow:
 
 #: The headings of the table; lengths are in cells.
 HEADS = (
-    "paper",
-    "map",
-    "planner",
-    "quantity",
-    "printed",
-    "mean",
-    "best",
-    "solved",
-    "shortest",
-    "gap",
-    "planning",
+    *("paper", "map", "planner", "quantity"),
+    *("printed", "mean", "best", "solved", "shortest", "gap", "planning"),
 )
 
 
@@ -304,29 +249,24 @@ def row_cells(row: ResultRow) -> list[str]:
     ]
 
 
-def _write_table(rows: Sequence[ResultRow], path: Path) -> Path:
-    lines = [HEADS, ["---"] * len(HEADS), *map(row_cells, rows)]
-    note = (
-        "Some papers show their maps as pictures only. Recreated maps are random maps of the same size on which the shortest\n"
-        "path is as long as the best that the paper prints; on another map only the gap to the shortest path (`shortest`)\n"
-        "means anything. All lengths are in cells; a gap is a median with its 95 % interval over maps.\n\n"
-    )
+NOTE = (
+    "Some papers show their maps as pictures only. Recreated maps are random maps of the same size on which the shortest\n"
+    "path is as long as the best that the paper prints; on another map only the gap to the shortest path (`shortest`)\n"
+    "means anything. All lengths are in cells; a gap is a median with its 95 % interval over maps.\n\n"
+)
+
+
+def _write_table(heads: Sequence[str], rows: Iterable[Sequence[str]], path: Path, note: str = "") -> str:
+    lines = [heads, ["---"] * len(heads), *rows]
     with written_whole(path) as temporary:
         temporary.write_text(note + "".join(f"| {' | '.join(line)} |\n" for line in lines), encoding="utf-8")
-    return path
+    return str(path)
 
 
-def _write_claims(verdicts: Sequence[Verdict], path: Path) -> Path:
-    lines = [VERDICT_HEADS, ["---"] * len(VERDICT_HEADS), *map(verdict_cells, verdicts)]
-    with written_whole(path) as temporary:
-        temporary.write_text("".join(f"| {' | '.join(line)} |\n" for line in lines), encoding="utf-8")
-    return path
-
-
-def _write_csv(rows: Sequence[Mapping[str, Any]], path: Path) -> Path:
+def _write_csv(rows: Sequence[Mapping[str, Any]], path: Path) -> str:
     with written_whole(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         if rows:
             writer.writerow(list(rows[0]))
         writer.writerows([list(row.values()) for row in rows])
-    return path
+    return str(path)

@@ -25,26 +25,17 @@ LAST = 10  # iterations over which `unrest` is measured
 
 @dataclass(frozen=True)
 class Trial:
-    """What one plan of an experiment gave. Lengths are in cells.
+    """What one plan of an experiment gave. Lengths are in cells."""
 
-    Attributes:
-        seed: the seed of map and planner
-        world: which of the experiment's maps it was
-        result: the plan
-        optimum: the length of the shortest path with the same moves
-        cpu_s: processor time of the plan [s]
-        total: hasan's total cost of the path; inf if there is none
-        concentration: the share of the planner's field, for ants their pheromone, that lies on the path's cells; nan if
-            there is no path or no field
-    """
-
-    seed: int
-    world: int
+    seed: int  # of map and planner
+    world: int  # which of the experiment's maps it was
     result: PlanResult
-    optimum: float
-    cpu_s: float
-    total: float
-    concentration: float = math.nan
+    optimum: float  # the length of the shortest path with the same moves
+    cpu_s: float  # processor time of the plan [s]
+    total: float  # hasan's total cost of the path; inf if there is none
+    concentration: float = (
+        math.nan
+    )  # the share of the planner's field that lies on the path; nan without a path or a field
 
     @property
     def length(self) -> float:

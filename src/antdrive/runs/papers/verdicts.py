@@ -3,42 +3,32 @@
 from __future__ import annotations
 
 import enum
-import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.runs.papers.kinds import (
-    Arm,
-    Arrive,
-    Cases,
-    Claim,
-    Less,
-    LessGain,
-    MayFail,
-    Mean,
-    NoWorse,
-    Oftener,
-    Test,
-    Wider,
-    Within,
-)
+from antdrive.runs.papers.claims import Arm, Claim
 from antdrive.runs.papers.trials import Trial
 from antdrive.runs.statistics.bootstrap import means_by_world, medians_by_world, resampled
 from antdrive.runs.statistics.proportions import Interval, wilson
 from antdrive.runs.statistics.significance import wilcoxon
 
 Floats = npt.NDArray[np.float64]
+Numbers = npt.NDArray[np.int64]
 Found = Mapping[Arm, Sequence[Trial]]
-NO_PATH = 1e9  # takes the place of infinity in differences, so that "no path" minus "no path" is 0
+NO_PATH = 1e9  # replaces infinity in differences, so that "no path" minus "no path" is 0
 FEWEST = 6  # with fewer trials no interval says anything
 MANY = 1000  # times as many maps and seeds: a factor above this is not written
+EQUAL = 1e-6  # a value is at most a bound that it exceeds by less
+ABOUT = 0.05  # the share of a printed mean by which ours may differ
 ENDLESS_TEXT = "∞"
 TIMED = "cpu_ms"  # the quantity that is measured by the clock
+NEVER = "neither ever gets there"
 
 
 class Decision(enum.Enum):
@@ -51,256 +41,238 @@ class Decision(enum.Enum):
 
 @dataclass(frozen=True)
 class Verdict:
-    """What became of a claim.
-
-    Attributes:
-        claim: the claim
-        decision: whether it holds
-        ours: our figure with its interval, in words
-        why: what decided
-        value: our figure
-        low: the lower end of its interval
-        high: its upper end
-    """
+    """What became of a claim."""
 
     claim: Claim
     decision: Decision
-    ours: str
+    ours: str  # our figure with its interval, in words
     why: str
     value: float
-    low: float
+    low: float  # the ends of the value's interval
     high: float
 
 
-class Judged(NamedTuple):
-    """A test's answer.
+@dataclass(frozen=True)
+class Measured:
+    """What a statistic gives on a claim's trials."""
 
-    Attributes:
-        decision: whether the claim holds
-        value: our figure
-        interval: its interval
-        ours: both in words
-        why: what decided
-    """
-
-    decision: Decision
     value: float
     interval: Interval
-    ours: str
-    why: str
+    trials: int  # trials, or pairs of them, that count
+    ours: str  # the value with its interval, in words
+    why: str = ""  # further figures, in words
+    unknown: str = ""  # why no decision is possible whatever the interval
+    few: str = ""  # what is said of fewer trials than the test needs, where it is not that no interval says anything
+    exact: bool = False  # the interval is right for any number of trials, so that even few can refute
+
+
+#: By relation, whether an interval bears it out, and whether it refutes it.
+RELATIONS: Mapping[str, Callable[[Interval, float], tuple[bool, bool]]] = MappingProxyType(
+    {
+        "<": lambda interval, bound: (interval.high < bound, interval.low >= bound),
+        "<=": lambda interval, bound: (interval.high <= bound + EQUAL, interval.low > bound + EQUAL),
+        ">": lambda interval, bound: (interval.low > bound, interval.high <= bound),
+        ">=": lambda interval, bound: (interval.low >= bound, interval.high < bound),
+        "about": lambda interval, bound: (
+            bound * (1 - ABOUT) <= interval.low and interval.high <= bound * (1 + ABOUT),
+            interval.high < bound * (1 - ABOUT) or interval.low > bound * (1 + ABOUT),
+        ),
+    }
+)
 
 
 def judge(claim: Claim, found: Found) -> Verdict:
     """Test a claim."""
-    decision, value, interval, ours, why = _judged(claim.test, found)
-    why = "; ".join(filter(None, (why, claim.remark)))
-    return Verdict(claim, decision, ours, why, value, interval.low, interval.high)
+    measured = STATISTICS[claim.statistic](claim, found)
+    holds, fails = RELATIONS[claim.relation](measured.interval, claim.bound)
+    decision, reason = Decision.OPEN, ""
+    if measured.unknown:
+        reason = measured.unknown
+    elif measured.trials < trials_needed(claim) and not (measured.exact and fails):
+        reason = measured.few or f"{measured.trials} trials, and with fewer than {FEWEST} no interval says anything"
+    elif holds or fails:
+        decision = Decision.HOLDS if holds else Decision.REFUTED
+    else:
+        reason = _undecided(measured, claim)
+    why = "; ".join(filter(None, (reason, measured.why, claim.remark)))
+    return Verdict(claim, decision, measured.ours, why, measured.value, *measured.interval)
 
 
-def trials_needed(test: Test) -> int:
-    """How many trials a test needs at least to bear a claim out."""
-    if isinstance(test, MayFail) or (isinstance(test, Cases) and test.quantity != TIMED):
-        return 1
-    if isinstance(test, Arrive):
-        return next(n for n in range(1, MANY) if _all_or_none(test, n))
-    return FEWEST
+def trials_needed(claim: Claim) -> int:
+    """How many trials a claim's test needs at least to bear it out."""
+    if claim.statistic in ("arrived", "failed"):
+        above = claim.relation in (">", ">=")
+        return next(
+            n for n in range(1, MANY) if RELATIONS[claim.relation](wilson(n if above else 0, n), claim.bound)[0]
+        )
+    return 1 if "wins" in claim.statistic and TIMED not in claim.quantity else FEWEST
 
 
-def _all_or_none(test: Arrive, trials: int) -> bool:
-    """Whether so many trials that all arrive, or none, as the claim wants, have an interval within its bounds."""
-    interval = wilson(trials if test.least else 0, trials)
-    return test.least <= interval.low and interval.high <= test.most
+def trials_at_hand(claim: Claim, sizes: Mapping[Arm, int]) -> int:
+    """How many trials, or pairs of them, a claim's test counts."""
+    counts = [min(sizes[arm] for arm in case) for case in claim.cases]
+    return min(counts) if "wins" in claim.statistic else sum(counts)
 
 
-def trials_at_hand(test: Test, sizes: Mapping[Arm, int]) -> int:
-    """How many trials, or pairs of them, a test counts."""
-    if isinstance(test, Mean):
-        return sizes[test.arm]
-    if isinstance(test, (Arrive, MayFail, Within)):
-        return sum(sizes[arm] for arm in test.arms)
-    counts = [min(sizes[one], sizes[other]) for one, other in test.pairs]
-    return min(counts) if isinstance(test, (LessGain, Cases)) else sum(counts)
-
-
-@functools.singledispatch
-def _judged(test: Any, found: Found) -> Judged:
-    raise TypeError(f"no judge for a test of type {type(test).__name__}")
-
-
-@_judged.register
-def _less(test: Less, found: Found) -> Judged:
-    first, second, world = _paired(test.pairs, test.quantity, found, test.against)
-    difference = np.round(first - second, 9)  # what is only rounding becomes 0
+def _difference(claim: Claim, found: Found) -> Measured:
+    """The median of the differences, pair by pair."""
+    first, second, world = _paired(claim, found)
+    difference = np.round(first - second, 9)  # rounding errors become 0
     value, interval = _median(difference, world)
-    below = interval.high < test.margin if test.strict else interval.high <= test.margin
-    above = interval.low >= test.margin if test.strict else interval.low > test.margin
-    decision, reason = _decided(below, above, len(difference), value, interval, test.margin)
-    if min(first.min(), second.min()) >= NO_PATH:
-        decision, reason = Decision.OPEN, "neither ever gets there"
     why = f"{_counts(difference)}; Wilcoxon's p {wilcoxon(difference):.2g}"
-    if test.quantity == "work":
-        why += f"; processor time {_slower(test.pairs, found):+.0f} %"
-    ours = f"median difference {_with_interval(value, interval, test.quantity, endless=ENDLESS_TEXT)}"
-    return Judged(decision, value, interval, ours, _joined(reason, why))
+    if claim.quantity == ("work",):
+        why += f"; processor time {_slower(claim, found):+.0f} %"
+    ours = f"median difference {_with_interval(value, interval, claim, endless=ENDLESS_TEXT)}"
+    return Measured(value, interval, len(difference), ours, why, _never(first, second))
 
 
-@_judged.register
-def _less_gain(test: LessGain, found: Found) -> Judged:
-    before, after, _ = _paired((test.first,), test.quantity, found)
-    earlier, later, world = _paired((test.second,), test.quantity, found)
-    difference = np.round((before - after) - (earlier - later), 9)
-    value, interval = _median(difference, world)
-    decision, reason = _decided(interval.high < 0, interval.low >= 0, len(difference), value, interval, 0.0)
+def _gain(claim: Claim, found: Found) -> Measured:
+    """The median of the differences of two gains: from the first planner to the second, and from the third to the fourth."""
+    (case,) = claim.cases
+    before, after, world = _paired(claim, found, [case[:2]])
+    earlier, later, _ = _paired(claim, found, [case[2:]])
+    value, interval = _median(np.round((before - after) - (earlier - later), 9), world)
     gains = f"median gains {np.median(before - after):.2f} and {np.median(earlier - later):.2f}"
-    ours = f"median difference of the gains {_with_interval(value, interval, test.quantity, endless=ENDLESS_TEXT)}"
-    return Judged(decision, value, interval, ours, _joined(reason, gains))
+    ours = f"median difference of the gains {_with_interval(value, interval, claim, endless=ENDLESS_TEXT)}"
+    return Measured(value, interval, len(before), ours, gains)
 
 
-@_judged.register
-def _oftener(test: Oftener, found: Found) -> Judged:
-    share = _share(test.pairs, test.quantity, found)
-    low, high = share.interval
-    decision, reason = _decided(high < 0, low >= 0, share.pairs, share.value, share.interval, 0.0)
-    if not share.known:
-        decision, reason = Decision.OPEN, "neither ever gets there"
-    why = _joined(reason, share.median)
-    return Judged(decision, share.value, share.interval, share.ours, why)
+def _balance(claim: Claim, found: Found) -> Measured:
+    """The share of the pairs in which the first value is above the second, less the share in which it is below [points].
+
+    For values of which many are equal, as lengths on small maps: their median difference is 0 whatever the others are. Two
+    planners that are alike have a balance of 0, of which an interval never says that it is 0 or less; so "no worse" lets a
+    small effect pass.
+    """
+    first, second, world = _paired(claim, found)
+    difference = np.round(first - second, 9)
+    signs = np.sign(difference)
+    value, interval = 100 * float(signs.mean()), means_by_world(100 * signs[:, None], _alone(world))[0]
+    less, more = int((signs < 0).sum()), int((signs > 0).sum())
+    points = f"{value:+.0f} points [{_written(interval.low, 0)}, {_written(interval.high, 0)}]"
+    ours = f"below in {less} of {len(signs)} pairs, above in {more}: {points}"
+    median = f"median difference {_with_interval(*_median(difference, world), claim, endless=ENDLESS_TEXT)}"
+    return Measured(value, interval, len(signs), ours, median, _never(first, second))
 
 
-@_judged.register
-def _no_worse(test: NoWorse, found: Found) -> Judged:
-    share = _share(test.pairs, test.quantity, found)
-    low, high = share.interval
-    decision, reason = _decided(
-        high <= test.margin, low > test.margin, share.pairs, share.value, share.interval, test.margin
-    )
-    if not share.known:
-        decision, reason = Decision.OPEN, "neither ever gets there"
-    why = _joined(reason, share.median)
-    return Judged(decision, share.value, share.interval, share.ours, why)
+def _scatter(claim: Claim, found: Found) -> Measured:
+    """The difference of the two ranges between quartiles; maps, and runs within each, are resampled for its interval.
 
+    A quartile that no path reaches is infinite, and so is the range.
+    """
+    first, second, world = _paired(claim, found)
 
-@_judged.register
-def _within(test: Within, found: Found) -> Judged:
-    values, world = _together(test.arms, test.quantity, found)
-    value, interval = _median(values, world)
-    ours = f"median {_with_interval(value, interval, test.quantity)}"
-    arrived, bound = int((values < NO_PATH).sum()), test.most + 1e-6
-    why = f"{arrived} of {len(values)} found a path, {int((values <= bound).sum())} are within the bound"
-    decision, reason = _decided(interval.high <= bound, interval.low > bound, len(values), value, interval, test.most)
-    return Judged(decision, value, interval, ours, _joined(reason, why))
+    def wider(counts: Numbers) -> float:
+        return _quartile_range(first, counts) - _quartile_range(second, counts)
 
-
-@_judged.register
-def _mean(test: Mean, found: Found) -> Judged:
-    values, _ = _together((test.arm,), test.quantity, found)
-    known = values < NO_PATH
-    if not known.any():
-        return Judged(Decision.OPEN, math.nan, Interval(math.nan, math.nan), "–", "no path was found")
-    value = float(values[known].mean())
-    # Trials are of one map, so each counts on its own.
-    interval = means_by_world(values[known][:, None], np.arange(int(known.sum())))[0]
-    low, high = test.value * (1 - test.margin), test.value * (1 + test.margin)
-    inside, outside = low <= interval.low and interval.high <= high, interval.high < low or interval.low > high
-    nearest = min(low, high, key=lambda bound: abs(value - bound))
-    decision, reason = _decided(inside, outside, int(known.sum()), value, interval, nearest)
-    why = f"{100 * (value / test.value - 1):+.1f} % from the printed mean"
-    if not known.all():
-        why += f"; {int((~known).sum())} of {len(values)} had no path"
-    ours = f"mean {_with_interval(value, interval, test.quantity)}"
-    return Judged(decision, value, interval, ours, _joined(reason, why))
-
-
-@_judged.register
-def _arrive(test: Arrive, found: Found) -> Judged:
-    trials = [trial for arm in test.arms for trial in found[arm]]
-    arrived = sum(trial.result.solved for trial in trials)
-    value, interval = arrived / len(trials), wilson(arrived, len(trials))
-    holds = test.least <= interval.low and interval.high <= test.most
-    fails = interval.high < test.least or interval.low > test.most
-    limit = test.least or test.most
-    needed = trials_needed(test)
-    decision = Decision.HOLDS if holds else Decision.REFUTED if fails else Decision.OPEN
-    reason = "" if holds or fails else _undecided(value, interval, limit)
-    if not (holds or fails) and len(trials) < needed:
-        reason = f"{len(trials)} runs, and the interval of fewer than {needed} is too wide whatever they give"
-    bound = f"at least {limit:.0%}" if test.least else f"at most {limit:.0%}"
-    ours = f"{arrived}/{len(trials)} arrived [{interval.low:.0%}, {interval.high:.0%}]"
-    return Judged(decision, value, interval, ours, _joined(reason, f"{bound} asked; Wilson's interval"))
-
-
-@_judged.register
-def _may_fail(test: MayFail, found: Found) -> Judged:
-    trials = [trial for arm in test.arms for trial in found[arm]]
-    failed = sum(not trial.result.solved for trial in trials)
-    value, interval = failed / len(trials), wilson(failed, len(trials))
-    decision = Decision.HOLDS if failed else Decision.OPEN
-    why = "one run that fails bears it out" if failed else "no run failed, which does not say that none may"
-    ours = f"{failed}/{len(trials)} found no path [{interval.low:.0%}, {interval.high:.0%}]"
-    return Judged(decision, value, interval, ours, why)
-
-
-@_judged.register
-def _wider(test: Wider, found: Found) -> Judged:
-    """The difference of the two ranges between quartiles; maps, and runs within each, are resampled for its interval."""
-    first, second, world = _paired((test.pair,), test.quantity, found)
-    each = np.ones(len(first), dtype=np.int64)
-    value = _quartile_range(first, each) - _quartile_range(second, each)
     rows = np.vstack(list(resampled(_alone(world))))
-    low, high = np.quantile(
-        [_quartile_range(first, row) - _quartile_range(second, row) for row in rows], [0.025, 0.975]
-    )
-    value, low, high = (
-        round(float(one), 9) for one in (value, low, high)
-    )  # differences of equal ranges are not quite 0
+    ends = np.quantile([wider(row) for row in rows], [0.025, 0.975])
+    # Differences of equal ranges are not quite 0.
+    value, low, high = (round(float(one), 9) for one in (wider(np.ones(len(first), dtype=np.int64)), *ends))
     interval = Interval(low, high)
-    ours = f"ranges differ by {_with_interval(value, interval, test.quantity, endless=ENDLESS_TEXT)}"
-    decision, reason = _decided(low > 0, high <= 0, len(first), value, interval, 0.0)
-    return Judged(decision, value, interval, ours, _joined(reason, "ranges between quartiles, bootstrapped"))
+    ours = f"ranges differ by {_with_interval(value, interval, claim, endless=ENDLESS_TEXT)}"
+    return Measured(value, interval, len(first), ours, "ranges between quartiles, bootstrapped")
 
 
-@_judged.register
-def _cases(test: Cases, found: Found) -> Judged:
-    stands = np.min if test.best_run else np.median
-    first = [float(stands([_value(trial, test.quantity) for trial in found[one]])) for one, _ in test.pairs]
-    second = [float(stands([_value(trial, test.quantity) for trial in found[other]])) for _, other in test.pairs]
-    less = sum(a < b - 1e-9 for a, b in zip(first, second, strict=True))
-    decision = Decision.HOLDS if less >= test.least else Decision.REFUTED
-    digits = 2 if test.quantity == TIMED else 0
-    why = ", ".join(f"{a:.{digits}f} : {b:.{digits}f}" for a, b in zip(first, second, strict=True))
-    runs = min(len(found[one]) for one, _ in test.pairs)
-    if runs < trials_needed(test):
-        decision, why = Decision.OPEN, f"{runs} runs tell no time, {FEWEST} do; {why}"
-    return Judged(decision, float(less), Interval(less, less), f"less in {less} of {len(first)}", why)
+def _median_of_one(claim: Claim, found: Found) -> Measured:
+    """The median of all values."""
+    values, world = _together(claim, found)
+    value, interval = _median(values, world)
+    arrived, within = int((values < NO_PATH).sum()), int((values <= claim.bound + EQUAL).sum())
+    why = f"{arrived} of {len(values)} found a path, {within} are within the bound"
+    return Measured(value, interval, len(values), f"median {_with_interval(value, interval, claim)}", why)
 
 
-def _decided(
-    holds: bool, fails: bool, trials: int, value: float, interval: Interval, bound: float
-) -> tuple[Decision, str]:
-    """The decision and, where there is none, why."""
-    if trials < FEWEST:
-        return Decision.OPEN, f"{trials} trials, and with fewer than {FEWEST} no interval says anything"
-    if holds or fails:
-        return (Decision.HOLDS if holds else Decision.REFUTED), ""
-    return Decision.OPEN, _undecided(value, interval, bound)
+def _mean_of_one(claim: Claim, found: Found) -> Measured:
+    """The mean of all finite values, beside the printed one."""
+    values, _ = _together(claim, found)
+    known = values[values < NO_PATH]
+    if not len(known):
+        return Measured(math.nan, Interval(math.nan, math.nan), 0, "–", unknown="no path was found")
+    value = float(known.mean())
+    # Trials are of one map, so each counts on its own.
+    interval = means_by_world(known[:, None], np.arange(len(known)))[0]
+    why = f"{100 * (value / claim.bound - 1):+.1f} % from the printed mean"
+    if len(known) < len(values):
+        why += f"; {len(values) - len(known)} of {len(values)} had no path"
+    return Measured(value, interval, len(known), f"mean {_with_interval(value, interval, claim)}", why)
 
 
-def _undecided(value: float, interval: Interval, bound: float) -> str:
+def _arrived(claim: Claim, found: Found) -> Measured:
+    """The share of the runs in which a planner finds a path."""
+    runs, arrived, needed = *_solved(claim, found), trials_needed(claim)
+    interval = wilson(arrived, runs)
+    return Measured(
+        value=arrived / runs,
+        interval=interval,
+        trials=runs,
+        ours=f"{arrived}/{runs} arrived [{interval.low:.0%}, {interval.high:.0%}]",
+        why=f"{'at least' if claim.relation == '>=' else 'at most'} {claim.bound:.0%} asked; Wilson's interval",
+        few=f"{runs} runs, and the interval of fewer than {needed} is too wide whatever they give",
+        exact=True,
+    )
+
+
+def _failed(claim: Claim, found: Found) -> Measured:
+    """The share of the runs in which a planner finds no path. One such run shows that there are any; none refutes it."""
+    runs, arrived = _solved(claim, found)
+    failed, interval = runs - arrived, wilson(runs - arrived, runs)
+    return Measured(
+        value=failed / runs,
+        interval=interval,
+        trials=runs,
+        ours=f"{failed}/{runs} found no path [{interval.low:.0%}, {interval.high:.0%}]",
+        why="one run that fails bears it out" if failed else "",
+        unknown="" if failed else "no run failed, which does not say that none may",
+    )
+
+
+def _wins(claim: Claim, found: Found) -> Measured:
+    """In how many cases the first planner's median, or its best run as for times of equal work, is below the second's."""
+    stands = np.min if claim.statistic == "wins of best runs" else np.median
+    pairs = [
+        [float(stands([_value(t, claim.quantity[0]) for t in found[arm]])) for arm in case] for case in claim.cases
+    ]
+    less = sum(a < b - 1e-9 for a, b in pairs)
+    digits = 2 if TIMED in claim.quantity else 0
+    why = ", ".join(f"{a:.{digits}f} : {b:.{digits}f}" for a, b in pairs)
+    runs = min(len(found[one]) for one, _ in claim.cases)
+    few = f"{runs} runs tell no time, {FEWEST} do"
+    return Measured(float(less), Interval(less, less), runs, f"less in {less} of {len(pairs)}", why, few=few)
+
+
+#: By its name in the table of claims, what a statistic measures of a claim's trials.
+STATISTICS: Mapping[str, Callable[[Claim, Found], Measured]] = MappingProxyType(
+    {
+        # A single planner's trials, all together.
+        "median": _median_of_one,
+        "mean": _mean_of_one,
+        "arrived": _arrived,
+        "failed": _failed,
+        # Two planners, pair by pair of the same map and seed; `gain` compares two pairs.
+        "difference": _difference,
+        "balance": _balance,
+        "scatter": _scatter,
+        "gain": _gain,
+        # Two planners, map by map.
+        "wins": _wins,
+        "wins of best runs": _wins,
+    }
+)
+
+
+def _undecided(measured: Measured, claim: Claim) -> str:
     """Why an interval decides nothing, and how much more it would take if the value stayed: intervals shrink with the root."""
+    value, bound = measured.value, claim.bound
+    if claim.relation == "about":
+        bound = min(bound * (1 - ABOUT), bound * (1 + ABOUT), key=lambda end: abs(value - end))
     words = f"the interval does not lie on one side of {bound:g}"
-    towards = interval.high - value if bound > value else value - interval.low
+    towards = measured.interval.high - value if bound > value else value - measured.interval.low
     if abs(bound - value) < 1e-9 or not abs(towards) < NO_PATH / 10:
         return words
     times = (towards / abs(bound - value)) ** 2
-    return (
-        f"{words}; some {times:{'.0f' if times > 10 else '.1f'}} times as many maps and seeds would tell"
-        if 1.1 < times < MANY
-        else words
-    )
-
-
-def _joined(*words: str) -> str:
-    return "; ".join(filter(None, words))
+    more = f"some {times:{'.0f' if times > 10 else '.1f'}} times as many maps and seeds would tell"
+    return f"{words}; {more}" if 1.1 < times < MANY else words
 
 
 def _counts(difference: Floats) -> str:
@@ -308,48 +280,14 @@ def _counts(difference: Floats) -> str:
     return f"{less} less, {equal} equal, {more} more"
 
 
-def _slower(pairs: Sequence[tuple[Arm, Arm]], found: Found) -> float:
-    """By how much the first arm's median processor time is above the second's [%]; below 0 if it is faster."""
-    first, second, _ = _paired(pairs, TIMED, found)
+def _never(first: Floats, second: Floats) -> str:
+    return NEVER if min(first.min(), second.min()) >= NO_PATH else ""
+
+
+def _slower(claim: Claim, found: Found) -> float:
+    """By how much the first planner's median processor time is above the second's [%]; below 0 if it is faster."""
+    first, second, _ = _paired(claim, found, quantity=(TIMED,))
     return 100 * (float(np.median(first)) / max(float(np.median(second)), 1e-9) - 1)
-
-
-class Share(NamedTuple):
-    """In how many pairs the first value is above the second, less in how many it is below.
-
-    Attributes:
-        value: the difference of the two shares [points]
-        interval: its interval
-        pairs: how many pairs there are
-        known: whether any value of any pair is finite
-        ours: the figures in words
-        median: the median difference in words
-    """
-
-    value: float
-    interval: Interval
-    pairs: int
-    known: bool
-    ours: str
-    median: str
-
-
-def _share(pairs: Sequence[tuple[Arm, Arm]], quantity: str, found: Found) -> Share:
-    first, second, world = _paired(pairs, quantity, found)
-    difference = np.round(first - second, 9)
-    signs = np.sign(difference)
-    value, interval = 100 * float(signs.mean()), means_by_world(100 * signs[:, None], _alone(world))[0]
-    less, more = int((signs < 0).sum()), int((signs > 0).sum())
-    points = f"{value:+.0f} points [{_written(interval.low, 0)}, {_written(interval.high, 0)}]"
-    middle = _with_interval(*_median(difference, world), quantity, endless=ENDLESS_TEXT)
-    return Share(
-        value,
-        interval,
-        len(signs),
-        bool(min(first.min(), second.min()) < NO_PATH),
-        f"below in {less} of {len(signs)} pairs, above in {more}: {points}",
-        f"median difference {middle}",
-    )
 
 
 def _value(trial: Trial, quantity: str) -> float:
@@ -357,45 +295,52 @@ def _value(trial: Trial, quantity: str) -> float:
     return NO_PATH if math.isnan(value) else min(value, NO_PATH)
 
 
-def _together(arms: Sequence[Arm], quantity: str, found: Found) -> tuple[Floats, npt.NDArray[np.int64]]:
-    """The values of all trials of some arms, (N,), and the number of each one's map, (N,)."""
-    rows = [(_value(trial, quantity), (arm.map, trial.world)) for arm in arms for trial in found[arm]]
+def _solved(claim: Claim, found: Found) -> tuple[int, int]:
+    """The number of all runs, and of those that found a path."""
+    solved = [trial.result.solved for (arm,) in claim.cases for trial in found[arm]]
+    return len(solved), sum(solved)
+
+
+def _together(claim: Claim, found: Found) -> tuple[Floats, Numbers]:
+    """The values of all trials, (N,), and the number of each one's map, (N,)."""
+    (quantity,) = claim.quantity
+    rows = [(_value(trial, quantity), (arm.map, trial.world)) for (arm,) in claim.cases for trial in found[arm]]
     return np.array([value for value, _ in rows]), _numbered([place for _, place in rows])
 
 
 def _paired(
-    pairs: Sequence[tuple[Arm, Arm]], quantity: str, found: Found, against: str = ""
-) -> tuple[Floats, Floats, npt.NDArray[np.int64]]:
-    """The values of first and second arms with the same map and seed, (N,) each, and the number of their map, (N,).
-
-    `against` is the second arm's quantity where it is another one.
-    """
+    claim: Claim,
+    found: Found,
+    cases: Sequence[tuple[Arm, ...]] | None = None,
+    quantity: tuple[str, ...] | None = None,
+) -> tuple[Floats, Floats, Numbers]:
+    """The values of first and second planners with the same map and seed, (N,) each, and the number of their map, (N,)."""
+    quantity = quantity or claim.quantity
     rows = []
-    for one, other in pairs:
+    for one, other in claim.cases if cases is None else cases:
         second = {trial.seed: trial for trial in found[other]}
         rows += [(trial, second[trial.seed], (one.map, trial.world)) for trial in found[one] if trial.seed in second]
-    values = np.array([[_value(a, quantity), _value(b, against or quantity)] for a, b, _ in rows]).reshape(-1, 2)
+    values = np.array([[_value(a, quantity[0]), _value(b, quantity[-1])] for a, b, _ in rows]).reshape(-1, 2)
     return values[:, 0], values[:, 1], _numbered([place for *_, place in rows])
 
 
-def _numbered(places: Sequence[tuple[str, int]]) -> npt.NDArray[np.int64]:
+def _numbered(places: Sequence[tuple[str, int]]) -> Numbers:
     names = {place: number for number, place in enumerate(dict.fromkeys(places))}
     return np.array([names[place] for place in places], dtype=np.int64)
 
 
-def _median(values: Floats, world: npt.NDArray[np.int64]) -> tuple[float, Interval]:
+def _median(values: Floats, world: Numbers) -> tuple[float, Interval]:
     """The median and its interval; where all trials are of one map, each counts on its own."""
     return float(np.median(values)), medians_by_world(values[:, None], _alone(world))[0]
 
 
-def _alone(world: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+def _alone(world: Numbers) -> Numbers:
     """What is resampled: maps or, where there is only one, single trials."""
     return np.arange(len(world)) if len(set(world.tolist())) == 1 else world
 
 
-def _quartile_range(values: Floats, counts: npt.NDArray[np.int64]) -> float:
-    drawn = np.repeat(values, counts)
-    low, high = np.quantile(drawn, [0.25, 0.75])
+def _quartile_range(values: Floats, counts: Numbers) -> float:
+    low, high = np.quantile(np.repeat(values, counts), [0.25, 0.75])
     return float(high - low)
 
 
@@ -414,8 +359,8 @@ UNITS: Mapping[str, tuple[int, str]] = {
 }
 
 
-def _with_interval(value: float, interval: Interval, quantity: str, endless: str = "no path") -> str:
-    digits, unit = UNITS[quantity]
+def _with_interval(value: float, interval: Interval, claim: Claim, endless: str = "no path") -> str:
+    digits, unit = UNITS[claim.quantity[0]]
 
     def number(one: float) -> str:
         if math.isnan(one):

@@ -21,6 +21,7 @@ from antdrive.base.reading import read_bytes
 from antdrive.base.types import Floats
 from antdrive.runs.suites.demands import WALL_CLOCK
 from antdrive.runs.suites.nearest import RULES, ClosestApproach, nearest_of
+from antdrive.runs.suites.suite import shown_path
 from antdrive.sim.log.binding import hashes_of
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
@@ -151,6 +152,18 @@ class Baseline:
         with written_whole(path) as temporary:
             temporary.write_text(self.to_text(), encoding="utf-8")
 
+    def renew(self, path: Path) -> str:
+        """Write the baseline unless the file holds the same drive already; what was done.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
+        existed = path.exists()
+        if existed and path.read_bytes() == self.to_text().encode():
+            return "unchanged"
+        self.save(path)
+        return "renewed" if existed else "written"
+
     @classmethod
     def load(cls, path: Path) -> Baseline | None:
         """The baseline in a file; None if there is no such file.
@@ -179,6 +192,19 @@ class Baseline:
             raise input_error(str(path), *filter(None, [key]), f"{problem}; restore it, or {again}") from None
         for key, problem in baseline.gaps():
             raise input_error(str(path), key, f"{problem}; restore it, or {again}")
+        return baseline
+
+    @classmethod
+    def own(cls, path: Path, case: str) -> Baseline | None:
+        """The baseline in a file, which must be that of the test; None if there is no such file.
+
+        Raises:
+            InputError: the file is no baseline, or that of another test.
+        """
+        baseline = cls.load(path)
+        if baseline is not None and baseline.case != case:
+            problem = f"belongs to {baseline.case}, not to {case}; remove the file, and accept {case} anew"
+            raise input_error(shown_path(path), "case", problem)
         return baseline
 
     def gaps(self) -> Iterator[tuple[str, str]]:

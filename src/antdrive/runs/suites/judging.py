@@ -32,6 +32,8 @@ _WORDS = {
 #: The metrics that messages begin with.
 FIRST = ("contacts_driving", "min_clearance_m", "duration_s", "driven_length_m")
 _PLACED = ("min_clearance_m",)
+#: The outcome of a test whose planner raised an error.
+RAISED = "planner_error"
 ROUNDED = 1e-6  # the last decimal of a baseline's metrics
 
 

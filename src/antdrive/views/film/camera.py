@@ -17,7 +17,7 @@ _FOV = {
     "oblique": 30.0,
     "top": 6.0,
     "follow": 34.0,
-}  # vertical [degrees]; TinyRenderer has no orthographic view
+}  # vertical [degrees]
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,18 +121,6 @@ class Camera:
         shift = np.eye(4)
         shift[:2, 3] = -x, -y
         return Camera(self.view @ shift, self.projection, self.size)
-
-    def matrices(self, box: tuple[int, int, int, int] | None = None) -> tuple[list[float], list[float]]:
-        """View and projection in OpenGL's column order, of the whole picture or of the pixels in `box`."""
-        projection = self.projection
-        if box is not None:
-            width, height = self.size
-            x0, y0, x1, y1 = box
-            across, down = (x0 + x1) / width - 1, 1 - (y0 + y1) / height
-            projection = projection.copy()
-            projection[0] = width / (x1 - x0) * (self.projection[0] - across * self.projection[3])
-            projection[1] = height / (y1 - y0) * (self.projection[1] - down * self.projection[3])
-        return self.view.T.ravel().tolist(), projection.T.ravel().tolist()
 
 
 def camera_for(name: str, low: npt.ArrayLike, high: npt.ArrayLike, height: float, size: tuple[int, int]) -> Camera:

@@ -6,7 +6,6 @@ import itertools
 import math
 import time
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
 from pathlib import Path
 from typing import NamedTuple
 
@@ -61,11 +60,8 @@ def compare_film(
     size = size or fitting_size(rollouts, camera)
     times = frame_times(max(float(log.t[-1] - log.t[0]) for log in rollouts), fps, speed)
     total = len(times) + round(2 * HOLD * fps)
-    with (
-        written_whole(target) as temporary,
-        encoding(temporary, size, fps) as send,
-        SplitScreen(rollouts, camera, size, titles, mark) as screen,
-    ):
+    screen = SplitScreen(rollouts, camera, size, titles, mark)
+    with written_whole(target) as temporary, encoding(temporary, size, fps) as send:
         for k, at in enumerate(itertools.chain(times, itertools.repeat(np.inf, total - len(times)))):
             send(screen.frame(float(at)))
             if progress is not None:
@@ -90,7 +86,7 @@ class Mark(NamedTuple):
 
 
 class SplitScreen:
-    """The frames of several runs, each in a tile. Use it in a `with` block."""
+    """The frames of several runs, each in a tile."""
 
     def __init__(
         self,
@@ -108,15 +104,6 @@ class SplitScreen:
         names = titles or [_title(log, one_world) for log in rollouts]
         room = (wide - 2, high - 2)
         self._tiles = [Tile(log, camera, room, name, mark) for log, name in zip(rollouts, names, strict=True)]
-        self._open = ExitStack()
-
-    def __enter__(self) -> SplitScreen:
-        for tile in self._tiles:
-            self._open.enter_context(tile.shot)
-        return self
-
-    def __exit__(self, *problem: object) -> None:
-        self._open.close()
 
     def frame(self, at: float) -> Picture:
         """The frame (H, W, 3) at a moment of all runs [s]."""

@@ -1,31 +1,27 @@
 """Compose the pictures of a film: everything that stands still is rendered once; each frame adds robot and movers.
 
-PyBullet's TinyRenderer draws the bodies that stand still. This backdrop keeps its depth, so a frame costs only the
-pixels around the robot and the movers: a kernel draws these as TinyRenderer would, and they are blended in where they
-are nearer than the backdrop. A camera that moves needs a new backdrop in every frame; ray casting draws it faster
-than TinyRenderer.
+Ray casting draws the bodies that stand still. This backdrop keeps its depth, so a frame costs only the pixels around
+the robot and the movers: their meshes are drawn, and blended in where they are nearer than the backdrop. A camera that
+moves needs a new backdrop in every frame.
 """
 
 from __future__ import annotations
 
-import contextlib
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from antdrive.sim.physics.bullet import bullet, client
 from antdrive.views.film import _kernels_paint as kernels
 from antdrive.views.film.camera import Camera
 from antdrive.views.film.ground import dashes, kerb_width, paint_ground
-from antdrive.views.film.meshes import Mesh, Part, cylinder, join, kerb, robot_height, robot_parts
+from antdrive.views.film.meshes import Part, cylinder, kerb, robot_height, robot_parts
 from antdrive.views.film.raycast import Solids
 from antdrive.views.film.sight import FanPainter, SightPainter
 from antdrive.views.film.text import glow
-from antdrive.views.film.tiny_renderer import Box, add_mesh, merged, overlap, render
-from antdrive.views.film.triangles import Solid, draw_solids, placed
+from antdrive.views.film.triangles import Box, Solid, draw_solids, merged, overlap, placed
 from antdrive.views.scene import Scene
 from antdrive.views.style import (
     FOLLOWED,
@@ -48,7 +44,6 @@ Picture = npt.NDArray[np.uint8]  # (H, W, 3)
 
 HIDDEN_OPACITY = 0.16  # of a robot behind a cylinder, so that it is never lost
 SHADOW_BLUR = 0.05  # softness of the shadow of a flat body [m]
-MANY, FEW_SIDES = 1000, 12  # in worlds of more cylinders, which look small, each is drawn with few sides
 RING_SIDES, RING_OFF = 32, 0.05  # of the ring around a mover that is followed, and how far off its surface [m]
 FORECAST = 1.5  # how far ahead the motion of movers is drawn [s]
 
@@ -62,7 +57,7 @@ class Backdrop:
         pixels: the picture (H, W, 3)
         visible: the fraction of each pixel that shows ground (H, W)
         depth: depth of the bodies in clip space, 1 where there is none, at the resolution they were rendered in
-        bodies: at the same resolution the number of the obstacle in sight, -1 for ground; empty where none is painted pale
+        bodies: at the same resolution the number of the obstacle in sight, -1 for ground
     """
 
     camera: Camera
@@ -73,11 +68,11 @@ class Backdrop:
 
 
 class Compositor:
-    """Draws frames of one scene for one camera. Use it in a `with` block.
+    """Draws frames of one scene for one camera.
 
-    >>> with Compositor(scene, camera, route=rollout.route) as compositor:
-    ...     compositor.extend_trail(points, speeds)
-    ...     picture = compositor.frame(pose, wheels)
+    >>> compositor = Compositor(scene, camera, route=rollout.route)
+    >>> compositor.extend_trail(points, speeds)
+    >>> picture = compositor.frame(pose, wheels)
     """
 
     def __init__(
@@ -87,13 +82,12 @@ class Compositor:
         *,
         route: Floats,
         fine: int = 2,
-        moving_camera: bool = False,
         sight: FanPainter | None = None,
     ) -> None:
         self.scene = scene
         self.camera = camera
         self.fine = fine
-        self._moving_camera, self._sight = moving_camera, sight
+        self._sight = sight
         self.tall = np.minimum(scene.obstacles[:, 3], drawn_height(scene))
         self._route = np.ascontiguousarray(route, dtype=np.float64).reshape(-1, 2)
         self._sun, self._light = _sun(camera)
@@ -101,24 +95,10 @@ class Compositor:
         self._trail: list[tuple[Floats, Floats]] = []
         self._labels: list[tuple[Picture, float, float, float]] = []
         self._changing_route = (np.empty((0, 5)), np.empty((0, 5)))  # dashes and dots, as capsules
-        self._open = contextlib.ExitStack()
-
-    def __enter__(self) -> Compositor:
-        self._still = self._open.enter_context(client())
-        self._meshes = still_meshes(self.scene, self.tall)
-        self._solids = still_solids(self._meshes, self.scene, self.tall)
-        balls = [mesh.ball for mesh, _ in self._meshes]
-        self._centres = np.array([centre for centre, _ in balls])
-        self._radii = np.array([radius for _, radius in balls])
-        self._loaded = np.zeros(len(balls), dtype=np.bool_)
-        self._parts = robot_parts(self.scene.robot)
-        tall = drawn_height(self.scene)
-        self._mover_meshes = [cylinder(radius, 0.0, tall) for radius in self.scene.mover_radii]
-        self.set_camera(self.camera)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._open.close()
+        self._solids = still_solids(scene, self.tall)
+        self._parts = robot_parts(scene.robot)
+        self._mover_meshes = [cylinder(radius, 0.0, drawn_height(scene)) for radius in scene.mover_radii]
+        self.set_camera(camera)
 
     def set_camera(self, camera: Camera) -> None:
         """Render the backdrop through a camera, with the labels and the trail so far."""
@@ -226,33 +206,16 @@ class Compositor:
         at = self.camera.pixels([(x, y, z)])[0]
         return float(at[0]), float(at[1])
 
-    def _load(self, chosen: npt.NDArray[np.bool_]) -> None:
-        """Have exactly these meshes in the client; the renderer spends time on meshes out of sight, too."""
-        if (chosen == self._loaded).all():
-            return
-        bullet().resetSimulation(physicsClientId=self._still)
-        for mesh, colour in merged_by_colour([self._meshes[k] for k in np.flatnonzero(chosen)]):
-            add_mesh(self._still, mesh, colour)
-        self._loaded = chosen
-
     def _render_still(self, camera: Camera) -> Backdrop:
-        if self._moving_camera:
-            image, depth, seg = self._solids.render(camera, self.fine, self._light)
-        else:
-            self._load(camera.sees(self._centres, self._radii))
-            image, depth, seg = render(self._still, camera, None, self.fine, self._light)
-        bodies = np.empty((0, 0), dtype=np.int32)
-        if isinstance(self._sight, SightPainter):  # TinyRenderer draws many obstacles as one body
-            bodies = seg if self._moving_camera else self._solids.render(camera, self.fine, self._light)[2]
+        image, depth, seg = self._solids.render(camera, self.fine, self._light)
         width, height = camera.size
         visible = np.empty((height, width), dtype=np.float32)
         ground = np.empty((height, width), dtype=np.bool_)
         kernels.count_ground(seg, self.fine, visible, ground)
-        depth[seg < 0] = 1.0
         rgb = paint_ground(camera, self.scene, self._route, ground, self.tall, self._sun)
         pixels = np.empty((height, width, 3), dtype=np.uint8)
         kernels.resolve(rgb, image, seg, self.fine, visible, pixels)
-        return Backdrop(camera, pixels, visible, depth, bodies)
+        return Backdrop(camera, pixels, visible, depth, seg)
 
     def _paint_trail(self, rows: Floats, colours: Floats) -> None:
         visible = self.backdrop.visible
@@ -378,36 +341,13 @@ def trail_width(scene: Scene, camera: Camera) -> float:
     return max(0.32 * scene.robot.footprint.radius, 4.0 * camera.pixel)
 
 
-def still_meshes(scene: Scene, tall: Floats) -> list[tuple[Mesh, Colour]]:
-    """Everything that stands still as coloured meshes: the kerb in pieces, and cylinders of heights `tall` (N,) [m]."""
+def still_solids(scene: Scene, tall: Floats) -> Solids:
+    """Everything that stands still: the kerb in pieces, and cylinders of heights `tall` (N,) [m]."""
     width = kerb_width(scene)
-    found = [(mesh, KERB) for mesh in kerb(scene.bounds, width, 0.8 * width)]
-    many = len(scene.obstacles) > MANY
-    rough = cylinder(1.0, 0.0, 1.0, sides=FEW_SIDES)
-    for (x, y, radius, _), z, unseen in zip(scene.obstacles, tall, scene.unseen, strict=True):
-        if many:
-            mesh = replace(rough, vertices=rough.vertices * (radius, radius, z) + (x, y, 0.0))
-        else:
-            mesh = cylinder(radius, 0.0, float(z), x=x, y=y)
-        found.append((mesh, UNSEEN if unseen else OBSTACLE))
-    return found
-
-
-def still_solids(meshes: list[tuple[Mesh, Colour]], scene: Scene, tall: Floats) -> Solids:
-    """Everything that stands still as boxes and cylinders, for ray casting."""
-    kerbs = [mesh.vertices for mesh, colour in meshes if colour == KERB]
+    kerbs = [mesh.vertices for mesh in kerb(scene.bounds, width, 0.8 * width)]
     boxes = np.array([np.concatenate([corners.min(axis=0), corners.max(axis=0)]) for corners in kerbs])
     cylinders = np.column_stack([scene.obstacles[:, :3], tall])
     return Solids.of(cylinders, [UNSEEN if unseen else OBSTACLE for unseen in scene.unseen], boxes, KERB)
-
-
-def merged_by_colour(meshes: list[tuple[Mesh, Colour]]) -> list[tuple[Mesh, Colour]]:
-    """The meshes, up to 400 of one colour joined to one: PyBullet takes at most 131072 vertices per mesh."""
-    found = []
-    for colour in dict.fromkeys(colour for _, colour in meshes):
-        alike = [mesh for mesh, c in meshes if c == colour]
-        found += [(join(*alike[i : i + 400]), colour) for i in range(0, len(alike), 400)]
-    return found
 
 
 def part_pose(

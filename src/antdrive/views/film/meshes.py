@@ -32,12 +32,6 @@ class Mesh:
     normals: Floats
     triangles: npt.NDArray[np.int64]
 
-    @property
-    def ball(self) -> tuple[Floats, float]:
-        """Centre (3,) and radius [m] of a ball that contains the mesh."""
-        centre = (self.vertices.min(axis=0) + self.vertices.max(axis=0)) / 2
-        return centre, float(np.sqrt(((self.vertices - centre) ** 2).sum(axis=1).max()))
-
 
 @dataclass(frozen=True, eq=False)
 class Part:

@@ -64,19 +64,19 @@ def planning_frames(rollout: Rollout, setting: dict[str, Any], count: int) -> It
     """
     grid, total, states = plan_again(rollout)
     still = {**setting, "camera": "oblique" if setting["camera"] == "follow" else setting["camera"]}
-    with Shot(rollout, **still, planning=True) as shot:
-        number, state = 1, next(states)
-        for k in range(count):
-            due = math.ceil((k + 1) * total / count)
-            for later in itertools.islice(states, due - number):
-                number, state = number + 1, later
-            assert state.field is not None
-            levels = field_levels(grid, state.field)
-            path = grid.xy(state.cells if state.waypoints is None else state.waypoints)
-            yield shot.planning_frame(
-                _values(number, total, state),
-                functools.partial(_draw_field, grid=grid, levels=levels, path=path),
-            )
+    shot = Shot(rollout, **still, planning=True)
+    number, state = 1, next(states)
+    for k in range(count):
+        due = math.ceil((k + 1) * total / count)
+        for later in itertools.islice(states, due - number):
+            number, state = number + 1, later
+        assert state.field is not None
+        levels = field_levels(grid, state.field)
+        path = grid.xy(state.cells if state.waypoints is None else state.waypoints)
+        yield shot.planning_frame(
+            _values(number, total, state),
+            functools.partial(_draw_field, grid=grid, levels=levels, path=path),
+        )
     if not np.array_equal(state.cells, rollout.cells):
         raise InputError("prelude: planning again led to another path; the log is of another version or machine")
 

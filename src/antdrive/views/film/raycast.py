@@ -1,4 +1,4 @@
-"""Ray casting of cylinders and boxes for moving cameras: exact, and several times as fast as TinyRenderer."""
+"""Ray casting of the cylinders and boxes that stand still."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ import numpy.typing as npt
 
 from antdrive.views.film import _kernels_raycast as kernels
 from antdrive.views.film.camera import Camera
-from antdrive.views.film.tiny_renderer import AMBIENT, DIFFUSE
 from antdrive.views.style import Colour
 
 Floats = npt.NDArray[np.float64]
+
+AMBIENT, DIFFUSE = 0.62, 0.46  # strength of the light from all sides and from the lamp
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +45,7 @@ class Solids:
         )
 
     def render(self, camera: Camera, fine: int, light: tuple[float, float, float]) -> tuple[Any, Any, Any]:
-        """Picture (h, w, 4), depth (h, w) and body numbers (h, w), -1 for none, like `tiny_renderer.render`."""
+        """Picture (h, w, 4), depth (h, w) and body numbers (h, w), -1 for none."""
         width, height = camera.size
         image = np.empty((height * fine, width * fine, 4), dtype=np.uint8)
         depth = np.ones(image.shape[:2], dtype=np.float32)

@@ -45,7 +45,7 @@ REPLAN_CAPTION = 1.5  # the cause of a replan is shown this long [s]
 
 
 class Shot:
-    """The frames of a run as one camera sees it. Ask for moments in increasing order. Use it in a `with` block."""
+    """The frames of a run as one camera sees it. Ask for moments in increasing order."""
 
     def __init__(
         self,
@@ -80,7 +80,6 @@ class Shot:
             self._camera,
             route=rollout.route[: None if fixed else 0],
             fine=fine,
-            moving_camera=self._follows,
             sight=self._fan,
         )
         self._replan_caption = REPLAN_CAPTION * speed
@@ -89,6 +88,9 @@ class Shot:
         room = max(size[0] - self._legend_width, size[0] // 2)
         self._banner = banner(self.outcome, self._layout, room, rollout.record.reason)
         self.shown = 0.0  # the trail reaches to this moment [s]
+        self._add_labels()
+        if self.replay.replans or self._fan:
+            self._show_route(0)
 
     def _lay_out(
         self,
@@ -120,16 +122,6 @@ class Shot:
             if bare or (legend.whole if self._legend is None else self._fits_beside_world(self._legend)):
                 break
         return legend
-
-    def __enter__(self) -> Shot:
-        self._compositor.__enter__()
-        self._add_labels()
-        if self.replay.replans or self._fan:
-            self._show_route(0)
-        return self
-
-    def __exit__(self, *problem: object) -> None:
-        self._compositor.__exit__(*problem)
 
     def frame(self, at: float) -> Picture:
         """The frame (H, W, 3) at a moment of the run [s]."""

@@ -1,8 +1,8 @@
-"""Meshes drawn as TinyRenderer draws them, without its cost for each call and each body."""
+"""Draw the meshes of what moves, within boxes of the picture."""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -10,10 +10,11 @@ import numpy.typing as npt
 from antdrive.views.film import _kernels_triangles as kernels
 from antdrive.views.film.camera import Camera
 from antdrive.views.film.meshes import Mesh
-from antdrive.views.film.tiny_renderer import AMBIENT, DIFFUSE, Box
+from antdrive.views.film.raycast import AMBIENT, DIFFUSE
 from antdrive.views.style import Colour
 
 Floats = npt.NDArray[np.float64]
+Box: TypeAlias = tuple[int, int, int, int]  # x0, y0, x1, y1 [px]; x1 and y1 are excluded
 
 
 class Solid(NamedTuple):
@@ -45,7 +46,7 @@ def placed(at: tuple[float, float, float], quaternion: tuple[float, float, float
 def draw_solids(
     solids: list[Solid], camera: Camera, box: Box, fine: int, light: tuple[float, float, float]
 ) -> tuple[Any, Any, Any]:
-    """Picture (h, w, 3), depth (h, w) and 0 where there is a body, else -1 (h, w), like `tiny_renderer.render`."""
+    """Picture (h, w, 3), depth (h, w) and 0 where there is a body, else -1 (h, w)."""
     x0, y0, x1, y1 = box
     shape = (y1 - y0) * fine, (x1 - x0) * fine
     image, depth = np.zeros((*shape, 3), dtype=np.uint8), np.ones(shape, dtype=np.float32)
@@ -76,3 +77,22 @@ def draw_solids(
             np.array(colour, dtype=np.float64),
         )
     return image, depth, seg
+
+
+def overlap(a: Box, b: Box) -> bool:
+    """Whether two boxes share a pixel."""
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
+
+
+def merged(boxes: list[Box]) -> list[Box]:
+    """The boxes, overlapping ones joined: bodies that may hide each other are drawn together, and no pixel twice."""
+    done: list[Box] = []
+    for box in boxes:
+        while True:
+            hit = next((b for b in done if overlap(b, box)), None)
+            if hit is None:
+                break
+            done.remove(hit)
+            box = (min(hit[0], box[0]), min(hit[1], box[1]), max(hit[2], box[2]), max(hit[3], box[3]))
+        done.append(box)
+    return done

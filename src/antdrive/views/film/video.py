@@ -56,11 +56,6 @@ class FilmInfo:
     wall_s: float
 
     @property
-    def renderer(self) -> str:
-        """The name of the renderer that drew the bodies."""
-        return "TinyRenderer and rays" if self.camera == "follow" else "TinyRenderer"
-
-    @property
     def duration_s(self) -> float:
         """The film's length [s]."""
         return self.frames / self.fps
@@ -124,16 +119,16 @@ def _frames(
     """Every frame in turn: `before` frames of planning, the drive at `times`, `hold` frames of its end."""
     if before:
         yield from planning_frames(rollout, setting, before)
-    with Shot(rollout, **setting) as shot:
-        jobs = process_count() if jobs is None else jobs
-        if setting["camera"] == "follow" and jobs > 1 and len(times) > MIN_FRAMES:
-            yield from render_frames(rollout, setting, times, jobs)
-            for at in times:  # the trail is painted step by step, as in the other processes
-                shot.extend_trail(at)
-        else:
-            for at in times:
-                yield shot.frame(at)
-        yield from itertools.repeat(shot.last_frame(), hold)
+    shot = Shot(rollout, **setting)
+    jobs = process_count() if jobs is None else jobs
+    if setting["camera"] == "follow" and jobs > 1 and len(times) > MIN_FRAMES:
+        yield from render_frames(rollout, setting, times, jobs)
+        for at in times:  # the trail is painted step by step, as in the other processes
+            shot.extend_trail(at)
+    else:
+        for at in times:
+            yield shot.frame(at)
+    yield from itertools.repeat(shot.last_frame(), hold)
 
 
 def still(
@@ -166,8 +161,8 @@ def still(
     if kind not in STILLS:
         raise InputError(f"{target}: unknown suffix {target.suffix!r}; choose {' or '.join(STILLS)}")
     check_options(camera, size, 1.0, 1.0)
-    with Shot(rollout, camera=camera, size=size, note=note) as shot:
-        picture = shot.last_frame() if t is None else shot.frame(min(max(float(t), 0.0), shot.replay.duration))
+    shot = Shot(rollout, camera=camera, size=size, note=note)
+    picture = shot.last_frame() if t is None else shot.frame(min(max(float(t), 0.0), shot.replay.duration))
     with written_whole(target) as temporary:
         Image.fromarray(picture).save(temporary, format=kind[1:], **STILLS[kind])
     return target

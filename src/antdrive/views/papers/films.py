@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
 from antdrive.base import Pose
 from antdrive.planners import capabilities_of
 from antdrive.robots import load_robot
+from antdrive.runs.papers.claims import Arm
 from antdrive.runs.papers.experiments import PAPERS
 from antdrive.runs.papers.maps import HAN_ANTS
 from antdrive.sim.pipeline import run
@@ -25,27 +25,14 @@ SIZE, FPS = (480, 360), 20.0
 PRELUDE, DRIVE = 3.0, 9.0  # how long the planning and the drive are shown [s]
 
 
-@dataclass(frozen=True)
-class FilmedExperiment:
-    """What a paper's film shows.
-
-    Attributes:
-        map: the experiment's map
-        name: the experiment's planner, with its setting
-    """
-
-    map: str
-    name: str
-
-
 #: By paper, the experiment whose first map is filmed.
-SCENES: Mapping[str, FilmedExperiment] = MappingProxyType(
+SCENES: Mapping[str, Arm] = MappingProxyType(
     {
-        "han2007": FilmedExperiment("14 obstacles", "100 ants"),
-        "suganthi2019": FilmedExperiment("20×20", "iaco"),
-        "ibraheem2016": FilmedExperiment("20×20, 10 obstacles", "maco"),
-        "lee2008": FilmedExperiment("2: 50×44", "pfaco"),
-        "hasan": FilmedExperiment("1a curved walls", "mmas-dstar"),
+        "han2007": Arm("14 obstacles", "100 ants"),
+        "suganthi2019": Arm("20×20", "iaco"),
+        "ibraheem2016": Arm("20×20, 10 obstacles", "maco"),
+        "lee2008": Arm("2: 50×44", "pfaco"),
+        "hasan": Arm("1a curved walls", "mmas-dstar"),
     }
 )
 

@@ -1,1 +1,0 @@
-"""Pages and tables about a campaign: thousands of runs, compared planner by planner."""

@@ -1,0 +1,53 @@
+"""A page in a headless browser: what a probe in it finds."""
+
+import html
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+BROWSER = next(
+    (found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None
+)
+needs_browser = pytest.mark.skipif(BROWSER is None, reason="no chromium on this machine")
+
+
+def found_by(probe: str, page: Path, *words: str) -> dict[str, Any]:
+    """What a script finds that ends by writing JSON into an element `#found`."""
+    probed = page.with_name("probed.html")
+    probed.write_text(page.read_text().replace("<head>", "<head>" + probe, 1))
+    return shown_in(probed, *words)
+
+
+def shown_in(page: Path, *words: str) -> dict[str, Any]:
+    """The JSON in the element `#found` of a page."""
+    assert BROWSER is not None
+    common = ("--headless", "--no-sandbox", "--disable-gpu", "--allow-file-access-from-files", "--dump-dom")
+    done = subprocess.run(
+        [BROWSER, *common, "--window-size=1280,900", *words, page.as_uri()],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    )
+    text = re.search(r'<pre id="found">(.*?)</pre>', done.stdout, re.S)
+    assert text is not None, done.stdout[-500:]
+    found: dict[str, Any] = json.loads(html.unescape(text[1]))
+    return found
+
+
+def overflow_on_a_phone(probe: str, page: Path, *words: str, wait: int = 0) -> int:
+    """How much wider than a phone's screen a page is [px]."""
+    found_by(probe, page, *words)
+    copy = "document.body.append(f.contentDocument.querySelector('#found').cloneNode(true))"
+    phone = page.with_name("phone.html")
+    phone.write_text(
+        f"<script>onload = () => setTimeout(() => {{ {copy} }}, {wait})</script>"
+        "<iframe id=f width=390 height=800 src=probed.html></iframe>"
+    )
+    overflow: int = shown_in(phone, *words)["overflow"]
+    return overflow
