@@ -20,9 +20,7 @@ say what a page needs:
 
 `--all` runs every page with code (`pages_with_code`), `--jobs 2` two at a time. `--kept FILE` keeps what ran without a
 fault and leaves a page out while it and the code are as they were then. `--update` writes what was printed into the
-page, apart from outputs with `...` that agree. `--times FILE` writes how long each page ran into the last column of FILE's
-table of pages: processor time, which other work on the machine does not change much, with a process for each command, as
-in a reader's shell.
+page, apart from outputs with `...` that agree.
 """
 
 from __future__ import annotations
@@ -40,9 +38,8 @@ import signal
 import subprocess
 import sys
 import tempfile
-import threading
 import warnings
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -59,27 +56,18 @@ TESTED = {
 }
 COMPILING = "antdrive: compiling the planners"  # what only the first command of an installation says
 WIDTH = "100"  # of the terminal that commands believe in
-APART = "ANTDRIVE_PAGES_APART"  # the environment's variable with which each command gets a process of its own
 LIMIT = 1200.0  # how long a page may run [s]: it ends what hangs, while the slowest page takes one minute
 
 
 @dataclasses.dataclass
 class Block:
-    """A block of a page.
+    """A block of a page."""
 
-    Attributes:
-        language: the word after the fence
-        text: the lines within
-        line: the number of its first line, from 1
-        marks: what the comments before it say, by their first word or two
-        follows: whether only empty lines lie between it and the block before
-    """
-
-    language: str
-    text: str
-    line: int
-    marks: dict[str, str]
-    follows: bool
+    language: str  # the word after the fence
+    text: str  # the lines within
+    line: int  # the number of its first line, from 1
+    marks: dict[str, str]  # what the comments before it say, by their first word or two
+    follows: bool  # whether only empty lines lie between it and the block before
 
 
 def blocks_of(page: str) -> list[Block]:
@@ -110,12 +98,8 @@ def blocks_of(page: str) -> list[Block]:
 
 def agrees(shown: str, printed: str) -> bool:
     """Whether what a page shows is what was printed; `...` stands for anything."""
-
-    def plain(text: str) -> str:
-        return "\n".join(line.rstrip() for line in text.strip("\n").splitlines())
-
-    pattern = re.escape(plain(shown)).replace(r"\.\.\.", ".*?")
-    return re.fullmatch(pattern, plain(printed), flags=re.DOTALL) is not None
+    plain = ["\n".join(line.rstrip() for line in text.strip("\n").splitlines()) for text in (shown, printed)]
+    return re.fullmatch(re.escape(plain[0]).replace(r"\.\.\.", ".*?"), plain[1], flags=re.DOTALL) is not None
 
 
 def commands_of(block: Block) -> Iterator[tuple[str, str, int]]:
@@ -135,39 +119,29 @@ def commands_of(block: Block) -> Iterator[tuple[str, str, int]]:
         yield command, shown, at
 
 
-def run_antdrive(words: list[str]) -> int:
-    """Call the command line in this process; its exit code."""
+def run_antdrive(words: list[str]) -> tuple[int, str]:
+    """Call the command line in this process; its exit code and what it printed."""
     from antdrive.cli.app import main
 
-    before, sys.argv = sys.argv, words
-    try:
-        main()
-    except SystemExit as ended:
-        return int(ended.code or 0)
-    finally:
-        sys.argv = before
-    return 0
-
-
-def declared(wanted: str) -> tuple[int, str]:
-    """Instead of installing an extra: whether antdrive has one of that name. What the page runs next needs what it brings."""
-    _, _, extras = (ROOT / "pyproject.toml").read_text().partition("\n[project.optional-dependencies]\n")
-    known = [f"antdrive[{name}]" for name in re.findall(r"^(\w+) = \[", extras.partition("\n[")[0], re.MULTILINE)]
-    return (0, "") if wanted in known else (1, f"pip install {wanted}: not one of {', '.join(known)}\n")
+    out, code, before, sys.argv = io.StringIO(), 0, sys.argv, words
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):
+        try:
+            main()
+        except SystemExit as ended:
+            code = int(ended.code or 0)
+        finally:
+            sys.argv = before
+    return code, "".join(line for line in out.getvalue().splitlines(keepends=True) if not line.startswith(COMPILING))
 
 
 def run_words(words: list[str]) -> tuple[int, str]:
     """Run a command; its exit code and what it printed."""
-    if words[0] == "antdrive" and os.environ.get(APART):
-        words = ["python", "-m", *words]
     if words[0] == "antdrive":
-        out = io.StringIO()
-        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):
-            code = run_antdrive(words)
-        said = out.getvalue().splitlines(keepends=True)
-        return code, "".join(line for line in said if not line.startswith(COMPILING))
-    if words[:2] == ["pip", "install"]:
-        return declared(words[2])
+        return run_antdrive(words)
+    if words[:2] == ["pip", "install"]:  # what the page runs next needs what the extra brings
+        extra = re.fullmatch(r"antdrive\[(\w+)\]", words[2])
+        known = extra and f"\n{extra[1]} = [" in (ROOT / "pyproject.toml").read_text()
+        return (0, "") if known else (1, f"pip install {words[2]}: no extra of antdrive\n")
     if words[0] == "python":
         words = [sys.executable, *words[1:]]
     elif words[0] == "pytest":
@@ -204,19 +178,14 @@ def write(block: Block) -> None:
 
 @dataclasses.dataclass
 class Page:
-    """The run of a page.
-
-    Attributes:
-        path: the page
-        problems: what did not run or printed something else, each with its line
-        printed: what was printed, by the number of the line at which the page shows it
-        line: the first line of the block or the command that runs
-    """
+    """The run of a page."""
 
     path: Path
-    problems: list[str] = dataclasses.field(default_factory=list)
-    printed: dict[int, tuple[str, str]] = dataclasses.field(default_factory=dict)
-    line: int = 0
+    problems: list[str] = dataclasses.field(default_factory=list)  # each with its line
+    printed: dict[int, tuple[str, str]] = dataclasses.field(
+        default_factory=dict
+    )  # what is shown and was printed, by line
+    line: int = 0  # of the block or the command that runs
 
     def run(self) -> Page:
         """Run all blocks."""
@@ -276,70 +245,41 @@ class OutOfTime(BaseException):
     """A page has run for too long. No `except Exception` of what it runs takes it for a fault of its own."""
 
 
-@contextlib.contextmanager
-def limited(seconds: float) -> Iterator[None]:
-    """End what runs within by `OutOfTime`, commands included. Other threads than the main one have no such limit.
-
-    Args:
-        seconds: how long it may run [s]
-    """
+def run_page(path: Path, limit: float = LIMIT) -> Page:
+    """Run a page in an empty folder, which is gone afterwards, for so long at most [s]."""
 
     def end(*_: object) -> None:
         raise OutOfTime
 
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGALRM, end)
-    running = signal.setitimer(signal.ITIMER_REAL, seconds)  # that of a test, for example
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, *running)
-        signal.signal(signal.SIGALRM, before)
-
-
-def run_page(path: Path, limit: float = LIMIT) -> Page:
-    """Run a page in an empty folder, which is gone afterwards.
-
-    Args:
-        path: the page, in Markdown
-        limit: how long it may run [s]
-    """
-    path, before, variables = path.resolve(), Path.cwd(), dict(os.environ)
-    page = Page(path)
+    page, before, variables = Page(path.resolve()), Path.cwd(), dict(os.environ)
     os.environ.update(COLUMNS=WIDTH, MPLBACKEND="agg")
+    handler = signal.signal(signal.SIGALRM, end)
+    timer = signal.setitimer(signal.ITIMER_REAL, limit)  # what was set is that of a test
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
         try:
-            with limited(limit):
-                page.run()
+            page.run()
         except OutOfTime:
-            page.problems.append(f"{path}:{page.line}: still runs {limit:g} s after the page began")
+            page.problems.append(f"{page.path}:{page.line}: still runs {limit:g} s after the page began")
         finally:
+            signal.setitimer(signal.ITIMER_REAL, *timer)
+            signal.signal(signal.SIGALRM, handler)
             os.chdir(before)
             os.environ.clear()
             os.environ.update(variables)
     return page
 
 
-def pages_with_code(root: Path = ROOT) -> list[Path]:
-    """Every page of the site and of the examples with a block that runs, apart from those that tests run.
+def pages_with_code() -> list[Path]:
+    """Every page of the site and of the examples with a block that runs, apart from those that tests run."""
 
-    Args:
-        root: the folder of the repository
-    """
-    pages = [*sorted((root / "docs").rglob("*.md")), *sorted((root / "examples").rglob("*.md"))]
-    return [
-        page
-        for page in pages
-        if not {"_build", "_gallery"} & set(page.parts)
-        and page.relative_to(root).as_posix() not in TESTED
-        and any(
-            block.language in RUN and "not run" not in block.marks
-            for block in blocks_of(page.read_text(encoding="utf-8"))
-        )
-    ]
+    def runs(page: Path) -> bool:
+        blocks = blocks_of(page.read_text(encoding="utf-8"))
+        return any(block.language in RUN and "not run" not in block.marks for block in blocks)
+
+    pages = [*sorted((ROOT / "docs").rglob("*.md")), *sorted((ROOT / "examples").rglob("*.md"))]
+    shown = [page for page in pages if not {"_build", "_gallery"} & set(page.parts)]
+    return [page for page in shown if page.relative_to(ROOT).as_posix() not in TESTED and runs(page)]
 
 
 def digest_of(paths: Iterable[Path]) -> str:
@@ -350,42 +290,14 @@ def digest_of(paths: Iterable[Path]) -> str:
     return found.hexdigest()
 
 
-def timed(path: Path) -> tuple[Page, float]:
-    """Run a page; what came of it, and the processor time that it took with its commands [s]."""
-    before = sum(os.times()[:4])
-    page = run_page(path)
-    return page, sum(os.times()[:4]) - before
-
-
-def run_pages(paths: list[Path], jobs: int) -> Iterator[tuple[Page, float]]:
-    """Run pages in processes of their own; each with its processor time, in the order in which they were given."""
-    if jobs == 1:
-        yield from map(timed, paths)
-        return
+def run_pages(paths: list[Path], jobs: int) -> Iterator[Page]:
+    """Run pages in processes of their own, in the order in which they were given."""
     from joblib import Parallel, delayed
 
     # A process that has grown is replaced between two pages, which is no fault.
     warnings.filterwarnings("ignore", "A worker stopped while some jobs", UserWarning)
-    yield from Parallel(n_jobs=jobs, return_as="generator", pre_dispatch="n_jobs", batch_size=1)(
-        delayed(timed)(path) for path in paths
-    )
-
-
-def with_times(text: str, took: Mapping[str, float]) -> str:
-    """A page's text with times in the last cells of the rows of its tables that link to pages.
-
-    Args:
-        text: the page with the tables, in Markdown
-        took: how long each page ran, by its file's name [s]
-    """
-
-    def row(line: str) -> str:
-        name = re.match(r"\| \[[^\]]+\]\((?P<name>[\w-]+\.md)\) \|", line)
-        if name is None or name["name"] not in took:
-            return line
-        return f"{line[: line.rstrip(' |').rindex('|')]}| {max(1, round(took[name['name']]))} s |"
-
-    return "".join(f"{row(line)}\n" for line in text.splitlines())
+    parallel = Parallel(n_jobs=jobs, return_as="generator", pre_dispatch="n_jobs", batch_size=1)
+    yield from parallel(delayed(run_page)(path) for path in paths)
 
 
 def main(words: list[str]) -> int:
@@ -396,32 +308,26 @@ def main(words: list[str]) -> int:
     asked.add_argument("--jobs", type=int, default=1, help="pages at a time")
     asked.add_argument("--kept", type=Path, help="file that keeps what ran without a fault")
     asked.add_argument("--update", action="store_true", help="write what was printed into the pages")
-    asked.add_argument("--times", type=Path, help="page with a table of these pages, for the times they ran")
     given = asked.parse_args(words)
     pages = [*given.pages, *(pages_with_code() if given.all else [])]
     files = (path for folder in CODE for path in (ROOT / folder).rglob("*") if path.suffix in (".py", ".yaml"))
     code = digest_of(sorted(files))
     kept = json.loads(given.kept.read_text()) if given.kept and given.kept.exists() else {}
     keys = {page.resolve(): digest_of([page]) + code for page in pages}
-    failed, times = False, {}
-    if given.times:
-        os.environ[APART] = "yes"
-    for page, took in run_pages([path for path, key in keys.items() if kept.get(str(path)) != key], given.jobs):
+    failed = False
+    for page in run_pages([path for path, key in keys.items() if kept.get(str(path)) != key], given.jobs):
         if given.update:
             page.update()
-        name = os.path.relpath(page.path)
-        said = "\n".join(page.problems) or f"{name}: every block runs and prints what the page shows ({took:.0f} s)"
+        said = (
+            "\n".join(page.problems) or f"{os.path.relpath(page.path)}: every block runs and prints what the page shows"
+        )
         sys.stdout.write(said + "\n")
         sys.stdout.flush()
         failed |= bool(page.problems)
-        times[page.path.name] = took
         if given.kept and not page.problems:
             kept[str(page.path)] = keys[page.path]
             given.kept.parent.mkdir(parents=True, exist_ok=True)
             given.kept.write_text(json.dumps(kept))
-    os.environ.pop(APART, None)
-    if given.times and not failed:
-        given.times.write_text(with_times(given.times.read_text(encoding="utf-8"), times), encoding="utf-8")
     return int(failed)
 
 

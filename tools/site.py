@@ -2,13 +2,23 @@
 
 Every link within the site leads to a file and, with an anchor, to a place in it. No page loads anything from elsewhere.
 The first page, with all that it loads, is under 1 MB. Films are, too.
+
+`--browser` opens every page from the disk in a Chromium, light at the width of a desktop and dark at the width of a phone, and
+tells errors on the console, exceptions, pictures that do not load, films that do not load or play, text that differs too little
+from what lies behind it, and a page that is wider than its window. The search is asked for some words, and must find pages.
+`--shots FOLDER` keeps a picture of each page, light and dark, wide and narrow. This needs `pip install playwright` and a
+Chromium: the one on the path, or `playwright install chromium`.
 """
 
 from __future__ import annotations
 
+import argparse
+import itertools
+import shutil
 import sys
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote, urlsplit
 
 MOST = 1_000_000  # [B]
@@ -21,16 +31,75 @@ LOADING = {
     ("source", "src"),
     ("iframe", "src"),
 }
+WIDE, NARROW, HIGH = 1280, 390, 900  # [px]
+CONTRAST = 3.0  # the least between a text and what lies behind it; WCAG asks 4.5 of small text, 3 of large
+ASKED = {"pure pursuit": "following", "certificate": "certificate", "limiter": "why-slow"}  # and where it is explained
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+CHECKED = (("light", WIDE), ("dark", NARROW))
+KEPT = tuple(itertools.product(("light", "dark"), (WIDE, NARROW)))
+
+#: What is wrong with a page, found by itself.
+PROBE = """async () => {
+  const wrong = [], at = (e) => `${e.tagName.toLowerCase()} "${(e.textContent || e.src || "").trim().slice(0, 40)}"`;
+  const wait = (ms) => new Promise((done) => setTimeout(done, ms));
+  for (const image of document.images) {
+    image.loading = "eager";
+    try { await image.decode(); } catch { wrong.push(`${image.getAttribute("src")}: does not load`); }
+  }
+  for (const film of document.querySelectorAll("video")) {
+    const name = film.getAttribute("src");
+    film.muted = true;
+    try { await film.play(); } catch (error) { wrong.push(`${name}: does not play: ${error.message}`); continue; }
+    const runs = () => film.readyState >= 3 && film.currentTime > 0.1;
+    for (let k = 0; k < 200 && !runs(); k++) await wait(50);
+    if (!runs()) wrong.push(`${name}: stands still at ${film.currentTime} s`);
+    film.pause();
+  }
+  const wide = document.documentElement.scrollWidth;
+  if (wide > innerWidth) wrong.push(`is ${wide} px wide in a window of ${innerWidth} px`);
+  const canvas = new OffscreenCanvas(1, 1).getContext("2d", { willReadFrequently: true });
+  const rgba = (text) => {
+    canvas.clearRect(0, 0, 1, 1); canvas.fillStyle = text; canvas.fillRect(0, 0, 1, 1);
+    const [r, g, b, a] = canvas.getImageData(0, 0, 1, 1).data; return [r, g, b, a / 255];
+  };
+  const over = (top, low) => [0, 1, 2].map((k) => top[k] * top[3] + low[k] * (1 - top[3]));
+  const light = (colour) => {
+    const [r, g, b] = colour.map((c) => (c /= 255) <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4);
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+  };
+  const behind = (element) => {
+    const layers = [];
+    for (let e = element; e; e = e.parentElement) {
+      const style = getComputedStyle(e);
+      if (style.backgroundImage !== "none") return null;
+      const colour = rgba(style.backgroundColor);
+      if (colour[3] > 0) layers.push(colour);
+      if (colour[3] === 1) break;
+    }
+    const dark = document.documentElement.dataset.theme === "dark";
+    return layers.reverse().reduce((low, top) => over(top, low), dark ? [0, 0, 0] : [255, 255, 255]);
+  };
+  const shown = { opacityProperty: true, visibilityProperty: true };
+  const apart = "script, style, noscript, .visually-hidden, .skip-link, dialog, video";
+  const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT), seen = new Set();
+  for (let node = walker.nextNode(); node; node = walker.nextNode()) {
+    const e = node.parentElement;
+    if (!node.textContent.trim() || seen.has(e) || !e.checkVisibility(shown)) continue;
+    const box = e.getBoundingClientRect();
+    if (box.width < 2 || box.height < 2 || e.closest(apart)) continue;
+    seen.add(e);
+    const low = behind(e);
+    if (!low) continue;
+    const a = light(over(rgba(getComputedStyle(e).color), low)), b = light(low);
+    const contrast = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+    if (contrast < CONTRAST) wrong.push(`contrast ${contrast.toFixed(1)}: ${at(e)}`);
+  }
+  return wrong;
+}""".replace("CONTRAST", str(CONTRAST))
 
 
 class Parsed(HTMLParser):
-    """What a page names.
-
-    Attributes:
-        ids: the places that anchors can lead to
-        links: the targets of `a`
-        loads: what the browser fetches with the page, each with its tag
-    """
+    """What a page names: places that anchors lead to, targets of links, and what the browser fetches with it."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -53,11 +122,7 @@ class Parsed(HTMLParser):
 
 
 def problems_of(site: Path) -> list[str]:
-    """What is wrong with a site, a line each.
-
-    Args:
-        site: the folder with `index.html`
-    """
+    """What is wrong with the files of a site, a line each."""
     pages = {
         path: Parsed(path.read_text(encoding="utf-8"))
         for path in sorted(site.rglob("*.html"))
@@ -104,10 +169,92 @@ def weight(path: Path, page: Parsed) -> int:
     return path.stat().st_size + sum(file.stat().st_size for file in files if file.is_file())
 
 
+class Looking:
+    """A browser (playwright's) with a window for each view; pictures of pages go to `shots`."""
+
+    def __init__(self, browser: Any, site: Path, shots: Path | None) -> None:
+        self.site, self.shots = site, shots
+        self.faults: list[str] = []
+        views = KEPT if shots else CHECKED
+        self.windows = {f"{theme}-{width}": self._window(browser, theme, width) for theme, width in views}
+
+    def _window(self, browser: Any, theme: str, width: int) -> Any:
+        window = browser.new_context(viewport={"width": width, "height": HIGH}, color_scheme=theme).new_page()
+        window.on("console", lambda said: said.type in ("error", "warning") and self._note(f"console: {said.text}"))
+        window.on("pageerror", lambda error: self._note(f"exception: {error}"))
+        aborted = "net::ERR_ABORTED"  # a film that is not loaded to its end
+        window.on("requestfailed", lambda it: it.failure == aborted or self._note(f"{it.url}: {it.failure}"))
+        return window
+
+    def _note(self, fault: str) -> None:
+        self.faults.append(fault)
+
+    def page(self, path: Path) -> list[str]:
+        """What is wrong with a page, a line each."""
+        found: dict[str, str] = {}
+        for view, window in self.windows.items():
+            self.faults.clear()
+            window.goto(path.as_uri(), wait_until="load")
+            wrong = window.evaluate(PROBE)
+            window.wait_for_timeout(20)
+            for fault in [*self.faults, *wrong]:
+                found.setdefault(fault, view)
+            if self.shots:
+                name = path.relative_to(self.site).with_suffix("").as_posix().replace("/", "-")
+                window.screenshot(path=str(self.shots / f"{name}-{view}.png"), full_page=True)
+        return [f"{path.relative_to(self.site)}: {view}: {fault}" for fault, view in found.items()]
+
+    def search(self, wait: float = 10_000) -> list[str]:
+        """What the search does not find within a time [ms]."""
+        window, found = next(iter(self.windows.values())), []
+        links = "page => [...document.querySelectorAll('#search-results a')].some(a => a.href.includes(page))"
+        for words, page in ASKED.items():
+            window.goto(f"{(self.site / 'search.html').as_uri()}?q={words.replace(' ', '+')}")
+            try:
+                window.wait_for_function(links, arg=page, timeout=wait)
+            except Exception as error:
+                found.append(f"search.html: {words!r} does not find {page}: {type(error).__name__}")
+        return found
+
+
+def opened(playwright: Any) -> Any:
+    """A browser: the Chromium on the path, or playwright's own."""
+    path = next(filter(None, map(shutil.which, BROWSERS)), None)
+    return playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+
+
+def look(site: Path, shots: Path | None) -> list[str]:
+    """What a browser finds wrong with a site, a line each."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = opened(playwright)
+        looking = Looking(browser, site, shots)
+        found = looking.search()
+        for page in sorted(path for path in site.rglob("*.html") if "_static" not in path.parts):
+            found += looking.page(page)
+        browser.close()
+    return found
+
+
 def main(words: list[str]) -> int:
-    """Print what is wrong; 1 if something is."""
-    found = problems_of(Path(words[0]).resolve())
-    sys.stdout.write(("\n".join(found) or f"{words[0]}: every link and every anchor leads somewhere") + "\n")
+    """Print what is wrong; 1 if something is, 2 without a browser."""
+    asked = argparse.ArgumentParser(prog="python -m tools.site", description="Check the built site.")
+    asked.add_argument("site", type=Path, help="the folder with index.html")
+    asked.add_argument("--browser", action="store_true", help="open every page in a Chromium, too")
+    asked.add_argument("--shots", type=Path, help="folder for pictures of the pages, for which it is opened")
+    given = asked.parse_args(words)
+    site = given.site.resolve()
+    found = problems_of(site)
+    if given.browser or given.shots:
+        if given.shots:
+            given.shots.mkdir(parents=True, exist_ok=True)
+        try:
+            found += look(site, given.shots)
+        except ImportError:
+            sys.stderr.write("playwright is missing: pip install playwright\n")
+            return 2
+    sys.stdout.write(("\n".join(found) or f"{given.site}: nothing is wrong") + "\n")
     return int(bool(found))
 
 

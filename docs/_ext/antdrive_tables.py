@@ -85,11 +85,9 @@ def keys(kind: str) -> list[str]:
 
 def commands() -> list[str]:
     """Each command with what it does, its arguments and its options, as `--help` has them."""
-    import typer
+    from antdrive.cli.groups import application
 
-    from antdrive.cli.app import application
-
-    command = typer.main.get_command(application())
+    command = application()
     return list(_commands(command, command.make_context("antdrive", [], resilient_parsing=True), "="))
 
 

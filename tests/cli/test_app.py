@@ -1,5 +1,6 @@
 """What every command shares: help, exit codes, streams, interruptions."""
 
+import importlib
 import json
 import os
 import re
@@ -12,27 +13,28 @@ from typing import Any
 
 import numpy as np
 import pytest
-import typer
 
-from antdrive.cli.app import COMMANDS, WORLDS, application
+from antdrive.cli.commands import COMMANDS, ROBOTS, WORLDS
 from antdrive.cli.exits import BROKEN_PIPE
+from antdrive.cli.groups import application
 from antdrive.planners import PLANNERS, PlanResult, Progress, Query, watch
 from tests.cli.calling import Call, Refused
 
 
-def test_help_lists_every_command_with_a_complete_line(antdrive: Call) -> None:
-    for group, commands in (([], COMMANDS), (["worlds"], WORLDS)):
-        code, out, _ = antdrive(*group, "--help")
-        assert code == 0
-        listed = dict(re.findall(r"^  ([a-z-]+) {2,}(\S.*)$", out.split("Commands:")[1], flags=re.MULTILINE))
-        for name in commands:
-            assert listed[name].endswith("."), listed[name]
-            assert not listed[name].endswith("...")
+@pytest.mark.parametrize(("group", "table"), [([], COMMANDS), (["worlds"], WORLDS), (["robots"], ROBOTS)])
+def test_help_lists_every_command_with_the_first_line_of_its_own(antdrive: Call, group: list[str], table: Any) -> None:
+    code, out, _ = antdrive(*group, "--help")
+    assert code == 0
+    listed = dict(re.findall(r"^  ([a-z-]+) {2,}(\S.*)$", out.split("Commands:")[1], flags=re.MULTILINE))
+    for name, command in table.items():
+        assert listed[name] == command.summary
+        function = getattr(importlib.import_module(f"antdrive.cli.commands.{command.module}"), command.function)
+        assert (function.__doc__ or "").split("\n")[0] == command.summary
 
 
 @pytest.mark.parametrize("name", [*COMMANDS, *(f"worlds {name}" for name in WORLDS)])
 def test_every_option_is_explained_with_its_unit(name: str) -> None:
-    command: Any = typer.main.get_command(application())
+    command = application()
     for word in name.split():
         command = command.commands[word]
     for param in command.params:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from antdrive.cli.app import COMMANDS
+from antdrive.cli.commands import COMMANDS
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMAND = re.compile(r"`(?:python -m (?P<module>[\w.]+)|make (?P<target>[\w-]+)|antdrive (?P<command>[\w-]+))[^`]*`")

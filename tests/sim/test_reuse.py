@@ -10,13 +10,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from antdrive.base import reuse
+from antdrive.base.reuse import bits, forget, reused
 from antdrive.planners import PLANNERS, Query
 from antdrive.robots import RobotSpec
 from antdrive.sim import Engine, Scenario, run
 from antdrive.sim.physics import engine as engine_module
 from antdrive.sim.physics.bullet import bullet
-from antdrive.worlds import Disc, World, load_task, rasterise, reuse, save_task
-from antdrive.worlds.reuse import bits, by_geometry, forget, reused
+from antdrive.worlds import Disc, World, load_task, rasterise, save_task
+from antdrive.worlds.world import by_geometry
 
 
 def scenarios() -> dict[str, Scenario]:

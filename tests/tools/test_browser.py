@@ -1,13 +1,12 @@
-"""The browser finds each kind of fault of a site; needs playwright and a Chromium, as `python -m tools.browser` does."""
+"""The browser finds each kind of fault of a site; needs playwright and a Chromium, as `python -m tools.site --browser` does."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tools import browser
+from tools import site as browser
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 
@@ -28,8 +27,6 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """A site's faults by page, and the folder of its pictures."""
     site = tmp_path_factory.mktemp("site")
     shots = tmp_path_factory.mktemp("shots")
-    (site / "heavy.js").write_text(" " * (browser.MOST + 1))
-    (site / "index.html").write_text(CLEAN.format("<script src=heavy.js></script>"))
     links = "".join(f"<a href={page}.html>{page}</a>" for page in list(browser.ASKED.values())[:-1])
     (site / "search.html").write_text(CLEAN.format(f"<div id=search-results>{links}</div>"))
     (site / "clean.html").write_text(CLEAN.format("<p hidden style='color:#fff'>not shown</p>"))
@@ -38,7 +35,7 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> Any:
     with playwright.sync_playwright() as started:
         opened = browser.opened(started)
         looking = browser.Looking(opened, site, shots)
-        result = {name: looking.page(site / name) for name in ("index.html", "clean.html", *FAULTS)}
+        result = {name: looking.page(site / name) for name in ("clean.html", *FAULTS)}
         result["search.html"] = looking.search(wait=300)
         opened.close()
     return result, shots
@@ -53,10 +50,6 @@ def test_a_fault_is_found(found: Any, name: str) -> None:
     assert any(FAULTS[name][1] in line for line in found[0][name]), found[0][name]
 
 
-def test_a_first_page_that_loads_too_much_is_found(found: Any) -> None:
-    assert [line.partition(": loads ")[0] for line in found[0]["index.html"]] == ["index.html: light-1280"]
-
-
 def test_what_the_search_does_not_find_is_found(found: Any) -> None:
     (last,) = list(browser.ASKED.items())[-1:]
     assert [line.rpartition(":")[0] for line in found[0]["search.html"]] == [
@@ -65,9 +58,6 @@ def test_what_the_search_does_not_find_is_found(found: Any) -> None:
 
 
 def test_pages_have_pictures(found: Any) -> None:
-    assert {path.name for path in found[1].glob("clean-*")} == {f"clean-{view}.png" for view in browser.KEPT}
-
-
-def test_a_page_that_is_not_there_is_wrong_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert browser.main([str(tmp_path), "gone.html"]) == 2
-    assert "gone.html: there is no such page" in capsys.readouterr().err
+    assert {path.name for path in found[1].glob("clean-*")} == {
+        f"clean-{theme}-{width}.png" for theme, width in browser.KEPT
+    }

@@ -11,11 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from tools.mutants.__main__ import as_text, counts, judged
+from tools.mutants.__main__ import as_text, counts, judged, stamp
 from tools.mutants.operators import Mutant, mutants_of
 from tools.mutants.plans import PLANS, ROOT, StaleTable, check_tables, drawn, named_mutants
-from tools.mutants.results import Results, ResultsUnfit, digest
-from tools.mutants.running import SOURCE, BaselineUnfit, Copy, Ended, Server, dependents
+from tools.mutants.running import SOURCE, BaselineUnfit, Copy, Ended, Processes, Server, dependents
 
 TEXT = '''"""A docstring with 1.0 in it."""
 LIMIT = 0.5  # [m]
@@ -167,91 +166,45 @@ def test_an_unfit_baseline_says_why(ends: dict[str, tuple[int, str]]) -> None:
     assert Ended(-11, 0.1, "").reason == "end with signal 11"
 
 
-class _Scripted(Server):
-    """A server whose runs end as told."""
-
-    def __init__(self, codes: list[int | None]) -> None:
-        self.codes = codes
-
-    def run(self, tests: tuple[str, ...], limit: float) -> Ended:
-        return Ended(self.codes.pop(0), 1.0, "FAILED tests/test_a.py::test_it - no")
-
-    def end(self) -> None: ...
-
-
-class _Same(Copy):
-    """A copy without files, whose server is scripted."""
-
-    def __init__(self, original: Path, root: Path, codes: list[int | None]) -> None:
-        self.root, self._original, self._codes = root, original, codes
-
-    def server(self, *_: object) -> Server:
-        return _Scripted(self._codes)
-
-
-def fates_of(tmp_path: Path, codes: list[int | None]) -> list[str]:
+def fates_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, codes: list[int | None]) -> list[str]:
     """What becomes of three mutants of a file when its tests end so: first without a fault, then with each."""
-    for folder in ("original", "copy"):
-        (tmp_path / folder / SOURCE / "sim/log").mkdir(parents=True)
-        (tmp_path / folder / SOURCE / "sim/log/metrics.py").write_text("a = 1\n")
-    copy = _Same(tmp_path / "original", tmp_path / "copy", codes)
+    file = tmp_path / "original" / SOURCE / "sim/log/metrics.py"
+    for path in (file, tmp_path / "original" / SOURCE / "base/kernel_cache.py"):
+        path.parent.mkdir(parents=True)
+        path.write_text("a = 1\n")
+    ends = iter(codes)
+    failed = "FAILED tests/test_a.py::test_it - no"
+    monkeypatch.setattr("tools.mutants.running.stamp_of", lambda root: "stamp")
+    monkeypatch.setattr(Server, "_start", lambda self: None)
+    monkeypatch.setattr(Server, "end", lambda self: None)
+    monkeypatch.setattr(Server, "run", lambda *_: Ended(next(ends), 1.0, failed))
+    copy = Copy(tmp_path / "original", tmp_path / "copy", Processes())
     mutants = [Mutant("sim/log/metrics.py", "constant", "", 1, "a = 1", f"a = {n}", f"a = {n}\n") for n in (2, 3, 4)]
     fates = [fate for _, fate in copy.fates(mutants, PLANS["sim/log/metrics.py"])]
     assert (tmp_path / "copy" / SOURCE / "sim/log/metrics.py").read_text() == "a = 1\n"
     return fates
 
 
-def test_a_mutant_is_killed_by_a_failure_a_signal_or_the_time_limit_and_else_alive(tmp_path: Path) -> None:
-    assert fates_of(tmp_path, [0, 1, 0, None]) == ["killed", "alive", "timeout"]
-    assert fates_of(tmp_path / "again", [0, -11, 3, 2]) == ["killed"] * 3
-    assert fates_of(tmp_path / "third", [0, 4, 5, 1]) == ["killed"] * 3  # 4: not even conftest.py can be loaded
-
-
-def test_tests_that_fail_on_the_unchanged_code_judge_nothing(tmp_path: Path) -> None:
-    with pytest.raises(
-        BaselineUnfit, match=r"metrics\.py: on the unchanged code its tests fail: tests/test_a\.py::test_it"
-    ):
-        fates_of(tmp_path, [1])
-    with pytest.raises(BaselineUnfit, match="do not end within their time limit"):
-        fates_of(tmp_path / "again", [None])
-
-
-def results_project(root: Path) -> Mutant:
-    """A project that holds the file of a mutant and its tests."""
-    for name in (f"{SOURCE}/sim/log/metrics.py", *PLANS["sim/log/metrics.py"].files):
-        (root / name).parent.mkdir(parents=True, exist_ok=True)
-        (root / name).write_text("a = 1\n")
-    digest.cache_clear()
-    return Mutant("sim/log/metrics.py", "constant", "f", 1, "a = 1", "a = 2", "a = 2\n")
-
-
-@pytest.mark.parametrize(("fate", "tests_changed", "file_changed"), [("killed", "killed", None), ("alive", None, None)])
-def test_a_result_holds_as_long_as_nothing_changes_that_could_alter_it(
-    tmp_path: Path, fate: str, tests_changed: str | None, file_changed: str | None
+def test_a_mutant_is_killed_by_a_failure_a_signal_or_the_time_limit_and_else_alive(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    mutant = results_project(tmp_path)
-    store = tmp_path / "results" / "fates.jsonl"
-    assert Results(store, tmp_path).fate(mutant) is None
-    Results(store, tmp_path).add(mutant, fate)
-    assert Results(store, tmp_path).fate(mutant) == fate
-    (tmp_path / PLANS[mutant.file].files[0]).write_text("a = 2\n")
-    digest.cache_clear()
-    assert Results(store, tmp_path).fate(mutant) == tests_changed
-    (tmp_path / SOURCE / mutant.file).write_text("b = 1\n")
-    digest.cache_clear()
-    assert Results(store, tmp_path).fate(mutant) == file_changed
+    assert fates_of(tmp_path / "a", monkeypatch, [0, 1, 0, None]) == ["killed", "alive", "timeout"]
+    assert fates_of(tmp_path / "b", monkeypatch, [0, -11, 3, 2]) == ["killed"] * 3
+    assert (
+        fates_of(tmp_path / "c", monkeypatch, [0, 4, 5, 1]) == ["killed"] * 3
+    )  # 4: not even conftest.py can be loaded
 
 
-def test_a_file_of_results_that_holds_something_else_is_an_error(tmp_path: Path) -> None:
-    (tmp_path / "notes.txt").write_text("nothing\n")
-    with pytest.raises(ResultsUnfit, match=r"notes\.txt: line 1: not a result"):
-        Results(tmp_path / "notes.txt")
+@pytest.mark.parametrize(("code", "says"), [(1, "fail: tests/test_a.py::test_it"), (None, "do not end within their")])
+def test_tests_that_fail_on_the_unchanged_code_judge_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int | None, says: str
+) -> None:
+    with pytest.raises(BaselineUnfit, match=f"metrics.py: on the unchanged code its tests {says}"):
+        fates_of(tmp_path, monkeypatch, [code])
 
 
 def test_what_is_known_already_is_not_judged_again(tmp_path: Path) -> None:
-    file = "sim/log/metrics.py"
-    mutants, store = drawn(file, 3), Results(tmp_path / "fates.jsonl")
-    for mutant, fate in zip(mutants, ("killed", "alive", "timeout"), strict=True):
-        store.add(mutant, fate)
-    fates = judged({file: mutants}, 1, Results(tmp_path / "fates.jsonl"))
-    assert fates == {file: list(zip(mutants, ("killed", "alive", "timeout"), strict=True))}
+    file, store = "sim/log/metrics.py", tmp_path / "fates.jsonl"
+    fates = list(zip(drawn(file, 3), ("killed", "alive", "timeout"), strict=True))
+    store.write_text("".join(json.dumps([*mutant.key, stamp(file), fate]) + "\n" for mutant, fate in fates))
+    assert judged({file: drawn(file, 3)}, 1, store) == {file: fates}

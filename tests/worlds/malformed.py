@@ -102,7 +102,7 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
     ),
     "no radius": (
         _disc("{x: 1.0, y: 5.0}"),
-        "bad.yaml:10: obstacles[1].radius: missing; the radius as built [m]",
+        "bad.yaml:10: obstacles[1].radius: missing; the radius as built, never inflated [m]",
     ),
     # kinds
     "newer schema": (_replace("schema: 1", "schema: 2"), "bad.yaml:1: schema: must be 1, got 2"),

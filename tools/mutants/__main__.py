@@ -12,6 +12,8 @@ and all kernels would compile anew for each.
 from __future__ import annotations
 
 import contextlib
+import functools
+import hashlib
 import json
 import queue
 import signal
@@ -27,12 +29,10 @@ import typer
 
 from tools.mutants.operators import Mutant
 from tools.mutants.plans import PLANS, ROOT, SEED, StaleTable, check_tables, drawn, equivalents, named_mutants
-from tools.mutants.results import Results, ResultsUnfit
-from tools.mutants.running import BaselineUnfit, Copy, Plan, Processes
+from tools.mutants.running import SOURCE, BaselineUnfit, Copy, Processes
 
-Fates = dict[
-    str, list[tuple[Mutant, str]]
-]  # "killed", "timeout", "equivalent", "alive", or "unjudged" where the tests are unfit
+FATES = ("killed", "timeout", "equivalent", "alive", "unjudged")  # unjudged: the tests fail on the unchanged code
+Fates = dict[str, list[tuple[Mutant, str]]]
 
 
 def main(
@@ -53,24 +53,24 @@ def main(
     try:
         check_tables()
         mutants = chosen(only, per_file, seed)
-        if list_only:
-            for mutant in (mutant for group in mutants.values() for mutant in group):
-                typer.echo(line_of(mutant))
-            return
-        fates = judged(mutants, jobs, Results(results))
-    except (StaleTable, ResultsUnfit) as error:
+    except StaleTable as error:
         typer.echo(f"error: {error}", err=True)
         raise typer.Exit(2) from None
+    if list_only:
+        typer.echo("\n".join(line_of(mutant) for group in mutants.values() for mutant in group))
+        return
+    fates = judged(mutants, jobs, results)
     typer.echo(json.dumps(as_data(fates), indent=1) if as_json else as_text(fates))
+    everything = [entry for group in fates.values() for entry in group]
     named = {mutant.key for mutant in named_mutants()}
-    if any(fate == "alive" and mutant.key in named for group in fates.values() for mutant, fate in group):
+    if any(fate == "alive" and mutant.key in named for mutant, fate in everything):
         raise typer.Exit(1)
-    if any(fate == "unjudged" for group in fates.values() for _, fate in group):
+    if any(fate == "unjudged" for _, fate in everything):
         raise typer.Exit(2)
 
 
 def chosen(only: list[str] | None, per_file: int | None, seed: int) -> dict[str, list[Mutant]]:
-    """The mutants to run, file by file, the named ones first.
+    """The mutants to run, file by file.
 
     Raises:
         StaleTable: one of the files has no plan.
@@ -78,8 +78,7 @@ def chosen(only: list[str] | None, per_file: int | None, seed: int) -> dict[str,
     unknown = [file for file in only or [] if file not in PLANS]
     if unknown:
         raise StaleTable(f"--only {unknown[0]}: not one of {', '.join(PLANS)}")
-    named = named_mutants()
-    mutants = {}
+    named, mutants = named_mutants(), {}
     for file in only or PLANS:
         count = PLANS[file].count if per_file is None else per_file
         by_key = {mutant.key: mutant for mutant in [*drawn(file, count, seed), *(m for m in named if m.file == file)]}
@@ -87,26 +86,29 @@ def chosen(only: list[str] | None, per_file: int | None, seed: int) -> dict[str,
     return mutants
 
 
-def judged(mutants: dict[str, list[Mutant]], jobs: int, results: Results) -> Fates:
-    """The fate of every mutant.
-
-    Args:
-        mutants: the mutants of each file
-        jobs: how many files are judged at once
-        results: the fates of earlier runs, which are taken as they are; new ones are added
-    """
-    processes, known = Processes(), equivalents()
+def judged(mutants: dict[str, list[Mutant]], jobs: int, results: Path | None) -> Fates:
+    """The fate of every mutant; those that `results` holds are taken as they are, and new ones are added to it."""
+    processes, equivalent, known = Processes(), equivalents(), kept(results)
     waiting: dict[str, list[Mutant]] = {}
     fates: Fates = {}
     for file, group in mutants.items():
-        fate_of = {m: "equivalent" if m.key in known else results.fate(m) for m in group}
+        fate_of = {m: "equivalent" if m.key in equivalent else known.get((*m.key, stamp(m.file))) for m in group}
         fates[file] = [(mutant, fate) for mutant, fate in fate_of.items() if fate is not None]
         waiting[file] = [mutant for mutant, fate in fate_of.items() if fate is None]
 
     def judge(file: str) -> None:
-        copy = copies.get()
+        copy, left = copies.get(), list(waiting[file])
         try:
-            _judge_file(copy, PLANS[file], waiting[file], fates[file], results)
+            for mutant, fate in copy.fates(left.copy(), PLANS[file]):
+                left.remove(mutant)
+                fates[file].append((mutant, fate))
+                typer.echo(f"{fate:8} {line_of(mutant)}", err=True)
+                if results:
+                    with results.open("a") as out:
+                        out.write(json.dumps([*mutant.key, stamp(file), fate]) + "\n")
+        except BaselineUnfit as error:
+            typer.echo(f"error: {error}", err=True)
+            fates[file] += [(mutant, "unjudged") for mutant in left]
         finally:
             copies.put(copy)
         fates[file].sort(key=lambda entry: entry[0].line)
@@ -130,70 +132,52 @@ def judged(mutants: dict[str, list[Mutant]], jobs: int, results: Results) -> Fat
     return fates
 
 
-def _judge_file(
-    copy: Copy, plan: Plan, mutants: list[Mutant], fates: list[tuple[Mutant, str]], results: Results
-) -> None:
-    judged_here = len(fates)
-    try:
-        for mutant, fate in copy.fates(mutants, plan):
-            fates.append((mutant, fate))
-            results.add(mutant, fate)
-            typer.echo(f"{fate:8} {line_of(mutant)}", err=True)
-    except BaselineUnfit as error:
-        typer.echo(f"error: {error}", err=True)
-        fates += [(mutant, "unjudged") for mutant in mutants[len(fates) - judged_here :]]
+def kept(results: Path | None) -> dict[tuple[str, ...], str]:
+    """What a file of results says of each mutant with its stamp."""
+    lines = results.read_text().splitlines() if results and results.exists() else []
+    return {tuple(entry[:-1]): entry[-1] for entry in map(json.loads, lines)}
+
+
+@functools.cache
+def stamp(file: str) -> str:
+    """A hash of a file and its tests: what became of its mutants holds as long as these are the same."""
+    texts = [(ROOT / name).read_bytes() for name in (f"{SOURCE}/{file}", *PLANS[file].files)]
+    return hashlib.sha256(b"\0".join(texts)).hexdigest()[:16]
 
 
 def line_of(mutant: Mutant) -> str:
     """A mutant as one line: where it is, what was there and what is."""
-    where = f"{mutant.file}:{mutant.line}"
-    return f"{where} [{mutant.operator}] {mutant.was}  ->  {mutant.now}"
+    return f"{mutant.file}:{mutant.line} [{mutant.operator}] {mutant.was}  ->  {mutant.now}"
 
 
 def counts(group: list[tuple[Mutant, str]]) -> dict[str, Any]:
-    """How many mutants met which fate, and the share of those killed among all that were judged and are not equivalent.
-
-    The share is None if there are none.
-    """
+    """How many mutants met which fate, and the share killed, timeouts too, of those judged; None if there are none."""
     found = Counter(fate for _, fate in group)
     killed = found["killed"] + found["timeout"]
-    judged_all = killed + found["alive"]
-    return {
-        "mutants": len(group),
-        "killed": killed,
-        "by_timeout": found["timeout"],
-        "equivalent": found["equivalent"],
-        "alive": found["alive"],
-        "unjudged": found["unjudged"],
-        "score": killed / judged_all if judged_all else None,
-    }
+    score = killed / (killed + found["alive"]) if killed + found["alive"] else None
+    return {"mutants": len(group), **{fate: found[fate] for fate in FATES}, "killed": killed, "score": score}
 
 
 def as_data(fates: Fates) -> dict[str, Any]:
     """The result as plain values, for JSON."""
     everything = [entry for group in fates.values() for entry in group]
+    names = ("file", "line", "function", "operator", "was", "now")
     return {
         "total": counts(everything),
         "files": {file: counts(group) for file, group in fates.items()},
-        "mutants": [
-            {key: getattr(mutant, key) for key in ("file", "line", "function", "operator", "was", "now")} | {"fate": fate}
-            for mutant, fate in everything
-        ],
-    }  # fmt: skip
+        "mutants": [{name: getattr(mutant, name) for name in names} | {"fate": fate} for mutant, fate in everything],
+    }
 
 
 def as_text(fates: Fates) -> str:
     """The result as a table in Markdown and the list of survivors."""
     everything = [entry for group in fates.values() for entry in group]
-    lines = [
-        "| file | mutants | killed | of these by timeout | equivalent | alive | not judged | score |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
+    heads = ("file", "mutants", "killed", "of these by timeout", "equivalent", "alive", "not judged", "score")
+    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
     for file, group in [*((f"`{file}`", group) for file, group in fates.items()), ("all", everything)]:
         found = counts(group)
         score = "–" if found["score"] is None else f"{100 * found['score']:.0f} %"
-        keys = ("mutants", "killed", "by_timeout", "equivalent", "alive", "unjudged")
-        cells = (file, *(found[key] for key in keys), score)
+        cells = (file, found["mutants"], *(found[fate] for fate in FATES), score)
         lines.append(f"| {' | '.join(map(str, cells))} |")
     alive = [mutant for mutant, fate in everything if fate == "alive"]
     return "\n".join([*lines, "", f"alive: {len(alive)}", *map(line_of, alive)])

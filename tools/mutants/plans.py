@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import random
 from pathlib import Path
-from typing import Any, Literal
 
 import yaml
-from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from tools.mutants.operators import Mutant, described, mutants_of
 from tools.mutants.running import SOURCE, Plan
@@ -80,68 +78,30 @@ class StaleTable(Exception):
     """A table names a piece of code that its file no longer holds, or no file."""
 
 
-class NamedFault(BaseModel):
-    """A fault written by hand.
-
-    Attributes:
-        name: what it leaves out or gets wrong
-        file: the file, relative to `SOURCE`
-        was: a piece of its text that occurs once
-        now: what replaces it
-    """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-    name: str
-    file: str
-    was: str
-    now: str
-
-
-class EquivalentFault(BaseModel):
-    """A generated mutant that no test can notice, because the program does the same.
-
-    Attributes:
-        file: the file, relative to `SOURCE`
-        function: the function that holds it, with its class; empty at the top of the file
-        was: the lines as they were, as the list of survivors shows them
-        now: the lines as they are
-        why: the reason
-        kind: "same" if the results are the same, "cost" if they are and only the work or memory differs
-    """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-    file: str
-    function: str
-    was: str
-    now: str
-    why: str
-    kind: Literal["same", "cost"] = "same"
-
-
 def named_mutants(root: Path = ROOT) -> list[Mutant]:
-    """The mutants of `named.yaml`.
+    """The mutants of `named.yaml`: faults written by hand, each with a piece of its file that occurs once.
 
     Raises:
-        StaleTable: a snippet does not occur exactly once in its file.
+        StaleTable: a piece does not.
     """
-    return [_placed(fault, root) for fault in _table("named.yaml", NamedFault)]
+    found = []
+    for fault in yaml.safe_load((HERE / "named.yaml").read_text()):
+        name, file, was = fault["name"], fault["file"], fault["was"]
+        source = (root / SOURCE / file).read_text()
+        if source.count(was) != 1:
+            raise StaleTable(f"named.yaml: {name}: {was!r} occurs {source.count(was)} times in {file}, must once")
+        found.append(described(file, name, "", source, source.replace(was, fault["now"])))
+    return found
 
 
-def equivalents() -> dict[tuple[str, str, str, str], str]:
-    """The reason for each mutant of `equivalent.yaml`, by the mutant's key."""
-    table = _table("equivalent.yaml", EquivalentFault)
-    return {(entry.file, entry.function, entry.was, entry.now): entry.why for entry in table}
+def equivalents() -> set[tuple[str, str, str, str]]:
+    """The keys of the mutants in `equivalent.yaml`, which no test can notice, because the program does the same."""
+    table = yaml.safe_load((HERE / "equivalent.yaml").read_text())
+    return {(entry["file"], entry["function"], entry["was"], entry["now"]) for entry in table}
 
 
 def drawn(file: str, count: int, seed: int = SEED, root: Path = ROOT) -> list[Mutant]:
-    """A sample of the mutants of a file: one of each function in turn, so that every function has its share.
-
-    Args:
-        file: the file, relative to `SOURCE`
-        count: how many, if there are as many
-        seed: another seed gives another sample
-        root: the root of the project
-    """
+    """A sample of the mutants of a file: one of each function in turn, so that every function has its share."""
     rng = random.Random(f"{seed} {file}")  # noqa: S311 - nothing is kept secret
     by_function: dict[str, list[Mutant]] = {}
     for mutant in mutants_of(file, (root / SOURCE / file).read_text()):
@@ -165,32 +125,13 @@ def check_tables(root: Path = ROOT) -> None:
     for file, plan in PLANS.items():
         for name in (f"{SOURCE}/{file}", *plan.files):
             if not (root / name).is_file():
-                raise StaleTable(f"tools/mutants/plans.py: {name} does not exist")
+                raise StaleTable(f"plans.py: {name} does not exist")
     for mutant in named_mutants(root):
         if mutant.file not in PLANS:
-            raise StaleTable(f"tools/mutants/named.yaml: {mutant.file} has no plan in tools/mutants/plans.py")
+            raise StaleTable(f"named.yaml: {mutant.file} has no plan")
     wanted = equivalents()
     for file in {key[0] for key in wanted}:
         known = {mutant.key for mutant in mutants_of(file, (root / SOURCE / file).read_text())}
         for key in wanted:
             if key[0] == file and key not in known:
-                raise StaleTable(f"tools/mutants/equivalent.yaml: no mutant of {file} turns {key[2]!r} into {key[3]!r}")
-
-
-def _placed(fault: NamedFault, root: Path) -> Mutant:
-    source = (root / SOURCE / fault.file).read_text()
-    if source.count(fault.was) != 1:
-        found = source.count(fault.was)
-        raise StaleTable(
-            f"tools/mutants/named.yaml: {fault.name}: {fault.was!r} occurs {found} times in {fault.file}, must once"
-        )
-    return described(fault.file, fault.name, "", source, source.replace(fault.was, fault.now))
-
-
-def _table(name: str, kind: type[Any]) -> list[Any]:
-    try:
-        return TypeAdapter(list[kind]).validate_python(yaml.safe_load((HERE / name).read_text()) or [])  # type: ignore[valid-type]
-    except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(map(str, first["loc"]))
-        raise StaleTable(f"tools/mutants/{name}: {place}: {first['msg']}") from error
+                raise StaleTable(f"equivalent.yaml: no mutant of {file} turns {key[2]!r} into {key[3]!r}")

@@ -19,9 +19,8 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
 
 from tools.mutants.operators import Mutant
 
@@ -44,16 +43,10 @@ class BaselineUnfit(Exception):
 
 @dataclass(frozen=True)
 class Ended:
-    """How a run of tests ended.
+    """How a run of tests ended."""
 
-    Attributes:
-        code: pytest's exit code, negative if a signal ended it; None if its time limit passed
-        seconds: its processor time [s], infinite if the time limit passed
-        output: what it printed
-    """
-
-    code: int | None
-    seconds: float
+    code: int | None  # pytest's exit code, negative if a signal ended it; None if its time limit passed
+    seconds: float  # its processor time [s], infinite if the time limit passed
     output: str
 
     @property
@@ -70,16 +63,11 @@ class Ended:
 
 @dataclass(frozen=True)
 class Plan:
-    """How the mutants of a file are judged.
+    """How the mutants of a file are judged."""
 
-    Attributes:
-        tests: arguments for pytest, the tests that are quick and notice much first
-        count: how many mutants are drawn
-        plain: whether kernels run as plain Python, which for small tests is quicker than compiling them for each mutant
-    """
-
-    tests: tuple[str, ...]
-    count: int
+    tests: tuple[str, ...]  # arguments for pytest, the tests that are quick and notice much first
+    count: int  # how many mutants are drawn
+    #: Whether kernels run as plain Python, which for small tests is quicker than compiling them for each mutant.
     plain: bool = False
 
     @property
@@ -88,17 +76,13 @@ class Plan:
         return tuple(dict.fromkeys(test.split("::")[0] for test in self.tests if test.startswith("tests/")))
 
 
-@dataclass
 class Processes:
-    """The processes that run at the moment, each with its children in a group of its own.
+    """The processes that run at the moment, each with its children in a group of its own."""
 
-    Attributes:
-        stopped: whether all were told to end and no more may start
-    """
-
-    stopped: bool = False
-    _running: set[subprocess.Popen[str]] = field(default_factory=set)
-    _lock: threading.Lock = field(default_factory=threading.Lock)
+    def __init__(self) -> None:
+        self.stopped = False  # whether all were told to end and no more may start
+        self._running: set[subprocess.Popen[str]] = set()
+        self._lock = threading.Lock()
 
     def start(self, command: list[str], folder: Path, environment: dict[str, str]) -> subprocess.Popen[str]:
         """Start a process that reads and writes lines."""
@@ -132,20 +116,12 @@ def _kill(process: subprocess.Popen[str]) -> None:
     process.wait()
     for pipe in (process.stdin, process.stdout):
         with contextlib.suppress(OSError):
-            _open(pipe).close()
-
-
-def _open(pipe: IO[str] | None) -> IO[str]:
-    assert pipe is not None
-    return pipe
+            assert pipe is not None
+            pipe.close()
 
 
 class Copy:
-    """A copy of the project in which one file at a time is changed.
-
-    Attributes:
-        root: its folder
-    """
+    """A copy of the project in which one file at a time is changed."""
 
     def __init__(self, original: Path, root: Path, processes: Processes) -> None:
         self.root = root
@@ -155,11 +131,7 @@ class Copy:
         _write(cache, f"{cache.read_text()}\n\ndef sources_stamp() -> str:\n    return {stamp_of(original)!r}\n")
 
     def fates(self, mutants: list[Mutant], plan: Plan) -> Iterator[tuple[Mutant, str]]:
-        """What becomes of each mutant of one file: "killed", "timeout" or "alive".
-
-        Args:
-            mutants: the faults, one or more, all in the same file
-            plan: the tests that should notice them
+        """What becomes of each mutant, all of one file: "killed", "timeout" or "alive".
 
         Raises:
             BaselineUnfit: the tests fail on the unchanged file, or there are none.
@@ -167,7 +139,7 @@ class Copy:
         file = mutants[0].file
         dependent = dependents(self._original, file)
         kernels = [] if plan.plain else [self.root / SOURCE / name for name in dependent if "_kernels" in name]
-        server = self.server(file, dependent, plan.plain)
+        server = Server(self.root, self._processes, file, dependent, plan.plain)
         try:
             first = server.run(plan.tests, BASELINE_TIME)
             if first.code != PASSED:
@@ -183,10 +155,6 @@ class Copy:
             server.end()
             _write(self.root / SOURCE / file, (self._original / SOURCE / file).read_text())
             self._restore(kernels)
-
-    def server(self, file: str, dependent: set[str], plain: bool) -> Server:
-        """A process that judges mutants of a file."""
-        return Server(self.root, self._processes, file, dependent, plain)
 
     def _restore(self, kernels: list[Path]) -> None:
         """Bring back the machine code that mutants have replaced by their own."""
@@ -212,19 +180,15 @@ class Server:
         self._start()
 
     def run(self, tests: tuple[str, ...], limit: float) -> Ended:
-        """Run tests.
-
-        Args:
-            tests: arguments for pytest
-            limit: the processor time that they may take [s]
-        """
+        """Run tests, which may take so much processor time [s]."""
         arguments = ["-x", "--tb=line", "--no-header", "-rfE", "--timeout=0", "-p", "no:cacheprovider", *tests]
         if self._plain:
             arguments += ["-W", "ignore"]  # numpy's numbers warn where compiled ones wrap around
         output = self._root.parent / "output.txt"
         output.unlink(missing_ok=True)
         self._tell({"arguments": arguments, "output": str(output), "limit": limit})
-        answer = _open(self._process.stdout)
+        answer = self._process.stdout
+        assert answer is not None
         ready, _, _ = select.select([answer], [], [], WAITING * limit)
         said = output.read_text(errors="replace") if output.exists() else ""
         if not ready:
@@ -255,7 +219,8 @@ class Server:
         self._tell(self._first)
 
     def _tell(self, message: object) -> None:
-        pipe = _open(self._process.stdin)
+        pipe = self._process.stdin
+        assert pipe is not None
         with contextlib.suppress(OSError):  # a process that has ended is noticed when it gives no answer
             pipe.write(json.dumps(message) + "\n")
             pipe.flush()

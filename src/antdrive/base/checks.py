@@ -1,18 +1,23 @@
-"""Documents checked against pydantic models. A fault becomes one line that says what would be right."""
+"""Documents checked against records. A fault becomes one line that says what would be right."""
 
 from __future__ import annotations
 
 import difflib
+import functools
 import json
 import math
-from collections.abc import Iterable, Mapping
-from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin
+import numbers
+from collections.abc import Hashable, Iterable, Iterator, Mapping
+from typing import Annotated, Any, Literal, TypeAlias, TypeVar, cast
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ValidationError
+from pydantic import AfterValidator, BeforeValidator, TypeAdapter, ValidationError
 
 from antdrive.base.document import Document, Location
+from antdrive.base.errors import FieldError
+from antdrive.base.records import attributes_of
 
-Model = TypeVar("Model", bound=BaseModel)
+R = TypeVar("R")
+Schema: TypeAlias = Mapping[str, Any]
 
 
 def _exactly_one(value: Any) -> Any:
@@ -22,35 +27,76 @@ def _exactly_one(value: Any) -> Any:
     return value
 
 
-#: The version of the file format; so far there has been one.
-
-
 def _printable(text: str) -> str:
     if not text.isprintable():
         raise ValueError("must be one line of printable characters")
     return text
 
 
+#: The version of the file format; so far there has been one.
 SchemaVersion = Annotated[Literal[1], BeforeValidator(_exactly_one)]
 OneLine = Annotated[str, AfterValidator(_printable)]
 
 
-def check(model: type[Model], document: Document) -> Model:
-    """The document as a checked model.
+def check(kind: type[R], document: Document) -> R:
+    """The document as a record: a dataclass or a pydantic model.
 
     Raises:
         InputError: something in the document is wrong. Of several faults the first is reported, unknown keys first.
     """
+    schema = schema_of(cast(Hashable, kind))
     if not isinstance(document.data, dict):
-        raise document.error((), f"must be {_mapping_of(model)}, got {show(document.data)}")
+        raise document.error((), f"must be {_mapping_of(schema)}, got {show(document.data)}")
     try:
-        return model.model_validate(document.data)
+        # As JSON, in which strict rules take lists for tuples and mappings for records.
+        found: R = _adapter(cast(Hashable, kind)).validate_json(json.dumps(document.data, default=_plain))
+        return found
     except ValidationError as error:
         faults = error.errors(include_url=False)
-    unknown = [f for f in faults if f["type"] == "extra_forbidden"]
+    except (TypeError, ValueError, RecursionError):
+        raise document.error((), "must be plain data: mappings, lists, numbers and texts") from None
+    if faults[0]["type"] == "json_invalid":
+        raise document.error(next(_broken(document.data, ()), ()), "must be text in Unicode")
+    unknown = [f for f in faults if f["type"] in _UNKNOWN]
     fault = (unknown or faults)[0]
     location = tuple(fault["loc"])
-    raise document.error(location, _problem(model, location, fault))
+    cause = fault.get("ctx", {}).get("error")
+    if isinstance(cause, FieldError):
+        raise document.field_error(cause, *location)
+    raise document.error(location, _problem(schema, location, fault))
+
+
+def _plain(value: Any) -> Any:
+    """What stands in JSON for a value that is not plain data, as those of numpy."""
+    return int(value) if isinstance(value, numbers.Integral) else repr(value)
+
+
+def _broken(data: Any, location: Location) -> Iterator[Location]:
+    """The places of texts that are no Unicode."""
+    if isinstance(data, str) and not data.isascii() and any("\ud800" <= mark <= "\udfff" for mark in data):
+        yield location
+    inner = data.items() if isinstance(data, Mapping) else enumerate(data) if isinstance(data, list | tuple) else ()
+    for key, value in inner:
+        yield from _broken(value, (*location, key))
+        yield from _broken(key, location)
+
+
+@functools.cache
+def schema_of(kind: Hashable) -> Mapping[str, Any]:
+    """The JSON Schema of a record; what docstrings say of a field describes it where nothing else does."""
+    schema = _adapter(kind).json_schema()
+    for part in (schema, *schema.get("$defs", {}).values()):
+        text = part.get("description", "")
+        for name, meaning in attributes_of(text).items():
+            part["properties"].get(name, {}).setdefault("description", meaning)
+        if "\nAttributes:" in text:
+            part["description"] = text.partition("\nAttributes:")[0].strip()
+    return schema
+
+
+@functools.cache
+def _adapter(kind: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(kind)
 
 
 def suggest(word: str, choices: Iterable[str]) -> str:
@@ -84,44 +130,43 @@ def yaml_number(value: float) -> str:
     return f"{mantissa}.0e{exponent}" if mark and "." not in mantissa else text
 
 
-def _keys(model: type[BaseModel]) -> list[str]:
-    return [info.alias or name for name, info in model.model_fields.items()]
-
-
-def _mapping_of(model: type[BaseModel]) -> str:
-    needed = [info.alias or name for name, info in model.model_fields.items() if info.is_required()]
+def _mapping_of(schema: Schema) -> str:
+    needed = schema.get("required", ())
     return f"a mapping with the keys {', '.join(needed)}" if needed else "a mapping"
 
 
-def _model_at(model: type[BaseModel], location: Location) -> type[BaseModel]:
-    """The model of the mapping at a location, found by following annotations such as list[Inner]."""
-    named = False  # whether the next part is a key of people's choice: that of a field such as dict[str, Inner]
+def _at(schema: Schema, location: Location) -> Schema:
+    """The schema of the value at a location; empty where there is none."""
+    here = schema
     for part in location:
-        if named or isinstance(part, int):
-            named = False
-            continue
-        annotations: list[Any] = [next(i.annotation for n, i in model.model_fields.items() if (i.alias or n) == part)]
-        named = get_origin(annotations[0]) is dict
-        while annotations:
-            annotation = annotations.pop()
-            if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-                model = annotation
-                break
-            annotations.extend(get_args(annotation))
-    return model
+        here = _one(schema, here)
+        if isinstance(part, int):
+            items = here.get("prefixItems", ())
+            here = items[part] if part < len(items) else here.get("items", {})
+        else:
+            here = here.get("properties", {}).get(part) or here.get("additionalProperties") or {}
+    return here
 
 
-def _describe(model: type[BaseModel], location: Location) -> str:
-    """The model's own description of the value at a location; empty where it has none."""
+def _one(schema: Schema, part: Schema) -> Schema:
+    """A part itself: a reference is followed, and of alternatives the one that holds others is taken."""
+    for other in part.get("anyOf", ()):
+        if other.get("type") != "null":
+            return _one(schema, other)
+    if "$ref" in part:
+        found: Schema = schema["$defs"][part["$ref"].rpartition("/")[2]]
+        return found
+    return part
+
+
+def _describe(schema: Schema, location: Location) -> str:
+    """The description of the value at a location; empty where it has none."""
     while location and isinstance(location[-1], int):  # the description of a list holds for its entries
         location = location[:-1]
-    parent = _model_at(model, location[:-1])
-    for name, info in parent.model_fields.items():
-        if location and (info.alias or name) == location[-1]:
-            return info.description or ""
-    return ""
+    return str(_at(schema, location).get("description", ""))
 
 
+_UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
 _KINDS = {
     "float_type": "a number",
     "int_type": "a whole number",
@@ -138,13 +183,14 @@ _BOUNDS = {
 }
 
 
-def _problem(model: type[BaseModel], location: Location, fault: Mapping[str, Any]) -> str:
+def _problem(schema: Schema, location: Location, fault: Mapping[str, Any]) -> str:
     """What is wrong and what would be right, for one fault found by pydantic."""
     kind, value, context = fault["type"], fault["input"], fault.get("ctx", {})
-    if kind == "extra_forbidden":
-        return f"unknown key; {suggest(str(location[-1]), _keys(_model_at(model, location[:-1])))}"
+    if kind in _UNKNOWN:
+        known = _one(schema, _at(schema, location[:-1]))["properties"]
+        return f"unknown key; {suggest(str(location[-1]), known)}"
     if kind == "missing":
-        return f"missing; {_describe(model, location) or 'this key is needed'}"
+        return f"missing; {_describe(schema, location) or 'this key is needed'}"
     if kind in _BOUNDS:
         words, bound = _BOUNDS[kind]
         return f"must be {words} {context[bound]:g}, got {show(value)}"
@@ -152,12 +198,12 @@ def _problem(model: type[BaseModel], location: Location, fault: Mapping[str, Any
         return f"must be a finite number, got {show(value)}"
     if kind in ("too_short", "too_long") and isinstance(value, list):
         count = context.get("min_length", context.get("max_length"))
-        words = _describe(model, location)
+        words = _describe(schema, location)
         return f"must have {count} entries, got {len(value)}" + (f"; {words}" if words else "")
     if kind == "literal_error":
         return f"must be {context['expected']}, got {show(value)}"
-    if kind == "model_type":
-        return f"must be {_mapping_of(_model_at(model, location))}, got {show(value)}"
+    if kind in ("model_type", "dataclass_type"):
+        return f"must be {_mapping_of(_one(schema, _at(schema, location)))}, got {show(value)}"
     if kind == "value_error":
         return str(context["error"])
     if kind in _KINDS:

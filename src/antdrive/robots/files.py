@@ -6,18 +6,17 @@ import dataclasses
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 
-from antdrive.base.checks import OneLine, SchemaVersion, check, suggest
+from antdrive.base.checks import OneLine, SchemaVersion, check, schema_of, suggest
 from antdrive.base.document import Document, parse_document, read_yaml
 from antdrive.base.errors import FieldError, input_error
+from antdrive.base.reuse import reused
 from antdrive.robots.feasible import require_feasible
-from antdrive.robots.lidar import LIDAR_RANGE, Lidar
 from antdrive.robots.outline import MOST_CORNERS
-from antdrive.robots.spec import NOISE_RANGE, ROBOT_RANGE, Footprint, Noise, RobotSpec
-from antdrive.worlds.reuse import reused
+from antdrive.robots.spec import Footprint, RobotSpec
 
 _CATALOG = Path(__file__).with_name("catalog")
 _RULES = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
@@ -76,77 +75,25 @@ class FootprintEntry(BaseModel):
         return Footprint.rectangle(self.length or 0.0, self.width or 0.0, centre)
 
 
-def _level(key: str, description: str) -> Any:
-    low, high = NOISE_RANGE[key]
-    return Field(getattr(Noise(), key), ge=low, le=high, description=description)
+def _robot_file() -> Any:
+    hints = get_type_hints(RobotSpec, include_extras=True)
+    values: dict[str, Any] = {
+        field.name: (hints[field.name], ... if field.default is dataclasses.MISSING else field.default)
+        for field in dataclasses.fields(RobotSpec)
+    }
+    values |= {
+        "schema_": (SchemaVersion, Field(alias="schema", description="write schema: 1")),
+        "name": (
+            OneLine,
+            Field(min_length=1, max_length=200, description="name of the robot, by default that of the file"),
+        ),
+        "footprint": (FootprintEntry, Field(description=f"{_FORMS} [m]")),
+    }
+    return create_model("RobotFile", __config__=_RULES, __doc__=RobotSpec.__doc__, **values)
 
 
-def _number(key: str, description: str, default: Any = ...) -> Any:
-    low, high = ROBOT_RANGE[key]
-    return Field(default, ge=low, le=high, description=description)
-
-
-class NoiseEntry(BaseModel):
-    """How the real robot differs from a perfect one; a level that is left out is that of a perfect robot."""
-
-    model_config = _RULES
-
-    pose_xy: float = _level("pose_xy", "standard deviation of a pose fix in x and in y [m]")
-    pose_yaw: float = _level("pose_yaw", "standard deviation of a pose fix's heading [rad]")
-    pose_rate: float = _level("pose_rate", "rate of pose fixes; between two fixes the robot uses odometry [Hz]")
-    encoder: float = _level("encoder", "standard deviation of each wheel's measured speed, as a fraction")
-    slip: float = _level("slip", "standard deviation of each wheel's slip, as a fraction of its speed")
-    delay: float = _level("delay", "time from a command to the motors [s]")
-
-
-def _beam(key: str, description: str, default: Any = ...) -> Any:
-    low, high = LIDAR_RANGE[key]
-    return Field(default, ge=low, le=high, description=description)
-
-
-class LidarEntry(BaseModel):
-    """A planar lidar: evenly spaced beams at one height."""
-
-    model_config = _RULES
-
-    beams: int = _beam("beams", "number of beams in a scan")
-    field_of_view: float = _beam("field_of_view", "angle from the first to the last beam [rad]; 6.2832: all around")
-    min_range: float = _beam("min_range", "what is nearer is not measured [m]")
-    max_range: float = _beam("max_range", "what is farther is not seen [m]")
-    rate: float = _beam("rate", "scans in a second [Hz]")
-    resolution: float = _beam("resolution", "ranges are multiples of it [m]; 0: exact", 0.0)
-    sigma: float = _beam("sigma", "standard deviation of a range [m]", 0.0)
-    x: float = _beam("x", "place ahead of the axle's centre [m]", 0.0)
-    y: float = _beam("y", "place to the left of the axle's centre [m]", 0.0)
-    yaw: float = _beam("yaw", "heading, counter-clockwise from the robot's [rad]", 0.0)
-    height: float = _beam("height", "height above the floor [m]; lower cylinders are not seen", 0.2)
-
-
-class RobotFile(BaseModel):
-    """A differential-drive robot: two driven wheels on one axle, whose centre is the robot's origin, and two casters."""
-
-    model_config = _RULES
-
-    schema_: SchemaVersion = Field(alias="schema", description="write schema: 1")
-    name: OneLine = Field(min_length=1, max_length=200, description="name of the robot, by default that of the file")
-    source: str | None = Field(None, description="where these values come from, free text")
-    footprint: FootprintEntry = Field(description=f"{_FORMS} [m]")
-    height: float = _number("height", "height of the body [m]")
-    mass: float = _number("mass", "mass of the whole robot [kg]")
-    wheel_radius: float = _number("wheel_radius", "radius of the driven wheels [m]")
-    track: float = _number("track", "distance between the driven wheels [m]")
-    max_speed: float = _number("max_speed", "limit of the forward speed [m/s]")
-    max_yaw_rate: float = _number("max_yaw_rate", "limit of the yaw rate [rad/s]")
-    max_acceleration: float = _number("max_acceleration", "limit of acceleration and deceleration [m/s^2]")
-    max_yaw_acceleration: float = _number("max_yaw_acceleration", "limit of the change of the yaw rate [rad/s^2]")
-    max_lateral_acceleration: float = _number("max_lateral_acceleration", "limit of speed times yaw rate [m/s^2]")
-    max_wheel_speed: float = _number("max_wheel_speed", "limit of each wheel's speed [rad/s]")
-    wheel_torque: float = _number("wheel_torque", "highest torque of each wheel's motor [N m]")
-    wheel_friction: float = _number("wheel_friction", "Coulomb friction coefficient of the wheels on the floor", 1.5)
-    noise: NoiseEntry = Field(
-        NoiseEntry(), description="errors of pose, encoders and wheels, and delay; `--noise` multiplies them"
-    )
-    lidar: LidarEntry | None = Field(None, description="what the robot sees with, for worlds that it has no map of")
+#: A robot as written in a file: a specification, but for its footprint and for a name that the file may leave out.
+RobotFile = _robot_file()
 
 
 def list_robots() -> Mapping[str, Path]:
@@ -194,29 +141,20 @@ def _robot_in(text: str, source: str, stem: str) -> RobotSpec:
 
 def robot_schema() -> dict[str, Any]:
     """The JSON Schema of robot files, for editors."""
-    schema = RobotFile.model_json_schema(by_alias=True)
-    schema["required"] = [key for key in schema["required"] if key != "name"]
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "antdrive robot"}
+    schema = schema_of(RobotFile)
+    required = [key for key in schema["required"] if key != "name"]
+    draft = "https://json-schema.org/draft/2020-12/schema"
+    return {"$schema": draft, **schema, "required": required, "title": "antdrive robot"}
 
 
-def _to_spec(entry: RobotFile, document: Document) -> RobotSpec:
-    values = {name: getattr(entry, name) for name in RobotFile.model_fields if name != "schema_"}
-    values["noise"] = Noise(**dict(entry.noise))
+def _to_spec(entry: Any, document: Document) -> RobotSpec:
+    values = {field.name: getattr(entry, field.name) for field in dataclasses.fields(RobotSpec)}
     try:
-        values["lidar"] = _lidar(entry.lidar)
-        values["footprint"] = entry.footprint.footprint()
-        robot = RobotSpec(**values)
+        robot = RobotSpec(**{**values, "footprint": entry.footprint.footprint()})
         require_feasible(robot)
     except FieldError as error:
         raise document.field_error(error) from None
     return robot
-
-
-def _lidar(entry: LidarEntry | None) -> Lidar | None:
-    try:
-        return None if entry is None else Lidar(**dict(entry))
-    except FieldError as error:
-        raise error.under("lidar") from None
 
 
 def robot_to_dict(robot: RobotSpec) -> dict[str, Any]:

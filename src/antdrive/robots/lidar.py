@@ -5,26 +5,15 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from annotated_types import Interval
 
 from antdrive.base.errors import FieldError
+from antdrive.base.records import require_ranges
 from antdrive.base.types import Floats, Pose
 
-#: The lowest and highest value of each number of a lidar.
-LIDAR_RANGE = {
-    "beams": (3, 10_000),
-    "field_of_view": (0.01, 2 * math.pi + 1e-6),  # a file that rounds 2 pi up means a full circle
-    "min_range": (0.0, 10.0),
-    "max_range": (0.1, 300.0),
-    "rate": (1.0, 1000.0),
-    "resolution": (0.0, 0.5),
-    "sigma": (0.0, 0.5),
-    "x": (-20.0, 20.0),
-    "y": (-20.0, 20.0),
-    "yaw": (-math.pi, math.pi),
-    "height": (0.01, 10.0),
-}
 FULL_CIRCLE = 2 * math.pi - 1e-4  # a field of view from here on has no first and last beam [rad]
 
 
@@ -37,7 +26,8 @@ class Lidar:
 
     Attributes:
         beams: number of beams in a scan
-        field_of_view: angle between the first and the last beam, symmetric about the lidar's heading [rad]
+        field_of_view: angle between the first and the last beam, symmetric about the lidar's heading [rad]; 6.2832: all
+            around
         min_range: what is nearer is noticed, but not measured [m]
         max_range: what is farther is not noticed [m]
         rate: scans in a second [Hz]
@@ -49,27 +39,23 @@ class Lidar:
         height: of the beams above the floor [m]; cylinders that are lower are not seen
 
     Raises:
-        FieldError: a value outside its LIDAR_RANGE, or ranges that enclose nothing.
+        FieldError: a value outside its range, or ranges that enclose nothing.
     """
 
-    beams: int
-    field_of_view: float
-    min_range: float
-    max_range: float
-    rate: float
-    resolution: float = 0.0
-    sigma: float = 0.0
-    x: float = 0.0
-    y: float = 0.0
-    yaw: float = 0.0
-    height: float = 0.2
+    beams: Annotated[int, Interval(ge=3, le=10_000)]
+    field_of_view: Annotated[float, Interval(ge=0.01, le=2 * math.pi + 1e-6)]  # files that round 2 pi up mean it
+    min_range: Annotated[float, Interval(ge=0.0, le=10.0)]
+    max_range: Annotated[float, Interval(ge=0.1, le=300.0)]
+    rate: Annotated[float, Interval(ge=1.0, le=1000.0)]
+    resolution: Annotated[float, Interval(ge=0.0, le=0.5)] = 0.0
+    sigma: Annotated[float, Interval(ge=0.0, le=0.5)] = 0.0
+    x: Annotated[float, Interval(ge=-20.0, le=20.0)] = 0.0
+    y: Annotated[float, Interval(ge=-20.0, le=20.0)] = 0.0
+    yaw: Annotated[float, Interval(ge=-math.pi, le=math.pi)] = 0.0
+    height: Annotated[float, Interval(ge=0.01, le=10.0)] = 0.2
 
     def __post_init__(self) -> None:
-        for field in dataclasses.fields(self):
-            value = getattr(self, field.name)
-            low, high = LIDAR_RANGE[field.name]
-            if not low <= value <= high:
-                raise FieldError(field.name, f"must be between {low:g} and {high:g}, got {value:g}")
+        require_ranges(self)
         if not self.min_range < self.max_range:
             raise FieldError("min_range", f"must be below max_range, {self.max_range:g}, got {self.min_range:g}")
 

@@ -5,20 +5,14 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
+from typing import Annotated
+
+from annotated_types import Interval
 
 from antdrive.base.errors import FieldError
+from antdrive.base.records import require_ranges
 from antdrive.robots.lidar import Lidar
 from antdrive.robots.outline import Footprint as Footprint
-
-#: The lowest and highest value of each field of `Noise`.
-NOISE_RANGE = {
-    "pose_xy": (0.0, 1.0),
-    "pose_yaw": (0.0, 1.0),
-    "pose_rate": (1.0, 1000.0),
-    "encoder": (0.0, 0.5),
-    "slip": (0.0, 0.5),
-    "delay": (0.0, 1.0),
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,22 +28,18 @@ class Noise:
         delay: time from a command to the motors [s]
 
     Raises:
-        ValueError: a value is outside its NOISE_RANGE.
+        ValueError: a value is outside its range.
     """
 
-    pose_xy: float = 0.0
-    pose_yaw: float = 0.0
-    pose_rate: float = 20.0
-    encoder: float = 0.0
-    slip: float = 0.0
-    delay: float = 0.0
+    pose_xy: Annotated[float, Interval(ge=0.0, le=1.0)] = 0.0
+    pose_yaw: Annotated[float, Interval(ge=0.0, le=1.0)] = 0.0
+    pose_rate: Annotated[float, Interval(ge=1.0, le=1000.0)] = 20.0
+    encoder: Annotated[float, Interval(ge=0.0, le=0.5)] = 0.0
+    slip: Annotated[float, Interval(ge=0.0, le=0.5)] = 0.0
+    delay: Annotated[float, Interval(ge=0.0, le=1.0)] = 0.0
 
     def __post_init__(self) -> None:
-        for field in dataclasses.fields(self):
-            value = getattr(self, field.name)
-            low, high = NOISE_RANGE[field.name]
-            if not low <= value <= high:
-                raise FieldError(field.name, f"must be between {low:g} and {high:g}, got {value:g}")
+        require_ranges(self)
 
     def scaled(self, factor: float) -> Noise:
         """The noise with all errors and the delay multiplied by `factor`."""
@@ -62,22 +52,7 @@ class Noise:
         return any(getattr(self, f.name) for f in dataclasses.fields(self) if f.name != "pose_rate")
 
 
-#: The lowest and highest value of each number in a robot's file: the robots that antdrive is meant for.
-ROBOT_RANGE = {
-    "footprint": (0.02, 20.0),  # diameter, length, width
-    "height": (0.01, 10.0),
-    "mass": (0.01, 1e5),
-    "wheel_radius": (0.005, 5.0),
-    "track": (0.01, 20.0),
-    "max_speed": (0.05, 10.0),  # slower ones would count as standing; faster ones wobble
-    "max_yaw_rate": (0.05, 50.0),
-    "max_acceleration": (0.01, 100.0),
-    "max_yaw_acceleration": (0.01, 1000.0),
-    "max_lateral_acceleration": (0.01, 100.0),
-    "max_wheel_speed": (0.1, 1e4),
-    "wheel_torque": (1e-6, 1e6),
-    "wheel_friction": (0.1, 100.0),
-}
+FOOTPRINT_RANGE = (0.02, 20.0)  # of the diameter, or of length and width [m]
 WHEEL_ROOM = 0.05  # the least distance from a wheel's middle to the footprint's edge, in wheel radii
 
 
@@ -107,24 +82,24 @@ class RobotSpec:
         lidar: what the robot sees with; None: it has no lidar
 
     Raises:
-        FieldError: a value is not positive or outside its ROBOT_RANGE, or the wheels stand
+        FieldError: a value is not positive or outside its range, or the wheels stand
             outside the footprint.
     """
 
     name: str
     footprint: Footprint
-    height: float
-    mass: float
-    wheel_radius: float
-    track: float
-    max_speed: float
-    max_yaw_rate: float
-    max_acceleration: float
-    max_yaw_acceleration: float
-    max_lateral_acceleration: float
-    max_wheel_speed: float
-    wheel_torque: float
-    wheel_friction: float = 1.5
+    height: Annotated[float, Interval(ge=0.01, le=10.0)]
+    mass: Annotated[float, Interval(ge=0.01, le=1e5)]
+    wheel_radius: Annotated[float, Interval(ge=0.005, le=5.0)]
+    track: Annotated[float, Interval(ge=0.01, le=20.0)]
+    max_speed: Annotated[float, Interval(ge=0.05, le=10.0)]  # slower ones would count as standing; faster ones wobble
+    max_yaw_rate: Annotated[float, Interval(ge=0.05, le=50.0)]
+    max_acceleration: Annotated[float, Interval(ge=0.01, le=100.0)]
+    max_yaw_acceleration: Annotated[float, Interval(ge=0.01, le=1000.0)]
+    max_lateral_acceleration: Annotated[float, Interval(ge=0.01, le=100.0)]
+    max_wheel_speed: Annotated[float, Interval(ge=0.1, le=1e4)]
+    wheel_torque: Annotated[float, Interval(ge=1e-6, le=1e6)]
+    wheel_friction: Annotated[float, Interval(ge=0.1, le=100.0)] = 1.5
     noise: Noise = Noise()
     source: str | None = None
     lidar: Lidar | None = dataclasses.field(default=None, metadata={"left_out_if_default": True})
@@ -134,8 +109,7 @@ class RobotSpec:
             value = getattr(self, field.name)
             if isinstance(value, float | int) and not (math.isfinite(value) and value > 0):
                 raise FieldError(field.name, f"must be greater than 0, got {value:g}")
-        for key in (key for key in ROBOT_RANGE if key != "footprint"):
-            _require_range(key, getattr(self, key))
+        require_ranges(self)
         foot = self.footprint
         for key in ("half_length", "half_width", "rounding"):
             if not getattr(foot, key) >= 0:
@@ -145,8 +119,10 @@ class RobotSpec:
         except FieldError as error:
             raise error.under("footprint") from None
         xmin, ymin, xmax, ymax = foot.bounds
+        low, high = FOOTPRINT_RANGE
         for size in (xmax - xmin, ymax - ymin):
-            _require_range("footprint", size)
+            if not low <= size <= high:
+                raise FieldError("footprint", f"must be between {low:g} and {high:g}, got {size:g}")
         self._require_wheels_inside()
 
     def _require_wheels_inside(self) -> None:
@@ -195,9 +171,3 @@ class RobotSpec:
         from antdrive.robots.drawing import robot_card
 
         return robot_card(self)
-
-
-def _require_range(key: str, value: float) -> None:
-    low, high = ROBOT_RANGE[key]
-    if not low <= value <= high:
-        raise FieldError(key, f"must be between {low:g} and {high:g}, got {value:g}")

@@ -17,7 +17,6 @@ from antdrive.sim.log.record import changes, plain_value, settings_of
 from antdrive.sim.policy import Perception, PerceptionKind, ReplanPolicy
 from antdrive.sim.settings import SETTINGS, Declared
 from antdrive.worlds import Disc
-from antdrive.worlds.files.world_file import DiscEntry
 
 MAX_SEEDS = 100_000  # of one range
 RULES = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
@@ -139,7 +138,7 @@ class _Sees(Form):
 
 class _Discs(Form):
     def read(self, key: str, value: Any) -> tuple[Disc, ...]:
-        return tuple(Disc(disc.x, disc.y, disc.radius, disc.height) for disc in value)
+        return tuple(value)
 
     def write(self, value: Any) -> Any:
         return [{name: float(number) for name, number in dataclasses.asdict(disc).items()} for disc in value]
@@ -213,7 +212,7 @@ FORMS: Mapping[str, Form] = {
     "plain": Form(),
     "margin": _Margin(MarginValue),
     "perception": _Sees(str | None),
-    "discs": _Discs(list[DiscEntry], []),
+    "discs": _Discs(list[Disc], []),
     "controller": _Record(dict[str, float], {}, PurePursuit()),
     "avoidance": _Switched(Switch, True, Avoidance()),
     "replanning": _Switched(Switch, True, ReplanPolicy(), ReplanPolicy(around_movers=False)),

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from antdrive.base.errors import FieldError
+from antdrive.base.reuse import Keyed, bits, reused
 from antdrive.planners import (
     PLANNERS,
     GridPlanner,
@@ -58,7 +59,7 @@ from antdrive.sim.scenario import Scenario
 from antdrive.sim.unknown import caution_of, exploration_of, lookout_of, predictor_of
 from antdrive.worlds import Cruising, Disc, Grid, Route, Task, World, rasterise
 from antdrive.worlds.drawing import LINE, card, world_svg
-from antdrive.worlds.reuse import Keyed, bits, by_geometry, reused
+from antdrive.worlds.world import by_geometry
 
 ROUTE_COLOUR = "#182242"  # of routes in notebooks
 ENDED_BY = {

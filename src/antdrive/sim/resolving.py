@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from antdrive.base.reuse import reused
 from antdrive.worlds import Task, generate
-from antdrive.worlds.reuse import reused
 
 
 @reused(64)

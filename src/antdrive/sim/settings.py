@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from antdrive.worlds import Disc
 
 #: The panels of `--help`, in order.
-GROUPS = ("World", "Planner", "Robot", "Sensing", "Movers", "Output")
+PANELS = ("World", "Planner", "Robot", "Sensing", "Movers", "Output")
 #: What a robot may know of the world before it drives, and how it may know its pose.
 MAPS = ("given", "none")
 LOCALISATIONS = ("fixes", "odometry", "matching", "true")

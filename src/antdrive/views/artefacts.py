@@ -116,11 +116,7 @@ def _user() -> str:
 def write_artefacts(
     run: Run, folder: Path, baseline: Baseline | None, *, film: bool, faults: Sequence[str], commands: Sequence[str]
 ) -> dict[str, str]:
-    """Write everything about a test into its folder; the files by what they are. Earlier files are removed first.
-
-    Raises:
-        InputError: the folder cannot be written to.
-    """
+    """Write everything about a test into its folder; the files by what they are. Earlier files are removed first."""
     from antdrive.views.figures.plan_figures import plan_figure
     from antdrive.views.figures.run_figures import overview
 
@@ -142,11 +138,7 @@ def write_artefacts(
 
 
 def write_traceback(folder: Path, error: BaseException, commands: Sequence[str]) -> dict[str, str]:
-    """Write where an error arose, in place of what an earlier run wrote about the test; the files by what they are.
-
-    Raises:
-        InputError: the folder cannot be written to.
-    """
+    """Write where an error arose, in place of what an earlier run wrote about the test; the files by what they are."""
     remove_artefacts(folder)
     _write(folder / "traceback.txt", "".join(traceback.format_exception(error)))
     _write(folder / "commands.txt", "".join(f"{command}\n" for command in commands))

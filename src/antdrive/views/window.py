@@ -22,11 +22,7 @@ AT_ONCE = 400  # meshes in one body: PyBullet takes at most 131072 vertices
 
 
 def check_display() -> None:
-    """Check, before any work, that a window can open.
-
-    Raises:
-        InputError: there is no display.
-    """
+    """Check, before any work, that a window can open."""
     if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
         raise InputError("--gui: no display (DISPLAY is not set); --video FILE.mp4 works without one")
 
@@ -47,11 +43,7 @@ def add_mesh(number: int, mesh: Mesh, colour: Colour) -> int:
 
 
 def show(rollout: Rollout, *, hold: float = 3.0) -> None:
-    """Replay a run in a window until it ends or the window is closed.
-
-    Raises:
-        InputError: there is no display, or the viewer did not open.
-    """
+    """Replay a run in a window until it ends or the window is closed."""
     check_display()
     p = bullet()
     number = p.connect(p.GUI)

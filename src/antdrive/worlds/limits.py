@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Annotated, TypeAlias
+
+from annotated_types import Interval
+
 MAX_COORDINATE = 1e6  # farthest coordinate and largest size in a file [m]
+Coordinate: TypeAlias = Annotated[float, Interval(ge=-MAX_COORDINATE, le=MAX_COORDINATE)]
+Size: TypeAlias = Annotated[float, Interval(gt=0, le=MAX_COORDINATE)]
 MAX_CELLS = 25_000_000  # of a grid or a map
 
 MAX_SPEED = 20.0  # of a mover [m/s]; physics feels movers up to five times as fast

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from antdrive.base.errors import FieldError, require_finite, require_positive
+from antdrive.base.reuse import Keyed, bits
 from antdrive.base.types import Bounds, Floats, Point, Pose
 from antdrive.worlds.drawing import card, world_svg
-from antdrive.worlds.limits import MAX_CELLS, MAX_WALK
+from antdrive.worlds.limits import MAX_CELLS, MAX_WALK, Coordinate, Size
 from antdrive.worlds.motions import Motion, first_cell, motion_of, require_few_draws, way_ahead
 from antdrive.worlds.movers import Cruising, Mover, Wandering, later
 
@@ -26,17 +27,17 @@ class Disc:
     Attributes:
         x: the centre's x [m]
         y: the centre's y [m]
-        radius: as built, never inflated [m], > 0
-        height: [m], > 0
+        radius: the radius as built, never inflated [m]
+        height: the height [m]
 
     Raises:
         FieldError: a value is not finite, or a size is not positive.
     """
 
-    x: float
-    y: float
-    radius: float
-    height: float = 1.0
+    x: Coordinate
+    y: Coordinate
+    radius: Size
+    height: Size = 1.0
 
     def __post_init__(self) -> None:
         for key in ("x", "y", "radius", "height"):
@@ -263,3 +264,8 @@ class Task:
         facts |= {"movers": len(world.movers)} if world.movers else {}
         movers = world.ways()
         return card(world_svg(world.bounds, world.discs, start=self.start, goal=goal, movers=movers), world.name, facts)
+
+
+def by_geometry(world: World) -> Keyed[World]:
+    """The world, equal to all worlds whose walls and standing cylinders have the same bits, seen from above."""
+    return Keyed(world, (bits(*world.bounds), world.discs.tobytes()))

@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 
 from antdrive.base import InputError
 from antdrive.base.document import parse_document
+from antdrive.base.reuse import forget
 from antdrive.worlds import (
     Disc,
     Task,
@@ -29,7 +30,6 @@ from antdrive.worlds import (
     task_schema,
     task_to_dict,
 )
-from antdrive.worlds.reuse import forget
 from tests.worlds.malformed import GOOD, MALFORMED
 
 TASK = Task(
@@ -347,7 +347,7 @@ def test_the_schema_lists_every_key_and_the_required_ones():
     assert schema["required"] == ["schema", "bounds", "start", "goal"]
     assert schema["additionalProperties"] is False
     assert schema["properties"]["start"]["minItems"] == schema["properties"]["start"]["maxItems"] == 3
-    assert schema["$defs"]["DiscEntry"]["properties"]["radius"]["exclusiveMinimum"] == 0
+    assert schema["$defs"]["Disc"]["properties"]["radius"]["exclusiveMinimum"] == 0
 
 
 def test_the_catalogue_is_the_files_that_come_along():

@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from antdrive.base import Bounds, Floats, Pose
 from antdrive.base.errors import FieldError
+from antdrive.base.reuse import Keyed, reused
 from antdrive.robots.control import _kernels_obstacles, _kernels_path, _kernels_pursuit
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex
 from antdrive.robots.control._kernels_path import PathSamples
@@ -25,7 +26,7 @@ from antdrive.robots.control._kernels_pursuit import MotionLimits, PursuitTuning
 from antdrive.robots.control.profile import SpeedProfile, speed_profile
 from antdrive.robots.spec import RobotSpec
 from antdrive.worlds import Route, World, point_clearance
-from antdrive.worlds.reuse import Keyed, by_geometry, reused
+from antdrive.worlds.world import by_geometry
 
 SPACING = 0.02  # distance between the samples along a route [m]
 SQUARE = 0.5  # least side of the squares that the obstacles are sorted into [m]

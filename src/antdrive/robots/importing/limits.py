@@ -9,17 +9,19 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from antdrive.base.records import ranges_of
 from antdrive.robots.feasible import GRAVITY, yaw_inertia_of
 from antdrive.robots.importing.model import UrdfModel
 from antdrive.robots.importing.wheels import DrivenWheel
 from antdrive.robots.outline import Footprint
-from antdrive.robots.spec import ROBOT_RANGE
+from antdrive.robots.spec import RobotSpec
 
 ACCELERATION, YAW_ACCELERATION = 1.0, 8.0  # that are assumed where the motors allow them [m/s^2], [rad/s^2]
 SPEED, YAW_RATE = 0.5, 2.0  # that are assumed where the file has no limits [m/s], [rad/s]
 MOST_YAW_RATE = 3.14  # that is taken where only the wheels limit it: half a turn a second [rad/s]
 SPARE = 0.9  # the share of what the motors could do that is used
 FRICTION = 1.5  # of wheels
+RANGES = ranges_of(RobotSpec)
 NO_LIMIT = "assumed: the file has no limit"
 LEAST_DRIVE = 0.05  # the least acceleration that makes an effort limit a motor's [m/s^2]
 
@@ -49,7 +51,7 @@ def add_speeds(
         if key in given:
             continue
         beside = ""
-        if told and told > ROBOT_RANGE[key][1]:  # what is faster stands for no limit
+        if told and told > RANGES[key][1]:  # what is faster stands for no limit
             beside, told = f"<{tag}> of the drive plugin, {told:.7g} {unit}, is {_beyond(key, unit)}", None
         if told and told > most:
             found[key] = _five(most), f"computed: {limit.where}; <{tag}> of the drive plugin is {told:g}"
@@ -64,7 +66,7 @@ def add_speeds(
     if "max_wheel_speed" in given:
         return
     needs = 1.2 * max(found["max_speed"][0], found["max_yaw_rate"][0] * track / 2) / radius
-    if turning <= ROBOT_RANGE["max_wheel_speed"][1]:
+    if turning <= RANGES["max_wheel_speed"][1]:
         found["max_wheel_speed"] = turning, f"read: {limit.where}"
     else:
         instead = f"; {limit.where} is {_beyond('max_wheel_speed', 'rad/s')}" if turning < math.inf else ""
@@ -75,7 +77,7 @@ def _of_joints(key: str, limit: _Limit, reach: float, most: float, assumed: floa
     """A limit of the speeds as it follows from the joints' alone, and how."""
     if reach == math.inf:
         return assumed, NO_LIMIT
-    if reach > ROBOT_RANGE["max_speed"][1]:
+    if reach > RANGES["max_speed"][1]:
         return assumed, f"assumed: {limit.where} would be {reach:.4g} m/s, {_beyond('max_speed', 'm/s')}"
     if key == "max_yaw_rate" and most > MOST_YAW_RATE:
         return MOST_YAW_RATE, f"assumed: half a turn a second; {limit.where} allows {most:.4g}"
@@ -120,7 +122,7 @@ def _torque(model: UrdfModel, wheels: tuple[DrivenWheel, DrivenWheel], mass: flo
     tag, told = model.drive_number("max_wheel_torque", "wheelTorque", "torque")
     if told:
         limits.append(_Limit(told, f"<{tag}> of the drive plugin, {told:.7g} N m"))
-    weakest, strongest = mass * LEAST_DRIVE * radius, ROBOT_RANGE["wheel_torque"][1]
+    weakest, strongest = mass * LEAST_DRIVE * radius, RANGES["wheel_torque"][1]
     limits = sorted(limit for limit in limits if limit.value < math.inf)
     used = next((limit for limit in limits if weakest < limit.value <= strongest), None)
     beside = ""
@@ -138,7 +140,7 @@ def _torque(model: UrdfModel, wheels: tuple[DrivenWheel, DrivenWheel], mass: flo
 
 def _beyond(key: str, unit: str) -> str:
     """What is said of a limit that no robot's file could hold."""
-    return f"above the {ROBOT_RANGE[key][1]:g} {unit} that a robot's file may say, and is not used"
+    return f"above the {RANGES[key][1]:g} {unit} that a robot's file may say, and is not used"
 
 
 def _lowest(wheels: tuple[DrivenWheel, DrivenWheel], key: str, unit: str) -> _Limit:

@@ -12,8 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from antdrive.base.errors import InputError, input_error
+from antdrive.base.records import ranges_of
 from antdrive.base.types import Floats
-from antdrive.robots.files import RobotFile, footprint_to_dict, robot_from_text
+from antdrive.robots.files import footprint_to_dict, robot_from_text
 from antdrive.robots.importing.hull import footprint_around
 from antdrive.robots.importing.limits import Found, add_forces, add_speeds, seven_digits
 from antdrive.robots.importing.model import UrdfModel, read_model
@@ -108,7 +109,7 @@ def import_urdf(
 
 
 def _checked(given: Mapping[str, float]) -> dict[str, float]:
-    keys = [key for key, field in RobotFile.model_fields.items() if field.annotation is float]
+    keys = list(ranges_of(RobotSpec))
     for key in given:
         if key not in keys:
             raise InputError(f"--set {key}: no such number in a robot file; choose from {', '.join(keys)}")
@@ -171,8 +172,7 @@ def _values(
         found[key] = value, "given"
     add_speeds(model, wheels, found, given)
     add_forces(model, wheels, outline, found, given)
-    order = [key for key, field in RobotFile.model_fields.items() if field.annotation is float and key in found]
-    return [_Value(key, *found[key]) for key in order]
+    return [_Value(key, *found[key]) for key in ranges_of(RobotSpec) if key in found]
 
 
 def _robot_in(text: str, path: Path, values: list[_Value]) -> RobotSpec:

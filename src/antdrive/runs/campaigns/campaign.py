@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, Field, PlainValidator, TypeAdapter, WithJsonSchema, create_model
 
-from antdrive.base.checks import SchemaVersion, check, show
+from antdrive.base.checks import SchemaVersion, check, schema_of, show
 from antdrive.base.document import Document, Location, read_document
 from antdrive.base.errors import InputError
 from antdrive.sim.forms import (
@@ -130,8 +130,8 @@ def _settings_given(value: Any) -> Any:
 
 def _settings_schema() -> dict[str, Any]:
     """The JSON Schema of settings in which a list of values may take the place of each, and of lists of such settings."""
-    schema = SettingsEntry.model_json_schema()
-    discs = {"type": "array", "items": schema.pop("$defs")["DiscEntry"]}
+    schema = dict(schema_of(SettingsEntry))
+    discs = {"type": "array", "items": schema.pop("$defs")["Disc"]}
     keys = {key: discs if key == "unseen" else one for key, one in schema["properties"].items()}
     number = keys["controller"]["additionalProperties"]
     several_numbers = {"anyOf": [number, {"type": "array", "items": number, "minItems": 1}]}

@@ -27,15 +27,7 @@ LAYOUT = ".foxglove.json"
 
 
 def export(log: str | Path, to: str, path: str | Path, *, replace: bool = False, scans: bool = True) -> list[Path]:
-    """Export a log; the files or the folder are written whole or not at all.
-
-    Returns:
-        What was written.
-
-    Raises:
-        FieldError: `to` is unknown.
-        InputError: the log cannot be read, the place cannot be written to or is taken, or a package is not installed.
-    """
+    """Export a log; the files or the folder are written whole or not at all."""
     if to not in EXPORTS:
         raise FieldError("to", f"unknown {to!r}; choose from {', '.join(EXPORTS)}")
     source, target = Path(log), Path(path)

@@ -5,11 +5,14 @@ A file's suffix chooses PNG, PDF or SVG. No dates or versions are written into f
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import matplotlib
 import numpy as np
+import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -17,8 +20,9 @@ from matplotlib.figure import Figure
 from antdrive.base.atomic import written_whole
 from antdrive.base.errors import InputError
 from antdrive.base.types import Bounds
+from antdrive.sim.log.outcome import Outcome
 from antdrive.views.scene import Scene
-from antdrive.views.style import INK, MUTED, hexed
+from antdrive.views.style import INK, MUTED, VERDICTS, hexed
 
 SUFFIXES = (".png", ".pdf", ".svg")
 
@@ -58,6 +62,46 @@ def new_figure(width: float, height: float) -> Figure:
     return figure
 
 
+@contextmanager
+def sheet(path: str | Path | None, size: tuple[float, float], dpi: float = 160) -> Iterator[Figure]:
+    """Draw on an empty figure of a size [inches]; where there is a path, it is written when the block ends."""
+    target = checked(path)
+    with styled():
+        figure = new_figure(*size)
+        yield figure
+        finished(figure, target, dpi)
+
+
+def head(figure: Figure, title: str, outcome: Outcome | None = None) -> None:
+    """Write a figure's title and, to the right, how a drive ended."""
+    figure.suptitle(title, x=0.012, ha="left", fontsize=12, weight="bold")
+    if outcome is not None:
+        name, colour = VERDICTS[outcome]
+        figure.text(0.988, 0.993, name, ha="right", va="top", fontsize=11, weight="bold", color=hexed(colour))
+
+
+def legend_above(axes: Any, handles: Sequence[Any] | None = None, **place: Any) -> None:
+    """Put a legend above the upper left corner of axes."""
+    common = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "ncols": 3, "borderaxespad": 0.2, "columnspacing": 1.2}
+    axes.legend(**({} if handles is None else {"handles": handles}), **(common | place))
+
+
+def colour_bar(figure: Any, drawn: Any, axes: Any, label: str, **place: Any) -> None:
+    """Draw the scale of a collection's or a picture's colours beside axes."""
+    bar = figure.colorbar(drawn, ax=axes, **({"shrink": 0.7, "aspect": 30, "pad": 0.02} | place))
+    bar.set_label(label)
+    bar.outline.set_visible(False)
+
+
+#: A colour bar below a map.
+BELOW: Any = {"orientation": "horizontal", "shrink": 0.6, "aspect": 34}
+
+
+def thinned(count: int, most: int = 1500) -> npt.NDArray[np.intp]:
+    """Return which of so many rows are drawn: at most `most`, the first and the last among them."""
+    return np.unique(np.linspace(0, count - 1, most).astype(int))
+
+
 def map_size(scene: Scene, shown: Bounds | None = None) -> tuple[float, float]:
     """The width and height of a scene's map in a figure [inches]."""
     x0, y0, x1, y1 = shown or scene.bounds
@@ -74,11 +118,7 @@ def frame_map(axes: Any, shown: Bounds) -> None:
 
 
 def checked(path: str | Path | None) -> Path | None:
-    """The path of a figure, checked before any work; None stays None.
-
-    Raises:
-        InputError: a suffix that is none of .png, .pdf, .svg.
-    """
+    """The path of a figure, checked before any work; None stays None."""
     if path is None:
         return None
     target = Path(path)

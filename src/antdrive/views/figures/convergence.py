@@ -56,14 +56,7 @@ def convergence_figure(
     single: bool = False,
     dpi: float = 160,
 ) -> Figure:
-    """Draw the best length so far while planners iterate, a panel for each map.
-
-    Returns:
-        The figure, which may be labelled and saved; `panels` gives its axes by name.
-
-    Raises:
-        InputError: a suffix that is none of .png, .pdf, .svg.
-    """
+    """Draw the best length so far while planners iterate, a panel for each map."""
     target = checked(path)
     with styled():
         across = 2 if len(curves) == 4 else min(len(curves), 3)

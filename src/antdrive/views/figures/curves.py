@@ -9,6 +9,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
 
 from antdrive.sim.log.rollout import Rollout
+from antdrive.views.figures.canvas import legend_above, thinned
 from antdrive.views.scene import Scene
 from antdrive.views.style import BAD, MUTED, ROUTE, SHELL, START, hexed
 
@@ -53,7 +54,7 @@ def draw_speed(axes: Any, scene: Scene, rollout: Rollout) -> None:
     axes.plot(rollout.t, rollout.twist[:, 0], color=hexed(ROUTE), lw=1.0, label="measured")
     axes.axhline(scene.robot.max_speed, color=hexed(MUTED), lw=0.9, ls="--", label="robot's top speed")
     axes.tick_params(labelbottom=False)
-    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 0.98), ncols=3, borderaxespad=0.2, handlelength=1.4)
+    legend_above(axes, bbox_to_anchor=(0.0, 0.98), handlelength=1.4, columnspacing=2.0)
 
 
 def draw_limiters(axes: Any, rollout: Rollout) -> None:
@@ -66,25 +67,16 @@ def draw_limiters(axes: Any, rollout: Rollout) -> None:
         return
     count = len(names)
     colours = ListedColormap([LIMITER_COLOURS[k % len(LIMITER_COLOURS)] for k in range(count)])
-    keep = np.unique(np.linspace(0, len(rollout.t) - 1, 2000).astype(int))
+    keep = thinned(len(rollout.t), 2000)
     edges = np.append(rollout.t[keep], rollout.t[-1] + 1e-6)
     axes.pcolormesh(
         edges, [0, 1], rollout.limiter[keep][None], cmap=colours, vmin=-0.5, vmax=count - 0.5, rasterized=True
     )
     used = [k for k in np.unique(rollout.limiter) if k < count]
     handles = [Patch(fc=LIMITER_COLOURS[k % len(LIMITER_COLOURS)], label=names[k]) for k in used]
-    axes.legend(
-        handles=handles,
-        loc="lower left",
-        bbox_to_anchor=(0.0, 0.95),
-        ncols=min(len(handles), MOST_LIMITERS),
-        handlelength=0.9,
-        columnspacing=1.0,
-        borderaxespad=0.1,
-        title="speed limited by",
-        title_fontsize=8,
-        alignment="left",
-    )
+    title: dict[str, Any] = {"title": "speed limited by", "title_fontsize": 8, "alignment": "left"}
+    place: dict[str, Any] = {"bbox_to_anchor": (0.0, 0.95), "borderaxespad": 0.1, "columnspacing": 1.0}
+    legend_above(axes, handles, ncols=min(len(handles), MOST_LIMITERS), handlelength=0.9, **place, **title)
 
 
 def draw_history(axes: Any, history: History) -> None:
@@ -100,5 +92,5 @@ def draw_history(axes: Any, history: History) -> None:
         shown = np.where(np.isfinite(values), values, np.nan)
         if np.isfinite(shown).any():
             axes.plot(iterations[: len(shown)], shown, **style)
-    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.2, columnspacing=1.2)
+    legend_above(axes)
     axes.set_xlim(1, max(2, len(history)))

@@ -12,7 +12,7 @@ from matplotlib.patches import Circle, Patch, Polygon, Rectangle
 from matplotlib.path import Path
 
 from antdrive.sim.log.rollout import Rollout
-from antdrive.views.figures.canvas import frame_map
+from antdrive.views.figures.canvas import BELOW, colour_bar, frame_map, legend_above, thinned
 from antdrive.views.scene import Scene, contact_point
 from antdrive.views.style import (
     BAD,
@@ -102,13 +102,7 @@ def _draw_robot(axes: Any, scene: Scene, pose: tuple[float, float, float], colou
     foot = scene.robot.footprint
     turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
     ahead = turn @ [foot.reach(0.0) if foot.corners else foot.half_length + foot.rounding, 0.0]
-    style: dict[str, Any] = {
-        "fill": True,
-        "fc": (1, 1, 1, 0.55),
-        "ec": hexed(colour),
-        "lw": 1.3,
-        "zorder": zorder,
-    }
+    style: dict[str, Any] = {"fc": (1, 1, 1, 0.55), "ec": hexed(colour), "lw": 1.3, "zorder": zorder}
     if foot.is_disc:
         axes.add_patch(Circle((x, y), foot.rounding, **style))
     else:
@@ -128,28 +122,31 @@ def draw_driven(figure: Any, axes: Any, scene: Scene, rollout: Rollout, cells: F
             drawn = axes.plot(*line.T, **{**style, "lw": 0.7, "alpha": 0.45}, label="new routes", zorder=4.7)
             handles += drawn if k == 0 else []
     if len(rollout.t) > 1:
-        keep = np.unique(np.linspace(0, len(rollout.t) - 1, 1500).astype(int))
-        points = rollout.pose[keep, :2]
-        lines = LineCollection(
-            list(np.stack([points[:-1], points[1:]], axis=1)),
-            cmap=SPEEDS,
-            norm=Normalize(0, scene.robot.max_speed),
-            linewidth=2.6,
-            capstyle="round",
-            zorder=5,
-        )
-        lines.set_array(np.abs(rollout.twist[keep[:-1], 0]))
-        axes.add_collection(lines)
-        bar = figure.colorbar(lines, ax=axes, orientation="horizontal", shrink=0.6, aspect=34, pad=0.02)
-        bar.set_label("driven path: speed [m/s]")
-        bar.outline.set_visible(False)
-        end = tuple(float(value) for value in rollout.pose[-1])
-        _draw_robot(axes, scene, (end[0], end[1], end[2]), SHELL, 6)
-    if len(rollout.contacts):
-        step = min(int(rollout.contacts[0, 0]), len(rollout.pose) - 1)
-        at = contact_point(scene, rollout.pose[step], int(rollout.contacts[0, 1]), rollout.movers[step])
-        handles += axes.plot(*at, "X", ms=9, color=hexed(BAD), mec="white", label="contact", zorder=8, ls="none")
-    draw_legend(axes, handles, scene)
+        keep, fastest = thinned(len(rollout.t)), scene.robot.max_speed
+        style = {"cmap": SPEEDS, "norm": Normalize(0, fastest), "lw": 2.6, "capstyle": "round"}
+        lines = draw_along(axes, rollout.pose[keep, :2], np.abs(rollout.twist[keep[:-1], 0]), **style)
+        colour_bar(figure, lines, axes, "driven path: speed [m/s]", **BELOW)
+        x, y, yaw = rollout.pose[-1].tolist()
+        _draw_robot(axes, scene, (x, y, yaw), SHELL, 6)
+    draw_legend(axes, [*handles, *draw_contact(axes, scene, rollout)], scene)
+
+
+def draw_along(axes: Any, points: Floats, values: Floats, **style: Any) -> LineCollection:
+    """Draw a polyline (N, 2) whose colour follows the values (N - 1,) of its segments."""
+    lines = LineCollection(list(np.stack([points[:-1], points[1:]], axis=1)), zorder=5, **style)
+    lines.set_array(values)
+    axes.add_collection(lines)
+    return lines
+
+
+def draw_contact(axes: Any, scene: Scene, rollout: Rollout) -> list[Any]:
+    """Draw a cross at the first contact; what the legend says of it."""
+    if not len(rollout.contacts):
+        return []
+    row = min(int(rollout.contacts[0, 0]), len(rollout.t) - 1)
+    at = contact_point(scene, rollout.pose[row], int(rollout.contacts[0, 1]), rollout.movers[row])
+    drawn: list[Any] = axes.plot(*at, "X", ms=9, color=hexed(BAD), mec="white", label="contact", zorder=9, ls="none")
+    return drawn
 
 
 def draw_legend(axes: Any, handles: list[Any], scene: Scene) -> None:
@@ -162,15 +159,7 @@ def draw_legend(axes: Any, handles: list[Any], scene: Scene) -> None:
     if scene.has_zones:
         pale = tuple(1 - 0.22 * (1 - channel / 255) for channel in ZONE)
         known.append(Patch(fc=pale, ec=hexed(ZONE), lw=0.5, label=f"inflated by {scene.inflate:.2f} m"))
-    axes.legend(
-        handles=[*handles, *known],
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        ncols=3,
-        handlelength=1.6,
-        columnspacing=1.2,
-        borderaxespad=0.2,
-    )
+    legend_above(axes, [*handles, *known], handlelength=1.6)
 
 
 def draw_field(figure: Any, axes: Any, grid: Grid, field: Floats) -> None:
@@ -179,25 +168,9 @@ def draw_field(figure: Any, axes: Any, grid: Grid, field: Floats) -> None:
     finite = values[np.isfinite(values)]
     if not len(finite):
         return
-    rows, cols = grid.shape
-    half = grid.cell / 2
-    extent = (
-        grid.origin[0] - half,
-        grid.origin[0] + (cols - 0.5) * grid.cell,
-        grid.origin[1] - half,
-        grid.origin[1] + (rows - 0.5) * grid.cell,
-    )
+    (rows, cols), (x, y), half = grid.shape, grid.origin, grid.cell / 2
+    extent = (x - half, x + (cols - 0.5) * grid.cell, y - half, y + (rows - 0.5) * grid.cell)
     low, high = np.quantile(finite, (0.02, 0.995))
-    image = axes.imshow(
-        values,
-        origin="lower",
-        extent=extent,
-        cmap=FIELD,
-        vmin=low,
-        vmax=max(high, low + 1e-12),
-        zorder=0.5,
-        interpolation="nearest",
-    )
-    bar = figure.colorbar(image, ax=axes, shrink=0.7, aspect=30, pad=0.02)
-    bar.set_label("planner's field at the end of planning")
-    bar.outline.set_visible(False)
+    scale: dict[str, Any] = {"cmap": FIELD, "vmin": low, "vmax": max(high, low + 1e-12)}
+    image = axes.imshow(values, origin="lower", extent=extent, zorder=0.5, interpolation="nearest", **scale)
+    colour_bar(figure, image, axes, "planner's field at the end of planning")

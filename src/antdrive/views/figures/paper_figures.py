@@ -29,14 +29,7 @@ def history_figure(
     unit: str = "m",
     dpi: float = 160,
 ) -> Figure:
-    """Draw the best path length so far by iteration for one or more planners.
-
-    Returns:
-        The figure, which may be labelled and saved; `panels` gives its axes by name.
-
-    Raises:
-        InputError: a suffix that is none of .png, .pdf, .svg.
-    """
+    """Draw the best path length so far by iteration for one or more planners."""
     target = checked(path)
     with styled():
         figure = new_figure(6.4, 4.0)
@@ -78,14 +71,7 @@ def history_figure(
 def maps_figure(
     paths: Mapping[str, tuple[Query, Mapping[str, PlanResult]]], path: str | Path | None = None, *, dpi: float = 160
 ) -> Figure:
-    """Draw paths on maps as the papers do: blocked cells black, the start a red square, the goal a blue one.
-
-    Returns:
-        The figure, which may be labelled and saved; `panels` gives its axes by name.
-
-    Raises:
-        InputError: a suffix that is none of .png, .pdf, .svg.
-    """
+    """Draw paths on maps as the papers do: blocked cells black, the start a red square, the goal a blue one."""
     target = checked(path)
     with styled():
         across = min(len(paths), 3)
@@ -125,14 +111,7 @@ def ants_figure(
     unit: str = "m",
     dpi: float = 160,
 ) -> Figure:
-    """Draw path length by number of ants: every seed, the mean, and the values that a paper prints.
-
-    Returns:
-        The figure, which may be labelled and saved; `panels` gives its axes by name.
-
-    Raises:
-        InputError: a suffix that is none of .png, .pdf, .svg.
-    """
+    """Draw path length by number of ants: every seed, the mean, and the values that a paper prints."""
     target = checked(path)
     colour = hexed(planner_style(planner)[0])
     with styled():
@@ -164,14 +143,7 @@ def sweep_figure(
     *,
     dpi: float = 160,
 ) -> Figure:
-    """Draw the mean path length by crossover and mutation probability, with and without elitism side by side.
-
-    Returns:
-        The figure, which may be labelled and saved; `panels` gives its axes by name.
-
-    Raises:
-        InputError: a suffix that is none of .png, .pdf, .svg.
-    """
+    """Draw the mean path length by crossover and mutation probability, with and without elitism side by side."""
     target = checked(path)
     both = np.concatenate([np.ravel(values) for values in lengths.values()])
     finite = both[np.isfinite(both)]

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from antdrive.views.figures.canvas import checked, finished, frame_map, map_size, new_figure, styled
+from antdrive.views.figures.canvas import colour_bar, frame_map, head, map_size, sheet
 from antdrive.views.figures.curves import draw_history
 from antdrive.views.figures.map_chart import FIELD, draw_field, draw_legend, draw_map
 from antdrive.views.figures.paper_figures import history_figure
@@ -65,18 +65,16 @@ def plan_figure(
     Raises:
         InputError: a suffix that is none of .png, .pdf, .svg.
     """
-    target = checked(path)
     scene = Scene.planned(task, robot, grid.inflate, mapped=mapped)
     cells, line = (grid.xy(plan.cells), grid.xy(plan.line)) if len(plan.cells) else (np.empty((0, 2)),) * 2
     shown = scene.around(line)
     iterations = len(plan.history)
-    with styled():
-        wide, high = map_size(scene, shown)
-        wide += 0.9 if plan.field is not None else 0.0
-        wide_all = wide + (4.6 if iterations else 0.6)
-        said = _said_below(plan, mapped=mapped)
-        below = textwrap.wrap(said, round(LETTERS * wide_all)) if said else []
-        figure = new_figure(wide_all, high + 0.9 + (0.4 + LINE * len(below) if below else 0.0))
+    wide, high = map_size(scene, shown)
+    wide += 0.9 if plan.field is not None else 0.0
+    wide_all = wide + (4.6 if iterations else 0.6)
+    said = _said_below(plan, mapped=mapped)
+    below = textwrap.wrap(said, round(LETTERS * wide_all)) if said else []
+    with sheet(path, (wide_all, high + 0.9 + (0.4 + LINE * len(below) if below else 0.0)), dpi) as figure:
         areas = figure.add_gridspec(1, 2 if iterations else 1, width_ratios=[wide, 4.2] if iterations else [1])
         chart = figure.add_subplot(areas[0, 0], label="map")
         if plan.field is not None:
@@ -95,9 +93,8 @@ def plan_figure(
             draw_history(figure.add_subplot(areas[0, 1], label="history"), plan.history)
         length = f"{plan.cost:.2f} m" if len(plan.cells) else plan.status.value
         length += ", stopped early" if len(plan.cells) and not plan.solved else ""
-        title = f"{scene.name}   ·   {length}   ·   {plan.work:,} {plan.work_unit}"
-        figure.suptitle(title, x=0.012, ha="left", fontsize=12, weight="bold")
-        return finished(figure, target, dpi)
+        head(figure, f"{scene.name}   ·   {length}   ·   {plan.work:,} {plan.work_unit}")
+    return figure
 
 
 def _said_below(plan: PlanResult, *, mapped: bool) -> str:
@@ -118,11 +115,7 @@ def plan_figures(
     suffixes: Sequence[str],
     mapped: bool = True,
 ) -> dict[str, Path]:
-    """Draw every figure of a plan: with the field, alone, by iteration, and its field as bars and as contours.
-
-    Returns:
-        The files' paths by the name of the figure; formats after the first are named like `plan pdf`.
-    """
+    """Draw every figure of a plan: with the field, alone, by iteration, and its field as bars and as contours."""
     found: dict[str, Path] = {}
     bare = dataclasses.replace(plan, field=None, history=type(plan.history)())
     for suffix in suffixes:
@@ -144,7 +137,6 @@ def plan_figures(
 
 def bars_figure(grid: Grid, field: Floats, path: str | Path | None = None, *, dpi: float = 160) -> Figure:
     """Draw a planner's field (R, C) as three-dimensional bars on the free cells."""
-    target = checked(path)
     step = max(1, math.ceil(max(grid.shape) / MAX_BARS))
     values = np.where(grid.free, np.asarray(field, dtype=np.float64), np.nan)
     rows, cols = (-(-side // step) for side in grid.shape)
@@ -156,8 +148,7 @@ def bars_figure(grid: Grid, field: Floats, path: str | Path | None = None, *, dp
     base = min(0.0, float(heights.min(initial=0.0)))
     share = (heights - base) / max(float(heights.max(initial=0.0)) - base, 1e-300)
     side = step * grid.cell
-    with styled():
-        figure = new_figure(7.2, 5.6)
+    with sheet(path, (7.2, 5.6), dpi) as figure:
         axes: Any = figure.add_subplot(projection="3d", label="field")
         x, y = grid.origin[0] + c * side - grid.cell / 2, grid.origin[1] + r * side - grid.cell / 2
         wide, tall = 0.92 * side, np.maximum(heights - base, 1e-12)
@@ -167,7 +158,7 @@ def bars_figure(grid: Grid, field: Floats, path: str | Path | None = None, *, dp
         axes.set_box_aspect((cols, rows, 0.55 * max(rows, cols)))
         for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
             axis.set_pane_color((1, 1, 1, 0))
-        return finished(figure, target, dpi)
+    return figure
 
 
 def contours_figure(
@@ -181,24 +172,20 @@ def contours_figure(
     dpi: float = 160,
 ) -> Figure:
     """Draw a planner's field as contours on the map, with the planned path."""
-    target = checked(path)
     scene = Scene.planned(task, robot, grid.inflate, mapped=mapped)
     assert plan.field is not None
     values = np.where(grid.free, np.asarray(plan.field, dtype=np.float64), np.nan)
     x = grid.origin[0] + grid.cell * np.arange(grid.shape[1])
     y = grid.origin[1] + grid.cell * np.arange(grid.shape[0])
     finite = values[np.isfinite(values)]
-    with styled():
-        figure = new_figure(6.6, 5.9)
+    with sheet(path, (6.6, 5.9), dpi) as figure:
         axes: Any = figure.add_subplot(label="map")
         if len(finite) and finite.max() > finite.min():
             levels = np.unique(np.quantile(finite, np.linspace(0.6, 0.998, 9)))
             if len(levels) > 1:
                 drawn = axes.contourf(x, y, values, levels=levels, cmap=FIELD, extend="both", zorder=0.6)
                 axes.contour(x, y, values, levels=levels, colors="#123f7a", linewidths=0.35, alpha=0.6, zorder=0.7)
-                bar = figure.colorbar(drawn, ax=axes, shrink=0.7, aspect=30, pad=0.02, format="%.2g")
-                bar.set_label("planner's field")
-                bar.outline.set_visible(False)
+                colour_bar(figure, drawn, axes, "planner's field", format="%.2g")
         draw_map(axes, scene, floor=False)
         line = grid.xy(plan.line) if plan.solved else np.empty((0, 2))
         frame_map(axes, scene.around(line))
@@ -206,4 +193,4 @@ def contours_figure(
         if len(line):
             handles = axes.plot(*line.T, "-", lw=1.9, color=hexed(SHELL), label="planned path", zorder=6)
         draw_legend(axes, handles, scene)
-        return finished(figure, target, dpi)
+    return figure

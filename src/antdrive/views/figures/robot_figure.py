@@ -14,7 +14,7 @@ from antdrive.base.types import Floats
 from antdrive.robots.drawing import footprint_text, wheel_thickness
 from antdrive.robots.importing.hull import convex_hull
 from antdrive.robots.spec import RobotSpec
-from antdrive.views.figures.canvas import checked, finished, new_figure, styled
+from antdrive.views.figures.canvas import sheet
 from antdrive.views.style import GOAL, INK, MUTED, ROUTE, hexed
 
 WIDTH = 5.6  # of the figure [inches]
@@ -29,14 +29,12 @@ def robot_figure(
     dpi: float = 160,
 ) -> Figure:
     """Draw a robot from above, heading right, in metres from the axle's centre."""
-    target = checked(path)
-    with styled():
-        outline = np.array(robot.footprint.outline(48))
-        everything = np.vstack([outline, *pieces, *above])
-        low, high = everything.min(axis=0) - 0.15 * robot.radius, everything.max(axis=0) + 0.15 * robot.radius
-        low, high = np.minimum(low, -1.08 * robot.radius), np.maximum(high, 1.08 * robot.radius)
-        wide, tall = high - low
-        figure = new_figure(WIDTH, float(np.clip(WIDTH * tall / wide, 3.0, 9.0)) + 0.9)
+    outline = np.array(robot.footprint.outline(48))
+    everything = np.vstack([outline, *pieces, *above])
+    low, high = everything.min(axis=0) - 0.15 * robot.radius, everything.max(axis=0) + 0.15 * robot.radius
+    low, high = np.minimum(low, -1.08 * robot.radius), np.maximum(high, 1.08 * robot.radius)
+    wide, tall = high - low
+    with sheet(path, (WIDTH, float(np.clip(WIDTH * tall / wide, 3.0, 9.0)) + 0.9), dpi) as figure:
         axes = figure.add_subplot(label="map")
         handles = _draw_pieces(axes, pieces, above)
         handles.append(axes.add_patch(Polygon(outline, fill=False, ec=hexed(ROUTE), lw=2.0, label="footprint")))
@@ -55,7 +53,7 @@ def robot_figure(
         title = f"{robot.name}: {footprint_text(robot)}".replace("; ", "\n")
         axes.set_title(title, fontsize=9, loc="left", wrap=True)
         figure.legend(handles=handles, loc="outside lower center", ncols=2)
-        return finished(figure, target, dpi)
+    return figure
 
 
 def _draw_pieces(axes: Any, pieces: Sequence[Floats], above: Sequence[Floats]) -> list[Patch]:

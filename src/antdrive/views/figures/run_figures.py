@@ -8,18 +8,17 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 from antdrive.sim.log.certificate import Certificate, in_metres
 from antdrive.sim.log.metrics import tracking_error
 from antdrive.sim.log.rollout import Rollout
-from antdrive.views.figures.canvas import checked, finished, frame_map, map_size, new_figure, styled
+from antdrive.views.figures.canvas import BELOW, colour_bar, frame_map, head, map_size, sheet, thinned
 from antdrive.views.figures.curves import draw_clearance, draw_limiters, draw_speed
-from antdrive.views.figures.map_chart import draw_driven, draw_legend, draw_map
+from antdrive.views.figures.map_chart import draw_along, draw_driven, draw_legend, draw_map
 from antdrive.views.scene import Scene
-from antdrive.views.style import BAD, GOOD, ROUTE, SHELL, VERDICTS, hexed, planner_style
+from antdrive.views.style import BAD, GOOD, ROUTE, SHELL, hexed, planner_style
 
 Floats = npt.NDArray[np.float64]
 
@@ -44,11 +43,9 @@ def overview(
         InputError: a suffix that is none of .png, .pdf, .svg.
     """
     scene = Scene.of(rollout)
-    target = checked(path)
-    with styled():
-        shown = scene.around(rollout.route)
-        wide, high = map_size(scene, shown)
-        figure = new_figure(wide + 5.6, high + 0.9)
+    shown = scene.around(rollout.route)
+    wide, high = map_size(scene, shown)
+    with sheet(path, (wide + 5.6, high + 0.9), dpi) as figure:
         grid = figure.add_gridspec(3, 2, width_ratios=[wide, 5.2], height_ratios=[1.0, 1.0, 0.11])
         chart = figure.add_subplot(grid[:, 0], label="map")
         draw_map(chart, scene)
@@ -58,12 +55,9 @@ def overview(
         draw_clearance(clearance, scene, rollout)
         draw_speed(figure.add_subplot(grid[1, 1], sharex=clearance, label="speed"), scene, rollout)
         draw_limiters(figure.add_subplot(grid[2, 1], sharex=clearance, label="limiters"), rollout)
-        name, colour = VERDICTS[rollout.outcome]
         planner = rollout.record.planner.name
-        title = f"{scene.name}   ·   {planner}   ·   {scene.robot.name}"
-        figure.suptitle(title, x=0.012, ha="left", fontsize=12, weight="bold")
-        figure.text(0.988, 0.993, name, ha="right", va="top", fontsize=11, weight="bold", color=hexed(colour))
-        return finished(figure, target, dpi)
+        head(figure, f"{scene.name}   ·   {planner}   ·   {scene.robot.name}", rollout.outcome)
+    return figure
 
 
 def certificate_figure(
@@ -83,29 +77,22 @@ def certificate_figure(
     Raises:
         InputError: a suffix that is none of .png, .pdf, .svg.
     """
-    target = checked(path)
     scene = Scene.of(rollout)
     error = tracking_error(rollout) if len(rollout.route) > 1 else np.zeros(len(rollout.t))
-    keep = np.unique(np.linspace(0, len(rollout.t) - 1, 1500).astype(int))
-    with styled():
-        figure = new_figure(10.6, 5.6)
+    keep = thinned(len(rollout.t))
+    with sheet(path, (10.6, 5.6), dpi) as figure:
         areas = figure.add_gridspec(2, 2, width_ratios=[1.0, 0.85], height_ratios=[1.0, 0.9])
         chart: Any = figure.add_subplot(areas[:, 0], label="map")
         draw_map(chart, scene)
-        points = rollout.pose[keep, :2]
-        lines = LineCollection(list(np.stack([points[:-1], points[1:]], axis=1)), cmap=ERROR, lw=3.0, zorder=5)
-        lines.set_array(1000 * error[keep[:-1]])
-        chart.add_collection(lines)
+        lines = draw_along(chart, rollout.pose[keep, :2], 1000 * error[keep[:-1]], cmap=ERROR, lw=3.0)
         handles = chart.plot(*rollout.route.T, "--", color=hexed(ROUTE), lw=1.0, label="route", zorder=6)
-        bar = figure.colorbar(lines, ax=chart, orientation="horizontal", shrink=0.6, aspect=34, pad=0.02)
-        bar.set_label("driven path: distance from the route [mm]")
-        bar.outline.set_visible(False)
+        colour_bar(figure, lines, chart, "driven path: distance from the route [mm]", **BELOW)
         draw_legend(chart, handles, scene)
         curve: Any = figure.add_subplot(areas[0, 1], label="distance")
         curve.plot(rollout.t[keep], 1000 * error[keep], color=hexed(SHELL), lw=1.4)
         curve.set(title="distance from the route [mm]", xlabel="time [s]", ylim=(0, None))
         _draw_readings(figure.add_subplot(areas[1, 1], label="readings"), certificate, rollout)
-        return finished(figure, target, dpi)
+    return figure
 
 
 def _draw_readings(axes: Any, certificate: Certificate, rollout: Rollout) -> None:
@@ -143,11 +130,9 @@ def comparison_figure(rollouts: Mapping[str, Rollout], path: str | Path | None =
     Raises:
         InputError: a suffix that is none of .png, .pdf, .svg.
     """
-    target = checked(path)
     scene = Scene.of(next(iter(rollouts.values())))
-    with styled():
-        xmin, ymin, xmax, ymax = scene.bounds
-        figure = new_figure(6.6, float(np.clip(5.6 * (ymax - ymin) / (xmax - xmin), 2.0, 9.0)) + 1.0)
+    xmin, ymin, xmax, ymax = scene.bounds
+    with sheet(path, (6.6, float(np.clip(5.6 * (ymax - ymin) / (xmax - xmin), 2.0, 9.0)) + 1.0), dpi) as figure:
         axes: Any = figure.add_subplot(label="map")
         draw_map(axes, scene)
         handles: list[Any] = []
@@ -159,4 +144,4 @@ def comparison_figure(rollouts: Mapping[str, Rollout], path: str | Path | None =
                 *rollout.pose[::8, :2].T, color=hexed(colour), ls=dash, lw=width, label=label, zorder=6
             )
         draw_legend(axes, handles, scene)
-        return finished(figure, target, dpi)
+    return figure

@@ -14,7 +14,7 @@ from matplotlib.patches import Circle, Patch
 
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.sights import Sighting, sightings
-from antdrive.views.figures.canvas import checked, finished, frame_map, map_size, new_figure, styled
+from antdrive.views.figures.canvas import frame_map, head, legend_above, map_size, sheet
 from antdrive.views.figures.map_chart import draw_map
 from antdrive.views.recollection import Recollection, containers
 from antdrive.views.scene import Scene
@@ -31,7 +31,6 @@ from antdrive.views.style import (
     PALE,
     ROUTE,
     SHELL,
-    VERDICTS,
     hexed,
 )
 
@@ -59,17 +58,16 @@ def sight_figure(rollout: Rollout, path: str | Path | None = None, *, dpi: float
         InputError: a suffix that is none of .png, .pdf, .svg.
         ValueError: the log has no scans.
     """
-    target, scene, seen = checked(path), Scene.of(rollout), Recollection(rollout)
+    scene, seen = Scene.of(rollout), Recollection(rollout)
     moments = np.unique(np.append(np.linspace(0.0, float(rollout.t[-1]), CURVE), rollout.t[-1]))
     explored = []
     for at in moments:
         seen.advance(float(at))
         explored.append(seen.explored)
     listed = sorted(sightings(rollout, seen.met)[:LISTED], key=lambda sight: sight.nearest_at)
-    with styled():
-        shown = scene.around(rollout.route)
-        wide, high = map_size(scene, shown)
-        figure = new_figure(wide + 5.4, high + 0.9)
+    shown = scene.around(rollout.route)
+    wide, high = map_size(scene, shown)
+    with sheet(path, (wide + 5.4, high + 0.9), dpi) as figure:
         areas = figure.add_gridspec(2, 2, width_ratios=[wide, 5.0], height_ratios=[1.0, 1.6])
         chart: Any = figure.add_subplot(areas[:, 0], label="map")
         _draw_known(chart, scene, rollout, seen, listed)
@@ -79,11 +77,8 @@ def sight_figure(rollout: Rollout, path: str | Path | None = None, *, dpi: float
         curve.set(title="ground on the robot's map [m²]", ylim=(0, None), xlim=(0, max(float(rollout.t[-1]), 1e-3)))
         curve.set_title(f"{explored[-1]:.1f} m² at the end", loc="right", fontsize=9, weight="normal")
         _draw_sights(figure.add_subplot(areas[1, 1], sharex=curve, label="first sights"), rollout, listed)
-        name, colour = VERDICTS[rollout.outcome]
-        title = f"{scene.name}   ·   what {scene.robot.name} knew"
-        figure.suptitle(title, x=0.012, ha="left", fontsize=12, weight="bold")
-        figure.text(0.988, 0.993, name, ha="right", va="top", fontsize=11, weight="bold", color=hexed(colour))
-        return finished(figure, target, dpi)
+        head(figure, f"{scene.name}   ·   what {scene.robot.name} knew", rollout.outcome)
+    return figure
 
 
 def _draw_known(axes: Any, scene: Scene, rollout: Rollout, seen: Recollection, listed: list[Sighting]) -> None:
@@ -105,15 +100,9 @@ def _draw_known(axes: Any, scene: Scene, rollout: Rollout, seen: Recollection, l
     axes.add_collection(PatchCollection(hits, facecolor=hexed(HIT), edgecolor="none", zorder=4.6))
     handles: list[Any] = []
     for k, (_, line) in enumerate(rollout.legs()):
-        style: dict[str, Any] = {
-            "ls": (0, (4, 2.5)),
-            "lw": 0.9,
-            "color": hexed(ROUTE),
-            "alpha": 0.7 if k == 0 else 0.35,
-        }
-        handles += axes.plot(*line.T, **style, zorder=4.8, label="routes") if k == 0 else []
-        if k:
-            axes.plot(*line.T, **style, zorder=4.7)
+        style: dict[str, Any] = {"ls": (0, (4, 2.5)), "lw": 0.9, "color": hexed(ROUTE), "label": "routes"}
+        drawn = axes.plot(*line.T, **style, alpha=0.35 if k else 0.7, zorder=4.7 if k else 4.8)
+        handles += [] if k else drawn
     handles += axes.plot(*rollout.pose[::8, :2].T, color=hexed(SHELL), lw=2.2, label="driven path", zorder=5)
     for sight in listed:
         x, y, _, _ = scene.obstacles[sight.obstacle]
@@ -128,9 +117,7 @@ def _draw_known(axes: Any, scene: Scene, rollout: Rollout, seen: Recollection, l
     ]
     if scene.mover_radii:
         known.append(Patch(fc=hexed(MOVER), label=scene.movers_said))
-    handles += known
-    place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "ncols": 3, "borderaxespad": 0.2}
-    axes.legend(handles=handles, handlelength=1.6, columnspacing=1.2, **place)
+    legend_above(axes, [*handles, *known], handlelength=1.6)
 
 
 def _draw_sights(axes: Any, rollout: Rollout, listed: list[Sighting]) -> None:
@@ -143,14 +130,7 @@ def _draw_sights(axes: Any, rollout: Rollout, listed: list[Sighting]) -> None:
         axes.plot(sight.nearest_at, row, "X" if sight.touched else "o", ms=6 if sight.touched else 4, color=colour)
         words = "never seen" if np.isinf(sight.seen_at) else f"first seen {sight.seen_from:.1f} m away"
         words += ", touched" if sight.touched else f", nearest {sight.nearest:.2f} m"
-        axes.text(
-            sight.nearest_at,
-            row,
-            f"  {words}",
-            va="center",
-            fontsize=7,
-            color=hexed(INK),
-        )
+        axes.text(sight.nearest_at, row, f"  {words}", va="center", fontsize=7, color=hexed(INK))
     axes.set_yticks(range(len(listed)), [str(sight.obstacle) for sight in listed], fontsize=7)
     axes.set_ylim(len(listed) - 0.4, -0.6)
     end = max(float(rollout.t[-1]), 1e-3)

@@ -45,12 +45,7 @@ def compare_film(
     mark: Mark | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> FilmInfo:
-    """Film two to six runs side by side. A run that ends before the others keeps its last picture.
-
-    Raises:
-        InputError: fewer than two runs or more than six, or an option that `film` refuses.
-        OSError: the encoder could not write the film.
-    """
+    """Film two to six runs side by side. A run that ends before the others keeps its last picture."""
     target = Path(path)
     known_suffix(target)
     check_options(camera, size or FULL, fps, speed)

@@ -56,11 +56,7 @@ ENCODERS: dict[str, tuple[str, ...]] = {
 
 
 def known_suffix(path: Path) -> str:
-    """The suffix of a film's path, in lower case.
-
-    Raises:
-        InputError: films cannot be written in this format.
-    """
+    """The suffix of a film's path, in lower case."""
     suffix = path.suffix.lower()
     if suffix not in ENCODERS:
         raise InputError(f"{path}: unknown suffix {path.suffix!r}; choose one of {', '.join(ENCODERS)}")
@@ -69,11 +65,7 @@ def known_suffix(path: Path) -> str:
 
 @contextmanager
 def encoding(path: Path, size: tuple[int, int], fps: float) -> Iterator[Callable[[Picture], None]]:
-    """A function that appends a frame (H, W, 3) to a film, which is complete when the `with` block ends.
-
-    Raises:
-        OSError: ffmpeg failed; the message quotes ffmpeg.
-    """
+    """A function that appends a frame (H, W, 3) to a film, which is complete when the `with` block ends."""
     import imageio_ffmpeg
 
     command = [

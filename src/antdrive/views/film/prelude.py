@@ -28,11 +28,7 @@ Floats = npt.NDArray[np.float64]
 
 
 def plan_again(rollout: Rollout) -> tuple[Grid, int, Iterator[Iteration]]:
-    """Repeat a run's planning: its grid, the number of iterations allowed, and the iterations one at a time.
-
-    Raises:
-        InputError: the planner is unknown, does not plan in iterations, or planned under a time budget.
-    """
+    """Repeat a run's planning: its grid, the number of iterations allowed, and the iterations one at a time."""
     record = rollout.record
     name = record.planner.name
     planner = as_iterative(load_planner(name, **record.planner.settings))
@@ -47,21 +43,13 @@ def plan_again(rollout: Rollout) -> tuple[Grid, int, Iterator[Iteration]]:
 
 
 def check_field(rollout: Rollout) -> None:
-    """Check, before anything is drawn, that a run's planner has a field.
-
-    Raises:
-        InputError: it has none, or its planning cannot be repeated.
-    """
+    """Check, before anything is drawn, that a run's planner has a field."""
     if next(plan_again(rollout)[2]).field is None:
         raise InputError(f"prelude: {rollout.record.planner.name} keeps no field")
 
 
 def planning_frames(rollout: Rollout, setting: dict[str, Any], count: int) -> Iterator[Picture]:
-    """Frames (H, W, 3) of a run's planning, from the first to the last iteration.
-
-    Raises:
-        InputError: planning again led to another path.
-    """
+    """Frames (H, W, 3) of a run's planning, from the first to the last iteration."""
     grid, total, states = plan_again(rollout)
     still = {**setting, "camera": "oblique" if setting["camera"] == "follow" else setting["camera"]}
     shot = Shot(rollout, **still, planning=True)

@@ -178,11 +178,7 @@ def frame_times(duration: float, fps: float, speed: float, slow: tuple[float, fl
 
 
 def check_options(camera: str, size: tuple[int, int], fps: float, speed: float) -> None:
-    """Check a film's options before any work.
-
-    Raises:
-        InputError: an unknown camera, or a size, rate or speed that is out of range.
-    """
+    """Check a film's options before any work."""
     if camera not in CAMERAS:
         raise InputError(f"camera: unknown camera {camera!r}; choose one of {', '.join(CAMERAS)}")
     if len(size) != 2 or any(side % 2 or not 160 <= side <= 4096 for side in size):

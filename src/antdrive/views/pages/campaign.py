@@ -130,24 +130,13 @@ def report_campaign(
 
 
 def write_campaign_report(summary: CampaignSummary, folder: Path, out: Path) -> list[Path]:
-    """Write a report about a campaign in the format of the file's suffix.
-
-    Returns:
-        The files written: for .csv two, the second with the pairs.
-
-    Raises:
-        InputError: another suffix, or the file cannot be written.
-    """
+    """Write a report about a campaign in the format of the file's suffix."""
     check_suffix(out)
     return WRITERS[out.suffix.lower()](summary, folder, out)
 
 
 def check_suffix(out: Path) -> None:
-    """Refuse a file of a kind that is not written, before any work.
-
-    Raises:
-        InputError: an unknown suffix.
-    """
+    """Refuse a file of a kind that is not written, before any work."""
     if out.suffix.lower() not in WRITERS:
         raise InputError(f"{out}: unknown suffix {out.suffix!r}; choose one of {', '.join(WRITERS)}")
 

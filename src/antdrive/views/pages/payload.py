@@ -18,16 +18,7 @@ def page_data(
     planners: Sequence[str],
     **more: Any,
 ) -> str:
-    """Return the runs of a page as JSON that may stand in a script element.
-
-    Args:
-        columns: as `json_column` gives them
-        shown: the names of the columns that the table of runs has
-        titles: the headings of columns by name
-        good: whether each run succeeded
-        planners: the planners in the order of their colours
-        more: what else the page's script is told
-    """
+    """Return the runs of a page as JSON that may stand in a script element."""
     data = {
         "rows": len(good),
         "planners": list(planners),

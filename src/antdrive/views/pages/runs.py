@@ -305,11 +305,7 @@ class ReportedRun:
 
 
 def find_runs(folder: Path) -> Iterator[ReportedRun]:
-    """The runs in a folder and below, in the order of their paths.
-
-    Raises:
-        InputError: no such folder, or a broken `result.json` or log.
-    """
+    """The runs in a folder and below, in the order of their paths."""
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder")
     for place, path in enumerate(sorted(folder.rglob("result.json"))):
@@ -323,11 +319,7 @@ def find_runs(folder: Path) -> Iterator[ReportedRun]:
 
 
 def facts_of(rollout: Rollout, result: Mapping[str, Any], name: str) -> LogFacts:
-    """What a log says, computed from the log alone, and what the result beside it says otherwise.
-
-    Raises:
-        InputError: the record is of no drive.
-    """
+    """What a log says, computed from the log alone, and what the result beside it says otherwise."""
     try:
         certificate, metrics, digest = certify(rollout), measure(rollout), rollout.digest
         sights = tuple(passed(rollout))

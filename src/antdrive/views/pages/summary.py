@@ -71,11 +71,7 @@ def summarise(
     allow: Mapping[str, float] = MappingProxyType({}),
     strict: bool = False,
 ) -> CampaignSummary:
-    """Compute a campaign's tables.
-
-    Raises:
-        FieldError: an unknown planner or metric, no runs, or nothing to compare.
-    """
+    """Compute a campaign's tables."""
     paired = PairedRuns.of(table.of_planners(planners) if planners else table)
     if planners:
         paired = paired.select(planners)

@@ -14,33 +14,20 @@ import yaml
 from pydantic import BaseModel, ConfigDict, Field
 
 from antdrive.base.atomic import written_whole
-from antdrive.base.checks import OneLine, SchemaVersion, check, suggest, yaml_number
+from antdrive.base.checks import OneLine, SchemaVersion, check, schema_of, suggest, yaml_number
 from antdrive.base.document import MAX_BYTES, MAX_VALUES, Document, count_values, parse_document, read_yaml
 from antdrive.base.errors import FieldError, input_error
-from antdrive.worlds.limits import MAX_CELLS, MAX_COORDINATE, MAX_PHASE, MIN_PERIOD
+from antdrive.base.reuse import reused
+from antdrive.worlds.limits import MAX_CELLS, MAX_COORDINATE, MAX_PHASE, MIN_PERIOD, Coordinate, Size
 from antdrive.worlds.movers import Mover, mover_from_dict, mover_to_dict
-from antdrive.worlds.reuse import reused
 from antdrive.worlds.world import Disc, Task, World
 
-Coordinate = Annotated[float, Field(ge=-MAX_COORDINATE, le=MAX_COORDINATE)]
-Size = Annotated[float, Field(gt=0, le=MAX_COORDINATE)]
 Pair = Annotated[list[Coordinate], Field(min_length=2, max_length=2)]
 Keyframe = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
 
 OF_OTHERS = (".sdf", ".world", ".map")  # the suffixes of other programs' worlds, which are imported
 _CATALOG = Path(__file__).parent.with_name("catalog")
 _RULES = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
-
-
-class DiscEntry(BaseModel):
-    """An upright cylinder. The radius is as built, never inflated."""
-
-    model_config = _RULES
-
-    x: Coordinate = Field(description="the centre's x [m]")
-    y: Coordinate = Field(description="the centre's y [m]")
-    radius: Size = Field(description="the radius as built [m]")
-    height: Size = Field(1.0, description="the height [m]")
 
 
 class WalkEntry(BaseModel):
@@ -106,7 +93,7 @@ class WorldFile(BaseModel):
     goal: list[Coordinate] = Field(min_length=2, max_length=2, description="write [x, y] in metres")
     goal_tolerance: Size = Field(0.25, description="how close to the goal the robot must stop [m]")
     cell: Size = Field(0.5, description="grid resolution for planners unless another is given [m]")
-    obstacles: list[DiscEntry] = Field([], description="upright cylinders")
+    obstacles: list[Disc] = Field([], description="upright cylinders")
     time_limit: Size | None = Field(None, description="simulated time allowed [s]; by default ample for the route")
     movers: list[MoverEntry] = Field([], max_length=1000, description="moving cylinders")
     tasks: list[EndsEntry] = Field([], max_length=10_000, description="other starts and goals, by name")
@@ -276,9 +263,10 @@ def task_from_dict(data: Mapping[str, Any], source: str = "task") -> Task:
 
 def task_schema() -> dict[str, Any]:
     """The JSON Schema of a world file, for editors."""
-    schema = WorldFile.model_json_schema(by_alias=True)
-    schema["required"] = [key for key in schema["required"] if key != "name"]
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "antdrive world"}
+    schema = schema_of(WorldFile)
+    required = [key for key in schema["required"] if key != "name"]
+    draft = "https://json-schema.org/draft/2020-12/schema"
+    return {"$schema": draft, **schema, "required": required, "title": "antdrive world"}
 
 
 def _to_task(document: Document, entry: WorldFile | None = None) -> Task:
@@ -287,10 +275,9 @@ def _to_task(document: Document, entry: WorldFile | None = None) -> Task:
     if (xmax - xmin) / entry.cell * (ymax - ymin) / entry.cell > MAX_CELLS:
         raise document.error(("cell",), f"{entry.cell:g} m cuts these bounds into more than {MAX_CELLS} cells")
     x, y, yaw = entry.start
-    discs = tuple(Disc(d.x, d.y, d.radius, d.height) for d in entry.obstacles)
     movers = tuple(_to_mover(document, i, mover) for i, mover in enumerate(entry.movers))
     try:
-        world = World(entry.name, (xmin, ymin, xmax, ymax), discs, entry.source, movers)
+        world = World(entry.name, (xmin, ymin, xmax, ymax), tuple(entry.obstacles), entry.source, movers)
         goal = entry.goal[0], entry.goal[1]
         frame = (0.0, 0.0, 0.0) if entry.frame is None else (entry.frame[0], entry.frame[1], entry.frame[2])
         return Task(world, (x, y, yaw), goal, entry.goal_tolerance, entry.cell, entry.time_limit, frame)

@@ -27,10 +27,9 @@ from antdrive.base.document import read_document
 from antdrive.base.errors import FieldError, input_error
 from antdrive.base.plane import in_map, out_of_map
 from antdrive.base.types import Floats, Point, Pose
-from antdrive.worlds.files.world_file import Coordinate, Size
 from antdrive.worlds.formats.cellmap import CellMap, Cells, cell_map, file_task
 from antdrive.worlds.formats.checks import require_new, require_no_movers
-from antdrive.worlds.limits import MAX_CELLS
+from antdrive.worlds.limits import MAX_CELLS, Coordinate, Size
 from antdrive.worlds.world import Task
 
 FORMATS = ("PPM", "PNG", "BMP")  # Pillow's "PPM" includes PBM and PGM

@@ -73,7 +73,10 @@ def import_robot(
     packages: Packages = None,
     json: options.Json = False,
 ) -> int:
-    """Write the robot file of a differential-drive robot in URDF; a comment says where each value comes from."""
+    """Write the robot file of a differential-drive robot in URDF.
+
+    A comment says where each value comes from.
+    """
     from antdrive.base.atomic import written_whole
     from antdrive.robots.importing.expanding import checked_packages
     from antdrive.robots.importing.urdf import import_urdf, require_writable

@@ -1,4 +1,4 @@
-"""What a process computes from a world, a robot or a file is kept for its next run, until others have taken its place.
+"""Per-process caches of what is computed from a world, a robot or a file.
 
 Everything kept is a function of its key alone: the text of a file, or the numbers of a world. A run therefore gives the same
 result, bit for bit, whatever ran before it in the process. `forget` frees the memory.
@@ -10,8 +10,6 @@ import functools
 import struct
 from collections.abc import Callable
 from typing import Any, Generic, ParamSpec, TypeVar, cast
-
-from antdrive.worlds.world import World
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -41,12 +39,7 @@ def forget() -> None:
 
 
 class Keyed(Generic[V]):
-    """A value that counts as equal to another one if their keys are equal.
-
-    Attributes:
-        value: the value
-        key: what stands for it; two values with equal keys must be the same for whoever asks
-    """
+    """A value that counts as equal to another one if their keys are equal. It must then be the same for whoever asks."""
 
     __slots__ = ("_hash", "key", "value")
 
@@ -58,11 +51,6 @@ class Keyed(Generic[V]):
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Keyed) and self.key == other.key
-
-
-def by_geometry(world: World) -> Keyed[World]:
-    """The world, equal to all worlds whose walls and standing cylinders have the same bits, seen from above."""
-    return Keyed(world, (bits(*world.bounds), world.discs.tobytes()))
 
 
 def bits(*values: float) -> bytes:

@@ -1,0 +1,189 @@
+"""Commands as typer runs them: groups that import a command when it is called, and exit codes for what can end one."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+import traceback
+from collections import UserDict
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+import typer
+import typer.core
+import typer.main
+
+from antdrive.base.errors import FieldError, InputError, Terminated, input_error
+from antdrive.cli.commands import ABOUT, COMMANDS, DEBUG, GROUPS, ROBOTS, WORLDS, Command
+from antdrive.cli.console import print_error, print_line
+from antdrive.cli.exits import FAULT, INTERRUPTED, SUCCEEDED, WRONG_INPUT
+from antdrive.sim.settings import PANELS
+
+SETTINGS: Mapping[str, Any] = {"rich_markup_mode": None, "pretty_exceptions_enable": False, "add_completion": False}
+
+# typer exports only descendants of the error that it raises for every wrong word.
+_USAGE_ERROR: Any = typer.BadParameter.__mro__[2]
+
+
+def exit_code_of(words: list[str]) -> int:
+    """Run the command that words name; its exit code.
+
+    Raises:
+        BrokenPipeError: the other end of a pipe is closed, such as that of stdout.
+    """
+    try:
+        code = application()(args=words, prog_name="antdrive", standalone_mode=False)
+    except (InputError, FieldError) as error:
+        print_error(str(error))
+        code = WRONG_INPUT
+    except (KeyboardInterrupt, typer.Abort):
+        code = INTERRUPTED
+    except BrokenPipeError:
+        raise
+    except OSError as error:  # such as a full disk
+        print_error(f"{error.filename or 'output'}: {error.strerror}")
+        code = WRONG_INPUT
+    except _USAGE_ERROR as error:
+        _print_usage_error(error)
+        code = WRONG_INPUT
+    except Terminated:
+        raise
+    except SystemExit as error:
+        if isinstance(error.__context__, BrokenPipeError):  # typer ends the program for it
+            raise error.__context__ from None
+        print_error("internal error: what was called ended the program; a planner must not call exit()")
+        code = FAULT
+    except Exception as error:
+        print_fault(error)
+        code = FAULT
+    if code == INTERRUPTED:  # typer turns Ctrl-C within a command into this code
+        print_error("interrupted")
+    return code if isinstance(code, int) else SUCCEEDED
+
+
+class _Commands(UserDict[str, Any]):
+    """The commands of a table by name; each is imported when it is first asked for."""
+
+    def __init__(self, table: Mapping[str, Command]) -> None:
+        super().__init__()
+        self.data.update(table)
+
+    def __getitem__(self, name: str) -> Any:
+        found = self.data[name]
+        if isinstance(found, Command):
+            module = importlib.import_module(f"antdrive.cli.commands.{found.module}")
+            alone = typer.Typer(**SETTINGS)
+            alone.command(name, cls=_Panelled)(getattr(module, found.function))
+            found = self.data[name] = typer.main.get_command(alone)
+        return found
+
+
+class _Panelled(typer.core.TyperCommand):
+    """A command whose options `--help` lists in panels."""
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """Write the arguments, then the options by panel."""
+        panels: dict[str, list[tuple[str, str]]] = {name: [] for name in ("Arguments", *PANELS, "Options")}
+        for one in self.get_params(ctx):
+            panel = "Arguments" if one.param_type_name == "argument" else getattr(one, "rich_help_panel", None)
+            if record := one.get_help_record(ctx):
+                panels[panel or "Options"].append(record)
+        for name, records in panels.items():
+            if records:
+                with formatter.section(name):
+                    formatter.write_dl(records)
+
+
+class _Group(typer.core.TyperGroup):
+    """Commands that are listed without being imported."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the table's summaries."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, command.summary) for name, command in TABLES[self.name or ""].items()])
+
+
+class _RobotsGroup(_Group):
+    """`antdrive robots` with the command that is meant where none is named."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Put the command's name before words that begin with none."""
+        first = next((word for word in args if not word.startswith("-")), None)
+        if first not in self.commands and not {"-h", "--help"} & set(args):
+            args = ["list" if first is None else "print", *args]
+        return super().parse_args(ctx, args)
+
+
+TABLES: Mapping[str, Mapping[str, Command]] = {"worlds": WORLDS, "robots": ROBOTS}
+
+
+def application() -> Any:
+    """The command line as typer runs it."""
+    app = typer.Typer(
+        name="antdrive",
+        help=ABOUT,
+        no_args_is_help=True,
+        context_settings={"help_option_names": ["-h", "--help"]},
+        **SETTINGS,
+    )
+    for name, kind in (("worlds", _Group), ("robots", _RobotsGroup)):
+        group = typer.Typer(cls=kind, help=GROUPS[name], no_args_is_help=kind is _Group, **SETTINGS)
+        group.callback()(lambda: None)  # makes it a group before it has commands
+        app.add_typer(group, name=name)
+    app.callback()(_global_options)
+    found: Any = typer.main.get_command(app)
+    groups = dict(found.commands)
+    for name, group in groups.items():
+        group.commands = _Commands(TABLES[name])
+    found.commands = _Commands(COMMANDS)
+    found.commands.data.update(groups)
+    return found
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        print_line(f"antdrive {version('antdrive')}")
+        raise typer.Exit
+
+
+def _global_options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+    debug: Annotated[
+        bool, typer.Option(DEBUG, help="Show the traceback of a fault, with exit code 3; may stand anywhere.")
+    ] = False,
+) -> None:
+    pass
+
+
+def print_fault(error: Exception) -> None:
+    """Print one line about a fault of a planner or of antdrive itself; with `--debug`, the traceback before it."""
+
+    from antdrive.planners import PlannerError
+
+    debug = DEBUG in sys.argv[1:]
+    if debug:
+        traceback.print_exception(error)
+    if isinstance(error, PlannerError):
+        says = str(error)
+    else:
+        says = str(input_error("internal error", type(error).__name__, *filter(None, [str(error)])))
+    print_error(says if debug else f"{says} (run again with {DEBUG} for the traceback)")
+
+
+def _print_usage_error(error: Any) -> None:
+    if type(error).__name__ == "NoArgsIsHelpError":
+        print_line(error.format_message())
+    else:
+        command = " ".join(["antdrive", *_command_words(error.ctx)])
+        print_error(f"{error.format_message()} (see {command} --help)")
+
+
+def _command_words(context: Any) -> list[str]:
+    """The words that name the command that was called, below the program's own name."""
+    if context is None or context.parent is None:
+        return []
+    return [*_command_words(context.parent), context.info_name]
