@@ -27,7 +27,7 @@ from PIL import Image
 from antdrive.planners import Query, checked, load_planner, smooth
 from antdrive.robots import PurePursuit, load_robot
 from antdrive.sim import Engine, Rollout, Scenario, certify, run
-from antdrive.sim.driving.drive import drive
+from antdrive.sim.driving.following import follow
 from antdrive.worlds import Disc, Route, Task, World, import_map_server, load_task, rasterise, save_task
 
 RESOLUTION = 0.05  # [m]
@@ -195,7 +195,7 @@ def loop(counts: tuple[int, ...] = (400, 10_000)) -> None:
     for turn in range(ROUNDS + 1):
         for count, task, tracked, engine in built:
             started = time.process_time()
-            log = drive(engine, controller, tracked, task, time_limit=120)
+            log = follow(engine, controller, tracked, task, limit=120)
             assert log.outcome.name == "SUCCEEDED", log.outcome
             if turn:
                 costs[count].append((time.process_time() - started) / (len(log.t) - 1) * 1e6)

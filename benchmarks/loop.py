@@ -16,8 +16,9 @@ import numpy as np
 
 from antdrive.robots import Avoidance, PurePursuit, TrackedPath, load_robot
 from antdrive.sim import Perception
-from antdrive.sim.driving.drive import drive
-from antdrive.sim.driving.perception import Predictor
+from antdrive.sim.driving.following import OnePath, follow
+from antdrive.sim.driving.perception import Told
+from antdrive.sim.driving.rules import Avoid
 from antdrive.sim.physics.bullet import bullet
 from antdrive.sim.physics.engine import Engine
 from antdrive.worlds import Cruising, Disc, Route, Task, Trajectories, World
@@ -64,10 +65,11 @@ def table_of_movers(route: Route) -> None:
                 (f"{MOVERS} movers, not seen", full, moving),
                 (f"{MOVERS} movers, avoided", full, moving),
             ):
-                avoidance = Avoidance() if name.endswith("avoided") else None
-                predictor = Predictor(motions, Perception(), 60)
+                told = Told(motions, Perception(), 60)
+                avoid = Avoid(Avoidance(), told, OnePath(), task, robot, 60)
                 started = time.perf_counter()
-                log = drive(engine, controller, tracked, task, time_limit=30, avoidance=avoidance, predictor=predictor)
+                rules = [avoid] if name.endswith("avoided") else []
+                log = follow(engine, controller, tracked, task, limit=30, rules=rules)
                 if turn:
                     costs.setdefault(name, []).append((time.perf_counter() - started) / (len(log.t) - 1) * 1e6)
     print("\nloop                     us/step   / no movers")
@@ -92,7 +94,7 @@ def main() -> None:
     for turn in range(ROUNDS + 1):
         for count, (engine, task, tracked) in engines.items():
             started = time.perf_counter()
-            log = drive(engine, controller, tracked, task, time_limit=120)
+            log = follow(engine, controller, tracked, task, limit=120)
             middle = time.perf_counter()
             assert log.outcome.name == "SUCCEEDED", log.outcome
             commands = log.command[1::4].tolist()
@@ -117,7 +119,7 @@ def main() -> None:
         )
     table_of_movers(route)
     for engine, _, _ in engines.values():
-        engine.__exit__()
+        engine.__exit__(None, None, None)
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from antdrive.runs.suites.baseline import Baseline
-from antdrive.sim.driving.driver import EXPLORING_LIMITERS
+from antdrive.sim.driving.rules import EXPLORING_LIMITERS
 from antdrive.sim.log.record import MarginRecord, SensingRecord, record_keys
 from antdrive.sim.log.rollout import ARRAYS, SENSED
 from tests.records import made_up_record

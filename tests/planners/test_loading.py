@@ -51,8 +51,8 @@ REPLANS = """
 import gc, os, sys
 from numba.core.dispatcher import Dispatcher
 from antdrive.sim import Scenario, run
-from antdrive.sim.driving.cellwise import CellwiseMonitor
-from antdrive.sim.driving.replanning import ReplanMonitor
+from antdrive.sim.driving.cellwise import CellByCell
+from antdrive.sim.driving.replanning import Replanning
 
 def overloads():
     return {f"{d.__module__}.{d.__name__}": len(d.overloads) for d in gc.get_objects() if isinstance(d, Dispatcher)}
@@ -68,7 +68,7 @@ def watched(method):
         return path
     return replan
 
-for kind in (ReplanMonitor, CellwiseMonitor):
+for kind in (Replanning, CellByCell):
     kind.replan = watched(kind.replan)
 if sys.argv[1] != "loaded":
     import antdrive.sim.pipeline

@@ -79,70 +79,43 @@ def test_robots_without_corners_and_lidar_are_recorded_as_they_always_were() -> 
     assert corners == ((0.6, -0.3), (0.6, 0.3), (-0.3, 0.3), (-0.3, -0.3))
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "expected"),
-    [
-        ("mass: 5.0", "mass: -5.0", "mass: must be at least 0.01, got -5.0"),
-        ("mass: 5.0", "mass: heavy", "mass: must be a number"),
-        ("mass: 5.0\n", "", "mass: missing"),
-        ("mass: 5.0", "mas: 5.0", "mas: unknown key; did you mean mass?"),
-        ("{radius: 0.2}", "{radius: 0.2, length: 1.0}", "footprint: write {radius: 0.18}"),
-        ("{radius: 0.2}", "{length: 1.0}", "footprint: write {radius: 0.18}"),
-        ("track: 0.25", "track: 0.55", "track: wheels of 0.04 m, 0.55 m apart, stand outside the footprint"),
-        ("wheel_radius: 0.04", "wheel_radius: 0.4", "track: wheels of 0.4 m"),
-        ("{radius: 0.2}", "{length: 0.6, width: 0.2}", "track: wheels 0.25 m apart stand outside the footprint"),
-        ("{radius: 0.2}", "{length: 0.06, width: 0.3}", "wheel_radius: wheels of 0.04 m stand outside the footprint"),
-        ("{radius: 0.2}", "{polygon: [[0.2, 0.2], [0.2, -0.2]]}", "footprint.polygon: must be three points or more"),
-        (
-            "{radius: 0.2}",
-            "{polygon: [[0.3, -0.2], [0.3, 0.2], [0.0, 0.05], [-0.3, 0.2], [-0.3, -0.2]]}",
-            "footprint.polygon: must be a convex polygon; it turns inwards at (0, 0.05)",
-        ),
-        ("{radius: 0.2}", "{radius: 0.2, polygon: [[1, 0], [0, 1], [-1, -1]]}", "footprint: write {radius: 0.18}"),
-        ("{radius: 0.2}", "{centre: [0.1, 0.0]}", "footprint: write {radius: 0.18}"),
-        ("{radius: 0.2}", "{radius: 0.2, centre: [0.1]}", "footprint.centre: must have 2 entries"),
-        (
-            "{radius: 0.2}",
-            "{length: 0.5, width: 0.4, centre: [0.23, 0.0]}",
-            "footprint: wheels of 0.04 m, 0.25 m apart, stand",
-        ),
-        ("max_speed: 1", "max_speed: .inf", "max_speed: must be"),
-        ("max_speed: 1", "max_speed: 0.0024", "max_speed: must be at least 0.05, got 0.0024"),
-        ("max_speed: 1", "max_speed: 30", "max_speed: must be at most 10, got 30"),
-        ("mass: 5.0", "mass: 1.0e-300", "mass: must be at least 0.01, got 1.0e-300"),
-        ("height: 0.3", "height: 1.0e-300", "height: must be at least 0.01, got 1.0e-300"),
-        ("{radius: 0.2}", "{radius: 0.005}", "footprint: must be between 0.02 and 20, got 0.01"),
-        ("{radius: 0.2}", "{length: 0.6, width: 0.252}", "track: wheels 0.25 m apart have their middles 0.001 m from"),
-        ("height: 0.3", "height: 0.05", "wheel_radius: wheels of 0.04 m are higher than the body of 0.05 m"),
-        (
-            "max_wheel_speed: 40.0",
-            "max_wheel_speed: 20.0",
-            "max_wheel_speed: 20 rad/s on a robot of 5 kg with wheels of 0.04 m, 0.25 m apart, reach 0.8 m/s at most, "
-            "but max_speed is 1; raise max_wheel_speed or lower max_speed",
-        ),
-        ("max_yaw_rate: 3.0", "max_yaw_rate: 13.0", "reach 12.8 rad/s at most, but max_yaw_rate is 13"),
-        ("wheel_torque: 2.0", "wheel_torque: 0.09", "reach 0.9 m/s2 at most, but max_acceleration is 1"),
-        ("mass: 5.0", "mass: 20000.0", "reach 0.005 m/s2 at most, but max_acceleration is 1"),
-        ("max_yaw_acceleration: 8.0", "max_yaw_acceleration: 93.0", "reach 92 rad/s2 at most, but"),
-        ("wheel_torque: 2.0", "wheel_torque: 2.0\nwheel_friction: 0.1", "wheel_friction: a friction of 0.1 on a robot"),
-        ("schema: 1", 'schema: 1\nname: "a\\0b"', "name: must be one line of printable characters"),
-        ("schema: 1", 'schema: 1\nname: "a\\nb"', "name: must be one line of printable characters"),
-        ("schema: 1", 'schema: 1\nname: "\\e[2J"', "name: must be one line of printable characters"),
-        ("schema: 1", "schema: 9", "schema: must be 1, got 9"),
-    ],
+#: Changes that make a robot's file wrong, in one way each.
+WRONG = (
+    ("mass: 5.0", "mass: -5.0"),
+    ("mass: 5.0", "mass: heavy"),
+    ("mass: 5.0\n", ""),
+    ("mass: 5.0", "mas: 5.0"),
+    ("{radius: 0.2}", "{radius: 0.2, length: 1.0}"),
+    ("{radius: 0.2}", "{length: 1.0}"),
+    ("track: 0.25", "track: 0.55"),
+    ("wheel_radius: 0.04", "wheel_radius: 0.4"),
+    ("{radius: 0.2}", "{length: 0.6, width: 0.2}"),
+    ("{radius: 0.2}", "{length: 0.06, width: 0.3}"),
+    ("{radius: 0.2}", "{polygon: [[0.2, 0.2], [0.2, -0.2]]}"),
+    ("{radius: 0.2}", "{polygon: [[0.3, -0.2], [0.3, 0.2], [0.0, 0.05], [-0.3, 0.2], [-0.3, -0.2]]}"),
+    ("{radius: 0.2}", "{radius: 0.2, polygon: [[1, 0], [0, 1], [-1, -1]]}"),
+    ("{radius: 0.2}", "{centre: [0.1, 0.0]}"),
+    ("{radius: 0.2}", "{radius: 0.2, centre: [0.1]}"),
+    ("{radius: 0.2}", "{length: 0.5, width: 0.4, centre: [0.23, 0.0]}"),
+    ("max_speed: 1", "max_speed: .inf"),
+    ("max_speed: 1", "max_speed: 0.0024"),
+    ("max_speed: 1", "max_speed: 30"),
+    ("mass: 5.0", "mass: 1.0e-300"),
+    ("height: 0.3", "height: 1.0e-300"),
+    ("{radius: 0.2}", "{radius: 0.005}"),
+    ("{radius: 0.2}", "{length: 0.6, width: 0.252}"),
+    ("height: 0.3", "height: 0.05"),
+    ("max_wheel_speed: 40.0", "max_wheel_speed: 20.0"),
+    ("max_yaw_rate: 3.0", "max_yaw_rate: 13.0"),
+    ("wheel_torque: 2.0", "wheel_torque: 0.09"),
+    ("mass: 5.0", "mass: 20000.0"),
+    ("max_yaw_acceleration: 8.0", "max_yaw_acceleration: 93.0"),
+    ("wheel_torque: 2.0", "wheel_torque: 2.0\nwheel_friction: 0.1"),
+    ("schema: 1", 'schema: 1\nname: "a\\0b"'),
+    ("schema: 1", 'schema: 1\nname: "a\\nb"'),
+    ("schema: 1", 'schema: 1\nname: "\\e[2J"'),
+    ("schema: 1", "schema: 9"),
 )
-def test_an_error_is_one_line_that_names_the_file_and_the_key(
-    tmp_path: Path, old: str, new: str, expected: str
-) -> None:
-    path = tmp_path / "mine.yaml"
-    assert old in GOOD
-    path.write_text(GOOD.replace(old, new))
-    with pytest.raises(InputError) as caught:
-        load_robot(path)
-    message = str(caught.value)
-    assert str(path) in message
-    assert expected in message
-    assert "\n" not in message
 
 
 def test_a_heavy_robot_whose_motors_are_too_weak_is_refused(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from antdrive.base import FieldError, InputError
 from antdrive.planners import Progress, keep_best, load_planner, watch
 from antdrive.robots import Footprint, PurePursuit, RobotSpec, load_robot
 from antdrive.sim import Engine, Outcome, Run, Scenario, measure, plan, run
-from antdrive.sim.driving.drive import drive
+from antdrive.sim.driving.following import follow
 from antdrive.sim.log import certificate
 from antdrive.sim.log.record import SmoothingRecord
 from antdrive.views.figures.plan_figures import plan_figure
@@ -262,7 +262,7 @@ def test_a_route_through_an_obstacle_ends_in_contact_not_in_a_loop(turtlebot: Ro
     controller = PurePursuit()
     tracked = controller.prepare(Route(np.array([(0.6, 1.5), (3.4, 1.5)])), task.world, turtlebot, 0.05, 1 / 60)
     with Engine(task.world, turtlebot) as engine:
-        log = drive(engine, controller, tracked, task, time_limit=120)
+        log = follow(engine, controller, tracked, task, limit=120)
     assert log.outcome in (Outcome.COLLIDED, Outcome.STUCK)
 
 

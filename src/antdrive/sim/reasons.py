@@ -15,14 +15,14 @@ from antdrive.robots.placing import name_of
 from antdrive.worlds import Grid, Task, point_clearance, rasterise
 
 if TYPE_CHECKING:
-    from antdrive.sim.scenario import Scenario
+    from antdrive.sim.driving.routes import RoutePlanner
 
 FINER = (2, 4, 8)  # cells are tried this many times smaller
 HALVINGS = 7  # of the radius that passes in a world of very many obstacles
 MOST_CELLS = 2_000_000  # of a grid that is made only to see whether it has a path
 
 
-def no_path_reason(s: Scenario, grid: Grid, said: str) -> str:
+def no_path_reason(s: RoutePlanner, grid: Grid, said: str) -> str:
     """What the planner said about a world that it could not cross, for whom, and what would help."""
     robot = s.robot
     disc = f"a disc of {s.inflate:.3g} m (radius {robot.radius:.3g} + margin {s.margin:.3g})"
@@ -38,7 +38,7 @@ def no_path_reason(s: Scenario, grid: Grid, said: str) -> str:
     return f"{start}; {_narrowest_place(s)}"
 
 
-def _narrowest_place(s: Scenario) -> str:
+def _narrowest_place(s: RoutePlanner) -> str:
     """How wide a disc passes, where that is decided, and whether a smaller margin would help."""
     task = s.task
     passage = widest_passage(task, s.inflate)
@@ -54,7 +54,7 @@ def _narrowest_place(s: Scenario) -> str:
     )
 
 
-def _what_it_takes(s: Scenario, passes: float) -> str:
+def _what_it_takes(s: RoutePlanner, passes: float) -> str:
     """What the robot needs where no disc of more than a radius passes [m], and what would help."""
     robot, foot = s.robot, s.robot.footprint
     fits = passes - robot.radius
@@ -71,7 +71,7 @@ def _what_it_takes(s: Scenario, passes: float) -> str:
     )
 
 
-def _narrowest_cell(s: Scenario, grid: Grid) -> str:
+def _narrowest_cell(s: RoutePlanner, grid: Grid) -> str:
     """The same in a world of so many obstacles that its gaps are too many to try: found on the cells of the plan."""
     low, high = 0.0, s.inflate
     for _ in range(HALVINGS):

@@ -321,47 +321,31 @@ def test_a_robot_that_turns_by_skidding_is_asked_for_its_axle() -> None:
 JOINT = '<joint name="{}" type="{}"><parent link="base_link"/><child link="{}"/><origin xyz="{}"/><axis xyz="0 0 1"/>{}</joint>'
 
 
-@pytest.mark.parametrize(
-    ("name", "changes", "says"),
-    [
-        ("burger.urdf", (("<robot name", "<sdf name"), ("</robot>", "</sdf>")), "its root element is <sdf>"),
-        ("burger.urdf", (('type="continuous"', 'type="fixed"'),), "has 0 wheels that turn freely and stand on the floor"),
-        ("burger.urdf", (("0 -0.080 0.023", "0.05 -0.080 0.023"),), "no two of its 2 wheels share an axle"),
-        ("burger.urdf", (('child link="scan"', 'child link="scam"'),), "joint scan_joint: there is no link 'scam'"),
-        ("burger.urdf", (('child link="scan"', 'child link="base_link"'),), "its links must form one tree"),
-        ("burger.urdf", (('radius="0.035"', 'radius="wide"'),), "<cylinder radius='wide'>: must be 1 numbers"),
-        ("burger.urdf", (('<box size="0.138 0.140 0.143"/>', '<mesh filename="package://a/b.stl"/>'),),
-         "link base_link: mesh package://a/b.stl is not found; say where with --meshes FOLDER"),
-        ("burger.urdf", (("0 -0.080 0.023", "0 -0.120 0.023"),), ""),  # the axle's middle is not the root's
-        ("burger.urdf", (("<box size", "<box dimensions"),),
-         "link base_link: the size of a <box> must be greater than 0, got 0"),
-        ("burger.urdf", (("<box size", "<cone size"),), "link base_link: unknown geometry <cone>"),
-        ("burger.urdf", (('<link name="scan">', "<link>"),), "a <link> has no name"),
-        ("burger.urdf", (('value="0.83"', 'value="nan"'),), "must be 1 numbers"),
-        ("burger.urdf", (("<robot name", "<!DOCTYPE robot><robot name"),), "declares a document type"),
-        ("burger.urdf", (('value="0.83"', 'value="2e8"'),), "must be 1 numbers"),
-        ("burger.urdf", (('value="0.83"', 'value="-0.83"'),), "link base_link: mass must be at least 0, got -0.83"),
-        ("burger.urdf", (('radius="0.033"', 'radius="-0.033"'),),
-         "link wheel_left_link: the radius of a <cylinder> must be greater than 0, got -0.033"),
-        ("burger.urdf", (('<origin xyz="-0.032 0 0.070"/>', '<origin xyz="-0.032 0 0.030"/>'),),
-         "the collision geometry of link base_link lies lower than its wheels (wheel_left_joint by 0.0"),
-        ("burger.urdf", (('type="continuous"', 'type="revolute"'),),
-         "wheel_left_joint, wheel_right_joint: revolute, with a range of 0 rad; the joint of a driven wheel is continuous"),
-        ("burger.urdf", (('value="0.83"', 'value="2e5"'),), "as imported"),
-    ],
-)  # fmt: skip
-def test_what_is_wrong_with_a_file_is_said_in_one_line(
-    tmp_path: Path, name: str, changes: tuple[tuple[str, str], ...], says: str
-) -> None:
-    path = changed(tmp_path, name, *changes)
-    if not says:
-        import_urdf(path)
-        return
-    with pytest.raises(InputError) as caught:
-        import_urdf(path)
-    assert says in str(caught.value)
-    assert str(path) in str(caught.value)
-    assert "\n" not in str(caught.value)
+#: Changes that make a file wrong, in one way each.
+WRONG: tuple[tuple[tuple[str, str], ...], ...] = (
+    (("<robot name", "<sdf name"), ("</robot>", "</sdf>")),
+    (('type="continuous"', 'type="fixed"'),),
+    (("0 -0.080 0.023", "0.05 -0.080 0.023"),),
+    (('child link="scan"', 'child link="scam"'),),
+    (('child link="scan"', 'child link="base_link"'),),
+    (('radius="0.035"', 'radius="wide"'),),
+    (('<box size="0.138 0.140 0.143"/>', '<mesh filename="package://a/b.stl"/>'),),
+    (("<box size", "<box dimensions"),),
+    (("<box size", "<cone size"),),
+    (('<link name="scan">', "<link>"),),
+    (('value="0.83"', 'value="nan"'),),
+    (("<robot name", "<!DOCTYPE robot><robot name"),),
+    (('value="0.83"', 'value="2e8"'),),
+    (('value="0.83"', 'value="-0.83"'),),
+    (('radius="0.033"', 'radius="-0.033"'),),
+    (('<origin xyz="-0.032 0 0.070"/>', '<origin xyz="-0.032 0 0.030"/>'),),
+    (('type="continuous"', 'type="revolute"'),),
+    (('value="0.83"', 'value="2e5"'),),
+)
+
+
+def test_the_middle_of_the_axle_need_not_be_the_roots(tmp_path: Path) -> None:
+    import_urdf(changed(tmp_path, "burger.urdf", ("0 -0.080 0.023", "0 -0.120 0.023")))
 
 
 def test_steered_wheels_and_rollers_are_no_differential_drive(tmp_path: Path) -> None:

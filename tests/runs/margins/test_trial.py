@@ -13,7 +13,7 @@ from antdrive.robots import Footprint, PurePursuit, RobotSpec
 from antdrive.runs.margins.courses import course
 from antdrive.runs.margins.trial import Conditions, least_bound, loss_on_course
 from antdrive.sim import Run, Scenario, run
-from antdrive.sim.driving.driver import Driver
+from antdrive.sim.driving.rules import Pursuit
 
 
 def conditions(robot: RobotSpec, **changes: Any) -> Conditions:
@@ -61,7 +61,8 @@ def test_a_robot_that_turns_to_and_fro_drives_off(turtlebot: RobotSpec, monkeypa
     """Among this course's pillars the carrot jumps from -0.29 to 0.45 rad while the robot turns to it, and back."""
     here = conditions(turtlebot, smoothing="none")
     assert loss_on_course(here, 0.03, 5).footprint < 0.03
-    monkeypatch.setattr(Driver, "_pursue", lambda driver, *now: driver._controller.step(driver.tracked, *now))
+    pursuit = Pursuit.__init__
+    monkeypatch.setattr(Pursuit, "__init__", lambda rule, controller, _: pursuit(rule, controller, 10**9))
     assert loss_on_course(here, 0.03, 5).footprint == math.inf
 
 

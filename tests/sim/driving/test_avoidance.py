@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from antdrive.planners import load_planner
 from antdrive.robots import LIMITERS, Avoidance, RobotSpec
 from antdrive.sim import Outcome, Perception, Run, Scenario, certify, run
-from antdrive.sim.driving.perception import Predictor
+from antdrive.sim.driving.perception import Told
 from antdrive.sim.log.record import PerceptionRecord
 from antdrive.worlds import Cruising, Disc, Keyframed, Mover, Task, Trajectories, World
 
@@ -173,7 +173,7 @@ def test_movers_are_predicted_as_the_perception_allows(tick: int, told: str) -> 
     movers = (CROSSING, Cruising(radius=0.2, position=(2.0, 2.0), velocity=(0.5, 0.3)))
     traffic = Trajectories.of(dataclasses.replace(HALL, movers=movers), (1.0, 3.0))
     ahead = Avoidance().prediction_times
-    places, radii = Predictor(traffic, Perception(kind=told), 60).predict(tick, (0.0, 0.0), ahead)  # type: ignore[arg-type]
+    places, radii = Told(traffic, Perception(kind=told), 60).predict(tick, (0.0, 0.0), ahead)  # type: ignore[arg-type]
     now, speed = traffic.positions(tick / 60)[0], traffic.velocities(tick / 60)[0]
     expected = {
         "positions": np.repeat(now[None], len(ahead), axis=0),

@@ -60,7 +60,7 @@ def driven(
     pose, last, poses = start, Twist(0.0, 0.0), []
     for tick in range(len(wanted) * held):
         want = wanted[tick // held]
-        survey.look(tick, pose, pose)
+        survey.scan(tick, pose, pose)
         speed = min(max(want.speed, last.speed - most), last.speed + most)
         rate = min(max(want.yaw_rate, last.yaw_rate - sharpest), last.yaw_rate + sharpest)
         last = Twist(speed, rate) if blind else caution.limit(pose, last, Twist(speed, rate))[0]
@@ -169,7 +169,7 @@ def test_a_robot_that_forgets_its_map_turns_over_no_post_that_it_has_seen(beside
     survey = Survey(Senses(Scanner.of(robot.lidar, world), world, None, None, 50), robot, start, (7.0, 2.0))
     for tick in range(210):
         x = min(3.0, 1.5 + 0.01 * tick)
-        survey.look(tick, (x, 2.0, 0.0), (x, 2.0, 0.0))
+        survey.scan(tick, (x, 2.0, 0.0), (x, 2.0, 0.0))
     known = survey.clear_turn(here, 1.0, math.pi)
     survey.forget(here)
     turn = survey.clear_turn(here, 1.0, math.pi)

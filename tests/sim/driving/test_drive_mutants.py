@@ -11,10 +11,13 @@ import pytest
 
 from antdrive.robots import AvoidanceState, Footprint, PurePursuit, PursuitState, RobotSpec, Twist
 from antdrive.sim import Outcome
-from antdrive.sim.driving.drive import drive
-from antdrive.sim.driving.driver import AVOIDING, STUCK_TIME, WAITING_SPEED, Driver, StuckClock
+from antdrive.sim.driving.driver import STUCK_TIME, StuckClock
+from antdrive.sim.driving.following import OnePath, follow
 from antdrive.sim.driving.leaving import cannot_leave, is_narrow
-from antdrive.sim.driving.recorder import Ending, Recorder
+from antdrive.sim.driving.localising import TruePose
+from antdrive.sim.driving.parts import Ending, Guide, Step
+from antdrive.sim.driving.plants import Bullet
+from antdrive.sim.driving.rules import AVOIDING, WAITING_SPEED, Avoid
 from antdrive.sim.physics.engine import Engine, State
 from antdrive.worlds import World
 from tests.sim.driving.test_driver import TASK, driver
@@ -44,33 +47,33 @@ class Cautious:
 
 
 def test_a_robot_that_gives_way_is_not_stuck(turtlebot: RobotSpec) -> None:
-    like = driver(turtlebot)
-    nobody = SimpleNamespace(predict=lambda *_: (np.empty((2, 0, 2)), np.empty(0)))
-    waits = Driver(PurePursuit(), like.tracked, TASK, turtlebot, 60, Cautious(), nobody, None)  # type: ignore[arg-type]
+    nobody: Any = SimpleNamespace(predict=lambda *_: (np.empty((2, 0, 2)), np.empty(0)))
+    cautious: Any = Cautious()
+    waits, rest = (
+        driver(turtlebot, None, Avoid(cautious, nobody, OnePath(), TASK, turtlebot, 60)),
+        State(*TASK.start, 0.0, 0.0),
+    )
     for tick in range(round(STUCK_TIME * 60) + 20):
-        assert waits.decide(tick, TASK.start, State(*TASK.start, 0.0, 0.0)) is None
-    assert waits.pursuit.limiter == AVOIDING
-    assert not waits.stuck
+        assert waits.decide(tick, TASK.start, rest) is None
+    assert waits.step.pursuit.limiter == AVOIDING
+    assert waits.gives_up(rest) is None
 
 
-class Watcher:
-    """A monitor that notes whether the robot waits, and what it is asked to replan for."""
+class Watcher(Guide):
+    """A guide that notes whether the robot waits, and where it is asked for a way because the robot missed the goal."""
 
-    schedule = None
-    blockage = SimpleNamespace(reason="")
     may_wait = True
-    wrong = ""
 
     def __init__(self) -> None:
+        self.log = []
         self.waiting: list[bool] = []
-        self.replans: list[str] = []
+        self.misses: list[Any] = []
 
-    def trigger(self, tick: int, pose: Any, waiting: bool, *_: Any) -> str:
+    def update(self, tick: int, pose: Any, waiting: bool, *_: Any) -> None:
         self.waiting.append(waiting)
-        return ""
 
-    def replan(self, tick: int, pose: Any, trigger: str) -> None:
-        self.replans.append(trigger)
+    def missed(self, tick: int, pose: Any) -> None:
+        self.misses.append(pose)
 
 
 @pytest.mark.parametrize(
@@ -83,7 +86,7 @@ class Watcher:
 def test_a_robot_waits_if_it_stands_to_give_way(turtlebot: RobotSpec, avoids: bool, speed: float, waits: bool) -> None:
     monitor = Watcher()
     robot = driver(turtlebot, monitor)
-    robot.avoids = avoids
+    robot.step = Step(avoids=avoids)
     robot.decide(0, TASK.start, State(*TASK.start, speed, 0.0))
     assert monitor.waiting == [waits]
 
@@ -98,24 +101,24 @@ def test_a_robot_looks_for_a_new_route_to_a_goal_that_it_believes_it_missed(
     robot = driver(turtlebot, monitor)
     endings = []
     for tick in range(9):  # the command comes to rest first
-        robot.pursuit = PursuitState(arc=robot.tracked.length)
+        robot.step = robot.step._replace(pursuit=PursuitState(arc=robot.path.length))
         endings.append(robot.decide(tick, (x - off, y, 0.0), State(x - true, y, 0.0, 0.0, 0.0)))
-    assert bool(monitor.replans) is knows
+    assert bool(monitor.misses) is knows
     assert any(ending is not None and ending.outcome is outcome for ending in endings) is not knows
 
 
 @pytest.mark.parametrize("control_hz", [7, 50, 480])
 def test_control_periods_are_whole_numbers_of_steps(turtlebot: RobotSpec, control_hz: int) -> None:
-    tracked = driver(turtlebot).tracked
+    tracked = driver(turtlebot).path
     with Engine(TASK.world, turtlebot) as engine, pytest.raises(ValueError, match="must divide the physics rate 240"):
-        drive(engine, PurePursuit(), tracked, TASK, control_hz=control_hz, time_limit=0.1)
+        follow(engine, PurePursuit(), tracked, TASK, control_hz=control_hz, limit=0.1)
 
 
 def test_progress_is_told_ten_times_a_second(turtlebot: RobotSpec) -> None:
     told: list[float] = []
     with Engine(TASK.world, turtlebot) as engine:
-        tracked = driver(turtlebot).tracked
-        log = drive(engine, PurePursuit(), tracked, TASK, time_limit=1.0, progress=told.append)
+        tracked = driver(turtlebot).path
+        log = follow(engine, PurePursuit(), tracked, TASK, limit=1.0, progress=told.append)
     assert len(log.t) == 241
     assert len(told) == 10
     assert told == sorted(told)
@@ -123,15 +126,17 @@ def test_progress_is_told_ten_times_a_second(turtlebot: RobotSpec) -> None:
 
 def test_the_first_row_is_at_rest_and_estimates_keep_their_error(turtlebot: RobotSpec) -> None:
     with Engine(TASK.world, turtlebot) as engine:
-        log = Recorder(engine, TASK.start, noisy=True)
-        x, y, yaw = log.state.pose
-        log.note_estimate((x + 0.1, y - 0.2, yaw + 0.3 + 2 * np.pi))
-        log.advance(3, Twist(0.2, 0.1), 2, Twist(0.3, 0.4))
-        found = log.finish(Ending(Outcome.TIMED_OUT))
+        plant = Bullet(engine, TASK.start, 80)
+        x, y, yaw = plant.state.pose
+        localiser = TruePose(turtlebot.noise, turtlebot.track, 1 / 80, TASK.start, np.random.default_rng(0))
+        localiser.settle((x + 0.1, y - 0.2, yaw + 0.3 + 2 * np.pi))
+        plant.advance(Step(Twist(0.2, 0.1), PursuitState(limiter=2)), Twist(0.3, 0.4))
+        found = plant.finish(Ending(Outcome.TIMED_OUT))
+        logged = localiser.logged(found, plant.per_tick)
     np.testing.assert_array_equal(found.command, [(0.0, 0.0), *[(0.2, 0.1)] * 3])
-    np.testing.assert_array_equal(found.actuated, [(0.0, 0.0), *[(0.3, 0.4)] * 3])
+    np.testing.assert_array_equal(logged["actuated"], [(0.0, 0.0), *[(0.3, 0.4)] * 3])
     np.testing.assert_array_equal(found.limiter, [0, 2, 2, 2])
-    np.testing.assert_allclose(found.estimate - found.pose, [(0.1, -0.2, 0.3)] * 4)
+    np.testing.assert_allclose(logged["estimate"] - found.pose, [(0.1, -0.2, 0.3)] * 4)
 
 
 def test_room_for_exactly_the_radius_is_narrow(turtlebot: RobotSpec) -> None:
@@ -154,5 +159,5 @@ def test_the_first_motion_is_rehearsed_for_a_minute(turtlebot: RobotSpec) -> Non
     cart = replace(turtlebot, footprint=Footprint.rectangle(0.6, 0.8))
     world = World("w", (0.0, 0.0, 6.0, 4.0))
     stays: Any = SimpleNamespace(step=step)
-    assert cannot_leave(driver(turtlebot).tracked, stays, world, cart, (0.45, 2.0, 0.0), 2) == ""
+    assert cannot_leave(driver(turtlebot).path, stays, world, cart, (0.45, 2.0, 0.0), 2) == ""
     assert len(steps) == 2 * 60

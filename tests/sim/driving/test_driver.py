@@ -1,5 +1,6 @@
 """The parts of a control period, without physics."""
 
+import dataclasses
 import itertools
 import math
 from types import SimpleNamespace
@@ -13,22 +14,18 @@ from hypothesis import strategies as st
 from antdrive.planners import Query, load_planner, smooth
 from antdrive.robots import LIMITERS, AvoidanceState, PurePursuit, PursuitState, RobotSpec, Twist, load_robot
 from antdrive.sim import Outcome, Perception, Scenario
+from antdrive.sim.compose import BLIND_SHARE, compose
 from antdrive.sim.driving.blocking import blocked_cells, covered_discs
-from antdrive.sim.driving.driver import (
-    BLIND_SHARE,
-    OUT_OF_SIGHT,
-    STUCK_PROGRESS,
-    STUCK_TIME,
-    Driver,
-    StuckClock,
-    _brake,
-)
-from antdrive.sim.driving.perception import Predictor
+from antdrive.sim.driving.driver import STUCK_PROGRESS, STUCK_TIME, Driver, StuckClock, full_turn
+from antdrive.sim.driving.following import OnePath
+from antdrive.sim.driving.parts import Guide, Moment, Rule, Step
+from antdrive.sim.driving.perception import Told
+from antdrive.sim.driving.rules import OUT_OF_SIGHT, Avoid, Pursuit, StayInSight, braked
 from antdrive.sim.physics.engine import State
-from antdrive.sim.unknown import exploration_of
 from antdrive.worlds import Cruising, Disc, Grid, Keyframed, Task, Trajectories, World, rasterise
 
 HALL = World("hall", (0.0, 0.0, 9.0, 6.0), (Disc(4.5, 4.5, 0.5),))
+CRUISING = Cruising(radius=0.3, position=(7.0, 1.0), velocity=(0.0, 0.1))
 TASK = Task(HALL, (1.0, 3.0, 0.0), (8.0, 3.0), cell=0.25)
 
 
@@ -36,12 +33,19 @@ def hall_grid(world: World = HALL) -> Grid:
     return rasterise(world, 0.25, 0.21)
 
 
-def driver(robot: RobotSpec, monitor: Any = None) -> Driver:
+def driver(robot: RobotSpec, guide: Guide | None = None, *rules: Rule) -> Driver:
     grid = hall_grid()
     plan = load_planner("astar").plan(Query.between(grid, TASK), np.random.default_rng(0))
     controller = PurePursuit()
     tracked = controller.prepare(smooth(plan, grid, TASK), HALL, robot, 0.03, 1 / 60)
-    return Driver(controller, tracked, TASK, robot, 60, None, None, monitor)
+    pursuit = Pursuit(controller, full_turn(robot, 60))
+    return Driver(guide or OnePath(), (pursuit, *rules), tracked, TASK, robot, 60)
+
+
+def at(driving: Driver, arc: float) -> Driver:
+    """The same, so far along its route [m]."""
+    driving.step = Step(pursuit=PursuitState(arc=arc))
+    return driving
 
 
 def test_progress_restarts_the_stuck_clock() -> None:
@@ -83,8 +87,9 @@ def test_that_sight_held_the_robot_is_said_where_it_did_so_for_most_of_the_time(
 def test_a_robot_that_does_not_move_is_stuck_after_the_stuck_time(turtlebot: RobotSpec) -> None:
     still = driver(turtlebot)
     ticks = 0
-    while not still.stuck:
-        assert still.decide(ticks, TASK.start, State(*TASK.start, 0.0, 0.0)) is None
+    rest = State(*TASK.start, 0.0, 0.0)
+    while still.gives_up(rest) is None:
+        assert still.decide(ticks, TASK.start, rest) is None
         ticks += 1
     assert ticks == pytest.approx(STUCK_TIME * 60, abs=2)
 
@@ -96,7 +101,7 @@ def test_a_robot_that_stops_just_outside_the_tolerance_has_not_arrived(
     x, y = TASK.goal
     away = TASK.goal_tolerance + outside
     at_end = driver(turtlebot)
-    at_end.pursuit = PursuitState(arc=at_end.tracked.length)
+    at(at_end, at_end.path.length)
     endings = [at_end.decide(tick, (x, y, 0.0), State(x - away, y, 0.0, 0.0, 0.0)) for tick in range(9)]
     assert {ending.outcome for ending in endings if ending is not None} == {outcome}
 
@@ -107,7 +112,7 @@ def test_a_mover_beside_the_goal_closes_no_cell_within_the_inflation_of_it() -> 
         for y in (3.5, 3.6):
             goal = (x, y - 0.6)
             mover = Keyframed(radius=0.5, keyframes=((0.0, x, y), (9.0, x, y)))
-            still = Predictor(Trajectories.of(World("w", HALL.bounds, movers=(mover,)), (1.0, 3.0)), Perception(), 60)
+            still = Told(Trajectories.of(World("w", HALL.bounds, movers=(mover,)), (1.0, 3.0)), Perception(), 60)
             grid = hall_grid()
             discs = covered_discs(still, 0, np.array([(1.0, 3.0), goal]), 0.0, grid)
             assert discs
@@ -119,7 +124,7 @@ def test_standing_at_the_routes_end_ends_the_drive_by_the_distance_to_the_goal(t
     x, y = TASK.goal
     for distance, outcome in ((0.0, Outcome.SUCCEEDED), (0.3, Outcome.STUCK)):
         at_end = driver(turtlebot)
-        at_end.pursuit = PursuitState(arc=at_end.tracked.length)
+        at(at_end, at_end.path.length)
         ending = None
         for tick in range(9):  # the command comes to rest first
             ending = ending or at_end.decide(tick, (x, y, 0.0), State(x, y - distance, 0.0, 0.0, 0.0))
@@ -144,29 +149,33 @@ def test_a_robot_that_avoids_a_mover_at_the_goal_stops_there_even_where_sight_ho
     turtlebot: RobotSpec,
 ) -> None:
     """Local avoidance goes on for ever, and slowly, because the robot sees too little there."""
-    alone = driver(turtlebot)
     calm: Any = SimpleNamespace(
         prediction_times=np.arange(3.0), step=1.0, avoid=lambda *_, **__: (Twist(0.5, 0.0), True, AvoidanceState())
     )
     caution: Any = SimpleNamespace(limit=lambda *_: (Twist(0.005, 0.0), True))
-    nobody = Predictor(Trajectories.of(HALL, TASK.start[:2]), Perception(), 60)
-    robot = Driver(PurePursuit(), alone.tracked, TASK, turtlebot, 60, calm, nobody, None, caution)
+    nobody = Told(Trajectories.of(HALL, TASK.start[:2]), Perception(), 60)
+    sight: Any = SimpleNamespace(note_sight=lambda *_: None)
+    robot = driver(turtlebot, None, Avoid(calm, nobody, OnePath(), TASK, turtlebot, 60), StayInSight(caution, sight))
     at_goal = (*TASK.goal, 0.0)
-    robot.pursuit = PursuitState(arc=robot.tracked.length - 0.5)
+    at(robot, robot.path.length - 0.5)
     endings = [robot.decide(tick, at_goal, State(*at_goal, 0.0, 0.0)) for tick in range(2)]
-    assert robot.pursuit.limiter != LIMITERS.index("avoid")
+    assert robot.step.pursuit.limiter != LIMITERS.index("avoid")
     assert [ending and ending.outcome for ending in endings] == [None, Outcome.SUCCEEDED]
 
 
 def test_a_robot_without_a_map_backs_off_slowly_where_its_lidar_does_not_look(
-    jackal: RobotSpec, turtlebot: RobotSpec
+    jackal: RobotSpec, turtlebot: RobotSpec, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """`jackal` sees 270 degrees, `turtlebot` all round. A robot that is told of movers knows what is behind it."""
-    told = Predictor(Trajectories.of(HALL, TASK.start[:2]), Perception(), 60)
     for robot, perception in itertools.product((jackal, turtlebot), (Perception(kind="lidar"), Perception())):
         planner = load_planner("astar")
         unknown = Scenario(
-            task=TASK, planner=planner, robot=robot, map="none", perception=perception, planner_name="astar"
+            task=dataclasses.replace(TASK, world=dataclasses.replace(HALL, movers=(CRUISING,))),
+            planner=planner,
+            robot=robot,
+            map="none",
+            perception=perception,
+            planner_name="astar",
         )
         asked: list[float] = []
 
@@ -174,49 +183,42 @@ def test_a_robot_without_a_map_backs_off_slowly_where_its_lidar_does_not_look(
             asked.append(backwards)
             return Twist(0.0, 0.0), False, AvoidanceState()
 
-        noted: Any = SimpleNamespace(prediction_times=np.arange(3.0), step=1.0, avoid=avoid)
-        path, monitor = driver(robot).tracked, exploration_of(unknown)
+        noted: Any = SimpleNamespace(prediction_times=np.arange(3.0), step=1.0, avoid=avoid, min_clearance=0.1)
+        monkeypatch.setattr(Scenario, "effective_avoidance", property(lambda _, noted=noted: noted))
+        rule = next(rule for rule in compose(unknown).rules if type(rule) is Avoid)
         still = State(*TASK.start, 0.0, 0.0)
-        Driver(PurePursuit(), path, TASK, robot, 60, noted, told, monitor).decide(0, TASK.start, still)
+        rule.apply(Moment(0, TASK.start, still, driver(robot).path, Step(), StuckClock()), Step())
         slow = robot is jackal and perception.kind == "lidar"
         assert asked == [BLIND_SHARE * robot.max_speed if slow else math.inf]
 
 
-class OneReplan:
-    """A monitor that replans once, back along the route that it is given."""
-
-    schedule = None
-    blockage = SimpleNamespace(reason="")
-    may_wait = False
-    wrong = ""
+class OneReplan(Guide):
+    """A guide that replans once, back along the path that it is given."""
 
     def __init__(self) -> None:
-        self.tracked: Any = None
+        self.log, self.path = [], None
 
-    def trigger(self, tick: int, *_: Any) -> str:
-        return "strayed" if tick == 1 else ""
-
-    def replan(self, *_: Any) -> Any:
-        return self.tracked
+    def update(self, tick: int, *_: Any) -> Any:
+        return self.path if tick == 1 else None
 
 
 def test_a_replan_starts_its_route_from_the_beginning(turtlebot: RobotSpec) -> None:
     monitor = OneReplan()
     robot = driver(turtlebot, monitor)
-    monitor.tracked = driver(turtlebot).tracked
+    monitor.path = driver(turtlebot).path
     robot.decide(0, (3.0, 3.0, 0.0), State(3.0, 3.0, 0.0, 0.5, 0.0))
-    old = robot.tracked
-    assert robot.pursuit.arc > 0
+    old = robot.path
+    assert robot.step.pursuit.arc > 0
     robot.decide(1, TASK.start, State(*TASK.start, 0.5, 0.0))
-    assert robot.tracked is monitor.tracked is not old
-    assert robot.pursuit.arc == pytest.approx(0.0, abs=0.02)
+    assert robot.path is monitor.path is not old
+    assert robot.step.pursuit.arc == pytest.approx(0.0, abs=0.02)
 
 
 def test_the_first_command_accelerates_within_the_robots_limit(turtlebot: RobotSpec) -> None:
     first = driver(turtlebot)
     first.decide(0, TASK.start, State(*TASK.start, 0.0, 0.0))
-    assert Twist(0.0, 0.0) != first.command
-    assert 0 < first.command.speed <= turtlebot.max_acceleration / 60 + 1e-12
+    assert Twist(0.0, 0.0) != first.step.command
+    assert 0 < first.step.command.speed <= turtlebot.max_acceleration / 60 + 1e-12
 
 
 @given(
@@ -237,7 +239,7 @@ def test_movers_close_neither_the_robots_position_nor_the_goal() -> None:
     over_goal = Keyframed(radius=0.6, keyframes=((0.0, 8.0, 3.2), (9.0, 8.0, 3.2001)))
     crossing = Cruising(radius=0.3, position=(4.0, 1.0), velocity=(0.0, 0.5))
     world = World("hall", HALL.bounds, HALL.obstacles, movers=(over_goal, crossing))
-    predictor = Predictor(Trajectories.of(world, TASK.start[:2]), Perception(), 60)
+    predictor = Told(Trajectories.of(world, TASK.start[:2]), Perception(), 60)
     grid = hall_grid()
     ends = np.array([TASK.start[:2], TASK.goal])
     discs = covered_discs(predictor, 0, ends, 1.0, grid)
@@ -250,10 +252,10 @@ def test_movers_close_neither_the_robots_position_nor_the_goal() -> None:
 @given(speed=st.floats(-2.0, 2.0), yaw_rate=st.floats(-4.0, 4.0))
 def test_a_robot_that_brakes_for_the_goal_slows_its_turn_no_faster_than_it_can(speed: float, yaw_rate: float) -> None:
     jackal, last = load_robot("jackal"), Twist(speed, yaw_rate)
-    braked = _brake(last, jackal, 60)
-    assert abs(last.speed - braked.speed) <= jackal.max_acceleration / 60 + 1e-12
-    assert abs(last.yaw_rate - braked.yaw_rate) <= jackal.max_yaw_acceleration / 60 + 1e-12
-    assert abs(braked.yaw_rate) <= abs(last.yaw_rate)
+    slower = braked(last, jackal, 60)
+    assert abs(last.speed - slower.speed) <= jackal.max_acceleration / 60 + 1e-12
+    assert abs(last.yaw_rate - slower.yaw_rate) <= jackal.max_yaw_acceleration / 60 + 1e-12
+    assert abs(slower.yaw_rate) <= abs(last.yaw_rate)
     gentle = abs(yaw_rate) * jackal.max_acceleration <= abs(speed) * jackal.max_yaw_acceleration
     if gentle and speed:
-        assert braked.yaw_rate * last.speed == pytest.approx(last.yaw_rate * braked.speed, abs=1e-9), "the same curve"
+        assert slower.yaw_rate * last.speed == pytest.approx(last.yaw_rate * slower.speed, abs=1e-9), "the same curve"

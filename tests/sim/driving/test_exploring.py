@@ -12,17 +12,17 @@ from antdrive.planners import load_planner
 from antdrive.robots import RobotSpec, Twist
 from antdrive.runs.failures.rebuild import rebuilt
 from antdrive.sim import Outcome, Rollout, Run, Scenario, run
-from antdrive.sim.driving import rescanning
+from antdrive.sim.compose import told
 from antdrive.sim.driving.caution import Caution
 from antdrive.sim.driving.own_map import forgetting_ticks
-from antdrive.sim.driving.replay import replay
+from antdrive.sim.driving.replay import map_of, replay
 from antdrive.sim.driving.survey import Senses, Survey
 from antdrive.sim.driving.watching import Watch
 from antdrive.sim.log.record import ReplanRecord
 from antdrive.sim.sensing import OccupancyMap, Scanner
-from antdrive.sim.unknown import exploration_of, told
 from antdrive.views.recollection import Recollection
 from antdrive.worlds import Disc, Task, World, generate, load_task
+from tests.sim.driving.guides import exploration_of
 
 POSTS = tuple(Disc(3.0, 0.15 * k, 0.075) for k in range(14))  # a row that leaves a gap at the top
 ROOM = World("room", (0.0, 0.0, 6.0, 4.0), POSTS)
@@ -158,13 +158,14 @@ def test_the_map_is_forgotten_where_plans_failed(log: Rollout) -> None:
 
 def own_map(log: Rollout) -> OccupancyMap:
     """The map that the robot of a log had at last."""
-    again = rescanning.Rescanning(log)
+    survey, forgets = map_of(log)
+    assert isinstance(survey, Survey)
     for row in range(0, len(log.t), log.record.physics_hz // log.record.control_hz):
         tick = row * log.record.control_hz // log.record.physics_hz
         estimate = tuple(log.estimate[row].tolist()) if len(log.estimate) else tuple(log.pose[row].tolist())
-        again.look(tick, tuple(log.pose[row].tolist()), estimate)
-        again.plan(tick, estimate)
-    return again._survey.map
+        survey.scan(tick, tuple(log.pose[row].tolist()), estimate)
+        forgets.get(tick, lambda pose: None)(estimate)
+    return survey.map
 
 
 def cells_of(known: OccupancyMap) -> set[tuple[int, int]]:
@@ -277,7 +278,7 @@ def test_a_map_counts_the_scans_that_are_taken(jackal: RobotSpec, rate: float, s
     survey = exploration_of(scenario(robot)).survey
     assert survey.map.share == share
     for tick in range(1, 61):
-        survey.look(tick, TASK.start, TASK.start)
+        survey.scan(tick, TASK.start, TASK.start)
     assert len(survey.scans) == pytest.approx(min(rate, 60), abs=1)
     assert survey.whole == pytest.approx(min(rate, 60) / share, abs=1)
     assert survey._recent == min(rate, 60)
@@ -288,7 +289,7 @@ def test_the_robot_can_stop_on_ground_that_it_has_seen(jackal: RobotSpec) -> Non
     assert jackal.lidar is not None
     senses = Senses(Scanner.of(jackal.lidar, ROOM), ROOM, None, None, 60)
     survey = Survey(senses, jackal, TASK.start, TASK.goal)
-    survey.look(0, TASK.start, TASK.start)
+    survey.scan(0, TASK.start, TASK.start)
     caution = Caution(survey, jackal, 60, 0.1)
     free = caution.limit(TASK.start, Twist(1.0, 0.0), Twist(1.0, 0.0))
     assert free == (Twist(1.0, 0.0), False)  # stops within 0.35 m, sees 2 m

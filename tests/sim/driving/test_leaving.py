@@ -12,7 +12,7 @@ from antdrive.base import Pose
 from antdrive.planners import load_planner
 from antdrive.robots import LIMITERS, Footprint, PurePursuit, RobotSpec, load_robot, overlap_at
 from antdrive.sim import Engine, Outcome, Scenario, plan, run
-from antdrive.sim.driving.drive import drive
+from antdrive.sim.driving.following import follow
 from antdrive.sim.driving.leaving import is_narrow
 from antdrive.worlds import Disc, Route, Task, World
 
@@ -65,7 +65,7 @@ def test_the_rehearsal_and_physics_agree(cart: RobotSpec, monkeypatch: pytest.Mo
         s = Scenario(task=task, planner=load_planner("astar"), robot=cart)
         planned = plan(s)
         with monkeypatch.context() as patch:
-            patch.setattr("antdrive.sim.pipeline.cannot_leave", lambda *_: "")
+            patch.setattr("antdrive.sim.driving.routes.cannot_leave", lambda *_: "")
             patch.setattr(PurePursuit, "step", lambda self, path, *now: step(self, path.for_any_turn, *now))
             driven = run(s)
         said = "" if planned[1].solved else planned[1].reason
@@ -87,7 +87,7 @@ def test_a_rectangle_does_not_turn_into_a_post_on_its_way(jackal: RobotSpec, sid
     ends = {}
     for name, path in (("checked", tracked), ("any turn", tracked.for_any_turn)):
         with Engine(task.world, jackal) as engine:
-            ends[name] = drive(engine, controller, path, task, time_limit=20)
+            ends[name] = follow(engine, controller, path, task, limit=20)
     assert ends["any turn"].outcome is Outcome.COLLIDED
     assert LIMITERS[ends["any turn"].limiter[-1]] == "rotate"
     assert ends["checked"].outcome is Outcome.STUCK

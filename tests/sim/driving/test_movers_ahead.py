@@ -17,10 +17,10 @@ from antdrive.sim import Perception, ReplanPolicy, Scenario, run
 from antdrive.sim.driving.movers_ahead import SLACK, MoversAhead
 from antdrive.sim.driving.replanning import OBSTRUCTED, TRAFFIC, WAITED
 from antdrive.sim.driving.traffic import FADING, FAST, TrackedTraffic
-from antdrive.sim.driving.watching import TrackedPredictor
+from antdrive.sim.driving.watching import Tracked
 from antdrive.sim.sensing import TrackedMovers
-from antdrive.sim.unknown import exploration_of
 from antdrive.worlds import Keyframed, Task, World, rasterise
+from tests.sim.driving.guides import exploration_of
 
 LIDAR = Perception(kind="lidar")
 HALL = World("hall", (0.0, 0.0, 16.0, 12.0))
@@ -49,14 +49,14 @@ class Seen:
 
 def traffic_seen(robot: RobotSpec) -> tuple[TrackedTraffic, Seen]:
     watch: Any = Seen()
-    return TrackedTraffic(TrackedPredictor(watch, LIDAR, 60), robot, 60), watch
+    return TrackedTraffic(Tracked(watch, LIDAR, 60), robot, 60), watch
 
 
 def ahead(robot: RobotSpec, hits: Floats | None = None, **policy: float) -> tuple[MoversAhead, Seen]:
     watch: Any = Seen()
     found = np.empty((0, 3)) if hits is None else hits
     survey: Any = SimpleNamespace(map=SimpleNamespace(trust=7.5, discs=lambda: found))
-    predictor, settings = TrackedPredictor(watch, LIDAR, 60), ReplanPolicy(**policy)
+    predictor, settings = Tracked(watch, LIDAR, 60), ReplanPolicy(**policy)
     return MoversAhead(predictor, survey, settings, robot, TASK.goal, robot.radius + 0.03, 60), watch
 
 
@@ -195,7 +195,7 @@ def test_plans_lead_round_busy_ground_and_off_movers(jackal: RobotSpec, planner:
         grid, plan, avoided = exploration._plan_around(60, pose)
         if planner != "tangent":  # which knows no cells, and what bounds the ground alone
             assert any(not zone.blocked[tuple(plan.cells.T)].any() for zone in movers.zones(60, pose, grid))
-        route, _ = exploration.route(pose, grid, plan, avoided)
+        route, _ = exploration._route(pose, grid, plan, avoided)
         arcs = np.arange(0.0, route.length, 0.05)
         points = np.stack([np.interp(arcs, route.arc, route.xy[:, k]) for k in (0, 1)], axis=1)
         gaps = [np.hypot(*(points - (disc.x, disc.y)).T).min() - disc.radius for disc in avoided]

@@ -12,7 +12,7 @@ from antdrive.base import Floats
 from antdrive.planners import load_planner
 from antdrive.robots import Footprint, PurePursuit, RobotSpec
 from antdrive.sim import Engine, Outcome, Rollout, Run, Scenario, certify, measure, run
-from antdrive.sim.driving.drive import drive
+from antdrive.sim.driving.following import follow
 from antdrive.sim.log.certificate import closed_form_clearance
 from antdrive.sim.log.contacts import Touch, touches
 from antdrive.sim.physics import movers as bodies_of_movers
@@ -290,12 +290,12 @@ def test_wanderers_avoid_unseen_obstacles(turtlebot: RobotSpec) -> None:
 
 
 def test_a_robot_drives_among_movers_without_a_scenario(turtlebot: RobotSpec) -> None:
-    """An engine with trajectories is all that `drive` needs to drive among movers."""
+    """An engine with trajectories is all that `follow` needs to drive among movers."""
     world = dataclasses.replace(ROOM, movers=BESIDE)
     controller = PurePursuit()
     tracked = controller.prepare(Route(np.array([(0.6, 1.4), (5.4, 1.4)])), world, turtlebot, 0.05, 1 / 60)
     with Engine(world, turtlebot, trajectories=Trajectories.of(world, TASK.start[:2])) as engine:
-        log = drive(engine, controller, tracked, TASK, time_limit=60)
+        log = follow(engine, controller, tracked, TASK, limit=60)
         assert engine.time == pytest.approx(log.t[-1])
     assert log.outcome is Outcome.SUCCEEDED
     assert log.movers.shape == (len(log.t), 3, 2)

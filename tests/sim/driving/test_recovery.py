@@ -14,11 +14,12 @@ from antdrive.robots import PursuitState, RobotSpec, Twist
 from antdrive.sim import Outcome, Run, Scenario, run
 from antdrive.sim.driving.driver import Driver
 from antdrive.sim.driving.own_map import LOOKED, forgetting_ticks
+from antdrive.sim.driving.parts import Step
 from antdrive.sim.driving.recovery import Look, Recovery
 from antdrive.sim.driving.replay import replay
 from antdrive.sim.physics.engine import State
-from antdrive.sim.unknown import caution_of, exploration_of
 from antdrive.worlds import Cruising, Disc, Task, World
+from tests.sim.driving.guides import exploration_of
 
 HALL = (0.0, 0.0, 8.0, 8.0)
 HERE = (4.0, 4.0, 0.0)
@@ -106,12 +107,12 @@ def test_a_robot_that_has_no_way_where_its_route_ends_looks_for_one_for_a_while(
     task = Task(World("hall", HALL), HERE, (7.0, 4.0), goal_tolerance=0.25, cell=0.1)
     s = Scenario(task=task, planner=load_planner("astar"), planner_name="astar", robot=jackal, map="none")
     exploration = exploration_of(s)
-    _, tracked = exploration.route(HERE, *exploration.plan(HERE))
-    robot = Driver(s.controller, tracked, task, jackal, 60, None, None, exploration, caution_of(s, exploration))
+    _, tracked = exploration.route(*exploration.first())
+    robot = Driver(exploration, (), tracked, task, jackal, 60)
     asked = []
     exploration.replan = lambda tick, pose, trigger: asked.append(trigger)  # type: ignore[method-assign, assignment, return-value]
     exploration.lost = lost
-    robot.pursuit = PursuitState(arc=tracked.length)
+    robot.step = Step(pursuit=PursuitState(arc=tracked.length))
     ending = robot._end_of_route(0, HERE, State(*HERE, 0.0, 0.0))
     assert (ending is None) == lost
     assert asked == ([] if lost else ["missed the goal"])

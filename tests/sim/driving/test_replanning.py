@@ -20,17 +20,15 @@ from antdrive.planners import (
     TimedPlan,
     capabilities_of,
     load_planner,
-    smooth,
 )
 from antdrive.robots import RobotSpec, TrackedPath, Twist
-from antdrive.sim import Outcome, ReplanPolicy, Rollout, Run, Scenario, certify, plan, run
-from antdrive.sim.driving.cellwise import CellwiseMonitor
-from antdrive.sim.driving.perception import Predictor
-from antdrive.sim.driving.replanning import ReplanMonitor
+from antdrive.sim import Outcome, ReplanPolicy, Rollout, Run, Scenario, certify, run
+from antdrive.sim.driving.cellwise import CellByCell
+from antdrive.sim.driving.replanning import Replanning
 from antdrive.sim.driving.schedule import MAX_LAG, Schedule, slow_down
 from antdrive.sim.log.metrics import tracking_error_max_m
-from antdrive.sim.pipeline import _monitor
 from antdrive.worlds import Disc, Keyframed, Mover, Route, Task, World, polyline_clearance
+from tests.sim.driving.guides import replanning_of
 
 # A wall with two gates; the path through the nearer gate is shorter.
 POSTS = tuple(Disc(4.0, y, 0.25) for y in np.arange(0.25, 6.0, 0.5) if not (2.2 < y < 3.8 or y > 5.0))
@@ -126,9 +124,10 @@ def test_a_robot_that_left_its_cell_returns_around_obstacles(turtlebot: RobotSpe
     """Avoiding movers has taken the robot to the other side of the wall; its own cell lies behind a post."""
     task = dataclasses.replace(TASK, world=dataclasses.replace(HALL, movers=(GATEKEEPER,)))
     scenario = Scenario(task=task, planner=load_planner("mmas-dstar"), robot=turtlebot)
-    grid, _ = plan(scenario)
-    monitor = _monitor(scenario, grid, Predictor(scenario.trajectories, scenario.effective_perception, 60))
-    assert isinstance(monitor, CellwiseMonitor)
+    monitor = replanning_of(scenario)
+    assert isinstance(monitor, CellByCell)
+    grid, answer = monitor.first()
+    monitor.route(grid, answer)
     centre = grid.xy(np.array([grid.cell_at(3.4, 1.5)]))[0]
     for x, straight in ((4.7, False), (2.6, True), (3.2, True)):
         way = monitor._way_back((x, 1.5, 0.0), centre)
@@ -204,26 +203,13 @@ ASIDE = Keyframed(radius=0.3, keyframes=((0.0, 7.0, 0.5), (100.0, 7.0, 0.51)), l
 
 def monitor_of(
     *movers: Mover, robot: RobotSpec, planner: str = "dstar-lite", **settings: Any
-) -> tuple[ReplanMonitor, TrackedPath]:
+) -> tuple[Replanning, TrackedPath]:
     task = dataclasses.replace(TASK, world=dataclasses.replace(HALL, movers=movers))
-    s = Scenario(task=task, planner=load_planner(planner), robot=robot)
-    grid, answer = plan(s)
-    route = smooth(answer, grid, task, kind="none" if s.timed else "clearance")
-    made = ReplanMonitor(
-        ReplanPolicy(**settings),
-        s.planner,
-        grid,
-        task,
-        s.rng("replanner"),
-        predictor=Predictor(s.trajectories, s.effective_perception, 60),
-        robot=robot,
-        controller=s.controller,
-        margin=s.margin,
-        smoothing="clearance",
-        hz=60,
+    policy = ReplanPolicy(**settings)
+    made = replanning_of(
+        Scenario(task=task, planner=load_planner(planner), robot=robot, avoidance=None, replanning=policy)
     )
-    made.track(answer, route)
-    return made, s.controller.prepare(route, task.world, robot, s.margin, 1 / 60)
+    return made, made.route(*made.first())[1]
 
 
 def test_a_robot_too_far_off_its_route_has_strayed(turtlebot: RobotSpec) -> None:

@@ -12,7 +12,7 @@ from antdrive.base import Floats
 from antdrive.planners import load_planner
 from antdrive.robots import RobotSpec
 from antdrive.sim import Outcome, Perception, ReplanPolicy, Run, Scenario, run
-from antdrive.sim.driving.perception import Predictor
+from antdrive.sim.driving.perception import Told
 from antdrive.sim.driving.traffic import MIXING, Traffic, Zone
 from antdrive.worlds import Cruising, Disc, Keyframed, Mover, Task, Trajectories, World, import_dynabarn, rasterise
 from tools.shared_data import DYNABARN
@@ -34,7 +34,7 @@ SHUTTLES = tuple(shuttle(3.0 + 0.9 * k, 1.2, phase=4.7 * k) for k in range(11))
 
 def traffic_of(*movers: Mover, kind: str = "velocities", reach: float = math.inf) -> Traffic:
     motions = Trajectories.of(dataclasses.replace(HALL, movers=movers), (1.0, 6.0))
-    predictor = Predictor(motions, Perception(kind=kind, range=reach), 60)  # type: ignore[arg-type]
+    predictor = Told(motions, Perception(kind=kind, range=reach), 60)  # type: ignore[arg-type]
     return Traffic(predictor, 0.2, HALL.bounds, 60)
 
 

@@ -13,15 +13,15 @@ from antdrive.robots import RobotSpec
 from antdrive.runs.failures.rebuild import rebuilt
 from antdrive.sim import Outcome, Perception, Rollout, Run, Scenario, run
 from antdrive.sim.driving.replay import replay
-from antdrive.sim.driving.watching import TrackedPredictor, Watch
+from antdrive.sim.driving.watching import Tracked, Watch
 from antdrive.sim.log.certificate import certify
 from antdrive.sim.log.metrics import measure
 from antdrive.sim.log.record import PerceptionRecord
 from antdrive.sim.log.scans import ranges_of
 from antdrive.sim.log.sights import passed
 from antdrive.sim.sensing import KnownGround, Scanner
-from antdrive.sim.unknown import exploration_of
 from antdrive.worlds import Disc, Keyframed, Task, World
+from tests.sim.driving.guides import exploration_of
 
 # A closet of touching posts in the lower right corner, into which no beam gets.
 CLOSET = tuple(Disc(5.0 + 0.14 * k, 1.2, 0.075) for k in range(22)) + tuple(
@@ -136,7 +136,7 @@ def test_movers_are_predicted_at_the_velocity_that_was_estimated(jackal: RobotSp
     for tick in range(31):
         places = np.array([[3.0 - tick / 60, 1.0], [2.0, -2.0]])
         watch.read(ground, (0.0, 0.0, 0.0), scanner.scan((0.0, 0.0, 0.0), places, np.array([0.3, 0.2])), tick)
-    predictor = TrackedPredictor(watch, LIDAR, 60)
+    predictor = Tracked(watch, LIDAR, 60)
     places, radii = predictor.predict(36, (0.0, 0.0), np.array([0.0, 1.0]))
     numbers, everywhere = predictor.perceived(36, (0.0, 0.0))
     first = int(np.argmin(places[0, :, 1] < 0))
@@ -145,7 +145,7 @@ def test_movers_are_predicted_at_the_velocity_that_was_estimated(jackal: RobotSp
     assert radii[first] == pytest.approx(0.3, abs=0.03)
     assert np.array_equal(everywhere[numbers], places[0])
     assert predictor.radius_of(int(numbers[first])) == radii[first]
-    near = TrackedPredictor(watch, Perception(kind="lidar", range=2.3), 60)
+    near = Tracked(watch, Perception(kind="lidar", range=2.3), 60)
     assert near.within_range(36, (0.0, 0.0)).tolist() == [numbers[first]]
     assert math.hypot(2.0, 2.0) - 0.2 > 2.3
 

@@ -14,19 +14,16 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given
-from hypothesis import strategies as st
 
 from antdrive.sim.log.record import ReplanRecord
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.sensing import Scanner
 from antdrive.views.export.exporting import export
-from antdrive.views.export.ground import free_cells
-from antdrive.views.export.libraries import message_types
 from antdrive.views.export.scans import LEFT_OUT, TAKEN_AGAIN
+from antdrive.views.export.topics import message_types
 from antdrive.worlds.files.world_file import load_task
 from antdrive.worlds.grid import rasterise
-from antdrive.worlds.world import Disc, World
+from antdrive.worlds.world import Disc
 
 rosbag2 = pytest.importorskip("rosbags.rosbag2", reason="rosbags is not installed")
 mcap_reader = pytest.importorskip("mcap.reader", reason="mcap is not installed")
@@ -169,16 +166,6 @@ def test_the_map_is_the_grid_that_was_planned_on(said: list[Said], log: Rollout)
     assert [info.origin.position.x, info.origin.position.y] == pytest.approx(to_map(record.world.bounds[:2]).tolist())
     assert heading(info.origin.orientation) == pytest.approx(FRAME[2])
     assert np.array_equal(np.array(entry.message.data).reshape(grid.shape) == 0, grid.free)
-
-
-@given(data=st.data())
-def test_free_cells_are_those_of_the_planners_grid(data: st.DataObject) -> None:
-    number = st.floats(-1.0, 6.0).map(lambda value: round(value, 2))
-    discs = data.draw(st.lists(st.tuples(number, number, st.floats(0.01, 2.0).map(lambda r: round(r, 2))), max_size=6))
-    width, height = (data.draw(st.sampled_from([0.3, 1.0, 4.95, 5.0])) for _ in range(2))
-    world = World("w", (-0.5, 0.25, width - 0.5, height + 0.25), tuple(Disc(*disc) for disc in discs))
-    cell, inflate = data.draw(st.sampled_from([0.05, 0.1, 0.3])), data.draw(st.sampled_from([0.0, 0.1, 0.25]))
-    assert np.array_equal(free_cells(world, cell, inflate), rasterise(world, cell, inflate).free)
 
 
 def test_each_route_comes_when_it_is_followed(said: list[Said], log: Rollout) -> None:

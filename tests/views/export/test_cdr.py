@@ -13,10 +13,9 @@ from hypothesis import strategies as st
 
 from antdrive.robots.lidar import Lidar
 from antdrive.views.export import samples
-from antdrive.views.export.cdr import CdrLayout
-from antdrive.views.export.libraries import message_types
+from antdrive.views.export.samples import CdrLayout
 from antdrive.views.export.scans import Scans
-from antdrive.views.export.topics import Topic
+from antdrive.views.export.topics import Topic, message_types
 
 pytest.importorskip("rosbags", reason="rosbags is not installed")
 

@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import TypeAlias
 
+import numpy as np
+
 from antdrive.base import Pose
-from antdrive.planners import PlannerError, smooth
-from antdrive.robots import NoiseModel, PursuitState, Twist, footprint_clearance
+from antdrive.planners import PlannerError
+from antdrive.robots import PurePursuit, TrackedPath, Twist, footprint_clearance
+from antdrive.sim.compose import route_planner
+from antdrive.sim.driving.drive import drive
+from antdrive.sim.driving.given import GivenMap
+from antdrive.sim.driving.localising import localiser_of
+from antdrive.sim.driving.parts import Decider, Ending, Step
+from antdrive.sim.driving.plants import Kinematic
+from antdrive.sim.driving.routes import OneRoute
+from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.physics.engine import State
 from antdrive.sim.pipeline import plan
 from antdrive.sim.scenario import Scenario
 
@@ -55,24 +67,30 @@ def rehearsed_clearance(s: Scenario) -> float:
         return -math.inf
     if not answer.solved:
         return math.inf
-    world, period = s.task.world, 1 / s.control_hz
-    route = smooth(answer, grid, s.task, kind=s.smoothing)
-    tracked = s.controller.prepare(route, world, s.robot, s.margin, period, s.task.goal_tolerance)
-    level = s.robot.noise.scaled(s.noise)
-    noise = NoiseModel(level, s.robot.track, period, s.task.start, s.rng("noise")) if level.nonzero else None
-    poses, state = [s.task.start], PursuitState()
-    command = actuated = Twist(0.0, 0.0)
-    for _ in range(round((SETTLING + PATIENCE * route.length / s.robot.max_speed) * s.control_hz)):
-        believed = poses[-1]
-        if noise is not None:
-            noise.estimate_pose(believed, actuated)
-            believed = noise.pose_after_delay()
-        command, state = s.controller.step(tracked, believed, command, state)
-        actuated = noise.actuate(command) if noise is not None else command
-        poses.append(_moved(poses[-1], actuated, period))
-        if state.arc > tracked.length - tracked.goal_distance and abs(actuated.speed) < STANDING:
-            break
-    return float(footprint_clearance(s.driven_world, s.robot.footprint, poses).min())
+    known = dataclasses.replace(route_planner(s), task=s.task, smoothing=s.smoothing)
+    route, path = OneRoute(known).route(grid, answer)
+    localiser = localiser_of("fixes", s.robot, s.noise, 1.0, 1 / s.control_hz, s.task.start, s.seed)
+    plant = Kinematic(s.task.start, lambda pose, twist: np.array([_moved(pose, twist, 1 / s.control_hz)]))
+    limit = SETTLING + PATIENCE * route.length / s.robot.max_speed
+    drive(plant, Rehearsing(path, s.controller), localiser, GivenMap(), hz=s.control_hz, limit=limit)
+    return float(footprint_clearance(s.driven_world, s.robot.footprint, plant.poses).min())
+
+
+class Rehearsing(Decider):
+    """Follows a path with the controller alone, until the robot stands at its end."""
+
+    def __init__(self, path: TrackedPath, controller: PurePursuit) -> None:
+        self.step = Step()
+        self._path, self._controller = path, controller
+
+    def decide(self, tick: int, pose: Pose, state: State) -> None:
+        """The controller's command."""
+        self.step = Step(*self._controller.step(self._path, pose, self.step.command, self.step.pursuit))
+
+    def gives_up(self, state: State) -> Ending | None:
+        """The end of a robot that stands at the end of the path."""
+        there = self.step.pursuit.arc > self._path.length - self._path.goal_distance
+        return Ending(Outcome.SUCCEEDED) if there and abs(state.speed) < STANDING else None
 
 
 def _moved(pose: Pose, twist: Twist, time: float) -> Pose:

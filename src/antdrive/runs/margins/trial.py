@@ -6,7 +6,6 @@ import dataclasses
 import hashlib
 import json
 import math
-import zlib
 from dataclasses import dataclass
 from importlib import metadata
 from typing import TYPE_CHECKING, NamedTuple
@@ -18,11 +17,13 @@ from antdrive.base.errors import FieldError
 from antdrive.base.kernel_cache import sources_stamp
 from antdrive.base.plane import segment_lengths, wrap_angle
 from antdrive.planners import PLANNERS, SMOOTHINGS, Query, smooth
-from antdrive.robots import NoiseModel, PurePursuit, RobotSpec
+from antdrive.robots import PurePursuit, RobotSpec
 from antdrive.runs.margins.courses import course
-from antdrive.sim.driving.drive import drive
-from antdrive.sim.driving.recorder import Drive
+from antdrive.sim.driving.following import follow
+from antdrive.sim.driving.localising import localiser_of
+from antdrive.sim.driving.plants import Drive
 from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.log.streams import random_stream
 from antdrive.sim.physics.engine import Engine
 from antdrive.worlds import point_clearance, rasterise
 
@@ -100,24 +101,15 @@ def loss_on_course(conditions: Conditions, margin: float, seed: int) -> Loss:
     obstacles than the disc that the plan was made for.
     """
     c, robot = conditions, conditions.robot
-    task = course(robot, robot.radius + margin, _rng(seed, "course"))
+    task = course(robot, robot.radius + margin, random_stream(seed, "course"))
     grid = rasterise(task.world, task.cell, robot.radius + margin)
-    answer = PLANNERS["astar"].plan(Query.between(grid, task), _rng(seed, "planner"))
+    answer = PLANNERS["astar"].plan(Query.between(grid, task), random_stream(seed, "planner"))
     route = smooth(answer, grid, task, kind=c.smoothing)
-    period = 1 / c.control_hz
-    tracked = c.controller.prepare(route, task.world, robot, margin, period, task.goal_tolerance)
-    noise = robot.noise.scaled(c.noise)
-    model = NoiseModel(noise, robot.track, period, task.start, _rng(seed, "noise")) if noise.nonzero else None
+    period, limit = 1 / c.control_hz, 30.0 + 10.0 * route.length / robot.max_speed
+    path = c.controller.prepare(route, task.world, robot, margin, period, task.goal_tolerance)
+    localiser = localiser_of("fixes", robot, c.noise, 1.0, period, task.start, seed)
     with Engine(task.world, robot, physics_hz=c.physics_hz) as engine:
-        log = drive(
-            engine,
-            c.controller,
-            tracked,
-            task,
-            control_hz=c.control_hz,
-            time_limit=30.0 + 10.0 * route.length / robot.max_speed,
-            noise_model=model,
-        )
+        log = follow(engine, c.controller, path, task, limit=limit, control_hz=c.control_hz, localiser=localiser)
     if log.outcome is not Outcome.SUCCEEDED:
         return Loss(math.inf, math.inf)
     disc = point_clearance(task.world, log.pose[:, :2]) - robot.radius
@@ -133,7 +125,3 @@ def least_bound(log: Drive, radius: float, clearance: Floats) -> float:
     travel += radius * np.maximum(turned, speed[:, 1] * dt)
     between = (clearance[:-1] + clearance[1:] - travel) / 2
     return float(between.min(initial=clearance.min()))
-
-
-def _rng(seed: int, purpose: str) -> np.random.Generator:
-    return np.random.default_rng([seed, zlib.crc32(purpose.encode())])

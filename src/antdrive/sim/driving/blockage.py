@@ -14,7 +14,7 @@ from antdrive.planners import Query
 from antdrive.planners.graph.search import reachable
 from antdrive.sim.driving.blocking import covered_discs, with_obstacles
 from antdrive.sim.driving.gaps import STILL, NarrowGaps
-from antdrive.sim.driving.perception import Predictor
+from antdrive.sim.driving.parts import Others
 from antdrive.worlds import Grid, Task, rasterise
 
 LOOK = 1.0  # predictions are checked this often for a mover that sets out again [s]
@@ -36,7 +36,7 @@ class Blockage:
         self,
         task: Task,
         grid: Grid,
-        predictor: Predictor,
+        predictor: Others,
         hz: int,
         *,
         interval: float,

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from antdrive.base import Floats
 from antdrive.robots import TrackedPath
-from antdrive.sim.driving.perception import Predictor
+from antdrive.sim.driving.parts import Others
 from antdrive.worlds import Disc, Grid, Task
 
 STEP = 0.25  # movers are predicted at least this often [s]
@@ -18,7 +18,7 @@ MIN_RADIUS = 0.01  # smaller discs are left out [m]
 
 
 def covered_discs(
-    predictor: Predictor,
+    predictor: Others,
     tick: int,
     ends: Floats,
     duration: float,

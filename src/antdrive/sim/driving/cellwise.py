@@ -5,19 +5,17 @@ from __future__ import annotations
 import dataclasses
 import math
 import time
-from typing import Any
 
 import numpy as np
 
 from antdrive.base import Floats, Pose
 from antdrive.base.plane import polyline_length
-from antdrive.planners import PLANNERS, Planner, Query, agent_for, blaming, capabilities_of, check_step, smooth
+from antdrive.planners import PLANNERS, PlanResult, Query, agent_for, blaming, check_step, smooth
 from antdrive.robots import TrackedPath
 from antdrive.sim.driving.blocking import blocked_cells, covered_discs
-from antdrive.sim.driving.replanning import MISSED, Replan, ReplanMonitor
+from antdrive.sim.driving.replanning import MISSED, Replan, Replanning
 from antdrive.sim.log.record import DECISION
-from antdrive.sim.policy import ReplanPolicy
-from antdrive.worlds import Route, segment_clearance
+from antdrive.worlds import Grid, Route, segment_clearance
 
 DECISION_PAUSE = 0.2  # the shortest time between two decisions [s]
 DECIDE_BEFORE = 0.6  # a decision is due when less than this many cells of the route remain
@@ -25,15 +23,16 @@ STRAIGHT_BACK = 1.5  # a robot within this many cells of its cell's centre goes 
 AT_CELL = 0.25  # a robot this close to its cell's centre, in cells, need not drive through it
 
 
-class CellwiseMonitor(ReplanMonitor):
-    """Monitors a robot that decides cell by cell: its route never goes beyond the next cell."""
+class CellByCell(Replanning):
+    """Decide cell by cell: the route never goes beyond the next cell."""
 
-    def __init__(self, *args: Any, **kwargs: Any) -> None:
-        super().__init__(*args, **kwargs)
-        self._query = Query.between(self._grid, self._task)
+    def route(self, grid: Grid, plan: PlanResult) -> tuple[Route, TrackedPath]:
+        """Set out; the whole route of the plan, which the robot leaves at its first decision."""
+        self._query = Query.between(grid, self._task)
         self._online = agent_for(self._planner, self._query, self._rng)
         self._goal = self._query.goal
         self._noted_at = -math.inf
+        return super().route(grid, plan)
 
     @property
     def may_wait(self) -> bool:
@@ -63,8 +62,8 @@ class CellwiseMonitor(ReplanMonitor):
         with blaming(self._planner):
             here, propagated = self._online.cell, self._online.stats.propagated
             to = self._online.step(np.argwhere(blocked_cells(self._grid, covered)))
-        self.wrong = self.wrong or check_step(self._query, here, to)
-        if self.wrong:
+        self._routes.wrong = self._routes.wrong or check_step(self._query, here, to)
+        if self._routes.wrong:
             self.log.append(Replan(now, trigger, False, math.inf, 0, np.empty((0, 2)), 0.0))
             return None
         xy = self._line(pose, here, to, tick)
@@ -119,8 +118,3 @@ class CellwiseMonitor(ReplanMonitor):
         """Whether the straight line between two points keeps the grid's inflation from every obstacle."""
         clearance = segment_clearance(self._task.world, np.array([a]), np.array([b]))[0]
         return bool(clearance >= self._grid.inflate - 1e-9)
-
-
-def monitor_class(planner: Planner, policy: ReplanPolicy) -> type[ReplanMonitor]:
-    """The monitor for a planner: cell by cell where the planner decides so and may go around movers."""
-    return CellwiseMonitor if capabilities_of(planner).cell_by_cell and policy.around_movers else ReplanMonitor

@@ -1,41 +1,21 @@
-"""What the robot does in one control period: replan, pursue, keep to a schedule, avoid movers, arrive."""
+"""What the robot does in one control period: follow the guide, apply the rules, arrive."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from antdrive.base import Pose
-from antdrive.robots import (
-    LIMITERS,
-    Avoidance,
-    AvoidanceState,
-    PurePursuit,
-    PursuitState,
-    RobotSpec,
-    TrackedPath,
-    Twist,
-)
-from antdrive.sim.driving.caution import SLOWEST, Caution
-from antdrive.sim.driving.exploring import Exploration
-from antdrive.sim.driving.perception import Predictor
-from antdrive.sim.driving.recorder import Ending
-from antdrive.sim.driving.replanning import MISSED, ReplanMonitor
-from antdrive.sim.driving.schedule import slow_down
+from antdrive.robots import PursuitState, RobotSpec, TrackedPath
+from antdrive.sim.driving.parts import Decider, Ending, Guide, Moment, Rule, Step
+from antdrive.sim.driving.rules import OUT_OF_SIGHT, WAITING_SPEED, standing
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.physics.engine import State
 from antdrive.worlds import Task
 
-STOPPED_SPEED = 0.01  # a robot slower than this has stopped [m/s], [rad/s]
-WAITING_SPEED = 0.1  # a robot that avoids a mover and is slower than this waits for it [m/s]
 STUCK_TIME = 8.0  # a robot without progress for this long is stuck [s]
 STUCK_PROGRESS = 0.02  # what counts as progress along the route [m]
-GOAL_SHARE = 0.95  # a robot that avoids a mover may stop early within this fraction of the goal's tolerance
-DRIFTING_SHARE = 0.6  # and within this one, if it finds movers and its way by its lidar, and where it is by odometry
-BLIND_SHARE = 0.3  # of its top speed such a robot backs off where its lidar does not look, unless a mover is met then
-AVOIDING, ROTATING = LIMITERS.index("avoid"), LIMITERS.index("rotate")
-EXPLORING_LIMITERS = (*LIMITERS, "sight")  # the rules where the robot has no map
-OUT_OF_SIGHT = EXPLORING_LIMITERS.index("sight")
 
 
 class StuckClock(NamedTuple):
@@ -73,199 +53,90 @@ class StuckClock(NamedTuple):
         return why
 
 
-class Driver:
-    """Drives a robot along a path, period by period. `decide` chooses each command.
+class Driver(Decider):
+    """Drives a robot along a path, period by period. `decide` makes each step.
 
     Attributes:
-        tracked: the path that the robot follows now
-        pursuit: the controller's state: how far the robot has got, and what limited its speed
-        command: the twist that was commanded last
-        avoids: whether that twist avoids a mover, even if sight then held its speed
+        path: the path that the robot follows now
+        step: what the robot does now
     """
 
     def __init__(
-        self,
-        controller: PurePursuit,
-        tracked: TrackedPath,
-        task: Task,
-        robot: RobotSpec,
-        control_hz: int,
-        avoidance: Avoidance | None,
-        predictor: Predictor | None,
-        monitor: ReplanMonitor | Exploration | None,
-        caution: Caution | None = None,
+        self, guide: Guide, rules: Sequence[Rule], path: TrackedPath, task: Task, robot: RobotSpec, hz: int
     ) -> None:
-        self.tracked, self.command, self.pursuit = tracked, Twist(0.0, 0.0), PursuitState()
-        self._controller, self._task, self._robot, self._hz = controller, task, robot, control_hz
-        self._avoidance, self._predictor, self._monitor = avoidance, predictor, monitor
-        self._caution = caution
-        self._drifts = isinstance(monitor, Exploration) and monitor.survey.watch is not None
-        blind = self._drifts and robot.lidar is not None and not robot.lidar.full_circle
-        self._backwards = BLIND_SHARE * robot.max_speed if blind else math.inf
-        self._avoidance_state = AvoidanceState()
-        self.avoids = False
+        self.path, self.step = path, Step()
+        self._guide, self._rules, self._task, self._hz = guide, tuple(rules), task, hz
         self._clock = StuckClock()
-        self._patience = round(STUCK_TIME * control_hz)
-        self._full_turn = round(2 * math.pi / robot.max_yaw_rate * control_hz)
-
-    @property
-    def stuck(self) -> bool:
-        """Whether the robot has made no progress for too long; rotating in place may take a full turn's time longer."""
-        clock = self._clock
-        return clock.driving >= self._patience or clock.turning >= self._patience + self._full_turn
-
-    @property
-    def why_stuck(self) -> str:
-        """Why the robot makes no progress."""
-        return self._clock.reason
+        self._patience = round(STUCK_TIME * hz)
+        self._full_turn = full_turn(robot, hz)
 
     @property
     def fraction(self) -> float:
         """The fraction of the route that is done."""
-        return self.pursuit.arc / self.tracked.length
+        return self.step.pursuit.arc / self.path.length
 
     def decide(self, tick: int, pose: Pose, state: State) -> Ending | None:
-        """Choose the command of one control period, or end the drive.
+        """Make the step of one control period, or end the drive.
 
         Returns:
             How the drive ends now; None if it goes on.
         """
-        if self._monitor is not None:
-            self._replan_if_triggered(tick, pose, state)
-            if self._monitor.wrong:
-                return self._wrong_plan(tick)
-            if self._monitor.blockage.reason:
-                return Ending(Outcome.BLOCKED, self._monitor.blockage.reason)
-        if isinstance(self._monitor, Exploration):
-            self.tracked = self._monitor.refreshed(self.tracked, pose)
-        last, before = self.command, self.pursuit
-        self.command, self.pursuit = self._pursue(pose, last, before)
-        if isinstance(self._monitor, Exploration):
-            self._look_round(pose, last, self._monitor)
-        speed_limit = self._keep_to_schedule(tick, last)
-        if self._avoidance is not None and self._predictor is not None:
-            stopping = self.avoids and self._stops_at_goal(pose, last)
-            if stopping and _standing(state):
-                return self._arrival(pose, state)
-            self._avoid_movers(tick, pose, last, before, speed_limit, stopping)
-        self._keep_within_sight(tick, pose, last)
+        guide, before = self._guide, self.step
+        waiting = before.avoids and abs(state.speed) < WAITING_SPEED
+        self._follow(guide.update(tick, pose, waiting, self.path, before.pursuit.arc))
+        if guide.wrong:
+            return self._wrong_plan(tick)
+        if guide.blocked:
+            return Ending(Outcome.BLOCKED, guide.blocked)
+        self.path = guide.refreshed(self.path, pose)
+        now, step = Moment(tick, pose, state, self.path, self.step, self._clock), self.step
+        for rule in self._rules:
+            step = rule.apply(now, step)
+        self.step = step
+        if step.arrived:
+            return self._arrival(pose, state)
         ending = self._end_of_route(tick, pose, state)
-        waiting = self.avoids or speed_limit < WAITING_SPEED or self._looks
-        self._clock = self._clock.after(self.pursuit, waiting)
+        self._clock = self._clock.after(self.step.pursuit, step.avoids or step.waits or guide.scans)
         return ending
 
-    def _pursue(self, pose: Pose, last: Twist, before: PursuitState) -> tuple[Twist, PursuitState]:
-        """What the controller commands. A robot that has turned for more than a full turn drives off as soon as it may.
+    def gives_up(self, state: State) -> Ending | None:
+        """End the drive of a robot without progress for too long; rotating in place may take a full turn's time longer."""
+        clock = self._clock
+        if clock.driving < self._patience and clock.turning < self._patience + self._full_turn:
+            return None
+        return Ending(Outcome.STUCK, clock.reason)
 
-        Between pillars the longest lookahead whose arc is clear depends on the heading. So a robot that turns towards its
-        carrot may find the next carrot on its other side, and turn to and fro without end.
-        """
-        if self._clock.turning <= self._full_turn:
-            return self._controller.step(self.tracked, pose, last, before)
-        return self._controller.step(self.tracked.without_turning, pose, last, before._replace(turning=False))
+    def explained(self, ending: Ending, tick: int) -> Ending:
+        """How the drive ends; of a robot that did not get on, whether it had found no way."""
+        if ending.outcome not in (Outcome.STUCK, Outcome.TIMED_OUT):
+            return ending
+        return Ending(ending.outcome, "; ".join(filter(None, (ending.reason, self._guide.no_way(tick)))))
 
-    def _replan_if_triggered(self, tick: int, pose: Pose, state: State) -> None:
-        """Go on along a new path, if one is due and there is one."""
-        assert self._monitor is not None
-        waiting = self.avoids and abs(state.speed) < WAITING_SPEED
-        trigger = self._monitor.trigger(tick, pose, waiting, self.tracked, self.pursuit.arc)
-        if trigger:
-            self._follow(self._monitor.replan(tick, pose, trigger))
-
-    def _follow(self, tracked: TrackedPath | None) -> bool:
+    def _follow(self, path: TrackedPath | None) -> bool:
         """Go on along a new path; whether there is one."""
-        if tracked is None:
+        if path is None:
             return False
-        self.tracked, self.pursuit = tracked, PursuitState(limiter=self.pursuit.limiter)
+        self.path = path
+        self.step = self.step._replace(pursuit=PursuitState(limiter=self.step.pursuit.limiter))
         self._clock = self._clock._replace(farthest=0.0)
         return True
 
-    @property
-    def _looks(self) -> bool:
-        """Whether the robot looks round."""
-        return isinstance(self._monitor, Exploration) and self._monitor.look is not None
-
-    def _look_round(self, pose: Pose, last: Twist, exploration: Exploration) -> None:
-        """Turn on the spot where the robot is to look round, once it stands; stop where it has no way."""
-        if exploration.look is not None and not last.speed:
-            self.command = exploration.look.command(pose, last)
-            self.pursuit = self.pursuit._replace(limiter=ROTATING)
-        elif exploration.look is not None or exploration.lost:
-            self.command = _brake(last, self._robot, self._hz)
-
-    def _keep_within_sight(self, tick: int, pose: Pose, last: Twist) -> None:
-        """Slow down where the robot could not stop on ground that it has seen."""
-        if self._caution is None:
-            return
-        wanted = self.command
-        self.command, slowed = self._caution.limit(pose, last, wanted)
-        if slowed:
-            self.pursuit = self.pursuit._replace(limiter=OUT_OF_SIGHT)
-        if isinstance(self._monitor, Exploration):
-            stands = abs(self.command.speed) < SLOWEST and abs(self.command.yaw_rate) < SLOWEST
-            self._monitor.note_sight(tick, wanted if slowed and stands else None)
-
-    def _keep_to_schedule(self, tick: int, last: Twist) -> float:
-        """Slow the command down to the schedule, if there is one. Returns the speed that it allows [m/s]."""
-        schedule = self._monitor.schedule if self._monitor is not None else None
-        if schedule is None:
-            return math.inf
-        limit = schedule.speed_limit(tick / self._hz, self.pursuit.arc)
-        self.command = slow_down(self.command, last, limit, self._robot.max_acceleration / self._hz)
-        return limit
-
-    def _avoid_movers(
-        self, tick: int, pose: Pose, last: Twist, before: PursuitState, speed_limit: float, stopping: bool
-    ) -> None:
-        """Replace the command where movers come too close. A robot that is `stopping` brakes for the goal."""
-        avoidance = self._avoidance
-        assert avoidance is not None
-        assert self._predictor is not None
-        ahead = avoidance.prediction_times
-        if stopping:
-            self.command = _brake(last, self._robot, self._hz)
-            # A robot that stands at the goal has arrived, so only the time until it stands matters.
-            ahead = ahead[: 2 + math.ceil(_stopping_time(last, self._robot) / avoidance.step)]
-        movers, radii = self._predictor.predict(tick, pose[:2], ahead)
-        if self._monitor is not None:
-            radii = radii - self._monitor.blockage.gaps.closer(tick, pose[:2])
-        self.command, avoids, self._avoidance_state = avoidance.avoid(
-            self.tracked,
-            self._robot,
-            pose,
-            last,
-            before,
-            self.command,
-            self._avoidance_state,
-            movers,
-            radii,
-            speed_limit=speed_limit,
-            backwards=self._backwards,
-        )
-        self.avoids = avoids or stopping
-        if self.avoids:
-            self.pursuit = self.pursuit._replace(turning=before.turning, limiter=AVOIDING)
-
     def _end_of_route(self, tick: int, pose: Pose, state: State) -> Ending | None:
         """The ending of a robot that stands at the end of its route, unless it can still get to the goal."""
-        left = self.tracked.length - self.pursuit.arc
-        if left > self.tracked.goal_distance or not _standing(state) or any(self.command):
+        left = self.path.length - self.step.pursuit.arc
+        if left > self.path.goal_distance or not standing(state) or any(self.step.command):
             return None
-        ending, monitor, task = self._arrival(pose, state), self._monitor, self._task
+        ending, guide, task = self._arrival(pose, state), self._guide, self._task
         # The robot goes by its estimate: one that is at the goal by it stays, even if it missed it, and one that is not goes on.
-        knows = math.dist(pose[:2], task.goal) > task.goal_tolerance
-        if monitor is None or not knows:
+        if math.dist(pose[:2], task.goal) <= task.goal_tolerance:
             return ending
-        if isinstance(monitor, Exploration) and (monitor.lost or self._looks):
-            return None  # it looks for a way already, and no longer than a robot may make no progress
-        if self._follow(monitor.replan(tick, pose, MISSED)) or monitor.may_wait:
+        if self._follow(guide.missed(tick, pose)) or guide.may_wait:
             return None
-        return self._wrong_plan(tick) if monitor.wrong else ending
+        return self._wrong_plan(tick) if guide.wrong else ending
 
     def _wrong_plan(self, tick: int) -> Ending:
         """The ending of a drive on which the planner has given a wrong plan."""
-        assert self._monitor is not None
-        return Ending(Outcome.INVALID_PLAN, f"on the way, at t = {tick / self._hz:g} s: {self._monitor.wrong}")
+        return Ending(Outcome.INVALID_PLAN, f"on the way, at t = {tick / self._hz:g} s: {self._guide.wrong}")
 
     def _arrival(self, pose: Pose, state: State) -> Ending:
         """How the drive ends if the robot stops here, where it believes that it is at a pose, without a contact."""
@@ -281,27 +152,7 @@ class Driver:
             )
         return Ending(Outcome.STUCK, why)
 
-    def _stops_at_goal(self, pose: Pose, command: Twist) -> bool:
-        """Whether a robot that brakes now stops within the goal's tolerance."""
-        x, y, yaw = pose
-        goal = self._task.goal
-        distance = command.speed * abs(command.speed) / (2 * self._robot.max_acceleration)
-        end = (x + distance * math.cos(yaw), y + distance * math.sin(yaw))
-        share = DRIFTING_SHARE if self._drifts else GOAL_SHARE
-        return max(math.dist((x, y), goal), math.dist(end, goal)) < share * self._task.goal_tolerance
 
-
-def _standing(state: State) -> bool:
-    return abs(state.speed) < STOPPED_SPEED and abs(state.yaw_rate) < STOPPED_SPEED
-
-
-def _stopping_time(command: Twist, robot: RobotSpec) -> float:
-    """How long a robot takes to stop [s]."""
-    return max(abs(command.speed) / robot.max_acceleration, abs(command.yaw_rate) / robot.max_yaw_acceleration)
-
-
-def _brake(command: Twist, robot: RobotSpec, hz: int) -> Twist:
-    """The command of a robot that brakes on the same curve, as far as it can slow its turn as fast."""
-    share = max(0.0, 1 - robot.max_acceleration / hz / abs(command.speed)) if command.speed else 0.0
-    turning = max(abs(command.yaw_rate) * share, abs(command.yaw_rate) - robot.max_yaw_acceleration / hz, 0.0)
-    return Twist(command.speed * share, math.copysign(turning, command.yaw_rate))
+def full_turn(robot: RobotSpec, hz: int) -> int:
+    """How many control periods a full turn on the spot takes."""
+    return round(2 * math.pi / robot.max_yaw_rate * hz)

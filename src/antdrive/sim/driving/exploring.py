@@ -15,31 +15,30 @@ import numpy as np
 
 from antdrive.base import Bounds, Floats, Pose
 from antdrive.planners import (
-    Planner,
     PlanResult,
     PlanStatus,
     Query,
     Replanner,
     answered,
-    ask,
     blaming,
     capabilities_of,
-    checked,
     replanner_for,
     smooth,
 )
 from antdrive.planners.plan import Cell
-from antdrive.robots import PurePursuit, RobotSpec, TrackedPath, Twist
+from antdrive.robots import TrackedPath, Twist
 from antdrive.robots.control.pursuit import unsorted
 from antdrive.sim.driving import _kernels_hits
 from antdrive.sim.driving.blocking import blocked_cells
 from antdrive.sim.driving.movers_ahead import MoversAhead
 from antdrive.sim.driving.own_map import LOOKED, PATIENCE
+from antdrive.sim.driving.parts import RouteGuide, Rows
 from antdrive.sim.driving.recovery import TRAIL, Look, Recovery
-from antdrive.sim.driving.replanning import STRAYED, Replan
+from antdrive.sim.driving.replanning import MISSED, STRAYED, Replan
+from antdrive.sim.driving.routes import RoutePlanner
 from antdrive.sim.driving.survey import Survey
 from antdrive.sim.driving.traffic import Zone
-from antdrive.sim.log.scans import scans_logged
+from antdrive.sim.log.streams import random_stream
 from antdrive.sim.policy import ReplanPolicy
 from antdrive.worlds import Disc, Grid, Route, Task, World, point_clearance, rasterise
 from antdrive.worlds.world import PointWorld
@@ -68,78 +67,66 @@ TURNING = 0.015  # a rectangle that turns on the spot keeps this much more from 
 LATELY = 30.0  # what plans found no longer ago than this is said of a drive that ends without a way [s]
 
 
-class Unblocked:
-    """What the driver asks about movers that close every way: none do, and all are passed as avoidance would have it.
-
-    Attributes:
-        reason: empty
-    """
-
-    reason = ""
-
-    @property
-    def gaps(self) -> Unblocked:
-        """Where the robot may pass closer: nowhere."""
-        return self
-
-    def closer(self, tick: int, robot: tuple[float, float]) -> float:
-        """By how much less than avoidance keeps the robot may pass movers [m]."""
-        return 0.0
-
-
-class Exploration:
+class Exploration(RouteGuide):
     """Finds routes through what a robot without a map has seen.
 
     Attributes:
-        wrong: what was wrong with the planner's first wrong plan; empty if none was
         log: every attempt to find a new route
         lost: whether there is no path through what was seen; then the robot stops
     """
 
-    schedule = None
-    blockage = Unblocked()
-
     def __init__(
         self,
-        planner: Planner,
+        planner: RoutePlanner,
         survey: Survey,
-        task: Task,
-        rng: np.random.Generator,
-        *,
-        robot: RobotSpec,
-        controller: PurePursuit,
         policy: ReplanPolicy,
-        margin: float,
-        smoothing: str,
-        cell: float,
-        hz: int,
         movers: MoversAhead | None = None,
     ) -> None:
         self._movers = movers
-        self.survey, self.wrong, self.log = survey, "", list[Replan]()
-        self._planner, self._task, self._rng = planner, task, rng
-        self._robot, self._controller, self._policy = robot, controller, policy
-        self._margin, self._smoothing, self._cell, self._hz = margin, smoothing, cell, hz
+        self.survey, self.log = survey, []
+        self._routes, self._policy = planner, policy
+        self._planner, self._task, self._hz = planner.planner, planner.task, planner.hz
+        self._robot, self._margin, self._cell = planner.robot, planner.margin, planner.cell
+        self._rng = self._fresh_rng()
         self._replanners: dict[tuple[float, float, Bounds], tuple[Replanner, Cell]] = {}
         self._ahead, self._needed = np.empty((0, 2)), np.empty(0)
         self._arcs = np.empty(0)
         self._looked = self._indexed = 0
         self._planned_at = -math.inf
         self.lost, self._failures, self._gave_up_at = False, 0, -math.inf
-        self._recovery = Recovery(survey, robot, task.start, hz)
+        self._recovery = Recovery(survey, planner.robot, planner.task.start, planner.hz)
         self._tick = 0
         self._seen: list[tuple[int, Floats]] = []
-        self._known_as: tuple[tuple[Any, ...], Task] = (), task
+        self._known_as: tuple[tuple[Any, ...], Task] = (), planner.task
+
+    def _fresh_rng(self) -> np.random.Generator:
+        return random_stream(self._routes.seed, "replanner")
 
     @property
     def may_wait(self) -> bool:
-        """Whether the robot stays where it is for a while: it has no way, and tries again."""
-        return self.lost
+        """Whether the robot stays where it is for a while: it has no way, and tries again, or it makes a scan turn."""
+        return self.lost or self.scans
+
+    @property
+    def scans(self) -> bool:
+        """Whether the robot makes a scan turn."""
+        return self._recovery.look is not None
 
     @property
     def look(self) -> Look | None:
-        """The turn with which the robot looks round now; None: it does not."""
+        """The scan turn that the robot makes now; None: it makes none."""
         return self._recovery.look
+
+    def first(self) -> tuple[Grid, PlanResult]:
+        """The grid and the plan from the start, through what the first scan shows. Later plans do not depend on it."""
+        found = self.plan(self._task.start)
+        self._rng = self._fresh_rng()
+        self._replanners.clear()
+        return found
+
+    def accept(self, grid: Grid, plan: PlanResult) -> tuple[Grid, PlanResult]:
+        """Take a plan that was made elsewhere as it is."""
+        return grid, plan
 
     # ---- plans
 
@@ -212,12 +199,15 @@ class Exploration:
         with blaming(planner):
             replanner.block(np.argwhere(blocked))
             answer = replanner.result()
-        return self._checked(query, answered(planner, answer))
+        return self._routes.checked(query, answered(planner, answer))
 
-    def route(
+    def route(self, grid: Grid, plan: PlanResult) -> tuple[Route, TrackedPath]:
+        """Set out on a plan: its route, and the same prepared for the controller."""
+        return self._route(self._task.start, grid, plan)
+
+    def _route(
         self, pose: Pose, grid: Grid, answer: PlanResult, avoided: list[Disc] | None = None
     ) -> tuple[Route, TrackedPath]:
-        """The route of a plan, smoothed, and the same prepared for the controller."""
         bounds = _bounds_of(grid)
         task = self._known(pose, bounds)
         self._seen.append((self._tick, task.world.discs))
@@ -225,7 +215,7 @@ class Exploration:
         discs = _kernels_hits.near_polyline(line, task.world.discs, grid.inflate + CORRIDOR)
         near = dataclasses.replace(task, world=_world(bounds, discs))
         around = dataclasses.replace(near, world=_with(near.world, avoided)) if avoided else near
-        route = smooth(answer, grid, around, kind=self._smoothing)
+        route = smooth(answer, grid, around, kind=self._routes.smoothing)
         tracked = self._prepare(route, near.world, grid.inflate - self._robot.radius)
         self._watch(route, near.world, grid.inflate)
         return route, tracked
@@ -260,18 +250,9 @@ class Exploration:
         query = Query.between(grid, task)
         if query.unreachable:
             return PlanResult(status=PlanStatus.NO_PATH, reason=query.unreachable)
-        planner = self._planner
-        if capabilities_of(planner).own_replanner:
-            answer = self._repaired(query)
-        else:
-            answer = ask(planner, query, self._rng)
-        return self._checked(query, answer)
-
-    def _checked(self, query: Query, answer: PlanResult) -> PlanResult:
-        plan = checked(query, answer)
-        if plan.status is PlanStatus.INVALID:
-            self.wrong = self.wrong or plan.reason
-        return plan
+        if capabilities_of(self._planner).own_replanner:
+            return self._routes.checked(query, self._repaired(query))
+        return self._routes.ask(query, self._rng)
 
     def _repaired(self, query: Query) -> PlanResult:
         grid, planner = query.grid, self._planner
@@ -292,8 +273,7 @@ class Exploration:
     def _prepare(self, route: Route, world: World, margin: float) -> TrackedPath:
         robot = self._robot
         self._indexed = -1  # the path knows the obstacles along the route, and is to know those near the robot
-        tolerance = self._task.goal_tolerance
-        tracked = self._controller.prepare(route, world, robot, margin, 1 / self._hz, tolerance, SAMPLES, indexed=False)
+        tracked = self._routes.prepared(route, world, margin, SAMPLES, indexed=False)
         foot, tuning = robot.footprint, tracked.tuning
         give = FORGIVING + CORNERED * (robot.radius - foot.inner_radius)
         return dataclasses.replace(
@@ -308,15 +288,26 @@ class Exploration:
 
     # ---- what the driver asks
 
-    def refreshed(self, tracked: TrackedPath, pose: Pose) -> TrackedPath:
+    def refreshed(self, path: TrackedPath, pose: Pose) -> TrackedPath:
         """The path with what the lidar has just seen near the robot."""
         if self._indexed == self.survey.whole:
-            return tracked
+            return path
         self._indexed = self.survey.whole
         x, y, _ = pose
-        near = self._controller.lookahead_max + tracked.tuning.lookahead_clearance + SPARE
+        near = self._routes.controller.lookahead_max + path.tuning.lookahead_clearance + SPARE
         discs = self.survey.discs((x - near, y - near, x + near, y + near))
-        return tracked.among(unsorted(discs, tracked.obstacles.bounds))
+        return path.among(unsorted(discs, path.obstacles.bounds))
+
+    def update(self, tick: int, pose: Pose, waiting: bool, path: TrackedPath, arc: float) -> TrackedPath | None:
+        """A new path, if one is due and there is one."""
+        trigger = self.trigger(tick, pose, waiting, path, arc)
+        new = self.replan(tick, pose, trigger) if trigger else None
+        self.wrong = self._routes.wrong
+        return new
+
+    def missed(self, tick: int, pose: Pose) -> TrackedPath | None:
+        """A new path to a goal that the robot missed, unless it looks for a way already."""
+        return None if self.may_wait else self.replan(tick, pose, MISSED)
 
     def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
         """Why a new route is due now; empty if none is."""
@@ -365,8 +356,8 @@ class Exploration:
             self.survey.forget(pose)
         grid, plan, avoided = self._plan_around(tick, pose)
         route, tracked = None, None
-        if plan.solved and len(plan.cells) and not self.wrong:
-            route, tracked = self.route(pose, grid, plan, avoided)
+        if plan.solved and len(plan.cells) and not self._routes.wrong:
+            route, tracked = self._route(pose, grid, plan, avoided)
         cost, xy = (plan.cost, route.xy) if route else (math.inf, np.empty((0, 2)))
         self.log.append(Replan(now, trigger, route is not None, cost, plan.work, xy, time.perf_counter() - started))
         self.lost = route is None
@@ -408,13 +399,13 @@ class Exploration:
             return ""
         return f"no way through what was seen, last at t = {self._gave_up_at:.1f} s"
 
-    def logged(self, per_tick: int, rows: int) -> dict[str, Any]:
-        """The arrays of a log about what was seen, by the names of `Rollout`."""
-        seen = [(tick, discs) for tick, discs in self._seen if tick * per_tick < rows]
+    def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
+        """The array `seen` of a log: the discs that each plan was made among. Cells lie on grids that nobody else knows."""
+        seen = [(tick, discs) for tick, discs in self._seen if tick * per_tick < len(log.t)]
         tables = [np.column_stack((np.full(len(discs), tick * per_tick), discs)) for tick, discs in seen]
         return {
-            **scans_logged(((scan.tick, scan.ranges) for scan in self.survey.scans), per_tick, rows),
-            "seen": np.concatenate(tables).astype(np.float32) if tables else np.empty((0, 4), dtype=np.float32),
+            "seen": np.concatenate(tables or [np.empty((0, 4))]).astype(np.float32),
+            "cells": np.empty((0, 2), dtype=np.int32),
         }
 
     # ---- the route ahead

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from antdrive.base import Floats
 from antdrive.robots import TrackedPath
 from antdrive.sim.driving.blocking import covered_discs
-from antdrive.sim.driving.perception import Predictor
+from antdrive.sim.driving.parts import Others
 from antdrive.worlds import Disc, Grid
 
 STILL = 0.05  # a mover that stays this close to where it was stands still [m]
@@ -30,7 +30,7 @@ class NarrowGaps:
         keeps: the distance that local avoidance keeps between the robot's centre and a mover's surface [m]
     """
 
-    def __init__(self, grid: Grid, predictor: Predictor, keeps: float) -> None:
+    def __init__(self, grid: Grid, predictor: Others, keeps: float) -> None:
         self.keeps = keeps
         self._grid, self._predictor = grid, predictor
         self._places: dict[int, tuple[float, float]] = {}

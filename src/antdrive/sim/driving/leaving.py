@@ -7,8 +7,14 @@ import math
 import numpy as np
 
 from antdrive.base import Floats, Pose
-from antdrive.robots import PurePursuit, PursuitState, RobotSpec, TrackedPath, Twist, footprint_clearance
+from antdrive.robots import PurePursuit, RobotSpec, TrackedPath, Twist, footprint_clearance
 from antdrive.robots.placing import gaps, name_of
+from antdrive.sim.driving.drive import drive
+from antdrive.sim.driving.given import Exact, GivenMap
+from antdrive.sim.driving.parts import Decider, Ending, Step
+from antdrive.sim.driving.plants import Kinematic
+from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.physics.engine import State
 from antdrive.worlds import World, point_clearance
 
 REHEARSED = 60.0  # after this time a robot that is still in a narrow place is left to the drive [s]
@@ -29,45 +35,48 @@ def cannot_leave(
     not take is no way out. It turns the shorter way round; a robot that is not centred on its axle turns the other way
     where the shorter is blocked and the longer is not.
     """
-    if robot.footprint.corners and _gets_away(tracked, controller, world, robot, start, control_hz):
-        return ""
-    pose, command, state = start, Twist(0.0, 0.0), PursuitState()
-    path = tracked.for_any_turn
-    for _ in range(round(REHEARSED * control_hz)):
-        if not is_narrow(world, robot, pose):
+    if robot.footprint.corners:
+        halting = Leaving(tracked, controller, world, robot, halts=True)
+        if _rehearsed(halting, world, robot, start, control_hz)[0].outcome is Outcome.SUCCEEDED:
             return ""
-        command, state = controller.step(path, pose, command, state)
-        way = _way(pose, command, 1 / control_hz, robot.radius)
-        touching = footprint_clearance(world, robot.footprint, way) <= 0
-        if touching.any():
-            gap = gaps(world, robot, way[touching][:1])[0]
-            does = "turning on the spot" if state.turning else "driving off"
-            return (
-                f"{does} at the start would bring {robot.name} into {name_of(world, int(gap.argmin()))}; "
-                f"a free turn needs {robot.radius:.3f} m around its centre, the start has {_room(world, start):.3f} m"
-            )
-        x, y, yaw = way[-1].tolist()
-        pose = (x, y, yaw)
-    return ""
+    leaving = Leaving(tracked.for_any_turn, controller, world, robot)
+    ending, plant = _rehearsed(leaving, world, robot, start, control_hz)
+    if ending.outcome is not Outcome.COLLIDED:
+        return ""
+    touching = footprint_clearance(world, robot.footprint, plant.way) <= 0
+    gap = gaps(world, robot, plant.way[touching][:1])[0]
+    does = "turning on the spot" if leaving.step.pursuit.turning else "driving off"
+    return (
+        f"{does} at the start would bring {robot.name} into {name_of(world, int(gap.argmin()))}; "
+        f"a free turn needs {robot.radius:.3f} m around its centre, the start has {_room(world, start):.3f} m"
+    )
 
 
-def _gets_away(
-    tracked: TrackedPath, controller: PurePursuit, world: World, robot: RobotSpec, start: Pose, control_hz: int
-) -> bool:
-    """Whether a robot that turns only where nothing is in its way leaves the narrow place and touches nothing."""
-    pose, command, state = start, Twist(0.0, 0.0), PursuitState()
-    for _ in range(round(REHEARSED * control_hz)):
-        if not is_narrow(world, robot, pose):
-            return True
-        command, state = controller.step(tracked, pose, command, state)
-        if not any(command):
-            return False
-        way = _way(pose, command, 1 / control_hz, robot.radius)
-        if (footprint_clearance(world, robot.footprint, way) <= 0).any():
-            return False
-        x, y, yaw = way[-1].tolist()
-        pose = (x, y, yaw)
-    return False
+class Leaving(Decider):
+    """Follows a path until the robot could turn freely; one that `halts` gives up where the controller stops it."""
+
+    def __init__(
+        self, path: TrackedPath, controller: PurePursuit, world: World, robot: RobotSpec, *, halts: bool = False
+    ) -> None:
+        self.step = Step()
+        self._path, self._controller, self._world, self._robot, self._halts = path, controller, world, robot, halts
+
+    def decide(self, tick: int, pose: Pose, state: State) -> Ending | None:
+        """The controller's command, as long as the place is narrow."""
+        if not is_narrow(self._world, self._robot, pose):
+            return Ending(Outcome.SUCCEEDED)
+        self.step = Step(*self._controller.step(self._path, pose, self.step.command, self.step.pursuit))
+        return Ending(Outcome.STUCK) if self._halts and not any(self.step.command) else None
+
+
+def _rehearsed(leaving: Leaving, world: World, robot: RobotSpec, start: Pose, hz: int) -> tuple[Ending, Kinematic]:
+    """How the way out ends, and the robot there."""
+    plant = Kinematic(
+        start,
+        lambda pose, twist: _way(pose, twist, 1 / hz, robot.radius),
+        lambda way: bool((footprint_clearance(world, robot.footprint, way) <= 0).any()),
+    )
+    return drive(plant, leaving, Exact(), GivenMap(), hz=hz, limit=REHEARSED), plant
 
 
 def _room(world: World, pose: Pose) -> float:

@@ -1,19 +1,72 @@
-"""Where the robot believes it is: by pose fixes, by odometry alone, or without error.
+"""Localisers: exact, by noisy pose fixes, by dead reckoning, or by the true pose.
 
 The same wheels slip and the same commands are late whichever way the robot localises itself.
 """
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
+import numpy as np
+
 from antdrive.base import Pose
 from antdrive.robots import NoiseModel, RobotSpec, Twist
 from antdrive.robots.odometry import Odometry
+from antdrive.robots.spec import Noise
+from antdrive.sim.driving.given import Exact
+from antdrive.sim.driving.parts import Rows
 from antdrive.sim.log.streams import random_stream
+from antdrive.sim.physics.engine import State
 from antdrive.sim.sensing.dead_reckoning import DeadReckoning
 
 
-class OdometryModel(NoiseModel):
-    """The noise of a drive without pose fixes: encoders tell the speed, a gyro the yaw rate, and errors add up."""
+class Fixes(NoiseModel):
+    """Wheel odometry that noisy pose fixes correct.
+
+    Attributes:
+        noisy: true
+        estimates: the estimated pose in each control period so far
+    """
+
+    noisy = True
+
+    def __init__(self, noise: Noise, track: float, period: float, start: Pose, rng: np.random.Generator) -> None:
+        super().__init__(noise, track, period, start, rng)
+        self.estimates: list[Pose] = []
+
+    def sense(self, state: State) -> Pose:
+        """The pose by odometry and, where one is due, a fix."""
+        return self.estimate_pose(state.pose, Twist(state.speed, state.yaw_rate))
+
+    def settle(self, estimate: Pose) -> Pose:
+        """Go on from an estimate; the pose after the commands that are under way."""
+        self.estimate = estimate
+        self.estimates.append(estimate)
+        return self.pose_after_delay()
+
+    def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
+        """The estimates, whose error stays the same between two control periods, and the targets of the motors."""
+        errors = [
+            (x - true_x, y - true_y, math.remainder(yaw - true_yaw, 2 * math.pi))
+            for (x, y, yaw), (true_x, true_y, true_yaw) in zip(
+                self.estimates, log.pose[::per_tick].tolist(), strict=False
+            )
+        ]
+        period = np.minimum(np.arange(len(log.t)) // per_tick, max(len(errors) - 1, 0))
+        return {"estimate": log.pose + np.array(errors or [(0.0, 0.0, 0.0)])[period], "actuated": log.actuated}
+
+
+class TruePose(Fixes):
+    """The true pose, on wheels that slip."""
+
+    def estimate_pose(self, pose: Pose, twist: Twist) -> Pose:
+        """The true pose."""
+        return pose
+
+
+class Reckoned(Fixes):
+    """Dead reckoning: encoders tell the speed, a gyro the yaw rate, and errors add up. Scans may correct it."""
 
     def __init__(self, robot: RobotSpec, noise: float, period: float, start: Pose, seed: int, errors: Odometry) -> None:
         super().__init__(robot.noise.scaled(noise), robot.track, period, start, random_stream(seed, "noise"))
@@ -28,28 +81,19 @@ class OdometryModel(NoiseModel):
         self._tick += 1
         return self.estimate
 
-    def correct(self, estimate: Pose) -> None:
-        """Go on from another pose."""
-        self.estimate = self._reckoning.pose = estimate
+    def settle(self, estimate: Pose) -> Pose:
+        """Go on from an estimate; the pose after the commands that are under way."""
+        self._reckoning.pose = estimate
+        return super().settle(estimate)
 
 
-class TruePoseModel(NoiseModel):
-    """The noise of a drive in which the robot knows its pose without error."""
-
-    def estimate_pose(self, pose: Pose, twist: Twist) -> Pose:
-        """The true pose."""
-        self.estimate = pose
-        return pose
-
-
-def noise_model_of(
+def localiser_of(
     kind: str, robot: RobotSpec, noise: float, odometry: float, period: float, start: Pose, seed: int
-) -> NoiseModel | None:
-    """The noise of one drive; None where the robot senses and acts perfectly."""
+) -> Exact | Fixes:
+    """The localiser of one drive."""
     if kind in ("odometry", "matching"):
-        return OdometryModel(robot, noise, period, start, seed, Odometry().scaled(odometry))
+        return Reckoned(robot, noise, period, start, seed, Odometry().scaled(odometry))
     levels = robot.noise.scaled(noise)
     if not levels.nonzero:
-        return None
-    model = TruePoseModel if kind == "true" else NoiseModel
-    return model(levels, robot.track, period, start, random_stream(seed, "noise"))
+        return Exact()
+    return (TruePose if kind == "true" else Fixes)(levels, robot.track, period, start, random_stream(seed, "noise"))

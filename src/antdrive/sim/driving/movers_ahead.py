@@ -16,7 +16,7 @@ from antdrive.sim.driving.blocking import close_route, covered_discs
 from antdrive.sim.driving.replanning import OBSTRUCTED, TRAFFIC, WAITED
 from antdrive.sim.driving.survey import Survey
 from antdrive.sim.driving.traffic import TrackedTraffic, Zone
-from antdrive.sim.driving.watching import TrackedPredictor
+from antdrive.sim.driving.watching import Tracked
 from antdrive.sim.policy import ReplanPolicy
 from antdrive.worlds import Disc, Grid, World, rasterise
 
@@ -32,7 +32,7 @@ class MoversAhead:
 
     def __init__(
         self,
-        predictor: TrackedPredictor,
+        predictor: Tracked,
         survey: Survey,
         policy: ReplanPolicy,
         robot: RobotSpec,

@@ -14,8 +14,8 @@ from antdrive.worlds import Trajectories
 CHUNK = 240  # control periods whose positions and velocities are computed at once
 
 
-class Predictor:
-    """Predicts the movers of one drive from what the robot perceives of them.
+class Told:
+    """Movers by ground truth: positions, velocities or motions, within range.
 
     Attributes:
         trajectories: the movers' true motions

@@ -21,25 +21,24 @@ import numpy as np
 
 from antdrive.base import Floats, Pose
 from antdrive.planners import (
-    Planner,
     PlanResult,
     PlanStatus,
     Query,
     TimedPlan,
     answered,
-    ask,
     blaming,
     capabilities_of,
-    checked,
     replanner_for,
     smooth,
 )
-from antdrive.robots import PurePursuit, RobotSpec, TrackedPath
+from antdrive.robots import TrackedPath
 from antdrive.sim.driving.blockage import Blockage
 from antdrive.sim.driving.blocking import blocked_cells, close_route, covered_discs, with_obstacles
-from antdrive.sim.driving.perception import Predictor
+from antdrive.sim.driving.parts import Others
+from antdrive.sim.driving.routes import OneRoute, RoutePlanner
 from antdrive.sim.driving.schedule import Schedule
 from antdrive.sim.driving.traffic import Traffic, Zone
+from antdrive.sim.log.streams import random_stream
 from antdrive.sim.policy import ReplanPolicy
 from antdrive.worlds import Disc, Grid, Route, Task, rasterise
 
@@ -78,8 +77,8 @@ class Replan:
     wall_s: float
 
 
-class ReplanMonitor:
-    """Decides during one drive when a new route is due, and finds it.
+class Replanning(OneRoute):
+    """Follow the first route until another is due: around movers, or back to the goal.
 
     It knows the world's obstacles, and of its movers what the robot perceives.
 
@@ -88,48 +87,58 @@ class ReplanMonitor:
         log: the attempts so far
         schedule: where the robot should be at each time; None unless the route comes from a plan in space
             and time
-        blockage: whether movers that stand still close every way
-        wrong: what is wrong with a plan that the planner has given on the way; empty if none was. The drive then ends
     """
 
-    def __init__(
-        self,
-        policy: ReplanPolicy,
-        planner: Planner,
-        grid: Grid,
-        task: Task,
-        rng: np.random.Generator,
-        *,
-        predictor: Predictor,
-        robot: RobotSpec,
-        controller: PurePursuit,
-        margin: float,
-        smoothing: str,
-        hz: int,
-        keeps: float = 0.0,
-    ) -> None:
-        self.policy, self.log, self.wrong = policy, list[Replan](), ""
+    def __init__(self, planner: RoutePlanner, policy: ReplanPolicy, others: Others, keeps: float = 0.0) -> None:
+        super().__init__(planner)
+        self.policy = policy
         self.schedule: Schedule | None = None
-        self._planner, self._grid, self._rng, self._predictor, self._hz = planner, grid, rng, predictor, hz
-        self._task = dataclasses.replace(task, world=dataclasses.replace(task.world, movers=()))
-        self._robot, self._controller, self._margin, self._smoothing = robot, controller, margin, smoothing
-        self._timed = capabilities_of(planner).needs_motions
+        self._planner, self._rng, self._hz = planner.planner, random_stream(planner.seed, "replanner"), planner.hz
+        self._predictor, self._keeps = others, keeps
+        self._task = dataclasses.replace(planner.task, world=dataclasses.replace(planner.task.world, movers=()))
+        self._timed = capabilities_of(planner.planner).needs_motions
         self._replanner: Replanner | None = None
-        self._blocked = np.zeros(grid.shape, dtype=np.bool_)
         self._replanned_at = -math.inf
         self._waiting_since = math.nan
-        learns = policy.around_movers and predictor.guesses and not self._timed
-        self._traffic = Traffic(predictor, robot.radius, task.world.bounds, hz) if learns else None
+        learns = policy.around_movers and others.guesses and not self._timed
+        bounds = planner.task.world.bounds
+        self._traffic = Traffic(others, planner.robot.radius, bounds, planner.hz) if learns else None
+
+    def route(self, grid: Grid, plan: PlanResult) -> tuple[Route, TrackedPath]:
+        """Set out on a plan: its route, and the same prepared for the controller."""
+        self._grid, policy = grid, self.policy
+        self._blocked = np.zeros(grid.shape, dtype=np.bool_)
         self.blockage = Blockage(
-            self._task, grid, predictor, hz, interval=policy.min_interval, patience=policy.patience, keeps=keeps
+            self._task,
+            grid,
+            self._predictor,
+            self._hz,
+            interval=policy.min_interval,
+            patience=policy.patience,
+            keeps=self._keeps,
         )
+        route, path = super().route(grid, plan)
+        self._track(plan, route)
+        return route, path
 
-    @property
-    def may_wait(self) -> bool:
-        """Whether a robot at the end of its route may wait there for a way on."""
-        return False
+    def update(self, tick: int, pose: Pose, waiting: bool, path: TrackedPath, arc: float) -> TrackedPath | None:
+        """A new path, if one is due and there is one."""
+        trigger = self.trigger(tick, pose, waiting, path, arc)
+        new = self.replan(tick, pose, trigger) if trigger else None
+        self.wrong, self.blocked = self._routes.wrong, self.blockage.reason
+        return new
 
-    def track(self, plan: PlanResult, route: Route) -> None:
+    def missed(self, tick: int, pose: Pose) -> TrackedPath | None:
+        """A new path for a robot that stands at the end of its route, but not at the goal."""
+        new = self.replan(tick, pose, MISSED)
+        self.wrong = self._routes.wrong
+        return new
+
+    def closer(self, tick: int, robot: tuple[float, float]) -> Floats:
+        """How much closer than usual the robot may pass each perceived mover (P,) [m]."""
+        return self.blockage.gaps.closer(tick, robot)
+
+    def _track(self, plan: PlanResult, route: Route) -> None:
         """Note that the robot sets out on a route that was made from a plan."""
         self.schedule = Schedule.of(plan, route) if self._timed and isinstance(plan, TimedPlan) else None
 
@@ -171,18 +180,18 @@ class ReplanMonitor:
             self.log.append(Replan(now, trigger, False, math.inf, 0, np.empty((0, 2)), 0.0))
             return None
         if self._timed:
-            plan = self._plan_in_time(task, now)
+            plan = self._routes.ask(self._routes.query(self._grid, task, now), self._rng)
         else:
             plan, discs = self._plan_around(task, discs, self._zones(tick, pose) if around_movers else [])
         if not plan.solved and around_movers and self.blockage.may_pass(tick, pose[:2]):
             discs = self._discs(tick, pose)
             plan = self._plan(task, discs)
         route = None
-        if plan.solved and len(plan.cells) and not self.wrong:
+        if plan.solved and len(plan.cells) and not self._routes.wrong:
             # A timed plan's times are those of its cells, so its route must follow the cells.
-            smoothing = "none" if self._timed else self._smoothing
+            smoothing = "none" if self._timed else self._routes.smoothing
             route = smooth(plan, self._grid, with_obstacles(task, discs), kind=smoothing)
-            self.track(plan, route)
+            self._track(plan, route)
         cost, xy = (plan.cost, route.xy) if route else (math.inf, np.empty((0, 2)))
         wall_s = time.perf_counter() - started
         self.log.append(Replan(now, trigger, route is not None, cost, plan.work, xy, wall_s))
@@ -193,20 +202,7 @@ class ReplanMonitor:
         return self._prepare(route) if route else None
 
     def _prepare(self, route: Route) -> TrackedPath:
-        task = self._task
-        return self._controller.prepare(route, task.world, self._robot, self._margin, 1 / self._hz, task.goal_tolerance)
-
-    def _plan_in_time(self, task: Task, now: float) -> PlanResult:
-        query = Query.between(self._grid, task)
-        query = dataclasses.replace(query, motions=self._predictor.trajectories.motions, start_time=now)
-        return self._checked(query, ask(self._planner, query, self._rng))
-
-    def _checked(self, query: Query, answer: PlanResult) -> PlanResult:
-        """The answer, if it is right; else note what is wrong with it."""
-        plan = checked(query, answer)
-        if plan.status is PlanStatus.INVALID:
-            self.wrong = self.wrong or plan.reason
-        return plan
+        return self._routes.prepared(route, self._task.world, self._routes.margin)
 
     def _plan_around(self, task: Task, discs: list[Disc], zones: list[Zone]) -> tuple[PlanResult, list[Disc]]:
         """A plan around the first zone where it is not too long, else around discs; and what it goes around."""
@@ -225,7 +221,7 @@ class ReplanMonitor:
             around = with_obstacles(task, discs + zone.discs if zone is not None else discs)
             grid = rasterise(around.world, self._grid.cell, self._grid.inflate)
             query = Query.between(grid, around)
-            return self._checked(query, ask(self._planner, query, self._rng))
+            return self._routes.ask(query, self._rng)
         query = Query.between(self._grid, task)
         if self._replanner is None:
             self._replanner = replanner_for(self._planner, query, self._rng)
@@ -242,7 +238,7 @@ class ReplanMonitor:
         answer = answered(self._planner, answer)
         if query.unreachable:  # a replanner knows cells only, not that the robot cannot get to the first of them
             return PlanResult(status=PlanStatus.NO_PATH, reason=query.unreachable)
-        return self._checked(query, answer)
+        return self._routes.checked(query, answer)
 
     def _discs(self, tick: int, pose: Pose) -> list[Disc]:
         """What movers will cover soon; they close neither the robot's position nor the goal."""

@@ -10,22 +10,30 @@ log it gives the same bits; elsewhere rounding differs, and `ROUNDING` says how 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
+from antdrive.base import Pose
 from antdrive.base.errors import FieldError
 from antdrive.base.plane import wrap_angle
 from antdrive.base.types import Floats
-from antdrive.robots import NoiseModel, Twist
-from antdrive.sim.driving.localising import OdometryModel, noise_model_of
-from antdrive.sim.driving.recorder import Ending, Recorder
-from antdrive.sim.driving.rescanning import Relooking, Rescanning, rescanning_of
+from antdrive.robots import Twist
+from antdrive.sim.driving.drive import drive
+from antdrive.sim.driving.given import Exact, GivenMap
+from antdrive.sim.driving.localising import localiser_of
+from antdrive.sim.driving.lookout import Scans
+from antdrive.sim.driving.own_map import forgetting_ticks
+from antdrive.sim.driving.parts import Decider, Ending, Step
+from antdrive.sim.driving.plants import Bullet
+from antdrive.sim.driving.survey import Senses, Survey
+from antdrive.sim.driving.watching import Watch
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout
-from antdrive.sim.physics.engine import Engine
+from antdrive.sim.physics.engine import Engine, State
 
 #: How far a replay on another machine or with other versions may be off, in metres, radians, m/s and rad/s.
 ROUNDING = 1e-3
@@ -78,23 +86,18 @@ def replay(rollout: Rollout) -> ReplayCheck:
     targets = rollout.actuated if len(rollout.actuated) else rollout.command
     movers = rollout.trajectories()
     with Engine(record.world, record.robot, physics_hz=record.physics_hz, trajectories=movers) as engine:
-        log = Recorder(engine, record.task.start, noisy=False)
-        for row in range(1, len(rollout.t), substeps):
-            target = Twist(*targets[row].tolist())
-            engine.command(*target)
-            log.advance(min(substeps, len(rollout.t) - row), target, 0)
-        drive = log.finish(Ending(rollout.outcome))
-    moved = drive.pose - rollout.pose
+        again = Bullet(engine, record.task.start, record.control_hz).play(targets[1:])
+    moved = again.pose - rollout.pose
     position = _most(np.hypot(moved[:, 0], moved[:, 1]))
-    turn, twist = _most(np.abs(wrap_angle(moved[:, 2]))), _most(np.abs(drive.twist - rollout.twist))
-    same = np.array_equal(drive.pose, rollout.pose) and np.array_equal(drive.twist, rollout.twist)
-    exact = same and np.array_equal(drive.contacts, rollout.contacts)
+    turn, twist = _most(np.abs(wrap_angle(moved[:, 2]))), _most(np.abs(again.twist - rollout.twist))
+    same = np.array_equal(again.pose, rollout.pose) and np.array_equal(again.twist, rollout.twist)
+    exact = same and np.array_equal(again.contacts, rollout.contacts)
     problems = []
     if not max(position, turn, twist) <= ROUNDING:
         problems.append(f"replay: the logged commands lead up to {position:.3g} m and {turn:.3g} rad away from the log")
-    if bool(len(drive.contacts)) != bool(len(rollout.contacts)) or (same and not exact):
+    if bool(len(again.contacts)) != bool(len(rollout.contacts)) or (same and not exact):
         problems.append(
-            f"replay: physics reports {len(drive.contacts)} contact points, the log {len(rollout.contacts)}"
+            f"replay: physics reports {len(again.contacts)} contact points, the log {len(rollout.contacts)}"
         )
     problems += _other_senses(rollout)
     return ReplayCheck(exact, position, turn, twist, tuple(problems))
@@ -103,61 +106,117 @@ def replay(rollout: Rollout) -> ReplayCheck:
 def _other_senses(rollout: Rollout) -> Iterator[str]:
     """What of a log is not as the seed's noise and the lidar make it: estimates, targets of the motors, scans."""
     record = rollout.record
-    again = rescanning_of(rollout)
-    if record.exploring and again is None:
+    if record.exploring and not len(rollout.scans):
         yield "replay: the log of a robot without a map has no scans"
         return
     odometry = 1.0 if record.sensing is None else record.sensing.odometry
-    model = noise_model_of(
+    localiser = localiser_of(
         record.localisation, record.robot, record.noise, odometry, 1 / record.control_hz, record.task.start, record.seed
     )
-    if model is not None and not len(rollout.actuated) == len(rollout.estimate) == len(rollout.t):
+    if localiser.noisy and not len(rollout.actuated) == len(rollout.estimate) == len(rollout.t):
         yield "replay: actuated and estimate are missing; the log of a robot with noise has them"
-        model = None
-    found: list[tuple[float, ...]] = []
+        localiser = Exact()
+    per_tick = record.physics_hz // record.control_hz
     # A period's first row is the last of the period before; a contact ends the control of the robot.
     touched = int(rollout.contacts[0, 0]) if len(rollout.contacts) else len(rollout.t)
-    rows = range(0, min(touched, len(rollout.t) - 1), record.physics_hz // record.control_hz)
-    for tick, row in enumerate(rows):
-        x, y, yaw = rollout.pose[row].tolist()
-        estimate = x, y, yaw
-        if model is not None:
-            estimate = model.estimate_pose((x, y, yaw), Twist(*rollout.twist[row].tolist()))
-        if again is not None:
-            estimate = again.look(tick, (x, y, yaw), estimate)
-            if isinstance(model, OdometryModel):
-                model.correct(estimate)
-            if isinstance(again, Rescanning):
-                again.plan(tick, model.pose_after_delay() if model is not None else estimate)
-        if model is not None:
-            found.append((*estimate, *model.actuate(Twist(*rollout.command[row + 1].tolist()))))
-    if again is not None:
-        _look_once_more(rollout, again, model)
-        yield from again.problems()
-    if not found:
+    rows = range(0, min(touched, len(rollout.t) - 1), per_tick)
+    map, forgets = map_of(rollout)
+    plant, reader = Logged(rollout), Reader(rollout, len(rows), forgets)
+    periods = len(rows) + _decided_at_the_end(rollout, per_tick)
+    drive(plant, reader, localiser, map, hz=record.control_hz, limit=periods / record.control_hz)
+    if len(rollout.scans):
+        yield from _other_scans(rollout, **map.logged(rollout, per_tick))
+    if not localiser.noisy or not rows:
         return
-    drawn = np.array(found)
-    off = drawn[:, :3] - rollout.estimate[rows]
+    off = np.array(localiser.estimates[: len(rows)]) - rollout.estimate[rows]
     off[:, 2] = wrap_angle(off[:, 2])
-    for name, error in (("estimate", off), ("actuated", drawn[:, 3:] - rollout.actuated[np.array(rows) + 1])):
+    for name, error in (
+        ("estimate", off),
+        ("actuated", np.array(plant.actuated) - rollout.actuated[np.array(rows) + 1]),
+    ):
         wrong = (np.abs(error) > SAME_NOISE).any(axis=1)
         if wrong.any():
             t = rollout.t[rows[int(wrong.argmax())]]
             yield f"replay: {name} is not what the noise of seed {record.seed} makes of the log, from t = {t:.3f} s"
 
 
-def _look_once_more(rollout: Rollout, again: Rescanning | Relooking, model: NoiseModel | None) -> None:
-    """Take the scan of the period in which the robot decided that its drive was over; other drives end without one."""
-    record, last = rollout.record, len(rollout.t) - 1
-    tick, rest = divmod(last, record.physics_hz // record.control_hz)
+class Logged:
+    """The plant of a log: its true poses, whatever is commanded.
+
+    Attributes:
+        state: where the robot is and how fast
+        actuated: the targets of the motors so far
+    """
+
+    touched = False
+
+    def __init__(self, rollout: Rollout) -> None:
+        self.actuated: list[Twist] = []
+        self._rollout, self._row = rollout, 0
+        self._per_tick = rollout.record.physics_hz // rollout.record.control_hz
+        self.state = self._state()
+
+    def advance(self, step: Step, actuated: Twist) -> None:
+        """Go to the row of the next control period."""
+        self.actuated.append(actuated)
+        self._row = min(self._row + self._per_tick, len(self._rollout.t) - 1)
+        self.state = self._state()
+
+    def _state(self) -> State:
+        return State(*self._rollout.pose[self._row].tolist(), *self._rollout.twist[self._row].tolist())
+
+
+class Reader(Decider):
+    """Decides as a log has it, for so many control periods, and has the map forgotten when the robot did so."""
+
+    def __init__(self, rollout: Rollout, periods: int, forgets: Mapping[int, Callable[[Pose], None]]) -> None:
+        self.step = Step()
+        self._rollout, self._periods, self._forgets = rollout, periods, forgets
+        self._per_tick = rollout.record.physics_hz // rollout.record.control_hz
+
+    def decide(self, tick: int, pose: Pose, state: State) -> Ending | None:
+        """The logged command of a control period, or the end."""
+        if tick == self._periods:
+            return Ending(self._rollout.outcome)
+        if tick in self._forgets:
+            self._forgets[tick](pose)
+        self.step = Step(Twist(*self._rollout.command[tick * self._per_tick + 1].tolist()))
+        return None
+
+
+def map_of(rollout: Rollout) -> tuple[GivenMap | Scans | Survey, Mapping[int, Callable[[Pose], None]]]:
+    """What takes the scans of a log again, and in which control periods the map is reset."""
+    record, lidar = rollout.record, rollout.record.robot.lidar
+    if not len(rollout.scans):
+        return GivenMap(), {}
+    assert lidar is not None
+    hz, noisy = record.control_hz, record.noise > 0
+    senses = Senses.of(lidar, record.world, rollout.trajectories(), seed=record.seed, noisy=noisy, hz=hz)
+    if not record.exploring:
+        return Scans(senses), {}
+    watching = record.perception is not None and record.perception.kind == "lidar"
+    watch, matching = Watch(lidar, hz) if watching else None, record.localisation == "matching"
+    survey = Survey.of(record.robot, record.task, senses, matching=matching, watch=watch)
+    return survey, dict.fromkeys(forgetting_ticks(record), survey.forget)
+
+
+def _decided_at_the_end(rollout: Rollout, per_tick: int) -> bool:
+    """Whether the robot decided in the last row that its drive was over, after a scan; other drives end without one."""
+    last = len(rollout.t) - 1
     decided = rollout.outcome is Outcome.SUCCEEDED or last in rollout.scan_rows
-    if rest or len(rollout.contacts) or not decided:
+    return len(rollout.scans) > 0 and last % per_tick == 0 and not len(rollout.contacts) and decided
+
+
+def _other_scans(rollout: Rollout, scans: npt.NDArray[np.uint16], scan_rows: npt.NDArray[np.int32]) -> Iterator[str]:
+    """The first scan of a log that is not one of those that were taken again, in a sentence."""
+    rows, again = rollout.scan_rows, dict(zip(scan_rows.tolist(), scans, strict=True))
+    last = max(again, default=-1)
+    for row in sorted({*again, *(row for row in rows.tolist() if row <= last)}):
+        at = np.flatnonzero(rows == row)
+        if row in again and len(at) == 1 and np.array_equal(again[row], rollout.scans[at[0]]):
+            continue
+        yield f"replay: scans are not what the lidar measures from the logged poses, from t = {rollout.t[row]:.3f} s"
         return
-    x, y, yaw = rollout.pose[last].tolist()
-    estimate = x, y, yaw
-    if model is not None:
-        estimate = model.estimate_pose((x, y, yaw), Twist(*rollout.twist[last].tolist()))
-    again.look(tick, (x, y, yaw), estimate)
 
 
 def _most(values: Floats) -> float:

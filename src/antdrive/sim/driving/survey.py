@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -15,13 +15,15 @@ from antdrive.robots import RobotSpec, Twist
 from antdrive.robots.lidar import Lidar
 from antdrive.sim.driving import _kernels_hits
 from antdrive.sim.driving.own_map import MAP_CELL, PAD, RECENT, horizon_of, turning_room
+from antdrive.sim.driving.parts import Rows
 from antdrive.sim.driving.watching import Watch
+from antdrive.sim.log.scans import scans_logged
 from antdrive.sim.log.streams import random_stream
 from antdrive.sim.sensing.mapping import OccupancyMap
 from antdrive.sim.sensing.matching import FAR, ScanMatcher, sliding_left_out
 from antdrive.sim.sensing.scanner import Scanner
 from antdrive.sim.sensing.sight import clear_distance, clear_turn
-from antdrive.worlds import Trajectories, World
+from antdrive.worlds import Task, Trajectories, World
 
 TOLERANCE = 0.008  # a route may lose this much of its clearance without being planned anew [m]
 BLUR = 0.02  # and this much more for each metre of distance [m/m]
@@ -123,7 +125,14 @@ class Survey:
         self.scans: list[Scan] = []
         self.whole = 0
 
-    def look(self, tick: int, pose: Pose, estimate: Pose) -> Pose:
+    @classmethod
+    def of(cls, robot: RobotSpec, task: Task, senses: Senses, *, matching: bool, watch: Watch | None) -> Survey:
+        """The survey of a drive, after the first scan from the start."""
+        survey = cls(senses, robot, task.start, task.goal, matching=matching, watch=watch)
+        survey.scan(0, task.start, task.start)
+        return survey
+
+    def scan(self, tick: int, pose: Pose, estimate: Pose) -> Pose:
         """Take a scan if one is due in a control period; the estimated pose, which the scan may correct."""
         if not self._senses.due(tick, self.scans[-1].tick if self.scans else -1):
             return estimate
@@ -145,6 +154,10 @@ class Survey:
         corrected = matcher.corrected(self.map, estimate, standing)
         near = np.where(standing <= FAR_AMONG_MOVERS, standing, np.inf)
         return sliding_left_out(estimate, corrected, self.map.endpoints(estimate, near))
+
+    def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
+        """The arrays of a log that hold the scans."""
+        return scans_logged(((scan.tick, scan.ranges) for scan in self.scans), per_tick, len(log.t))
 
     def discs(self, bounds: Bounds) -> Floats:
         """What was hit within bounds, as discs (N, 3) [m]."""

@@ -14,8 +14,8 @@ import numpy.typing as npt
 from antdrive.base import Bounds, Floats
 from antdrive.robots import RobotSpec, TrackedPath
 from antdrive.sim.driving.blocking import points_at
-from antdrive.sim.driving.perception import Predictor
-from antdrive.sim.driving.watching import TrackedPredictor
+from antdrive.sim.driving.parts import Others
+from antdrive.sim.driving.watching import Tracked
 from antdrive.worlds import Disc, Grid
 
 MIXING = 2.0  # after this time a mover's place counts as a new sample of where movers go [s]
@@ -36,7 +36,7 @@ class Traffic:
         samples: how many independent places of movers that makes, about
     """
 
-    def __init__(self, predictor: Predictor, radius: float, bounds: Bounds, hz: int) -> None:
+    def __init__(self, predictor: Others, radius: float, bounds: Bounds, hz: int) -> None:
         self.box, self.samples = _nowhere(), 0.0
         self._predictor, self._radius, self._hz = predictor, radius, hz
         self._area = (bounds[2] - bounds[0]) * (bounds[3] - bounds[1])
@@ -91,7 +91,7 @@ class TrackedTraffic(Traffic):
     seen; the ground that was in sight lately stands for it.
     """
 
-    def __init__(self, predictor: TrackedPredictor, robot: RobotSpec, hz: int) -> None:
+    def __init__(self, predictor: Tracked, robot: RobotSpec, hz: int) -> None:
         super().__init__(predictor, robot.radius, (0.0, 0.0, 1.0, 1.0), hz)
         self._tracks, self._fast = predictor, FAST * robot.max_speed
         self._last, self._lately, self._most = -1, 0.0, 0.0

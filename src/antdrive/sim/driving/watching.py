@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
 from antdrive.base import Floats, Pose
 from antdrive.robots.lidar import Lidar
 from antdrive.sim.driving.own_map import MAP_CELL
-from antdrive.sim.driving.perception import Predictor
+from antdrive.sim.driving.parts import Rows
 from antdrive.sim.policy import Perception
 from antdrive.sim.sensing.ground import Ground, MappedGround
 from antdrive.sim.sensing.mapping import OccupancyMap
 from antdrive.sim.sensing.tracking import MoverTracker, TrackedMovers
-from antdrive.worlds import Trajectories, World
 
 STANDS = 0.08  # a mover that is slower than this, as far as scans tell, stands still [m/s]
 
@@ -54,8 +55,8 @@ class Watch:
         ground = MappedGround(seen, self._settle)
         return np.where(self.tracker.suspected(ground, pose, ranges, tick / self._hz), np.inf, ranges)
 
-    def logged(self, per_tick: int, rows: int) -> npt.NDArray[np.float32]:
-        """The movers that were followed, as the array `tracks` of a log has them (K, 7)."""
+    def logged(self, log: Rows, per_tick: int) -> dict[str, Any]:
+        """The array `tracks` of a log (K, 7): the movers that were followed."""
         tables = [
             np.column_stack(
                 (
@@ -67,13 +68,13 @@ class Watch:
                 )
             )
             for tick, found in self._log
-            if tick * per_tick < rows
+            if tick * per_tick < len(log.t)
         ]
-        return np.concatenate(tables).astype(np.float32) if tables else np.empty((0, 7), dtype=np.float32)
+        return {"tracks": np.concatenate(tables or [np.empty((0, 7))]).astype(np.float32)}
 
 
-class TrackedPredictor(Predictor):
-    """Predicts movers from a watch: whatever is followed goes on at the velocity that was estimated.
+class Tracked:
+    """Movers by tracks of a lidar: whatever is followed goes on at the velocity that was estimated.
 
     Movers are counted as they are found. In arrays of all movers those that are not followed any more have no place.
 
@@ -81,10 +82,10 @@ class TrackedPredictor(Predictor):
         watch: what the scans tell
     """
 
+    guesses = True  # movers may do something else than is predicted
+
     def __init__(self, watch: Watch, perception: Perception, hz: int) -> None:
-        nothing = World("nothing", (0.0, 0.0, 1.0, 1.0))
-        super().__init__(Trajectories.of(nothing, (0.5, 0.5)), perception, hz)
-        self.watch = watch
+        self.watch, self._range, self._hz = watch, perception.range, hz
 
     def predict(self, tick: int, robot: tuple[float, float], ahead: Floats) -> tuple[Floats, Floats]:
         """Predict the movers that the robot follows.
@@ -129,4 +130,4 @@ class TrackedPredictor(Predictor):
         return found, found.positions + (tick - self.watch.tick) / self._hz * velocities, velocities
 
     def _near(self, places: Floats, radii: Floats, robot: tuple[float, float]) -> npt.NDArray[np.bool_]:
-        return np.asarray(np.hypot(*(places - robot).T) - radii <= self._perception.range)
+        return np.asarray(np.hypot(*(places - robot).T) - radii <= self._range)

@@ -8,8 +8,7 @@ from typing import Any
 
 import yaml
 
-from antdrive.views.export.libraries import library, message_types
-from antdrive.views.export.topics import Topic, in_order
+from antdrive.views.export.topics import Topic, in_order, library, message_types
 
 VERSION = 9  # of rosbag2's metadata
 FOREVER = {"sec": 9223372036, "nsec": 854775807}  # how ROS writes "no limit"

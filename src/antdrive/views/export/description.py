@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from antdrive.robots.spec import RobotSpec
-from antdrive.views.export.frames import BASE
+from antdrive.views.export.topics import BASE
 
 GAP = 0.005  # height of the body above the floor [m]
 WHEEL_WIDTH = 0.3  # in wheel radii

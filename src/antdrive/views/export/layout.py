@@ -7,7 +7,7 @@ from typing import Any
 from antdrive.base.plane import in_map
 from antdrive.base.types import Floats
 from antdrive.sim.log.rollout import Rollout
-from antdrive.views.export.frames import MAP
+from antdrive.views.export.topics import MAP
 
 #: The topics of the scene with their settings, where the programs' own would not do: without intensities scans have no colour.
 SHOWN: dict[str, dict[str, Any]] = {

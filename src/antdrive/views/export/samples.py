@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,10 +11,69 @@ import numpy.typing as npt
 
 from antdrive.sim.log.frames import frame_at
 from antdrive.sim.log.rollout import Rollout
-from antdrive.views.export.cdr import CdrLayout
-from antdrive.views.export.frames import BASE, ESTIMATE, LIDAR, ODOM, ROBOT_MAP, mover_frame
 from antdrive.views.export.scans import Scans
-from antdrive.views.export.topics import Floats, Stamps, Topic, nanoseconds
+from antdrive.views.export.topics import (
+    BASE,
+    ESTIMATE,
+    LIDAR,
+    ODOM,
+    ROBOT_MAP,
+    Floats,
+    Stamps,
+    Topic,
+    mover_frame,
+    nanoseconds,
+)
+
+HEADER = b"\x00\x01\x00\x00"  # CDR, little endian
+
+
+class CdrLayout:
+    """Many messages of one shape, serialised together: all hold the same texts and as many elements.
+
+    CDR (OMG DDS-XTypes, encoding version 1, little endian) puts each number at a multiple of its own size, counted from the
+    end of a header of four bytes. So every number is at the same place in all messages, and numpy fills a column at a time.
+
+    The methods add the message's values in their order.
+    """
+
+    def __init__(self) -> None:
+        self._constant = bytearray(HEADER)
+        self._numbers: dict[str, tuple[int, np.dtype[np.generic], tuple[int, ...]]] = {}
+
+    def number(self, name: str, kind: str, count: int | None = None) -> None:
+        """Add a number, or numbers in a row, that differ between messages; they are 0 unless `messages` is given them."""
+        dtype = np.dtype(f"<{kind}")
+        self._align(dtype.itemsize if count != 0 else 1)
+        self._numbers[name] = (len(self._constant), dtype, () if count is None else (count,))
+        self._constant += bytes(dtype.itemsize * (1 if count is None else count))
+
+    def length(self, count: int) -> None:
+        """Add the length of a sequence whose elements follow."""
+        self._align(4)
+        self._constant += struct.pack("<I", count)
+
+    def text(self, value: str) -> None:
+        """Add a text that is the same in all messages."""
+        content = value.encode() + b"\0"
+        self.length(len(content))
+        self._constant += content
+
+    def messages(self, values: dict[str, npt.NDArray[np.generic]]) -> list[memoryview]:
+        """The serialised messages."""
+        many = len(next(iter(values.values())))
+        size = len(self._constant)
+        buffer = np.tile(np.frombuffer(bytes(self._constant), dtype=np.uint8), (many, 1))
+        for name, column in values.items():
+            offset, dtype, shape = self._numbers[name]
+            strides = (size, *([dtype.itemsize] * len(shape)))
+            place = np.ndarray((many, *shape), dtype, buffer=buffer.data, offset=offset, strides=strides)
+            place[...] = column
+        content = memoryview(buffer.tobytes())
+        return [content[start : start + size] for start in range(0, many * size, size)]
+
+    def _align(self, size: int) -> None:
+        self._constant += bytes(-(len(self._constant) - len(HEADER)) % size)
 
 
 def samples(rollout: Rollout, scans: Scans) -> list[Topic]:

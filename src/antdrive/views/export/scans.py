@@ -9,7 +9,6 @@ import numpy.typing as npt
 
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.log.scans import ranges_of
-from antdrive.views.export.scanning import exact_scans
 
 LOGGED = "taken by the drive"
 TAKEN_AGAIN = "taken at export, without noise, from the logged poses; the log holds no scans"
@@ -44,9 +43,14 @@ class Scans(NamedTuple):
 
 def _taken_again(rollout: Rollout) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.float32]]:
     """The rows (S,) in which the lidar is due, and what it measures without noise from the logged poses (S, beams) [m]."""
+    from antdrive.sim.sensing import Scanner
+
     record, lidar = rollout.record, rollout.record.robot.lidar
     assert lidar is not None
     per_tick = max(1, record.physics_hz // record.control_hz)
     ticks = range(-(-len(rollout.t) // per_tick))
     rows = np.array([tick * per_tick for tick in ticks if lidar.due(tick, record.control_hz)], dtype=np.int64)
-    return rows, exact_scans(lidar, record.world, rollout.pose[rows], rollout.movers[rows])
+    scanner, radii = Scanner.of(lidar, record.world), np.array([mover.radius for mover in record.world.movers])
+    poses = rollout.pose[rows].tolist()
+    scans = [scanner.scan((x, y, yaw), rollout.movers[k], radii) for k, (x, y, yaw) in zip(rows, poses, strict=True)]
+    return rows, np.array(scans, dtype=np.float32).reshape(len(rows), lidar.beams)

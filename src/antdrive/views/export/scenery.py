@@ -10,10 +10,20 @@ import numpy as np
 from antdrive.base.plane import in_map
 from antdrive.sim.log.rollout import Rollout
 from antdrive.views.export.description import description, wheel_places
-from antdrive.views.export.frames import BASE, IDENTITY, LIDAR, MAP, ODOM, ROBOT_MAP, mover_frame
 from antdrive.views.export.ground import GroundGrid, known_ground, planned_ground
-from antdrive.views.export.libraries import message_types
-from antdrive.views.export.topics import Floats, Topic, nanoseconds
+from antdrive.views.export.topics import (
+    BASE,
+    IDENTITY,
+    LIDAR,
+    MAP,
+    ODOM,
+    ROBOT_MAP,
+    Floats,
+    Topic,
+    message_types,
+    mover_frame,
+    nanoseconds,
+)
 from antdrive.views.scene import Scene, contact_point
 
 CUBE, SPHERE, CYLINDER, LINE_STRIP = 1, 2, 3, 4  # kinds of markers

@@ -11,7 +11,7 @@ import numpy as np
 
 from antdrive.base.plane import in_map
 from antdrive.sim.log.rollout import Rollout
-from antdrive.views.export.frames import IDENTITY
+from antdrive.views.export.topics import IDENTITY
 
 
 def write_tables(rollout: Rollout, folder: Path) -> None:

@@ -1,33 +1,25 @@
-"""The log of one drive: a row per physics step, and what follows from the rows."""
+"""Plants: a robot in physics with a log of every step, and one that follows its commands exactly."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from antdrive.base import Floats, Pose
+from antdrive.base.errors import FieldError
 from antdrive.robots import Twist, footprint_clearance
 from antdrive.robots.footprint import shape_of
 from antdrive.sim.driving import _kernels_movers
+from antdrive.sim.driving.parts import Ending, Step
 from antdrive.sim.log.contacts import touches
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.physics.engine import Contact, Engine, State
 from antdrive.worlds import Trajectories
 
-
-class Ending(NamedTuple):
-    """How a drive ends.
-
-    Attributes:
-        outcome: the kind of ending
-        reason: what the outcome's sentence leaves open; may be empty
-    """
-
-    outcome: Outcome
-    reason: str = ""
+AFTER_CONTACT = 0.5  # after a collision the robot brakes for this long in the log [s]
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +37,7 @@ class Drive:
         limiter: what held the speed (T,), an index into `LIMITERS`
         movers: positions of the movers (T, M, 2) [m]
         contacts: one line per contact (K, 4): row, obstacle, distance [m], force [N]
-        estimate: estimated poses (T, 3) [m, m, rad]; (0, 3) where the robot knows its pose exactly
-        actuated: the twists that the wheels' motors were set to (T, 2) [m/s, rad/s]; (0, 2) where they are the commands
+        actuated: the twists that the wheels' motors were set to (T, 2) [m/s, rad/s]
     """
 
     outcome: Outcome
@@ -59,42 +50,49 @@ class Drive:
     limiter: np.ndarray[tuple[int], np.dtype[np.uint8]]
     movers: Floats
     contacts: Floats
-    estimate: Floats
     actuated: Floats
 
 
-class Recorder:
-    """Steps an engine and records a row per physics step.
+class Bullet:
+    """The robot of an engine, placed at a pose. Logs a row per physics step.
 
     Attributes:
         state: the robot's true pose and velocity in the last row
+
+    Raises:
+        FieldError: the control rate does not divide the physics rate.
     """
 
-    def __init__(self, engine: Engine, start: Pose, *, noisy: bool) -> None:
+    def __init__(self, engine: Engine, start: Pose, control_hz: int) -> None:
+        self.per_tick, rest = divmod(engine.physics_hz, control_hz)
+        if rest or self.per_tick < 1:
+            raise FieldError("control_hz", f"must divide the physics rate {engine.physics_hz}, got {control_hz}")
         self._engine = engine
         engine.place(start)
         self.state: State = engine.state()
         self._rows: list[tuple[float, ...]] = [(*self.state, 0.0, 0.0, 0, 0.0, 0.0)]
         self._contacts: list[tuple[float, ...]] = []
         self._add_contacts(engine.contacts())
-        # The error of the estimate in each row. Between two measurements it stays the same.
-        self._errors: list[tuple[float, float, float]] | None = [(0.0, 0.0, 0.0)] if noisy else None
 
     @property
     def touched(self) -> bool:
         """Whether the robot has touched anything so far."""
         return bool(self._contacts)
 
-    def note_estimate(self, estimate: Pose) -> None:
-        """Record where a noisy robot estimates to be in the last row."""
-        x, y, yaw = self.state.pose
-        assert self._errors is not None
-        turned = math.remainder(estimate[2] - yaw, 2 * math.pi)
-        self._errors[-1] = (estimate[0] - x, estimate[1] - y, turned)
+    def advance(self, step: Step, actuated: Twist) -> None:
+        """Drive for one control period."""
+        self._engine.command(*actuated)
+        self._log(self.per_tick, (*step.command, step.pursuit.limiter, *actuated))
 
-    def advance(self, steps: int, command: Twist, limiter: int, actuated: Twist | None = None) -> None:
-        """Advance a number of physics steps; the rows show the command and the limiter in force."""
-        in_force = (*command, limiter, *(actuated or command))
+    def play(self, targets: Floats) -> Drive:
+        """Set the motors to targets (N, 2), a row for each physics step, whatever happens; the log."""
+        for row in range(0, len(targets), self.per_tick):
+            target = targets[row].tolist()
+            self._engine.command(*target)
+            self._log(min(self.per_tick, len(targets) - row), (*target, 0, *target))
+        return self._drive(Ending(Outcome.TIMED_OUT))
+
+    def _log(self, steps: int, in_force: tuple[float, ...]) -> None:
         engine, rows = self._engine, self._rows
         for _ in range(steps):
             contacts = engine.step()
@@ -102,11 +100,15 @@ class Recorder:
             rows.append((*self.state, *in_force))
             if contacts:
                 self._add_contacts(contacts)
-        if self._errors is not None:
-            self._errors += [self._errors[-1]] * steps
 
     def finish(self, ending: Ending) -> Drive:
-        """The whole log. A collision is attributed to the robot or to the mover."""
+        """The whole log; a robot that has touched something brakes first. A collision is attributed to it or to the mover."""
+        if self.touched:
+            self._engine.command(0.0, 0.0)
+            self._log(round(AFTER_CONTACT * self._engine.physics_hz), (0.0, 0.0, self._rows[-1][7], 0.0, 0.0))
+        return self._drive(ending)
+
+    def _drive(self, ending: Ending) -> Drive:
         engine, rows = self._engine, np.array(self._rows)
         t = np.arange(len(rows)) / engine.physics_hz
         pose, twist = np.ascontiguousarray(rows[:, :3]), np.ascontiguousarray(rows[:, 3:5])
@@ -129,12 +131,40 @@ class Recorder:
             limiter=rows[:, 7].astype(np.uint8),
             movers=movers,
             contacts=contacts,
-            estimate=np.empty((0, 3)) if self._errors is None else pose + np.array(self._errors),
-            actuated=np.empty((0, 2)) if self._errors is None else np.ascontiguousarray(rows[:, 8:10]),
+            actuated=np.ascontiguousarray(rows[:, 8:10]),
         )
 
     def _add_contacts(self, contacts: list[Contact]) -> None:
         self._contacts += [(len(self._rows) - 1, *contact) for contact in contacts]
+
+
+class Kinematic:
+    """A robot without physics, whose wheels do exactly as told.
+
+    Attributes:
+        state: where the robot is and how fast
+        touched: whether it touched something in the last control period
+        way: the poses (K, 3) that it passed in that period [m, m, rad]
+        poses: where it was after each control period, and at first [m, m, rad]
+    """
+
+    def __init__(
+        self,
+        start: Pose,
+        motion: Callable[[Pose, Twist], Floats],
+        touches: Callable[[Floats], bool] = lambda way: False,
+    ) -> None:
+        self._motion, self._touches = motion, touches
+        self.state, self.touched = State(*start, 0.0, 0.0), False
+        self.way, self.poses = np.array([start]), [start]
+
+    def advance(self, step: Step, actuated: Twist) -> None:
+        """Drive for one control period."""
+        self.way = self._motion(self.state.pose, actuated)
+        self.touched = self._touches(self.way)
+        x, y, yaw = self.way[-1].tolist()
+        self.state = State(x, y, yaw, *actuated)
+        self.poses.append((x, y, yaw))
 
 
 def _attribute(

@@ -1,0 +1,154 @@
+"""Routes in a known world: how a plan is asked for, checked, smoothed and prepared, and the guide that follows just one."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from antdrive.base.reuse import Keyed, bits, reused
+from antdrive.planners import Planner, PlanResult, PlanStatus, Query, ask, checked, smooth
+from antdrive.robots import PurePursuit, RobotSpec, TrackedPath
+from antdrive.sim.driving.leaving import cannot_leave, is_narrow
+from antdrive.sim.driving.parts import RouteGuide
+from antdrive.sim.log.streams import random_stream
+from antdrive.sim.reasons import no_path_reason
+from antdrive.worlds import Grid, MoverMotion, Route, Task, World, rasterise
+from antdrive.worlds.world import by_geometry
+
+
+@dataclass(eq=False, kw_only=True)
+class RoutePlanner:
+    """Plans and prepares the routes of one drive.
+
+    Attributes:
+        planner: finds the paths
+        planner_label: its name in records
+        task: the world as the robot is told of it, the start and the goal
+        robot: drives the routes
+        controller: follows them
+        margin: distance kept free around the robot, on top of its radius [m]
+        cell: side of the cells of grids [m]
+        smoothing: how plans become routes
+        hz: control periods per second
+        seed: the seed of the drive's random numbers
+        motions: the motions of the movers, for planners in space and time
+        wrong: what is wrong with the planner's first wrong plan; empty if none was
+    """
+
+    planner: Planner
+    planner_label: str
+    task: Task
+    robot: RobotSpec
+    controller: PurePursuit
+    margin: float
+    cell: float
+    smoothing: str
+    hz: int
+    seed: int
+    motions: tuple[MoverMotion, ...] = ()
+    wrong: str = ""
+
+    @property
+    def inflate(self) -> float:
+        """The distance that plans keep between the robot's centre and every surface [m]."""
+        return self.robot.radius + self.margin
+
+    def query(self, grid: Grid, task: Task, start_time: float = 0.0) -> Query:
+        """What the planner is asked at a time [s]."""
+        query = Query.between(grid, task)
+        timed = bool(self.motions) or start_time
+        return dataclasses.replace(query, motions=self.motions, start_time=start_time) if timed else query
+
+    def ask(self, query: Query, rng: np.random.Generator, label: str = "") -> PlanResult:
+        """The planner's answer, checked."""
+        return self.checked(query, ask(self.planner, query, rng, label))
+
+    def checked(self, query: Query, answer: PlanResult) -> PlanResult:
+        """The answer, if it is right; else note what is wrong with it."""
+        plan = checked(query, answer)
+        if plan.status is PlanStatus.INVALID:
+            self.wrong = self.wrong or plan.reason
+        return plan
+
+    def prepared(self, route: Route, world: World, margin: float, *options: Any, **settings: Any) -> TrackedPath:
+        """A route that is prepared for the controller among what stands in a world."""
+        period, tolerance = 1 / self.hz, self.task.goal_tolerance
+        return self.controller.prepare(route, world, self.robot, margin, period, tolerance, *options, **settings)
+
+
+class OneRoute(RouteGuide):
+    """Follow the first route. Movers are not on its grid; a planner in space and time is given their motions."""
+
+    def __init__(self, planner: RoutePlanner) -> None:
+        self.log = []
+        self._routes = planner
+
+    def first(self) -> tuple[Grid, PlanResult]:
+        """Plan from the start; without a path if the robot has too little room there to get away along it."""
+        routes = self._routes
+        grid = grid_of(by_geometry(routes.task.world), routes.cell, routes.inflate)
+        plan = routes.ask(routes.query(grid, routes.task), random_stream(routes.seed, "planner"), routes.planner_label)
+        if plan.status is PlanStatus.NO_PATH:
+            return grid, dataclasses.replace(plan, reason=no_path_reason(routes, grid, plan.reason))
+        return grid, self._drivable(grid, plan)
+
+    def accept(self, grid: Grid, plan: PlanResult) -> tuple[Grid, PlanResult]:
+        """Check a plan that was made elsewhere on the grid of `first`."""
+        if plan.status is PlanStatus.INVALID:
+            return grid, plan
+        return grid, self._drivable(grid, self._routes.checked(self._routes.query(grid, self._routes.task), plan))
+
+    def route(self, grid: Grid, plan: PlanResult) -> tuple[Route, TrackedPath]:
+        """Set out on a plan: its route, and the same prepared for the controller."""
+        return self._prepared(grid, plan)
+
+    def _prepared(self, grid: Grid, plan: PlanResult) -> tuple[Route, TrackedPath]:
+        routes = self._routes
+        numbers = bits(plan.cost, routes.margin, 1 / routes.hz)
+        line = plan.waypoints.tobytes() if plan.waypoints is not None else b""
+        setting = type(routes.controller), repr((routes.robot, routes.controller))
+        contents = by_contents(grid, routes.task)
+        plan_made = plan.cells.tobytes(), line, numbers, *setting
+        return _tracked(Keyed((routes, grid, plan), (*contents.key, *plan_made)), routes.smoothing)
+
+    def _drivable(self, grid: Grid, plan: PlanResult) -> PlanResult:
+        """The plan, without its path if the robot cannot get away from its start along it."""
+        routes = self._routes
+        task, robot = routes.task, routes.robot
+        if not plan.solved or not is_narrow(task.world, robot, task.start):
+            return plan
+        _, tracked = self._prepared(grid, plan)
+        reason = cannot_leave(tracked, routes.controller, task.world, robot, task.start, routes.hz)
+        if not reason:
+            return plan
+        return PlanResult(
+            status=PlanStatus.NO_PATH,
+            reason=reason,
+            work=plan.work,
+            work_unit=plan.work_unit,
+            options=plan.options,
+            wall_s=plan.wall_s,
+        )
+
+
+@reused(16)
+def grid_of(world: Keyed[World], cell: float, inflate: float) -> Grid:
+    """The grid of a world."""
+    return rasterise(world.value, cell, inflate)
+
+
+def by_contents(grid: Grid, task: Task) -> Keyed[tuple[Grid, Task]]:
+    """A grid and a task, equal to others whose cells, numbers, walls and standing cylinders have the same bits."""
+    numbers = bits(grid.cell, *grid.origin, grid.inflate, *task.start, *task.goal, task.goal_tolerance)
+    cells = grid.shape, grid.free.tobytes(), grid.moves.tobytes()
+    return Keyed((grid, task), (numbers, cells, by_geometry(task.world)))
+
+
+@reused(64)
+def _tracked(asked: Keyed[tuple[RoutePlanner, Grid, PlanResult]], kind: str) -> tuple[Route, TrackedPath]:
+    routes, grid, plan = asked.value
+    route = smooth(plan, grid, routes.task, kind=kind)
+    return route, routes.prepared(route, routes.task.world, routes.margin)

@@ -1,0 +1,168 @@
+"""The rules of control, in the order in which they apply: pursue, scan turn, schedule, avoidance, stopping constraint."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from antdrive.base import Pose
+from antdrive.robots import LIMITERS, Avoidance, AvoidanceState, PurePursuit, RobotSpec, Twist
+from antdrive.sim.driving.caution import SLOWEST, Caution
+from antdrive.sim.driving.parts import Guide, Moment, Others, Step
+from antdrive.sim.driving.schedule import slow_down
+from antdrive.sim.physics.engine import State
+from antdrive.worlds import Task
+
+if TYPE_CHECKING:
+    from antdrive.sim.driving.exploring import Exploration
+    from antdrive.sim.driving.replanning import Replanning
+
+STOPPED_SPEED = 0.01  # a robot slower than this has stopped [m/s], [rad/s]
+WAITING_SPEED = 0.1  # a robot that avoids a mover and is slower than this waits for it [m/s]
+GOAL_SHARE = 0.95  # a robot that avoids a mover may stop early within this fraction of the goal's tolerance
+AVOIDING, ROTATING = LIMITERS.index("avoid"), LIMITERS.index("rotate")
+EXPLORING_LIMITERS = (*LIMITERS, "sight")  # the rules where the robot has no map
+OUT_OF_SIGHT = EXPLORING_LIMITERS.index("sight")
+
+
+class Pursuit:
+    """Follow the path. A robot that has turned for more than a full turn drives off as soon as it may.
+
+    Between pillars the longest lookahead whose arc is clear depends on the heading. So a robot that turns towards its
+    carrot may find the next carrot on its other side, and turn to and fro without end.
+    """
+
+    def __init__(self, controller: PurePursuit, full_turn: int) -> None:
+        self._controller, self._full_turn = controller, full_turn
+
+    def apply(self, now: Moment, step: Step) -> Step:
+        """What the controller commands."""
+        last, before = now.before.command, now.before.pursuit
+        if now.clock.turning <= self._full_turn:
+            return Step(*self._controller.step(now.path, now.pose, last, before))
+        return Step(*self._controller.step(now.path.without_turning, now.pose, last, before._replace(turning=False)))
+
+
+class LookRound:
+    """Turn on the spot to scan, once the robot stands; stop where it has no way."""
+
+    def __init__(self, guide: Exploration, robot: RobotSpec, hz: int) -> None:
+        self._guide, self._robot, self._hz = guide, robot, hz
+
+    def apply(self, now: Moment, step: Step) -> Step:
+        """The scan turn's command, or one that brakes for it."""
+        look, last = self._guide.look, now.before.command
+        if look is not None and not last.speed:
+            turning = step.pursuit._replace(limiter=ROTATING)
+            return step._replace(command=look.command(now.pose, last), pursuit=turning)
+        if look is not None or self._guide.lost:
+            return step._replace(command=braked(last, self._robot, self._hz))
+        return step
+
+
+class KeepToSchedule:
+    """Slow down to the schedule of a plan in space and time."""
+
+    def __init__(self, guide: Replanning, robot: RobotSpec, hz: int) -> None:
+        self._guide, self._hz, self._max_change = guide, hz, robot.max_acceleration / hz
+
+    def apply(self, now: Moment, step: Step) -> Step:
+        """The command, no faster than the schedule allows."""
+        schedule = self._guide.schedule
+        if schedule is None:
+            return step
+        limit = schedule.speed_limit(now.tick / self._hz, step.pursuit.arc)
+        command = slow_down(step.command, now.before.command, limit, self._max_change)
+        return step._replace(command=command, speed_limit=limit, waits=limit < WAITING_SPEED)
+
+
+class Avoid:
+    """Replace the command where movers come too close. A robot that gives way at the goal brakes and stays there."""
+
+    def __init__(
+        self,
+        avoidance: Avoidance,
+        others: Others,
+        guide: Guide,
+        task: Task,
+        robot: RobotSpec,
+        hz: int,
+        *,
+        goal_share: float = GOAL_SHARE,
+        backwards: float = math.inf,
+    ) -> None:
+        self._avoidance, self._others, self._guide = avoidance, others, guide
+        self._task, self._robot, self._hz = task, robot, hz
+        self._goal_share, self._backwards = goal_share, backwards
+        self._state = AvoidanceState()
+
+    def apply(self, now: Moment, step: Step) -> Step:
+        """The command that avoids movers."""
+        avoidance, (tick, pose, _, path, before, _) = self._avoidance, now
+        last, ahead = before.command, avoidance.prediction_times
+        stopping = before.avoids and self._stops_at_goal(pose, last)
+        if stopping:
+            if standing(now.state):
+                return step._replace(arrived=True)
+            step = step._replace(command=braked(last, self._robot, self._hz))
+            # A robot that stands at the goal has arrived, so only the time until it stands matters.
+            ahead = ahead[: 2 + math.ceil(stopping_time(last, self._robot) / avoidance.step)]
+        movers, radii = self._others.predict(tick, pose[:2], ahead)
+        command, avoids, self._state = avoidance.avoid(
+            path,
+            self._robot,
+            pose,
+            last,
+            before.pursuit,
+            step.command,
+            self._state,
+            movers,
+            radii - self._guide.closer(tick, pose[:2]),
+            speed_limit=step.speed_limit,
+            backwards=self._backwards,
+        )
+        if not (avoids or stopping):
+            return step._replace(command=command)
+        pursuit = step.pursuit._replace(turning=before.pursuit.turning, limiter=AVOIDING)
+        return step._replace(command=command, pursuit=pursuit, avoids=True)
+
+    def _stops_at_goal(self, pose: Pose, command: Twist) -> bool:
+        """Whether a robot that brakes now stops within the goal's tolerance."""
+        x, y, yaw = pose
+        goal = self._task.goal
+        distance = command.speed * abs(command.speed) / (2 * self._robot.max_acceleration)
+        end = (x + distance * math.cos(yaw), y + distance * math.sin(yaw))
+        return max(math.dist((x, y), goal), math.dist(end, goal)) < self._goal_share * self._task.goal_tolerance
+
+
+class StayInSight:
+    """Slow down where the robot could not stop on ground that it has seen."""
+
+    def __init__(self, caution: Caution, guide: Exploration) -> None:
+        self._caution, self._guide = caution, guide
+
+    def apply(self, now: Moment, step: Step) -> Step:
+        """The command, slower where it leads out of sight."""
+        command, slowed = self._caution.limit(now.pose, now.before.command, step.command)
+        stands = abs(command.speed) < SLOWEST and abs(command.yaw_rate) < SLOWEST
+        self._guide.note_sight(now.tick, step.command if slowed and stands else None)
+        if not slowed:
+            return step
+        return step._replace(command=command, pursuit=step.pursuit._replace(limiter=OUT_OF_SIGHT))
+
+
+def standing(state: State) -> bool:
+    """Whether the robot has stopped."""
+    return abs(state.speed) < STOPPED_SPEED and abs(state.yaw_rate) < STOPPED_SPEED
+
+
+def stopping_time(command: Twist, robot: RobotSpec) -> float:
+    """How long a robot takes to stop [s]."""
+    return max(abs(command.speed) / robot.max_acceleration, abs(command.yaw_rate) / robot.max_yaw_acceleration)
+
+
+def braked(command: Twist, robot: RobotSpec, hz: int) -> Twist:
+    """The next command of a robot that brakes on the same curve, as far as it can slow its turn as fast."""
+    share = max(0.0, 1 - robot.max_acceleration / hz / abs(command.speed)) if command.speed else 0.0
+    turning = max(abs(command.yaw_rate) * share, abs(command.yaw_rate) - robot.max_yaw_acceleration / hz, 0.0)
+    return Twist(command.speed * share, math.copysign(turning, command.yaw_rate))

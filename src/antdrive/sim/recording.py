@@ -1,0 +1,150 @@
+"""The rollout of a drive: its arrays, and the record of the scenario and of the parts that drove it."""
+
+from __future__ import annotations
+
+import functools
+import platform
+from importlib import metadata
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from antdrive.base.reuse import Keyed, reused
+from antdrive.planners import PLANNERS, PlanResult, Query
+from antdrive.sim.driving.plants import Drive
+from antdrive.sim.driving.replanning import Replan
+from antdrive.sim.driving.routes import by_contents, grid_of
+from antdrive.sim.log.record import (
+    ComponentRecord,
+    DriveRecord,
+    MarginRecord,
+    PerceptionRecord,
+    PlanRecord,
+    ReplanRecord,
+    SmoothingRecord,
+    TimesRecord,
+    finite_or_none,
+    settings_of,
+)
+from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.log.streams import random_stream
+from antdrive.worlds import Grid, Route, Task
+from antdrive.worlds.world import by_geometry
+
+if TYPE_CHECKING:
+    from antdrive.sim.compose import Parts
+    from antdrive.sim.scenario import Scenario
+
+
+def rollout_of(
+    s: Scenario, parts: Parts, grid: Grid, answer: PlanResult, route: Route, log: Drive, limit: float, wall: float
+) -> Rollout:
+    """The log of a scenario's drive.
+
+    Args:
+        limit: the time limit [s]
+        wall: wall time of the drive [s]
+    """
+    declared, replans = parts.declared, parts.guide.log
+    perception, avoidance, replanning = declared.perception, declared.avoidance, declared.replanning
+    record = DriveRecord(
+        task=s.task,
+        unseen=s.unseen,
+        seed=s.seed,
+        planner=ComponentRecord(name=s.planner_label, settings=settings_of(answer.options)),
+        plan=_plan_record(s, grid, answer, declared.mapped),
+        robot=s.robot,
+        controller=ComponentRecord(name=type(s.controller).__name__, settings=settings_of(s.controller)),
+        smoothing=SmoothingRecord(asked=s.smoothing, made=route.kind, note=route.note),
+        perception=PerceptionRecord(kind=perception.kind, range_m=finite_or_none(perception.range))
+        if perception
+        else None,
+        avoidance=settings_of(avoidance) if avoidance else None,
+        replanning=settings_of(replanning) if replanning else None,
+        replans=tuple(_replan_record(replan) for replan in replans),
+        limiters=declared.limiters,
+        noise=s.noise,
+        margin=s.margin,
+        margin_choice=_margin_record(s),
+        sensing=s.sensing,
+        settings=s.other_settings,
+        inflate=s.inflate,
+        cell=grid.cell,
+        physics_hz=s.physics_hz,
+        control_hz=s.control_hz,
+        time_limit=limit,
+        outcome=log.outcome,
+        reason=log.reason,
+        versions=versions(),
+        times=TimesRecord(
+            plan_s=answer.wall_s, drive_wall_s=wall, replans_s=tuple(replan.wall_s for replan in replans)
+        ),
+    )
+    arrays: dict[str, Any] = {
+        "t": log.t,
+        "pose": log.pose,
+        "twist": log.twist,
+        "command": log.command,
+        "clearance": log.clearance,
+        "limiter": log.limiter,
+        "movers": log.movers,
+        "contacts": log.contacts,
+        "route": route.xy,
+        "cells": answer.cells,
+    }
+    for part in parts.logs:
+        arrays |= part.logged(log, s.physics_hz // s.control_hz)
+    return Rollout(**arrays, record=record)
+
+
+def _plan_record(s: Scenario, grid: Grid, answer: PlanResult, mapped: bool) -> PlanRecord:
+    if not mapped:  # the shortest ways are those of the world as it is
+        grid = grid_of(by_geometry(s.task.world), grid.cell, s.inflate)
+    grid_optimum, euclidean_optimum = _optima(by_contents(grid, s.task))
+    return PlanRecord(
+        cost_m=finite_or_none(answer.cost),
+        length_m=answer.line_length,
+        grid_optimum_m=grid_optimum,
+        euclidean_optimum_m=euclidean_optimum,
+        work=answer.work,
+        work_unit=answer.work_unit,
+    )
+
+
+@reused(64)
+def _optima(asked: Keyed[tuple[Grid, Task]]) -> tuple[float | None, float | None]:
+    """The lengths of the shortest path on the grid and of that among the inflated discs [m]; both searches draw nothing."""
+    query, rng = Query.between(*asked.value), random_stream(0, "optimum")
+    on_grid, free = PLANNERS["astar"].plan(query, rng), PLANNERS["tangent"].plan(query, rng)
+    return finite_or_none(on_grid.cost), finite_or_none(free.line_length)
+
+
+def _margin_record(s: Scenario) -> MarginRecord | None:
+    chosen = s.chosen
+    if chosen is None:
+        return None
+    return MarginRecord(
+        loss_m=chosen.loss, reserve_m=chosen.reserve, probability=chosen.probability, drives=chosen.drives
+    )
+
+
+def _replan_record(replan: Replan) -> ReplanRecord:
+    return ReplanRecord(
+        t=replan.t,
+        trigger=replan.trigger,
+        solved=replan.solved,
+        cost_m=finite_or_none(replan.cost),
+        work=replan.work,
+        route=tuple((x, y) for x, y in np.round(replan.route, 4).tolist()),
+    )
+
+
+def versions() -> dict[str, str]:
+    """The versions of Python and of the packages that a run depends on."""
+    return dict(_versions())
+
+
+@functools.cache
+def _versions() -> dict[str, str]:
+    packages = ("antdrive", "numpy", "pybullet", "numba")
+    return {"python": platform.python_version(), **{name: metadata.version(name) for name in packages}}
