@@ -14,6 +14,7 @@ from typing import Any
 from antdrive.base.checks import suggest
 from antdrive.base.document import Location
 from antdrive.base.errors import FieldError
+from antdrive.base.files import file_name
 from antdrive.robots import RobotSpec, list_robots, load_robot
 from antdrive.runs.campaigns.campaign import AXES, Campaign
 from antdrive.runs.campaigns.grid_planners import PlannerVariant, planner_variants
@@ -255,4 +256,4 @@ def _words(world: str, robot: str, settings: Sequence[str], planner: PlannerVari
 
 def _file_name(task: NamedTask) -> str:
     name = task.world if task.name == "own" else f"{task.world}-{task.name}"
-    return "".join(c if c.isascii() and (c.isalnum() or c in "-_.=") else "_" for c in name)[:100]
+    return file_name(name, "-_.=", ascii_only=True)[:100]

@@ -12,7 +12,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from antdrive.runs.campaigns.extras import parquet_library
+from antdrive.base.optional import parquet_library
 from antdrive.runs.campaigns.job import Job
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.pipeline import Run, versions
