@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import shutil
 import sys
@@ -12,6 +11,8 @@ from contextlib import contextmanager
 from typing import Any
 
 import typer
+
+from antdrive.base.files import as_json
 
 
 @contextmanager
@@ -139,11 +140,6 @@ def print_json(value: Any) -> None:
     typer.echo(as_json(value))
 
 
-def as_json(value: Any) -> str:
-    """Indented JSON that every reader accepts: infinities and nan become null."""
-    return json.dumps(_json_value(value), indent=2, allow_nan=False)
-
-
 def print_table(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
     """Print aligned columns on stdout. On a terminal, lines are cut at its width; elsewhere they are complete."""
     lines = [tuple(headers), *(tuple(row) for row in rows)]
@@ -160,15 +156,3 @@ def print_files(files: dict[str, str]) -> None:
     width = max([8, *map(len, files)])
     for name, path in files.items():
         print_line(f"  {name:{width}} {path}")
-
-
-def _json_value(value: Any) -> Any:
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, dict):
-        return {str(key): _json_value(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_json_value(item) for item in value]
-    if hasattr(value, "item"):
-        return _json_value(value.item())
-    return value

@@ -62,9 +62,9 @@ def barn(
 
     Exit code 0: all runs are done, whatever came out of them. The same command goes on after an interruption.
     """
+    from antdrive.base.optional import parquet_library
     from antdrive.runs import barn as challenge
     from antdrive.runs.campaigns.campaign import make_campaign
-    from antdrive.runs.campaigns.extras import parquet_library
     from antdrive.runs.campaigns.sweeping import sweep
     from antdrive.runs.statistics.price import prices
     from antdrive.runs.statistics.runs import RunTable

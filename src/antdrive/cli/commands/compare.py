@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from antdrive.base.atomic import claimed
 from antdrive.base.errors import InputError
+from antdrive.base.files import file_name, write_json
 from antdrive.cli import options
 from antdrive.cli.campaign_tables import Against, Allow, Metrics, Where, campaigns_of_words, compare_campaigns
 from antdrive.cli.comparing import (
@@ -29,14 +29,12 @@ from antdrive.cli.scenario import chosen_task, ends_words, make_scenario
 from antdrive.cli.write import (
     check_film,
     check_folder,
-    file_name,
-    free_folder,
     this_command,
     write_comparison_film,
-    write_marker,
     write_result,
     write_run,
 )
+from antdrive.runs.folder import free_folder, opened
 
 if TYPE_CHECKING:
     from antdrive.sim.log.rollout import Rollout
@@ -118,14 +116,14 @@ def compare(
     default, mark = _default_folder(scenarios, cases)
     folder = out or default
     _make_ready(folder, video)
-    with claimed(folder):
+    with opened(folder, MARKER):
         facts = {"fingerprint": mark, "command": this_command()}
         runs, logs = _drive(scenarios, cases, folder, robot, figures, facts, ends_words(task, start, goal, frame))
         files = {run.label: run.facts["folder"] for run in runs} if len(cases) == 1 else {"folder": str(folder)}
         files |= _views(logs, folder, video, speed, figures)
         told = {"differences": differences(runs), "same": same_drives(runs, smoothing)}
         told["drives"] = [{"label": run.label, **run.facts} for run in runs]
-        write_marker(folder / MARKER, {**facts, **told})
+        write_json(folder / MARKER, {**facts, **told})
     if json:
         print_json({"runs": {run.label: run.facts for run in runs[: len(entrants)]}, **told, "files": files})
     else:
@@ -205,7 +203,7 @@ def _drive(
             with planning(f"{base.task.world.name}, seed {seed}: {entrant.label}"):
                 result = drive(scenario)
             if not runs:  # an interrupted comparison leaves the results that it has, marked as its own
-                write_marker(folder / MARKER, facts)
+                write_json(folder / MARKER, facts)
             written = write_run(result, part / entrant.label, figures=figures and place == 0)
             write_result(result, written, repeating(scenario, entrant, world, robot, ends))
             kept = Compared.of(entrant.label, result)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from antdrive.base.atomic import claimed
 from antdrive.base.errors import InputError
+from antdrive.base.files import file_name
 from antdrive.cli import options
 from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import bar, print_json, print_line, print_table
@@ -17,15 +17,13 @@ from antdrive.cli.scenario import make_scenario
 from antdrive.cli.write import (
     RUN_FILES,
     check_folder,
-    file_name,
     fingerprint,
-    free_folder,
     this_command,
     write_film,
-    write_marker,
     write_result,
     write_run,
 )
+from antdrive.runs.folder import free_folder, opened
 
 if TYPE_CHECKING:
     from antdrive.runs.failures.hunt import Hunt
@@ -85,8 +83,7 @@ def falsify(
     folder = out or free_folder(usual, MARKER, mark)
     check_folder(folder)
     compile_once()
-    with claimed(folder):
-        write_marker(folder / MARKER, {"fingerprint": mark, "command": this_command()})
+    with opened(folder, MARKER, {"fingerprint": mark, "command": this_command()}):
         with bar("looking for failures") as progress:
             hunt = find_failures(
                 setup,

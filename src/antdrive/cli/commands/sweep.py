@@ -195,11 +195,11 @@ def _check(keep: str | None, dask: str | None, jobs: int | None, report: Path | 
 
 def _run(asked: "Campaign", expansion: "Expansion", out: Path, **options: Any) -> "SweepResults":
     """Make the runs, with a progress bar."""
-    from antdrive.runs.campaigns.sweeping import run_expansion
+    from antdrive.runs.campaigns.sweeping import sweep as make_runs
 
     compile_once()
     with _resumable(out), campaign_bar("driving") as progress:
-        return run_expansion(asked, expansion, out, progress=progress, **options)
+        return make_runs(asked, out, expansion=expansion, progress=progress, **options)
 
 
 @contextmanager

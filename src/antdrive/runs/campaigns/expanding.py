@@ -15,6 +15,7 @@ from typing import Any
 from antdrive.base.checks import suggest
 from antdrive.base.document import Location
 from antdrive.base.errors import FieldError, InputError
+from antdrive.base.files import file_name
 from antdrive.planners import SMOOTHINGS
 from antdrive.robots import RobotSpec, list_robots, load_robot
 from antdrive.runs.campaigns.campaign import Campaign
@@ -272,4 +273,4 @@ def _words(world: str, robot: str, settings: Sequence[str], planner: PlannerVari
 
 def _file_name(task: NamedTask) -> str:
     name = task.world if task.name == "own" else f"{task.world}-{task.name}"
-    return "".join(c if c.isascii() and (c.isalnum() or c in "-_.=") else "_" for c in name)[:100]
+    return file_name(name, "-_.=", ascii_only=True)[:100]

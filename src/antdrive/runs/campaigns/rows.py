@@ -12,8 +12,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from antdrive.base.optional import parquet_library
 from antdrive.robots import Avoidance, PurePursuit
-from antdrive.runs.campaigns.extras import parquet_library
 from antdrive.runs.campaigns.job import Job
 from antdrive.sim.driving.replanning import ReplanPolicy
 from antdrive.sim.entries import option_text

@@ -7,7 +7,6 @@ import functools
 import itertools
 import math
 import os
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,15 +16,16 @@ import yaml
 
 from antdrive.base.atomic import written_whole
 from antdrive.base.errors import InputError
+from antdrive.base.files import file_name
 from antdrive.planners import PlannerError, list_planners, load_planner
 from antdrive.robots import Avoidance, PurePursuit, RobotSpec, list_robots, load_robot
 from antdrive.robots.files import footprint_to_dict
 from antdrive.runs.pool import Pool
 from antdrive.runs.suites.demands import Bound
 from antdrive.runs.suites.names import is_own_entry
+from antdrive.runs.suites.nearest import cause_of_contact, touched_first
 from antdrive.runs.suites.scenarios import scenario_of
 from antdrive.runs.suites.suite import load_suite
-from antdrive.runs.suites.touching import cause_of_contact, touched_first
 from antdrive.sim.driving.perception import usual_perception
 from antdrive.sim.driving.replanning import ReplanPolicy
 from antdrive.sim.log.outcome import Outcome
@@ -168,7 +168,7 @@ def _fingerprint_from(suite: Path, index: int) -> str:
 
 def scenario_name(text: str) -> str:
     """A name that a suite takes for a scenario."""
-    return re.sub(r"[^A-Za-z0-9_.-]", "_", text).lstrip("_.-")[:90] or "failure"
+    return file_name(text, ascii_only=True).lstrip("_.-")[:90] or "failure"
 
 
 def run_elsewhere(scenarios: Sequence[Scenario]) -> list[str]:
@@ -224,7 +224,7 @@ def _robot(robot: RobotSpec, folder: Path, robots: dict[str, RobotSpec]) -> str:
     """The robot's name in the catalogue, or the file beside the suite that is written for it."""
     if robot.name in list_robots() and load_robot(robot.name) == robot:
         return robot.name
-    plain = "".join(c if c.isalnum() or c in "-_." else "_" for c in robot.name)
+    plain = file_name(robot.name)
     names = (plain if k == 1 else f"{plain}-{k}" for k in itertools.count(1))
     name = next(name for name in names if robots.get(name, robot) == robot)
     if name not in robots:

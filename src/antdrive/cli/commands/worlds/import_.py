@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from antdrive.base.errors import FieldError, InputError
+from antdrive.base.files import file_name
 from antdrive.cli import options
 from antdrive.cli.console import bar, print_files, print_json, print_line
 from antdrive.cli.exits import SUCCEEDED
 from antdrive.cli.output import task_facts
 from antdrive.cli.parse import numbers
-from antdrive.cli.write import file_name
 
 if TYPE_CHECKING:
     from antdrive.worlds import Task
