@@ -25,8 +25,8 @@ from antdrive.sim.driving.localising import Fixes, localiser_of
 from antdrive.sim.driving.lookout import Lookout
 from antdrive.sim.driving.movers_ahead import MoversAhead
 from antdrive.sim.driving.parts import Localiser, Logs, Map, Others, RouteGuide, Rule
-from antdrive.sim.driving.perception import Perception, Told
-from antdrive.sim.driving.replanning import Replanning, ReplanPolicy
+from antdrive.sim.driving.perception import Told
+from antdrive.sim.driving.replanning import Replanning
 from antdrive.sim.driving.routes import OneRoute, RoutePlanner
 from antdrive.sim.driving.rules import (
     EXPLORING_LIMITERS,
@@ -39,6 +39,7 @@ from antdrive.sim.driving.rules import (
 )
 from antdrive.sim.driving.survey import Senses, Survey
 from antdrive.sim.driving.watching import Tracked, Watch
+from antdrive.sim.policy import Perception, ReplanPolicy
 from antdrive.sim.scenario import Scenario
 from antdrive.sim.sensing.ground import KnownGround
 from antdrive.worlds import Task, World
@@ -47,7 +48,7 @@ DRIFTING_SHARE = 0.6  # of the goal's tolerance, as `GOAL_SHARE`, of a robot tha
 BLIND_SHARE = 0.3  # of its top speed such a robot backs off where its lidar does not look, unless a mover is met then
 
 
-class Declared(NamedTuple):
+class Composition(NamedTuple):
     """What the record says of a composition; None: the robot has no use for it.
 
     Attributes:
@@ -73,7 +74,7 @@ class Parts(NamedTuple):
     guide: RouteGuide
     rules: tuple[Rule, ...]
     logs: tuple[Logs, ...]
-    declared: Declared
+    declared: Composition
 
 
 def compose(s: Scenario) -> Parts:
@@ -182,9 +183,9 @@ def _pursuit(s: Scenario) -> Pursuit:
     return Pursuit(s.controller, full_turn(s.robot, s.control_hz))
 
 
-def _declared(s: Scenario, limiters: tuple[str, ...]) -> Declared:
+def _declared(s: Scenario, limiters: tuple[str, ...]) -> Composition:
     moving = s.among_movers
-    return Declared(
+    return Composition(
         perception=s.effective_perception if moving else None,
         avoidance=s.effective_avoidance if moving else None,
         replanning=s.replanning if moving or s.exploring else None,
