@@ -39,7 +39,7 @@ from antdrive.runs.campaigns.job import Job
 from antdrive.runs.campaigns.rows import fault_row
 from antdrive.runs.campaigns.running import Finished
 from antdrive.runs.campaigns.store import parts_in
-from antdrive.runs.campaigns.sweeping import run_expansion
+from antdrive.runs.campaigns.sweeping import sweep
 from benchmarks.planners import table
 
 OUT = Path(__file__).parent.parent / "out" / "campaigns"
@@ -87,7 +87,7 @@ def go(folder: Path, runs: int, work: Any, **options: Any) -> float:
     def note(done: int, size: int) -> None:
         times.append(time.perf_counter())
 
-    run_expansion(asked, expand(asked), folder, work=work, progress=note, **options)
+    sweep(asked, folder, work=work, progress=note, **options)
     return times[-1] - times[min(1, len(times) - 1)]
 
 
@@ -274,7 +274,7 @@ def equality(runs: int) -> dict[str, Any]:
     for name, (expansion, options) in ways.items():
         folder = OUT / "folders" / f"equality-{name.replace(' ', '-').replace(',', '')}"
         shutil.rmtree(folder, ignore_errors=True)
-        run_expansion(asked, expansion, folder, **options)
+        sweep(asked, folder, expansion=expansion, **options)
         hashes[name] = hashlib.sha256(canonical_bytes(folder)).hexdigest()
     equal = {name: one == hashes["this process"] for name, one in hashes.items()}
     return {"runs": len(calm.jobs), **equal, "equal": sum(equal.values()), "of": len(ways)}

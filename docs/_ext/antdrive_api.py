@@ -93,8 +93,9 @@ def property_read(app: Sphinx, what: str, name: str, thing: Any, options: Any, l
 
 
 def signature_read(app: Sphinx, what: str, name: str, thing: Any, options: Any, signature: Any, returned: Any) -> Any:
-    """Write defaults that have no literal, such as `<factory>`, as three dots: Sphinx can only read what Python can."""
-    return (re.sub(r"<[^<>]*>", "...", signature), returned) if signature else None
+    """Write types without their limits, and defaults that have no literal, such as `<factory>`, as three dots."""
+    plain = re.sub(r"Annotated\[([^,\[\]]+), (?:[^\[\]]|\[[^\[\]]*\])*\]", r"\1", signature or "")
+    return (re.sub(r"<[^<>]*>", "...", plain), returned) if signature else None
 
 
 def setup(app: Sphinx) -> dict[str, Any]:

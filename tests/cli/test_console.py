@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from antdrive.cli.console import as_json
+from antdrive.base.files import as_json
 from tests.cli.calling import Call
 
 

@@ -19,7 +19,7 @@ from antdrive.base.errors import InputError
 from antdrive.runs.campaigns import canonical_bytes, make_campaign, read_results
 from antdrive.runs.campaigns.expanding import expand
 from antdrive.runs.campaigns.running import finished_of, log_path
-from antdrive.runs.campaigns.sweeping import run_expansion, sweep
+from antdrive.runs.campaigns.sweeping import sweep
 from antdrive.runs.cluster import _received, run_chunk, run_on_cluster
 from antdrive.runs.waiting import Ticket, Waiting
 from tests.runs.campaigns.works import Deadly, Endless, Refusing
@@ -113,10 +113,10 @@ def test_a_scheduler_that_is_gone_ends_the_campaign_which_goes_on_elsewhere(
             process.kill()
 
     with pytest.raises(InputError, match=r"^--dask: tcp://.*: the scheduler is gone; the same command goes on"):
-        run_expansion(campaign, expansion, tmp_path / "killed", dask=address, work=Deadly(seconds=0.2), progress=kill)
+        sweep(campaign, tmp_path / "killed", expansion=expansion, dask=address, work=Deadly(seconds=0.2), progress=kill)
     assert 3 <= len(read_results(tmp_path / "killed").table) < len(expansion.jobs)
-    run_expansion(campaign, expansion, tmp_path / "killed", jobs=0, work=Deadly())
-    run_expansion(campaign, expansion, tmp_path / "calm", jobs=0, work=Deadly())
+    sweep(campaign, tmp_path / "killed", expansion=expansion, jobs=0, work=Deadly())
+    sweep(campaign, tmp_path / "calm", expansion=expansion, jobs=0, work=Deadly())
     assert canonical_bytes(tmp_path / "killed") == canonical_bytes(tmp_path / "calm")
 
 

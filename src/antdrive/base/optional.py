@@ -19,3 +19,23 @@ def optional(module: str, extra: str, purpose: str) -> Any:
     except ModuleNotFoundError as error:
         package = (error.name or module).partition(".")[0]
         raise InputError(f"{package}: not installed; {purpose}: pip install 'antdrive[{extra}]'") from None
+
+
+def parquet_library() -> Any:
+    """The module `pyarrow`, with `pyarrow.parquet` loaded.
+
+    Raises:
+        InputError: it is not installed.
+    """
+    purpose = "a campaign's table is kept as Parquet"
+    optional("pyarrow.parquet", "campaigns", purpose)
+    return optional("pyarrow", "campaigns", purpose)
+
+
+def statistics_library(name: str) -> Any:
+    """A module of scipy or statsmodels.
+
+    Raises:
+        InputError: it is not installed.
+    """
+    return optional(name, "campaigns", "statistics of campaigns are computed with it")

@@ -9,6 +9,10 @@ import numpy.typing as npt
 
 #: An array of float64; its shape and unit stand where it is described.
 Floats: TypeAlias = npt.NDArray[np.float64]
+#: An array of truth values.
+Flags: TypeAlias = npt.NDArray[np.bool_]
+#: An array of int64, such as indices.
+Ints: TypeAlias = npt.NDArray[np.int64]
 #: x [m], y [m] and yaw [rad], counter-clockwise from +x.
 Pose: TypeAlias = tuple[float, float, float]
 #: x [m] and y [m].

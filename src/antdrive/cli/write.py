@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import shlex
 import sys
 from collections.abc import Mapping, Sequence
@@ -11,7 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from antdrive.base.errors import InputError
-from antdrive.cli.console import as_json, bar
+from antdrive.base.files import file_name, write_json
+from antdrive.cli.console import bar
+from antdrive.runs.folder import free_folder
 
 if TYPE_CHECKING:
     from antdrive.sim.log.rollout import Rollout
@@ -65,41 +65,9 @@ def default_folder(scenario: Scenario) -> Path:
     return free_folder(Path("out") / "-".join(map(file_name, parts)), "result.json", fingerprint(scenario))
 
 
-def free_folder(folder: Path, marker: str, own: str) -> Path:
-    """The folder itself, unless its marker shows results of something else; then one with the fingerprint in its name."""
-    try:
-        found = json.loads((folder / marker).read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        return folder
-    except (OSError, ValueError, RecursionError):
-        found = None
-    same = isinstance(found, dict) and found.get("fingerprint") == own
-    return folder if same else folder.with_name(f"{folder.name}-{own}")
-
-
-def write_marker(path: Path, facts: Mapping[str, Any]) -> None:
-    """Write the file that says what a folder's results are of."""
-    from antdrive.base.atomic import written_whole
-
-    with written_whole(path) as temporary:
-        temporary.write_text(as_json(dict(facts)) + "\n", encoding="utf-8")
-
-
 def fingerprint(scenario: Scenario, *more: object) -> str:
-    """Eight hexadecimal digits that differ between scenarios: of SHA-256 over all of its fields."""
-    import dataclasses
-
-    from antdrive.sim.log.record import settings_of
-
-    fields = {field.name: getattr(scenario, field.name) for field in dataclasses.fields(scenario)}
-    planner = fields.pop("planner")
-    settings = settings_of(planner) if dataclasses.is_dataclass(planner) else type(planner).__qualname__
-    return hashlib.sha256(repr((settings, fields, *more)).encode()).hexdigest()[:8]
-
-
-def file_name(name: str) -> str:
-    """A name with only the characters that every file system takes."""
-    return "".join(c if c.isalnum() or c in "-_." else "_" for c in name)
+    """Eight hexadecimal digits that differ between scenarios."""
+    return scenario.identity(*more)[:8]
 
 
 def suffixes(vector: bool) -> tuple[str, ...]:
@@ -153,7 +121,7 @@ def _write_figures(run: Run, folder: Path, log: str, endings: Sequence[str]) -> 
 def write_result(run: Run, files: Mapping[str, str], command: str) -> dict[str, Any]:
     """Write a run's `result.json`, at `files["result"]`; what was written."""
     result = {**run.as_dict(), "fingerprint": fingerprint(run.scenario), "files": dict(files), "command": command}
-    write_marker(Path(files["result"]), result)
+    write_json(Path(files["result"]), result)
     return result
 
 

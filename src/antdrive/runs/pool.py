@@ -167,28 +167,31 @@ class Pool:
             if any(worker.handed or not worker.ready for worker in self._workers):
                 self.close()
 
+    def in_order(
+        self, work: Callable[[Item], Result], items: Iterable[Item]
+    ) -> Generator[Done[Item, Result], None, None]:
+        """Do the work for each item; what comes of it in the order of the items, as soon as those before it are there."""
+        early: dict[int, Done[Item, Result]] = {}
+        following = 0
+        with contextlib.closing(self.each(work, items)) as arriving:
+            for done in arriving:
+                early[done.number] = done
+                while following in early:
+                    yield early.pop(following)
+                    following += 1
+
     def results(
         self, work: Callable[[Item], Result], items: Iterable[Item], *, in_order: bool = True
     ) -> Generator[Result, None, None]:
-        """Do the work for each item; the results in the order of the items, each as soon as those before it are there.
-
-        Out of order they come as they are made.
+        """Do the work for each item; the results, in the order of the items or as they are made.
 
         Raises:
             WorkerDied: an item killed its process twice.
             Exception: what the work raised.
         """
-        early: dict[int, Done[Item, Result]] = {}
-        following = 0
-        with contextlib.closing(self.each(work, items)) as arriving:
+        with contextlib.closing((self.in_order if in_order else self.each)(work, items)) as arriving:
             for done in arriving:
-                if not in_order:
-                    yield done.value
-                    continue
-                early[done.number] = done
-                while following in early:
-                    yield early.pop(following).value
-                    following += 1
+                yield done.value
 
     def close(self) -> None:
         """End the workers: those that wait for work at once, the others when they have had time for their present run."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import json
 import math
 import os
 import re
@@ -18,10 +17,11 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from antdrive.base.atomic import written_whole
+from antdrive.base.files import write_json
 from antdrive.base.types import Floats
 from antdrive.robots.placing import gaps
 from antdrive.runs.suites.baseline import Baseline
-from antdrive.runs.suites.parting import parting
+from antdrive.runs.suites.divergence import divergence
 from antdrive.runs.suites.suite import SUFFIX
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import Run
@@ -42,18 +42,13 @@ FILM_LENGTH = 12.0  # where a drive, then or now, is longer, its film is faster 
 
 @dataclasses.dataclass(frozen=True)
 class Results:
-    """Where results are written, and how much.
+    """Where results are written, and how much."""
 
-    Attributes:
-        folder: of all results; each test has a folder of its own in it
-        films: of which tests a film is made
-        places: a folder in which all processes of a run count the films of failed tests; None: they are not limited
-        root: the project's folder; what lies in its folders gets results in folders of the same names
-    """
-
-    folder: Path
-    films: Films = "failed"
+    folder: Path  # of all results; each test has a folder of its own in it
+    films: Films = "failed"  # of which tests a film is made
+    # a folder in which all processes of a run count the films of failed tests; None: they are not limited
     places: Path | None = None
+    # the project's folder; what lies in its folders gets results in folders of the same names
     root: Path = dataclasses.field(default_factory=Path.cwd)
 
     def of(self, file: Path, name: str) -> Path:
@@ -133,7 +128,7 @@ def write_artefacts(
         files |= _comparison(rollout, baseline, folder, film)
     _write(folder / "commands.txt", "".join(f"{command}\n" for command in commands))
     result = {**run.as_dict(), "files": files, "command": commands[0] if commands else "", "faults": list(faults)}
-    _write(folder / "result.json", json.dumps(_finite(result), indent=2, allow_nan=False) + "\n")
+    write_json(folder / "result.json", result)
     return files
 
 
@@ -166,7 +161,7 @@ def _comparison(rollout: Rollout, baseline: Baseline | None, folder: Path, film:
         return {"film": str(make_film(rollout, folder / "film.mp4", **options).path)}
     from antdrive.views.figures.then_and_now import then_and_now
 
-    then, found = drive_of(baseline, rollout), parting(baseline, rollout)
+    then, found = drive_of(baseline, rollout), divergence(baseline, rollout)
     place = None if found is None else (found.t, *found.then)
     files = {"then and now": str(folder / "then-and-now.png")}
     then_and_now(then, rollout, files["then and now"], parted=place)
@@ -228,12 +223,3 @@ def _clearance(now: Rollout, pose: Floats, movers: Floats) -> Floats:
 def _write(path: Path, text: str) -> None:
     with written_whole(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
-
-
-def _finite(value: Any) -> Any:
-    """Plain values with null for numbers that JSON does not have."""
-    if isinstance(value, dict):
-        return {key: _finite(inner) for key, inner in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(inner) for inner in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

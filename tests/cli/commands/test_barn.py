@@ -1,5 +1,6 @@
 """`antdrive barn`, without its drives."""
 
+import importlib
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,8 @@ ENDS = (
     {"key": "b", "succeeded": False, "outcome": "collided", "reason": "obstacles[3]", "rollout": "rollouts/b.npz"},
 )
 
+films = importlib.import_module("antdrive.views.film.failures")  # its package has a function of this name
+
 
 @pytest.fixture
 def driven(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, compiled: list[str]) -> Path:
@@ -46,7 +49,7 @@ def test_the_table_is_printed_whatever_becomes_of_the_films(
     def full(*_words: object, **_settings: object) -> dict[str, Path]:
         raise InputError("films: cannot be written (No space left on device)")
 
-    monkeypatch.setattr("antdrive.views.film.failures.film_failures", full)
+    monkeypatch.setattr(films, "film_failures", full)
     code, out, err = antdrive("barn", driven, "--films")
     assert (code, err.splitlines()[-1]) == (2, "antdrive: films: cannot be written (No space left on device)")
     assert ["world_0", "2", "1", "10.00"] in [line.split()[:4] for line in out.splitlines()]
@@ -65,6 +68,10 @@ def test_a_folder_without_worlds_leaves_nothing_behind(
 def test_a_failure_is_listed_with_its_film_or_its_log(
     driven: Path, antdrive: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("antdrive.views.film.failures.film_failures", lambda *_words, **_settings: {"b": Path("b.mp4")})
+    monkeypatch.setattr(
+        films,
+        "film_failures",
+        lambda *_words, **_settings: {"b": Path("b.mp4")},
+    )
     ends = [antdrive("barn", driven, *words)[1].splitlines()[-1] for words in ((), ("--films",))]
     assert ends == [f"  world_0, seed 0: collided  obstacles[3]  {end}" for end in ("rollouts/b.npz", "b.mp4")]

@@ -117,6 +117,18 @@ def test_a_broken_test_hides_no_other(antdrive: Call, suite: Path, jobs: str) ->
     assert code == 2, "of the worst: input is wrong"
 
 
+def test_a_test_that_kills_its_process_is_named(antdrive: Call, suite: Path) -> None:
+    (suite.parent / "mine.py").write_text(
+        "import os\nfrom antdrive.planners import AStar\nclass Deadly(AStar):\n    def plan(self, *_): os._exit(3)\n"
+    )
+    suite.write_text(SUITE + "  deadly: {planner: 'mine.py:Deadly'}\n")
+    antdrive("accept", "a.drive.yaml", "--only", "cl*", "--jobs", "1")
+    code, out, _ = antdrive("check", "a.drive.yaml", "--jobs", "2", "--json", "--results", "res")
+    *others, deadly = json.loads(out)["tests"]
+    assert (code, [test["passed"] for test in others]) == (3, [True] * 3)
+    assert deadly["faults"] == ["internal error: the process that made it ended with exit code 3"]
+
+
 def test_a_fault_of_the_program_is_told_with_its_traceback(
     antdrive: Call, suite: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,6 +1,7 @@
 """The controller in closed loop with perfect wheels, without physics."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -253,3 +254,13 @@ def test_discs_that_are_left_out_change_no_clearance(seed: int) -> None:
     for most in (expected - 0.1, expected + 0.1):
         below = clearance_below(most, *a, *b, discs, bounds)
         assert below == found if found < most else below >= most
+
+
+def test_driving_backwards_is_driving_forwards_seen_from_behind(turtlebot: RobotSpec) -> None:
+    controller = PurePursuit()
+    tracked = controller.prepare(STAIRCASE, OPEN, turtlebot, 0.05, DT)
+    ahead, _ = controller.step(tracked, (0.2, 0.1, 0.4), Twist(0.1, 0.2), PursuitState())
+    backwards = replace(tracked, backwards=True)
+    behind, _ = controller.step(backwards, (0.2, 0.1, 0.4 - math.pi), Twist(-0.1, 0.2), PursuitState())
+    assert behind == pytest.approx(Twist(-ahead.speed, ahead.yaw_rate))
+    assert ahead.speed > 0.05

@@ -5,8 +5,8 @@ from __future__ import annotations
 import signal
 import sys
 
-from antdrive.runs.campaigns import expand, make_campaign, store
-from antdrive.runs.campaigns.sweeping import run_expansion
+from antdrive.runs.campaigns import make_campaign, store
+from antdrive.runs.campaigns.sweeping import sweep
 from tests.runs.campaigns.works import Deadly
 
 CAMPAIGN = {"worlds": ["empty", "gate"], "planners": ["astar"], "seeds": 150}
@@ -16,7 +16,7 @@ def go(folder: str, seconds: float, jobs: int) -> None:
     """Run the campaign, or what is left of it."""
     store.FLUSH_EVERY = 0.05
     campaign = make_campaign(CAMPAIGN)
-    run_expansion(campaign, expand(campaign), folder, jobs=jobs, work=Deadly(seconds=seconds))
+    sweep(campaign, folder, jobs=jobs, work=Deadly(seconds=seconds))
 
 
 if __name__ == "__main__":

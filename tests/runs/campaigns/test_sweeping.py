@@ -12,7 +12,6 @@ import pytest
 from antdrive import Scenario, run
 from antdrive.base.errors import FieldError, InputError
 from antdrive.runs.campaigns import canonical_bytes, expand, make_campaign, read_results, sweep
-from antdrive.runs.campaigns.sweeping import run_expansion
 from antdrive.worlds import Disc, Task, World, save_task
 from tests.runs.campaigns.works import Deadly
 
@@ -55,10 +54,10 @@ def test_what_is_there_is_not_run_again(worlds: Path) -> None:
 def test_runs_that_crashed_are_made_again_only_if_asked(tmp_path: Path) -> None:
     campaign = make_campaign({"worlds": "empty", "planners": "astar", "seeds": 4})
     expansion = expand(campaign)
-    first = run_expansion(campaign, expansion, tmp_path, jobs=1, work=Deadly((2,)))
+    first = sweep(campaign, tmp_path, expansion=expansion, jobs=1, work=Deadly((2,)))
     assert first.outcomes == {"succeeded": 3, "crashed": 1}
-    assert run_expansion(campaign, expansion, tmp_path, jobs=0, work=Deadly()).made == 0
-    again = run_expansion(campaign, expansion, tmp_path, jobs=0, work=Deadly(), retry_crashed=True)
+    assert sweep(campaign, tmp_path, expansion=expansion, jobs=0, work=Deadly()).made == 0
+    again = sweep(campaign, tmp_path, expansion=expansion, jobs=0, work=Deadly(), retry_crashed=True)
     assert (again.made, again.outcomes) == (1, {"succeeded": 4})
 
 
@@ -67,10 +66,10 @@ def test_runs_of_a_planner_or_an_outcome_are_made_again(tmp_path: Path) -> None:
     expansion = expand(campaign)
 
     def again(*words: str) -> int:
-        return run_expansion(campaign, expansion, tmp_path, jobs=0, work=Deadly(), again=words).made
+        return sweep(campaign, tmp_path, expansion=expansion, jobs=0, work=Deadly(), again=words).made
 
     assert again() == 6
-    run_expansion(campaign, expansion, tmp_path, jobs=1, work=Deadly((1,)), again=["as ants=6"])
+    sweep(campaign, tmp_path, expansion=expansion, jobs=1, work=Deadly((1,)), again=["as ants=6"])
     assert [again("crashed"), again("crashed"), again("as"), again("as ants=5", "astar"), again()] == [1, 0, 4, 4, 0]
     with pytest.raises(
         InputError, match=r"^--again ants: no such planner or outcome; choose from astar, as ants=5, as"

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from antdrive.base import Floats
-from antdrive.runs.failures.diversity import POINTS, driven_line, is_new, line_distance
+from antdrive.runs.failures.hunt import POINTS, driven_line, is_new, line_distance
 from antdrive.sim import Run
 
 PLACES = st.tuples(st.integers(-5, 5), st.integers(-5, 5))

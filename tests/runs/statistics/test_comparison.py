@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from antdrive.base import FieldError
-from antdrive.runs.statistics.columns import SETTINGS
 from antdrive.runs.statistics.comparison import compare_metric, compare_success, pairs_of
 from antdrive.runs.statistics.pairing import PairedRuns
-from antdrive.runs.statistics.runs import RunTable
+from antdrive.runs.statistics.runs import SETTINGS, RunTable
 from antdrive.runs.statistics.success import common_medians, success_table
 from tests.runs.made_up_campaign import Skill, made_up_columns, made_up_runs
 

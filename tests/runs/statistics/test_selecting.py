@@ -5,11 +5,10 @@ from typing import Any
 import pytest
 
 from antdrive.base import FieldError
-from antdrive.runs.statistics.columns import PLACE, SETTINGS
 from antdrive.runs.statistics.comparison import compare_success, pairs_of
 from antdrive.runs.statistics.merging import merged
 from antdrive.runs.statistics.pairing import PairedRuns
-from antdrive.runs.statistics.runs import RunTable
+from antdrive.runs.statistics.runs import PLACE, SETTINGS, RunTable
 from antdrive.runs.statistics.selecting import described, matching
 from tests.runs.made_up_campaign import Skill, made_up_columns
 

@@ -18,9 +18,8 @@ from antdrive import METRICS, Outcome, Run, Scenario, run
 from antdrive.base.errors import FieldError, InputError
 from antdrive.runs.suites import Baseline, Demands, judge, judging
 from antdrive.runs.suites.baseline import MAX_BYTES
-from antdrive.runs.suites.explaining import explain
+from antdrive.runs.suites.divergence import distances, divergence, explain, farthest
 from antdrive.runs.suites.nearest import nearest_of, touched_in
-from antdrive.runs.suites.parting import distances, farthest, parting
 from antdrive.sim.log.metrics import Tolerance
 from antdrive.views.artefacts import MOST_FILMS, Results, drive_of, file_name, remove_artefacts
 
@@ -48,8 +47,8 @@ def test_a_drive_is_as_good_as_its_own_baseline(small_run: Run, baseline: Baseli
         judgement = judge(small_run, demands, baseline)
         assert (judgement.faults, judgement.gains) == ((), ())
     assert small_run.rollout is not None
-    assert parting(baseline, small_run.rollout) is None
-    assert "bit for bit" in " ".join(explain(small_run, judge(small_run, PLAIN, baseline), baseline))
+    assert divergence(baseline, small_run.rollout) is None
+    assert "bit for bit" in " ".join(explain(small_run, baseline))
 
 
 def test_a_baseline_is_small_text_that_is_read_back_the_same(baseline: Baseline, tmp_path: Path) -> None:
@@ -219,7 +218,7 @@ def test_the_line_is_judged_where_it_is_asked_for_and_the_end_always(small_run: 
     assert judge(small_run, dataclasses.replace(PLAIN, trajectory=0.04), aside).passed
     (fault,) = judge(small_run, dataclasses.replace(PLAIN, trajectory=0.02), aside).faults
     assert fault.startswith("trajectory: up to 0.03")
-    found = parting(aside, small_run.rollout)
+    found = divergence(aside, small_run.rollout)
     assert found is not None
     assert found.t == pytest.approx(aside.times[middle])
     assert math.dist(found.now, found.then) == pytest.approx(0.03, abs=1e-3)
@@ -232,10 +231,8 @@ def test_the_line_is_judged_where_it_is_asked_for_and_the_end_always(small_run: 
 
 
 def test_messages_name_what_changed_since_the_baseline(small_run: Run, baseline: Baseline) -> None:
-    judgement = judge(small_run, PLAIN, baseline)
-
     def text(**changes: Any) -> str:
-        return "\n".join(explain(small_run, judgement, dataclasses.replace(baseline, **changes)))
+        return "\n".join(explain(small_run, dataclasses.replace(baseline, **changes)))
 
     assert "what changed" not in text(), "it is the baseline's drive, so the demands are what changed"
     assert "so the code is what changed" in text(drive_digest="0")

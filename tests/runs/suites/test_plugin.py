@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import re
 import subprocess
@@ -11,7 +12,6 @@ import xml.etree.ElementTree
 from pathlib import Path
 from types import SimpleNamespace
 
-import matplotlib.backends.backend_agg  # noqa: F401 - see below
 import numba
 import pybullet  # noqa: F401
 import pytest
@@ -383,7 +383,7 @@ def test_the_summary_says_which_failed_drives_have_no_film(
         path.write_text("a film")
         return SimpleNamespace(path=path)
 
-    monkeypatch.setattr("antdrive.views.film.video.film", film)
+    monkeypatch.setattr(importlib.import_module("antdrive.views.film.video"), "film", film)
     monkeypatch.setattr("antdrive.views.artefacts.MOST_FILMS", 1)
     monkeypatch.setenv("PYTEST_ADDOPTS", "")
     project.makefile(".drive.yaml", a=SUITE.replace("clear: {}", "clear: {seeds: [0, 1, 2]}"))

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from antdrive.base.atomic import claimed
 from antdrive.base.errors import InputError
+from antdrive.base.files import file_name
 from antdrive.cli import options
 from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import bar, print_json, print_line, print_table
@@ -17,15 +17,13 @@ from antdrive.cli.scenario import make_scenario
 from antdrive.cli.write import (
     RUN_FILES,
     check_folder,
-    file_name,
     fingerprint,
-    free_folder,
     this_command,
     write_film,
-    write_marker,
     write_result,
     write_run,
 )
+from antdrive.runs.folder import free_folder, opened
 
 if TYPE_CHECKING:
     from antdrive.runs.failures.hunt import Hunt
@@ -51,6 +49,7 @@ Seed = Annotated[
 ]
 
 
+@options.with_settings(("smoothing", "noise", "margin", "cell"))
 def falsify(
     budget: Budget = 100,
     seed: Seed = 0,
@@ -59,14 +58,11 @@ def falsify(
     planner: options.Planner = "ants",
     settings: options.Settings = None,
     robot: options.Robot = "turtlebot",
-    margin: options.Margin = 0.03,
-    cell: options.CellSize = None,
-    smoothing: options.Smoothing = "clearance",
-    noise: options.Noise = 0.0,
     out: options.Out = None,
     seconds: Seconds = 20.0,
     film: Film = True,
     json: options.Json = False,
+    **given: Any,
 ) -> int:
     """Look for worlds where a set-up fails.
 
@@ -79,14 +75,13 @@ def falsify(
     if is_own(planner):
         problem = "failures are run again in other processes, which know registered planners only"
         raise InputError(f"--planner {planner}: {problem}; register the class under the entry point antdrive.planners")
-    setup = make_scenario("empty", planner, settings, robot, margin=margin, cell=cell, smoothing=smoothing, noise=noise)
+    setup = make_scenario("empty", planner, settings, robot, given)
     mark = fingerprint(setup, budget, seed, method, obstacles, seconds)
     usual = Path("out") / file_name(f"falsify-{planner}-{setup.robot.name}-{seed}")
     folder = out or free_folder(usual, MARKER, mark)
     check_folder(folder)
     compile_once()
-    with claimed(folder):
-        write_marker(folder / MARKER, {"fingerprint": mark, "command": this_command()})
+    with opened(folder, MARKER, {"fingerprint": mark, "command": this_command()}):
         with bar("looking for failures") as progress:
             hunt = find_failures(
                 setup,

@@ -5,12 +5,13 @@ from typing import Annotated
 
 import typer
 
-from antdrive.base.atomic import claimed
+from antdrive.base.files import write_json
 from antdrive.cli import options
 from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import bar, print_error, print_files, print_json, print_line, print_table
 from antdrive.cli.exits import SUCCEEDED
-from antdrive.cli.write import check_folder, free_folder, suffixes, this_command, write_marker
+from antdrive.cli.write import check_folder, suffixes, this_command
+from antdrive.runs.folder import free_folder, opened
 
 MARKER = "reproduce.json"
 QUICK_SEEDS = 6
@@ -58,7 +59,7 @@ def reproduce(
     if few:
         print_error(few)
     compile_once()
-    with claimed(folder), bar("planning") as progress:
+    with opened(folder, MARKER), bar("planning") as progress:
         found = repeat(papers, folder, seeds=seeds, jobs=jobs, quick=quick, progress=progress)
         files = dict(found.files)
         for one in papers:
@@ -74,7 +75,7 @@ def reproduce(
             "files": files,
             "kept": found.kept,
         }
-        write_marker(folder / MARKER, {"fingerprint": mark, "command": this_command(), **result})
+        write_json(folder / MARKER, {"fingerprint": mark, "command": this_command(), **result})
     if json:
         print_json(result)
     else:

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from antdrive.base.atomic import claimed
 from antdrive.base.errors import InputError
 from antdrive.cli import options
 from antdrive.cli.compiling import compile_once
@@ -15,13 +14,12 @@ from antdrive.cli.exits import FAILED, SUCCEEDED
 from antdrive.cli.write import (
     check_folder,
     fingerprint,
-    free_folder,
     this_command,
     write_film,
-    write_marker,
     write_result,
     write_run,
 )
+from antdrive.runs.folder import free_folder, opened
 
 if TYPE_CHECKING:
     from antdrive.runs.failures.handover import Handover
@@ -94,8 +92,7 @@ def shrink(
     folder = out or free_folder(Path("out") / name, MARKER, mark)
     check_folder(folder)
     compile_once()
-    with claimed(folder):
-        write_marker(folder / MARKER, {"fingerprint": mark, "command": this_command()})
+    with opened(folder, MARKER, {"fingerprint": mark, "command": this_command()}):
         with working("shrinking") as progress:
             journal = folder / "journal.json"
             shrunk = make_small(scenario, bound=crossed, seconds=seconds, journal=journal, jobs=jobs, progress=progress)
@@ -116,8 +113,8 @@ def shrink(
 def _of_a_test(words: str) -> "tuple[Scenario, SuiteCase]":
     """A suite's test and its scenario."""
     from antdrive.cli.calibrating import with_chosen_margin
+    from antdrive.runs.suites.names import select
     from antdrive.runs.suites.scenarios import scenario_of
-    from antdrive.runs.suites.selecting import select
 
     cases = select([words])
     if len(cases) > 1:

@@ -16,10 +16,10 @@ from typing import Any, Literal, TypeAlias
 
 from antdrive.base.errors import FieldError, InputError
 from antdrive.planners import PlannerError
-from antdrive.runs.pool import Pool
+from antdrive.runs.pool import Pool, WorkerDied
 from antdrive.runs.suites.baseline import Baseline
 from antdrive.runs.suites.demands import Demands
-from antdrive.runs.suites.explaining import explain
+from antdrive.runs.suites.divergence import explain
 from antdrive.runs.suites.judging import RAISED, Judgement, judge, unfulfilled
 from antdrive.runs.suites.scenarios import run_command, scenario_of
 from antdrive.runs.suites.suite import ScenarioEntry, SuiteCase, load_suite, shown_path
@@ -92,6 +92,140 @@ class CheckResult:
         return dataclasses.asdict(self)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Check:
+    """What a drive is judged by, and where its results go.
+
+    Attributes:
+        address: the test, as commands name it
+        name: the test's name in its baseline
+        demands: what the test demands
+        baseline: the file of its baseline; None: it has none
+        commands: how to repeat the test
+        accept: the command that accepts the drive
+        update: which baselines to write
+        folder: where logs, pictures and films of the test are written; None: nowhere
+        results: which of them are written; None: none
+    """
+
+    address: str
+    name: str
+    demands: Demands
+    baseline: Path | None
+    commands: tuple[str, ...]
+    accept: str
+    update: Update = ""
+    folder: Path | None = None
+    results: Results | None = None
+
+    def judge(self, run: Run) -> CheckResult:
+        """Judge a run.
+
+        Raises:
+            InputError: the baseline is wrong, or it or the folder cannot be written.
+        """
+        started, path, accepted = time.perf_counter(), self.baseline, ""
+        baseline = None if path is None or self.update == "all" else Baseline.own(path, self.name)
+        if path is not None and baseline is None:
+            judgement, accepted = self._without_baseline(run, path)
+        else:
+            judgement = judge(run, self.demands, baseline)
+        details = [] if judgement.passed else [*explain(run, baseline)]
+        files, unfilmed = dict[str, str](), False
+        try:
+            files, unfilmed = self._written(run, judgement, baseline)
+        except Exception as error:  # a picture of a planner's odd answer may fail in many ways
+            if judgement.passed:
+                raise
+            said = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
+            details.append(f"results: {said}")  # which must not hide the faults
+        rollout, wall = run.rollout, run.plan.wall_s
+        return CheckResult(
+            address=self.address,
+            passed=judgement.passed,
+            outcome=run.outcome.key,
+            certified=run.certificate is not None and run.certificate.certified,
+            case="" if path is None else self.name,
+            faults=judgement.faults,
+            gains=judgement.gains,
+            details=tuple(details),
+            accepted=accepted,
+            commands=self.commands,
+            files=files,
+            unfilmed=unfilmed,
+            metrics={} if rollout is None else {name: x for name, x in run.metrics.items() if not math.isnan(x)},
+            digest="" if rollout is None else rollout.drive_digest,
+            wall_s=wall + (rollout.record.times.drive_wall_s if rollout else 0.0) + time.perf_counter() - started,
+        )
+
+    def unjudged(self, outcome: str, fault: str, error: BaseException) -> CheckResult:
+        """The result of a test that an error ended; its results are where the error arose, unless the input was wrong."""
+        files: dict[str, str] = {}
+        details: tuple[str, ...] = ()
+        if self.folder is not None:
+            try:
+                if outcome == WRONG_INPUT:
+                    remove_artefacts(self.folder)
+                else:
+                    files = write_traceback(self.folder, error, self.commands)
+            except (InputError, OSError) as problem:
+                details = (f"results: {problem}",)
+        return CheckResult(
+            address=self.address,
+            passed=False,
+            outcome=outcome,
+            certified=False,
+            faults=(fault,),
+            details=details,
+            commands=self.commands,
+            files=files,
+        )
+
+    def _without_baseline(self, run: Run, path: Path) -> tuple[Judgement, str]:
+        """Judge a run by its demands alone, and write its baseline if asked to and if it fulfils them; what was written."""
+        faults, accepted = list(unfulfilled(run, self.demands)), ""
+        if not self.update:
+            remedy = "" if faults else f"; accept this drive with {self.accept}"
+            faults.append(f"baseline: {shown_path(path)} is missing{remedy}")
+        elif faults:
+            faults.append("baseline: not accepted, because the drive is not what the test expects")
+        else:
+            accepted = Baseline.of(run, self.name).renew(path)
+        return Judgement(tuple(faults)), accepted
+
+    def _written(self, run: Run, judgement: Judgement, baseline: Baseline | None) -> tuple[dict[str, str], bool]:
+        """What was written about a test, by name, and whether it failed and only its film is missing."""
+        if self.folder is None or self.results is None:
+            return {}, False
+        remove_artefacts(self.folder)
+        failed, drove, films = not judgement.passed, run.rollout is not None, self.results.films
+        filmed = drove and self.results.takes_film(failed=failed)
+        if not (failed or films == "always"):
+            return {}, False
+        files = write_artefacts(
+            run, self.folder, baseline, film=filmed, faults=judgement.faults, commands=self.commands
+        )
+        return files, drove and films == "failed" and not filmed
+
+
+def _check_of(case: SuiteCase, update: Update, results: Results | None) -> Check:
+    """How a suite's test is judged, with the command that names it alone."""
+    # The commands must work in the folder where pytest was started, and in its rootdir, to which its own names of tests relate.
+    anywhere = results is not None and results.root.resolve() != Path.cwd().resolve()
+    address = f"{case.suite}::{case.id}" if anywhere else case.address
+    return Check(
+        address=case.address,
+        name=case.id,
+        demands=case.demands,
+        baseline=case.baseline_path if case.entry.baseline else None,
+        commands=(shlex.join(["antdrive", "check", address]),),
+        accept=shlex.join(["antdrive", "accept", address]),
+        update=update,
+        folder=results.of(case.suite, case.id) if results else None,
+        results=results,
+    )
+
+
 def check_case(case: SuiteCase, *, update: Update = "", results: Results | None = None) -> CheckResult:
     """Drive a suite's test and judge it.
 
@@ -103,79 +237,29 @@ def check_case(case: SuiteCase, *, update: Update = "", results: Results | None 
     Raises:
         InputError: the suite, a file that it names, or the baseline is wrong.
     """
-    scenario = scenario_of(case)
-    # The commands must work in the folder where pytest was started, and in its rootdir, to which its own names of tests relate.
-    anywhere = results is not None and results.root.resolve() != Path.cwd().resolve()
-    address = f"{case.suite}::{case.id}" if anywhere else case.address
-    run_alone = run_command(case, anywhere=anywhere)
-    commands = tuple(filter(None, (shlex.join(["antdrive", "check", address]), run_alone)))
+    scenario, check = scenario_of(case), _check_of(case, update, results)
+    run_alone = run_command(case, anywhere=check.commands != (shlex.join(["antdrive", "check", case.address]),))
+    check = dataclasses.replace(check, commands=tuple(filter(None, (*check.commands, run_alone))))
     try:
-        run = drive(scenario)
+        return check.judge(drive(scenario))
     except PlannerError as error:
-        return _unjudged(case, RAISED, str(error), error, results, commands)
-    path = case.baseline_path if case.entry.baseline else None
-    folder = results.of(case.suite, case.id) if results else None
-    return check_run(
-        run,
-        case.demands,
-        path,
-        address=case.address,
-        name=case.id,
-        update=update,
-        commands=commands,
-        accept=shlex.join(["antdrive", "accept", address]),
-        folder=folder,
-        results=results,
-    )
-
-
-def _unjudged(
-    case: SuiteCase,
-    outcome: str,
-    fault: str,
-    error: BaseException,
-    results: Results | None,
-    commands: tuple[str, ...] = (),
-) -> CheckResult:
-    """The result of a test that an error ended; its results are where the error arose, unless the input was wrong."""
-    files: dict[str, str] = {}
-    details: tuple[str, ...] = ()
-    commands = commands or (shlex.join(["antdrive", "check", case.address]),)
-    if results is not None:
-        try:
-            folder = results.of(case.suite, case.id)
-            if outcome == WRONG_INPUT:
-                remove_artefacts(folder)
-            else:
-                files = write_traceback(folder, error, commands)
-        except (InputError, OSError) as problem:
-            details = (f"results: {problem}",)
-    return CheckResult(
-        address=case.address,
-        passed=False,
-        outcome=outcome,
-        certified=False,
-        faults=(fault,),
-        details=details,
-        commands=commands,
-        files=files,
-    )
+        return check.unjudged(RAISED, str(error), error)
 
 
 def _check_whatever_comes(case: SuiteCase, update: Update, results: Results | None) -> CheckResult:
     """The result of a test; it fails where it cannot be judged, so that one broken test hides no other."""
+    raised: Exception
     try:
         return check_case(case, update=update, results=results)
     except FieldError as error:
-        problem = str(case.error(error.key, error.problem))
-        return _unjudged(case, WRONG_INPUT, problem, error, results)
+        outcome, fault, raised = WRONG_INPUT, str(case.error(error.key, error.problem)), error
     except InputError as error:
         key, mark, problem = str(error).partition(": ")
         of_the_suite = mark and key in ScenarioEntry.model_fields  # found only in the run, such as too small a cell
-        said = str(case.error(key, problem)) if of_the_suite else str(error)
-        return _unjudged(case, WRONG_INPUT, said, error, results)
+        outcome, fault, raised = WRONG_INPUT, str(case.error(key, problem)) if of_the_suite else str(error), error
     except Exception as error:  # people's planners and robots are code too
-        return _unjudged(case, FAULT, f"internal error: {type(error).__name__}: {error}", error, results)
+        outcome, fault, raised = FAULT, f"internal error: {type(error).__name__}: {error}", error
+    return _check_of(case, update, results).unjudged(outcome, fault, raised)
 
 
 def check_cases(
@@ -205,12 +289,15 @@ def _check_in_turn(
         return
     work = functools.partial(_check_by_name, str(Path.cwd()), update, results)
     with Pool(jobs) as pool:
-        made = pool.results(work, [(str(case.suite), case.id) for case in cases])
-        for case, result in zip(cases, made, strict=True):
-            # A text: the suite has changed since it was read.
-            yield (
-                _unjudged(case, WRONG_INPUT, result, InputError(result), results) if isinstance(result, str) else result
-            )
+        made = pool.in_order(work, [(str(case.suite), case.id) for case in cases])
+        for case, done in zip(cases, made, strict=True):
+            if done.died:
+                fault = f"internal error: {done.died}"
+                yield _check_of(case, update, results).unjudged(FAULT, fault, WorkerDied(done.died))
+            elif isinstance(done.value, str):  # the suite has changed since it was read
+                yield _check_of(case, update, results).unjudged(WRONG_INPUT, done.value, InputError(done.value))
+            else:
+                yield done.value
 
 
 def _check_by_name(folder: str, update: Update, results: Results | None, name: tuple[str, str]) -> CheckResult | str:
@@ -224,109 +311,3 @@ def _check_by_name(folder: str, update: Update, results: Results | None, name: t
     if found is None:
         return f"{suite}: has no test {test} any more"
     return _check_whatever_comes(found, update, results)
-
-
-def check_run(
-    run: Run,
-    demands: Demands,
-    path: Path | None,
-    *,
-    address: str,
-    name: str,
-    update: Update = "",
-    commands: tuple[str, ...] = (),
-    accept: str = "",
-    folder: Path | None = None,
-    results: Results | None = None,
-) -> CheckResult:
-    """Judge a run.
-
-    Raises:
-        InputError: the baseline is wrong, or it or the folder cannot be written.
-    """
-    started = time.perf_counter()
-    baseline = None if path is None or update == "all" else Baseline.own(path, name)
-    accepted = ""
-    if path is not None and baseline is None:
-        accept = accept or shlex.join(["antdrive", "accept", address])
-        judgement, accepted = _without_baseline(run, demands, path, name, accept, update)
-    else:
-        judgement = judge(run, demands, baseline)
-    details = () if judgement.passed else tuple(explain(run, dataclasses.replace(judgement, faults=()), baseline))
-    files, unfilmed, problem = _written_or_why(run, judgement, baseline, folder, results, commands)
-    details = (*details, *filter(None, [problem]))
-    return CheckResult(
-        address=address,
-        passed=judgement.passed,
-        outcome=run.outcome.key,
-        certified=run.certificate is not None and run.certificate.certified,
-        case="" if path is None else name,
-        faults=judgement.faults,
-        gains=judgement.gains,
-        details=details,
-        accepted=accepted,
-        commands=commands,
-        files=files,
-        unfilmed=unfilmed,
-        metrics={name: x for name, x in run.metrics.items() if not math.isnan(x)} if run.rollout is not None else {},
-        digest=run.rollout.drive_digest if run.rollout is not None else "",
-        wall_s=_wall(run) + time.perf_counter() - started,
-    )
-
-
-def _written_or_why(
-    run: Run,
-    judgement: Judgement,
-    baseline: Baseline | None,
-    folder: Path | None,
-    results: Results | None,
-    commands: Sequence[str],
-) -> tuple[dict[str, str], bool, str]:
-    """What `_written` says, and why nothing could be written about a failed test, which must not hide its faults."""
-    try:
-        return *_written(run, judgement, baseline, folder, results, commands), ""
-    except Exception as error:  # a picture of a planner's odd answer may fail in many ways
-        if judgement.passed:
-            raise
-        said = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
-        return {}, False, f"results: {said}"
-
-
-def _written(
-    run: Run,
-    judgement: Judgement,
-    baseline: Baseline | None,
-    folder: Path | None,
-    results: Results | None,
-    commands: Sequence[str],
-) -> tuple[dict[str, str], bool]:
-    """What was written about a test, by name, and whether it failed and only its film is missing."""
-    if folder is None or results is None:
-        return {}, False
-    remove_artefacts(folder)
-    failed, drove = not judgement.passed, run.rollout is not None
-    filmed = drove and results.takes_film(failed=failed)
-    if not (failed or results.films == "always"):
-        return {}, False
-    files = write_artefacts(run, folder, baseline, film=filmed, faults=judgement.faults, commands=commands)
-    return files, drove and results.films == "failed" and not filmed
-
-
-def _without_baseline(
-    run: Run, demands: Demands, path: Path, name: str, accept: str, update: Update
-) -> tuple[Judgement, str]:
-    """Judge a run by its demands alone, and write its baseline if asked to and if it fulfils them; what was written."""
-    faults, accepted = list(unfulfilled(run, demands)), ""
-    if not update:
-        remedy = "" if faults else f"; accept this drive with {accept}"
-        faults.append(f"baseline: {shown_path(path)} is missing{remedy}")
-    elif faults:
-        faults.append("baseline: not accepted, because the drive is not what the test expects")
-    else:
-        accepted = Baseline.of(run, name).renew(path)
-    return Judgement(tuple(faults)), accepted
-
-
-def _wall(run: Run) -> float:
-    """How long planning and driving took [s]."""
-    return run.rollout.record.times.drive_wall_s + run.plan.wall_s if run.rollout else run.plan.wall_s

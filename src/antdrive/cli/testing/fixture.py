@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from antdrive.base.errors import FieldError
-from antdrive.cli.testing.checking import CheckResult, Update, check_run
+from antdrive.cli.testing.checking import Check, CheckResult, Update
 from antdrive.planners import Planner
 from antdrive.robots import RobotSpec, list_robots
 from antdrive.runs.suites.demands import Demands
@@ -117,18 +117,17 @@ class DriveFixture:
         self._names.add(name)
         run = self.run(world, planner, robot, **settings)
         whole = f"{self._test}-{name}" if name else self._test
-        result = check_run(
-            run,
-            demands,
-            self.baseline_path(whole) if baseline else None,
+        result = Check(
             address=self._address,
             name=whole,
-            update=self._update,
+            demands=demands,
+            baseline=self.baseline_path(whole) if baseline else None,
             commands=(shlex.join(["pytest", self._repeat]),),
             accept=shlex.join(["pytest", self._repeat, "--drive-update"]),
+            update=self._update,
             folder=self._results.of(self._file, whole) if self._results else None,
             results=self._results,
-        )
+        ).judge(run)
         self._report(result)
         if not result.passed:
             raise DriveFailure(result)

@@ -147,14 +147,14 @@ def compile_first(config: pytest.Config) -> None:
     if _COMPILED in config.stash:
         return
     config.stash[_COMPILED] = True
-    from antdrive.cli.testing.compiling import compile_in_turn
+    from antdrive.cli.compiling import compile_once
 
     def say(text: str) -> None:
         capture = config.pluginmanager.getplugin("capturemanager")
         with capture.global_and_fixture_disabled() if capture else contextlib.nullcontext():
             print(f"\nantdrive: {text}", file=sys.stderr, flush=True)  # noqa: T201 - in a process of xdist, too
 
-    compile_in_turn(say)
+    compile_once(say)
 
 
 def note(item: pytest.Item, result: CheckResult) -> None:

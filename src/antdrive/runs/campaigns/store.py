@@ -22,9 +22,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from antdrive.base.atomic import claimed, written_whole
+from antdrive.base.atomic import written_whole
 from antdrive.base.errors import InputError, input_error
-from antdrive.runs.campaigns.extras import parquet_library
+from antdrive.base.optional import parquet_library
+from antdrive.runs import folder as folders
 from antdrive.runs.campaigns.rows import CRASHED, NOT_CANONICAL, result_schema, result_table
 
 if TYPE_CHECKING:
@@ -123,10 +124,7 @@ def opened(folder: str | os.PathLike[str]) -> Iterator[Store]:
     Raises:
         InputError: another process writes into it, it cannot be written to, or it holds something else.
     """
-    path = Path(folder)
-    if path.is_dir() and not (path / MANIFEST).exists() and any(p.name[0] != "." for p in path.iterdir()):
-        raise input_error(str(folder), f"holds other files and no {MANIFEST}; name a new folder, or that of a campaign")
-    with claimed(path):
+    with folders.opened(Path(folder), MANIFEST, kind="a campaign") as path:
         (path / PARTS).mkdir(exist_ok=True)
         for left in (*path.glob(f"{UNFINISHED}*"), *(path / PARTS).glob(f"{UNFINISHED}*")):
             left.unlink(missing_ok=True)  # of a process that was killed

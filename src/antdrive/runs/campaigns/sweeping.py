@@ -13,9 +13,9 @@ from typing import Any, get_args
 
 from antdrive.base.atomic import written_whole
 from antdrive.base.errors import FieldError
+from antdrive.base.optional import parquet_library
 from antdrive.runs.campaigns.campaign import Campaign, load_campaign, make_campaign
 from antdrive.runs.campaigns.expanding import Expansion, expand
-from antdrive.runs.campaigns.extras import parquet_library
 from antdrive.runs.campaigns.job import Job, SweepCase
 from antdrive.runs.campaigns.missing import changed_planners, missing_runs
 from antdrive.runs.campaigns.results import SweepResults
@@ -24,6 +24,7 @@ from antdrive.runs.campaigns.running import Driving, Finished, Keep, Work, finis
 from antdrive.runs.campaigns.store import Store, opened
 from antdrive.runs.margins.choice import choose_margin
 from antdrive.runs.margins.prediction import Calibration
+from antdrive.runs.margins.trial import Conditions
 from antdrive.runs.pool import Done, Pool, cores
 from antdrive.sim.pipeline import versions
 from antdrive.worlds import save_task
@@ -33,47 +34,7 @@ def sweep(
     campaign: Campaign | str | os.PathLike[str] | Mapping[str, Any],
     folder: str | os.PathLike[str],
     *,
-    jobs: int | None = None,
-    dask: str | None = None,
-    keep: Keep | None = None,
-    retry_crashed: bool = False,
-    again: Sequence[str] = (),
-    progress: Callable[[int, int], None] | None = None,
-) -> SweepResults:
-    """Make all runs of a campaign that its folder does not hold yet. Whatever ends it, the same call goes on later.
-
-    Args:
-        campaign: a campaign, its file, or plain data with the keys of such a file
-        folder: where results are kept
-        jobs: number of processes; None: one per core; 0: this process, which a run that crashes then ends
-        dask: the cluster that makes the runs instead: "local:N", or the address of a scheduler, "tcp://HOST:PORT"
-        keep: which runs' logs are kept: none, failed or all; None: as the campaign says
-        retry_crashed: whether runs are made again that crashed
-        again: planners, by label or name, and outcomes whose runs are made again; their present results are forgotten
-        progress: is called at first and after each run with the numbers of runs that are done and of all
-
-    Raises:
-        InputError: something in the campaign is wrong, another process writes into the folder, or the scheduler is gone.
-    """
-    asked = campaign_of(campaign)
-    return run_expansion(
-        asked,
-        expand(asked),
-        folder,
-        jobs=jobs,
-        dask=dask,
-        keep=keep,
-        retry_crashed=retry_crashed,
-        again=again,
-        progress=progress,
-    )
-
-
-def run_expansion(
-    campaign: Campaign,
-    expansion: Expansion,
-    folder: str | os.PathLike[str],
-    *,
+    expansion: Expansion | None = None,
     jobs: int | None = None,
     dask: str | None = None,
     keep: Keep | None = None,
@@ -82,12 +43,26 @@ def run_expansion(
     progress: Callable[[int, int], None] | None = None,
     work: Work | None = None,
 ) -> SweepResults:
-    """Make those runs of an expanded campaign that its folder does not hold yet.
+    """Make all runs of a campaign that its folder does not hold yet. Whatever ends it, the same call goes on later.
+
+    Args:
+        campaign: a campaign, its file, or plain data with the keys of such a file
+        folder: where results are kept
+        expansion: the campaign's runs, where they are known already
+        jobs: number of processes; None: one per core; 0: this process, which a run that crashes then ends
+        dask: the cluster that makes the runs instead: "local:N", or the address of a scheduler, "tcp://HOST:PORT"
+        keep: which runs' logs are kept: none, failed or all; None: as the campaign says
+        retry_crashed: whether runs are made again that crashed
+        again: planners, by label or name, and outcomes whose runs are made again; their present results are forgotten
+        progress: is called at first and after each run with the numbers of runs that are done and of all
+        work: what is done with each run; None: it is driven
 
     Raises:
-        InputError: another process writes into the folder, or the scheduler is gone.
+        InputError: something in the campaign is wrong, another process writes into the folder, or the scheduler is gone.
     """
+    campaign = campaign_of(campaign)
     _check(campaign, jobs, dask, keep)
+    expansion = expansion or expand(campaign)
     parquet_library()
     report = progress or (lambda done, size: None)
     with opened(folder) as store:
@@ -150,7 +125,7 @@ def calibrated(jobs: Iterable[Job]) -> list[Job]:
     cases: dict[int, SweepCase] = {}
     for job in jobs:
         if job.case.fields["margin"] == "auto" and id(job.case) not in cases:
-            conditions = dataclasses.replace(job.case, calibration=None).scenario(job.seed, margin=0.0).conditions
+            conditions = Conditions.of(job.case.scenario(job.seed, margin=0.0))
             if conditions.key not in chosen:
                 chosen[conditions.key] = choose_margin(conditions)
             cases[id(job.case)] = dataclasses.replace(job.case, calibration=chosen[conditions.key])

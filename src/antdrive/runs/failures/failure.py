@@ -13,8 +13,8 @@ from antdrive.planners import PlannerError
 from antdrive.runs.suites.baseline import Baseline
 from antdrive.runs.suites.demands import CYLINDER, UNSEEN, WALL, WALL_CLOCK, Bound
 from antdrive.runs.suites.judging import RAISED, judge, limits, unfulfilled
+from antdrive.runs.suites.nearest import NOTHING, cause_of_contact, touched_first
 from antdrive.runs.suites.suite import SuiteCase
-from antdrive.runs.suites.touching import NOTHING, cause_of_contact, touched_first
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout

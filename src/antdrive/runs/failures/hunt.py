@@ -1,9 +1,9 @@
-"""Worlds in which a set-up fails, looked for within a budget of runs."""
+"""Worlds in which a configuration fails, found within a budget of runs."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,14 +11,46 @@ import numpy as np
 from antdrive.base import Floats
 from antdrive.base.errors import FieldError
 from antdrive.planners import PlannerError
-from antdrive.runs.failures.diversity import driven_line, is_new
 from antdrive.runs.failures.failure import Failure, failure_of, failure_of_planner
 from antdrive.runs.failures.handover import fingerprint_of
 from antdrive.runs.failures.search import METHODS
 from antdrive.runs.failures.space import WorldSpace, feasible
 from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import Run, run
 from antdrive.sim.scenario import Scenario
+
+POINTS = 60  # of a line, at equal distances along it
+
+
+def driven_line(rollout: Rollout) -> Floats:
+    """The line that was driven up to the first contact, as `POINTS` points (N, 2) at equal distances along it [m]."""
+    end = int(rollout.contacts[0, 0]) + 1 if len(rollout.contacts) else len(rollout.t)
+    xy = rollout.pose[:end, :2]
+    along = np.concatenate(([0.0], np.hypot(*np.diff(xy, axis=0).T).cumsum()))
+    at = np.linspace(0.0, along[-1], POINTS)
+    return np.column_stack([np.interp(at, along, xy[:, k]) for k in (0, 1)])
+
+
+def line_distance(one: Floats, other: Floats) -> float:
+    """The mean distance between the points of two lines (N, 2) and (M, 2) that dynamic time warping pairs [m]."""
+    apart = np.hypot(one[:, None, 0] - other[None, :, 0], one[:, None, 1] - other[None, :, 1])
+    rows, columns = apart.shape
+    cost = np.full((rows + 1, columns + 1), np.inf)
+    pairs = np.zeros((rows + 1, columns + 1))
+    cost[0, 0] = 0.0
+    for i in range(1, rows + 1):
+        for j in range(1, columns + 1):
+            before = min((i - 1, j - 1), (i - 1, j), (i, j - 1), key=lambda cell: cost[cell])
+            cost[i, j] = cost[before] + apart[i - 1, j - 1]
+            pairs[i, j] = pairs[before] + 1
+    return float(cost[-1, -1] / pairs[-1, -1])
+
+
+def is_new(line: Floats, others: Sequence[Floats], least: float) -> bool:
+    """Whether a line is farther than a distance from all others."""
+    return all(line_distance(line, other) > least for other in others)
+
 
 TRIES = 1000  # worlds that are drawn for one run; those without a path are not driven
 
@@ -32,7 +64,7 @@ class Finding:
         failure: how it fails
         line: the line that was driven until then (N, 2) [m]; (0, 2) if nothing was driven
         number: which run of the search found it, counted from 1
-        is_new: whether it differs from all that were found before; `antdrive.runs.failures.diversity` defines it
+        is_new: whether it differs from all that were found before; `antdrive.runs.failures.hunt` defines it
         fingerprint: the run in one text, which is the same wherever the run is the same bit for bit; what the planner raised,
             if it did
     """

@@ -8,16 +8,11 @@ no part in them, so that an interval is the same however often a drive was repea
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
+from antdrive.base.types import Flags, Floats, Ints
 from antdrive.runs.statistics.proportions import CONFIDENCE, Interval
-
-Floats: TypeAlias = npt.NDArray[np.float64]
-Flags: TypeAlias = npt.NDArray[np.bool_]
-Ints: TypeAlias = npt.NDArray[np.int64]
 
 RESAMPLES = 2000
 SEED = 19_790_101  # the same table gives the same intervals

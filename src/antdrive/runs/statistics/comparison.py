@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
 from antdrive.base.errors import FieldError
+from antdrive.base.types import Flags, Floats
 from antdrive.runs.statistics.bootstrap import means_by_world, medians_by_world
 from antdrive.runs.statistics.pairing import PairedRuns
 from antdrive.runs.statistics.proportions import CONFIDENCE, Interval, paired_difference
@@ -27,8 +27,6 @@ from antdrive.runs.statistics.significance import (
     wilcoxon,
 )
 
-Floats: TypeAlias = npt.NDArray[np.float64]
-Flags: TypeAlias = npt.NDArray[np.bool_]
 Pairs: TypeAlias = Sequence[tuple[int, int]]
 Direction: TypeAlias = Literal["lower", "higher", "neither"]
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from antdrive.base.errors import FieldError
-from antdrive.runs.statistics.columns import ASKED, DRIVEN, PLACE, SETTINGS
-from antdrive.runs.statistics.runs import RunTable
+from antdrive.runs.statistics.runs import ASKED, DRIVEN, PLACE, SETTINGS, RunTable
 
 FOLDER = "folder"  # the column that names the campaign
 

@@ -6,20 +6,19 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.errors import FieldError
+from antdrive.base.optional import statistics_library
+from antdrive.base.types import Floats
 from antdrive.runs.statistics.bootstrap import RESAMPLES, means_by_world, medians_by_world
 from antdrive.runs.statistics.comparison import ALPHA, SUCCESS, Direction, pairs_of, success_interval
-from antdrive.runs.statistics.libraries import library
 from antdrive.runs.statistics.pairing import PairedRuns
 from antdrive.runs.statistics.proportions import Interval
 from antdrive.runs.statistics.significance import differences
-
-Floats: TypeAlias = npt.NDArray[np.float64]
 
 POWER = 0.8  # the chance with which the needed worlds show it, if the two are equally good
 TAIL_RESAMPLES = 20  # resamples beyond each end of an interval, at least
@@ -113,7 +112,7 @@ def _world_means(gap: Floats, world: npt.NDArray[np.int64]) -> Floats:
 
 def _needed(means: Sequence[float] | Floats, allowed: float, alpha: float, success: bool) -> int:
     """Worlds after which the interval's lower end is above `-allowed`; at least as many as a run without disagreement takes."""
-    z = library("scipy.stats").norm.ppf([1 - alpha / 2, POWER])
+    z = statistics_library("scipy.stats").norm.ppf([1 - alpha / 2, POWER])
     spread = float(np.std(means, ddof=1)) if len(means) > 1 else math.nan
     normal = 0 if math.isnan(spread) else math.ceil((z.sum() * spread / allowed) ** 2)
     # Where nothing fails, Wilson's interval over n worlds is as wide as z² / (n + z²).

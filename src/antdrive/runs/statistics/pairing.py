@@ -4,18 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
 from antdrive.base.errors import FieldError
-from antdrive.runs.statistics.columns import OF_WORLDS, PLACE, WALL_TIMES
-from antdrive.runs.statistics.runs import RunTable
-
-Floats: TypeAlias = npt.NDArray[np.float64]
-Flags: TypeAlias = npt.NDArray[np.bool_]
-Ints: TypeAlias = npt.NDArray[np.int64]
+from antdrive.base.types import Flags, Floats, Ints
+from antdrive.runs.statistics.runs import OF_WORLDS, PLACE, WALL_TIMES, RunTable
 
 
 @dataclass(frozen=True, eq=False)

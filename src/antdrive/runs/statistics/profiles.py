@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from antdrive.base.errors import FieldError
-
-Floats: TypeAlias = npt.NDArray[np.float64]
+from antdrive.base.types import Floats
 
 
 class StepCurve(NamedTuple):

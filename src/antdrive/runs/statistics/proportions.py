@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from antdrive.base.errors import FieldError
-from antdrive.runs.statistics.libraries import library
+from antdrive.base.optional import statistics_library
 
 CONFIDENCE = 0.95
 
@@ -31,7 +31,7 @@ def wilson(successes: int, total: int, confidence: float = CONFIDENCE) -> Interv
     """
     if not 0 <= successes <= total or total < 1:
         raise FieldError("successes", f"must be 0 to total, and total at least 1; got {successes} of {total}")
-    proportion = library("statsmodels.stats.proportion")
+    proportion = statistics_library("statsmodels.stats.proportion")
     low, high = proportion.proportion_confint(successes, total, alpha=1 - confidence, method="wilson")
     # At 0 and at `total` the interval ends exactly there; rounding may leave it 1e-17 off.
     return Interval(0.0 if successes == 0 else float(low), 1.0 if successes == total else float(high))

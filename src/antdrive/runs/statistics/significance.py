@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
-from antdrive.runs.statistics.libraries import library
-
-Floats: TypeAlias = npt.NDArray[np.float64]
-Ints: TypeAlias = npt.NDArray[np.int64]
+from antdrive.base.optional import statistics_library
+from antdrive.base.types import Floats, Ints
 
 EXACT_WORLDS = 16  # up to so many worlds, all 2^W flips are tried
 FLIPS = 99_999  # random flips above
@@ -24,7 +20,7 @@ def mcnemar(first: int, second: int) -> float:
     """The exact p-value of McNemar's test (McNemar 1947): a two-sided binomial test of the pairs that disagree."""
     if first + second == 0:
         return 1.0
-    tables = library("statsmodels.stats.contingency_tables")
+    tables = statistics_library("statsmodels.stats.contingency_tables")
     return float(min(1.0, tables.mcnemar([[0, first], [second, 0]], exact=True).pvalue))
 
 
@@ -38,7 +34,7 @@ def signed_ranks(difference: Floats) -> Floats:
     """The rank of each difference's size among those that are not 0, with its sign, (N,); 0 stays 0."""
     ranks = np.zeros(len(difference))
     other = difference != 0
-    ranks[other] = library("scipy.stats").rankdata(_levelled(np.abs(difference[other])))
+    ranks[other] = statistics_library("scipy.stats").rankdata(_levelled(np.abs(difference[other])))
     return np.asarray(np.sign(difference) * ranks)
 
 
@@ -57,7 +53,7 @@ def wilcoxon(difference: Floats) -> float:
     if not len(other):
         return 1.0
     levelled = np.sign(other) * _levelled(np.abs(other))
-    return float(min(1.0, library("scipy.stats").wilcoxon(levelled).pvalue))
+    return float(min(1.0, statistics_library("scipy.stats").wilcoxon(levelled).pvalue))
 
 
 def rank_biserial(difference: Floats) -> float:

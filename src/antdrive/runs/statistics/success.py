@@ -7,16 +7,14 @@ import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from antdrive.base.types import Flags
 from antdrive.runs.statistics.bootstrap import means_by_world, medians_by_world
 from antdrive.runs.statistics.pairing import PairedRuns
 from antdrive.runs.statistics.proportions import Interval, wilson
-
-Flags: TypeAlias = npt.NDArray[np.bool_]
 
 NOWHERE = Interval(math.nan, math.nan)
 

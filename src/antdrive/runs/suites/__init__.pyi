@@ -3,8 +3,8 @@ from .demands import Bound as Bound
 from .demands import Demands as Demands
 from .judging import Judgement as Judgement
 from .judging import judge as judge
+from .names import select as select
 from .scenarios import scenario_of as scenario_of
-from .selecting import select as select
 from .strategies import tasks as tasks
 from .strategies import worlds as worlds
 from .suite import SuiteCase as SuiteCase

@@ -13,9 +13,8 @@ from dataclasses import dataclass
 
 from antdrive.runs.suites.baseline import Baseline
 from antdrive.runs.suites.demands import END, WALL_CLOCK, Bound, Demands
-from antdrive.runs.suites.nearest import nearest_of
-from antdrive.runs.suites.parting import end_distance, farthest
-from antdrive.runs.suites.touching import cause_of_contact, touched_first
+from antdrive.runs.suites.divergence import end_distance, farthest
+from antdrive.runs.suites.nearest import cause_of_contact, nearest_of, touched_first
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.rollout import Rollout

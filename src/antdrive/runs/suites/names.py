@@ -1,18 +1,19 @@
-"""What a suite names: worlds, robots and planners, of the catalogue or in files beside it. Loads no compiler."""
+"""What people name: the tests of suites, and the worlds, robots and planners of tests. Loads no compiler."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import fnmatch
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from antdrive.base.checks import show, suggest
-from antdrive.base.errors import InputError
+from antdrive.base.errors import InputError, input_error
 from antdrive.planners.own_code import OwnCodeError, is_own, object_in, record_name
 from antdrive.planners.plan import Planner
 from antdrive.planners.registry import load_planner, make_planner
 from antdrive.robots.files import list_robots
-from antdrive.runs.suites.suite import SuiteCase
+from antdrive.runs.suites.suite import SUFFIX, SuiteCase, load_suite
 from antdrive.worlds.files.world_file import list_worlds
 
 #: Where a planner comes from: a key of the mapping, beside its options.
@@ -117,3 +118,47 @@ def _own(case: SuiteCase, name: str, sources: Mapping[str, Any]) -> Any:
         return object_in(source, word, case.suite.parent, is_file=is_file)
     except OwnCodeError as error:
         raise case.error(of_word if error.of_class else key, error.problem) from error
+
+
+def select(words: Sequence[str], only: str | None = None) -> list[SuiteCase]:
+    """The tests that words name, each once, in their order.
+
+    Args:
+        words: suites, folders with suites, SUITE::scenario or SUITE::scenario[seed]
+        only: a pattern with * and ? that a scenario's name must match
+
+    Raises:
+        InputError: there is no such suite or test, or something in a suite is wrong.
+    """
+    found: dict[tuple[Path, str], SuiteCase] = {}
+    for word in words:
+        for case in _named(word):
+            if only is None or fnmatch.fnmatchcase(case.name, only) or case.id == only:
+                found.setdefault((case.suite, case.id), case)
+    for case in found.values():
+        check_names(case)
+    if not found:
+        raise input_error("--only", f"no test of {' '.join(words)} matches {only!r}")
+    return list(found.values())
+
+
+def _named(word: str) -> Iterator[SuiteCase]:
+    """The tests that one word names."""
+    place, mark, wanted = word.partition("::")
+    if mark and not wanted:
+        raise input_error(word, f"names no test; write {place} for all, or {place}::SCENARIO")
+    path = Path(place)
+    if path.is_dir() and not wanted:
+        suites = sorted(path.rglob(f"*{SUFFIX}"))
+        if not suites:
+            raise input_error(word, f"holds no suites; their names end in {SUFFIX}")
+        for suite in suites:
+            yield from load_suite(suite)
+        return
+    if path.is_file() and not path.name.endswith(SUFFIX):
+        raise input_error(word, f"is no suite; the name of a suite ends in {SUFFIX}")
+    cases = load_suite(path)
+    chosen = [case for case in cases if wanted in ("", case.name, case.id)]
+    if not chosen:
+        raise input_error(place, f"no test {wanted!r}; {suggest(wanted, [case.id for case in cases])}")
+    yield from chosen

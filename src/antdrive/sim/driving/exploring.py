@@ -34,7 +34,7 @@ from antdrive.sim.driving.movers_ahead import MoversSeenAhead
 from antdrive.sim.driving.own_map import PATIENCE
 from antdrive.sim.driving.parts import RouteGuide, Rows
 from antdrive.sim.driving.recovery import TRAIL, Look, Recovery
-from antdrive.sim.driving.replanning import Replan, ReplanPolicy
+from antdrive.sim.driving.replanning import Replan
 from antdrive.sim.driving.routes import RoutePlanner
 from antdrive.sim.driving.survey import Survey
 from antdrive.sim.driving.traffic import Zone
@@ -50,6 +50,7 @@ from antdrive.sim.driving.triggers import (
     STRAYED,
 )
 from antdrive.sim.log.streams import random_stream
+from antdrive.sim.policy import ReplanPolicy
 from antdrive.worlds import Disc, Grid, Route, Task, World, point_clearance, rasterise
 from antdrive.worlds.world import PointWorld
 

@@ -21,10 +21,10 @@ from antdrive.sim.driving.parts import Others
 from antdrive.sim.driving.traffic import TrackedTraffic, Traffic, Zone
 from antdrive.sim.driving.triggers import OBSTRUCTED, TRAFFIC, WAITED
 from antdrive.sim.driving.watching import Tracked
+from antdrive.sim.policy import ReplanPolicy
 from antdrive.worlds import Disc, Grid, World, rasterise
 
 if TYPE_CHECKING:
-    from antdrive.sim.driving.replanning import ReplanPolicy
     from antdrive.sim.driving.survey import Survey
 
 COARSE = 0.25  # side of the cells on which a route is held against the ground that movers roam [m]

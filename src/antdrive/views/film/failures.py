@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from antdrive.base.files import file_name
 from antdrive.sim.log.rollout import Rollout
 from antdrive.views.film.video import film
 
@@ -24,13 +25,14 @@ def film_failures(
     """Film every run that did not arrive and whose log is there; the films, earlier ones among them, by the keys of the runs.
 
     The line below the picture names the run, how it ended, and why. A drive longer than 30 s is shown in
-    30 s. A film that is newer than its log, or whose log is gone, is not made again."""
+    30 s. A film that is newer than its log, or whose log is gone, is not made again.
+    """
     failed = [row for row in rows if not row["succeeded"] and row["rollout"]]
     films = {}
     for k, row in enumerate(failed):
         log = Path(logs) / row["rollout"]
         name = f"{row['world']}-{row['planner']}-{row['robot']}-{row['seed']}-{row['key'][:8]}.mp4"
-        path = Path(folder) / "".join(c if c.isalnum() or c in "-_." else "_" for c in name)
+        path = Path(folder) / file_name(name)
         kept = log.exists()
         if kept and (not path.exists() or path.stat().st_mtime < log.stat().st_mtime):
             cause = ": ".join(text for text in (row["outcome"], row["reason"]) if text)

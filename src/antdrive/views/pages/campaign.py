@@ -10,9 +10,8 @@ from typing import Any
 from urllib.parse import quote
 
 from antdrive.base.errors import FieldError, InputError, input_error
-from antdrive.runs.campaigns.reading import common_folder, read_runs
-from antdrive.runs.statistics.columns import HASHES
-from antdrive.runs.statistics.runs import RunTable
+from antdrive.runs.campaigns.results import common_folder, read_runs
+from antdrive.runs.statistics.runs import HASHES, RunTable
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
 from antdrive.views.pages.headline import headline

@@ -6,10 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from antdrive.runs.statistics.columns import HASHES
 from antdrive.runs.statistics.comparison import ALPHA, PairedComparison
 from antdrive.runs.statistics.price import prices
 from antdrive.runs.statistics.proportions import Interval
+from antdrive.runs.statistics.runs import HASHES
 from antdrive.runs.statistics.significance import FLIPS
 from antdrive.views.pages.texts import percent, percents
 

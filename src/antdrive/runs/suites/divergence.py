@@ -1,22 +1,26 @@
-"""When and where two drives of the same scenario first part."""
+"""How a drive differs from its baseline: where the two diverge, and what changed in between."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from antdrive.base.types import Floats, Point
-from antdrive.runs.suites.baseline import Baseline
+from antdrive.runs.suites.baseline import Baseline, conditions
+from antdrive.runs.suites.nearest import touched_in
 from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.pipeline import Run, versions
 
-#: Two drives part where they are farther apart than this at the same time [m].
+#: Two drives diverge where they are farther apart than this at the same time [m].
 APART = 0.01
+SAME = "world, robot and settings are those of the baseline"
 
 
 @dataclass(frozen=True)
-class Parting:
+class Divergence:
     """Where a drive leaves the line of its baseline.
 
     Attributes:
@@ -35,7 +39,7 @@ class Parting:
 
     @property
     def sentence(self) -> str:
-        """The parting in words."""
+        """The divergence in words."""
         (x, y), (x0, y0) = self.now, self.then
         rule = f"{_rule(self.limiter)} keeps the robot below its top speed then"
         if self.limiter != self.limiter_then:
@@ -69,7 +73,7 @@ def end_distance(baseline: Baseline, rollout: Rollout) -> float:
     return float(np.hypot(*(rollout.pose[-1, :2] - baseline.xy[-1])))
 
 
-def parting(baseline: Baseline, rollout: Rollout, apart: float = APART) -> Parting | None:
+def divergence(baseline: Baseline, rollout: Rollout, apart: float = APART) -> Divergence | None:
     """Where a drive first is farther from its baseline than allowed; None if it nowhere is."""
     far = distances(baseline, rollout) > apart
     if not far.any():
@@ -80,10 +84,63 @@ def parting(baseline: Baseline, rollout: Rollout, apart: float = APART) -> Parti
     names, names_then = rollout.record.limiters, baseline.limiters
     rule, rule_then = int(rollout.limiter[row]), baseline.line[at][3]
     x, y = rollout.pose[row, :2].tolist()
-    return Parting(
+    return Divergence(
         t,
         (x, y),
         baseline.line[at][:2],
         names[rule] if rule < len(names) else "cruise",
         names_then[rule_then] if rule_then < len(names_then) else "cruise",
     )
+
+
+def explain(run: Run, baseline: Baseline | None) -> Iterator[str]:
+    """Yield what explains the faults of a test, a sentence each."""
+    if run.rollout is not None:
+        touched = touched_in(run.rollout)
+        if touched is not None:
+            yield f"touched {touched.thing}; {touched.place}"
+            if baseline is not None and baseline.nearest is not None:
+                was = baseline.nearest
+                yield f"in the baseline it came no nearer than {was.clearance:.3f} m, to {was.thing}; {was.place}"
+    if baseline is not None:
+        if run.rollout is not None and baseline.line:
+            yield from _divergence(run, baseline)
+        yield from changes(run, baseline)
+
+
+def _divergence(run: Run, baseline: Baseline) -> Iterator[str]:
+    assert run.rollout is not None
+    found = divergence(baseline, run.rollout)
+    most = float(distances(baseline, run.rollout).max(initial=0.0))
+    if found is not None:
+        yield f"{found.sentence}; at most {most:.3g} m apart"
+    elif run.rollout.drive_digest == baseline.drive_digest:
+        yield "the drive is the baseline's, bit for bit"
+    else:
+        yield f"the drive follows the baseline's line within {max(most, 0.001):.3f} m"
+
+
+def changes(run: Run, baseline: Baseline) -> Iterator[str]:
+    """What differs between the conditions of a run and those of its baseline, a line each."""
+    present: Mapping[str, str] = run.rollout.record.versions if run.rollout else versions()
+    others = [
+        f"{name} {baseline.versions.get(name, 'none')} -> {version}"
+        for name, version in present.items()
+        if baseline.versions.get(name) != version
+    ]
+    hashes = conditions(run)
+    if hashes and baseline.hashes:
+        changed = [name for name in hashes if hashes[name] != baseline.hashes.get(name)]
+        if changed:
+            yield f"changed since the baseline: {', '.join(changed)}"
+        elif others:
+            yield SAME
+        elif (
+            run.rollout is None or run.rollout.drive_digest != baseline.drive_digest
+        ):  # else the demands are what changed
+            yield f"{SAME}; so the code is what changed"
+    chosen = run.scenario.chosen
+    if chosen is not None and baseline.margin_m is not None and chosen.margin != baseline.margin_m:
+        yield f"margin: auto chose {chosen.margin:g} m, for the baseline {baseline.margin_m:g} m"
+    if others:
+        yield f"versions since the baseline: {', '.join(others)}"
