@@ -1,26 +1,25 @@
 """Scenarios whose margin is chosen: under which conditions, and for how long the choice counts."""
 
 import dataclasses
-from pathlib import Path
 
 import pytest
 
 from antdrive.base.errors import FieldError
 from antdrive.planners import load_planner
-from antdrive.robots import PurePursuit, RobotSpec
+from antdrive.robots import PurePursuit
 from antdrive.runs.margins import choice
 from antdrive.runs.margins.trial import Conditions, Loss
 from antdrive.sim import Scenario
 
 
 @pytest.fixture(autouse=True)
-def made_up(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def made_up(monkeypatch, tmp_path):
     """An empty cache, and drives that all lose 2 cm for each unit of noise."""
     monkeypatch.setattr(choice, "cache_folder", lambda: tmp_path)
     monkeypatch.setattr(choice, "_driving", lambda c, *_: lambda margin: [Loss(0.02 * c.noise, 0.02 * c.noise)] * 80)
 
 
-def test_a_margin_is_chosen_for_the_scenarios_own_settings(jackal: RobotSpec) -> None:
+def test_a_margin_is_chosen_for_the_scenarios_own_settings(jackal):
     controller = PurePursuit(lookahead_time=0.3)
     s = Scenario.of("empty", "astar", jackal, margin="auto", noise=2, smoothing="taut", controller=controller)
     assert s.chosen is not None
@@ -30,7 +29,7 @@ def test_a_margin_is_chosen_for_the_scenarios_own_settings(jackal: RobotSpec) ->
     assert s.inflate == jackal.radius + s.margin
 
 
-def test_a_choice_counts_as_long_as_its_conditions_hold(small_scenario: Scenario) -> None:
+def test_a_choice_counts_as_long_as_its_conditions_hold(small_scenario):
     s = small_scenario.with_chosen_margin()
     assert s.chosen is not None
     assert dataclasses.replace(s, seed=5).chosen == s.chosen
@@ -41,13 +40,13 @@ def test_a_choice_counts_as_long_as_its_conditions_hold(small_scenario: Scenario
     assert small_scenario.chosen is None
 
 
-def test_plans_in_space_and_time_are_not_smoothed(turtlebot: RobotSpec) -> None:
+def test_plans_in_space_and_time_are_not_smoothed(turtlebot):
     assert Scenario.of("plaza-moving", "sipp", turtlebot).conditions.smoothing == "none"
     assert Scenario.of("plaza-moving", "astar", turtlebot).conditions.smoothing == "clearance"
 
 
-def test_words_other_than_auto_are_no_margin(small_scenario: Scenario) -> None:
+def test_words_other_than_auto_are_no_margin(small_scenario):
     with pytest.raises(FieldError, match="margin: must be a number, got 'wide'"):
-        Scenario.of(small_scenario.task, margin="wide")  # type: ignore[arg-type]
+        Scenario.of(small_scenario.task, margin="wide")
     with pytest.raises(FieldError, match="calibration: must be a Calibration"):
-        dataclasses.replace(small_scenario, calibration=0.03)  # type: ignore[arg-type]
+        dataclasses.replace(small_scenario, calibration=0.03)
