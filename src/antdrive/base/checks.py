@@ -60,6 +60,8 @@ def check(kind: type[R], document: Document) -> R:
     unknown = [f for f in faults if f["type"] in _UNKNOWN]
     fault = (unknown or faults)[0]
     location = tuple(fault["loc"])
+    if fault["type"] == "missing" and isinstance(location[-1], int):  # an entry of a list, which is too short
+        location, fault = location[:-1], {**fault, "type": "too_short"}
     cause = fault.get("ctx", {}).get("error")
     if isinstance(cause, FieldError):
         raise document.field_error(cause, *location)
@@ -173,6 +175,7 @@ _KINDS = {
     "string_type": "text",
     "bool_type": "true or false",
     "list_type": "a list",
+    "tuple_type": "a list",
     "dict_type": "a mapping",
 }
 _BOUNDS = {
@@ -197,7 +200,9 @@ def _problem(schema: Schema, location: Location, fault: Mapping[str, Any]) -> st
     if kind == "finite_number":
         return f"must be a finite number, got {show(value)}"
     if kind in ("too_short", "too_long") and isinstance(value, list):
-        count = context.get("min_length", context.get("max_length"))
+        count = context.get(
+            "min_length", context.get("max_length", _one(schema, _at(schema, location)).get("minItems"))
+        )
         words = _describe(schema, location)
         return f"must have {count} entries, got {len(value)}" + (f"; {words}" if words else "")
     if kind == "literal_error":

@@ -32,16 +32,11 @@ TOO_MUCH = "its aliases stand for too much; write the values out without aliases
 
 @dataclass(frozen=True, eq=False)
 class Document:
-    """Plain data, with the line of each value.
+    """Plain data, with the line of each value."""
 
-    Attributes:
-        source: the file's path, or what people call the data
-        data: mappings, lists, numbers, texts, true, false and null
-        lines: the line of each value, counted from 1; empty where lines are not known
-    """
-
-    source: str
-    data: Any
+    source: str  # the file's path, or what people call the data
+    data: Any  # mappings, lists, numbers, texts, true, false and null
+    # the line of each value, counted from 1; empty where lines are not known
     lines: Mapping[Location, int] = field(default_factory=dict)
 
     def error(self, location: Location, problem: str) -> InputError:

@@ -6,7 +6,7 @@ import dataclasses
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any, TypeAlias, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 
@@ -22,7 +22,7 @@ _CATALOG = Path(__file__).with_name("catalog")
 _RULES = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
 
 _Size = Annotated[float, Field(gt=0)]
-_Place = Annotated[list[float], Field(min_length=2, max_length=2)]
+_Place: TypeAlias = tuple[float, float]
 
 
 _FORMS = (
@@ -64,7 +64,7 @@ class FootprintEntry(BaseModel):
         Raises:
             FieldError: the polygon is not convex.
         """
-        centre = (self.centre[0], self.centre[1]) if self.centre is not None else (0.0, 0.0)
+        centre = self.centre or (0.0, 0.0)
         if self.polygon is not None:
             try:
                 return Footprint.polygon(self.polygon)

@@ -51,14 +51,10 @@ class Motion(ABC):
     """The motion of a world's mover: a `MoverMotion` that also says how fast it moves and when it jumps.
 
     All times (T,) are seconds since a run's start, >= 0 and increasing.
-
-    Attributes:
-        radius: the mover's radius [m]
-        draws: how many random places were tried before a wanderer had its first cell
     """
 
-    radius: float
-    draws: int = 0
+    radius: float  # the mover's radius [m]
+    draws: int = 0  # how many random places were tried before a wanderer had its first cell
 
     @abstractmethod
     def at(self, t: Floats) -> Floats:

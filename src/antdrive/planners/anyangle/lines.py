@@ -21,20 +21,13 @@ CONTACT = 5e-10  # m: an end whose room falls short of the clearance by no more 
 
 
 class RouteEnds(NamedTuple):
-    """The ends of the part of a route that keeps the clearance, and the exact ends where these have too little room.
+    """The ends of the part of a route that keeps the clearance, and the exact ends where these have too little room."""
 
-    Attributes:
-        start: where the part that keeps the clearance starts [m]
-        goal: where it stops [m]
-        lead_in: the exact start, where it has too little room itself and is left on a straight line to
-            `start`
-        lead_out: the exact goal, where it has just the clearance and is reached on a straight line from
-            `goal`
-    """
-
-    start: Point
-    goal: Point
+    start: Point  # where the part that keeps the clearance starts [m]
+    goal: Point  # where it stops [m]
+    # the exact start, where it has too little room itself and is left on a straight line to `start`
     lead_in: tuple[Point, ...] = ()
+    # the exact goal, where it has just the clearance and is reached on a straight line from `goal`
     lead_out: tuple[Point, ...] = ()
 
     @property

@@ -21,17 +21,12 @@ CLOSER = 1e-7  # a gap passes discs that are smaller by this; contact closes it 
 
 @dataclass(frozen=True)
 class Passage:
-    """The narrowest place on the way of the widest disc that gets from the start to the goal.
+    """The narrowest place on the way of the widest disc that gets from the start to the goal."""
 
-    Attributes:
-        radius: of that disc [m]
-        at: the narrowest place: x, y [m]
-        between: the two obstacles that form it, counting the world's obstacles and then its left, lower, right and upper
-            wall; empty where an end has the least room
-    """
-
-    radius: float
-    at: Point
+    radius: float  # of that disc [m]
+    at: Point  # the narrowest place: x, y [m]
+    # the two obstacles that form it, counting the world's obstacles and then its left, lower, right and upper
+    # wall; empty where an end has the least room
     between: tuple[int, ...] = ()
 
 

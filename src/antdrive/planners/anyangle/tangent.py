@@ -28,15 +28,10 @@ NO_GAP = "discs and walls leave no way from the start to the goal for this clear
 
 @dataclass(frozen=True)
 class Line:
-    """A straight piece of a path.
+    """A straight piece of a path."""
 
-    Attributes:
-        start: its first point [m]
-        end: its last point [m]
-    """
-
-    start: Point
-    end: Point
+    start: Point  # its first point [m]
+    end: Point  # its last point [m]
 
     @property
     def length(self) -> float:
@@ -46,19 +41,12 @@ class Line:
 
 @dataclass(frozen=True)
 class Arc:
-    """A piece of a path along the rim of a disc.
+    """A piece of a path along the rim of a disc."""
 
-    Attributes:
-        centre: the centre of the disc [m]
-        radius: the radius of the inflated disc [m]
-        begin: the angle of its first point, seen from the centre [rad]
-        sweep: the angle from its first point to its last, positive counter-clockwise [rad]
-    """
-
-    centre: Point
-    radius: float
-    begin: float
-    sweep: float
+    centre: Point  # the centre of the disc [m]
+    radius: float  # the radius of the inflated disc [m]
+    begin: float  # the angle of its first point, seen from the centre [rad]
+    sweep: float  # the angle from its first point to its last, positive counter-clockwise [rad]
 
     @property
     def length(self) -> float:

@@ -25,21 +25,13 @@ Heuristic = npt.NDArray[np.floating[Any]]  # (cells, 8)
 
 @dataclass(frozen=True, eq=False)
 class ColonyGraph:
-    """The graph that ants walk on, in the form that compiled code takes: cells are flat indices.
+    """The graph that ants walk on, in the form that compiled code takes: cells are flat indices."""
 
-    Attributes:
-        mask: the allowed moves of each cell, one bit per direction (cells,)
-        offset: what each of the eight moves adds to a flat index (8,)
-        shape: rows and columns of the grid
-        start: the start cell
-        goal: the goal cell
-    """
-
-    mask: npt.NDArray[np.uint8]
-    offset: npt.NDArray[np.int64]
-    shape: tuple[int, int]
-    start: int
-    goal: int
+    mask: npt.NDArray[np.uint8]  # the allowed moves of each cell, one bit per direction (cells,)
+    offset: npt.NDArray[np.int64]  # what each of the eight moves adds to a flat index (8,)
+    shape: tuple[int, int]  # rows and columns of the grid
+    start: int  # the start cell
+    goal: int  # the goal cell
 
     @classmethod
     def of(cls, query: Query) -> ColonyGraph:
@@ -76,17 +68,11 @@ class ColonyGraph:
 
 @dataclass(frozen=True, eq=False)
 class Walks:
-    """The walks of one iteration's ants, a row each. A row of an ant that did not arrive has no meaning.
+    """The walks of one iteration's ants, a row each. A row of an ant that did not arrive has no meaning."""
 
-    Attributes:
-        cells: the cells of each walk in order, as flat indices (ants, room)
-        sizes: how many cells of each row are used (ants,), 0 where the ant did not arrive
-        lengths: the length of each walk [cells] (ants,), inf where the ant did not arrive
-    """
-
-    cells: Flat
-    sizes: npt.NDArray[np.int64]
-    lengths: Floats
+    cells: Flat  # the cells of each walk in order, as flat indices (ants, room)
+    sizes: npt.NDArray[np.int64]  # how many cells of each row are used (ants,), 0 where the ant did not arrive
+    lengths: Floats  # the length of each walk [cells] (ants,), inf where the ant did not arrive
 
     def __len__(self) -> int:
         return len(self.sizes)
@@ -114,66 +100,39 @@ class Walks:
 
 
 class WalkSummary(NamedTuple):
-    """How the ants of an iteration fared.
+    """How the ants of an iteration fared."""
 
-    Attributes:
-        arrived: how many ants reached the goal
-        mean: the mean length of their walks [cells], inf if no ant arrived
-        shortest: the row of the shortest walk
-    """
-
-    arrived: int
-    mean: float
-    shortest: int
+    arrived: int  # how many ants reached the goal
+    mean: float  # the mean length of their walks [cells], inf if no ant arrived
+    shortest: int  # the row of the shortest walk
 
 
 class ChoiceContext(NamedTuple):
-    """What choice weights depend on besides trails and heuristic.
+    """What choice weights depend on besides trails and heuristic."""
 
-    Attributes:
-        kind: the kind of ant that the weights are for, an index of `Colony.kinds`
-        uniform: a random number in [0, 1), drawn once per iteration and kind
-    """
-
-    kind: int = 0
-    uniform: float = 0.5
+    kind: int = 0  # the kind of ant that the weights are for, an index of `Colony.kinds`
+    uniform: float = 0.5  # a random number in [0, 1), drawn once per iteration and kind
 
 
 @dataclass(eq=False)
 class Memory:
-    """What a colony hands on to a later colony on the same cells; the colony keeps it up to date.
+    """What a colony hands on to a later colony on the same cells; the colony keeps it up to date."""
 
-    Attributes:
-        trail: the trails, as `Colony.initial_trail` returns them
-        tour: the best tour, a single row
-    """
-
-    trail: Floats | None = None
-    tour: Walks | None = None
+    trail: Floats | None = None  # the trails, as `Colony.initial_trail` returns them
+    tour: Walks | None = None  # the best tour, a single row
 
 
 class IterationState(NamedTuple):
-    """One iteration of a colony, as the rules that change trails see it.
+    """One iteration of a colony, as the rules that change trails see it."""
 
-    Attributes:
-        number: the iteration's number, from 0
-        graph: the graph that ants walk on
-        walks: the ants' walks, loops included
-        tours: the same walks without loops and, with `Colony.shortcut`, cut short
-        daemon_tour: the tour that `Colony.daemon_action` made, a single row
-        best: the best tour so far, a single row
-        since: number of iterations since the best tour was found
-        rng: the colony's source of random numbers
-    """
-
-    number: int
-    graph: ColonyGraph
-    walks: Walks
-    tours: Walks
-    daemon_tour: Walks | None
-    best: Walks | None
-    since: int
-    rng: np.random.Generator
+    number: int  # the iteration's number, from 0
+    graph: ColonyGraph  # the graph that ants walk on
+    walks: Walks  # the ants' walks, loops included
+    tours: Walks  # the same walks without loops and, with `Colony.shortcut`, cut short
+    daemon_tour: Walks | None  # the tour that `Colony.daemon_action` made, a single row
+    best: Walks | None  # the best tour so far, a single row
+    since: int  # number of iterations since the best tour was found
+    rng: np.random.Generator  # the colony's source of random numbers
 
 
 #: The context of colonies that have one kind of ant.
@@ -344,23 +303,14 @@ class Colony(IterativePlanner):
 
 @dataclass(frozen=True, eq=False)
 class TourConstruction:
-    """Sends the ants of one plan; the arrays are allocated once and reused in every iteration.
+    """Sends the ants of one plan; the arrays are allocated once and reused in every iteration."""
 
-    Attributes:
-        planner: the colony, for its numbers of ants and rules of walking
-        graph: the graph that ants walk on
-        limit: the steps after which an ant gives up
-        weights: the choice weights of each kind of ant, to be filled before `construct`
-        walks: where `construct` puts the walks
-        tours: where `shorten` puts the tours
-    """
-
-    planner: Colony
-    graph: ColonyGraph
-    limit: int
-    weights: tuple[Weights, ...]
-    walks: Walks
-    tours: Walks
+    planner: Colony  # the colony, for its numbers of ants and rules of walking
+    graph: ColonyGraph  # the graph that ants walk on
+    limit: int  # the steps after which an ant gives up
+    weights: tuple[Weights, ...]  # the choice weights of each kind of ant, to be filled before `construct`
+    walks: Walks  # where `construct` puts the walks
+    tours: Walks  # where `shorten` puts the tours
 
     @classmethod
     def of(cls, planner: Colony, graph: ColonyGraph) -> TourConstruction:

@@ -215,29 +215,17 @@ class PotentialFieldAnts(IterativePlanner):
 
 @dataclass(eq=False)
 class AntPool:
-    """The ants of one plan and their ranking list, in the form that compiled code takes.
+    """The ants of one plan and their ranking list, in the form that compiled code takes."""
 
-    Attributes:
-        planner: the parameters
-        graph: the graph that ants walk on
-        limit: the steps after which a walk ends
-        ants: the ants and their unfinished walks
-        ranking: the ranking list
-        buffer: where compiled code puts a new best walk (room,)
-        arrivals: where compiled code puts the lengths of the walks that arrived
-        shortest: the length of the best walk [cells], inf while there is none
-        best: the cells of the best walk, as flat indices
-    """
-
-    planner: PotentialFieldAnts
-    graph: ColonyGraph
-    limit: int
-    ants: Ants
-    ranking: Ranking
-    buffer: npt.NDArray[np.int32]
-    arrivals: Floats
-    shortest: float = math.inf
-    best: npt.NDArray[np.int32] | None = None
+    planner: PotentialFieldAnts  # the parameters
+    graph: ColonyGraph  # the graph that ants walk on
+    limit: int  # the steps after which a walk ends
+    ants: Ants  # the ants and their unfinished walks
+    ranking: Ranking  # the ranking list
+    buffer: npt.NDArray[np.int32]  # where compiled code puts a new best walk (room,)
+    arrivals: Floats  # where compiled code puts the lengths of the walks that arrived
+    shortest: float = math.inf  # the length of the best walk [cells], inf while there is none
+    best: npt.NDArray[np.int32] | None = None  # the cells of the best walk, as flat indices
 
     @classmethod
     def of(cls, planner: PotentialFieldAnts, graph: ColonyGraph, rng: np.random.Generator) -> AntPool:

@@ -132,38 +132,23 @@ def pull_taut(xy: npt.ArrayLike, discs: npt.ArrayLike, bounds: Bounds, inflate: 
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """A part of a route.
+    """A part of a route."""
 
-    Attributes:
-        xy: its points (N, 2) [m]
-        curvature: curvature from each point on (N,) [1/m]
-        kind: its kind of smoothing
-        note: why it is not smoothed as asked; empty if it is
-    """
-
-    xy: Floats
-    curvature: Floats
-    kind: str = "none"
-    note: str = ""
+    xy: Floats  # its points (N, 2) [m]
+    curvature: Floats  # curvature from each point on (N,) [1/m]
+    kind: str = "none"  # its kind of smoothing
+    note: str = ""  # why it is not smoothed as asked; empty if it is
 
 
 @dataclass(frozen=True, eq=False)
 class TautString:
-    """A taut string with K contacts, where it bends around discs, and K + 1 straight links.
+    """A taut string with K contacts, where it bends around discs, and K + 1 straight links."""
 
-    Attributes:
-        disc: index of the disc that it bends around at each contact (K,)
-        turn: 1 where it bends to the left, -1 to the right (K,)
-        sweep: by how much it bends (K,) [rad]
-        links: ends of each link as x, y from and x, y to (K + 1, 4) [m]
-        discs: the discs that it bends around, with the radii of its arcs (N, 3) [m]
-    """
-
-    disc: npt.NDArray[np.int64]
-    turn: Floats
-    sweep: Floats
-    links: Floats
-    discs: Floats
+    disc: npt.NDArray[np.int64]  # index of the disc that it bends around at each contact (K,)
+    turn: Floats  # 1 where it bends to the left, -1 to the right (K,)
+    sweep: Floats  # by how much it bends (K,) [rad]
+    links: Floats  # ends of each link as x, y from and x, y to (K + 1, 4) [m]
+    discs: Floats  # the discs that it bends around, with the radii of its arcs (N, 3) [m]
 
     @property
     def length(self) -> float:

@@ -28,80 +28,48 @@ MOST_LINKS = 10_000
 
 @dataclass(frozen=True, eq=False)
 class UrdfJoint:
-    """A joint of a URDF file.
+    """A joint of a URDF file."""
 
-    Attributes:
-        name: its name
-        kind: fixed, continuous, revolute, prismatic, floating or planar
-        parent: the link that holds it
-        child: the link that it moves
-        place: its frame in that of the model's root (4, 4)
-        axis: the direction of its axis in the root's frame (3,)
-        velocity: the limit of its speed [rad/s]; None where the file has none
-        effort: the limit of its torque [N m]; None where the file has none
-        range: how far it turns, from its lower to its upper limit [rad]; inf where it turns freely
-        commanded: the greatest speed that <ros2_control> lets it be given, inf without a limit [rad/s]; None where it is not
-            driven by speed there
-    """
-
-    name: str
-    kind: str
-    parent: str
-    child: str
-    place: Floats
-    axis: Floats
-    velocity: float | None
-    effort: float | None
-    range: float
+    name: str  # its name
+    kind: str  # fixed, continuous, revolute, prismatic, floating or planar
+    parent: str  # the link that holds it
+    child: str  # the link that it moves
+    place: Floats  # its frame in that of the model's root (4, 4)
+    axis: Floats  # the direction of its axis in the root's frame (3,)
+    velocity: float | None  # the limit of its speed [rad/s]; None where the file has none
+    effort: float | None  # the limit of its torque [N m]; None where the file has none
+    range: float  # how far it turns, from its lower to its upper limit [rad]; inf where it turns freely
+    # the greatest speed that <ros2_control> lets it be given, inf without a limit [rad/s]; None where it is not
+    # driven by speed there
     commanded: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class CollisionPiece:
-    """A piece of collision geometry, in the root's frame.
+    """A piece of collision geometry, in the root's frame."""
 
-    Attributes:
-        link: the link that it belongs to
-        kind: box, cylinder, sphere or mesh
-        points: points whose convex hull holds it (N, 3)
-        centre: its middle (3,)
-        radius: of a cylinder or sphere [m]
-        length: of a cylinder [m]
-    """
-
-    link: str
-    kind: str
-    points: Floats
-    centre: Floats
-    radius: float | None = None
-    length: float | None = None
+    link: str  # the link that it belongs to
+    kind: str  # box, cylinder, sphere or mesh
+    points: Floats  # points whose convex hull holds it (N, 3)
+    centre: Floats  # its middle (3,)
+    radius: float | None = None  # of a cylinder or sphere [m]
+    length: float | None = None  # of a cylinder [m]
 
 
 @dataclass(frozen=True, eq=False)
 class UrdfModel:
-    """A robot as a URDF file describes it.
+    """A robot as a URDF file describes it."""
 
-    Attributes:
-        source: the file
-        name: the robot's name in it
-        joints: its joints by name
-        places: the frame of each link in that of the root (4, 4)
-        pieces: its collision geometry
-        masses: the mass of each link that has one [kg]
-        drive: what a Gazebo plugin that drives wheels says, by tag; what it says of several wheels is left out
-        left_out: meshes that were not found
-        lidars: the lidars that Gazebo would simulate
-    """
-
-    source: Path
-    name: str
-    joints: dict[str, UrdfJoint]
-    places: dict[str, Floats]
-    pieces: tuple[CollisionPiece, ...]
-    masses: dict[str, float]
+    source: Path  # the file
+    name: str  # the robot's name in it
+    joints: dict[str, UrdfJoint]  # its joints by name
+    places: dict[str, Floats]  # the frame of each link in that of the root (4, 4)
+    pieces: tuple[CollisionPiece, ...]  # its collision geometry
+    masses: dict[str, float]  # the mass of each link that has one [kg]
+    # what a Gazebo plugin that drives wheels says, by tag; what it says of several wheels is left out
     drive: dict[str, str]
-    left_out: tuple[str, ...]
-    lidars: tuple[UrdfSensor, ...] = ()
+    left_out: tuple[str, ...]  # meshes that were not found
+    lidars: tuple[UrdfSensor, ...] = ()  # the lidars that Gazebo would simulate
 
     def above(self, link: str) -> Iterator[UrdfJoint]:
         """The joints between a link and the root, from the link on."""

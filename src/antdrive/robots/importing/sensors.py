@@ -25,17 +25,11 @@ ALL_AROUND = 2 * math.pi - 0.01  # a field of view from here on is meant as a fu
 
 @dataclass(frozen=True, eq=False)
 class UrdfSensor:
-    """A lidar of a URDF file.
+    """A lidar of a URDF file."""
 
-    Attributes:
-        name: what messages call it
-        place: the frame of its link in that of the root (4, 4)
-        element: its <sensor>
-    """
-
-    name: str
-    place: Floats
-    element: ET.Element
+    name: str  # what messages call it
+    place: Floats  # the frame of its link in that of the root (4, 4)
+    element: ET.Element  # its <sensor>
 
 
 def lidar_sensors(root: ET.Element, places: Mapping[str, Floats]) -> tuple[UrdfSensor, ...]:

@@ -41,22 +41,15 @@ class _Value(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ImportedRobot:
-    """A robot out of a URDF file.
+    """A robot out of a URDF file."""
 
-    Attributes:
-        robot: the robot
-        text: its file, with a comment for each value
-        pieces: the collision geometry below the height of the import, from above: points of each piece in the robot's
-            frame (N, 2) [m]
-        above: the same of the pieces that lie above that height
-        left_out: meshes that were not found
-    """
-
-    robot: RobotSpec
-    text: str
+    robot: RobotSpec  # the robot
+    text: str  # its file, with a comment for each value
+    # the collision geometry below the height of the import, from above: points of each piece in the robot's
+    # frame (N, 2) [m]
     pieces: tuple[Floats, ...]
-    above: tuple[Floats, ...]
-    left_out: tuple[str, ...]
+    above: tuple[Floats, ...]  # the same of the pieces that lie above that height
+    left_out: tuple[str, ...]  # meshes that were not found
 
 
 def import_urdf(

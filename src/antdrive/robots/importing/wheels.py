@@ -20,23 +20,14 @@ SWIVEL = 0.9  # the least vertical part of the axis of a caster or a steering jo
 
 @dataclass(frozen=True, eq=False)
 class DrivenWheel:
-    """A driven wheel.
+    """A driven wheel."""
 
-    Attributes:
-        joint: the joint that turns it
-        centre: its middle, in the root's frame (3,) [m]
-        radius: [m]
-        width: along its axis [m]
-        read_from: where these values come from, in words
-        told: whether the radius was given, or the drive plugin's
-    """
-
-    joint: UrdfJoint
-    centre: Floats
-    radius: float
-    width: float
-    read_from: str
-    told: bool = False
+    joint: UrdfJoint  # the joint that turns it
+    centre: Floats  # its middle, in the root's frame (3,) [m]
+    radius: float  # [m]
+    width: float  # along its axis [m]
+    read_from: str  # where these values come from, in words
+    told: bool = False  # whether the radius was given, or the drive plugin's
 
 
 def driven_wheels(

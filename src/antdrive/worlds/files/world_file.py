@@ -8,7 +8,7 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeAlias
 
 import yaml
 from pydantic import BaseModel, ConfigDict, Field
@@ -22,8 +22,10 @@ from antdrive.worlds.limits import MAX_CELLS, MAX_COORDINATE, MAX_PHASE, MIN_PER
 from antdrive.worlds.movers import Mover, mover_from_dict, mover_to_dict
 from antdrive.worlds.world import Disc, Task, World
 
-Pair = Annotated[list[Coordinate], Field(min_length=2, max_length=2)]
-Keyframe = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
+Pair: TypeAlias = tuple[Coordinate, Coordinate]
+Triple: TypeAlias = tuple[Coordinate, Coordinate, Coordinate]
+Start = Annotated[Triple, Field(description="write [x, y, yaw] in metres and radians")]
+Goal = Annotated[Pair, Field(description="write [x, y] in metres")]
 
 OF_OTHERS = (".sdf", ".world", ".map")  # the suffixes of other programs' worlds, which are imported
 _CATALOG = Path(__file__).parent.with_name("catalog")
@@ -53,7 +55,7 @@ class MoverEntry(BaseModel):
     phase: float = Field(
         0.0, ge=0, le=MAX_PHASE, description="how much of the motion has already passed at the start [s]"
     )
-    keyframes: list[Keyframe] | None = Field(None, max_length=10_000, description="write [t, x, y] for each")
+    keyframes: list[Triple] | None = Field(None, max_length=10_000, description="write [t, x, y] for each")
     loop: Literal["pingpong", "teleport", "once"] | None = Field(None, description="what follows the last keyframe")
     interpolation: Literal["linear", "catmull-rom"] | None = Field(None, description="how it moves between keyframes")
     position: Pair | None = Field(None, description="write [x, y], the centre at first")
@@ -67,13 +69,10 @@ class EndsEntry(BaseModel):
     model_config = _RULES
 
     name: OneLine = Field(min_length=1, max_length=100, description="what --task calls it")
-    start: list[Coordinate] | None = Field(
-        None,
-        min_length=3,
-        max_length=3,
-        description="write [x, y, yaw] in metres and radians; by default the world's own",
+    start: Triple | None = Field(
+        None, description="write [x, y, yaw] in metres and radians; by default the world's own"
     )
-    goal: list[Coordinate] = Field(min_length=2, max_length=2, description="write [x, y] in metres")
+    goal: Goal
     goal_tolerance: Size | None = Field(None, description="how close to the goal the robot must stop [m]")
 
 
@@ -88,19 +87,19 @@ class WorldFile(BaseModel):
         min_length=1, max_length=200, description="what people call the world; by default the file's name"
     )
     source: str | None = Field(None, description="where the world comes from, free text")
-    bounds: list[Coordinate] = Field(min_length=4, max_length=4, description="write [xmin, ymin, xmax, ymax] in metres")
-    start: list[Coordinate] = Field(min_length=3, max_length=3, description="write [x, y, yaw] in metres and radians")
-    goal: list[Coordinate] = Field(min_length=2, max_length=2, description="write [x, y] in metres")
+    bounds: tuple[Coordinate, Coordinate, Coordinate, Coordinate] = Field(
+        description="write [xmin, ymin, xmax, ymax] in metres"
+    )
+    start: Start
+    goal: Goal
     goal_tolerance: Size = Field(0.25, description="how close to the goal the robot must stop [m]")
     cell: Size = Field(0.5, description="grid resolution for planners unless another is given [m]")
     obstacles: list[Disc] = Field([], description="upright cylinders")
     time_limit: Size | None = Field(None, description="simulated time allowed [s]; by default ample for the route")
     movers: list[MoverEntry] = Field([], max_length=1000, description="moving cylinders")
     tasks: list[EndsEntry] = Field([], max_length=10_000, description="other starts and goals, by name")
-    frame: list[Coordinate] | None = Field(
+    frame: Triple | None = Field(
         None,
-        min_length=3,
-        max_length=3,
         description="write [x, y, yaw]: where the world's origin lies in the map that it was made from, in metres and radians; "
         "exports use it",
     )
@@ -177,11 +176,10 @@ def _named_tasks(document: Document, entry: WorldFile, own: Task) -> dict[str | 
     for i, ends in enumerate(entry.tasks):
         if ends.name in found:
             raise document.error(("tasks", i, "name"), f"{ends.name!r} is the name of two tasks")
-        start = own.start if ends.start is None else (ends.start[0], ends.start[1], ends.start[2])
         tolerance = ends.goal_tolerance or own.goal_tolerance
         try:
-            goal = ends.goal[0], ends.goal[1]
-            found[ends.name] = dataclasses.replace(own, start=start, goal=goal, goal_tolerance=tolerance)
+            start = ends.start or own.start
+            found[ends.name] = dataclasses.replace(own, start=start, goal=ends.goal, goal_tolerance=tolerance)
         except FieldError as error:
             raise document.field_error(error, "tasks", i) from None
     return found
@@ -274,13 +272,11 @@ def _to_task(document: Document, entry: WorldFile | None = None) -> Task:
     xmin, ymin, xmax, ymax = entry.bounds
     if (xmax - xmin) / entry.cell * (ymax - ymin) / entry.cell > MAX_CELLS:
         raise document.error(("cell",), f"{entry.cell:g} m cuts these bounds into more than {MAX_CELLS} cells")
-    x, y, yaw = entry.start
     movers = tuple(_to_mover(document, i, mover) for i, mover in enumerate(entry.movers))
     try:
-        world = World(entry.name, (xmin, ymin, xmax, ymax), tuple(entry.obstacles), entry.source, movers)
-        goal = entry.goal[0], entry.goal[1]
-        frame = (0.0, 0.0, 0.0) if entry.frame is None else (entry.frame[0], entry.frame[1], entry.frame[2])
-        return Task(world, (x, y, yaw), goal, entry.goal_tolerance, entry.cell, entry.time_limit, frame)
+        world = World(entry.name, entry.bounds, tuple(entry.obstacles), entry.source, movers)
+        frame = entry.frame or (0.0, 0.0, 0.0)
+        return Task(world, entry.start, entry.goal, entry.goal_tolerance, entry.cell, entry.time_limit, frame)
     except FieldError as error:
         raise document.field_error(error) from None
 

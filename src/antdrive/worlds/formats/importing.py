@@ -23,21 +23,13 @@ _OF_EVERY_TASK = ("start", "goal", "bounds")
 
 @dataclass(frozen=True)
 class Format:
-    """A file format of another program that can be imported.
+    """A file format of another program that can be imported."""
 
-    Attributes:
-        name: what messages call a file of this format
-        suffixes: the suffixes of its files, in lower case
-        options: the options that `read` takes besides the path
-        read: the function that reads the tasks in a file
-        is_map: whether a file holds a map of cells, which the import covers with cylinders
-    """
-
-    name: str
-    suffixes: tuple[str, ...]
-    options: tuple[str, ...]
-    read: Callable[..., list[Task]]
-    is_map: bool = False
+    name: str  # what messages call a file of this format
+    suffixes: tuple[str, ...]  # the suffixes of its files, in lower case
+    options: tuple[str, ...]  # the options that `read` takes besides the path
+    read: Callable[..., list[Task]]  # the function that reads the tasks in a file
+    is_map: bool = False  # whether a file holds a map of cells, which the import covers with cylinders
 
 
 def _read_map_server(path: Path, unknown: str = "blocked", **options: Any) -> list[Task]:

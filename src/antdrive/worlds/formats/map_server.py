@@ -27,57 +27,57 @@ from antdrive.base.document import read_document
 from antdrive.base.errors import FieldError, input_error
 from antdrive.base.plane import in_map, out_of_map
 from antdrive.base.types import Floats, Point, Pose
+from antdrive.worlds.files.world_file import Goal, Start, Triple
 from antdrive.worlds.formats.cellmap import CellMap, Cells, cell_map, file_task
 from antdrive.worlds.formats.checks import require_new, require_no_movers
-from antdrive.worlds.limits import MAX_CELLS, Coordinate, Size
+from antdrive.worlds.limits import MAX_CELLS, Size
 from antdrive.worlds.world import Task
 
 FORMATS = ("PPM", "PNG", "BMP")  # Pillow's "PPM" includes PBM and PGM
 MODES = {"1": "L", "P": "RGB"}  # black-and-white images become grey, palettes become colours
 FREE, OCCUPIED = 254, 0  # the shades that map_saver writes
 
+_RULES = ConfigDict(strict=True, extra="ignore", allow_inf_nan=False, frozen=True)
 Share = Annotated[float, Field(ge=0, le=1)]
 
 
-class KeptTask(BaseModel):
-    """Another start and goal, which `export_map_server` adds to a map."""
+class KeptEnds(BaseModel):
+    """Start, goal and tolerance, which `export_map_server` adds to a map for `import_map_server`."""
 
-    model_config = ConfigDict(strict=True, extra="ignore", allow_inf_nan=False, frozen=True)
+    model_config = _RULES
+
+    start: Start
+    goal: Goal
+    goal_tolerance: Size = 0.25
+
+
+class KeptTask(KeptEnds):
+    """Another start and goal."""
 
     name: OneLine = Field(min_length=1, max_length=100)
-    start: list[Coordinate] = Field(min_length=3, max_length=3, description="write [x, y, yaw] in metres and radians")
-    goal: list[Coordinate] = Field(min_length=2, max_length=2, description="write [x, y] in metres")
-    goal_tolerance: Size = 0.25
 
 
-class KeptEnds(BaseModel):
-    """Start, goal and tolerance, and other tasks, which `export_map_server` adds to a map for `import_map_server`."""
+class KeptTasks(KeptEnds):
+    """The task of a map, and others."""
 
-    model_config = ConfigDict(strict=True, extra="ignore", allow_inf_nan=False, frozen=True)
-
-    start: list[Coordinate] = Field(min_length=3, max_length=3, description="write [x, y, yaw] in metres and radians")
-    goal: list[Coordinate] = Field(min_length=2, max_length=2, description="write [x, y] in metres")
-    goal_tolerance: Size = 0.25
     tasks: list[KeptTask] = Field([], max_length=10_000)
 
 
 class MapFile(BaseModel):
     """The YAML file of a map. Keys of other tools are ignored, as by map_server."""
 
-    model_config = ConfigDict(strict=True, extra="ignore", allow_inf_nan=False, frozen=True)
+    model_config = _RULES
 
     image: str = Field(min_length=1, description="the image's file name, from the YAML file's folder")
     resolution: Size = Field(description="the side of a cell [m]")
-    origin: list[Coordinate] = Field(
-        min_length=3, max_length=3, description="write [x, y, yaw] of the lower left corner in metres and radians"
-    )
+    origin: Triple = Field(description="write [x, y, yaw] of the lower left corner in metres and radians")
     negate: bool = Field(description="write 0, or 1 where black is free")
     occupied_thresh: Share = Field(
         description="cells that are occupied with a higher probability are occupied; 0.65 is usual"
     )
     free_thresh: Share = Field(description="cells that are occupied with a lower probability are free; 0.196 is usual")
     mode: Literal["trinary", "scale", "raw"] = "trinary"
-    antdrive: KeptEnds | None = None
+    antdrive: KeptTasks | None = None
 
     @field_validator("negate", mode="before")
     @classmethod
@@ -95,18 +95,12 @@ class MapFile(BaseModel):
 
 @dataclass(frozen=True, eq=False)
 class ServedMap:
-    """A map as map_server would serve it.
+    """A map as map_server would serve it."""
 
-    Attributes:
-        cells: the free cells; unknown cells are free only where that was asked for
-        unknown: how many cells are neither free nor occupied
-        ends: start and goal, where antdrive wrote the map
-        frame: where the frame of the cells lies in that of the map; not zero for a turned map, whose cells begin at (0, 0)
-    """
-
-    cells: CellMap
-    unknown: int
-    ends: KeptEnds | None
+    cells: CellMap  # the free cells; unknown cells are free only where that was asked for
+    unknown: int  # how many cells are neither free nor occupied
+    ends: KeptTasks | None  # start and goal, where antdrive wrote the map
+    # where the frame of the cells lies in that of the map; not zero for a turned map, whose cells begin at the origin
     frame: Pose = (0.0, 0.0, 0.0)
 
 
@@ -140,8 +134,7 @@ def import_map_server(
     served = read_map(file, unknown_is_free=unknown_is_free)
     ends = served.ends
     if ends is not None:
-        start = start or (ends.start[0], ends.start[1], ends.start[2])
-        goal = goal or (ends.goal[0], ends.goal[1])
+        start, goal = start or ends.start, goal or ends.goal
         goal_tolerance = goal_tolerance or ends.goal_tolerance
     source = f"the map_server map {file.name}"
     if served.unknown:

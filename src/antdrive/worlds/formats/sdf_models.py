@@ -21,15 +21,10 @@ class Unsupported(Exception):
 
 @dataclass
 class Models:
-    """The models of a world.
+    """The models of a world."""
 
-    Attributes:
-        discs: the upright cylinders
-        unsupported: the models that are something else, each as "name (reason)"
-    """
-
-    discs: list[Disc] = field(default_factory=list)
-    unsupported: list[str] = field(default_factory=list)
+    discs: list[Disc] = field(default_factory=list)  # the upright cylinders
+    unsupported: list[str] = field(default_factory=list)  # the models that are something else, each as "name (reason)"
 
 
 def read_models(world: ET.Element, frame: Pose = (0.0, 0.0, 0.0)) -> Models:
