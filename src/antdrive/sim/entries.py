@@ -5,13 +5,13 @@ from __future__ import annotations
 import re
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, PlainValidator, WithJsonSchema
+from pydantic import BaseModel, Field, PlainValidator, WithJsonSchema
 
 from antdrive.base.checks import show
+from antdrive.base.records import STRICT
 from antdrive.worlds.world import Disc
 
 MAX_SEEDS = 100_000  # of one range
-RULES = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
 
 _SEEDS = re.compile(r"(\d{1,18})-(\d{1,18})")
 
@@ -74,7 +74,7 @@ MarginValue = Annotated[Any, PlainValidator(_margin), WithJsonSchema(MARGIN_SCHE
 class SettingsEntry(BaseModel):
     """How a robot drives, beside its margin, noise, smoothing and seed."""
 
-    model_config = RULES
+    model_config = STRICT
 
     controller: dict[str, float] = Field({}, description="settings of the controller, such as {lookahead_time: 0.5}")
     cell: float | None = Field(None, gt=0, description="grid resolution [m]; by default the world's")

@@ -15,7 +15,8 @@ from pydantic import BaseModel, BeforeValidator, Field, PlainValidator, WithJson
 from antdrive.base.checks import SchemaVersion, check, schema_of, show
 from antdrive.base.document import Document, Location, read_document
 from antdrive.base.errors import InputError
-from antdrive.sim.entries import RULES, SEEDS_SCHEMA, MarginValue, SettingsEntry, TextOrMapping, seed_list
+from antdrive.base.records import STRICT
+from antdrive.sim.entries import SEEDS_SCHEMA, MarginValue, SettingsEntry, TextOrMapping, seed_list
 
 MOST_SEEDS = 1_000_000  # given as a number
 
@@ -63,7 +64,7 @@ NamesOrMappings = Annotated[list[TextOrMapping], Field(min_length=1), BeforeVali
 class TaskEntry(BaseModel):
     """A start and a goal that every world of the campaign is driven with."""
 
-    model_config = RULES
+    model_config = STRICT
 
     name: str | None = Field(None, min_length=1, max_length=100, description="what tables call the task")
     start: list[float] = Field(min_length=3, max_length=3, description="write [x, y, yaw] in metres and radians")
@@ -73,7 +74,7 @@ class TaskEntry(BaseModel):
 class RandomTasks(BaseModel):
     """Starts and goals drawn in each world: free cells for the largest robot, with a path between them."""
 
-    model_config = RULES
+    model_config = STRICT
 
     random: int = Field(ge=1, le=100_000, description="tasks in each world")
     seed: int = Field(0, ge=0, lt=2**63, description="seed of the draws")
@@ -120,7 +121,7 @@ def _settings_schema() -> dict[str, Any]:
 class CampaignFile(BaseModel):
     """A campaign, as written in a file: each combination of its lists is a run."""
 
-    model_config = RULES
+    model_config = STRICT
 
     schema_: SchemaVersion = Field(alias="schema", description="write schema: 1")
     note: str | None = Field(None, description="what the campaign is for, free text")

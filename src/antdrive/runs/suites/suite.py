@@ -15,8 +15,9 @@ from pydantic import BaseModel, Field, PlainValidator, WithJsonSchema
 from antdrive.base.checks import SchemaVersion, check
 from antdrive.base.document import Document, Location, read_document
 from antdrive.base.errors import FieldError, InputError, input_error
+from antdrive.base.records import STRICT
 from antdrive.runs.suites.demands import END, KINDS, Demands, causes
-from antdrive.sim.entries import RULES, MarginValue, SeedList, SettingsEntry, TextOrMapping
+from antdrive.sim.entries import MarginValue, SeedList, SettingsEntry, TextOrMapping
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
 
@@ -43,7 +44,7 @@ TrajectoryValue = Annotated[Any, PlainValidator(_anything), WithJsonSchema(_TRAJ
 class ScenarioEntry(SettingsEntry):
     """A scenario of a suite, or the defaults of all of them."""
 
-    model_config = RULES
+    model_config = STRICT
 
     note: str | None = Field(None, description="what the scenario is for, free text")
     world: TextOrMapping = Field(
@@ -86,7 +87,7 @@ class ScenarioEntry(SettingsEntry):
 class SuiteFile(BaseModel):
     """A suite of scenarios, as written in a `*.drive.yaml` file."""
 
-    model_config = RULES
+    model_config = STRICT
 
     schema_: SchemaVersion = Field(alias="schema", description="write schema: 1")
     defaults: ScenarioEntry = Field(
