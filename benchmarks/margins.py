@@ -17,7 +17,7 @@ import numpy as np
 
 from antdrive.planners import load_planner
 from antdrive.robots import load_robot
-from antdrive.runs.margins.choice import choose_margin
+from antdrive.runs.margins.choice import choose_margin, with_chosen_margin
 from antdrive.runs.margins.prediction import Calibration
 from antdrive.runs.pool import call_all
 from antdrive.sim import Outcome, Scenario, run
@@ -56,7 +56,7 @@ def scenario(kind: str, seed: int, robot: str, noise: float, smoothing: str) -> 
 def drive(kind: str, seed: int, robot: str, noise: float, smoothing: str, margin: float | None) -> Driven:
     """Drive a world with a margin; None: with the one that the cache holds."""
     made = scenario(kind, seed, robot, noise, smoothing)
-    done = run(made.with_chosen_margin() if margin is None else replace(made, margin=margin))
+    done = run(with_chosen_margin(made) if margin is None else replace(made, margin=margin))
     if done.rollout is None or done.certificate is None:
         return Driven(made.task.world.name, math.nan, done.outcome, 0, False)
     loss = done.scenario.margin - done.certificate.bound

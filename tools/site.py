@@ -23,13 +23,8 @@ from urllib.parse import unquote, urlsplit
 
 MOST = 1_000_000  # [B]
 LOADING = {
-    ("script", "src"),
-    ("img", "src"),
-    ("link", "href"),
-    ("video", "src"),
-    ("video", "poster"),
-    ("source", "src"),
-    ("iframe", "src"),
+    *(("script", "src"), ("img", "src"), ("link", "href"), ("video", "src"), ("video", "poster")),
+    *(("source", "src"), ("iframe", "src")),
 }
 WIDE, NARROW, HIGH = 1280, 390, 900  # [px]
 CONTRAST = 3.0  # the least between a text and what lies behind it; WCAG asks 4.5 of small text, 3 of large

@@ -114,10 +114,9 @@ def test_a_calibration_that_is_due_is_announced(antdrive: Call, small: Path, mon
     assert antdrive("plan", small, "-p", "astar", "--margin", "auto")[::2] == (0, "")
 
 
-@pytest.mark.parametrize("text", ["soon", "-1", "inf", "nan", "1000", "AUTO"])
+@pytest.mark.parametrize("text", ["soon", "-1", "inf", "nan", "AUTO"])
 def test_other_words_are_refused(refused: Refused, small: Path, text: str) -> None:
-    assert "--margin" in (says := refused("run", small, "--margin", text))
-    assert "or auto" in says
+    assert "--margin: " in refused("run", small, "--margin", text)
 
 
 def test_where_no_margin_is_enough_the_option_is_named(

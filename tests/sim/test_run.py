@@ -1,13 +1,12 @@
 """Runs: plan, drive, certify."""
 
 import dataclasses
-import inspect
 import json
 import math
 import re
 import subprocess
 import sys
-from dataclasses import MISSING, fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -269,8 +268,8 @@ def test_a_route_through_an_obstacle_ends_in_contact_not_in_a_loop(turtlebot: Ro
 @pytest.mark.parametrize(
     ("rates", "says"),
     [
-        ({"control_hz": 70}, "control_hz: must divide the physics rate 240 and be at least 10, got 70; 60 would do"),
-        ({"control_hz": 5}, "control_hz: must divide the physics rate 240 and be at least 10, got 5; 10 would do"),
+        ({"control_hz": 70}, "control_hz: must divide the physics rate 240, got 70; 60 would do"),
+        ({"control_hz": 5}, "control_hz: must be at least 10, got 5"),
         ({"control_hz": 480}, "got 480; 240 would do"),
         ({"physics_hz": 30, "control_hz": 30}, "physics_hz: must be between 60 and 10000, got 30"),
         ({"physics_hz": 20_000, "control_hz": 50}, "physics_hz: must be between 60 and 10000, got 20000"),
@@ -494,14 +493,6 @@ def test_a_scenario_is_made_of_names_files_or_objects(tmp_path: Path) -> None:
     assert Scenario.of("empty", "aco-han", options={"ants": 3}).planner == load_planner("aco-han", ants=3)
     with pytest.raises(ValueError, match="options: need a planner's name"):
         Scenario.of("empty", planner, options={"ants": 3})
-
-
-def test_a_scenario_made_of_names_has_the_same_defaults() -> None:
-    parameters = inspect.signature(Scenario.of).parameters
-    for setting in fields(Scenario):
-        if setting.name not in ("task", "planner", "robot", "planner_name", "calibration"):
-            made = setting.default_factory() if setting.default_factory is not MISSING else setting.default
-            assert parameters[setting.name].default == made, setting.name
 
 
 def test_metrics_of_a_run_without_a_rollout_say_why(small_run: Run) -> None:

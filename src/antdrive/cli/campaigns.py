@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from antdrive.base.errors import InputError
 from antdrive.cli.console import print_line, print_table
+from antdrive.sim.settings import SETTINGS
 
 if TYPE_CHECKING:
     from antdrive.runs.campaigns.campaign import Campaign
@@ -22,20 +23,12 @@ MEDIANS = {
     "plan_s": "planning ms",
 }
 #: The options that a campaign's keys come from, in errors.
-OPTIONS = {
-    "robots": "--robot",
-    "routes": "--smoothing",
-    "noise": "--noise",
-    "margin": "--margin",
-    "seeds": "--seeds",
-    "map": "--map",
-    "localisation": "--localisation",
-    "odometry": "--odometry",
-}
+OPTIONS = {"robots": "--robot"} | {one.setting.axis or one.key: one.flag for one in SETTINGS.values() if one.flag}
+OPTIONS["seeds"] = "--seeds"
 SOURCE = "the options"  # what errors call a campaign that no file describes
 
 
-def campaign_from(path: Path | None, **words: Any) -> Campaign:
+def campaign_from(path: Path | None, settings: Mapping[str, Any], **words: Any) -> Campaign:
     """The campaign in a file, with the keys that options give in place of the file's.
 
     Raises:
@@ -43,7 +36,7 @@ def campaign_from(path: Path | None, **words: Any) -> Campaign:
     """
     from antdrive.runs.campaigns.campaign import load_campaign, make_campaign
 
-    given = _keys(words)
+    given = _keys(words, settings)
     if path is not None and not given:
         return load_campaign(path)
     if path is None:
@@ -63,19 +56,19 @@ def campaign_from(path: Path | None, **words: Any) -> Campaign:
     return make_campaign(merged, file.folder, str(path))
 
 
-def _keys(words: dict[str, Any]) -> dict[str, Any]:
+def _keys(words: dict[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
     """The campaign's keys that options give."""
-    found = {key: words[key] for key in ("robots", "routes", "noise") if words[key]}
+    axes = {one.key: one.setting.axis for one in SETTINGS.values()}
+    found = {axes[key]: value for key, value in settings.items() if axes[key]}
+    if words["robots"]:
+        found["robots"] = words["robots"]
     worlds = [*(words["worlds"] or ()), *(_generated(text) for text in words["generate"] or ())]
     if worlds:
         found["worlds"] = worlds
     if words["planners"]:
         found["planners"] = [_planner(text) for text in words["planners"]]
-    if words["margin"]:
-        found["margin"] = [text if text == "auto" else _number("--margin", text) for text in words["margin"]]
-    settings = {key: value for key, value in words["settings"].items() if value}
-    if settings:
-        found["settings"] = settings
+    if others := {key: value for key, value in settings.items() if not axes[key]}:
+        found["settings"] = others
     if words["seeds"] is not None:
         found["seeds"] = _seeds(words["seeds"])
     if words["run_limit"] is not None:

@@ -100,18 +100,13 @@ def mark_of(scenarios: Mapping[str, Scenario], cases: Sequence[tuple[str, int]])
 
 def repeating(scenario: Scenario, entrant: Entrant, world: str, robot: str, ends: Sequence[str] = ()) -> str:
     """The `antdrive run` that repeats one of the compared runs."""
-    given = {
-        "--planner": entrant.name,
-        "--robot": robot,
-        "--seed": scenario.seed,
-        "--margin": "auto" if scenario.chosen else scenario.margin,
-        "--smoothing": scenario.smoothing,
-        "--noise": scenario.noise,
-    }
-    words = [str(word) for option in given.items() for word in option]
+    from antdrive.sim.forms import setting_words, written
+
+    given = written(lambda name: getattr(scenario, name))
+    given |= {"controller": {}, **({"margin": "auto"} if scenario.chosen else {})}
+    words = ["--planner", entrant.name, "--robot", robot, *(setting_words(given) or ())]
     words += [word for text in entrant.settings for word in ("--set", text)]
-    cell = [] if scenario.cell is None else ["--cell", str(scenario.cell)]
-    return shlex.join(["antdrive", "run", world, *words, *ends, *cell])
+    return shlex.join(["antdrive", "run", world, *words, *ends])
 
 
 @dataclass(frozen=True)

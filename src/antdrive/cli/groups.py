@@ -17,6 +17,7 @@ from antdrive.base.errors import FieldError, InputError, Terminated, input_error
 from antdrive.cli.commands import ABOUT, COMMANDS, DEBUG, GROUPS, ROBOTS, WORLDS, Command
 from antdrive.cli.console import print_error, print_line
 from antdrive.cli.exits import FAULT, INTERRUPTED, SUCCEEDED, WRONG_INPUT
+from antdrive.sim.settings import PANELS
 
 SETTINGS: Mapping[str, Any] = {"rich_markup_mode": None, "pretty_exceptions_enable": False, "add_completion": False}
 
@@ -72,9 +73,25 @@ class _Commands(UserDict[str, Any]):
         if isinstance(found, Command):
             module = importlib.import_module(f"antdrive.cli.commands.{found.module}")
             alone = typer.Typer(**SETTINGS)
-            alone.command(name)(getattr(module, found.function))
+            alone.command(name, cls=_Panelled)(getattr(module, found.function))
             found = self.data[name] = typer.main.get_command(alone)
         return found
+
+
+class _Panelled(typer.core.TyperCommand):
+    """A command whose options `--help` lists in panels."""
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """Write the arguments, then the options by panel."""
+        panels: dict[str, list[tuple[str, str]]] = {name: [] for name in ("Arguments", *PANELS, "Options")}
+        for one in self.get_params(ctx):
+            panel = "Arguments" if one.param_type_name == "argument" else getattr(one, "rich_help_panel", None)
+            if record := one.get_help_record(ctx):
+                panels[panel or "Options"].append(record)
+        for name, records in panels.items():
+            if records:
+                with formatter.section(name):
+                    formatter.write_dl(records)
 
 
 class _Group(typer.core.TyperGroup):

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 from antdrive.cli.console import print_files, print_line
 
 if TYPE_CHECKING:
-    from antdrive.runs.margins.prediction import Calibration
     from antdrive.sim.pipeline import Run
+    from antdrive.sim.scenario import MarginChoice
     from antdrive.worlds import Task
 
 
@@ -54,7 +54,7 @@ def _discovery(sight: dict[str, Any]) -> str:
     return f"obstacle {sight['obstacle']}, not in the world file: {seen}; {near}"
 
 
-def chosen_margin(chosen: Calibration) -> str:
+def chosen_margin(chosen: MarginChoice) -> str:
     """A margin that was chosen by calibration, with what it rests on."""
     return (
         f"margin {chosen.margin:.3f} m, chosen: a loss of {chosen.loss:.3f} m is predicted from {chosen.drives} drives, "

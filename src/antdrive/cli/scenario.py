@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING, Any, get_args
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 from antdrive.base.errors import FieldError, InputError, input_error
 from antdrive.cli.parse import pair
 
 if TYPE_CHECKING:
-    from antdrive.robots import PurePursuit
-    from antdrive.sim.driving.perception import Perception
     from antdrive.sim.scenario import Scenario
     from antdrive.worlds import Task
 
@@ -56,8 +54,10 @@ def ends_words(task: str | None, start: str | None, goal: str | None, frame: str
     return [f"{option}={value}" for option, value in given.items() if value is not None]
 
 
-def make_scenario(world: str | Task, planner: str, settings: list[str] | None, robot: str, **rest: Any) -> Scenario:
-    """The scenario that a command's options describe; `rest` are fields of `Scenario`.
+def make_scenario(
+    world: str | Task, planner: str, settings: list[str] | None, robot: str, given: Mapping[str, Any]
+) -> Scenario:
+    """The scenario that a command's options describe; `given` are values of settings by key, as files write them.
 
     With the margin "auto" the robot is calibrated, if that was not done before.
 
@@ -65,19 +65,20 @@ def make_scenario(world: str | Task, planner: str, settings: list[str] | None, r
         InputError: an unknown name, or a value out of range; the message names the option.
     """
     from antdrive.cli.calibrating import with_chosen_margin
+    from antdrive.sim.forms import scenario_fields
     from antdrive.sim.scenario import Scenario
 
     chosen = grouped(settings)
-    controller = make_controller(chosen["controller"])
-    auto = rest.get("margin") == "auto"
-    given = {**rest, "margin": 0.0} if auto else rest
+    auto = given.get("margin") == "auto"
+    asked = {**given, "controller": _numbers(chosen["controller"]), **({"margin": 0.0} if auto else {})}
     try:
-        scenario = Scenario.of(world, planner, robot, options=chosen["planner"], controller=controller, **given)
+        scenario = Scenario.of(world, planner, robot, options=chosen["planner"], **scenario_fields(asked))
         return with_chosen_margin(scenario) if auto else scenario
     except FieldError as error:
         if error.key == "start":  # the robot does not fit there
             raise input_error(world if isinstance(world, str) else world.world.name, str(error)) from None
-        raise InputError(f"--{error.key.replace('_', '-')}: {error.problem}") from None
+        option = "" if error.key.startswith("controller") else "--"
+        raise InputError(f"{option}{error.key.replace('_', '-') if option else error.key}: {error.problem}") from None
 
 
 def grouped(settings: list[str] | None) -> dict[str, dict[str, str]]:
@@ -92,48 +93,8 @@ def grouped(settings: list[str] | None) -> dict[str, dict[str, str]]:
     return groups
 
 
-def make_controller(values: dict[str, str]) -> PurePursuit:
-    """The controller with these values, given as text."""
-    import dataclasses
-
+def _numbers(values: dict[str, str]) -> dict[str, float]:
+    """The settings of the controller, given as text."""
     from antdrive.planners.registry import parse
-    from antdrive.robots import PurePursuit
 
-    known = [field.name for field in dataclasses.fields(PurePursuit)]
-    for name in values:
-        if name not in known:
-            raise InputError(f"controller.{name}: unknown; choose from {', '.join(known)}")
-    try:
-        return PurePursuit(**{name: parse(f"controller.{name}", float, value) for name, value in values.items()})
-    except InputError:
-        raise
-    except ValueError as error:
-        raise InputError(f"controller.{error}") from None
-
-
-def among_movers(avoid: bool, replan: bool, sees: str | None) -> dict[str, Any]:
-    """The fields of a scenario that say how the robot drives among movers."""
-    from antdrive.sim.driving.replanning import ReplanPolicy
-
-    avoidance = {} if avoid else {"avoidance": None}  # the default is a record of weights
-    return {
-        "perception": make_perception(sees) if sees else None,
-        "replanning": ReplanPolicy(around_movers=replan),
-        **avoidance,
-    }
-
-
-def make_perception(text: str) -> Perception:
-    """What the robot perceives of movers, from `--sees KIND[:METRES]`."""
-    from antdrive.sim.driving.perception import Perception, PerceptionKind
-
-    kind, mark, metres = text.partition(":")
-    if kind not in get_args(PerceptionKind):
-        raise InputError(f"--sees {text}: unknown kind {kind!r}; choose from {', '.join(get_args(PerceptionKind))}")
-    try:
-        distance = float(metres) if mark else math.inf
-    except ValueError:
-        distance = math.nan
-    if not distance > 0:
-        raise InputError(f"--sees {text}: write KIND or KIND:METRES with a range greater than 0, such as positions:3")
-    return Perception(kind=kind, range=distance)  # type: ignore[arg-type]
+    return {name: parse(f"controller.{name}", float, value) for name, value in values.items()}

@@ -80,7 +80,7 @@ def drive_suites(
     cases = select(suites, only)
     compile_once()
     for case in cases:
-        if case.entry.margin == "auto":  # chosen once and with a bar, not by each process
+        if case.given.get("margin") == "auto":  # chosen once and with a bar, not by each process
             with suppress(InputError, FieldError):  # is told as the fault of the test
                 scenario_of(case, with_chosen_margin)
     processes = min(jobs or cores(), len(cases))

@@ -1,5 +1,3 @@
-from .driving.perception import Perception as Perception
-from .driving.replanning import ReplanPolicy as ReplanPolicy
 from .log.certificate import Certificate as Certificate
 from .log.certificate import certify as certify
 from .log.metrics import METRICS as METRICS
@@ -11,4 +9,6 @@ from .physics.engine import Engine as Engine
 from .pipeline import Run as Run
 from .pipeline import plan as plan
 from .pipeline import run as run
+from .policy import Perception as Perception
+from .policy import ReplanPolicy as ReplanPolicy
 from .scenario import Scenario as Scenario

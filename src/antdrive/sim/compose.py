@@ -25,8 +25,8 @@ from antdrive.sim.driving.localising import Fixes, localiser_of
 from antdrive.sim.driving.lookout import Lookout
 from antdrive.sim.driving.movers_ahead import MoversAhead
 from antdrive.sim.driving.parts import Localiser, Logs, Map, Others, RouteGuide, Rule
-from antdrive.sim.driving.perception import Perception, Told
-from antdrive.sim.driving.replanning import Replanning, ReplanPolicy
+from antdrive.sim.driving.perception import Told
+from antdrive.sim.driving.replanning import Replanning
 from antdrive.sim.driving.routes import OneRoute, RoutePlanner
 from antdrive.sim.driving.rules import (
     EXPLORING_LIMITERS,
@@ -39,6 +39,7 @@ from antdrive.sim.driving.rules import (
 )
 from antdrive.sim.driving.survey import Senses, Survey
 from antdrive.sim.driving.watching import Tracked, Watch
+from antdrive.sim.policy import Perception, ReplanPolicy
 from antdrive.sim.scenario import Scenario
 from antdrive.sim.sensing.ground import KnownGround
 from antdrive.worlds import Task, World

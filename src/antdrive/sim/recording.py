@@ -67,6 +67,7 @@ def rollout_of(
         margin=s.margin,
         margin_choice=_margin_record(s),
         sensing=s.sensing,
+        settings=s.other_settings,
         inflate=s.inflate,
         cell=grid.cell,
         physics_hz=s.physics_hz,

@@ -3,38 +3,66 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
+import json
 import os
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from antdrive.base.errors import FieldError
 from antdrive.base.plane import place_name
-from antdrive.planners import SMOOTHINGS, Planner, capabilities_of, load_planner, record_name
+from antdrive.planners import Planner, capabilities_of, load_planner, record_name
 from antdrive.robots import Avoidance, PurePursuit, RobotSpec, load_robot, overlap_at
 from antdrive.robots.odometry import Odometry
-from antdrive.runs.margins.choice import choose_margin
-from antdrive.runs.margins.prediction import Calibration
-from antdrive.runs.margins.trial import Conditions
-from antdrive.sim.driving.perception import Perception, usual_perception
-from antdrive.sim.driving.replanning import ReplanPolicy
-from antdrive.sim.log.record import LOCALISATIONS, MAPS, SensingRecord, settings_of
+from antdrive.sim.log.binding import canonical_hash
+from antdrive.sim.log.record import DriveRecord, SensingRecord, changes, settings_of
 from antdrive.sim.log.streams import random_stream
+from antdrive.sim.policy import Perception, ReplanPolicy, usual_perception
+from antdrive.sim.settings import SETTINGS, SLOWEST_CONTROL, Settings, part_of_key
 from antdrive.worlds import Disc, Task, Trajectories, World, load_task
 from antdrive.worlds.drawing import card, world_svg
 
-PHYSICS_HZ = (60, 10_000)  # slower physics jolts the robot
-SLOWEST_CONTROL = 10  # [Hz]
 DRIFTING = "odometry", "matching"  # localisation without fixes
 FINE = 0.05  # without a map, plans are made on cells of this side at most [m]
+NO_LIDAR = "has no lidar; add one to its file, or drive jackal or turtlebot4"
 
-CONTROLLER, PERCEPTION, AVOIDANCE, REPLANNING = PurePursuit(), Perception(), Avoidance(), ReplanPolicy()
+_KINDS: Mapping[str, Any] = {
+    "task": Task,
+    "robot": RobotSpec,
+    "controller": PurePursuit,
+    "perception": Perception | None,
+    "avoidance": Avoidance | None,
+    "replanning": ReplanPolicy | None,
+    "unseen": tuple,
+}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Scenario:
+class MarginChoice:
+    """What a margin was chosen by, see `antdrive.runs.margins.with_chosen_margin`.
+
+    Attributes:
+        margin: the margin that was chosen [m]
+        loss: how much of it a drive is predicted to use up [m]
+        reserve: what the predicted loss leaves of it, at least [m]
+        probability: of a larger loss than predicted
+        drives: number of drives that the prediction rests on
+        conditions: what the loss depends on, as `Scenario.loss_conditions`
+    """
+
+    margin: float
+    loss: float
+    reserve: float
+    probability: float
+    drives: int
+    conditions: tuple[Any, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scenario(Settings):
     """Everything a run depends on. The same scenario gives the same rollout, bit for bit, on one machine.
 
     Attributes:
@@ -42,25 +70,7 @@ class Scenario:
         planner: finds the path
         robot: drives it
         planner_name: the planner's name in records; empty: the name of its class
-        margin: distance kept free around the robot, on top of its radius [m]
-        cell: grid resolution [m]; None: the task's own, without a map at most 5 cm
-        smoothing: how the plan becomes a route: none, taut or clearance, see `antdrive.planners.smooth`
-        seed: the seed of all random numbers
-        controller: follows the route
-        noise: the factor on the robot's documented noise in sensing and acting; 0: a perfect robot
-        perception: what the robot perceives of movers; None: their velocities, without a map only what its lidar finds
-        avoidance: how the robot avoids movers; None: not at all
-        replanning: when the robot looks for a new route in a world with movers; None: never
-        unseen: obstacles that neither the planner nor the controller knows of
-        map: `given`: planner and controller know the world; `none`: the robot knows only what its lidar has seen
-        localisation: how the robot knows its pose: `fixes` with the noise of its file, `odometry` without any fix,
-            `matching`: odometry that is corrected by laying scans on the map that the robot makes, or `true`, without error
-        odometry: the factor on the errors of odometry, see `antdrive.robots.odometry`
-        time_limit: simulated time after which the drive ends [s]; None: the task's own, or 30 s plus ten times the
-            route at full speed
-        physics_hz: physics steps per simulated second, 60 to 10000
-        control_hz: control periods per simulated second, at least 10; must divide `physics_hz`
-        calibration: what the margin was chosen by; see `with_chosen_margin`
+        margin_choice: what the margin was chosen by; None: it was given
 
     Raises:
         ValueError: a setting is out of range, or the robot's footprint overlaps an obstacle or a wall at the start.
@@ -70,50 +80,38 @@ class Scenario:
     planner: Planner
     robot: RobotSpec
     planner_name: str = ""
-    margin: float = 0.03
-    cell: float | None = None
-    smoothing: str = "clearance"
-    seed: int = 0
-    controller: PurePursuit = field(default_factory=PurePursuit)
-    noise: float = 0.0
-    perception: Perception | None = None
-    avoidance: Avoidance | None = field(default_factory=Avoidance)
-    replanning: ReplanPolicy | None = field(default_factory=ReplanPolicy)
-    unseen: tuple[Disc, ...] = ()
-    map: str = "given"
-    localisation: str = "fixes"
-    odometry: float = 1.0
-    time_limit: float | None = None
-    physics_hz: int = 240
-    control_hz: int = 60
-    calibration: Calibration | None = None
+    margin_choice: MarginChoice | None = None
 
     def __post_init__(self) -> None:
         self._check_kinds()
-        if not self.margin >= 0:
-            raise FieldError("margin", f"must be at least 0, got {self.margin:g}")
-        if self.smoothing not in SMOOTHINGS:
-            raise FieldError("smoothing", f"unknown {self.smoothing!r}; choose from {', '.join(SMOOTHINGS)}")
+        super().__post_init__()
         try:
             self.robot.noise.scaled(self.noise)
         except ValueError as error:
             raise FieldError("noise", f"{self.noise:g} times the robot's own is too much: {error}") from None
         self._check_sensing()
-        if self.time_limit is not None and not self.time_limit > 0:
-            raise FieldError("time_limit", f"must be greater than 0, got {self.time_limit:g}")
-        self._check_rates()
+        if not self.control_hz <= self.physics_hz or self.physics_hz % self.control_hz:
+            rates = (hz for hz in range(SLOWEST_CONTROL, self.physics_hz + 1) if not self.physics_hz % hz)
+            nearest = min(rates, key=lambda hz: abs(hz - self.control_hz))
+            problem = f"must divide the physics rate {self.physics_hz}, got {self.control_hz}; {nearest} would do"
+            raise FieldError("control_hz", problem)
         overlap = overlap_at(self.task.world, self.robot, self.task.start, self.unseen)
         if overlap:
             at = place_name(self.task.frame, *self.task.start[:2], "g")
             raise FieldError("start", f"{self.robot.name} at {at} {overlap}; move the start away from it")
 
+    def _check_kinds(self) -> None:
+        """Refuse objects of the wrong type here, where the field can be named, and not deep in a run."""
+        for name, kind in _KINDS.items():
+            value = getattr(self, name)
+            if not isinstance(value, kind):
+                wanted = str(getattr(kind, "__name__", kind)).replace("antdrive.", "").rpartition(".")[2]
+                raise FieldError(name, f"must be a {wanted.replace(' | ', ' or ')}, got {value!r:.60}")
+        if not all(isinstance(disc, Disc) for disc in self.unseen):
+            raise FieldError("unseen", f"must hold Disc objects, got {self.unseen!r:.60}")
+
     def _check_sensing(self) -> None:
-        """Refuse unknown kinds of maps and localisation, and a robot without a map that has no lidar."""
-        for key, known in (("map", MAPS), ("localisation", LOCALISATIONS)):
-            if getattr(self, key) not in known:
-                raise FieldError(key, f"unknown {getattr(self, key)!r:.60}; choose from {', '.join(known)}")
-        if not self.odometry >= 0:
-            raise FieldError("odometry", f"must be at least 0, got {self.odometry:g}")
+        """Refuse what does not go together of map, localisation, perception, planner and robot."""
         try:
             Odometry().scaled(self.odometry)
         except FieldError as error:
@@ -121,16 +119,10 @@ class Scenario:
                 "odometry", f"{self.odometry:g} times the documented errors is too much: {error}"
             ) from None
         if self.map == "none" and self.robot.lidar is None:
-            raise FieldError(
-                "map",
-                f"none: {self.robot.name} has no lidar; add one to its file, or drive jackal or turtlebot4",
-            )
+            raise FieldError("map", f"none: {self.robot.name} {NO_LIDAR}")
         kind = self.known_perception.kind
         if kind == "lidar" and self.robot.lidar is None:
-            raise FieldError(
-                "sees",
-                f"lidar: {self.robot.name} has no lidar; add one to its file, or drive jackal or turtlebot4",
-            )
+            raise FieldError("sees", f"lidar: {self.robot.name} {NO_LIDAR}")
         if kind == "lidar" and self.map == "given" and self.localisation == "odometry":
             raise FieldError("sees", "lidar: with a given map the pose must not drift; localise by fixes or true")
         drifts = self.map == "none" and self.localisation in DRIFTING
@@ -148,53 +140,6 @@ class Scenario:
                 "map", f"none: {self.planner_label} plans among known motions, and a robot without a map knows none"
             )
 
-    def _check_rates(self) -> None:
-        """Refuse rates at which the robot is not simulated as it would drive."""
-        low, high = PHYSICS_HZ
-        if not low <= self.physics_hz <= high:
-            raise FieldError("physics_hz", f"must be between {low} and {high}, got {self.physics_hz}")
-        if not SLOWEST_CONTROL <= self.control_hz <= self.physics_hz or self.physics_hz % self.control_hz:
-            rates = (hz for hz in range(SLOWEST_CONTROL, self.physics_hz + 1) if not self.physics_hz % hz)
-            nearest = min(rates, key=lambda hz: abs(hz - self.control_hz))
-            raise FieldError(
-                "control_hz",
-                f"must divide the physics rate {self.physics_hz} and be at least {SLOWEST_CONTROL}, "
-                f"got {self.control_hz}; {nearest} would do",
-            )
-
-    def _check_kinds(self) -> None:
-        """Refuse values of the wrong type here, where the setting can be named, and not deep in a run."""
-        kinds: tuple[tuple[str, type | tuple[type, ...], str], ...] = (
-            ("task", Task, "a Task, such as load_task gives"),
-            ("robot", RobotSpec, "a RobotSpec, such as load_robot gives"),
-            ("controller", PurePursuit, "a PurePursuit"),
-            (
-                "perception",
-                (Perception, type(None)),
-                "a Perception, such as Perception(kind='positions'), or None for the usual one",
-            ),
-            ("avoidance", (Avoidance, type(None)), "an Avoidance, or None for no avoidance"),
-            ("replanning", (ReplanPolicy, type(None)), "a ReplanPolicy, or None for no replanning"),
-            ("unseen", tuple, "a tuple of Disc"),
-            ("calibration", (Calibration, type(None)), "a Calibration, such as choose_margin gives, or None"),
-            ("seed", (int, np.integer), "a whole number"),
-            ("physics_hz", (int, np.integer), "a whole number"),
-            ("control_hz", (int, np.integer), "a whole number"),
-        )
-        for key, kind, wanted in kinds:
-            value = getattr(self, key)
-            if not isinstance(value, kind) or isinstance(value, bool):
-                raise FieldError(key, f"must be {wanted}, got {value!r:.60}")
-        if not all(isinstance(disc, Disc) for disc in self.unseen):
-            raise FieldError("unseen", f"must hold Disc objects, got {self.unseen!r:.60}")
-        if self.seed < 0:
-            raise FieldError("seed", f"must be at least 0, got {self.seed}")
-        for key in ("margin", "noise", "odometry", "cell", "time_limit"):
-            value = getattr(self, key)
-            optional = value is None and key in ("cell", "time_limit")
-            if not optional and (not isinstance(value, int | float | np.number) or isinstance(value, bool)):
-                raise FieldError(key, f"must be a number, got {value!r:.60}")
-
     @classmethod
     def of(
         cls,
@@ -203,36 +148,18 @@ class Scenario:
         robot: str | os.PathLike[str] | RobotSpec = "turtlebot",
         *,
         options: Mapping[str, Any] | None = None,
-        margin: float | Literal["auto"] = 0.03,
-        cell: float | None = None,
-        smoothing: str = "clearance",
-        seed: int = 0,
-        controller: PurePursuit = CONTROLLER,
-        noise: float = 0.0,
-        perception: Perception | None = None,
-        avoidance: Avoidance | None = AVOIDANCE,
-        replanning: ReplanPolicy | None = REPLANNING,
-        unseen: tuple[Disc, ...] = (),
-        map: str = "given",
-        localisation: str = "fixes",
-        odometry: float = 1.0,
-        time_limit: float | None = None,
-        physics_hz: int = 240,
-        control_hz: int = 60,
+        **settings: Any,
     ) -> Scenario:
         """A scenario from names, files or objects.
 
         >>> Scenario.of("forest", "aco-han", "jackal", options={"ants": 30}, noise=1.0, seed=2)
-
-        The settings margin, cell, smoothing, seed, controller, noise, perception, avoidance, replanning, unseen,
-        map, localisation, odometry, time_limit, physics_hz and control_hz are the fields of `Scenario`. "auto": see
-        `with_chosen_margin`.
 
         Args:
             world: a world of the catalogue, a world file, or a task
             planner: a planner's name, FILE.py:CLASS, MODULE:CLASS, or a planner
             robot: a robot of the catalogue, a robot file, or a robot
             options: options of a planner that is given by name
+            settings: fields of `Scenario`, such as noise=1.0
 
         Raises:
             InputError: there is no such world, planner, option or robot, or a file is wrong.
@@ -240,52 +167,39 @@ class Scenario:
         """
         if not isinstance(planner, str) and options:
             raise FieldError("options", "need a planner's name; set the options of a planner object itself")
-        scenario = cls(
+        return cls(
             task=world if isinstance(world, Task) else load_task(world),
             planner=load_planner(planner, **(options or {})) if isinstance(planner, str) else planner,
             planner_name=record_name(planner) if isinstance(planner, str) else "",
             robot=robot if isinstance(robot, RobotSpec) else load_robot(robot),
-            margin=0.0 if margin == "auto" else margin,
-            cell=cell, smoothing=smoothing, seed=seed, controller=controller, noise=noise,
-            perception=perception, avoidance=avoidance, replanning=replanning, unseen=unseen,
-            map=map, localisation=localisation, odometry=odometry,
-            time_limit=time_limit, physics_hz=physics_hz, control_hz=control_hz,
-        )  # fmt: skip
-        return scenario.with_chosen_margin() if margin == "auto" else scenario
-
-    @property
-    def conditions(self) -> Conditions:
-        """What the loss of margin depends on."""
-        return Conditions(
-            robot=self.robot,
-            controller=self.controller,
-            noise=float(self.noise),
-            smoothing="none" if self.timed else self.smoothing,
-            physics_hz=self.physics_hz,
-            control_hz=self.control_hz,
+            **settings,
         )
 
-    def with_chosen_margin(self, progress: Callable[[int, float], None] | None = None) -> Scenario:
-        """The scenario with the least margin whose predicted loss leaves a reserve, see `antdrive.runs.margins`.
-
-        Short drives of this robot predict the loss, once; the cache keeps the result. Movers are no part of it.
+    def identity(self, *more: object, without: Collection[str] = ()) -> str:
+        """The SHA-256 of everything that the drive depends on, and of `more`.
 
         Args:
-            progress: is called after each of these drives with their number so far and the margin that is tried [m]
-
-        Raises:
-            FieldError: no margin leaves the reserve.
+            more: what else the result depends on
+            without: fields to leave out
         """
-        calibration = choose_margin(self.conditions, progress=progress)
-        return dataclasses.replace(self, margin=calibration.margin, calibration=calibration)
+        fields = {name: getattr(self, name) for name in SETTINGS}
+        text = identity_text(
+            canonical_hash(self.task), self.planner_label, self.planner, canonical_hash(self.robot), fields, without
+        )
+        return hashlib.sha256(repr((text, *more)).encode()).hexdigest()
 
     @property
-    def chosen(self) -> Calibration | None:
-        """The calibration that the margin comes from; None where the margin was given, or the conditions have changed."""
-        calibration = self.calibration
-        if calibration is None or calibration.margin != self.margin or calibration.key != self.conditions.key:
-            return None
-        return calibration
+    def loss_conditions(self) -> tuple[RobotSpec, PurePursuit, float, str, int, int]:
+        """What the loss of margin depends on: robot, controller, noise, smoothing, and the rates of physics and control."""
+        smoothing = "none" if self.timed else self.smoothing
+        return self.robot, self.controller, float(self.noise), smoothing, self.physics_hz, self.control_hz
+
+    @property
+    def chosen(self) -> MarginChoice | None:
+        """What the margin was chosen by; None where it was given, or the conditions have changed."""
+        choice = self.margin_choice
+        same = choice is not None and (choice.margin, choice.conditions) == (self.margin, self.loss_conditions)
+        return choice if same else None
 
     def as_dict(self) -> dict[str, Any]:
         """The settings as plain values, for JSON; `docs/reference/rollout-format.md` lists the keys.
@@ -294,14 +208,11 @@ class Scenario:
         where there is none, and the unseen obstacles.
         """
         task, planner = self.task, self.planner
-        defaults = {
-            "controller": CONTROLLER,
-            "perception": PERCEPTION,
-            "avoidance": AVOIDANCE,
-            "replanning": REPLANNING,
-        }
-        values = {key: getattr(self, key) for key in defaults} | {"perception": self.known_perception}
-        changed: dict[str, Any] = {key: _changed(values[key], default) for key, default in defaults.items()}
+        changed: dict[str, Any] = {}
+        for key in ("controller", "perception", "avoidance", "replanning"):
+            value = self.known_perception if key == "perception" else getattr(self, key)
+            usual = Perception() if key == "perception" else SETTINGS[key].default
+            changed[key] = None if value is None else settings_of(changes(value, usual))
         if self.sensing is not None:
             changed |= settings_of(self.sensing)
         if self.unseen:
@@ -366,6 +277,14 @@ class Scenario:
         return SensingRecord(map=self.map, localisation=self.localisation, odometry=float(self.odometry))
 
     @property
+    def other_settings(self) -> dict[str, Any] | None:
+        """The settings that differ from their defaults and that no other key of the record holds."""
+        names = (
+            name for name, one in SETTINGS.items() if not DriveRecord.held(name) and getattr(self, name) != one.default
+        )
+        return settings_of({name: getattr(self, name) for name in names}) or None
+
+    @property
     def timed(self) -> bool:
         """Whether the planner plans in space and time, among movers."""
         return bool(self.driven_world.movers) and capabilities_of(self.planner).needs_motions
@@ -424,9 +343,27 @@ class Scenario:
         return card(picture, task.world.name, facts)
 
 
-def _changed(values: Any, default: Any) -> dict[str, Any] | None:
-    """The settings that differ from their defaults; None where there are none at all."""
-    if values is None:
-        return None
-    usual = settings_of(default)
-    return {key: value for key, value in settings_of(values).items() if value != usual[key]}
+def identity_text(
+    task: str,
+    planner: str,
+    options: Any,
+    robot: str,
+    fields: Mapping[str, Any],
+    without: Collection[str] = (),
+    **more: str,
+) -> str:
+    """A scenario as JSON text, for hashes.
+
+    Args:
+        task: the canonical hash of the world with start and goal
+        planner: the planner's name
+        options: the planner, or its options as plain values
+        robot: the robot's canonical hash
+        fields: the values of `SETTINGS` by field
+        without: fields to leave out
+        more: what else the drive depends on
+    """
+    plain = settings_of(options) if isinstance(options, Mapping) or dataclasses.is_dataclass(options) else {}
+    parts = {"task": task, "planner": planner, "options": plain, "robot": robot, **more}
+    parts["settings"] = settings_of(part_of_key(fields, without))
+    return json.dumps(parts, sort_keys=True)

@@ -1,97 +1,320 @@
-"""From what people write about scenarios to the objects that it stands for: tasks, robots, fields of a scenario."""
+"""The settings of a scenario, each declared once: type, bounds, default, help, and how people write it.
 
-from __future__ import annotations
+Files, options, tables, keys, records and reference pages are read from `SETTINGS`. Imports nothing heavy: the command line does.
+"""
 
 import dataclasses
 import math
-from collections.abc import Callable
-from typing import Any, TypeAlias, get_args
+import numbers
+import typing
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Any
 
-from antdrive.base.checks import suggest
-from antdrive.base.errors import FieldError, InputError
-from antdrive.base.reuse import reused
-from antdrive.robots import Avoidance, PurePursuit
-from antdrive.sim.driving.perception import Perception, PerceptionKind
-from antdrive.sim.driving.replanning import ReplanPolicy
-from antdrive.sim.entries import SettingsEntry
-from antdrive.worlds import Task, generate
+from annotated_types import Ge, Gt, Le
 
-#: The error for a key, such as "planner.ants", and what is wrong with its value: file, line, key and problem.
-Fail: TypeAlias = Callable[[str, str], InputError]
+from antdrive.base.errors import FieldError
+from antdrive.sim.policy import Perception, ReplanPolicy
+
+if TYPE_CHECKING:
+    from antdrive.robots import Avoidance, PurePursuit
+    from antdrive.worlds import Disc
+
+#: The panels of `--help`, in order.
+PANELS = ("World", "Planner", "Robot", "Sensing", "Movers", "Output")
+#: What a robot may know of the world before it drives, and how it may know its pose.
+MAPS = ("given", "none")
+LOCALISATIONS = ("fixes", "odometry", "matching", "true")
+SMOOTHINGS = ("none", "taut", "clearance")
+PHYSICS_HZ = (60, 10_000)  # slower physics jolts the robot
+SLOWEST_CONTROL = 10  # [Hz]
 
 
-#: What a robot knows of the world and of its pose unless it is told otherwise: fields of a scenario.
-SENSING: dict[str, Any] = {"map": "given", "localisation": "fixes", "odometry": 1.0}
+@dataclass(frozen=True)
+class Setting:
+    """How people write a field of a scenario.
 
-
-def scenario_fields(entry: SettingsEntry, fail: Fail) -> dict[str, Any]:
-    """The fields of a scenario that an entry's settings stand for, by name.
-
-    Raises:
-        InputError: an unknown setting, or a value that it cannot have.
+    Attributes:
+        help: the description, in files, in `--help` and on reference pages
+        group: the panel of `--help`
+        metavar: what `--help` calls the value
+        key: the key in files, in errors and in tables; empty: the field's name
+        flag: the option; None: the key with `--`; empty: there is none
+        form: how values are written, see `antdrive.sim.forms`
+        choices: the words that the field can be
+        axis: the key of a campaign file that lists values; empty: one of its `settings`
+        column: the column in a campaign's table; empty: the key
+        usual: what the default None means, for `--help`
+        since: the format of a campaign's keys that the setting joined in; later ones are left out at their default
     """
-    avoiding = None if entry.avoid in (False, "none") else _record(fail, "avoid", Avoidance(), entry.avoid)
-    return {
-        "cell": entry.cell,
-        "controller": _record(fail, "controller", PurePursuit(), entry.controller),
-        "perception": _perception(fail, entry.sees),
-        "avoidance": avoiding,
-        "replanning": _replanning(fail, entry),
-        "unseen": tuple(entry.unseen),
-        "time_limit": entry.time_limit,
-        "physics_hz": entry.physics_hz,
-        "control_hz": entry.control_hz,
-        # The names of a campaign's runs are made of all of this: they are as they were before there were these settings.
-        **{key: getattr(entry, key) for key, usual in SENSING.items() if getattr(entry, key) != usual},
-    }
+
+    help: str
+    group: str
+    metavar: str = ""
+    key: str = ""
+    flag: str | None = None
+    form: str = "plain"
+    choices: tuple[str, ...] = ()
+    axis: str = ""
+    column: str = ""
+    usual: str = ""
+    since: int = 1
 
 
-@reused(64)
-def generated(kind: str, seed: int, options: tuple[tuple[str, str], ...]) -> Task:
-    """The random world that {generate: KIND, seed: SEED} with options stands for.
+def _pursuit() -> "PurePursuit":
+    from antdrive.robots import PurePursuit
 
-    Raises:
-        InputError: an unknown kind or option, a wrong value, or no such world was found.
+    return PurePursuit()
+
+
+def _avoidance() -> "Avoidance":
+    from antdrive.robots import Avoidance
+
+    return Avoidance()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """The fields of a scenario beside task, planner and robot."""
+
+    smoothing: Annotated[
+        str,
+        Setting(
+            "how the planned cells become a route: none (drive the cells), taut (as short as possible) or clearance (short, "
+            "and away from obstacles where there is room)",
+            "Planner",
+            "KIND",
+            choices=SMOOTHINGS,
+            axis="routes",
+        ),
+    ] = "clearance"
+    noise: Annotated[
+        float,
+        Ge(0),
+        Setting(
+            "factor on the noise that the robot's file documents; 0 is a perfect robot", "Robot", "FACTOR", axis="noise"
+        ),
+    ] = 0.0
+    margin: Annotated[
+        float,
+        Ge(0),
+        Setting(
+            "distance that plans keep from obstacles, beyond the robot's radius [m], or auto: the least that robot, noise and "
+            "smoothing are predicted to need, from 80 short drives for each margin that is tried, once",
+            "Planner",
+            "METRES|auto",
+            form="margin",
+            axis="margin",
+            column="margin_asked",
+        ),
+    ] = 0.03
+    cell: Annotated[
+        float | None,
+        Gt(0),
+        Setting("side of a grid cell [m]", "Planner", "METRES", usual="the world's own; without a map 0.05 at most"),
+    ] = None
+    map: Annotated[
+        str,
+        Setting(
+            "what the robot knows of the world before it drives: given (all of it), or none (only what its lidar sees)",
+            "Sensing",
+            "given|none",
+            choices=MAPS,
+            since=2,
+        ),
+    ] = "given"
+    localisation: Annotated[
+        str,
+        Setting(
+            "how the robot knows its pose: fixes (with the noise of its file), odometry (wheels and gyro, which drift), "
+            "matching (odometry, corrected by scan matching; needs map none) or true (without error)",
+            "Sensing",
+            "KIND",
+            choices=LOCALISATIONS,
+            since=2,
+        ),
+    ] = "fixes"
+    odometry: Annotated[
+        float, Ge(0), Setting("factor on the documented errors of odometry", "Sensing", "FACTOR", since=2)
+    ] = 1.0
+    controller: Annotated[
+        "PurePursuit",
+        Setting("settings of the controller, such as {lookahead_time: 0.5}", "Robot", flag="", form="controller"),
+    ] = field(default_factory=_pursuit)
+    perception: Annotated[
+        Perception | None,
+        Setting(
+            "what the robot perceives of movers, KIND or KIND:METRES: positions, velocities, motions (their whole future), or "
+            "lidar (only what its lidar shows); with METRES, only of movers within that range [m]",
+            "Movers",
+            "KIND[:METRES]",
+            key="sees",
+            form="perception",
+            usual="velocities; without a map lidar",
+        ),
+    ] = None
+    avoidance: Annotated[
+        "Avoidance | None",
+        Setting(
+            "whether the robot avoids movers: true, false or none, or settings such as {horizon: 2.0}",
+            "Movers",
+            key="avoid",
+            form="avoidance",
+        ),
+    ] = field(default_factory=_avoidance)
+    replanning: Annotated[
+        ReplanPolicy | None,
+        Setting(
+            "whether the robot replans around movers, or only after it has strayed from its route: true, false, none (never) or "
+            "settings such as {patience: 10}",
+            "Movers",
+            key="replan",
+            form="replanning",
+        ),
+    ] = field(default_factory=ReplanPolicy)
+    unseen: Annotated[
+        "tuple[Disc, ...]",
+        Setting(
+            "cylinders {x, y, radius} [m] that neither planner nor controller knows of",
+            "World",
+            "X,Y,RADIUS",
+            form="discs",
+        ),
+    ] = ()
+    time_limit: Annotated[
+        float | None,
+        Gt(0),
+        Setting(
+            "simulated time allowed [s]",
+            "World",
+            "SECONDS",
+            usual="the world's own, or 30 s plus ten times the route at full speed",
+        ),
+    ] = None
+    physics_hz: Annotated[
+        int,
+        Ge(PHYSICS_HZ[0]),
+        Le(PHYSICS_HZ[1]),
+        Setting("physics steps per simulated second, 60 to 10000", "Robot", flag=""),
+    ] = 240
+    control_hz: Annotated[
+        int,
+        Ge(SLOWEST_CONTROL),
+        Setting("control periods per simulated second, at least 10; must divide physics_hz", "Robot", flag=""),
+    ] = 60
+    seed: Annotated[
+        int, Ge(0), Le(2**63 - 1), Setting("seed of all random numbers", "World", "NUMBER", axis="seeds")
+    ] = 0
+
+    def __post_init__(self) -> None:
+        for one in SETTINGS.values():
+            one.check(getattr(self, one.name))
+
+
+@dataclass(frozen=True)
+class Declared:
+    """A setting as declared in `Settings`.
+
+    Attributes:
+        name: the field of the scenario
+        kind: the field's type; that of other records as text
+        optional: whether None is a value
+        bounds: of numbers, as pydantic takes them
+        setting: how people write it
+        field: the field of the record
     """
-    import numpy as np
 
-    return generate(kind, np.random.default_rng(seed), dict(options), name=f"{kind}-{seed}", note=f"seed {seed}")
+    name: str
+    kind: Any
+    optional: bool
+    bounds: tuple[Ge | Gt | Le, ...]
+    setting: Setting
+    field: "dataclasses.Field[Any]"
+
+    @property
+    def key(self) -> str:
+        """The key in files, in errors and in tables."""
+        return self.setting.key or self.name
+
+    @property
+    def flag(self) -> str:
+        """The option of commands; empty: there is none."""
+        return f"--{self.key.replace('_', '-')}" if self.setting.flag is None else self.setting.flag
+
+    @property
+    def column(self) -> str:
+        """The column in a campaign's table."""
+        return self.setting.column or self.key
+
+    @property
+    def is_word(self) -> bool:
+        """Whether one word writes a value, so that a list of words can write several; seeds have a notation of their own."""
+        return self.setting.form in ("plain", "margin", "perception") and self.name != "seed"
+
+    @property
+    def default(self) -> Any:
+        """The value of a scenario that does not say."""
+        made = self.field.default_factory
+        return self.field.default if made is dataclasses.MISSING else made()
+
+    def check(self, value: Any) -> None:
+        """Refuse a number of another kind or beyond its bounds, and a word that is none of the choices.
+
+        Raises:
+            FieldError: the value is refused.
+        """
+        if self.kind not in (int, float, str) or (value is None and self.optional):
+            return
+        choices = self.setting.choices
+        if choices and value not in choices:
+            raise FieldError(self.key, f"unknown {value!r:.60}; choose from {', '.join(choices)}")
+        wanted: Any = {int: numbers.Integral, float: numbers.Real, str: str}[self.kind]
+        if not isinstance(value, wanted) or isinstance(value, bool):
+            words = {int: "a whole number", float: "a number", str: "text"}[self.kind]
+            raise FieldError(self.key, f"must be {words}, got {value!r:.60}")
+        if self.kind is not str and not (math.isfinite(value) and all(_keeps(bound, value) for bound in self.bounds)):
+            raise FieldError(self.key, f"must be {self.range}, got {value:g}")
+
+    @property
+    def range(self) -> str:
+        """The bounds in words."""
+        ends = {type(bound): getattr(bound, type(bound).__name__.lower()) for bound in self.bounds}
+        if Ge in ends and Le in ends:
+            return f"between {ends[Ge]} and {ends[Le]}"
+        return f"at least {ends[Ge]:g}" if Ge in ends else f"greater than {ends[Gt]:g}"
 
 
-def _record(fail: Fail, key: str, default: Any, values: Any) -> Any:
-    """A record of settings with some of them replaced."""
-    if not isinstance(values, dict):
-        return default
-    known = [field.name for field in dataclasses.fields(default)]
-    for name in values:
-        if name not in known:
-            raise fail(f"{key}.{name}", f"unknown setting; {suggest(name, known)}")
-    try:
-        return dataclasses.replace(default, **values)
-    except FieldError as error:
-        raise fail(f"{key}.{error.key}", error.problem) from None
-    except TypeError:
-        wrong = next((name for name, value in values.items() if not isinstance(value, int | float)), "")
-        raise fail(f"{key}.{wrong}" if wrong else key, "must be a number") from None
+def _keeps(bound: Ge | Gt | Le, value: Any) -> bool:
+    if isinstance(bound, Le):
+        return bool(value <= bound.le)
+    return bool(value >= bound.ge) if isinstance(bound, Ge) else bool(value > bound.gt)
 
 
-def _replanning(fail: Fail, entry: SettingsEntry) -> ReplanPolicy | None:
-    if entry.replan == "none":
-        return None
-    policy: ReplanPolicy = _record(fail, "replan", ReplanPolicy(), entry.replan)
-    return dataclasses.replace(policy, around_movers=False) if entry.replan is False else policy
+def declared(kind: type[Any]) -> Iterator[Declared]:
+    """The settings that a record declares, in the order of its fields."""
+    for one in dataclasses.fields(kind):
+        base, *notes = typing.get_args(one.type)
+        of = typing.get_args(base)
+        optional = type(None) in of
+        setting = next(note for note in notes if isinstance(note, Setting))
+        bounds = tuple(note for note in notes if isinstance(note, Ge | Gt | Le))
+        yield Declared(one.name, of[0] if optional else base, optional, bounds, setting, one)
 
 
-def _perception(fail: Fail, sees: str | None) -> Perception | None:
-    if sees is None:
-        return None
-    kind, mark, metres = sees.partition(":")
-    if kind not in get_args(PerceptionKind):
-        raise fail("sees", f"unknown kind {kind!r}; choose from {', '.join(get_args(PerceptionKind))}")
-    try:
-        reach = float(metres) if mark else math.inf
-    except ValueError:
-        reach = math.nan
-    if not reach > 0:
-        raise fail("sees", "write KIND or KIND:METRES with a range greater than 0, such as positions:3")
-    return Perception(kind=kind, range=reach)  # type: ignore[arg-type]
+#: Every setting of a scenario by the name of its field, in the order of tables.
+SETTINGS: Mapping[str, Declared] = MappingProxyType({one.name: one for one in declared(Settings)})
+
+
+def part_of_key(fields: Mapping[str, Any], without: Collection[str] = ()) -> dict[str, Any]:
+    """The fields that a scenario is known by; those that came later are left out at their default, so keys stay valid."""
+    known = (one for one in SETTINGS.values() if one.name in fields and one.name not in without)
+    return {one.name: fields[one.name] for one in known if one.setting.since == 1 or fields[one.name] != one.default}
+
+
+Settings.__doc__ = "\n".join(
+    [
+        f"{Settings.__doc__}\n\nAttributes:",
+        *(f"    {one.name}: {one.setting.help}" for one in SETTINGS.values()),
+    ]
+)

@@ -42,18 +42,13 @@ FILM_LENGTH = 12.0  # where a drive, then or now, is longer, its film is faster 
 
 @dataclasses.dataclass(frozen=True)
 class Results:
-    """Where results are written, and how much.
+    """Where results are written, and how much."""
 
-    Attributes:
-        folder: of all results; each test has a folder of its own in it
-        films: of which tests a film is made
-        places: a folder in which all processes of a run count the films of failed tests; None: they are not limited
-        root: the project's folder; what lies in its folders gets results in folders of the same names
-    """
-
-    folder: Path
-    films: Films = "failed"
+    folder: Path  # of all results; each test has a folder of its own in it
+    films: Films = "failed"  # of which tests a film is made
+    # a folder in which all processes of a run count the films of failed tests; None: they are not limited
     places: Path | None = None
+    # the project's folder; what lies in its folders gets results in folders of the same names
     root: Path = dataclasses.field(default_factory=Path.cwd)
 
     def of(self, file: Path, name: str) -> Path:

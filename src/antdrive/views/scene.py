@@ -5,16 +5,17 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.types import Bounds, Point, Pose
-from antdrive.robots.spec import Footprint, RobotSpec
+from antdrive.robots.spec import RobotSpec
 from antdrive.sim.log.rollout import Rollout
 from antdrive.worlds.movers import Wandering
 from antdrive.worlds.trajectories import Trajectories
-from antdrive.worlds.world import Task
+from antdrive.worlds.world import Task, World
 
 Floats = npt.NDArray[np.float64]
 
@@ -22,86 +23,39 @@ MIN_JUMP = 0.05  # the least distance between two rows that counts as a mover's 
 PLANNED_TRACK = 30.0  # a plan's figure shows the movers' tracks for this long [s]
 
 
-@dataclass(frozen=True)
-class Body:
-    """The robot's visible shape, and its top speed for the scale of colours.
-
-    Attributes:
-        name: the robot's name
-        footprint: its outline on the ground
-        height: [m]
-        wheel_radius: [m]
-        track: distance between the wheels [m]
-        max_speed: [m/s]
-    """
-
-    name: str
-    footprint: Footprint
-    height: float
-    wheel_radius: float
-    track: float
-    max_speed: float
-
-    @classmethod
-    def of(cls, robot: RobotSpec) -> Body:
-        """The shape of a robot that is not yet in a log."""
-        return cls(robot.name, robot.footprint, robot.height, robot.wheel_radius, robot.track, robot.max_speed)
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Scene:
-    """Everything that stands still during a run, the robot's shape, and the movers' tracks.
+    """Everything that stands still during a run, the robot's shape, and the movers' tracks."""
 
-    Attributes:
-        name: the world's name
-        bounds: xmin, ymin, xmax, ymax [m]
-        obstacles: x, y, radius and height of each cylinder (N, 4) [m]
-        unseen: whether each obstacle was placed after planning (N,)
-        start: x, y [m] and heading [rad]
-        goal: x, y [m]
-        goal_tolerance: how far from the goal the robot may stop [m]
-        inflate: how far the planner kept its path from obstacles: the robot's radius plus the margin [m]
-        margin: the part of `inflate` beyond the robot's radius [m]
-        robot: the robot's shape
-        mapped: whether the robot had a map, and kept a distance from all obstacles from the start
-        mover_radii: one per mover [m]
-        movers: one position per mover [m]: at the run's end, or at t = 0 for a plan that was not driven
-        movers_at: when they are there [s]
-        tracks: polylines (N, 2) that movers follow [m]; a mover that jumps has several
-    """
-
-    name: str
-    bounds: Bounds
-    obstacles: Floats
-    unseen: npt.NDArray[np.bool_]
-    start: Pose
-    goal: Point
-    goal_tolerance: float
-    inflate: float
-    margin: float
-    robot: Body
-    mapped: bool = True
-    mover_radii: tuple[float, ...] = ()
-    movers: tuple[Point, ...] = ()
-    movers_at: float = 0.0
-    tracks: tuple[Floats, ...] = ()
+    name: str  # the world's name
+    bounds: Bounds  # xmin, ymin, xmax, ymax [m]
+    obstacles: Floats  # x, y, radius and height of each cylinder (N, 4) [m]
+    unseen: npt.NDArray[np.bool_]  # whether each obstacle was placed after planning (N,)
+    start: Pose  # x, y [m] and heading [rad]
+    goal: Point  # x, y [m]
+    goal_tolerance: float  # how far from the goal the robot may stop [m]
+    inflate: float  # how far the planner kept its path from obstacles: the robot's radius plus the margin [m]
+    margin: float  # the part of `inflate` beyond the robot's radius [m]
+    robot: RobotSpec  # the robot's shape
+    mapped: bool = True  # whether the robot had a map, and kept a distance from all obstacles from the start
+    mover_radii: tuple[float, ...] = ()  # one per mover [m]
+    movers: tuple[
+        Point, ...
+    ] = ()  # one position per mover [m]: at the run's end, or at t = 0 for a plan that was not driven
+    movers_at: float = 0.0  # when they are there [s]
+    tracks: tuple[Floats, ...] = ()  # polylines (N, 2) that movers follow [m]; a mover that jumps has several
 
     @classmethod
     def of(cls, rollout: Rollout) -> Scene:
         """The scene of a logged run."""
-        record, task, world = rollout.record, rollout.record.task, rollout.record.world
-        discs = [(disc.x, disc.y, disc.radius, disc.height) for disc in world.obstacles]
-        return cls(
-            name=world.name,
-            bounds=world.bounds,
-            obstacles=np.array(discs, dtype=np.float64).reshape(-1, 4),
-            unseen=np.arange(len(discs)) >= len(discs) - len(record.unseen),
-            start=task.start,
-            goal=task.goal,
-            goal_tolerance=task.goal_tolerance,
+        record, world = rollout.record, rollout.record.world
+        return cls._in(
+            world,
+            record.task,
+            record.robot,
+            unseen=np.arange(len(world.obstacles)) >= len(world.obstacles) - len(record.unseen),
             inflate=record.inflate,
             margin=record.margin,
-            robot=Body.of(record.robot),
             mapped=not record.exploring,
             mover_radii=tuple(mover.radius for mover in world.movers),
             movers=tuple((float(x), float(y)) for x, y in rollout.movers[-1]) if len(rollout.movers) else (),
@@ -112,27 +66,29 @@ class Scene:
     @classmethod
     def planned(cls, task: Task, robot: RobotSpec, inflate: float, *, mapped: bool = True) -> Scene:
         """The scene of a plan that was not driven."""
-        discs = [(disc.x, disc.y, disc.radius, disc.height) for disc in task.world.obstacles]
         # The motion of wandering movers depends on a run's seed.
         shown = [mover for mover in task.world.movers if not isinstance(mover, Wandering)]
         trajectories = Trajectories.of(dataclasses.replace(task.world, movers=tuple(shown)), task.start[:2])
         positions = trajectories.positions(np.arange(0.0, PLANNED_TRACK, 0.05))
-        return cls(
-            name=task.world.name,
-            bounds=task.world.bounds,
-            obstacles=np.array(discs, dtype=np.float64).reshape(-1, 4),
-            unseen=np.zeros(len(discs), dtype=np.bool_),
-            start=task.start,
-            goal=task.goal,
-            goal_tolerance=task.goal_tolerance,
+        return cls._in(
+            task.world,
+            task,
+            robot,
+            unseen=np.zeros(len(task.world.obstacles), dtype=np.bool_),
             inflate=inflate,
             margin=max(0.0, inflate - robot.radius),
-            robot=Body.of(robot),
             mapped=mapped,
             mover_radii=tuple(trajectories.radii.tolist()),
             movers=tuple((x, y) for x, y in positions[0].tolist()),
             tracks=mover_tracks(positions),
         )
+
+    @classmethod
+    def _in(cls, world: World, task: Task, robot: RobotSpec, **more: Any) -> Scene:
+        discs = [(disc.x, disc.y, disc.radius, disc.height) for disc in world.obstacles]
+        obstacles = np.array(discs, dtype=np.float64).reshape(-1, 4)
+        ends: dict[str, Any] = {"start": task.start, "goal": task.goal, "goal_tolerance": task.goal_tolerance}
+        return cls(name=world.name, bounds=world.bounds, obstacles=obstacles, robot=robot, **ends, **more)
 
     @property
     def unseen_said(self) -> str:

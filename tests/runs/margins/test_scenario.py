@@ -22,16 +22,18 @@ def made_up(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 def test_a_margin_is_chosen_for_the_scenarios_own_settings(jackal: RobotSpec) -> None:
     controller = PurePursuit(lookahead_time=0.3)
-    s = Scenario.of("empty", "astar", jackal, margin="auto", noise=2, smoothing="taut", controller=controller)
+    s = choice.with_chosen_margin(
+        Scenario.of("empty", "astar", jackal, noise=2, smoothing="taut", controller=controller)
+    )
     assert s.chosen is not None
     assert s.margin == s.chosen.margin
     assert 0.05 <= s.margin <= 0.056
-    assert s.conditions == Conditions(robot=jackal, controller=controller, noise=2.0, smoothing="taut")
+    assert Conditions.of(s) == Conditions(robot=jackal, controller=controller, noise=2.0, smoothing="taut")
     assert s.inflate == jackal.radius + s.margin
 
 
 def test_a_choice_counts_as_long_as_its_conditions_hold(small_scenario: Scenario) -> None:
-    s = small_scenario.with_chosen_margin()
+    s = choice.with_chosen_margin(small_scenario)
     assert s.chosen is not None
     assert dataclasses.replace(s, seed=5).chosen == s.chosen
     assert dataclasses.replace(s, planner=load_planner("ants")).chosen == s.chosen
@@ -42,12 +44,10 @@ def test_a_choice_counts_as_long_as_its_conditions_hold(small_scenario: Scenario
 
 
 def test_plans_in_space_and_time_are_not_smoothed(turtlebot: RobotSpec) -> None:
-    assert Scenario.of("plaza-moving", "sipp", turtlebot).conditions.smoothing == "none"
-    assert Scenario.of("plaza-moving", "astar", turtlebot).conditions.smoothing == "clearance"
+    assert Conditions.of(Scenario.of("plaza-moving", "sipp", turtlebot)).smoothing == "none"
+    assert Conditions.of(Scenario.of("plaza-moving", "astar", turtlebot)).smoothing == "clearance"
 
 
-def test_words_other_than_auto_are_no_margin(small_scenario: Scenario) -> None:
+def test_words_are_no_margin(small_scenario: Scenario) -> None:
     with pytest.raises(FieldError, match="margin: must be a number, got 'wide'"):
-        Scenario.of(small_scenario.task, margin="wide")  # type: ignore[arg-type]
-    with pytest.raises(FieldError, match="calibration: must be a Calibration"):
-        dataclasses.replace(small_scenario, calibration=0.03)  # type: ignore[arg-type]
+        Scenario.of(small_scenario.task, margin="wide")

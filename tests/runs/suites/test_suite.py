@@ -86,7 +86,7 @@ def test_a_suite_can_express_every_setting_of_a_scenario() -> None:
         "perception": "sees",
         "seed": "seeds",
         "planner_name": "planner",
-        "calibration": "margin",
+        "margin_choice": "margin",
         "frame": "start",  # suites have places of the world itself
     }
     assert all(keys[field.name] in ScenarioEntry.model_fields for field in fields(Scenario))
@@ -113,7 +113,7 @@ def test_a_margin_is_chosen_once_and_named_by_the_baseline(tmp_path: Path, monke
         )
 
     chosen: list[Conditions] = []
-    monkeypatch.setattr("antdrive.sim.scenario.choose_margin", choose)
+    monkeypatch.setattr("antdrive.runs.margins.choice.choose_margin", choose)
     case = only(tmp_path, "world: empty, planner: astar, noise: 0.5, smoothing: taut, margin: auto")
     assert check_case(case, update="new").accepted == "written"
     assert (chosen[0].noise, chosen[0].smoothing) == (0.5, "taut")
@@ -225,7 +225,7 @@ def test_a_planner_of_ones_own_comes_from_a_file_or_a_module(tmp_path: Path, mon
         ("world: empty, sees: 'positions:x'", 3, "scenarios.one.sees: write KIND or KIND:METRES"),
         ("world: empty, avoid: 1", 3, "scenarios.one.avoid: must be true, false, none or a mapping of settings, got 1"),
         ("world: empty, replan: never", 3, 'scenarios.one.replan: must be true, false, none or a mapping of settings, got "n'),
-        ("world: empty, replanning: none", 3, "scenarios.one.replanning: unknown key; write replan: when the robot replans"),
+        ("world: empty, replanning: none", 3, "scenarios.one.replanning: unknown key; write replan: whether the robot replans"),
         ("world: empty, perception: positions", 3, "scenarios.one.perception: unknown key; write sees: what the robot"),
         ("world: empty, seed: 3", 3, "scenarios.one.seed: unknown key; write seeds: one test for each"),
         ("world: empty, avoid: {horizn: 1}", 3, "scenarios.one.avoid.horizn: unknown setting; did you mean horizon?"),

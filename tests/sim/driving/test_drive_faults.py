@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from antdrive.robots import Avoidance, RobotSpec, Twist
-from antdrive.sim import Run
+from antdrive.sim import Perception, Run
 from antdrive.sim.driving.following import OnePath
-from antdrive.sim.driving.perception import Perception, Told
+from antdrive.sim.driving.perception import Told
 from antdrive.sim.driving.rules import Avoid, braked, stopping_time
 from antdrive.worlds import Trajectories
 from tests.sim.driving.test_driver import HALL, TASK

@@ -14,7 +14,6 @@ from antdrive.views.film.compositor import part_pose
 from antdrive.views.film.meshes import Mesh, cylinder, robot_parts
 from antdrive.views.film.raycast import AMBIENT, DIFFUSE
 from antdrive.views.film.triangles import Solid, draw_solids, merged, overlap, placed
-from antdrive.views.scene import Body
 from antdrive.views.style import MOVER, Colour
 from antdrive.views.window import add_mesh
 
@@ -93,7 +92,7 @@ def test_cylinders_are_drawn_as_tiny_renderer_draws_them(
 @pytest.mark.parametrize(("yaw", "wheels"), [(0.0, (0.0, 0.0)), (2.1, (0.4, -1.7)), (-1.3, (3.0, 3.1))])
 def test_robots_are_drawn_as_tiny_renderer_draws_them(robot: str, yaw: float, wheels: tuple[float, float]) -> None:
     camera = camera_for("oblique", (0, 0), (2, 1.6), 0.6, (240, 180))
-    parts = robot_parts(Body.of(load_robot(robot)))
+    parts = robot_parts(load_robot(robot))
     bodies = [(part.mesh, part.colour, part_pose(part, 1.0, 0.8, yaw, wheels)) for part in parts]
     assert_alike(bodies, camera, 2)
 

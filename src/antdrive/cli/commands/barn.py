@@ -3,16 +3,17 @@
 import math
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from antdrive.base.errors import InputError
-from antdrive.cli import knowing, options
+from antdrive.cli import options
 from antdrive.cli.campaigns import OPTIONS
 from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import bar, campaign_bar, print_error, print_json, print_line, print_table
 from antdrive.cli.exits import FAILED, SUCCEEDED
+from antdrive.sim.settings import SETTINGS
 
 if TYPE_CHECKING:
     import pyarrow
@@ -43,20 +44,23 @@ Out = Annotated[
 ]
 
 
+@options.with_settings(
+    ("noise", *(name for name, one in SETTINGS.items() if one.setting.group == "Sensing")),
+    noise=1.0,
+    map="none",
+    localisation="matching",
+)
 def barn(
     source: Source,
-    map: knowing.Map = "none",
     with_map: WithMap = False,
-    localisation: knowing.Localisation = "matching",
-    odometry: knowing.Odometry = 1.0,
     planner: options.Planner = "astar",
     robot: options.Robot = "jackal",
-    noise: options.Noise = 1.0,
     trials: Trials = 10,
     jobs: Jobs = None,
     out: Out = Path("out/barn"),
     films: Films = False,
     json: options.Json = False,
+    **given: Any,
 ) -> int:
     """Drive the BARN challenge's worlds and print its table.
 
@@ -69,18 +73,14 @@ def barn(
     from antdrive.runs.statistics.price import prices
     from antdrive.runs.statistics.runs import RunTable
 
+    map = given["map"]
     if with_map and map != "none":
         raise InputError("--with-map: is for --map none; with the map there is nothing to compare")
     parquet_library()
     folder = challenge.unpacked(source, out / "worlds")
-    given = map == "given"
-    settings = {
-        "noise": noise,
-        "map": map,
-        "localisation": "fixes" if given and localisation == "matching" else localisation,
-        "odometry": odometry,
-    }
-    data = challenge.campaign_data(folder, trials, planner, robot, settings, with_map=with_map)
+    if map == "given" and given["localisation"] == "matching":
+        given["localisation"] = "fixes"
+    data = challenge.campaign_data(folder, trials, planner, robot, given, with_map=with_map)
     campaign = make_campaign(data, source="barn", options={**OPTIONS, "seeds": "--trials", "planners": "--planner"})
     compile_once()
     try:

@@ -71,22 +71,18 @@ Seeds = Annotated[
 ]
 
 
+@options.with_settings(("smoothing", "noise", "margin", "cell", "seed"))
 def compare(
     context: typer.Context,
     worlds: Worlds,
     planner: Planners = None,
     settings: Settings = None,
     robot: options.Robot = "turtlebot",
-    seed: options.Seed = 0,
     seeds: Seeds = 1,
-    margin: options.Margin = 0.03,
-    cell: options.CellSize = None,
     task: options.TaskName = None,
     start: options.Start = None,
     goal: options.Goal = None,
     frame: options.Frame = "world",
-    smoothing: options.Smoothing = "clearance",
-    noise: options.Noise = 0.0,
     out: options.Out = None,
     figures: options.Figures = True,
     video: Annotated[
@@ -99,6 +95,7 @@ def compare(
     allow: Allow = None,
     where: Where = None,
     json: options.Json = False,
+    **given: Any,
 ) -> int:
     """Compare planners: drive worlds with each, or read a campaign.
 
@@ -109,10 +106,9 @@ def compare(
         return compare_campaigns(campaigns, planner or (), metric, against, allow, where, json)
     check_worlds(worlds)
     entrants = entrants_of(planner, settings)
-    rest = {"margin": margin, "cell": cell, "smoothing": smoothing, "noise": noise}
     tasks = {world: chosen_task(world, task, start, goal, frame) for world in worlds}
-    scenarios = _scenarios(worlds, tasks, entrants, robot, seed, rest)
-    cases = [(world, number) for world in worlds for number in range(seed, seed + seeds)]
+    scenarios = _scenarios(worlds, tasks, entrants, robot, given)
+    cases = [(world, number) for world in worlds for number in range(given["seed"], given["seed"] + seeds)]
     default, mark = _default_folder(scenarios, cases)
     folder = out or default
     _make_ready(folder, video)
@@ -121,7 +117,7 @@ def compare(
         runs, logs = _drive(scenarios, cases, folder, robot, figures, facts, ends_words(task, start, goal, frame))
         files = {run.label: run.facts["folder"] for run in runs} if len(cases) == 1 else {"folder": str(folder)}
         files |= _views(logs, folder, video, speed, figures)
-        told = {"differences": differences(runs), "same": same_drives(runs, smoothing)}
+        told = {"differences": differences(runs), "same": same_drives(runs, given["smoothing"])}
         told["drives"] = [{"label": run.label, **run.facts} for run in runs]
         write_json(folder / MARKER, {**facts, **told})
     if json:
@@ -152,12 +148,11 @@ def _scenarios(
     tasks: "Mapping[str, str | Task]",
     entrants: Sequence[Entrant],
     robot: str,
-    seed: int,
-    rest: dict[str, Any],
+    given: Mapping[str, Any],
 ) -> "dict[tuple[str, Entrant], Scenario]":
     """The scenario of every world, as given, and planner, with the first seed."""
     scenarios = {
-        (world, entrant): make_scenario(tasks[world], entrant.name, list(entrant.settings), robot, seed=seed, **rest)
+        (world, entrant): make_scenario(tasks[world], entrant.name, list(entrant.settings), robot, given)
         for world in worlds
         for entrant in entrants
     }

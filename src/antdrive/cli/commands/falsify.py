@@ -49,6 +49,7 @@ Seed = Annotated[
 ]
 
 
+@options.with_settings(("smoothing", "noise", "margin", "cell"))
 def falsify(
     budget: Budget = 100,
     seed: Seed = 0,
@@ -57,14 +58,11 @@ def falsify(
     planner: options.Planner = "ants",
     settings: options.Settings = None,
     robot: options.Robot = "turtlebot",
-    margin: options.Margin = 0.03,
-    cell: options.CellSize = None,
-    smoothing: options.Smoothing = "clearance",
-    noise: options.Noise = 0.0,
     out: options.Out = None,
     seconds: Seconds = 20.0,
     film: Film = True,
     json: options.Json = False,
+    **given: Any,
 ) -> int:
     """Look for worlds where a set-up fails.
 
@@ -77,7 +75,7 @@ def falsify(
     if is_own(planner):
         problem = "failures are run again in other processes, which know registered planners only"
         raise InputError(f"--planner {planner}: {problem}; register the class under the entry point antdrive.planners")
-    setup = make_scenario("empty", planner, settings, robot, margin=margin, cell=cell, smoothing=smoothing, noise=noise)
+    setup = make_scenario("empty", planner, settings, robot, given)
     mark = fingerprint(setup, budget, seed, method, obstacles, seconds)
     usual = Path("out") / file_name(f"falsify-{planner}-{setup.robot.name}-{seed}")
     folder = out or free_folder(usual, MARKER, mark)

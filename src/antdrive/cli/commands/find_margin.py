@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from antdrive.worlds import Task
 
 
+@options.with_settings(("smoothing", "noise", "cell", "seed"))
 def find_margin(
     world: Annotated[
         str | None, typer.Argument(metavar="WORLD", help="Name of a world in the catalogue, or a world file.")
@@ -35,13 +36,9 @@ def find_margin(
     planner: options.Planner = "astar",
     settings: options.Settings = None,
     robot: options.Robot = "turtlebot",
-    seed: options.Seed = 0,
     seeds: Annotated[
         int, typer.Option(min=1, max=10_000, metavar="NUMBER", help="Number of drives, with seeds from --seed on.")
     ] = 10,
-    cell: options.CellSize = None,
-    smoothing: options.Smoothing = "clearance",
-    noise: options.Noise = 0.0,
     max_speed: Annotated[
         float | None,
         typer.Option(min=0.05, metavar="SPEED", help="Speed limit [m/s].  [default: the robot's own]"),
@@ -53,6 +50,7 @@ def find_margin(
         ),
     ] = 0.005,
     json: options.Json = False,
+    **given: Any,
 ) -> int:
     """Find the least margin with which all drives are safe.
 
@@ -61,8 +59,9 @@ def find_margin(
     from antdrive.sim.log.margin import find_margin as search
     from antdrive.sim.pipeline import run as drive
 
+    seed = given.pop("seed")
     chosen = _chosen(world, kind, task, start, goal, frame)
-    base = make_scenario(chosen, planner, settings, robot, cell=cell, smoothing=smoothing, noise=noise)
+    base = make_scenario(chosen, planner, settings, robot, given)
     base = base if max_speed is None else _slowed(base, max_speed)
     tasks = {n: base.task if kind is None else _generated(kind, n) for n in range(seed, seed + seeds)}
 

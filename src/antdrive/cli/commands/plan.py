@@ -20,14 +20,12 @@ if TYPE_CHECKING:
     from antdrive.worlds import Grid
 
 
+@options.with_settings(("margin", "cell", "seed"))
 def plan(
     world: options.World,
     planner: options.Planner = "ants",
     settings: options.Settings = None,
     robot: options.Robot = "turtlebot",
-    seed: options.Seed = 0,
-    margin: options.Margin = 0.03,
-    cell: options.CellSize = None,
     task: options.TaskName = None,
     start: options.Start = None,
     goal: options.Goal = None,
@@ -37,6 +35,7 @@ def plan(
     ] = None,
     vector: options.Vector = False,
     json: options.Json = False,
+    **given: Any,
 ) -> int:
     """Plan a path without driving it.
 
@@ -45,9 +44,7 @@ def plan(
     from antdrive.planners import keep_best
     from antdrive.sim.pipeline import plan as make_plan
 
-    scenario = make_scenario(
-        chosen_task(world, task, start, goal, frame), planner, settings, robot, seed=seed, margin=margin, cell=cell
-    )
+    scenario = make_scenario(chosen_task(world, task, start, goal, frame), planner, settings, robot, given)
     compile_once()
     with planning(f"planning with {planner}"), keep_best():
         grid, answer = make_plan(scenario)

@@ -7,13 +7,12 @@ import typer
 
 from antdrive.base.atomic import claimed
 from antdrive.base.errors import InputError
-from antdrive.cli import knowing, options
+from antdrive.cli import options
 from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import bar, planning, print_json
 from antdrive.cli.exits import FAILED, SUCCEEDED
 from antdrive.cli.output import print_run
-from antdrive.cli.parse import disc
-from antdrive.cli.scenario import among_movers, chosen_task, make_scenario
+from antdrive.cli.scenario import chosen_task, make_scenario
 from antdrive.cli.write import (
     check_film,
     check_folder,
@@ -23,70 +22,31 @@ from antdrive.cli.write import (
     write_result,
     write_run,
 )
+from antdrive.sim.settings import SETTINGS
 
 if TYPE_CHECKING:
     from antdrive.sim.pipeline import Run
     from antdrive.sim.scenario import Scenario
 
-Unseen = Annotated[
-    list[str] | None,
-    typer.Option(
-        metavar="X,Y,RADIUS",
-        help="Add a cylinder that neither planner nor controller knows about [m]. May be repeated.",
-    ),
+Video = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="Film the drive: .mp4, .gif or .webp.", rich_help_panel="Output")
 ]
-TimeLimit = Annotated[
-    float | None,
-    typer.Option(
-        min=1e-3,
-        max=1e6,
-        metavar="SECONDS",
-        help="Simulated time allowed [s].  [default: the world's own, or 30 s plus ten times the route at full speed]",
-    ),
-]
-Avoid = Annotated[bool, typer.Option("--avoid/--no-avoid", help="Avoid movers: slow down, stop, back off or go round.")]
-Replan = Annotated[
+Gui = Annotated[
     bool,
-    typer.Option(
-        "--replan/--no-replan",
-        help="In worlds with movers: replan around them; otherwise only after straying from the route.",
-    ),
+    typer.Option("--gui", help="Replay the drive in a window afterwards; needs a screen.", rich_help_panel="Output"),
 ]
-Sees = Annotated[
-    str | None,
-    typer.Option(
-        metavar="KIND[:METRES]",
-        help="What the robot perceives of movers: positions, velocities, motions (their whole future), or lidar: nothing but "
-        "what its lidar shows; with METRES, only of movers within that range [m].  "
-        "[default: velocities; with --map none lidar]",
-    ),
-]
-Video = Annotated[Path | None, typer.Option(metavar="FILE", help="Film the drive: .mp4, .gif or .webp.")]
-Gui = Annotated[bool, typer.Option("--gui", help="Replay the drive in a window afterwards; needs a screen.")]
 
 
+@options.with_settings(name for name, one in SETTINGS.items() if one.flag)
 def run(
     world: options.World,
     planner: options.Planner = "ants",
     settings: options.Settings = None,
     robot: options.Robot = "turtlebot",
-    seed: options.Seed = 0,
-    margin: options.Margin = 0.03,
-    cell: options.CellSize = None,
     task: options.TaskName = None,
     start: options.Start = None,
     goal: options.Goal = None,
     frame: options.Frame = "world",
-    smoothing: options.Smoothing = "clearance",
-    noise: options.Noise = 0.0,
-    unseen: Unseen = None,
-    time_limit: TimeLimit = None,
-    avoid: Avoid = True,
-    replan: Replan = True,
-    sees: Sees = None,
-    map: knowing.Map = "given",
-    localisation: knowing.Localisation = "fixes",
-    odometry: knowing.Odometry = 1.0,
     out: options.Out = None,
     video: Video = None,
     prelude: options.Prelude = 0.0,
@@ -94,18 +54,13 @@ def run(
     figures: options.Figures = True,
     gui: Gui = False,
     json: options.Json = False,
+    **given: Any,
 ) -> int:
     """Plan a path, drive it in physics and certify the drive.
 
     Exit code 0: the robot stopped at the goal, and its log proves that it touched nothing.
     """
-    knows: dict[str, Any] = {"map": map, "localisation": localisation, "odometry": odometry}
-    hidden = tuple(disc(text) for text in unseen or ())
-    scenario = make_scenario(
-        chosen_task(world, task, start, goal, frame), planner, settings, robot,
-        seed=seed, margin=margin, cell=cell, smoothing=smoothing, noise=noise, unseen=hidden, time_limit=time_limit,
-        **knows, **among_movers(avoid, replan, sees),
-    )  # fmt: skip
+    scenario = make_scenario(chosen_task(world, task, start, goal, frame), planner, settings, robot, given)
     folder = out or default_folder(scenario)
     _check_views(scenario, video, prelude, gui)
     check_folder(folder)

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Any, cast, get_args
 import typer
 
 from antdrive.base.errors import InputError
-from antdrive.cli import knowing
+from antdrive.cli import options
 from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import campaign_bar, print_error, print_json, print_line
 from antdrive.cli.exits import SUCCEEDED
+from antdrive.sim.settings import SETTINGS
 
 if TYPE_CHECKING:
     from antdrive.runs.campaigns.campaign import Campaign
@@ -50,16 +51,6 @@ Robots = Annotated[
 ]
 Seeds = Annotated[
     str | None, typer.Option(metavar="SEEDS", help="How many seeds, such as 10, or which, such as 0-9 or 3,7.")
-]
-Routes = Annotated[
-    list[str] | None, typer.Option("--smoothing", metavar="KIND", help="none, taut or clearance. May be repeated.")
-]
-Noise = Annotated[
-    list[float] | None,
-    typer.Option("--noise", min=0.0, metavar="FACTOR", help="Factor on the robot's noise. May be repeated."),
-]
-Margins = Annotated[
-    list[str] | None, typer.Option("--margin", metavar="METRES|auto", help="Margin [m]. May be repeated.")
 ]
 Tasks = Annotated[
     str | None,
@@ -107,9 +98,9 @@ Report = Annotated[
         metavar="FILE", help="Write the campaign's statistics too, as `antdrive report` does: .html, .md, .tex or .csv."
     ),
 ]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else.")]
 
 
+@options.with_settings((name for name, one in SETTINGS.items() if one.flag and one.is_word), many=True)
 def sweep(
     campaign: File = None,
     out: Folder = None,
@@ -118,12 +109,6 @@ def sweep(
     planner: Planners = None,
     robot: Robots = None,
     seeds: Seeds = None,
-    smoothing: Routes = None,
-    noise: Noise = None,
-    margin: Margins = None,
-    map: knowing.Maps = None,
-    localisation: knowing.Localisations = None,
-    odometry: knowing.Odometries = None,
     tasks: Tasks = None,
     jobs: Jobs = None,
     dask: Dask = None,
@@ -133,7 +118,8 @@ def sweep(
     again: Again = None,
     dry_run: DryRun = False,
     report: Report = None,
-    json: Json = False,
+    json: options.Json = False,
+    **given: Any,
 ) -> int:
     """Drive every combination of a campaign.
 
@@ -147,17 +133,16 @@ def sweep(
     if out is None and not dry_run:
         raise InputError("--out: missing; name the folder for the results")
     _check(keep, dask, jobs, report, dry_run)
-    knows = {"map": map, "localisation": localisation, "odometry": odometry}
     asked = campaign_from(
-        campaign, worlds=world, generate=generate, planners=planner, robots=robot, seeds=seeds, routes=smoothing,
-        noise=noise, margin=margin, settings=knows, tasks=tasks, run_limit=run_limit,
+        campaign, given, worlds=world, generate=generate, planners=planner, robots=robot, seeds=seeds, tasks=tasks,
+        run_limit=run_limit,
     )  # fmt: skip
     expansion = expand(asked)
     if dry_run:
         return _say_size(expansion, out, json, retry_crashed=retry_crashed, again=again or ())
     assert out is not None
-    options: dict[str, Any] = {"retry_crashed": retry_crashed, "again": again or ()}
-    results = _run(asked, expansion, out, jobs=jobs, dask=dask, keep=cast("Keep | None", keep), **options)
+    rest: dict[str, Any] = {"retry_crashed": retry_crashed, "again": again or ()}
+    results = _run(asked, expansion, out, jobs=jobs, dask=dask, keep=cast("Keep | None", keep), **rest)
     for note in results.notes:
         print_error(note)
     files = _reported(out, report)

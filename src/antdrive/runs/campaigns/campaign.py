@@ -8,15 +8,24 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, Field, PlainValidator, WithJsonSchema
+from pydantic import BaseModel, BeforeValidator, Field, PlainValidator, TypeAdapter, WithJsonSchema, create_model
 
 from antdrive.base.checks import SchemaVersion, check, schema_of, show
 from antdrive.base.document import Document, Location, read_document
 from antdrive.base.errors import InputError
 from antdrive.base.records import STRICT
-from antdrive.sim.entries import SEEDS_SCHEMA, MarginValue, SettingsEntry, TextOrMapping, seed_list
+from antdrive.sim.forms import (
+    SEEDS_SCHEMA,
+    TextOrMapping,
+    file_fields,
+    said,
+    seed_list,
+    written_default,
+    written_kind,
+)
+from antdrive.sim.settings import SETTINGS
 
 MOST_SEEDS = 1_000_000  # given as a number
 
@@ -51,14 +60,27 @@ def _of(item: dict[str, Any]) -> dict[str, Any]:
 
 
 Names = Annotated[list[str], Field(min_length=1), BeforeValidator(_listed), WithJsonSchema(_of({"type": "string"}))]
-Factors = Annotated[
-    list[Annotated[float, Field(ge=0)]],
-    Field(min_length=1),
-    BeforeValidator(_listed),
-    WithJsonSchema(_of({"type": "number", "minimum": 0})),
-]
-Margins = Annotated[list[MarginValue], Field(min_length=1), BeforeValidator(_listed)]
 NamesOrMappings = Annotated[list[TextOrMapping], Field(min_length=1), BeforeValidator(_listed)]
+
+#: The settings that a campaign lists under keys of their own; the others are its `settings`.
+AXES = MappingProxyType({name: one for name, one in SETTINGS.items() if one.setting.axis and name != "seed"})
+SettingsEntry = create_model(
+    "SettingsEntry",
+    __config__=STRICT,
+    __doc__="How a robot drives: the settings that have no key of their own in a campaign.",
+    **file_fields(one for one in SETTINGS.values() if not one.setting.axis),
+)
+
+
+def _axes() -> dict[str, Any]:
+    """The fields of a campaign file that list values of a setting."""
+    fields = {}
+    for one in AXES.values():
+        kind, usual = written_kind(one), written_default(one)
+        listed = Annotated[list[kind], Field(min_length=1), BeforeValidator(_listed)]  # type: ignore[valid-type]
+        schema = WithJsonSchema(_of(TypeAdapter(kind).json_schema()))
+        fields[one.setting.axis] = (Annotated[listed, schema], Field([usual.default], description=usual.description))
+    return fields
 
 
 class TaskEntry(BaseModel):
@@ -118,8 +140,8 @@ def _settings_schema() -> dict[str, Any]:
     return _of({**schema, "properties": several})
 
 
-class CampaignFile(BaseModel):
-    """A campaign, as written in a file: each combination of its lists is a run."""
+class GridEntry(BaseModel):
+    """What a campaign lists beside settings."""
 
     model_config = STRICT
 
@@ -134,9 +156,6 @@ class CampaignFile(BaseModel):
         "stands for several values"
     )
     robots: Names = Field(["turtlebot"], description="names of the catalogue, or files")
-    routes: Names = Field(["clearance"], description="how plans become routes: none, taut, clearance")
-    noise: Factors = Field([0.0], description="factors on the noise that the robot's file documents")
-    margin: Margins = Field([0.03], description="distances that plans keep beyond the robot's radius [m], or auto")
     seeds: Seeds = Field([0], description="how many seeds, or a list such as [3, 7], or a range such as 0-9")
     tasks: Annotated[Any, PlainValidator(_tasks), WithJsonSchema(_TASKS_SCHEMA)] = Field(
         "own",
@@ -155,6 +174,17 @@ class CampaignFile(BaseModel):
     rollouts: Literal["none", "failed", "all"] = Field("none", description="which runs' logs are kept")
 
 
+if TYPE_CHECKING:
+    CampaignFile = GridEntry
+else:
+    CampaignFile = create_model(
+        "CampaignFile",
+        __base__=GridEntry,
+        __doc__="A campaign, as written in a file: each combination of its lists is a run.",
+        **_axes(),
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class Campaign:
     """A campaign as read.
@@ -165,7 +195,7 @@ class Campaign:
         document: its data, with the line of each value
         entry: its data, checked
         tasks: the tasks in each world; empty: the worlds' own
-        settings: every combination of the settings that it lists; one with the defaults where it lists none
+        settings: every combination of the settings that it lists, as files write them, by key; one where it lists none
         places: where in the file each of them is written
     """
 
@@ -174,8 +204,12 @@ class Campaign:
     document: Document
     entry: CampaignFile
     tasks: RandomTasks | tuple[TaskEntry, ...]
-    settings: tuple[SettingsEntry, ...]
+    settings: tuple[Mapping[str, Any], ...]
     places: tuple[Location, ...]
+
+    def values(self, name: str) -> list[Any]:
+        """The values of a setting that the campaign lists under a key of its own."""
+        return list(getattr(self.entry, AXES[name].setting.axis))
 
     def error(self, location: Location, problem: str) -> InputError:
         """The error for a value: file, line, key and problem.
@@ -245,7 +279,7 @@ def _checked(document: Document, folder: Path) -> Campaign:
 
 def _settings(
     document: Document, given: dict[str, Any] | list[dict[str, Any]]
-) -> Iterator[tuple[SettingsEntry, Location]]:
+) -> Iterator[tuple[Mapping[str, Any], Location]]:
     """Every combination of the settings that a campaign lists, and its place; the last of several lists varies fastest."""
     if isinstance(given, dict):
         yield from _combinations(document, given, ("settings",))
@@ -256,12 +290,12 @@ def _settings(
 
 def _combinations(
     document: Document, given: dict[str, Any], place: Location
-) -> Iterator[tuple[SettingsEntry, Location]]:
+) -> Iterator[tuple[Mapping[str, Any], Location]]:
     """Every combination of the settings in one mapping."""
     lists = [_alternatives(document, key, value, place) for key, value in given.items()]
     for values in itertools.product(*lists):
         data = dict(zip(given, values, strict=True))
-        yield check(SettingsEntry, _Part(document.source, data, whole=document, place=place)), place
+        yield said(check(SettingsEntry, _Part(document.source, data, whole=document, place=place))), place
 
 
 def _alternatives(document: Document, key: str, value: Any, place: Location) -> list[Any]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import itertools
 import shlex
 from collections import Counter
@@ -14,20 +13,18 @@ from typing import Any
 
 from antdrive.base.checks import suggest
 from antdrive.base.document import Location
-from antdrive.base.errors import FieldError, InputError
+from antdrive.base.errors import FieldError
 from antdrive.base.files import file_name
-from antdrive.planners import SMOOTHINGS
 from antdrive.robots import RobotSpec, list_robots, load_robot
-from antdrive.runs.campaigns.campaign import Campaign
+from antdrive.runs.campaigns.campaign import AXES, Campaign
 from antdrive.runs.campaigns.grid_planners import PlannerVariant, planner_variants
 from antdrive.runs.campaigns.grid_tasks import campaign_tasks
 from antdrive.runs.campaigns.grid_worlds import NamedTask, campaign_worlds
 from antdrive.runs.campaigns.job import Job, SweepCase, key_of
-from antdrive.runs.campaigns.rows import setting_columns
-from antdrive.sim.driving.perception import usual_perception
-from antdrive.sim.entries import SettingsEntry, has_flags, option_text, setting_words
+from antdrive.sim.forms import columns_of, option_text, scenario_fields, setting_words
 from antdrive.sim.log.binding import canonical_hash
-from antdrive.sim.settings import scenario_fields
+from antdrive.sim.policy import usual_perception
+from antdrive.sim.settings import SETTINGS
 from antdrive.worlds import Task
 
 WORLDS, ROBOTS = "worlds", "robots"  # folders in a campaign's folder with what its commands name
@@ -72,8 +69,8 @@ class NamedSettings:
         """The settings with what robots perceive in a world with movers, or without; so keys name what is driven."""
         if self.fields["perception"] is not None:
             return self
-        fields = {**self.fields, "perception": usual_perception(self.fields.get("map", "given"), movers)}
-        return dataclasses.replace(self, fields=fields, columns=setting_columns(fields))
+        fields = {**self.fields, "perception": usual_perception(self.fields["map"], movers)}
+        return dataclasses.replace(self, fields=fields, columns=columns_of(fields))
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,9 +115,7 @@ def expand(campaign: Campaign) -> Expansion:
     counts = {
         **_count_tasks(tasks),
         "robots": len(robots),
-        "routes": len(campaign.entry.routes),
-        "noise": len(campaign.entry.noise),
-        "margin": len(campaign.entry.margin),
+        **{one.setting.axis: len(campaign.values(name)) for name, one in AXES.items()},
         "settings": len(campaign.settings),
         "planners": len(planners),
         "seeds": len(campaign.entry.seeds),
@@ -159,39 +154,27 @@ def _robots(campaign: Campaign) -> list[NamedRobot]:
 
 
 def _settings(campaign: Campaign) -> list[NamedSettings]:
-    """Every combination of route, noise, margin and settings."""
-    entry = campaign.entry
-
-    def fail_at(place: Location, key: str, problem: str) -> InputError:
-        return campaign.error((*place, *key.split(".")), problem)
-
-    listed = zip(campaign.settings, campaign.places, strict=True)
-    shared = [(one, place, scenario_fields(one, functools.partial(fail_at, place))) for one, place in listed]
-    for i, route in enumerate(entry.routes):
-        if route not in SMOOTHINGS:
-            raise campaign.error(("routes", i), f"unknown {route!r}; {suggest(route, SMOOTHINGS)}")
-    return [
-        _named_settings(one, place, {**fields, "smoothing": route, "noise": noise, "margin": margin})
-        for route, noise, margin, (one, place, fields) in itertools.product(
-            entry.routes, entry.noise, entry.margin, shared
-        )
-    ]
-
-
-def _named_settings(entry: SettingsEntry, place: Location, fields: dict[str, Any]) -> NamedSettings:
-    asked = ["--margin", option_text(fields["margin"]), "--smoothing", fields["smoothing"]]
-    words = (*asked, "--noise", option_text(fields["noise"]), *setting_words(entry)) if has_flags(entry) else None
-    return NamedSettings(fields, setting_columns(fields), words, place)
+    """Every combination of the values that the campaign lists and of its settings."""
+    for name, one in AXES.items():
+        for i, value in enumerate(campaign.values(name)):
+            if one.setting.choices and value not in one.setting.choices:
+                raise campaign.error((one.setting.axis, i), f"unknown {value!r}; {suggest(value, one.setting.choices)}")
+    listed = list(zip(campaign.settings, campaign.places, strict=True))
+    found = []
+    for *values, (settings, place) in itertools.product(*map(campaign.values, AXES), listed):
+        given = {**settings, **dict(zip((one.key for one in AXES.values()), values, strict=True))}
+        try:
+            fields = scenario_fields(given)
+        except FieldError as error:
+            raise campaign.error((*place, *error.key.split(".")), error.problem) from None
+        del fields["seed"]
+        words = setting_words(given)
+        found.append(NamedSettings(fields, columns_of(fields), None if words is None else tuple(words), place))
+    return found
 
 
 #: Where a campaign writes what a scenario calls by another name.
-_PLACES = {
-    "smoothing": ("routes",),
-    "noise": ("noise",),
-    "margin": ("margin",),
-    "start": ("tasks",),
-    "seed": ("seeds",),
-}
+_PLACES = {"start": ("tasks",)} | {one.key: (one.setting.axis,) for one in SETTINGS.values() if one.setting.axis}
 
 
 def _check(

@@ -15,7 +15,7 @@ from antdrive.base.document import Location
 from antdrive.base.errors import InputError
 from antdrive.planners import load_planner, planner_version
 from antdrive.runs.campaigns.campaign import Campaign
-from antdrive.sim.entries import option_text
+from antdrive.sim.forms import option_text
 from antdrive.sim.log.record import settings_of
 
 MOST_VALUES = 10_000  # of one range

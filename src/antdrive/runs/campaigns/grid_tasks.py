@@ -28,7 +28,7 @@ def campaign_tasks(campaign: Campaign, worlds: Sequence[NamedTask], robots: Sequ
         InputError: a start or goal is impossible in a world, or too few were found.
     """
     if isinstance(campaign.tasks, RandomTasks):
-        margins = [ROOM if margin == "auto" else float(margin) for margin in campaign.entry.margin]
+        margins = [ROOM if margin == "auto" else float(margin) for margin in campaign.values("margin")]
         inflate = max(robot.radius for robot in robots) + max(margins)
         for world in _each_once(worlds):
             yield from _drawn(campaign, campaign.tasks, world, robots, inflate)
@@ -70,10 +70,12 @@ def _drawn(
     campaign: Campaign, asked: RandomTasks, world: NamedTask, robots: Sequence[RobotSpec], inflate: float
 ) -> Iterator[NamedTask]:
     """Random tasks in one world. They depend on it, the seed and what needs room, not on the campaign's other worlds."""
-    unseen = tuple(dict.fromkeys(Disc(d.x, d.y, d.radius, d.height) for one in campaign.settings for d in one.unseen))
+    unseen = tuple(
+        dict.fromkeys(Disc(d.x, d.y, d.radius, d.height) for one in campaign.settings for d in one.get("unseen", ()))
+    )
     content = int(canonical_hash(world.task)[:16], 16)
     rng = np.random.default_rng([asked.seed, content])
-    cell = max(entry.cell or world.task.cell for entry in campaign.settings)
+    cell = max(entry.get("cell") or world.task.cell for entry in campaign.settings)
     grid = rasterise(world.task.world, cell, inflate)
     free = np.argwhere(grid.moves > 0)
     for number in range(asked.random):

@@ -15,8 +15,8 @@ from antdrive.base.checks import show, suggest
 from antdrive.base.document import Location
 from antdrive.base.errors import FieldError, InputError
 from antdrive.runs.campaigns.campaign import Campaign, seeds_of
-from antdrive.sim.entries import option_text, seed_list
-from antdrive.sim.settings import generated
+from antdrive.sim.forms import option_text, seed_list
+from antdrive.sim.resolving import generated
 from antdrive.worlds import Task, World, list_worlds, load_task, load_tasks
 from antdrive.worlds.formats.importing import import_file
 

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from antdrive.planners import PLANNERS, load_planner, record_name
 from antdrive.robots import RobotSpec
+from antdrive.runs.margins.choice import with_chosen_margin, with_margin_of
 from antdrive.runs.margins.prediction import Calibration
-from antdrive.sim.log.record import settings_of
-from antdrive.sim.scenario import Scenario
+from antdrive.sim.scenario import Scenario, identity_text
 from antdrive.worlds import Task
 
 KEY_DIGITS = 32  # hexadecimal digits of a key: two runs of a billion have the same one with probability 1e-21
@@ -72,31 +71,24 @@ class SweepCase:
             FieldError: a setting is out of range, or the robot does not fit at the start.
         """
         choose = self.fields["margin"] == "auto" and margin is None
-        chosen = self.calibration.margin if self.calibration else 0.0
         scenario = Scenario(
             task=self.task,
             planner=load_planner(self.planner_source, **self.given),
             planner_name=record_name(self.planner_source),
             robot=self.robot,
             seed=seed,
-            calibration=self.calibration,
-            **{**self.fields, "margin": chosen if choose else self.fields["margin"] if margin is None else margin},
+            **{**self.fields, "margin": 0.0 if choose else self.fields["margin"] if margin is None else margin},
         )
-        return scenario.with_chosen_margin() if choose and self.calibration is None else scenario
+        if not choose:
+            return scenario
+        return with_margin_of(scenario, self.calibration) if self.calibration else with_chosen_margin(scenario)
 
     @property
     def identity(self) -> str:
         """The text that keys are made from: everything that the runs depend on but the seed."""
-        parts = {
-            "task": self.world_hash,
-            "planner": self.planner_name,
-            "options": self.options,
-            "robot": self.robot_hash,
-            "settings": settings_of(self.fields),
-        }
-        if self.planner_name not in PLANNERS:  # people's own planners change more often than antdrive
-            parts["planner_version"] = self.planner_version
-        return json.dumps(parts, sort_keys=True)
+        # People's own planners change more often than antdrive.
+        own = {} if self.planner_name in PLANNERS else {"planner_version": self.planner_version}
+        return identity_text(self.world_hash, self.planner_name, self.options, self.robot_hash, self.fields, **own)
 
 
 class Job(NamedTuple):

@@ -9,18 +9,14 @@ from __future__ import annotations
 import functools
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from antdrive.base.optional import parquet_library
-from antdrive.robots import Avoidance, PurePursuit
 from antdrive.runs.campaigns.job import Job
-from antdrive.sim.driving.replanning import ReplanPolicy
-from antdrive.sim.entries import option_text
 from antdrive.sim.log.metrics import METRICS
-from antdrive.sim.log.record import settings_of
 from antdrive.sim.pipeline import Run, versions
-from antdrive.sim.settings import SENSING
+from antdrive.sim.settings import SETTINGS
 
 if TYPE_CHECKING:
     import pyarrow
@@ -34,6 +30,17 @@ NOT_CANONICAL = (*WALL_TIMES, "attempts")
 VERSIONS = ("antdrive", "numpy", "pybullet", "numba")
 BATCH = 50_000  # rows that are plain Python at a time
 OPTION = "option."  # what the names of columns with a planner's option begin with
+
+
+def _setting_columns() -> Iterator[tuple[str, str]]:
+    """The column of each setting and its type; the margin that was driven with stands beside the one that was asked for."""
+    for one in SETTINGS.values():
+        plain = one.setting.form == "plain"
+        yield one.column, {float: "double", int: "int64"}.get(one.kind, "string") if plain else "string"
+        if one.column != one.key:
+            yield one.key, "double"
+
+
 #: What a run is, besides its options: the column's name and its type.
 GRID: Mapping[str, str] = {
     "key": "string",
@@ -47,23 +54,7 @@ GRID: Mapping[str, str] = {
     "options": "string",
     "robot": "string",
     "robot_hash": "string",
-    "smoothing": "string",
-    "noise": "double",
-    "margin_asked": "string",
-    "margin": "double",
-    "cell": "double",
-    "map": "string",
-    "localisation": "string",
-    "odometry": "double",
-    "controller": "string",
-    "sees": "string",
-    "avoid": "string",
-    "replan": "string",
-    "unseen": "string",
-    "time_limit": "double",
-    "physics_hz": "int64",
-    "control_hz": "int64",
-    "seed": "int64",
+    **dict(_setting_columns()),
     "command": "string",
 }
 #: What came out of a run: the column's name and its type.
@@ -109,34 +100,6 @@ def grid_row(job: Job) -> dict[str, Any]:
         "seed": job.seed,
         "command": None if case.words is None else f"{case.words} --seed {job.seed}",
     }
-
-
-def setting_columns(fields: Mapping[str, Any]) -> dict[str, Any]:
-    """What tables say of a run's settings, by column."""
-    sees, margin, limit = fields["perception"], fields["margin"], fields["time_limit"]
-    return {
-        "smoothing": fields["smoothing"],
-        "noise": float(fields["noise"]),
-        "margin_asked": margin if margin == "auto" else str(float(margin)),
-        **{key: fields.get(key, usual) for key, usual in SENSING.items()},
-        "controller": _changes(fields["controller"], PurePursuit()),
-        "sees": None if sees is None else sees.kind if math.isinf(sees.range) else f"{sees.kind}:{sees.range:g}",
-        "avoid": _changes(fields["avoidance"], Avoidance()),
-        "replan": _changes(fields["replanning"], ReplanPolicy()),
-        "unseen": " ".join(f"{disc.x:g},{disc.y:g},{disc.radius:g}" for disc in fields["unseen"]) or "none",
-        "time_limit": None if limit is None else float(limit),
-        "physics_hz": fields["physics_hz"],
-        "control_hz": fields["control_hz"],
-    }
-
-
-def _changes(record: Any, default: Any) -> str:
-    """The settings of a record that are not the defaults, as NAME=VALUE."""
-    if record is None:
-        return "none"
-    usual = settings_of(default)
-    changed = (f"{key}={option_text(value)}" for key, value in settings_of(record).items() if value != usual[key])
-    return " ".join(changed) or "default"
 
 
 def run_row(key: str, run: Run, rollout: str | None) -> dict[str, Any]:

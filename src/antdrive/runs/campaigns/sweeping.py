@@ -24,6 +24,7 @@ from antdrive.runs.campaigns.running import Driving, Finished, Keep, Work, finis
 from antdrive.runs.campaigns.store import Store, opened
 from antdrive.runs.margins.choice import choose_margin
 from antdrive.runs.margins.prediction import Calibration
+from antdrive.runs.margins.trial import Conditions
 from antdrive.runs.pool import Done, Pool, cores
 from antdrive.sim.pipeline import versions
 from antdrive.worlds import save_task
@@ -124,7 +125,7 @@ def calibrated(jobs: Iterable[Job]) -> list[Job]:
     cases: dict[int, SweepCase] = {}
     for job in jobs:
         if job.case.fields["margin"] == "auto" and id(job.case) not in cases:
-            conditions = dataclasses.replace(job.case, calibration=None).scenario(job.seed, margin=0.0).conditions
+            conditions = Conditions.of(job.case.scenario(job.seed, margin=0.0))
             if conditions.key not in chosen:
                 chosen[conditions.key] = choose_margin(conditions)
             cases[id(job.case)] = dataclasses.replace(job.case, calibration=chosen[conditions.key])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import functools
 import itertools
-import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,7 +17,7 @@ from antdrive.base.atomic import written_whole
 from antdrive.base.errors import InputError
 from antdrive.base.files import file_name
 from antdrive.planners import PlannerError, list_planners, load_planner
-from antdrive.robots import Avoidance, PurePursuit, RobotSpec, list_robots, load_robot
+from antdrive.robots import RobotSpec, list_robots, load_robot
 from antdrive.robots.files import footprint_to_dict
 from antdrive.runs.pool import Pool
 from antdrive.runs.suites.demands import Bound
@@ -26,9 +25,9 @@ from antdrive.runs.suites.names import is_own_entry
 from antdrive.runs.suites.nearest import cause_of_contact, touched_first
 from antdrive.runs.suites.scenarios import scenario_of
 from antdrive.runs.suites.suite import load_suite
-from antdrive.sim.driving.perception import usual_perception
-from antdrive.sim.driving.replanning import ReplanPolicy
+from antdrive.sim.forms import written
 from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.log.record import changes
 from antdrive.sim.pipeline import Run, run
 from antdrive.sim.scenario import Scenario
 from antdrive.worlds import save_task
@@ -92,30 +91,12 @@ def write_suite(path: Path, handovers: Sequence[Handover]) -> Path:
 
 def suite_entry(scenario: Scenario, robot: str) -> dict[str, Any]:
     """A scenario as plain data with the keys of a suite, without its world and what is expected."""
-    plain: dict[str, Any] = {
+    return {
         "robot": robot,
         "planner": planner_words(scenario),
-        "smoothing": scenario.smoothing,
-        "margin": float(scenario.margin),
-        "noise": float(scenario.noise),
+        **{key: value for key, value in written(lambda name: getattr(scenario, name)).items() if key != "seed"},
         "seeds": [int(scenario.seed)],
     }
-    if controller := _changed(scenario.controller, PurePursuit()):
-        plain["controller"] = controller
-    if scenario.cell is not None and scenario.cell != scenario.task.cell:
-        plain["cell"] = float(scenario.cell)
-    if scenario.time_limit is not None:
-        plain["time_limit"] = float(scenario.time_limit)
-    if scenario.unseen:
-        plain["unseen"] = [
-            {key: float(value) for key, value in dataclasses.asdict(disc).items()} for disc in scenario.unseen
-        ]
-    for key, usual in (("physics_hz", 240), ("control_hz", 60)):
-        if getattr(scenario, key) != usual:
-            plain[key] = getattr(scenario, key)
-    if scenario.sensing is not None:
-        plain |= dataclasses.asdict(scenario.sensing)
-    return plain | (_among_movers(scenario) if scenario.among_movers or scenario.exploring else {})
 
 
 def planner_moved(given: str | Mapping[str, Any], home: Path, folder: Path) -> str | dict[str, Any] | None:
@@ -193,31 +174,10 @@ def run_if_planned(scenario: Scenario) -> Run | str:
 def planner_words(scenario: Scenario, own: str | None = None) -> str | dict[str, Any]:
     """A scenario's planner in the words of a suite: its name, with the options that differ from those of that name."""
     name = own or scenario.planner_label
-    options = _changed(scenario.planner, load_planner(own) if own else list_planners().get(name))
+    planner: Any = scenario.planner
+    usual: Any = load_planner(own) if own else list_planners().get(name)
+    options = changes(planner, usual) if dataclasses.is_dataclass(planner) and type(planner) is type(usual) else {}
     return {"name": name, **options} if options else name
-
-
-def _changed(settings: Any, usual: Any) -> dict[str, Any]:
-    """The fields of a record that differ from the usual ones."""
-    if not dataclasses.is_dataclass(settings) or type(settings) is not type(usual):
-        return {}
-    names = [field.name for field in dataclasses.fields(settings) if field.init]
-    return {name: getattr(settings, name) for name in names if getattr(settings, name) != getattr(usual, name)}
-
-
-def _among_movers(scenario: Scenario) -> dict[str, Any]:
-    """How the robot drives among movers, where it is not the usual way."""
-    plain: dict[str, Any] = {}
-    perception = scenario.known_perception
-    if perception != usual_perception(scenario.map, movers=bool(scenario.task.world.movers)):
-        reach = f":{perception.range!r}" if math.isfinite(perception.range) else ""
-        plain["sees"] = perception.kind + reach
-    for key, settings, usual in (
-        ("avoid", scenario.avoidance, Avoidance()),
-        ("replan", scenario.replanning, ReplanPolicy()),
-    ):
-        plain[key] = "none" if settings is None else _changed(settings, usual) or True
-    return {key: value for key, value in plain.items() if value is not True}
 
 
 def _robot(robot: RobotSpec, folder: Path, robots: dict[str, RobotSpec]) -> str:

@@ -12,10 +12,10 @@ from antdrive.base.errors import FieldError, InputError
 from antdrive.planners import Planner, list_planners, load_planner
 from antdrive.planners.own_code import is_own, own_object, record_name
 from antdrive.robots import Avoidance, PurePursuit
-from antdrive.sim.driving.perception import Perception
-from antdrive.sim.driving.replanning import ReplanPolicy
 from antdrive.sim.log.record import DriveRecord
+from antdrive.sim.policy import Perception, ReplanPolicy
 from antdrive.sim.scenario import Scenario
+from antdrive.sim.settings import SETTINGS
 
 Settings = TypeVar("Settings", PurePursuit, Avoidance, ReplanPolicy)
 
@@ -38,40 +38,32 @@ def rebuilt(record: DriveRecord, planner: Planner | str | None = None) -> Scenar
         name, planner = _planner(name, record.planner.settings)
     if record.controller.name != PurePursuit.__name__:
         raise InputError(f"record.controller.name: {record.controller.name!r:.60} cannot be rebuilt, only PurePursuit")
-    perception = record.perception
     try:
-        among_movers: dict[str, Any] = {}
-        if perception is not None:
-            distance = math.inf if perception.range_m is None else perception.range_m
-            among_movers["perception"] = Perception(kind=perception.kind, range=distance)  # type: ignore[arg-type]
-            among_movers["avoidance"] = _settings(Avoidance, record.avoidance, "avoidance")
-            among_movers["replanning"] = _settings(ReplanPolicy, record.replanning, "replanning")
-        sensing: dict[str, Any] = {}
-        if record.sensing is not None:
-            sensing = dataclasses.asdict(record.sensing)
-            among_movers["replanning"] = _settings(ReplanPolicy, record.replanning, "replanning")
-        controller = _settings(PurePursuit, record.controller.settings, "controller.settings")
-        assert controller is not None
-        return Scenario(
-            task=record.task,
-            planner=planner,
-            planner_name=name,
-            robot=record.robot,
-            margin=record.margin,
-            cell=record.cell,
-            smoothing=record.smoothing.asked,
-            seed=record.seed,
-            controller=controller,
-            noise=record.noise,
-            unseen=record.unseen,
-            time_limit=record.time_limit,
-            physics_hz=record.physics_hz,
-            control_hz=record.control_hz,
-            **among_movers,
-            **sensing,
-        )
+        return Scenario(task=record.task, planner=planner, planner_name=name, robot=record.robot, **_fields(record))
     except FieldError as error:
         raise InputError(str(error.under("record"))) from None
+
+
+def _fields(record: DriveRecord) -> dict[str, Any]:
+    """The settings that a record holds, by field."""
+    fields = {name: getattr(record, name) for name in SETTINGS if hasattr(record, name)}
+    fields |= record.settings or {}
+    if record.sensing is not None:
+        fields |= dataclasses.asdict(record.sensing)
+    fields["smoothing"] = record.smoothing.asked
+    fields["controller"] = _settings(PurePursuit, record.controller.settings, "controller.settings")
+    perception = record.perception
+    if perception is None:
+        del fields["perception"], fields["avoidance"]
+    else:
+        distance = math.inf if perception.range_m is None else perception.range_m
+        fields["perception"] = Perception(kind=perception.kind, range=distance)  # type: ignore[arg-type]
+        fields["avoidance"] = _settings(Avoidance, record.avoidance, "avoidance")
+    if perception is None and record.sensing is None:
+        del fields["replanning"]
+    else:
+        fields["replanning"] = _settings(ReplanPolicy, record.replanning, "replanning")
+    return fields
 
 
 def _planner(name: str, settings: Mapping[str, Any]) -> tuple[str, Planner]:

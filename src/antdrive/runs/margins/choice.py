@@ -6,6 +6,7 @@ found in the cache or on the number of processes.
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 from collections.abc import Callable
 from pathlib import Path
@@ -18,6 +19,7 @@ from antdrive.base.kernel_cache import cache_folder
 from antdrive.runs.margins.prediction import Calibration, least_margin
 from antdrive.runs.margins.trial import Conditions, Loss, loss_on_course
 from antdrive.runs.pool import Pool, processes_for
+from antdrive.sim.scenario import MarginChoice, Scenario
 
 DRIVES = 80  # courses that each margin is tried on
 JOBS = 2  # processes at most
@@ -39,6 +41,34 @@ def choose_margin(
             found = least_margin(_driving(conditions, pool, progress), conditions.key, conditions.robot.radius)
         _keep(found)
     return found
+
+
+def with_chosen_margin(scenario: Scenario, progress: Callable[[int, float], None] | None = None) -> Scenario:
+    """The scenario with the least margin whose predicted loss leaves a reserve.
+
+    Short drives of its robot predict the loss, once; the cache keeps the result. Movers are no part of it.
+
+    Args:
+        scenario: the scenario; its own margin does not count
+        progress: is called after each of these drives with their number so far and the margin that is tried [m]
+
+    Raises:
+        FieldError: no margin leaves the reserve.
+    """
+    return with_margin_of(scenario, choose_margin(Conditions.of(scenario), progress=progress))
+
+
+def with_margin_of(scenario: Scenario, found: Calibration) -> Scenario:
+    """The scenario with the margin of a calibration for its conditions."""
+    choice = MarginChoice(
+        margin=found.margin,
+        loss=found.loss,
+        reserve=found.reserve,
+        probability=found.probability,
+        drives=found.drives,
+        conditions=scenario.loss_conditions,
+    )
+    return dataclasses.replace(scenario, margin=found.margin, margin_choice=choice)
 
 
 def known_margin(conditions: Conditions) -> Calibration | None:

@@ -8,7 +8,7 @@ import json
 import math
 from dataclasses import dataclass
 from importlib import metadata
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -26,6 +26,9 @@ from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.log.streams import random_stream
 from antdrive.sim.physics.engine import Engine
 from antdrive.worlds import point_clearance, rasterise
+
+if TYPE_CHECKING:
+    from antdrive.sim.scenario import Scenario
 
 METHOD = 3  # to be counted up when courses, statistic or search change, so that older results are not used
 
@@ -61,6 +64,19 @@ class Conditions:
     smoothing: str
     physics_hz: int = 240
     control_hz: int = 60
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> Conditions:
+        """The conditions of a scenario."""
+        robot, controller, noise, smoothing, physics_hz, control_hz = scenario.loss_conditions
+        return cls(
+            robot=robot,
+            controller=controller,
+            noise=noise,
+            smoothing=smoothing,
+            physics_hz=physics_hz,
+            control_hz=control_hz,
+        )
 
     def __post_init__(self) -> None:
         if self.smoothing not in SMOOTHINGS:

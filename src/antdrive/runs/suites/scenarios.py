@@ -11,15 +11,16 @@ from typing import Any
 from antdrive.base.checks import show
 from antdrive.base.errors import FieldError, InputError
 from antdrive.robots import RobotSpec, list_robots, load_robot
+from antdrive.runs.margins.choice import with_chosen_margin
 from antdrive.runs.suites.names import SOURCES, is_own_entry, planner_of, robot_path, world_path
 from antdrive.runs.suites.suite import SuiteCase, shown_path
-from antdrive.sim.entries import has_flags, option_text, setting_words
+from antdrive.sim.forms import option_text, scenario_fields, setting_words
+from antdrive.sim.resolving import generated
 from antdrive.sim.scenario import Scenario
-from antdrive.sim.settings import generated, scenario_fields
 from antdrive.worlds import Task, list_worlds, load_task
 
 
-def scenario_of(case: SuiteCase, choose: Callable[[Scenario], Scenario] = Scenario.with_chosen_margin) -> Scenario:
+def scenario_of(case: SuiteCase, choose: Callable[[Scenario], Scenario] = with_chosen_margin) -> Scenario:
     """The scenario of a suite's test.
 
     Files of worlds and robots that were read last are kept, by their text.
@@ -31,21 +32,14 @@ def scenario_of(case: SuiteCase, choose: Callable[[Scenario], Scenario] = Scenar
     Raises:
         InputError: something that the suite names is missing or wrong; the message has the suite's file, line and key.
     """
-    entry, auto = case.entry, case.entry.margin == "auto"
+    given = case.given
+    auto = given.get("margin") == "auto"
     planner, name = planner_of(case)
     task = _with_ends(case, task_of(case))
     try:
-        scenario = Scenario.of(
-            task,
-            planner,
-            robot_of(case),
-            margin=0.0 if auto else entry.margin,
-            smoothing=entry.smoothing,
-            seed=case.seed,
-            noise=entry.noise,
-            **scenario_fields(entry, case.error),
-        )
-        return dataclasses.replace(choose(scenario) if auto else scenario, planner_name=name)
+        fields = {**scenario_fields(given), "seed": case.seed, **({"margin": 0.0} if auto else {})}
+        scenario = Scenario(task=task, planner=planner, planner_name=name, robot=robot_of(case), **fields)
+        return choose(scenario) if auto else scenario
     except FieldError as error:
         raise case.error(error.key, error.problem) from None
 
@@ -86,18 +80,14 @@ def run_command(case: SuiteCase, *, anywhere: bool = False) -> str | None:
     """The `antdrive run` command that drives a test's scenario alone; None where only `antdrive check` can."""
     entry = case.entry
     planner = {"name": entry.planner} if isinstance(entry.planner, str) else dict(entry.planner)
-    usual = entry.start is None and entry.goal is None
-    word = _planner_word(case, planner, anywhere)
-    if not (usual and has_flags(entry)) or word is None:
+    word, settings = _planner_word(case, planner, anywhere), setting_words(case.given)
+    if entry.start is not None or entry.goal is not None or settings is None or word is None:
         return None
     world, before = _world_words(case, anywhere)
     words = ["antdrive", "run", world, "--planner", word]
     words += [word for key, value in planner.items() for word in ("--set", f"planner.{key}={option_text(value)}")]
     words += ["--robot", _shown_name(case, entry.robot, list_robots(), anywhere), "--seed", str(case.seed)]
-    for key in ("margin", "smoothing", "noise"):
-        if key in entry.model_fields_set:
-            words += [f"--{key}", option_text(getattr(entry, key))]
-    return before + shlex.join([*words, *setting_words(entry)])
+    return before + shlex.join([*words, *settings])
 
 
 def _planner_word(case: SuiteCase, planner: dict[str, Any], anywhere: bool) -> str | None:

@@ -8,18 +8,19 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import BaseModel, Field, PlainValidator, WithJsonSchema
+from pydantic import BaseModel, Field, PlainValidator, WithJsonSchema, create_model
 
 from antdrive.base.checks import SchemaVersion, check
 from antdrive.base.document import Document, Location, read_document
 from antdrive.base.errors import FieldError, InputError, input_error
 from antdrive.base.records import STRICT
 from antdrive.runs.suites.demands import END, KINDS, Demands, causes
-from antdrive.sim.entries import MarginValue, SeedList, SettingsEntry, TextOrMapping
+from antdrive.sim.forms import SeedList, TextOrMapping, file_fields, said
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.settings import SETTINGS
 
 SUFFIX = ".drive.yaml"
 MAX_CASES = 100_000  # scenarios times seeds of one suite
@@ -41,8 +42,8 @@ _TRAJECTORY_SCHEMA: dict[str, Any] = {"anyOf": [{"type": "number", "minimum": 0.
 TrajectoryValue = Annotated[Any, PlainValidator(_anything), WithJsonSchema(_TRAJECTORY_SCHEMA)]
 
 
-class ScenarioEntry(SettingsEntry):
-    """A scenario of a suite, or the defaults of all of them."""
+class CaseEntry(BaseModel):
+    """A scenario of a suite beside its settings."""
 
     model_config = STRICT
 
@@ -64,13 +65,6 @@ class ScenarioEntry(SettingsEntry):
         description="a planner's name; {name: aco-han, ants: 200} with options; planners.py:Mine, {file: planners.py, "
         "name: Mine} or {module: my_package.planners, name: Mine} for a planner of your own",
     )
-    smoothing: str = Field("clearance", description="none, taut or clearance")
-    margin: MarginValue = Field(
-        0.03,
-        description="distance that plans keep beyond the robot's radius [m], or auto: the least that robot, noise and "
-        "smoothing are predicted to need",
-    )
-    noise: float = Field(0.0, ge=0, description="factor on the noise that the robot's file documents")
     seeds: SeedList = Field([0], description="one test for each: [0, 1, 2], or a range such as 0-9")
     expect: dict[str, Any] = Field(
         {}, description='demands: {outcome: succeeded, certified: true, min_clearance_m: ">= 0.05"}'
@@ -82,6 +76,17 @@ class ScenarioEntry(SettingsEntry):
         None, description="how far from the baseline's line the robot may be at any time [m], or exact"
     )
     baseline: bool = Field(True, description="whether there is a baseline to compare with; false: only expect counts")
+
+
+if TYPE_CHECKING:
+    ScenarioEntry = CaseEntry
+else:
+    ScenarioEntry = create_model(
+        "ScenarioEntry",
+        __base__=CaseEntry,
+        __doc__="A scenario of a suite, or the defaults of all of them.",
+        **file_fields(one for one in SETTINGS.values() if one.name != "seed"),
+    )
 
 
 class SuiteFile(BaseModel):
@@ -120,6 +125,11 @@ class SuiteCase:
     demands: Demands
     document: Document
     own: frozenset[str]
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """The settings that the scenario or the defaults give, by key."""
+        return said(self.entry)
 
     @property
     def id(self) -> str:

@@ -34,11 +34,12 @@ from antdrive.sim.driving.movers_ahead import MoversAhead
 from antdrive.sim.driving.own_map import LOOKED, PATIENCE
 from antdrive.sim.driving.parts import RouteGuide, Rows
 from antdrive.sim.driving.recovery import TRAIL, Look, Recovery
-from antdrive.sim.driving.replanning import MISSED, STRAYED, Replan, ReplanPolicy
+from antdrive.sim.driving.replanning import MISSED, STRAYED, Replan
 from antdrive.sim.driving.routes import RoutePlanner
 from antdrive.sim.driving.survey import Survey
 from antdrive.sim.driving.traffic import Zone
 from antdrive.sim.log.streams import random_stream
+from antdrive.sim.policy import ReplanPolicy
 from antdrive.worlds import Disc, Grid, Route, Task, World, point_clearance, rasterise
 from antdrive.worlds.world import PointWorld
 

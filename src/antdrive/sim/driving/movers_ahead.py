@@ -13,10 +13,11 @@ import numpy as np
 from antdrive.base import Bounds, Floats, Point, Pose
 from antdrive.robots import RobotSpec, TrackedPath
 from antdrive.sim.driving.blocking import close_route, covered_discs
-from antdrive.sim.driving.replanning import OBSTRUCTED, TRAFFIC, WAITED, ReplanPolicy
+from antdrive.sim.driving.replanning import OBSTRUCTED, TRAFFIC, WAITED
 from antdrive.sim.driving.survey import Survey
 from antdrive.sim.driving.traffic import TrackedTraffic, Zone
 from antdrive.sim.driving.watching import Tracked
+from antdrive.sim.policy import ReplanPolicy
 from antdrive.worlds import Disc, Grid, World, rasterise
 
 COARSE = 0.25  # side of the cells on which a route is held against the ground that movers roam [m]

@@ -3,48 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from antdrive.base import Floats
-from antdrive.base.errors import FieldError
+from antdrive.sim.policy import Perception
 from antdrive.worlds import Trajectories
 
-PerceptionKind: TypeAlias = Literal["positions", "velocities", "motions", "lidar"]
 CHUNK = 240  # control periods whose positions and velocities are computed at once
-
-
-@dataclass(frozen=True, kw_only=True)
-class Perception:
-    """What the robot perceives of movers in every control period: without error, or what its lidar shows.
-
-    Attributes:
-        kind: `positions`: where movers are; the robot predicts that they stay there. `velocities`: their
-            velocities too; the robot predicts constant velocity. `motions`: their positions at any time,
-            turns and teleports included; the prediction is exact. `lidar`: what is found in the scans of the robot's
-            lidar, see `antdrive.sim.sensing.MoverTracker`; the robot predicts constant velocity.
-        range: movers are perceived if their surface is within this distance of the robot's centre [m]
-
-    Raises:
-        ValueError: an unknown kind, or a range that is not positive.
-    """
-
-    kind: PerceptionKind = "velocities"
-    range: float = math.inf
-
-    def __post_init__(self) -> None:
-        if self.kind not in get_args(PerceptionKind):
-            raise FieldError("kind", f"unknown {self.kind!r}; choose from {', '.join(get_args(PerceptionKind))}")
-        if not self.range > 0:
-            raise FieldError("range", f"must be greater than 0, got {self.range:g}")
-
-
-def usual_perception(map: str, movers: bool) -> Perception:
-    """What a robot perceives of movers where nobody says it by name: without a map nothing but what its lidar finds."""
-    return Perception(kind="lidar") if map == "none" and movers else Perception()
 
 
 class Told:

@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from antdrive.base import Floats, Pose
-from antdrive.base.errors import FieldError
 from antdrive.planners import (
     PlanResult,
     PlanStatus,
@@ -40,6 +39,7 @@ from antdrive.sim.driving.routes import OneRoute, RoutePlanner
 from antdrive.sim.driving.schedule import Schedule
 from antdrive.sim.driving.traffic import Traffic, Zone
 from antdrive.sim.log.streams import random_stream
+from antdrive.sim.policy import ReplanPolicy
 from antdrive.worlds import Disc, Grid, Route, Task, rasterise
 
 if TYPE_CHECKING:
@@ -52,47 +52,6 @@ WAITED = "waited"
 OBSTRUCTED = "obstructed"
 TRAFFIC = "traffic"
 MISSED = "missed the goal"
-
-
-@dataclass(frozen=True, kw_only=True)
-class ReplanPolicy:
-    """When the robot looks for a new route.
-
-    Attributes:
-        around_movers: whether predicted movers count as obstacles; if not, the robot replans only after it has
-            strayed from its route
-        obstruction_range: replan when a mover is predicted on the route within this distance ahead [m]
-        max_wait: replan when the robot has waited for movers for this long [s]
-        max_deviation: replan when the robot is farther off its route than this [m]
-        max_shortfall: replan when the straight-line distance to the route's end exceeds the remaining route
-            by this much [m]
-        min_interval: the shortest time between two replans [s]
-        prediction_time: whatever movers are predicted to cover within this time is blocked [s]
-        patience: the drive ends as blocked when movers that stand still have closed every way for this long [s]
-        max_traffic: where more movers a second than this would meet a standing robot, routes lead round the ground that
-            movers roam [1/s]
-        max_detour: how many times as long as the straight line to the goal such a route may be
-
-    Raises:
-        ValueError: a setting is out of range.
-    """
-
-    around_movers: bool = True
-    obstruction_range: float = 3.0
-    max_wait: float = 2.0
-    max_deviation: float = 0.75
-    max_shortfall: float = 0.25
-    min_interval: float = 1.0
-    prediction_time: float = 1.0
-    patience: float = 30.0
-    max_traffic: float = 0.07
-    max_detour: float = 2.5
-
-    def __post_init__(self) -> None:
-        for field in dataclasses.fields(self)[1:]:
-            value = getattr(self, field.name)
-            if not 0 <= value < math.inf:
-                raise FieldError(field.name, f"must be at least 0 and finite, got {value:g}")
 
 
 @dataclass(frozen=True)

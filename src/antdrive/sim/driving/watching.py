@@ -11,7 +11,7 @@ from antdrive.base import Floats, Pose
 from antdrive.robots.lidar import Lidar
 from antdrive.sim.driving.own_map import MAP_CELL
 from antdrive.sim.driving.parts import Rows
-from antdrive.sim.driving.perception import Perception
+from antdrive.sim.policy import Perception
 from antdrive.sim.sensing.ground import Ground, MappedGround
 from antdrive.sim.sensing.mapping import OccupancyMap
 from antdrive.sim.sensing.tracking import MoverTracker, TrackedMovers

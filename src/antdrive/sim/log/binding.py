@@ -41,7 +41,11 @@ def hashes_of(record: DriveRecord) -> dict[str, str]:
     parts = {
         "world": _meaning(record.task),
         "robot": _meaning(record.robot),
-        "settings": {**{key: values[key] for key in SETTINGS}, "smoothing": record.smoothing.asked},
+        "settings": {
+            **{key: values[key] for key in SETTINGS},
+            "smoothing": record.smoothing.asked,
+            **(record.settings or {}),
+        },
     }
     return {name: _sha256(part) for name, part in parts.items()}
 

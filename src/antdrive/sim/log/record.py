@@ -24,6 +24,7 @@ from antdrive.base.errors import FieldError
 from antdrive.base.types import Point
 from antdrive.robots.spec import RobotSpec
 from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.settings import SETTINGS
 from antdrive.worlds.files.world_file import task_from_dict, task_to_dict
 from antdrive.worlds.limits import MAX_COORDINATE
 from antdrive.worlds.world import Disc, Task, World
@@ -41,10 +42,6 @@ MAX_HZ = 10_000
 MAX_MARGIN = 1000.0
 
 MARGIN_ROUNDING = 1e-9  # [m]
-
-#: What a robot may know of the world before it drives, and how it may know its pose.
-MAPS = ("given", "none")
-LOCALISATIONS = ("fixes", "odometry", "matching", "true")
 
 #: The trigger of a replan by a planner that decides anew at every cell.
 DECISION = "decision"
@@ -162,10 +159,8 @@ class SensingRecord:
     odometry: float
 
     def __post_init__(self) -> None:
-        for key, known in (("map", MAPS), ("localisation", LOCALISATIONS)):
-            if getattr(self, key) not in known:
-                raise FieldError(key, f"must be one of {', '.join(known)}, got {getattr(self, key)!r:.40}")
-        _at_least(self, 0.0, "odometry")
+        for field in dataclasses.fields(self):
+            SETTINGS[field.name].check(getattr(self, field.name))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -245,6 +240,7 @@ class DriveRecord:
         reason: details of the outcome, in words; may be empty
         versions: versions of antdrive, Python and the packages that computed the drive
         sensing: what the robot knew of the world and of its pose; the key is left out where that is the map and pose fixes
+        settings: settings that no other key holds, by name; the key is left out where all have their defaults
         times: wall-clock times, not covered by the digest
         digest: the SHA-256 over arrays and record, see `Rollout.digest`; null until the log is saved
 
@@ -281,6 +277,7 @@ class DriveRecord:
     times: TimesRecord
     margin_choice: MarginRecord | None = None
     sensing: SensingRecord | None = None
+    settings: Mapping[str, Any] | None = None
     digest: str | None = None
 
     def __post_init__(self) -> None:
@@ -297,6 +294,10 @@ class DriveRecord:
         for key in ("cell", "time_limit"):
             if not getattr(self, key) > 0:
                 raise FieldError(key, f"must be greater than 0, got {getattr(self, key)!r:.40}")
+        for key, value in (self.settings or {}).items():
+            if key not in SETTINGS or self.held(key):
+                raise FieldError(f"settings.{key}", "unknown key; a later version of antdrive may have written it")
+            SETTINGS[key].check(value)
         choice = self.margin_choice
         if choice is not None and not choice.loss_m + choice.reserve_m <= self.margin + MARGIN_ROUNDING:
             raise FieldError("margin_choice", f"loss_m and reserve_m must not exceed the margin of {self.margin:g} m")
@@ -314,6 +315,11 @@ class DriveRecord:
         world = self.task.world
         return dataclasses.replace(world, obstacles=world.obstacles + self.unseen) if self.unseen else world
 
+    @classmethod
+    def held(cls, setting: str) -> bool:
+        """Whether a key of the record's own holds a setting."""
+        return any(setting in {field.name for field in dataclasses.fields(kind)} for kind in (cls, SensingRecord))
+
     @property
     def exploring(self) -> bool:
         """Whether the robot had no map."""
@@ -327,7 +333,11 @@ class DriveRecord:
     def as_dict(self) -> dict[str, Any]:
         """The record as plain values, for JSON."""
         values = {field.name: plain_value(getattr(self, field.name)) for field in dataclasses.fields(self)}
-        for key in ("margin_choice", "sensing"):  # logs without them are as they were before there were such things
+        for key in (
+            "margin_choice",
+            "sensing",
+            "settings",
+        ):  # logs without them are as they were before there were such things
             if values[key] is None:
                 del values[key]
         return values
@@ -443,6 +453,12 @@ def settings_of(values: Any) -> dict[str, Any]:
     found = finite(plain_value(values))
     assert isinstance(found, dict)
     return found
+
+
+def changes(values: Any, usual: Any) -> dict[str, Any]:
+    """The fields of a record that differ from those of another one of its class."""
+    names = (field.name for field in dataclasses.fields(values) if field.init)
+    return {name: getattr(values, name) for name in names if getattr(values, name) != getattr(usual, name)}
 
 
 def finite_or_none(value: float) -> float | None:

@@ -18,19 +18,12 @@ PERIOD = 1.0  # between two maps of a robot that has none at first [s]
 
 @dataclass(frozen=True, eq=False)
 class GroundGrid:
-    """An occupancy grid.
+    """An occupancy grid."""
 
-    Attributes:
-        at: when it was known [s]
-        cell: side of a cell [m]
-        origin: the pose of the lower left corner of cell (0, 0) in the grid's frame: x, y [m], yaw [rad]
-        cells: FREE, OCCUPIED or UNKNOWN (rows, cols)
-    """
-
-    at: float
-    cell: float
-    origin: Pose
-    cells: npt.NDArray[np.int8]
+    at: float  # when it was known [s]
+    cell: float  # side of a cell [m]
+    origin: Pose  # the pose of the lower left corner of cell (0, 0) in the grid's frame: x, y [m], yaw [rad]
+    cells: npt.NDArray[np.int8]  # FREE, OCCUPIED or UNKNOWN (rows, cols)
 
 
 def planned_ground(rollout: Rollout) -> GroundGrid:

@@ -17,17 +17,11 @@ NONE = "none; the robot has no lidar"
 
 
 class Scans(NamedTuple):
-    """The scans of a drive.
+    """The scans of a drive."""
 
-    Attributes:
-        source: where they come from, in words
-        rows: of the log, at which they were taken (S,)
-        ranges: what was measured (S, beams) [m]; infinite where nothing was in range, minus infinity where something was
-            too near
-    """
-
-    source: str
-    rows: npt.NDArray[np.int64]
+    source: str  # where they come from, in words
+    rows: npt.NDArray[np.int64]  # of the log, at which they were taken (S,)
+    # what was measured (S, beams) [m]; infinite where nothing was in range, minus infinity where something was too near
     ranges: npt.NDArray[np.floating]
 
     @classmethod

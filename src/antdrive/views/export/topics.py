@@ -34,21 +34,13 @@ def mover_frame(index: int) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Topic:
-    """The messages of one topic.
+    """The messages of one topic."""
 
-    Attributes:
-        name: the topic, such as /odom
-        kind: the messages' type, such as nav_msgs/msg/Odometry
-        stamps: when each message was sent (N,) [ns]
-        payloads: the serialised messages
-        latched: whether a late subscriber still gets the last message (durability transient local)
-    """
-
-    name: str
-    kind: str
-    stamps: Stamps
-    payloads: Payloads
-    latched: bool = False
+    name: str  # the topic, such as /odom
+    kind: str  # the messages' type, such as nav_msgs/msg/Odometry
+    stamps: Stamps  # when each message was sent (N,) [ns]
+    payloads: Payloads  # the serialised messages
+    latched: bool = False  # whether a late subscriber still gets the last message (durability transient local)
 
 
 def nanoseconds(t: npt.ArrayLike) -> Stamps:

@@ -22,17 +22,11 @@ _FOV = {
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """A pinhole camera. Pixels count from the upper left corner, x to the right and y down.
+    """A pinhole camera. Pixels count from the upper left corner, x to the right and y down."""
 
-    Attributes:
-        view: world to camera (4, 4)
-        projection: camera to clip space (4, 4)
-        size: width and height of the picture [px]
-    """
-
-    view: Floats
-    projection: Floats
-    size: tuple[int, int]
+    view: Floats  # world to camera (4, 4)
+    projection: Floats  # camera to clip space (4, 4)
+    size: tuple[int, int]  # width and height of the picture [px]
 
     @classmethod
     def framing(

@@ -65,19 +65,12 @@ def compare_film(
 
 
 class Mark(NamedTuple):
-    """A place that is marked in a film.
+    """A place that is marked in a film."""
 
-    Attributes:
-        t: from when on [s]
-        x: where [m]
-        y: where [m]
-        text: what is written there
-    """
-
-    t: float
-    x: float
-    y: float
-    text: str
+    t: float  # from when on [s]
+    x: float  # where [m]
+    y: float  # where [m]
+    text: str  # what is written there
 
 
 class SplitScreen:

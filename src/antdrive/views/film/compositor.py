@@ -50,21 +50,14 @@ FORECAST = 1.5  # how far ahead the motion of movers is drawn [s]
 
 @dataclass(frozen=True, eq=False)
 class Backdrop:
-    """What a camera sees of everything that stands still.
+    """What a camera sees of everything that stands still."""
 
-    Attributes:
-        camera: the camera
-        pixels: the picture (H, W, 3)
-        visible: the fraction of each pixel that shows ground (H, W)
-        depth: depth of the bodies in clip space, 1 where there is none, at the resolution they were rendered in
-        bodies: at the same resolution the number of the obstacle in sight, -1 for ground
-    """
-
-    camera: Camera
-    pixels: Picture
-    visible: npt.NDArray[np.float32]
+    camera: Camera  # the camera
+    pixels: Picture  # the picture (H, W, 3)
+    visible: npt.NDArray[np.float32]  # the fraction of each pixel that shows ground (H, W)
+    # depth of the bodies in clip space, 1 where there is none, at the resolution they were rendered in
     depth: npt.NDArray[np.float32]
-    bodies: npt.NDArray[np.int32]
+    bodies: npt.NDArray[np.int32]  # at the same resolution the number of the obstacle in sight, -1 for ground
 
 
 class Compositor:

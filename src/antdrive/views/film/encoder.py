@@ -20,18 +20,7 @@ Picture = npt.NDArray[np.uint8]  # (H, W, 3)
 #: The file suffixes of films, each with ffmpeg's options for its format.
 ENCODERS: dict[str, tuple[str, ...]] = {
     ".mp4": (
-        *(
-            "-c:v",
-            "libx264",
-            "-preset",
-            "veryfast",
-            "-crf",
-            "20",
-            "-pix_fmt",
-            "yuv420p",
-            "-movflags",
-            "+faststart",
-        ),
+        *("-c:v", "libx264", "-preset", "veryfast", "-crf", "20", "-pix_fmt", "yuv420p", "-movflags", "+faststart"),
         *("-vf", "scale=out_color_matrix=bt709", "-colorspace", "bt709"),
         *("-color_primaries", "bt709", "-color_trc", "bt709"),
     ),
@@ -40,18 +29,7 @@ ENCODERS: dict[str, tuple[str, ...]] = {
         *("-vf", "split[a][b];[a]palettegen=stats_mode=single[p];[b][p]paletteuse=new=1:dither=none"),
         *("-c:v", "gif", "-loop", "0"),
     ),
-    ".webp": (
-        "-c:v",
-        "libwebp_anim",
-        "-pix_fmt",
-        "yuv420p",
-        "-quality",
-        "70",
-        "-compression_level",
-        "2",
-        "-loop",
-        "0",
-    ),
+    ".webp": ("-c:v", "libwebp_anim", "-pix_fmt", "yuv420p", "-quality", "70", "-compression_level", "2", "-loop", "0"),
 }
 
 
@@ -68,19 +46,10 @@ def encoding(path: Path, size: tuple[int, int], fps: float) -> Iterator[Callable
     """A function that appends a frame (H, W, 3) to a film, which is complete when the `with` block ends."""
     import imageio_ffmpeg
 
+    rate = str(Fraction(fps).limit_denominator(100_000))
     command = [
         *(imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-v", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"),
-        *(
-            "-s",
-            f"{size[0]}x{size[1]}",
-            "-r",
-            str(Fraction(fps).limit_denominator(100_000)),
-            "-i",
-            "-",
-            "-an",
-        ),
-        *ENCODERS[known_suffix(path)],
-        str(path),
+        *("-s", f"{size[0]}x{size[1]}", "-r", rate, "-i", "-", "-an", *ENCODERS[known_suffix(path)], str(path)),
     ]
     with tempfile.TemporaryFile() as messages:
         # In its own session: Ctrl-C then reaches only this process, which stops ffmpeg and removes the file.

@@ -25,7 +25,8 @@ def film_failures(
     """Film every run that did not arrive and whose log is there; the films, earlier ones among them, by the keys of the runs.
 
     The line below the picture names the run, how it ended, and why. A drive longer than 30 s is shown in
-    30 s. A film that is newer than its log, or whose log is gone, is not made again."""
+    30 s. A film that is newer than its log, or whose log is gone, is not made again.
+    """
     failed = [row for row in rows if not row["succeeded"] and row["rollout"]]
     films = {}
     for k, row in enumerate(failed):

@@ -11,8 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from antdrive.base.types import Point
-from antdrive.robots.spec import Footprint
-from antdrive.views.scene import Body
+from antdrive.robots.spec import Footprint, RobotSpec
 from antdrive.views.style import SHELL, TURRET, WHITE, Colour
 
 Floats = npt.NDArray[np.float64]
@@ -20,34 +19,21 @@ Floats = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangles with a normal per vertex.
+    """Triangles with a normal per vertex."""
 
-    Attributes:
-        vertices: points (V, 3) [m]; those on a sharp edge occur once for each face
-        normals: a unit vector per vertex (V, 3)
-        triangles: vertex numbers (T, 3), counter-clockwise as seen from outside
-    """
-
-    vertices: Floats
-    normals: Floats
-    triangles: npt.NDArray[np.int64]
+    vertices: Floats  # points (V, 3) [m]; those on a sharp edge occur once for each face
+    normals: Floats  # a unit vector per vertex (V, 3)
+    triangles: npt.NDArray[np.int64]  # vertex numbers (T, 3), counter-clockwise as seen from outside
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A part of the robot, of one colour, that moves as a whole.
+    """A part of the robot, of one colour, that moves as a whole."""
 
-    Attributes:
-        mesh: its shape
-        colour: its colour
-        wheel: 0 if it is fixed to the chassis, 1 if it turns with the left wheel, -1 with the right wheel
-        axle: where its origin is on the chassis [m]
-    """
-
-    mesh: Mesh
-    colour: Colour
-    wheel: int = 0
-    axle: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    mesh: Mesh  # its shape
+    colour: Colour  # its colour
+    wheel: int = 0  # 0 if it is fixed to the chassis, 1 if it turns with the left wheel, -1 with the right wheel
+    axle: tuple[float, float, float] = (0.0, 0.0, 0.0)  # where its origin is on the chassis [m]
 
 
 def join(*meshes: Mesh) -> Mesh:
@@ -112,12 +98,12 @@ def _cuts(low: float, high: float) -> list[float]:
     return cuts
 
 
-def robot_height(body: Body) -> float:
+def robot_height(body: RobotSpec) -> float:
     """The height that the robot is drawn with [m]; a tall mast is left out, as it would hide the path."""
     return min(body.height, max(1.1 * body.footprint.radius, 2.4 * body.wheel_radius))
 
 
-def robot_parts(body: Body) -> tuple[Part, ...]:
+def robot_parts(body: RobotSpec) -> tuple[Part, ...]:
     """The robot's parts. The origin is on the ground below the axle's centre, and the robot heads along +x.
 
     The deck has the footprint's exact outline. On it are a turret, a white arrow and two lamps in front; the wheels

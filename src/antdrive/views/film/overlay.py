@@ -59,52 +59,26 @@ MOST_REASONS, REASON_FONT = 4, 1.05
 Values: TypeAlias = list[tuple[str, bool]]  # each number as text, and whether it is shown in red
 
 
-@dataclass(frozen=True)
-class Reading:
-    """The numbers of one frame of a drive.
-
-    Attributes:
-        time: [s]
-        speed: [m/s]
-        clearance: [m]
-        min_clearance: the smallest clearance so far [m]
-    """
-
-    time: float
-    speed: float
-    clearance: float
-    min_clearance: float
-
-    @property
-    def values(self) -> Values:
-        """The numbers as the band shows them."""
-        return [
-            (f"{self.time:.1f} s", False),
-            (f"{max(self.speed, 0.0):.2f} m/s", False),
-            (_metres(self.clearance), self.clearance <= 0),
-            (_metres(self.min_clearance), self.min_clearance <= 0),
-        ]
+def drive_values(time: float, speed: float, clearance: float, least: float) -> Values:
+    """The numbers of one frame of a drive [s, m/s, m, m], as the band shows them."""
+    return [
+        (f"{time:.1f} s", False),
+        (f"{max(speed, 0.0):.2f} m/s", False),
+        (_metres(clearance), clearance <= 0),
+        (_metres(least), least <= 0),
+    ]
 
 
 @dataclass(frozen=True)
 class Layout:
-    """The sizes of text and band in a frame.
+    """The sizes of text and band in a frame."""
 
-    Attributes:
-        width: of the frame [px]
-        unit: height of small text [px]
-        wide: names, numbers and outcome stand beside each other in the band
-        rows: how many rows of the band the legend has; 0: it is a card in the picture's corner
-        height: of the band [px]
-        note: the lines of a note that has no room beside the numbers
-    """
-
-    width: int
-    unit: int
-    wide: bool
-    rows: int
-    height: int
-    note: tuple[str, ...] = ()
+    width: int  # of the frame [px]
+    unit: int  # height of small text [px]
+    wide: bool  # names, numbers and outcome stand beside each other in the band
+    rows: int  # how many rows of the band the legend has; 0: it is a card in the picture's corner
+    height: int  # of the band [px]
+    note: tuple[str, ...] = ()  # the lines of a note that has no room beside the numbers
 
     @classmethod
     def of(cls, size: tuple[int, int], rows: int, note: str = "") -> Layout:
@@ -212,19 +186,12 @@ _WIDE_KINDS = ("ramp", "field", "line", "dash", "zone", "hatch")
 
 
 class LegendEntry(NamedTuple):
-    """A line of the legend.
+    """A line of the legend."""
 
-    Attributes:
-        kind: how its sample is drawn: `ramp`, `field`, `line`, `dash`, `zone`, `hatch`, `dot` or `scale`
-        colour: of the sample
-        text: its meaning
-        width: of a scale bar [px]
-    """
-
-    kind: str
-    colour: Colour
-    text: str
-    width: float = 0.0
+    kind: str  # how its sample is drawn: `ramp`, `field`, `line`, `dash`, `zone`, `hatch`, `dot` or `scale`
+    colour: Colour  # of the sample
+    text: str  # its meaning
+    width: float = 0.0  # of a scale bar [px]
 
 
 def legend_entries(
@@ -280,17 +247,11 @@ def legend_card(entries: list[LegendEntry], layout: Layout) -> Sprite:
 
 
 class LegendRows(NamedTuple):
-    """The legend's entries in rows of the band.
+    """The legend's entries in rows of the band."""
 
-    Attributes:
-        size: of the text [px]
-        rows: the entries of each row, from the left
-        whole: whether every entry has a place
-    """
-
-    size: int
-    rows: list[list[LegendEntry]]
-    whole: bool
+    size: int  # of the text [px]
+    rows: list[list[LegendEntry]]  # the entries of each row, from the left
+    whole: bool  # whether every entry has a place
 
 
 def legend_rows(entries: list[LegendEntry], layout: Layout) -> LegendRows:

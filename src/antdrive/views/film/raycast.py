@@ -19,19 +19,12 @@ AMBIENT, DIFFUSE = 0.62, 0.46  # strength of the light from all sides and from t
 
 @dataclass(frozen=True, eq=False)
 class Solids:
-    """Cylinders that stand on the ground, and boxes along the axes.
+    """Cylinders that stand on the ground, and boxes along the axes."""
 
-    Attributes:
-        cylinders: x, y, radius and height of each (N, 4) [m]
-        cylinder_colours: red, green, blue of each (N, 3), 0 to 255
-        boxes: x0, y0, z0, x1, y1, z1 of each (M, 6) [m]
-        box_colours: red, green, blue of each (M, 3), 0 to 255
-    """
-
-    cylinders: Floats
-    cylinder_colours: Floats
-    boxes: Floats
-    box_colours: Floats
+    cylinders: Floats  # x, y, radius and height of each (N, 4) [m]
+    cylinder_colours: Floats  # red, green, blue of each (N, 3), 0 to 255
+    boxes: Floats  # x0, y0, z0, x1, y1, z1 of each (M, 6) [m]
+    box_colours: Floats  # red, green, blue of each (M, 3), 0 to 255
 
     @classmethod
     def of(cls, cylinders: Floats, colours: list[Colour], boxes: Floats, box_colour: Colour) -> Solids:

@@ -21,19 +21,12 @@ SLOW_BEFORE, SLOW_AFTER = 0.3, 0.1  # slow motion starts and ends this long befo
 
 
 class ReplanEvent(NamedTuple):
-    """A replan during the run.
+    """A replan during the run."""
 
-    Attributes:
-        t: when [s]
-        trigger: why the robot replanned
-        solved: whether it found a new route
-        route: the polyline followed from then on (N, 2) [m]
-    """
-
-    t: float
-    trigger: str
-    solved: bool
-    route: Floats
+    t: float  # when [s]
+    trigger: str  # why the robot replanned
+    solved: bool  # whether it found a new route
+    route: Floats  # the polyline followed from then on (N, 2) [m]
 
     @property
     def caption(self) -> str:

@@ -23,9 +23,9 @@ from antdrive.views.film.overlay import (
     Band,
     Layout,
     LegendRows,
-    Reading,
     Values,
     banner,
+    drive_values,
     legend_card,
     legend_entries,
     legend_rows,
@@ -191,8 +191,8 @@ class Shot:
 
     def _with_band(self, view: Picture, at: float, verdict: tuple[str, Colour]) -> Picture:
         replay = self.replay
-        reading = Reading(at, replay.speed(at), replay.clearance(at), replay.min_clearance(at))
-        return np.vstack([view, self._band.draw(reading.values, verdict)])
+        values = drive_values(at, replay.speed(at), replay.clearance(at), replay.min_clearance(at))
+        return np.vstack([view, self._band.draw(values, verdict)])
 
     def _put_legend(self, view: Picture) -> None:
         if self._legend is not None:

@@ -18,17 +18,11 @@ Box: TypeAlias = tuple[int, int, int, int]  # x0, y0, x1, y1 [px]; x1 and y1 are
 
 
 class Solid(NamedTuple):
-    """A mesh of one colour at a place.
+    """A mesh of one colour at a place."""
 
-    Attributes:
-        mesh: its shape
-        colour: its colour
-        place: the rotation and, in the last column, the position of the mesh (3, 4) [m]
-    """
-
-    mesh: Mesh
-    colour: Colour
-    place: Floats
+    mesh: Mesh  # its shape
+    colour: Colour  # its colour
+    place: Floats  # the rotation and, in the last column, the position of the mesh (3, 4) [m]
 
 
 def placed(at: tuple[float, float, float], quaternion: tuple[float, float, float, float]) -> Floats:

@@ -39,17 +39,11 @@ PAGE_COLOURS = {hexed(INK): "--ink", hexed(MUTED): "--muted", "#aab2bf": "--axis
 
 
 class Chart(NamedTuple):
-    """A chart of the page.
+    """A chart of the page."""
 
-    Attributes:
-        title: its heading
-        note: what it shows, in a sentence
-        svg: the picture
-    """
-
-    title: str
-    note: str
-    svg: str
+    title: str  # its heading
+    note: str  # what it shows, in a sentence
+    svg: str  # the picture
 
 
 def campaign_charts(summary: CampaignSummary, styles: Sequence[LabelStyle]) -> list[Chart]:

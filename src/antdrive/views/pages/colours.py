@@ -13,17 +13,11 @@ LIGHT_LUMINANCE = 0.45  # of a colour on a light page, at most
 
 
 class LabelStyle(NamedTuple):
-    """How a planner is drawn.
+    """How a planner is drawn."""
 
-    Attributes:
-        light: its colour on a light page, as #rrggbb; no two labels of a page share one
-        dark: its colour on a dark page
-        dash: its line style
-    """
-
-    light: str
-    dark: str
-    dash: str
+    light: str  # its colour on a light page, as #rrggbb; no two labels of a page share one
+    dark: str  # its colour on a dark page
+    dash: str  # its line style
 
 
 def label_styles(labels: Sequence[str], names: Sequence[str]) -> list[LabelStyle]:

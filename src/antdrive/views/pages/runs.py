@@ -89,74 +89,43 @@ COLUMN_NOTES = (
 
 @dataclass(frozen=True)
 class Attachment:
-    """A film, figure or file of a run.
+    """A film, figure or file of a run."""
 
-    Attributes:
-        name: the file's name
-        source: a path relative to the page, or a data URI with the content
-        is_video: it needs a video element; other films are animated images
-        caption: what the figure shows
-        width: of an embedded figure [px]
-        height: of an embedded figure [px]
-    """
-
-    name: str
-    source: str
-    is_video: bool = False
-    caption: str = ""
-    width: int = 0
-    height: int = 0
+    name: str  # the file's name
+    source: str  # a path relative to the page, or a data URI with the content
+    is_video: bool = False  # it needs a video element; other films are animated images
+    caption: str = ""  # what the figure shows
+    width: int = 0  # of an embedded figure [px]
+    height: int = 0  # of an embedded figure [px]
 
 
 @dataclass(frozen=True)
 class LogFacts:
-    """What the log of a run says.
+    """What the log of a run says."""
 
-    Attributes:
-        record: the log's record
-        certificate: the log's, computed for the report
-        metrics: the log's metrics by name
-        sights: the cylinders and movers that a robot which used its lidar passed, as the log's scans met them
-        scans: how many scans the log holds
-        digest: of the log's content
-        settings: the log's settings by the keys of result.json
-        contradictions: what result.json says otherwise, a sentence each
-    """
-
-    record: DriveRecord
-    certificate: Certificate
-    metrics: Mapping[str, float]
-    sights: tuple[Sighting, ...]
-    scans: int
-    digest: str
-    settings: Mapping[str, Any]
-    contradictions: tuple[str, ...]
+    record: DriveRecord  # the log's record
+    certificate: Certificate  # the log's, computed for the report
+    metrics: Mapping[str, float]  # the log's metrics by name
+    sights: tuple[Sighting, ...]  # the cylinders and movers that a robot with a lidar passed
+    scans: int  # how many scans the log holds
+    digest: str  # of the log's content
+    settings: Mapping[str, Any]  # the log's settings by the keys of result.json
+    contradictions: tuple[str, ...]  # what result.json says otherwise, a sentence each
 
 
 @dataclass
 class ReportedRun:
-    """A run as the report's templates show it: from its log alone, and as a claim of result.json where there is none.
+    """A run as the report's templates show it: from its log alone, and as a claim of result.json where there is none."""
 
-    Attributes:
-        folder: where the run's files are; None for a run made in Python
-        result: the content of result.json
-        log: what the log says; None if there is none
-        number: its place among the runs of the report
-        figures: embedded figures
-        films: films, embedded or linked
-        links: files beside the page
-        pictures: figures beside the page, for the Markdown report
-        differing: settings that differ between the runs, as shown, by the keys of `SETTINGS`
-    """
-
-    folder: Path | None
-    result: Mapping[str, Any]
-    log: LogFacts | None
-    number: int
-    figures: list[Attachment] = field(default_factory=list)
-    films: list[Attachment] = field(default_factory=list)
-    links: list[Attachment] = field(default_factory=list)
-    pictures: list[Attachment] = field(default_factory=list)
+    folder: Path | None  # where the run's files are; None for a run made in Python
+    result: Mapping[str, Any]  # the content of result.json
+    log: LogFacts | None  # what the log says; None if there is none
+    number: int  # its place among the runs of the report
+    figures: list[Attachment] = field(default_factory=list)  # embedded figures
+    films: list[Attachment] = field(default_factory=list)  # films, embedded or linked
+    links: list[Attachment] = field(default_factory=list)  # files beside the page
+    pictures: list[Attachment] = field(default_factory=list)  # figures beside the page, for the Markdown report
+    # settings that differ between the runs, as shown, by the keys of `SETTINGS`
     differing: dict[str, str] = field(default_factory=dict)
 
     @property

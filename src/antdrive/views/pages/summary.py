@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -25,28 +26,19 @@ UNITS = ("_rad_per_m", "_m", "_s")  # that the names of metrics end with
 
 @dataclass(frozen=True, eq=False)
 class CampaignSummary:
-    """A campaign's runs and its two tables.
+    """A campaign's runs and its two tables."""
 
-    Attributes:
-        title: of the page
-        paired: the runs, by instance and planner
-        size: how many runs of these planners the campaign has; fewer may be done
-        success: a row for each planner
-        comparisons: by measure, "success" first, a row for each pair of planners; empty with one planner
-        common: number of instances in which every planner succeeded
-        medians: by metric, the median of each planner over those instances, with its interval
-        refusal: why planners are not compared; empty where they are
-        allowances: whether planners are not worse than one of them by more than was allowed; empty where that is not asked
-    """
-
-    title: str
-    paired: PairedRuns
-    size: int
-    success: Sequence[PlannerSuccess]
+    title: str  # of the page
+    paired: PairedRuns  # the runs, by instance and planner
+    size: int  # how many runs of these planners the campaign has; fewer may be done
+    success: Sequence[PlannerSuccess]  # a row for each planner
+    # by measure, "success" first, a row for each pair of planners; empty with one planner
     comparisons: Mapping[str, Sequence[PairedComparison]]
-    common: int
+    common: int  # number of instances in which every planner succeeded
+    # by metric, the median of each planner over those instances, with its interval
     medians: Mapping[str, Sequence[tuple[float, Interval]]]
-    refusal: str = ""
+    refusal: str = ""  # why planners are not compared; empty where they are
+    # whether planners are not worse than one of them by more than was allowed; empty where that is not asked
     allowances: Sequence[NonInferiority] = ()
 
     @property
@@ -58,6 +50,25 @@ class CampaignSummary:
     def notes(self) -> list[str]:
         """What a reader of the tables must know about this campaign, a sentence each."""
         return notes_on(self)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, for JSON."""
+        return {
+            "runs": len(self.table),
+            "size": self.size,
+            "planners": [row.as_dict() for row in self.success],
+            "comparisons": {name: [row.as_dict() for row in rows] for name, rows in self.comparisons.items()},
+            "not_worse": [row.as_dict() for row in self.allowances],
+            "common": self.common,
+            "medians": {
+                name: [
+                    {"planner": planner, "median": median, "interval": list(interval)}
+                    for planner, (median, interval) in zip(self.paired.planners, rows, strict=True)
+                ]
+                for name, rows in self.medians.items()
+            },
+            "notes": self.notes,
+        }
 
 
 def summarise(

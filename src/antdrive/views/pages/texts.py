@@ -12,17 +12,11 @@ LONGEST = 200  # characters of a text
 
 
 class TextTable(NamedTuple):
-    """A table of text.
+    """A table of text."""
 
-    Attributes:
-        title: what it shows
-        headings: of its columns
-        rows: its cells
-    """
-
-    title: str
-    headings: tuple[str, ...]
-    rows: list[tuple[str, ...]]
+    title: str  # what it shows
+    headings: tuple[str, ...]  # of its columns
+    rows: list[tuple[str, ...]]  # its cells
 
 
 def percent(share: float) -> str:

@@ -1,7 +1,7 @@
 """`antdrive worlds generate`."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -12,12 +12,12 @@ from antdrive.cli.exits import SUCCEEDED
 from antdrive.cli.parse import pair
 
 
+@options.with_settings(("seed",))
 def generate_world(
     kind: Annotated[
         str, typer.Argument(metavar="KIND", help="forest (Han's rule) or barn (the BARN cellular automaton).")
     ],
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="The world file to write.")],
-    seed: options.Seed = 0,
     settings: Annotated[
         list[str] | None,
         typer.Option(
@@ -28,12 +28,14 @@ def generate_world(
             "May be repeated.",
         ),
     ] = None,
+    **given: Any,
 ) -> int:
     """Write a random world."""
     import numpy as np
 
     from antdrive.worlds import GENERATORS, generate, save_task
 
+    seed = given["seed"]
     values = dict(pair(text) for text in settings or ())
     if kind not in GENERATORS:
         raise InputError(f"generate: unknown kind {kind!r}; choose from {', '.join(GENERATORS)}")

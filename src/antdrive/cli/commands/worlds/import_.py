@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -72,6 +72,7 @@ Problem = Annotated[
 ]
 
 
+@options.with_settings(("cell",))
 def import_world(
     path: Source,
     out: Target = None,
@@ -79,13 +80,13 @@ def import_world(
     start: Start = None,
     goal: Goal = None,
     bounds: Bounds = None,
-    cell: options.CellSize = None,
     skip_unsupported: SkipUnsupported = False,
     unknown: Unknown = None,
     overhang: Overhang = None,
     resolution: Resolution = None,
     problem: Problem = None,
     json: options.Json = False,
+    **given: Any,
 ) -> int:
     """Turn a world or map of another program into a world file.
 
@@ -105,7 +106,7 @@ def import_world(
                 start=numbers("--start", start, 3, "X,Y,YAW"),
                 goal=numbers("--goal", goal, 2, "X,Y"),
                 bounds=numbers("--bounds", bounds, 4),
-                cell=cell,
+                cell=given["cell"],
                 barn=barn,
                 skip_unsupported=skip_unsupported or None,
                 unknown=unknown,

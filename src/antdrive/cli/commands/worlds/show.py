@@ -1,10 +1,11 @@
 """`antdrive worlds show`."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
+from antdrive.base.errors import InputError
 from antdrive.cli import options
 from antdrive.cli.console import print_files, print_json, print_line
 from antdrive.cli.exits import SUCCEEDED
@@ -21,10 +22,10 @@ UNITS = {
 }
 
 
+@options.with_settings(("margin",))
 def show_world(
     world: options.World,
     robot: options.Robot = "turtlebot",
-    margin: options.Margin = 0.03,
     task: options.TaskName = None,
     start: options.Start = None,
     goal: options.Goal = None,
@@ -33,6 +34,7 @@ def show_world(
         Path | None, typer.Option("--out", "-o", metavar="FILE", help="Draw the world: .png, .svg or .pdf.")
     ] = None,
     json: options.Json = False,
+    **asked: Any,
 ) -> int:
     """Describe a world, and whether a robot can cross it."""
     from antdrive.base.plane import in_map
@@ -40,6 +42,9 @@ def show_world(
     from antdrive.robots import list_robots, load_robot, overlap_at
     from antdrive.worlds import load_task, load_tasks, rasterise, task_to_dict
 
+    margin = asked["margin"]
+    if margin == "auto":
+        raise InputError("--margin auto: is chosen for a drive; write a number of metres")
     given, spec = chosen_task(world, task, start, goal, frame), load_robot(robot)
     shown = load_task(given) if isinstance(given, str) else given
     grid = rasterise(shown.world, shown.cell, spec.radius + margin)

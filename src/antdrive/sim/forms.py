@@ -1,0 +1,298 @@
+"""How people write the settings of a scenario: as values of files, options of commands, and columns of tables."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from collections.abc import Callable, Iterable, Mapping
+from typing import Annotated, Any, get_args
+
+from pydantic import BaseModel, Field, PlainValidator, WithJsonSchema
+
+from antdrive.base.checks import show, suggest
+from antdrive.base.errors import FieldError
+from antdrive.robots import Avoidance, PurePursuit
+from antdrive.sim.log.record import changes, plain_value, settings_of
+from antdrive.sim.policy import Perception, PerceptionKind, ReplanPolicy
+from antdrive.sim.settings import SETTINGS, Declared
+from antdrive.worlds import Disc
+
+MAX_SEEDS = 100_000  # of one range
+_SEEDS = re.compile(r"(\d{1,18})-(\d{1,18})")
+
+
+def _text_or_mapping(value: Any) -> Any:
+    if not isinstance(value, str | dict) or not value:
+        raise ValueError(f"must be a name or a mapping, got {show(value)}")
+    return value
+
+
+def _margin(value: Any) -> Any:
+    if value != "auto" and (isinstance(value, bool) or not isinstance(value, int | float)):
+        raise ValueError(f"must be a number of metres, or auto, got {show(value)}")
+    return value
+
+
+def _switch(value: Any) -> Any:
+    if not isinstance(value, bool | dict) and value != "none":
+        raise ValueError(f"must be true, false, none or a mapping of settings, got {show(value)}")
+    return value
+
+
+def seed_list(value: Any) -> list[int]:
+    """The seeds that people write as [0, 1, 2] or 0-9.
+
+    Raises:
+        ValueError: it is neither; the text says what would be right.
+    """
+    if isinstance(value, str) and (match := _SEEDS.fullmatch(value)):
+        first, last = int(match[1]), int(match[2])
+        if first <= last < first + MAX_SEEDS:
+            return list(range(first, last + 1))
+    seeds = value if isinstance(value, list) else []
+    if not seeds or not all(type(seed) is int and 0 <= seed < 2**63 for seed in seeds):
+        raise ValueError(
+            f"must be whole numbers of at least 0, such as [0, 1, 2], or a range such as 0-9, got {show(value)}"
+        )
+    if len(set(seeds)) < len(seeds):
+        raise ValueError(f"must be different numbers, got {show(value)}")
+    return seeds
+
+
+_SWITCH_SCHEMA: dict[str, Any] = {"anyOf": [{"type": "boolean"}, {"const": "none"}, {"type": "object"}]}
+_MARGIN_SCHEMA: dict[str, Any] = {"anyOf": [{"type": "number", "minimum": 0}, {"const": "auto"}]}
+_NAME_OR_MAPPING: dict[str, Any] = {"anyOf": [{"type": "string"}, {"type": "object"}]}
+SEEDS_SCHEMA: dict[str, Any] = {
+    "anyOf": [
+        {"type": "array", "items": {"type": "integer", "minimum": 0}, "minItems": 1, "uniqueItems": True},
+        {"type": "string", "pattern": f"^{_SEEDS.pattern}$"},
+    ]
+}
+TextOrMapping = Annotated[Any, PlainValidator(_text_or_mapping), WithJsonSchema(_NAME_OR_MAPPING)]
+SeedList = Annotated[Any, PlainValidator(seed_list), WithJsonSchema(SEEDS_SCHEMA)]
+Switch = Annotated[Any, PlainValidator(_switch), WithJsonSchema(_SWITCH_SCHEMA)]
+MarginValue = Annotated[Any, PlainValidator(_margin), WithJsonSchema(_MARGIN_SCHEMA)]
+
+
+@dataclasses.dataclass(frozen=True)
+class Form:
+    """Numbers and words, which are written as they are.
+
+    Attributes:
+        written: what a file may hold, for pydantic; None: the field's own type and bounds
+        usual: the value in a file that means the default; None: the default itself
+    """
+
+    written: Any = None
+    usual: Any = None
+
+    def read(self, key: str, value: Any) -> Any:
+        """The field's value that a file's value means.
+
+        Raises:
+            FieldError: it means none.
+        """
+        return value
+
+    def write(self, value: Any) -> Any:
+        """The value of a file that means the field's value."""
+        return plain_value(value)
+
+    def column(self, value: Any) -> Any:
+        """What a table says."""
+        return value
+
+    def words(self, flag: str, value: Any) -> list[str] | None:
+        """The options of `antdrive run` for a file's value; None where there are none."""
+        return [] if value is None else [flag, option_text(value)] if flag else None
+
+
+class _Margin(Form):
+    def column(self, value: Any) -> Any:
+        return value if value == "auto" else str(float(value))
+
+
+class _Sees(Form):
+    def read(self, key: str, value: Any) -> Perception | None:
+        if value is None:
+            return None
+        kind, mark, metres = value.partition(":")
+        if kind not in get_args(PerceptionKind):
+            raise FieldError(key, f"unknown kind {kind!r}; choose from {', '.join(get_args(PerceptionKind))}")
+        try:
+            reach = float(metres) if mark else math.inf
+        except ValueError:
+            reach = math.nan
+        if not reach > 0:
+            raise FieldError(key, "write KIND or KIND:METRES with a range greater than 0, such as positions:3")
+        return Perception(kind=kind, range=reach)
+
+    def write(self, value: Any) -> Any:
+        return None if value is None else value.kind + ("" if math.isinf(value.range) else f":{value.range!r}")
+
+    def column(self, value: Any) -> Any:
+        return None if value is None else value.kind + ("" if math.isinf(value.range) else f":{value.range:g}")
+
+
+class _Discs(Form):
+    def read(self, key: str, value: Any) -> tuple[Disc, ...]:
+        return tuple(value)
+
+    def write(self, value: Any) -> Any:
+        return [{name: float(number) for name, number in dataclasses.asdict(disc).items()} for disc in value]
+
+    def column(self, value: Any) -> Any:
+        return " ".join(f"{disc.x:g},{disc.y:g},{disc.radius:g}" for disc in value) or "none"
+
+    def words(self, flag: str, value: Any) -> list[str] | None:
+        discs = [disc if isinstance(disc, dict) else vars(disc) for disc in value]
+        if any(disc["height"] != 1.0 for disc in discs):
+            return None
+        return [word for disc in discs for word in (flag, f"{disc['x']},{disc['y']},{disc['radius']}")]
+
+
+@dataclasses.dataclass(frozen=True)
+class _Record(Form):
+    """A record of settings: what differs from the defaults."""
+
+    default: Any = None
+
+    def read(self, key: str, value: Any) -> Any:
+        if not isinstance(value, dict):
+            return self.default
+        known = [field.name for field in dataclasses.fields(self.default)]
+        for name in value:
+            if name not in known:
+                raise FieldError(f"{key}.{name}", f"unknown setting; {suggest(name, known)}")
+        try:
+            return dataclasses.replace(self.default, **value)
+        except FieldError as error:
+            raise error.under(key) from None
+        except TypeError:
+            wrong = next((name for name, one in value.items() if not isinstance(one, int | float)), "")
+            raise FieldError(f"{key}.{wrong}" if wrong else key, "must be a number") from None
+
+    def write(self, value: Any) -> Any:
+        return changes(value, self.default)
+
+    def column(self, value: Any) -> Any:
+        if value is None:
+            return "none"
+        return (
+            " ".join(f"{name}={option_text(one)}" for name, one in settings_of(changes(value, self.default)).items())
+            or "default"
+        )
+
+    def words(self, flag: str, value: Any) -> list[str] | None:
+        return [word for name, one in value.items() for word in ("--set", f"controller.{name}={option_text(one)}")]
+
+
+@dataclasses.dataclass(frozen=True)
+class _Switched(_Record):
+    """A record of settings that can be switched off: none or false, or a record `off` where false is another thing."""
+
+    off: Any = None
+
+    def read(self, key: str, value: Any) -> Any:
+        return None if value == "none" else self.off if value is False else super().read(key, value)
+
+    def write(self, value: Any) -> Any:
+        return "none" if value is None else changes(value, self.default) or True
+
+    def words(self, flag: str, value: Any) -> list[str] | None:
+        if isinstance(value, dict) or (value == "none" and self.off is not None):
+            return None
+        return [] if value is True else [f"--no-{flag.removeprefix('--')}"]
+
+
+#: The forms by the name that a setting calls them.
+FORMS: Mapping[str, Form] = {
+    "plain": Form(),
+    "margin": _Margin(MarginValue),
+    "perception": _Sees(str | None),
+    "discs": _Discs(list[Disc], []),
+    "controller": _Record(dict[str, float], {}, PurePursuit()),
+    "avoidance": _Switched(Switch, True, Avoidance()),
+    "replanning": _Switched(Switch, True, ReplanPolicy(), ReplanPolicy(around_movers=False)),
+}
+
+
+def form_of(one: Declared) -> Form:
+    """How a setting is written."""
+    return FORMS[one.setting.form]
+
+
+def option_text(value: Any) -> str:
+    """A value as the command line takes it."""
+    if isinstance(value, list):
+        return ",".join(map(option_text, value))
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def file_fields(settings: Iterable[Declared]) -> dict[str, Any]:
+    """The fields of a pydantic model of a file that holds settings, by key."""
+    return {one.key: (written_kind(one), written_default(one)) for one in settings}
+
+
+def written_kind(one: Declared) -> Any:
+    """What a file may hold for a setting, for pydantic."""
+    form = form_of(one)
+    if form.written is not None:
+        return form.written
+    kind = Annotated[(one.kind, *one.bounds)] if one.bounds else one.kind
+    return kind | None if one.optional else kind
+
+
+def written_default(one: Declared) -> Any:
+    """The default of a setting in a file, with its description."""
+    usual = form_of(one).usual
+    default = one.default if usual is None else usual
+    text = one.setting.help + (f"; by default {one.setting.usual}" if one.setting.usual else "")
+    return Field(default, description=text)
+
+
+def scenario_fields(given: Mapping[str, Any]) -> dict[str, Any]:
+    """The fields of a scenario that values of files mean, by name; defaults for what is not given.
+
+    Raises:
+        FieldError: a value that means nothing.
+    """
+    return {
+        one.name: form_of(one).read(one.key, given[one.key]) if one.key in given else one.default
+        for one in SETTINGS.values()
+    }
+
+
+def said(entry: BaseModel) -> dict[str, Any]:
+    """The values of a file's settings that are written there, by key."""
+    keys = {one.key for one in SETTINGS.values()} & entry.model_fields_set
+    return {one.key: getattr(entry, one.key) for one in SETTINGS.values() if one.key in keys}
+
+
+def setting_words(given: Mapping[str, Any]) -> list[str] | None:
+    """The words of `antdrive run` for values of files; None where it has no options for all of them."""
+    words: list[str] = []
+    for one in SETTINGS.values():
+        if one.key not in given or (not one.flag and given[one.key] == one.default):
+            continue
+        found = form_of(one).words(one.flag, given[one.key])
+        if found is None:
+            return None
+        words += found
+    return words
+
+
+def written(values: Callable[[str], Any]) -> dict[str, Any]:
+    """The settings that differ from their defaults as files write them, by key.
+
+    Args:
+        values: the value of a field
+    """
+    differing = (one for one in SETTINGS.values() if values(one.name) != one.default)
+    return {one.key: form_of(one).write(values(one.name)) for one in differing}
+
+
+def columns_of(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """What tables say of the fields of a scenario, by column."""
+    return {one.column: form_of(one).column(fields[one.name]) for one in SETTINGS.values() if one.name in fields}
