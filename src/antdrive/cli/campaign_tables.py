@@ -11,7 +11,6 @@ from antdrive.cli.console import print_files, print_json, print_line, print_tabl
 from antdrive.cli.exits import SUCCEEDED
 
 if TYPE_CHECKING:
-    from antdrive.views.pages.summary import CampaignSummary
     from antdrive.views.pages.texts import TextTable
 
 Metrics = Annotated[
@@ -99,7 +98,7 @@ def compare_campaigns(
     words: dict[str, Any] = {"allow": _allowed(allow, against), "where": _conditions(where), "strict": True}
     summary = summarise_campaign(folders, metrics=metrics or None, against=against, planners=planners, **words)
     if json:
-        print_json(_plain(summary))
+        print_json(summary.as_dict())
         return SUCCEEDED
     from antdrive.views.pages.tables import all_cells
 
@@ -162,22 +161,3 @@ def _conditions(where: Sequence[str] | None) -> dict[str, str]:
 def _print_table(table: "TextTable") -> None:
     print_line(table.title)
     print_table(table.headings, table.rows)
-
-
-def _plain(summary: "CampaignSummary") -> dict[str, object]:
-    return {
-        "runs": len(summary.table),
-        "size": summary.size,
-        "planners": [row.as_dict() for row in summary.success],
-        "comparisons": {name: [row.as_dict() for row in rows] for name, rows in summary.comparisons.items()},
-        "not_worse": [row.as_dict() for row in summary.allowances],
-        "common": summary.common,
-        "medians": {
-            name: [
-                {"planner": planner, "median": median, "interval": list(interval)}
-                for planner, (median, interval) in zip(summary.paired.planners, rows, strict=True)
-            ]
-            for name, rows in summary.medians.items()
-        },
-        "notes": summary.notes,
-    }

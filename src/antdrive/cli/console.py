@@ -16,69 +16,52 @@ from antdrive.base.files import as_json
 
 
 @contextmanager
-def bar(label: str) -> Iterator[Callable[[float], None]]:
-    """A progress bar on stderr, which shows nothing where stderr is no terminal.
+def _progress(
+    label: str, *columns: Any, total: float | None = None, **settings: Any
+) -> Iterator[Callable[..., None] | None]:
+    """A transient bar on stderr with a label, a bar and more columns; None where stderr is no terminal.
 
-    Yields a function that the block calls with the fraction that is done.
+    Yields a function that the block calls with what changes: `completed`, `total`, or a column's field.
     """
     if not sys.stderr.isatty():
-        yield lambda fraction: None
+        yield None
         return
+    from rich import progress
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.percentage:>3.0f} %"),
-        TimeRemainingColumn(),
-    )
+    made = [
+        getattr(progress, column)() if column.endswith("Column") else progress.TextColumn(column) for column in columns
+    ]
+    shown = (progress.TextColumn("{task.description}"), progress.BarColumn(), *made)
+    with progress.Progress(*shown, console=Console(stderr=True), transient=True, **settings) as rows:
+        task = rows.add_task(label, total=total, note="")
+        yield lambda **changes: rows.update(task, **changes)
+
+
+@contextmanager
+def bar(label: str) -> Iterator[Callable[[float], None]]:
+    """A progress bar; yields a function that the block calls with the fraction that is done."""
     on_top = sys.stdout.isatty()  # else what is printed meanwhile would not reach the file that stdout is
-    with Progress(*columns, console=Console(stderr=True), transient=True, redirect_stdout=on_top) as progress:
-        task = progress.add_task(label, total=1.0)
-        yield lambda fraction: progress.update(task, completed=fraction)
+    columns = ("{task.percentage:>3.0f} %", "TimeRemainingColumn")
+    with _progress(label, *columns, total=1.0, redirect_stdout=on_top) as show:
+        yield lambda fraction: show(completed=fraction) if show else None
 
 
 @contextmanager
 def working(label: str) -> Iterator[Callable[[str, int], None]]:
-    """A bar on stderr for work of unknown length, which shows nothing where stderr is no terminal.
-
-    Yields a function that the block calls with what it is doing and how many steps it has done.
-    """
-    if not sys.stderr.isatty():
-        yield lambda stage, done: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[at]}"), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task(label, total=None, at="")
-        yield lambda stage, done: progress.update(task, at=f"{stage}, {done} runs")
+    """A bar for work of unknown length; yields a function that takes what is being done and the steps that are done."""
+    with _progress(label, "{task.fields[note]}", "TimeElapsedColumn") as show:
+        yield lambda stage, done: show(note=f"{stage}, {done} runs") if show else None
 
 
 @contextmanager
 def campaign_bar(label: str) -> Iterator[Callable[[int, int], None]]:
-    """A bar on stderr for many runs, with their rate and the time left; where stderr is no terminal it shows nothing.
+    """A bar for many runs, with their rate and the time left; yields a function that takes the runs done and all runs.
 
-    Yields a function that the block calls with the numbers of runs that are done and of all. What is done at the first call
-    does not count for the rate.
+    What is done at the first call does not count for the rate.
     """
-    if not sys.stderr.isatty():
-        yield lambda done, size: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[pace]}"),
-        TimeElapsedColumn(),
-    )
-    with Progress(*columns, console=Console(stderr=True), transient=True, refresh_per_second=4) as progress:
-        task = progress.add_task(label, total=None, pace="")
+    columns = ("MofNCompleteColumn", "{task.fields[note]}", "TimeElapsedColumn")
+    with _progress(label, *columns, refresh_per_second=4) as show:
         first: list[float] = []
 
         def update(done: int, size: int) -> None:
@@ -86,9 +69,27 @@ def campaign_bar(label: str) -> Iterator[Callable[[int, int], None]]:
             first[:] = first or [done, now]
             made, seconds = done - first[0], now - first[1]
             pace = f"{made / seconds:.1f} runs/s, {duration((size - done) * seconds / made)} left" if made > 0 else ""
-            progress.update(task, completed=done, total=size, pace=pace)
+            if show:
+                show(completed=done, total=size, note=pace)
 
         yield update
+
+
+@contextmanager
+def planning(label: str) -> Iterator[None]:
+    """A bar over the iterations of planners that run in the block, with the best length so far."""
+    with _progress(label, "{task.fields[note]}") as show:
+        if show is None:
+            yield
+            return
+        from antdrive.planners import watch
+
+        def update(state: Any) -> None:
+            best = f"best {state.best:.2f} m" if math.isfinite(state.best) else "no path yet"
+            show(completed=state.done, total=state.total, note=best)
+
+        with watch(update):
+            yield
 
 
 def duration(seconds: float) -> str:
@@ -100,29 +101,6 @@ def duration(seconds: float) -> str:
         return f"{minutes} min"
     hours = minutes // 60
     return f"{hours} h {minutes % 60} min" if hours < 48 else f"{hours // 24} d {hours % 24} h"
-
-
-@contextmanager
-def planning(label: str) -> Iterator[None]:
-    """A progress bar over the iterations of planners that run in the block, with the best length so far."""
-    if not sys.stderr.isatty():
-        yield
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn
-
-    from antdrive.planners import watch
-
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[best]}"))
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task(label, total=None, best="")
-
-        def update(state: Any) -> None:
-            best = f"best {state.best:.2f} m" if math.isfinite(state.best) else "no path yet"
-            progress.update(task, completed=state.done, total=state.total, best=best)
-
-        with watch(update):
-            yield
 
 
 def print_error(message: str) -> None:

@@ -23,7 +23,7 @@ from antdrive.sim.driving.exploring import Exploration
 from antdrive.sim.driving.given import Exact, GivenMap
 from antdrive.sim.driving.localising import Fixes, localiser_of
 from antdrive.sim.driving.lookout import Lookout
-from antdrive.sim.driving.movers_ahead import MoversAhead
+from antdrive.sim.driving.movers_ahead import MoversSeenAhead
 from antdrive.sim.driving.parts import Localiser, Logs, Map, Others, RouteGuide, Rule
 from antdrive.sim.driving.perception import Told
 from antdrive.sim.driving.replanning import Replanning
@@ -113,7 +113,7 @@ def _without_map(s: Scenario, localiser: Exact | Fixes) -> Parts:
     ahead = None
     if watch is not None and s.replanning is not None and policy.around_movers:
         tracked = Tracked(watch, s.effective_perception, hz)
-        ahead = MoversAhead(tracked, survey, policy, s.robot, s.task.goal, s.inflate, hz)
+        ahead = MoversSeenAhead(tracked, survey, policy, s.robot, s.task.goal, s.inflate, hz)
     guide = Exploration(planner, survey, policy, ahead)
     rules: list[Rule] = [_pursuit(s), LookRound(guide, s.robot, hz)]
     if s.among_movers and s.effective_avoidance is not None:

@@ -8,7 +8,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from typing import Annotated, Any, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, PlainValidator, WithJsonSchema
+from pydantic import BaseModel, Field, PlainValidator, WithJsonSchema
 
 from antdrive.base.checks import show, suggest
 from antdrive.base.errors import FieldError
@@ -19,7 +19,6 @@ from antdrive.sim.settings import SETTINGS, DeclaredSetting
 from antdrive.worlds import Disc
 
 MAX_SEEDS = 100_000  # of one range
-RULES = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
 _SEEDS = re.compile(r"(\d{1,18})-(\d{1,18})")
 
 

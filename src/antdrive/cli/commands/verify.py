@@ -41,13 +41,17 @@ def verify(
     Exit code 0: every log proves that the robot touched nothing.
     Exit code 2: one cannot be read; the others are certified all the same.
     """
+    from antdrive.sim.verifying import verified
+
     task, spec = _expected(world, robot)
     checked: dict[str, dict[str, Any]] = {}
     for given in rollouts:
         path = str(given)
         try:
             path = str(log_at(given))
-            checked[path] = _checked(given, task, spec, replay)
+            checked[path] = verified(
+                Path(path), task, spec, given / "result.json" if given.is_dir() else None, replay=replay
+            )
         except InputError as error:
             print_error(str(error))
             checked[path] = {"certified": False, "problems": [str(error)], "readable": False}
@@ -71,43 +75,6 @@ def _expected(world: str | None, robot: str | None) -> tuple[Task | None, RobotS
         None if world is None else load_task(world),
         None if robot is None else load_robot(robot),
     )
-
-
-def _checked(path: Path, task: Task | None, robot: RobotSpec | None, again: bool) -> dict[str, Any]:
-    """Everything that is found out about one log or folder of a run, ready for JSON."""
-    from antdrive.sim.log.binding import differences, hashes_of
-    from antdrive.sim.log.certificate import certify
-    from antdrive.sim.log.claims import false_claims, read_result
-    from antdrive.sim.log.rollout import Rollout
-
-    rollout, result = Rollout.load(log_at(path)), path / "result.json"
-    certificate = certify(rollout)
-    found = certificate.as_dict()
-    problems = [*certificate.problems, *differences(rollout.record, task=task, robot=robot)]
-    if path.is_dir() and result.exists():
-        problems += false_claims(read_result(result), rollout, rollout.digest)
-    sentence = certificate.sentence
-    if again:
-        from antdrive.sim.driving.replay import replay
-
-        try:
-            check = replay(rollout)
-        except ValueError as error:  # the record is of no drive
-            problems.append(f"replay: {error}")
-        else:
-            found["replay"] = check.as_dict()
-            problems += check.problems
-            sentence += f"; {check.sentence}"
-    if problems and certificate.certified:
-        sentence = f"NOT verified; the log alone is {sentence}"
-    return {
-        **found,
-        "readable": True,
-        "certified": not problems,
-        "problems": problems,
-        "hashes": hashes_of(rollout.record),
-        "sentence": sentence,
-    }
 
 
 def _sentences(found: dict[str, Any], world: str | None, robot: str | None) -> list[str]:

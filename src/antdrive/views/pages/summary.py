@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -49,6 +50,25 @@ class CampaignSummary:
     def notes(self) -> list[str]:
         """What a reader of the tables must know about this campaign, a sentence each."""
         return notes_on(self)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, for JSON."""
+        return {
+            "runs": len(self.table),
+            "size": self.size,
+            "planners": [row.as_dict() for row in self.success],
+            "comparisons": {name: [row.as_dict() for row in rows] for name, rows in self.comparisons.items()},
+            "not_worse": [row.as_dict() for row in self.allowances],
+            "common": self.common,
+            "medians": {
+                name: [
+                    {"planner": planner, "median": median, "interval": list(interval)}
+                    for planner, (median, interval) in zip(self.paired.planners, rows, strict=True)
+                ]
+                for name, rows in self.medians.items()
+            },
+            "notes": self.notes,
+        }
 
 
 def summarise(
