@@ -51,13 +51,6 @@ def test_a_plan_has_all_kinds_of_figures_in_pixels_and_vectors(planned, tmp_path
     assert near(pixels(made["tour"]), (121, 136, 160)) > 1000, "obstacles"
 
 
-def test_a_search_has_neither_history_nor_field(planned, tmp_path):
-    task, grid, _ = planned
-    plan = load_planner("astar").plan(Query.between(grid, task), np.random.default_rng(0))
-    made = plan_figures(task, grid, plan, load_robot("turtlebot"), tmp_path, name="astar", suffixes=(".png",))
-    assert set(made) == {"plan"}
-
-
 def test_bars_rise_with_the_field(planned, tmp_path):
     _, grid, _ = planned
     field = np.zeros(grid.shape)
@@ -78,12 +71,6 @@ def test_a_large_field_is_drawn_with_fewer_bars_that_keep_its_peaks(tmp_path, mo
     bars_figure(grid, field, tmp_path / "a.png", dpi=50)
     assert len(heights[0]) <= module.MAX_BARS**2
     assert heights[0].max() == pytest.approx(3.0)
-
-
-def test_a_plan_is_drawn_on_the_map(planned, searched, tmp_path):
-    task, grid, _ = planned
-    picture = pixels(plan_figure(task, grid, searched, load_robot("turtlebot"), tmp_path / "plan.png", dpi=80))
-    assert near(picture, (255, 122, 14), 24) > 300
 
 
 def test_an_iterative_planner_gets_its_history_and_field(planned, searched, tmp_path):

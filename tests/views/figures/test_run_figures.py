@@ -109,12 +109,6 @@ def test_the_legend_says_when_movers_are_where_they_are_drawn(made_up_drive, pla
         assert f"moving obstacle, at {at:.1f} s" in named
 
 
-def test_a_rectangular_robot_and_planned_cells_are_drawn(made_up_drive, tmp_path):
-    drive = made_up_drive(square=True)
-    overview(drive, tmp_path / "square.png", cells=np.array([(0.5, 1.5), (0.75, 1.5)]), dpi=60)
-    assert (tmp_path / "square.png").exists()
-
-
 def test_a_run_that_never_drove_has_an_overview(made_up_drive, tmp_path):
     drive = made_up_drive(outcome="no_path")
     empty = dataclasses.replace(
@@ -123,14 +117,6 @@ def test_a_run_that_never_drove_has_an_overview(made_up_drive, tmp_path):
     )  # fmt: skip
     overview(empty, tmp_path / "empty.png", dpi=60)
     assert (tmp_path / "empty.png").stat().st_size > 5000
-
-
-def test_an_unknown_suffix_is_refused(made_up_drive, planned, tmp_path):
-    with pytest.raises(InputError, match=r"choose one of .png, .pdf, .svg"):
-        overview(made_up_drive(), tmp_path / "a.bmp")
-    with pytest.raises(InputError, match="choose one of"):
-        plan_figure(*planned, ROBOT, tmp_path / "a")
-    assert not list(tmp_path.iterdir())
 
 
 def test_figures_work_in_a_thread_without_pyplot_and_leave_settings_alone(made_up_drive, tmp_path, monkeypatch):

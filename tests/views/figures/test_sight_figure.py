@@ -45,13 +45,6 @@ def test_an_overview_calls_the_first_route_one_and_shows_all_of_it(log: Rollout)
     assert {"first route, before the world was seen", "obstacle, on no map"} <= words
 
 
-def test_nothing_is_passed_that_the_robot_only_came_nearest_to(log: Rollout) -> None:
-    said = " ".join(text.get_text() for text in panels(sight_figure(log))["first sights"].texts)
-    assert "first seen" in said
-    assert "nearest" in said
-    assert "passed" not in said
-
-
 def test_the_words_beside_the_curves_lie_in_the_picture_and_on_nothing_else(log: Rollout) -> None:
     """Every rule limited the speed in turn."""
     count = len(log.record.limiters)
@@ -64,12 +57,6 @@ def test_the_words_beside_the_curves_lie_in_the_picture_and_on_nothing_else(log:
         assert box.x1 <= figure.bbox.x1
     title = named["speed"].title.get_window_extent()
     assert not title.overlaps(named["speed"].get_legend().get_window_extent())
-
-
-def test_the_same_log_gives_the_same_file(log: Rollout, tmp_path: Path) -> None:
-    for name in ("a.png", "b.png"):
-        sight_figure(log, tmp_path / name, dpi=40)
-    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
 
 def test_a_log_without_scans_has_no_such_figure(made_up_drive: Any) -> None:

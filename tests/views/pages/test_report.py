@@ -117,11 +117,6 @@ def test_the_page_needs_no_network_and_escapes_its_content(runs, tmp_path):
     assert "antdrive run made-up --planner &#39;mmas&#39;" in text
 
 
-def test_films_can_be_embedded(runs, tmp_path):
-    write_report(runs, tmp_path / "with.html", embed_films=True)
-    assert "data:video/mp4;base64," in (tmp_path / "with.html").read_text()
-
-
 def test_the_page_stays_small_by_linking_figures(runs, tmp_path, monkeypatch):
     from antdrive.views.pages import report as reporting
 

@@ -1,7 +1,6 @@
 """A campaign's tables as Markdown, LaTeX and CSV, and the numbers in their cells."""
 
 import csv
-import json
 import math
 from pathlib import Path
 
@@ -216,8 +215,3 @@ def test_cells_by_hand() -> None:
     assert [measure_title(name) for name in ("success", "duration_s", "plan_s", "spl", "turning_rad_per_m")] == [
         "success", "duration [s]", "planning time [s]", "spl", "turning [rad/m]",
     ]  # fmt: skip
-
-
-def test_json_is_made_of_plain_values(summary: CampaignSummary) -> None:
-    for row in (summary.success[0], summary.comparisons["success"][0]):
-        assert json.loads(json.dumps(row.as_dict()))["interval"] == list(row.interval)
