@@ -138,9 +138,9 @@ def no_elite() -> None:
 
 
 def no_avoidance() -> None:
-    from antdrive.sim import Scenario
+    from antdrive.sim import compose
 
-    Scenario.effective_avoidance = property(lambda self: None)  # type: ignore[method-assign,assignment]
+    compose.avoidance_of = lambda s: None
 
 
 DESK = "x: 4.0, y: 2.3,"

@@ -72,7 +72,7 @@ nitpick_ignore_regex = [
     # Contents of files, whose keys the pages on formats describe.
     (
         "py:class",
-        r"antdrive\.(runs\.campaigns\.campaign|sim\.entries|runs\.suites\.suite)\.(\w+Entry|CampaignFile|RandomTasks)",
+        r"antdrive\.(runs\.campaigns\.campaign|runs\.suites\.suite)\.(\w+Entry|CampaignFile|RandomTasks)",
     ),
 ]
 

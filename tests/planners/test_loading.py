@@ -26,7 +26,7 @@ from antdrive.worlds import rasterise
 def overloads():
     return {f"{d.__module__}.{d.__name__}": len(d.overloads) for d in gc.get_objects() if isinstance(d, Dispatcher)}
 
-for words in sys.argv[2:]:
+for words in sys.argv[1:]:
     if os.fork():
         os.wait()
         continue
@@ -37,8 +37,7 @@ for words in sys.argv[2:]:
     s = Scenario.of("plaza-moving", planner)
     query = Query.between(rasterise(s.task.world, s.task.cell, s.inflate), s.task)
     query = replace(query, motions=s.trajectories.motions) if s.timed else query
-    if sys.argv[1] == "loaded":
-        load_kernels(planner, query)
+    load_kernels(planner, query)
     before = overloads()
     status = planner._answer(query, s.rng("planner")).status.name
     loaded = sorted(kernel for kernel, count in overloads().items() if count != before.get(kernel))
@@ -70,10 +69,7 @@ def watched(method):
 
 for kind in (Replanning, CellByCell):
     kind.replan = watched(kind.replan)
-if sys.argv[1] != "loaded":
-    import antdrive.sim.pipeline
-    antdrive.sim.pipeline._load_replanning = lambda s: None
-for words in sys.argv[2:]:
+for words in sys.argv[1:]:
     if os.fork():
         os.wait()
         continue
@@ -97,21 +93,15 @@ def printed(script: str, *words: str) -> dict[str, list[str]]:
     done = subprocess.run([sys.executable, "-c", script, *words], capture_output=True, text=True, timeout=1800)
     assert done.returncode == 0, done.stderr
     lines = [line.split(" - ") for line in done.stdout.splitlines()]
-    assert len(lines) == len(words) - 1, done.stderr
+    assert len(lines) == len(words), done.stderr
     return {name: found.split() for name, found in lines}
 
 
 @needs_kernels
 @pytest.mark.parametrize("words", [SOON, pytest.param((*PLANNERS, *COLONIES), marks=pytest.mark.slow)], ids=len)
 def test_every_kernel_of_a_planner_is_loaded_before_the_clock_starts(words: tuple[str, ...]) -> None:
-    for name, (_, *loaded) in printed(PLANS, "loaded", *words).items():
+    for name, (_, *loaded) in printed(PLANS, *words).items():
         assert loaded == [], name
-
-
-@needs_kernels
-def test_without_a_rehearsal_the_clock_would_hold_the_loading() -> None:
-    for name, (_, *loaded) in printed(PLANS, "bare", "astar", "tangent").items():
-        assert loaded, name
 
 
 @needs_kernels
@@ -120,15 +110,9 @@ def test_without_a_rehearsal_the_clock_would_hold_the_loading() -> None:
     "words", ["dstar-lite clearance", "ants taut", "mmas-dstar none", "as clearance", "tangent taut"]
 )
 def test_every_kernel_of_a_replan_is_loaded_before_the_clock_starts(words: str) -> None:
-    count, *loaded = printed(REPLANS, "loaded", words)[words]
+    count, *loaded = printed(REPLANS, words)[words]
     assert int(count) > 0, "the drive replans"
     assert loaded == []
-
-
-@needs_kernels
-@pytest.mark.slow
-def test_without_a_rehearsal_the_first_replan_would_hold_the_loading() -> None:
-    assert len(printed(REPLANS, "bare", "ants taut")["ants taut"]) > 1
 
 
 class Counting(GridPlanner):

@@ -19,9 +19,6 @@ from antdrive.planners import (
     PLANNERS,
     AcoHan,
     Capabilities,
-    GridPlanner,
-    PlanResult,
-    Query,
     capabilities_of,
     describe,
     list_planners,
@@ -211,16 +208,3 @@ def test_a_planner_has_the_methods_that_it_declares(name: str) -> None:
     assert can.iterative == hasattr(planner, "iterate")
     assert can.own_replanner == hasattr(planner, "replanner")
     assert can.cell_by_cell == hasattr(planner, "agent")
-
-
-def test_an_unknown_planner_would_be_noticed() -> None:
-    class Newcomer(GridPlanner):
-        """As a planner whose module uses kernels that nothing warms up."""
-
-        def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
-            raise NotImplementedError
-
-    assert capabilities_of(Newcomer()) == Capabilities()
-    assert "newcomer" not in PLANNER_STYLES
-    assert kernel_modules(PLANNERS["sipp"]) >= {"_kernels_sipp"}
-    assert kernel_modules(PLANNERS["ants"]) >= {"_kernels_colony", "_kernels_search"}

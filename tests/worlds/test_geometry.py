@@ -99,13 +99,6 @@ def test_clearance_is_negative_inside_a_disc_and_beyond_a_wall():
     assert point_clearance(world, [(5, 5), (-1, 5), (5, 4)]).tolist() == [-2.0, -1.0, -1.0]
 
 
-def test_many_points_at_once_are_as_each_alone():
-    world = World("w", (0, 0, 10, 10), (Disc(5, 5, 2), Disc(1, 8, 0.5)))
-    xy = np.random.default_rng(0).uniform(-1, 11, (100, 2))
-    together = point_clearance(world, xy)
-    assert together.tolist() == [point_clearance(world, p)[0] for p in xy]
-
-
 def test_no_points_have_no_clearances():
     world = World("w", (0, 0, 10, 10))
     assert point_clearance(world, np.empty((0, 2))).shape == (0,)

@@ -9,11 +9,17 @@ import functools
 import inspect
 import re
 from collections.abc import Hashable, Mapping
-from typing import Any, cast, get_type_hints
+from typing import TYPE_CHECKING, Any, cast, get_type_hints
 
 from annotated_types import Interval
 
 from antdrive.base.errors import FieldError
+
+if TYPE_CHECKING:
+    from pydantic import ConfigDict
+
+#: The rules of records and files: no guessing of types, no unknown keys, no NaN and no infinity, also in nested records.
+STRICT: ConfigDict = {"strict": True, "extra": "forbid", "allow_inf_nan": False, "frozen": True}
 
 
 def attributes_of(docstring: str | None) -> dict[str, str]:

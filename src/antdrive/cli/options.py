@@ -15,7 +15,7 @@ import typer
 
 from antdrive.base.errors import FieldError, InputError
 from antdrive.cli.parse import disc
-from antdrive.sim.settings import SETTINGS, Declared
+from antdrive.sim.settings import SETTINGS, DeclaredSetting
 
 Command = Callable[..., int]
 
@@ -46,7 +46,7 @@ def with_settings(names: Iterable[str], *, many: bool = False, **defaults: Any) 
     return decorated
 
 
-def _parameter(one: Declared, many: bool, defaults: dict[str, Any]) -> inspect.Parameter:
+def _parameter(one: DeclaredSetting, many: bool, defaults: dict[str, Any]) -> inspect.Parameter:
     """The parameter of a command that typer makes a setting's option of."""
     setting = one.setting
     text = setting.help[0].upper() + setting.help[1:]
@@ -72,7 +72,7 @@ def _parameter(one: Declared, many: bool, defaults: dict[str, Any]) -> inspect.P
     return inspect.Parameter(one.key, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
 
 
-def _value(one: Declared, value: Any, many: bool) -> Any:
+def _value(one: DeclaredSetting, value: Any, many: bool) -> Any:
     """A setting as files write it, from what an option gives."""
     if one.setting.form == "discs":
         return [disc(text) for text in value or ()]
@@ -193,6 +193,10 @@ Speed = Annotated[
 ]
 Vector = Annotated[bool, typer.Option("--vector", help="Write figures as PDF too.", rich_help_panel="Output")]
 Figures = Annotated[bool, typer.Option("--figures/--no-figures", help="Write figures.", rich_help_panel="Output")]
+Jobs = Annotated[
+    int | None,
+    typer.Option("--jobs", "-j", min=1, max=256, metavar="NUMBER", help="Processes.  [default: one per core]"),
+]
 Json = Annotated[
     bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else.", rich_help_panel="Output")
 ]

@@ -8,18 +8,18 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
+from pydantic import BaseModel, Field, create_model, model_validator
 
 from antdrive.base.checks import OneLine, SchemaVersion, check, schema_of, suggest
 from antdrive.base.document import Document, parse_document, read_yaml
 from antdrive.base.errors import FieldError, input_error
+from antdrive.base.records import STRICT
 from antdrive.base.reuse import reused
 from antdrive.robots.feasible import require_feasible
 from antdrive.robots.outline import MOST_CORNERS
 from antdrive.robots.spec import Footprint, RobotSpec
 
 _CATALOG = Path(__file__).with_name("catalog")
-_RULES = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
 
 _Size = Annotated[float, Field(gt=0)]
 _Place: TypeAlias = tuple[float, float]
@@ -37,7 +37,7 @@ class FootprintEntry(BaseModel):
     Positions are in the robot's frame: x ahead and y to the left of the axle's centre.
     """
 
-    model_config = _RULES
+    model_config = STRICT
 
     radius: _Size | None = Field(None, description="radius of a round robot [m]")
     length: _Size | None = Field(None, description="length of a rectangular robot, along its heading [m]")
@@ -89,7 +89,7 @@ def _robot_file() -> Any:
         ),
         "footprint": (FootprintEntry, Field(description=f"{_FORMS} [m]")),
     }
-    return create_model("RobotFile", __config__=_RULES, __doc__=RobotSpec.__doc__, **values)
+    return create_model("RobotFile", __config__=STRICT, __doc__=RobotSpec.__doc__, **values)
 
 
 #: A robot as written in a file: a specification, but for its footprint and for a name that the file may leave out.

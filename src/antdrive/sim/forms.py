@@ -8,18 +8,17 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from typing import Annotated, Any, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, PlainValidator, WithJsonSchema
+from pydantic import BaseModel, Field, PlainValidator, WithJsonSchema
 
 from antdrive.base.checks import show, suggest
 from antdrive.base.errors import FieldError
 from antdrive.robots import Avoidance, PurePursuit
 from antdrive.sim.log.record import changes, plain_value, settings_of
 from antdrive.sim.policy import Perception, PerceptionKind, ReplanPolicy
-from antdrive.sim.settings import SETTINGS, Declared
+from antdrive.sim.settings import SETTINGS, DeclaredSetting
 from antdrive.worlds import Disc
 
 MAX_SEEDS = 100_000  # of one range
-RULES = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
 _SEEDS = re.compile(r"(\d{1,18})-(\d{1,18})")
 
 
@@ -219,7 +218,7 @@ FORMS: Mapping[str, Form] = {
 }
 
 
-def form_of(one: Declared) -> Form:
+def form_of(one: DeclaredSetting) -> Form:
     """How a setting is written."""
     return FORMS[one.setting.form]
 
@@ -231,12 +230,12 @@ def option_text(value: Any) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def file_fields(settings: Iterable[Declared]) -> dict[str, Any]:
+def file_fields(settings: Iterable[DeclaredSetting]) -> dict[str, Any]:
     """The fields of a pydantic model of a file that holds settings, by key."""
     return {one.key: (written_kind(one), written_default(one)) for one in settings}
 
 
-def written_kind(one: Declared) -> Any:
+def written_kind(one: DeclaredSetting) -> Any:
     """What a file may hold for a setting, for pydantic."""
     form = form_of(one)
     if form.written is not None:
@@ -245,7 +244,7 @@ def written_kind(one: Declared) -> Any:
     return kind | None if one.optional else kind
 
 
-def written_default(one: Declared) -> Any:
+def written_default(one: DeclaredSetting) -> Any:
     """The default of a setting in a file, with its description."""
     usual = form_of(one).usual
     default = one.default if usual is None else usual

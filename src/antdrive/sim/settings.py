@@ -213,7 +213,7 @@ class Settings:
 
 
 @dataclass(frozen=True)
-class Declared:
+class DeclaredSetting:
     """A setting as declared in `Settings`.
 
     Attributes:
@@ -291,7 +291,7 @@ def _keeps(bound: Ge | Gt | Le, value: Any) -> bool:
     return bool(value >= bound.ge) if isinstance(bound, Ge) else bool(value > bound.gt)
 
 
-def declared(kind: type[Any]) -> Iterator[Declared]:
+def declared(kind: type[Any]) -> Iterator[DeclaredSetting]:
     """The settings that a record declares, in the order of its fields."""
     for one in dataclasses.fields(kind):
         base, *notes = typing.get_args(one.type)
@@ -299,11 +299,11 @@ def declared(kind: type[Any]) -> Iterator[Declared]:
         optional = type(None) in of
         setting = next(note for note in notes if isinstance(note, Setting))
         bounds = tuple(note for note in notes if isinstance(note, Ge | Gt | Le))
-        yield Declared(one.name, of[0] if optional else base, optional, bounds, setting, one)
+        yield DeclaredSetting(one.name, of[0] if optional else base, optional, bounds, setting, one)
 
 
 #: Every setting of a scenario by the name of its field, in the order of tables.
-SETTINGS: Mapping[str, Declared] = MappingProxyType({one.name: one for one in declared(Settings)})
+SETTINGS: Mapping[str, DeclaredSetting] = MappingProxyType({one.name: one for one in declared(Settings)})
 
 
 def part_of_key(fields: Mapping[str, Any], without: Collection[str] = ()) -> dict[str, Any]:
@@ -311,6 +311,17 @@ def part_of_key(fields: Mapping[str, Any], without: Collection[str] = ()) -> dic
     known = (one for one in SETTINGS.values() if one.name in fields and one.name not in without)
     return {one.name: fields[one.name] for one in known if one.setting.since == 1 or fields[one.name] != one.default}
 
+
+def _columns() -> Iterator[tuple[str, str]]:
+    for one in SETTINGS.values():
+        plain = one.setting.form == "plain"
+        yield one.column, {float: "double", int: "int64"}.get(one.kind, "string") if plain else "string"
+        if one.column != one.key:
+            yield one.key, "double"
+
+
+#: The columns of settings in a campaign's table and their types; the margin that was driven with follows the one asked for.
+SETTING_COLUMNS: Mapping[str, str] = MappingProxyType(dict(_columns()))
 
 Settings.__doc__ = "\n".join(
     [

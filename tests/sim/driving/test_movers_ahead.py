@@ -14,9 +14,9 @@ from antdrive.base import Floats
 from antdrive.planners import load_planner
 from antdrive.robots import RobotSpec
 from antdrive.sim import Perception, ReplanPolicy, Scenario, run
-from antdrive.sim.driving.movers_ahead import SLACK, MoversAhead
-from antdrive.sim.driving.replanning import OBSTRUCTED, TRAFFIC, WAITED
+from antdrive.sim.driving.movers_ahead import SLACK, MoversSeenAhead
 from antdrive.sim.driving.traffic import FADING, FAST, TrackedTraffic
+from antdrive.sim.driving.triggers import OBSTRUCTED, TRAFFIC, WAITED
 from antdrive.sim.driving.watching import Tracked
 from antdrive.sim.sensing import TrackedMovers
 from antdrive.worlds import Keyframed, Task, World, rasterise
@@ -52,15 +52,15 @@ def traffic_seen(robot: RobotSpec) -> tuple[TrackedTraffic, Seen]:
     return TrackedTraffic(Tracked(watch, LIDAR, 60), robot, 60), watch
 
 
-def ahead(robot: RobotSpec, hits: Floats | None = None, **policy: float) -> tuple[MoversAhead, Seen]:
+def ahead(robot: RobotSpec, hits: Floats | None = None, **policy: float) -> tuple[MoversSeenAhead, Seen]:
     watch: Any = Seen()
     found = np.empty((0, 3)) if hits is None else hits
     survey: Any = SimpleNamespace(map=SimpleNamespace(trust=7.5, discs=lambda: found))
     predictor, settings = Tracked(watch, LIDAR, 60), ReplanPolicy(**policy)
-    return MoversAhead(predictor, survey, settings, robot, TASK.goal, robot.radius + 0.03, 60), watch
+    return MoversSeenAhead(predictor, survey, settings, robot, TASK.goal, robot.radius + 0.03, 60), watch
 
 
-def busy(movers: MoversAhead, watch: Seen, speed: float) -> None:
+def busy(movers: MoversSeenAhead, watch: Seen, speed: float) -> None:
     """Show it ten movers between the long walls, each on another place and going north."""
     for tick in range(1, 61):
         watch.see([(3.0 + k, 3.0 + 6.0 * ((k + 0.1 * tick) % 1.0), 0.0, speed) for k in range(10)], tick=tick)

@@ -13,10 +13,11 @@ from antdrive.planners import load_planner
 from antdrive.robots import PursuitState, RobotSpec, Twist
 from antdrive.sim import Outcome, Run, Scenario, run
 from antdrive.sim.driving.driver import Driver
-from antdrive.sim.driving.own_map import LOOKED, forgetting_ticks
+from antdrive.sim.driving.own_map import forgetting_ticks
 from antdrive.sim.driving.parts import Step
 from antdrive.sim.driving.recovery import Look, Recovery
 from antdrive.sim.driving.replay import replay
+from antdrive.sim.driving.triggers import LOOKED
 from antdrive.sim.physics.engine import State
 from antdrive.worlds import Cruising, Disc, Task, World
 from tests.sim.driving.guides import exploration_of

@@ -15,8 +15,8 @@ from pydantic import BaseModel, BeforeValidator, Field, PlainValidator, TypeAdap
 from antdrive.base.checks import SchemaVersion, check, schema_of, show
 from antdrive.base.document import Document, Location, read_document
 from antdrive.base.errors import InputError
+from antdrive.base.records import STRICT
 from antdrive.sim.forms import (
-    RULES,
     SEEDS_SCHEMA,
     TextOrMapping,
     file_fields,
@@ -66,7 +66,7 @@ NamesOrMappings = Annotated[list[TextOrMapping], Field(min_length=1), BeforeVali
 AXES = MappingProxyType({name: one for name, one in SETTINGS.items() if one.setting.axis and name != "seed"})
 SettingsEntry = create_model(
     "SettingsEntry",
-    __config__=RULES,
+    __config__=STRICT,
     __doc__="How a robot drives: the settings that have no key of their own in a campaign.",
     **file_fields(one for one in SETTINGS.values() if not one.setting.axis),
 )
@@ -86,7 +86,7 @@ def _axes() -> dict[str, Any]:
 class TaskEntry(BaseModel):
     """A start and a goal that every world of the campaign is driven with."""
 
-    model_config = RULES
+    model_config = STRICT
 
     name: str | None = Field(None, min_length=1, max_length=100, description="what tables call the task")
     start: list[float] = Field(min_length=3, max_length=3, description="write [x, y, yaw] in metres and radians")
@@ -96,7 +96,7 @@ class TaskEntry(BaseModel):
 class RandomTasks(BaseModel):
     """Starts and goals drawn in each world: free cells for the largest robot, with a path between them."""
 
-    model_config = RULES
+    model_config = STRICT
 
     random: int = Field(ge=1, le=100_000, description="tasks in each world")
     seed: int = Field(0, ge=0, lt=2**63, description="seed of the draws")
@@ -143,7 +143,7 @@ def _settings_schema() -> dict[str, Any]:
 class GridEntry(BaseModel):
     """What a campaign lists beside settings."""
 
-    model_config = RULES
+    model_config = STRICT
 
     schema_: SchemaVersion = Field(alias="schema", description="write schema: 1")
     note: str | None = Field(None, description="what the campaign is for, free text")

@@ -9,14 +9,14 @@ from __future__ import annotations
 import functools
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from antdrive.base.optional import parquet_library
 from antdrive.runs.campaigns.job import Job
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.pipeline import Run, versions
-from antdrive.sim.settings import SETTINGS
+from antdrive.sim.settings import SETTING_COLUMNS
 
 if TYPE_CHECKING:
     import pyarrow
@@ -30,17 +30,6 @@ NOT_CANONICAL = (*WALL_TIMES, "attempts")
 VERSIONS = ("antdrive", "numpy", "pybullet", "numba")
 BATCH = 50_000  # rows that are plain Python at a time
 OPTION = "option."  # what the names of columns with a planner's option begin with
-
-
-def _setting_columns() -> Iterator[tuple[str, str]]:
-    """The column of each setting and its type; the margin that was driven with stands beside the one that was asked for."""
-    for one in SETTINGS.values():
-        plain = one.setting.form == "plain"
-        yield one.column, {float: "double", int: "int64"}.get(one.kind, "string") if plain else "string"
-        if one.column != one.key:
-            yield one.key, "double"
-
-
 #: What a run is, besides its options: the column's name and its type.
 GRID: Mapping[str, str] = {
     "key": "string",
@@ -54,7 +43,7 @@ GRID: Mapping[str, str] = {
     "options": "string",
     "robot": "string",
     "robot_hash": "string",
-    **dict(_setting_columns()),
+    **SETTING_COLUMNS,
     "command": "string",
 }
 #: What came out of a run: the column's name and its type.

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from antdrive.base.errors import FieldError
+from antdrive.base.records import STRICT
 from antdrive.runs.margins.trial import Loss
 
 PROBABILITY = 1e-3  # of a drive along a course that loses more than predicted
@@ -44,7 +45,7 @@ class Calibration:
     drives: int
     key: str
 
-    __pydantic_config__ = {"strict": True, "extra": "forbid", "allow_inf_nan": False}  # noqa: RUF012
+    __pydantic_config__ = STRICT
 
 
 def predicted_loss(losses: Sequence[float], probability: float = PROBABILITY) -> float:

@@ -12,16 +12,15 @@ import numpy.typing as npt
 from antdrive.base.errors import FieldError
 from antdrive.base.types import Flags, Floats
 from antdrive.runs.statistics.selecting import column_named, places_of
+from antdrive.sim.settings import SETTING_COLUMNS
+from antdrive.sim.settings import SETTINGS as DECLARED
 
 #: Where a run took place.
 PLACE = ("world", "world_hash", "task")
 #: The rest of what a run is, besides planner and seed. A table may lack some of them.
-SETTINGS = (
-    *("robot", "robot_hash", "smoothing", "noise", "margin_asked", "margin", "cell", "map", "localisation", "odometry"),
-    *("controller", "sees", "avoid", "replan", "unseen", "time_limit", "physics_hz", "control_hz"),
-)
+SETTINGS = ("robot", "robot_hash", *(name for name in SETTING_COLUMNS if name != "seed"))
 #: What a robot knows of the world and of its pose.
-SENSING = ("map", "localisation", "odometry")
+SENSING = tuple(one.column for one in DECLARED.values() if one.setting.group == "Sensing")
 #: The margin as the campaign asks for it, such as "auto", and the one that was driven with: runs are paired by the first.
 ASKED, DRIVEN = "margin_asked", "margin"
 #: A world's own cell size is no setting of the campaign, so that seeds are not judged apart for each size.

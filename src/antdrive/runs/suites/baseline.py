@@ -18,9 +18,10 @@ from antdrive.base.atomic import written_whole
 from antdrive.base.errors import input_error
 from antdrive.base.plane import wrap_angle
 from antdrive.base.reading import read_bytes
+from antdrive.base.records import STRICT
 from antdrive.base.types import Floats
 from antdrive.runs.suites.demands import WALL_CLOCK
-from antdrive.runs.suites.nearest import RULES, ClosestApproach, nearest_of
+from antdrive.runs.suites.nearest import ClosestApproach, nearest_of
 from antdrive.runs.suites.suite import shown_path
 from antdrive.sim.log.binding import hashes_of
 from antdrive.sim.log.metrics import METRICS
@@ -61,7 +62,7 @@ class Baseline:
             the drive's end
     """
 
-    __pydantic_config__ = RULES
+    __pydantic_config__ = STRICT
 
     schema: int = SCHEMA
     case: str
@@ -197,6 +198,10 @@ class Baseline:
     @classmethod
     def own(cls, path: Path, case: str) -> Baseline | None:
         """The baseline in a file, which must be that of the test; None if there is no such file.
+
+        Args:
+            path: the file
+            case: the name of the test
 
         Raises:
             InputError: the file is no baseline, or that of another test.

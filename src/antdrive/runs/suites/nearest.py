@@ -7,15 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from antdrive.base.records import STRICT
 from antdrive.robots.placing import gaps, name_of
 from antdrive.runs.suites.demands import CYLINDER, MOVER, UNSEEN, WALL
 from antdrive.sim.log.contacts import touches_of
 from antdrive.sim.log.margin import budget
 from antdrive.sim.log.rollout import Rollout
 from antdrive.worlds.world import Disc
-
-# pydantic reads this attribute of records: no guessing of types, no unknown keys, no NaN and no infinity.
-RULES = {"strict": True, "extra": "forbid", "allow_inf_nan": False}
 
 # Columns of `gaps` and indices in a log's contacts count the walls in different orders.
 _WALL_OF_CONTACT = (0, 2, 1, 3)  # left, right, lower, upper as columns after the obstacles
@@ -33,7 +31,7 @@ class ClosestApproach:
         clearance: distance between the robot's surface and the thing's [m]
     """
 
-    __pydantic_config__ = RULES
+    __pydantic_config__ = STRICT
 
     thing: str
     t: float

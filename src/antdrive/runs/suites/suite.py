@@ -15,8 +15,9 @@ from pydantic import BaseModel, Field, PlainValidator, WithJsonSchema, create_mo
 from antdrive.base.checks import SchemaVersion, check
 from antdrive.base.document import Document, Location, read_document
 from antdrive.base.errors import FieldError, InputError, input_error
+from antdrive.base.records import STRICT
 from antdrive.runs.suites.demands import END, KINDS, Demands, causes
-from antdrive.sim.forms import RULES, SeedList, TextOrMapping, file_fields, said
+from antdrive.sim.forms import SeedList, TextOrMapping, file_fields, said
 from antdrive.sim.log.metrics import METRICS
 from antdrive.sim.log.outcome import Outcome
 from antdrive.sim.settings import SETTINGS
@@ -44,7 +45,7 @@ TrajectoryValue = Annotated[Any, PlainValidator(_anything), WithJsonSchema(_TRAJ
 class CaseEntry(BaseModel):
     """A scenario of a suite beside its settings."""
 
-    model_config = RULES
+    model_config = STRICT
 
     note: str | None = Field(None, description="what the scenario is for, free text")
     world: TextOrMapping = Field(
@@ -91,7 +92,7 @@ else:
 class SuiteFile(BaseModel):
     """A suite of scenarios, as written in a `*.drive.yaml` file."""
 
-    model_config = RULES
+    model_config = STRICT
 
     schema_: SchemaVersion = Field(alias="schema", description="write schema: 1")
     defaults: ScenarioEntry = Field(

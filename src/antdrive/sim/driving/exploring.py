@@ -30,25 +30,29 @@ from antdrive.robots import TrackedPath, Twist
 from antdrive.robots.control.pursuit import unsorted
 from antdrive.sim.driving import _kernels_hits
 from antdrive.sim.driving.blocking import blocked_cells
-from antdrive.sim.driving.movers_ahead import MoversAhead
-from antdrive.sim.driving.own_map import LOOKED, PATIENCE
+from antdrive.sim.driving.movers_ahead import MoversSeenAhead
+from antdrive.sim.driving.own_map import PATIENCE
 from antdrive.sim.driving.parts import RouteGuide, Rows
 from antdrive.sim.driving.recovery import TRAIL, Look, Recovery
-from antdrive.sim.driving.replanning import MISSED, STRAYED, Replan
+from antdrive.sim.driving.replanning import Replan
 from antdrive.sim.driving.routes import RoutePlanner
 from antdrive.sim.driving.survey import Survey
 from antdrive.sim.driving.traffic import Zone
+from antdrive.sim.driving.triggers import (
+    BACKED,
+    DISCOVERED,
+    HELD,
+    LOOKED,
+    LOST,
+    MADE_ROOM,
+    MISSED,
+    STALLED,
+    STRAYED,
+)
 from antdrive.sim.log.streams import random_stream
 from antdrive.sim.policy import ReplanPolicy
 from antdrive.worlds import Disc, Grid, Route, Task, World, point_clearance, rasterise
 from antdrive.worlds.world import PointWorld
-
-DISCOVERED = "discovered"
-STALLED = "stalled"
-HELD = "held by sight"
-BACKED = "backed off"
-MADE_ROOM = "made room"
-LOST = "no way"
 
 GROWTH = (4.0, 16.0)  # how far beyond start and goal plans may lead, then if there is no path [m]
 MARGINS = (1.0, 0.0)  # shares of the margin that plans keep, then if the way is long or there is none
@@ -80,7 +84,7 @@ class Exploration(RouteGuide):
         planner: RoutePlanner,
         survey: Survey,
         policy: ReplanPolicy,
-        movers: MoversAhead | None = None,
+        movers: MoversSeenAhead | None = None,
     ) -> None:
         self._movers = movers
         self.survey, self.log = survey, []
@@ -167,13 +171,12 @@ class Exploration(RouteGuide):
         if movers.heavy(tick, pose):
             task = self._known(pose, movers.bounds(self._bounds(GROWTH[0], pose)))
             grid = rasterise(task.world, self._cell, self._robot.radius + self._margin)
-            longest = self._policy.max_detour * math.dist(pose[:2], self._task.goal)
-            for zone in movers.zones(tick, pose, grid):
-                # Movers that are far away will have moved on: they must not close the only way to the goal.
-                near = movers.discs(tick, pose, zone)
-                answer = self._ask_around(task, grid, near + zone.discs, zone)
-                if answer.cost <= longest:
-                    return grid, answer, near + zone.discs
+            zones, soon = movers.zones(tick, pose, grid), movers.discs(tick, pose)
+            around = movers.way_round(
+                pose, zones, soon, lambda near, zone: self._ask_around(task, grid, near + zone.discs, zone)
+            )
+            if around is not None:
+                return (grid, *around)
         discs = movers.discs(tick, pose)
         if discs:
             grid, answer = self.plan(pose, discs)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from antdrive.sim.driving.triggers import LOOKED
 from antdrive.sim.log.record import DriveRecord, ReplanRecord
-
-LOOKED = "looked round"  # why a route is planned after the robot has looked round
 
 MAP_CELL = 0.05  # side of the map's cells [m]
 HORIZON, HORIZON_AMONG_MOVERS = 10.0, 16.0  # hits farther away are not entered in the map [m]

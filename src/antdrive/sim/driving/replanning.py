@@ -33,25 +33,19 @@ from antdrive.planners import (
 )
 from antdrive.robots import TrackedPath
 from antdrive.sim.driving.blockage import Blockage
-from antdrive.sim.driving.blocking import blocked_cells, close_route, covered_discs, with_obstacles
+from antdrive.sim.driving.blocking import blocked_cells, with_obstacles
+from antdrive.sim.driving.movers_ahead import MoversOnMap
 from antdrive.sim.driving.parts import Others
 from antdrive.sim.driving.routes import OneRoute, RoutePlanner
 from antdrive.sim.driving.schedule import Schedule
 from antdrive.sim.driving.traffic import Traffic, Zone
+from antdrive.sim.driving.triggers import LATE, MISSED, STRAYED, WAITED
 from antdrive.sim.log.streams import random_stream
 from antdrive.sim.policy import ReplanPolicy
 from antdrive.worlds import Disc, Grid, Route, Task, rasterise
 
 if TYPE_CHECKING:
     from antdrive.planners import Replanner
-
-# Triggers, as the log records them.
-STRAYED = "strayed"
-LATE = "late"
-WAITED = "waited"
-OBSTRUCTED = "obstructed"
-TRAFFIC = "traffic"
-MISSED = "missed the goal"
 
 
 @dataclass(frozen=True)
@@ -99,10 +93,6 @@ class Replanning(OneRoute):
         self._timed = capabilities_of(planner.planner).needs_motions
         self._replanner: Replanner | None = None
         self._replanned_at = -math.inf
-        self._waiting_since = math.nan
-        learns = policy.around_movers and others.guesses and not self._timed
-        bounds = planner.task.world.bounds
-        self._traffic = Traffic(others, planner.robot.radius, bounds, planner.hz) if learns else None
 
     def route(self, grid: Grid, plan: PlanResult) -> tuple[Route, TrackedPath]:
         """Set out on a plan: its route, and the same prepared for the controller."""
@@ -117,6 +107,10 @@ class Replanning(OneRoute):
             patience=policy.patience,
             keeps=self._keeps,
         )
+        others, robot, task = self._predictor, self._routes.robot, self._task
+        learns = policy.around_movers and others.guesses and not self._timed
+        traffic = Traffic(others, robot.radius, task.world.bounds, self._hz) if learns else None
+        self._ahead = MoversOnMap(others, policy, task.goal, grid, self._hz, traffic, self.blockage.gaps)
         route, path = super().route(grid, plan)
         self._track(plan, route)
         return route, path
@@ -145,12 +139,7 @@ class Replanning(OneRoute):
     def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
         """Why a new route is due now; empty if none is."""
         now, policy = tick / self._hz, self.policy
-        if self._traffic is not None:
-            self._traffic.look(tick, pose[:2])
-        if not waiting:
-            self._waiting_since = math.nan
-        elif math.isnan(self._waiting_since):
-            self._waiting_since = now
+        self._ahead.look(tick, pose, waiting)
         if self.blockage.pause(tick, pose[:2]) or now - self._replanned_at < policy.min_interval:
             return ""
         deviation = math.dist(_point_at(tracked.route, arc), pose[:2])
@@ -159,21 +148,20 @@ class Replanning(OneRoute):
             return STRAYED
         if self._timed:
             return LATE if self.schedule is None or self.schedule.late(now, arc) else ""
-        if policy.around_movers and now - self._waiting_since >= policy.max_wait:
+        due = self._ahead.trigger(tick, pose, tracked, arc) if policy.around_movers else ""
+        if due == WAITED:
             self.blockage.gaps.note(tick, pose[:2], tracked, arc, self.blockage.standing(tick, pose[:2]))
-            return WAITED
-        if policy.around_movers and self._obstructed(tick, pose, tracked, arc):
-            return OBSTRUCTED
-        return TRAFFIC if self._in_traffic(tick, pose, tracked, arc) else ""
+        return due
 
     def replan(self, tick: int, pose: Pose, trigger: str) -> TrackedPath | None:
         """A new path from a pose [m, m, rad], prepared for the controller; None if there is none."""
         now = tick / self._hz
-        self._replanned_at, self._waiting_since = now, math.nan
+        self._replanned_at = now
+        self._ahead.wait_anew()
         started = time.perf_counter()
         # A robot that has missed the goal is near it, where avoiding movers is enough.
         around_movers = self.policy.around_movers and trigger != MISSED and not self._timed
-        discs = self._discs(tick, pose) if around_movers else []
+        discs = self._ahead.discs(tick, pose) if around_movers else []
         try:
             task = dataclasses.replace(self._task, start=pose)
         except ValueError:  # the estimated pose lies outside the world or in an obstacle
@@ -182,9 +170,11 @@ class Replanning(OneRoute):
         if self._timed:
             plan = self._routes.ask(self._routes.query(self._grid, task, now), self._rng)
         else:
-            plan, discs = self._plan_around(task, discs, self._zones(tick, pose) if around_movers else [])
+            zones = self._ahead.zones(tick, pose, self._grid) if around_movers and self._ahead.heavy(tick, pose) else []
+            around = self._ahead.way_round(pose, zones, discs, lambda near, zone: self._plan(task, near, zone))
+            plan, discs = around or (self._plan(task, discs), discs)
         if not plan.solved and around_movers and self.blockage.may_pass(tick, pose[:2]):
-            discs = self._discs(tick, pose)
+            discs = self._ahead.discs(tick, pose)
             plan = self._plan(task, discs)
         route = None
         if plan.solved and len(plan.cells) and not self._routes.wrong:
@@ -203,17 +193,6 @@ class Replanning(OneRoute):
 
     def _prepare(self, route: Route) -> TrackedPath:
         return self._routes.prepared(route, self._task.world, self._routes.margin)
-
-    def _plan_around(self, task: Task, discs: list[Disc], zones: list[Zone]) -> tuple[PlanResult, list[Disc]]:
-        """A plan around the first zone where it is not too long, else around discs; and what it goes around."""
-        here = task.start[:2]
-        for zone in zones:
-            # Movers that are far away will have moved on: they must not close the only way to the goal.
-            near = [d for d in discs if math.dist((d.x, d.y), here) <= self.policy.obstruction_range and zone.holds(d)]
-            plan = self._plan(task, near, zone)
-            if plan.cost <= self.policy.max_detour * math.dist(here, task.goal):
-                return plan, near + zone.discs
-        return self._plan(task, discs), discs
 
     def _plan(self, task: Task, discs: list[Disc], zone: Zone | None = None) -> PlanResult:
         """A plan around discs, and a zone: by the planner itself if it needs the world, else by its replanner."""
@@ -239,32 +218,6 @@ class Replanning(OneRoute):
         if query.unreachable:  # a replanner knows cells only, not that the robot cannot get to the first of them
             return PlanResult(status=PlanStatus.NO_PATH, reason=query.unreachable)
         return self._routes.checked(query, answer)
-
-    def _discs(self, tick: int, pose: Pose) -> list[Disc]:
-        """What movers will cover soon; they close neither the robot's position nor the goal."""
-        ends = np.array([pose[:2], self._task.goal])
-        soon = covered_discs(self._predictor, tick, ends, self.policy.prediction_time, self._grid)
-        return soon + self.blockage.gaps.discs(tick, ends)
-
-    def _zones(self, tick: int, pose: Pose) -> list[Zone]:
-        """The ground that movers roam, largest first, if there is so much traffic that the robot should go round it."""
-        if self._traffic is None or self._traffic.rate(tick, pose[:2]) <= self.policy.max_traffic:
-            return []
-        return self._traffic.zones(tick, pose[:2], self._task.goal, self._grid)
-
-    def _in_traffic(self, tick: int, pose: Pose, tracked: TrackedPath, arc: float) -> bool:
-        """Whether the route ahead leads through ground that movers roam, as has just been seen."""
-        if self._traffic is None or not self._traffic.grown(self._grid.cell):
-            return False
-        zones = self._zones(tick, pose)
-        if not zones:
-            return False
-        return zones[-1].crossed(tracked, arc)
-
-    def _obstructed(self, tick: int, pose: Pose, tracked: TrackedPath, arc: float) -> bool:
-        """Whether a mover will soon cover a point of the route ahead."""
-        discs = self._discs(tick, pose)
-        return close_route(discs, tracked, arc, self.policy.obstruction_range, self._grid.inflate)
 
 
 def _point_at(route: Route, arc: float) -> tuple[float, float]:

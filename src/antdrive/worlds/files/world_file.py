@@ -11,12 +11,13 @@ from types import MappingProxyType
 from typing import Annotated, Any, Literal, TypeAlias
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
 from antdrive.base.atomic import written_whole
 from antdrive.base.checks import OneLine, SchemaVersion, check, schema_of, suggest, yaml_number
 from antdrive.base.document import MAX_BYTES, MAX_VALUES, Document, count_values, parse_document, read_yaml
 from antdrive.base.errors import FieldError, input_error
+from antdrive.base.records import STRICT
 from antdrive.base.reuse import reused
 from antdrive.worlds.limits import MAX_CELLS, MAX_COORDINATE, MAX_PHASE, MIN_PERIOD, Coordinate, Size
 from antdrive.worlds.movers import Mover, mover_from_dict, mover_to_dict
@@ -29,13 +30,12 @@ Goal = Annotated[Pair, Field(description="write [x, y] in metres")]
 
 OF_OTHERS = (".sdf", ".world", ".map")  # the suffixes of other programs' worlds, which are imported
 _CATALOG = Path(__file__).parent.with_name("catalog")
-_RULES = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
 
 
 class WalkEntry(BaseModel):
     """A random walk: in every period from a cell's centre to that of a random free neighbour."""
 
-    model_config = _RULES
+    model_config = STRICT
 
     cell: Size = Field(description="side of a cell [m]")
     period: float = Field(ge=MIN_PERIOD, le=MAX_COORDINATE, description="time for one step [s]")
@@ -48,7 +48,7 @@ class WalkEntry(BaseModel):
 class MoverEntry(BaseModel):
     """A moving cylinder; exactly one of keyframes, velocity and walk says how it moves."""
 
-    model_config = _RULES
+    model_config = STRICT
 
     radius: Size = Field(description="the radius as built [m]")
     height: Size = Field(1.0, description="the height [m]")
@@ -66,7 +66,7 @@ class MoverEntry(BaseModel):
 class EndsEntry(BaseModel):
     """Another start and goal in the same world; `--task NAME` chooses it."""
 
-    model_config = _RULES
+    model_config = STRICT
 
     name: OneLine = Field(min_length=1, max_length=100, description="what --task calls it")
     start: Triple | None = Field(
@@ -79,7 +79,7 @@ class EndsEntry(BaseModel):
 class WorldFile(BaseModel):
     """A world with a start and a goal, as written in a file."""
 
-    model_config = _RULES
+    model_config = STRICT
 
     # "schema" is also a method of BaseModel, hence the alias.
     schema_: SchemaVersion = Field(alias="schema", description="write schema: 1")

@@ -26,6 +26,7 @@ from antdrive.base.checks import OneLine, check, yaml_number
 from antdrive.base.document import read_document
 from antdrive.base.errors import FieldError, input_error
 from antdrive.base.plane import in_map, out_of_map
+from antdrive.base.records import STRICT
 from antdrive.base.types import Floats, Point, Pose
 from antdrive.worlds.files.world_file import Goal, Start, Triple
 from antdrive.worlds.formats.cellmap import CellMap, Cells, cell_map, file_task
@@ -37,7 +38,7 @@ FORMATS = ("PPM", "PNG", "BMP")  # Pillow's "PPM" includes PBM and PGM
 MODES = {"1": "L", "P": "RGB"}  # black-and-white images become grey, palettes become colours
 FREE, OCCUPIED = 254, 0  # the shades that map_saver writes
 
-_RULES = ConfigDict(strict=True, extra="ignore", allow_inf_nan=False, frozen=True)
+_RULES: ConfigDict = {**STRICT, "extra": "ignore"}
 Share = Annotated[float, Field(ge=0, le=1)]
 
 

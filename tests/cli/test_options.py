@@ -1,0 +1,59 @@
+"""The options that follow from the settings of a scenario: the words that repeat a scenario give it again."""
+
+from typing import Any
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from antdrive.cli.options import with_settings
+from antdrive.sim.forms import scenario_fields, setting_words
+from antdrive.sim.settings import SETTINGS
+from antdrive.worlds import Disc
+
+FLAGGED = [name for name, one in SETTINGS.items() if one.flag]
+
+
+def parsed(*words: str, many: bool = False) -> dict[str, Any]:
+    """What a command with the options of all settings is given for these words."""
+    found: dict[str, Any] = {}
+    names = [name for name in FLAGGED if not many or SETTINGS[name].is_word]
+
+    @with_settings(names, many=many)
+    def command(**given: Any) -> int:
+        found.update(given)
+        return 0
+
+    app = typer.Typer()
+    app.command()(command)
+    done = CliRunner().invoke(app, list(words))
+    if done.exception and not isinstance(done.exception, SystemExit):
+        raise done.exception
+    assert done.exit_code == 0, done.output
+    return found
+
+
+def test_no_words_give_the_defaults() -> None:
+    usual = scenario_fields({})
+    assert scenario_fields(parsed()) == usual
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"margin": "auto", "smoothing": "none", "noise": 0.25, "cell": 0.1},
+        {"map": "none", "localisation": "odometry", "odometry": 0.5, "sees": "lidar"},
+        {"avoid": False, "replan": False, "sees": "velocities:2.5", "time_limit": 30.0, "seed": 4},
+        {"unseen": [Disc(1.0, -2.0, 0.5), Disc(3.0, 3.0, 0.25)]},
+    ],
+    ids=lambda given: " ".join(given),
+)
+def test_the_words_that_repeat_settings_give_them_again(given: dict[str, Any]) -> None:
+    words = setting_words(given)
+    assert words is not None
+    assert scenario_fields(parsed(*words)) == scenario_fields(given)
+
+
+def test_a_repeated_option_lists_values_and_what_is_not_given_is_left_out() -> None:
+    words = ("--noise", "0", "--noise", "1", "--margin", "auto", "--margin", "0.1", "--map", "none")
+    assert parsed(*words, many=True) == {"noise": [0.0, 1.0], "margin": ["auto", 0.1], "map": ["none"]}

@@ -1,0 +1,107 @@
+"""Every setting of a scenario is written, read, tabulated and keyed from its declaration."""
+
+from dataclasses import dataclass, fields
+from typing import Annotated, Any
+
+import pytest
+from annotated_types import Ge, Gt, Le
+
+from antdrive.base.errors import FieldError
+from antdrive.planners import SMOOTHINGS
+from antdrive.runs.campaigns.rows import GRID
+from antdrive.sim import Scenario
+from antdrive.sim.forms import columns_of, scenario_fields, setting_words, written
+from antdrive.sim.settings import SETTINGS, Setting, declared, part_of_key
+
+#: For each setting a value that is not its default, as files write it, with its cell in a table and its words.
+WRITTEN: dict[str, tuple[Any, Any, list[str] | None]] = {
+    "smoothing": ("taut", "taut", ["--smoothing", "taut"]),
+    "noise": (0.5, 0.5, ["--noise", "0.5"]),
+    "margin": (0.1, "0.1", ["--margin", "0.1"]),
+    "cell": (0.2, 0.2, ["--cell", "0.2"]),
+    "map": ("none", "none", ["--map", "none"]),
+    "localisation": ("matching", "matching", ["--localisation", "matching"]),
+    "odometry": (2.0, 2.0, ["--odometry", "2.0"]),
+    "controller": (
+        {"lookahead_time": 0.5}, "lookahead_time=0.5", ["--set", "controller.lookahead_time=0.5"]
+    ),
+    "sees": ("positions:3.5", "positions:3.5", ["--sees", "positions:3.5"]),
+    "avoid": ("none", "none", ["--no-avoid"]),
+    "replan": ({"patience": 5.0}, "patience=5.0", None),
+    "unseen": (
+        [{"x": 1.0, "y": 2.0, "radius": 0.5, "height": 1.0}], "1,2,0.5", ["--unseen", "1.0,2.0,0.5"]
+    ),
+    "time_limit": (9.0, 9.0, ["--time-limit", "9.0"]),
+    "physics_hz": (120, 120, None),
+    "control_hz": (30, 30, None),
+    "seed": (7, 7, ["--seed", "7"]),
+}  # fmt: skip
+
+
+def test_a_scenario_has_every_setting_and_every_setting_an_example() -> None:
+    assert {one.key for one in SETTINGS.values()} == set(WRITTEN)
+    assert set(SETTINGS) <= {field.name for field in fields(Scenario)}
+    assert SETTINGS["smoothing"].setting.choices == SMOOTHINGS
+
+
+@pytest.mark.parametrize("name", SETTINGS)
+def test_what_is_read_is_written_the_same(name: str) -> None:
+    one = SETTINGS[name]
+    value, cell, words = WRITTEN[one.key]
+    read = value if one.key != "unseen" else list(scenario_fields({"unseen": [_Disc(**value[0])]})["unseen"])
+    given = scenario_fields({one.key: read})
+    assert written(given.__getitem__) == {one.key: value}
+    assert columns_of(given)[one.column] == cell
+    assert one.column in GRID
+    assert setting_words({one.key: value}) == words
+
+
+@dataclass(frozen=True)
+class _Disc:
+    x: float
+    y: float
+    radius: float
+    height: float
+
+
+def test_later_settings_are_part_of_a_key_only_beyond_their_defaults() -> None:
+    usual = scenario_fields({})
+    assert {"map", "localisation", "odometry"} & set(part_of_key(usual)) == set()
+    assert part_of_key({**usual, "odometry": 2.0})["odometry"] == 2.0
+    assert "seed" not in part_of_key(usual, without=["seed"])
+
+
+@dataclass(frozen=True)
+class Made:
+    """A record with settings of every kind of number."""
+
+    share: Annotated[float, Ge(0), Le(1), Setting("a share", "Robot")] = 0.5
+    size: Annotated[float | None, Gt(0), Setting("a size", "Robot")] = None
+    count: Annotated[int, Ge(1), Setting("a count", "Robot")] = 1
+    kind: Annotated[str, Setting("a kind", "Robot", choices=("a", "b"))] = "a"
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "says"),
+    [
+        ("share", 1.5, "share: must be between 0 and 1, got 1.5"),
+        ("share", float("nan"), "share: must be between 0 and 1, got nan"),
+        ("share", "x", "share: must be a number, got 'x'"),
+        ("size", 0, "size: must be greater than 0, got 0"),
+        ("size", float("inf"), "size: must be greater than 0, got inf"),
+        ("count", 0, "count: must be at least 1, got 0"),
+        ("count", 1.0, "count: must be a whole number, got 1.0"),
+        ("count", True, "count: must be a whole number, got True"),
+        ("kind", "c", "kind: unknown 'c'; choose from a, b"),
+        ("size", None, ""),
+        ("share", 1, ""),
+    ],
+)
+def test_bounds_and_choices_are_checked_as_declared(name: str, value: Any, says: str) -> None:
+    (one,) = (one for one in declared(Made) if one.name == name)
+    if not says:
+        one.check(value)
+        return
+    with pytest.raises(FieldError) as error:
+        one.check(value)
+    assert str(error.value) == says
