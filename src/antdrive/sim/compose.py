@@ -49,7 +49,7 @@ DRIFTING_SHARE = 0.6  # of the goal's tolerance, as `GOAL_SHARE`, of a robot tha
 BLIND_SHARE = 0.3  # of its top speed such a robot backs off where its lidar does not look, unless a mover is met then
 
 
-class Declared(NamedTuple):
+class Composition(NamedTuple):
     """What the record says of a composition; None: the robot has no use for it.
 
     Attributes:
@@ -75,7 +75,7 @@ class Parts(NamedTuple):
     guide: RouteGuide
     rules: tuple[Rule, ...]
     logs: tuple[Logs, ...]
-    declared: Declared
+    declared: Composition
 
 
 def compose(s: Scenario) -> Parts:
@@ -197,9 +197,9 @@ def _pursuit(s: Scenario) -> Pursuit:
     return Pursuit(s.controller, full_turn(s.robot, s.control_hz))
 
 
-def _declared(s: Scenario, limiters: tuple[str, ...]) -> Declared:
+def _declared(s: Scenario, limiters: tuple[str, ...]) -> Composition:
     moving = s.among_movers
-    return Declared(
+    return Composition(
         perception=s.effective_perception if moving else None,
         avoidance=avoidance_of(s) if moving else None,
         replanning=s.replanning if moving or s.exploring else None,
