@@ -40,7 +40,7 @@ $(VENV)/.docs: $(VENV)/.core
 warm: $(VENV)/.warm
 
 demo: $(VENV)/.warm
-	@$(BIN)/antdrive run forest --out $(DEMO) --video $(DEMO)/film.mp4
+	@$(BIN)/antdrive run forest --out $(DEMO) --film $(DEMO)/film.mp4
 
 test: $(VENV)/.dev $(VENV)/.warm
 	@$(BIN)/ruff check --quiet .

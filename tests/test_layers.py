@@ -15,11 +15,7 @@ ROOT = Path(__file__).parent.parent / "src" / "antdrive"
 #: A room imports itself and the rooms of lower ranks.
 RANKS = {"base": 0, "worlds": 1, "planners": 2, "robots": 2, "sim": 3, "runs": 4, "views": 5, "cli": 6}
 MODULES = sorted(path for room in RANKS for path in (ROOT / room).rglob("*.py"))
-#: Imports that still climb.
-CLIMBING = {
-    ("runs.failures.failure", "cli.testing.checking"),
-}
-#: Functions that still hide a package of their name.
+#: Functions that hide a package of their name; its kernels keep this one where it is.
 HIDING = {"views.film"}
 
 
@@ -47,10 +43,6 @@ def imported(path: Path, *, types: bool = True) -> set[str]:
     return names
 
 
-def climbing(module: str, name: str) -> bool:
-    return any(module == a and name.startswith(f"antdrive.{b}") for a, b in CLIMBING)
-
-
 @pytest.mark.parametrize("path", MODULES, ids=name_of)
 def test_imports_go_one_way(path: Path) -> None:
     module = name_of(path)
@@ -58,7 +50,7 @@ def test_imports_go_one_way(path: Path) -> None:
     for name in imported(path):
         top, _, rest = name.partition(".")
         assert top not in ("tests", "benchmarks", "examples", *RANKS), f"{module} imports {name}"
-        if top == "antdrive" and rest and not climbing(module, name):
+        if top == "antdrive" and rest:
             other = rest.split(".")[0]
             assert other == room or RANKS[other] < RANKS[room], f"{module} imports {name}"
 
@@ -70,7 +62,7 @@ def test_imports_have_no_circles() -> None:
     folders: dict[Path, set[Path]] = {}
     for module, path in known.items():
         modules[module] = imported(path, types=False) & (set(known) - {module})
-        for other in (known[one] for one in modules[module] if not climbing(name_of(path), one)):
+        for other in (known[one] for one in modules[module]):
             a, b = path.parent, other.parent
             if other.name != "__init__.py" and not (a.is_relative_to(b) or b.is_relative_to(a)):
                 folders.setdefault(a, set()).add(b)

@@ -66,7 +66,7 @@ def drive_outside(wheel: Path, version: str, home: Path) -> list[str]:
     code, text = said(antdrive, "--version")
     if (code, text.strip()) != (0, f"antdrive {version}"):
         problems.append(f"antdrive --version: {text.strip()}, must be antdrive {version}")
-    code, text = said(antdrive, "run", "slalom", "--planner", "ants", "--out", "drive", "--video", "film.mp4", "--json")
+    code, text = said(antdrive, "run", "slalom", "--planner", "ants", "--out", "drive", "--film", "film.mp4", "--json")
     if code or not json.loads(text)["certificate"]["certified"] or not (home / "film.mp4").stat().st_size:
         problems.append(f"antdrive run: exit code {code}\n{text}")
     code, text = said(antdrive, "verify", "drive")

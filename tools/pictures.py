@@ -19,13 +19,13 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from antdrive.cli.write import caption
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import run
 from antdrive.sim.scenario import Scenario
 from antdrive.views.film.compare import SplitScreen
 from antdrive.views.film.prelude import planning_frames
 from antdrive.views.film.video import STILLS, still
+from antdrive.views.folder import caption
 from antdrive.views.pages.report import write_report
 from antdrive.worlds.world import Disc
 

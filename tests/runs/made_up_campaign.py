@@ -30,9 +30,7 @@ class Skill(NamedTuple):
     options: Mapping[str, Any] = {}
 
 
-def made_up_columns(
-    planners: Mapping[str, Skill], worlds: int = 10, seeds: int = 5, *, spread: float = 0.0, rng_seed: int = 1
-) -> dict[str, list[Any]]:
+def made_up_columns(planners, worlds=10, seeds=5, *, spread=0.0, rng_seed=1):
     """The columns of a campaign's table.
 
     Args:
@@ -89,11 +87,11 @@ def made_up_columns(
     return {name: [row[name] for row in rows] for name in rows[0]}
 
 
-def made_up_runs(planners: Mapping[str, Skill], worlds: int = 10, seeds: int = 5, **words: Any) -> RunTable:
+def made_up_runs(planners, worlds=10, seeds=5, **words):
     return RunTable(made_up_columns(planners, worlds, seeds, **words))
 
 
-def _metrics(good: bool, drove: bool, length: float, optimum: float, luck: float) -> dict[str, float | None]:
+def _metrics(good, drove, length, optimum, luck):
     if not drove:
         return dict.fromkeys(METRICS)
     known = {

@@ -7,8 +7,6 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterator
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -33,7 +31,7 @@ CAMPAIGN = {"worlds": ["empty", "gate"], "planners": ["astar"], "seeds": 12, "ro
 
 
 @pytest.fixture
-def scheduler(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[bytes], str]]:
+def scheduler(tmp_path):
     """A scheduler with two workers, in processes of their own: the scheduler's process and its address."""
     file = tmp_path / "scheduler.json"
     words = ["--port", "0", "--host", "127.0.0.1", "--no-dashboard", "--no-show", "--scheduler-file", str(file)]
@@ -54,14 +52,12 @@ def scheduler(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[bytes], str]]:
             one.wait()
 
 
-def started(module: str, *words: str) -> subprocess.Popen[bytes]:
+def started(module, *words):
     command = [sys.executable, "-m", f"distributed.cli.{module}", *words]
     return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
-def test_a_cluster_makes_the_same_table_as_processes_and_hands_logs_back(
-    tmp_path: Path, scheduler: tuple[subprocess.Popen[bytes], str]
-) -> None:
+def test_a_cluster_makes_the_same_table_as_processes_and_hands_logs_back(tmp_path, scheduler):
     _, address = scheduler
     few = {**CAMPAIGN, "seeds": 2}
     for name, dask in (("local", None), ("dask", "local:2"), ("tcp", address)):
@@ -74,14 +70,14 @@ def test_a_cluster_makes_the_same_table_as_processes_and_hands_logs_back(
         assert all((tmp_path / name / log_path(key)).exists() for key in keys)
 
 
-def test_a_run_that_kills_its_workers_is_recorded_and_no_other_is_lost() -> None:
+def test_a_run_that_kills_its_workers_is_recorded_and_no_other_is_lost():
     jobs = expand(make_campaign(CAMPAIGN)).jobs
     rows = [finished_of(done, None).row for done in run_on_cluster(Deadly((3,)), jobs, "local:2")]
     assert Counter(row["key"] for row in rows) == Counter(job.key for job in jobs)
     assert {row["key"] for row in rows if row["outcome"] == "crashed"} == {job.key for job in jobs if job.seed == 3}
 
 
-def test_a_run_that_does_not_end_is_ended() -> None:
+def test_a_run_that_does_not_end_is_ended():
     jobs = expand(make_campaign({**CAMPAIGN, "worlds": ["empty"], "seeds": 6})).jobs
     rows = [finished_of(done, 1.0).row for done in run_on_cluster(Endless((3,)), jobs, "local:2", limit=1.0)]
     assert Counter(row["key"] for row in rows) == Counter(job.key for job in jobs)
@@ -89,7 +85,7 @@ def test_a_run_that_does_not_end_is_ended() -> None:
     assert sum(row["outcome"] == "succeeded" for row in rows) == 5
 
 
-def test_a_run_that_finds_no_room_ends_the_campaign() -> None:
+def test_a_run_that_finds_no_room_ends_the_campaign():
     jobs = expand(make_campaign({**CAMPAIGN, "worlds": ["empty"], "seeds": 4})).jobs
     try:
         run_chunk(Refusing(), jobs)
@@ -100,15 +96,13 @@ def test_a_run_that_finds_no_room_ends_the_campaign() -> None:
         list(_received(failed, [Ticket(0, jobs[0])], Waiting(jobs, 1), slow=False))
 
 
-def test_a_scheduler_that_is_gone_ends_the_campaign_which_goes_on_elsewhere(
-    tmp_path: Path, scheduler: tuple[subprocess.Popen[bytes], str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_scheduler_that_is_gone_ends_the_campaign_which_goes_on_elsewhere(tmp_path, scheduler, monkeypatch):
     monkeypatch.setattr("antdrive.runs.cluster.PATIENCE", 1.0)
     process, address = scheduler
     campaign = make_campaign(CAMPAIGN)
     expansion = expand(campaign)
 
-    def kill(done: int, size: int) -> None:
+    def kill(done, size):
         if done == 3:
             process.kill()
 
@@ -121,12 +115,12 @@ def test_a_scheduler_that_is_gone_ends_the_campaign_which_goes_on_elsewhere(
 
 
 @pytest.mark.parametrize("address", ["local:", "local:x", "local:0", "localhost:8786", "tcp://"])
-def test_a_wrong_address_is_refused(address: str) -> None:
+def test_a_wrong_address_is_refused(address):
     with pytest.raises(InputError, match="write local:N with a number of processes above 0, or tcp://HOST:PORT"):
         next(run_on_cluster(Deadly(), [], address))
 
 
-def test_a_scheduler_that_does_not_answer_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_scheduler_that_does_not_answer_is_named(monkeypatch):
     monkeypatch.setattr("antdrive.runs.cluster.PATIENCE", 0.5)
     with pytest.raises(InputError, match=r"^--dask: tcp://127\.0\.0\.1:1: no scheduler answers"):
         next(run_on_cluster(Deadly(), [], "tcp://127.0.0.1:1"))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -13,7 +12,7 @@ from antdrive.runs.waiting import CHUNK_SECONDS, LONGEST_CHUNK, Waiting
 Run = tuple[str, int]  # the world, the seed
 
 
-def queue(runs: Iterable[Run], processes: int) -> Waiting[Run]:
+def queue(runs, processes):
     return Waiting(runs, processes, lambda run: run[0])
 
 
@@ -22,9 +21,7 @@ def queue(runs: Iterable[Run], processes: int) -> Waiting[Run]:
     st.integers(1, 4),
     st.lists(st.tuples(st.sampled_from([None, *"abc"]), st.floats(1e-4, 10), st.booleans()), max_size=40),
 )
-def test_every_run_is_handed_out_once_whatever_is_asked_measured_and_put_back(
-    runs: list[Run], processes: int, asked: list[tuple[str | None, float, bool]]
-) -> None:
+def test_every_run_is_handed_out_once_whatever_is_asked_measured_and_put_back(runs, processes, asked):
     waiting, made = queue(runs, processes), Counter[Run]()
     left = len(runs)
     for world, seconds, back in [*asked, *[(None, 1e-3, False)] * len(runs)]:
@@ -41,7 +38,7 @@ def test_every_run_is_handed_out_once_whatever_is_asked_measured_and_put_back(
     assert made == Counter(runs)
 
 
-def test_chunks_take_two_seconds_and_shrink_at_the_end() -> None:
+def test_chunks_take_two_seconds_and_shrink_at_the_end():
     waiting = queue((("a", seed) for seed in range(1000)), 2)
     assert len(waiting.chunk(None)) == 1, "nothing is measured yet"
     waiting.measured(0.1)
@@ -53,7 +50,7 @@ def test_chunks_take_two_seconds_and_shrink_at_the_end() -> None:
     assert len(waiting.chunk(None)) == 1
 
 
-def test_runs_that_are_put_back_come_one_by_one_before_all_others() -> None:
+def test_runs_that_are_put_back_come_one_by_one_before_all_others():
     waiting = queue((("a", seed) for seed in range(9)), 1)
     waiting.measured(1e-3)
     first = waiting.chunk(None)
@@ -61,7 +58,7 @@ def test_runs_that_are_put_back_come_one_by_one_before_all_others() -> None:
     assert [waiting.chunk(None) for _ in first] == [[one] for one in first]
 
 
-def test_a_process_goes_on_with_its_world_then_takes_a_fresh_one_then_helps() -> None:
+def test_a_process_goes_on_with_its_world_then_takes_a_fresh_one_then_helps():
     runs = [*(("a", seed) for seed in range(40)), ("b", 0), ("c", 0)]
     waiting = queue(runs, 40)
     worlds = [waiting.chunk(world)[0].group for world in (None, "a", None, "b", "b")]

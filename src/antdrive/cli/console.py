@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 import shutil
 import sys
 import time
@@ -134,3 +135,8 @@ def print_files(files: dict[str, str]) -> None:
     width = max([8, *map(len, files)])
     for name, path in files.items():
         print_line(f"  {name:{width}} {path}")
+
+
+def this_command() -> str:
+    """The command that is running, as one would type it."""
+    return shlex.join(["antdrive", *sys.argv[1:]])

@@ -193,6 +193,10 @@ Speed = Annotated[
 ]
 Vector = Annotated[bool, typer.Option("--vector", help="Write figures as PDF too.", rich_help_panel="Output")]
 Figures = Annotated[bool, typer.Option("--figures/--no-figures", help="Write figures.", rich_help_panel="Output")]
+Jobs = Annotated[
+    int | None,
+    typer.Option("--jobs", "-j", min=1, max=256, metavar="NUMBER", help="Processes.  [default: one per core]"),
+]
 Json = Annotated[
     bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else.", rich_help_panel="Output")
 ]

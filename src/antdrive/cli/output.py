@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from antdrive.cli.console import print_files, print_line
+from antdrive.cli.console import bar, print_files, print_line
 
 if TYPE_CHECKING:
+    from antdrive.sim.log.rollout import Rollout
     from antdrive.sim.pipeline import Run
     from antdrive.sim.scenario import MarginChoice
     from antdrive.worlds import Task
+
+
+def film_drives(logs: Sequence[Rollout], path: Path, **options: Any) -> dict[str, Any]:
+    """Film a drive, or several side by side, with a progress bar; facts about the film."""
+    from antdrive.views.folder import write_film
+
+    with bar("filming") as progress:
+        return write_film(logs, path, progress=progress, **options)
 
 
 def print_run(run: Run, files: dict[str, str]) -> None:

@@ -27,10 +27,6 @@ Suites = Annotated[
 Only = Annotated[
     str | None, typer.Option(metavar="PATTERN", help="Only scenarios whose name matches, such as 'aisle-*'.")
 ]
-Jobs = Annotated[
-    int | None,
-    typer.Option("--jobs", "-j", min=1, max=256, metavar="NUMBER", help="Processes.  [default: one per core]"),
-]
 
 
 ResultsFolder = Annotated[
@@ -48,8 +44,8 @@ def results_in(folder: Path | None, film: str) -> Results:
     Raises:
         InputError: the folder cannot be written to, or an unknown word for `--film`.
     """
-    from antdrive.cli.write import check_folder
     from antdrive.views.artefacts import Films, Results, default_folder
+    from antdrive.views.folder import check_folder
 
     if film not in get_args(Films):
         raise InputError(f"--film {film}: unknown; choose from {', '.join(get_args(Films))}")

@@ -11,6 +11,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import NamedTuple
 
@@ -48,7 +49,7 @@ DRIFTING_SHARE = 0.6  # of the goal's tolerance, as `GOAL_SHARE`, of a robot tha
 BLIND_SHARE = 0.3  # of its top speed such a robot backs off where its lidar does not look, unless a mover is met then
 
 
-class Declared(NamedTuple):
+class Composition(NamedTuple):
     """What the record says of a composition; None: the robot has no use for it.
 
     Attributes:
@@ -74,7 +75,7 @@ class Parts(NamedTuple):
     guide: RouteGuide
     rules: tuple[Rule, ...]
     logs: tuple[Logs, ...]
-    declared: Declared
+    declared: Composition
 
 
 def compose(s: Scenario) -> Parts:
@@ -91,8 +92,9 @@ def _with_map(s: Scenario, localiser: Exact | Fixes) -> Parts:
     rules: list[Rule] = [_pursuit(s)]
     if isinstance(guide, Replanning) and capabilities_of(s.planner).needs_motions:
         rules.append(KeepToSchedule(guide, s.robot, s.control_hz))
-    if s.among_movers and s.effective_avoidance is not None:
-        rules.append(Avoid(s.effective_avoidance, others, guide, s.task, s.robot, s.control_hz))
+    avoidance = avoidance_of(s)
+    if s.among_movers and avoidance is not None:
+        rules.append(Avoid(avoidance, others, guide, s.task, s.robot, s.control_hz))
     logs = (localiser, lookout, lookout.watch) if lookout else (localiser,)
     return Parts(localiser, lookout or GivenMap(), guide, tuple(rules), logs, _declared(s, LIMITERS))
 
@@ -116,11 +118,11 @@ def _without_map(s: Scenario, localiser: Exact | Fixes) -> Parts:
         ahead = MoversSeenAhead(tracked, survey, policy, s.robot, s.task.goal, s.inflate, hz)
     guide = Exploration(planner, survey, policy, ahead)
     rules: list[Rule] = [_pursuit(s), LookRound(guide, s.robot, hz)]
-    if s.among_movers and s.effective_avoidance is not None:
+    avoidance = avoidance_of(s)
+    if s.among_movers and avoidance is not None:
         drifts = watch is not None
         share = DRIFTING_SHARE if drifts else GOAL_SHARE
         backwards = BLIND_SHARE * s.robot.max_speed if drifts and not lidar.full_circle else math.inf
-        avoidance = s.effective_avoidance
         rules.append(Avoid(avoidance, others, guide, s.task, s.robot, hz, goal_share=share, backwards=backwards))
     # One scan may be as old as their period, and commands are late.
     reaction = 1 / hz + 1 / lidar.rate + s.robot.noise.scaled(s.noise).delay
@@ -153,9 +155,21 @@ def told(task: Task) -> Task:
     return Task(empty, task.start, task.goal, task.goal_tolerance)
 
 
+def avoidance_of(s: Scenario) -> Avoidance | None:
+    """How the robot avoids movers, given what it knows of them.
+
+    Movers whose motions are known do not reverse unexpectedly, so reversals are not considered. A plan in
+    space and time avoids the movers already, so the horizon is short.
+    """
+    if s.avoidance is None or s.effective_perception.kind != "motions":
+        return s.avoidance
+    horizon = min(s.avoidance.horizon, 1.0) if s.timed else s.avoidance.horizon
+    return dataclasses.replace(s.avoidance, reversal_weight=0.0, horizon=horizon)
+
+
 def _guide(s: Scenario, others: Others) -> OneRoute:
     """What plans the routes of a robot with a map."""
-    policy, avoidance = s.replanning, s.effective_avoidance
+    policy, avoidance = s.replanning, avoidance_of(s)
     if policy is None or not s.among_movers:
         return OneRoute(route_planner(s))
     kind = CellByCell if capabilities_of(s.planner).cell_by_cell and policy.around_movers else Replanning
@@ -183,11 +197,11 @@ def _pursuit(s: Scenario) -> Pursuit:
     return Pursuit(s.controller, full_turn(s.robot, s.control_hz))
 
 
-def _declared(s: Scenario, limiters: tuple[str, ...]) -> Declared:
+def _declared(s: Scenario, limiters: tuple[str, ...]) -> Composition:
     moving = s.among_movers
-    return Declared(
+    return Composition(
         perception=s.effective_perception if moving else None,
-        avoidance=s.effective_avoidance if moving else None,
+        avoidance=avoidance_of(s) if moving else None,
         replanning=s.replanning if moving or s.exploring else None,
         limiters=limiters,
         mapped=not s.exploring,

@@ -309,18 +309,6 @@ class Scenario(Settings):
         """What the robot perceives of movers as asked for; the usual where nobody asked."""
         return self.perception or usual_perception(self.map, movers=bool(self.task.world.movers))
 
-    @property
-    def effective_avoidance(self) -> Avoidance | None:
-        """How the robot avoids movers, given what it knows of them.
-
-        Movers whose motions are known do not reverse unexpectedly, so reversals are not considered. A plan in
-        space and time avoids the movers already, so the horizon is short.
-        """
-        if self.avoidance is None or self.effective_perception.kind != "motions":
-            return self.avoidance
-        horizon = min(self.avoidance.horizon, 1.0) if self.timed else self.avoidance.horizon
-        return dataclasses.replace(self.avoidance, reversal_weight=0.0, horizon=horizon)
-
     def rng(self, purpose: str) -> np.random.Generator:
         """A random stream from the seed; every `purpose` has its own, so that one does not change another."""
         return random_stream(self.seed, purpose)

@@ -24,7 +24,7 @@ AT_ONCE = 400  # meshes in one body: PyBullet takes at most 131072 vertices
 def check_display() -> None:
     """Check, before any work, that a window can open."""
     if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
-        raise InputError("--gui: no display (DISPLAY is not set); --video FILE.mp4 works without one")
+        raise InputError("--gui: no display (DISPLAY is not set); --film FILE.mp4 works without one")
 
 
 def add_mesh(number: int, mesh: Mesh, colour: Colour) -> int:

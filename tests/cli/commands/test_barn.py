@@ -50,7 +50,7 @@ def test_the_table_is_printed_whatever_becomes_of_the_films(
         raise InputError("films: cannot be written (No space left on device)")
 
     monkeypatch.setattr(films, "film_failures", full)
-    code, out, err = antdrive("barn", driven, "--films")
+    code, out, err = antdrive("barn", driven, "--film")
     assert (code, err.splitlines()[-1]) == (2, "antdrive: films: cannot be written (No space left on device)")
     assert ["world_0", "2", "1", "10.00"] in [line.split()[:4] for line in out.splitlines()]
     assert "  DWA, 0.5 m/s: github.com/Daffan/the-barn-challenge, res/dwa_out.txt" in out.splitlines()
@@ -73,5 +73,5 @@ def test_a_failure_is_listed_with_its_film_or_its_log(
         "film_failures",
         lambda *_words, **_settings: {"b": Path("b.mp4")},
     )
-    ends = [antdrive("barn", driven, *words)[1].splitlines()[-1] for words in ((), ("--films",))]
+    ends = [antdrive("barn", driven, *words)[1].splitlines()[-1] for words in ((), ("--film",))]
     assert ends == [f"  world_0, seed 0: collided  obstacles[3]  {end}" for end in ("rollouts/b.npz", "b.mp4")]

@@ -15,7 +15,7 @@ CATALOGUE = Path(robots.__path__[0]) / "catalog"
 
 
 def test_planners_are_compared_in_a_table_a_figure_and_a_film(antdrive: Call, small: Path, tmp_path: Path) -> None:
-    words = ("--out", "c", "--video", "c.mp4", "--speed", "20")
+    words = ("--out", "c", "--film", "c.mp4", "--speed", "20")
     code, out, err = antdrive("compare", small, "-p", "astar", "-p", "tangent", *words, "--json")
     facts = json.loads(out)
     assert (code, err) == (0, "")

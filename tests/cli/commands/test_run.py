@@ -108,11 +108,11 @@ def test_without_figures_a_run_writes_its_log_and_result(antdrive: Call, small: 
 
 
 def test_a_prelude_needs_a_film(refused: Refused) -> None:
-    assert "give --video" in refused("run", "empty", "-p", "as", "--prelude", "2")
+    assert "give --film" in refused("run", "empty", "-p", "as", "--prelude", "2")
 
 
 def test_a_prelude_needs_a_planner_with_iterations(refused: Refused) -> None:
-    words = ["-p", "astar", "--prelude", "2", "--video", "a.mp4"]
+    words = ["-p", "astar", "--prelude", "2", "--film", "a.mp4"]
     assert "astar does not plan in iterations" in refused("run", "empty", *words)
 
 
@@ -152,9 +152,9 @@ def test_a_window_needs_a_display(refused: Refused, monkeypatch: pytest.MonkeyPa
         (["run", "empty", "--sees", "positions:far"], "--sees: write KIND or KIND:METRES"),
         (["run", "empty", "--sees", "positions:-1"], "with a range greater than 0"),
         (["run", "empty", "--unseen", "1,2,-3"], "radius: must be greater than 0"),
-        (["run", "empty", "--video", "film.avi"], ".mp4"),
+        (["run", "empty", "--film", "film.avi"], ".mp4"),
         (["run", "empty", "--out", "/proc/nowhere"], "/proc/nowhere: cannot be written"),
-        (["run", "empty", "--video", "folder.mp4"], "--video folder.mp4: is a directory"),
+        (["run", "empty", "--film", "folder.mp4"], "--film folder.mp4: is a directory"),
         (
             ["run", "empty", "--smoothing", "straight"],
             "smoothing: unknown 'straight'; choose from none, taut, clearance",

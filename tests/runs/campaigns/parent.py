@@ -12,7 +12,7 @@ from tests.runs.campaigns.works import Deadly
 CAMPAIGN = {"worlds": ["empty", "gate"], "planners": ["astar"], "seeds": 150}
 
 
-def go(folder: str, seconds: float, jobs: int) -> None:
+def go(folder, seconds, jobs):
     """Run the campaign, or what is left of it."""
     store.FLUSH_EVERY = 0.05
     campaign = make_campaign(CAMPAIGN)

@@ -19,25 +19,25 @@ TEXT = (DOCS / "how-to" / "campaigns.md").read_text()
 FOLDER = (DOCS / "reference" / "formats" / "campaign-folder.md").read_text()
 
 
-def test_the_file_that_the_page_shows_has_every_key_and_is_right() -> None:
+def test_the_file_that_the_page_shows_has_every_key_and_is_right():
     block = max(re.findall(r"```yaml\n(.*?)```", TEXT, flags=re.DOTALL), key=len)  # the others are first steps
     data = parse_document(block, "docs/how-to/campaigns.md").data
     assert make_campaign(data).entry.rollouts == "failed"
     assert set(data) == {info.alias or name for name, info in CampaignFile.model_fields.items()}
 
 
-def test_the_page_names_every_column() -> None:
+def test_the_page_names_every_column():
     names = {*GRID, *RESULT} - set(METRICS) | {"plan_s", "drive_wall_s"}
     assert [name for name in names if f"`{name}`" not in FOLDER and not name.startswith("version.")] == []
 
 
-def test_the_page_names_every_key_of_the_manifest(tmp_path: Path) -> None:
+def test_the_page_names_every_key_of_the_manifest(tmp_path):
     sweep({"worlds": "empty", "planners": "astar"}, tmp_path / "out", jobs=0)
     table = FOLDER.partition("`manifest.json` has these keys:")[2].partition("\n## ")[0]
     assert re.findall(r"^\| `(\w+)` \|", table, flags=re.MULTILINE) == list(read_manifest(tmp_path / "out"))
 
 
-def test_the_line_for_pandas_reads_the_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_line_for_pandas_reads_the_table(tmp_path, monkeypatch):
     pandas = pytest.importorskip("pandas")
     monkeypatch.chdir(tmp_path)
     results = sweep({"worlds": "empty", "planners": "astar"}, "out/first", jobs=0)

@@ -19,13 +19,13 @@ from tests.runs.campaigns.parent import go
 
 
 @pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+def undisturbed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("calm")
     go(str(folder), 0.0, 0)
     return canonical_bytes(folder)
 
 
-def begun(folder: Path) -> subprocess.Popen[bytes]:
+def begun(folder):
     """A campaign that has written its first rows and is far from its end; Ctrl-C reaches all its processes."""
     words = [sys.executable, "-m", "tests.runs.campaigns.parent", str(folder)]
     process = subprocess.Popen(words, stderr=subprocess.PIPE, start_new_session=True)
@@ -36,14 +36,14 @@ def begun(folder: Path) -> subprocess.Popen[bytes]:
     return process
 
 
-def children(process: int) -> list[int]:
+def children(process):
     """The worker processes of a campaign."""
     text = Path(f"/proc/{process}/task/{process}/children").read_text()
     return [pid for pid in map(int, text.split()) if b"popen_loky" in Path(f"/proc/{pid}/cmdline").read_bytes()]
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks for processes in /proc")
-def test_a_killed_worker_and_a_killed_parent_change_nothing(tmp_path: Path, undisturbed: bytes) -> None:
+def test_a_killed_worker_and_a_killed_parent_change_nothing(tmp_path, undisturbed):
     process = begun(tmp_path)
     workers = children(process.pid)
     assert len(workers) == 2
@@ -61,7 +61,7 @@ def test_a_killed_worker_and_a_killed_parent_change_nothing(tmp_path: Path, undi
     assert read_results(tmp_path).complete
 
 
-def test_ctrl_c_keeps_what_is_done_and_the_rest_follows(tmp_path: Path, undisturbed: bytes) -> None:
+def test_ctrl_c_keeps_what_is_done_and_the_rest_follows(tmp_path, undisturbed):
     process = begun(tmp_path)
     with pytest.raises(InputError, match=r"another run \(process \d+\) is writing into this folder"):
         go(str(tmp_path), 0.0, 0)
@@ -76,7 +76,7 @@ def test_ctrl_c_keeps_what_is_done_and_the_rest_follows(tmp_path: Path, undistur
     assert canonical_bytes(tmp_path) == undisturbed
 
 
-def test_half_a_file_of_a_killed_process_is_removed_and_never_read(tmp_path: Path, undisturbed: bytes) -> None:
+def test_half_a_file_of_a_killed_process_is_removed_and_never_read(tmp_path, undisturbed):
     (tmp_path / "parts").mkdir()
     (tmp_path / "manifest.json").write_text("{}")
     left = tmp_path / "parts" / ".new-0123.parquet"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import errno
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -17,7 +16,6 @@ from antdrive.runs.campaigns import expand, job, make_campaign, running, sweepin
 from antdrive.runs.campaigns.running import Driving, log_path
 from antdrive.runs.campaigns.sweeping import calibrated, sweep
 from antdrive.runs.margins.prediction import Calibration
-from antdrive.runs.margins.trial import Conditions
 
 BASE = {"worlds": ["empty", "no-path"], "planners": ["astar"]}
 
@@ -29,10 +27,8 @@ BASE = {"worlds": ["empty", "no-path"], "planners": ["astar"]}
         (ZeroDivisionError("oh"), "crashed", "ZeroDivisionError: oh"),
     ],
 )
-def test_what_a_run_raises_is_its_result(
-    raised: Exception, outcome: str, reason: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def fails(scenario: Any) -> None:
+def test_what_a_run_raises_is_its_result(raised, outcome, reason, monkeypatch):
+    def fails(scenario):
         raise raised
 
     monkeypatch.setattr(running, "run", fails)
@@ -41,7 +37,7 @@ def test_what_a_run_raises_is_its_result(
 
 
 @pytest.mark.parametrize(("keep", "kept"), [("none", 0), ("failed", 0), ("all", 1)])
-def test_logs_are_kept_by_rule_and_hold_what_the_row_says(keep: Any, kept: int, tmp_path: Path) -> None:
+def test_logs_are_kept_by_rule_and_hold_what_the_row_says(keep, kept, tmp_path):
     rows = sweep({**BASE, "rollouts": keep}, tmp_path, jobs=0).table.to_pylist()
     assert [row["outcome"] for row in rows] == ["succeeded", "no_path"]
     assert [row["certified"] for row in rows] == [True, None]
@@ -54,10 +50,8 @@ def test_logs_are_kept_by_rule_and_hold_what_the_row_says(keep: Any, kept: int, 
 
 
 @pytest.mark.parametrize("folder", ["", None])
-def test_a_log_that_cannot_be_written_is_no_crash_of_the_run(
-    folder: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def full(log: Rollout, path: Path) -> None:
+def test_a_log_that_cannot_be_written_is_no_crash_of_the_run(folder, tmp_path, monkeypatch):
+    def full(log, path):
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(Rollout, "save", full)
@@ -66,14 +60,14 @@ def test_a_log_that_cannot_be_written_is_no_crash_of_the_run(
         driving(expand(make_campaign(BASE)).jobs[0])
 
 
-def test_a_planner_that_this_machine_lacks_ends_the_campaign(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_planner_that_this_machine_lacks_ends_the_campaign(monkeypatch):
     one = expand(make_campaign(BASE)).jobs[0]
     case = dataclasses.replace(one.case, planner_source="elsewhere")
     with pytest.raises(InputError, match="no planner is called 'elsewhere'"):
         Driving()(one._replace(case=case))
 
 
-def test_the_log_of_a_failed_drive_is_kept(tmp_path: Path) -> None:
+def test_the_log_of_a_failed_drive_is_kept(tmp_path):
     hit = {
         **BASE,
         "worlds": "empty",
@@ -86,10 +80,10 @@ def test_the_log_of_a_failed_drive_is_kept(tmp_path: Path) -> None:
     assert "--unseen 3.0,3.0,0.2" in row["command"]
 
 
-def test_an_auto_margin_is_chosen_once_for_each_robot_and_its_settings(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_auto_margin_is_chosen_once_for_each_robot_and_its_settings(monkeypatch):
     asked = []
 
-    def choose(conditions: Conditions) -> Calibration:
+    def choose(conditions):
         asked.append((conditions.robot.name, conditions.noise))
         return Calibration(
             margin=0.07, loss=0.05, largest=0.04, reserve=0.01, probability=1e-3, drives=100, key=conditions.key
@@ -106,7 +100,7 @@ def test_an_auto_margin_is_chosen_once_for_each_robot_and_its_settings(monkeypat
     assert {sweeping.grid_table([one])["margin"][0].as_py() for one in auto} == {0.07}
 
 
-def test_a_robot_of_ones_own_comes_along_with_the_folder(tmp_path: Path) -> None:
+def test_a_robot_of_ones_own_comes_along_with_the_folder(tmp_path):
     source = tmp_path / "mine.yaml"
     catalogue = Path(job.__file__).parents[2] / "robots" / "catalog" / "turtlebot.yaml"
     source.write_text(catalogue.read_text().replace("mass: ", "mass: 1"))

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from antdrive.base.errors import InputError
-from antdrive.runs.campaigns.job import Job
 from antdrive.runs.campaigns.rows import fault_row
 from antdrive.runs.campaigns.running import Finished
 
@@ -22,7 +21,7 @@ class Deadly:
     marks: str = ""
     seconds: float = 0.0
 
-    def __call__(self, job: Job) -> Finished:
+    def __call__(self, job):
         time.sleep(self.seconds)
         mark = Path(self.marks) / job.key
         if job.seed in self.seeds and not (self.marks and mark.exists()):
@@ -38,7 +37,7 @@ class Listing:
 
     path: str
 
-    def __call__(self, job: Job) -> Finished:
+    def __call__(self, job):
         time.sleep(0.01)
         with Path(self.path).open("a") as stream:
             stream.write(f"{os.getpid()} {job.case.world}\n")
@@ -51,7 +50,7 @@ class Endless:
 
     seeds: tuple[int, ...]
 
-    def __call__(self, job: Job) -> Finished:
+    def __call__(self, job):
         while job.seed in self.seeds:
             time.sleep(0.1)
         return Finished(fault_row(job.key, "succeeded", f"seed {job.seed}"))
@@ -61,7 +60,7 @@ class Endless:
 class Refusing:
     """A run whose seed is 3 finds that the campaign cannot go on."""
 
-    def __call__(self, job: Job) -> Finished:
+    def __call__(self, job):
         if job.seed == 3:
             raise InputError("rollouts/ab.npz: cannot be written (No space left on device)")
         return Finished(fault_row(job.key, "succeeded", f"seed {job.seed}"))
@@ -70,8 +69,8 @@ class Refusing:
 class Unloadable:
     """Work that ends the process that unpickles it."""
 
-    def __reduce__(self) -> tuple[object, tuple[int, ...]]:
+    def __reduce__(self):
         return os._exit, (7,)
 
-    def __call__(self, job: Job) -> Finished:
+    def __call__(self, job):
         raise AssertionError

@@ -7,15 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from antdrive.base import Floats
 from antdrive.runs.failures.hunt import POINTS, driven_line, is_new, line_distance
-from antdrive.sim import Run
 
 PLACES = st.tuples(st.integers(-5, 5), st.integers(-5, 5))
 LINES = st.lists(PLACES, min_size=1, max_size=4).map(lambda places: np.array(places, dtype=np.float64))
 
 
-def every_alignment(rows: int, columns: int) -> list[list[tuple[int, int]]]:
+def every_alignment(rows, columns):
     """All ways through a table from corner to corner, by steps down, right and diagonal."""
     if rows == columns == 1:
         return [[(0, 0)]]
@@ -27,7 +25,7 @@ def every_alignment(rows: int, columns: int) -> list[list[tuple[int, int]]]:
 
 
 @given(LINES, LINES)
-def test_the_pairs_are_those_of_the_cheapest_alignment(one: Floats, other: Floats) -> None:
+def test_the_pairs_are_those_of_the_cheapest_alignment(one, other):
     alignments = every_alignment(len(one), len(other))
     sums = [sum(float(np.hypot(*(one[i] - other[j]))) for i, j in way) for way in alignments]
     cheapest = {
@@ -36,7 +34,7 @@ def test_the_pairs_are_those_of_the_cheapest_alignment(one: Floats, other: Float
     assert round(line_distance(one, other), 9) in cheapest
 
 
-def test_parallel_lines_are_as_far_apart_as_they_are() -> None:
+def test_parallel_lines_are_as_far_apart_as_they_are():
     line = np.column_stack([np.linspace(0, 5, 50), np.zeros(50)])
     assert line_distance(line, line) == 0
     assert line_distance(line, line + [0.0, 0.4]) == pytest.approx(0.4)
@@ -45,7 +43,7 @@ def test_parallel_lines_are_as_far_apart_as_they_are() -> None:
     assert not is_new(line, [line + [0.0, 5.0], line + [0.0, 0.2]], 0.3)
 
 
-def test_a_line_has_equal_steps_and_ends_at_the_first_contact(collided_run: Run) -> None:
+def test_a_line_has_equal_steps_and_ends_at_the_first_contact(collided_run):
     rollout = collided_run.rollout
     assert rollout is not None
     line = driven_line(rollout)

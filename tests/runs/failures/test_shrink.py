@@ -1,27 +1,25 @@
 """Shrinking keeps the failure, leaves nothing that can be left out, and goes on where it stopped."""
 
-from collections.abc import Iterable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from antdrive.base import InputError
-from antdrive.planners import PLANNERS, Planner, PlanResult, Query
+from antdrive.planners import PLANNERS, Planner
 from antdrive.runs.failures import passes
 from antdrive.runs.failures.failure import Failure, failure_of, parse_bound
-from antdrive.runs.failures.shrink import Shrunk, shrink
+from antdrive.runs.failures.shrink import shrink
 from antdrive.runs.failures.space import feasible
 from antdrive.runs.failures.trials import Trials, changeable, identity_of, room_in
-from antdrive.sim import Scenario, run
+from antdrive.sim import run
 from antdrive.worlds import Cruising, Disc, Task, World
 
 SIDE = 6.0
 COARSE = {"physics_hz": 80, "control_hz": 20}  # a third of the work of a drive; nothing here depends on the rates
 
 
-def clutter(count: int, rng: np.random.Generator) -> tuple[Disc, ...]:
+def clutter(count, rng):
     """Cylinders along the lower and the upper wall, out of everybody's way."""
     return tuple(
         Disc(float(rng.uniform(0.3, SIDE - 0.3)), float(y), float(rng.uniform(0.05, 0.1)))
@@ -29,12 +27,12 @@ def clutter(count: int, rng: np.random.Generator) -> tuple[Disc, ...]:
     )
 
 
-def task_with(*discs: Disc) -> Task:
+def task_with(*discs):
     return Task(World("planted", (0.0, 0.0, SIDE, SIDE), discs), (0.61234, 3.0, 0.0), (5.4, 3.0), cell=0.25)
 
 
 @pytest.fixture(scope="module")
-def fenced(small_scenario: Scenario) -> Scenario:
+def fenced(small_scenario):
     """No path: a fence of cylinders from wall to wall, among clutter; without movers nothing is driven, so it is quick."""
     fence = [Disc(3.0 + 0.01 * k, 0.4 + 0.74 * k, 0.26) for k in range(8)]
     discs = [*fence, *clutter(22, np.random.default_rng(1))]
@@ -44,7 +42,7 @@ def fenced(small_scenario: Scenario) -> Scenario:
 
 
 @pytest.fixture(scope="module")
-def struck(small_scenario: Scenario) -> Scenario:
+def struck(small_scenario):
     """A contact with one of two unseen cylinders on the route, by a noisy robot."""
     unseen = (Disc(3.0, 3.0, 0.2), Disc(1.0, 5.0, 0.2), Disc(4.0, 3.1, 0.3))
     task = task_with(*clutter(5, np.random.default_rng(3)))
@@ -52,16 +50,16 @@ def struck(small_scenario: Scenario) -> Scenario:
 
 
 @pytest.fixture(scope="module")
-def steps(struck: Scenario) -> list[Scenario]:
+def steps(struck):
     """The steps by which the contact is made small; the last one is the result."""
     return []
 
 
 @pytest.fixture(scope="module")
-def struck_small(struck: Scenario, steps: list[Scenario]) -> Shrunk:
+def struck_small(struck, steps):
     first = Trials.first
 
-    def watched(self: Trials, candidates: Iterable[Scenario | None]) -> Scenario | None:
+    def watched(self, candidates):
         found = first(self, candidates)
         if found is not None:
             steps.append(found)
@@ -72,7 +70,7 @@ def struck_small(struck: Scenario, steps: list[Scenario]) -> Shrunk:
         return shrink(struck)
 
 
-def without_one(scenario: Scenario) -> list[Scenario | None]:
+def without_one(scenario):
     """The scenario without each one of its obstacles, unseen obstacles and movers."""
     discs, unseen, movers = scenario.task.world.obstacles, scenario.unseen, scenario.task.world.movers
     return [
@@ -82,7 +80,7 @@ def without_one(scenario: Scenario) -> list[Scenario | None]:
     ]
 
 
-def assert_small(shrunk: Shrunk) -> None:
+def assert_small(shrunk):
     """The small scenario fails in the same way, and no longer without any one of its parts."""
     assert shrunk.complete
     assert failure_of(run(shrunk.scenario)) == shrunk.failure
@@ -90,7 +88,7 @@ def assert_small(shrunk: Shrunk) -> None:
         assert smaller is None or failure_of(run(smaller)) != shrunk.failure
 
 
-def test_a_world_without_a_path_keeps_the_cylinders_that_close_it(fenced: Scenario) -> None:
+def test_a_world_without_a_path_keeps_the_cylinders_that_close_it(fenced):
     shrunk = shrink(fenced)
     assert shrunk.failure.outcome == "no_path"
     assert_small(shrunk)
@@ -101,7 +99,7 @@ def test_a_world_without_a_path_keeps_the_cylinders_that_close_it(fenced: Scenar
     assert np.ptp(small.task.world.bounds) < SIDE
 
 
-def test_a_contact_with_an_unseen_cylinder_keeps_that_cylinder_alone(struck: Scenario, struck_small: Shrunk) -> None:
+def test_a_contact_with_an_unseen_cylinder_keeps_that_cylinder_alone(struck, struck_small):
     shrunk = struck_small
     assert shrunk.failure == Failure("collided", "unseen cylinder", "")
     assert_small(shrunk)
@@ -111,7 +109,7 @@ def test_a_contact_with_an_unseen_cylinder_keeps_that_cylinder_alone(struck: Sce
     assert feasible(small.task, small.inflate)
 
 
-def test_the_mover_that_was_touched_is_kept_alone(small_scenario: Scenario) -> None:
+def test_the_mover_that_was_touched_is_kept_alone(small_scenario):
     movers = tuple(Cruising(radius=0.2, position=(5.0, y), velocity=(-0.6, 0.0)) for y in (1.0, 3.0, 5.0))
     world = World("movers", (0.0, 0.0, SIDE, SIDE), clutter(3, np.random.default_rng(3)), movers=movers)
     task = Task(world, (0.6, 3.0, 0.0), (5.4, 3.0), cell=0.25)
@@ -121,7 +119,7 @@ def test_the_mover_that_was_touched_is_kept_alone(small_scenario: Scenario) -> N
     assert (len(shrunk.scenario.task.world.movers), shrunk.scenario.task.world.obstacles) == (1, ())
 
 
-def test_a_bound_on_a_metric_persists(small_scenario: Scenario) -> None:
+def test_a_bound_on_a_metric_persists(small_scenario):
     bound = parse_bound("min_clearance_m < 0.05")
     tight = replace(small_scenario, task=task_with(Disc(3.0, 2.5, 0.3), Disc(3.0, 3.5, 0.25), Disc(1.0, 5.0, 0.2)))
     tight = replace(tight, margin=0.0, smoothing="taut", **COARSE)
@@ -134,12 +132,12 @@ def test_a_bound_on_a_metric_persists(small_scenario: Scenario) -> None:
         shrink(small_scenario, bound=bound)
 
 
-def test_a_success_cannot_be_shrunk(small_scenario: Scenario) -> None:
+def test_a_success_cannot_be_shrunk(small_scenario):
     with pytest.raises(InputError, match="small: this run does not fail, so there is nothing to shrink"):
         shrink(small_scenario)
 
 
-def test_two_processes_give_the_same_result(fenced: Scenario) -> None:
+def test_two_processes_give_the_same_result(fenced):
     alone, together = shrink(fenced), shrink(fenced, jobs=2)
     assert changeable(alone.scenario) == changeable(together.scenario)
     assert together.complete
@@ -148,20 +146,18 @@ def test_two_processes_give_the_same_result(fenced: Scenario) -> None:
 class Counting:
     """A* that counts its plans."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.count = 0
 
-    def __repr__(self) -> str:
+    def __repr__(self):
         return "Counting()"
 
-    def plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+    def plan(self, query, rng):
         self.count += 1
         return PLANNERS["astar"].plan(query, rng)
 
 
-def test_a_session_that_ran_out_of_time_is_taken_up_where_it_stopped(
-    fenced: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_session_that_ran_out_of_time_is_taken_up_where_it_stopped(fenced, tmp_path, monkeypatch):
     clock = iter(range(10**6))
     monkeypatch.setattr("antdrive.runs.failures.trials.time.monotonic", lambda: float(next(clock)))
     counting = Counting()
@@ -179,7 +175,7 @@ def test_a_session_that_ran_out_of_time_is_taken_up_where_it_stopped(
     assert whole.trials == cut.trials + rest.trials
 
 
-def test_a_journal_of_another_failure_or_an_unreadable_one_is_not_used(fenced: Scenario, tmp_path: Path) -> None:
+def test_a_journal_of_another_failure_or_an_unreadable_one_is_not_used(fenced, tmp_path):
     journal = tmp_path / "journal.json"
     first = shrink(fenced, journal=journal)
     assert shrink(replace(fenced, margin=0.031), journal=journal).recalled == 0
@@ -189,7 +185,7 @@ def test_a_journal_of_another_failure_or_an_unreadable_one_is_not_used(fenced: S
         assert (again.recalled, again.trials) == (0, first.trials)
 
 
-def test_answers_that_no_longer_hold_are_forgotten(fenced: Scenario, tmp_path: Path) -> None:
+def test_answers_that_no_longer_hold_are_forgotten(fenced, tmp_path):
     """A journal in which every candidate fails, as if the planner had been mended since, misleads nobody."""
     journal = tmp_path / "journal.json"
     honest = shrink(fenced, journal=journal)
@@ -199,12 +195,12 @@ def test_answers_that_no_longer_hold_are_forgotten(fenced: Scenario, tmp_path: P
     assert changeable(again.scenario) == changeable(honest.scenario)
 
 
-def test_every_accepted_step_fails_in_the_same_way(struck_small: Shrunk, steps: list[Scenario]) -> None:
+def test_every_accepted_step_fails_in_the_same_way(struck_small, steps):
     assert len(steps) > 3
     assert {failure_of(run(step)) for step in steps} == {struck_small.failure}
 
 
-def test_a_moved_wall_cuts_no_cylinder_that_was_whole(small_scenario: Scenario) -> None:
+def test_a_moved_wall_cuts_no_cylinder_that_was_whole(small_scenario):
     """Each wall is moved to everywhere from outside a cylinder to beyond it; another one was cut from the start."""
     whole, cut = Disc(3.0, 3.0, 0.5), Disc(0.1, 3.0, 0.3)
     task = Task(World("w", (0.0, 0.0, 6.0, 6.0), (whole, cut)), (1.0, 1.0, 0.0), (5.0, 5.0), cell=0.25)
@@ -225,7 +221,7 @@ def test_a_moved_wall_cuts_no_cylinder_that_was_whole(small_scenario: Scenario) 
             assert (cut in smaller.task.world.obstacles) == (cut.x + cut.radius >= xmin)
 
 
-def test_the_touched_cylinder_stays_whole_within_the_walls(small_scenario: Scenario) -> None:
+def test_the_touched_cylinder_stays_whole_within_the_walls(small_scenario):
     """A contact beside the straight way to the goal, with a cylinder that reaches far aside."""
     blind = Disc(3.0, 3.7, 0.75)
     small = shrink(replace(small_scenario, task=task_with(), unseen=(blind,), **COARSE)).scenario
@@ -235,7 +231,7 @@ def test_the_touched_cylinder_stays_whole_within_the_walls(small_scenario: Scena
     assert ymax < SIDE
 
 
-def test_a_world_that_has_a_path_keeps_one(struck: Scenario, fenced: Scenario) -> None:
+def test_a_world_that_has_a_path_keeps_one(struck, fenced):
     """A cylinder beside the start is farther than the footprint reaches, and nearer than the clearance that is claimed."""
     failure = Failure("collided", "unseen cylinder", "")
     room = room_in(struck, failure)
@@ -255,14 +251,14 @@ def test_a_world_that_has_a_path_keeps_one(struck: Scenario, fenced: Scenario) -
 class Textless:
     """A planner whose class has no text of its own."""
 
-    def __init__(self, ants: int) -> None:
+    def __init__(self, ants):
         self.ants = ants
 
-    def plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+    def plan(self, query, rng):
         raise NotImplementedError
 
 
-def test_a_journal_knows_a_planner_again_without_a_text_of_its_own(small_scenario: Scenario) -> None:
+def test_a_journal_knows_a_planner_again_without_a_text_of_its_own(small_scenario):
     first, again, other = (identity_of(replace(small_scenario, planner=Textless(ants))) for ants in (3, 3, 4))
     assert first == again
     assert first != other

@@ -8,17 +8,17 @@ import pytest
 from antdrive.planners import PLANNERS, Query, smooth
 from antdrive.robots import load_robot
 from antdrive.runs.margins.courses import course
-from antdrive.worlds import Task, rasterise
+from antdrive.worlds import rasterise
 
 
-def made(robot: str, margin: float, seed: int) -> tuple[Task, float]:
+def made(robot, margin, seed):
     spec = load_robot(robot)
     return course(spec, spec.radius + margin, np.random.default_rng(seed)), spec.radius + margin
 
 
 @pytest.mark.parametrize("robot", ["turtlebot", "jackal"])
 @pytest.mark.parametrize("margin", [0.0, 0.12])
-def test_a_course_has_a_path_that_touches_its_pillars_surroundings(robot: str, margin: float) -> None:
+def test_a_course_has_a_path_that_touches_its_pillars_surroundings(robot, margin):
     spare = []
     for seed in range(20):
         task, inflate = made(robot, margin, seed)
@@ -34,6 +34,6 @@ def test_a_course_has_a_path_that_touches_its_pillars_surroundings(robot: str, m
     assert np.median(spare) < 1e-3
 
 
-def test_courses_differ_by_seed_and_only_by_seed() -> None:
+def test_courses_differ_by_seed_and_only_by_seed():
     assert made("jackal", 0.05, 3) == made("jackal", 0.05, 3)
     assert made("jackal", 0.05, 3) != made("jackal", 0.05, 4)

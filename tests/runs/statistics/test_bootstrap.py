@@ -9,11 +9,11 @@ from antdrive.runs.statistics import bootstrap
 from antdrive.runs.statistics.bootstrap import means_by_world, medians_by_world, resampled
 
 
-def drawn(world: np.ndarray, resamples: int = 200) -> np.ndarray:
+def drawn(world, resamples=200):
     return np.concatenate(list(resampled(world, resamples)))
 
 
-def test_worlds_are_drawn_and_then_runs_within() -> None:
+def test_worlds_are_drawn_and_then_runs_within():
     world = np.array([0, 0, 0, 1, 1, 2])
     weights = drawn(world, 2000)
     by_world = np.stack([weights[:, world == w].sum(axis=1) for w in range(3)], axis=1)
@@ -25,7 +25,7 @@ def test_worlds_are_drawn_and_then_runs_within() -> None:
     assert (weights[:, 0] != weights[:, 1]).any(), "runs within a world are drawn, too"
 
 
-def test_blocks_do_not_change_what_one_block_would_be(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_blocks_do_not_change_what_one_block_would_be(monkeypatch):
     world = np.array([0, 0, 1, 1, 1])
     assert (drawn(world) == drawn(world)).all()
     monkeypatch.setattr(bootstrap, "BLOCK", 50)
@@ -34,7 +34,7 @@ def test_blocks_do_not_change_what_one_block_would_be(monkeypatch: pytest.Monkey
 
 @settings(max_examples=30)
 @given(st.lists(st.one_of(st.none(), st.integers(-9, 9)), min_size=1, max_size=9), st.integers(1, 3))
-def test_medians_of_resamples_are_numpys(values: list[int | None], worlds: int) -> None:
+def test_medians_of_resamples_are_numpys(values, worlds):
     column = np.array([np.nan if value is None else value for value in values])
     world = np.arange(len(column)) % worlds
     by_hand = []
@@ -49,13 +49,13 @@ def test_medians_of_resamples_are_numpys(values: list[int | None], worlds: int) 
         assert np.isnan(found).all()
 
 
-def test_means_of_resamples_are_numpys() -> None:
+def test_means_of_resamples_are_numpys():
     column, world = np.array([1.0, 0.0, np.nan, 1.0, 0.5]), np.array([0, 0, 1, 1, 2])
     by_hand = [np.nanmean(np.repeat(column, w)) for w in drawn(world, 60) if not np.isnan(np.repeat(column, w)).all()]
     assert means_by_world(column[:, None], world, 60)[0] == pytest.approx(np.quantile(by_hand, [0.025, 0.975]))
 
 
-def simulated(by_world: bool, trials: int = 150) -> float:
+def simulated(by_world, trials=150):
     """How often the interval holds the median 0 of a quantity whose worlds differ more than their runs."""
     rng, held = np.random.default_rng(5), 0
     world = np.repeat(np.arange(30), 8)
@@ -67,6 +67,6 @@ def simulated(by_world: bool, trials: int = 150) -> float:
 
 
 @pytest.mark.slow
-def test_intervals_over_worlds_cover_the_truth_and_over_single_runs_do_not() -> None:
+def test_intervals_over_worlds_cover_the_truth_and_over_single_runs_do_not():
     assert simulated(by_world=True) > 0.88
     assert simulated(by_world=False) < 0.7

@@ -17,12 +17,12 @@ PAGE = (ROOT / "docs" / "how-to" / "regression-tests.md").read_text()
 REFERENCE = ROOT / "docs" / "reference"
 
 
-def block(language: str) -> str:
+def block(language):
     (text,) = re.findall(rf"```{language}\n(.*?)```", PAGE, flags=re.DOTALL)
     return str(text)
 
 
-def test_the_tolerances_are_those_of_the_table_of_metrics() -> None:
+def test_the_tolerances_are_those_of_the_table_of_metrics():
     page = (REFERENCE / "regression.md").read_text()
     for name, metric in METRICS.items():
         row = re.search(rf"^\| `{name}` \| (\w+) \| (.*) \|$", page, flags=re.MULTILINE)
@@ -35,14 +35,14 @@ def test_the_tolerances_are_those_of_the_table_of_metrics() -> None:
         assert row.groups() == (metric.better, f"{metric.tolerance.absolute:g}{unit}{share}")
 
 
-def test_every_key_of_a_suite_is_explained() -> None:
+def test_every_key_of_a_suite_is_explained():
     table = (REFERENCE / "formats" / "suite.md").read_text().split("| key | meaning |")[1].split("\n\n")[0]
     assert {key for key in ScenarioEntry.model_fields if f"`{key}`" not in table} == {"note"}
     properties = suite_schema()["$defs"]["ScenarioEntry"]["properties"]
     assert all(entry.get("description") for entry in properties.values())
 
 
-def test_the_suite_is_read(tmp_path: Path) -> None:
+def test_the_suite_is_read(tmp_path):
     (tmp_path / "page.drive.yaml").write_text(block("yaml"))
     assert [case.id for case in load_suite(tmp_path / "page.drive.yaml")] == [
         "forest[0]", "forest[1]", "random[0]", "random[1]", "random[2]", "closed-door[0]",
@@ -50,7 +50,7 @@ def test_the_suite_is_read(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_suite_and_the_tests_pass(tmp_path: Path) -> None:
+def test_the_suite_and_the_tests_pass(tmp_path):
     (tmp_path / "page.drive.yaml").write_text(block("yaml"))
     (tmp_path / "test_page.py").write_text(block("python"))
     command = [sys.executable, "-m", "pytest", "-q", "-p", "antdrive.cli.testing.plugin"]

@@ -35,13 +35,13 @@ SMALL = "{schema: 1, bounds: [0, 0, 4, 2], start: [0.6, 1, 0], goal: [3.4, 1], c
 
 
 @pytest.fixture
-def pictures() -> bool:
+def pictures():
     """Whether pictures are drawn; else empty files stand for them, which is quicker."""
     return False
 
 
 @pytest.fixture
-def project(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, pictures: bool) -> pytest.Pytester:
+def project(pytester, monkeypatch, pictures):
     """A folder with a suite; results go beside it, without films."""
     if not pictures:
         monkeypatch.setattr(RUN_FIGURES + "overview", lambda rollout, path: Path(path).touch())
@@ -54,7 +54,7 @@ def project(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, pictures
     return pytester
 
 
-def test_a_suite_is_collected_driven_and_compared(project: pytest.Pytester) -> None:
+def test_a_suite_is_collected_driven_and_compared(project):
     add_collision(project)
     project.runpytest(*PLUGIN, "--collect-only", "-q").stdout.fnmatch_lines(
         ["*::clear[[]0]", "*::closed[[]0]", "*::hit[[]0]"]
@@ -79,7 +79,7 @@ def test_a_suite_is_collected_driven_and_compared(project: pytest.Pytester) -> N
     second.stdout.no_fnmatch_line("*Traceback*")
 
 
-def test_a_wrong_suite_is_one_line_of_collection(project: pytest.Pytester) -> None:
+def test_a_wrong_suite_is_one_line_of_collection(project):
     project.makefile(".drive.yaml", b="schema: 1\nscenarios:\n  x: {world: small.yaml, planner: astarr}\n")
     found = project.runpytest(*PLUGIN)
     found.assert_outcomes(errors=1)
@@ -88,13 +88,13 @@ def test_a_wrong_suite_is_one_line_of_collection(project: pytest.Pytester) -> No
 
 
 @pytest.fixture
-def accepted(project: pytest.Pytester) -> pytest.Pytester:
+def accepted(project):
     """The same with baselines."""
     project.runpytest(*PLUGIN, "--drive-update-new").assert_outcomes(passed=2)
     return project
 
 
-def add_collision(project: pytest.Pytester) -> None:
+def add_collision(project):
     """Add a scenario that fails."""
     project.makefile(".drive.yaml", a=SUITE + HIT)
 
@@ -118,7 +118,7 @@ def test_plain():
 """
 
 
-def test_tests_in_python_have_baselines_of_their_own(project: pytest.Pytester) -> None:
+def test_tests_in_python_have_baselines_of_their_own(project):
     project.makepyfile(test_mine=FIXTURE)
     first = project.runpytest(*PLUGIN, "test_mine.py")
     first.assert_outcomes(failed=3, passed=1)
@@ -136,7 +136,7 @@ def test_tests_in_python_have_baselines_of_their_own(project: pytest.Pytester) -
 
 
 @pytest.mark.parametrize("pictures", [True])
-def test_a_worse_drive_fails_with_what_was_lost_and_where_it_parts(accepted: pytest.Pytester) -> None:
+def test_a_worse_drive_fails_with_what_was_lost_and_where_it_parts(accepted):
     folder = accepted.path / "res"
     (accepted.path / "slow.yaml").write_text(_robot().replace("max_speed: 0.7", "max_speed: 0.4"))
     text = SUITE.replace("clear: {}", "clear: {robot: slow.yaml}")
@@ -159,7 +159,7 @@ def test_a_worse_drive_fails_with_what_was_lost_and_where_it_parts(accepted: pyt
     assert not (folder / "a" / "clear-0").exists(), "what an earlier run wrote about a test that passes now is removed"
 
 
-def test_a_better_drive_passes_and_says_that_the_baseline_can_be_renewed(accepted: pytest.Pytester) -> None:
+def test_a_better_drive_passes_and_says_that_the_baseline_can_be_renewed(accepted):
     path = accepted.path / "baselines" / "a" / "clear-0.json"
     path.write_text(re.sub(r'"duration_s": [\d.]+', '"duration_s": 99.0', path.read_text()))
     found = accepted.runpytest(*PLUGIN, "-k", "clear")
@@ -169,7 +169,7 @@ def test_a_better_drive_passes_and_says_that_the_baseline_can_be_renewed(accepte
     accepted.runpytest(*PLUGIN, "-k", "clear").stdout.no_fnmatch_line("better*")
 
 
-def test_unused_baselines_are_told_and_fail_if_asked_to(accepted: pytest.Pytester) -> None:
+def test_unused_baselines_are_told_and_fail_if_asked_to(accepted):
     folder = accepted.path / "baselines"
     (folder / "a" / "gone-0.json").write_text((folder / "a" / "clear-0.json").read_text())
     (folder / "b").mkdir()
@@ -183,7 +183,7 @@ def test_unused_baselines_are_told_and_fail_if_asked_to(accepted: pytest.Pyteste
     assert accepted.runpytest(*chosen, "--drive-strict").ret == 1
 
 
-def test_a_suite_that_is_reached_through_a_link_uses_its_baselines(accepted: pytest.Pytester) -> None:
+def test_a_suite_that_is_reached_through_a_link_uses_its_baselines(accepted):
     link = accepted.path.parent / f"{accepted.path.name}-link"
     link.symlink_to(accepted.path, target_is_directory=True)
     found = accepted.runpytest(
@@ -193,7 +193,7 @@ def test_a_suite_that_is_reached_through_a_link_uses_its_baselines(accepted: pyt
     found.stdout.no_fnmatch_line("*unused baseline*")
 
 
-def test_a_suite_and_a_module_of_one_name_use_their_own_baselines(accepted: pytest.Pytester) -> None:
+def test_a_suite_and_a_module_of_one_name_use_their_own_baselines(accepted):
     accepted.makepyfile(a="def test_one(drive): drive('small.yaml', 'astar')\n")
     accepted.runpytest(*PLUGIN, "a.py", "--drive-update-new").assert_outcomes(passed=1)
     folder = accepted.path / "baselines" / "a"
@@ -204,7 +204,7 @@ def test_a_suite_and_a_module_of_one_name_use_their_own_baselines(accepted: pyte
     assert accepted.runpytest(*chosen).ret == 1
 
 
-def test_last_failed_calls_no_baseline_unused(accepted: pytest.Pytester) -> None:
+def test_last_failed_calls_no_baseline_unused(accepted):
     """pytest leaves out the tests that passed before it says which tests there are."""
     accepted.makepyfile(
         test_m="def test_one(drive): drive('small.yaml', 'astar')\n"
@@ -216,9 +216,7 @@ def test_last_failed_calls_no_baseline_unused(accepted: pytest.Pytester) -> None
     again.stdout.no_fnmatch_line("*test_one*")
 
 
-def test_a_page_of_a_ci_run_that_cannot_be_written_is_one_line(
-    accepted: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_page_of_a_ci_run_that_cannot_be_written_is_one_line(accepted, monkeypatch):
     monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(accepted.path / "none" / "page.md"))
     found = accepted.runpytest(*PLUGIN, "-k", "closed")
     assert found.ret == 0
@@ -226,7 +224,7 @@ def test_a_page_of_a_ci_run_that_cannot_be_written_is_one_line(
 
 
 @pytest.mark.slow
-def test_it_works_with_xdist_and_in_any_order(accepted: pytest.Pytester) -> None:
+def test_it_works_with_xdist_and_in_any_order(accepted):
     add_collision(accepted)
     accepted.makeconftest("def pytest_collection_modifyitems(items): items.reverse()")
     spread = accepted.runpytest(*PLUGIN, "-p", "xdist", "-n", "2")
@@ -239,7 +237,7 @@ def test_it_works_with_xdist_and_in_any_order(accepted: pytest.Pytester) -> None
 
 
 @pytest.mark.slow
-def test_last_failed_repeats_the_failed_drive(accepted: pytest.Pytester) -> None:
+def test_last_failed_repeats_the_failed_drive(accepted):
     add_collision(accepted)
     accepted.runpytest(*PLUGIN[:2]).assert_outcomes(passed=2, failed=1)
     accepted.runpytest(*PLUGIN[:2], "--lf").assert_outcomes(failed=1)
@@ -247,8 +245,8 @@ def test_last_failed_repeats_the_failed_drive(accepted: pytest.Pytester) -> None
 
 
 @pytest.mark.slow
-def test_nothing_is_written_into_the_checkout(accepted: pytest.Pytester) -> None:
-    def files() -> set[Path]:
+def test_nothing_is_written_into_the_checkout(accepted):
+    def files():
         return {path for path in accepted.path.rglob("*") if path.is_file() and "cache" not in path.parts}
 
     add_collision(accepted)
@@ -258,7 +256,7 @@ def test_nothing_is_written_into_the_checkout(accepted: pytest.Pytester) -> None
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root can write everywhere")
-def test_a_baseline_that_cannot_be_written_is_one_line(accepted: pytest.Pytester) -> None:
+def test_a_baseline_that_cannot_be_written_is_one_line(accepted):
     folder = accepted.path / "baselines" / "a"
     folder.chmod(0o500)
     found = accepted.runpytest(*PLUGIN, "-k", "clear", "--drive-update")
@@ -272,7 +270,7 @@ TWO = (
 
 
 @pytest.mark.parametrize("change", ["rename", "drop"])
-def test_the_baseline_of_a_drive_that_is_gone_is_unused(project: pytest.Pytester, change: str) -> None:
+def test_the_baseline_of_a_drive_that_is_gone_is_unused(project, change):
     project.makepyfile(test_m=TWO)
     project.runpytest(*PLUGIN, "test_m.py", "--drive-update-new", "--drive-strict").assert_outcomes(passed=1)
     gone = TWO.replace("'two'", "'other'") if change == "rename" else "".join(TWO.splitlines(keepends=True)[:2])
@@ -286,7 +284,7 @@ def test_the_baseline_of_a_drive_that_is_gone_is_unused(project: pytest.Pytester
     found.stdout.no_fnmatch_line("*unused baseline*")  # it might have come after what failed
 
 
-def test_commands_work_where_pytest_was_started_and_in_its_rootdir(project: pytest.Pytester) -> None:
+def test_commands_work_where_pytest_was_started_and_in_its_rootdir(project):
     project.makeini("[pytest]\n")
     inner = project.mkdir("inner")
     (inner / "small.yaml").write_text(SMALL)
@@ -307,9 +305,7 @@ def test_commands_work_where_pytest_was_started_and_in_its_rootdir(project: pyte
         again.assert_outcomes(passed=1)
 
 
-def test_kernels_are_compiled_before_the_first_drive_with_one_line(
-    project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_kernels_are_compiled_before_the_first_drive_with_one_line(project, monkeypatch, capfd):
     compiled: list[int] = []
     monkeypatch.setattr("antdrive.cli.warm.is_warm", lambda: bool(compiled))
     monkeypatch.setattr("antdrive.cli.warm.warm", lambda: compiled.append(1))
@@ -320,9 +316,7 @@ def test_kernels_are_compiled_before_the_first_drive_with_one_line(
     assert capfd.readouterr().err.count("antdrive: compiling the planners, once for this installation") == 1
 
 
-def test_junit_properties_and_the_summary_of_a_ci_run(
-    accepted: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_junit_properties_and_the_summary_of_a_ci_run(accepted, monkeypatch):
     add_collision(accepted)
     page = accepted.path / "summary.md"
     page.write_text("before\n")
@@ -338,7 +332,7 @@ def test_junit_properties_and_the_summary_of_a_ci_run(
     assert "    antdrive check 'a.drive.yaml::hit[0]'\n" in text
 
 
-def test_a_planner_that_raises_fails_its_test_in_one_line(project: pytest.Pytester) -> None:
+def test_a_planner_that_raises_fails_its_test_in_one_line(project):
     project.makepyfile(mine="class Mine:\n    def plan(self, query, rng):\n        raise RuntimeError('lost')\n")
     text = SUITE.replace("clear: {}", "clear: {planner: {file: mine.py, name: Mine}, baseline: false}")
     project.makefile(".drive.yaml", a=text)
@@ -347,14 +341,14 @@ def test_a_planner_that_raises_fails_its_test_in_one_line(project: pytest.Pytest
     found.stdout.no_fnmatch_line("*Traceback*")
 
 
-def _robot() -> str:
+def _robot():
     return list_robots()["turtlebot"].read_text()
 
 
 HEAVY = "('numpy', 'numba', 'pybullet', 'matplotlib', 'PIL', 'pydantic', 'yaml', 'hypothesis')"
 
 
-def test_the_plugin_imports_nothing_for_a_run_that_does_not_use_it(pytester: pytest.Pytester) -> None:
+def test_the_plugin_imports_nothing_for_a_run_that_does_not_use_it(pytester):
     pytester.makepyfile("def test_one(): pass")
     code = (
         f"import sys, pytest; code = pytest.main(['-q', '-p', '{PLUGIN[1]}', '-p', 'no:hypothesispytest', '-p', 'no:regressions',"
@@ -365,7 +359,7 @@ def test_the_plugin_imports_nothing_for_a_run_that_does_not_use_it(pytester: pyt
     assert done.stdout.splitlines()[-1] == "0 []"
 
 
-def test_collecting_loads_no_physics_and_no_compiler(project: pytest.Pytester) -> None:
+def test_collecting_loads_no_physics_and_no_compiler(project):
     code = (
         f"import sys, pytest; pytest.main(['-q', '--collect-only', '-p', '{PLUGIN[1]}'])\n"
         "print([name for name in ('numba', 'pybullet', 'matplotlib', 'PIL') if name in sys.modules])"
@@ -374,12 +368,10 @@ def test_collecting_loads_no_physics_and_no_compiler(project: pytest.Pytester) -
     assert done.stdout.splitlines()[-1] == "[]"
 
 
-def test_the_summary_says_which_failed_drives_have_no_film(
-    project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_summary_says_which_failed_drives_have_no_film(project, monkeypatch):
     """One film is allowed, and a file stands for it; the suite fails three times, for want of baselines."""
 
-    def film(rollout: object, path: Path, **_: object) -> SimpleNamespace:
+    def film(rollout, path, **_):
         path.write_text("a film")
         return SimpleNamespace(path=path)
 

@@ -184,7 +184,7 @@ def test_a_robot_without_a_map_backs_off_slowly_where_its_lidar_does_not_look(
             return Twist(0.0, 0.0), False, AvoidanceState()
 
         noted: Any = SimpleNamespace(prediction_times=np.arange(3.0), step=1.0, avoid=avoid, min_clearance=0.1)
-        monkeypatch.setattr(Scenario, "effective_avoidance", property(lambda _, noted=noted: noted))
+        monkeypatch.setattr("antdrive.sim.compose.avoidance_of", lambda _, noted=noted: noted)
         rule = next(rule for rule in compose(unknown).rules if type(rule) is Avoid)
         still = State(*TASK.start, 0.0, 0.0)
         rule.apply(Moment(0, TASK.start, still, driver(robot).path, Step(), StuckClock()), Step())

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from antdrive.robots.lidar import Lidar
 from antdrive.views.export import samples
-from antdrive.views.export.scans import Scans
+from antdrive.views.export.scans import DriveScans
 from antdrive.views.export.topics import Topic, message_types
 
 pytest.importorskip("rosbags", reason="rosbags is not installed")
@@ -110,7 +110,7 @@ def log_with_scans(beams: int, field_of_view: float) -> Any:
 @pytest.mark.parametrize(("beams", "around", "step"), [(3, math.pi, math.pi / 2), (4, 2 * math.pi, math.pi / 2)])
 def test_scans(beams: int, around: float, step: float) -> None:
     log = log_with_scans(beams, around)
-    (topic,) = samples.scan_topics(log, Scans.of(log))
+    (topic,) = samples.scan_topics(log, DriveScans.of(log))
     ranges = (log.scans * 1e-3).astype(np.float32)
     ranges[0, :2] = np.inf, -np.inf  # REP 117: nothing in range, too near to measure
     expected = [
@@ -135,6 +135,6 @@ def test_scans(beams: int, around: float, step: float) -> None:
 def test_a_log_without_scans_has_no_topic_for_them() -> None:
     log = log_with_scans(3, math.pi)
     log.scans = np.empty((0, 0), dtype=np.uint16)
-    assert samples.scan_topics(log, Scans.of(log, again=False)) == []
+    assert samples.scan_topics(log, DriveScans.of(log, again=False)) == []
     log.record.robot.lidar = None
-    assert samples.scan_topics(log, Scans.of(log)) == []
+    assert samples.scan_topics(log, DriveScans.of(log)) == []

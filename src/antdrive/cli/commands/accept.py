@@ -12,7 +12,7 @@ def accept(
     tests: suites.Suites,
     only: suites.Only = None,
     new: Annotated[bool, typer.Option("--new", help="Write missing baselines only.")] = False,
-    jobs: suites.Jobs = None,
+    jobs: options.Jobs = None,
     results: suites.ResultsFolder = None,
     film: suites.Film = "failed",
     json: options.Json = False,

@@ -32,11 +32,7 @@ WithMap = Annotated[
 Trials = Annotated[int, typer.Option(min=1, max=10_000, metavar="NUMBER", help="How often each world is driven.")]
 Films = Annotated[
     bool,
-    typer.Option("--films", help="Film each run that did not arrive, into OUT/films; its cause is in the picture."),
-]
-Jobs = Annotated[
-    int | None,
-    typer.Option("--jobs", "-j", min=1, max=256, metavar="NUMBER", help="Processes.  [default: one per core]"),
+    typer.Option("--film", help="Film each run that did not arrive, into OUT/films; its cause is in the picture."),
 ]
 Out = Annotated[
     Path,
@@ -56,7 +52,7 @@ def barn(
     planner: options.Planner = "astar",
     robot: options.Robot = "jackal",
     trials: Trials = 10,
-    jobs: Jobs = None,
+    jobs: options.Jobs = None,
     out: Out = Path("out/barn"),
     films: Films = False,
     json: options.Json = False,

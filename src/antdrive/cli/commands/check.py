@@ -19,7 +19,7 @@ Strict = Annotated[bool, typer.Option("--strict", help="Fail if there are baseli
 def check(
     tests: suites.Suites,
     only: suites.Only = None,
-    jobs: suites.Jobs = None,
+    jobs: options.Jobs = None,
     results: suites.ResultsFolder = None,
     film: suites.Film = "failed",
     junit: Junit = None,

@@ -10,31 +10,20 @@ from antdrive.base.errors import InputError
 from antdrive.base.files import file_name, write_json
 from antdrive.cli import options
 from antdrive.cli.campaign_tables import Against, Allow, Metrics, Where, campaigns_of_words, compare_campaigns
-from antdrive.cli.comparing import (
-    COMPARED,
-    Compared,
-    Entrant,
-    check_worlds,
-    difference_cells,
-    differences,
-    entrants_of,
-    mark_of,
-    repeating,
-    same_drives,
-)
 from antdrive.cli.compiling import compile_once
-from antdrive.cli.console import planning, print_error, print_files, print_json, print_line, print_table
+from antdrive.cli.console import planning, print_error, print_files, print_json, print_line, print_table, this_command
+from antdrive.cli.entrants import Entrant, check_worlds, entrants_of, repeating
 from antdrive.cli.exits import FAILED, SUCCEEDED
+from antdrive.cli.output import film_drives
 from antdrive.cli.scenario import chosen_task, ends_words, make_scenario
-from antdrive.cli.write import (
+from antdrive.runs.comparing import COMPARED, Compared, difference_cells, differences, mark_of, same_drives
+from antdrive.runs.folder import free_folder, opened
+from antdrive.views.folder import (
     check_film,
     check_folder,
-    this_command,
-    write_comparison_film,
     write_result,
     write_run,
 )
-from antdrive.runs.folder import free_folder, opened
 
 if TYPE_CHECKING:
     from antdrive.sim.log.rollout import Rollout
@@ -85,7 +74,7 @@ def compare(
     frame: options.Frame = "world",
     out: options.Out = None,
     figures: options.Figures = True,
-    video: Annotated[
+    film: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Film the first world's drives side by side: .mp4, .gif or .webp."),
     ] = None,
@@ -111,12 +100,12 @@ def compare(
     cases = [(world, number) for world in worlds for number in range(given["seed"], given["seed"] + seeds)]
     default, mark = _default_folder(scenarios, cases)
     folder = out or default
-    _make_ready(folder, video)
+    _make_ready(folder, film)
     with opened(folder, MARKER):
         facts = {"fingerprint": mark, "command": this_command()}
         runs, logs = _drive(scenarios, cases, folder, robot, figures, facts, ends_words(task, start, goal, frame))
         files = {run.label: run.facts["folder"] for run in runs} if len(cases) == 1 else {"folder": str(folder)}
-        files |= _views(logs, folder, video, speed, figures)
+        files |= _views(logs, folder, film, speed, figures)
         told = {"differences": differences(runs), "same": same_drives(runs, given["smoothing"])}
         told["drives"] = [{"label": run.label, **run.facts} for run in runs]
         write_json(folder / MARKER, {**facts, **told})
@@ -128,10 +117,10 @@ def compare(
     return SUCCEEDED if all(run.facts["succeeded"] for run in runs) else FAILED
 
 
-def _make_ready(folder: Path, video: Path | None) -> None:
+def _make_ready(folder: Path, film: Path | None) -> None:
     """Refuse places where nothing can be written, before anything is driven, and compile the kernels."""
-    if video is not None:
-        check_film(video)
+    if film is not None:
+        check_film(film)
     check_folder(folder)
     compile_once()
 
@@ -208,7 +197,7 @@ def _drive(
     return runs, logs
 
 
-def _views(logs: "dict[str, Rollout]", folder: Path, video: Path | None, speed: float, figures: bool) -> dict[str, str]:
+def _views(logs: "dict[str, Rollout]", folder: Path, film: Path | None, speed: float, figures: bool) -> dict[str, str]:
     """The figure and the film of the first world and seed."""
     files: dict[str, str] = {}
     if len(logs) > 1 and figures:
@@ -216,8 +205,8 @@ def _views(logs: "dict[str, Rollout]", folder: Path, video: Path | None, speed: 
 
         comparison_figure(logs, folder / "comparison.png")
         files["figure"] = str(folder / "comparison.png")
-    if len(logs) > 1 and video is not None:
-        files["film"] = write_comparison_film(list(logs.values()), video, speed=speed, titles=list(logs))["file"]
+    if len(logs) > 1 and film is not None:
+        files["film"] = film_drives(list(logs.values()), film, speed=speed, titles=list(logs))["file"]
     return files
 
 

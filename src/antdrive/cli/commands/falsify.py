@@ -11,19 +11,18 @@ from antdrive.base.errors import InputError
 from antdrive.base.files import file_name
 from antdrive.cli import options
 from antdrive.cli.compiling import compile_once
-from antdrive.cli.console import bar, print_json, print_line, print_table
+from antdrive.cli.console import bar, print_json, print_line, print_table, this_command
 from antdrive.cli.exits import FAILED, SUCCEEDED
+from antdrive.cli.output import film_drives
 from antdrive.cli.scenario import make_scenario
-from antdrive.cli.write import (
+from antdrive.runs.folder import free_folder, opened
+from antdrive.views.folder import (
     RUN_FILES,
     check_folder,
     fingerprint,
-    this_command,
-    write_film,
     write_result,
     write_run,
 )
-from antdrive.runs.folder import free_folder, opened
 
 if TYPE_CHECKING:
     from antdrive.runs.failures.hunt import Hunt
@@ -116,7 +115,7 @@ def _report(hunt: "Hunt", folder: Path, seconds: float, film: bool) -> "list[Rep
             continue
         files = write_run(one.run, folder / one.name, figures=film)
         if film and one.run.rollout is not None:
-            files["film"] = write_film(one.run.rollout, folder / one.name / "film.mp4")["file"]
+            files["film"] = film_drives([one.run.rollout], folder / one.name / "film.mp4")["file"]
         write_result(one.run, files, shlex.join(["antdrive", "check", f"{folder / SUITE}::{one.name}"]))
     return reported
 

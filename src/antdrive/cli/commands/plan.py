@@ -12,7 +12,7 @@ from antdrive.cli.console import planning, print_files, print_json, print_line
 from antdrive.cli.exits import FAILED, SUCCEEDED
 from antdrive.cli.output import chosen_margin, in_brackets, plain
 from antdrive.cli.scenario import chosen_task, make_scenario
-from antdrive.cli.write import suffixes
+from antdrive.views.folder import suffixes
 
 if TYPE_CHECKING:
     from antdrive.planners import PlanResult

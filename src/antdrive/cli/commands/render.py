@@ -10,9 +10,10 @@ from antdrive.cli import options
 from antdrive.cli.compiling import compile_once
 from antdrive.cli.console import print_files, print_json
 from antdrive.cli.exits import SUCCEEDED
+from antdrive.cli.output import film_drives
 from antdrive.cli.parse import log_at
 from antdrive.cli.parse import size as parse_size
-from antdrive.cli.write import caption, write_comparison_film, write_film
+from antdrive.views.folder import caption
 
 
 def render(
@@ -59,10 +60,9 @@ def render(
 
         still(logs[0], out, at, camera=camera, **shape, note=caption(logs[0]))
         facts: dict[str, Any] = {"file": str(out), "frames": 1}
-    elif len(logs) > 1:
-        facts = write_comparison_film(logs, out, camera=camera, **shape, fps=fps, speed=speed)
     else:
-        facts = write_film(logs[0], out, camera=camera, **shape, fps=fps, speed=speed, prelude=prelude)
+        begins = {} if len(logs) > 1 else {"prelude": prelude}
+        facts = film_drives(logs, out, camera=camera, **shape, fps=fps, speed=speed, **begins)
     if json:
         print_json(facts)
     else:

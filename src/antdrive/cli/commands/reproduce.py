@@ -8,10 +8,10 @@ import typer
 from antdrive.base.files import write_json
 from antdrive.cli import options
 from antdrive.cli.compiling import compile_once
-from antdrive.cli.console import bar, print_error, print_files, print_json, print_line, print_table
+from antdrive.cli.console import bar, print_error, print_files, print_json, print_line, print_table, this_command
 from antdrive.cli.exits import SUCCEEDED
-from antdrive.cli.write import check_folder, suffixes, this_command
 from antdrive.runs.folder import free_folder, opened
+from antdrive.views.folder import check_folder, suffixes
 
 MARKER = "reproduce.json"
 QUICK_SEEDS = 6
@@ -31,9 +31,9 @@ def reproduce(
             "--quick", help="A look: six seeds, fewer ant steps, two maps for each picture, no slow experiment."
         ),
     ] = False,
-    jobs: Annotated[int, typer.Option(min=1, max=256, metavar="NUMBER", help="Number of processes.")] = 1,
+    jobs: options.Jobs = None,
     films: Annotated[
-        bool, typer.Option("--films", help="Film a drive for each paper: its colony plans, a robot drives.")
+        bool, typer.Option("--film", help="Film a drive for each paper: its colony plans, a robot drives.")
     ] = False,
     vector: options.Vector = False,
     json: options.Json = False,

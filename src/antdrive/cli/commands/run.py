@@ -9,26 +9,24 @@ from antdrive.base.atomic import claimed
 from antdrive.base.errors import InputError
 from antdrive.cli import options
 from antdrive.cli.compiling import compile_once
-from antdrive.cli.console import bar, planning, print_json
+from antdrive.cli.console import bar, planning, print_json, this_command
 from antdrive.cli.exits import FAILED, SUCCEEDED
-from antdrive.cli.output import print_run
+from antdrive.cli.output import film_drives, print_run
 from antdrive.cli.scenario import chosen_task, make_scenario
-from antdrive.cli.write import (
+from antdrive.sim.settings import SETTINGS
+from antdrive.views.folder import (
     check_film,
     check_folder,
     default_folder,
-    this_command,
-    write_film,
     write_result,
     write_run,
 )
-from antdrive.sim.settings import SETTINGS
 
 if TYPE_CHECKING:
     from antdrive.sim.pipeline import Run
     from antdrive.sim.scenario import Scenario
 
-Video = Annotated[
+Film = Annotated[
     Path | None, typer.Option(metavar="FILE", help="Film the drive: .mp4, .gif or .webp.", rich_help_panel="Output")
 ]
 Gui = Annotated[
@@ -48,7 +46,7 @@ def run(
     goal: options.Goal = None,
     frame: options.Frame = "world",
     out: options.Out = None,
-    video: Video = None,
+    film: Film = None,
     prelude: options.Prelude = 0.0,
     vector: options.Vector = False,
     figures: options.Figures = True,
@@ -62,13 +60,13 @@ def run(
     """
     scenario = make_scenario(chosen_task(world, task, start, goal, frame), planner, settings, robot, given)
     folder = out or default_folder(scenario)
-    _check_views(scenario, video, prelude, gui)
+    _check_views(scenario, film, prelude, gui)
     check_folder(folder)
     compile_once()
     with claimed(folder):
         result = _drive(scenario)
         files = write_run(result, folder, vector=vector, figures=figures)
-        report = _write_views(result, files, video, prelude)
+        report = _write_views(result, files, film, prelude)
     if json:
         print_json(report)
     else:
@@ -86,16 +84,16 @@ def _show(result: "Run") -> None:
         show(result.rollout)
 
 
-def _write_views(result: "Run", files: dict[str, str], video: Path | None, prelude: float) -> dict[str, Any]:
+def _write_views(result: "Run", files: dict[str, str], film: Path | None, prelude: float) -> dict[str, Any]:
     """Write the result and, if asked for, the film, and the result again with it; what was written."""
     report = write_result(result, files, this_command())
-    if video is None or result.rollout is None:
+    if film is None or result.rollout is None:
         return report
-    files["film"] = write_film(result.rollout, video, prelude=prelude)["file"]
+    files["film"] = film_drives([result.rollout], film, prelude=prelude)["file"]
     return write_result(result, files, this_command())
 
 
-def _check_views(scenario: "Scenario", video: Path | None, prelude: float, gui: bool) -> None:
+def _check_views(scenario: "Scenario", film: Path | None, prelude: float, gui: bool) -> None:
     """Refuse, before any work, a film or a window that could not be made afterwards."""
     if gui:
         from antdrive.views.window import check_display
@@ -104,14 +102,14 @@ def _check_views(scenario: "Scenario", video: Path | None, prelude: float, gui: 
     if prelude > 0:
         from antdrive.planners import capabilities_of
 
-        if video is None:
-            raise InputError("--prelude: belongs to a film; give --video, too")
+        if film is None:
+            raise InputError("--prelude: belongs to a film; give --film, too")
         if not capabilities_of(scenario.planner).iterative:
             raise InputError(
                 f"--prelude: {scenario.planner_name} does not plan in iterations; there is no field to show"
             )
-    if video is not None:
-        check_film(video)
+    if film is not None:
+        check_film(film)
 
 
 def _drive(scenario: "Scenario") -> "Run":

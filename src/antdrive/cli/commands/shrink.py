@@ -9,17 +9,16 @@ import typer
 from antdrive.base.errors import InputError
 from antdrive.cli import options
 from antdrive.cli.compiling import compile_once
-from antdrive.cli.console import print_files, print_json, print_line, working
+from antdrive.cli.console import print_files, print_json, print_line, this_command, working
 from antdrive.cli.exits import FAILED, SUCCEEDED
-from antdrive.cli.write import (
+from antdrive.cli.output import film_drives
+from antdrive.runs.folder import free_folder, opened
+from antdrive.views.folder import (
     check_folder,
     fingerprint,
-    this_command,
-    write_film,
     write_result,
     write_run,
 )
-from antdrive.runs.folder import free_folder, opened
 
 if TYPE_CHECKING:
     from antdrive.runs.failures.handover import Handover
@@ -51,7 +50,9 @@ OwnPlanner = Annotated[
     ),
 ]
 Film = Annotated[bool, typer.Option("--film/--no-film", help="Film the small failure.")]
-Jobs = Annotated[int, typer.Option(min=1, max=64, metavar="NUMBER", help="Processes; the result is the same.")]
+Jobs = Annotated[
+    int, typer.Option("--jobs", "-j", min=1, max=64, metavar="NUMBER", help="Processes; the result is the same.")
+]
 
 
 def shrink(
@@ -183,7 +184,7 @@ def _write(
     repeats = failure_of(result, handover.bound) == shrunk.failure and elsewhere == [fingerprint_of(result)]
     files = {**write_run(result, folder, figures=figures), **files}
     if film and result.rollout is not None:
-        files["film"] = write_film(result.rollout, folder / f"{name}.mp4")["file"]
+        files["film"] = film_drives([result.rollout], folder / f"{name}.mp4")["file"]
     return {**write_result(result, files, this_command()), **_facts(shrunk, repeats)}, repeats
 
 

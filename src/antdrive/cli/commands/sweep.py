@@ -60,10 +60,6 @@ Tasks = Annotated[
         "[default: its own]",
     ),
 ]
-Jobs = Annotated[
-    int | None,
-    typer.Option("--jobs", "-j", min=1, max=256, metavar="NUMBER", help="Processes.  [default: one per core]"),
-]
 Dask = Annotated[
     str | None,
     typer.Option(
@@ -110,7 +106,7 @@ def sweep(
     robot: Robots = None,
     seeds: Seeds = None,
     tasks: Tasks = None,
-    jobs: Jobs = None,
+    jobs: options.Jobs = None,
     dask: Dask = None,
     keep: Rollouts = None,
     run_limit: Limit = None,

@@ -1,18 +1,13 @@
 """`antdrive warm`."""
 
-from typing import Annotated
-
-import typer
-
 from antdrive.base.errors import InputError
+from antdrive.cli import options
 from antdrive.cli.console import bar, print_line
 from antdrive.cli.exits import SUCCEEDED
 
 
 def warm(
-    jobs: Annotated[
-        int | None, typer.Option(min=1, max=256, metavar="NUMBER", help="Number of processes.  [default: one a core]")
-    ] = None,
+    jobs: options.Jobs = None,
 ) -> int:
     """Compile every planner into the cache.
 
@@ -28,6 +23,6 @@ def warm(
         print_line("every planner is compiled already")
         return SUCCEEDED
     with bar("compiling the planners") as progress:
-        compile_all(-1 if jobs is None else jobs, progress=progress)
+        compile_all(jobs, progress=progress)
     print_line("every planner is compiled")
     return SUCCEEDED

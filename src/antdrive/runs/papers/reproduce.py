@@ -85,7 +85,7 @@ def reproduce(
     folder: Path,
     *,
     seeds: int,
-    jobs: int = 1,
+    jobs: int | None = 1,
     quick: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> Reproduction:
@@ -128,7 +128,7 @@ def _all_trials(
     experiments: Sequence[Experiment],
     folder: Path,
     seeds: int,
-    jobs: int,
+    jobs: int | None,
     progress: Callable[[float], None] | None,
 ) -> tuple[Measurements, int]:
     """The experiments with their trials, and for how many these were in the folder already."""

@@ -199,6 +199,10 @@ class Baseline:
     def own(cls, path: Path, case: str) -> Baseline | None:
         """The baseline in a file, which must be that of the test; None if there is no such file.
 
+        Args:
+            path: the file
+            case: the name of the test
+
         Raises:
             InputError: the file is no baseline, or that of another test.
         """

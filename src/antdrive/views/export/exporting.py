@@ -17,7 +17,7 @@ from antdrive.sim.log.rollout import Rollout
 from antdrive.views.export.bags import metadata, write_mcap
 from antdrive.views.export.layout import foxglove_layout
 from antdrive.views.export.samples import samples
-from antdrive.views.export.scans import Scans
+from antdrive.views.export.scans import DriveScans
 from antdrive.views.export.scenery import scenery
 from antdrive.views.export.tables import write_tables
 from antdrive.views.export.topics import Topic
@@ -43,7 +43,7 @@ def export(log: str | Path, to: str, path: str | Path, *, replace: bool = False,
     return EXPORTS[to](rollout, source, target, scans)
 
 
-def topics_of(rollout: Rollout, scans: Scans) -> list[Topic]:
+def topics_of(rollout: Rollout, scans: DriveScans) -> list[Topic]:
     """All messages of a drive. At the first stamp the fixed transforms come first, on both of their topics."""
     static, few = scenery(rollout)
     many = samples(rollout, scans)
@@ -69,7 +69,7 @@ def attachments_of(rollout: Rollout, log: Path) -> dict[str, tuple[str, bytes]]:
 
 def _to_mcap(rollout: Rollout, log: Path, target: Path, again: bool) -> list[Path]:
     layout = _layout_beside(target)
-    scans = Scans.of(rollout, again=again)
+    scans = DriveScans.of(rollout, again=again)
     with written_whole(layout) as beside, written_whole(target) as part:  # both or none
         write_mcap(part, topics_of(rollout, scans), attachments_of(rollout, log), _notes(scans))
         beside.write_text(_layout(rollout), encoding="utf-8")
@@ -78,7 +78,7 @@ def _to_mcap(rollout: Rollout, log: Path, target: Path, again: bool) -> list[Pat
 
 def _to_rosbag2(rollout: Rollout, log: Path, target: Path, again: bool) -> list[Path]:
     with folder_written_whole(target) as folder:
-        scans = Scans.of(rollout, again=again)
+        scans = DriveScans.of(rollout, again=again)
         topics, notes, bag = topics_of(rollout, scans), _notes(scans), f"{target.name}.mcap"
         write_mcap(folder / bag, topics, attachments_of(rollout, log), notes)
         (folder / "metadata.yaml").write_text(metadata(bag, topics, notes), encoding="utf-8")
@@ -92,7 +92,7 @@ def _to_csv(rollout: Rollout, log: Path, target: Path, again: bool) -> list[Path
     return [target]
 
 
-def _notes(scans: Scans) -> dict[str, str]:
+def _notes(scans: DriveScans) -> dict[str, str]:
     """What a reader of a bag has to know of its messages."""
     return {"scans": scans.source}
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from antdrive.sim.log.frames import frame_at
 from antdrive.sim.log.rollout import Rollout
-from antdrive.views.export.scans import Scans
+from antdrive.views.export.scans import DriveScans
 from antdrive.views.export.topics import (
     BASE,
     ESTIMATE,
@@ -76,7 +76,7 @@ class CdrLayout:
         self._constant += bytes(-(len(self._constant) - len(HEADER)) % size)
 
 
-def samples(rollout: Rollout, scans: Scans) -> list[Topic]:
+def samples(rollout: Rollout, scans: DriveScans) -> list[Topic]:
     """The topics with a message for each row of a log or for each scan."""
     stamps = nanoseconds(rollout.t)
     frames = [(ODOM, BASE), *((ODOM, mover_frame(i)) for i in range(rollout.movers.shape[1]))]
@@ -98,7 +98,7 @@ def samples(rollout: Rollout, scans: Scans) -> list[Topic]:
     return [*topics, *scan_topics(rollout, scans)]
 
 
-def scan_topics(rollout: Rollout, scans: Scans) -> list[Topic]:
+def scan_topics(rollout: Rollout, scans: DriveScans) -> list[Topic]:
     """What the robot's lidar saw; empty where there are no scans.
 
     Ranges are as REP 117 has them: +inf where nothing was in range, -inf where something was too near to measure.

@@ -16,7 +16,7 @@ LEFT_OUT = "left out"
 NONE = "none; the robot has no lidar"
 
 
-class Scans(NamedTuple):
+class DriveScans(NamedTuple):
     """The scans of a drive."""
 
     source: str  # where they come from, in words
@@ -25,7 +25,7 @@ class Scans(NamedTuple):
     ranges: npt.NDArray[np.floating]
 
     @classmethod
-    def of(cls, rollout: Rollout, *, again: bool = True) -> Scans:
+    def of(cls, rollout: Rollout, *, again: bool = True) -> DriveScans:
         """The scans of a drive."""
         if len(rollout.scans):
             return cls(LOGGED, rollout.scan_rows.astype(np.int64), ranges_of(rollout.scans))

@@ -1,16 +1,13 @@
-"""The files that commands write: folders of results, figures, films."""
+"""The folder of a run: log, result, figures and films."""
 
 from __future__ import annotations
 
-import shlex
-import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from antdrive.base.errors import InputError
 from antdrive.base.files import file_name, write_json
-from antdrive.cli.console import bar
 from antdrive.runs.folder import free_folder
 
 if TYPE_CHECKING:
@@ -42,7 +39,7 @@ def check_folder(folder: Path) -> None:
 
 
 def check_film(path: Path) -> None:
-    """Check that a film can be written to `--video PATH`, before any work is done for it.
+    """Check that a film can be written to `--film PATH`, before any work is done for it.
 
     Raises:
         InputError: an unknown suffix, or a path that cannot be written to.
@@ -50,9 +47,9 @@ def check_film(path: Path) -> None:
     from antdrive.views.film.encoder import ENCODERS
 
     if path.suffix.lower() not in ENCODERS:
-        raise InputError(f"--video {path}: films are written as {', '.join(ENCODERS)}")
+        raise InputError(f"--film {path}: films are written as {', '.join(ENCODERS)}")
     if path.is_dir():
-        raise InputError(f"--video {path}: is a directory; name a file")
+        raise InputError(f"--film {path}: is a directory; name a file")
     check_folder(path.parent)
 
 
@@ -125,20 +122,14 @@ def write_result(run: Run, files: Mapping[str, str], command: str) -> dict[str, 
     return result
 
 
-def write_film(log: Rollout, path: Path, **options: Any) -> dict[str, Any]:
-    """Film a rollout with a progress bar; facts about the film."""
+def write_film(logs: Sequence[Rollout], path: Path, **options: Any) -> dict[str, Any]:
+    """Film a drive, or several side by side; facts about the film."""
+    from antdrive.views.film.compare import compare_film
     from antdrive.views.film.video import film
 
-    with bar("filming") as progress:
-        return _film_facts(film(log, path, note=caption(log), progress=progress, **options))
-
-
-def write_comparison_film(logs: Sequence[Rollout], path: Path, **options: Any) -> dict[str, Any]:
-    """Film rollouts side by side with a progress bar; facts about the film."""
-    from antdrive.views.film.compare import compare_film
-
-    with bar("filming") as progress:
-        return _film_facts(compare_film(logs, path, progress=progress, **options))
+    if len(logs) > 1:
+        return _film_facts(compare_film(logs, path, **options))
+    return _film_facts(film(logs[0], path, note=caption(logs[0]), **options))
 
 
 def _film_facts(info: FilmInfo) -> dict[str, Any]:
@@ -156,8 +147,3 @@ def caption(log: Rollout) -> str:
 
     c = certify(log)
     return f"certified: never closer than {c.bound:.3f} m" if c.certified else "not certified collision-free"
-
-
-def this_command() -> str:
-    """The command that is running, as one would type it."""
-    return shlex.join(["antdrive", *sys.argv[1:]])

@@ -1,0 +1,93 @@
+"""The planners of `antdrive compare`, from words to what each is driven with."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from antdrive.base.errors import FieldError, InputError
+from antdrive.cli.parse import pair
+from antdrive.cli.scenario import GROUPS
+
+if TYPE_CHECKING:
+    from antdrive.sim.scenario import Scenario
+
+MAX_PLANNERS = 6
+
+
+@dataclass(frozen=True)
+class Entrant:
+    """A planner with its options, as the command line names it.
+
+    Attributes:
+        label: what it is called in tables, folders and `--set`
+        name: the planner's name
+        settings: its own `--set` in the words of `antdrive run`
+    """
+
+    label: str
+    name: str
+    settings: tuple[str, ...] = ()
+
+
+def check_worlds(words: Sequence[str]) -> None:
+    """Check that there are worlds of these names, before anything is said about planners, which a campaign needs none of.
+
+    Raises:
+        InputError: there is no such world.
+    """
+    from antdrive.base.checks import resolve
+    from antdrive.worlds.files.world_file import list_worlds
+
+    known = list_worlds()
+    for word in words:
+        try:
+            if resolve("world", word, known).is_dir():
+                problem = "neither a world file nor the folder of a campaign, as antdrive sweep writes it"
+                raise InputError(f"{word}: {problem}")
+        except FieldError as error:
+            raise InputError(error.problem) from None
+
+
+def entrants_of(planners: Sequence[str] | None, settings: Sequence[str] | None) -> list[Entrant]:
+    """The planners of `--planner NAME` or `--planner LABEL=NAME`, with the options of `--set GROUP.KEY=VALUE`.
+
+    Raises:
+        InputError: not two to six different labels, or a group that is none.
+    """
+    words, labels = planners or (), dict[str, str]()
+    for word in words:
+        label, mark, name = word.partition("=")
+        if not label or (mark and not name) or label in GROUPS or (mark and not re.fullmatch(r"[\w-]{1,40}", label)):
+            raise InputError(
+                f"--planner {word}: write NAME or LABEL=NAME, such as few=aco-han, with a label of letters, digits, - and _"
+            )
+        labels[label] = name if mark else label
+    if len(labels) < len(words) or not 2 <= len(labels) <= MAX_PLANNERS:
+        raise InputError(
+            f"{' '.join(['--planner', *words])}: name two to six different planners; "
+            "one planner with other options gets a label, such as --planner few=aco-han --set few.ants=10"
+        )
+    own: dict[str, list[str]] = {label: [] for label in labels}
+    for text in settings or ():
+        key, value = pair(text)
+        group, _, name = key.partition(".")
+        if not name or group not in (*labels, *GROUPS):
+            raise InputError(f"--set {text}: write GROUP.KEY=VALUE with a group of {', '.join([*labels, *GROUPS])}")
+        for label in labels if group in GROUPS else [group]:
+            own[label].append(f"{group if group == 'controller' else 'planner'}.{name}={value}")
+    return [Entrant(label, name, tuple(own[label])) for label, name in labels.items()]
+
+
+def repeating(scenario: Scenario, entrant: Entrant, world: str, robot: str, ends: Sequence[str] = ()) -> str:
+    """The `antdrive run` that repeats one of the compared runs."""
+    from antdrive.sim.forms import setting_words, written
+
+    given = written(lambda name: getattr(scenario, name))
+    given |= {"controller": {}, **({"margin": "auto"} if scenario.chosen else {})}
+    words = ["--planner", entrant.name, "--robot", robot, *(setting_words(given) or ())]
+    words += [word for text in entrant.settings for word in ("--set", text)]
+    return shlex.join(["antdrive", "run", world, *words, *ends])
