@@ -904,7 +904,7 @@ def sha(raw: bytes) -> str:
 
 # Processes ------------------------------------------------------------------------------------------------------------
 
-LIMIT = 240.0  # that a scenario may take [s]
+LIMIT = 900.0  # that a scenario may take [s]
 
 
 def work(pipe: multiprocessing.connection.Connection, root: str) -> None:
@@ -1073,6 +1073,12 @@ def differences(old: Any, new: Any, skipped: set[str], where: str = "") -> Itera
         yield f"{where}: was {shown(old)}, now {shown(new)}"
 
 
+def weight(line: str) -> int:
+    """Where a difference stands in the list: outcomes, then what was driven, then all else."""
+    marks = ("outcome", " exit", "record.reason", "array pose", "array", "record.")
+    return next((n for n, mark in enumerate(marks) if mark in line.partition(": ")[0]), len(marks))
+
+
 def shown(value: Any) -> str:
     text = value if isinstance(value, str) else json.dumps(value)
     return text if len(text) <= 300 else f"{text[:300]}…"
@@ -1100,7 +1106,7 @@ def compare(path: Path, found: Mapping[str, Mapping[str, Any]], without: list[st
 
         old = {part: value for part, value in record[name].items() if kept(part)}
         new = json.loads(json.dumps({part: value for part, value in parts.items() if kept(part)}))
-        lines = list(differences(old, new, skipped))
+        lines = sorted(differences(old, new, skipped), key=weight)
         if lines:
             wrong += 1
             print(f"\n{name}: {len(lines)} differences")
