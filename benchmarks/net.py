@@ -24,6 +24,7 @@ import multiprocessing.connection
 import os
 import re
 import shutil
+import signal
 import sys
 import tarfile
 import tempfile
@@ -909,6 +910,7 @@ LIMIT = 900.0  # that a scenario may take [s]
 
 def work(pipe: multiprocessing.connection.Connection, root: str) -> None:
     """Run scenarios by name until None comes."""
+    os.setsid()  # so that it can be ended with its own processes
     known = {each.name: each for each in scenarios()}
     os.environ.update({"COLUMNS": "200", "NO_COLOR": "1"})
     while (name := pipe.recv()) is not None:
@@ -925,6 +927,7 @@ def run_all(chosen: list[Scenario], jobs: int) -> dict[str, dict[str, Any]]:
     waiting = collections.deque(sorted(chosen, key=lambda each: -each.cost))
     done: dict[str, dict[str, Any]] = {}
     lock, began = threading.Lock(), time.monotonic()
+    started_processes: list[Any] = []
 
     def serve(root: str) -> None:
         process = pipe = None
@@ -938,6 +941,7 @@ def run_all(chosen: list[Scenario], jobs: int) -> dict[str, dict[str, Any]]:
                 process = context.Process(target=work, args=(end, root))
                 process.start()
                 end.close()
+                started_processes.append(process)
             assert pipe is not None
             started = time.monotonic()
             pipe.send(scenario.name)
@@ -946,7 +950,7 @@ def run_all(chosen: list[Scenario], jobs: int) -> dict[str, dict[str, Any]]:
             except EOFError:
                 parts = {"net": "the process died"}
             if set(parts) == {"net"} and not parts["net"].startswith("Traceback"):
-                process.kill()
+                end_group(process)
                 process = None
             with lock:
                 done[scenario.name] = parts
@@ -955,16 +959,29 @@ def run_all(chosen: list[Scenario], jobs: int) -> dict[str, dict[str, Any]]:
                       f"{told(parts)}", flush=True)  # fmt: skip
         if process is not None and pipe is not None:
             pipe.send(None)
-            process.join(30)
+            process.join(10)
 
     with tempfile.TemporaryDirectory() as folder:
         prepare(Path(folder))
-        threads = [threading.Thread(target=serve, args=(folder,)) for _ in range(jobs)]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
+        threads = [threading.Thread(target=serve, args=(folder,), daemon=True) for _ in range(jobs)]
+        try:
+            for thread in threads:
+                thread.start()
+            for thread in threads:
+                thread.join()
+        finally:
+            for process in started_processes:
+                end_group(process)
     return {each.name: done[each.name] for each in chosen}
+
+
+def end_group(process: Any) -> None:
+    """End a process and those that it started."""
+    if process.is_alive():
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.kill()
+        process.join()
 
 
 def told(parts: Mapping[str, Any]) -> str:
