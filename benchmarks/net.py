@@ -754,6 +754,7 @@ def call(step: list[str], here: Path) -> dict[str, Any]:
     """Call a command in this process; its exit code and what it printed."""
     out, err = io.StringIO(), io.StringIO()
     argv, sys.argv = sys.argv, ["antdrive", *step]
+    terminated = signal.getsignal(signal.SIGTERM)  # the command sets its own handler
     try:
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
             code = command_line()()
@@ -764,6 +765,7 @@ def call(step: list[str], here: Path) -> dict[str, Any]:
         err.write(traceback.format_exc())
     finally:
         sys.argv = argv
+        signal.signal(signal.SIGTERM, terminated)
     said = {"exit": code, "printed": printed(out.getvalue(), here)}
     if code not in (0, 1):
         said["error"] = plain_text(err.getvalue(), here)
@@ -1123,7 +1125,8 @@ def compare(path: Path, found: Mapping[str, Mapping[str, Any]], without: list[st
 
         old = {part: value for part, value in record[name].items() if kept(part)}
         new = json.loads(json.dumps({part: value for part, value in parts.items() if kept(part)}))
-        lines = sorted(differences(old, new, skipped), key=weight)
+        lines = [line for line in differences(old, new, skipped) if kept(line.partition(": ")[0])]
+        lines.sort(key=weight)
         if lines:
             wrong += 1
             print(f"\n{name}: {len(lines)} differences")
@@ -1152,7 +1155,11 @@ def main() -> int:
         "--only", metavar="PATTERN", action="append", help="scenarios whose name matches, such as 'movers/*'"
     )
     parser.add_argument(
-        "--without", metavar="PATTERN", action="append", default=[], help="parts that are not compared, such as printed"
+        "--without",
+        metavar="PATTERN",
+        action="append",
+        default=[],
+        help="parts and keys that are not compared, such as printed or fingerprint",
     )
     parser.add_argument("--jobs", type=int, default=2, help="processes")
     parser.add_argument("--quick", action="store_true", help="a spread of the scenarios")
