@@ -119,7 +119,7 @@ class Kind:
 
     Attributes:
         name: what is forged
-        level: the last level at which one of these must be found
+        level: the last level at which each of these must be found
         forge: changes a log
         breaks: changes a file's bytes instead
     """
@@ -255,7 +255,7 @@ for _name, _path, _to in (
     ("a time limit of 0", ("time_limit",), 0.0),
     ("a cell of -1", ("cell",), -1.0),
     ("a robot without mass", ("robot", "mass"), 0.0),
-    ("a robot of 1 mm", ("robot", "footprint", "rounding"), 0.001),
+    ("a robot of 1 mm", ("robot", "footprint"), {"half_length": 0.0, "half_width": 0.0, "rounding": 0.001}),
     ("an unknown key in the footprint", ("robot", "footprint", "colour"), 1),
     ("a cylinder of height -5", ("task", "obstacles", 0, "height"), -5.0),
     ("a cylinder of radius 0", ("task", "obstacles", 0, "radius"), 0.0),
@@ -436,9 +436,14 @@ def _(log: Log) -> Log:
     return _bent(log, 0.035, follow=False)
 
 
-@forgery("a bend of 35 mm in 1 s, speeds to match", "verify")
-def _(log: Log) -> Log:
+@forgery("a bend of 35 mm in 1 s, speeds to match", "replay")
+def _(log: Log) -> Log:  # within what targets leave: 1 cm, 0.05 rad and what late motors explain
     return _bent(log, 0.035, follow=True)
+
+
+@forgery("a bend of 15 cm in 1 s, speeds to match", "verify")
+def _(log: Log) -> Log:
+    return _bent(log, 0.15, follow=True)
 
 
 @forgery("a bend of 35 mm in 1 s, speeds and commands to match", "replay")
@@ -541,9 +546,15 @@ def _(log: Log) -> Log:
 
 
 @forgery("commands 10 % lower", "verify")
-def _(log: Log) -> Log:
+def _(log: Log) -> Log | None:
     log["command"][:] *= 0.9
-    return log
+    return log if len(log["t"]) > 4 * log.hz else None
+
+
+@forgery("commands 10 % lower for less than 4 s", "replay")  # late motors explain as much while the robot speeds up
+def _(log: Log) -> Log | None:
+    log["command"][:] *= 0.9
+    return log if len(log["t"]) <= 4 * log.hz else None
 
 
 @forgery("commands and targets 10 % lower", "verify")
