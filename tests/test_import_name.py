@@ -91,3 +91,11 @@ def test_the_source_distribution_holds_each_file_once(tmp_path: Path) -> None:
     assert "antdrive/worlds/world.py" in names
     assert "worlds/world.py" not in names
     assert "tests/test_import_name.py" in names
+
+
+def test_a_package_called_tests_elsewhere_hides_none_of_these(tmp_path: Path) -> None:
+    """Processes that tests start import `tests`, and some distributions install a package by that name."""
+    (tmp_path / "tests").mkdir()
+    (tmp_path / "tests" / "__init__.py").touch()
+    done = python("-c", "import tests.worlds.malformed as found; print(found.__file__)", cwd=ROOT, path=tmp_path)
+    assert done.stdout.split() == [str(ROOT / "tests" / "worlds" / "malformed.py")], done.stderr
