@@ -9,6 +9,7 @@ A second table compares the loop among 24 movers that the robot avoids with the 
 
 from __future__ import annotations
 
+import contextlib
 import statistics
 import time
 
@@ -80,13 +81,13 @@ def main() -> None:
     robot, controller = load_robot("turtlebot"), PurePursuit()
     p = bullet()
     print("discs   bare us/step   loop us/step   loop / bare   x real time   step / step among 10")
-    engines = {}
+    engines, stack = {}, contextlib.ExitStack()
     for count in (10, 100, 400):
         task = task_among(count)
         x = np.linspace(1, 19, 73)
         route = Route(np.stack([x, 10 + 0.4 * np.sin((x - 1) * np.pi / 3)], axis=1))
         tracked = controller.prepare(route, task.world, robot, 0.05, 1 / 60)
-        engines[count] = (Engine(task.world, robot).__enter__(), task, tracked)
+        engines[count] = (stack.enter_context(Engine(task.world, robot)), task, tracked)
     bare: dict[int, list[float]] = {count: [] for count in engines}
     loop: dict[int, list[float]] = {count: [] for count in engines}
     for turn in range(ROUNDS + 1):
@@ -116,8 +117,7 @@ def main() -> None:
             f"   {growth:20.2f}"
         )
     table_of_movers(route)
-    for engine, _, _ in engines.values():
-        engine.__exit__()
+    stack.close()
 
 
 if __name__ == "__main__":
