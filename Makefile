@@ -21,9 +21,9 @@ $(VENV)/.core: pyproject.toml tools/find-python
 	@$(PIP) install --editable .
 	@touch $@
 
-$(VENV)/.warm: $(VENV)/.core $(wildcard */_kernels*.py */*/_kernels*.py */*/*/_kernels*.py)
+$(VENV)/.warm: $(VENV)/.core $(wildcard src/antdrive/*/_kernels*.py src/antdrive/*/*/_kernels*.py)
 	@echo "Compiling the kernels, once"
-	@$(BIN)/python -m antdrive.sim.warm
+	@$(BIN)/python -m antdrive.cli.warm
 	@touch $@
 
 $(VENV)/.dev: $(VENV)/.core
@@ -53,7 +53,7 @@ test-slow: $(VENV)/.dev $(VENV)/.warm
 
 # What pages show runs again when they or the packages change. Both halves use a process for each core, four at most.
 DEPTHS := * */* */*/* */*/*/*
-SOURCES := $(foreach folder,worlds planners robots sim,$(wildcard $(foreach depth,$(DEPTHS),$(folder)/$(depth).py $(folder)/$(depth).yaml)))
+SOURCES := $(foreach folder,src/antdrive,$(wildcard $(foreach depth,$(DEPTHS),$(folder)/$(depth).py $(folder)/$(depth).yaml)))
 # `make docs JOBS=1` uses fewer.
 JOBS ?= $(shell cores=$$(nproc 2>/dev/null || echo 2); [ "$$cores" -le 4 ] && echo "$$cores" || echo 4)
 

@@ -118,8 +118,8 @@ def processor_time() -> float:
 
 def stages(folder: Path) -> None:
     """Import, plan, drive, check, film."""
-    from antdrive.sim.view.figures.run_figures import overview
-    from antdrive.sim.view.film.video import film
+    from antdrive.views.figures.run_figures import overview
+    from antdrive.views.film.video import film
 
     stage("load kernels with a small world", lambda: run(Scenario.of("gate", "astar")))
     path = stage("draw the map", lambda: write_map(folder))

@@ -33,13 +33,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from antdrive.sim.campaigns import canonical_bytes, expand, make_campaign, read_results
-from antdrive.sim.campaigns.expanding import Expansion
-from antdrive.sim.campaigns.job import Job
-from antdrive.sim.campaigns.rows import fault_row
-from antdrive.sim.campaigns.running import Finished
-from antdrive.sim.campaigns.store import parts_in
-from antdrive.sim.campaigns.sweeping import run_expansion
+from antdrive.runs.campaigns import canonical_bytes, expand, make_campaign, read_results
+from antdrive.runs.campaigns.expanding import Expansion
+from antdrive.runs.campaigns.job import Job
+from antdrive.runs.campaigns.rows import fault_row
+from antdrive.runs.campaigns.running import Finished
+from antdrive.runs.campaigns.store import parts_in
+from antdrive.runs.campaigns.sweeping import run_expansion
 from benchmarks.planners import table
 
 OUT = Path(__file__).parent.parent / "out" / "campaigns"

@@ -59,7 +59,7 @@ def film_rate(movers: int, size: tuple[int, int], seconds: float) -> dict[str, A
     import numpy as np
 
     from antdrive.sim import Scenario, run
-    from antdrive.sim.view.film.video import film
+    from antdrive.views.film.video import film
     from antdrive.worlds import Cruising, Task, World
 
     rng, found = np.random.default_rng(1), list[Any]()

@@ -30,7 +30,7 @@ DRIVES = {
 TIMED = """
 import sys, time
 from pathlib import Path
-from antdrive.sim.export.exporting import export
+from antdrive.views.export.exporting import export
 log, kind, folder, times, suffix = sys.argv[1:]
 for turn in range(int(times)):
     started = time.process_time()
@@ -57,8 +57,8 @@ def by_command(log: Path, kind: str, target: Path) -> float:
 
 def messages(log: Path) -> tuple[int, int]:
     """How many messages and scans the bag of a log has."""
-    from antdrive.sim.export.exporting import topics_of
-    from antdrive.sim.export.scans import Scans
+    from antdrive.views.export.exporting import topics_of
+    from antdrive.views.export.scans import Scans
 
     rollout = Rollout.load(log)
     scans = Scans.of(rollout)

@@ -24,12 +24,12 @@ from typing import Any
 
 from joblib import Parallel, delayed
 
+from antdrive.runs.failures.failure import failure_of
+from antdrive.runs.failures.handover import fingerprint_of
+from antdrive.runs.failures.hunt import Finding, Hunt, find_failures
+from antdrive.runs.failures.search import METHODS
+from antdrive.runs.failures.space import feasible
 from antdrive.sim import Scenario, run
-from antdrive.sim.falsify.failure import failure_of
-from antdrive.sim.falsify.handover import fingerprint_of
-from antdrive.sim.falsify.hunt import Finding, Hunt, find_failures
-from antdrive.sim.falsify.search import METHODS
-from antdrive.sim.falsify.space import feasible
 from benchmarks.planners import table
 from benchmarks.resuming import append_line, current_commit, read_lines
 

@@ -22,14 +22,14 @@ from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.physics.bullet import client
 from antdrive.sim.pipeline import run
 from antdrive.sim.scenario import Scenario
-from antdrive.sim.view.film.camera import camera_for
-from antdrive.sim.view.film.compositor import drawn_height, merged_by_colour, still_meshes
-from antdrive.sim.view.film.meshes import robot_parts
-from antdrive.sim.view.film.parallel import process_count
-from antdrive.sim.view.film.shot import Shot
-from antdrive.sim.view.film.tiny_renderer import add_mesh, render
-from antdrive.sim.view.film.video import film
-from antdrive.sim.view.scene import Scene
+from antdrive.views.film.camera import camera_for
+from antdrive.views.film.compositor import drawn_height, merged_by_colour, still_meshes
+from antdrive.views.film.meshes import robot_parts
+from antdrive.views.film.parallel import process_count
+from antdrive.views.film.shot import Shot
+from antdrive.views.film.tiny_renderer import add_mesh, render
+from antdrive.views.film.video import film
+from antdrive.views.scene import Scene
 
 ROUNDS = 3
 SIZES = ((640, 480), (1280, 720))

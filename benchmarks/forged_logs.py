@@ -19,11 +19,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from antdrive.base.errors import FieldError, InputError
 from antdrive.sim import Rollout
 from antdrive.sim.log.certificate import closed_form_clearance
 from antdrive.sim.log.record import DriveRecord
 from antdrive.sim.log.rollout import ARRAYS
-from antdrive.worlds.errors import FieldError, InputError
 
 Array = npt.NDArray[Any]
 LEVELS = ("load", "verify", "files", "replay", "none")

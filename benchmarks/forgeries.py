@@ -21,13 +21,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from antdrive.base.errors import InputError
 from antdrive.planners import load_planner
 from antdrive.robots import load_robot
 from antdrive.sim import Rollout, Scenario, certify, run
 from antdrive.sim.driving.replay import replay
 from antdrive.sim.log.binding import differences
 from antdrive.worlds import Cruising, Disc, Keyframed, Task, Wandering, World
-from antdrive.worlds.errors import InputError
 from benchmarks.forged_logs import KINDS, LEVELS, Kind, Log
 from benchmarks.planners import table
 

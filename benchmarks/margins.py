@@ -17,9 +17,9 @@ from joblib import Parallel, delayed
 
 from antdrive.planners import load_planner
 from antdrive.robots import load_robot
+from antdrive.runs.margins.choice import choose_margin
+from antdrive.runs.margins.prediction import Calibration
 from antdrive.sim import Outcome, Scenario, run
-from antdrive.sim.calibration.choice import choose_margin
-from antdrive.sim.calibration.prediction import Calibration
 from antdrive.worlds import generate
 from benchmarks.planners import table
 

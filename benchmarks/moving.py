@@ -1,6 +1,6 @@
 """hasan's six cases with movers, cell by cell: `python -m benchmarks.moving [--seeds N]`. Prints Markdown.
 
-The environments are recreated (`antdrive.sim.papers.maps`) with the paper's start and goal. The paper has
+The environments are recreated (`antdrive.runs.papers.maps`) with the paper's start and goal. The paper has
 one mover; here 1 and 10 start on random free cells. In every step each mover goes to a random free
 neighbouring cell other than the robot's, then the robot decides. With the same seed, movers go the same way
 for every planner until they meet the robot. `mmas-dstar` uses one rule for its exponents in all cases; the
@@ -18,8 +18,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from antdrive.planners import OnlineAgent, Query, agent_for, load_planner
-from antdrive.sim.papers.maps import environments
-from antdrive.sim.papers.movers import Strollers, drive
+from antdrive.runs.papers.maps import environments
+from antdrive.runs.papers.movers import Strollers, drive
 from benchmarks.planners import seconds, table
 
 #: hasan, Table 1: alpha/beta, cells propagated, steps, total cost, seconds; basic D*'s total cost and seconds.

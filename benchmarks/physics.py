@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from antdrive import Disc, RobotSpec, World, load_robot
+from antdrive.base.types import Pose
 from antdrive.robots.footprint import footprint_clearance
 from antdrive.sim import Engine
-from antdrive.worlds.types import Pose
 
 ROBOTS = ("turtlebot", "jackal")
 RATES = (60, 120, 240, 1000)  # physics steps per second

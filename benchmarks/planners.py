@@ -27,7 +27,7 @@ import numpy as np
 
 from antdrive.planners import PLANNERS, Planner, PlanResult, Query, capabilities_of, load_planner
 from antdrive.planners.colonies.colony import ColonyGraph, TourConstruction
-from antdrive.sim.papers.maps import blocks, environments, han_ants, optimum, scattered
+from antdrive.runs.papers.maps import blocks, environments, han_ants, optimum, scattered
 from antdrive.worlds import DIRECTIONS, Disc, Grid, Task, World, forest, rasterise
 
 SEEDS = range(10)

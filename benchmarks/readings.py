@@ -21,11 +21,11 @@ from typing import Any
 import numpy as np
 
 from antdrive.planners import Query
-from antdrive.sim.papers.experiments import Experiment, ibraheem2016
-from antdrive.sim.papers.maps import blocks, scattered
-from antdrive.sim.papers.trials import Trial, solve
-from antdrive.sim.statistics.bootstrap import medians_by_world
-from antdrive.sim.statistics.significance import wilcoxon
+from antdrive.runs.papers.experiments import Experiment, ibraheem2016
+from antdrive.runs.papers.maps import blocks, scattered
+from antdrive.runs.papers.trials import Trial, solve
+from antdrive.runs.statistics.bootstrap import medians_by_world
+from antdrive.runs.statistics.significance import wilcoxon
 
 Options = Mapping[str, Any]
 NO_PATH = 1e6  # the gap that stands for no path [%]

@@ -15,10 +15,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from antdrive.runs.failures.failure import failure_of
+from antdrive.runs.failures.passes import with_obstacles
+from antdrive.runs.failures.shrink import shrink
 from antdrive.sim import Run, Scenario, run
-from antdrive.sim.falsify.failure import failure_of
-from antdrive.sim.falsify.passes import with_obstacles
-from antdrive.sim.falsify.shrink import shrink
 from antdrive.worlds import generate
 from benchmarks.planners import table
 

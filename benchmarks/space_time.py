@@ -14,8 +14,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from antdrive.base import Floats
 from antdrive.planners import Query, TimedPlan, plan_in_time, reachable
-from antdrive.worlds import Floats, Grid, MoverMotion
+from antdrive.worlds import Grid, MoverMotion
 from benchmarks.planners import seconds, table
 
 CELL, SPEED, INFLATE, WORLDS = 0.2, 0.5, 0.25, 20

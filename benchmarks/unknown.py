@@ -23,14 +23,14 @@ from typing import Any
 
 import yaml
 
+from antdrive.base.atomic import written_whole
 from antdrive.robots import list_robots
-from antdrive.sim.campaigns import sweep
-from antdrive.sim.campaigns.challenge import campaign_data, lines, reference_times, unpacked
-from antdrive.sim.campaigns.results import SweepResults
-from antdrive.sim.statistics.price import Ratio, prices
-from antdrive.sim.statistics.runs import RunTable
-from antdrive.sim.view.film.failures import film_failures
-from antdrive.worlds.files.atomic import written_whole
+from antdrive.runs.barn import campaign_data, lines, reference_times, unpacked
+from antdrive.runs.campaigns import sweep
+from antdrive.runs.campaigns.results import SweepResults
+from antdrive.runs.statistics.price import Ratio, prices
+from antdrive.runs.statistics.runs import RunTable
+from antdrive.views.film.failures import film_failures
 from benchmarks.planners import table
 from tools.shared_data import BARN
 

@@ -80,7 +80,7 @@ nitpick_ignore_regex = [
     # Contents of files, whose keys the pages on formats describe.
     (
         "py:class",
-        r"antdrive\.sim\.(campaigns\.campaign|entries|regression\.suite)\.(\w+Entry|CampaignFile|RandomTasks)",
+        r"antdrive\.(runs\.campaigns\.campaign|sim\.entries|runs\.suites\.suite)\.(\w+Entry|CampaignFile|RandomTasks)",
     ),
 ]
 

@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 from antdrive import Outcome, Scenario, list_robots, load_robot, run
+from antdrive.cli.commands.worlds.import_ import import_world
 from antdrive.robots import LIMITERS
 from antdrive.robots.control import _kernels_pursuit as rules
-from antdrive.sim.cli.commands.worlds.import_ import import_world
 from antdrive.sim.log.metrics import METRICS
-from antdrive.sim.view.figures.curves import LIMITER_COLOURS
-from antdrive.sim.view.style import VERDICTS
+from antdrive.views.figures.curves import LIMITER_COLOURS
+from antdrive.views.style import VERDICTS
 from antdrive.worlds import IMPORTS
 
 ROOT = Path(__file__).parent.parent

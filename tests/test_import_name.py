@@ -4,6 +4,8 @@ import importlib
 import os
 import subprocess
 import sys
+import tarfile
+import venv
 import zipfile
 from pathlib import Path
 
@@ -13,48 +15,25 @@ import antdrive
 from antdrive.worlds import load_task, save_task
 
 ROOT = Path(__file__).parent.parent
-FOLDERS = ("worlds", "planners", "robots", "sim")
+ROOMS = ("base", "worlds", "planners", "robots", "sim", "runs", "views", "cli")
+TESTS = """import sim
+
+def test_the_own_package_is_imported():
+    assert sim.OWNER == "the project"
+
+def test_a_drive(drive):
+    drive.run("mine.yaml", planner="astar")
+"""
 
 
-def python(*words: str, cwd: Path, path: Path) -> subprocess.CompletedProcess[str]:
-    """A process with one folder in front of its import path."""
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(path), os.environ.get("PYTHONPATH", "")])}
-    return subprocess.run(
-        [sys.executable, *words], cwd=cwd, env=environment, capture_output=True, text=True, check=False
+def called(*words: str | Path, cwd: Path, **variables: str) -> str:
+    """What a command prints; it must succeed. It knows nothing of how these tests were started."""
+    clean = {key: value for key, value in os.environ.items() if not key.startswith(("PYTHON", "PYTEST", "VIRTUAL_ENV"))}
+    done = subprocess.run(
+        [str(word) for word in words], cwd=cwd, env=clean | variables, capture_output=True, text=True, check=False
     )
-
-
-def test_a_project_with_packages_of_the_same_names_can_drive(tmp_path: Path) -> None:
-    for name in FOLDERS:
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "__init__.py").write_text(f"OWNER = 'the project that has its own {name}'\n")
-    save_task(load_task("empty"), tmp_path / "mine.yaml")
-    done = python(
-        "-m", "antdrive", "run", "mine.yaml", "--planner", "astar", "--no-figures", cwd=tmp_path, path=tmp_path
-    )
-    assert done.returncode == 0, done.stderr
-    code = "import worlds, planners, robots, sim; from antdrive import Scenario; print(sim.OWNER, Scenario.__module__)"
-    done = python("-c", code, cwd=tmp_path, path=tmp_path)
-    assert done.stdout.split() == ["the", "project", "that", "has", "its", "own", "sim", "antdrive.sim.scenario"], (
-        done.stderr
-    )
-
-
-def test_some_thirty_names_are_at_the_top_and_each_is_there() -> None:
-    assert 25 <= len(antdrive.__all__) <= 45
-    for name in antdrive.__all__:
-        assert getattr(antdrive, name) is not None
-    for package in FOLDERS:
-        assert importlib.import_module(f"antdrive.{package}") is getattr(antdrive, package)
-
-
-def test_importing_antdrive_loads_nothing_heavy(tmp_path: Path) -> None:
-    code = (
-        "import sys, antdrive, antdrive.worlds, antdrive.planners, antdrive.robots, antdrive.sim\n"
-        "print([m for m in ('numpy', 'numba', 'pybullet', 'matplotlib', 'PIL', 'pydantic') if m in sys.modules])"
-    )
-    done = python("-c", code, cwd=tmp_path, path=ROOT)
-    assert done.stdout == "[]\n", done.stderr
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
 
 
 @pytest.fixture(scope="module")
@@ -65,31 +44,91 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return Path(built)
 
 
-def test_a_wheel_installs_one_name_with_all_it_needs(wheel: Path, tmp_path: Path) -> None:
+@pytest.fixture(scope="module", params=["editable", "wheel"])
+def installed(
+    request: pytest.FixtureRequest, wheel: Path, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Path, Path]:
+    """The Python of a fresh environment with antdrive and a project whose packages have the rooms' names, and that project.
+
+    The project comes last on the import path: whatever antdrive's installation makes importable hides it.
+    """
+    home = tmp_path_factory.mktemp(request.param)
+    project = home / "project"
+    for name in (*ROOMS, "tests"):
+        (project / name).mkdir(parents=True)
+        (project / name / "__init__.py").write_text("OWNER = 'the project'\n")
+    (project / "test_drives.py").write_text(TESTS)
+    save_task(load_task("empty"), project / "mine.yaml")
+    venv.create(home / "env")
+    (packages,) = (home / "env" / "lib").glob("python*/site-packages")
+    python = home / "env" / "bin" / "python"
+    needed = [path for path in sys.path if path.endswith("site-packages")]
+    (packages / "needed.pth").write_text("".join(f"{path}\n" for path in needed))
+    (packages / "zz_project.pth").write_text(f"{project}\n")
+    what = ("--no-build-isolation", "--editable", ROOT) if request.param == "editable" else (wheel,)
+    called(python, "-m", "pip", "install", "--quiet", "--no-deps", "--ignore-installed", *what, cwd=home)
+    return python, project
+
+
+def test_a_project_with_packages_of_the_same_names_imports_its_own(installed: tuple[Path, Path]) -> None:
+    python, project = installed
+    code = (
+        f"import {', '.join(ROOMS)}, tests, antdrive; print(sim.OWNER, antdrive.__file__)\nimport antdrive.sim.pipeline"
+    )
+    owner, file = called(python, "-c", code, cwd=project.parent).removeprefix("the ").split()
+    assert owner == "project"
+    assert Path(file).is_relative_to(project.parent) or Path(file) == ROOT / "src" / "antdrive" / "__init__.py"
+    places = called(
+        python,
+        "-c",
+        f"import {', '.join(ROOMS)}, tests; print({', '.join(f'{n}.__file__' for n in ROOMS)})",
+        cwd=project.parent,
+    )
+    assert all(Path(place).is_relative_to(project) for place in places.split())
+
+
+def test_a_project_with_packages_of_the_same_names_drives_and_tests(installed: tuple[Path, Path]) -> None:
+    """Kernels run as plain Python: the wheel's are not compiled."""
+    python, project = installed
+    command = python.with_name("antdrive")
+    called(command, "run", "mine.yaml", "--planner", "astar", "--no-figures", cwd=project, NUMBA_DISABLE_JIT="1")
+    said = called(python, "-m", "pytest", "-q", "-W", "ignore", cwd=project, NUMBA_DISABLE_JIT="1")
+    assert "2 passed" in said
+
+
+def test_the_offered_names_and_the_rooms_are_there() -> None:
+    for name in antdrive.__all__:
+        assert getattr(antdrive, name) is not None
+    for room in ROOMS:
+        assert importlib.import_module(f"antdrive.{room}") is getattr(antdrive, room)
+
+
+def test_importing_antdrive_loads_nothing_heavy(tmp_path: Path) -> None:
+    code = (
+        "import sys, antdrive, antdrive.worlds, antdrive.planners, antdrive.robots, antdrive.sim\n"
+        "print([m for m in ('numpy', 'numba', 'pybullet', 'matplotlib', 'PIL', 'pydantic') if m in sys.modules])"
+    )
+    assert called(sys.executable, "-c", code, cwd=tmp_path) == "[]\n"
+
+
+def test_a_wheel_holds_one_name_with_all_it_needs(wheel: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
-        archive.extractall(tmp_path)
     assert {name.split("/")[0] for name in names if ".dist-info/" not in name} == {"antdrive"}
-    tracked = subprocess.run(
-        ["git", "ls-files", *FOLDERS], cwd=ROOT, capture_output=True, text=True, check=False
-    ).stdout.split()
-    assert not tracked or {f"antdrive/{name}" for name in tracked} <= set(names)
+    listed = ["git", "ls-files", "src"]
+    tracked = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=False).stdout.split()
+    assert {name.removeprefix("src/") for name in tracked} <= set(names)
     assert "antdrive/py.typed" in names
-    code = "import antdrive; print(antdrive.__file__); print(antdrive.load_robot('jackal').name, len(antdrive.list_worlds()) > 9)"
-    done = python("-c", code, cwd=tmp_path, path=tmp_path)
-    assert done.stdout.split() == [str(tmp_path / "antdrive" / "__init__.py"), "jackal", "True"], done.stderr
 
 
 def test_the_source_distribution_holds_each_file_once(tmp_path: Path) -> None:
-    import tarfile
-
     from hatchling.builders.sdist import SdistBuilder
 
     (built,) = SdistBuilder(str(ROOT)).build(directory=str(tmp_path), versions=["standard"])
     with tarfile.open(built) as archive:
         names = [name.partition("/")[2] for name in archive.getnames()]
-    assert "antdrive/worlds/world.py" in names
-    assert "worlds/world.py" not in names
+    assert "src/antdrive/worlds/world.py" in names
+    assert not {"worlds", "worlds/world.py"} & set(names)
     assert "tests/test_import_name.py" in names
 
 

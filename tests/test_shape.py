@@ -1,4 +1,4 @@
-"""The shape of the code: functions that fit on a screen, one meaning for each class name, names that reach `help()`."""
+"""One meaning for each class name, and docstrings that tell users of a public name what they need."""
 
 from __future__ import annotations
 
@@ -9,56 +9,19 @@ import importlib
 import inspect
 import re
 import textwrap
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-ROOT = Path(__file__).parent.parent
-PACKAGES = ("worlds", "planners", "robots", "sim")
+ROOT = Path(__file__).parent.parent / "src" / "antdrive"
+PACKAGES = ("base", "worlds", "planners", "robots", "sim", "runs", "views", "cli")
 MODULES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
-BRANCHES = (ast.If, ast.For, ast.While, ast.IfExp, ast.BoolOp, ast.ExceptHandler, ast.comprehension, ast.match_case)
-LINES, MOST_BRANCHES = 60, 25
-KERNEL_LINES = 100
 #: Parameters that their name and type explain.
 PLAIN = {
     "self", "cls", "args", "kwargs", "path", "seed", "rng", "name", "robot", "world", "task", "grid", "query", "plan", "planner",
     "rollout", "route", "pose", "log",
 }  # fmt: skip
-
-
-def functions(path: Path) -> Iterator[ast.FunctionDef]:
-    return (node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.FunctionDef))
-
-
-def too_large(node: ast.FunctionDef, kernel: bool) -> str:
-    """What is too much in a function, if anything."""
-    lines = (node.end_lineno or 0) - node.lineno + 1
-    branches = sum(isinstance(inner, BRANCHES) for inner in ast.walk(node))
-    if kernel:
-        return f"{lines} lines" if lines > KERNEL_LINES else ""
-    return f"{lines} lines" if lines > LINES else f"{branches} branches" if branches > MOST_BRANCHES else ""
-
-
-@pytest.mark.parametrize("path", MODULES, ids=lambda p: str(p.relative_to(ROOT)))
-def test_functions_fit_on_a_screen(path: Path) -> None:
-    found = {node.name: too_large(node, path.name.startswith("_kernels")) for node in functions(path)}
-    assert {name: why for name, why in found.items() if why} == {}
-
-
-def test_a_large_function_is_noticed() -> None:
-    long = ast.parse("def f():\n" + "    x = 1\n" * 60).body[0]
-    branchy = ast.parse("def f():\n" + "    x = 1 if y else 2\n" * 26).body[0]
-    assert isinstance(long, ast.FunctionDef)
-    assert isinstance(branchy, ast.FunctionDef)
-    assert (too_large(long, False), too_large(long, True)) == ("61 lines", "")
-    assert too_large(branchy, False) == "26 branches"
-
-
-def test_files_of_the_command_line_are_short() -> None:
-    lengths = {path.name: len(path.read_text().splitlines()) for path in (ROOT / "sim" / "cli").rglob("*.py")}
-    assert {name: length for name, length in lengths.items() if length > 250} == {}
 
 
 def test_a_class_name_has_one_meaning() -> None:
@@ -73,8 +36,8 @@ def test_a_class_name_has_one_meaning() -> None:
 
 def public() -> list[tuple[str, Any]]:
     found = {}
-    rooms = ("testing", "sim.campaigns", "sim.regression", "sim.sensing")
-    for package in ("antdrive", *(f"antdrive.{name}" for name in (*PACKAGES, *rooms))):
+    rooms = ("testing", "runs.campaigns", "runs.suites", "sim.sensing")
+    for package in ("antdrive", *(f"antdrive.{name}" for name in (*PACKAGES[:-1], *rooms))):
         module = importlib.import_module(package)
         found |= {f"{package}.{name}": getattr(module, name) for name in module.__all__}
     return [(name, thing) for name, thing in found.items() if inspect.isclass(thing) or inspect.isfunction(thing)]
@@ -125,15 +88,6 @@ def test_public_functions_and_records_tell_what_they_raise() -> None:
     assert {name: errors for name, errors in untold.items() if errors} == {}
 
 
-def test_an_error_that_is_not_told_is_noticed() -> None:
-    def half(ants: int) -> None:
-        if ants < 1:
-            raise ValueError("ants")
-
-    assert untold_errors(half, "Half of the ants.") == {"ValueError"}
-    assert untold_errors(half, "Half of the ants.\n\nRaises:\n    ValueError: fewer than one.") == set()
-
-
 @pytest.mark.parametrize(("name", "thing"), public(), ids=[name for name, _ in public()])
 def test_public_names_document_their_fields_and_parameters(name: str, thing: Any) -> None:
     missing = undescribed_fields(thing) if inspect.isclass(thing) else undescribed_parameters(thing)
@@ -144,18 +98,3 @@ def test_public_names_document_their_fields_and_parameters(name: str, thing: Any
                 missing += [f"{key}({parameter})" for parameter in undescribed_parameters(function)]
     assert inspect.getdoc(thing), f"{name} has no docstring"
     assert missing == []
-
-
-def test_a_field_without_a_description_is_noticed() -> None:
-    @dataclasses.dataclass
-    class Half:
-        """A record.
-
-        Attributes:
-            told: described
-        """
-
-        told: int
-        untold: int
-
-    assert undescribed_fields(Half) == ["untold"]

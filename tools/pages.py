@@ -49,7 +49,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 MARK = re.compile(r"<!-- (file|added to|before|not run|run by): (.+?) -->\s*$")
 SHELL = ("ls", "cat", "mkdir", "cp", "sed")
-CODE = ("antdrive", "worlds", "planners", "robots", "sim", "examples", "tools")  # what pages run
+CODE = ("src", "examples", "tools")  # what pages run
 RUN = ("python", "console", "sh")  # languages that run
 #: Pages whose blocks tests run, each with the tests' file.
 TESTED = {
@@ -137,7 +137,7 @@ def commands_of(block: Block) -> Iterator[tuple[str, str, int]]:
 
 def run_antdrive(words: list[str]) -> int:
     """Call the command line in this process; its exit code."""
-    from antdrive.sim.cli.app import main
+    from antdrive.cli.app import main
 
     before, sys.argv = sys.argv, words
     try:

@@ -13,9 +13,8 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from antdrive.sim.papers.claims import CLAIMS
-from antdrive.sim.papers.kinds import Claim
-from antdrive.worlds.files.atomic import written_whole
+from antdrive.base.atomic import written_whole
+from antdrive.runs.papers.claims import CLAIMS, Claim
 
 PAGES = Path(__file__).parent.parent / "docs" / "papers"
 HEADS = ("claim", "reading", "printed", "ours", "verdict", "why", "source")
@@ -24,11 +23,7 @@ END = "<!-- end -->"
 
 
 def claims_table(rows: Sequence[Mapping[str, str]]) -> list[str]:
-    """The table of a paper's claims as lines of Markdown.
-
-    Args:
-        rows: those of `claims.csv`
-    """
+    """The table of a paper's claims as lines of Markdown."""
     cells = [[row[head] for head in HEADS] for row in rows]
     for line in cells:
         line[4] = f"**{line[4]}**"
@@ -36,11 +31,7 @@ def claims_table(rows: Sequence[Mapping[str, str]]) -> list[str]:
 
 
 def counts_table(rows: Sequence[Mapping[str, str]]) -> list[str]:
-    """How many claims of each paper came out how, as lines of Markdown.
-
-    Args:
-        rows: those of `claims.csv`
-    """
+    """How many claims of each paper came out how, as lines of Markdown."""
     papers = dict.fromkeys(row["paper"] for row in rows)
     lines = [_line(["paper", "rows", *VERDICTS]), _line(["---"] * 5)]
     for paper in (*papers, "all"):
@@ -51,25 +42,14 @@ def counts_table(rows: Sequence[Mapping[str, str]]) -> list[str]:
 
 
 def replaced(text: str, name: str, lines: Sequence[str]) -> str:
-    """A page whose lines between a mark and the end are others.
-
-    Args:
-        text: the page
-        name: of the mark
-        lines: what stands between them then
-    """
+    """A page whose lines between a mark and the end are others."""
     before, _, rest = text.partition(f"<!-- {name} -->\n")
     _, _, after = rest.partition(END)
     return f"{before}<!-- {name} -->\n\n" + "\n".join(lines) + f"\n\n{END}{after}"
 
 
 def missing(claims: Sequence[Claim], pages: Mapping[str, str]) -> list[str]:
-    """The claims whose row a page does not show, with their reading and the printed figures.
-
-    Args:
-        claims: the claims
-        pages: the text of each paper's page
-    """
+    """The claims whose row a page does not show, with their reading and the printed figures."""
     found = []
     for claim in claims:
         start = _line([claim.sentence, claim.reading, claim.printed]).removesuffix(" |")

@@ -19,14 +19,14 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from antdrive.sim.cli.write import caption
+from antdrive.cli.write import caption
 from antdrive.sim.log.rollout import Rollout
 from antdrive.sim.pipeline import run
 from antdrive.sim.scenario import Scenario
-from antdrive.sim.view.film.compare import SplitScreen
-from antdrive.sim.view.film.prelude import planning_frames
-from antdrive.sim.view.film.video import STILLS, still
-from antdrive.sim.view.report.report import write_report
+from antdrive.views.film.compare import SplitScreen
+from antdrive.views.film.prelude import planning_frames
+from antdrive.views.film.video import STILLS, still
+from antdrive.views.report.report import write_report
 from antdrive.worlds.world import Disc
 
 PICTURES = Path(__file__).resolve().parents[1] / "docs" / "pictures"

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
-PACKAGES = ("worlds", "planners", "robots", "sim")
 
 
 def sources(root: Path = ROOT) -> list[Path]:
@@ -15,7 +14,7 @@ def sources(root: Path = ROOT) -> list[Path]:
     Args:
         root: the folder of the repository
     """
-    return sorted(path for name in PACKAGES for path in (root / name).rglob("*") if path.suffix in (".py", ".yaml"))
+    return sorted(path for path in (root / "src").rglob("*") if path.suffix in (".py", ".yaml"))
 
 
 def note_sources(env: Any) -> None:

@@ -74,8 +74,8 @@ def told(text: str) -> str:
 def schema_of(kind: str) -> dict[str, Any]:
     """The JSON Schema that `antdrive schema KIND` prints."""
     from antdrive.robots import robot_schema
-    from antdrive.sim.campaigns import campaign_schema
-    from antdrive.sim.regression import suite_schema
+    from antdrive.runs.campaigns import campaign_schema
+    from antdrive.runs.suites import suite_schema
     from antdrive.worlds import task_schema
 
     known: dict[str, Callable[[], dict[str, Any]]] = {
@@ -127,7 +127,7 @@ class Schema(Directive):
 
 def exit_codes() -> list[str]:
     """Each exit code with the comment that stands beside it in the code."""
-    from antdrive.sim.cli import exits
+    from antdrive.cli import exits
 
     rows = []
     for line in inspect.getsource(exits).splitlines():

@@ -7,7 +7,7 @@ search his map with fourteen obstacles, and a robot drives what they found.
 """
 
 from antdrive import Scenario, film, plan, run
-from antdrive.sim import plan_figure
+from antdrive.views import plan_figure
 
 scenario = Scenario.of(
     "han2007-aco", "aco-han-elite", options={"ants": 100}, seed=4

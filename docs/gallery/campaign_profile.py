@@ -10,10 +10,9 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
-
 from antdrive import sweep
-from antdrive.sim.statistics.profiles import performance_profiles
+from antdrive.runs.statistics.profiles import performance_profiles
+from matplotlib.figure import Figure
 
 campaign = {
     "worlds": [{"generate": "forest", "seeds": 6}],

@@ -6,7 +6,7 @@ A check that cannot fail is worth nothing. So here is a cylinder that neither th
 """
 
 from antdrive import Disc, Scenario, film, run
-from antdrive.sim import certificate_figure
+from antdrive.views import certificate_figure
 
 hidden = Disc(3.0, 3.0, 0.2)
 result = run(Scenario.of("empty", "astar", unseen=(hidden,)))

@@ -7,9 +7,8 @@ automaton, with room for a Jackal to pass. Here the robot knows the world.
 """
 
 import numpy as np
-
 from antdrive import Scenario, film, run
-from antdrive.sim import overview
+from antdrive.views import overview
 from antdrive.worlds import barn
 
 world = barn(np.random.default_rng(3), fill=0.27)

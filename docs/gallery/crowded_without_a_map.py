@@ -8,9 +8,8 @@ stop on ground that it has seen.
 """
 
 import numpy as np
-
 from antdrive import Scenario, film, run
-from antdrive.sim import sight_figure
+from antdrive.views import sight_figure
 from antdrive.worlds import barn
 
 world = barn(np.random.default_rng(3), fill=0.27)

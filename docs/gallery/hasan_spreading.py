@@ -8,7 +8,7 @@ with the paper's mover: it goes to a random neighbouring cell every 0.8 s.
 """
 
 from antdrive import Scenario, film, plan, run
-from antdrive.sim import overview, plan_figure
+from antdrive.views import overview, plan_figure
 
 scenario = Scenario.of("hasan-1a-moving", "mmas-dstar", seed=0)
 

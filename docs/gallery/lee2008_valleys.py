@@ -7,8 +7,8 @@ first valley. Lee, Kim, Choi and Lee (2008) let ants take the field as their heu
 """
 
 from antdrive import Scenario, film, plan, run
-from antdrive.sim import plan_figure
-from antdrive.sim.view.figures.plan_figures import contours_figure
+from antdrive.views import plan_figure
+from antdrive.views.figures.plan_figures import contours_figure
 
 # %%
 # A valley

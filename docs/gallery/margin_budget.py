@@ -6,10 +6,9 @@ Planning keeps 6 cm free around the disc that holds the robot. Where did they go
 route, the true pose and the pose in which the robot believed, so every loss has a cause.
 """
 
-from matplotlib.figure import Figure
-
 from antdrive import Scenario, film, run
 from antdrive.sim.log.margin import CAUSES, budget
+from matplotlib.figure import Figure
 
 result = run(
     Scenario.of("slalom", "astar", margin=0.06, smoothing="taut", noise=3.0, seed=3)

@@ -9,9 +9,8 @@ every blocked cell beside free ground, and one world serves many tasks.
 from dataclasses import replace
 
 import numpy as np
-
 from antdrive import Scenario, film, run
-from antdrive.sim import comparison_figure
+from antdrive.views import comparison_figure
 from antdrive.worlds import CellMap, map_task
 
 # %%

@@ -8,7 +8,7 @@ one is obstructed.
 """
 
 from antdrive import Scenario, film, run
-from antdrive.sim import overview
+from antdrive.views import overview
 
 result = run(Scenario.of("plaza-moving", "dstar-lite"))
 print(result.outcome.value)

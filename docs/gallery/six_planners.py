@@ -7,7 +7,7 @@ planner found.
 """
 
 from antdrive import Scenario, run
-from antdrive.sim import comparison_figure
+from antdrive.views import comparison_figure
 
 names = ["astar", "tangent", "as", "mmas", "aco-han", "ants"]
 runs = {

@@ -8,11 +8,10 @@ cells, drawn from the paper's printed lengths.
 """
 
 import numpy as np
-
 from antdrive import film, load_planner, plan, run
 from antdrive.planners import Query
-from antdrive.sim.papers.films import paper_scenario
-from antdrive.sim.view.figures.paper_figures import history_figure, maps_figure
+from antdrive.views.figures.paper_figures import history_figure, maps_figure
+from antdrive.views.papers.films import paper_scenario
 
 scenario = paper_scenario("suganthi2019")
 grid, _ = plan(scenario)

@@ -13,7 +13,7 @@ import yaml
 from markdown_it import MarkdownIt
 
 from antdrive.robots.files import robot_from_text
-from antdrive.sim.campaigns import expand, make_campaign
+from antdrive.runs.campaigns import expand, make_campaign
 from antdrive.worlds import load_task, save_task
 from tools.pages import RUN, TESTED, Block, blocks_of, pages_with_code
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from antdrive.sim.cli.app import COMMANDS
+from antdrive.cli.app import COMMANDS
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMAND = re.compile(r"`(?:python -m (?P<module>[\w.]+)|make (?P<target>[\w-]+)|antdrive (?P<command>[\w-]+))[^`]*`")

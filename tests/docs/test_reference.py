@@ -11,21 +11,17 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-STUBS = [
-    *sorted(ROOT.glob("[!.]*/__init__.pyi")),
-    *sorted(ROOT.glob("*/*/__init__.pyi")),
-    ROOT / "antdrive" / "testing.pyi",
-]
+SOURCE = ROOT / "src" / "antdrive"
+STUBS = [*sorted(SOURCE.rglob("__init__.pyi")), SOURCE / "testing.pyi"]
 NAMES = re.compile(r"^from (\.[\w.]*) import (\w+)", re.MULTILINE)
 
 
 def package_of(stub: Path) -> str:
-    parts = stub.relative_to(ROOT).with_suffix("").parts
-    within = parts[1:] if parts[0] == "antdrive" else parts
+    within = stub.relative_to(SOURCE).with_suffix("").parts
     return ".".join(["antdrive", *(part for part in within if part != "__init__")])
 
 
-PACKAGES = {package_of(stub): stub for stub in STUBS if "docs" not in stub.parts and "out" not in stub.parts}
+PACKAGES = {package_of(stub): stub for stub in STUBS}
 
 
 def test_every_package_that_offers_names_has_a_page_in_the_api() -> None:

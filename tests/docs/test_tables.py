@@ -6,8 +6,8 @@ import dataclasses
 import re
 from pathlib import Path
 
+from antdrive.runs.suites.baseline import Baseline
 from antdrive.sim.driving.driver import EXPLORING_LIMITERS
-from antdrive.sim.regression.baseline import Baseline
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -29,7 +29,7 @@ def test_every_key_of_a_baseline_is_explained() -> None:
 
 
 def test_every_variable_that_the_code_reads_is_explained() -> None:
-    folders = [ROOT / name for name in ("worlds", "planners", "robots", "sim", "tools")]
+    folders = [ROOT / "src", ROOT / "tools"]
     sources = "".join(path.read_text() for folder in folders for path in folder.rglob("*.py"))
     read = set(re.findall(r"os\.environ(?:\.get\(|\[)\"(\w+)\"", sources))
     assert sorted(read) == sorted(first_cells("reference/environment.md", "## Variables of the environment"))

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from antdrive.robots import load_robot
-from tests.sim.cli.calling import Call
-from tests.sim.cli.conftest import antdrive as antdrive  # a fixture
+from tests.cli.calling import Call
+from tests.cli.conftest import antdrive as antdrive  # a fixture
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "bridges"
 COMMANDS = [line for line in (EXAMPLE / "README.md").read_text().splitlines() if line.startswith("antdrive ")]

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from antdrive.planners import PLANNERS, capabilities_of
-from antdrive.sim.campaigns import expand, load_campaign
+from antdrive.runs.campaigns import expand, load_campaign
 from tools.shared_data import BARN
 
 FOLDER = Path(__file__).parent.parent.parent / "examples" / "campaigns"

@@ -17,7 +17,7 @@ import yaml
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "regression_suite"
 PAGE = (EXAMPLE / "README.md").read_text()
-PLUGIN = ("-p", "antdrive.sim.regression.plugin", "-p", "no:cacheprovider")
+PLUGIN = ("-p", "antdrive.cli.testing.plugin", "-p", "no:cacheprovider")
 
 
 @pytest.fixture

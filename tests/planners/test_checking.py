@@ -13,6 +13,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from antdrive.base import InputError
+from antdrive.base.errors import Terminated
 from antdrive.planners import (
     History,
     PlannerError,
@@ -27,8 +29,7 @@ from antdrive.planners import (
     load_planner,
     path_cost,
 )
-from antdrive.worlds import Cruising, Disc, Grid, InputError, Task, Trajectories, World, rasterise
-from antdrive.worlds.errors import Terminated
+from antdrive.worlds import Cruising, Disc, Grid, Task, Trajectories, World, rasterise
 from tests.planners.worlds_to_solve import catalogue
 
 QUERY = catalogue()["trap"]

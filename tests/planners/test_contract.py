@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from antdrive.base import InputError
 from antdrive.planners import (
     PLANNERS,
     Planner,
@@ -20,7 +21,7 @@ from antdrive.planners import (
     load_planner,
     path_cost,
 )
-from antdrive.worlds import DIRECTIONS, Grid, InputError, polyline_clearance
+from antdrive.worlds import DIRECTIONS, Grid, polyline_clearance
 from tests.planners.worlds_to_solve import catalogue, optimum, random_query, sealed
 
 CATALOGUE = catalogue()

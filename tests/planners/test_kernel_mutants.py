@@ -6,13 +6,14 @@ import itertools
 
 import numpy as np
 
+from antdrive.base import Floats
 from antdrive.planners.anyangle._kernels_ga import tighten_all
 from antdrive.planners.anyangle._kernels_lines import Terrain, clear_cells, clear_line, corridor_moves, pull
 from antdrive.planners.colonies._kernels_colony import goal_pull, next_random
 from antdrive.planners.colonies._kernels_mmas_dstar import close_gates
 from antdrive.planners.graph._kernels_dstar_lite import update_vertex
 from antdrive.planners.graph._kernels_incremental import COST, DIAGONAL, STRAIGHT, put
-from antdrive.worlds import DIRECTIONS, Floats, Grid
+from antdrive.worlds import DIRECTIONS, Grid
 
 NO_DISCS, NO_WALLS = np.empty((0, 3)), np.zeros(4)
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from antdrive import Scenario
+from antdrive.base.errors import InputError
 from antdrive.planners import load_planner, planner_version, record_name
-from antdrive.worlds.errors import InputError
 
 TEXT = """
 from dataclasses import dataclass

@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 
 import antdrive.planners
+from antdrive.base import InputError
+from antdrive.cli.warm import TOGETHER
 from antdrive.planners import (
     PLANNERS,
     AcoHan,
@@ -26,9 +28,7 @@ from antdrive.planners import (
     load_planner,
     planner_version,
 )
-from antdrive.sim.view.style import PLANNER_STYLES
-from antdrive.sim.warm import TOGETHER
-from antdrive.worlds import InputError
+from antdrive.views.style import PLANNER_STYLES
 from tests.planners.worlds_to_solve import catalogue, optimum
 
 ROOT = Path(__file__).parents[2]
@@ -189,12 +189,12 @@ def test_a_planner_s_kernels_are_compiled_by_a_warm_up_group(name: str) -> None:
     groups = [names for names in TOGETHER if name in names]
     # The drive in the warm-up plans with `astar` and `as`, whose kernels other planners use, too.
     known = {kernel for names in (*TOGETHER, ("astar", "as")) for n in names for kernel in kernel_modules(PLANNERS[n])}
-    assert groups or kernel_modules(PLANNERS[name]) <= known, f"add {name} to TOGETHER in sim/warm.py"
+    assert groups or kernel_modules(PLANNERS[name]) <= known, f"add {name} to TOGETHER in cli/warm.py"
 
 
 @pytest.mark.parametrize("name", PLANNERS)
 def test_a_planner_has_a_line_style_of_its_own(name: str) -> None:
-    assert name in PLANNER_STYLES, f"add {name} to sim/view/style.py"
+    assert name in PLANNER_STYLES, f"add {name} to views/style.py"
     assert list(PLANNER_STYLES.values()).count(PLANNER_STYLES[name]) == 1
 
 

@@ -5,11 +5,12 @@ from pathlib import Path
 
 import pytest
 
+from antdrive.base import InputError
 from antdrive.robots import Footprint, RobotSpec, list_robots, load_robot, robot_schema, robot_to_dict
 from antdrive.robots.files import footprint_to_dict
 from antdrive.sim import Engine
 from antdrive.sim.log.binding import canonical_hash
-from antdrive.worlds import InputError, World
+from antdrive.worlds import World
 
 GOOD = """\
 schema: 1

@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 import yaml
 
+from antdrive.base import InputError
 from antdrive.robots import Lidar, Odometry, RobotSpec, load_robot, robot_to_dict
 from antdrive.robots.files import robot_schema
 from antdrive.sim import Run
 from antdrive.sim.log.binding import canonical_hash
 from antdrive.sim.log.record import DriveRecord
-from antdrive.worlds import InputError
 
 CATALOG = Path(__file__).parent.parent.parent / "robots" / "catalog"
 LIDAR = {"beams": 181, "field_of_view": 3.0, "min_range": 0.1, "max_range": 5.0, "rate": 10.0}

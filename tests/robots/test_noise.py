@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from antdrive.base import InputError
 from antdrive.robots import Noise, NoiseModel, RobotSpec, Twist, load_robot
-from antdrive.worlds import InputError
 
 DT = 1 / 60
 

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from antdrive.base import FieldError, Pose
 from antdrive.robots import Footprint, RobotSpec, footprint_clearance, load_robot
 from antdrive.robots.control._kernels_obstacles import turn_clearance
 from antdrive.robots.feasible import yaw_inertia
@@ -17,7 +18,7 @@ from antdrive.robots.placing import gaps
 from antdrive.sim.driving._kernels_movers import lower_by_movers
 from antdrive.sim.log.certificate import _polygon_to_points, _polygon_to_walls
 from antdrive.sim.log.contacts import _gap
-from antdrive.worlds import Disc, FieldError, Pose, World
+from antdrive.worlds import Disc, World
 
 POSES = st.tuples(st.floats(-2, 2), st.floats(-2, 2), st.floats(-4, 4))
 DISCS = st.tuples(st.floats(-3, 3), st.floats(-3, 3), st.floats(0.05, 1.0))

@@ -16,7 +16,7 @@ from antdrive.sim.log.record import ComponentRecord
 from antdrive.sim.log.rollout import Rollout
 from antdrive.worlds.movers import Cruising
 from antdrive.worlds.world import Disc, Task, World
-from tests.sim.records import made_up_record
+from tests.records import made_up_record
 
 
 @pytest.fixture(scope="session")

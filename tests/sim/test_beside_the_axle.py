@@ -14,8 +14,8 @@ from antdrive.planners import load_planner
 from antdrive.robots import Footprint, list_robots, load_robot
 from antdrive.sim import Outcome, Rollout, Run, Scenario, certify, run
 from antdrive.sim.log.certificate import _between_steps, _clearances
-from antdrive.sim.view.film.meshes import robot_parts
-from antdrive.sim.view.scene import Body, Scene, contact_point
+from antdrive.views.film.meshes import robot_parts
+from antdrive.views.scene import Body, Scene, contact_point
 from antdrive.worlds import Cruising, Disc, Task, World, task_to_dict
 from benchmarks.second_audit import least_clearance
 

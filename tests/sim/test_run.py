@@ -14,14 +14,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from antdrive.base import FieldError, InputError
 from antdrive.planners import Progress, keep_best, load_planner, watch
 from antdrive.robots import Footprint, PurePursuit, RobotSpec, load_robot
 from antdrive.sim import Engine, Outcome, Run, Scenario, measure, plan, run
 from antdrive.sim.driving.drive import drive
 from antdrive.sim.log import certificate
 from antdrive.sim.log.record import SmoothingRecord
-from antdrive.sim.view.figures.plan_figures import plan_figure
-from antdrive.worlds import Disc, FieldError, InputError, Route, Task, World, list_worlds, load_task, save_task
+from antdrive.views.figures.plan_figures import plan_figure
+from antdrive.worlds import Disc, Route, Task, World, list_worlds, load_task, save_task
 
 
 def test_a_run_ends_at_the_goal_certified(small_run: Run) -> None:

@@ -15,9 +15,9 @@ from tools.mutants.__main__ import as_text, counts, judged
 from tools.mutants.operators import Mutant, mutants_of
 from tools.mutants.plans import PLANS, ROOT, StaleTable, check_tables, drawn, named_mutants
 from tools.mutants.results import Results, ResultsUnfit, digest
-from tools.mutants.running import BaselineUnfit, Copy, Ended, Server, dependents
+from tools.mutants.running import SOURCE, BaselineUnfit, Copy, Ended, Server, dependents
 
-SOURCE = '''"""A docstring with 1.0 in it."""
+TEXT = '''"""A docstring with 1.0 in it."""
 LIMIT = 0.5  # [m]
 
 
@@ -62,17 +62,17 @@ def changes(source: str) -> set[tuple[str, str]]:
     ],
 )
 def test_each_kind_of_fault_is_made(operator: str, now: str) -> None:
-    assert (operator, now) in changes(SOURCE)
+    assert (operator, now) in changes(TEXT)
 
 
 def test_texts_types_and_messages_are_left_alone() -> None:
-    for mutant in mutants_of("f.py", SOURCE):
+    for mutant in mutants_of("f.py", TEXT):
         assert compile(mutant.source, "f.py", "exec")
         assert "A docstring with 1.0 in it." in mutant.source
         assert "f(a: int, b: float" in mutant.source
         assert 'f"{a + 1}"' in mutant.source or mutant.operator == "statement deleted"
-        assert mutant.source != SOURCE
-    assert len({mutant.source for mutant in mutants_of("f.py", SOURCE)}) == len(mutants_of("f.py", SOURCE))
+        assert mutant.source != TEXT
+    assert len({mutant.source for mutant in mutants_of("f.py", TEXT)}) == len(mutants_of("f.py", TEXT))
 
 
 def test_letters_of_several_bytes_do_not_shift_an_edit() -> None:
@@ -96,11 +96,11 @@ def test_every_table_speaks_of_code_that_exists() -> None:
 
 def test_a_snippet_that_its_file_no_longer_holds_is_an_error(tmp_path: Path) -> None:
     for mutant in named_mutants():
-        target = tmp_path / mutant.file
+        target = tmp_path / SOURCE / mutant.file
         target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_text((ROOT / mutant.file).read_text())
+        target.write_text((ROOT / SOURCE / mutant.file).read_text())
     assert len(named_mutants(tmp_path)) == len(named_mutants())
-    (tmp_path / "sim/driving/drive.py").write_text("AFTER_CONTACT = 1.0\n")
+    (tmp_path / SOURCE / "sim/driving/drive.py").write_text("AFTER_CONTACT = 1.0\n")
     with pytest.raises(StaleTable, match=r"0\.05 s logged after a contact: .* occurs 0 times in sim/driving/drive\.py"):
         named_mutants(tmp_path)
 
@@ -192,15 +192,12 @@ class _Same(Copy):
 def fates_of(tmp_path: Path, codes: list[int | None]) -> list[str]:
     """What becomes of three mutants of a file when its tests end so: first without a fault, then with each."""
     for folder in ("original", "copy"):
-        (tmp_path / folder / "sim/log").mkdir(parents=True)
-        (tmp_path / folder / "sim/log/metrics.py").write_text("a = 1\n")
-    for package in ("antdrive", "worlds", "planners", "robots", "sim"):
-        (tmp_path / "original" / package).mkdir(exist_ok=True)
-        (tmp_path / "original" / package / "__init__.pyi").write_text("")
+        (tmp_path / folder / SOURCE / "sim/log").mkdir(parents=True)
+        (tmp_path / folder / SOURCE / "sim/log/metrics.py").write_text("a = 1\n")
     copy = _Same(tmp_path / "original", tmp_path / "copy", codes)
     mutants = [Mutant("sim/log/metrics.py", "constant", "", 1, "a = 1", f"a = {n}", f"a = {n}\n") for n in (2, 3, 4)]
     fates = [fate for _, fate in copy.fates(mutants, PLANS["sim/log/metrics.py"])]
-    assert (tmp_path / "copy/sim/log/metrics.py").read_text() == "a = 1\n"
+    assert (tmp_path / "copy" / SOURCE / "sim/log/metrics.py").read_text() == "a = 1\n"
     return fates
 
 
@@ -221,7 +218,7 @@ def test_tests_that_fail_on_the_unchanged_code_judge_nothing(tmp_path: Path) -> 
 
 def results_project(root: Path) -> Mutant:
     """A project that holds the file of a mutant and its tests."""
-    for name in ("sim/log/metrics.py", *PLANS["sim/log/metrics.py"].files):
+    for name in (f"{SOURCE}/sim/log/metrics.py", *PLANS["sim/log/metrics.py"].files):
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         (root / name).write_text("a = 1\n")
     digest.cache_clear()
@@ -240,7 +237,7 @@ def test_a_result_holds_as_long_as_nothing_changes_that_could_alter_it(
     (tmp_path / PLANS[mutant.file].files[0]).write_text("a = 2\n")
     digest.cache_clear()
     assert Results(store, tmp_path).fate(mutant) == tests_changed
-    (tmp_path / mutant.file).write_text("b = 1\n")
+    (tmp_path / SOURCE / mutant.file).write_text("b = 1\n")
     digest.cache_clear()
     assert Results(store, tmp_path).fate(mutant) == file_changed
 

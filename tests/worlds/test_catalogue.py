@@ -6,7 +6,7 @@ import itertools
 import numpy as np
 import pytest
 
-from antdrive.sim.papers.maps import environments
+from antdrive.runs.papers.maps import environments
 from antdrive.worlds import Disc, Task, Trajectories, forest, list_worlds, load_task, point_clearance, rasterise
 from tests.worlds.oracles import passable
 

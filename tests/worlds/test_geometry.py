@@ -8,14 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from antdrive.worlds import (
-    Disc,
-    World,
-    point_clearance,
-    polyline_clearance,
-    segment_clearance,
-    swept_clearance,
-)
+from antdrive.worlds import Disc, World, point_clearance, polyline_clearance, segment_clearance, swept_clearance
 from tests.worlds.oracles import clearance_of_point, clearance_of_segment, coordinates, worlds
 
 points = st.tuples(coordinates(-7, 7), coordinates(-7, 7))

@@ -12,11 +12,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from antdrive.base import FieldError, InputError
 from antdrive.worlds import (
     Cruising,
     Disc,
-    FieldError,
-    InputError,
     Keyframed,
     Task,
     Trajectories,

@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
+from antdrive.base.errors import FieldError
 from antdrive.worlds import Disc, World
-from antdrive.worlds.errors import FieldError
 from antdrive.worlds.world import PointWorld
 
 ROWS = np.array([[1.0, 2.0, 0.3], [4.0, 3.0, 0.1]])

@@ -10,7 +10,7 @@ import yaml
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from tools.mutants.operators import Mutant, described, mutants_of
-from tools.mutants.running import Plan
+from tools.mutants.running import SOURCE, Plan
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent.parent
@@ -36,7 +36,7 @@ PLANS: dict[str, Plan] = {
     "sim/driving/recorder.py": Plan(_DRIVE, 8),
     "sim/driving/leaving.py": Plan((f"{_DRIVING}test_drive_mutants.py", f"{_DRIVING}test_leaving.py"), 8),
     "sim/driving/blocking.py": Plan((f"{_DRIVING}test_driver.py",), 0),
-    "sim/view/film/replay.py": Plan(("tests/sim/view/film/test_replay.py",), 0),
+    "views/film/replay.py": Plan(("tests/views/film/test_replay.py",), 0),
     "robots/_kernels_footprint.py": Plan((_PARTS, "tests/robots/test_footprint.py"), 4, plain=True),
     "robots/outline.py": Plan(("tests/robots/test_polygons.py",), 6, plain=True),
     "robots/importing/wheels.py": Plan(("tests/robots/importing/test_urdf.py",), 6, plain=True),
@@ -85,7 +85,7 @@ class NamedFault(BaseModel):
 
     Attributes:
         name: what it leaves out or gets wrong
-        file: the file, relative to the root of the project
+        file: the file, relative to `SOURCE`
         was: a piece of its text that occurs once
         now: what replaces it
     """
@@ -101,7 +101,7 @@ class EquivalentFault(BaseModel):
     """A generated mutant that no test can notice, because the program does the same.
 
     Attributes:
-        file: the file, relative to the root of the project
+        file: the file, relative to `SOURCE`
         function: the function that holds it, with its class; empty at the top of the file
         was: the lines as they were, as the list of survivors shows them
         now: the lines as they are
@@ -137,14 +137,14 @@ def drawn(file: str, count: int, seed: int = SEED, root: Path = ROOT) -> list[Mu
     """A sample of the mutants of a file: one of each function in turn, so that every function has its share.
 
     Args:
-        file: the file, relative to the root of the project
+        file: the file, relative to `SOURCE`
         count: how many, if there are as many
         seed: another seed gives another sample
         root: the root of the project
     """
     rng = random.Random(f"{seed} {file}")  # noqa: S311 - nothing is kept secret
     by_function: dict[str, list[Mutant]] = {}
-    for mutant in mutants_of(file, (root / file).read_text()):
+    for mutant in mutants_of(file, (root / SOURCE / file).read_text()):
         by_function.setdefault(mutant.function, []).append(mutant)
     groups = list(by_function.values())
     rng.shuffle(groups)
@@ -163,7 +163,7 @@ def check_tables(root: Path = ROOT) -> None:
         StaleTable: one does not.
     """
     for file, plan in PLANS.items():
-        for name in (file, *plan.files):
+        for name in (f"{SOURCE}/{file}", *plan.files):
             if not (root / name).is_file():
                 raise StaleTable(f"tools/mutants/plans.py: {name} does not exist")
     for mutant in named_mutants(root):
@@ -171,14 +171,14 @@ def check_tables(root: Path = ROOT) -> None:
             raise StaleTable(f"tools/mutants/named.yaml: {mutant.file} has no plan in tools/mutants/plans.py")
     wanted = equivalents()
     for file in {key[0] for key in wanted}:
-        known = {mutant.key for mutant in mutants_of(file, (root / file).read_text())}
+        known = {mutant.key for mutant in mutants_of(file, (root / SOURCE / file).read_text())}
         for key in wanted:
             if key[0] == file and key not in known:
                 raise StaleTable(f"tools/mutants/equivalent.yaml: no mutant of {file} turns {key[2]!r} into {key[3]!r}")
 
 
 def _placed(fault: NamedFault, root: Path) -> Mutant:
-    source = (root / fault.file).read_text()
+    source = (root / SOURCE / fault.file).read_text()
     if source.count(fault.was) != 1:
         found = source.count(fault.was)
         raise StaleTable(

@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from tools.mutants.operators import Mutant
 from tools.mutants.plans import PLANS, ROOT
+from tools.mutants.running import SOURCE
 
 Fate = Literal["killed", "timeout", "alive"]
 
@@ -69,7 +70,7 @@ class Results:
     def fate(self, mutant: Mutant) -> Fate | None:
         """What became of a mutant, if that still holds."""
         entry = self._known.get(mutant.key)
-        if entry is None or entry.source != digest(self._root, mutant.file):
+        if entry is None or entry.source != digest(self._root, f"{SOURCE}/{mutant.file}"):
             return None
         same_tests = entry.tests == digest(self._root, *PLANS[mutant.file].files)
         return entry.fate if same_tests or entry.fate != "alive" else None
@@ -80,7 +81,7 @@ class Results:
             return
         names = ("file", "function", "operator", "line", "was", "now")
         told: dict[str, Any] = {name: getattr(mutant, name) for name in names}
-        told |= {"fate": fate, "source": digest(self._root, mutant.file)}
+        told |= {"fate": fate, "source": digest(self._root, f"{SOURCE}/{mutant.file}")}
         told |= {"tests": digest(self._root, *PLANS[mutant.file].files)}
         self._path.parent.mkdir(parents=True, exist_ok=True)
         with self._path.open("a") as out:

@@ -25,10 +25,11 @@ from typing import IO
 
 from tools.mutants.operators import Mutant
 
-PACKAGES = ("worlds", "planners", "robots", "sim")
+SOURCE = "src/antdrive"  # the files of plans are named from here
+ROOMS = ("base", "worlds", "planners", "robots", "sim", "runs", "views", "cli")
 LEFT_OUT = (".*", "out", "examples", "benchmarks", "docs")
-LOADED = ("worlds/*.py", "worlds/files/*.py", "planners/**/*.py", "robots/**/*.py", "sim/log/*.py", "sim/physics/*.py",
-          "sim/driving/*.py", "sim/pipeline.py")  # fmt: skip
+LOADED = ("base/*.py", "worlds/*.py", "worlds/files/*.py", "planners/**/*.py", "robots/**/*.py", "sim/log/*.py",
+          "sim/physics/*.py", "sim/driving/*.py", "sim/pipeline.py")  # fmt: skip
 LIBRARIES = ["pytest", "numpy", "yaml", "pydantic", "joblib", "pybullet", "numba"]
 PASSED, FAILED, FAULTY, USAGE, NO_TESTS = 0, 1, 3, 4, 5  # pytest's exit codes; 3: pytest itself has failed
 # The limit of a mutant's processor time: at least [s], times the time without a fault, and for compiling kernels [s].
@@ -150,7 +151,7 @@ class Copy:
         self.root = root
         self._original, self._processes = original, processes
         shutil.copytree(original, root, symlinks=True, ignore=shutil.ignore_patterns(*LEFT_OUT))
-        cache = root / "worlds" / "kernel_cache.py"
+        cache = root / SOURCE / "base" / "kernel_cache.py"
         _write(cache, f"{cache.read_text()}\n\ndef sources_stamp() -> str:\n    return {stamp_of(original)!r}\n")
 
     def fates(self, mutants: list[Mutant], plan: Plan) -> Iterator[tuple[Mutant, str]]:
@@ -165,9 +166,7 @@ class Copy:
         """
         file = mutants[0].file
         dependent = dependents(self._original, file)
-        kernels = (
-            [] if plan.plain else [self.root / name for name in dependent if Path(name).name.startswith("_kernels")]
-        )
+        kernels = [] if plan.plain else [self.root / SOURCE / name for name in dependent if "_kernels" in name]
         server = self.server(file, dependent, plan.plain)
         try:
             first = server.run(plan.tests, BASELINE_TIME)
@@ -177,12 +176,12 @@ class Copy:
             limit = max(LEAST_TIME, MORE_TIME * first.seconds) + (COMPILING if kernels else 0.0)
             for mutant in mutants:
                 _forget(kernels)
-                _write(self.root / file, mutant.source)
+                _write(self.root / SOURCE / file, mutant.source)
                 run = server.run(plan.tests, limit)
                 yield mutant, "timeout" if run.code is None else "alive" if run.code == PASSED else "killed"
         finally:
             server.end()
-            _write(self.root / file, (self._original / file).read_text())
+            _write(self.root / SOURCE / file, (self._original / SOURCE / file).read_text())
             self._restore(kernels)
 
     def server(self, file: str, dependent: set[str], plain: bool) -> Server:
@@ -206,7 +205,8 @@ class Server:
 
     def __init__(self, root: Path, processes: Processes, file: str, dependent: set[str], plain: bool) -> None:
         self._root, self._processes, self._plain = root, processes, plain
-        free = sorted({str(p.relative_to(root)) for pattern in LOADED for p in root.glob(pattern)} - dependent)
+        source = root / SOURCE
+        free = sorted({str(p.relative_to(source)) for pattern in LOADED for p in source.glob(pattern)} - dependent)
         names = [f"antdrive.{_module(name)}" for name in free if not name.endswith("__init__.py")]
         self._first = {"modules": LIBRARIES + names, "changing": f"antdrive.{_module(file)}"}
         self._start()
@@ -247,7 +247,7 @@ class Server:
 
     def _start(self) -> None:
         environment = {key: value for key, value in os.environ.items() if not key.startswith(("NUMBA_", "PYTEST_"))}
-        environment |= {"PYTHONPATH": str(self._root), "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
+        environment |= {"PYTHONPATH": str(self._root / "src"), "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
         environment |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
         if self._plain:
             environment |= {"NUMBA_DISABLE_JIT": "1", "PYTHONWARNINGS": "ignore"}
@@ -263,21 +263,21 @@ class Server:
 
 def stamp_of(root: Path) -> str:
     """The stamp that the cache of machine code has in a project."""
-    code = "from antdrive.worlds.kernel_cache import sources_stamp; print(sources_stamp())"
-    environment = {**os.environ, "PYTHONPATH": str(root)}
+    code = "from antdrive.base.kernel_cache import sources_stamp; print(sources_stamp())"
+    environment = {**os.environ, "PYTHONPATH": str(root / "src")}
     command = [sys.executable, "-c", code]
     done = subprocess.run(command, cwd=root, env=environment, capture_output=True, text=True, check=True)  # noqa: S603
     return done.stdout.strip()
 
 
 def dependents(root: Path, file: str) -> set[str]:
-    """A file and all files of the packages that import it, directly or through others, relative to the root."""
-    lazy = _lazy_names(root)
+    """A file and all files of the rooms that import it, directly or through others, relative to `SOURCE`."""
+    source = root / SOURCE
+    lazy = _lazy_names(source)
     imported: dict[str, set[str]] = {}
-    for package in PACKAGES:
-        for path in (root / package).rglob("*.py"):
-            names = _imports(path)
-            imported[str(path.relative_to(root))] = names | {lazy[name] for name in names if name in lazy}
+    for path in (path for room in ROOMS for path in (source / room).rglob("*.py")):
+        names = _imports(path)
+        imported[str(path.relative_to(source))] = names | {lazy[name] for name in names if name in lazy}
     found = {file}
     while True:
         modules = {_module(name) for name in found}
@@ -302,12 +302,12 @@ def _imports(path: Path) -> set[str]:
     return {name.removeprefix("antdrive.") for name in names if name.startswith("antdrive.")}
 
 
-def _lazy_names(root: Path) -> dict[str, str]:
+def _lazy_names(source: Path) -> dict[str, str]:
     """The module that holds each name that a package offers: "worlds.Disc" is in "worlds.world"."""
     found = {}
-    for package in ("", *(f"{name}." for name in PACKAGES)):
-        folder = root / (package.rstrip(".") or "antdrive")
-        for node in ast.parse((folder / "__init__.pyi").read_text()).body:
+    for stub in source.rglob("__init__.pyi"):
+        package = "".join(f"{part}." for part in stub.parent.relative_to(source).parts)
+        for node in ast.parse(stub.read_text()).body:
             if isinstance(node, ast.ImportFrom) and node.module:
                 found |= {f"{package}{alias.asname or alias.name}": f"{package}{node.module}" for alias in node.names}
     return found

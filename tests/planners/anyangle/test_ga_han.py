@@ -7,9 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 
+from antdrive.base.plane import polyline_length
 from antdrive.planners import GaHan, PlanStatus, Query, load_planner
 from antdrive.worlds import Disc, Grid, Task, World, load_task, polyline_clearance, rasterise
-from antdrive.worlds.plane import polyline_length
 from tests.planners.worlds_to_solve import catalogue, random_query, sealed
 
 THESIS = 33.1798  # the length that the thesis prints for 3 via points, the best of 1, 2 and 3

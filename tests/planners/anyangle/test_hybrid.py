@@ -7,10 +7,11 @@ import dataclasses
 import numpy as np
 import pytest
 
+from antdrive.base import InputError
+from antdrive.base.plane import polyline_length
 from antdrive.planners import AcoHan, Hybrid, PlanResult, PlanStatus, Query, Tangent, keep_best, load_planner, watch
 from antdrive.planners.iterative import Progress
-from antdrive.worlds import Disc, Grid, InputError, Task, World, load_task, polyline_clearance, rasterise
-from antdrive.worlds.plane import polyline_length
+from antdrive.worlds import Disc, Grid, Task, World, load_task, polyline_clearance, rasterise
 from tests.planners.worlds_to_solve import catalogue, optimum
 
 FLOOR = 30.0711

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from antdrive.base.plane import polyline_length
 from antdrive.planners import AStar, Query, path_cost
 from antdrive.planners.anyangle.lines import cells_along, cells_under, clear_line, route_ends
 from antdrive.worlds import DIRECTIONS, Disc, Grid, Task, World, rasterise, segment_clearance
-from antdrive.worlds.plane import polyline_length
 from tests.planners.worlds_to_solve import catalogue, optimum, random_query, sealed
 
 RNG = np.random.default_rng(0)

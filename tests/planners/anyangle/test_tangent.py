@@ -14,10 +14,11 @@ from hypothesis import strategies as st
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from antdrive.base import InputError
 from antdrive.planners import AStar, PlanStatus, Query, Tangent, route_along
 from antdrive.planners.anyangle import _kernels_tangent
 from antdrive.planners.anyangle.tangent import Arc, Line, TangentPath, shortest
-from antdrive.worlds import Disc, InputError, Task, World, forest, polyline_clearance, rasterise
+from antdrive.worlds import Disc, Task, World, forest, polyline_clearance, rasterise
 from tests.planners.worlds_to_solve import catalogue, random_query
 
 Discs = Sequence[tuple[float, float, float]]

@@ -6,9 +6,10 @@ import math
 import numpy as np
 import pytest
 
+from antdrive.base import Floats
 from antdrive.planners import AcoHan, Iteration, PlanStatus, Progress, Query, keep_best, watch
 from antdrive.planners.colonies.colony import ColonyGraph, IterationState, TourConstruction, Walks, without_loops
-from antdrive.worlds import Floats, Grid
+from antdrive.worlds import Grid
 from tests.planners.worlds_to_solve import catalogue
 
 OPEN = Query(Grid.from_free(np.ones((3, 4))), (0, 0), (2, 3))

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from antdrive.base import Floats
 from antdrive.planners import (
     PLANNERS,
     AgeingAnts,
@@ -35,7 +36,7 @@ from antdrive.planners.colonies.colony import (
     cut_short,
 )
 from antdrive.planners.colonies.mmas import best_so_far_every
-from antdrive.worlds import DIRECTIONS, Floats, Grid
+from antdrive.worlds import DIRECTIONS, Grid
 from tests.planners.worlds_to_solve import catalogue, optimum, random_query
 
 OPEN = Query(Grid.from_free(np.ones((3, 4))), (0, 0), (2, 3))

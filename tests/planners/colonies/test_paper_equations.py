@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from antdrive.base import Floats
 from antdrive.planners import AcoHan, MaxMinDStar, PotentialField, PotentialFieldAnts, Query
 from antdrive.planners.anyangle import _kernels_ga
 from antdrive.planners.anyangle.lines import terrain
@@ -16,7 +17,7 @@ from antdrive.planners.colonies.ant_system import AgeingAnts, AntSystem, Explori
 from antdrive.planners.colonies.colony import ChoiceContext, Colony, ColonyGraph, IterationState, Walks
 from antdrive.planners.colonies.mmas import MaxMinAnts
 from antdrive.planners.colonies.pfaco import AntPool
-from antdrive.worlds import Disc, Floats, Grid, Task, World, rasterise
+from antdrive.worlds import Disc, Grid, Task, World, rasterise
 
 EAST, NORTH_EAST, NORTH, WEST = 0, 1, 2, 4
 

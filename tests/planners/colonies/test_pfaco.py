@@ -10,7 +10,7 @@ from antdrive.planners import PlanResult, PlanStatus, PotentialFieldAnts, Query
 from antdrive.planners.colonies import _kernels_pfaco
 from antdrive.planners.colonies.colony import ColonyGraph
 from antdrive.planners.colonies.pfaco import FIELDS, FORMS, AntPool
-from antdrive.sim.papers.maps import blocks
+from antdrive.runs.papers.maps import blocks
 from antdrive.worlds import DIRECTIONS, Grid
 from tests.planners.worlds_to_solve import catalogue, optimum
 

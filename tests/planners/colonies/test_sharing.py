@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from antdrive.base import Floats
 from antdrive.planners import PotentialFieldAnts, Query
 from antdrive.planners.colonies.ant_system import ExploringAnts
 from antdrive.planners.colonies.pfaco import AntPool
-from antdrive.worlds import Floats, Grid
+from antdrive.worlds import Grid
 from tests.planners.colonies.test_colony import BEND, DIRECT, state, walks
 
 

@@ -17,8 +17,8 @@ from antdrive.planners import (
     load_planner,
 )
 from antdrive.planners.colonies.mmas_dstar import PATIENCE
-from antdrive.sim.papers.maps import environments
-from antdrive.sim.papers.movers import Strollers, drive
+from antdrive.runs.papers.maps import environments
+from antdrive.runs.papers.movers import Strollers, drive
 from antdrive.worlds import DIRECTIONS, Grid
 from tests.planners.worlds_to_solve import catalogue, optimum, random_query, sealed
 

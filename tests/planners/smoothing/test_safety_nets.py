@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from antdrive.base import Floats
 from antdrive.planners.smoothing.smooth import SHRINK, _clears, _fault, _pulled, _runs, _smoothed
-from antdrive.worlds import Disc, Floats, World
+from antdrive.worlds import Disc, World
 
 INFLATE = 0.2
 WORLD = World("w", (0.0, 0.0, 8.0, 6.0), (Disc(4.0, 3.0, 0.5),))

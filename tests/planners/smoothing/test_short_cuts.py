@@ -8,8 +8,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from antdrive.base import Floats
 from antdrive.planners.smoothing import _kernels_smooth as kernels
-from antdrive.worlds import Floats
 
 seeds = st.integers(0, 10_000)
 

@@ -15,13 +15,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from antdrive.base import Floats
 from antdrive.planners import AStar, PlanResult, PlanStatus, Query, load_planner, path_cost, route_along
 from antdrive.planners.anyangle.tangent import Arc, Line, TangentPath, shortest
 from antdrive.planners.smoothing.smooth import SMOOTHINGS, pull_taut, smooth
 from antdrive.robots import load_robot
 from antdrive.worlds import (
     Disc,
-    Floats,
     Grid,
     Route,
     Task,

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from antdrive.base import Floats
 from antdrive.robots import Avoidance, AvoidanceState, PurePursuit, PursuitState, RobotSpec, TrackedPath, Twist
 from antdrive.robots.control._kernels_avoidance import first_contact, intrusion
-from antdrive.worlds import Floats, Route, World
+from antdrive.worlds import Route, World
 
 OPEN = World("open", (-20, -20, 20, 20))
 NEAR = np.array([0])

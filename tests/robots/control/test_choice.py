@@ -8,10 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from antdrive.base import Floats
 from antdrive.robots import Avoidance, AvoidanceState, PurePursuit, TrackedPath, load_robot
 from antdrive.robots.control import _kernels_avoidance as kernels
 from antdrive.robots.control.avoidance import _weights
-from antdrive.worlds import Disc, Floats, Route, World
+from antdrive.worlds import Disc, Route, World
 
 ROBOT, AVOIDANCE = load_robot("turtlebot"), Avoidance()
 TABLE = AVOIDANCE._candidates(ROBOT, AvoidanceState((1.0, 0.3, 0.4, 0.4, 0.3, 0.0), 0.2), 0.6)

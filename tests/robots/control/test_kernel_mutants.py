@@ -5,13 +5,14 @@ import math
 import numpy as np
 import pytest
 
+from antdrive.base import Floats
 from antdrive.robots import Footprint, PurePursuit, RobotSpec, footprint_clearance
 from antdrive.robots.control._kernels_avoidance import AvoidanceWeights, Encounter, among_movers, progress_by_distance
 from antdrive.robots.control._kernels_obstacles import ObstacleIndex, arc_clearance, index_discs
 from antdrive.robots.control._kernels_path import PathSamples, clear_lookaheads, project
 from antdrive.robots.control._kernels_pursuit import rotation, slow_for_curvature
 from antdrive.robots.control.profile import speed_profile
-from antdrive.worlds import Disc, Floats, Route, World
+from antdrive.worlds import Disc, Route, World
 from tests.robots.control.test_rules import LIMITS, TUNING
 
 WIDE = np.array([-50.0, -50.0, 50.0, 50.0])

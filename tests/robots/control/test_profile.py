@@ -10,9 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from antdrive.base import Floats
 from antdrive.robots import RobotSpec
 from antdrive.robots.control.profile import SpeedProfile, speed_profile, turning_time
-from antdrive.worlds import Floats, Route
+from antdrive.worlds import Route
 
 
 def straight(length: float) -> Route:

@@ -15,11 +15,11 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
+from antdrive.base import InputError
 from antdrive.robots import Footprint, RobotSpec, load_robot
 from antdrive.robots.files import footprint_to_dict as written
 from antdrive.robots.importing.hull import convex_hull, fewer_corners, footprint_around
 from antdrive.robots.importing.urdf import ImportedRobot, import_urdf
-from antdrive.worlds import InputError
 from benchmarks.robots import SPECIFICATIONS, values_of
 
 FIXTURES = Path(__file__).parent / "urdf"

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
+from antdrive.base import Floats, Pose
 from antdrive.robots import Footprint, Lidar, RobotSpec, Twist, footprint_clearance, load_robot
 from antdrive.sim.driving.caution import Caution
 from antdrive.sim.driving.survey import Senses, Survey
 from antdrive.sim.sensing import Scanner
-from antdrive.worlds import Disc, Floats, Pose, World
+from antdrive.worlds import Disc, World
 
 EYE = Lidar(beams=360, field_of_view=2 * math.pi, min_range=0.05, max_range=3.0, rate=20.0)
 SHAPES = {

@@ -7,8 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from antdrive.base.errors import FieldError
 from antdrive.planners import load_planner
 from antdrive.robots import RobotSpec, Twist
+from antdrive.runs.failures.rebuild import rebuilt
 from antdrive.sim import Outcome, Rollout, Run, Scenario, run
 from antdrive.sim.driving import rescanning
 from antdrive.sim.driving.caution import Caution
@@ -16,13 +18,11 @@ from antdrive.sim.driving.own_map import forgetting_ticks
 from antdrive.sim.driving.replay import replay
 from antdrive.sim.driving.survey import Senses, Survey
 from antdrive.sim.driving.watching import Watch
-from antdrive.sim.falsify.rebuild import rebuilt
 from antdrive.sim.log.record import ReplanRecord
 from antdrive.sim.sensing import OccupancyMap, Scanner
 from antdrive.sim.unknown import exploration_of, told
-from antdrive.sim.view.recollection import Recollection
+from antdrive.views.recollection import Recollection
 from antdrive.worlds import Disc, Task, World, generate, load_task
-from antdrive.worlds.errors import FieldError
 
 POSTS = tuple(Disc(3.0, 0.15 * k, 0.075) for k in range(14))  # a row that leaves a gap at the top
 ROOM = World("room", (0.0, 0.0, 6.0, 4.0), POSTS)

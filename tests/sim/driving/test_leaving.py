@@ -8,12 +8,13 @@ import math
 import numpy as np
 import pytest
 
+from antdrive.base import Pose
 from antdrive.planners import load_planner
 from antdrive.robots import LIMITERS, Footprint, PurePursuit, RobotSpec, load_robot, overlap_at
 from antdrive.sim import Engine, Outcome, Scenario, plan, run
 from antdrive.sim.driving.drive import drive
 from antdrive.sim.driving.leaving import is_narrow
-from antdrive.worlds import Disc, Pose, Route, Task, World
+from antdrive.worlds import Disc, Route, Task, World
 
 
 @pytest.fixture(scope="module")

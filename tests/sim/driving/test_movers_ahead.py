@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from antdrive.base import Floats
 from antdrive.planners import load_planner
 from antdrive.robots import RobotSpec
 from antdrive.sim import Perception, ReplanPolicy, Scenario, run
@@ -19,7 +20,7 @@ from antdrive.sim.driving.traffic import FADING, FAST, TrackedTraffic
 from antdrive.sim.driving.watching import TrackedPredictor
 from antdrive.sim.sensing import TrackedMovers
 from antdrive.sim.unknown import exploration_of
-from antdrive.worlds import Floats, Keyframed, Task, World, rasterise
+from antdrive.worlds import Keyframed, Task, World, rasterise
 
 LIDAR = Perception(kind="lidar")
 HALL = World("hall", (0.0, 0.0, 16.0, 12.0))

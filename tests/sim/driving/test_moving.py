@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from antdrive.base import Floats
 from antdrive.planners import load_planner
 from antdrive.robots import Footprint, PurePursuit, RobotSpec
 from antdrive.sim import Engine, Outcome, Rollout, Run, Scenario, certify, measure, run
@@ -15,7 +16,7 @@ from antdrive.sim.driving.drive import drive
 from antdrive.sim.log.certificate import closed_form_clearance
 from antdrive.sim.log.contacts import Touch, touches
 from antdrive.sim.physics import movers as bodies_of_movers
-from antdrive.worlds import Cruising, Disc, Floats, Keyframed, Mover, Route, Task, Trajectories, Wandering, World
+from antdrive.worlds import Cruising, Disc, Keyframed, Mover, Route, Task, Trajectories, Wandering, World
 
 OPEN = (-10.0, -10.0, 10.0, 10.0)
 ZIGZAG = ((0.0, -3.0, 3.0), (2.0, 0.0, 4.0), (2.5, 1.0, 4.0), (4.0, 1.0, 6.0))

@@ -8,23 +8,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from antdrive.base import Floats
 from antdrive.planners import load_planner
 from antdrive.robots import RobotSpec
 from antdrive.sim import Outcome, Perception, ReplanPolicy, Run, Scenario, run
 from antdrive.sim.driving.perception import Predictor
 from antdrive.sim.driving.traffic import MIXING, Traffic, Zone
-from antdrive.worlds import (
-    Cruising,
-    Disc,
-    Floats,
-    Keyframed,
-    Mover,
-    Task,
-    Trajectories,
-    World,
-    import_dynabarn,
-    rasterise,
-)
+from antdrive.worlds import Cruising, Disc, Keyframed, Mover, Task, Trajectories, World, import_dynabarn, rasterise
 from tools.shared_data import DYNABARN
 
 HALL = World("hall", (0.0, 0.0, 16.0, 12.0))

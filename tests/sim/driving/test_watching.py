@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from antdrive.base.errors import FieldError
 from antdrive.planners import load_planner
 from antdrive.robots import RobotSpec
+from antdrive.runs.failures.rebuild import rebuilt
 from antdrive.sim import Outcome, Perception, Rollout, Run, Scenario, run
 from antdrive.sim.driving.replay import replay
 from antdrive.sim.driving.watching import TrackedPredictor, Watch
-from antdrive.sim.falsify.rebuild import rebuilt
 from antdrive.sim.log.certificate import certify
 from antdrive.sim.log.metrics import measure
 from antdrive.sim.log.record import PerceptionRecord
@@ -21,7 +22,6 @@ from antdrive.sim.log.sights import passed
 from antdrive.sim.sensing import KnownGround, Scanner
 from antdrive.sim.unknown import exploration_of
 from antdrive.worlds import Disc, Keyframed, Task, World
-from antdrive.worlds.errors import FieldError
 
 # A closet of touching posts in the lower right corner, into which no beam gets.
 CLOSET = tuple(Disc(5.0 + 0.14 * k, 1.2, 0.075) for k in range(22)) + tuple(

@@ -289,7 +289,7 @@ def test_verify_needs_neither_physics_nor_compiler(log: Rollout, tmp_path: Path)
     code = (
         "import sys\n"
         "for name in ('pybullet', 'numba', 'matplotlib', 'PIL', 'imageio'): sys.modules[name] = None\n"
-        "from antdrive.sim.cli.app import main\n"
+        "from antdrive.cli.app import main\n"
         "main()"
     )
     done = subprocess.run(

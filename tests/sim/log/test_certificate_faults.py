@@ -12,13 +12,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from antdrive.base import Floats
 from antdrive.robots import load_robot
 from antdrive.robots.spec import Footprint
 from antdrive.sim import Outcome, Rollout, certify
 from antdrive.sim.log.certificate import Certificate, closed_form_clearance
 from antdrive.sim.log.record import DECISION, PerceptionRecord, ReplanRecord
-from antdrive.worlds import Cruising, Disc, Floats, Keyframed, Task, World
-from tests.sim.records import made_up_record
+from antdrive.worlds import Cruising, Disc, Keyframed, Task, World
+from tests.records import made_up_record
 
 HZ, ROWS = 240, 1201
 ROBOT = load_robot("turtlebot")

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from antdrive.base import Floats
 from antdrive.robots.spec import Footprint
 from antdrive.sim import Outcome, Run
 from antdrive.sim.log.contacts import Touch, _gap, touches, touches_of
-from antdrive.worlds import Floats
 
 HZ, ROWS = 100, 300
 DISCS = 2  # obstacles 0 and 1 are cylinders, 2 to 4 movers, 5 and more walls

@@ -8,7 +8,7 @@ from pathlib import Path
 from antdrive.sim.log.format_page import tables, with_tables
 from antdrive.sim.log.record import DriveRecord, MarginRecord, SensingRecord, record_keys
 from antdrive.sim.log.rollout import ARRAYS, SENSED
-from tests.sim.records import made_up_record
+from tests.records import made_up_record
 
 PAGE = Path(__file__).parents[3] / "docs" / "reference" / "rollout-format.md"
 ON = {"arrays": PAGE.name, "record": PAGE.name, "outcomes": "exit-codes.md", "metrics": "metrics.md"}

@@ -12,7 +12,7 @@ from antdrive.robots import Footprint, load_robot
 from antdrive.sim import Outcome, Rollout, Scenario, run
 from antdrive.sim.log.margin import CAUSES, budget, find_margin
 from antdrive.worlds.world import Disc, Task, World
-from tests.sim.records import made_up_record
+from tests.records import made_up_record
 
 
 def passing(offset: float, *, estimated: float | None = None, commanded: float = 0.0, **changes: Any) -> Rollout:

@@ -12,7 +12,7 @@ from antdrive.sim import METRICS, Outcome, Rollout, measure
 from antdrive.sim.log.metrics import AVOIDING, tracking_error
 from antdrive.sim.log.record import PlanRecord, ReplanRecord, SensingRecord
 from antdrive.worlds import Task, World
-from tests.sim.records import made_up_record
+from tests.records import made_up_record
 
 
 def with_record(log: Rollout, **changes: Any) -> Rollout:

@@ -16,15 +16,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from antdrive.base import InputError
+from antdrive.base.errors import FieldError
 from antdrive.sim import Outcome, Rollout, Run, certify, measure
 from antdrive.sim.log import rollout
 from antdrive.sim.log.margin import budget
 from antdrive.sim.log.record import DriveRecord
 from antdrive.sim.log.rollout import ARRAYS, read_record
-from antdrive.worlds import InputError
-from antdrive.worlds.errors import FieldError
 from antdrive.worlds.movers import Cruising, Keyframed, Wandering
-from tests.sim.records import made_up_record
+from tests.records import made_up_record
 
 
 @pytest.fixture(scope="module")

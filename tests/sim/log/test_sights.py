@@ -11,7 +11,7 @@ from antdrive.robots.footprint import footprint_clearance
 from antdrive.sim import METRICS, Rollout
 from antdrive.sim.log.sights import PASSED, first_meetings, movers_met, passed, seen_ground, sightings
 from antdrive.worlds import Disc, World
-from tests.sim.view.scanned import scanned
+from tests.views.scanned import scanned
 
 
 @pytest.fixture(scope="module")

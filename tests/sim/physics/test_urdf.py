@@ -8,9 +8,10 @@ import pytest
 from hypothesis import given, reject
 from hypothesis import strategies as st
 
+from antdrive.base import FieldError
 from antdrive.robots import Footprint, RobotSpec, list_robots, load_robot
 from antdrive.sim import Engine
-from antdrive.worlds import Disc, FieldError, World
+from antdrive.worlds import Disc, World
 
 OPEN = World("open", (-50, -50, 50, 50))
 

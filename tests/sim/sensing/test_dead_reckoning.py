@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from antdrive.base import Pose
 from antdrive.robots import Odometry
 from antdrive.sim.sensing import DeadReckoning
-from antdrive.worlds import Pose
 
 
 def driven(odometry: Odometry, seed: int = 0, hz: int = 60, start: Pose = (0.0, 0.0, 0.0)) -> Pose:

@@ -8,10 +8,11 @@ import numpy.typing as npt
 import pytest
 from hypothesis import strategies as st
 
+from antdrive.base import Floats, Pose
 from antdrive.robots import Footprint, Lidar, RobotSpec
 from antdrive.sim.sensing import OccupancyMap, Scanner, clear_distance
 from antdrive.sim.sensing._kernels_mapping import SQUARE
-from antdrive.worlds import Disc, Floats, Pose, World
+from antdrive.worlds import Disc, World
 
 EYE = Lidar(beams=240, field_of_view=4.7, min_range=0.1, max_range=6.0, rate=10.0, resolution=0.01, sigma=0.003, x=0.1)
 POSTS = np.array([[2.0, 0.4, 0.3], [1.0, -1.2, 0.2], [3.5, 1.5, 0.4]])

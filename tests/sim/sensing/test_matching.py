@@ -5,10 +5,11 @@ import math
 import numpy as np
 import pytest
 
+from antdrive.base import Floats
 from antdrive.robots import RobotSpec
 from antdrive.sim.sensing import OccupancyMap, Scanner
 from antdrive.sim.sensing.matching import ScanMatcher, sliding_left_out
-from antdrive.worlds import Disc, Floats, World
+from antdrive.worlds import Disc, World
 
 WORLD = World("room", (0.0, 0.0, 6.0, 5.0), (Disc(2.0, 3.5, 0.3), Disc(4.0, 1.5, 0.2), Disc(3.2, 4.1, 0.15)))
 POSE = (2.0, 1.5, 0.4)

@@ -9,10 +9,11 @@ import numpy.typing as npt
 import pytest
 from hypothesis import strategies as st
 
+from antdrive.base import Pose
 from antdrive.robots import Lidar, RobotSpec
 from antdrive.sim import Engine
 from antdrive.sim.sensing import Scanner
-from antdrive.worlds import Cruising, Disc, Pose, Trajectories, World
+from antdrive.worlds import Cruising, Disc, Trajectories, World
 
 EXACT = Lidar(beams=180, field_of_view=4.7, min_range=0.0, max_range=12.0, rate=20.0, x=0.05, y=-0.02, yaw=0.3)
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
+from antdrive.base import Floats, Pose
 from antdrive.robots import Footprint, Lidar
 from antdrive.sim.sensing import OccupancyMap, clear_distance, clear_turn
-from antdrive.worlds import Floats, Pose
 
 EYE = Lidar(beams=240, field_of_view=4.7, min_range=0.1, max_range=6.0, rate=20.0)
 BOX, ROUND = Footprint.rectangle(0.5, 0.4), Footprint.disc(0.2)

@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 
+from antdrive.base import Floats
 from antdrive.robots import Lidar, RobotSpec
 from antdrive.sim.sensing import (
     KnownGround,
@@ -17,7 +18,7 @@ from antdrive.sim.sensing import (
     TrackingPolicy,
     _kernels_tracking,
 )
-from antdrive.worlds import Disc, Floats, World
+from antdrive.worlds import Disc, World
 
 POSTS = np.array([[2.5, 1.8, 0.2], [2.5, -2.2, 0.3], [-1.0, 2.0, 0.4]])
 BOUNDS = (-4.0, -4.0, 6.0, 4.0)

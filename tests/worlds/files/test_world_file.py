@@ -15,9 +15,10 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from antdrive.base import InputError
+from antdrive.base.document import parse_document
 from antdrive.worlds import (
     Disc,
-    InputError,
     Task,
     World,
     list_worlds,
@@ -28,7 +29,6 @@ from antdrive.worlds import (
     task_schema,
     task_to_dict,
 )
-from antdrive.worlds.files.document import parse_document
 from antdrive.worlds.reuse import forget
 from tests.worlds.malformed import GOOD, MALFORMED
 
@@ -288,7 +288,8 @@ def test_a_world_that_could_not_be_read_back_is_not_written(
 
 def test_the_largest_world_that_is_written_reads_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Values are counted alike in writing and in reading."""
-    from antdrive.worlds.files import document, world_file
+    from antdrive.base import document
+    from antdrive.worlds.files import world_file
 
     values = document.count_values(task_to_dict(TASK))
     for limit, written in ((values - 1, False), (values, True)):

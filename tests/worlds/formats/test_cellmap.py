@@ -11,7 +11,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from antdrive.worlds import CellMap, Disc, InputError, Task, World, cell_map, map_task, rasterise
+from antdrive.base import InputError
+from antdrive.worlds import CellMap, Disc, Task, World, cell_map, map_task, rasterise
 from antdrive.worlds.formats.cellmap import cover, watch_conversion
 from tests.worlds.oracles import worlds
 

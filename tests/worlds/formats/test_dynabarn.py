@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from antdrive.worlds import InputError, Trajectories, import_dynabarn, load_task, save_task
+from antdrive.base import InputError
+from antdrive.worlds import Trajectories, import_dynabarn, load_task, save_task
 from tools.shared_data import DYNABARN
 
 MOVER = {"radius": 0.5, "length": 1.0, "period": 8.0, "loop": "teleport",

@@ -5,16 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from antdrive.worlds import (
-    FieldError,
-    InputError,
-    export_map_server,
-    export_movingai_map,
-    export_sdf,
-    import_file,
-    import_format,
-    load_task,
-)
+from antdrive.base import FieldError, InputError
+from antdrive.worlds import export_map_server, export_movingai_map, export_sdf, import_file, import_format, load_task
 from tests.worlds.formats.test_dynabarn import ONE
 
 GIVEN = {

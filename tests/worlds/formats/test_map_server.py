@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from antdrive.worlds import InputError, export_map_server, import_map_server, load_task, save_task
+from antdrive.base import InputError
+from antdrive.worlds import export_map_server, import_map_server, load_task, save_task
 from antdrive.worlds.formats.map_server import read_map
 
 GOOD = """\

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from antdrive.base import InputError
 from antdrive.planners import Query, load_planner
 from antdrive.worlds import (
     Grid,
-    InputError,
     MapProblem,
     import_movingai_map,
     import_movingai_problems,

@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from antdrive.base import InputError
 from antdrive.worlds import (
     Disc,
-    InputError,
     MapProblem,
     Task,
     World,

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from antdrive.worlds import Disc, InputError, import_barn, import_sdf, load_task, point_clearance, save_task
+from antdrive.base import InputError
+from antdrive.worlds import Disc, import_barn, import_sdf, load_task, point_clearance, save_task
 
 GROUND = """
 <model name='ground_plane'><static>1</static><link name='link'><collision name='c'>

@@ -6,7 +6,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from antdrive.worlds import GENERATORS, InputError, barn, forest, generate, load_task, rasterise, save_task
+from antdrive.base import InputError
+from antdrive.worlds import GENERATORS, barn, forest, generate, load_task, rasterise, save_task
 from antdrive.worlds.generators.generate import BARN_FILLS, BARN_ROUNDS
 from tests.worlds.oracles import passable
 

@@ -1,6 +1,0 @@
-"""`python -m antdrive` is the same as the command `antdrive`."""
-
-from antdrive.sim.cli.app import main
-
-if __name__ == "__main__":
-    main()

@@ -1,0 +1,9 @@
+from .errors import FieldError as FieldError
+from .errors import InputError as InputError
+from .plane import arc_lengths as arc_lengths
+from .plane import polyline_length as polyline_length
+from .plane import wrap_angle as wrap_angle
+from .types import Bounds as Bounds
+from .types import Floats as Floats
+from .types import Point as Point
+from .types import Pose as Pose

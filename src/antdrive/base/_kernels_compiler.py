@@ -1,0 +1,118 @@
+"""How kernels are compiled and cached.
+
+An entry of the cache that cannot be read (cut short, damaged, or written for records that no longer exist) is dropped, and the
+kernel is compiled again. An entry is valid for one text of *all* kernel files; numba by itself would notice a change of the
+kernel's own file, but not of a kernel in another file that it calls.
+
+Each entry is one file, which holds what it is for beside the machine code, and is written whole. numba keeps an index apart from
+numbered files of machine code: it enters a number before it writes that file, and two processes that compile at once take the
+same number. A process then runs code of older sources, or code for other types.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import pickle
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+from numba.core import config
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+
+from antdrive.base.kernel_cache import cache_folder, default_folders, sources_stamp
+
+_settings: Any = config  # its names are set when it is imported
+F = TypeVar("F", bound=Callable[..., Any])
+
+# IEEE arithmetic (no fastmath), so that results repeat bit for bit.
+_SETTINGS: dict[str, Any] = {"error_model": "numpy", "nogil": True}
+
+
+def kernel(function: F) -> F:
+    """A function that is compiled at its first call and cached on disk."""
+    return _cached(numba.njit(**_SETTINGS)(function), function)
+
+
+def inline(function: F) -> F:
+    """A kernel that is always inlined into the kernels that call it."""
+    return _cached(numba.njit(inline="always", **_SETTINGS)(function), function)
+
+
+class _Entries(IndexDataCacheFile):  # type: ignore[misc]  # numba has no types
+    """The machine code of one kernel: a file for each combination of argument types, without an index."""
+
+    def save(self, key: Any, data: Any) -> None:
+        path = self._path(key)
+        with self._open_for_write(str(path)) as file:
+            file.write(self._dump((self._version, self._source_stamp, key, data)))
+        for other in self._files():
+            if not other.name.startswith(self._begin()):  # of older sources
+                with contextlib.suppress(OSError):
+                    other.unlink()
+
+    def load(self, key: Any) -> Any:
+        try:
+            found = pickle.loads(self._path(key).read_bytes())  # noqa: S301 - as executable as the code it holds
+        except FileNotFoundError:
+            return None
+        *is_for, data = found
+        return data if is_for == [self._version, self._source_stamp, key] else None
+
+    def flush(self) -> None:
+        for path in self._files():
+            path.unlink(missing_ok=True)
+
+    def _path(self, key: Any) -> Path:
+        # Types that stand for functions have their addresses in their names; the file itself says what it is for.
+        text = re.sub(r"0x[0-9a-f]+", "", repr(key))
+        return Path(self._cache_path) / f"{self._begin()}{hashlib.sha256(text.encode()).hexdigest()[:16]}.nbc"
+
+    def _begin(self) -> str:
+        return f"{self._name}.{self._source_stamp[:16]}-"
+
+    def _files(self) -> list[Path]:
+        return [path for path in Path(self._cache_path).glob("*.nb?") if path.name.startswith(f"{self._name}.")]
+
+    @property
+    def _name(self) -> str:
+        return str(self._index_name).removesuffix(".nbi")
+
+
+class _Cache(FunctionCache):  # type: ignore[misc]
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        entries = self._cache_file  # type: ignore[has-type]
+        name = entries._index_name.removesuffix(".nbi")
+        self._cache_file = _Entries(entries._cache_path, name, sources_stamp())
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception:  # unpickling damaged bytes can raise nearly anything; compiling again mends all of it
+            with contextlib.suppress(OSError):
+                self.flush()
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        with contextlib.suppress(OSError):  # a full disk costs time at the next start, not this run
+            super().save_overload(sig, data)
+
+
+def _cached(dispatcher: Any, function: F) -> F:
+    if hasattr(dispatcher, "enable_caching"):  # with NUMBA_DISABLE_JIT the dispatcher is the plain function
+        with contextlib.suppress(RuntimeError):  # no folder can be written: every process compiles anew
+            dispatcher._cache = _Cache(function)
+    return dispatcher  # type: ignore[no-any-return]  # stands for the function
+
+
+def _choose_folder() -> None:
+    folder = cache_folder()
+    if folder is not None and folder not in default_folders():
+        _settings.CACHE_DIR = str(folder)
+
+
+_choose_folder()

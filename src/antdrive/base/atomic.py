@@ -1,0 +1,154 @@
+"""Files that are written whole or not at all, so that nobody ever reads half a file; folders that one process claims."""
+
+from __future__ import annotations
+
+import errno
+import os
+import platform
+import re
+import shutil
+import tempfile
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from antdrive.base.errors import InputError
+
+LOCK = ".antdrive.lock"
+LONGEST_STEM = 100  # characters of a file's name that its temporary file repeats
+
+
+@contextmanager
+def written_whole(path: str | Path) -> Iterator[Path]:
+    """A context with a temporary path, which replaces `path` when the block succeeds and is removed when it fails.
+
+    What processes that were killed left of earlier attempts at this file is removed.
+
+    Raises:
+        InputError: the folder cannot be written to.
+    """
+    target = Path(path)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if target.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        _sweep(target)
+        prefix = f"{_prefix(target)}{os.getpid()}-"
+        handle, name = tempfile.mkstemp(dir=target.parent, prefix=prefix, suffix=target.suffix)
+    except OSError as error:
+        raise InputError(f"{target}: cannot be written ({error.strerror})") from None
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        yield temporary
+        temporary.chmod(0o666 & ~_umask())
+        try:
+            temporary.replace(target)
+        except OSError as error:
+            raise InputError(f"{target}: cannot be written ({error.strerror})") from None
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def folder_written_whole(path: str | Path) -> Iterator[Path]:
+    """A context with a temporary folder, which becomes `path` when the block succeeds and is removed when it fails.
+
+    Raises:
+        InputError: there is something, or the folder cannot be written to.
+    """
+    target = Path(path)
+    try:
+        if target.is_file() or (target.is_dir() and any(target.iterdir())):
+            raise InputError(f"{target}: exists; name a new folder")
+        target.parent.mkdir(parents=True, exist_ok=True)
+        temporary = Path(tempfile.mkdtemp(dir=target.parent, prefix=f".{target.name[:LONGEST_STEM]}-"))
+    except OSError as error:
+        raise InputError(f"{target}: cannot be written ({error.strerror})") from None
+    try:
+        yield temporary
+        temporary.chmod(0o777 & ~_umask())
+        try:
+            temporary.replace(target)
+        except OSError as error:
+            raise InputError(f"{target}: cannot be written ({error.strerror})") from None
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+@contextmanager
+def claimed(folder: str | Path) -> Iterator[None]:
+    """A context in which no other process may claim the folder. A claim ends with its process, however that ends.
+
+    Raises:
+        InputError: another process has claimed the folder, or it cannot be written to.
+    """
+    try:
+        import fcntl
+    except ImportError:  # no such locks on this system
+        yield
+        return
+    path = Path(folder) / LOCK
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        while True:
+            handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                holder = os.read(handle, 20).decode(errors="replace").strip() or "unknown"
+                os.close(handle)
+                raise InputError(
+                    f"{folder}: another run (process {holder}) is writing into this folder; wait for it or name another"
+                ) from None
+            if _is_still(path, handle):
+                break
+            os.close(handle)  # its last owner removed it before we got it
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written ({error.strerror})") from None
+    try:
+        os.ftruncate(handle, 0)
+        os.write(handle, f"{os.getpid()}\n".encode())
+        yield
+    finally:
+        path.unlink(missing_ok=True)
+        os.close(handle)
+
+
+def _is_still(path: Path, handle: int) -> bool:
+    """Whether an open file is the one that the path names."""
+    try:
+        return os.path.samestat(os.stat(path), os.fstat(handle))
+    except FileNotFoundError:
+        return False
+
+
+def _prefix(target: Path) -> str:
+    """What the names of temporary files for a target begin with, on this machine; the process follows."""
+    return f".{target.stem[:LONGEST_STEM]}-{zlib.crc32(platform.node().encode()):08x}-"
+
+
+def _sweep(target: Path) -> None:
+    """Remove temporary files for a target whose processes on this machine are no more."""
+    name = re.compile(re.escape(_prefix(target)) + r"(\d{1,10})-\w+" + re.escape(target.suffix))
+    for path in target.parent.iterdir():
+        found = name.fullmatch(path.name)
+        if found and not _is_alive(int(found[1])):
+            path.unlink(missing_ok=True)
+
+
+def _is_alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):  # another user's
+        return True
+    return True

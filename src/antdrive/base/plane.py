@@ -1,0 +1,75 @@
+"""Angles and polylines in the plane. Needs numpy alone: logs are read without the compiler."""
+
+from __future__ import annotations
+
+import math
+from typing import TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.base.types import Floats, Pose
+
+Angle = TypeVar("Angle", float, Floats)
+
+
+def wrap_angle(angle: Angle) -> Angle:
+    """The same direction as an angle from -pi up to but not including pi.
+
+    Args:
+        angle: one angle or an array of them [rad]
+    """
+    return (angle + math.pi) % (2 * math.pi) - math.pi
+
+
+def segment_lengths(xy: npt.ArrayLike) -> Floats:
+    """The length of each segment of a polyline, shape (N - 1,)."""
+    steps = np.diff(np.asarray(xy, dtype=np.float64).reshape(-1, 2), axis=0)
+    return np.asarray(np.hypot(*steps.T))
+
+
+def arc_lengths(xy: npt.ArrayLike) -> Floats:
+    """The length along a polyline at each of its points, shape (N,), from 0.
+
+    Args:
+        xy: the polyline's points (N, 2)
+    """
+    return np.concatenate(([0.0], np.cumsum(segment_lengths(xy))))
+
+
+def polyline_length(xy: npt.ArrayLike) -> float:
+    """The whole length of a polyline, in the unit of its points.
+
+    Args:
+        xy: the polyline's points (N, 2)
+    """
+    return float(segment_lengths(xy).sum())
+
+
+def in_map(frame: Pose, points: npt.ArrayLike) -> Floats:
+    """Points (N, 2) or poses (N, 3) of the world in the frame of its map; the same numbers, bit for bit, where the two agree."""
+    found = np.array(points, dtype=np.float64)
+    x, y, yaw = frame
+    if (x, y, yaw) == (0.0, 0.0, 0.0):
+        return found
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    found[..., :2] = found[..., :2] @ np.array([[cosine, sine], [-sine, cosine]]) + (x, y)
+    if found.shape[-1] > 2:
+        found[..., 2] = wrap_angle(found[..., 2] + yaw)
+    return found
+
+
+def out_of_map(frame: Pose, points: npt.ArrayLike) -> Floats:
+    """Points (N, 2) or poses (N, 3) of a map in the frame of a world that was made from it: the inverse of `in_map`."""
+    x, y, yaw = frame
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    return in_map((-x * cosine - y * sine, x * sine - y * cosine, -yaw), points)
+
+
+def place_name(frame: Pose, x: float, y: float, digits: str = ".2f") -> str:
+    """A place of a world in words; where the world lies in a map, in the frames of both."""
+    here = f"({x:{digits}}, {y:{digits}})"
+    if not any(frame):
+        return here
+    there = in_map(frame, [(x, y)])[0].tolist()
+    return f"{here} in the world, ({there[0]:{digits}}, {there[1]:{digits}}) in its map"

@@ -1,0 +1,30 @@
+"""`antdrive schema`."""
+
+from typing import Annotated
+
+import typer
+
+from antdrive.base.errors import InputError
+from antdrive.cli.console import print_json
+from antdrive.cli.exits import SUCCEEDED
+
+
+def schema(
+    kind: Annotated[
+        str, typer.Argument(metavar="KIND", help="Kind of file: world, robot, suite or campaign.")
+    ] = "world",
+) -> int:
+    """Print the JSON Schema of a kind of file.
+
+    An editor that knows it completes keys and marks mistakes.
+    """
+    from antdrive.robots import robot_schema
+    from antdrive.runs.campaigns import campaign_schema
+    from antdrive.runs.suites import suite_schema
+    from antdrive.worlds import task_schema
+
+    schemas = {"world": task_schema, "robot": robot_schema, "suite": suite_schema, "campaign": campaign_schema}
+    if kind not in schemas:
+        raise InputError(f"schema: unknown kind {kind!r}; choose from {', '.join(schemas)}")
+    print_json(schemas[kind]())
+    return SUCCEEDED

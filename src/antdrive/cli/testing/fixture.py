@@ -1,0 +1,224 @@
+"""Drives within tests in Python: the fixture `drive`, and assertions about runs."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from antdrive.base.errors import FieldError
+from antdrive.cli.testing.checking import CheckResult, Update, check_run
+from antdrive.planners import Planner
+from antdrive.robots import RobotSpec, list_robots
+from antdrive.runs.suites.demands import Demands
+from antdrive.runs.suites.nearest import nearest_of, touched_in
+from antdrive.runs.suites.suite import BASELINES
+from antdrive.sim.log.certificate import certify, in_metres
+from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.pipeline import Run
+from antdrive.sim.pipeline import run as drive_scenario
+from antdrive.sim.scenario import Scenario
+from antdrive.views.artefacts import Results, file_name
+from antdrive.worlds import Task, list_worlds
+
+
+class DriveFailure(AssertionError):
+    """A drive is not as its test demands; the message says why.
+
+    Attributes:
+        result: what came out of the test
+    """
+
+    def __init__(self, result: CheckResult) -> None:
+        super().__init__(result.message)
+        self.result = result
+
+    def __reduce__(self) -> tuple[type[DriveFailure], tuple[CheckResult]]:
+        return type(self), (self.result,)  # by default it would be made again from its message alone
+
+
+class DriveFixture:
+    """What the fixture `drive` gives to a test: call it to drive a scenario and compare it with its baseline.
+
+    >>> def test_mine(drive):
+    ...     drive("forest", planner=MyPlanner(), seed=1, expect={"min_clearance_m": ">= 0.05"})
+
+    The baseline is `baselines/MODULE/TEST.json` beside the test's file. A test that drives more than once names its drives.
+
+    Args:
+        file: the test's file
+        test: the test's name in the file, such as test_mine[3]
+        address: the test as pytest names it, relative to its rootdir
+        repeat: the test as commands name it, where these would not work in every folder in which people may call them; by
+            default the address
+        update: which baselines to write
+        results: where logs, pictures and films are written; None: nowhere
+        report: is called with what came out of each drive
+    """
+
+    def __init__(
+        self,
+        *,
+        file: Path,
+        test: str,
+        address: str,
+        repeat: str = "",
+        update: Update = "",
+        results: Results | None = None,
+        report: Callable[[CheckResult], None] = lambda result: None,
+    ) -> None:
+        self._file, self._test, self._address = file, test, address
+        self._repeat = repeat or address
+        self._update, self._results, self._report = update, results, report
+        self._names: set[str] = set()
+
+    def __call__(
+        self,
+        world: str | Path | Task | Scenario,
+        planner: str | Planner | None = None,
+        robot: str | Path | RobotSpec | None = None,
+        *,
+        name: str = "",
+        expect: Mapping[str, Any] | None = None,
+        tolerance: Mapping[str, Any] | None = None,
+        trajectory: float | str | None = None,
+        baseline: bool = True,
+        **settings: Any,
+    ) -> Run:
+        """Drive, and compare with the demands and the baseline.
+
+        Args:
+            world: a scenario (then all settings are its own), a task, a world of the catalogue, or a world file relative to
+                the test's file
+            planner: a planner's name, or a planner; by default ants
+            robot: a robot, a robot of the catalogue, or a robot file relative to the test's file; by default turtlebot
+            name: of the drive, where a test drives more than once
+            expect: outcome, certified, and bounds such as {"min_clearance_m": ">= 0.05"}
+            tolerance: by how much metrics may be worse than in the baseline
+            trajectory: how far from the baseline's line the robot may be [m], or "exact"
+            baseline: whether there is a baseline to compare with
+            settings: further settings of `Scenario.of`, such as seed, noise and margin
+
+        Raises:
+            DriveFailure: the drive is not as demanded, or worse than its baseline.
+            InputError: the world, the planner or the robot is wrong.
+            FieldError: a setting is wrong, or two drives of a test have the same name.
+        """
+        __tracebackhide__ = True
+        demands = Demands.of(expect or {}, tolerance or {}, trajectory)
+        if not baseline:
+            for key, value in (("tolerance", tolerance), ("trajectory", trajectory)):
+                if value:
+                    raise FieldError(key, "there is no baseline to compare with; leave it out, or baseline=False")
+        if name in self._names:
+            raise FieldError("name", f"this test has already driven {name!r}; give each of its drives a name")
+        self._names.add(name)
+        run = self.run(world, planner, robot, **settings)
+        whole = f"{self._test}-{name}" if name else self._test
+        result = check_run(
+            run,
+            demands,
+            self.baseline_path(whole) if baseline else None,
+            address=self._address,
+            name=whole,
+            update=self._update,
+            commands=(shlex.join(["pytest", self._repeat]),),
+            accept=shlex.join(["pytest", self._repeat, "--drive-update"]),
+            folder=self._results.of(self._file, whole) if self._results else None,
+            results=self._results,
+        )
+        self._report(result)
+        if not result.passed:
+            raise DriveFailure(result)
+        return run
+
+    def run(
+        self,
+        world: str | Path | Task | Scenario,
+        planner: str | Planner | None = None,
+        robot: str | Path | RobotSpec | None = None,
+        **settings: Any,
+    ) -> Run:
+        """Drive, without judging.
+
+        Args:
+            world: a scenario (then all settings are its own), a task, a world of the catalogue, or a world file relative to
+                the test's file
+            planner: a planner's name, or a planner; by default ants
+            robot: a robot, a robot of the catalogue, or a robot file relative to the test's file; by default turtlebot
+            settings: further settings of `Scenario.of`, such as seed, noise and margin
+
+        Raises:
+            InputError: the world, the planner or the robot is wrong.
+            FieldError: a setting is wrong.
+        """
+        if isinstance(world, Scenario):
+            beside = {"planner": planner, "robot": robot, **settings}
+            given = [key for key, value in beside.items() if key in settings or value is not None]
+            if given:
+                raise FieldError(given[0], "a scenario has its own; change it with dataclasses.replace")
+            return drive_scenario(world)
+        planner = "ants" if planner is None else planner
+        robot = "turtlebot" if robot is None else robot
+        place = world if isinstance(world, Task) else self._beside(world, list_worlds())
+        body = robot if isinstance(robot, RobotSpec) else self._beside(robot, list_robots())
+        return drive_scenario(Scenario.of(place, planner, body, **settings))
+
+    def baseline_path(self, name: str) -> Path:
+        """The baseline of a drive.
+
+        Args:
+            name: the test's name, and that of the drive where it has one
+        """
+        return self._file.parent / BASELINES / self._file.stem / f"{file_name(name)}.json"
+
+    def _beside(self, name: str | Path, known: Mapping[str, Path]) -> str | Path:
+        """A name of the catalogue, or the path of a file beside the test's file where there is one."""
+        beside = self._file.parent / name
+        return beside if str(name) not in known and beside.exists() else name
+
+
+def assert_collision_free(run: Run | Rollout, clearance: float = 0.0) -> None:
+    """Assert that a drive is certified collision-free, with some clearance.
+
+    Args:
+        run: a run, or the log of one
+        clearance: the least distance to everything that must be proved, between the log's rows, too [m]
+
+    Raises:
+        AssertionError: it is not; the message names what was touched or passed too near, where and when.
+    """
+    __tracebackhide__ = True
+    rollout = run.rollout if isinstance(run, Run) else run
+    if rollout is None:
+        assert isinstance(run, Run)
+        raise AssertionError(f"the robot did not drive: {run.outcome.key}{f' ({run.reason})' if run.reason else ''}")
+    certificate = certify(rollout)
+    touched = touched_in(rollout) if rollout.outcome.with_contact else None
+    if touched is not None:
+        raise AssertionError(f"{rollout.outcome.key}: touched {touched.thing}; {touched.place}")
+    if not certificate.certified:
+        raise AssertionError(f"not certified collision-free: {'; '.join(certificate.problems)}")
+    if certificate.bound < clearance:
+        found = nearest_of(rollout)
+        raise AssertionError(
+            f"clearance: {in_metres(certificate.bound)} is proved, expected {clearance:g} m; nearest to {found.thing}, "
+            f"{found.place}"
+        )
+
+
+def assert_reached_goal(run: Run) -> None:
+    """Assert that the robot stopped at the goal and its drive is certified collision-free.
+
+    Args:
+        run: the run
+
+    Raises:
+        AssertionError: it did not; the message says how the run ended.
+    """
+    __tracebackhide__ = True
+    if run.outcome is not Outcome.SUCCEEDED and not run.outcome.with_contact:
+        raise AssertionError(f"{run.outcome.key}: {run.outcome.value}{f' ({run.reason})' if run.reason else ''}")
+    assert_collision_free(run)

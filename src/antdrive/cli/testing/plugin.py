@@ -1,0 +1,326 @@
+"""The pytest plugin: suites, `*.drive.yaml`, are collected, and tests have the fixture `drive`.
+
+Importing it must cost nothing: a run of pytest that collects no suite and uses no fixture imports nothing else of antdrive.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from antdrive.cli.testing.checking import CheckResult, Update
+    from antdrive.cli.testing.fixture import DriveFixture
+    from antdrive.runs.suites.suite import SuiteCase
+    from antdrive.views.artefacts import Results
+
+SUFFIX = ".drive.yaml"
+WORKER_KEY = "antdrive_unused"  # under which a process of xdist hands over the baselines that no test uses
+
+_DROVE = pytest.StashKey[list[Any]]()  # the results of a test's drives
+FILMS_KEY = "antdrive_films"  # under which a process of xdist is told where films are counted
+_PLACES = pytest.StashKey[str]()  # the folder in which films of failed drives are counted
+_UNUSED = pytest.StashKey[set[str]]()  # the baselines that no test uses
+_COMPILED = pytest.StashKey[bool]()  # whether the kernels were compiled, or found to be
+_LISTENER = pytest.StashKey["_Listener"]()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the options `--drive-*`."""
+    group = parser.getgroup("antdrive", "drives (antdrive)")
+    group.addoption("--drive-update", action="store_true", help="write the baselines of drives that are as expected")
+    group.addoption("--drive-update-new", action="store_true", help="write the baselines that are missing")
+    group.addoption("--drive-strict", action="store_true", help="fail if there are baselines that belong to no test")
+    group.addoption(
+        "--drive-results",
+        metavar="FOLDER",
+        help="where logs, pictures and films of failed drives are written; by default in the user's cache",
+    )
+    group.addoption(
+        "--drive-film",
+        choices=("never", "failed", "always"),
+        default="failed",
+        help="of which drives a film is made (default: failed)",
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Begin the lists of this run."""
+    config.stash[_UNUSED], config.stash[_LISTENER] = set(), _Listener()
+    config.pluginmanager.register(config.stash[_LISTENER], "antdrive-listener")
+
+
+def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> DriveSuite | None:
+    """Collect suites."""
+    return DriveSuite.from_parent(parent, path=file_path) if file_path.name.endswith(SUFFIX) else None
+
+
+class DriveSuite(pytest.File):
+    """A suite as pytest collects it."""
+
+    def collect(self) -> Iterator[DriveItem]:
+        """One item for each scenario and seed."""
+        from antdrive.base.errors import InputError
+        from antdrive.cli.testing.unused import unused_of_suite
+        from antdrive.runs.suites.names import check_names
+        from antdrive.runs.suites.suite import load_suite
+
+        try:
+            cases = load_suite(self.path)
+            for case in cases:
+                check_names(case)
+        except InputError as error:
+            raise self.CollectError(str(error)) from None
+        self.config.stash[_UNUSED].update(str(path) for path in unused_of_suite(self.path, cases))
+        for case in cases:
+            # Given as text, pytest takes [0] for a parameter, as it does when it reads the id back for --lf.
+            yield DriveItem.from_parent(self, name=case.id, nodeid=f"{self.nodeid}::{case.id}", case=case)
+
+
+class DriveItem(pytest.Item):
+    """A scenario of a suite with one seed.
+
+    Attributes:
+        case: the test
+    """
+
+    def __init__(self, *, case: SuiteCase, **others: Any) -> None:
+        super().__init__(**others)
+        self.case = case
+
+    def runtest(self) -> None:
+        """Drive and judge."""
+        from antdrive.cli.testing.checking import check_case
+        from antdrive.cli.testing.fixture import DriveFailure
+
+        compile_first(self.config)
+        result = check_case(self.case, update=update_of(self.config), results=results_of(self.config))
+        note(self, result)
+        if not result.passed:
+            raise DriveFailure(result)
+
+    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
+        """The message alone, where a drive or what people wrote is wrong; else the traceback."""
+        from antdrive.base.errors import InputError
+        from antdrive.cli.testing.fixture import DriveFailure
+
+        if isinstance(excinfo.value, DriveFailure | InputError):
+            return str(excinfo.value)
+        return super().repr_failure(excinfo, style)
+
+    def reportinfo(self) -> tuple[Path, int | None, str]:
+        """The suite, the line of the scenario, and the test's name."""
+        line = self.case.document.lines.get(("scenarios", self.case.name))
+        return self.path, None if line is None else line - 1, self.case.id
+
+
+@pytest.fixture
+def drive(request: pytest.FixtureRequest) -> DriveFixture:
+    """Drive scenarios and compare them with their baselines: `drive("forest", planner=MyPlanner(), seed=1)`.
+
+    It fails the test unless the drive is as demanded and not worse than its baseline; `drive.run(...)` only drives.
+    """
+    from antdrive.cli.testing.fixture import DriveFixture
+
+    compile_first(request.config)
+    item, config = request.node, request.config
+    at_root = config.invocation_params.dir.resolve() == config.rootpath.resolve()
+    return DriveFixture(
+        file=item.path,
+        test=_name_in_file(item),
+        address=item.nodeid,
+        repeat="" if at_root else f"{item.path}::{item.nodeid.partition('::')[2]}",
+        update=update_of(request.config),
+        results=results_of(request.config),
+        report=lambda result: note(item, result),
+    )
+
+
+def compile_first(config: pytest.Config) -> None:
+    """Compile the kernels before the first drive of an installation, and say so."""
+    if _COMPILED in config.stash:
+        return
+    config.stash[_COMPILED] = True
+    from antdrive.cli.testing.compiling import compile_in_turn
+
+    def say(text: str) -> None:
+        capture = config.pluginmanager.getplugin("capturemanager")
+        with capture.global_and_fixture_disabled() if capture else contextlib.nullcontext():
+            print(f"\nantdrive: {text}", file=sys.stderr, flush=True)  # noqa: T201 - in a process of xdist, too
+
+    compile_in_turn(say)
+
+
+def note(item: pytest.Item, result: CheckResult) -> None:
+    """Remember what came out of a drive, for reports."""
+    from antdrive.cli.testing.summary import properties
+
+    item.stash.setdefault(_DROVE, []).append(result)
+    item.user_properties.extend(properties(result))
+
+
+def update_of(config: pytest.Config) -> Update:
+    """Which baselines this run of pytest writes."""
+    if config.getoption("drive_update"):
+        return "all"
+    return "new" if config.getoption("drive_update_new") else ""
+
+
+def results_of(config: pytest.Config) -> Results:
+    """Where this run of pytest writes logs, pictures and films."""
+    from antdrive.views.artefacts import Results, default_folder
+
+    given = config.getoption("drive_results")
+    folder = config.invocation_params.dir / given if given else default_folder(config.rootpath)
+    return Results(folder, config.getoption("drive_film"), Path(places_of(config)), config.rootpath)
+
+
+def places_of(config: pytest.Config) -> str:
+    """The folder in which all processes of this run of pytest count the films of failed drives."""
+    if _PLACES not in config.stash:
+        import tempfile
+
+        told = getattr(config, "workerinput", {}).get(FILMS_KEY)
+        config.stash[_PLACES] = told or tempfile.mkdtemp(prefix="antdrive-films-")
+    return config.stash[_PLACES]
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_configure_node(node: Any) -> None:
+    """Tell a process of xdist where films are counted."""
+    node.workerinput[FILMS_KEY] = places_of(node.config)
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Remove the folder in which films were counted."""
+    if _PLACES in config.stash and not hasattr(config, "workerinput"):
+        import shutil
+
+        shutil.rmtree(config.stash[_PLACES], ignore_errors=True)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Look for baselines of tests that are gone, in modules that were collected as a whole."""
+    if any("::" in str(word) for word in config.args) or config.getoption("lf", False):
+        return  # not all tests of a module are among the items
+    modules: dict[Path, set[str]] = {}
+    for item in items:
+        if not isinstance(item, DriveItem):
+            modules.setdefault(item.path, set()).add(_name_in_file(item))
+    folders = {path: path.parent / "baselines" / path.stem for path in modules}
+    if any(folder.is_dir() for folder in folders.values()):
+        from antdrive.cli.testing.unused import unused_of_module
+
+        for path, names in modules.items():
+            config.stash[_UNUSED].update(str(found) for found in unused_of_module(path, names))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) -> Any:
+    """Add pictures to the page of pytest-html, where it is installed."""
+    report = yield
+    if call.when == "call" and _DROVE in item.stash and item.config.pluginmanager.hasplugin("html"):
+        _add_extras(report, item.stash[_DROVE])
+    return report
+
+
+def _add_extras(report: Any, results: list[CheckResult]) -> None:
+    try:
+        from pytest_html import extras
+    except ImportError:
+        return
+    import base64
+
+    found = list(getattr(report, "extras", []))
+    for result in results:
+        for name, path in result.files.items():
+            if path.endswith(".png"):
+                found.append(extras.png(base64.b64encode(Path(path).read_bytes()).decode(), name=name))
+            else:
+                found.append(extras.url(Path(path).as_uri(), name=name))
+    report.extras = found
+
+
+class _Listener:
+    """Keeps what reports tell of drives; with xdist they come from other processes.
+
+    Attributes:
+        told: the properties of reports that tell of drives
+        passed: the tests that passed, each with the names of its drives that have baselines
+    """
+
+    def __init__(self) -> None:
+        self.told: list[Any] = []
+        self.passed: dict[str, set[str]] = {}
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        if report.when != "call":
+            return
+        if report.passed:
+            self.passed[report.nodeid] = {str(value) for name, value in report.user_properties if name == "drive.case"}
+        if any(name == "drive.test" for name, _ in report.user_properties):
+            self.told.append(report.user_properties)
+
+
+def _gone_drives(config: pytest.Config) -> Iterator[Path]:
+    """The baselines of drives that tests of this run, which passed, no longer make."""
+    modules: dict[Path, dict[str, set[str]]] = {}
+    for nodeid, drives in config.stash[_LISTENER].passed.items():
+        file, _, name = nodeid.partition("::")
+        if not file.endswith(SUFFIX):
+            modules.setdefault(config.rootpath / file, {})[name.replace("::", ".")] = drives
+    for path, made in modules.items():
+        if (path.parent / "baselines" / path.stem).is_dir():
+            from antdrive.cli.testing.unused import unused_drives_of_module
+
+            yield from unused_drives_of_module(path, made)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node: Any, error: Any) -> None:
+    """Take over what a process of xdist has found."""
+    node.config.stash[_UNUSED].update(getattr(node, "workeroutput", {}).get(WORKER_KEY, ()))
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Fail for unused baselines if asked to; in a process of xdist, hand them over."""
+    config = session.config
+    found = config.stash[_UNUSED]
+    if hasattr(config, "workeroutput"):
+        config.workeroutput[WORKER_KEY] = sorted(found)
+        return
+    found.update(map(str, _gone_drives(config)))
+    if found and config.getoption("drive_strict") and session.exitstatus == pytest.ExitCode.OK:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
+    """Say what was driven, on the terminal and in the file that GITHUB_STEP_SUMMARY names."""
+    told, found = config.stash[_LISTENER].told, config.stash[_UNUSED]
+    unused = sorted(found)
+    if not (told or unused):
+        return
+    from antdrive.cli.testing.summary import add_to_page, drives_in, lines
+
+    drives = [drive for properties in told for drive in drives_in(properties)]
+    terminalreporter.section("drives")
+    for line in lines(drives, unused, config.getoption("drive_strict")):
+        terminalreporter.write_line(line)
+    page = os.environ.get("GITHUB_STEP_SUMMARY")
+    if page:
+        problem = add_to_page(page, drives, unused)
+        if problem:
+            terminalreporter.write_line(problem)
+
+
+def _name_in_file(item: pytest.Item) -> str:
+    """A test's name within its file, such as TestDoors.test_open[3]."""
+    return item.nodeid.partition("::")[2].replace("::", ".")

@@ -1,0 +1,149 @@
+"""Compile every kernel once, into the cache that `antdrive.base.kernel_cache` describes.
+
+Compiling takes about half a minute on two idle cores. The command line does it before the first command that plans, drives or
+films (`is_warm` tells it whether that is due), and `antdrive warm` does it on request.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import importlib.metadata
+import os
+import platform
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from antdrive.base.kernel_cache import cache_folder, sources_stamp
+from antdrive.base.processes import delayed
+
+if TYPE_CHECKING:
+    from antdrive.sim.scenario import Scenario
+
+# Planners that share kernels are compiled by one process; the groups that take longest come first.
+TOGETHER = (
+    ("tangent",),
+    ("aco-han", "as", "pfaco"),
+    ("ga-han", "hybrid"),
+    ("sipp",),
+    ("dstar-lite", "dstar"),
+    ("apf", "mmas-dstar"),
+)
+
+
+def is_warm() -> bool:
+    """Whether `warm` has run for these sources, this Python, this numba and this processor."""
+    marker = _marker()
+    return os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0") or (marker is not None and marker.exists())
+
+
+def warm(jobs: int = -1, progress: Callable[[float], None] | None = None) -> None:
+    """Plan with every planner, drive once and film it, so that every kernel is in the cache."""
+    from joblib import Parallel
+
+    from antdrive.planners import PLANNERS
+
+    # The second round reads the cache, and compiles what two processes wrote at the same moment and one of them lost.
+    first = [delayed(_plan_with)(TOGETHER[0]), delayed(_drive_and_film)(), *map(delayed(_plan_with), TOGETHER[1:])]
+    second = [delayed(_plan_with)(list(PLANNERS)), delayed(_drive_and_film)()]
+    done = 0
+    for tasks in (first, second):
+        for _ in Parallel(jobs, return_as="generator_unordered")(tasks):
+            done += 1
+            if progress is not None:
+                progress(done / (len(first) + len(second)))
+    marker = _marker()
+    if marker is not None:
+        with contextlib.suppress(OSError):
+            marker.parent.mkdir(parents=True, exist_ok=True)
+            marker.touch()
+
+
+def _scenario() -> Scenario:
+    """A scenario in a world so small that compiling is nearly all it costs."""
+    from antdrive.planners import PLANNERS
+    from antdrive.robots import load_robot
+    from antdrive.sim.scenario import Scenario
+    from antdrive.worlds import Cruising, Disc, Task, World
+
+    mover = Cruising(radius=0.1, position=(0.2, 2.8), velocity=(0.1, 0.0))
+    world = World("warm", (0.0, 0.0, 3.0, 3.0), (Disc(1.5, 1.5, 0.2),), movers=(mover,))
+    task = Task(world, (0.75, 0.75, 0.0), (2.25, 2.25), cell=0.25)
+    return Scenario(task=task, planner=PLANNERS["astar"], robot=load_robot("turtlebot"))
+
+
+def _plan_with(names: Sequence[str]) -> None:
+    from antdrive.planners import PLANNERS
+    from antdrive.sim.pipeline import plan
+
+    for name in names:
+        plan(replace(_scenario(), planner=PLANNERS[name]))
+
+
+def _drive_and_film() -> None:
+    from antdrive.planners import PLANNERS
+    from antdrive.sim.pipeline import run
+    from antdrive.views.film.video import film
+    from antdrive.worlds import Cruising
+
+    _sense()
+    log = run(_scenario()).rollout
+    task = _scenario().task
+    comes = Cruising(radius=0.2, position=(2.5, 0.75), velocity=(-2.0, 0.0))  # the robot has to escape from it
+    run(replace(_scenario(), task=replace(task, world=replace(task.world, movers=(comes,)))))
+    ants = run(replace(_scenario(), planner=PLANNERS["as"], planner_name="as")).rollout
+    assert log is not None
+    assert ants is not None
+    with tempfile.TemporaryDirectory() as folder:
+        film(log, Path(folder) / "warm.mp4", size=(160, 160), fps=2)
+        film(log, Path(folder) / "warm.mp4", size=(160, 160), fps=2, camera="follow")
+        film(ants, Path(folder) / "warm.mp4", size=(160, 160), fps=2, prelude=1.0)
+
+
+def _sense() -> None:
+    """Scan a tiny world, map it and follow a mover in it."""
+    import numpy as np
+
+    from antdrive.robots import load_robot
+    from antdrive.sim.sensing import MappedGround, MoverTracker, OccupancyMap, Scanner, clear_distance
+
+    robot = load_robot("turtlebot")
+    assert robot.lidar is not None
+    scanner, seen, tracker = (
+        Scanner.of(robot.lidar, _scenario().task.world),
+        OccupancyMap(robot.lidar),
+        MoverTracker(robot.lidar),
+    )
+    ground = MappedGround(seen, 10)
+    for k in range(4):
+        ranges = scanner.scan(
+            (0.75, 0.75, 0.0), np.array([[2.2 - 0.1 * k, 0.8]]) + (90 if k == 0 else 0), np.array([0.2])
+        )
+        seen.insert((0.75, 0.75, 0.0), ranges, tracker.update(ground, (0.75, 0.75, 0.0), ranges, 0.2 * k))
+    seen.take_as_free((0.75, 0.75), 0.2)
+    seen.forget((2.0, 0.8), 0.3)
+    seen.discs()
+    clear_distance(seen, (0.75, 0.75, 0.0), 0.5, 0.1, robot.footprint, 1.0)
+
+
+def _marker() -> Path | None:
+    """The file whose presence says that the kernels are compiled; None where nothing can be kept."""
+    folder = cache_folder()
+    if folder is None:
+        return None
+    numba = importlib.metadata.version("numba")
+    facts = (
+        sources_stamp(),
+        platform.python_version(),
+        platform.machine(),
+        numba,
+        os.environ.get("NUMBA_CPU_NAME", ""),
+    )
+    return folder / f"antdrive-warm-{hashlib.sha256('|'.join(facts).encode()).hexdigest()[:16]}"
+
+
+if __name__ == "__main__":
+    warm()

@@ -1,0 +1,192 @@
+"""A genetic algorithm on via points (Han, MSc thesis, Missouri 2007, section 4.1)."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from antdrive.base import Floats
+from antdrive.base.plane import polyline_length
+from antdrive.planners.anyangle.lines import RouteEnds, cells_along, route_ends, terrain
+from antdrive.planners.iterative import Iteration, IterativePlanner, require
+from antdrive.planners.plan import Capabilities, Cells, PlanResult, Query
+
+
+@dataclass(frozen=True, kw_only=True)
+class ViaPointPlanner(IterativePlanner):
+    """A planner whose answer is a polyline over via points that need not lie on the grid's moves."""
+
+    @property
+    def work_unit(self) -> str:
+        """What `work` counts."""
+        return "chromosomes rated"
+
+    def _conclude(self, query: Query, done: list[Iteration], note: str) -> PlanResult:
+        result = super()._conclude(query, done, note)
+        if result.waypoints is None:
+            return result
+        return dataclasses.replace(result, length=polyline_length(query.grid.xy(result.waypoints)))
+
+
+class Incumbent:
+    """The best line so far, with its leads; the cells beside it are searched only when it changes.
+
+    Attributes:
+        query: the query
+        ends: the ends of the line, and its leads
+        best: the length of the best line, leads included [m], inf while there is none
+        cells: a path of cells beside the line (N, 2)
+        waypoints: the line in fractional cells (M, 2), None while there is none
+    """
+
+    def __init__(self, query: Query, ends: RouteEnds) -> None:
+        self.query, self.ends = query, ends
+        self.best = math.inf
+        self.cells: Cells = np.empty((0, 2), dtype=np.int32)
+        self.waypoints: Floats | None = None
+
+    def offer(self, via: Floats, length: float) -> bool:
+        """Keep the line over via points (n, 2) [m], of this length without leads, if it is the best; whether it is."""
+        length += self.ends.lead_length
+        if length >= self.best:
+            return False
+        self.best = length
+        line = self.ends.with_leads(np.vstack([self.ends.start, via, self.ends.goal]))
+        self.waypoints = self.query.grid.fractional(line)
+        self.cells = cells_along(self.query, self.waypoints)
+        return True
+
+    def report(self, population: Floats, lengths: Floats, *, arrived: int, work: int) -> Iteration:
+        """The state after a generation, whose shortest line is offered first."""
+        leads = self.ends.lead_length
+        if len(lengths):
+            first = int(lengths.argmin())
+            self.offer(population[first], float(lengths[first]))
+        return Iteration(
+            cells=self.cells,
+            best=self.best,
+            iteration_best=float(lengths.min()) + leads if len(lengths) else math.inf,
+            iteration_mean=float(lengths.mean()) + leads if len(lengths) else math.inf,
+            arrived=arrived,
+            work=work,
+            waypoints=self.waypoints,
+            field=self._visits(population),
+        )
+
+    def _visits(self, population: Floats) -> Floats:
+        from antdrive.planners.anyangle import _kernels_lines
+
+        grid = self.query.grid
+        lines = np.empty((len(population), population.shape[1] + 2, 2))
+        lines[:, 0], lines[:, 1:-1], lines[:, -1] = self.ends.start, population, self.ends.goal
+        cells = np.ascontiguousarray(grid.fractional(lines)).reshape(lines.shape)
+        return np.asarray(_kernels_lines.visits(cells, grid.shape))
+
+
+def seeded(rng: np.random.Generator) -> Any:
+    """A seed for the random numbers of compiled code."""
+    return np.uint64(rng.bit_generator.random_raw()) | np.uint64(1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class GaHan(ViaPointPlanner):
+    """A genetic algorithm on a few via points, refilled with random chromosomes (Han 2007).
+
+    Section 4.1 of the thesis: a chromosome is a row of via points on free cells. Each generation selects by 1
+    / length, crosses, mutates, eliminates what touches an obstacle and refills the population at random. The
+    defaults are those of the thesis. `field` counts the chromosomes of the last population that pass each
+    cell.
+
+    Known weakness, measured (docs/benchmarks.md): the algorithm depends on chance finding a first feasible
+    line. In worlds with many obstacles there may be no line over so few via points, or none that chance
+    finds: then the answer is `STOPPED`. With a quarter of the cells blocked 6 of 10 runs find one on 20 x 20
+    cells, and none on 50 x 50.
+
+    Attributes:
+        population: chromosomes
+        iterations: generations
+        crossover: Pc, the probability that a chromosome takes part in crossover
+        mutation: Pm, the probability that a gene mutates; the thesis uses 0.4 with nine obstacles
+        via_points: via points of a chromosome, 1 to 6 in the thesis
+        elitism: whether the best chromosome always survives
+        tries: random chromosomes drawn at most in the whole run
+        complete: False, as the planner may miss a path that exists
+    """
+
+    population: int = 100
+    iterations: int = 100
+    crossover: float = 0.25
+    mutation: float = 0.2
+    via_points: int = 3
+    elitism: bool = True
+    tries: int = 1_000_000
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """What this planner can do and what it needs. It may miss a path that exists."""
+        return Capabilities(iterative=True, complete=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require("population", self.population, at_least=2, at_most=1_000_000)
+        require("crossover", self.crossover, at_least=0, at_most=1)
+        require("mutation", self.mutation, at_least=0, at_most=1)
+        require("via_points", self.via_points, at_least=1, at_most=1000)
+        require("tries", self.tries, at_least=1)
+
+    def iterate(self, query: Query, rng: np.random.Generator) -> Iterator[Iteration]:
+        """Breed generations as in section 4.1 viii, without end unless no feasible chromosome is ever found."""
+        from antdrive.planners.anyangle import _kernels_ga
+
+        ends, land, state = route_ends(query), terrain(query), seeded(rng)
+        fixed = np.array([ends.start, ends.goal])
+        points = query.grid.xy(_genes(query))
+        population = np.empty((self.population, self.via_points, 2))
+        lengths = np.empty(self.population)
+        incumbent, tries = Incumbent(query, ends), self.tries
+        size = survivors = 0
+        while True:
+            if size:
+                survivors, state = _kernels_ga.next_generation(
+                    population,
+                    lengths,
+                    size,
+                    points,
+                    fixed,
+                    land,
+                    self.crossover,
+                    self.mutation,
+                    self.elitism,
+                    np.uint64(state),
+                )
+                rated = self.population
+            else:
+                survivors, rated = 0, 0
+            size, drawn, state = _kernels_ga.refill(
+                population, lengths, survivors, points, fixed, land, tries, np.uint64(state)
+            )
+            tries -= drawn
+            yield incumbent.report(
+                population[:size], lengths[:size], arrived=survivors if rated else size, work=rated + drawn
+            )
+            if not size and not tries:
+                return
+
+    def _conclude(self, query: Query, done: list[Iteration], note: str) -> PlanResult:
+        result = super()._conclude(query, done, note)
+        if result.solved or note:
+            return result
+        return dataclasses.replace(result, reason=f"no feasible chromosome found within {self.tries} tries")
+
+
+def _genes(query: Query) -> Cells:
+    """The cells a via point may lie on: all free ones but the start and the goal."""
+    free = query.grid.free.copy()
+    free[query.start] = free[query.goal] = False
+    cells = np.argwhere(free) if free.any() else np.array([query.start])
+    return np.asarray(cells, dtype=np.int32)

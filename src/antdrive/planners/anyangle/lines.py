@@ -1,0 +1,159 @@
+"""Straight lines, their ends and the cells beside them, for planners that are not bound to the grid's directions."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.base import Floats, Point
+from antdrive.base.plane import polyline_length
+from antdrive.planners.plan import Cells, Query
+from antdrive.worlds.ends import longest_line
+
+if TYPE_CHECKING:  # importing kernels loads the compiler
+    from antdrive.planners.anyangle._kernels_lines import Terrain
+
+CONTACT = 5e-10  # m: an end whose room falls short of the clearance by no more than this has just the clearance
+
+
+class RouteEnds(NamedTuple):
+    """The ends of the part of a route that keeps the clearance, and the exact ends where these have too little room.
+
+    Attributes:
+        start: where the part that keeps the clearance starts [m]
+        goal: where it stops [m]
+        lead_in: the exact start, where it has too little room itself and is left on a straight line to
+            `start`
+        lead_out: the exact goal, where it has just the clearance and is reached on a straight line from
+            `goal`
+    """
+
+    start: Point
+    goal: Point
+    lead_in: tuple[Point, ...] = ()
+    lead_out: tuple[Point, ...] = ()
+
+    @property
+    def lead_length(self) -> float:
+        """The length of both leads together [m]."""
+        return polyline_length([*self.lead_in, self.start]) + polyline_length([self.goal, *self.lead_out])
+
+    def with_leads(self, xy: npt.ArrayLike) -> Floats:
+        """The route (M, 2) [m]: a polyline from `start` to `goal` with both leads."""
+        parts = [np.reshape(part, (-1, 2)) for part in (self.lead_in, xy, self.lead_out)]
+        return np.vstack(parts).astype(np.float64)
+
+
+def route_ends(query: Query, *, touching: bool = False) -> RouteEnds:
+    """The exact start and goal of the query's task; without a task, the centres of its end cells.
+
+    A start with too little room is left on the straight line to the centre of its cell, which `Query.between`
+    has found clear. A goal with too little room is not reached: the route ends at the centre of its cell. A
+    goal with just the clearance is reached from that centre.
+    """
+    (start, goal) = (_point(xy) for xy in query.grid.xy([query.start, query.goal]))
+    if query.task is None:
+        return RouteEnds(start, goal)
+    from antdrive.worlds.geometry import point_clearance
+
+    inflate = query.grid.inflate
+    exact_start, exact_goal = _point(query.task.start[:2]), _point(query.task.goal)
+    room = [float(r) for r in point_clearance(query.task.world, [exact_start, exact_goal])]
+    fits = [r >= inflate - CONTACT if touching else r > inflate for r in room]
+    return RouteEnds(
+        exact_start if fits[0] else start,
+        exact_goal if fits[1] else goal,
+        () if fits[0] else (exact_start,),
+        (exact_goal,) if not fits[1] and room[1] >= inflate - CONTACT else (),
+    )
+
+
+def terrain(query: Query) -> Terrain:
+    """Where straight lines may run: among the discs of the query's world or, without a task, over free cells."""
+    from antdrive.planners.anyangle._kernels_lines import Terrain
+
+    grid, task = query.grid, query.task
+    discs = np.empty((0, 3)) if task is None else task.world.discs
+    discs[:, 2] += grid.inflate
+    bounds = np.zeros(4) if task is None else np.asarray(task.world.bounds, dtype=np.float64)
+    x0, y0 = grid.origin
+    return Terrain(discs, bounds, float(grid.inflate), grid.free, float(x0), float(y0), float(grid.cell), task is None)
+
+
+def clear_line(query: Query, start: Point, goal: Point) -> bool:
+    """Whether the straight line between two points [m] keeps the clearance; contact counts as too close.
+
+    With a world, the exact distance to discs and walls decides. On a bare grid, every cell that the line
+    touches, if only at a corner, must be free.
+    """
+    from antdrive.planners.anyangle import _kernels_lines
+
+    return bool(_kernels_lines.clear_line(terrain(query), *map(float, (*start, *goal))))
+
+
+def cells_along(query: Query, waypoints: npt.ArrayLike) -> Cells:
+    """A path of allowed moves from start to goal beside a polyline in fractional cells; empty if there is none.
+
+    It is the shortest path within a corridor around the polyline; the corridor widens until it contains a
+    path. Where the line makes a loop or comes back beside itself, that path would cut it short. Then the path goes
+    leg by leg, from the cell of one waypoint to that of the next.
+    """
+    line = np.ascontiguousarray(waypoints, dtype=np.float64).reshape(-1, 2)
+    whole = np.vstack([query.start, line, query.goal]).astype(np.float64)
+    cells = _shortest_beside(query, whole)
+    leads = math.dist(query.start, line[0]) + math.dist(line[-1], query.goal)
+    if not len(cells) or polyline_length(line) <= longest_line(polyline_length(cells), leads, 1.0):
+        return cells
+    parts = [cells[:1]]
+    for cell in [*_passed(query, line), query.goal]:
+        leg = _shortest_beside(query, np.array([parts[-1][-1], cell], dtype=np.float64))
+        if len(leg) > 1:  # 1: the cell is the last one's; 0: no move leads there
+            parts.append(leg[1:])
+    return np.asarray(np.vstack(parts), dtype=np.int32)
+
+
+def _passed(query: Query, line: Floats) -> list[tuple[int, int]]:
+    """The free cells that hold points of a line (M, 2) in fractional cells; a point whose cell is blocked has none."""
+    cells = np.clip(np.floor(line + 0.5).astype(np.int64), 0, np.array(query.grid.shape) - 1)
+    return [(int(row), int(col)) for row, col in cells if query.grid.free[row, col]]
+
+
+def _shortest_beside(query: Query, line: Floats) -> Cells:
+    """The shortest path of cells from the first to the last point of a line, which are cells, in a corridor around it."""
+    from antdrive.planners.anyangle import _kernels_lines
+    from antdrive.planners.graph import _kernels_search
+
+    (r0, c0), (r1, c1) = line[[0, -1]].astype(int).tolist()
+    moves, width = query.grid.moves, 1.0
+    while True:
+        within = width < max(query.grid.shape)
+        near = _kernels_lines.corridor_moves(moves, line, width) if within else moves
+        near.setflags(write=False)  # the search is compiled for read-only moves, as those of a grid are
+        cells, _, _, _ = _kernels_search.shortest_path(near, r0, c0, r1, c1, True)
+        if len(cells) or not within:
+            return np.asarray(cells, dtype=np.int32)
+        width *= 2.0
+
+
+def cells_under(query: Query, waypoints: npt.ArrayLike) -> Cells:
+    """The cells that a polyline in fractional cells passes over, each a neighbour of the last; they need not be free."""
+    line = np.asarray(waypoints, dtype=np.float64).reshape(-1, 2)
+    line = np.vstack([query.start, line, query.goal])
+    parts = [line[:1]]
+    for a, b in itertools.pairwise(line):
+        steps = max(1, math.ceil(2 * np.abs(b - a).max()))  # with steps of a whole cell, rounding may skip one
+        parts.append(a + np.linspace(0.0, 1.0, steps + 1)[1:, None] * (b - a))
+    cells = np.floor(np.vstack(parts) + 0.5).astype(np.int32)
+    cells = np.clip(cells, 0, np.array(query.grid.shape, dtype=np.int32) - 1)
+    fresh = np.ones(len(cells), dtype=np.bool_)
+    fresh[1:] = np.any(np.diff(cells, axis=0) != 0, axis=1)
+    return np.asarray(cells[fresh], dtype=np.int32)
+
+
+def _point(xy: npt.ArrayLike) -> Point:
+    x, y = np.asarray(xy, dtype=np.float64)
+    return float(x), float(y)

@@ -1,0 +1,271 @@
+"""The ant system and its two variants for robots: ants that deposit less with age, and exploratory ants.
+
+ibraheem2016: I. K. Ibraheem, F. H. Ajeil, *Path planning of an autonomous mobile robot using swarm based
+optimization techniques*, Al-Khwarizmi Engineering Journal, 2016. suganthi2019: P. H. Suganthi, K. Subha,
+*Path navigation in ACO using mobile robot*, IJTSRD 3(3), 2019. lee2008: J.-W. Lee, J.-J. Kim, B.-S. Choi,
+J.-J. Lee, *Improved ant colony optimization algorithm by potential field concept for optimal path planning*,
+2008.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from antdrive.base import Floats
+from antdrive.base.errors import FieldError
+from antdrive.planners.colonies.colony import (
+    FIRST_KIND,
+    ChoiceContext,
+    Colony,
+    ColonyGraph,
+    Heuristic,
+    IterationState,
+    Weights,
+)
+from antdrive.planners.iterative import require
+
+#: The length of each move [cells].
+STEP = np.sqrt([1.0, 2.0, 1.0, 2.0, 1.0, 2.0, 1.0, 2.0])
+
+
+@dataclass(frozen=True, kw_only=True)
+class AntSystem(Colony):
+    """Ants guided by pheromone on arcs and by a heuristic: the ant system, as ibraheem2016 sets it up.
+
+    Section 3.1 of ibraheem2016: p ~ tau^alpha eta^beta (eq. 1), and every ant that arrives deposits Q /
+    length on the arcs it used. The defaults are the values of ibraheem2016. suganthi2019 uses beta 1 and
+    heuristic "step"; lee2008 uses 500 ants, beta 2 and evaporation 0.01.
+
+    Known weaknesses, measured (docs/benchmarks.md): ants die in dead ends, as in the papers. With a quarter
+    of the cells blocked, 6 of 10 runs cross 50 x 50 cells, with paths twice as long as the shortest, and none
+    crosses 100 x 100. With `backtrack` and `shortcut` all arrive.
+
+    Attributes:
+        alpha: the exponent of the pheromone
+        beta: the exponent of the heuristic; None: 0.22 N on a map of N x N cells, the rule of ibraheem2016,
+            Table 1
+        evaporation: rho, the share of the pheromone that is lost per iteration; rho of lee2008 is the share
+            retained
+        deposit: Q; an ant deposits Q / length on each of its arcs
+        initial: the pheromone on every arc at the start
+        heuristic: "goal": eta = 1 / distance from the next cell to the goal (ibraheem2016 eq. 6, lee2008);
+            "step": eta = 1 / length of the move (suganthi2019 eq. 6)
+        ranks: paths in the ranking list of an iteration: its best `ranks` ants deposit, the first all of eq. 4
+            and each later one a share of 1 / `ranks` less; None: all ants that arrive deposit all of eq. 4.
+            Section V of lee2008 gives its conventional colony such a list of 100 and leaves open what it does
+
+    Raises:
+        FieldError: an option is out of range; names it and what would be right.
+    """
+
+    alpha: float = 1.0
+    beta: float | None = None
+    evaporation: float = 0.3
+    deposit: float = 1.0
+    initial: float = 1.0
+    heuristic: Literal["goal", "step"] = "goal"
+    ranks: int | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require("alpha", self.alpha, at_least=0)
+        if self.beta is not None:
+            require("beta", self.beta, at_least=0)
+        require("evaporation", self.evaporation, at_least=0, at_most=1)
+        require("deposit", self.deposit, above=0)
+        require("initial", self.initial, above=0)
+        if self.ranks is not None:
+            require("ranks", self.ranks, at_least=1, at_most=1_000_000)
+        if self.heuristic not in ("goal", "step"):
+            raise FieldError("heuristic", f"must be 'goal' or 'step', got {self.heuristic!r}")
+
+    def initial_trail(self, graph: ColonyGraph, rng: np.random.Generator) -> Floats:
+        """tau(0) = `initial` on every arc of `graph`."""
+        return np.full((len(graph.mask), 8), self.initial)
+
+    def heuristic_values(self, graph: ColonyGraph) -> Heuristic:
+        """eta^beta for each move of `graph`, as a share of the largest value in its cell."""
+        if self.heuristic == "goal":
+            # The goal is at distance 0 from itself; the bound makes every ant beside the goal step onto it.
+            eta = graph.at_neighbours(1.0 / np.maximum(graph.distance_to(graph.goal), 0.01))  # ibraheem2016 eq. 6
+        else:
+            eta = np.where(
+                np.isfinite(graph.at_neighbours(np.ones(len(graph.mask)))), 1.0 / STEP, -np.inf
+            )  # suganthi2019 eq. 6
+        beta = ibraheem_beta(max(graph.shape)) if self.beta is None else self.beta
+        return shares(eta, beta)
+
+    def choice_weights(
+        self,
+        graph: ColonyGraph,
+        trail: Floats,
+        heuristic: Heuristic,
+        weights: Weights,
+        context: ChoiceContext = FIRST_KIND,
+    ) -> None:
+        """p ~ tau^alpha eta^beta (eq. 1 of all three papers).
+
+        `weights` depends on `trail` and `heuristic` alone, neither on `graph` nor on `context`.
+        """
+        from antdrive.planners.colonies import _kernels_colony
+
+        _kernels_colony.arc_weights(trail, heuristic, self.alpha, weights)
+
+    def update(self, trail: Floats, state: IterationState) -> None:
+        """Evaporate `trail`; every ant of `state` that arrived deposits on its arcs (suganthi2019 eq. 2-4)."""
+        from antdrive.planners.colonies import _kernels_colony
+
+        tours, amounts = state.tours, self.amounts(state)
+        if self.ranks is not None:
+            amounts = amounts * ranked(tours.lengths, self.ranks)
+        _kernels_colony.evaporate(trail.ravel(), self.evaporation)  # eq. 2, first term
+        _kernels_colony.deposit_on_arcs(trail, state.graph.shape[1], tours.cells, tours.sizes, amounts)  # eq. 2-3
+
+    def amounts(self, state: IterationState) -> Floats:
+        """What each ant of `state` deposits on an arc (ants,): Q / L_k, 0 if the ant did not arrive."""
+        return self.deposit / state.tours.lengths  # eq. 4
+
+
+@dataclass(frozen=True, kw_only=True)
+class AgeingAnts(AntSystem):
+    """An ant system in which older ants deposit less pheromone: the modified ACO of ibraheem2016, section 3.2.
+
+    Ant m of M deposits Q_m / length, and Q_m falls from Q_max to Q_min with m (eq. 5). The paper gives no
+    values for the two bounds.
+
+    Known weaknesses, measured (docs/papers/ibraheem2016.md): these ants die as those of `AntSystem` do, and
+    ageing does not pay. On maps of 30 x 30 and 40 x 40 cells paths are longer than those of `AntSystem` in 170
+    of 400 runs and shorter in 71; no values of the bounds change that.
+
+    Attributes:
+        q_max: Q_max, the deposit of a young ant
+        q_min: Q_min, the deposit of an old ant
+    """
+
+    q_max: float = 1.0
+    q_min: float = 0.1
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require("q_min", self.q_min, above=0)
+        require("q_max", self.q_max, at_least=self.q_min)
+
+    def amounts(self, state: IterationState) -> Floats:
+        """Q_m / L_m for each ant m of `state`, with Q_m by eq. 5."""
+        count = len(state.tours)
+        return self.aged(state.rng.random(count)) / state.tours.lengths  # eq. 4
+
+    def aged(self, rand: Floats) -> Floats:
+        """Q_m of ants m = 1 to M (eq. 5), clipped to its bounds, which eq. 5 as printed may leave.
+
+        Args:
+            rand: a random number in [0, 1) for each ant (M,)
+        """
+        span, m = self.q_max - self.q_min, np.arange(1, len(rand) + 1)
+        amounts = self.q_max - span / 2 * rand - span / len(rand) * m  # eq. 5
+        return np.clip(amounts, self.q_min, self.q_max)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExploringAnts(AntSystem):
+    """Common ants, exploratory ants that avoid pheromone, and an elite: the improved ACO of suganthi2019.
+
+    Section IV of suganthi2019: common ants choose by tau^alpha eta^beta (eq. 1), exploratory ants by eta^beta
+    / tau^alpha (eq. 5), and the best ants of an iteration, of either kind, deposit more (eq. 7-8). The text
+    below eq. 7 says that its second term is what common ants deposit, and its third has the factor alpha,
+    whose value is 1: that is the default. With `depositors="all"` exploratory ants deposit like common ones.
+
+    The paper leaves open what an ant in a dead end does and whether loops are cut; with `backtrack=False` and
+    `shortcut=False` ants die and walk in loops. docs/papers/suganthi2019.md says which readings were tried.
+
+    Known weaknesses, measured on the same page: exploratory ants wander, which makes an iteration up to ten
+    times as long as that of `AntSystem`; where they deposit like common ants, they keep paths long unless the
+    elite is heavy (`elite=25`). At 50 x 50 cells paths are 7 per cent longer than the shortest.
+
+    Attributes:
+        ants: the number of common ants
+        explorers: the number of exploratory ants
+        beta: the exponent of the heuristic
+        elite: the factor alpha of eq. 7, the additional deposit of the iteration's best ants in units of Q /
+            length
+        depositors: whose tours count in the second term of eq. 7. "common": those of common ants, as the text
+            says; "all": those of exploratory ants, too
+        heuristic: as in `AntSystem`
+        backtrack: as in `Colony`; open in the paper, which only says that ants in deadlock are a difficulty
+        shortcut: as in `Colony`; open in the paper
+
+    Raises:
+        FieldError: an option is out of range; names it and what would be right.
+    """
+
+    ants: int = 25
+    explorers: int = 75
+    beta: float | None = 1.0
+    elite: float = 1.0
+    depositors: Literal["common", "all"] = "common"
+    heuristic: Literal["goal", "step"] = "step"
+    backtrack: bool = True
+    shortcut: bool = True
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require("explorers", self.explorers, at_least=0, at_most=1_000_000)
+        require("elite", self.elite, at_least=0)
+        if self.depositors not in ("common", "all"):
+            raise FieldError("depositors", f"must be 'common' or 'all', got {self.depositors!r}")
+
+    @property
+    def kinds(self) -> tuple[int, ...]:
+        """Common ants, then exploratory ants."""
+        return (self.ants, self.explorers)
+
+    def choice_weights(
+        self,
+        graph: ColonyGraph,
+        trail: Floats,
+        heuristic: Heuristic,
+        weights: Weights,
+        context: ChoiceContext = FIRST_KIND,
+    ) -> None:
+        """p ~ eta^beta tau^alpha for common ants (eq. 1), eta^beta / tau^alpha for exploratory ants (eq. 5).
+
+        `context` says which kind the `weights` are for; they depend on `trail` and `heuristic`, not on
+        `graph`.
+        """
+        from antdrive.planners.colonies import _kernels_colony
+
+        _kernels_colony.arc_weights(trail, heuristic, self.alpha if context.kind == 0 else -self.alpha, weights)
+
+    def amounts(self, state: IterationState) -> Floats:
+        """Q / L_k where an ant is a depositor and, for the best ants of `state`, elite Q / L_best, shared among them."""
+        lengths = state.tours.lengths
+        best = lengths <= lengths.min() + 1e-9
+        usual = 1.0 if self.depositors == "all" else np.arange(len(lengths)) < self.ants
+        return np.where(best, usual + self.elite / best.sum(), usual) * self.deposit / lengths  # eq. 4, 7 and 8
+
+
+def ranked(lengths: Floats, ranks: int) -> Floats:
+    """The share of its deposit that each ant makes (ants,): 1 for the best, 1 / ranks less with each rank, 0 off the list."""
+    rank = np.empty(len(lengths), dtype=np.int64)
+    rank[np.argsort(lengths, kind="stable")] = np.arange(len(lengths))
+    return np.maximum(1.0 - rank / ranks, 0.0)
+
+
+def ibraheem_beta(side: int) -> float:
+    """The exponent of the heuristic that ibraheem2016, Table 1, gives for a map of side x side cells."""
+    return 1.605e-17 * side**2 + 0.22 * side + 6.181e-15
+
+
+def shares(eta: Floats, beta: float) -> Weights:
+    """eta^beta (cells, 8) as a share of each cell's largest value; 0 for moves that are not allowed (eta = -inf).
+
+    Ants choose by ratios within a cell, so the scale does not matter to them, and no power leaves the range
+    of float32.
+    """
+    largest = eta.max(axis=1, keepdims=True)
+    with np.errstate(invalid="ignore"):
+        ratio = np.where(np.isfinite(eta), eta / np.where(np.isfinite(largest), largest, 1.0), 0.0)
+    return np.where(ratio > 0, np.maximum(ratio**beta, 1e-30), 0.0).astype(np.float32)

@@ -1,0 +1,92 @@
+"""The artificial potential field of Lee et al. 2008, section III (eq. 5 to 12)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from antdrive.base import Floats
+from antdrive.planners.graph.search import NO_WAY, reachable
+from antdrive.planners.iterative import require
+from antdrive.planners.plan import Capabilities, GridPlanner, PlanResult, PlanStatus, Query, path_cost
+
+
+@dataclass(frozen=True, kw_only=True)
+class PotentialField(GridPlanner):
+    """Descends the potential of an attracting goal and repelling obstacles (Lee et al. 2008, III); may get stuck.
+
+    The potential U = 1/2 k_att d_goal^2 (eq. 9) + 1/2 k_rep (1/d - 1/d0)^2 for d <= d0 (eq. 11) is followed
+    along the allowed move of steepest descent. U has local minima besides the goal. There the planner stops
+    and reports the cell; it cannot go in circles, as every step leads down. The paper gives no values for the
+    gains and d0; of those tried, these defaults arrive most often among random cylinders.
+
+    Known weaknesses, measured (docs/benchmarks.md): local minima. In forests of cylinders 9 of 10 runs arrive
+    on 20 x 20 cells and 2 of 10 on 50 x 50 and on 100 x 100; where a quarter of single cells is blocked, 1 of
+    10 and none. An obstacle near the goal moves the minimum away from it (`tests/planners/graph/test_apf.py`).
+
+    `d` is measured from the cell's centre to the nearest cylinder, less the grid's inflation; on a grid
+    without a world behind it, to the centre of the nearest blocked cell. Walls do not repel.
+
+    Attributes:
+        k_att: gain of the attraction
+        k_rep: gain of the repulsion
+        influence: d0, the distance beyond which obstacles do not repel [m]
+    """
+
+    k_att: float = 1.0
+    k_rep: float = 0.01
+    influence: float = 0.5
+
+    def __post_init__(self) -> None:
+        require("k_att", self.k_att, above=0)
+        require("k_rep", self.k_rep, at_least=0)
+        require("influence", self.influence, above=0)
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """What this planner can do and what it needs. It may miss a path that exists."""
+        return Capabilities(complete=False)
+
+    def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        from antdrive.planners.graph import _kernels_apf  # imported here because it loads the compiler
+
+        if not reachable(query):
+            return PlanResult(status=PlanStatus.NO_PATH, reason=NO_WAY, work_unit="steps")
+        field = self.potential(query)
+        cells = _kernels_apf.roll_down(query.grid.moves, field, *query.start, *query.goal)
+        last, work = tuple(map(int, cells[-1])), len(cells) - 1
+        if last != query.goal:
+            left = query.grid.cell * math.dist(last, query.goal)
+            reason = f"stuck in a local minimum of the potential at cell {last}, {left:.2f} m from the goal"
+            return PlanResult(status=PlanStatus.STOPPED, reason=reason, work=work, work_unit="steps", field=field)
+        cost = path_cost(cells, query.grid.cell)
+        return PlanResult(status=PlanStatus.SOLVED, cells=cells, cost=cost, work=work, work_unit="steps", field=field)
+
+    def potential(self, query: Query) -> Floats:
+        """The potential U of every cell (R, C), inf where blocked."""
+        from antdrive.planners.graph import _kernels_apf
+
+        grid = query.grid
+        field = np.empty(grid.shape)
+        gains = (self.k_att, self.k_rep, self.influence)
+        _kernels_apf.potential(
+            grid.free, obstacle_distance(query, self.influence), *query.goal, grid.cell, *gains, field
+        )
+        return field
+
+
+def obstacle_distance(query: Query, reach: float = math.inf) -> Floats:
+    """Distance from each cell's centre to the nearest obstacle (R, C) [m]."""
+    from antdrive.planners.graph import _kernels_apf
+
+    grid = query.grid
+    if query.task is not None:
+        distance, discs = np.full(grid.shape, np.inf), query.task.world.discs
+        within = min(reach, grid.cell * sum(grid.shape))
+        _kernels_apf.disc_distances(discs, *grid.origin, grid.cell, grid.inflate, within, distance)
+        return distance
+    squared = np.empty(grid.shape, dtype=np.int64)
+    some = _kernels_apf.squared_distances(grid.free, squared)
+    return grid.cell * np.sqrt(squared) if some else np.full(grid.shape, np.inf)

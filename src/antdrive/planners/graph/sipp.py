@@ -1,0 +1,235 @@
+"""Planning in space and time, among movers whose motions are known: safe-interval path planning.
+
+M. Phillips and M. Likhachev, *SIPP: Safe interval path planning for dynamic environments*, ICRA 2011.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.base import Floats
+from antdrive.base.errors import FieldError
+from antdrive.base.plane import segment_lengths
+from antdrive.planners.graph.search import NO_WAY, reachable
+from antdrive.planners.iterative import require
+from antdrive.planners.plan import Capabilities, GridPlanner, PlanResult, PlanStatus, Query, path_cost
+from antdrive.worlds import MoverMotion
+
+STEP = 0.05  # time between the first samples of a motion; more are added where it turns in between [s]
+INSTANT = 1e-6  # a motion that is not straight over so short a time is a jump [s]
+# How far a motion may stray from its samples' chords, and those samples from the legs that replace them [m]. Twice this
+# is added to the distance that the robot keeps.
+TOLERANCE = 1e-3
+UNIT = "safe intervals expanded"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TimedPlan(PlanResult):
+    """A plan with times: each cell is reached at `arrive` and left at `leave`; the robot waits in between.
+
+    From one cell to the next it drives straight at the plan's speed.
+
+    Attributes:
+        arrive: when each cell is reached (N,) [s]
+        leave: when each cell is left (N,) [s]
+        xy: centres of the cells (N, 2) [m]
+    """
+
+    arrive: Floats = field(default_factory=lambda: np.empty(0))
+    leave: Floats = field(default_factory=lambda: np.empty(0))
+    xy: Floats = field(default_factory=lambda: np.empty((0, 2)))
+
+    @property
+    def duration(self) -> float:
+        """Time from the departure to the arrival [s]; infinite without a path."""
+        return float(self.arrive[-1] - self.arrive[0]) if len(self.arrive) else math.inf
+
+    @property
+    def waited(self) -> float:
+        """The total time that the robot waits on its way [s]."""
+        return float((self.leave - self.arrive).sum())
+
+    def at(self, t: npt.ArrayLike) -> Floats:
+        """Where the robot is (T, 2) [m] at times `t` (T,) [s]; before the plan begins and after it ends, at its ends.
+
+        Raises:
+            ValueError: the plan has no path.
+        """
+        if not self.solved:
+            raise FieldError("plan", "has no path to follow")
+        knots = np.stack([self.arrive, self.leave], axis=1).ravel()
+        when = np.asarray(t, dtype=np.float64)
+        return np.stack([np.interp(when, knots, np.repeat(self.xy[:, k], 2)) for k in (0, 1)], axis=-1)
+
+    def clearance(self, movers: Iterable[MoverMotion], step: float = 0.01) -> float:
+        """The least distance between the robot's centre and a mover's surface [m], sampled every `step` seconds.
+
+        Args:
+            movers: the motions of the movers
+            step: time between two samples [s]
+        """
+        ticks = max(1, math.ceil(self.duration / step))
+        t = np.linspace(self.arrive[0], self.arrive[-1], ticks + 1)
+        robot = self.at(t)
+        return min((float(np.hypot(*(robot - m.at(t)).T).min()) - m.radius for m in movers), default=math.inf)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SafeIntervals(GridPlanner):
+    """The path that arrives first among movers whose motions are known, with waits where they help: SIPP.
+
+    The motions are the query's. Without any it is the shortest path. The answer is a `TimedPlan`.
+
+    Known weaknesses, measured (docs/benchmarks.md): it must know all motions in advance, and its effort grows
+    with them. Among 40 movers in circles the median plan takes 43 ms on 50 x 50 cells and 92 ms on 200 x 200,
+    among 10 of them 12 and 30 ms.
+
+    Attributes:
+        speed: the robot's speed on every move [m/s]
+        horizon: time from the departure for which the motions are known, and within which the robot must arrive [s]
+        stay: whether the goal must also be safe from the arrival to the horizon
+    """
+
+    speed: float = 0.5
+    horizon: float = 120.0
+    stay: bool = False
+
+    def __post_init__(self) -> None:
+        require("speed", self.speed, above=0)
+        require("horizon", self.horizon, above=0)
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """What this planner can do, and that it needs the movers' motions."""
+        return Capabilities(needs_motions=True)
+
+    def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        return plan_in_time(
+            query,
+            query.motions,
+            speed=self.speed,
+            start_time=query.start_time,
+            horizon=self.horizon,
+            stay=self.stay,
+        )
+
+
+def plan_in_time(
+    query: Query,
+    movers: Iterable[MoverMotion],
+    *,
+    speed: float,
+    start_time: float = 0.0,
+    horizon: float = 120.0,
+    stay: bool = False,
+) -> TimedPlan:
+    """The path over the grid's moves that arrives first, or `NO_PATH` if none arrives within `horizon` seconds.
+
+    The robot makes each move at `speed` and may wait in any cell for any time. Each motion is replaced by
+    straight legs, at most `2 * TOLERANCE` off. The robot's centre keeps the grid's `inflate` and `2 * TOLERANCE`
+    from a mover's surface on these legs, and so at least `inflate` from the mover itself. Over the legs the
+    answer is exact: no path on this grid, at this speed, arrives sooner. Motions are sampled `STEP` apart,
+    closer near turns and jumps; two turns within half a `STEP` may be missed.
+
+    Args:
+        query: the grid and its ends; its own motions are not used
+        movers: the motions of the movers
+        speed: the robot's speed on every move [m/s]
+        start_time: when the robot sets out, on the clock of the motions [s]
+        horizon: how long after `start_time` the robot may arrive [s]
+        stay: whether the goal must also be safe from the arrival to the horizon
+
+    Raises:
+        ValueError: the speed or the horizon is not positive, or a mover's position is not finite.
+    """
+    require("speed", speed, above=0, below=math.inf)
+    require("horizon", horizon, above=0)
+    started = time.perf_counter()
+    reason = query.blocked_end or ("" if reachable(query) else NO_WAY)
+    plan = (
+        TimedPlan(status=PlanStatus.NO_PATH, reason=reason)
+        if reason
+        else _earliest(query, movers, speed=speed, start_time=start_time, horizon=horizon, stay=stay)
+    )
+    return replace(plan, work_unit=UNIT, wall_s=time.perf_counter() - started)
+
+
+def _earliest(
+    query: Query, movers: Iterable[MoverMotion], *, speed: float, start_time: float, horizon: float, stay: bool
+) -> TimedPlan:
+    """The plan that arrives first, on a grid that can be crossed."""
+    from antdrive.planners.graph import _kernels_sipp as kernels
+
+    grid, cols = query.grid, query.grid.shape[1]
+    known = [_legs(mover, start_time, start_time + horizon, grid.inflate) for mover in movers]
+    legs = np.concatenate([np.empty((0, 7)), *known])
+    legs = legs[np.argsort(legs[:, kernels.BEGIN], kind="stable")]
+    end = start_time + horizon if known else math.inf
+    start, goal = (cell[0] * cols + cell[1] for cell in (query.start, query.goal))
+    frame = kernels.Frame(*grid.origin, grid.cell)
+    near = kernels.NearLegs(legs, *kernels.near_legs(legs, grid.free, frame))
+    intervals = kernels.Intervals(*kernels.safe_intervals(near, grid.free, frame, start_time, end))
+    first = intervals.first[start]
+    if first == intervals.first[start + 1] or intervals.since[first] > start_time:
+        reason = "a mover is too close to the start when the robot sets out"
+        return TimedPlan(status=PlanStatus.NO_PATH, reason=reason)
+    trip = kernels.Trip(start, goal, float(speed), float(start_time), end, stay)
+    cells, arrive, leave, work = kernels.earliest(grid.moves, frame, near, intervals, trip)
+    if not len(cells):
+        stays = " and can stay there" if stay else ""
+        reason = f"no way past the movers reaches the goal within {horizon:g} s{stays}"
+        return TimedPlan(status=PlanStatus.NO_PATH, reason=reason, work=work)
+    return TimedPlan(
+        status=PlanStatus.SOLVED,
+        cells=cells,
+        cost=path_cost(cells, grid.cell),
+        work=work,
+        arrive=arrive,
+        leave=leave,
+        xy=grid.xy(cells),
+    )
+
+
+def _legs(mover: MoverMotion, start: float, end: float, inflate: float) -> Floats:
+    """A motion as straight legs (L, 7) at constant speed, with the columns of `_kernels_sipp`."""
+    from antdrive.planners.graph import _kernels_sipp as kernels
+
+    t, xy, jump = _samples(mover, start, end)
+    first, last, count = kernels.legs_within(t, np.ascontiguousarray(xy), jump, TOLERANCE)
+    first, last = first[:count], last[:count]
+    span = t[last] - t[first]
+    velocity = (xy[last] - xy[first]) / span[:, np.newaxis]
+    keep = np.full(count, mover.radius + inflate + 2 * TOLERANCE)
+    return np.column_stack([t[first], t[last], xy[first], velocity, keep])
+
+
+def _samples(mover: MoverMotion, start: float, end: float) -> tuple[Floats, Floats, npt.NDArray[np.bool_]]:
+    """A motion as times (T,), positions (T, 2), and whether it jumps after each sample (T - 1,).
+
+    Between samples without a jump, the motion is within `TOLERANCE` of the straight line that joins them.
+    """
+    t = np.linspace(start, end, max(2, math.ceil((end - start) / STEP) + 1))
+    xy = np.asarray(mover.at(t), dtype=np.float64)
+    unchecked = np.arange(len(t) - 1)  # stretches not yet known to be straight
+    while len(unchecked):
+        middle = (t[unchecked] + t[unchecked + 1]) / 2
+        there = np.asarray(mover.at(middle), dtype=np.float64)
+        # A motion of two straight legs that meet within a stretch strays from the stretch's chord at most twice as
+        # far as its middle does.
+        stray = 2 * np.hypot(*(there - (xy[unchecked] + xy[unchecked + 1]) / 2).T)
+        bent = (stray > TOLERANCE) & (t[unchecked + 1] - t[unchecked] > INSTANT)
+        if not bent.any():
+            break
+        at = unchecked[bent] + 1
+        t, xy = np.insert(t, at, middle[bent]), np.insert(xy, at, there[bent], axis=0)
+        halves = at + np.arange(len(at))  # the indices of the middles
+        unchecked = np.stack([halves - 1, halves], axis=1).ravel()
+    if not np.isfinite(xy).all():
+        raise FieldError("movers", "a mover's position is not finite")
+    return t, xy, (np.diff(t) <= INSTANT) & (segment_lengths(xy) > TOLERANCE)

@@ -1,0 +1,245 @@
+"""The loop that all iterative planners share: budget, history, interruption, progress."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+import itertools
+import math
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+from typing import NamedTuple, cast
+
+import numpy as np
+
+from antdrive.base import Floats
+from antdrive.base.errors import FieldError
+from antdrive.planners.graph.search import NO_WAY, reachable
+from antdrive.planners.plan import (
+    Capabilities,
+    Cells,
+    GridPlanner,
+    History,
+    Planner,
+    PlanResult,
+    PlanStatus,
+    Query,
+    capabilities_of,
+    path_cost,
+)
+
+REHEARSED = 2  # iterations in which kernels are loaded: the second evaporates and reuses what the first left
+
+
+class Iteration(NamedTuple):
+    """The state of a planner after an iteration. Lengths are in metres; infinite means no path.
+
+    Attributes:
+        cells: the best path so far as (row, col) of each cell (N, 2), empty while there is none
+        best: length of the best path so far [m]
+        iteration_best: length of this iteration's best path [m]
+        iteration_mean: mean length over those of this iteration that arrived [m]
+        arrived: how many ants or chromosomes of this iteration arrived
+        work: the work of this iteration, in the planner's `work_unit`
+        waypoints: the best path so far as a polyline of fractional (row, col) (M, 2), as in `PlanResult`
+        field: the planner's field (R, C), as in `PlanResult`
+    """
+
+    cells: Cells
+    best: float
+    iteration_best: float
+    iteration_mean: float
+    arrived: int
+    work: int
+    waypoints: Floats | None = None
+    field: Floats | None = None
+
+
+class Progress(NamedTuple):
+    """How far a planner has come.
+
+    Attributes:
+        done: iterations done
+        total: iterations to do
+        best: length of the best path so far [m], infinite while there is none
+    """
+
+    done: int
+    total: int
+    best: float
+
+
+_watcher: ContextVar[Callable[[Progress], None] | None] = ContextVar("_watcher", default=None)
+
+
+@contextmanager
+def watch(see: Callable[[Progress], None]) -> Iterator[None]:
+    """Within this block, planners call `see` after every iteration.
+
+    Args:
+        see: called with the progress; what it raises ends the planning
+    """
+    token = _watcher.set(see)
+    try:
+        yield
+    finally:
+        _watcher.reset(token)
+
+
+_keeping: ContextVar[bool] = ContextVar("_keeping", default=False)
+
+
+@contextmanager
+def keep_best() -> Iterator[None]:
+    """Within this block, Ctrl-C makes a planner return its best path so far, with the status `STOPPED`.
+
+    Outside such a block `KeyboardInterrupt` is raised as usual, so that it ends a series of plans.
+    """
+    token = _keeping.set(True)
+    try:
+        yield
+    finally:
+        _keeping.reset(token)
+
+
+@dataclass(frozen=True, kw_only=True)
+class IterativePlanner(GridPlanner):
+    """A planner that improves its answer in iterations.
+
+    It ends after `iterations` or at the `time_budget`, whichever comes first. A plan with a time budget
+    cannot be repeated: a faster machine gets further. Ctrl-C within `keep_best` returns the best path so far
+    as `STOPPED`.
+
+    Attributes:
+        iterations: how many iterations are made at most
+        time_budget: planning time after which no further iteration begins [s]; None for no limit
+    """
+
+    iterations: int = 100
+    time_budget: float | None = None
+
+    def __post_init__(self) -> None:
+        require("iterations", self.iterations, at_least=1)
+        if self.time_budget is not None:
+            require("time_budget", self.time_budget, above=0)
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """What this planner can do and what it needs."""
+        return Capabilities(iterative=True)
+
+    def rehearsal(self) -> IterativePlanner:
+        """This planner with few iterations, which call the same kernels."""
+        return dataclasses.replace(self, iterations=min(self.iterations, REHEARSED), time_budget=None)
+
+    @abc.abstractmethod
+    def iterate(self, query: Query, rng: np.random.Generator) -> Iterator[Iteration]:
+        """Improve the answer until there is nothing more to gain, or without end.
+
+        It is only called for queries whose goal can be reached from the start.
+        """
+
+    @property
+    @abc.abstractmethod
+    def work_unit(self) -> str:
+        """What `work` counts."""
+
+    def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        return self.answer(query, self.iterate(query, rng))
+
+    def answer(self, query: Query, states: Iterator[Iteration]) -> PlanResult:
+        """The answer after as many iterations as the planner's options allow.
+
+        Args:
+            query: the query, with both ends free
+            states: the iterations, as `iterate` yields them
+        """
+        if not reachable(query):
+            return PlanResult(status=PlanStatus.NO_PATH, reason=NO_WAY, work_unit=self.work_unit)
+        if query.start == query.goal:
+            here = np.array([query.start], dtype=np.int32)
+            return PlanResult(status=PlanStatus.SOLVED, cells=here, cost=0.0, work_unit=self.work_unit)
+        done: list[Iteration] = []
+        note = ""
+        try:
+            note = self._improve(states, done)
+        except KeyboardInterrupt:
+            if not _keeping.get():
+                raise
+            note = f"interrupted after {len(done)} of {self.iterations} iterations"
+            return dataclasses.replace(self._conclude(query, done, note), status=PlanStatus.STOPPED)
+        return self._conclude(query, done, note)
+
+    def _improve(self, states: Iterator[Iteration], done: list[Iteration]) -> str:
+        deadline = math.inf if self.time_budget is None else time.perf_counter() + self.time_budget
+        see = _watcher.get()
+        for state in itertools.islice(states, self.iterations):
+            done.append(state)
+            if see is not None:
+                see(Progress(len(done), self.iterations, done[-1].best))
+            if time.perf_counter() >= deadline and len(done) < self.iterations:
+                spent = f"{len(done)} of {self.iterations} iterations"
+                return f"stopped by the time budget of {self.time_budget:g} s after {spent}"
+        return ""
+
+    def _conclude(self, query: Query, done: list[Iteration], note: str) -> PlanResult:
+        last = done[-1] if done else None
+        work = sum(state.work for state in done)
+        history = History(
+            best=np.array([state.best for state in done], dtype=np.float64),
+            iteration_best=np.array([state.iteration_best for state in done], dtype=np.float64),
+            iteration_mean=np.array([state.iteration_mean for state in done], dtype=np.float64),
+            arrived=np.array([state.arrived for state in done], dtype=np.int64),
+        )
+        field = None if last is None else last.field
+        if last is None or not len(last.cells):
+            return PlanResult(
+                status=PlanStatus.STOPPED,
+                reason=note or f"nothing arrived within {self.iterations} iterations",
+                work=work,
+                work_unit=self.work_unit,
+                history=history,
+                field=field,
+            )
+        return PlanResult(
+            status=PlanStatus.SOLVED,
+            cells=last.cells,
+            cost=path_cost(last.cells, query.grid.cell),
+            waypoints=last.waypoints,
+            reason=note,
+            work=work,
+            work_unit=self.work_unit,
+            history=history,
+            field=field,
+        )
+
+
+def as_iterative(planner: Planner) -> IterativePlanner | None:
+    """The planner itself if it declares that it plans in iterations, else None."""
+    return cast(IterativePlanner, planner) if capabilities_of(planner).iterative else None
+
+
+def require(
+    key: str,
+    value: float,
+    *,
+    at_least: float = -math.inf,
+    above: float = -math.inf,
+    at_most: float = math.inf,
+    below: float = math.inf,
+) -> None:
+    """Refuse an option outside its range.
+
+    Raises:
+        ValueError: the value is out of range; the message names the key and the range.
+    """
+    bounds = [
+        f"{word} {bound:.12g}"
+        for word, bound in (("at least", at_least), ("above", above), ("at most", at_most), ("below", below))
+        if math.isfinite(bound)
+    ]
+    if not (at_least <= value <= at_most and above < value < below):
+        raise FieldError(key, f"must be {' and '.join(bounds) or 'finite'}, got {value:g}")

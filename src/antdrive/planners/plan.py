@@ -1,0 +1,337 @@
+"""What every planner is asked, what it answers, and what it declares about itself."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+import enum
+import math
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, runtime_checkable
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.base import Floats, Point
+from antdrive.base.errors import FieldError, input_error
+from antdrive.planners.loading import kernels_loaded
+from antdrive.worlds import MoverMotion, Task
+from antdrive.worlds.ends import cells_beside
+
+if TYPE_CHECKING:  # importing a grid loads the compiler, which naming a planner should not
+    from antdrive.worlds import Grid
+
+#: A cell of a grid: row along +y, column along +x.
+Cell: TypeAlias = tuple[int, int]
+#: Cells of a grid, (N, 2): row and column of each.
+Cells: TypeAlias = npt.NDArray[np.int32]
+
+ENDS_TOGETHER = 16  # lines from an end to free cells that are looked at together, the shortest first
+
+
+class PlanStatus(enum.Enum):
+    """How planning ended. The value is the sentence shown to people."""
+
+    SOLVED = "found a path"
+    NO_PATH = "no path on this grid"
+    STOPPED = "stopped early"
+    INVALID = "gave a wrong plan"
+
+
+@dataclass(frozen=True)
+class Query:
+    """What a planner is asked: a grid with a start cell and a goal cell.
+
+    Attributes:
+        grid: the grid to plan on
+        start: the start cell (row, col)
+        goal: the goal cell (row, col)
+        task: the task whose world the grid was made from, for planners that are not bound to cells
+        unreachable: why the robot cannot get from the start to a free cell, or from one to the goal; empty if it can
+        motions: the motions of the movers, for planners in space and time
+        start_time: when the robot sets out, on the clock of the motions [s]
+
+    Raises:
+        ValueError: a cell lies outside the grid. A blocked cell is not an error: planners answer it with
+            `NO_PATH`.
+    """
+
+    grid: Grid
+    start: Cell
+    goal: Cell
+    task: Task | None = None
+    unreachable: str = ""
+    motions: tuple[MoverMotion, ...] = ()
+    start_time: float = 0.0
+
+    def __post_init__(self) -> None:
+        rows, cols = self.grid.shape
+        for key, (row, col) in (("start", self.start), ("goal", self.goal)):
+            if not (0 <= row < rows and 0 <= col < cols):
+                raise FieldError(key, f"cell ({row}, {col}) is outside the grid of {rows} rows and {cols} columns")
+
+    @classmethod
+    def between(cls, grid: Grid, task: Task) -> Query:
+        """The query for a task: each end becomes the nearest free cell that the robot reaches on a straight line.
+
+        If an end has no such cell, `unreachable` says so and planners answer `NO_PATH`.
+        """
+        from antdrive.worlds.geometry import point_clearance  # imports the compiler
+
+        own, room = point_clearance(task.world, [task.start[:2], task.goal]).tolist()
+        start, can_leave = _entrance(grid, task, task.start[:2], math.inf, own)
+        # If the goal is closer to an obstacle than the inflation, the robot stops at a free cell within the goal
+        # tolerance. It stops a little short of that cell's centre, or beside it, hence the allowance.
+        within = task.goal_tolerance - min(0.02, task.goal_tolerance / 2)
+        goal, can_arrive = _entrance(grid, task, task.goal, math.inf if room >= grid.inflate else within, room)
+        ends = {"the start": can_leave, "the goal": can_arrive}
+        unreachable = "; ".join(
+            f"no free cell near {end} can be reached from it" for end, usable in ends.items() if not usable
+        )
+        return cls(grid, start, goal, task, unreachable)
+
+    @property
+    def blocked_end(self) -> str | None:
+        """A sentence naming the end that cannot be used, or None if both can."""
+        if self.unreachable:
+            return self.unreachable
+        for key, cell in (("start", self.start), ("goal", self.goal)):
+            if not self.grid.free[cell]:
+                return f"the {key} cell ({cell[0]}, {cell[1]}) is blocked"
+        return None
+
+
+def _entrance(grid: Grid, task: Task, point: Point, within: float, own: float) -> tuple[Cell, bool]:
+    """The nearest free cell within `within` [m] whose centre a clear straight line joins to the point, and True.
+
+    If there is none, the cell that holds the point, and False. `own` is the point's clearance [m].
+    """
+    from antdrive.worlds.geometry import segment_clearance
+
+    row, col = grid.cell_at(*point)
+    if grid.free[row, col]:  # no centre is nearer than that of the cell around the point
+        centre = grid.xy([(row, col)])
+        off = np.abs(centre[0] - point)
+        if off.max() < 0.5 * grid.cell - 1e-9 and math.hypot(*off) <= within:
+            room = segment_clearance(task.world, centre, np.array([point], dtype=np.float64))
+            if room[0] >= min(grid.inflate, own) - 1e-9:
+                return (row, col), True
+    reach = cells_beside(grid.inflate, grid.cell)
+    low, left = max(0, row - reach), max(0, col - reach)
+    near = np.argwhere(grid.free[low : row + reach + 1, left : col + reach + 1]) + (low, left)
+    if not len(near):
+        return (row, col), False
+    centres = grid.xy(near)
+    distance = np.hypot(*(centres - point).T)
+    ends = np.broadcast_to(np.asarray(point, dtype=np.float64), centres.shape)
+    # A point may itself lie closer to a disc than the inflation; then the line must not come closer than the
+    # point.
+    needed = min(grid.inflate, own)
+    order = np.argsort(distance, kind="stable")
+    order = order[distance[order] <= within]
+    first, last = 0, 1  # most ends can be joined to the nearest one
+    while first < len(order):
+        some = order[first:last]
+        clear = segment_clearance(task.world, centres[some], ends[some]) >= needed - 1e-9
+        if clear.any():
+            at_row, at_col = near[some[clear.argmax()]].tolist()
+            return (at_row, at_col), True
+        first, last = last, last + ENDS_TOGETHER
+    return (row, col), False
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """What an iterative planner achieved in each of its I iterations; empty for a search. Infinite means no path.
+
+    Attributes:
+        best: length of the best path so far (I,) [m]
+        iteration_best: length of the iteration's best path (I,) [m]
+        iteration_mean: mean length of the iteration's paths that arrived (I,) [m]
+        arrived: how many ants or chromosomes arrived in the iteration (I,)
+    """
+
+    best: Floats = dataclasses.field(default_factory=lambda: np.empty(0))
+    iteration_best: Floats = dataclasses.field(default_factory=lambda: np.empty(0))
+    iteration_mean: Floats = dataclasses.field(default_factory=lambda: np.empty(0))
+    arrived: npt.NDArray[np.int64] = dataclasses.field(default_factory=lambda: np.empty(0, dtype=np.int64))
+
+    def __len__(self) -> int:
+        return len(self.best)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PlanResult:
+    """A planner's answer, in cells.
+
+    `cells` runs along allowed moves of the grid from start to goal. A planner that was interrupted returns
+    its best path so far, if it has one, with the status `STOPPED`; such a path is drawn, not driven. A
+    planner that is not bound to the grid's eight directions also returns `waypoints`.
+
+    Attributes:
+        status: how planning ended
+        cells: the path as (row, col) of each cell (N, 2), empty without a path
+        cost: length of `cells` [m], infinite without a path
+        waypoints: the polyline to drive as fractional (row, col) (M, 2); None if that is `cells`
+        length: exact length of the curve that `waypoints` approximates, arcs included [m]; None if that is
+            `cost`
+        reason: why there is no path, or a remark on the plan; may be empty
+        work: the planner's effort, such as the number of cells expanded, in units of `work_unit`
+        work_unit: what `work` counts
+        history: what each iteration achieved
+        field: the planner's field, such as pheromone or potential, at the end (R, C), for plots; None
+            without one
+        options: the planner's options by name
+        wall_s: planning time [s]
+    """
+
+    status: PlanStatus
+    cells: Cells = dataclasses.field(default_factory=lambda: np.empty((0, 2), dtype=np.int32))
+    cost: float = math.inf
+    waypoints: Floats | None = None
+    length: float | None = None
+    reason: str = ""
+    work: int = 0
+    work_unit: str = "cells expanded"
+    history: History = dataclasses.field(default_factory=History)
+    field: Floats | None = None
+    options: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    wall_s: float = 0.0
+
+    @property
+    def solved(self) -> bool:
+        """Whether there is a path to be driven."""
+        return self.status is PlanStatus.SOLVED
+
+    @property
+    def line_length(self) -> float:
+        """Length of the line to drive [m]: `length` if the planner set it, else `cost`."""
+        return self.cost if self.length is None else self.length
+
+    @property
+    def line(self) -> Floats:
+        """The polyline to drive as fractional (row, col) (M, 2): `waypoints` if there are any, else `cells`."""
+        return self.cells.astype(np.float64) if self.waypoints is None else self.waypoints
+
+    def _repr_html_(self) -> str:
+        from antdrive.worlds.drawing import card, curve_svg, path_svg
+
+        picture = (path_svg(self.line[:, ::-1]) if self.solved else "") + curve_svg(self.history.best)
+        facts = {
+            "length": f"{self.line_length:.3f} m",
+            "work": f"{self.work:,} {self.work_unit}",
+            "time": f"{1000 * self.wall_s:.1f} ms",
+        }
+        return card(picture, self.status.value + (f": {self.reason}" if self.reason else ""), facts)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Capabilities:
+    """What a planner can do and what it needs.
+
+    Attributes:
+        complete: it finds a path whenever there is one
+        iterative: it improves its answer in iterations, as an `IterativePlanner` does
+        needs_world: it plans among the world's discs, so the query must have a task
+        needs_motions: it plans in space and time among the query's motions, and solves it with a `TimedPlan`
+        own_replanner: it has a method `replanner(query, rng)`; planners without one plan anew after every
+            change
+        cell_by_cell: it has a method `agent(query, rng)` for driving; for planners without one, the robot
+            follows the route
+    """
+
+    complete: bool = True
+    iterative: bool = False
+    needs_world: bool = False
+    needs_motions: bool = False
+    own_replanner: bool = False
+    cell_by_cell: bool = False
+
+
+class PlannerError(RuntimeError):
+    """A planner raised something, or returned something that is not what was asked for; the message is one line.
+
+    Attributes:
+        planner: the planner's name
+        problem: what it did
+    """
+
+    def __init__(self, planner: str, problem: str) -> None:
+        super().__init__(str(input_error(f"planner {planner} {problem}")))
+        self.planner, self.problem = planner, problem
+
+    def __reduce__(self) -> tuple[type[PlannerError], tuple[str, str]]:
+        """Another process makes it anew from the two parts."""
+        return type(self), (self.planner, self.problem)
+
+
+@runtime_checkable
+class Planner(Protocol):
+    """Anything that answers a query. All randomness comes from `rng`: the same seed gives the same plan.
+
+    A planner that departs from the defaults of `Capabilities` declares so in an attribute `capabilities`.
+    """
+
+    def plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        """Find a path from the start cell to the goal cell."""
+        ...
+
+
+def capabilities_of(planner: Planner) -> Capabilities:
+    """What a planner declares; the defaults if it declares nothing, as other people's planners may.
+
+    Raises:
+        PlannerError: what it declares are no `Capabilities`.
+    """
+    declared: Any = getattr(planner, "capabilities", Capabilities())
+    if not isinstance(declared, Capabilities):
+        raise PlannerError(type(planner).__name__, f"declares {declared!r:.40} where Capabilities are due")
+    return declared
+
+
+@dataclass(frozen=True, kw_only=True)
+class GridPlanner(abc.ABC):
+    """A planner whose fields are its options.
+
+    It checks both ends and records the planning time, with the kernels loaded, and the options.
+    """
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """What this planner can do and what it needs."""
+        return Capabilities()
+
+    def plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        """Find a path from the start cell to the goal cell."""
+        with kernels_loaded(self, query):
+            started = time.perf_counter()
+            result = self._answer(query, rng)
+            spent = time.perf_counter() - started
+        options = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        return dataclasses.replace(result, options=options, wall_s=spent)
+
+    def rehearsal(self) -> GridPlanner:
+        """This planner with as little work as calls the same kernels, which are loaded so before the clock starts."""
+        return self
+
+    def _answer(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        blocked = query.blocked_end
+        return PlanResult(status=PlanStatus.NO_PATH, reason=blocked) if blocked else self._plan(query, rng)
+
+    @abc.abstractmethod
+    def _plan(self, query: Query, rng: np.random.Generator) -> PlanResult:
+        """Find a path between two free cells."""
+
+
+def path_cost(cells: npt.ArrayLike, cell: float) -> float:
+    """The length [m] of a path of cells (N, 2): a step costs 1 or sqrt(2) cell sides.
+
+    Args:
+        cells: (row, col) of each cell of the path
+        cell: side of a cell [m]
+    """
+    steps = np.abs(np.diff(np.asarray(cells), axis=0)).sum(axis=1)
+    diagonal = int((steps == 2).sum())
+    return cell * (len(steps) - diagonal + math.sqrt(2.0) * diagonal)

@@ -1,0 +1,267 @@
+"""All planners by name, with their options checked. Planners of other packages join through entry points."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import importlib.metadata
+import math
+import numbers
+import types
+import typing
+import warnings
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
+from typing import Any, Literal, Union
+
+from antdrive.base import FieldError, InputError
+from antdrive.planners.anyangle.ga_han import GaHan
+from antdrive.planners.anyangle.hybrid import Hybrid
+from antdrive.planners.anyangle.tangent import Tangent
+from antdrive.planners.colonies.catalog import ANT_PLANNERS
+from antdrive.planners.graph.apf import PotentialField
+from antdrive.planners.graph.dstar import DStar
+from antdrive.planners.graph.dstar_lite import DStarLite
+from antdrive.planners.graph.search import AStar, Dijkstra
+from antdrive.planners.graph.sipp import SafeIntervals
+from antdrive.planners.own_code import is_own, module_hash, own_object, own_version
+from antdrive.planners.plan import Planner
+
+#: The planners of this package.
+PLANNERS: Mapping[str, Planner] = MappingProxyType(
+    {
+        "dijkstra": Dijkstra(),
+        "astar": AStar(),
+        "dstar": DStar(),
+        "dstar-lite": DStarLite(),
+        "sipp": SafeIntervals(),
+        "apf": PotentialField(),
+        **ANT_PLANNERS,
+        "ga-han": GaHan(),
+        "hybrid": Hybrid(),
+        "tangent": Tangent(),
+    }
+)
+
+#: The entry-point group through which other packages add a planner: an object with `plan`, or a class of such objects.
+GROUP = "antdrive.planners"
+
+
+def load_planner(name: str, /, **options: Any) -> Planner:
+    """The planner of that name, with options set.
+
+    Args:
+        name: one of `list_planners()`, or FILE.py:CLASS or MODULE:CLASS for people's own code
+        options: the planner's options by name; values may be text, as from a command line
+
+    Raises:
+        InputError: there is no such planner or option, or the option does not take the value; lists what is
+            valid.
+    """
+    if is_own(name):
+        return make_planner(own_object(name), name, **options)
+    planner = PLANNERS.get(name)
+    if planner is None:
+        entry = _plugins().get(name)
+        if entry is None:
+            raise InputError(f"planner: {_unknown(name, [*PLANNERS, *_plugins()])}")
+        planner = _load(entry)
+    return _with_options(name, planner, options)
+
+
+def make_planner(made: Any, name: str, /, **options: Any) -> Planner:
+    """The planner that people's own code defines, with options set.
+
+    Raises:
+        InputError: it is no planner, its class cannot be called without arguments, or an option is wrong.
+    """
+    return _with_options(name, _instance(made, f"planner {name!r}"), options)
+
+
+def planner_version(name: str) -> str:
+    """What the code of a planner is: its distribution with version, and the hash of its file unless it is antdrive's.
+
+    Args:
+        name: what `load_planner` takes
+
+    Raises:
+        InputError: there is no such planner.
+    """
+    if is_own(name):
+        own_object(name)
+        return own_version(name)
+    if name in PLANNERS:
+        return f"antdrive {importlib.metadata.version('antdrive')}"
+    load_planner(name)
+    entry = _plugins()[name]
+    version = entry.dist.version if entry.dist is not None else "without version"
+    return f"{_maker(entry)} {version} {module_hash(entry.module)}".rstrip()
+
+
+def list_planners() -> Mapping[str, Planner]:
+    """All planners by name, those of other packages last.
+
+    A planner that cannot be loaded is left out with a warning.
+    """
+    found = dict(PLANNERS)
+    for name, entry in _plugins().items():
+        try:
+            found[name] = _load(entry)
+        except InputError as broken:
+            warnings.warn(str(broken), stacklevel=2)
+    return MappingProxyType(found)
+
+
+def describe(planner: Planner) -> str:
+    """One line on what a planner does, and which of its options differ from the defaults of its class."""
+    summary = (type(planner).__doc__ or "No description.").strip().splitlines()[0]
+    changed = [
+        f"{f.name} {getattr(planner, f.name)}"
+        for f in _fields(planner)
+        if f.default is not dataclasses.MISSING and getattr(planner, f.name) != f.default
+    ]
+    return f"{summary} With {', '.join(changed)}." if changed else summary
+
+
+def parse(key: str, kind: Any, value: Any) -> Any:
+    """The value of an option of a given type.
+
+    Raises:
+        InputError: the value, or the text for it, is not of that type.
+    """
+    origin, members = typing.get_origin(kind), typing.get_args(kind)
+    if origin in (Union, types.UnionType) and type(None) in members:
+        if value is None or (isinstance(value, str) and value.strip().lower() in ("none", "null", "")):
+            return None
+        inner = tuple(m for m in members if m is not type(None))
+        return parse(key, Union[inner], value)  # noqa: UP007 - the members are known only at run time
+    if origin is Literal:
+        for member in members:
+            if value == member or (isinstance(value, str) and value == str(member)):
+                return member
+        raise InputError(f"{key}: must be one of {', '.join(map(str, members))}; got {value!r}")
+    if kind in _READERS:
+        wanted, read = _READERS[kind]
+        try:
+            return read(value)
+        except (ValueError, KeyError, OverflowError):
+            raise InputError(f"{key}: must be {wanted}, got {value!r}") from None
+    if isinstance(value, str):
+        raise InputError(f"{key}: cannot be given as text; set it from Python")
+    return value
+
+
+def _whole(value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, str | numbers.Integral):
+        raise ValueError
+    return int(value)
+
+
+def _real(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, str | numbers.Real):
+        raise ValueError
+    number = float(value)
+    if not math.isfinite(number):
+        raise ValueError
+    return number
+
+
+def _truth(value: Any) -> bool:
+    if isinstance(value, bool):
+        return value
+    if not isinstance(value, str):
+        raise ValueError
+    return {
+        "true": True,
+        "yes": True,
+        "on": True,
+        "1": True,
+        "false": False,
+        "no": False,
+        "off": False,
+        "0": False,
+    }[value.strip().lower()]
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise ValueError
+    return value
+
+
+_READERS: Mapping[Any, tuple[str, typing.Callable[[Any], Any]]] = {
+    int: ("a whole number", _whole),
+    float: ("a finite number", _real),
+    bool: ("true or false", _truth),
+    str: ("text", _text),
+}
+
+
+def _with_options(name: str, planner: Planner, options: Mapping[str, Any]) -> Planner:
+    if not options:
+        return planner
+    known = {f.name for f in _fields(planner)}
+    hints = typing.get_type_hints(type(planner)) if known else {}
+    values: dict[str, Any] = {}
+    for key, value in options.items():
+        if key not in known:
+            raise InputError(f"planner.{key}: {_unknown(key, known, f'option of {name}')}")
+        values[key] = parse(f"planner.{key}", hints[key], value)
+    try:
+        return typing.cast(Planner, dataclasses.replace(typing.cast(Any, planner), **values))
+    except FieldError as error:
+        raise InputError(str(error.under("planner"))) from None
+    except ValueError as error:  # of another package's planner
+        raise InputError(f"planner: {error}") from None
+
+
+def _fields(planner: Planner) -> tuple[dataclasses.Field[Any], ...]:
+    kind = type(planner)
+    return tuple(f for f in dataclasses.fields(kind) if f.init) if dataclasses.is_dataclass(kind) else ()
+
+
+def _unknown(name: str, choices: Iterable[str], what: str = "planner") -> str:
+    choices = sorted(choices)
+    if not choices:
+        return f"no {what} is called {name!r}; there are none"
+    close = difflib.get_close_matches(name, choices, n=3)
+    hint = f"did you mean {' or '.join(close)}? " if close else ""
+    return f"no {what} is called {name!r}; {hint}choose from {', '.join(choices)}"
+
+
+def _plugins() -> dict[str, importlib.metadata.EntryPoint]:
+    found: dict[str, importlib.metadata.EntryPoint] = {}
+    for entry in importlib.metadata.entry_points(group=GROUP):
+        if entry.name in PLANNERS or (entry.name in found and found[entry.name].value != entry.value):
+            taken = "antdrive" if entry.name in PLANNERS else _maker(found[entry.name])
+            warnings.warn(
+                f"planner {entry.name!r} of {_maker(entry)} is left out: {taken} has one of that name",
+                stacklevel=3,
+            )
+            continue
+        found.setdefault(entry.name, entry)
+    return found
+
+
+def _load(entry: importlib.metadata.EntryPoint) -> Planner:
+    who = f"planner {entry.name!r} of {_maker(entry)}"
+    try:
+        made = entry.load()
+    except Exception as error:  # another package's import may raise anything
+        raise InputError(f"{who} cannot be loaded ({entry.value}): {type(error).__name__}: {error}") from error
+    return _instance(made, who, f" ({entry.value})")
+
+
+def _instance(made: Any, who: str, source: str = "") -> Planner:
+    """What other people's code defines, as a planner; `who` and `source` are for messages."""
+    try:
+        planner = made() if isinstance(made, type) else made
+    except Exception as error:  # another package's constructor may raise anything
+        raise InputError(f"{who} cannot be loaded{source}: {type(error).__name__}: {error}") from error
+    if not isinstance(planner, Planner):
+        raise InputError(f"{who} is not a planner{source}: it has no method `plan(query, rng)`")
+    return planner
+
+
+def _maker(entry: importlib.metadata.EntryPoint) -> str:
+    return entry.dist.name if entry.dist is not None else "an unnamed distribution"

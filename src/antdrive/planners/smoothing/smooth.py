@@ -1,0 +1,306 @@
+"""From a plan to a route: pulled taut in the plan's own corridor, and moved away from discs where there is room.
+
+The shortest line among discs that is homotopic to a given one consists of tangents and of arcs along the
+discs. It is found by carrying the end of a string along the given line, as the funnel algorithm does in a
+sleeve of triangles (Lee & Preparata, *Euclidean shortest paths in the presence of rectilinear barriers*,
+Networks 14, 1984; for homotopy among obstacles Hershberger & Snoeyink, *Computing minimum length paths of a
+given homotopy class*, Comput. Geom. 4, 1994). Here the string bends around the discs themselves, so no triangles are
+needed: between two events the string's last link turns about one disc, and the next event is the first of its
+tangents to come. Walls are left out, as leaving a convex room never makes a line shorter.
+
+A line with more clearance is the taut line among discs that have grown: each by up to a preferred clearance,
+and in a gap by no more than its share of the gap.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.base import Bounds, Floats
+from antdrive.base.errors import FieldError
+from antdrive.base.plane import polyline_length
+from antdrive.planners.anyangle.tangent import Arc, Line, TangentPath
+from antdrive.planners.plan import PlanResult
+from antdrive.planners.smoothing.cells import route_along
+from antdrive.worlds import Route, Task, World, segment_clearance
+
+if TYPE_CHECKING:  # importing a grid loads the compiler
+    from antdrive.worlds import Grid
+
+#: The kinds of smoothing: the plan's own line, that line pulled taut, or taut with more clearance where there is room.
+SMOOTHINGS: tuple[str, ...] = ("none", "taut", "clearance")
+
+#: What may be wrong with a smoothed line, by the numbers of the kernel `fault`.
+FAULTS: tuple[str, ...] = (
+    "",
+    "the smoothed line would be longer than the plan's",
+    "the smoothed line would come closer than the clearance",
+    "the smoothed line would pass an obstacle on its other side",
+)
+
+SLACK = 1e-9  # how much too close or too long a line may be, by rounding [m]
+SHRINK = 2e-9  # strings are first pulled among discs that are smaller by this, which the plan's line surely clears [m]
+
+
+def smooth(
+    plan: PlanResult,
+    grid: Grid,
+    task: Task,
+    *,
+    kind: str = "taut",
+    clearance: float = 0.2,
+    stretch: float = 0.03,
+    bulge: float = 5e-4,
+) -> Route:
+    """The route for a plan.
+
+    A smoothed route keeps the grid's clearance exactly, passes every disc on the same side as the plan's
+    line, and is never longer than that line or than the plan's cells. Parts that cannot be smoothed this way
+    stay as planned, and the route's note says why. Where the plan's line itself comes closer than the grid's
+    clearance, for example at a start close to a disc, the line is kept.
+
+    Args:
+        plan: a plan with a path
+        grid: the grid that it was made on
+        task: the task that the grid was made from
+        kind: `none` for the plan's own line, `taut` for that line pulled taut, `clearance` for a taut line
+            that keeps more distance from discs where there is room
+        clearance: how much more than the grid's clearance the kind `clearance` keeps at most [m]
+        stretch: how much longer than the taut line the kind `clearance` may be, as a fraction of its length
+        bulge: how far the corners of the route's polyline may stand off an arc [m]
+
+    Raises:
+        ValueError: the plan has no path, the kind is unknown, or a setting is out of range.
+    """
+    if kind not in SMOOTHINGS:
+        raise FieldError("kind", f"unknown smoothing {kind!r}; choose from {', '.join(SMOOTHINGS)}")
+    for key, value in (("clearance", clearance), ("stretch", stretch)):
+        if not (math.isfinite(value) and value >= 0):
+            raise FieldError(key, f"must be at least 0, got {value:g}")
+    if not (math.isfinite(bulge) and bulge > 0):
+        raise FieldError("bulge", f"must be greater than 0, got {bulge:g}")
+    line = route_along(plan, grid, task)
+    if kind == "none":
+        return line
+    world, inflate = task.world, grid.inflate
+    spare = max(0.0, plan.cost - line.length) if math.isfinite(plan.cost) else 0.0
+    extra = clearance if kind == "clearance" else 0.0
+    xy, curvature, kinds, notes = [line.xy[:1]], [np.zeros(1)], [], []
+    for run, clear in _runs(line.xy, world, inflate):
+        piece = Piece(run, np.zeros(len(run)))
+        if clear:
+            piece = _smoothed(run, world, inflate, extra, stretch, spare, bulge)
+            spare -= max(0.0, polyline_length(piece.xy) - polyline_length(run))
+            kinds.append(piece.kind)
+        elif len(run) > 2 or not (run[0] == line.xy[0]).all():
+            piece = replace(piece, note="the plan's line comes closer than the clearance and is kept there")
+        if piece.note:
+            notes.append(piece.note)
+        curvature[-1] = np.append(curvature[-1][:-1], piece.curvature[0])
+        xy.append(piece.xy[1:])
+        curvature.append(piece.curvature[1:])
+    made = min(kinds, key=SMOOTHINGS.index, default="none")
+    return Route(np.vstack(xy), np.concatenate(curvature), made, "; ".join(dict.fromkeys(notes)))
+
+
+def pull_taut(xy: npt.ArrayLike, discs: npt.ArrayLike, bounds: Bounds, inflate: float) -> TangentPath | None:
+    """The shortest path that keeps a distance from all discs and passes each on the same side as a polyline does.
+
+    Args:
+        xy: the polyline (M, 2) [m]
+        discs: the discs (N, 3) as x, y, radius [m]
+        bounds: the walls as xmin, ymin, xmax, ymax [m]
+        inflate: the distance to keep [m]
+
+    Returns:
+        The path, or None if the polyline itself does not keep the distance.
+    """
+    line = np.ascontiguousarray(xy, dtype=np.float64).reshape(-1, 2)
+    built = np.ascontiguousarray(discs, dtype=np.float64).reshape(-1, 3)
+    if not _clears(line, built, bounds, inflate):
+        return None
+    string = _pulled(line, built, inflate)
+    return None if string is None else string.path
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A part of a route.
+
+    Attributes:
+        xy: its points (N, 2) [m]
+        curvature: curvature from each point on (N,) [1/m]
+        kind: its kind of smoothing
+        note: why it is not smoothed as asked; empty if it is
+    """
+
+    xy: Floats
+    curvature: Floats
+    kind: str = "none"
+    note: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class TautString:
+    """A taut string with K contacts, where it bends around discs, and K + 1 straight links.
+
+    Attributes:
+        disc: index of the disc that it bends around at each contact (K,)
+        turn: 1 where it bends to the left, -1 to the right (K,)
+        sweep: by how much it bends (K,) [rad]
+        links: ends of each link as x, y from and x, y to (K + 1, 4) [m]
+        discs: the discs that it bends around, with the radii of its arcs (N, 3) [m]
+    """
+
+    disc: npt.NDArray[np.int64]
+    turn: Floats
+    sweep: Floats
+    links: Floats
+    discs: Floats
+
+    @property
+    def length(self) -> float:
+        """Its length [m]."""
+        from antdrive.planners.smoothing import _kernels_smooth as kernels
+
+        return float(kernels.string_length(self.compiled))
+
+    @property
+    def path(self) -> TangentPath:
+        """Its lines and arcs."""
+        pieces: list[Line | Arc] = []
+        for i, (ax, ay, bx, by) in enumerate(self.links.tolist()):
+            if (ax, ay) != (bx, by):
+                pieces.append(Line((ax, ay), (bx, by)))
+            if i < len(self.disc) and self.sweep[i] > SLACK:
+                x, y, radius = self.discs[self.disc[i]].tolist()
+                begin, sweep = math.atan2(by - y, bx - x), float(self.turn[i] * self.sweep[i])
+                pieces.append(Arc((x, y), radius, begin, sweep))
+        return TangentPath(tuple(pieces))
+
+    def clearance(self, world: World) -> float:
+        """The exact distance to the nearest disc surface or wall [m]."""
+        from antdrive.planners.smoothing import _kernels_smooth as kernels
+
+        box = np.asarray(world.bounds, dtype=np.float64)
+        return float(kernels.string_clearance(self.compiled, world.discs, box))
+
+    def drawn(self, world: World, inflate: float, bulge: float) -> tuple[Floats, Floats]:
+        """A polyline (M, 2) [m] whose corners stand off the arcs by at most `bulge`, and its curvature (M,)."""
+        from antdrive.planners.smoothing import _kernels_smooth as kernels
+
+        box = np.asarray(world.bounds, dtype=np.float64)
+        xy, curvature = kernels.string_points(self.compiled, world.discs, box, inflate, bulge)
+        return xy, curvature
+
+    @property
+    def compiled(self) -> Any:
+        """The record that kernels take."""
+        from antdrive.planners.smoothing import _kernels_smooth as kernels
+
+        return kernels.String(kernels.Contacts(self.disc, self.turn, self.sweep), self.links, self.discs)
+
+
+def _runs(xy: Floats, world: World, inflate: float) -> Iterator[tuple[Floats, bool]]:
+    """The polyline cut where it begins or ceases to keep the clearance; with each part, whether it does."""
+    clear = segment_clearance(world, xy[:-1], xy[1:]) >= inflate - 1.01 * SLACK  # joined lines just have the clearance
+    cuts = [0, *(np.flatnonzero(clear[1:] != clear[:-1]) + 1).tolist(), len(clear)]
+    for first, last in itertools.pairwise(cuts):
+        yield np.ascontiguousarray(xy[first : last + 1]), bool(clear[first])
+
+
+def _clears(xy: Floats, discs: Floats, bounds: Bounds, inflate: float) -> bool:
+    from antdrive.worlds import _kernels
+
+    room = np.empty(len(xy) - 1)
+    box = np.asarray(bounds, dtype=np.float64)
+    _kernels.segment_clearances(np.ascontiguousarray(xy[:-1]), np.ascontiguousarray(xy[1:]), discs, box, room)
+    return bool((room >= inflate - SLACK).all())
+
+
+def _smoothed(
+    line: Floats, world: World, inflate: float, extra: float, stretch: float, spare: float, bulge: float
+) -> Piece:
+    """A clear polyline, smoothed as far as the checks allow."""
+    own = polyline_length(line)
+    taut = _pulled(line, world.discs, inflate)
+    if taut is None:
+        return Piece(line, np.zeros(len(line)), note="the line could not be pulled taut")
+    note = ""
+    for fine in (bulge, bulge / 100.0):  # a plan whose arcs are drawn finer than ours may be shorter
+        drawn = taut.drawn(world, inflate, fine)
+        note = _fault(taut, drawn[0], line, world, inflate, own)
+        if not note:
+            break
+    if note:
+        return Piece(line, np.zeros(len(line)), note=note)
+    piece = Piece(*drawn, "taut")
+    if not extra:
+        return piece
+    found = _with_clearance(
+        taut, piece.xy, world, inflate, extra, min(taut.length * (1.0 + stretch), own + spare), bulge
+    )
+    return replace(piece, note="no room or length to spare for more clearance") if found is None else found
+
+
+def _pulled(line: Floats, discs: Floats, inflate: float) -> TautString | None:
+    """The taut string that passes all discs as a clear polyline does; None if it was not found."""
+    from antdrive.planners.smoothing import _kernels_smooth as kernels
+
+    grown = discs[kernels.outermost(discs)]
+    grown[:, 2] += inflate - SHRINK
+    found, disc, turn, sweep = kernels.pull(line, grown)
+    if not found:
+        return None
+    ends = np.ascontiguousarray(line[[0, -1]])
+    for more in (SHRINK, SHRINK * 0.6):  # if rounding closes a gap, there is no string among discs of exact radius
+        exact = grown.copy()
+        exact[:, 2] += more
+        string = _settled(disc, turn, sweep, exact, ends)
+        if string is not None:
+            return string
+    return None
+
+
+def _settled(
+    disc: npt.NDArray[np.int64], turn: Floats, sweep: Floats, discs: Floats, ends: Floats
+) -> TautString | None:
+    from antdrive.planners.smoothing import _kernels_smooth as kernels
+
+    found, disc, turn, sweep, links = kernels.settle(kernels.Contacts(disc, turn, sweep), discs, ends)
+    return TautString(disc, turn, sweep, links, discs) if found else None
+
+
+def _fault(string: TautString, xy: Floats, line: Floats, world: World, inflate: float, longest: float) -> str:
+    """The reason why a smoothed line cannot be used; empty if it can."""
+    from antdrive.planners.smoothing import _kernels_smooth as kernels
+
+    box = np.asarray(world.bounds, dtype=np.float64)
+    return FAULTS[kernels.fault(string.compiled, xy, line, world.discs, box, inflate - SLACK, longest + SLACK)]
+
+
+def _with_clearance(
+    taut: TautString, xy: Floats, world: World, inflate: float, extra: float, longest: float, bulge: float
+) -> Piece | None:
+    """The line with the most clearance that is no longer than `longest`; None if there is no room or length for more."""
+    from antdrive.planners.smoothing import _kernels_smooth as kernels
+
+    near = np.flatnonzero(kernels.near_polyline(xy, taut.discs, 2.0 * extra))
+    discs = np.ascontiguousarray(taut.discs[near])
+    contacts = kernels.Contacts(np.searchsorted(near, taut.disc), taut.turn, taut.sweep)
+    xmin, ymin, xmax, ymax = world.bounds
+    box = np.array([xmin + inflate, ymin + inflate, xmax - inflate, ymax - inflate])
+    room = np.empty(len(discs))
+    kernels.room_to_grow(xy, discs, box, np.ascontiguousarray(xy[[0, -1]]), extra, room)
+    found, wide, curvature = kernels.widest(
+        contacts, discs, room, extra, xy, world.discs, np.asarray(world.bounds, dtype=np.float64), inflate, SLACK,
+        longest + SLACK, bulge,
+    )  # fmt: skip
+    return Piece(wide, curvature, "clearance") if found else None

@@ -1,0 +1,246 @@
+"""Local avoidance of movers: slow down, stop, back off or go around them, then resume the route.
+
+In every control period the controller's own motion is simulated ahead among the predicted movers. If it keeps
+the preferred clearance, it is taken unchanged. Otherwise it competes with other candidates: the same route at
+lower speeds, and pairs of constant twists, forwards and backwards, one after the other, within the robot's
+dynamic window (after D. Fox, W. Burgard and S. Thrun, *The dynamic window approach to collision avoidance*,
+IEEE Robotics & Automation Magazine 4, 1997). Every candidate must keep clear of static obstacles. Standing
+still is simulated like any other candidate, so the robot moves out of the way of a mover that approaches it.
+
+A mover that turns close by may leave no candidate with the least clearance. While the robot can still stop in time,
+it takes the candidate whose contact comes last. After that it takes the one that stays farthest from movers, and
+stops only if each would touch one (T. Fraichard and H. Asama, *Inevitable collision states*, Advanced Robotics 18,
+2004, judge a state by its best escape in the same way).
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from antdrive.base import Floats, Pose
+from antdrive.base.errors import FieldError
+from antdrive.robots.control import _kernels_avoidance as kernels
+from antdrive.robots.control._kernels_pursuit import reachable_twist
+from antdrive.robots.control.pursuit import PursuitState, TrackedPath, Twist
+from antdrive.robots.spec import Footprint, RobotSpec
+
+SPEED_WEIGHT = 0.3  # progress that 1 m/s of final speed along the route is worth [m per m/s]
+PERSISTENCE = 0.05  # progress that keeping to the last decision is worth [m]
+
+
+class AvoidanceState(NamedTuple):
+    """What avoidance remembers between two control periods.
+
+    Attributes:
+        candidate: the pair of twists that is being executed, a row of the table of candidates; empty if there
+            is none
+        remaining: how long its first twist still lasts [s]
+    """
+
+    candidate: tuple[float, ...] = ()
+    remaining: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Avoidance:
+    """The settings of local avoidance. A weight is the progress along the route that a shortcoming costs.
+
+    Attributes:
+        horizon: how far ahead movers are predicted [s]
+        step: time between two predicted instants [s]
+        min_clearance: the least clearance to movers; one that is closer already may come only a little closer [m]
+        preferred_clearance: clearance beyond the least from which more makes no difference [m]
+        clearance_weight: progress that each metre short of the preferred clearance costs [m/m]
+        cross_track_weight: progress that each metre off the route costs [m/m]
+        heading_weight: progress that each radian off the route's direction costs [m/rad]
+        reversal_time: how far ahead a sudden reversal of a mover is considered [s]
+        reversal_margin: clearance, beyond `min_clearance`, to keep from where a mover that reverses would be [m]
+        reversal_weight: progress that each metre of this clearance that is missing costs [m/m]; 0 ignores reversals
+
+    Raises:
+        ValueError: a setting is out of range.
+    """
+
+    horizon: float = 2.5
+    step: float = 0.1
+    min_clearance: float = 0.1
+    preferred_clearance: float = 0.4
+    clearance_weight: float = 1.5
+    cross_track_weight: float = 0.6
+    heading_weight: float = 0.3
+    reversal_time: float = 0.6
+    reversal_margin: float = 0.05
+    reversal_weight: float = 6.0
+
+    def __post_init__(self) -> None:
+        for key in ("horizon", "step"):
+            if not 0 < getattr(self, key) <= 60:
+                raise FieldError(key, f"must be greater than 0 and at most 60, got {getattr(self, key):g}")
+        for key in _NOT_NEGATIVE:
+            if not 0 <= getattr(self, key) < math.inf:
+                raise FieldError(key, f"must be at least 0, got {getattr(self, key):g}")
+
+    @property
+    def prediction_times(self) -> Floats:
+        """The times from now (K + 1,) for which `avoid` needs the movers' places [s]."""
+        return _instants(self.horizon, self.step)
+
+    def avoid(
+        self,
+        tracked: TrackedPath,
+        robot: RobotSpec,
+        pose: Pose,
+        last: Twist,
+        before: PursuitState,
+        wanted: Twist,
+        state: AvoidanceState,
+        places: Floats,
+        radii: Floats,
+        speed_limit: float = math.inf,
+        backwards: float = math.inf,
+    ) -> tuple[Twist, bool, AvoidanceState]:
+        """The next command, whether avoidance changed it, and the state for the next period.
+
+        Args:
+            tracked: the path that the controller follows
+            robot: the robot
+            pose: its estimated pose
+            last: the command of the last period
+            before: the controller's state before it chose `wanted`
+            wanted: the controller's command for this period
+            state: what this method returned in the last period
+            places: the movers' predicted places at the `prediction_times` (K + 1, M, 2) [m]
+            radii: their radii (M,) [m]
+            speed_limit: the speed that the schedule of a timed plan allows [m/s]
+            backwards: the highest speed backwards, as long as no mover is met at it, for a robot that does not see what
+                is behind it [m/s]
+        """
+        candidates = self._candidates(robot, state, speed_limit, backwards)
+        situation = (
+            *pose, *last, before.arc, before.turning, candidates, tracked.samples, tracked.obstacles,
+            tracked.limits, tracked.tuning._replace(period=self.step),
+            _weights(self, tracked.tuning.robot_radius, robot.footprint), places, radii,
+        )  # fmt: skip
+        chosen, contact = kernels.choose(*situation)
+        if chosen == 0 and contact == math.inf:
+            return wanted, False, AvoidanceState()
+        if contact < math.inf and backwards < robot.max_speed:
+            return self.avoid(tracked, robot, pose, last, before, wanted, state, places, radii, speed_limit)
+        stopping = abs(last.speed) / tracked.limits.acceleration
+        if contact < max(stopping, self._too_late(tracked, pose, places[0], radii)):
+            chosen = kernels.best_escape(*situation)
+        twist, state = _carried_out(candidates[chosen] if chosen >= 0 else None, wanted, last, tracked)
+        return twist, True, state
+
+    def _too_late(self, tracked: TrackedPath, pose: Pose, places: Floats, radii: Floats) -> float:
+        """A contact sooner than this counts as unavoidable [s]: 0 unless a mover is within the least clearance."""
+        away = np.hypot(*(places - pose[:2]).T) - radii
+        close = away.min(initial=math.inf) < tracked.tuning.robot_radius + self.min_clearance
+        return 2 * self.step if close else 0.0
+
+    def _candidates(
+        self, robot: RobotSpec, state: AvoidanceState, speed_limit: float, backwards: float = math.inf
+    ) -> Floats:
+        """The robot's candidates (N, 6): row 0 keeps the speed limit, row 1 is the last decision."""
+        table = _candidate_table(robot.max_speed, robot.max_yaw_rate, robot.max_lateral_acceleration)
+        if backwards < robot.max_speed:
+            slowest = table[:, [kernels.SPEED, kernels.NEXT_SPEED]].min(axis=1)
+            table = table[slowest >= -backwards - 1e-9]
+        if not state.candidate and speed_limit >= robot.max_speed:
+            return table
+        table = table.copy()
+        table[0, kernels.SPEED] = min(robot.max_speed, speed_limit)
+        if state.candidate:
+            table[1] = state.candidate
+            table[1, kernels.DURATION] = state.remaining
+        return table
+
+
+def _carried_out(
+    candidate: Floats | None, wanted: Twist, last: Twist, tracked: TrackedPath
+) -> tuple[Twist, AvoidanceState]:
+    """The command that carries a candidate out, and what avoidance remembers of it; None: nothing avoids a contact."""
+    limits, period = tracked.limits, tracked.tuning.period
+    if candidate is None:
+        # The robot stops: a contact while standing is attributed to the mover.
+        speed, yaw_rate, state = 0.0, 0.0, AvoidanceState()
+    elif candidate[kernels.KIND] == kernels.FOLLOW_ROUTE:
+        slowest = last.speed - limits.acceleration * period
+        speed = min(wanted.speed, max(float(candidate[kernels.SPEED]), slowest))
+        yaw_rate = wanted.yaw_rate * (speed / wanted.speed if wanted.speed > 0 else 1.0)
+        return Twist(speed, yaw_rate), AvoidanceState()
+    else:
+        first = candidate[kernels.DURATION] > 1e-9
+        speed = float(candidate[kernels.SPEED if first else kernels.NEXT_SPEED])
+        yaw_rate = float(candidate[kernels.YAW_RATE if first else kernels.NEXT_YAW_RATE])
+        remaining = max(0.0, float(candidate[kernels.DURATION]) - period)
+        state = AvoidanceState(tuple(candidate.tolist()), remaining)
+    return Twist(*reachable_twist(speed, yaw_rate, *last, period, limits)), state
+
+
+_NOT_NEGATIVE = (
+    "min_clearance",
+    "preferred_clearance",
+    "clearance_weight",
+    "cross_track_weight",
+    "heading_weight",
+    "reversal_time",
+    "reversal_margin",
+    "reversal_weight",
+)
+
+
+@functools.cache
+def _candidate_table(max_speed: float, max_yaw_rate: float, lateral_acceleration: float) -> Floats:
+    """What a robot chooses from (N, 6): the controller's motion at full and at lower speeds, and pairs of twists.
+
+    Row 1 repeats row 0, and is where the last decision goes. The second twist of a pair drives straight or stands.
+    """
+    shares = (1.0, 1.0, 0.7, 0.45, 0.2)
+    rows = [(kernels.FOLLOW_ROUTE, share * max_speed, 0.0, 0.0, 0.0, 0.0) for share in shares]
+    rows.append((kernels.TWO_TWISTS, 0.0, 0.0, 0.0, 0.0, 0.0))
+    for speed in (1.0, 0.6, 0.3, 0.0, -0.3, -0.6, -1.0):
+        v = speed * max_speed
+        most = min(max_yaw_rate, lateral_acceleration / abs(v)) if v else max_yaw_rate
+        for turn in (0.0, 0.25, -0.25, 0.6, -0.6, 1.0, -1.0):
+            w = turn * most
+            if not (v or w):
+                continue
+            rows.append((kernels.TWO_TWISTS, v, w, math.inf, 0.0, 0.0))
+            for duration in (0.4, 0.9):
+                rows.append((kernels.TWO_TWISTS, v, w, duration, 0.0, 0.0))
+                ahead = (v,) if v else (max_speed, -max_speed)
+                rows += [(kernels.TWO_TWISTS, v, w, duration, next_speed, 0.0) for next_speed in ahead if w]
+    return np.array(rows)
+
+
+@functools.lru_cache(maxsize=64)
+def _instants(horizon: float, step: float) -> Floats:
+    """The times of a prediction (K + 1,) [s], read-only."""
+    times = np.arange(math.ceil(horizon / step - 1e-9) + 1) * np.float64(step)
+    times.flags.writeable = False
+    return times
+
+
+@functools.lru_cache(maxsize=64)
+def _weights(avoidance: Avoidance, radius: float, footprint: Footprint) -> kernels.AvoidanceWeights:
+    """The settings as they apply to a robot of a circumscribed radius [m]."""
+    return kernels.AvoidanceWeights(
+        step=avoidance.step,
+        min_distance=radius + avoidance.min_clearance,
+        preferred_clearance=avoidance.preferred_clearance,
+        clearance_weight=avoidance.clearance_weight,
+        cross_track_weight=avoidance.cross_track_weight,
+        heading_weight=avoidance.heading_weight,
+        speed_weight=SPEED_WEIGHT,
+        persistence=PERSISTENCE,
+        reversal_time=avoidance.reversal_time,
+        reversal_distance=radius + avoidance.min_clearance + avoidance.reversal_margin,
+        reversal_weight=avoidance.reversal_weight,
+        narrowest=footprint.inner_radius,
+    )

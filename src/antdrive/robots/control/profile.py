@@ -1,0 +1,187 @@
+"""How fast a robot may drive along a route: a forward and a backward pass under the robot's limits.
+
+On a fixed path, the fastest speeds follow from a limit at each place: a forward pass lowers them to what
+accelerating can reach, and a backward pass to what braking can still obey (Bobrow, Dubowsky & Gibson,
+*Time-optimal control of robotic manipulators along specified paths*, IJRR 4, 1985; in this form Lipp & Boyd,
+*Minimum-time speed optimisation over a fixed path*, Int. J. Control 87, 2014). Here the yaw acceleration is
+checked with the speed at the slower end of each step, so the result is the fastest up to the length of a
+step.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from antdrive.base import Floats
+from antdrive.base.errors import FieldError
+from antdrive.robots.spec import RobotSpec
+from antdrive.worlds import Route
+
+
+@dataclass(frozen=True, eq=False)
+class SpeedProfile:
+    """The speeds along a route and when each place is reached; places where the robot rotates come twice.
+
+    Attributes:
+        arc: length along the route, from 0 (S,) [m]
+        speed: speed, 0 at both ends (S,) [m/s]
+        time: when the place is reached, from 0 (S,) [s]
+        curvature: curvature of the path that is driven, with its corners rounded (S,) [1/m]
+        heading: heading on that path, rotations in place included; it never jumps by a full turn (S,) [rad]
+        limit: the speed that must not be exceeded, however the robot came to drive at it (S,) [m/s]
+    """
+
+    arc: Floats
+    speed: Floats
+    time: Floats
+    curvature: Floats
+    heading: Floats
+    limit: Floats
+
+    @property
+    def duration(self) -> float:
+        """How long the whole route takes [s]."""
+        return float(self.time[-1])
+
+    @property
+    def yaw_rate(self) -> Floats:
+        """Yaw rate (S,) [rad/s]."""
+        return self.speed * self.curvature
+
+
+def speed_profile(
+    route: Route,
+    robot: RobotSpec,
+    *,
+    blend: float = 0.2,
+    rotate_in_place_above: float = 1.0,
+    braking: float = 1.0,
+    step: float = 0.02,
+) -> SpeedProfile:
+    """The fastest speeds along a route, from standing to standing, within all limits of the robot.
+
+    Args:
+        route: the route
+        robot: its limits are those of speed, acceleration, lateral acceleration, yaw rate, yaw acceleration
+            and wheels
+        blend: the route's curvature is averaged over this distance on both sides, with weights that fall
+            linearly: no robot follows a corner or a jump in curvature at speed [m]
+        rotate_in_place_above: at corners of at least this angle, the robot stops and rotates in place [rad]
+        braking: share of the robot's deceleration that braking may use
+        step: longest distance between two samples [m]
+
+    Raises:
+        ValueError: a setting is out of range.
+    """
+    for key, value in (("blend", blend), ("rotate_in_place_above", rotate_in_place_above), ("step", step)):
+        if not (math.isfinite(value) and value > 0):
+            raise FieldError(key, f"must be greater than 0, got {value:g}")
+    if not 0 < braking <= 1:
+        raise FieldError("braking", f"must be greater than 0 and at most 1, got {braking:g}")
+
+    places, headings, stops, turns = _headings(route, rotate_in_place_above)
+    legs: list[tuple[Floats, ...]] = []
+    now, turned = 0.0, 0.0
+    for first, last, turn in zip([0.0, *stops], [*stops, route.length], [0.0, *turns], strict=True):
+        now += turning_time(turn, robot)
+        turned += turn
+        arc = np.linspace(first, last, max(3, math.ceil((last - first) / step) + 1))
+        heading, curvature, change = _blended(arc, places, headings, blend)
+        speed, limit = _speeds(arc, curvature, change, robot, braking)
+        time = now + np.concatenate(([0.0], np.cumsum(2.0 * np.diff(arc) / (speed[1:] + speed[:-1]))))
+        now = float(time[-1])
+        legs.append((arc, speed, time, curvature, heading + turned, limit))
+    return SpeedProfile(*(np.concatenate(parts) for parts in zip(*legs, strict=True)))
+
+
+def _speeds(arc: Floats, curvature: Floats, change: Floats, robot: RobotSpec, braking: float) -> tuple[Floats, Floats]:
+    """Speed and limit along a leg that begins and ends standing; the limit may begin at any speed."""
+    from antdrive.robots.control import _kernels_profile
+
+    limit = np.empty(len(arc))
+    _kernels_profile.limit_speed(
+        curvature,
+        change,
+        robot.max_speed,
+        robot.max_lateral_acceleration,
+        robot.max_yaw_rate,
+        robot.max_yaw_acceleration,
+        robot.track / 2,
+        robot.max_wheel_speed * robot.wheel_radius,
+        limit,
+    )
+    limit[-1] = 0.0
+    acceleration, yaw_acceleration = robot.max_acceleration, robot.max_yaw_acceleration
+    _kernels_profile.limit_braking(arc, curvature, change, braking * acceleration, yaw_acceleration, limit)
+    speed = limit.copy()
+    speed[0] = 0.0
+    _kernels_profile.limit_acceleration(arc, curvature, change, acceleration, yaw_acceleration, speed)
+    return speed, limit
+
+
+def turning_time(angle: float, robot: RobotSpec) -> float:
+    """How long the robot takes to rotate in place by an angle [rad], from standing to standing [s]."""
+    fastest = min(robot.max_yaw_rate, 2 * robot.max_wheel_speed * robot.wheel_radius / robot.track)
+    spin_up = fastest / robot.max_yaw_acceleration
+    if abs(angle) >= fastest * spin_up:
+        return abs(angle) / fastest + spin_up
+    return 2.0 * math.sqrt(abs(angle) / robot.max_yaw_acceleration)
+
+
+def _headings(route: Route, rotate_in_place_above: float) -> tuple[Floats, Floats, list[float], list[float]]:
+    """The heading along the route, piecewise linear, and where the robot rotates in place, by how much.
+
+    The function is given by places [m] and the headings there [rad]. On an arc the heading grows linearly; at
+    a corner a place comes twice. Rotations in place are left out of it.
+    """
+    steps = np.diff(route.xy, axis=0)
+    heading = np.arctan2(steps[:, 1], steps[:, 0])
+    turn = np.diff(heading)
+    turn -= 2 * np.pi * np.round(turn / (2 * np.pi))
+    heading = heading[0] + np.concatenate(([0.0], np.cumsum(turn)))
+    at_start, at_end = heading.copy(), heading.copy()  # of each segment
+    corner = np.ones(len(turn), dtype=np.bool_)
+    if route.curvature is not None:
+        bend = route.curvature[:-1]
+        corner = (bend[:-1] != bend[1:]) | (bend[1:] == 0.0)  # the other points are vertices of a drawn arc
+        middle = (heading[1:] + heading[:-1]) / 2
+        at_start[1:][~corner] = at_end[:-1][~corner] = middle[~corner]
+    arc = route.arc
+    sharp = corner & (np.abs(turn) >= rotate_in_place_above)
+    rotated = np.concatenate(([0.0], np.cumsum(np.where(sharp, turn, 0.0))))
+    places = np.stack((arc[:-1], arc[1:]), axis=1).ravel()
+    headings = np.stack((at_start - rotated, at_end - rotated), axis=1).ravel()
+    return places, headings, arc[1:-1][sharp].tolist(), turn[sharp].tolist()
+
+
+def _blended(s: Floats, places: Floats, headings: Floats, blend: float) -> tuple[Floats, Floats, Floats]:
+    """Heading, curvature and its growth per metre at arc lengths s, averaged over `blend` on both sides.
+
+    The weights are a triangle. The heading is piecewise linear, so its average and the average's derivatives
+    are exact second differences of its first and second integrals.
+    """
+    widths = np.diff(places)
+    slopes = np.diff(headings) / np.where(widths > 0, widths, 1.0)
+    integral = np.concatenate(([0.0], np.cumsum(widths * (headings[1:] + headings[:-1]) / 2)))
+    growth = integral[:-1] * widths + headings[:-1] * widths**2 / 2 + slopes * widths**3 / 6
+    second_integral = np.concatenate(([0.0], np.cumsum(growth)))
+
+    def at(t: Floats) -> tuple[Floats, Floats, Floats]:
+        """Heading, integral and second integral at t; beyond the ends the heading is constant."""
+        inside = np.clip(t, places[0], places[-1])
+        i = np.clip(np.searchsorted(places, inside, side="right") - 1, 0, len(slopes) - 1)
+        d = inside - places[i]
+        heading = headings[i] + slopes[i] * d
+        first = integral[i] + headings[i] * d + slopes[i] * d**2 / 2
+        second = second_integral[i] + integral[i] * d + headings[i] * d**2 / 2 + slopes[i] * d**3 / 6
+        beyond = t - inside
+        return heading, first + heading * beyond, second + first * beyond + heading * beyond**2 / 2
+
+    change, curvature, heading = (
+        (after - 2 * here + before) / blend**2
+        for before, here, after in (np.split(found, 3) for found in at(np.concatenate((s - blend, s, s + blend))))
+    )
+    return heading, curvature, change

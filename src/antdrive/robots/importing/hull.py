@@ -1,0 +1,166 @@
+"""Convex outlines around points in the plane: few corners, and nothing cut off."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from antdrive.base.types import Point
+from antdrive.robots.outline import Footprint
+
+MOST_OUTLINE = 12  # corners of an outline that was computed
+STEP = 1e-5  # of the numbers of an outline that was computed [m]
+LOOSE = 1e-8  # what turns such as 1.5707963, which stand for a quarter, may move a corner by [m]
+ALIKE = 1e-4  # how far the left and the right of an outline may be from mirror images of each other [m]
+CHEAP = 1e-4  # the share of its area that an outline may gain for a corner less
+LIKE = 0.97  # the share of a disc or rectangle that an outline fills which counts as one
+
+
+def convex_hull(points: Iterable[Point]) -> list[Point]:
+    """The corners of the convex hull, counter-clockwise."""
+    ordered = sorted({(round(x, 7), round(y, 7)) for x, y in points})
+    halves: list[list[Point]] = []
+    for way in (ordered, ordered[::-1]):
+        chain: list[Point] = []
+        for point in way:
+            while len(chain) > 1 and _area(chain[-2], chain[-1], point) <= 1e-12:
+                chain.pop()
+            chain.append(point)
+        halves.append(chain[:-1])
+    return halves[0] + halves[1]
+
+
+def fewer_corners(corners: list[Point], most: int) -> list[Point]:
+    """A polygon around a convex one with no more than `most` corners: the edges that cost the least area are left out.
+
+    Edges that cost next to nothing are left out in any case: a wheel whose quarter turn is written 1.57 is a little askew.
+    What is the same on the left as on the right stays so: edges are left out together with their mirror images.
+    """
+    corners = list(corners)
+    cheap = CHEAP * sum(_area((0.0, 0.0), a, b) for a, b in zip(corners, corners[1:] + corners[:1], strict=True))
+    symmetric = all(_nearest(corners, (x, -y)) is not None for x, y in corners)
+    while len(corners) > 4:
+        costs = [_cost(corners, k) for k in range(len(corners))]
+        affordable = [k for k, cost in enumerate(costs) if cost < math.inf and (len(corners) > most or cost <= cheap)]
+        ways = (_left_out(corners, k, symmetric) for k in sorted(affordable, key=lambda k: costs[k]))
+        fewer = next((way for way in ways if way is not None), None)
+        if fewer is not None:
+            corners = fewer
+        elif symmetric and len(corners) > most:
+            symmetric = False  # no pair can be left out
+        else:
+            break
+    return corners
+
+
+def _around_edge(corners: list[Point], k: int) -> tuple[Point, Point, Point, Point]:
+    """The corner before the edge from corner k, its two ends, and the corner after it."""
+    a, b, c, d = (corners[(k + j) % len(corners)] for j in (-1, 0, 1, 2))
+    return a, b, c, d
+
+
+def _cost(corners: list[Point], k: int) -> float:
+    """The area that a polygon gains without the edge from corner k; inf where it cannot do without."""
+    a, b, c, d = _around_edge(corners, k)
+    tip = _meeting(a, b, d, c)
+    return math.inf if tip is None else _area(b, tip, c)
+
+
+def _left_out(corners: list[Point], k: int, symmetric: bool) -> list[Point] | None:
+    """The corners without the edge from corner k; None where that is impossible."""
+    n, (a, b, c, d) = len(corners), _around_edge(corners, k)
+    tip = _meeting(a, b, d, c)
+    if tip is None:
+        return None
+    fewer = [tip if corner is b else corner for corner in corners if corner is not c]
+    if not symmetric:
+        return fewer
+    twin = _nearest(corners, (c[0], -c[1])), _nearest(corners, (b[0], -b[1]))
+    if twin == (k, (k + 1) % n):  # it is its own mirror image
+        return fewer
+    if None in twin or set(twin) & {k, (k + 1) % n} or n < 6:
+        return None
+    first = corners[twin[0] or 0]
+    return _left_out(fewer, next(j for j, corner in enumerate(fewer) if corner is first), False)
+
+
+def _nearest(corners: list[Point], place: Point) -> int | None:
+    """The corner at a place; None where there is none."""
+    k = min(range(len(corners)), key=lambda j: math.dist(corners[j], place))
+    return k if math.dist(corners[k], place) <= ALIKE else None
+
+
+def footprint_around(points: Iterable[Point], kind: str = "auto") -> Footprint:
+    """A footprint that holds all points: a disc or a rectangle where they nearly fill one, and else a polygon.
+
+    Its numbers are multiples of a hundredth of a millimetre, rounded so that no point is outside by more than `LOOSE`.
+    """
+    held = list(points)
+    hull = convex_hull(held)
+    area = sum(_area((0.0, 0.0), a, b) for a, b in zip(hull, hull[1:] + hull[:1], strict=True))
+    xs, ys = zip(*held, strict=True)
+    xmin, xmax, ymin, ymax = min(xs), max(xs), min(ys), max(ys)
+    length, width, middle = xmax - xmin, ymax - ymin, (_near((xmin + xmax) / 2), _near((ymin + ymax) / 2))
+    reach = max(math.dist(middle, point) for point in held)
+    if kind == "disc" or (kind == "auto" and area >= LIKE * math.pi * reach**2):
+        away = max(math.hypot(*point) for point in held)
+        if kind == "disc" or away <= 1.02 * reach:
+            return Footprint.disc(_up(away))
+        return Footprint.disc(_up(reach), middle)
+    if kind == "rectangle" or (kind == "auto" and area >= LIKE * length * width):
+        x, y = (0.0 if abs(m) < 5e-4 else m for m in middle)
+        return Footprint.rectangle(_up(2 * max(xmax - x, x - xmin)), _up(2 * max(ymax - y, y - ymin)), (x, y))
+    return _polygon_around(held, fewer_corners(hull, MOST_OUTLINE))
+
+
+def _polygon_around(held: list[Point], corners: list[Point]) -> Footprint:
+    """A polygon with rounded corners, moved outwards until it holds all points."""
+    out = 0.0
+    while True:
+        # The hull of rounded corners holds them all, although rounding may bend a nearly straight corner inwards.
+        found = Footprint.polygon(convex_hull((_near(x), _near(y)) for x, y in _moved_out(corners, out)))
+        if min(found.depth(x, y) for x, y in held) >= -LOOSE:
+            return found
+        out += STEP
+
+
+def _moved_out(corners: list[Point], distance: float) -> list[Point]:
+    """A convex polygon whose edges are moved outwards."""
+    found = []
+    for k, (x, y) in enumerate(corners):
+        (ax, ay), (bx, by) = (
+            _right_of(*edge) for edge in ((corners[k - 1], (x, y)), ((x, y), corners[k + 1 - len(corners)]))
+        )
+        share = distance / (1 + ax * bx + ay * by)
+        found.append((x + share * (ax + bx), y + share * (ay + by)))
+    return found
+
+
+def _right_of(a: Point, b: Point) -> Point:
+    """The direction to the right of the way from a to b: outwards, for a polygon's edge."""
+    away = math.dist(a, b)
+    return (b[1] - a[1]) / away, (a[0] - b[0]) / away
+
+
+def _near(value: float) -> float:
+    """A coordinate, rounded to the nearest hundredth of a millimetre."""
+    return round(value, 5) + 0.0  # no -0.0
+
+
+def _up(value: float) -> float:
+    """A length, rounded up to a hundredth of a millimetre, but for what the arithmetic adds."""
+    return math.ceil((value - LOOSE) / STEP) / 1e5
+
+
+def _area(a: Point, b: Point, c: Point) -> float:
+    return ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])) / 2
+
+
+def _meeting(a: Point, b: Point, d: Point, c: Point) -> Point | None:
+    """Where the ways from a through b and from d through c meet ahead of both; None where they do not."""
+    ux, uy, vx, vy = b[0] - a[0], b[1] - a[1], c[0] - d[0], c[1] - d[1]
+    cross = ux * vy - uy * vx
+    if cross >= -1e-12:  # they part, or the turn from one to the other is half a circle
+        return None
+    share = ((c[0] - b[0]) * vy - (c[1] - b[1]) * vx) / cross
+    return (b[0] + share * ux, b[1] + share * uy) if share >= 0 else None

@@ -1,0 +1,400 @@
+"""What a URDF file says, with every link where it is when all joints are at zero. Lengths in metres."""
+
+from __future__ import annotations
+
+import math
+import re
+import tempfile
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import MappingProxyType
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from antdrive.base.errors import InputError, input_error
+from antdrive.base.optional import optional
+from antdrive.base.types import Floats
+from antdrive.robots.importing.expanding import expanded
+from antdrive.robots.importing.sensors import UrdfSensor, lidar_sensors
+from antdrive.worlds.formats.xml import parse_xml
+
+# Around a circle of radius 1, with sides ahead, behind, to the left and to the right: it is as long and as wide as the circle.
+CIRCLE = np.exp(2j * math.pi * (np.arange(96) + 0.5) / 96) / math.cos(math.pi / 96)
+MOST_LINKS = 10_000
+
+
+@dataclass(frozen=True, eq=False)
+class UrdfJoint:
+    """A joint of a URDF file.
+
+    Attributes:
+        name: its name
+        kind: fixed, continuous, revolute, prismatic, floating or planar
+        parent: the link that holds it
+        child: the link that it moves
+        place: its frame in that of the model's root (4, 4)
+        axis: the direction of its axis in the root's frame (3,)
+        velocity: the limit of its speed [rad/s]; None where the file has none
+        effort: the limit of its torque [N m]; None where the file has none
+        range: how far it turns, from its lower to its upper limit [rad]; inf where it turns freely
+        commanded: the greatest speed that <ros2_control> lets it be given, inf without a limit [rad/s]; None where it is not
+            driven by speed there
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    place: Floats
+    axis: Floats
+    velocity: float | None
+    effort: float | None
+    range: float
+    commanded: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class CollisionPiece:
+    """A piece of collision geometry, in the root's frame.
+
+    Attributes:
+        link: the link that it belongs to
+        kind: box, cylinder, sphere or mesh
+        points: points whose convex hull holds it (N, 3)
+        centre: its middle (3,)
+        radius: of a cylinder or sphere [m]
+        length: of a cylinder [m]
+    """
+
+    link: str
+    kind: str
+    points: Floats
+    centre: Floats
+    radius: float | None = None
+    length: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class UrdfModel:
+    """A robot as a URDF file describes it.
+
+    Attributes:
+        source: the file
+        name: the robot's name in it
+        joints: its joints by name
+        places: the frame of each link in that of the root (4, 4)
+        pieces: its collision geometry
+        masses: the mass of each link that has one [kg]
+        drive: what a Gazebo plugin that drives wheels says, by tag; what it says of several wheels is left out
+        left_out: meshes that were not found
+        lidars: the lidars that Gazebo would simulate
+    """
+
+    source: Path
+    name: str
+    joints: dict[str, UrdfJoint]
+    places: dict[str, Floats]
+    pieces: tuple[CollisionPiece, ...]
+    masses: dict[str, float]
+    drive: dict[str, str]
+    left_out: tuple[str, ...]
+    lidars: tuple[UrdfSensor, ...] = ()
+
+    def above(self, link: str) -> Iterator[UrdfJoint]:
+        """The joints between a link and the root, from the link on."""
+        holders = {joint.child: joint for joint in self.joints.values()}
+        while link in holders:
+            yield holders[link]
+            link = holders[link].parent
+
+    def drive_number(self, *tags: str) -> tuple[str, float | None]:
+        """The first of some tags of the drive plugin that has a number greater than 0, and the number; None if none has."""
+        for tag in tags:
+            try:
+                value = float(self.drive.get(tag, ""))
+            except ValueError:
+                continue
+            if 0 < value < math.inf:
+                return tag, value
+        return "", None
+
+
+def read_model(
+    path: Path,
+    *,
+    meshes: Path | None = None,
+    without_meshes: bool = False,
+    arguments: Mapping[str, str] = MappingProxyType({}),
+    packages: Mapping[str, Path] = MappingProxyType({}),
+) -> UrdfModel:
+    """The robot in a URDF or xacro file.
+
+    Raises:
+        InputError: the file cannot be read, or is no robot.
+    """
+    root = _root_element(path, arguments, packages)
+    if root.tag != "robot":
+        raise input_error(str(path), f"its root element is <{root.tag}>; a URDF file begins with <robot>")
+    links = {_named(path, link): link for link in root.findall("link")}
+    if not 0 < len(links) <= MOST_LINKS:
+        raise input_error(str(path), f"has {len(links)} links; a robot has 1 to {MOST_LINKS}")
+    found = [_joint(path, element) for element in root.findall("joint")]
+    commanded = _commanded(path, root, {joint.name for joint in found})
+    places, joints = _placed(path, set(links), [replace(joint, commanded=commanded.get(joint.name)) for joint in found])
+    reader = _Shapes(path, meshes, without_meshes, packages)
+    pieces = [
+        piece
+        for name, link in links.items()
+        for element in link.findall("collision")
+        for piece in reader.piece(name, places[name] @ _origin(path, element), element)
+    ]
+    masses = {
+        name: _at_least_0(path, f"link {name}", "mass", _number(path, mass, "value", 0.0))
+        for name, link in links.items()
+        for mass in link.findall("inertial/mass")
+    }
+    lidars, left_out = lidar_sensors(root, places), tuple(reader.left_out)
+    return UrdfModel(
+        path, root.get("name", path.stem), joints, places, tuple(pieces), masses, _drive(root), left_out, lidars
+    )
+
+
+def _commanded(path: Path, root: ET.Element, joints: set[str]) -> dict[str, float]:
+    """The joints that <ros2_control> drives by their speed, and the greatest speed that each may be given [rad/s]."""
+    found = {}
+    for joint in root.findall("ros2_control/joint"):
+        name = _named(path, joint)
+        for interface in joint.findall("command_interface"):
+            if interface.get("name") != "velocity":
+                continue
+            if name not in joints:
+                raise input_error(str(path), f"<ros2_control> drives joint {name!r}, which there is not")
+            most = next((param.text for param in interface.findall("param") if param.get("name") == "max"), None)
+            try:
+                found[name] = math.inf if most is None else float(most)
+            except ValueError:
+                found[name] = math.nan
+            if not found[name] > 0:
+                raise input_error(
+                    str(path), f"joint {name}", f"max in <ros2_control> must be a number above 0, got {most!r}"
+                )
+    return found
+
+
+def _drive(root: ET.Element) -> dict[str, str]:
+    """What plugins that drive wheels say, by tag. A tag that a plugin repeats, such as the left wheels of a vehicle that
+    skids, is left out: it names no one wheel."""
+    drive: dict[str, str] = {}
+    for plugin in root.findall("gazebo/plugin"):
+        tags = Counter(element.tag for element in plugin)
+        if any(re.fullmatch(r"left\w*joint", tag, re.IGNORECASE) for tag in tags):
+            drive |= {element.tag: (element.text or "").strip() for element in plugin if tags[element.tag] == 1}
+    return drive
+
+
+def _root_element(path: Path, arguments: Mapping[str, str], packages: Mapping[str, Path]) -> ET.Element:
+    if path.suffix.lower() != ".xacro":
+        if arguments:
+            raise InputError(f"--arg {next(iter(arguments))}: {path.name} is no .xacro, and has no arguments")
+        return parse_xml(path)
+    text = expanded(path, arguments, packages)
+    with tempfile.TemporaryDirectory() as folder:
+        plain = Path(folder) / f"{path.stem}.urdf"
+        plain.write_text(text, encoding="utf-8")
+        try:
+            return parse_xml(plain)
+        except InputError as error:
+            raise InputError(str(error).replace(str(plain), str(path))) from None
+
+
+def _named(path: Path, element: ET.Element) -> str:
+    name = element.get("name")
+    if not name:
+        raise input_error(str(path), f"a <{element.tag}> has no name")
+    return name
+
+
+def _numbers(path: Path, element: ET.Element | None, key: str, default: tuple[float, ...]) -> Floats:
+    text = None if element is None else element.get(key)
+    if text is None:
+        return np.array(default)
+    try:
+        values = np.array([float(word) for word in text.split()])
+    except ValueError:
+        values = np.array([math.nan])
+    if len(values) != len(default) or not np.isfinite(values).all() or not (np.abs(values) <= 1e6).all():
+        tag = "" if element is None else element.tag
+        raise input_error(str(path), f"<{tag} {key}={text!r}>", f"must be {len(default)} numbers")
+    return values
+
+
+def _number(path: Path, element: ET.Element | None, key: str, default: float) -> float:
+    return float(_numbers(path, element, key, (default,))[0])
+
+
+def _at_least_0(path: Path, where: str, what: str, value: float) -> float:
+    if value < 0:
+        raise input_error(str(path), where, f"{what} must be at least 0, got {value:g}")
+    return value
+
+
+def _greater_than_0(path: Path, where: str, what: str, value: float) -> float:
+    if not value > 0:
+        raise input_error(str(path), where, f"{what} must be greater than 0, got {value:g}")
+    return value
+
+
+def _origin(path: Path, element: ET.Element) -> Floats:
+    """The frame (4, 4) that an element's <origin> describes."""
+    origin = element.find("origin")
+    place = np.eye(4)
+    roll, pitch, yaw = _numbers(path, origin, "rpy", (0.0, 0.0, 0.0))
+    place[:3, :3] = _turn(2, yaw) @ _turn(1, pitch) @ _turn(0, roll)
+    place[:3, 3] = _numbers(path, origin, "xyz", (0.0, 0.0, 0.0))
+    return place
+
+
+def _turn(axis: int, angle: float) -> Floats:
+    turn, (a, b) = np.eye(3), ((1, 2), (2, 0), (0, 1))[axis]
+    turn[a, a] = turn[b, b] = math.cos(angle)
+    turn[a, b], turn[b, a] = -math.sin(angle), math.sin(angle)
+    return turn
+
+
+def _joint(path: Path, element: ET.Element) -> UrdfJoint:
+    """A joint, with its place and axis in the frame of its parent."""
+    name, kind = _named(path, element), element.get("type", "")
+    ends = [element.find(tag) for tag in ("parent", "child")]
+    parent, child = ("" if end is None else end.get("link", "") for end in ends)
+    limit = element.find("limit")
+    lower, upper = (_number(path, limit, key, 0.0) for key in ("lower", "upper"))
+    velocity, effort = (
+        _at_least_0(path, f"joint {name}", f"the limit's {key}", _number(path, limit, key, 0.0))
+        for key in ("velocity", "effort")
+    )
+    axis = _numbers(path, element.find("axis"), "xyz", (1.0, 0.0, 0.0))
+    if not np.any(axis):
+        raise input_error(str(path), f"joint {name}", "its axis is 0 0 0")
+    turns = math.inf if kind == "continuous" else upper - lower
+    place = _origin(path, element)
+    return UrdfJoint(
+        name, kind, parent, child, place, axis / np.linalg.norm(axis), velocity or None, effort or None, turns
+    )
+
+
+def _placed(path: Path, links: set[str], found: list[UrdfJoint]) -> tuple[dict[str, Floats], dict[str, UrdfJoint]]:
+    """The frame of each link, and the joints with place and axis, in the frame of the root."""
+    for joint in found:
+        for link in (joint.parent, joint.child):
+            if link not in links:
+                raise input_error(str(path), f"joint {joint.name}", f"there is no link {link!r}")
+    children = [joint.child for joint in found]
+    roots = sorted(links - set(children))
+    if len(roots) != 1 or len(children) != len(set(children)):
+        raise input_error(
+            str(path), f"its links must form one tree; links without a parent: {', '.join(roots) or 'none'}"
+        )
+    places: dict[str, Floats] = {roots[0]: np.eye(4)}
+    joints: dict[str, UrdfJoint] = {}
+    while len(joints) < len(found):
+        ready = [joint for joint in found if joint.parent in places and joint.name not in joints]
+        if not ready:
+            raise input_error(str(path), "two joints have one name, or joints form a ring")
+        for joint in ready:
+            place = places[joint.parent] @ joint.place
+            places[joint.child] = place
+            joints[joint.name] = replace(joint, place=place, axis=place[:3, :3] @ joint.axis)
+    return places, joints
+
+
+class _Shapes:
+    """Reads collision geometry, meshes among it."""
+
+    def __init__(self, path: Path, meshes: Path | None, without_meshes: bool, packages: Mapping[str, Path]) -> None:
+        self._path, self._meshes, self._without, self._packages = path, meshes, without_meshes, packages
+        self.left_out: list[str] = []
+
+    def piece(self, link: str, place: Floats, element: ET.Element) -> Iterator[CollisionPiece]:
+        """The piece of a <collision>; none for a mesh that is left out."""
+        geometry = element.find("geometry")
+        shape = None if geometry is None else next(iter(geometry), None)
+        if shape is None:
+            raise input_error(str(self._path), f"link {link}", "a <collision> has no geometry")
+        radius = length = None
+        if shape.tag == "box":
+            size = _numbers(self._path, shape, "size", (0.0, 0.0, 0.0))
+            _greater_than_0(self._path, f"link {link}", "the size of a <box>", float(size.min()))
+            half = size / 2
+            points = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half
+        elif shape.tag == "cylinder":
+            radius, length = (self._extent(link, shape, key) for key in ("radius", "length"))
+            ring = radius * np.column_stack([CIRCLE.real, CIRCLE.imag])
+            points = np.vstack([np.column_stack([ring, np.full(len(ring), z)]) for z in (-length / 2, length / 2)])
+        elif shape.tag == "sphere":
+            radius = self._extent(link, shape, "radius")
+            ring, flat = radius * np.column_stack([CIRCLE.real, CIRCLE.imag]), np.zeros(len(CIRCLE))
+            place = place.copy()
+            place[:3, :3] = np.eye(3)
+            points = np.vstack([np.column_stack([ring, flat]), [[0, 0, radius], [0, 0, -radius]]])
+        elif shape.tag == "mesh":
+            mesh = self._mesh(link, shape)
+            if mesh is None:
+                return
+            points = mesh * _numbers(self._path, shape, "scale", (1.0, 1.0, 1.0))
+        else:
+            raise input_error(str(self._path), f"link {link}", f"unknown geometry <{shape.tag}>")
+        placed = points @ place[:3, :3].T + place[:3, 3]
+        centre = (placed.min(axis=0) + placed.max(axis=0)) / 2
+        yield CollisionPiece(link, shape.tag, placed, centre, radius, length)
+
+    def _extent(self, link: str, shape: ET.Element, key: str) -> float:
+        value = _number(self._path, shape, key, 0.0)
+        return _greater_than_0(self._path, f"link {link}", f"the {key} of a <{shape.tag}>", value)
+
+    def _mesh(self, link: str, shape: ET.Element) -> Floats | None:
+        """The vertices (N, 3) of a mesh; None where it is left out."""
+        name = shape.get("filename", "")
+        file = next((file for file in self._candidates(name) if file.is_file()), None)
+        if file is None:
+            if not self._without:
+                raise input_error(
+                    str(self._path),
+                    f"link {link}",
+                    f"mesh {name} is not found; say where with --meshes FOLDER or --package NAME=FOLDER, or --without-meshes",
+                )
+            self.left_out.append(f"{link}: {name}")
+            return None
+        trimesh = optional("trimesh", "urdf", f"mesh {file.name} is read with it")
+        try:
+            vertices = np.asarray(trimesh.load(str(file), force="mesh").vertices, dtype=np.float64)
+        except Exception as error:  # each format has errors of its own
+            raise input_error(str(file), f"cannot be read as a mesh: {error or type(error).__name__}") from None
+        if not len(vertices) or not np.isfinite(vertices).all():
+            raise input_error(str(file), "has no vertices, or some that are not finite")
+        return vertices * _unit(file)
+
+    def _candidates(self, name: str) -> Iterator[Path]:
+        """Where a mesh may be: package://NAME/meshes/a.stl is below a folder called NAME, or the folder given."""
+        bare = name.partition("://")[2] if "://" in name else name
+        package, _, inside = bare.partition("/") if name.startswith("package://") else ("", "", bare)
+        if package in self._packages:
+            yield self._packages[package] / inside
+        folders = [self._meshes] if self._meshes is not None else [self._path.parent, *self._path.resolve().parents]
+        for folder in folders:
+            yield folder / bare
+            yield folder / inside
+            yield folder / Path(bare).name
+
+
+def _unit(file: Path) -> float:
+    """The unit of a mesh file [m]. COLLADA states it, and trimesh leaves it to its caller; other formats have none.
+
+    The file's up axis is left as it is, as RViz and Gazebo leave it.
+    """
+    if file.suffix.lower() != ".dae":
+        return 1.0
+    unit = next((element for element in parse_xml(file).iter() if element.tag.rpartition("}")[2] == "unit"), None)
+    return _greater_than_0(file, "<unit>", "meter", _number(file, unit, "meter", 1.0))

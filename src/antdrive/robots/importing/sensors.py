@@ -1,0 +1,153 @@
+"""The lidar of a robot out of URDF: what a Gazebo sensor says of it, and where it is on the robot."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from antdrive.base.errors import FieldError
+from antdrive.base.types import Floats
+from antdrive.robots.feasible import require_on_robot
+from antdrive.robots.lidar import Lidar
+from antdrive.robots.outline import Footprint
+
+KINDS = ("ray", "gpu_ray", "lidar", "gpu_lidar")  # of Gazebo's sensors that are lidars
+LEVEL = 0.99  # the least vertical part of a planar lidar's axis
+RATE = 10.0  # that is assumed where a sensor has none [Hz]
+HALF_TURN = 3.141592  # pi in six digits, rounded down [rad]
+ALL_AROUND = 2 * math.pi - 0.01  # a field of view from here on is meant as a full circle [rad]
+
+
+@dataclass(frozen=True, eq=False)
+class UrdfSensor:
+    """A lidar of a URDF file.
+
+    Attributes:
+        name: what messages call it
+        place: the frame of its link in that of the root (4, 4)
+        element: its <sensor>
+    """
+
+    name: str
+    place: Floats
+    element: ET.Element
+
+
+def lidar_sensors(root: ET.Element, places: Mapping[str, Floats]) -> tuple[UrdfSensor, ...]:
+    """The lidars that Gazebo would simulate."""
+    return tuple(
+        UrdfSensor(f"sensor {sensor.get('name', 'without a name')} of link {link}", places[link], sensor)
+        for gazebo in root.findall("gazebo")
+        for sensor in gazebo.findall("sensor")
+        if (link := gazebo.get("reference", "")) in places and sensor.get("type") in KINDS
+    )
+
+
+def found_lidar(
+    sensors: tuple[UrdfSensor, ...], frame: Floats, floor: float, foot: Footprint
+) -> tuple[Lidar | None, str]:
+    """The first lidar that a robot's file can hold, and where it comes from; none, and why, where there is no such."""
+    problems = []
+    for k, sensor in enumerate(sensors):
+        try:
+            lidar, assumed = _lidar(sensor, frame, floor)
+            require_on_robot(lidar, foot)
+        except FieldError as error:
+            problems.append(f"{sensor.name} is not used: {error}")
+            continue
+        more = [*problems, *(f"{other.name} is not used" for other in sensors[k + 1 :])]
+        return lidar, "; ".join([f"read: {sensor.name}", *assumed, *more])
+    return None, "; ".join(problems)
+
+
+def _lidar(sensor: UrdfSensor, frame: Floats, floor: float) -> tuple[Lidar, list[str]]:
+    """The lidar, and what is assumed of it.
+
+    Raises:
+        FieldError: it is no planar lidar, or has a value that none may have.
+    """
+    scan = sensor.element.find("ray")
+    scan = sensor.element.find("lidar") if scan is None else scan
+    if scan is None or scan.find("scan/horizontal/samples") is None:
+        raise FieldError("scan", "has no horizontal samples")
+    if _number(scan, "scan/vertical/samples", 1.0) > 1:
+        raise FieldError("scan", "has several layers")
+    x, y, z, *angles = _pose(sensor.element)
+    turn = sensor.place[:3, :3] @ _turned(*angles)
+    if abs(turn[2, 2]) < LEVEL:
+        raise FieldError("pose", "its beams are not level")
+    spot = sensor.place @ (x, y, z, 1.0)
+    low, high = (_number(scan, f"scan/horizontal/{end}_angle", 0.0) for end in ("min", "max"))
+    full = high - low >= ALL_AROUND
+    middle = 0.0 if full else (low + high) / 2  # all around it does not matter which beam is the first
+    ahead = turn @ (math.cos(middle), math.sin(middle), 0.0)
+    (right, left), (away, aside) = frame[1:] @ ahead[:2], frame[1:] @ (spot[:2] - frame[0])
+    rate = _number(sensor.element, "update_rate", 0.0)
+    lidar = Lidar(
+        beams=round(_number(scan, "scan/horizontal/samples", 0.0) * _number(scan, "scan/horizontal/resolution", 1.0)),
+        field_of_view=round(2 * math.pi, 6) if full else high - low,
+        min_range=_number(scan, "range/min", 0.0),
+        max_range=_number(scan, "range/max", 0.0),
+        rate=rate or RATE,
+        resolution=_number(scan, "range/resolution", 0.0),
+        sigma=_number(scan, "noise/stddev", 0.0),
+        x=round(float(away), 5) + 0.0,
+        y=round(float(aside), 5) + 0.0,
+        yaw=min(max(round(math.atan2(left, right), 6), -HALF_TURN), HALF_TURN) + 0.0,
+        height=round(float(spot[2]) - floor, 5),
+    )
+    return lidar, [] if rate else [f"rate of {RATE:g} Hz assumed"]
+
+
+def lidar_entry(lidar: Lidar) -> dict[str, str]:
+    """A lidar as it stands in a robot's file."""
+    values = dataclasses.asdict(lidar)
+    return {key: str(value) if key == "beams" else _decimal(value) for key, value in values.items()}
+
+
+def _decimal(value: float) -> str:
+    """A number with a point and without an exponent, as YAML's floats are written."""
+    digits = f"{value:.7f}".rstrip("0")
+    return f"{digits}0" if digits.endswith(".") else digits
+
+
+def _pose(sensor: ET.Element) -> tuple[float, ...]:
+    """Where a sensor is on its link: x, y, z [m], roll, pitch, yaw [rad]."""
+    text = sensor.findtext("pose") or "0 0 0 0 0 0"
+    try:
+        pose = tuple(float(word) for word in text.split())
+    except ValueError:
+        pose = ()
+    if len(pose) != 6 or not all(abs(value) <= 1e6 for value in pose):
+        raise FieldError("pose", f"must be 6 numbers, got {text.strip()[:40]!r}")
+    return pose
+
+
+def _number(element: ET.Element, path: str, default: float) -> float:
+    text = element.findtext(path)
+    if text is None or not text.strip():
+        return default
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not abs(value) <= 1e6:
+        raise FieldError(path.rpartition("/")[2], f"must be a number, got {text.strip()[:40]!r}")
+    return value
+
+
+def _turned(roll: float, pitch: float, yaw: float) -> Floats:
+    """The turn (3, 3) about the fixed axes x, y and z [rad]."""
+    (sr, cr), (sp, cp), (sy, cy) = ((math.sin(a), math.cos(a)) for a in (roll, pitch, yaw))
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )

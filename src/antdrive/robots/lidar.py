@@ -1,0 +1,118 @@
+"""The lidar of a robot: a fan of beams in one horizontal plane."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from antdrive.base.errors import FieldError
+from antdrive.base.types import Floats, Pose
+
+#: The lowest and highest value of each number of a lidar.
+LIDAR_RANGE = {
+    "beams": (3, 10_000),
+    "field_of_view": (0.01, 2 * math.pi + 1e-6),  # a file that rounds 2 pi up means a full circle
+    "min_range": (0.0, 10.0),
+    "max_range": (0.1, 300.0),
+    "rate": (1.0, 1000.0),
+    "resolution": (0.0, 0.5),
+    "sigma": (0.0, 0.5),
+    "x": (-20.0, 20.0),
+    "y": (-20.0, 20.0),
+    "yaw": (-math.pi, math.pi),
+    "height": (0.01, 10.0),
+}
+FULL_CIRCLE = 2 * math.pi - 1e-4  # a field of view from here on has no first and last beam [rad]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lidar:
+    """A planar lidar.
+
+    The beams are evenly spaced. The first and the last lie on the edges of the field of view, unless it is a full circle:
+    then the first points backwards and all are one spacing apart.
+
+    Attributes:
+        beams: number of beams in a scan
+        field_of_view: angle between the first and the last beam, symmetric about the lidar's heading [rad]
+        min_range: what is nearer is noticed, but not measured [m]
+        max_range: what is farther is not noticed [m]
+        rate: scans in a second [Hz]
+        resolution: measured ranges are multiples of it [m]; 0: they are exact
+        sigma: standard deviation of a measured range [m]
+        x: where the lidar is, ahead of the axle's centre [m]
+        y: to the left of it [m]
+        yaw: the lidar's heading, counter-clockwise from the robot's [rad]
+        height: of the beams above the floor [m]; cylinders that are lower are not seen
+
+    Raises:
+        FieldError: a value outside its LIDAR_RANGE, or ranges that enclose nothing.
+    """
+
+    beams: int
+    field_of_view: float
+    min_range: float
+    max_range: float
+    rate: float
+    resolution: float = 0.0
+    sigma: float = 0.0
+    x: float = 0.0
+    y: float = 0.0
+    yaw: float = 0.0
+    height: float = 0.2
+
+    def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):
+            value = getattr(self, field.name)
+            low, high = LIDAR_RANGE[field.name]
+            if not low <= value <= high:
+                raise FieldError(field.name, f"must be between {low:g} and {high:g}, got {value:g}")
+        if not self.min_range < self.max_range:
+            raise FieldError("min_range", f"must be below max_range, {self.max_range:g}, got {self.min_range:g}")
+
+    @property
+    def spacing(self) -> float:
+        """Angle between two neighbouring beams [rad]."""
+        return 2 * math.pi / self.beams if self.full_circle else self.field_of_view / (self.beams - 1)
+
+    @property
+    def full_circle(self) -> bool:
+        """Whether the lidar sees all around."""
+        return self.field_of_view >= FULL_CIRCLE
+
+    @property
+    def angles(self) -> Floats:
+        """The direction of each beam, counter-clockwise from the robot's heading (beams,) [rad]."""
+        first = -math.pi if self.full_circle else -self.field_of_view / 2
+        return np.asarray(self.yaw + first + self.spacing * np.arange(self.beams), dtype=np.float64)
+
+    def at(self, hz: int) -> Lidar:
+        """The lidar on a robot of so many control periods a second, which takes one scan in each of them at most.
+
+        Args:
+            hz: control periods per second
+        """
+        return self if self.rate <= hz else dataclasses.replace(self, rate=float(hz))
+
+    def pose_on(self, robot: Pose) -> Pose:
+        """The lidar's own pose on a robot: x, y [m] and yaw [rad].
+
+        Args:
+            robot: the robot's pose
+        """
+        x, y, yaw = robot
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        return x + cos * self.x - sin * self.y, y + sin * self.x + cos * self.y, yaw + self.yaw
+
+    def due(self, tick: int, hz: int) -> bool:
+        """Whether a scan is due in a control period.
+
+        Args:
+            tick: the number of the control period
+            hz: control periods per second
+        """
+        per_tick = self.rate / hz
+        return tick == 0 or math.floor(tick * per_tick) != math.floor((tick - 1) * per_tick)

@@ -1,0 +1,115 @@
+"""The noise of a real robot: wheels that slip, inexact encoders, delayed commands and an estimated pose.
+
+A robot's file holds the levels (`Noise`). A drive scales them; at 0 the robot is perfect. All random numbers
+come from the generator that the caller passes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+import numpy as np
+
+from antdrive.base import Floats, Pose
+from antdrive.robots.control.pursuit import Twist
+from antdrive.robots.spec import Noise
+
+SLIP_TIME = 0.5  # correlation time of slip [s]
+MIN_GAIN = 0.05  # of the filter, so that fixes always correct the estimate somewhat
+
+
+class NoiseModel:
+    """The noise of one drive: what the wheels make of commands, and what the robot estimates its pose to be.
+
+    Between two pose fixes the robot uses odometry. A fix corrects the estimate with the gain of a
+    steady-state Kalman filter. Slip is a first-order Gauss-Markov process, a factor on each wheel's speed.
+    Encoders count turns of the wheels, so they do not measure it.
+
+    Attributes:
+        estimate: the estimated pose at the last control period: x, y [m] and yaw [rad]
+
+    Args:
+        noise: the levels
+        track: distance between the wheels [m]
+        period: control period [s]
+        start: the pose at the start, which the robot knows
+        rng: where all random numbers come from
+    """
+
+    def __init__(self, noise: Noise, track: float, period: float, start: Pose, rng: np.random.Generator) -> None:
+        self._noise, self._half_track, self._period, self._rng = noise, track / 2, period, rng
+        self._slip = np.zeros(2)
+        self._pending = deque([Twist(0.0, 0.0)] * round(noise.delay / period))
+        self._ticks_per_fix = max(1, round(1 / (noise.pose_rate * period)))
+        self._tick = 0
+        self.estimate = start
+        # The variance of odometry at 1 m/s between two fixes. Slip is correlated, so its errors add up over
+        # several.
+        correlated = max(1.0, 2 * SLIP_TIME * noise.pose_rate)
+        drift = (noise.encoder**2 + correlated * noise.slip**2) / noise.pose_rate**2
+        self._gain = _steady_gain(drift / 2, noise.pose_xy**2), _steady_gain(2 * drift / track**2, noise.pose_yaw**2)
+
+    def estimate_pose(self, pose: Pose, twist: Twist) -> Pose:
+        """The estimated pose of a robot whose true pose is `pose` and whose true velocity is `twist`.
+
+        To be called once in every control period, before `actuate`.
+        """
+        noise, rng = self._noise, self._rng
+        rolled = self._wheels(twist) / (1 + self._slip) * (1 + noise.encoder * rng.standard_normal(2))
+        fix = np.asarray(pose) + rng.standard_normal(3) * (noise.pose_xy, noise.pose_xy, noise.pose_yaw)
+        if self._tick:
+            self.estimate = _moved(self.estimate, self._twist(*rolled), self._period)
+        if self._tick % self._ticks_per_fix == 0:
+            x, y, yaw = self.estimate
+            gain_xy, gain_yaw = self._gain
+            turned = math.remainder(fix[2] - yaw, 2 * math.pi)
+            self.estimate = (x + gain_xy * (fix[0] - x), y + gain_xy * (fix[1] - y), yaw + gain_yaw * turned)
+        self._tick += 1
+        return self.estimate
+
+    def pose_after_delay(self) -> Pose:
+        """The pose expected when the next command takes effect: the estimate moved by pending commands."""
+        pose = self.estimate
+        for twist in self._pending:
+            pose = _moved(pose, twist, self._period)
+        return pose
+
+    def actuate(self, command: Twist) -> Twist:
+        """The velocity that the wheels produce now, from a delayed command and with slip.
+
+        Args:
+            command: the new command, which takes effect after the delay
+        """
+        self._pending.append(command)
+        delayed = self._pending.popleft()
+        keep = math.exp(-self._period / SLIP_TIME)
+        fresh = self._noise.slip * math.sqrt(1 - keep * keep)
+        self._slip = keep * self._slip + fresh * self._rng.standard_normal(2)
+        return self._twist(*(self._wheels(delayed) * (1 + self._slip)))
+
+    def _wheels(self, twist: Twist) -> Floats:
+        rim = twist.yaw_rate * self._half_track
+        return np.array([twist.speed - rim, twist.speed + rim])
+
+    def _twist(self, left: float, right: float) -> Twist:
+        return Twist(float(left + right) / 2, float(right - left) / (2 * self._half_track))
+
+
+def _moved(pose: Pose, twist: Twist, time: float) -> Pose:
+    """A pose after driving with a twist for a time."""
+    x, y, yaw = pose
+    middle = yaw + twist.yaw_rate * time / 2
+    return (
+        x + twist.speed * math.cos(middle) * time,
+        y + twist.speed * math.sin(middle) * time,
+        yaw + twist.yaw_rate * time,
+    )
+
+
+def _steady_gain(drift: float, error: float) -> float:
+    """The steady-state gain of a scalar Kalman filter, from the variances of drift and of a fix."""
+    if error == 0:
+        return 1.0
+    ratio = drift / error
+    return min(1.0, max(MIN_GAIN, (math.sqrt(ratio * ratio + 4 * ratio) - ratio) / 2))

@@ -1,0 +1,11 @@
+from .failures.failure import Failure as Failure
+from .failures.failure import failure_of as failure_of
+from .failures.failure import parse_bound as parse_bound
+from .failures.handover import Handover as Handover
+from .failures.handover import write_suite as write_suite
+from .failures.hunt import Finding as Finding
+from .failures.hunt import Hunt as Hunt
+from .failures.hunt import find_failures as find_failures
+from .failures.rebuild import rebuilt as rebuilt
+from .failures.shrink import Shrunk as Shrunk
+from .failures.shrink import shrink as shrink

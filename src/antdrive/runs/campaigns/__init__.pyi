@@ -1,0 +1,12 @@
+from .campaign import Campaign as Campaign
+from .campaign import campaign_schema as campaign_schema
+from .campaign import load_campaign as load_campaign
+from .campaign import make_campaign as make_campaign
+from .expanding import expand as expand
+from .job import Job as Job
+from .job import SweepCase as SweepCase
+from .results import SweepResults as SweepResults
+from .results import canonical_bytes as canonical_bytes
+from .results import canonical_table as canonical_table
+from .results import read_results as read_results
+from .sweeping import sweep as sweep

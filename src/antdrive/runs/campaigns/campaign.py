@@ -1,0 +1,315 @@
+"""Campaign files: the grid of worlds, tasks, planners with options, robots, settings and seeds that `antdrive sweep` runs."""
+
+from __future__ import annotations
+
+import itertools
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, Field, PlainValidator, WithJsonSchema
+
+from antdrive.base.checks import SchemaVersion, check, show
+from antdrive.base.document import Document, Location, read_document
+from antdrive.base.errors import InputError
+from antdrive.sim.entries import RULES, SEEDS_SCHEMA, MarginValue, SettingsEntry, TextOrMapping, seed_list
+
+MOST_SEEDS = 1_000_000  # given as a number
+
+
+def _listed(value: Any) -> Any:
+    """One value stands for a list of it."""
+    return value if isinstance(value, list) else [value]
+
+
+def seeds_of(value: Any) -> list[int]:
+    """The seeds that people write as a number of them, as [3, 7] or as 0-9.
+
+    Raises:
+        ValueError: it is none of these; the text says what would be right.
+    """
+    if type(value) is int:
+        if not 1 <= value <= MOST_SEEDS:
+            raise ValueError(f"must be from 1 to {MOST_SEEDS} seeds, or a list such as [{value}], got {value}")
+        return list(range(value))
+    try:
+        return seed_list(value)
+    except ValueError as error:
+        raise ValueError(f"{error}; a number such as 20 means the seeds 0 to 19") from None
+
+
+_COUNT_OR_SEEDS: dict[str, Any] = {"anyOf": [{"type": "integer", "minimum": 1}, *SEEDS_SCHEMA["anyOf"]]}
+Seeds = Annotated[Any, PlainValidator(seeds_of), WithJsonSchema(_COUNT_OR_SEEDS)]
+
+
+def _of(item: dict[str, Any]) -> dict[str, Any]:
+    return {"anyOf": [item, {"type": "array", "items": item, "minItems": 1}]}
+
+
+Names = Annotated[list[str], Field(min_length=1), BeforeValidator(_listed), WithJsonSchema(_of({"type": "string"}))]
+Factors = Annotated[
+    list[Annotated[float, Field(ge=0)]],
+    Field(min_length=1),
+    BeforeValidator(_listed),
+    WithJsonSchema(_of({"type": "number", "minimum": 0})),
+]
+Margins = Annotated[list[MarginValue], Field(min_length=1), BeforeValidator(_listed)]
+NamesOrMappings = Annotated[list[TextOrMapping], Field(min_length=1), BeforeValidator(_listed)]
+
+
+class TaskEntry(BaseModel):
+    """A start and a goal that every world of the campaign is driven with."""
+
+    model_config = RULES
+
+    name: str | None = Field(None, min_length=1, max_length=100, description="what tables call the task")
+    start: list[float] = Field(min_length=3, max_length=3, description="write [x, y, yaw] in metres and radians")
+    goal: list[float] = Field(min_length=2, max_length=2, description="write [x, y] in metres")
+
+
+class RandomTasks(BaseModel):
+    """Starts and goals drawn in each world: free cells for the largest robot, with a path between them."""
+
+    model_config = RULES
+
+    random: int = Field(ge=1, le=100_000, description="tasks in each world")
+    seed: int = Field(0, ge=0, lt=2**63, description="seed of the draws")
+    min_distance: float = Field(0.0, ge=0, description="distance from start to goal as the crow flies, at least [m]")
+
+
+def _tasks(value: Any) -> Any:
+    listed = isinstance(value, list) and value and all(isinstance(one, dict) for one in value)
+    if value not in ("own", "named") and not isinstance(value, dict) and not listed:
+        raise ValueError(
+            f"must be own, named, {{random: 30, min_distance: 5}} or a list of {{start, goal}}, got {show(value)}"
+        )
+    return value
+
+
+_TASKS_SCHEMA: dict[str, Any] = {
+    "anyOf": [
+        {"enum": ["own", "named"]},
+        RandomTasks.model_json_schema(),
+        {"type": "array", "items": TaskEntry.model_json_schema()},
+    ]
+}
+
+
+def _settings_given(value: Any) -> Any:
+    listed = isinstance(value, list) and value and all(isinstance(one, dict) for one in value)
+    if not isinstance(value, dict) and not listed:
+        raise ValueError(f"must be a mapping such as {{cell: 0.1}}, or a list of mappings, got {show(value)}")
+    return value
+
+
+def _settings_schema() -> dict[str, Any]:
+    """The JSON Schema of settings in which a list of values may take the place of each, and of lists of such settings."""
+    schema = SettingsEntry.model_json_schema()
+    discs = {"type": "array", "items": schema.pop("$defs")["DiscEntry"]}
+    keys = {key: discs if key == "unseen" else one for key, one in schema["properties"].items()}
+    number = keys["controller"]["additionalProperties"]
+    several_numbers = {"anyOf": [number, {"type": "array", "items": number, "minItems": 1}]}
+    keys["controller"] = {**keys["controller"], "additionalProperties": several_numbers}
+    several = {key: {"anyOf": [one, {"type": "array", "items": one, "minItems": 1}]} for key, one in keys.items()}
+    return _of({**schema, "properties": several})
+
+
+class CampaignFile(BaseModel):
+    """A campaign, as written in a file: each combination of its lists is a run."""
+
+    model_config = RULES
+
+    schema_: SchemaVersion = Field(alias="schema", description="write schema: 1")
+    note: str | None = Field(None, description="what the campaign is for, free text")
+    worlds: NamesOrMappings = Field(
+        description="a list of files or patterns such as worlds/*.yaml, names of the catalogue, "
+        "{generate: forest, seeds: 20} with the generator's options, or {import: barn/*.world, barn: true}"
+    )
+    planners: NamesOrMappings = Field(
+        description="a list of names, or {name: aco-han, ants: [10, 50]}; a list, or {from: 10, to: 50, step: 10}, "
+        "stands for several values"
+    )
+    robots: Names = Field(["turtlebot"], description="names of the catalogue, or files")
+    routes: Names = Field(["clearance"], description="how plans become routes: none, taut, clearance")
+    noise: Factors = Field([0.0], description="factors on the noise that the robot's file documents")
+    margin: Margins = Field([0.03], description="distances that plans keep beyond the robot's radius [m], or auto")
+    seeds: Seeds = Field([0], description="how many seeds, or a list such as [3, 7], or a range such as 0-9")
+    tasks: Annotated[Any, PlainValidator(_tasks), WithJsonSchema(_TASKS_SCHEMA)] = Field(
+        "own",
+        description="own: the worlds' own starts and goals; named: the tasks that their files list; {random: 30, seed: 1, "
+        "min_distance: 5}; or a list of "
+        "{start: [x, y, yaw], goal: [x, y]}",
+    )
+    settings: Annotated[Any, PlainValidator(_settings_given), WithJsonSchema(_settings_schema())] = Field(
+        {},
+        description="how robots drive, such as {cell: 0.1, time_limit: 60}; a list of values stands for several settings, "
+        "and so does a list of such mappings",
+    )
+    run_limit: float | None = Field(
+        None, gt=0, description="wall-clock time that a run may take before its process is ended [s]; none by default"
+    )
+    rollouts: Literal["none", "failed", "all"] = Field("none", description="which runs' logs are kept")
+
+
+@dataclass(frozen=True, eq=False)
+class Campaign:
+    """A campaign as read.
+
+    Attributes:
+        source: its file, or what messages call it
+        folder: where relative paths begin
+        document: its data, with the line of each value
+        entry: its data, checked
+        tasks: the tasks in each world; empty: the worlds' own
+        settings: every combination of the settings that it lists; one with the defaults where it lists none
+        places: where in the file each of them is written
+    """
+
+    source: str
+    folder: Path
+    document: Document
+    entry: CampaignFile
+    tasks: RandomTasks | tuple[TaskEntry, ...]
+    settings: tuple[SettingsEntry, ...]
+    places: tuple[Location, ...]
+
+    def error(self, location: Location, problem: str) -> InputError:
+        """The error for a value: file, line, key and problem.
+
+        Args:
+            location: the path to the value
+            problem: what is wrong and what would be right
+        """
+        return self.document.error(location, problem)
+
+
+def load_campaign(path: str | os.PathLike[str]) -> Campaign:
+    """The campaign in a file.
+
+    Raises:
+        InputError: there is no such file, or something in it is wrong.
+    """
+    return _checked(read_document(path), Path(path).parent)
+
+
+def make_campaign(
+    data: Mapping[str, Any],
+    folder: str | os.PathLike[str] = ".",
+    source: str = "campaign",
+    options: Mapping[str, str] = MappingProxyType({}),
+) -> Campaign:
+    """A campaign from plain data with the keys of a campaign file; `schema` may be left out.
+
+    Args:
+        data: mappings, lists, numbers and texts; also tuples, ranges, paths, and numbers and arrays of numpy
+        folder: where relative paths begin
+        source: what messages call the data
+        options: the options of a command that keys, also those of settings, come from; messages name them instead
+
+    Raises:
+        InputError: something in the data is wrong.
+    """
+    plain = {"schema": 1, **{key: _plain(value) for key, value in data.items()}}
+    return _checked(_Asked(source, plain, options=options), Path(folder))
+
+
+def _plain(value: Any) -> Any:
+    """What Python code gives, as a file would hold it: numpy's numbers and arrays, tuples, ranges and paths."""
+    if isinstance(value, Mapping):
+        return {key: _plain(one) for key, one in value.items()}
+    if isinstance(value, list | tuple | range):
+        return [_plain(one) for one in value]
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
+def _checked(document: Document, folder: Path) -> Campaign:
+    entry = check(CampaignFile, document)
+    settings, places = zip(*_settings(document, entry.settings), strict=True)
+    if isinstance(entry.tasks, dict):
+        random = check(RandomTasks, _part(document, "tasks"))
+        return Campaign(document.source, folder, document, entry, random, settings, places)
+    tasks = entry.tasks if isinstance(entry.tasks, list) else []
+    checked = tuple(check(TaskEntry, _part(document, "tasks", i)) for i in range(len(tasks)))
+    names = [task.name or str(i) for i, task in enumerate(checked)]
+    for i, name in enumerate(names):
+        if name in names[:i]:
+            raise document.error(("tasks", i, "name"), f"{name!r} is the name of another task, too")
+    return Campaign(document.source, folder, document, entry, checked, settings, places)
+
+
+def _settings(
+    document: Document, given: dict[str, Any] | list[dict[str, Any]]
+) -> Iterator[tuple[SettingsEntry, Location]]:
+    """Every combination of the settings that a campaign lists, and its place; the last of several lists varies fastest."""
+    if isinstance(given, dict):
+        yield from _combinations(document, given, ("settings",))
+    else:
+        for i, one in enumerate(given):
+            yield from _combinations(document, one, ("settings", i))
+
+
+def _combinations(
+    document: Document, given: dict[str, Any], place: Location
+) -> Iterator[tuple[SettingsEntry, Location]]:
+    """Every combination of the settings in one mapping."""
+    lists = [_alternatives(document, key, value, place) for key, value in given.items()]
+    for values in itertools.product(*lists):
+        data = dict(zip(given, values, strict=True))
+        yield check(SettingsEntry, _Part(document.source, data, whole=document, place=place)), place
+
+
+def _alternatives(document: Document, key: str, value: Any, place: Location) -> list[Any]:
+    """The values that a setting takes: those of a list, and every combination of the lists within a mapping."""
+    if isinstance(value, dict):
+        inner = [one if isinstance(one, list) else [one] for one in value.values()]
+        found: list[Any] = [dict(zip(value, values, strict=True)) for values in itertools.product(*inner)]
+    elif key == "unseen":  # one value is a list itself
+        found = value if isinstance(value, list) and value and isinstance(value[0], list) else [value]
+    else:
+        found = value if isinstance(value, list) else [value]
+    if not found:
+        raise document.error((*place, key), "must have at least one value, got an empty list")
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Asked(Document):
+    """Data some of which options of a command hold, whose errors name these."""
+
+    options: Mapping[str, str] = field(default_factory=dict)
+
+    def error(self, location: Location, problem: str) -> InputError:
+        key = next((step for step in location if isinstance(step, str) and step != "settings"), None)
+        option = self.options.get(key) if key else None
+        return InputError(f"{option}: {problem}") if option else super().error(location, problem)
+
+
+@dataclass(frozen=True, eq=False)
+class _Part(Document):
+    """A part of a document, whose errors are those of the whole."""
+
+    whole: Document | None = None
+    place: Location = ()
+
+    def error(self, location: Location, problem: str) -> InputError:
+        assert self.whole is not None
+        return self.whole.error((*self.place, *location), problem)
+
+
+def _part(document: Document, *place: str | int) -> Document:
+    """The part of a document at a place."""
+    data = document.data
+    for step in place:
+        data = data[step]
+    return _Part(document.source, data, whole=document, place=place)
+
+
+def campaign_schema() -> dict[str, Any]:
+    """The JSON Schema of campaign files, for editors."""
+    schema = CampaignFile.model_json_schema(by_alias=True)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "antdrive campaign"}

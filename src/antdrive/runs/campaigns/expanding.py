@@ -1,0 +1,275 @@
+"""From a campaign to its runs: every combination of what it lists, in a fixed order, each with its key."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import itertools
+import shlex
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from antdrive.base.checks import suggest
+from antdrive.base.document import Location
+from antdrive.base.errors import FieldError, InputError
+from antdrive.planners import SMOOTHINGS
+from antdrive.robots import RobotSpec, list_robots, load_robot
+from antdrive.runs.campaigns.campaign import Campaign
+from antdrive.runs.campaigns.grid_planners import PlannerVariant, planner_variants
+from antdrive.runs.campaigns.grid_tasks import campaign_tasks
+from antdrive.runs.campaigns.grid_worlds import NamedTask, campaign_worlds
+from antdrive.runs.campaigns.job import Job, SweepCase, key_of
+from antdrive.runs.campaigns.rows import setting_columns
+from antdrive.sim.driving.perception import usual_perception
+from antdrive.sim.entries import SettingsEntry, has_flags, option_text, setting_words
+from antdrive.sim.log.binding import canonical_hash
+from antdrive.sim.settings import scenario_fields
+from antdrive.worlds import Task
+
+WORLDS, ROBOTS = "worlds", "robots"  # folders in a campaign's folder with what its commands name
+
+
+@dataclass(frozen=True, eq=False)
+class NamedRobot:
+    """A robot as a campaign and its commands call it.
+
+    Attributes:
+        robot: the robot
+        name: what tables call it: its own name, or its file where another robot of the campaign has that name, too
+        content: its canonical hash
+        word: what commands call it
+        file: its file; None: it is of the catalogue
+    """
+
+    robot: RobotSpec
+    name: str
+    content: str
+    word: str
+    file: Path | None
+
+
+@dataclass(frozen=True, eq=False)
+class NamedSettings:
+    """One combination of route, noise, margin and settings.
+
+    Attributes:
+        fields: fields of `Scenario` by name; the margin may be "auto", and perception None until the world is known
+        columns: what tables say of them, by column
+        words: the words of `antdrive run` for them; None where it has no flags for all
+        place: where in the campaign the settings are written
+    """
+
+    fields: Mapping[str, Any]
+    columns: Mapping[str, Any]
+    words: tuple[str, ...] | None
+    place: Location
+
+    def among(self, movers: bool) -> NamedSettings:
+        """The settings with what robots perceive in a world with movers, or without; so keys name what is driven."""
+        if self.fields["perception"] is not None:
+            return self
+        fields = {**self.fields, "perception": usual_perception(self.fields.get("map", "given"), movers)}
+        return dataclasses.replace(self, fields=fields, columns=setting_columns(fields))
+
+
+@dataclass(frozen=True, eq=False)
+class Expansion:
+    """The runs of a campaign.
+
+    Attributes:
+        jobs: the runs in the campaign's order: by world, task, robot, route, noise, margin, planner and seed
+        duplicates: how many combinations were left out because they mean the same as an earlier one
+        counts: how many there are of worlds, tasks in each, robots, and so on, by name
+        worlds: the world files that the runs' commands name, by path relative to the campaign's folder
+        robots: likewise the files of robots
+        planners: likewise the files of people's own planners
+    """
+
+    jobs: tuple[Job, ...]
+    duplicates: int
+    counts: dict[str, int]
+    worlds: dict[str, Task]
+    robots: dict[str, Path]
+    planners: dict[str, Path]
+
+
+def expand(campaign: Campaign) -> Expansion:
+    """The runs of a campaign.
+
+    Raises:
+        InputError: something that the campaign names does not exist or has a value that it cannot have; file, line, key.
+    """
+    planners, robots = planner_variants(campaign), _robots(campaign)
+    worlds = campaign_worlds(campaign)
+    tasks = list(campaign_tasks(campaign, worlds, [one.robot for one in robots]))
+    settings = _settings(campaign)
+    _check(campaign, tasks, robots, settings, planners[0])
+    jobs: dict[str, Job] = {}
+    files: dict[str, Task] = {}
+    for case in _cases(tasks, robots, settings, planners, files):
+        identity = case.identity
+        for seed in campaign.entry.seeds:
+            key = key_of(identity, seed)
+            jobs.setdefault(key, Job(key, case, seed))
+    counts = {
+        **_count_tasks(tasks),
+        "robots": len(robots),
+        "routes": len(campaign.entry.routes),
+        "noise": len(campaign.entry.noise),
+        "margin": len(campaign.entry.margin),
+        "settings": len(campaign.settings),
+        "planners": len(planners),
+        "seeds": len(campaign.entry.seeds),
+    }
+    wanted = len(tasks) * len(robots) * len(settings) * len(planners) * len(campaign.entry.seeds)
+    own = {one.word: one.file for one in robots if one.file is not None}
+    codes = {one.word.rpartition(":")[0]: one.file for one in planners if one.file is not None}
+    return Expansion(tuple(jobs.values()), wanted - len(jobs), counts, files, own, codes)
+
+
+def _count_tasks(tasks: Sequence[NamedTask]) -> dict[str, int]:
+    """How many worlds there are, and tasks in each; where these differ, how many tasks in all worlds."""
+    each = Counter(one.world for one in tasks)
+    if len(set(each.values())) == 1:
+        return {"worlds": len(each), "tasks": len(tasks) // len(each)}
+    return {f"tasks in {len(each)} worlds": len(tasks)}
+
+
+def _robots(campaign: Campaign) -> list[NamedRobot]:
+    """The robots of a campaign, each once."""
+    known, found = list_robots(), dict[str, NamedRobot]()
+    for i, name in enumerate(campaign.entry.robots):
+        path = known.get(name, campaign.folder / name)
+        if not path.is_file():
+            raise campaign.error(
+                ("robots", i), f"{name}: no such file, nor a robot of the catalogue; {suggest(name, known)}"
+            )
+        robot = load_robot(path)
+        content = canonical_hash(robot)
+        word = name if name in known else f"{ROBOTS}/{content[:8]}/{path.name}"
+        if content not in found:
+            taken = {one.name for one in found.values()}
+            called = next(one for one in (robot.name, name, f"{name} {content[:8]}") if one not in taken)
+            found[content] = NamedRobot(robot, called, content, word, None if name in known else path)
+    return list(found.values())
+
+
+def _settings(campaign: Campaign) -> list[NamedSettings]:
+    """Every combination of route, noise, margin and settings."""
+    entry = campaign.entry
+
+    def fail_at(place: Location, key: str, problem: str) -> InputError:
+        return campaign.error((*place, *key.split(".")), problem)
+
+    listed = zip(campaign.settings, campaign.places, strict=True)
+    shared = [(one, place, scenario_fields(one, functools.partial(fail_at, place))) for one, place in listed]
+    for i, route in enumerate(entry.routes):
+        if route not in SMOOTHINGS:
+            raise campaign.error(("routes", i), f"unknown {route!r}; {suggest(route, SMOOTHINGS)}")
+    return [
+        _named_settings(one, place, {**fields, "smoothing": route, "noise": noise, "margin": margin})
+        for route, noise, margin, (one, place, fields) in itertools.product(
+            entry.routes, entry.noise, entry.margin, shared
+        )
+    ]
+
+
+def _named_settings(entry: SettingsEntry, place: Location, fields: dict[str, Any]) -> NamedSettings:
+    asked = ["--margin", option_text(fields["margin"]), "--smoothing", fields["smoothing"]]
+    words = (*asked, "--noise", option_text(fields["noise"]), *setting_words(entry)) if has_flags(entry) else None
+    return NamedSettings(fields, setting_columns(fields), words, place)
+
+
+#: Where a campaign writes what a scenario calls by another name.
+_PLACES = {
+    "smoothing": ("routes",),
+    "noise": ("noise",),
+    "margin": ("margin",),
+    "start": ("tasks",),
+    "seed": ("seeds",),
+}
+
+
+def _check(
+    campaign: Campaign,
+    tasks: Sequence[NamedTask],
+    robots: Sequence[NamedRobot],
+    settings: Sequence[NamedSettings],
+    planner: PlannerVariant,
+) -> None:
+    """Refuse, before any work, settings that a robot cannot have and starts where one has no room."""
+    obstructed = list({one.fields["unseen"]: one for one in reversed(settings)}.values())
+    moving = [n for n, task in enumerate(tasks) if task.task.world.movers]
+    whole = {0, *moving[:1]}  # what robots may perceive depends on whether there are movers
+    for robot in robots:
+        for n, task in enumerate(tasks):
+            for one in settings if n in whole else obstructed:
+                margin = 0.0 if one.fields["margin"] == "auto" else None
+                try:
+                    _case(task, robot, one.among(n in moving), planner).scenario(0, margin)
+                except FieldError as error:
+                    place = _PLACES.get(error.key, (*one.place, error.key))
+                    where = task.place if error.key == "start" and not campaign.tasks else place
+                    raise campaign.error(where, f"{task.world} with {robot.name}: {error.problem}") from None
+
+
+def _cases(
+    tasks: Sequence[NamedTask],
+    robots: Sequence[NamedRobot],
+    settings: Sequence[NamedSettings],
+    planners: Sequence[PlannerVariant],
+    files: dict[str, Task],
+) -> Iterator[SweepCase]:
+    """Every combination but for the seeds; `files` is filled with the worlds that commands name."""
+    for task in tasks:
+        content = canonical_hash(task.task)
+        word = task.catalogue or f"{WORLDS}/{_file_name(task)}-{content[:8]}.yaml"
+        if task.catalogue is None:
+            files[word] = task.task
+        known = [one.among(bool(task.task.world.movers)) for one in settings]
+        for robot, one, planner in itertools.product(robots, known, planners):
+            yield _case(task, robot, one, planner, word, content)
+
+
+def _case(
+    task: NamedTask,
+    robot: NamedRobot,
+    settings: NamedSettings,
+    planner: PlannerVariant,
+    word: str = "",
+    content: str = "",
+) -> SweepCase:
+    """A run but for its seed; its command calls the world by `word`."""
+    return SweepCase(
+        task=task.task,
+        world=task.world,
+        world_hash=content,
+        task_name=task.name,
+        planner=planner.label,
+        planner_name=planner.name,
+        planner_source=planner.source,
+        planner_version=planner.version,
+        given=planner.given,
+        options=planner.options,
+        robot=robot.robot,
+        robot_name=robot.name,
+        robot_hash=robot.content,
+        fields=settings.fields,
+        columns=settings.columns,
+        words=None if settings.words is None else _words(word, robot.word, settings.words, planner),
+    )
+
+
+def _words(world: str, robot: str, settings: Sequence[str], planner: PlannerVariant) -> str:
+    """The command that repeats a run, from within the campaign's folder, without its seed."""
+    words = ["antdrive", "run", world, "--planner", planner.word]
+    words += [word for key, value in planner.given.items() for word in ("--set", f"planner.{key}={option_text(value)}")]
+    return shlex.join([*words, "--robot", robot, *settings])
+
+
+def _file_name(task: NamedTask) -> str:
+    name = task.world if task.name == "own" else f"{task.world}-{task.name}"
+    return "".join(c if c.isascii() and (c.isalnum() or c in "-_.=") else "_" for c in name)[:100]

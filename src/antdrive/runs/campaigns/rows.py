@@ -1,0 +1,220 @@
+"""The columns of a campaign's table, and the row of one run.
+
+A run's row has two parts. What the run is comes from the campaign (`grid_row`), so that labels are always those of the
+present campaign. What came out of it is written once, when it ends (`run_row`, `crash_row`).
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from antdrive.robots import Avoidance, PurePursuit
+from antdrive.runs.campaigns.extras import parquet_library
+from antdrive.runs.campaigns.job import Job
+from antdrive.sim.driving.replanning import ReplanPolicy
+from antdrive.sim.entries import option_text
+from antdrive.sim.log.metrics import METRICS
+from antdrive.sim.log.record import settings_of
+from antdrive.sim.pipeline import Run, versions
+from antdrive.sim.settings import SENSING
+
+if TYPE_CHECKING:
+    import pyarrow
+
+CRASHED = "crashed"  # the outcome of a run whose process died, or in which antdrive itself failed
+PLANNER_FAULT = "planner_fault"  # the outcome of a run whose planner raised something
+TOO_SLOW = "too_slow"  # the outcome of a run that was ended because it took longer than the campaign's limit
+WALL_TIMES = ("plan_s", "drive_wall_s")  # metrics that differ between repetitions
+#: The columns that differ between repetitions of the same run; the canonical table is without them.
+NOT_CANONICAL = (*WALL_TIMES, "attempts")
+VERSIONS = ("antdrive", "numpy", "pybullet", "numba")
+BATCH = 50_000  # rows that are plain Python at a time
+OPTION = "option."  # what the names of columns with a planner's option begin with
+#: What a run is, besides its options: the column's name and its type.
+GRID: Mapping[str, str] = {
+    "key": "string",
+    "world": "string",
+    "world_hash": "string",
+    "area_m2": "double",
+    "task": "string",
+    "planner": "string",
+    "planner_name": "string",
+    "planner_version": "string",
+    "options": "string",
+    "robot": "string",
+    "robot_hash": "string",
+    "smoothing": "string",
+    "noise": "double",
+    "margin_asked": "string",
+    "margin": "double",
+    "cell": "double",
+    "map": "string",
+    "localisation": "string",
+    "odometry": "double",
+    "controller": "string",
+    "sees": "string",
+    "avoid": "string",
+    "replan": "string",
+    "unseen": "string",
+    "time_limit": "double",
+    "physics_hz": "int64",
+    "control_hz": "int64",
+    "seed": "int64",
+    "command": "string",
+}
+#: What came out of a run: the column's name and its type.
+RESULT: Mapping[str, str] = {
+    "key": "string",
+    "outcome": "string",
+    "succeeded": "bool",
+    "certified": "bool",
+    "reason": "string",
+    "digest": "string",
+    "drive_digest": "string",
+    **{name: "double" for name in METRICS if name not in WALL_TIMES},
+    "plan_length_m": "double",
+    "grid_optimum_m": "double",
+    "rollout": "string",
+    **{f"version.{name}": "string" for name in VERSIONS},
+    "plan_s": "double",
+    "drive_wall_s": "double",
+    "attempts": "int64",
+}
+
+
+def grid_row(job: Job) -> dict[str, Any]:
+    """What a run is, by column."""
+    case, fields = job.case, job.case.fields
+    x0, y0, x1, y1 = case.task.world.bounds
+    margin = case.calibration.margin if case.calibration else fields["margin"]
+    return {
+        "key": job.key,
+        "world": case.world,
+        "world_hash": case.world_hash,
+        "area_m2": (x1 - x0) * (y1 - y0),
+        "task": case.task_name,
+        "planner": case.planner,
+        "planner_name": case.planner_name,
+        "planner_version": case.planner_version,
+        "options": json.dumps(case.options, sort_keys=True),
+        "robot": case.robot_name,
+        "robot_hash": case.robot_hash,
+        **case.columns,
+        "margin": None if margin == "auto" else float(margin),
+        "cell": float(fields["cell"] or case.task.cell),
+        "seed": job.seed,
+        "command": None if case.words is None else f"{case.words} --seed {job.seed}",
+    }
+
+
+def setting_columns(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """What tables say of a run's settings, by column."""
+    sees, margin, limit = fields["perception"], fields["margin"], fields["time_limit"]
+    return {
+        "smoothing": fields["smoothing"],
+        "noise": float(fields["noise"]),
+        "margin_asked": margin if margin == "auto" else str(float(margin)),
+        **{key: fields.get(key, usual) for key, usual in SENSING.items()},
+        "controller": _changes(fields["controller"], PurePursuit()),
+        "sees": None if sees is None else sees.kind if math.isinf(sees.range) else f"{sees.kind}:{sees.range:g}",
+        "avoid": _changes(fields["avoidance"], Avoidance()),
+        "replan": _changes(fields["replanning"], ReplanPolicy()),
+        "unseen": " ".join(f"{disc.x:g},{disc.y:g},{disc.radius:g}" for disc in fields["unseen"]) or "none",
+        "time_limit": None if limit is None else float(limit),
+        "physics_hz": fields["physics_hz"],
+        "control_hz": fields["control_hz"],
+    }
+
+
+def _changes(record: Any, default: Any) -> str:
+    """The settings of a record that are not the defaults, as NAME=VALUE."""
+    if record is None:
+        return "none"
+    usual = settings_of(default)
+    changed = (f"{key}={option_text(value)}" for key, value in settings_of(record).items() if value != usual[key])
+    return " ".join(changed) or "default"
+
+
+def run_row(key: str, run: Run, rollout: str | None) -> dict[str, Any]:
+    """What came out of a run that ended by itself, by column."""
+    log, plan = run.rollout, run.plan
+    row = _empty(key) | {
+        "outcome": run.outcome.key,
+        "succeeded": run.succeeded,
+        "reason": run.reason,
+        "plan_length_m": plan.line_length if plan.solved else None,
+        "rollout": rollout,
+        "plan_s": plan.wall_s,
+    }
+    if log is None:
+        return row
+    return row | {
+        "certified": run.certificate is not None and run.certificate.certified,
+        "digest": log.digest,
+        "drive_digest": log.drive_digest,
+        **{name: None if math.isnan(value) else value for name, value in run.metrics.items()},
+        "plan_length_m": log.record.plan.length_m,
+        "grid_optimum_m": log.record.plan.grid_optimum_m,
+    }
+
+
+def fault_row(key: str, outcome: str, reason: str) -> dict[str, Any]:
+    """The row of a run that did not end by itself."""
+    return _empty(key) | {"outcome": outcome, "succeeded": False, "reason": reason}
+
+
+def slow_row(key: str, limit: float) -> dict[str, Any]:
+    """The row of a run that was ended because it took too long."""
+    return fault_row(key, TOO_SLOW, f"took longer than the campaign's run_limit of {limit:g} s")
+
+
+def _empty(key: str) -> dict[str, Any]:
+    return {**dict.fromkeys(RESULT), "key": key, **_version_columns(), "attempts": 1}
+
+
+@functools.cache  # looking versions up takes milliseconds
+def _version_columns() -> dict[str, str]:
+    found = versions()
+    return {f"version.{name}": found[name] for name in VERSIONS}
+
+
+def result_table(rows: Sequence[Mapping[str, Any]]) -> pyarrow.Table:
+    """What came out of some runs as an Arrow table."""
+    return parquet_library().Table.from_pylist(list(rows), schema=_schema(RESULT))
+
+
+def grid_table(jobs: Sequence[Job]) -> pyarrow.Table:
+    """What the runs of a campaign are as an Arrow table, with a column for each option that the campaign sets."""
+    arrow, schema = parquet_library(), _schema(GRID)
+    batches = (jobs[first : first + BATCH] for first in range(0, len(jobs), BATCH))
+    tables = [arrow.Table.from_pylist([grid_row(job) for job in batch], schema=schema) for batch in batches]
+    table = arrow.concat_tables([schema.empty_table(), *tables]).combine_chunks()
+    place = table.schema.get_field_index("options") + 1
+    for name in sorted({option for job in jobs for option in job.case.given}):
+        values = [job.case.options.get(name) for job in jobs]
+        table = table.add_column(place, OPTION + name, arrow.array(_alike(values)))
+        place += 1
+    return table
+
+
+def _alike(values: list[Any]) -> list[Any]:
+    """The values of a column, all of one type: numbers as they are, mixtures with text as text."""
+    kinds = {type(value) for value in values if value is not None}
+    if kinds <= {int, float}:
+        return [float(value) if float in kinds and value is not None else value for value in values]
+    return values if len(kinds) < 2 else [None if value is None else str(value) for value in values]
+
+
+def _schema(columns: Mapping[str, str]) -> pyarrow.Schema:
+    arrow = parquet_library()
+    kinds = {"string": arrow.string(), "double": arrow.float64(), "bool": arrow.bool_(), "int64": arrow.int64()}
+    return arrow.schema([(name, kinds[kind]) for name, kind in columns.items()])
+
+
+def result_schema() -> pyarrow.Schema:
+    """The Arrow schema of what comes out of runs."""
+    return _schema(RESULT)

@@ -1,0 +1,111 @@
+"""One run of a campaign in a worker process: prepare, drive, measure, keep the log if wanted."""
+
+from __future__ import annotations
+
+import dataclasses
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, Protocol, TypeAlias
+
+from antdrive.base.errors import InputError
+from antdrive.planners import PlannerError
+from antdrive.runs.campaigns.job import Job
+from antdrive.runs.campaigns.rows import CRASHED, PLANNER_FAULT, fault_row, run_row
+from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.pipeline import Run, run
+from antdrive.sim.scenario import Scenario
+
+Keep: TypeAlias = Literal["none", "failed", "all"]
+LOGS = "rollouts"  # the folder with the logs that are kept
+
+
+@dataclass(frozen=True, eq=False)
+class Finished:
+    """What a worker hands back about a run.
+
+    Attributes:
+        row: what came out of it, by column
+        log: the log as bytes, if it is to be kept and the worker does not share the campaign's folder
+    """
+
+    row: dict[str, Any]
+    log: bytes | None = None
+
+
+class Work(Protocol):
+    """What workers do with a run."""
+
+    def __call__(self, job: Job) -> Finished:
+        """Make the run; whatever goes wrong in it stands in the row.
+
+        Raises:
+            InputError: the campaign cannot go on, such as where logs cannot be written.
+        """
+
+
+@dataclass(frozen=True)
+class Driving:
+    """Plan, drive and certify a run.
+
+    Attributes:
+        keep: which runs' logs are kept
+        folder: the campaign's folder, where logs are written; None: they are handed back
+    """
+
+    keep: Keep = "none"
+    folder: str | None = None
+
+    def __call__(self, job: Job) -> Finished:
+        """Make the run. What its planner raises, and what antdrive itself raises, is the run's result, not the campaign's end.
+
+        Raises:
+            InputError: the planner does not exist on this machine, or the log cannot be written.
+        """
+        try:
+            done = run(prepare(job))
+        except InputError:
+            raise
+        except PlannerError as error:
+            return Finished(fault_row(job.key, PLANNER_FAULT, str(error)))
+        except Exception as error:
+            return Finished(fault_row(job.key, CRASHED, f"{type(error).__name__}: {error}"))
+        return self._kept(job, done)
+
+    def _kept(self, job: Job, done: Run) -> Finished:
+        log = done.rollout
+        if log is None or self.keep == "none" or (self.keep == "failed" and done.succeeded):
+            return Finished(run_row(job.key, done, None))
+        row = run_row(job.key, done, log_path(job.key))
+        try:
+            if self.folder is None:
+                return Finished(row, _bytes_of(log))
+            log.save(Path(self.folder) / log_path(job.key))
+        except OSError as error:
+            raise InputError(f"{log_path(job.key)}: cannot be written ({error.strerror or error})") from None
+        return Finished(row)
+
+
+def prepare(job: Job) -> Scenario:
+    """The scenario of a run. What runs in the same world can share within a process belongs here.
+
+    Raises:
+        InputError: a planner or option does not exist here.
+        FieldError: a setting is out of range.
+    """
+    return job.case.scenario(job.seed)
+
+
+def log_path(key: str) -> str:
+    """Where the log of a run is, relative to the campaign's folder."""
+    return f"{LOGS}/{key[:2]}/{key}.npz"
+
+
+def _bytes_of(log: Rollout) -> bytes:
+    with tempfile.TemporaryDirectory() as folder:
+        return log.save(Path(folder) / "log.npz").read_bytes()
+
+
+def again(finished: Finished, attempts: int) -> Finished:
+    """The same result, with the number of attempts that it took."""
+    return dataclasses.replace(finished, row={**finished.row, "attempts": attempts})

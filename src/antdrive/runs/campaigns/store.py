@@ -1,0 +1,271 @@
+"""A campaign's folder: what is to be run, what came out so far, and a table of both.
+
+    manifest.json   the campaign as written, its size and hash, the versions of the latest command
+    grid.parquet    a row for each run: what it is
+    parts/          what came out of runs: a file for every few seconds, merged from time to time
+    rollouts/       the logs that are kept
+    worlds/, robots/  files for the commands that repeat runs
+    runs.parquet    the table of all runs that are done, written when a command begins and when it ends
+
+Every file is written under another name, brought to the disk and then renamed, so that a process that is killed leaves no
+half of one. A run that was made twice stands in two parts; the table has it once.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+import uuid
+from collections.abc import Iterator, Mapping, Sequence, Set
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from antdrive.base.atomic import claimed, written_whole
+from antdrive.base.errors import InputError, input_error
+from antdrive.runs.campaigns.extras import parquet_library
+from antdrive.runs.campaigns.rows import CRASHED, NOT_CANONICAL, result_schema, result_table
+
+if TYPE_CHECKING:
+    import pyarrow
+
+MANIFEST, GRID_FILE, PARTS, TABLE = "manifest.json", "grid.parquet", "parts", "runs.parquet"
+FLUSH_EVERY = 2.0  # finished runs are written at least this often [s]
+TRIES = 100  # at reading parts that another process merges meanwhile
+MOST_PARTS = 200  # more are merged into one
+UNFINISHED = ".new-"  # what the names of files begin with that are being written
+
+
+class Store:
+    """The folder of a campaign, while this process alone writes into it.
+
+    Attributes:
+        folder: the folder
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._rows: list[Mapping[str, Any]] = []
+        self._written = time.monotonic()
+        self._parts = len(parts_in(folder))
+
+    def begin(self, manifest: Mapping[str, Any], grid: pyarrow.Table) -> None:
+        """Write what is to be run."""
+        write_table(grid, self.folder / GRID_FILE)
+        text = json.dumps(manifest, indent=1, ensure_ascii=False)
+        with written_whole(self.folder / MANIFEST) as part:
+            part.write_text(text + "\n", encoding="utf-8")
+        write_table(joined(self.folder), self.folder / TABLE)  # until there is another one at the end
+
+    def add(self, row: Mapping[str, Any], log: bytes | None = None) -> None:
+        """Keep what came out of a run; it is on the disk after `FLUSH_EVERY` seconds, if `tick` is called that often."""
+        if log is not None:
+            try:
+                with written_whole(self.folder / row["rollout"]) as part:
+                    part.write_bytes(log)
+            except OSError as error:
+                raise InputError(f"{row['rollout']}: cannot be written ({error.strerror or error})") from None
+        self._rows.append(row)
+        self.tick()
+
+    def tick(self) -> None:
+        """Write what came out of runs, if that was not done for `FLUSH_EVERY` seconds."""
+        if time.monotonic() - self._written > FLUSH_EVERY:
+            self.flush()
+
+    def flush(self) -> None:
+        """Write what came out of runs since the last time."""
+        self._written = time.monotonic()
+        if self._rows:
+            write_table(result_table(self._rows), self.folder / PARTS / _part_name())
+            self._rows = []
+            self._parts += 1
+        if self._parts > MOST_PARTS:
+            self.merge()
+
+    def merge(self) -> None:
+        """Make one part of all of them. The old ones go when the new one is on the disk."""
+        old = parts_in(self.folder)
+        if len(old) > 1:
+            write_table(_results(self.folder), self.folder / PARTS / _part_name())
+            for path in old:
+                path.unlink(missing_ok=True)
+        self._parts = 1
+
+    def drop(self, keys: Set[str]) -> None:
+        """Forget what came out of some runs, so that they are made again."""
+        old, table = parts_in(self.folder), _results(self.folder)
+        names = table["key"].to_pylist()
+        for i, path in enumerate(table["rollout"].to_pylist()):
+            if path is not None and names[i] in keys:
+                (self.folder / path).unlink(missing_ok=True)
+        write_table(
+            _rows(table, [i for i, key in enumerate(names) if key not in keys]), self.folder / PARTS / _part_name()
+        )
+        for path in old:
+            path.unlink(missing_ok=True)
+        self._parts = 1
+
+    def finish(self) -> pyarrow.Table:
+        """Write everything, merge the parts, and write the table; the table."""
+        self.flush()
+        self.merge()
+        table = joined(self.folder)
+        write_table(table, self.folder / TABLE)
+        return table
+
+
+@contextmanager
+def opened(folder: str | os.PathLike[str]) -> Iterator[Store]:
+    """A context with a campaign's folder for this process alone.
+
+    Raises:
+        InputError: another process writes into it, it cannot be written to, or it holds something else.
+    """
+    path = Path(folder)
+    if path.is_dir() and not (path / MANIFEST).exists() and any(p.name[0] != "." for p in path.iterdir()):
+        raise input_error(str(folder), f"holds other files and no {MANIFEST}; name a new folder, or that of a campaign")
+    with claimed(path):
+        (path / PARTS).mkdir(exist_ok=True)
+        for left in (*path.glob(f"{UNFINISHED}*"), *(path / PARTS).glob(f"{UNFINISHED}*")):
+            left.unlink(missing_ok=True)  # of a process that was killed
+        yield Store(path)
+
+
+def outcomes_in(folder: Path) -> dict[str, str]:
+    """How each run ended that was ever made in a folder, by key, also of campaigns that have changed since."""
+    results = _results(folder)
+    return dict(zip(results["key"].to_pylist(), results["outcome"].to_pylist(), strict=True))
+
+
+def former_grid(folder: Path) -> pyarrow.Table | None:
+    """What the runs were of the campaign that a folder held before; None if it held none."""
+    return _read(folder / GRID_FILE) if (folder / GRID_FILE).exists() else None
+
+
+def read_manifest(folder: str | Path) -> dict[str, Any]:
+    """The manifest of a campaign's folder.
+
+    Raises:
+        InputError: there is none.
+    """
+    path = Path(folder) / MANIFEST
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise input_error(str(folder), f"no {MANIFEST} in this folder; antdrive sweep writes it") from None
+    except (OSError, ValueError) as error:
+        raise input_error(str(path), f"cannot be read ({error})") from None
+    if not isinstance(found, dict) or type(found.get("size")) is not int:
+        raise input_error(str(path), "is no manifest of a campaign; antdrive sweep writes a new one")
+    return found
+
+
+def joined(folder: Path) -> pyarrow.Table:
+    """A row for each run of the campaign that is done, in the campaign's order."""
+    grid, results = _read(folder / GRID_FILE), _results(folder)
+    places = {key: i for i, key in enumerate(results["key"].to_pylist())}
+    keys = grid["key"].to_pylist()
+    rows = [i for i, key in enumerate(keys) if key in places]
+    left, right = _rows(grid, rows), _rows(results, [places[keys[i]] for i in rows])
+    command = left.schema.get_field_index("command")
+    for name in right.column_names:
+        if name != "key" and name not in left.column_names:
+            left = left.append_column(name, right[name])
+    order = [name for name in left.column_names if name not in ("command", *NOT_CANONICAL)]
+    order.insert(_after(order, "rollout"), left.column_names[command])
+    return left.select([*order, *NOT_CANONICAL]).combine_chunks()
+
+
+def _rows(table: pyarrow.Table, numbers: list[int]) -> pyarrow.Table:
+    """Some rows of a table, in this order; none where there are none."""
+    arrow = parquet_library()
+    return table.take(arrow.array(numbers, type=arrow.int64()))
+
+
+def _after(names: Sequence[str], name: str) -> int:
+    return list(names).index(name) + 1
+
+
+def write_table(table: pyarrow.Table, path: Path) -> None:
+    """Write an Arrow table as Parquet, whole or not at all, and onto the disk.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    parquet_library()
+    import pyarrow.parquet
+
+    temporary = path.with_name(f"{UNFINISHED}{uuid.uuid4().hex}{path.suffix}")
+    try:
+        with temporary.open("wb") as stream:
+            pyarrow.parquet.write_table(table, stream, compression="zstd")
+            stream.flush()
+            os.fsync(stream.fileno())
+        temporary.replace(path)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        raise InputError(f"{path}: cannot be written ({error.strerror})") from None
+
+
+def parts_in(folder: Path) -> list[Path]:
+    """The parts in a campaign's folder, in the order in which they were written."""
+    return sorted(path for path in (folder / PARTS).glob("*.parquet") if not path.name.startswith(UNFINISHED))
+
+
+def _part_name() -> str:
+    return f"{time.time_ns():020d}-{uuid.uuid4().hex[:8]}.parquet"
+
+
+def _tables(folder: Path) -> list[pyarrow.Table]:
+    """The parts of a folder, also while another process merges them."""
+    for _ in range(TRIES):
+        tables = []
+        for path in parts_in(folder):
+            try:
+                tables.append(_cast(_read(path), result_schema()))
+            except InputError:
+                if path.exists():
+                    raise
+                break  # it was merged into another one since it was listed
+        else:
+            return tables
+    raise input_error(str(folder / PARTS), "changes faster than it can be read; try again")
+
+
+def _results(folder: Path) -> pyarrow.Table:
+    """What came out of all runs that were ever made in a folder, each once: a run that did not crash counts first."""
+    arrow, schema = parquet_library(), result_schema()
+    tables = _tables(folder)
+    table = arrow.concat_tables(tables) if tables else schema.empty_table()
+    places: dict[str, int] = {}
+    outcomes = table["outcome"].to_pylist()
+    for i, key in enumerate(table["key"].to_pylist()):
+        if key not in places or (outcomes[places[key]] == CRASHED != outcomes[i]):
+            places[key] = i
+    return table if len(places) == len(table) else _rows(table, sorted(places.values()))
+
+
+def _cast(table: pyarrow.Table, schema: pyarrow.Schema) -> pyarrow.Table:
+    """A table with the present columns: those that a part of another version lacks are null."""
+    arrow = parquet_library()
+    if table.schema.equals(schema):
+        return table
+    have = set(table.column_names)
+    columns = [
+        table[field.name].cast(field.type) if field.name in have else arrow.nulls(len(table), field.type)
+        for field in schema
+    ]
+    return arrow.table(columns, schema=schema)
+
+
+def _read(path: Path) -> pyarrow.Table:
+    arrow = parquet_library()
+    try:
+        return arrow.parquet.read_table(path)
+    except FileNotFoundError:
+        raise input_error(str(path), "no such file; antdrive sweep writes it") from None
+    except (OSError, arrow.ArrowException) as error:
+        remedy = "; without this file its runs are made again" if path.parent.name == PARTS else ""
+        raise input_error(str(path), f"cannot be read as Parquet ({error}){remedy}") from None

@@ -1,0 +1,242 @@
+"""Failures handed over: world files, robot files and a suite that expects each scenario to fail as it did."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+import os
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from antdrive.base.atomic import written_whole
+from antdrive.base.errors import InputError
+from antdrive.base.processes import delayed
+from antdrive.planners import PlannerError, list_planners, load_planner
+from antdrive.robots import Avoidance, PurePursuit, RobotSpec, list_robots, load_robot
+from antdrive.robots.files import footprint_to_dict
+from antdrive.runs.suites.demands import Bound
+from antdrive.runs.suites.names import is_own_entry
+from antdrive.runs.suites.scenarios import scenario_of
+from antdrive.runs.suites.suite import load_suite
+from antdrive.runs.suites.touching import cause_of_contact, touched_first
+from antdrive.sim.driving.perception import usual_perception
+from antdrive.sim.driving.replanning import ReplanPolicy
+from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.pipeline import Run, run
+from antdrive.sim.scenario import Scenario
+from antdrive.worlds import save_task
+
+
+@dataclass(frozen=True, eq=False)
+class Handover:
+    """A failing run under a name.
+
+    Attributes:
+        name: the scenario's name in the suite, and that of its world file
+        run: the run that failed; the scenario alone where the planner raised something
+        bound: the metric's bound that it crosses, if that is its failure
+        note: what people should know about it; may be empty
+        planner: the planner in the words of the suite, such as {file: ../mine.py, name: Mine}; None: by its name
+    """
+
+    name: str
+    run: Run | Scenario
+    bound: Bound | None = None
+    note: str = ""
+    planner: str | Mapping[str, Any] | None = None
+
+
+def write_suite(path: Path, handovers: Sequence[Handover]) -> Path:
+    """Write a suite, and beside it the worlds, and the robots that are not in the catalogue.
+
+    The suite has no baselines: it holds as long as the scenarios fail as they did. A scenario whose planner raises something
+    is expected to succeed, because no outcome says so; its test fails until the planner is mended.
+
+    Args:
+        path: the suite's file; its name ends in .drive.yaml
+        handovers: the failures, with different names
+
+    Returns:
+        The suite's path.
+
+    Raises:
+        InputError: a file cannot be written.
+    """
+    entries: dict[str, Any] = {}
+    robots: dict[str, RobotSpec] = {}
+    for handover in handovers:
+        failed = handover.run
+        scenario = failed.scenario if isinstance(failed, Run) else failed
+        world = Path("worlds") / f"{handover.name}.yaml"
+        save_task(scenario.task, path.parent / world)
+        entries[handover.name] = {
+            **({"note": handover.note} if handover.note else {}),
+            "world": str(world),
+            **suite_entry(scenario, _robot(scenario.robot, path.parent, robots)),
+            **({"planner": handover.planner} if handover.planner else {}),
+            **({"expect": expectation(failed, handover.bound)} if isinstance(failed, Run) else {}),
+            "baseline": False,
+        }
+    with written_whole(path) as part:
+        text = yaml.safe_dump({"schema": 1, "scenarios": entries}, sort_keys=False, allow_unicode=True, width=110)
+        part.write_text(text, encoding="utf-8")
+    return path
+
+
+def suite_entry(scenario: Scenario, robot: str) -> dict[str, Any]:
+    """A scenario as plain data with the keys of a suite, without its world and what is expected."""
+    plain: dict[str, Any] = {
+        "robot": robot,
+        "planner": planner_words(scenario),
+        "smoothing": scenario.smoothing,
+        "margin": float(scenario.margin),
+        "noise": float(scenario.noise),
+        "seeds": [int(scenario.seed)],
+    }
+    if controller := _changed(scenario.controller, PurePursuit()):
+        plain["controller"] = controller
+    if scenario.cell is not None and scenario.cell != scenario.task.cell:
+        plain["cell"] = float(scenario.cell)
+    if scenario.time_limit is not None:
+        plain["time_limit"] = float(scenario.time_limit)
+    if scenario.unseen:
+        plain["unseen"] = [
+            {key: float(value) for key, value in dataclasses.asdict(disc).items()} for disc in scenario.unseen
+        ]
+    for key, usual in (("physics_hz", 240), ("control_hz", 60)):
+        if getattr(scenario, key) != usual:
+            plain[key] = getattr(scenario, key)
+    if scenario.sensing is not None:
+        plain |= dataclasses.asdict(scenario.sensing)
+    return plain | (_among_movers(scenario) if scenario.among_movers or scenario.exploring else {})
+
+
+def planner_moved(given: str | Mapping[str, Any], home: Path, folder: Path) -> str | dict[str, Any] | None:
+    """The words of a suite for a planner in a file or module of people's own, as a suite in another folder writes them.
+
+    None for a registered planner.
+    """
+    if not is_own_entry(given):
+        return None
+    words = {"name": given} if isinstance(given, str) else dict(given)
+    file, mark, word = words["name"].rpartition(":")
+    if "file" in words:
+        words["file"] = os.path.relpath(home / words["file"], folder)
+    elif mark and file.endswith(".py"):
+        words["name"] = f"{os.path.relpath(home / file, folder)}:{word}"
+    return words if len(words) > 1 else str(words["name"])
+
+
+def expectation(failed: Run, bound: Bound | None = None) -> dict[str, Any]:
+    """What a suite expects of a scenario that is to fail as it did."""
+    expected: dict[str, Any] = {"outcome": failed.outcome.key}
+    if failed.outcome is Outcome.SUCCEEDED:
+        expected["certified"] = failed.succeeded
+    if failed.rollout is not None and failed.outcome.with_contact:
+        expected["touched"] = touched_first(failed.rollout)
+        if bound is None and (cause := cause_of_contact(failed.rollout)):
+            expected["cause"] = cause
+    if bound is not None:
+        expected[bound.metric] = f"{bound.sign} {bound.value!r}"
+    return expected
+
+
+def fingerprint_of(done: Run) -> str:
+    """A run in one text, which is the same wherever the run is the same bit for bit."""
+    return done.rollout.digest if done.rollout is not None else f"{done.outcome.key}: {done.reason}"
+
+
+def suite_elsewhere(suite: Path) -> list[str]:
+    """The fingerprints of a suite's scenarios, run in other processes; a fault of a file stands for one."""
+    from joblib import Parallel
+
+    return list(Parallel(2)(delayed(_fingerprint_from)(suite.resolve(), k) for k in range(len(load_suite(suite)))))
+
+
+def _fingerprint_from(suite: Path, index: int) -> str:
+    try:
+        return _fingerprint(scenario_of(load_suite(suite)[index]))
+    except InputError as error:
+        return str(error)
+
+
+def scenario_name(text: str) -> str:
+    """A name that a suite takes for a scenario."""
+    return re.sub(r"[^A-Za-z0-9_.-]", "_", text).lstrip("_.-")[:90] or "failure"
+
+
+def run_elsewhere(scenarios: Sequence[Scenario]) -> list[str]:
+    """The fingerprints of scenarios that are run in other processes."""
+    from joblib import Parallel
+
+    return list(Parallel(2)(delayed(_fingerprint)(scenario) for scenario in scenarios))
+
+
+def _fingerprint(scenario: Scenario) -> str:
+    done = run_if_planned(scenario)
+    return done if isinstance(done, str) else fingerprint_of(done)
+
+
+def run_if_planned(scenario: Scenario) -> Run | str:
+    """A scenario's run; where the planner raises something, what it raises."""
+    try:
+        return run(scenario)
+    except PlannerError as error:
+        return str(error)
+
+
+def planner_words(scenario: Scenario, own: str | None = None) -> str | dict[str, Any]:
+    """A scenario's planner in the words of a suite: its name, with the options that differ from those of that name."""
+    name = own or scenario.planner_label
+    options = _changed(scenario.planner, load_planner(own) if own else list_planners().get(name))
+    return {"name": name, **options} if options else name
+
+
+def _changed(settings: Any, usual: Any) -> dict[str, Any]:
+    """The fields of a record that differ from the usual ones."""
+    if not dataclasses.is_dataclass(settings) or type(settings) is not type(usual):
+        return {}
+    names = [field.name for field in dataclasses.fields(settings) if field.init]
+    return {name: getattr(settings, name) for name in names if getattr(settings, name) != getattr(usual, name)}
+
+
+def _among_movers(scenario: Scenario) -> dict[str, Any]:
+    """How the robot drives among movers, where it is not the usual way."""
+    plain: dict[str, Any] = {}
+    perception = scenario.known_perception
+    if perception != usual_perception(scenario.map, movers=bool(scenario.task.world.movers)):
+        reach = f":{perception.range!r}" if math.isfinite(perception.range) else ""
+        plain["sees"] = perception.kind + reach
+    for key, settings, usual in (
+        ("avoid", scenario.avoidance, Avoidance()),
+        ("replan", scenario.replanning, ReplanPolicy()),
+    ):
+        plain[key] = "none" if settings is None else _changed(settings, usual) or True
+    return {key: value for key, value in plain.items() if value is not True}
+
+
+def _robot(robot: RobotSpec, folder: Path, robots: dict[str, RobotSpec]) -> str:
+    """The robot's name in the catalogue, or the file beside the suite that is written for it."""
+    if robot.name in list_robots() and load_robot(robot.name) == robot:
+        return robot.name
+    plain = "".join(c if c.isalnum() or c in "-_." else "_" for c in robot.name)
+    names = (plain if k == 1 else f"{plain}-{k}" for k in itertools.count(1))
+    name = next(name for name in names if robots.get(name, robot) == robot)
+    if name not in robots:
+        robots[name] = robot
+        _write_robot(robot, folder / "robots" / f"{name}.yaml")
+    return f"robots/{name}.yaml"
+
+
+def _write_robot(robot: RobotSpec, target: Path) -> None:
+    data = {"schema": 1, **dataclasses.asdict(robot)}
+    data["footprint"] = footprint_to_dict(robot.footprint)
+    with written_whole(target) as part:
+        text = yaml.safe_dump({key: value for key, value in data.items() if value is not None}, sort_keys=False)
+        part.write_text(text, encoding="utf-8")

@@ -1,0 +1,329 @@
+"""The ways in which a failing scenario is made simpler. Each proposes candidates, the simplest first."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any, TypeVar
+
+import numpy as np
+
+from antdrive.base import Bounds, Floats
+from antdrive.base.errors import FieldError
+from antdrive.planners import capabilities_of
+from antdrive.runs.failures.ddmin import one_minimal
+from antdrive.runs.failures.trials import Trials
+from antdrive.sim.log.metrics import nearest_on_route
+from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.scenario import Scenario
+from antdrive.worlds import Disc, Mover, Wandering
+
+Item = TypeVar("Item")
+
+NOISES = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)  # fractions of the scenario's own
+SEEDS = 10  # the simplest seeds are those below this
+BEFORE = (1.0, 2.0, 4.0, 8.0, 16.0)  # how long before the failure a nearer start may lie [s]
+BEYOND = (0.5, 1.0, 2.0, 4.0, 8.0)  # how far beyond the failure, along the route, a nearer goal may lie [m]
+INWARDS = (1.0, 0.75, 0.5, 0.25)  # fractions of the way that a wall can be moved inwards
+FEW, MANY = 2, 8  # of MANY obstacles or fewer, each single one and each pair is tried
+DIGITS = (0, 1, 2, 3)  # behind the decimal point; radii and angles keep at least one
+
+
+def nearest(scenario: Scenario, trials: Trials) -> Scenario:
+    """The scenario with the 1, 2, 4, ... obstacles that are nearest to the drive, as many as suffice."""
+    discs, order = scenario.task.world.obstacles, _by_distance(scenario, trials)
+    counts = itertools.takewhile(lambda count: count < len(discs), (2**k for k in itertools.count()))
+    fewer = (with_obstacles(scenario, _at(discs, order[:count])) for count in counts)
+    return trials.first(_with_seeds(fewer)) or scenario
+
+
+def obstacles(scenario: Scenario, trials: Trials) -> Scenario:
+    """The scenario with the obstacles that the failure needs."""
+    discs, order = scenario.task.world.obstacles, _by_distance(scenario, trials)
+    scenario = _needed(scenario, order, lambda s, kept: with_obstacles(s, _at(discs, kept)), trials)
+    discs = scenario.task.world.obstacles
+    if not FEW < len(discs) <= MANY:
+        return scenario
+    fewer = (some for count in range(1, FEW + 1) for some in itertools.combinations(discs, count))
+    return trials.first(with_obstacles(scenario, some) for some in fewer) or scenario
+
+
+def movers(scenario: Scenario, trials: Trials) -> Scenario:
+    """The scenario with the movers that the failure needs."""
+    return _needed(scenario, scenario.task.world.movers, with_movers, trials)
+
+
+def unseen(scenario: Scenario, trials: Trials) -> Scenario:
+    """The scenario with the unseen obstacles that the failure needs."""
+    return _needed(scenario, scenario.unseen, with_unseen, trials)
+
+
+def start(scenario: Scenario, trials: Trials) -> Scenario:
+    """The scenario with the start moved along the drive, towards the failure."""
+    return trials.first(_with_seeds(_nearer_starts(scenario, trials.rollout(scenario)))) or scenario
+
+
+def goal(scenario: Scenario, trials: Trials) -> Scenario:
+    """The scenario with the goal moved along the route, towards the failure."""
+    return trials.first(_nearer_goals(scenario, trials.rollout(scenario))) or scenario
+
+
+def bounds(scenario: Scenario, trials: Trials) -> Scenario:
+    """The scenario with walls moved inwards, by whole cells, so that the grid stays where it is.
+
+    Cylinders that a moved wall would cut or leave outside go.
+    """
+    for side in range(4):
+        scenario = trials.first(_walled(scenario, side, b) for b in _tighter(scenario, side)) or scenario
+    return scenario
+
+
+def noise(scenario: Scenario, trials: Trials) -> Scenario:
+    """The scenario with the least noise: none, or a tenth to nine tenths of its own."""
+    levels = [float(f"{scenario.noise * share:.2g}") for share in NOISES]
+    return trials.first(_varied(scenario, noise=level) for level in levels if level < scenario.noise) or scenario
+
+
+def seed(scenario: Scenario, trials: Trials) -> Scenario:
+    """The scenario with the simplest seed."""
+    most = SEEDS if _is_random(scenario) else 1
+    return trials.first(_varied(scenario, seed=n) for n in range(min(most, scenario.seed))) or scenario
+
+
+def time_limit(scenario: Scenario, trials: Trials) -> Scenario:
+    """The scenario without a time limit of its own."""
+    task = dataclasses.replace(scenario.task, time_limit=None)
+    free = _varied(scenario, time_limit=None, task=task)
+    return scenario if free == scenario else trials.first([free]) or scenario
+
+
+def digits(scenario: Scenario, trials: Trials) -> Scenario:
+    """The scenario with its positions and radii rounded to fewer digits: all at once, then one by one."""
+    for count in DIGITS:
+        whole = _all_rounded(scenario, count)
+        if whole == scenario or trials.first([whole]) is not None:
+            return whole or scenario
+    for rounded in _roundings(scenario):
+        for count in DIGITS:
+            candidate = rounded(scenario, count)
+            if candidate == scenario:
+                break
+            if trials.first([candidate]) is not None:
+                scenario = candidate or scenario
+                break
+    return scenario
+
+
+#: The passes with their names, in their order. Nearer ends come first, because they shorten every later trial.
+PASSES: tuple[tuple[str, Callable[[Scenario, Trials], Scenario]], ...] = (
+    ("start", start),
+    ("goal", goal),
+    ("obstacles", nearest),
+    ("start", start),
+    ("goal", goal),
+    ("obstacles", obstacles),
+    ("movers", movers),
+    ("unseen", unseen),
+    ("bounds", bounds),
+    ("noise", noise),
+    ("seed", seed),
+    ("time limit", time_limit),
+    ("digits", digits),
+)
+
+
+def with_obstacles(scenario: Scenario, discs: Sequence[Disc]) -> Scenario | None:
+    """The scenario with other obstacles; None if that is impossible."""
+    return _varied_world(scenario, obstacles=tuple(discs))
+
+
+def with_movers(scenario: Scenario, kept: Sequence[Mover]) -> Scenario | None:
+    """The scenario with other movers; None if that is impossible."""
+    return _varied_world(scenario, movers=tuple(kept))
+
+
+def with_unseen(scenario: Scenario, discs: Sequence[Disc], **world: Any) -> Scenario | None:
+    """The scenario with other unseen obstacles, and fields of its world changed; None if that is impossible."""
+    fewer = _varied(scenario, unseen=tuple(discs))
+    return fewer if fewer is None or not world else _varied_world(fewer, **world)
+
+
+def _needed(
+    scenario: Scenario,
+    items: Sequence[Item],
+    make: Callable[[Scenario, Sequence[Item]], Scenario | None],
+    trials: Trials,
+) -> Scenario:
+    """The scenario with those of some items that the failure needs, by delta debugging."""
+
+    def first(lists: Iterable[Sequence[Item]]) -> Sequence[Item] | None:
+        tried: list[tuple[Scenario | None, Sequence[Item]]] = []
+
+        def candidates() -> Iterator[Scenario | None]:
+            for some in lists:
+                tried.append((make(scenario, some), some))
+                yield tried[-1][0]
+
+        found = trials.first(candidates())
+        return None if found is None else next(some for candidate, some in tried if candidate is found)
+
+    kept = one_minimal(items, first)
+    return scenario if len(kept) == len(items) else make(scenario, kept) or scenario
+
+
+def _is_random(scenario: Scenario) -> bool:
+    """Whether a run depends on its seed."""
+    wandering = any(isinstance(mover, Wandering) and mover.seed is None for mover in scenario.task.world.movers)
+    return scenario.noise > 0 or wandering or capabilities_of(scenario.planner).iterative
+
+
+def _with_seeds(candidates: Iterable[Scenario | None]) -> Iterator[Scenario | None]:
+    """Each candidate with its own seed and, where chance plays a part, with the simplest seeds.
+
+    A failure by chance goes with everything that changes when the chance is drawn; with another seed it comes back.
+    """
+    for candidate in candidates:
+        yield candidate
+        if candidate is not None and _is_random(candidate):
+            yield from (_varied(candidate, seed=n) for n in range(SEEDS) if n != candidate.seed)
+
+
+def _at(discs: Sequence[Disc], indices: Iterable[int]) -> list[Disc]:
+    """The obstacles at some indices, in the order of the world."""
+    return [discs[i] for i in sorted(indices)]
+
+
+def _by_distance(scenario: Scenario, trials: Trials) -> list[int]:
+    """The indices of the obstacles, those nearest to the drive and to the rest of its route first."""
+    discs, rollout = scenario.task.world.obstacles, trials.rollout(scenario)
+    if rollout is None or not discs:
+        return list(range(len(discs)))
+    line = np.vstack([rollout.pose[::12, :2], _rest_of_route(rollout, len(rollout.t) - 1)])
+    xy = np.array([(disc.x, disc.y) for disc in discs])
+    away = np.hypot(*(nearest_on_route(xy, line) - xy).T) - [disc.radius for disc in discs]
+    return [int(i) for i in np.argsort(away, kind="stable")]
+
+
+def _rest_of_route(rollout: Rollout, row: int) -> Floats:
+    """What remains of the last route (N, 2) [m] from the point on that is nearest to the robot in a row."""
+    _, route = rollout.legs()[-1]
+    at = rollout.pose[row, :2]
+    feet = np.array([nearest_on_route(at[None], route[k : k + 2])[0] for k in range(len(route) - 1)])
+    k = int(np.hypot(*(feet - at).T).argmin())
+    return np.vstack([feet[k], route[k + 1 :]])
+
+
+def _failing_row(rollout: Rollout) -> int:
+    """The row of the first contact, else that of the least clearance, else the last."""
+    if len(rollout.contacts):
+        return int(rollout.contacts[0, 0])
+    return int(rollout.clearance.argmin()) if rollout.outcome.key == "succeeded" else len(rollout.t) - 1
+
+
+def _nearer_starts(scenario: Scenario, rollout: Rollout | None) -> Iterator[Scenario | None]:
+    """The scenario, started from poses of its drive before it failed, the latest first."""
+    if rollout is None:
+        return
+    for before in BEFORE:
+        row = _failing_row(rollout) - round(before * rollout.record.physics_hz)
+        if row > 0:
+            x, y, yaw = rollout.pose[row].tolist()
+            yield _varied_task(scenario, start=(round(x, 2), round(y, 2), round(yaw, 2)))
+
+
+def _nearer_goals(scenario: Scenario, rollout: Rollout | None) -> Iterator[Scenario | None]:
+    """The scenario with goals on its route beyond the failure, the nearest first."""
+    if rollout is None:
+        return
+    rest = _rest_of_route(rollout, _failing_row(rollout))
+    along = np.concatenate(([0.0], np.hypot(*np.diff(rest, axis=0).T).cumsum()))
+    for distance in BEYOND:
+        if distance < along[-1] - 0.1:
+            x, y = (round(float(np.interp(distance, along, rest[:, k])), 2) for k in (0, 1))
+            yield _varied_task(scenario, goal=(x, y))
+
+
+def _tighter(scenario: Scenario, side: int) -> Iterator[Bounds]:
+    """Bounds with one wall moved inwards by whole cells, the tightest first."""
+    task, now = scenario.task, scenario.task.world.bounds
+    cell = scenario.cell or task.cell
+    axis, low = side % 2, side < 2
+    ends = (task.start[axis], task.goal[axis])
+    inner = min(ends) - scenario.inflate if low else max(ends) + scenario.inflate
+    most = (inner - now[side] if low else now[side] - inner) / cell + 1e-9
+    for count in sorted({math.floor(most * share) for share in INWARDS} - {0}, reverse=True):
+        if count > 0:
+            limits = list(now)
+            limits[side] = round(now[side] + (count if low else -count) * cell, 9)
+            yield limits[0], limits[1], limits[2], limits[3]
+
+
+def _walled(scenario: Scenario, side: int, bounds: Bounds) -> Scenario | None:
+    """The scenario with other bounds, of which one side differs, and the cylinders that stand as whole as before."""
+    axis, low, before = side % 2, side < 2, scenario.task.world.bounds[side]
+
+    def stands(disc: Disc) -> bool:
+        """Whether a cylinder stays whole, or reaches into the room as one that the wall has always cut."""
+        centre = (disc.x, disc.y)[axis]
+        from_old, from_new = ((centre - wall) * (1 if low else -1) for wall in (before, bounds[side]))
+        return from_new >= (disc.radius if from_old >= disc.radius else -disc.radius)
+
+    obstacles = tuple(disc for disc in scenario.task.world.obstacles if stands(disc))
+    hidden = tuple(disc for disc in scenario.unseen if stands(disc))
+    return with_unseen(scenario, hidden, bounds=bounds, obstacles=obstacles)
+
+
+def _all_rounded(scenario: Scenario, count: int) -> Scenario | None:
+    result: Scenario | None = scenario
+    for rounded in _roundings(scenario):
+        result = None if result is None else rounded(result, count)
+    return result
+
+
+def _ends_rounded(scenario: Scenario, count: int) -> Scenario | None:
+    (x, y, yaw), (gx, gy) = scenario.task.start, scenario.task.goal
+    start_pose = (round(x, count), round(y, count), round(yaw, max(count, 1)))
+    return _varied_task(scenario, start=start_pose, goal=(round(gx, count), round(gy, count)))
+
+
+def _disc_rounded(index: int) -> Callable[[Scenario, int], Scenario | None]:
+    def rounded(scenario: Scenario, count: int) -> Scenario | None:
+        discs = list(scenario.task.world.obstacles)
+        disc = discs[index]
+        radius = round(disc.radius, max(count, 1))
+        if not radius > 0:
+            return None
+        discs[index] = Disc(round(disc.x, count), round(disc.y, count), radius, round(disc.height, 1) or disc.height)
+        return with_obstacles(scenario, discs)
+
+    return rounded
+
+
+def _roundings(scenario: Scenario) -> list[Callable[[Scenario, int], Scenario | None]]:
+    """What is rounded by itself: start and goal, and each obstacle."""
+    return [_ends_rounded, *map(_disc_rounded, range(len(scenario.task.world.obstacles)))]
+
+
+def _varied_world(scenario: Scenario, **changes: Any) -> Scenario | None:
+    """The scenario with fields of its world changed; None if no world, task or start can be so."""
+    try:
+        world = dataclasses.replace(scenario.task.world, **changes)
+    except FieldError:
+        return None
+    return _varied_task(scenario, world=world)
+
+
+def _varied_task(scenario: Scenario, **changes: Any) -> Scenario | None:
+    try:
+        return _varied(scenario, task=dataclasses.replace(scenario.task, **changes))
+    except FieldError:
+        return None
+
+
+def _varied(scenario: Scenario, **changes: Any) -> Scenario | None:
+    try:
+        return dataclasses.replace(scenario, **changes)
+    except FieldError:
+        return None

@@ -1,0 +1,122 @@
+"""From a log's record back to the scenario that was driven."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import typing
+from collections.abc import Mapping
+from typing import Any, TypeVar
+
+from antdrive.base.errors import FieldError, InputError
+from antdrive.planners import Planner, list_planners, load_planner
+from antdrive.planners.own_code import is_own, own_object, record_name
+from antdrive.robots import Avoidance, PurePursuit
+from antdrive.sim.driving.perception import Perception
+from antdrive.sim.driving.replanning import ReplanPolicy
+from antdrive.sim.log.record import DriveRecord
+from antdrive.sim.scenario import Scenario
+
+Settings = TypeVar("Settings", PurePursuit, Avoidance, ReplanPolicy)
+
+
+def rebuilt(record: DriveRecord, planner: Planner | str | None = None) -> Scenario:
+    """The scenario that a log's record describes. It gives the same drive, bit for bit, with the same versions.
+
+    Args:
+        record: the record of a log
+        planner: the planner that was used; FILE.py:CLASS or MODULE:CLASS: people's own, with the record's settings; None: the
+            registered one of the record's name, with the record's settings
+
+    Raises:
+        InputError: the planner or the controller is not one that can be found by its name, or has settings of its own.
+    """
+    name = record.planner.name
+    if isinstance(planner, str):
+        planner = _own_planner(planner, name, record.planner.settings)
+    elif planner is None:
+        name, planner = _planner(name, record.planner.settings)
+    if record.controller.name != PurePursuit.__name__:
+        raise InputError(f"record.controller.name: {record.controller.name!r:.60} cannot be rebuilt, only PurePursuit")
+    perception = record.perception
+    try:
+        among_movers: dict[str, Any] = {}
+        if perception is not None:
+            distance = math.inf if perception.range_m is None else perception.range_m
+            among_movers["perception"] = Perception(kind=perception.kind, range=distance)  # type: ignore[arg-type]
+            among_movers["avoidance"] = _settings(Avoidance, record.avoidance, "avoidance")
+            among_movers["replanning"] = _settings(ReplanPolicy, record.replanning, "replanning")
+        sensing: dict[str, Any] = {}
+        if record.sensing is not None:
+            sensing = dataclasses.asdict(record.sensing)
+            among_movers["replanning"] = _settings(ReplanPolicy, record.replanning, "replanning")
+        controller = _settings(PurePursuit, record.controller.settings, "controller.settings")
+        assert controller is not None
+        return Scenario(
+            task=record.task,
+            planner=planner,
+            planner_name=name,
+            robot=record.robot,
+            margin=record.margin,
+            cell=record.cell,
+            smoothing=record.smoothing.asked,
+            seed=record.seed,
+            controller=controller,
+            noise=record.noise,
+            unseen=record.unseen,
+            time_limit=record.time_limit,
+            physics_hz=record.physics_hz,
+            control_hz=record.control_hz,
+            **among_movers,
+            **sensing,
+        )
+    except FieldError as error:
+        raise InputError(str(error.under("record"))) from None
+
+
+def _planner(name: str, settings: Mapping[str, Any]) -> tuple[str, Planner]:
+    """The registered name and the planner of a record's name, which may be that of a planner's class."""
+    known = list_planners()
+    if name not in known:
+        of_class = [key for key, planner in known.items() if type(planner).__name__ == name]
+        if not of_class:
+            raise InputError(
+                f"record.planner.name: {name!r:.60} is not registered, so the run cannot be rebuilt; say where its class is "
+                f"(--planner FILE.py:CLASS), or register it under the entry point antdrive.planners"
+            )
+        name = of_class[0]
+    return name, load_planner(name, **_options(type(known[name]), settings))
+
+
+def _own_planner(words: str, name: str, settings: Mapping[str, Any]) -> Planner:
+    """The planner of people's own file or module that a record names by its class."""
+    if record_name(words) not in (words, name):
+        raise InputError(f"planner: the log's planner is {name!r:.60}, not {record_name(words)!r:.60}")
+    if not is_own(words):
+        raise InputError(
+            f"planner: write FILE.py:CLASS or MODULE:CLASS, got {words!r:.60}; registered ones need no words"
+        )
+    return load_planner(words, **_options(own_object(words), settings))
+
+
+def _options(kind: Any, settings: Mapping[str, Any]) -> dict[str, Any]:
+    """A planner's options as they were."""
+    hints = typing.get_type_hints(kind)
+    return {key: _restored(hints.get(key), value) for key, value in settings.items()}
+
+
+def _settings(kind: type[Settings], values: Mapping[str, Any] | None, key: str) -> Settings | None:
+    """The record of settings, with the infinite numbers that JSON cannot hold."""
+    if values is None:
+        return None
+    fields = {field.name: field for field in dataclasses.fields(kind)}
+    for name in values:
+        if name not in fields:
+            raise FieldError(f"{key}.{name}", f"unknown; choose from {', '.join(fields)}")
+    hints = typing.get_type_hints(kind)
+    return kind(**{name: _restored(hints[name], value) for name, value in values.items()})
+
+
+def _restored(hint: Any, value: Any) -> Any:
+    """A setting as it was: null stands for "no limit" where a number cannot be left out."""
+    return math.inf if value is None and hint is float else value

@@ -1,0 +1,208 @@
+"""Trials of candidate scenarios: each is run at most once, within a time budget, and remembered in a journal."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import itertools
+import json
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from antdrive.base.atomic import written_whole
+from antdrive.base.errors import FieldError, InputError
+from antdrive.base.processes import delayed
+from antdrive.planners import Planner, PlannerError
+from antdrive.planners.anyangle.passage import MOST_OBSTACLES
+from antdrive.planners.own_code import is_importable_elsewhere
+from antdrive.runs.failures.failure import Failure, failure_of, failure_of_planner
+from antdrive.runs.failures.space import feasible
+from antdrive.runs.suites.demands import Bound
+from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.log.record import settings_of
+from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.pipeline import ENDED_BY, Run, plan, run, versions
+from antdrive.sim.scenario import Scenario
+from antdrive.worlds.files.world_file import task_to_dict
+
+JOURNAL_EVERY = 2.0  # the journal is written at most this often, apart from its last state [s]
+
+
+class OutOfTimeError(Exception):
+    """The time for trials is over."""
+
+
+def failure_in(scenario: Scenario, bound: Bound | None = None, *, drive: bool = True) -> Failure | None:
+    """How a scenario fails when it is run; None if it does not, or cannot be run at all."""
+    try:
+        if drive:
+            return failure_of(run(scenario), bound)
+        grid, answer = plan(scenario)
+        return None if answer.solved else failure_of(Run(scenario, grid, answer), bound)
+    except PlannerError as error:
+        return None if bound is not None else failure_of_planner(error)
+    except (FieldError, InputError):  # such as a wanderer without a free cell in a smaller world
+        return None
+
+
+def room_in(scenario: Scenario, failure: Failure) -> float | None:
+    """The clearance with which a path exists in the world of a failing scenario [m]; None where none does.
+
+    That is the clearance that the scenario claims and, where the planner found no path, a cell's side more if a path exists
+    with that: then the grid is no excuse. In worlds of more than `MOST_OBSTACLES` it is not looked for.
+    """
+    task, claimed = scenario.task, scenario.inflate
+    if len(task.world.obstacles) > MOST_OBSTACLES:
+        return None
+    more = [claimed + (scenario.cell or task.cell)] if failure.outcome == Outcome.NO_PATH.key else []
+    return next((clearance for clearance in (*more, claimed) if feasible(task, clearance)), None)
+
+
+class Trials:
+    """Runs candidates and says which of them fail in one given way, in worlds that leave as much room.
+
+    The answers depend on the candidates alone, not on time, processes, or what a journal already knew.
+
+    Attributes:
+        stage: what is being tried, for the progress
+        made: how many candidates were run so far
+        recalled: the candidates whose answers came from an earlier session's journal
+    """
+
+    def __init__(
+        self,
+        wanted: Failure,
+        bound: Bound | None = None,
+        *,
+        room: float | None = None,
+        seconds: float = float("inf"),
+        journal: Path | None = None,
+        identity: str = "",
+        jobs: int = 1,
+        progress: Callable[[str, int], None] | None = None,
+    ) -> None:
+        self.stage, self.made, self.recalled = "", 0, set[str]()
+        self._room = room
+        self._wanted, self._bound, self._jobs, self._progress = wanted, bound, max(1, jobs), progress
+        self._deadline = time.monotonic() + seconds
+        self._journal, self._written = journal, time.monotonic()
+        header = {
+            "failure": dataclasses.astuple(wanted),
+            "bound": str(bound),
+            "room": room,
+            "versions": versions(),
+            "of": identity,
+        }
+        self._header = _digest(header)
+        self._answers = _read(journal, self._header)
+        self._known = frozenset(self._answers)
+        self._latest: tuple[str, Rollout | None] | None = None
+
+    def first(self, candidates: Iterable[Scenario | None]) -> Scenario | None:
+        """The first candidate that fails in the wanted way; None if there is none. Candidates that are None are left out.
+
+        Raises:
+            OutOfTimeError: the time is over.
+        """
+        waiting = (candidate for candidate in candidates if candidate is not None)
+        while batch := list(itertools.islice(waiting, self._jobs)):
+            keys = [_digest(changeable(candidate)) for candidate in batch]
+            self._try([(key, candidate) for key, candidate in zip(keys, batch, strict=True)])
+            for key, candidate in zip(keys, batch, strict=True):
+                if self._answers[key]:
+                    return candidate
+        return None
+
+    def rollout(self, scenario: Scenario) -> Rollout | None:
+        """The drive of a scenario that is known to fail; None if it fails before it drives."""
+        key = _digest(changeable(scenario))
+        if self._latest is None or self._latest[0] != key:
+            try:
+                self._latest = key, run(scenario).rollout
+            except PlannerError:  # the failure itself
+                self._latest = key, None
+        return self._latest[1]
+
+    def forget(self) -> None:
+        """Drop all answers, also those of the journal."""
+        self._answers.clear()
+        self._known, self._latest = frozenset(), None
+        self.save()
+
+    def save(self) -> None:
+        """Write the journal, if there is one."""
+        self._written = time.monotonic()
+        if self._journal is not None:
+            text = json.dumps({"header": self._header, "answers": self._answers}, indent=0, sort_keys=True)
+            with written_whole(self._journal) as part:
+                part.write_text(text + "\n", encoding="utf-8")
+
+    def _try(self, batch: list[tuple[str, Scenario]]) -> None:
+        self.recalled |= {key for key, _ in batch} & self._known
+        fresh = {key: candidate for key, candidate in batch if key not in self._answers}
+        if not fresh:
+            return
+        if time.monotonic() > self._deadline:
+            raise OutOfTimeError
+        self._answers.update(zip(fresh, self._run(list(fresh.values())), strict=True))
+        self.made += len(fresh)
+        if self._progress is not None:
+            self._progress(self.stage, self.made)
+        if time.monotonic() - self._written > JOURNAL_EVERY:
+            self.save()
+
+    def _run(self, candidates: list[Scenario]) -> Iterator[bool]:
+        drive = self._wanted.outcome not in {outcome.key for outcome in ENDED_BY.values()}
+        if len(candidates) == 1 or not is_importable_elsewhere(candidates[0].planner):
+            found = [failure_in(candidate, self._bound, drive=drive) for candidate in candidates]
+        else:
+            from joblib import Parallel
+
+            found = Parallel(self._jobs)(
+                delayed(failure_in)(candidate, self._bound, drive=drive) for candidate in candidates
+            )
+        return (
+            failure == self._wanted and (self._room is None or feasible(candidate.task, self._room))
+            for candidate, failure in zip(candidates, found, strict=True)
+        )
+
+
+def changeable(scenario: Scenario) -> Mapping[str, Any]:
+    """What shrinking may change in a scenario, as plain values."""
+    return {
+        "task": task_to_dict(scenario.task),
+        "unseen": [dataclasses.astuple(disc) for disc in scenario.unseen],
+        "seed": int(scenario.seed),
+        "noise": float(scenario.noise),
+        "time_limit": scenario.time_limit,
+    }
+
+
+def identity_of(scenario: Scenario) -> str:
+    """A text that is the same for scenarios that agree in everything."""
+    fields = {field.name: getattr(scenario, field.name) for field in dataclasses.fields(scenario)}
+    return _digest(settings_of({**fields, "planner": _text_of(scenario.planner)}))
+
+
+def _text_of(planner: Planner) -> str:
+    """A planner as text; one whose class has no text of its own would be told by its address, which no other process repeats."""
+    kind = type(planner)
+    if kind.__repr__ is not object.__repr__:
+        return repr(planner)
+    return f"{kind.__module__}.{kind.__qualname__}({sorted(vars(planner).items()) if hasattr(planner, '__dict__') else ''})"
+
+
+def _digest(value: Any) -> str:
+    return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()[:20]
+
+
+def _read(journal: Path | None, header: str) -> dict[str, bool]:
+    """The answers of an earlier session about the same failure; none if there was no such session."""
+    try:
+        found = json.loads(journal.read_text(encoding="utf-8")) if journal is not None else {}
+        answers = found["answers"] if found.get("header") == header else {}
+    except (OSError, ValueError, AttributeError, KeyError):
+        return {}
+    return {str(key): value is True for key, value in answers.items()} if isinstance(answers, dict) else {}

@@ -1,0 +1,271 @@
+"""Repeat the papers' experiments: printed and measured values, and the claims with their verdicts."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import math
+import re
+import statistics
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import joblib
+import numpy as np
+
+from antdrive.base.atomic import written_whole
+from antdrive.base.errors import InputError
+from antdrive.base.processes import delayed
+from antdrive.runs.papers.claims import CLAIMS, Arm, Claim
+from antdrive.runs.papers.experiments import PAPERS, Experiment
+from antdrive.runs.papers.keeping import keep_trials, kept_trials, trials_key
+from antdrive.runs.papers.movers import drive_among
+from antdrive.runs.papers.trials import Trial, solve
+from antdrive.runs.papers.verdicts import (
+    VERDICT_HEADS,
+    Verdict,
+    judge,
+    trials_at_hand,
+    trials_needed,
+    verdict_cells,
+    verdict_facts,
+)
+from antdrive.runs.statistics.bootstrap import medians_by_world
+
+T = TypeVar("T")
+MOST_SEEDS = 1000  # every claim can be decided with fewer
+TRIALS = "trials"  # the folder of the trials within that of the results
+
+
+Measurements = list[tuple[Experiment, list[Trial]]]
+
+
+@dataclass(frozen=True)
+class ResultRow:
+    """An experiment's result over its seeds. Lengths are in cells."""
+
+    paper: str
+    map: str
+    recreated: bool  # the map is not the paper's own
+    comparable: bool  # the shortest path is as long as the paper says, so that lengths compare with the printed one
+    planner: str  # with its setting
+    quantity: str  # the value that is printed and measured: `length`, `steps` or `total`
+    printed: float | None  # the paper's value; None: it prints none
+    mean: float  # of the seeds that found a path; nan if none did
+    best: float
+    arrived: int  # how many seeds found a path
+    seeds: int
+    optimum: float  # length of the shortest path with the same moves, mean over the seeds' maps
+    gap: float  # median of length / shortest - 1 of the seeds that found a path
+    gap_low: float  # the ends of its interval, bootstrapped over maps
+    gap_high: float
+    plan_s: float  # median processor time of planning [s]
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """What `reproduce` found."""
+
+    measured: Measurements
+    rows: list[ResultRow]  # one for each experiment
+    verdicts: list[Verdict]  # one for each claim whose experiments were run
+    files: dict[str, str]  # by name
+    kept: int  # how many experiments were taken from the files of an earlier, interrupted command
+
+    def of(self, paper: str) -> Measurements:
+        """The experiments of one paper with their trials."""
+        return [(experiment, trials) for experiment, trials in self.measured if experiment.paper == paper]
+
+
+def reproduce(
+    papers: Sequence[str],
+    folder: Path,
+    *,
+    seeds: int,
+    jobs: int = 1,
+    quick: bool = False,
+    progress: Callable[[float], None] | None = None,
+) -> Reproduction:
+    """Run the experiments of papers again, judge the papers' claims, and write tables and CSV files.
+
+    The trials of an experiment are written as soon as it is done. A second call with the same folder and seeds takes them
+    from there, unless the source code has changed in between.
+
+    Raises:
+        InputError: an unknown paper.
+    """
+    experiments = _experiments(papers, quick)
+    measured, kept = _all_trials(experiments, folder / TRIALS, seeds, jobs, progress)
+    rows = [_row(experiment, trials) for experiment, trials in measured]
+    arms = {(e.paper, e.map, e.name): trials for e, trials in measured if e.name != "steps"}
+    verdicts = [judge(claim, found) for claim, found in _judgeable(arms)]
+    files = {
+        "table": _write_table(HEADS, map(row_cells, rows), folder / "table.md", NOTE),
+        "csv": _write_csv([vars(row) for row in rows], folder / "table.csv"),
+        "claims": _write_table(VERDICT_HEADS, map(verdict_cells, verdicts), folder / "claims.md"),
+        "claims csv": _write_csv([verdict_facts(verdict) for verdict in verdicts], folder / "claims.csv"),
+    }
+    return Reproduction(measured, rows, verdicts, files, kept)
+
+
+def _experiments(papers: Sequence[str], quick: bool) -> list[Experiment]:
+    """The experiments of these papers; for a quick look without the slow ones, and with fewer ant steps and maps."""
+    for paper in papers:
+        if paper not in PAPERS:
+            raise InputError(f"reproduce: unknown paper {paper!r}; choose from {', '.join([*PAPERS, 'all'])}")
+    every = [experiment for paper in papers for experiment in PAPERS[paper]()]
+    return [_hurried(experiment) for experiment in every if not experiment.slow] if quick else every
+
+
+def _hurried(experiment: Experiment) -> Experiment:
+    return dataclasses.replace(experiment, work=experiment.work / 10, worlds=min(experiment.worlds, 2), rounds=1)
+
+
+def _all_trials(
+    experiments: Sequence[Experiment],
+    folder: Path,
+    seeds: int,
+    jobs: int,
+    progress: Callable[[float], None] | None,
+) -> tuple[Measurements, int]:
+    """The experiments with their trials, and for how many these were in the folder already."""
+    total, done, kept = sum(len(experiment.seeds(seeds)) for experiment in experiments), 0, 0
+    found: Measurements = []
+    with joblib.Parallel(n_jobs=jobs, return_as="generator") as parallel:
+        for experiment in experiments:
+            words = f"{experiment.paper} {experiment.map} {experiment.name}"
+            path, key = folder / f"{re.sub(r'[^A-Za-z0-9×*]+', '-', words)}.npz", trials_key(experiment, seeds)
+            trials = kept_trials(path, key)
+            if trials is None:
+                trials = []
+                for trial in parallel(_planned(experiment, seeds)):
+                    trials.append(dataclasses.replace(trial, world=experiment.world(trial.seed)))
+                    if progress is not None:
+                        progress((done + len(trials)) / total)
+                keep_trials(trials, path, key)
+            else:
+                kept += 1
+            done += len(trials)
+            found.append((experiment, trials))
+    if progress is not None:
+        progress(1.0)
+    return found, kept
+
+
+def _planned(experiment: Experiment, seeds: int) -> Iterator[Any]:
+    """The calls that plan an experiment; each map is made when its turn comes."""
+    planner = experiment.made or experiment.planner
+    for seed in experiment.seeds(seeds):
+        query = experiment.query(experiment.world(seed))
+        if experiment.movers:
+            yield delayed(drive_among)(planner, experiment.options, query, seed, experiment.movers)
+            continue
+        yield delayed(solve)(planner, experiment.options, query, seed, experiment.work)
+
+
+def _judgeable(known: Mapping[tuple[str, str, str], T]) -> Iterator[tuple[Claim, dict[Arm, T]]]:
+    """The claims all of whose experiments are among these (paper, map, name), with what is known of them."""
+    for claim in CLAIMS:
+        places = {arm: (claim.paper, *arm) for arm in claim.arms}
+        if known.keys() >= set(places.values()):
+            yield claim, {arm: known[place] for arm, place in places.items()}
+
+
+def too_few_seeds(papers: Sequence[str], seeds: int, *, quick: bool = False) -> str:
+    """One line on how many claims so few seeds cannot decide, and how many can; empty if they can decide all.
+
+    Raises:
+        InputError: an unknown paper.
+    """
+    experiments = _experiments(papers, quick)
+
+    def undecided(count: int) -> tuple[int, int]:
+        claims = list(_judgeable({(e.paper, e.map, e.name): len(e.seeds(count)) for e in experiments}))
+        return sum(trials_at_hand(claim, sizes) < trials_needed(claim) for claim, sizes in claims), len(claims)
+
+    few, total = undecided(seeds)
+    if not few:
+        return ""
+    enough = next(count for count in range(seeds, MOST_SEEDS) if not undecided(count)[0])
+    return f"seeds: {seeds} are too few to decide {few} of {total} claims, whatever they give; {enough} suffice"
+
+
+def _row(experiment: Experiment, trials: Sequence[Trial]) -> ResultRow:
+    values = [float(getattr(trial, experiment.quantity)) for trial in trials]
+    known = [value for value in values if math.isfinite(value)]
+    solved = [trial for trial in trials if trial.result.solved]
+    gaps = np.array([trial.gap / 100.0 for trial in solved])
+    worlds = np.array([trial.world for trial in solved], dtype=np.int64)
+    alone = np.arange(len(worlds)) if len(set(worlds.tolist())) == 1 else worlds
+    low, high = medians_by_world(gaps[:, None], alone)[0] if solved else (math.nan, math.nan)
+    return ResultRow(
+        paper=experiment.paper,
+        map=experiment.map,
+        recreated=experiment.recreated,
+        comparable=experiment.comparable or not experiment.recreated,
+        planner=experiment.name,
+        quantity=experiment.quantity,
+        printed=experiment.printed,
+        mean=statistics.mean(known) if known else math.nan,
+        best=min(known, default=math.nan),
+        arrived=len(known),
+        seeds=len(trials),
+        optimum=statistics.mean(trial.optimum for trial in trials),
+        gap=float(np.median(gaps)) if solved else math.nan,
+        gap_low=low,
+        gap_high=high,
+        plan_s=statistics.median(trial.cpu_s for trial in trials),
+    )
+
+
+#: The headings of the table; lengths are in cells.
+HEADS = (
+    *("paper", "map", "planner", "quantity"),
+    *("printed", "mean", "best", "solved", "shortest", "gap", "planning"),
+)
+
+
+def row_cells(row: ResultRow) -> list[str]:
+    """A row of the table as text, under `HEADS`."""
+
+    def number(value: float) -> str:
+        return f"{value:.{3 if row.quantity == 'length' else 0}f}" if math.isfinite(value) else "–"
+
+    return [
+        row.paper,
+        row.map + ("" if not row.recreated else " (recreated)" if row.comparable else " (another map)"),
+        row.planner,
+        row.quantity,
+        "–" if row.printed is None else f"{row.printed:g}",
+        number(row.mean),
+        number(row.best),
+        f"{row.arrived}/{row.seeds}",
+        f"{row.optimum:.3f}",
+        f"{100 * row.gap:.1f} % [{100 * row.gap_low:.1f}, {100 * row.gap_high:.1f}]" if row.arrived else "–",
+        f"{row.plan_s:.3f} s",
+    ]
+
+
+NOTE = (
+    "Some papers show their maps as pictures only. Recreated maps are random maps of the same size on which the shortest\n"
+    "path is as long as the best that the paper prints; on another map only the gap to the shortest path (`shortest`)\n"
+    "means anything. All lengths are in cells; a gap is a median with its 95 % interval over maps.\n\n"
+)
+
+
+def _write_table(heads: Sequence[str], rows: Iterable[Sequence[str]], path: Path, note: str = "") -> str:
+    lines = [heads, ["---"] * len(heads), *rows]
+    with written_whole(path) as temporary:
+        temporary.write_text(note + "".join(f"| {' | '.join(line)} |\n" for line in lines), encoding="utf-8")
+    return str(path)
+
+
+def _write_csv(rows: Sequence[Mapping[str, Any]], path: Path) -> str:
+    with written_whole(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        if rows:
+            writer.writerow(list(rows[0]))
+        writer.writerows([list(row.values()) for row in rows])
+    return str(path)

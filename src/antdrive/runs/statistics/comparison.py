@@ -1,0 +1,253 @@
+"""Each pair of planners on the runs that they share: success, and any metric."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.base.errors import FieldError
+from antdrive.runs.statistics.bootstrap import means_by_world, medians_by_world
+from antdrive.runs.statistics.pairing import PairedRuns
+from antdrive.runs.statistics.proportions import CONFIDENCE, Interval, paired_difference
+from antdrive.runs.statistics.significance import (
+    differences,
+    flips_by_world,
+    holm,
+    mcnemar,
+    rank_biserial,
+    signed_ranks,
+    sums_by_world,
+    wilcoxon,
+)
+
+Floats: TypeAlias = npt.NDArray[np.float64]
+Flags: TypeAlias = npt.NDArray[np.bool_]
+Pairs: TypeAlias = Sequence[tuple[int, int]]
+Direction: TypeAlias = Literal["lower", "higher", "neither"]
+
+SUCCESS = "success"
+ALPHA = 0.05
+NOWHERE = Interval(math.nan, math.nan)
+
+
+@dataclass(frozen=True)
+class PairedComparison:
+    """Two planners on the runs that they share.
+
+    Attributes:
+        measure: "success" or the name of a metric
+        first: label of the first planner
+        second: label of the second planner
+        direction: whether lower or higher values are better, or neither
+        pairs: number of pairs that the numbers rest on
+        worlds: number of worlds that these pairs are in
+        dropped: pairs left out because not both succeeded; 0 for success
+        unpaired: runs of either planner without a partner
+        first_wins: pairs in which the first planner's value is better; where no direction is, those in which it is lower
+        second_wins: pairs in which the second planner's value is better, or lower
+        ties: pairs with equal values
+        difference: first minus second: of success shares, or the median of the paired differences
+        interval: 95 % interval of the difference
+        effect: matched-pairs rank biserial correlation, -1 to 1; above 0 if the first planner wins, or has less where no
+            direction is better
+        p: exact McNemar or Wilcoxon signed rank, over pairs; nan without pairs
+        p_worlds: signs flipped by world; nan where no world has two pairs, or there is one world
+        p_holm: `p` with Holm's correction over all comparisons of this measure
+        p_worlds_holm: `p_worlds` with Holm's correction
+    """
+
+    measure: str
+    first: str
+    second: str
+    direction: Direction
+    pairs: int
+    worlds: int
+    dropped: int
+    unpaired: int
+    first_wins: int
+    second_wins: int
+    ties: int
+    difference: float
+    interval: Interval
+    effect: float
+    p: float
+    p_worlds: float
+    p_holm: float = math.nan
+    p_worlds_holm: float = math.nan
+
+    @property
+    def decisive_p(self) -> float:
+        """The larger of the two corrected p-values; nan without pairs."""
+        return max((p for p in (self.p_holm, self.p_worlds_holm) if not math.isnan(p)), default=math.nan)
+
+    @property
+    def decided(self) -> str:
+        """The planner that `effect` favours, if both corrected p-values are below 0.05; else empty."""
+        if not self.decisive_p < ALPHA or self.effect == 0:
+            return ""
+        return self.first if self.effect > 0 else self.second
+
+    @property
+    def better(self) -> str:
+        """The planner that is better, if that is decided and one direction is better; else empty."""
+        return "" if self.direction == "neither" else self.decided
+
+    @property
+    def lower(self) -> str:
+        """The planner with less, if that is decided and no direction is better; else empty."""
+        return self.decided if self.direction == "neither" else ""
+
+    def as_dict(self) -> dict[str, Any]:
+        """All fields as plain values, and which planner is better, or has less."""
+        fields = {**dataclasses.asdict(self), "interval": list(self.interval)}
+        return {**fields, "better": self.better, "lower": self.lower}
+
+
+def pairs_of(paired: PairedRuns, against: str | None = None) -> list[tuple[int, int]]:
+    """The pairs of planners to compare, as indices.
+
+    Raises:
+        FieldError: fewer than two planners, an unknown one, or no two with a run in common.
+    """
+    labels = paired.planners
+    if len(labels) < 2:
+        raise FieldError(
+            "planners", f"{labels[0]} alone; two are needed for a comparison, antdrive report is about one, too"
+        )
+    if against is not None and against not in labels:
+        raise FieldError("against", f"unknown planner {against!r}; choose from {', '.join(labels)}")
+    chosen = [
+        (i, j)
+        for i, j in itertools.combinations(range(len(labels)), 2)
+        if against is None or against in (labels[i], labels[j])
+    ]
+    if not any((paired.present[:, i] & paired.present[:, j]).any() for i, j in chosen):
+        raise FieldError(
+            "planners", "no two have a run in the same world, task, settings and seed; only paired runs are compared"
+        )
+    return chosen
+
+
+def compare_success(paired: PairedRuns, pairs: Pairs) -> list[PairedComparison]:
+    """Compare success: exact McNemar, Newcombe's interval, and both again over whole worlds."""
+    masks = [paired.counted(i, j) for i, j in pairs]
+    raw = [paired.success[:, i].astype(float) - paired.success[:, j] for i, j in pairs]
+    gaps = np.stack([np.where(mask, gap, np.nan) for mask, gap in zip(masks, raw, strict=True)], axis=1)
+    by_world = means_by_world(gaps, paired.world, counted=np.stack(masks, axis=1))
+    rows = []
+    for k, (i, j) in enumerate(pairs):
+        mask, gap = masks[k], gaps[masks[k], k]
+        first, second = int((gap > 0).sum()), int((gap < 0).sum())
+        n, worlds = int(mask.sum()), paired.worlds_in(mask)
+        interval = success_interval(paired, mask, i, j, by_world[k]) if n else NOWHERE
+        rows.append(
+            PairedComparison(
+                measure=SUCCESS,
+                first=paired.planners[i],
+                second=paired.planners[j],
+                direction="higher",
+                pairs=n,
+                worlds=worlds,
+                dropped=0,
+                unpaired=_unpaired(paired, i, j),
+                first_wins=first,
+                second_wins=second,
+                ties=n - first - second,
+                difference=(first - second) / n if n else math.nan,
+                interval=interval,
+                effect=(first - second) / (first + second) if first + second else 0.0,
+                p=mcnemar(first, second) if n else math.nan,
+                p_worlds=math.nan,
+            )
+        )
+    return _corrected(paired, rows, masks, gaps)
+
+
+def success_interval(
+    paired: PairedRuns, mask: Flags, i: int, j: int, resampled: Interval, confidence: float = CONFIDENCE
+) -> Interval:
+    """An interval for the difference of two planners' success that holds over runs and over worlds."""
+    first, second = paired.success[mask, i], paired.success[mask, j]
+    both, one, other = (int(found.sum()) for found in (first & second, first & ~second, ~first & second))
+    interval = paired_difference(both, one, other, len(first) - both - one - other, confidence)
+    if not paired.several_in_worlds(mask):
+        return interval
+    if len(np.unique(first.astype(int) - second)) == 1:  # no resample differs: a world counts as one pair
+        worlds = paired.worlds_in(mask)
+        both, one, other = (round(worlds * count / len(first)) for count in (both, one, other))
+        resampled = paired_difference(both, one, other, worlds - both - one - other, confidence)
+    return Interval(min(interval.low, resampled.low), max(interval.high, resampled.high))
+
+
+def compare_metric(paired: PairedRuns, pairs: Pairs, metric: str, better: Direction) -> list[PairedComparison]:
+    """Compare a metric on the pairs in which both planners succeeded: Wilcoxon, median difference, rank biserial.
+
+    Raises:
+        FieldError: no run has a value of this metric.
+    """
+    values = paired.values(metric)
+    if not np.isfinite(values).any():
+        raise FieldError("metric", f"{metric}: no successful run has a value of it")
+    masks, gaps, ranks, shared = [], [], [], []
+    for i, j in pairs:
+        shared.append(paired.counted(i, j))
+        masks.append(shared[-1] & np.isfinite(values[:, i]) & np.isfinite(values[:, j]))
+        gap, rank = np.full(len(values), np.nan), np.full(len(values), np.nan)
+        gap[masks[-1]] = differences(values[masks[-1], i], values[masks[-1], j])
+        rank[masks[-1]] = signed_ranks(gap[masks[-1]])
+        gaps.append(gap)
+        ranks.append(rank)
+    intervals = medians_by_world(np.stack(gaps, axis=1), paired.world, counted=np.stack(shared, axis=1))
+    sign = 1 if better == "higher" else -1
+    rows = []
+    for k, (i, j) in enumerate(pairs):
+        gap = gaps[k][masks[k]]
+        lower, higher = int((gap < 0).sum()), int((gap > 0).sum())
+        rows.append(
+            PairedComparison(
+                measure=metric,
+                first=paired.planners[i],
+                second=paired.planners[j],
+                direction=better,
+                pairs=len(gap),
+                worlds=paired.worlds_in(masks[k]),
+                dropped=int((shared[k] & ~masks[k]).sum()),
+                unpaired=_unpaired(paired, i, j),
+                first_wins=higher if sign > 0 else lower,
+                second_wins=lower if sign > 0 else higher,
+                ties=len(gap) - lower - higher,
+                difference=float(np.median(gap)) if len(gap) else math.nan,
+                interval=intervals[k],
+                effect=sign * rank_biserial(gap),
+                p=wilcoxon(gap) if len(gap) else math.nan,
+                p_worlds=math.nan,
+            )
+        )
+    return _corrected(paired, rows, masks, np.stack(ranks, axis=1))
+
+
+def _unpaired(paired: PairedRuns, i: int, j: int) -> int:
+    return int((paired.present[:, i] != paired.present[:, j]).sum())
+
+
+def _corrected(
+    paired: PairedRuns, rows: list[PairedComparison], masks: Sequence[Flags], scores: Floats
+) -> list[PairedComparison]:
+    """The rows with the test over worlds and with Holm's correction; scores (N, K) are nan outside the masks."""
+    sums = np.stack(
+        [sums_by_world(np.nan_to_num(column), paired.world, len(paired.worlds)) for column in scores.T], axis=1
+    )
+    flipped = flips_by_world(sums[(sums != 0).any(axis=1)])  # other worlds add nothing
+    over = np.array([p if paired.several_in_worlds(mask) else math.nan for p, mask in zip(flipped, masks, strict=True)])
+    single, worlds = holm(np.array([row.p for row in rows])), holm(over)
+    return [
+        dataclasses.replace(row, p_worlds=float(over[k]), p_holm=float(single[k]), p_worlds_holm=float(worlds[k]))
+        for k, row in enumerate(rows)
+    ]

@@ -1,0 +1,196 @@
+"""Runs arranged so that planners are compared in the same world, task, settings and seed, and nowhere else."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.base.errors import FieldError
+from antdrive.runs.statistics.columns import OF_WORLDS, PLACE, WALL_TIMES
+from antdrive.runs.statistics.runs import RunTable
+
+Floats: TypeAlias = npt.NDArray[np.float64]
+Flags: TypeAlias = npt.NDArray[np.bool_]
+Ints: TypeAlias = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class PairedRuns:
+    """Runs by instance and planner. An instance is a world, a task, the settings that `RunTable.settings` lists, and a seed.
+
+    Attributes:
+        table: the runs
+        planners: their labels, P of them, in the order of the table
+        worlds: names of the W worlds
+        world: the index of each instance's world, (N,)
+        setting_group: a number for each instance that is the same where only the seed differs, (N,)
+        row: the row of each instance and planner in the table, (N, P); -1 where there is none
+        success: whether that run succeeded, (N, P)
+        seeded: whether the seed changes any drive of each planner under the settings of each instance, (N, P)
+    """
+
+    table: RunTable
+    planners: tuple[str, ...]
+    worlds: tuple[str, ...]
+    world: Ints
+    setting_group: Ints
+    row: Ints
+    success: Flags
+    seeded: Flags
+
+    @classmethod
+    def of(cls, table: RunTable) -> PairedRuns:
+        """Arrange a table.
+
+        Raises:
+            FieldError: the table is empty, or a planner has two runs of one instance.
+        """
+        if not len(table):
+            raise FieldError("runs", "none; the campaign has no finished run")
+        labels = table.texts("planner")
+        planners = tuple(dict.fromkeys(labels))
+        column = _places(labels)
+        described = (*PLACE, *table.settings)
+        instances, first, place = np.unique(_joint(table, (*described, "seed")), return_index=True, return_inverse=True)
+        row = np.full((len(instances), len(planners)), -1, dtype=np.int64)
+        row[place, column] = np.arange(len(table))
+        if (row >= 0).sum() != len(table):
+            twice = next(k for k in range(len(table)) if row[place[k], column[k]] != k)
+            raise FieldError("runs", _twice(table, labels[twice]))
+        names, world = _worlds(table)
+        success = (row >= 0) & table.success[row]
+        group = _joint(table, described)[first]
+        judged = _joint(table, [name for name in table.settings if name not in OF_WORLDS])[first]
+        seeded = _seeded(table, row, group, judged)
+        return cls(table, planners, names, world[first], group, row, success, seeded)
+
+    @property
+    def present(self) -> Flags:
+        """Whether the run exists, (N, P)."""
+        return np.asarray(self.row >= 0)
+
+    @property
+    def shared(self) -> Flags:
+        """The instances that every planner ran, (N,)."""
+        return np.asarray(self.present.all(axis=1))
+
+    def values(self, name: str) -> Floats:
+        """A column of the table by instance and planner, (N, P); nan without success.
+
+        Wall-clock times of a drive that repeats with every seed are the median over its repetitions.
+        """
+        values = np.where(self.success, self.table.numbers(name)[self.row], np.nan)
+        return self._over_repetitions(values) if name in WALL_TIMES else values
+
+    def _over_repetitions(self, values: Floats) -> Floats:
+        """Values (N, P) in which those of repeated drives are replaced by their median."""
+        found = values.copy()
+        for k in range(len(self.planners)):
+            places = np.flatnonzero(~self.seeded[:, k] & np.isfinite(values[:, k]))
+            if not len(places):
+                continue
+            order = places[np.argsort(self.setting_group[places], kind="stable")]
+            for same in np.split(order, np.flatnonzero(np.diff(self.setting_group[order])) + 1):
+                found[same, k] = np.median(values[same, k])
+        return found
+
+    def worlds_in(self, mask: Flags) -> int:
+        """The number of worlds among some instances."""
+        return len(np.unique(self.world[mask]))
+
+    def several_in_worlds(self, mask: Flags) -> bool:
+        """Whether there are several worlds among some instances, and several instances in one of them."""
+        sizes = np.bincount(self.world[mask])
+        return bool((sizes > 0).sum() > 1 and sizes.max() > 1)
+
+    def counted(self, *planners: int, within: Flags | None = None) -> Flags:
+        """The instances that all of these planners ran, each different drive once, (N,).
+
+        Under settings where the seed changes no drive of any of them, the first seed stands for all: repetitions are no
+        evidence.
+        """
+        chosen = list(planners)
+        both: Flags = np.asarray(self.present[:, chosen].all(axis=1))
+        if within is not None:
+            both &= within
+        places = np.flatnonzero(both & ~self.seeded[:, chosen].any(axis=1))
+        repeated = np.ones(len(places), dtype=np.bool_)
+        repeated[np.unique(self.setting_group[places], return_index=True)[1]] = False
+        both[places[repeated]] = False
+        return both
+
+    def select(self, planners: Sequence[str]) -> PairedRuns:
+        """The runs of some planners only.
+
+        Raises:
+            FieldError: no such planner among the runs.
+        """
+        for label in planners:
+            if label not in self.planners:
+                raise FieldError("planner", f"unknown {label!r}; the campaign has {', '.join(self.planners)}")
+        chosen = [self.planners.index(label) for label in dict.fromkeys(planners)]
+        here = self.present[:, chosen].any(axis=1)
+        return PairedRuns(
+            self.table,
+            tuple(self.planners[k] for k in chosen),
+            self.worlds,
+            self.world[here],
+            self.setting_group[here],
+            self.row[here][:, chosen],
+            self.success[here][:, chosen],
+            self.seeded[here][:, chosen],
+        )
+
+
+def _twice(table: RunTable, label: str) -> str:
+    """What is wrong with a table in which a planner has two runs of one instance."""
+    lacks = [name for name in ("robot_hash", "margin_asked") if name not in table]
+    why = "one is needed to pair them"
+    if lacks:
+        why = f"the table lacks {' and '.join(lacks)}, which may tell them apart; antdrive sweep of the same campaign adds them"
+    return f"{label} has two runs of one world, task, settings and seed; {why}"
+
+
+def _places(labels: list[str]) -> Ints:
+    order = {label: k for k, label in enumerate(dict.fromkeys(labels))}
+    return np.array([order[label] for label in labels])
+
+
+def _joint(table: RunTable, names: Sequence[str]) -> Ints:
+    """Equal numbers for runs that agree in all of these columns, ascending in the order of the columns."""
+    joint = np.zeros(len(table), dtype=np.int64)
+    for name in names:
+        codes = _seeds(table) if name == "seed" else table.codes(name)
+        joint = np.unique(joint * (int(codes.max()) + 1) + codes, return_inverse=True)[1].astype(np.int64)
+    return joint
+
+
+def _seeds(table: RunTable) -> Ints:
+    """Codes of the seeds in the order of numbers, so that the first seed is the smallest."""
+    return np.unique(table.numbers("seed"), return_inverse=True)[1].astype(np.int64)
+
+
+def _worlds(table: RunTable) -> tuple[tuple[str, ...], Ints]:
+    """Names of the worlds, and the index of each run's. Several tasks in one world are no other worlds."""
+    names, codes = np.unique(np.array(table.texts("world"), dtype=object), return_inverse=True)
+    return tuple(names), codes.astype(np.int64)
+
+
+def _seeded(table: RunTable, row: Ints, group: Ints, setting: Ints) -> Flags:
+    """Whether runs of a planner under one setting that differ in the seed alone differ in their drives, (N, P)."""
+    seeded = np.ones(row.shape, dtype=np.bool_)
+    if "drive_digest" not in table:
+        return seeded
+    marks = np.array([f"{a} {b}" for a, b in zip(table.texts("outcome"), table.texts("drive_digest"), strict=True)])
+    marks = np.unique(marks, return_inverse=True)[1]
+    for k, rows in enumerate(row.T):
+        for one in np.unique(setting):
+            here = (rows >= 0) & (setting == one)
+            groups = len(np.unique(group[here]))
+            different = np.unique(np.stack([group[here], marks[rows[here]]]), axis=1).shape[1]
+            seeded[here, k] = different > groups
+    return seeded

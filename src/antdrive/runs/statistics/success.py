@@ -1,0 +1,116 @@
+"""How often each planner succeeds, and its medians: both on instances that all of the planners share."""
+
+from __future__ import annotations
+
+import collections
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.runs.statistics.bootstrap import means_by_world, medians_by_world
+from antdrive.runs.statistics.pairing import PairedRuns
+from antdrive.runs.statistics.proportions import Interval, wilson
+
+Flags: TypeAlias = npt.NDArray[np.bool_]
+
+NOWHERE = Interval(math.nan, math.nan)
+
+
+@dataclass(frozen=True)
+class PlannerSuccess:
+    """How often a planner succeeds, on the instances that every planner ran.
+
+    Attributes:
+        planner: its label
+        runs: number of all its runs
+        elsewhere: how many of them are left out, because some other planner lacks a run of their instance
+        counted: number of different runs among the rest: where the seed changes no drive, one run stands for all seeds
+        successes: how many of the counted runs succeeded
+        interval: Wilson's 95 % interval for the share
+        over_worlds: 95 % interval over worlds: by bootstrap, or Wilson's for whole worlds if all runs ended alike; nan
+            where no world has two counted runs, or there is one world
+        outcomes: number of all runs by outcome
+    """
+
+    planner: str
+    runs: int
+    elsewhere: int
+    counted: int
+    successes: int
+    interval: Interval
+    over_worlds: Interval
+    outcomes: Mapping[str, int]
+
+    @property
+    def share(self) -> float:
+        """The share of the counted runs that succeeded."""
+        return self.successes / self.counted
+
+    @property
+    def across_worlds(self) -> Interval:
+        """The interval over worlds, or the one over runs where each world has one."""
+        return self.interval if math.isnan(self.over_worlds.low) else self.over_worlds
+
+    def as_dict(self) -> dict[str, Any]:
+        """All fields as plain values, and the share."""
+        fields = dataclasses.asdict(self)
+        return {**fields, "share": self.share, "interval": list(self.interval), "over_worlds": list(self.over_worlds)}
+
+
+def success_table(paired: PairedRuns) -> list[PlannerSuccess]:
+    """A row for each planner, in the order of the runs.
+
+    Shares are over the instances that every planner ran; where there is none, over each planner's own.
+    """
+    outcomes = paired.table.texts("outcome")
+    shared = paired.shared if paired.shared.any() else np.ones(len(paired.row), dtype=np.bool_)
+    masks = [paired.counted(k, within=shared) for k in range(len(paired.planners))]
+    over = means_by_world(paired.success.astype(float), paired.world, counted=np.stack(masks, axis=1))
+    rows = []
+    for k, (planner, mask) in enumerate(zip(paired.planners, masks, strict=True)):
+        here = paired.row[paired.present[:, k], k]
+        counted, successes = int(mask.sum()), int(paired.success[mask, k].sum())
+        rows.append(
+            PlannerSuccess(
+                planner=planner,
+                runs=len(here),
+                elsewhere=int((paired.present[:, k] & ~shared).sum()),
+                counted=counted,
+                successes=successes,
+                interval=wilson(successes, counted),
+                over_worlds=_over_worlds(paired, mask, successes, over[k]),
+                outcomes=dict(sorted(collections.Counter(outcomes[row] for row in here).items())),
+            )
+        )
+    return rows
+
+
+def _over_worlds(paired: PairedRuns, mask: Flags, successes: int, resampled: Interval) -> Interval:
+    """The interval of a share over worlds. Where all runs ended alike, no resample differs; whole worlds are counted then."""
+    if not paired.several_in_worlds(mask):
+        return NOWHERE
+    if successes in (0, int(mask.sum())):
+        worlds = paired.worlds_in(mask)
+        return wilson(worlds if successes else 0, worlds)
+    return resampled
+
+
+def common_medians(paired: PairedRuns, metrics: Sequence[str]) -> tuple[int, dict[str, list[tuple[float, Interval]]]]:
+    """The median of each metric and planner over the instances in which every planner succeeded.
+
+    Returns:
+        The number of those instances, and for each metric the medians of the planners with 95 % bootstrap intervals.
+    """
+    common = paired.success.all(axis=1) & paired.counted(*range(len(paired.planners)))
+    found = {}
+    for metric in metrics:
+        values = paired.values(metric)[common]
+        if len(values) and np.isfinite(values).all():
+            intervals = medians_by_world(values, paired.world[common])
+            found[metric] = list(zip(np.median(values, axis=0).tolist(), intervals, strict=True))
+    return int(common.sum()), found

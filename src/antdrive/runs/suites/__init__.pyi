@@ -1,0 +1,12 @@
+from .baseline import Baseline as Baseline
+from .demands import Bound as Bound
+from .demands import Demands as Demands
+from .judging import Judgement as Judgement
+from .judging import judge as judge
+from .scenarios import scenario_of as scenario_of
+from .selecting import select as select
+from .strategies import tasks as tasks
+from .strategies import worlds as worlds
+from .suite import SuiteCase as SuiteCase
+from .suite import load_suite as load_suite
+from .suite import suite_schema as suite_schema

@@ -1,0 +1,245 @@
+"""Baselines: what an earlier drive did, in a small text file for version control."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import PlainValidator, TypeAdapter, ValidationError
+
+from antdrive.base.atomic import written_whole
+from antdrive.base.errors import input_error
+from antdrive.base.plane import wrap_angle
+from antdrive.base.reading import read_bytes
+from antdrive.base.types import Floats
+from antdrive.runs.suites.demands import WALL_CLOCK
+from antdrive.runs.suites.nearest import RULES, ClosestApproach, nearest_of
+from antdrive.sim.log.binding import hashes_of
+from antdrive.sim.log.metrics import METRICS
+from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.pipeline import ENDED_BY, Run, versions
+
+SCHEMA = 1
+MAX_BYTES = 20_000  # of a baseline
+LINE_HZ = 10.0  # rate of the driven line, halved until the file is small enough [Hz]
+LEAST_HZ = 1e-3
+
+
+def _to_outcome(value: Any) -> Outcome:
+    return Outcome.from_key(str(value))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Baseline:
+    """What an earlier drive did.
+
+    Attributes:
+        schema: the version of the format, 1
+        case: the test that it belongs to, such as aisle[0]
+        outcome: how the run ended
+        reason: details of the outcome, in words; may be empty
+        certified: whether the drive was certified collision-free
+        margin_m: the margin that was chosen for `margin: auto` [m]; None: it was given
+        bound_m: the clearance that the certificate proved [m]; None without one
+        metrics: every metric but wall-clock times; empty if the robot did not drive
+        nearest: what the robot came nearest to; None if it did not drive
+        hashes: of the world, the unseen obstacles, the robot and the settings; empty if the robot did not drive
+        versions: of antdrive, Python and the packages that computed the drive
+        drive_digest: `Rollout.drive_digest`; empty if the robot did not drive
+        limiters: names of the rules that can limit the robot's speed
+        line_hz: rate of the line [Hz]
+        line: x [m], y [m], yaw [rad] and the index of the rule that limited the speed, for each sample; the last one is
+            the drive's end
+    """
+
+    __pydantic_config__ = RULES
+
+    schema: int = SCHEMA
+    case: str
+    outcome: Annotated[Outcome, PlainValidator(_to_outcome)]
+    reason: str
+    certified: bool
+    bound_m: float | None
+    metrics: Mapping[str, float | None]
+    nearest: ClosestApproach | None
+    hashes: Mapping[str, str]
+    versions: Mapping[str, str]
+    drive_digest: str
+    limiters: tuple[str, ...]
+    line_hz: float
+    line: tuple[tuple[float, float, float, int], ...]
+    margin_m: float | None = None
+
+    @property
+    def times(self) -> Floats:
+        """The time of each sample of the line (N,) [s]."""
+        times = np.arange(len(self.line)) / self.line_hz
+        if len(times):
+            times[-1] = self.metric("duration_s")
+        return times
+
+    @property
+    def xy(self) -> Floats:
+        """The places of the line (N, 2) [m]."""
+        return np.array([sample[:2] for sample in self.line], dtype=np.float64).reshape(-1, 2)
+
+    def metric(self, name: str) -> float:
+        """A metric of the earlier drive; NaN where there is none.
+
+        Args:
+            name: a name of `METRICS`
+        """
+        value = self.metrics.get(name)
+        return math.nan if value is None else value
+
+    @classmethod
+    def of(cls, run: Run, case: str) -> Baseline:
+        """The baseline that a run makes.
+
+        Args:
+            run: the run
+            case: the test's name
+        """
+        rollout, certificate = run.rollout, run.certificate
+        baseline = cls(
+            case=case,
+            outcome=run.outcome,
+            reason=run.reason,
+            certified=certificate is not None and certificate.certified,
+            bound_m=_rounded(certificate.bound) if certificate else None,
+            metrics=_metrics(rollout) if rollout else {},
+            nearest=nearest_of(rollout) if rollout else None,
+            hashes=conditions(run),
+            versions=dict(rollout.record.versions) if rollout else versions(),
+            drive_digest=rollout.drive_digest if rollout else "",
+            limiters=rollout.record.limiters if rollout else (),
+            line_hz=LINE_HZ,
+            line=_line(rollout, LINE_HZ) if rollout else (),
+            margin_m=_chosen_margin(run),
+        )
+        while rollout and len(baseline.to_text()) > MAX_BYTES and baseline.line_hz > LEAST_HZ:
+            hz = baseline.line_hz / 2
+            baseline = dataclasses.replace(baseline, line_hz=hz, line=_line(rollout, hz))
+        return baseline
+
+    def to_text(self) -> str:
+        """The baseline as JSON with one value, or one sample of the line, on each line."""
+        values = _ADAPTER.dump_python(self, mode="python")
+        if self.margin_m is None:
+            del values["margin_m"]
+        line = [json.dumps(sample) for sample in values.pop("line")]
+        values["outcome"] = self.outcome.key
+        values["nearest"] = None if self.nearest is None else dataclasses.asdict(self.nearest)
+        head = json.dumps(values, indent=1, allow_nan=False, ensure_ascii=False)
+        body = ",\n".join(line)
+        return head.removesuffix("\n}") + f',\n "line": [\n{body}\n ]\n}}\n'.replace("[\n\n ]", "[]")
+
+    def save(self, path: Path) -> None:
+        """Write the baseline, whole or not at all.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
+        with written_whole(path) as temporary:
+            temporary.write_text(self.to_text(), encoding="utf-8")
+
+    @classmethod
+    def load(cls, path: Path) -> Baseline | None:
+        """The baseline in a file; None if there is no such file.
+
+        Raises:
+            InputError: the file is no baseline.
+        """
+        if not path.exists():
+            return None
+        again = "accept the drive again with antdrive accept"
+        try:
+            text = read_bytes(path, 10 * MAX_BYTES, "a baseline").decode("utf-8")
+            found = json.loads(text)
+        except (UnicodeDecodeError, ValueError, RecursionError) as error:
+            if type(error).__name__ == "InputError":
+                raise
+            raise input_error(str(path), f"not a baseline: not JSON; restore it, or {again}") from None
+        if not isinstance(found, dict) or found.get("schema") != SCHEMA:
+            raise input_error(str(path), f"schema: must be {SCHEMA}; {again}")
+        try:
+            baseline = _ADAPTER.validate_json(text)
+        except ValidationError as error:
+            fault = error.errors(include_url=False)[0]
+            key = ".".join(map(str, fault["loc"]))
+            problem = f"{fault['msg'][0].lower()}{fault['msg'][1:]}"
+            raise input_error(str(path), *filter(None, [key]), f"{problem}; restore it, or {again}") from None
+        for key, problem in baseline.gaps():
+            raise input_error(str(path), key, f"{problem}; restore it, or {again}")
+        return baseline
+
+    def gaps(self) -> Iterator[tuple[str, str]]:
+        """What is missing or too much, as key and problem: with less than this a comparison would say nothing."""
+        parts = {name: getattr(self, name) for name in ("metrics", "nearest", "hashes", "drive_digest", "line")}
+        if self.outcome in ENDED_BY.values() and not any(parts.values()):
+            return
+        known = [name for name in METRICS if name not in WALL_CLOCK]
+        missing = [name for name in known if name not in self.metrics and METRICS[name].better != "neither"]
+        if missing:
+            yield "metrics", f"{', '.join(missing[:3])}{' and others' if len(missing) > 3 else ''} missing"
+        for name in self.metrics:
+            if name not in known:
+                yield f"metrics.{name}", "no such metric"
+        for name, part in parts.items():
+            if not part:
+                yield name, "missing, though the robot drove"
+        if not (math.isfinite(self.line_hz) and self.line_hz > 0):
+            yield "line_hz", "must be greater than 0"
+        if not math.isfinite(self.metric("duration_s")):
+            yield "metrics.duration_s", "must be a number"
+
+
+_ADAPTER = TypeAdapter(Baseline)
+
+
+def conditions(run: Run) -> dict[str, str]:
+    """The hashes of all that a run depends on, by name: world, robot, settings, unseen obstacles; none without a rollout.
+
+    The record's time limit counts only where it was given: by default it follows from the robot and the route.
+    """
+    if run.rollout is None:
+        return {}
+    scenario, record = run.scenario, run.rollout.record
+    given = dataclasses.replace(record, time_limit=scenario.time_limit or scenario.task.time_limit or 1.0)
+    unseen = json.dumps([dataclasses.asdict(disc) for disc in record.unseen], sort_keys=True)
+    return {**hashes_of(given), "unseen obstacles": hashlib.sha256(unseen.encode()).hexdigest()}
+
+
+def _chosen_margin(run: Run) -> float | None:
+    return run.scenario.margin if run.scenario.chosen is not None else None
+
+
+def _rounded(value: float) -> float | None:
+    return round(value, 6) if math.isfinite(value) else None
+
+
+def _metrics(rollout: Rollout) -> dict[str, float | None]:
+    return {name: _rounded(metric(rollout)) for name, metric in METRICS.items() if name not in WALL_CLOCK}
+
+
+def _line(rollout: Rollout, hz: float) -> tuple[tuple[float, float, float, int], ...]:
+    """The driven line at a rate, with the drive's end as its last sample."""
+    end = float(rollout.t[-1])
+    moments = np.append(np.arange(0.0, max(end - 0.5 / hz, 0.0), 1 / hz), end) if end > 0 else np.zeros(1)
+    rows = np.clip(np.round(moments * rollout.record.physics_hz).astype(int), 0, len(rollout.t) - 1)
+    # Between rows, because a rate of physics that the line's does not divide has no row at most of the moments.
+    turned = np.column_stack([rollout.pose[:, :2], np.unwrap(rollout.pose[:, 2])])
+    x, y, yaw = (np.interp(moments, rollout.t, turned[:, axis]) for axis in range(3))
+    samples = np.column_stack([x, y, wrap_angle(yaw)]).tolist()
+    return tuple(
+        (round(x, 3) + 0.0, round(y, 3) + 0.0, round(a, 3) + 0.0, int(rule))
+        for (x, y, a), rule in zip(samples, rollout.limiter[rows].tolist(), strict=True)
+    )

@@ -1,0 +1,197 @@
+"""Judge a run by what its test demands, and against its baseline.
+
+The verdict always counts: the outcome, whether the drive is certified, and the bounds of the suite. A metric that is worse
+than in the baseline by more than its tolerance is a fault, one that is better by more than that a gain. The driven line is
+judged only where the test demands it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from antdrive.runs.suites.baseline import Baseline
+from antdrive.runs.suites.demands import END, WALL_CLOCK, Bound, Demands
+from antdrive.runs.suites.nearest import nearest_of
+from antdrive.runs.suites.parting import end_distance, farthest
+from antdrive.runs.suites.touching import cause_of_contact, touched_first
+from antdrive.sim.log.metrics import METRICS
+from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.pipeline import Run
+
+#: In words, what is worse about a metric.
+_WORSE = {"m": "longer", "s": "longer"}
+_WORDS = {
+    "min_clearance_m": "nearer",
+    "mean_clearance_m": "nearer",
+    "tracking_error_max_m": "farther off",
+    "tracking_error_p95_m": "farther off",
+}
+#: The metrics that messages begin with.
+FIRST = ("contacts_driving", "min_clearance_m", "duration_s", "driven_length_m")
+_PLACED = ("min_clearance_m",)
+ROUNDED = 1e-6  # the last decimal of a baseline's metrics
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What is wrong with a run, and what is better than before.
+
+    Attributes:
+        faults: why the test fails, a sentence each
+        gains: what is better than in the baseline, a sentence each
+    """
+
+    faults: tuple[str, ...] = ()
+    gains: tuple[str, ...] = ()
+
+    @property
+    def passed(self) -> bool:
+        """Whether there is no fault."""
+        return not self.faults
+
+
+def judge(run: Run, demands: Demands, baseline: Baseline | None) -> Judgement:
+    """Judge a run.
+
+    Args:
+        run: the run
+        demands: what its test demands
+        baseline: the earlier drive; None: only the demands count
+    """
+    faults = list(unfulfilled(run, demands))
+    gains: list[str] = []
+    if baseline is not None:
+        verdict = _verdict(run, baseline)
+        if run.succeeded:
+            gains.extend(verdict)
+        elif not _was_as_demanded(demands, baseline) or _as_demanded(run, demands):  # else it is among the faults
+            faults.extend(verdict)
+        if run.rollout is not None and baseline.line and run.outcome is baseline.outcome:
+            for name in (*FIRST, *(name for name in METRICS if name not in FIRST)):
+                _compare(name, run.rollout, baseline, demands, faults, gains)
+            faults += _line_faults(run.rollout, baseline, demands)
+    return Judgement(tuple(faults), tuple(gains))
+
+
+def unfulfilled(run: Run, demands: Demands) -> Iterator[str]:
+    """What a run does not fulfil, whatever the baseline, a sentence each."""
+    certified = run.certificate is not None and run.certificate.certified
+    if run.outcome is not demands.outcome:
+        reason = f" ({run.reason})" if run.reason else ""
+        yield f"outcome: {run.outcome.key}, expected {demands.outcome.key}{reason}"
+    elif demands.must_be_certified and not certified:
+        problems = run.certificate.problems if run.certificate else ("the robot did not drive",)
+        yield f"certificate: not certified collision-free ({'; '.join(problems)})"
+    elif demands.certified is False and certified:
+        yield "certificate: certified collision-free, expected not to be"
+    if run.outcome is demands.outcome and run.rollout is not None:
+        yield from _other_contact(run.rollout, demands)
+    for bound in demands.bounds:
+        if run.rollout is None:
+            yield f"{bound.metric}: the robot did not drive, expected {bound.sign} {bound.value:g}"
+        elif not bound.holds(found := METRICS[bound.metric](run.rollout)):
+            yield f"{bound.metric}: {found:.6g}, expected {bound.sign} {bound.value:g}{_place(bound.metric, run.rollout)}"
+
+
+def _other_contact(rollout: Rollout, demands: Demands) -> Iterator[str]:
+    """How the first contact differs from the one that is demanded."""
+    if demands.touched is not None and (touched := touched_first(rollout)) != demands.touched:
+        yield f"touched: {touched}, expected {demands.touched}"
+    elif demands.cause is not None and (cause := cause_of_contact(rollout)) != demands.cause:
+        yield f"cause: {cause or 'none'} took most of the margin, expected {demands.cause}"
+
+
+def _verdict(run: Run, baseline: Baseline) -> list[str]:
+    """How outcome and certificate differ from the baseline's, a sentence each."""
+    if run.outcome is not baseline.outcome:
+        return [f"outcome: {run.outcome.key}, in the baseline {baseline.outcome.key}"]
+    certified = run.certificate is not None and run.certificate.certified
+    if certified == baseline.certified:
+        return []
+    words = "certified collision-free"
+    return [
+        f"certificate: {words}, in the baseline not"
+        if certified
+        else f"certificate: not {words}, in the baseline it was"
+    ]
+
+
+def _as_demanded(run: Run, demands: Demands) -> bool:
+    """Whether outcome and certificate of a run are those that its test demands."""
+    certified = run.certificate is not None and run.certificate.certified
+    return _demanded(run.outcome, certified, demands)
+
+
+def _was_as_demanded(demands: Demands, baseline: Baseline) -> bool:
+    """Whether outcome and certificate of the earlier drive are those that the test demands now."""
+    return _demanded(baseline.outcome, baseline.certified, demands)
+
+
+def _demanded(outcome: Outcome, certified: bool, demands: Demands) -> bool:
+    wanted = True if demands.must_be_certified else demands.certified
+    return outcome is demands.outcome and wanted in (None, certified)
+
+
+def _compare(
+    name: str, rollout: Rollout, baseline: Baseline, demands: Demands, faults: list[str], gains: list[str]
+) -> None:
+    """Compare one metric with the baseline's."""
+    metric, tolerance = METRICS[name], demands.tolerance(name)
+    if metric.better == "neither" or tolerance is None or name in WALL_CLOCK:
+        return
+    now, then = metric(rollout), baseline.metric(name)
+    unit = "" if metric.unit == "1" else f" {metric.unit}"
+    if not math.isfinite(then) or (math.isnan(now) and rollout.record.exploring):
+        return  # earlier versions held the first plan of a robot without a map against the optimum
+    if not math.isfinite(now):
+        faults.append(f"{name}: {now:g}, in the baseline {then:.6g}{unit}")
+        return
+    worse_by = now - then if metric.better == "lower" else then - now
+    allowed = tolerance.allowed(then)
+    if abs(worse_by) <= allowed + ROUNDED:
+        return
+    text = f"{name}: {now:.6g}{unit}, in the baseline {then:.6g}{unit}: {abs(worse_by):.3g}{unit}"
+    if worse_by > 0:
+        words = _WORDS.get(name, _WORSE.get(metric.unit, "worse"))
+        faults.append(f"{text} {words}, tolerance {allowed:.3g}{unit}{_place(name, rollout)}")
+    else:
+        gains.append(f"{text} better")
+
+
+def limits(demands: Demands, baseline: Baseline) -> Iterator[Bound]:
+    """The bounds on metrics that a baseline sets: breaking one is worse than the baseline by more than its tolerance."""
+    for name in (*FIRST, *(name for name in METRICS if name not in FIRST)):
+        better, tolerance, then = METRICS[name].better, demands.tolerance(name), baseline.metric(name)
+        if better == "neither" or tolerance is None or name in WALL_CLOCK or not math.isfinite(then):
+            continue
+        allowed = tolerance.allowed(then) + ROUNDED
+        yield Bound(name, "<=", then + allowed) if better == "lower" else Bound(name, ">=", then - allowed)
+
+
+def _place(name: str, rollout: Rollout) -> str:
+    """Where a metric is at its worst, for those that have a place."""
+    if name not in _PLACED:
+        return ""
+    found = nearest_of(rollout)
+    return f"; nearest to {found.thing}, {found.place}"
+
+
+def _line_faults(rollout: Rollout, baseline: Baseline, demands: Demands) -> Iterator[str]:
+    """What is wrong with where the robot ended and which line it drove."""
+    ends, tolerance = end_distance(baseline, rollout), demands.tolerance(END)
+    if tolerance is not None and ends > tolerance.allowed(0.0) + 1e-3:
+        (x, y), (x0, y0) = rollout.pose[-1, :2].tolist(), baseline.xy[-1].tolist()
+        yield (
+            f"{END}: the drive ends at ({x:.2f}, {y:.2f}), in the baseline at ({x0:.2f}, {y0:.2f}): {ends:.3g} m apart, "
+            f"tolerance {tolerance.allowed(0.0):.3g} m"
+        )
+    if demands.trajectory == "exact":
+        if rollout.drive_digest != baseline.drive_digest:
+            yield "trajectory: not the baseline's, bit for bit"
+    elif demands.trajectory is not None:
+        most = farthest(baseline, rollout)
+        if most > demands.trajectory + 1e-3:
+            yield f"trajectory: up to {most:.3g} m from the baseline's line, allowed {demands.trajectory:g} m"

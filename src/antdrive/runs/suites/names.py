@@ -1,0 +1,119 @@
+"""What a suite names: worlds, robots and planners, of the catalogue or in files beside it. Loads no compiler."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from antdrive.base.checks import show, suggest
+from antdrive.base.errors import InputError
+from antdrive.planners.own_code import OwnCodeError, is_own, object_in, record_name
+from antdrive.planners.plan import Planner
+from antdrive.planners.registry import load_planner, make_planner
+from antdrive.robots.files import list_robots
+from antdrive.runs.suites.suite import SuiteCase
+from antdrive.worlds.files.world_file import list_worlds
+
+#: Where a planner comes from: a key of the mapping, beside its options.
+SOURCES = frozenset({"module", "file"})
+
+
+def check_names(case: SuiteCase) -> None:
+    """Check what can be checked of a test without reading worlds and robots: that all it names exists.
+
+    Raises:
+        InputError: something is missing; the message has the suite's file, line and key.
+    """
+    entry = case.entry
+    if isinstance(entry.world, str):
+        world_path(case, entry.world)
+    robot_path(case)
+    if not is_own_entry(entry.planner):
+        planner_of(case)
+
+
+def world_path(case: SuiteCase, name: str) -> Path:
+    """The file of a world that a test names.
+
+    Raises:
+        InputError: there is no such world.
+    """
+    return _path(case, "world", name, list_worlds())
+
+
+def robot_path(case: SuiteCase) -> Path:
+    """The file of a test's robot.
+
+    Raises:
+        InputError: there is no such robot.
+    """
+    return _path(case, "robot", case.entry.robot, list_robots())
+
+
+def planner_of(case: SuiteCase) -> tuple[Planner, str]:
+    """The planner of a test, and its name in records.
+
+    Raises:
+        InputError: there is no such planner, module, file or option, or an option does not take the value.
+    """
+    given = case.entry.planner
+    options = {"name": given} if isinstance(given, str) else dict(given)
+    name, sources = options.pop("name", None), {key: options.pop(key) for key in SOURCES if key in options}
+    if not isinstance(name, str):
+        raise case.error("planner.name", "missing; write the planner's name, or that of its class in a module or file")
+    if len(sources) > 1:
+        raise case.error("planner.file", "a planner comes from a module or from a file; keep one")
+    try:
+        if not sources and not is_own(name):
+            return load_planner(name, **options), name
+        made = _own(case, name, sources)
+        return make_planner(made, record_name(name), **options), record_name(name)
+    except InputError as error:
+        text = str(error)
+        if text.startswith("planner.") and ": " in text:  # an option
+            option, _, problem = text.partition(": ")
+            raise case.error(option, problem) from None
+        raise (error if text.startswith(case.document.source) else _at_planner(case, text)) from None
+
+
+def is_own_entry(planner: str | Mapping[str, Any]) -> bool:
+    """Whether the words of a suite name a planner in a file or module."""
+    name = planner if isinstance(planner, str) else planner.get("name")
+    sources = () if isinstance(planner, str) else (key for key in SOURCES if key in planner)
+    return any(sources) or (isinstance(name, str) and is_own(name))
+
+
+def _path(case: SuiteCase, key: str, name: str, known: Mapping[str, Path]) -> Path:
+    """A file of the catalogue, or one relative to the suite; the catalogue's names come first."""
+    if name in known:
+        return known[name]
+    path = case.suite.parent / name
+    if not path.is_file():
+        hint = suggest(Path(name).stem, known)
+        raise case.error(key, f"{name}: no such file beside the suite, nor in the catalogue; {hint}")
+    return path
+
+
+def _at_planner(case: SuiteCase, text: str) -> InputError:
+    return case.error("planner", text.removeprefix("planner: "))
+
+
+def _own(case: SuiteCase, name: str, sources: Mapping[str, Any]) -> Any:
+    """What a module or a file of people's own calls by a name, from FILE.py:NAME, MODULE:NAME or a key of `SOURCES`."""
+    if not sources:
+        key, (source, _, word) = "planner", name.rpartition(":")
+        is_file, of_word = source.endswith(".py"), key
+    else:
+        ((key, source),) = sources.items()
+        key, word, is_file, of_word = f"planner.{key}", name, key == "file", "planner.name"
+        if not isinstance(source, str):
+            raise case.error(key, f"must be text, got {show(source)}")
+        if is_own(name):
+            raise case.error(of_word, f"must be the class alone, because {key} says where it is, got {show(name)}")
+    if is_file and not (case.suite.parent / source).is_file():
+        raise case.error(key, f"{source}: no such file beside the suite")
+    try:
+        return object_in(source, word, case.suite.parent, is_file=is_file)
+    except OwnCodeError as error:
+        raise case.error(of_word if error.of_class else key, error.problem) from error

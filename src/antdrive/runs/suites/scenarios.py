@@ -1,0 +1,144 @@
+"""From a suite's words to a scenario, and to the command that runs it alone."""
+
+from __future__ import annotations
+
+import dataclasses
+import shlex
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from antdrive.base.checks import show
+from antdrive.base.errors import FieldError, InputError
+from antdrive.robots import RobotSpec, list_robots, load_robot
+from antdrive.runs.suites.names import SOURCES, is_own_entry, planner_of, robot_path, world_path
+from antdrive.runs.suites.suite import SuiteCase, shown_path
+from antdrive.sim.entries import has_flags, option_text, setting_words
+from antdrive.sim.scenario import Scenario
+from antdrive.sim.settings import generated, scenario_fields
+from antdrive.worlds import Task, list_worlds, load_task
+
+
+def scenario_of(case: SuiteCase, choose: Callable[[Scenario], Scenario] = Scenario.with_chosen_margin) -> Scenario:
+    """The scenario of a suite's test.
+
+    Files of worlds and robots that were read last are kept, by their text.
+
+    Args:
+        case: the test
+        choose: chooses the margin where the suite says auto
+
+    Raises:
+        InputError: something that the suite names is missing or wrong; the message has the suite's file, line and key.
+    """
+    entry, auto = case.entry, case.entry.margin == "auto"
+    planner, name = planner_of(case)
+    task = _with_ends(case, task_of(case))
+    try:
+        scenario = Scenario.of(
+            task,
+            planner,
+            robot_of(case),
+            margin=0.0 if auto else entry.margin,
+            smoothing=entry.smoothing,
+            seed=case.seed,
+            noise=entry.noise,
+            **scenario_fields(entry, case.error),
+        )
+        return dataclasses.replace(choose(scenario) if auto else scenario, planner_name=name)
+    except FieldError as error:
+        raise case.error(error.key, error.problem) from None
+
+
+def task_of(case: SuiteCase) -> Task:
+    """The world of a test, with the world's own start and goal.
+
+    Raises:
+        InputError: there is no such world, or something in its file is wrong.
+    """
+    world = case.entry.world
+    if isinstance(world, str):
+        path = world_path(case, world)
+        return load_task(path)
+    options = dict(world)
+    kind, seed = options.pop("generate", None), options.pop("seed", 0)
+    if not isinstance(kind, str):
+        raise case.error("world", "write a file, a name of the catalogue, or {generate: forest, seed: 7}")
+    if type(seed) is not int or not 0 <= seed < 2**63:
+        raise case.error("world.seed", f"must be a whole number of at least 0, got {show(seed)}")
+    try:
+        return generated(kind, seed, tuple((key, option_text(value)) for key, value in options.items()))
+    except InputError as error:
+        raise case.error("world", str(error)) from None
+
+
+def robot_of(case: SuiteCase) -> RobotSpec:
+    """The robot of a test.
+
+    Raises:
+        InputError: there is no such robot, or something in its file is wrong.
+    """
+    path = robot_path(case)
+    return load_robot(path)
+
+
+def run_command(case: SuiteCase, *, anywhere: bool = False) -> str | None:
+    """The `antdrive run` command that drives a test's scenario alone; None where only `antdrive check` can."""
+    entry = case.entry
+    planner = {"name": entry.planner} if isinstance(entry.planner, str) else dict(entry.planner)
+    usual = entry.start is None and entry.goal is None
+    word = _planner_word(case, planner, anywhere)
+    if not (usual and has_flags(entry)) or word is None:
+        return None
+    world, before = _world_words(case, anywhere)
+    words = ["antdrive", "run", world, "--planner", word]
+    words += [word for key, value in planner.items() for word in ("--set", f"planner.{key}={option_text(value)}")]
+    words += ["--robot", _shown_name(case, entry.robot, list_robots(), anywhere), "--seed", str(case.seed)]
+    for key in ("margin", "smoothing", "noise"):
+        if key in entry.model_fields_set:
+            words += [f"--{key}", option_text(getattr(entry, key))]
+    return before + shlex.join([*words, *setting_words(entry)])
+
+
+def _planner_word(case: SuiteCase, planner: dict[str, Any], anywhere: bool) -> str | None:
+    """What a command calls a planner, whose name is taken out of its words; None where it is in a module beside the suite."""
+    name = planner.pop("name")
+    if not is_own_entry({"name": name, **planner}):
+        return str(name)
+    file, word = (planner.pop("file", None), name) if SOURCES & planner.keys() else name.rpartition(":")[::2]
+    if file is None or not file.endswith(".py"):
+        return None
+    return f"{_shown_name(case, file, {}, anywhere)}:{word}"
+
+
+def _world_words(case: SuiteCase, anywhere: bool) -> tuple[str, str]:
+    """What a command calls the world of a test, and the command that must write a random one before."""
+    world = case.entry.world
+    if isinstance(world, str):
+        return _shown_name(case, world, list_worlds(), anywhere), ""
+    options = dict(world)
+    kind, seed = options.pop("generate"), options.pop("seed", 0)
+    name = f"{kind}-{seed}.yaml"
+    words = ["antdrive", "worlds", "generate", kind, "--seed", str(seed), "--out", name]
+    words += [word for key, value in options.items() for word in ("--set", f"{key}={option_text(value)}")]
+    return name, f"{shlex.join(words)} && "
+
+
+def _shown_name(case: SuiteCase, name: str, known: Mapping[str, Path], anywhere: bool) -> str:
+    if name in known:
+        return name
+    path = (case.suite.parent / name).resolve()
+    return str(path) if anywhere else shown_path(path)
+
+
+def _with_ends(case: SuiteCase, task: Task) -> Task:
+    """The task with the test's own start and goal."""
+    start, goal = case.entry.start, case.entry.goal
+    try:
+        if start is not None:
+            task = dataclasses.replace(task, start=(start[0], start[1], start[2]))
+        if goal is not None:
+            task = dataclasses.replace(task, goal=(goal[0], goal[1]))
+    except FieldError as error:
+        raise case.error(error.key, error.problem) from None
+    return task

@@ -1,0 +1,264 @@
+"""Suites: files of scenarios, `*.drive.yaml`, each driven with one or several seeds and compared with its baseline."""
+
+from __future__ import annotations
+
+import functools
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Annotated, Any
+
+from pydantic import BaseModel, Field, PlainValidator, WithJsonSchema
+
+from antdrive.base.checks import SchemaVersion, check
+from antdrive.base.document import Document, Location, read_document
+from antdrive.base.errors import FieldError, InputError, input_error
+from antdrive.runs.suites.demands import END, KINDS, Demands, causes
+from antdrive.sim.entries import RULES, MarginValue, SeedList, SettingsEntry, TextOrMapping
+from antdrive.sim.log.metrics import METRICS
+from antdrive.sim.log.outcome import Outcome
+
+SUFFIX = ".drive.yaml"
+MAX_CASES = 100_000  # scenarios times seeds of one suite
+BASELINES = "baselines"  # the folder beside a suite
+
+#: What Python calls some keys, and what people may take for one.
+_SYNONYMS = MappingProxyType(
+    {"avoidance": "avoid", "replanning": "replan", "perception": "sees", "seed": "seeds", "options": "planner"}
+)
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")
+
+
+def _anything(value: Any) -> Any:
+    return value
+
+
+_TRAJECTORY_SCHEMA: dict[str, Any] = {"anyOf": [{"type": "number", "minimum": 0.002}, {"const": "exact"}]}
+
+TrajectoryValue = Annotated[Any, PlainValidator(_anything), WithJsonSchema(_TRAJECTORY_SCHEMA)]
+
+
+class ScenarioEntry(SettingsEntry):
+    """A scenario of a suite, or the defaults of all of them."""
+
+    model_config = RULES
+
+    note: str | None = Field(None, description="what the scenario is for, free text")
+    world: TextOrMapping = Field(
+        None,
+        description="a world file relative to the suite, a world of the catalogue, or {generate: forest, seed: 7} with the "
+        "generator's options",
+    )
+    start: list[float] | None = Field(
+        None, min_length=3, max_length=3, description="write [x, y, yaw] in metres and radians; by default the world's"
+    )
+    goal: list[float] | None = Field(
+        None, min_length=2, max_length=2, description="write [x, y] in metres; by default the world's"
+    )
+    robot: str = Field("turtlebot", description="a robot file relative to the suite, or a robot of the catalogue")
+    planner: TextOrMapping = Field(
+        "ants",
+        description="a planner's name; {name: aco-han, ants: 200} with options; planners.py:Mine, {file: planners.py, "
+        "name: Mine} or {module: my_package.planners, name: Mine} for a planner of your own",
+    )
+    smoothing: str = Field("clearance", description="none, taut or clearance")
+    margin: MarginValue = Field(
+        0.03,
+        description="distance that plans keep beyond the robot's radius [m], or auto: the least that robot, noise and "
+        "smoothing are predicted to need",
+    )
+    noise: float = Field(0.0, ge=0, description="factor on the noise that the robot's file documents")
+    seeds: SeedList = Field([0], description="one test for each: [0, 1, 2], or a range such as 0-9")
+    expect: dict[str, Any] = Field(
+        {}, description='demands: {outcome: succeeded, certified: true, min_clearance_m: ">= 0.05"}'
+    )
+    tolerance: dict[str, Any] = Field(
+        {}, description="by how much a metric may be worse than in the baseline: {duration_s: 0.5, jerk_rms: any}"
+    )
+    trajectory: TrajectoryValue = Field(
+        None, description="how far from the baseline's line the robot may be at any time [m], or exact"
+    )
+    baseline: bool = Field(True, description="whether there is a baseline to compare with; false: only expect counts")
+
+
+class SuiteFile(BaseModel):
+    """A suite of scenarios, as written in a `*.drive.yaml` file."""
+
+    model_config = RULES
+
+    schema_: SchemaVersion = Field(alias="schema", description="write schema: 1")
+    defaults: ScenarioEntry = Field(
+        default_factory=ScenarioEntry.model_construct,
+        description="keys that hold for all scenarios that do not set them",
+    )
+    scenarios: dict[str, ScenarioEntry] = Field(
+        description="the scenarios by name", json_schema_extra={"minProperties": 1}
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class SuiteCase:
+    """One test: a scenario of a suite with one seed.
+
+    Attributes:
+        suite: the suite's file
+        name: the scenario's name
+        seed: the seed of all random numbers
+        entry: the scenario, with the suite's defaults
+        demands: what the drive must fulfil
+        document: the suite as read, for errors
+        own: the keys that the scenario sets itself; the others come from the defaults
+    """
+
+    suite: Path
+    name: str
+    seed: int
+    entry: ScenarioEntry
+    demands: Demands
+    document: Document
+    own: frozenset[str]
+
+    @property
+    def id(self) -> str:
+        """The test's name in its suite, such as aisle[0]."""
+        return f"{self.name}[{self.seed}]"
+
+    @property
+    def address(self) -> str:
+        """The test as commands name it: SUITE::aisle[0], the suite relative to the working directory where it can be."""
+        return f"{shown_path(self.suite)}::{self.id}"
+
+    @property
+    def baseline_path(self) -> Path:
+        """Where the baseline is."""
+        return baseline_folder(self.suite) / f"{self.name}-{self.seed}.json"
+
+    def error(self, key: str, problem: str) -> InputError:
+        """The error for a key of the scenario: file, line, key and problem.
+
+        Args:
+            key: the key, such as "planner.ants"; empty for the whole scenario
+            problem: what is wrong and what would be right
+        """
+        location = _place(self.document, self.name, key, self.own)
+        return self.document.error(location, problem)
+
+
+def baseline_folder(suite: Path) -> Path:
+    """The folder with the baselines of a suite, beside it."""
+    return suite.parent / BASELINES / suite.name.removesuffix(SUFFIX)
+
+
+def shown_path(path: Path) -> str:
+    """A path as messages show it: relative to the working directory if it lies below."""
+    try:
+        return str(path.relative_to(Path.cwd()))
+    except (ValueError, OSError):
+        return str(path)
+
+
+def load_suite(path: str | os.PathLike[str]) -> tuple[SuiteCase, ...]:
+    """The tests of a suite, in the order of the file. A suite is read once per process, and again when it changes.
+
+    Raises:
+        InputError: there is no such file, or something in it is wrong.
+    """
+    target = Path(path)
+    try:
+        state = target.stat()
+    except OSError as error:
+        raise input_error(os.fspath(path), f"cannot be read ({error.strerror})") from None
+    return _load(target.resolve(), os.fspath(path), state.st_mtime_ns, state.st_size)
+
+
+@functools.lru_cache(maxsize=64)
+def _load(path: Path, source: str, mtime: int, size: int) -> tuple[SuiteCase, ...]:
+    document = read_document(source)
+    _refuse_synonyms(document)
+    suite = check(SuiteFile, document)
+    if not suite.scenarios:
+        raise document.error(("scenarios",), "holds none; write at least one, such as one: {world: empty}")
+    cases: list[SuiteCase] = []
+    for name, entry in suite.scenarios.items():
+        if not _NAME.fullmatch(name):
+            raise document.error(
+                ("scenarios", name), "a name has letters, digits, '-', '_' and '.' only, at most 100 of them"
+            )
+        cases += _cases(path, document, name, suite.defaults, entry)
+        if len(cases) > MAX_CASES:
+            raise document.error(("scenarios", name), f"scenarios times seeds must be at most {MAX_CASES}")
+    return tuple(cases)
+
+
+def _refuse_synonyms(document: Document) -> None:
+    """Refuse keys that are called otherwise in a suite, where the likeness of the words would not tell which is meant."""
+    for location in document.lines:
+        scenario = location[:1] == ("defaults",) and len(location) == 2
+        if (scenario or (location[:1] == ("scenarios",) and len(location) == 3)) and location[-1] in _SYNONYMS:
+            key = _SYNONYMS[str(location[-1])]
+            hint = ScenarioEntry.model_fields[key].description
+            raise document.error(location, f"unknown key; write {key}: {hint}")
+
+
+def _cases(path: Path, document: Document, name: str, defaults: ScenarioEntry, entry: ScenarioEntry) -> list[SuiteCase]:
+    """The tests of one scenario, one for each seed."""
+    own = frozenset(entry.model_fields_set)
+    values = {key: getattr(defaults, key) for key in defaults.model_fields_set}
+    values |= {key: getattr(entry, key) for key in own}
+    for key in ("expect", "tolerance"):
+        values[key] = {**getattr(defaults, key), **getattr(entry, key)}
+    merged = ScenarioEntry.model_construct(**values)
+    if merged.world is None:
+        hint = ScenarioEntry.model_fields["world"].description
+        raise document.error(("scenarios", name, "world"), f"missing; write {hint}")
+    try:
+        demands = Demands.of(merged.expect, merged.tolerance, merged.trajectory)
+    except FieldError as error:
+        raise document.error(_place(document, name, error.key, own), error.problem) from None
+    for key in ("tolerance", "trajectory"):
+        if not merged.baseline and key in own and getattr(entry, key):
+            problem = "there is no baseline to compare with; leave it out, or baseline: false"
+            raise document.error(_place(document, name, key, own), problem)
+    return [SuiteCase(path, name, seed, merged, demands, document, own) for seed in merged.seeds]
+
+
+def _place(document: Document, name: str, key: str, own: frozenset[str]) -> Location:
+    """Where a key of a scenario stands: in the scenario, or in the defaults."""
+    parts = tuple(key.split(".")) if key else ()
+    here: Location = ("scenarios", name, *parts)
+    there: Location = ("defaults", *parts)
+    if here in document.lines or not parts:
+        return here
+    return (
+        there if there in document.lines or (parts[0] not in own and ("defaults", parts[0]) in document.lines) else here
+    )
+
+
+def suite_schema() -> dict[str, Any]:
+    """The JSON Schema of suites, for editors."""
+    schema = SuiteFile.model_json_schema(by_alias=True)
+    entry = schema["$defs"]["ScenarioEntry"]["properties"]
+    bound = {"anyOf": [{"type": "number"}, {"type": "string", "pattern": "^\\s*(>=|<=|>|<|==)"}]}
+    allowed = {"anyOf": [{"type": "number", "minimum": 0}, {"type": "string", "pattern": "^(any|.*%)\\s*$"}]}
+    entry["expect"] |= {
+        "properties": {
+            "outcome": {"enum": [outcome.key for outcome in Outcome]},
+            "certified": {"type": "boolean"},
+            "touched": {"enum": list(KINDS), "description": "what kind of thing must be touched first"},
+            "cause": {
+                "enum": list(causes()),
+                "description": "what must have taken most of the margin until the contact",
+            },
+            **{name: {**bound, "description": metric.definition} for name, metric in METRICS.items()},
+        },
+        "additionalProperties": False,
+    }
+    compared = {name: metric.definition for name, metric in METRICS.items() if metric.better != "neither"}
+    compared[END] = "Distance between the places where the two drives end."
+    entry["tolerance"] |= {
+        "properties": {name: {**allowed, "description": text} for name, text in compared.items()},
+        "additionalProperties": False,
+    }
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "antdrive suite"}

@@ -1,0 +1,14 @@
+from .driving.perception import Perception as Perception
+from .driving.replanning import ReplanPolicy as ReplanPolicy
+from .log.certificate import Certificate as Certificate
+from .log.certificate import certify as certify
+from .log.metrics import METRICS as METRICS
+from .log.metrics import measure as measure
+from .log.outcome import Outcome as Outcome
+from .log.record import DriveRecord as DriveRecord
+from .log.rollout import Rollout as Rollout
+from .physics.engine import Engine as Engine
+from .pipeline import Run as Run
+from .pipeline import plan as plan
+from .pipeline import run as run
+from .scenario import Scenario as Scenario

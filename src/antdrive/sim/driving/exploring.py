@@ -1,0 +1,449 @@
+"""Routes in a world without a map: planned through what the lidar has seen, and anew when it finds something in the way.
+
+What nobody has seen counts as free for a plan (S. Koenig and Y. Smirnov, *Sensor-based planning with the freespace
+assumption*, ICRA 1997), and never for the speed, see `antdrive.sim.driving.caution`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import time
+from typing import Any
+
+import numpy as np
+
+from antdrive.base import Bounds, Floats, Pose
+from antdrive.planners import (
+    Planner,
+    PlanResult,
+    PlanStatus,
+    Query,
+    Replanner,
+    answered,
+    ask,
+    blaming,
+    capabilities_of,
+    checked,
+    replanner_for,
+    smooth,
+)
+from antdrive.planners.plan import Cell
+from antdrive.robots import PurePursuit, RobotSpec, TrackedPath, Twist
+from antdrive.robots.control.pursuit import unsorted
+from antdrive.sim.driving import _kernels_hits
+from antdrive.sim.driving.blocking import blocked_cells
+from antdrive.sim.driving.movers_ahead import MoversAhead
+from antdrive.sim.driving.own_map import LOOKED, PATIENCE
+from antdrive.sim.driving.recovery import TRAIL, Look, Recovery
+from antdrive.sim.driving.replanning import STRAYED, Replan, ReplanPolicy
+from antdrive.sim.driving.survey import Survey
+from antdrive.sim.driving.traffic import Zone
+from antdrive.sim.log.scans import scans_logged
+from antdrive.worlds import Disc, Grid, Route, Task, World, point_clearance, rasterise
+from antdrive.worlds.world import PointWorld
+
+DISCOVERED = "discovered"
+STALLED = "stalled"
+HELD = "held by sight"
+BACKED = "backed off"
+MADE_ROOM = "made room"
+LOST = "no way"
+
+GROWTH = (4.0, 16.0)  # how far beyond start and goal plans may lead, then if there is no path [m]
+MARGINS = (1.0, 0.0)  # shares of the margin that plans keep, then if the way is long or there is none
+FAIR = 1.25  # a way that is longer than the straight line by more than this factor is long
+DETOUR = 1.15  # a way with less margin must be shorter by this factor
+CORRIDOR = 1.2  # a route is smoothed among what lies within this distance of the plan, beyond the inflation [m]
+SAMPLES = 0.06  # spacing of the places on a route at which speed limits and lookaheads are worked out [m]
+SPARE = 0.25  # the controller knows what lies this much farther away than its longest arcs lead [m]
+KEPT = 4  # searches that are kept for repair: two margins within near and wide bounds
+INTERVAL = 0.15  # the shortest time between two plans [s]
+COVERS = 1e-3  # what was hit so near to the robot or to its goal covers it [m]
+LOOK_AT_ROUTE = 0.1  # spacing of the points of a route that are looked at [m]
+FORGIVING = 0.005  # the arcs of a disc may come this much closer to what was hit than in a known world [m]
+CORNERED = 0.1  # and those of other shapes by this share more of what their corners stand out [m/m]
+TURNING = 0.015  # a rectangle that turns on the spot keeps this much more from what was hit than in a known world [m]
+LATELY = 30.0  # what plans found no longer ago than this is said of a drive that ends without a way [s]
+
+
+class Unblocked:
+    """What the driver asks about movers that close every way: none do, and all are passed as avoidance would have it.
+
+    Attributes:
+        reason: empty
+    """
+
+    reason = ""
+
+    @property
+    def gaps(self) -> Unblocked:
+        """Where the robot may pass closer: nowhere."""
+        return self
+
+    def closer(self, tick: int, robot: tuple[float, float]) -> float:
+        """By how much less than avoidance keeps the robot may pass movers [m]."""
+        return 0.0
+
+
+class Exploration:
+    """Finds routes through what a robot without a map has seen.
+
+    Attributes:
+        wrong: what was wrong with the planner's first wrong plan; empty if none was
+        log: every attempt to find a new route
+        lost: whether there is no path through what was seen; then the robot stops
+    """
+
+    schedule = None
+    blockage = Unblocked()
+
+    def __init__(
+        self,
+        planner: Planner,
+        survey: Survey,
+        task: Task,
+        rng: np.random.Generator,
+        *,
+        robot: RobotSpec,
+        controller: PurePursuit,
+        policy: ReplanPolicy,
+        margin: float,
+        smoothing: str,
+        cell: float,
+        hz: int,
+        movers: MoversAhead | None = None,
+    ) -> None:
+        self._movers = movers
+        self.survey, self.wrong, self.log = survey, "", list[Replan]()
+        self._planner, self._task, self._rng = planner, task, rng
+        self._robot, self._controller, self._policy = robot, controller, policy
+        self._margin, self._smoothing, self._cell, self._hz = margin, smoothing, cell, hz
+        self._replanners: dict[tuple[float, float, Bounds], tuple[Replanner, Cell]] = {}
+        self._ahead, self._needed = np.empty((0, 2)), np.empty(0)
+        self._arcs = np.empty(0)
+        self._looked = self._indexed = 0
+        self._planned_at = -math.inf
+        self.lost, self._failures, self._gave_up_at = False, 0, -math.inf
+        self._recovery = Recovery(survey, robot, task.start, hz)
+        self._tick = 0
+        self._seen: list[tuple[int, Floats]] = []
+        self._known_as: tuple[tuple[Any, ...], Task] = (), task
+
+    @property
+    def may_wait(self) -> bool:
+        """Whether the robot stays where it is for a while: it has no way, and tries again."""
+        return self.lost
+
+    @property
+    def look(self) -> Look | None:
+        """The turn with which the robot looks round now; None: it does not."""
+        return self._recovery.look
+
+    # ---- plans
+
+    def plan(self, pose: Pose, avoided: list[Disc] | None = None) -> tuple[Grid, PlanResult]:
+        """The grid and the plan from a pose, through what is known; with less margin where there is no path otherwise."""
+        straight = math.dist(pose[:2], self._task.goal)
+        best: tuple[Grid, PlanResult] | None = None
+        for growth in GROWTH:
+            for share in MARGINS:
+                grid, answer = found = self._planned(pose, self._bounds(growth, pose), share * self._margin, avoided)
+                if answer.status is PlanStatus.INVALID:
+                    return found
+                if best is None or answer.cost < best[1].cost / DETOUR:
+                    best = grid, answer
+                if answer.cost <= FAIR * straight:
+                    break
+            assert best is not None
+            if best[1].solved:
+                break
+        assert best is not None
+        return best
+
+    def _planned(
+        self, pose: Pose, bounds: Bounds, margin: float, avoided: list[Disc] | None = None
+    ) -> tuple[Grid, PlanResult]:
+        """The grid and the plan from a pose, within bounds and with a margin [m]."""
+        task = self._known(pose, bounds)
+        grid = rasterise(task.world, self._cell, self._robot.radius + margin)
+        if not avoided:
+            return grid, self._ask(task, grid)
+        return grid, self._ask_around(task, grid, avoided)
+
+    def _plan_around(self, tick: int, pose: Pose) -> tuple[Grid, PlanResult, list[Disc]]:
+        """The grid and the plan from a pose that keeps off the movers that are followed; and what the plan keeps off."""
+        movers = self._movers
+        if movers is None:
+            return (*self.plan(pose), [])
+        if movers.heavy(tick, pose):
+            task = self._known(pose, movers.bounds(self._bounds(GROWTH[0], pose)))
+            grid = rasterise(task.world, self._cell, self._robot.radius + self._margin)
+            longest = self._policy.max_detour * math.dist(pose[:2], self._task.goal)
+            for zone in movers.zones(tick, pose, grid):
+                # Movers that are far away will have moved on: they must not close the only way to the goal.
+                near = movers.discs(tick, pose, zone)
+                answer = self._ask_around(task, grid, near + zone.discs, zone)
+                if answer.cost <= longest:
+                    return grid, answer, near + zone.discs
+        discs = movers.discs(tick, pose)
+        if discs:
+            grid, answer = self.plan(pose, discs)
+            if answer.solved:
+                return grid, answer, discs
+        return (*self.plan(pose), [])
+
+    def _ask_around(self, task: Task, grid: Grid, discs: list[Disc], zone: Zone | None = None) -> PlanResult:
+        """A plan that keeps off discs, and out of a zone."""
+        planner = self._planner
+        if capabilities_of(planner).needs_world:
+            task = dataclasses.replace(task, world=_with(task.world, discs))
+            return self._ask(task, rasterise(task.world, grid.cell, grid.inflate))
+        query = Query.between(grid, task)
+        blocked = blocked_cells(grid, discs)
+        if zone is not None:
+            blocked |= zone.blocked
+        blocked[query.start] = blocked[query.goal] = False
+        if query.unreachable:
+            return PlanResult(status=PlanStatus.NO_PATH, reason=query.unreachable)
+        # Movers change so many cells that a search is repaired no faster than made anew.
+        replanner = replanner_for(planner, query, self._rng)
+        with blaming(planner):
+            replanner.block(np.argwhere(blocked))
+            answer = replanner.result()
+        return self._checked(query, answered(planner, answer))
+
+    def route(
+        self, pose: Pose, grid: Grid, answer: PlanResult, avoided: list[Disc] | None = None
+    ) -> tuple[Route, TrackedPath]:
+        """The route of a plan, smoothed, and the same prepared for the controller."""
+        bounds = _bounds_of(grid)
+        task = self._known(pose, bounds)
+        self._seen.append((self._tick, task.world.discs))
+        line = np.vstack([[pose[:2]], grid.xy(answer.line), [self._task.goal]])
+        discs = _kernels_hits.near_polyline(line, task.world.discs, grid.inflate + CORRIDOR)
+        near = dataclasses.replace(task, world=_world(bounds, discs))
+        around = dataclasses.replace(near, world=_with(near.world, avoided)) if avoided else near
+        route = smooth(answer, grid, around, kind=self._smoothing)
+        tracked = self._prepare(route, near.world, grid.inflate - self._robot.radius)
+        self._watch(route, near.world, grid.inflate)
+        return route, tracked
+
+    def _bounds(self, growth: float, pose: Pose) -> Bounds:
+        """Around start and goal, and around the robot where drift took its estimated pose out of there."""
+        (x0, y0), (x1, y1), (x, y) = self._task.start[:2], self._task.goal, pose[:2]
+        low, high = (min(x0, x1) - growth, min(y0, y1) - growth), (max(x0, x1) + growth, max(y0, y1) + growth)
+        return (
+            low[0] if x > low[0] else x - growth,
+            low[1] if y > low[1] else y - growth,
+            high[0] if x < high[0] else x + growth,
+            high[1] if y < high[1] else y + growth,
+        )
+
+    def _known(self, pose: Pose, bounds: Bounds) -> Task:
+        """The task as it is known, from a pose."""
+        # A grid gives its bounds back but for rounding.
+        key = self.survey.map, len(self.survey.scans), pose, tuple(round(side, 9) for side in bounds)
+        if self._known_as[0] == key:
+            return self._known_as[1]
+        discs = self.survey.discs(bounds)
+        if self._movers is not None:
+            discs = self._movers.without_trails(discs, pose)
+        ends = np.array((pose[:2], self._task.goal))
+        discs = _kernels_hits.beside(discs, ends, COVERS)  # what covers one of them is an error of the map
+        known = dataclasses.replace(self._task, world=_world(bounds, discs), start=pose)
+        self._known_as = key, known
+        return known
+
+    def _ask(self, task: Task, grid: Grid) -> PlanResult:
+        query = Query.between(grid, task)
+        if query.unreachable:
+            return PlanResult(status=PlanStatus.NO_PATH, reason=query.unreachable)
+        planner = self._planner
+        if capabilities_of(planner).own_replanner:
+            answer = self._repaired(query)
+        else:
+            answer = ask(planner, query, self._rng)
+        return self._checked(query, answer)
+
+    def _checked(self, query: Query, answer: PlanResult) -> PlanResult:
+        plan = checked(query, answer)
+        if plan.status is PlanStatus.INVALID:
+            self.wrong = self.wrong or plan.reason
+        return plan
+
+    def _repaired(self, query: Query) -> PlanResult:
+        grid, planner = query.grid, self._planner
+        key = grid.cell, grid.inflate, _bounds_of(grid)
+        with blaming(planner):
+            replanner, goal = self._replanners.get(key, (None, None))
+            if replanner is None or goal != query.goal:
+                replanner = planner.replanner(query, self._rng)  # type: ignore[attr-defined]
+                if len(self._replanners) >= KEPT:  # bounds follow a robot that has left them
+                    del self._replanners[next(iter(self._replanners))]
+                self._replanners[key] = replanner, query.goal
+            else:
+                replanner.change(grid)
+                replanner.move(query.start)
+            answer = replanner.result()
+        return answered(planner, answer)
+
+    def _prepare(self, route: Route, world: World, margin: float) -> TrackedPath:
+        robot = self._robot
+        self._indexed = -1  # the path knows the obstacles along the route, and is to know those near the robot
+        tolerance = self._task.goal_tolerance
+        tracked = self._controller.prepare(route, world, robot, margin, 1 / self._hz, tolerance, SAMPLES, indexed=False)
+        foot, tuning = robot.footprint, tracked.tuning
+        give = FORGIVING + CORNERED * (robot.radius - foot.inner_radius)
+        return dataclasses.replace(
+            tracked,
+            tuning=tuning._replace(
+                lookahead_clearance=tuning.lookahead_clearance - give,
+                stopping_clearance=tuning.stopping_clearance - give,
+                robot_radius=tuning.robot_radius + TURNING,
+                rounding=tuning.rounding + TURNING,
+            ),
+        )
+
+    # ---- what the driver asks
+
+    def refreshed(self, tracked: TrackedPath, pose: Pose) -> TrackedPath:
+        """The path with what the lidar has just seen near the robot."""
+        if self._indexed == self.survey.whole:
+            return tracked
+        self._indexed = self.survey.whole
+        x, y, _ = pose
+        near = self._controller.lookahead_max + tracked.tuning.lookahead_clearance + SPARE
+        discs = self.survey.discs((x - near, y - near, x + near, y + near))
+        return tracked.among(unsorted(discs, tracked.obstacles.bounds))
+
+    def trigger(self, tick: int, pose: Pose, waiting: bool, tracked: TrackedPath, arc: float) -> str:
+        """Why a new route is due now; empty if none is."""
+        now = tick / self._hz
+        if self._movers is not None:
+            self._movers.look(tick, pose, waiting)
+        recovery = self._recovery
+        if recovery.look is not None:
+            return LOOKED if recovery.look.done else ""
+        if self.lost:
+            return LOST if now - self._planned_at >= INTERVAL else ""
+        recovery.note_way(now, pose, waiting=waiting, backwards=tracked.backwards)
+        if tracked.route is recovery.route:
+            over = tracked.length - arc < 2 * TRAIL or recovery.stalled(now)
+            return (BACKED if tracked.backwards else MADE_ROOM) if over else ""
+        if now - self._planned_at < INTERVAL:
+            return ""
+        if recovery.stalled(now):
+            return STALLED
+        if recovery.held(now, pose):
+            return HELD
+        if self._movers is not None and now - self._planned_at >= self._policy.min_interval:
+            due = self._movers.trigger(tick, pose, tracked, arc)
+            if due:
+                return due
+        if self._looked == self.survey.whole:
+            return ""
+        self._looked = self.survey.whole
+        deviation = math.dist(_kernels_hits.point_at(tracked.samples.xy, tracked.samples.arc, arc), pose[:2])
+        if deviation > self._policy.max_deviation:
+            return STRAYED
+        return DISCOVERED if self._discovered(pose, arc) else ""
+
+    def replan(self, tick: int, pose: Pose, trigger: str) -> TrackedPath | None:
+        """A new path from a pose, prepared for the controller; None: there is none, or the robot looks round first."""
+        now, started = tick / self._hz, time.perf_counter()
+        self._planned_at, self._tick = now, tick
+        if trigger in (STALLED, HELD, BACKED, MADE_ROOM, LOOKED):
+            recovers, way = self._recovered(now, pose, trigger)
+            if way is not None:
+                self.log.append(Replan(now, trigger, True, way.length, 0, way.route.xy, time.perf_counter() - started))
+            if recovers:
+                return way
+        if self._failures >= PATIENCE and trigger != LOOKED:
+            self._failures = 0
+            self.survey.forget(pose)
+        grid, plan, avoided = self._plan_around(tick, pose)
+        route, tracked = None, None
+        if plan.solved and len(plan.cells) and not self.wrong:
+            route, tracked = self.route(pose, grid, plan, avoided)
+        cost, xy = (plan.cost, route.xy) if route else (math.inf, np.empty((0, 2)))
+        self.log.append(Replan(now, trigger, route is not None, cost, plan.work, xy, time.perf_counter() - started))
+        self.lost = route is None
+        self._failures = self._failures + 1 if self.lost else 0
+        if self.lost:
+            self._recovery.rests(now, pose)
+        if self._failures >= PATIENCE:
+            self._gave_up_at = now
+            self._recovery.begin_look(pose)
+        return tracked
+
+    def _recovered(self, now: float, pose: Pose, trigger: str) -> tuple[bool, TrackedPath | None]:
+        """Whether a robot that did not get on does something else than to plan anew, and the way that it then follows."""
+        recovery = self._recovery
+        if trigger == LOOKED:
+            recovery.end_look(now, pose)
+            return False, None
+        if trigger in (BACKED, MADE_ROOM):
+            recovery.rests(now, pose)
+        if trigger == STALLED:
+            recovery.note_stall(now, pose)
+        if (trigger != STALLED or recovery.misses_sight(pose)) and recovery.begin_look(pose):
+            return True, None
+        if trigger == HELD:
+            return True, None
+        found = recovery.way(pose) if trigger == STALLED else None
+        if found is None:
+            return False, None
+        way = self._prepare(found, _world(self._bounds(GROWTH[1], pose), np.empty((0, 3))), 0.0)
+        return True, dataclasses.replace(way, backwards=recovery.backwards)
+
+    def note_sight(self, tick: int, held: Twist | None) -> None:
+        """Note whether the robot stands because its sight does not let it go on."""
+        self._recovery.note_sight(tick / self._hz, held)
+
+    def no_way(self, tick: int) -> str:
+        """That the robot planned in vain, several times in a row and not long ago, in words; empty if it did not."""
+        if tick / self._hz - self._gave_up_at > LATELY:
+            return ""
+        return f"no way through what was seen, last at t = {self._gave_up_at:.1f} s"
+
+    def logged(self, per_tick: int, rows: int) -> dict[str, Any]:
+        """The arrays of a log about what was seen, by the names of `Rollout`."""
+        seen = [(tick, discs) for tick, discs in self._seen if tick * per_tick < rows]
+        tables = [np.column_stack((np.full(len(discs), tick * per_tick), discs)) for tick, discs in seen]
+        return {
+            **scans_logged(((scan.tick, scan.ranges) for scan in self.survey.scans), per_tick, rows),
+            "seen": np.concatenate(tables).astype(np.float32) if tables else np.empty((0, 4), dtype=np.float32),
+        }
+
+    # ---- the route ahead
+
+    def _watch(self, route: Route, world: World, inflate: float) -> None:
+        """Note the points of a route and the clearance that they are to keep."""
+        arcs = np.arange(0.0, route.length + LOOK_AT_ROUTE, LOOK_AT_ROUTE)
+        self._arcs = arcs
+        self._ahead = np.stack([np.interp(arcs, route.arc, route.xy[:, k]) for k in (0, 1)], axis=1)
+        self._needed = np.minimum(point_clearance(world, self._ahead), inflate)
+
+    def _discovered(self, pose: Pose, arc: float) -> bool:
+        """Whether the last scan met something where the route ahead leads."""
+        first = int(arc / LOOK_AT_ROUTE)
+        ahead, needed = self._ahead[first:], self._needed[first:]
+        return len(ahead) > 0 and self.survey.hit_within(ahead, needed, self._arcs[first:] - arc)
+
+
+def _world(bounds: Bounds, discs: Floats) -> World:
+    return PointWorld.of("seen", bounds, discs)
+
+
+def _with(world: World, discs: list[Disc]) -> World:
+    """A world of points with more obstacles."""
+    more = np.array([(disc.x, disc.y, disc.radius) for disc in discs]).reshape(-1, 3)
+    return _world(world.bounds, np.concatenate((world.discs, more)))
+
+
+def _bounds_of(grid: Grid) -> Bounds:
+    rows, cols = grid.shape
+    x, y = grid.origin
+    half = grid.cell / 2
+    return x - half, y - half, x + (cols - 0.5) * grid.cell, y + (rows - 0.5) * grid.cell

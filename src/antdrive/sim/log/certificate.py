@@ -1,0 +1,496 @@
+"""Certify from a drive's log that nothing was touched: three readings that must agree. Needs numpy alone.
+
+1. PyBullet's contacts of the chassis, at every physics step.
+2. The distance between footprint and obstacles in closed form at every logged pose, computed here independently.
+3. A bound on what can happen between two logged poses. No point of the footprint moves farther than the axle's centre
+   travels plus the footprint's radius times the turn, so the clearance in between is at least
+   (c_i + c_{i+1} - travel) / 2. For a mover its own travel is added; where the mover teleports, the bound is
+   min(c_i, c_{i+1}) - travel.
+
+Movers must be where the record's task and seed put them. Further checks look for a log that was changed or does not
+describe one drive; each is a function `_check_...` that gives a sentence for every fault.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.base.errors import FieldError
+from antdrive.base.plane import segment_lengths, wrap_angle
+from antdrive.base.types import Bounds, Floats, Point
+from antdrive.robots.spec import RobotSpec
+from antdrive.sim.log.consistency import GRIP, inconsistencies, windowed
+from antdrive.sim.log.contacts import STANDING_SPEED, touches_of
+from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.log.record import DriveRecord
+from antdrive.sim.log.rollout import Rollout
+from antdrive.worlds.limits import MAX_NEAR_DISTANCES
+from antdrive.worlds.trajectories import Trajectories
+
+SAME_CLEARANCE = 1e-9  # closed-form distances, computed twice, agree to this [m]
+# Contact points describe the pose before a step, and a robot pushes some millimetres into what it hits. Physics and
+# closed form disagree if a contact is reported with more clearance than this [m].
+CONTACT_SLACK = 0.012
+# Physics reports surfaces that are no farther apart than 0.1 mm, rounded up here, and those with a force [m].
+TOUCHING = 2e-4
+START_SLACK, START_TURN_SLACK = 0.005, 0.01  # between the first row and the task's start [m], [rad]
+# How far poses may differ from where measured speeds lead: in one step, and over some seconds, where errors would add up
+# but rounding does not. Genuine drives stay below 0.07 mm in a step and below 0.6 mm plus 1 % of the way in any window.
+STEP_SLIP, STEP_SLIP_TURN = 0.001, 0.002  # [m], [rad], of steps at USUAL_HZ or finer; more at lower rates
+USUAL_HZ = 240
+DRIFT, DRIFT_SHARE, DRIFT_TURN = 0.004, 0.015, 0.05  # [m], fraction of the distance covered, [rad]
+DRIFT_WINDOWS = (0.25, 1.0, 4.0)  # [s]
+# A robot that gains speed slides aside, depending on its heading, because the solver works out friction along the world's x
+# and y one after the other: at up to 0.33 of what it gains in a physics step. Where commands change by more than the wheels'
+# grip gives in a physics step, the wheels spin; it then slides at 0.19 of what it gains in a control period, for the share of
+# the time in which they spin.
+SKID, SPINNING = 0.4, 0.25
+GRAVITY = 9.81  # [m/s^2]
+SAFE_GRIP = 0.75  # a robot that uses more of its grip may slide farther than that
+BLOCK = 60  # rows for which the discs that may be nearest are found at once
+NOWHERE = 0.001  # a robot that never was farther from its start went nowhere [m]
+BLOCKER_MOVED = 0.1  # a mover that blocks the robot for good has not moved farther than this [m]
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """What the log proves.
+
+    Attributes:
+        certified: whether robot and obstacles, standing or moving, provably never touched and all readings agree
+        contacts: number of PyBullet's contact points with cylinders, movers and walls
+        min_clearance: the least closed-form clearance at the logged poses [m]; NaN for a log of wrong shape
+        bound: the clearance that is certain between the logged poses, too [m]; NaN for a log of wrong shape
+        problems: why the drive is not certified, a sentence each
+        moved: how far from its first position the robot got [m]; NaN for a log of wrong shape
+    """
+
+    certified: bool
+    contacts: int
+    min_clearance: float
+    bound: float
+    problems: tuple[str, ...]
+    moved: float = math.nan
+
+    @property
+    def verdict(self) -> str:
+        """Whether the drive is certified, in words."""
+        if self.certified and self.moved <= NOWHERE:
+            return "certified: touched nothing, went nowhere"
+        return "certified collision-free" if self.certified else "NOT certified collision-free"
+
+    @property
+    def sentence(self) -> str:
+        """The verdict with the distances that it rests on."""
+        least, bound = in_metres(self.min_clearance), in_metres(self.bound)
+        return f"{self.verdict}: least clearance {least}, between steps at least {bound}"
+
+    def _repr_html_(self) -> str:
+        from antdrive.worlds.drawing import card
+
+        facts: dict[str, object] = {
+            "least clearance": in_metres(self.min_clearance),
+            "between steps at least": in_metres(self.bound),
+            "contact points": self.contacts,
+            "moved at most": in_metres(self.moved),
+        }
+        facts |= {f"problem {i}": problem for i, problem in enumerate(self.problems, 1)}
+        return card("", self.verdict, facts)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The certificate as plain values, for JSON."""
+        return {
+            "certified": self.certified,
+            "contacts": self.contacts,
+            "min_clearance_m": self.min_clearance,
+            "bound_m": self.bound,
+            "problems": list(self.problems),
+            "moved_m": self.moved,
+        }
+
+
+def in_metres(value: float) -> str:
+    """A distance as text, to a tenth of a millimetre, and finer for distances that would read as 0."""
+    return f"{value:.4f} m" if abs(value) >= 5e-5 or value == 0 else f"{value:.1e} m"
+
+
+def certify(rollout: Rollout) -> Certificate:
+    """Check from the log alone whether the robot and obstacles never touched."""
+    touched = len(rollout.contacts)
+    problems = rollout.problems()
+    if problems:
+        return Certificate(False, touched, math.nan, math.nan, tuple(problems))
+    try:
+        movers = rollout.trajectories()
+    except ValueError as error:
+        return Certificate(False, touched, math.nan, math.nan, (f"record.task: {error}",))
+    try:
+        still, moving = _clearances(rollout)
+    except FieldError as error:
+        return Certificate(False, touched, math.nan, math.nan, (str(error),))
+    clearance = np.minimum(still, moving.min(axis=1, initial=math.inf))
+    bound = float(_between_steps(rollout, movers, still, moving).min())
+    problems = [*_check_digest(rollout), *_check_times(rollout)]
+    rollout = dataclasses.replace(rollout, t=_clock(rollout))  # other checks count rows, whatever times were logged
+    problems = [
+        *_check_readings(rollout, clearance, bound),
+        *problems,
+        *_check_clearances(rollout, clearance),
+        *_check_movers(rollout, movers),
+        *_check_start(rollout),
+        *_check_motion(rollout),
+        *_check_outcome(rollout),
+        *_check_contacts(rollout),
+        *_check_blocked(rollout),
+        *inconsistencies(rollout),
+    ]
+    moved = float(np.hypot(*(rollout.pose[:, :2] - rollout.pose[0, :2]).T).max())
+    return Certificate(not problems, touched, float(clearance.min()), bound, tuple(problems), moved)
+
+
+def closed_form_clearance(rollout: Rollout) -> Floats:
+    """The distance from the footprint to the nearest cylinder, mover or wall at each logged pose, shape (T,) [m].
+
+    The code shares nothing with the compiled geometry that the drive uses, so that one checks the other.
+    """
+    still, moving = _clearances(rollout)
+    return np.asarray(np.minimum(still, moving.min(axis=1, initial=math.inf)))
+
+
+def _clearances(rollout: Rollout) -> tuple[Floats, Floats]:
+    """The distances from the footprint to the nearest cylinder or wall (T,) and to each mover (T, M) [m]."""
+    foot, world = rollout.record.robot.footprint, rollout.record.world
+    half = np.array([foot.half_length, foot.half_width])
+    rounding, sides = foot.rounding, max(1, len(foot.corners))
+    xmin, ymin, xmax, ymax = world.bounds
+    discs = world.discs
+    x, y, yaw = rollout.pose.T
+    rotation = np.abs(np.stack([np.cos(yaw), np.sin(yaw)]))
+    reach_x = half @ rotation + rounding
+    reach_y = half[::-1] @ rotation + rounding
+    best = np.minimum.reduce([x - reach_x - xmin, xmax - x - reach_x, y - reach_y - ymin, ymax - y - reach_y])
+    if foot.corners:
+        best = _polygon_to_walls(foot.corners, rollout.pose, world.bounds).min(axis=1) - rounding
+
+    def distance(rows: npt.NDArray[np.int64], centres: npt.NDArray[np.complex128], radii: Floats) -> Floats:
+        body = (centres - (x + 1j * y)[rows, None]) * np.exp(-1j * yaw[rows, None])  # in the robot's frame
+        if foot.corners:
+            return _polygon_to_points(foot.corners, body) - rounding - radii
+        over = np.stack([np.abs(body.real) - half[0], np.abs(body.imag) - half[1]])
+        outside = np.linalg.norm(np.maximum(over, 0.0), axis=0)
+        return np.asarray(outside + np.minimum(over.max(axis=0), 0.0) - rounding - radii)
+
+    for block, near in _blocks(rollout.pose[:, :2], foot.radius, discs):
+        centres = (near[:, 0] + 1j * near[:, 1])[None]
+        for rows in np.array_split(block, 1 + len(block) * len(near) * sides // 1_000_000):
+            best[rows] = np.minimum(best[rows], distance(rows, centres, near[:, 2]).min(axis=1))
+    radii = np.array([mover.radius for mover in world.movers])
+    moving = np.empty((len(x), len(radii)))
+    for rows in np.array_split(np.arange(len(x)), 1 + moving.size * sides // 1_000_000):
+        if not len(radii):
+            break
+        centres = rollout.movers[rows]
+        moving[rows] = distance(rows, centres[..., 0] + 1j * centres[..., 1], radii)
+    return np.asarray(best), moving
+
+
+def _polygon_to_points(corners: tuple[Point, ...], points: npt.NDArray[np.complex128]) -> Floats:
+    """The distance from a convex polygon to points x + iy (...) in its frame, negative within it [m].
+
+    Each point is looked at from each edge, turned so that the edge lies along the real axis and the inside is to the left.
+    """
+    here = np.array([complex(*corner) for corner in corners])
+    if len(here) == 1:
+        return np.asarray(np.abs(points - here[0]))
+    edge = np.roll(here, -1) - here
+    seen = (points[..., None] - here) * (np.conj(edge) / np.abs(edge))
+    apart = np.abs(seen - np.clip(seen.real, 0.0, np.abs(edge))).min(axis=-1)
+    depth = seen.imag.min(axis=-1)
+    return np.asarray(np.where(depth >= 0, -depth, apart))
+
+
+def _polygon_to_walls(corners: tuple[Point, ...], pose: Floats, bounds: Bounds) -> Floats:
+    """The distance from a polygon at each pose (T, 3) to the left, right, lower and upper wall, shape (T, 4) [m]."""
+    here = np.array([complex(*corner) for corner in corners])
+    placed = (pose[:, 0] + 1j * pose[:, 1])[:, None] + np.exp(1j * pose[:, 2])[:, None] * here
+    xmin, ymin, xmax, ymax = bounds
+    low, high = placed.real.min(axis=1), placed.real.max(axis=1)
+    near, far = placed.imag.min(axis=1), placed.imag.max(axis=1)
+    return np.stack([low - xmin, xmax - high, near - ymin, ymax - far], axis=1)
+
+
+def _blocks(places: Floats, radius: float, discs: Floats) -> Iterator[tuple[npt.NDArray[np.int64], Floats]]:
+    """Rows (B,), some at a time, and the discs (N, 3) one of which is the nearest to the footprint in each of them.
+
+    Raises:
+        FieldError: more distances have to be computed than a minute is enough for.
+    """
+    if not len(discs):
+        return
+    count = 0
+    for first in range(0, len(places), BLOCK):
+        block = places[first : first + BLOCK]
+        spread = float(np.hypot(*(block - block[0]).T).max())
+        # Between the centre's distance and the footprint's lies no more than its radius.
+        away = np.hypot(discs[:, 0] - block[0, 0], discs[:, 1] - block[0, 1]) - discs[:, 2]
+        near = discs[away <= away.min() + 2 * spread + radius + SAME_CLEARANCE]
+        count += len(block) * len(near)
+        if count > MAX_NEAR_DISTANCES:
+            raise FieldError(
+                "pose",
+                f"{len(places)} rows that leap between {len(discs)} obstacles take more than {MAX_NEAR_DISTANCES:.0e} "
+                f"distances to check, by row {first}; a drive takes a few for each row",
+            )
+        yield np.arange(first, first + len(block)), near
+
+
+def _between_steps(rollout: Rollout, movers: Trajectories, still: Floats, moving: Floats) -> Floats:
+    """A lower bound of the clearance between each row and the next, shape (T - 1,) [m]; of one row, its clearance."""
+    if len(still) < 2:
+        return np.asarray(np.minimum(still, moving.min(axis=1, initial=math.inf)))
+    radius = rollout.record.robot.footprint.radius
+    dt = np.diff(_clock(rollout))
+    moved = segment_lengths(rollout.pose[:, :2])
+    turned = np.abs(wrap_angle(np.diff(rollout.pose[:, 2])))
+    speed = np.maximum(*np.abs([rollout.twist[:-1], rollout.twist[1:]]))
+    travel = np.maximum(moved, speed[:, 0] * dt) + radius * np.maximum(turned, speed[:, 1] * dt)
+    bound = (still[:-1] + still[1:] - travel) / 2
+    if movers:
+        t = _clock(rollout)
+        both = travel[:, None] + movers.travel(t)
+        steady = (moving[:-1] + moving[1:] - both) / 2
+        teleporting = np.minimum(moving[:-1], moving[1:]) - both
+        bound = np.minimum(bound, np.where(movers.jumps(t), teleporting, steady).min(axis=1))
+    return np.asarray(bound)
+
+
+def _clock(rollout: Rollout) -> Floats:
+    """The times that the rows must have, shape (T,) [s]."""
+    return np.asarray(np.arange(len(rollout.t)) / rollout.record.physics_hz)
+
+
+def _check_readings(rollout: Rollout, clearance: Floats, bound: float) -> Iterator[str]:
+    """Physics, closed form and bound must agree that there is clearance at every moment."""
+    touched, least = len(rollout.contacts), float(clearance.min())
+    if touched:
+        step = int(rollout.contacts[0, 0])
+        yield f"physics reports {touched} contact points, the first at t = {rollout.t[step]:.3f} s"
+        if float(clearance[max(0, step - 1) : step + 2].min()) > CONTACT_SLACK:
+            yield (
+                f"readings disagree: physics reports a contact at row {step}, "
+                f"closed form a clearance of {clearance[step]:.4f} m"
+            )
+    if not least > 0:
+        at = float(rollout.t[clearance.argmin()])
+        yield f"closed form: the robot overlaps an obstacle by {in_metres(-least)} at t = {at:.3f} s"
+        if not touched:
+            yield "readings disagree: closed form finds an overlap, physics reports no contact"
+    elif not bound > 0:
+        yield f"between two logged poses a contact cannot be ruled out (bound {bound:.4f} m)"
+
+
+def _check_digest(rollout: Rollout) -> Iterator[str]:
+    """The log must still be as it was saved."""
+    if rollout.record.digest is not None and rollout.record.digest != rollout.digest:
+        yield "digest: the log was changed after it was written"
+
+
+def _check_times(rollout: Rollout) -> Iterator[str]:
+    """Rows must be at the physics rate."""
+    if not np.array_equal(rollout.t, _clock(rollout)):
+        yield f"t: the rows are not at {rollout.record.physics_hz} Hz"
+
+
+def _check_clearances(rollout: Rollout, clearance: Floats) -> Iterator[str]:
+    """Logged clearances must be those of the logged poses."""
+    error = np.abs(rollout.clearance - clearance)
+    if not error.max() <= SAME_CLEARANCE:
+        at = int(error.argmax())
+        yield (
+            f"clearance: logged {rollout.clearance[at]:.4f} m at t = {rollout.t[at]:.3f} s, "
+            f"closed form says {clearance[at]:.4f} m"
+        )
+
+
+def _check_movers(rollout: Rollout, movers: Trajectories) -> Iterator[str]:
+    """Movers must be where the record's task and seed put them."""
+    if not movers:
+        return
+    error = np.abs(rollout.movers - movers.positions(_clock(rollout))).max(axis=2)
+    if not error.max() <= SAME_CLEARANCE:
+        row, m = np.unravel_index(int(error.argmax()), error.shape)
+        yield f"movers: movers[{m}] is logged {error[row, m]:.4f} m off its trajectory at t = {rollout.t[row]:.3f} s"
+
+
+def _check_start(rollout: Rollout) -> Iterator[str]:
+    """The drive must begin at the task's start, and headings be angles from -pi to pi."""
+    if np.abs(rollout.pose[:, 2]).max() > math.pi + SAME_CLEARANCE:
+        yield "pose: headings must be from -pi to pi"
+    pose, start = rollout.pose[0], rollout.record.task.start
+    if np.hypot(*(pose[:2] - start[:2])) > START_SLACK or abs(wrap_angle(pose[2] - start[2])) > START_TURN_SLACK:
+        yield f"pose: the first row is not the task's start {list(start)}"
+
+
+def _check_motion(rollout: Rollout) -> Iterator[str]:
+    """Poses must follow from the measured speeds, up to the first contact, which may throw the robot."""
+    end = len(rollout.t)
+    if len(rollout.contacts):
+        end = max(1, int(rollout.contacts[0, 0]))
+    if end < 2:
+        return
+    pose, twist, dt = rollout.pose[:end], rollout.twist[:end], np.diff(rollout.t[:end])
+    turned = wrap_angle(np.diff(pose[:, 2]))
+    # Physics computes the new speed first, then moves with it along the old heading (semi-implicit Euler). The speed is
+    # measured along the new heading, which sees a part of it.
+    covered = twist[1:, 0] * dt / np.maximum(np.cos(turned), 0.5)
+    slip = np.diff(pose[:, 0] + 1j * pose[:, 1]) - np.exp(1j * pose[:-1, 2]) * covered
+    slip_turn = turned - twist[1:, 1] * dt
+    coarse = max(1.0, USUAL_HZ / rollout.record.physics_hz)
+    wrong = (np.abs(slip) > STEP_SLIP * coarse) | (np.abs(slip_turn) > STEP_SLIP_TURN * coarse)
+    robot = rollout.record.robot
+    share = DRIFT_SHARE * max(1.0, GRIP / robot.wheel_friction)
+    sliding = _sliding_speed(rollout.record)
+    for seconds in DRIFT_WINDOWS:
+        rows = min(len(slip), max(1, round(seconds * rollout.record.physics_hz)))
+        drift, turn, distance = (windowed(values, rows) for values in (slip, slip_turn, np.abs(covered)))
+        # A robot gains or loses twice its highest speed at most before its slides begin to cancel out.
+        changing = min(seconds + 1 / rollout.record.control_hz, 2 * robot.max_speed / robot.max_acceleration)
+        allowed = max(DRIFT, sliding * changing) + share * distance.real
+        wrong[: len(drift)] |= (np.abs(drift) > allowed) | (np.abs(turn) > DRIFT_TURN)
+    if wrong.any():
+        yield (
+            f"pose: the steps at t = {rollout.t[wrong.argmax()]:.3f} s do not follow from the measured speed"
+            f"{_grip_warning(robot)}"
+        )
+
+
+def _sliding_speed(record: DriveRecord) -> float:
+    """How fast a robot may slide aside while it speeds up or brakes [m/s]."""
+    robot, grip = record.robot, record.robot.wheel_friction * GRAVITY
+    slides = SKID * robot.max_acceleration / record.physics_hz
+    change = robot.max_acceleration / record.control_hz
+    if change * record.physics_hz > grip:
+        slides += SPINNING * change * min(1.0, robot.max_acceleration / grip)
+    return slides
+
+
+def _grip_warning(robot: RobotSpec) -> str:
+    """What a robot's file says of its grip, if braking in a bend needs more than there is; else empty."""
+    used = math.hypot(robot.max_acceleration, robot.max_lateral_acceleration) / (robot.wheel_friction * GRAVITY)
+    if used <= SAFE_GRIP:
+        return ""
+    return (
+        f"; the robot may have slid: {robot.max_acceleration:.3g} m/s2 along and {robot.max_lateral_acceleration:.3g} m/s2 "
+        f"across are {100 * used:.0f} % of what a wheel friction of {robot.wheel_friction:.3g} holds"
+    )
+
+
+def _check_outcome(rollout: Rollout) -> Iterator[str]:
+    """The outcome must be that of the first contact, or of a robot that stands at the goal."""
+    outcome, contacts, task = rollout.outcome, len(rollout.contacts), rollout.record.task
+    if outcome.with_contact != bool(contacts):
+        yield f"outcome: {outcome.key}, with {contacts} contacts"
+    elif outcome.with_contact:
+        first = touches_of(rollout)[0].outcome
+        if outcome is not first:
+            yield f"outcome: {outcome.key}, but the first contact was {first.key}"
+    if outcome is Outcome.SUCCEEDED:
+        left, speed = float(np.hypot(*(rollout.pose[-1, :2] - task.goal))), float(rollout.twist[-1, 0])
+        if not left <= task.goal_tolerance:
+            yield (
+                f"outcome: succeeded, but the drive ends {left:.3f} m from the goal "
+                f"(tolerance {task.goal_tolerance:g} m)"
+            )
+        if not abs(speed) <= STANDING_SPEED:
+            yield f"outcome: succeeded, but the robot still moves at {speed:.3f} m/s at the end"
+
+
+def _check_contacts(rollout: Rollout) -> Iterator[str]:
+    """Each contact must be with an obstacle that is there, and be what physics can report."""
+    contacts = rollout.contacts
+    if not len(contacts):
+        return
+    distance, force = contacts[:, 2:].T
+    near = (distance <= TOUCHING) | ((force > 0) & (distance <= TOUCHING + _approach(rollout)))
+    if not near.all() or not (force >= 0).all():
+        yield (
+            f"contacts: physics reports surfaces no farther apart than {TOUCHING:g} m, or with a force than they come nearer "
+            "in one step, and forces of at least 0"
+        )
+    first = contacts[contacts[:, 0] == contacts[0, 0]]
+    row = int(first[0, 0])
+    some = slice(max(0, row - 1), row + 2)
+    nearby = dataclasses.replace(rollout, pose=rollout.pose[some], movers=rollout.movers[some])
+    gaps = _gaps(nearby).min(axis=0)
+    for obstacle in np.unique(first[:, 1]).astype(int).tolist():
+        if gaps[obstacle] > CONTACT_SLACK:
+            yield (
+                f"readings disagree: physics reports a contact with obstacle {obstacle} at row {row}, "
+                f"closed form a clearance of {gaps[obstacle]:.4f} m"
+            )
+
+
+def _approach(rollout: Rollout) -> Floats:
+    """How much nearer to each contact's obstacle the robot can come in the step of the contact (K,) [m].
+
+    Physics finds distances before a step, and stops in it whatever would otherwise overlap at its end. So surfaces with a force
+    may be apart by what the robot's speed before that step, which includes sliding aside, and the mover's travel cover.
+    """
+    record, contacts = rollout.record, rollout.contacts
+    row = contacts[:, 0].astype(np.int64)
+    before, earlier = np.maximum(row - 1, 0), np.maximum(row - 2, 0)
+    ahead, turning = np.abs(rollout.twist[before]).T / record.physics_hz
+    way = np.maximum(ahead, np.hypot(*(rollout.pose[before, :2] - rollout.pose[earlier, :2]).T))
+    turn = np.maximum(turning, np.abs(wrap_angle(rollout.pose[before, 2] - rollout.pose[earlier, 2])))
+    approach = way + record.robot.footprint.radius * turn
+    mover = contacts[:, 1].astype(np.int64) - len(record.world.obstacles)
+    of_mover = np.flatnonzero((mover >= 0) & (mover < rollout.movers.shape[1]))
+    some, which = row[of_mover], mover[of_mover]
+    travel = rollout.movers[some, which] - rollout.movers[before[of_mover], which]
+    approach[of_mover] += np.hypot(*travel.T)
+    return np.asarray(approach)
+
+
+def _gaps(rollout: Rollout) -> Floats:
+    """The distance from the footprint to each cylinder, mover and wall, numbered as in contacts, shape (T, N) [m]."""
+    world, foot = rollout.record.world, rollout.record.robot.footprint
+    discs = np.tile(world.discs, (len(rollout.pose), 1, 1))
+    radii = np.array([mover.radius for mover in world.movers])
+    moving = np.concatenate([rollout.movers, np.tile(radii[:, None], (len(rollout.pose), 1, 1))], axis=2)
+    x, y, yaw = (column[:, None] for column in rollout.pose.T)
+    round_ones = np.concatenate([discs, moving], axis=1)
+    body = (round_ones[..., 0] - x + 1j * (round_ones[..., 1] - y)) * np.exp(-1j * yaw)
+    if foot.corners:
+        apart = np.maximum(_polygon_to_points(foot.corners, body), 0.0) - foot.rounding - round_ones[..., 2]
+        away = _polygon_to_walls(foot.corners, rollout.pose, world.bounds) - foot.rounding
+        return np.concatenate([apart, away], axis=1)
+    ahead, aside = np.abs(body.real) - foot.half_length, np.abs(body.imag) - foot.half_width
+    apart = np.hypot(np.maximum(ahead, 0.0), np.maximum(aside, 0.0)) - foot.rounding - round_ones[..., 2]
+    xmin, ymin, xmax, ymax = world.bounds
+    cos, sin = np.abs(np.cos(yaw)), np.abs(np.sin(yaw))
+    reach_x = foot.half_length * cos + foot.half_width * sin + foot.rounding
+    reach_y = foot.half_length * sin + foot.half_width * cos + foot.rounding
+    walls = [x - reach_x - xmin, xmax - x - reach_x, y - reach_y - ymin, ymax - y - reach_y]
+    return np.concatenate([apart, *walls], axis=1)
+
+
+def _check_blocked(rollout: Rollout) -> Iterator[str]:
+    """A blocked drive ends with searches that found no route, and a mover stood still since the first of them."""
+    if rollout.outcome is not Outcome.BLOCKED:
+        return
+    failed = list(itertools.takewhile(lambda replan: not replan.solved, reversed(rollout.record.replans)))
+    if not failed:
+        yield "outcome: blocked, but the drive does not end with a search that found no route"
+        return
+    places = rollout.movers[min(int(np.searchsorted(rollout.t, failed[-1].t)), len(rollout.t) - 1) :]
+    moved = np.hypot(*np.moveaxis(places - places[-1], -1, 0)).max(axis=0)
+    if not (moved <= BLOCKER_MOVED).any():
+        yield f"outcome: blocked, but no mover stood still from t = {failed[-1].t:.3f} s on"

@@ -1,0 +1,241 @@
+"""The safety margin: what a drive used it up for, and how much of it is enough.
+
+Planners keep the disc around the robot `margin` metres away from every surface. A drive comes closer, for several reasons.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.base.errors import FieldError
+from antdrive.base.plane import wrap_angle
+from antdrive.base.types import Floats
+from antdrive.sim.log.metrics import nearest_on_route
+from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.log.rollout import Rollout
+from antdrive.worlds import point_clearance
+
+if TYPE_CHECKING:
+    from antdrive.sim.pipeline import Run
+
+#: The causes of a loss of margin, with what each of them is.
+CAUSES: dict[str, str] = {
+    "rounding": "the route comes closer to obstacles than planned, where start and goal are no cell centres",
+    "cutting": "the robot leaves the route to the inside of a corner",
+    "tracking": "the robot leaves the route elsewhere",
+    "slip": "the wheels did not do as commanded during the last quarter of a second",
+    "localisation": "the estimated pose is wrong",
+}
+CORNER = 0.3  # a bend of the route by at least this angle is a corner [rad]
+NEAR_CORNER = 0.6  # leaving the route within this distance of a corner is cutting [m]
+REACTION = 0.25  # the controller has answered slip that is older than this [s]
+
+
+@dataclass(frozen=True)
+class Contribution:
+    """The part of the margin that one cause took, at the place where it took most.
+
+    Attributes:
+        cause: a key of `CAUSES`
+        metres: the largest loss [m]; 0 if the cause never brought the robot closer to an obstacle than planned
+        t: when the loss was largest [s]
+        x: where [m]
+        y: where [m]
+        at_tightest: the loss, or the gain where negative, at the place where the robot had least clearance [m]
+    """
+
+    cause: str
+    metres: float
+    t: float
+    x: float
+    y: float
+    at_tightest: float
+
+
+@dataclass(frozen=True)
+class Budget:
+    """A drive's safety margin, broken down by cause. Clearances are those of the disc around the robot.
+
+    Attributes:
+        margin: the margin that was planned with [m]
+        left: the least clearance that was left of it [m]
+        t: when that was [s]
+        x: where [m]
+        y: where [m]
+        contributions: one for each of `CAUSES`, in that order; their `at_tightest` add up to margin - left
+    """
+
+    margin: float
+    left: float
+    t: float
+    x: float
+    y: float
+    contributions: tuple[Contribution, ...]
+
+    @property
+    def largest(self) -> Contribution:
+        """The contribution of the cause that took most."""
+        return max(self.contributions, key=lambda part: part.metres)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The budget as plain values, for JSON."""
+        return {**dataclasses.asdict(self), "largest": self.largest.cause}
+
+
+def budget(rollout: Rollout) -> Budget:
+    """Break a drive's safety margin down by cause.
+
+    At each row, margin - clearance is the sum of three losses. The first is at the route's point nearest to the
+    estimated pose, where the route itself may be closer to obstacles than the margin (rounding). The second is from
+    that point to the estimated pose: cutting near corners, else tracking, but slip as far as the robot is closer to an
+    obstacle than its last commands would have brought it. The third is from the estimated to the true pose
+    (localisation). Cylinders that the planner did not know of are left out.
+    """
+    margin = rollout.record.margin
+    true = np.ascontiguousarray(rollout.pose[:, :2])
+    estimated = np.ascontiguousarray(rollout.estimate[:, :2]) if len(rollout.estimate) else true
+    foot, cutting = np.empty_like(true), np.empty(len(true), dtype=np.bool_)
+    for rows, route in rollout.legs():
+        foot[rows] = nearest_on_route(estimated[rows], route)
+        cutting[rows] = _near_corner(foot[rows], route)
+
+    def clearance(points: Floats) -> Floats:
+        return point_clearance(rollout.record.task.world, points) - rollout.record.robot.radius
+
+    left, at_estimate, on_route = clearance(true), clearance(estimated), clearance(foot)
+    off_route = on_route - at_estimate
+    slip = np.clip(clearance(_as_commanded(rollout)) - left, 0.0, np.maximum(off_route, 0.0))
+    losses = {
+        "rounding": margin - on_route,
+        "cutting": np.where(cutting, off_route - slip, 0.0),
+        "tracking": np.where(cutting, 0.0, off_route - slip),
+        "slip": slip,
+        "localisation": at_estimate - left,
+    }
+    tightest = int(left.argmin())
+    contributions = []
+    for cause in CAUSES:
+        # A loss only counts where the robot is closer to an obstacle than planned.
+        harm = np.where(left < margin, np.minimum(losses[cause], margin - left), 0.0)
+        at = int(harm.argmax())
+        x, y = true[at].tolist()
+        most = max(0.0, float(harm[at]))
+        contributions.append(Contribution(cause, most, float(rollout.t[at]), x, y, float(losses[cause][tightest])))
+    x, y = true[tightest].tolist()
+    return Budget(margin, float(left[tightest]), float(rollout.t[tightest]), x, y, tuple(contributions))
+
+
+@dataclass(frozen=True)
+class MarginTrial:
+    """All drives with one margin, up to the first that failed.
+
+    Attributes:
+        margin: the margin that was tried [m]
+        drives: number of drives
+        impassable: number of worlds that this margin closes; they are not counted as drives
+        failed: the seed of the drive that failed: no success, not certified, or too little clearance left; or None
+        left: the least clearance of all drives [m]
+    """
+
+    margin: float
+    drives: int
+    impassable: int
+    failed: int | None
+    left: float
+
+    @property
+    def safe(self) -> bool:
+        """Whether there were drives and none failed."""
+        return self.failed is None and self.drives > 0
+
+
+def find_margin(
+    drive: Callable[[float, int], Run],
+    seeds: Sequence[int],
+    *,
+    reserve: float = 0.005,
+    most: float = 0.2,
+    resolution: float = 0.005,
+) -> Iterator[MarginTrial]:
+    """Search by bisection for the smallest margin with which the drives of all seeds succeed.
+
+    Trials come as they are made; the smallest margin of those that are safe is the answer.
+
+    Raises:
+        FieldError: a setting outside its range.
+    """
+    if not 0 < resolution < most:
+        raise FieldError("resolution", f"must be greater than 0 and less than {most:g}, got {resolution:g}")
+    hardest_first = list(seeds)
+    low, high = (
+        0,
+        math.ceil(most / resolution),
+    )  # in steps: the answer is at least low; high is safe or closes all worlds
+    trial = _try_margin(high * resolution, drive, hardest_first, reserve)
+    yield trial
+    if trial.failed is not None:
+        return
+    while low < high:
+        middle = (low + high) // 2
+        trial = _try_margin(middle * resolution, drive, hardest_first, reserve)
+        yield trial
+        if trial.failed is None:
+            high = middle
+        else:
+            low = middle + 1
+
+
+def _try_margin(
+    margin: float, drive: Callable[[float, int], Run], hardest_first: list[int], reserve: float
+) -> MarginTrial:
+    """Drive with one margin until a drive fails; a seed that fails moves to the front of `hardest_first`."""
+    left, drives, impassable = math.inf, 0, 0
+    for seed in hardest_first:
+        run = drive(margin, seed)
+        if run.outcome is Outcome.NO_PATH:
+            impassable += 1
+            continue
+        drives += 1
+        if run.rollout is not None:
+            left = min(left, budget(run.rollout).left)
+        if not run.succeeded or left < reserve:
+            hardest_first.remove(seed)
+            hardest_first.insert(0, seed)
+            return MarginTrial(margin, drives, impassable, seed, left)
+    return MarginTrial(margin, drives, impassable, None, left)
+
+
+def _as_commanded(rollout: Rollout) -> Floats:
+    """Where the robot would be at each row, (T, 2) [m], if it had done as commanded over the last `REACTION` seconds."""
+    dt = 1.0 / rollout.record.physics_hz
+    back = min(round(REACTION / dt), len(rollout.t) - 1)
+    turned = np.concatenate(([0.0], np.cumsum(rollout.command[1:, 1] * dt)))
+    begin = np.maximum(np.arange(len(rollout.t)) - back, 0)
+    xy = rollout.pose[begin, :2].copy()
+    for step in range(1, back + 1):
+        row = begin + step
+        live = row <= np.arange(len(row))
+        row = np.minimum(row, len(row) - 1)
+        yaw = rollout.pose[begin, 2] + (turned[row] + turned[row - 1]) / 2 - turned[begin]
+        distance = np.where(live, rollout.command[row, 0] * dt, 0.0)
+        xy[:, 0] += distance * np.cos(yaw)
+        xy[:, 1] += distance * np.sin(yaw)
+    return xy
+
+
+def _near_corner(points: Floats, route: Floats) -> npt.NDArray[np.bool_]:
+    """Whether points (T, 2) are near a corner of a route (N, 2), shape (T,)."""
+    steps = np.diff(route, axis=0)
+    heading = np.arctan2(steps[:, 1], steps[:, 0])
+    turn = np.abs(wrap_angle(np.diff(heading)))
+    near = np.zeros(len(points), dtype=np.bool_)
+    for corner in route[1:-1][turn >= CORNER]:
+        near |= np.hypot(*(points - corner).T) <= NEAR_CORNER
+    return near

@@ -1,0 +1,324 @@
+"""The log of one drive: everything that metrics, certificates, figures and films read.
+
+The file is a `.npz` archive that numpy reads without pickles: one member for each array, and the member `record`, a JSON
+text. `docs/reference/rollout-format.md` describes the format.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.base.atomic import written_whole
+from antdrive.base.errors import FieldError
+from antdrive.sim.log.archive import Archive, guarded_log, read_array
+from antdrive.sim.log.outcome import Outcome
+from antdrive.sim.log.record import DriveRecord
+from antdrive.worlds.limits import MAX_LOG_DISTANCES, MAX_LOG_WALK, MAX_NEAR_DISTANCES
+from antdrive.worlds.movers import Wandering
+from antdrive.worlds.trajectories import Trajectories
+
+MAX_ROWS = 20_000_000  # a day at 240 Hz
+MAX_VALUE = 1e12  # of any number in the arrays; sums and squares of greater ones lose all meaning
+MAX_RECORD = 32_000_000  # characters of the record; a world of 20,000 cylinders takes 2 million
+#: The dtypes of the arrays that do not hold float64.
+DTYPES = {
+    "limiter": np.dtype("u1"),
+    "cells": np.dtype("<i4"),
+    "scans": np.dtype("<u2"),
+    "scan_rows": np.dtype("<i4"),
+    "seen": np.dtype("<f4"),
+    "tracks": np.dtype("<f4"),
+}
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Rollout:
+    """The log of one drive. Each of its T rows is a physics step; row 0 is the start, before the first step.
+
+    Attributes:
+        t: simulated time (T,) [s]
+        pose: x, y [m] and yaw [rad] of the axle's centre (T, 3)
+        twist: measured forward speed [m/s] and yaw rate [rad/s] (T, 2)
+        command: commanded forward speed [m/s] and yaw rate [rad/s] (T, 2)
+        clearance: distance from the robot's surface to the nearest cylinder, mover or wall (T,) [m]
+        limiter: the rule that limited the robot's speed (T,), an index into `record.limiters`
+        movers: centres of the movers (T, M, 2) [m]
+        contacts: contact points (K, 4): row, obstacle, distance [m] and normal force [N]; obstacles count from 0,
+            first the cylinders, then the movers, then the walls left, right, bottom and top
+        route: points (N, 2) of the first route [m]; `Rollout.legs` adds the routes after replans
+        cells: the planned cells (P, 2), (row, col)
+        estimate: the estimated pose (T, 3) of a noisy robot, x, y [m] and yaw [rad]; (0, 3) for a perfect robot
+        actuated: forward speed [m/s] and yaw rate [rad/s] that the motors of a noisy robot were set to (T, 2), after
+            delay and slip; (0, 2) for a perfect robot, whose motors are set to `command`
+        scans: the lidar's ranges of a robot that uses it, since it has no map or looks for movers (S, beams) [mm]; 0 where
+            nothing was in range, 1 where something was too near to measure. This array and the next two are left out of files
+            and of the digest where they are empty
+        scan_rows: the row of each scan (S,)
+        seen: what plans on the way were made around, as discs (K, 4): the row of the plan, x, y and radius [m], in the frame of
+            the estimated poses
+        tracks: the movers that a robot which looks for them with its lidar followed (K, 7): the row of the scan, the mover's
+            number in the order in which they were found, x, y [m], velocity along x and y [m/s] and radius [m], in the frame of
+            the estimated poses; left out as the three above are
+        record: everything else: scenario, plan and outcome
+    """
+
+    t: npt.NDArray[np.float64]
+    pose: npt.NDArray[np.float64]
+    twist: npt.NDArray[np.float64]
+    command: npt.NDArray[np.float64]
+    clearance: npt.NDArray[np.float64]
+    limiter: npt.NDArray[np.uint8]
+    movers: npt.NDArray[np.float64]
+    contacts: npt.NDArray[np.float64]
+    route: npt.NDArray[np.float64]
+    cells: npt.NDArray[np.int32]
+    estimate: npt.NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))
+    actuated: npt.NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+    scans: npt.NDArray[np.uint16] = field(default_factory=lambda: np.empty((0, 0), dtype=np.uint16))
+    scan_rows: npt.NDArray[np.int32] = field(default_factory=lambda: np.empty(0, dtype=np.int32))
+    seen: npt.NDArray[np.float32] = field(default_factory=lambda: np.empty((0, 4), dtype=np.float32))
+    tracks: npt.NDArray[np.float32] = field(default_factory=lambda: np.empty((0, 7), dtype=np.float32))
+    record: DriveRecord
+
+    @property
+    def outcome(self) -> Outcome:
+        """How the drive ended."""
+        return self.record.outcome
+
+    @property
+    def digest(self) -> str:
+        """The SHA-256 of all that a repetition must reproduce: every array and the record without wall-clock times.
+
+        For each array, in the order of this class, the hash takes the line "name dtype shape" and the bytes in C order;
+        at last the record's JSON text, without `digest` and `times`.
+        """
+        return self._hash(self.record.to_json(without=("digest", "times")))
+
+    @property
+    def drive_digest(self) -> str:
+        """The SHA-256 of what was driven, whatever it was driven with: every array, the outcome and the replans.
+
+        It is computed as `digest` is, with the record reduced to the keys `outcome` and `replans`. Two drives with other
+        settings or versions have the same one if the robot did the same, bit for bit.
+        """
+        record = self.record
+        others = [entry.name for entry in dataclasses.fields(record) if entry.name not in ("outcome", "replans")]
+        return self._hash(record.to_json(without=others))
+
+    def _hash(self, record: str) -> str:
+        """The SHA-256 of every array and of a JSON text."""
+        sha = hashlib.sha256()
+        for name in self._written:
+            array = np.ascontiguousarray(getattr(self, name))
+            sha.update(f"{name} {array.dtype.str} {array.shape}\n".encode())
+            sha.update(array.tobytes())
+        sha.update(record.encode())
+        return sha.hexdigest()
+
+    @property
+    def _written(self) -> tuple[str, ...]:
+        """The arrays that files and digests hold."""
+        return ARRAYS + tuple(name for name in SENSED if np.size(getattr(self, name)))
+
+    def legs(self) -> list[tuple[slice, npt.NDArray[np.float64]]]:
+        """The routes (N, 2) [m] that were followed, each with its rows: the first route, then one for each replan."""
+        renewals = [replan for replan in self.record.replans if replan.solved]
+        routes = [self.route, *(np.array(replan.route, dtype=np.float64) for replan in renewals)]
+        begins = np.searchsorted(self.t, [replan.t - 1e-9 for replan in renewals]).tolist()
+        ends = itertools.pairwise([0, *begins, len(self.t)])
+        return [(slice(*rows), route) for rows, route in zip(ends, routes, strict=True)]
+
+    def trajectories(self) -> Trajectories:
+        """The movers as functions of time, from the record's world and seed.
+
+        Raises:
+            InputError: a mover finds no free cell to start from.
+        """
+        task = self.record.task
+        return Trajectories.of(self.record.world, task.start[:2], self.record.seed)
+
+    def save(self, path: str | Path) -> Path:
+        """Write the log with its digest, whole or not at all.
+
+        Args:
+            path: the file to write, by custom with the suffix .npz
+
+        Raises:
+            InputError: the file cannot be written.
+            FieldError: the record holds what no log can, such as a world without a name.
+        """
+        target = Path(path)
+        text = dataclasses.replace(self.record, digest=self.digest).to_json()
+        DriveRecord.from_json(text)  # a log that could not be read again is not written
+        with written_whole(target) as temporary, temporary.open("wb") as file:
+            np.savez_compressed(file, record=np.array(text), **{name: getattr(self, name) for name in self._written})
+        return target
+
+    @classmethod
+    def load(cls, path: str | Path) -> Rollout:
+        """Read a log.
+
+        Raises:
+            InputError: there is no such file, it is not a rollout, it was written by a later version, or an array or
+                a key of the record is missing or impossible.
+        """
+        with guarded_log(path) as archive:
+            there = [name for name in SENSED if f"{name}.npy" in archive.namelist()]
+            arrays = {name: read_array(archive, name) for name in (*ARRAYS, *there)}
+            loaded = cls(**arrays, record=_record_in(archive))
+            for problem in loaded.problems():
+                raise ValueError(problem)
+        return loaded
+
+    def problems(self) -> list[str]:
+        """What the arrays of no drive can look like: a sentence for each array of wrong shape or kind."""
+        return list(self._array_problems())
+
+    def _array_problems(self) -> Iterator[str]:
+        rows = self.t.shape[0] if self.t.ndim else 0
+        if rows == 0:
+            yield "t: the log is empty"
+        elif rows > MAX_ROWS:
+            yield f"t: must have at most {MAX_ROWS} rows, found {rows}"
+        noisy = {name for name in ("estimate", "actuated") if np.size(getattr(self, name))}
+        for name, shape in _shapes(rows, noisy).items():
+            array = getattr(self, name)
+            if not _fits(array.shape, shape):
+                yield f"{name}: must have the shape {_shape_text(shape)}, found {array.shape}"
+            elif array.dtype != DTYPES.get(name, np.dtype("<f8")):
+                yield f"{name}: must hold {DTYPES.get(name, np.dtype('<f8'))}, found {array.dtype}"
+            elif not np.isfinite(array).all():
+                yield f"{name}: must hold finite numbers, found others"
+            elif array.size and float(np.abs(array.astype(np.float64)).max()) > MAX_VALUE:
+                yield f"{name}: must hold numbers within {MAX_VALUE:g}, found others"
+        yield from self._scan_problems(rows)
+        if _fits(self.contacts.shape, (None, 4)) and self.contacts.dtype.kind == "f" and len(self.contacts):
+            steps = self.contacts[:, 0]
+            if not (steps.min() >= 0 and steps.max() < rows):
+                yield f"contacts: must be at rows from 0 to {rows - 1}"
+            elif (np.diff(steps) < 0).any() or (self.contacts[:, :2] % 1).any():
+                yield "contacts: rows must be in order, and rows and obstacles whole numbers"
+            things = len(self.record.world.obstacles) + len(self.record.world.movers) + 4
+            if not (self.contacts[:, 1].min() >= 0 and self.contacts[:, 1].max() < things):
+                yield f"contacts: must be with one of the {things} obstacles, movers and walls"
+        count = len(self.record.task.world.movers)
+        if self.movers.ndim == 3 and self.movers.shape[1] != count:
+            yield f"movers: must be {count}, as in the record's task, found {self.movers.shape[1]}"
+        if rows <= MAX_ROWS:
+            yield from self._work_problems(rows)
+        names = len(self.record.limiters)
+        if self.limiter.dtype.kind in "iu" and np.size(self.limiter) and not 0 <= self.limiter.max() < max(1, names):
+            yield f"limiter: must hold indices into the {names} of record.limiters, found {self.limiter.max()}"
+
+    def _scan_problems(self, rows: int) -> Iterator[str]:
+        """Scans of another number of beams than the robot has, or at no row of the log."""
+        lidar, at = self.record.robot.lidar, self.scan_rows
+        if len(self.scans) and (lidar is None or self.scans.shape[1:] != (lidar.beams,)):
+            yield f"scans: must have the {lidar.beams if lidar else 0} beams of the robot's lidar, found {self.scans.shape}"
+        if len(self.scans) != np.size(at):
+            yield f"scan_rows: must be {len(self.scans)}, one for each scan, found {np.size(at)}"
+        tables = [("seen", self.seen), ("tracks", self.tracks)]
+        for name, places in [
+            ("scan_rows", at),
+            *((name, table[:, 0] if table.ndim == 2 else at) for name, table in tables),
+        ]:
+            if np.size(places) and not (places.min() >= 0 and places.max() < rows and (np.diff(places) >= 0).all()):
+                yield f"{name}: must be at rows from 0 to {rows - 1}, in order"
+
+    def _work_problems(self, rows: int) -> Iterator[str]:
+        """Too many distances to compute when the log is checked, or too many steps of wanderers, drawn one by one."""
+        world = self.record.world
+        things = len(world.obstacles) + len(world.movers)
+        if rows * things > MAX_LOG_DISTANCES:
+            rows_checked = int(MAX_LOG_DISTANCES / things)
+            yield f"t: must have at most {rows_checked} rows in a world of {things} obstacles and movers, found {rows}"
+        if rows * len(world.movers) > MAX_NEAR_DISTANCES:
+            rows_checked = int(MAX_NEAR_DISTANCES / len(world.movers))
+            yield f"t: must have at most {rows_checked} rows in a world of {len(world.movers)} movers, found {rows}"
+        wanderers = [mover for mover in world.movers if isinstance(mover, Wandering)]
+        steps = sum((mover.phase + rows / self.record.physics_hz) / mover.period for mover in wanderers)
+        most = MAX_LOG_WALK / (200 + len(world.obstacles))
+        if steps > most:
+            yield f"movers: the wanderers of record.task take {steps:.3g} steps in this log; at most {most:.3g} are checked"
+
+    def _repr_html_(self) -> str:
+        from antdrive.worlds.drawing import LINE, card, world_svg
+
+        task, world = self.record.task, self.record.world
+        lines = [(self.route, "#182242", True), (self.pose[::12, :2], LINE, False)]
+        goal = (*task.goal, task.goal_tolerance)
+        movers = world.ways(task.start[:2], self.record.seed)
+        picture = world_svg(world.bounds, world.discs, start=task.start, goal=goal, lines=lines, movers=movers)
+        facts = {
+            "planner": self.record.planner.name,
+            "robot": self.record.robot.name,
+            "time": f"{self.t[-1]:.1f} s",
+            "least clearance": f"{self.clearance.min():.3f} m",
+        }
+        return card(picture, f"{task.world.name}: {self.outcome.value}", facts)
+
+
+#: The names of the arrays that only logs of robots which use their lidar hold, in the order of the digest, after the others.
+SENSED = ("scans", "scan_rows", "seen", "tracks")
+#: The names of the arrays of every log, in the order of the digest.
+ARRAYS = tuple(entry.name for entry in dataclasses.fields(Rollout) if entry.name not in ("record", *SENSED))
+
+
+def read_record(path: str | Path) -> DriveRecord:
+    """The record of a log, without its arrays.
+
+    Raises:
+        InputError: there is no such file, it is not a rollout, or a key of the record is missing or impossible.
+    """
+    with guarded_log(path) as archive:
+        return _record_in(archive)
+
+
+def _record_in(archive: Archive) -> DriveRecord:
+    text = read_array(archive, "record")
+    if text.dtype.itemsize > 4 * MAX_RECORD:
+        raise FieldError("record", f"must have at most {MAX_RECORD} characters, found {text.dtype.itemsize // 4}")
+    if text.shape != () or text.dtype.kind != "U":
+        raise FieldError("record", "must be one text")
+    record = DriveRecord.from_json(str(text[()]))
+    if record.digest is None:
+        raise FieldError("record.digest", "missing; a log that antdrive wrote has it")
+    return record
+
+
+def _shapes(rows: int, noisy: set[str]) -> dict[str, tuple[int | None, ...]]:
+    """The shape that each array must have; None stands for any length."""
+    return {
+        "t": (rows,),
+        "pose": (rows, 3),
+        "twist": (rows, 2),
+        "command": (rows, 2),
+        "clearance": (rows,),
+        "limiter": (rows,),
+        "movers": (rows, None, 2),
+        "contacts": (None, 4),
+        "route": (None, 2),
+        "cells": (None, 2),
+        "estimate": (rows if "estimate" in noisy else 0, 3),
+        "actuated": (rows if "actuated" in noisy else 0, 2),
+        "scans": (None, None),
+        "scan_rows": (None,),
+        "seen": (None, 4),
+        "tracks": (None, 7),
+    }
+
+
+def _fits(found: tuple[int, ...], shape: tuple[int | None, ...]) -> bool:
+    return len(found) == len(shape) and all(m in (None, n) for n, m in zip(found, shape, strict=True))
+
+
+def _shape_text(shape: tuple[int | None, ...]) -> str:
+    return "(" + ", ".join("any" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "") + ")"

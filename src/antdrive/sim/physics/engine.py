@@ -1,0 +1,356 @@
+"""A world and a robot in physics: place, command, step, state, contacts.
+
+Obstacles are sleeping maximal-coordinate bodies, so 400 of them were measured to cost hardly more than ten. In worlds of
+thousands, only those around the robot have bodies.
+Collision groups let the chassis meet obstacles, movers and walls only; the wheels meet only the floor.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import math
+import os
+import tempfile
+from collections.abc import Iterator, Sequence
+from types import TracebackType
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+
+from antdrive.base.errors import FieldError
+from antdrive.base.types import Floats, Pose
+from antdrive.robots.footprint import footprint_clearance
+from antdrive.robots.spec import RobotSpec
+from antdrive.sim.physics.bullet import CHASSIS, GROUND, OBSTACLE, WHEELS, bullet, client, drawn_as
+from antdrive.sim.physics.movers import MoverBodies
+from antdrive.sim.physics.near import NearBodies
+from antdrive.sim.physics.urdf import CASTER_GAP, CHASSIS_FILE, chassis_mesh, robot_urdf, rolling_radius
+from antdrive.worlds.trajectories import Trajectories
+from antdrive.worlds.world import Disc, World
+
+Point3: TypeAlias = tuple[float, float, float]  # [m]
+
+MIN_HEIGHT = 0.05  # of obstacles: the chassis hangs 5 mm above the floor and must not pass over anything [m]
+SETTLING_TIME = 0.1  # in which a placed robot sinks onto its wheels [s]
+TOUCHING_DISTANCE = 1e-4  # surfaces closer than this touch [m]
+MAX_JOINT_VELOCITY = 1e6  # of wheels; Bullet's default of 100 would slow down small wheels [rad/s]
+RESIDUAL = 5e-7  # where the solver stops for geared wheels; at 2e-6 speeds are 4 mm/s off [(rad/s)^2]
+USUAL_RESIDUAL = 1e-7  # the same of all other wheels, which is Bullet's default [(rad/s)^2]
+OVERSPEED = 1.5  # no robot drives faster by itself than its highest speed times this
+# Any other body, the robot's link -1, any link of the other: naming these costs 0.4 us a step.
+CHASSIS_AND_ANY = (-1, -1, -2)
+BATCH = 5000  # bodies that are built in one call at most
+MANY_BODIES = 1000  # in worlds of more cylinders only those near the robot have bodies
+LOOK_EVERY = 8  # physics steps after which bodies are looked for again
+NEAR_MARGIN = 0.2  # how much farther than the robot can get in that time bodies are made [m]
+WALL_THICKNESS = 0.1  # half of it [m]
+
+
+class Contact(NamedTuple):
+    """The robot's chassis touching something at one physics step.
+
+    Attributes:
+        obstacle: what is touched; indices count the world's obstacles, then its movers, then the walls in
+            the order left, right, bottom, top
+        distance: distance of the surfaces [m]; negative where they overlap
+        force: normal force [N]
+    """
+
+    obstacle: int
+    distance: float
+    force: float
+
+
+class State(NamedTuple):
+    """Pose and velocity of the robot, measured at the axle's centre.
+
+    Attributes:
+        x: position [m]
+        y: position [m]
+        yaw: heading [rad]
+        speed: forward speed [m/s]
+        yaw_rate: counter-clockwise [rad/s]
+    """
+
+    x: float
+    y: float
+    yaw: float
+    speed: float
+    yaw_rate: float
+
+    @property
+    def pose(self) -> Pose:
+        """Position and heading [m, m, rad]."""
+        return self.x, self.y, self.yaw
+
+
+class Engine:
+    """A world and a robot in physics. Use it in a `with` block.
+
+    >>> with Engine(world, robot) as engine:
+    ...     engine.place(task.start)
+    ...     engine.command(0.5, 0.0)
+    ...     contacts = engine.step()
+
+    Args:
+        physics_hz: physics steps per simulated second
+        trajectories: the motions of the world's movers; needed where the world has movers
+
+    Raises:
+        ValueError: `trajectories` are not those of the world's movers.
+    """
+
+    def __init__(
+        self, world: World, robot: RobotSpec, *, physics_hz: int = 240, trajectories: Trajectories | None = None
+    ) -> None:
+        if len(trajectories or ()) != len(world.movers):
+            raise FieldError("trajectories", f"must be those of the world's {len(world.movers)} movers")
+        self.world = world
+        self.robot = robot
+        self.physics_hz = physics_hz
+        self.trajectories = trajectories
+        self._steps = 0  # since the robot was placed
+        self._open = contextlib.ExitStack()
+
+    def __enter__(self) -> Engine:
+        p = self._p = bullet()
+        self._client = self._open.enter_context(client())
+        p.resetSimulation(physicsClientId=self._client)
+        p.setGravity(0, 0, -9.81, physicsClientId=self._client)
+        p.setPhysicsEngineParameter(
+            fixedTimeStep=1.0 / self.physics_hz,
+            numSubSteps=0,
+            numSolverIterations=50,
+            enableConeFriction=0,
+            deterministicOverlappingPairs=0,
+            physicsClientId=self._client,
+        )
+        self._drawn = drawn_as(self._client)
+        self._build_ground()
+        self._build_robot()
+        self._obstacles: dict[int, int] = {}  # contact index by body number, without movers
+        # Bullet's search tree, and with it the order of contacts, follows the order in which bodies are made.
+        self._shapes: dict[tuple[float, float], int] = {}
+        self._near = self._near_bodies() if len(self.world.obstacles) > MANY_BODIES else None
+        if self._near is None:
+            for _, alike in itertools.groupby(enumerate(self.world.obstacles), lambda one: _size(one[1])):
+                indices, discs = zip(*alike, strict=True)
+                self._build_cylinders(discs[0], list(indices))
+        self._movers = self._mover_bodies(self.trajectories) if self.trajectories else None
+        standing = len(self.world.obstacles) + len(self.world.movers)
+        for i, (half_extents, centre) in enumerate(_walls(self.world, max(2 * self.robot.height, 0.2)), standing):
+            shape = p.createCollisionShape(p.GEOM_BOX, halfExtents=half_extents, physicsClientId=self._client)
+            self._build_obstacles([i], shape, [centre])
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._open.__exit__(kind, error, traceback)
+
+    def place(self, pose: Pose) -> None:
+        """Put the robot at a pose, at rest on its wheels, and restart the movers at time 0.
+
+        If the robot overlaps an obstacle, settling is skipped: the solver would push it out before contacts
+        are checked.
+        """
+        p, x, y, yaw = self._p, *pose
+        height = self.robot.wheel_radius + CASTER_GAP - self._com_drop
+        quaternion = (0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))
+        p.resetBasePositionAndOrientation(self._robot, (x, y, height), quaternion, physicsClientId=self._client)
+        p.resetBaseVelocity(self._robot, (0, 0, 0), (0, 0, 0), physicsClientId=self._client)
+        self.command(0.0, 0.0)
+        self._steps = 0
+        if self._near is not None:
+            self._near.start(x, y)
+        if self._movers is not None:
+            self._movers.park()
+        free = footprint_clearance(self.world, self.robot.footprint, [pose])[0] > 0
+        for _ in range(round(SETTLING_TIME * self.physics_hz) if free else 0):
+            p.stepSimulation(physicsClientId=self._client)
+        if self._movers is not None:
+            self._movers.restart()
+
+    def command(self, speed: float, yaw_rate: float) -> None:
+        """Set the wheel motors' target to a twist; the motors reach it as far as their torque allows.
+
+        Args:
+            speed: forward [m/s]
+            yaw_rate: counter-clockwise [rad/s]
+        """
+        rim, radius = yaw_rate * self.robot.track / 2, self._rolling
+        self._p.setJointMotorControlArray(
+            self._robot,
+            (0, 1),
+            self._p.VELOCITY_CONTROL,
+            targetVelocities=((speed - rim) / radius, (speed + rim) / radius),
+            forces=self._torques,
+            physicsClientId=self._client,
+        )
+
+    def step(self) -> list[Contact]:
+        """Advance one physics step and return the chassis's contacts after it."""
+        if self._movers is not None:
+            self._movers.steer(self._steps)
+        if self._near is not None and self._steps % LOOK_EVERY == 0:
+            (x, y, _), _ = self._p.getBasePositionAndOrientation(self._robot, self._client)
+            self._near.follow(x, y)
+        self._steps += 1
+        self._p.stepSimulation(self._client)
+        points = self._p.getContactPoints(self._robot, *CHASSIS_AND_ANY, self._client)
+        return self._touching(points) if points else []
+
+    def contacts(self) -> list[Contact]:
+        """The chassis's contacts now, without advancing time."""
+        self._p.performCollisionDetection(physicsClientId=self._client)
+        return self._touching(self._p.getContactPoints(bodyA=self._robot, linkIndexA=-1, physicsClientId=self._client))
+
+    def state(self) -> State:
+        """The pose and velocity of the axle's centre."""
+        p = self._p
+        (x, y, _), (qx, qy, qz, qw) = p.getBasePositionAndOrientation(self._robot, self._client)
+        (vx, vy, _), (_, _, yaw_rate) = p.getBaseVelocity(self._robot, self._client)
+        # PyBullet reports the centre of mass, which hangs below the axle: subtract the offset along the
+        # tilted z axis.
+        x += 2.0 * (qx * qz + qw * qy) * self._com_drop
+        y += 2.0 * (qy * qz - qw * qx) * self._com_drop
+        yaw = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
+        return State(x, y, yaw, vx * math.cos(yaw) + vy * math.sin(yaw), yaw_rate)
+
+    @property
+    def time(self) -> float:
+        """Simulated time since the robot was placed [s]."""
+        return self._steps / self.physics_hz
+
+    def mover_positions(self) -> Floats:
+        """Positions of the movers (M, 2) [m]: the trajectories at `time`, apart from rounding; of bodies, where there are."""
+        return self._movers.positions(self._steps) if self._movers else np.empty((0, 2))
+
+    def mover_track(self, steps: int) -> Floats:
+        """Where the trajectories lead the movers (steps, M, 2) [m]: before each of the first steps since placing."""
+        return self._movers.track(steps) if self._movers else np.empty((steps, 0, 2))
+
+    def _touching(self, points: Sequence[Any]) -> list[Contact]:
+        # Bullet also lists points some millimetres apart. A pressing contact may read 0.05 mm apart, but
+        # has a force.
+        return [
+            Contact(self._index(point[2]), point[8], point[9])
+            for point in points
+            if point[8] <= TOUCHING_DISTANCE or point[9] > 0
+        ]
+
+    def _index(self, body: int) -> int:
+        """The contact index of a body."""
+        if body in self._obstacles:
+            return self._obstacles[body]
+        assert self._movers is not None
+        return len(self.world.obstacles) + self._movers.indices[body]
+
+    def _build_ground(self) -> None:
+        p = self._p
+        plane = p.createCollisionShape(p.GEOM_PLANE, physicsClientId=self._client)
+        ground = p.createMultiBody(0, plane, self._drawn, useMaximalCoordinates=1, physicsClientId=self._client)
+        p.changeDynamics(
+            ground, -1, lateralFriction=1, rollingFriction=0, spinningFriction=0, physicsClientId=self._client
+        )
+        p.setCollisionFilterGroupMask(ground, -1, GROUND, WHEELS, physicsClientId=self._client)
+
+    def _build_robot(self) -> None:
+        p = self._p
+        self._com_drop = 0.5 * self.robot.wheel_radius  # a low centre of mass keeps the casters from rocking
+        self._rolling = rolling_radius(self.robot)
+        torque = self.robot.wheel_torque * (self._rolling / self.robot.wheel_radius)
+        self._torques = torque, torque
+        gear = self.robot.wheel_radius / self._rolling
+        # The solver measures in rad/s, and smaller spheres turn faster. The client may have simulated another robot before.
+        residual = RESIDUAL * gear**2 if gear > 1 else USUAL_RESIDUAL
+        p.setPhysicsEngineParameter(solverResidualThreshold=residual, physicsClientId=self._client)
+        text = robot_urdf(self.robot, self._com_drop)
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "robot.urdf")
+            with open(path, "w", encoding="utf-8") as file:
+                file.write(text)
+            mesh = chassis_mesh(self.robot)
+            if mesh is not None:
+                with open(os.path.join(folder, CHASSIS_FILE), "w", encoding="utf-8") as file:
+                    file.write(mesh)
+            flags = p.URDF_USE_IMPLICIT_CYLINDER | p.URDF_USE_INERTIA_FROM_FILE
+            self._robot = p.loadURDF(path, flags=flags, physicsClientId=self._client)
+        for link in range(-1, 4):
+            p.changeDynamics(
+                self._robot,
+                link,
+                linearDamping=0,
+                angularDamping=0,
+                jointDamping=0,
+                maxJointVelocity=MAX_JOINT_VELOCITY,
+                physicsClientId=self._client,
+            )
+            group, mask = (CHASSIS, OBSTACLE) if link == -1 else (WHEELS, GROUND)
+            p.setCollisionFilterGroupMask(self._robot, link, group, mask, physicsClientId=self._client)
+
+    def _mover_bodies(self, trajectories: Trajectories) -> MoverBodies:
+        def where() -> tuple[float, float]:
+            (x, y, _), _ = self._p.getBasePositionAndOrientation(self._robot, self._client)
+            return x, y
+
+        fast = OVERSPEED * self.robot.max_speed
+        return MoverBodies(trajectories, self.robot.radius, fast, where, self.physics_hz, self._client)
+
+    def _near_bodies(self) -> NearBodies:
+        """The bodies around the robot; it cannot pass beyond them before it is looked at again."""
+        way = OVERSPEED * self.robot.max_speed * LOOK_EVERY / self.physics_hz
+        reach = self.robot.radius + way + NEAR_MARGIN
+        return NearBodies(self.world.obstacles, reach, _size, self._build_cylinders, self._obstacles, self._client)
+
+    def _build_cylinders(self, alike: Disc, indices: list[int]) -> list[int]:
+        """Build the bodies of obstacles of one size, the first of them given; the bodies' numbers."""
+        radius, height = size = _size(alike)
+        if size not in self._shapes:
+            self._shapes[size] = self._p.createCollisionShape(
+                self._p.GEOM_CYLINDER, radius=radius, height=height, physicsClientId=self._client
+            )
+        places = [(disc.x, disc.y, height / 2) for disc in map(self.world.obstacles.__getitem__, indices)]
+        return self._build_obstacles(indices, self._shapes[size], places)
+
+    def _build_obstacles(self, indices: list[int], shape: int, centres: list[Point3]) -> list[int]:
+        """Build bodies of one shape with these contact indices; their numbers.
+
+        Many in one call take a tenth of the time of as many calls.
+        """
+        p = self._p
+        bodies = [
+            body
+            for i in range(0, len(centres), BATCH)
+            for body in p.createMultiBody(
+                0,
+                shape,
+                self._drawn,
+                batchPositions=centres[i : i + BATCH],
+                useMaximalCoordinates=1,
+                physicsClientId=self._client,
+            )
+        ]
+        for index, body in zip(indices, bodies, strict=True):
+            p.changeDynamics(body, -1, activationState=p.ACTIVATION_STATE_SLEEP, physicsClientId=self._client)
+            p.setCollisionFilterGroupMask(body, -1, OBSTACLE, CHASSIS, physicsClientId=self._client)
+            self._obstacles[body] = index
+        return bodies
+
+
+def _size(disc: Disc) -> tuple[float, float]:
+    """Radius and height of a cylinder as it is built [m]."""
+    return disc.radius, max(disc.height, MIN_HEIGHT)
+
+
+def _walls(world: World, height: float) -> Iterator[tuple[Point3, Point3]]:
+    """Half extents and centres of the walls [m]: left, right, bottom, top."""
+    xmin, ymin, xmax, ymax = world.bounds
+    width, depth = world.size
+    thick = WALL_THICKNESS
+    x, y, z = (xmin + xmax) / 2, (ymin + ymax) / 2, height / 2
+    for side in (xmin - thick, xmax + thick):
+        yield (thick, depth / 2 + 2 * thick, z), (side, y, z)
+    for side in (ymin - thick, ymax + thick):
+        yield (width / 2 + 2 * thick, thick, z), (x, side, z)

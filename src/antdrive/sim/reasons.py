@@ -1,0 +1,96 @@
+"""Why there is no path, with the sizes that matter and what would help."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from antdrive.base.plane import place_name
+from antdrive.planners import PLANNERS, Query
+from antdrive.planners.anyangle.passage import MOST_OBSTACLES, widest_passage
+from antdrive.planners.anyangle.tangent import shortest
+from antdrive.planners.graph.search import reachable
+from antdrive.robots.placing import name_of
+from antdrive.worlds import Grid, Task, point_clearance, rasterise
+
+if TYPE_CHECKING:
+    from antdrive.sim.scenario import Scenario
+
+FINER = (2, 4, 8)  # cells are tried this many times smaller
+HALVINGS = 7  # of the radius that passes in a world of very many obstacles
+MOST_CELLS = 2_000_000  # of a grid that is made only to see whether it has a path
+
+
+def no_path_reason(s: Scenario, grid: Grid, said: str) -> str:
+    """What the planner said about a world that it could not cross, for whom, and what would help."""
+    robot = s.robot
+    disc = f"a disc of {s.inflate:.3g} m (radius {robot.radius:.3g} + margin {s.margin:.3g})"
+    says = f": {said}" if said else ""
+    if reachable(Query.between(grid, s.task)):
+        return f"{s.planner_label} found no path for {disc}{says}; astar finds one on these cells of {grid.cell:g} m"
+    start = f"no path for {disc} on cells of {grid.cell:g} m{says}"
+    if len(s.task.world.obstacles) > MOST_OBSTACLES:
+        return f"{start}; {_narrowest_cell(s, grid)}"
+    if shortest(s.task.world.discs, s.task.world.bounds, s.inflate, s.task.start[:2], s.task.goal) is not None:
+        finer = next((grid.cell / k for k in FINER if _has_path(s.task, grid.cell / k, s.inflate)), None)
+        return f"{start}; there is one on {f'cells of {finer:g} m' if finer else 'finer cells'}"
+    return f"{start}; {_narrowest_place(s)}"
+
+
+def _narrowest_place(s: Scenario) -> str:
+    """How wide a disc passes, where that is decided, and whether a smaller margin would help."""
+    task = s.task
+    passage = widest_passage(task, s.inflate)
+    if passage is None:
+        return "not even a point gets through"
+    at = place_name(task.frame, *passage.at)
+    ends = ((task.start[:2], "the start has no more room"), (task.goal, "the goal has no more room"))
+    where = " and ".join(name_of(task.world, k) for k in passage.between)
+    where = f"between {where}" if where else next(says for end, says in ends if end == passage.at)
+    return (
+        f"the widest disc that passes has a radius of {passage.radius:.3g} m, at {at}, {where}; "
+        f"{_what_it_takes(s, passage.radius)}"
+    )
+
+
+def _what_it_takes(s: Scenario, passes: float) -> str:
+    """What the robot needs where no disc of more than a radius passes [m], and what would help."""
+    robot, foot = s.robot, s.robot.footprint
+    fits = passes - robot.radius
+    helps = f"a margin below {fits:.3g} m leaves a way, on cells that are fine enough" if fits > 0 else ""
+    if foot.is_disc:
+        return helps or "this robot does not fit through"
+    xmin, ymin, xmax, ymax = foot.bounds
+    shape = f"its {'rectangle' if foot.box else 'outline'} of {xmax - xmin:.3g} x {ymax - ymin:.3g} m"
+    needs = ymax - ymin + 2 * s.margin
+    does = "would need" if needs <= 2 * passes else "would not fit either: it needs"
+    return (
+        f"the place is {2 * passes:.3g} m wide, and plans are made for the disc around {robot.name}, which needs "
+        f"{2 * s.inflate:.3g} m; {shape} {does} {needs:.3g} m straight ahead{'; ' * bool(helps)}{helps}"
+    )
+
+
+def _narrowest_cell(s: Scenario, grid: Grid) -> str:
+    """The same in a world of so many obstacles that its gaps are too many to try: found on the cells of the plan."""
+    low, high = 0.0, s.inflate
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if _has_path(s.task, grid.cell, middle) else (low, middle)
+    if low == 0:
+        return f"no disc of {high:.2g} m gets through, on these cells"
+    free = rasterise(s.task.world, grid.cell, low)
+    cells = PLANNERS["astar"].plan(Query.between(free, s.task), np.random.default_rng(0)).cells
+    room = point_clearance(s.task.world, free.xy(cells))
+    at = place_name(s.task.frame, *free.xy(cells)[int(room.argmin())].tolist())
+    return (
+        f"on these cells, the widest disc that passes has a radius of about {low:.2g} m, near {at}; "
+        f"{_what_it_takes(s, low)}"
+    )
+
+
+def _has_path(task: Task, cell: float, inflate: float) -> bool:
+    width, height = task.world.size
+    return width * height <= MOST_CELLS * cell**2 and reachable(
+        Query.between(rasterise(task.world, cell, inflate), task)
+    )

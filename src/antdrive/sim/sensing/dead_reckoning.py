@@ -1,0 +1,49 @@
+"""A pose from wheels and a gyro alone: it starts right and drifts away from the truth."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from antdrive.base import Pose
+from antdrive.robots.odometry import SAMPLE_RATE, Odometry
+
+
+class DeadReckoning:
+    """The pose of a robot in its odometry frame, from measured speeds and yaw rates.
+
+    Attributes:
+        pose: the estimated pose: x, y [m] and yaw [rad]
+
+    Args:
+        odometry: how wrong the measurements are
+        rng: where all random numbers come from: three for the drive, then two for each call of `advance`
+        start: the first pose, which the robot takes for true
+    """
+
+    def __init__(self, odometry: Odometry, rng: np.random.Generator, start: Pose = (0.0, 0.0, 0.0)) -> None:
+        self._odometry, self._rng = odometry, rng
+        scale, turn, bias = rng.standard_normal(3)
+        self._scale = 1 + odometry.speed_scale * float(scale)
+        self._turn = 1 + odometry.yaw_scale * float(turn)
+        self._bias = odometry.gyro_bias * float(bias)
+        self.pose = start
+
+    def advance(self, speed: float, yaw_rate: float, dt: float) -> Pose:
+        """Move on by one sample, and return the estimated pose.
+
+        Args:
+            speed: the true forward speed [m/s]
+            yaw_rate: the true yaw rate, counter-clockwise [rad/s]
+            dt: how long the sample lasts [s]
+        """
+        once, turn_noise = self._rng.standard_normal(2)
+        louder = 1 / math.sqrt(SAMPLE_RATE * dt)  # a short sample counts less, so it may be wrong by more
+        measured = speed * (self._scale + self._odometry.speed_noise * louder * float(once))
+        rate = yaw_rate * self._turn + self._bias + self._odometry.gyro_noise * louder * float(turn_noise)
+        x, y, yaw = self.pose
+        middle = yaw + rate * dt / 2
+        way = measured * dt
+        self.pose = (x + way * math.cos(middle), y + way * math.sin(middle), yaw + rate * dt)
+        return self.pose

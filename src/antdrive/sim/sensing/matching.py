@@ -1,0 +1,69 @@
+"""Where the robot must be for its scan to lie on its map: drift of odometry is taken back while the map is in sight."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from antdrive.base import Floats, Pose
+from antdrive.robots.lidar import Lidar
+from antdrive.sim.sensing import _kernels_matching
+from antdrive.sim.sensing.mapping import OccupancyMap
+
+BEAMS = 180  # of a scan that are matched, at most
+FAR = 8.0  # hits farther away are not matched, unless more is asked for [m]
+NEAR = 3  # how far partners are looked for, in grains of the map
+FEWEST = 25  # pairs below which a scan is not matched
+CHORD = 10  # beams between the two hits that tell how a surface lies
+LONGEST_STEP = 0.2  # hits of neighbouring beams farther apart do not belong to one surface [m]
+HELD = 0.1  # a direction is held by the scan where this share of the surfaces face it
+MOST = (0.02, 0.01)  # what one scan may correct; more is an error of the match [m], [rad]
+
+
+class ScanMatcher:
+    """Corrects a pose by laying a scan on the map."""
+
+    def __init__(self, lidar: Lidar, far: float = FAR) -> None:
+        self._lidar, self._far = lidar, far
+        angles = lidar.angles - lidar.yaw
+        self._beams = np.column_stack((np.cos(angles), np.sin(angles)))
+        self._every = max(1, round(lidar.beams / BEAMS))
+
+    def corrected(self, seen: OccupancyMap, pose: Pose, ranges: Floats) -> Pose:
+        """The pose, corrected; the pose itself where too little of the scan is on the map, or the map says too much else."""
+        lidar = self._lidar
+        eye = lidar.pose_on(pose)
+        first = seen.scans // seen.share % self._every
+        x, y, yaw, pairs = _kernels_matching.match(
+            *eye, self._beams, ranges, self._every, first, self._far, NEAR, FEWEST, seen.plain
+        )
+        turn = math.remainder(yaw - eye[2], 2 * math.pi)
+        if pairs < FEWEST or math.hypot(x - eye[0], y - eye[1]) > MOST[0] or abs(turn) > MOST[1]:
+            return pose
+        heading = pose[2] + turn
+        cos, sin = math.cos(heading), math.sin(heading)
+        return x - cos * lidar.x + sin * lidar.y, y - sin * lidar.x - cos * lidar.y, heading
+
+
+def sliding_left_out(before: Pose, after: Pose, points: Floats) -> Pose:
+    """A corrected pose without the part of its shift that the scan cannot tell: along a wall that is all there is in sight.
+
+    The normals of the surfaces that were hit tell in which directions they hold the pose: along the eigenvectors of their mean
+    outer product whose eigenvalues are not small.
+    """
+    along = points[CHORD:] - points[:-CHORD]
+    length = np.hypot(along[:, 0], along[:, 1])
+    step = np.hypot(*np.diff(points, axis=0).T)
+    gaps = np.concatenate([[0], np.cumsum(~(step < LONGEST_STEP))])  # also where a point is missing
+    flat = (gaps[CHORD:] == gaps[:-CHORD]) & (length > 0)
+    tangents = along[flat] / length[flat, None]
+    single = max(0, int(np.count_nonzero(np.isfinite(points[:, 0]))) - len(tangents) - CHORD)  # on small things
+    count = single + len(tangents)
+    if not count:
+        return after
+    spread = (np.eye(2) * (single / 2 + len(tangents)) - tangents.T @ tangents) / count
+    values, vectors = np.linalg.eigh(spread)
+    held = vectors[:, values >= HELD]
+    dx, dy = held @ held.T @ np.array([after[0] - before[0], after[1] - before[1]])
+    return before[0] + float(dx), before[1] + float(dy), after[2]

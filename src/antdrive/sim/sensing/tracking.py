@@ -1,0 +1,217 @@
+"""Movers found in scans: points that what stands still does not explain, clustered, fitted with circles, followed over time.
+
+Each track is a Kalman filter with constant velocity (Y. Bar-Shalom, X. Li, T. Kirubarajan, *Estimation with Applications to
+Tracking and Navigation*, 2001, chapter 6). A cluster in which several tracks expect points is shared out among them, so that
+movers which pass each other keep their tracks; other clusters and tracks are matched nearest first.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.base import Floats, Pose
+from antdrive.base.errors import FieldError, require_positive
+from antdrive.robots.lidar import Lidar
+from antdrive.sim.sensing import _kernels_tracking as kernels
+from antdrive.sim.sensing.ground import Ground
+
+SKIN = kernels.SKIN
+ROOM = 64  # tracks that there is room for at first
+PARTIAL = 3.0  # the centre of a mover that is partly hidden has so many times the error
+
+
+class TrackedMovers(NamedTuple):
+    """The movers that are followed now.
+
+    Attributes:
+        positions: their centres (T, 2) [m]
+        velocities: their velocities (T, 2) [m/s]
+        radii: their radii (T,) [m]
+        numbers: their numbers (T,), in the order in which they were found; a number is never used again
+        met: whether the last scan met them (T,), or they are expected where they are hidden
+    """
+
+    positions: Floats
+    velocities: Floats
+    radii: Floats
+    numbers: npt.NDArray[np.int64]
+    met: npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrackingPolicy:
+    """How movers are found and followed.
+
+    Attributes:
+        gap: neighbouring points farther apart belong to different things [m]
+        least: points that a cluster needs to begin a track
+        settle: what has stood on once free ground for so long is part of a map of the robot's own [s]
+        smallest: the least radius that is estimated [m]
+        largest: the largest one [m]
+        gate: a cluster farther from where a track is expected is not its own [m]
+        speed: the highest speed that a mover is looked for with [m/s]; it widens the gate of a new track
+        acceleration: standard deviation of the movers' acceleration [m/s^2]
+        error: standard deviation of a measured centre [m]
+        confirmed: in how many scans a mover has to be seen before it counts
+        way: how far a mover has to have come before it counts [m]; on a given map it need not have moved
+        patience: for how long a track goes on while it is hidden [s]
+        doubt: the same for one that does not count yet [s]
+
+    Raises:
+        FieldError: a value that is not positive.
+    """
+
+    gap: float = 0.2
+    least: int = 3
+    settle: float = 2.0
+    smallest: float = 0.05
+    largest: float = 1.0
+    gate: float = 0.4
+    speed: float = 2.0
+    acceleration: float = 3.0
+    error: float = 0.02
+    confirmed: int = 3
+    way: float = 0.12
+    patience: float = 3.0
+    doubt: float = 0.5
+
+    def __post_init__(self) -> None:
+        for key, value in vars(self).items():
+            require_positive(key, value)
+        if not self.smallest <= self.largest:
+            raise FieldError("smallest", f"must be at most largest, {self.largest:g}, got {self.smallest:g}")
+
+
+class MoverTracker:
+    """Finds movers in the scans of one drive, and follows them.
+
+    Attributes:
+        policy: how movers are found and followed
+
+    Args:
+        lidar: the lidar whose scans are read
+        policy: how movers are found and followed; None: as by default
+        pose_xy: standard deviation of the estimated positions at which scans are taken [m]
+        pose_yaw: and of the headings [rad]
+    """
+
+    def __init__(
+        self, lidar: Lidar, policy: TrackingPolicy | None = None, pose_xy: float = 0.0, pose_yaw: float = 0.0
+    ) -> None:
+        self.policy = policy or TrackingPolicy()
+        self._lidar, self._pose_xy, self._pose_yaw = lidar, pose_xy, pose_yaw
+        self._rules = {complete: self._rules_where(complete) for complete in (False, True)}
+        self._tracks, self._count = np.zeros(ROOM, dtype=kernels.TRACK), 0
+        self._time = -math.inf
+        self._found = 0
+        self._usual = np.array((self.policy.smallest, 0.0))
+        self._now: TrackedMovers = _listed(self._tracks[:0], self._time)
+
+    def _rules_where(self, complete: bool) -> kernels.TrackingRules:
+        policy, lidar = self.policy, self._lidar
+        return kernels.TrackingRules(
+            gap=float(policy.gap),
+            least=int(policy.least),
+            settle=float(policy.settle),
+            smallest=float(policy.smallest),
+            largest=float(policy.largest),
+            gate=float(policy.gate),
+            speed=float(policy.speed),
+            confirmed=int(policy.confirmed),
+            way=float(policy.way),
+            patience=float(policy.patience),
+            doubt=float(policy.doubt),
+            whole=(policy.error * 1.0) ** 2,
+            part=(policy.error * PARTIAL) ** 2,
+            pose_xy=float(self._pose_xy) ** 2,
+            pose_yaw=float(self._pose_yaw),
+            power=2.0,
+            spacing=lidar.spacing,
+            first=float(lidar.angles[0]) - lidar.yaw,
+            reach=float(lidar.max_range),
+            rate=float(lidar.rate),
+            closed=bool(lidar.full_circle),
+            complete=complete,
+        )
+
+    @property
+    def found(self) -> int:
+        """How many tracks were begun so far."""
+        return self._found
+
+    def movers(self) -> TrackedMovers:
+        """The movers that count, at the time of the last scan."""
+        return self._now
+
+    def update(self, ground: Ground, pose: Pose, ranges: Floats, time: float) -> npt.NDArray[np.bool_]:
+        """Read a scan; which beams met movers that are followed (beams,).
+
+        Those beams can be left out of a map (`OccupancyMap.insert`, `left_out`).
+
+        Args:
+            ground: what stands still, as known before this scan
+            pose: the robot's estimated pose
+            ranges: the scan (beams,) [m]
+            time: when it was taken [s]; later than the scan before
+        """
+        dt = time - self._time if math.isfinite(self._time) else 0.0
+        self._time = time
+        power = self.policy.acceleration * self.policy.acceleration
+        kernels.predict(self._tracks, self._count, dt, power, power * dt**4 / 4, power * dt**3 / 2)
+        hits = ground.hits(pose, ranges)
+        points, explained = np.ascontiguousarray(hits.points), np.ascontiguousarray(hits.explained)
+        owner = np.empty(len(points), dtype=np.int64)
+        kernels.own(self._tracks, self._count, points, explained, owner)
+        self._make_room(len(points))
+        eye = np.array(self._lidar.pose_on(pose))
+        view = kernels.View(points, hits.beams, explained, owner, np.ascontiguousarray(ranges), eye, float(time))
+        self._count, self._found = kernels.read(
+            view, self._rules[ground.complete], self._tracks, self._count, self._found, self._usual
+        )
+        tracks = self._tracks[: self._count]
+        self._now = _listed(tracks[tracks["sure"] & (tracks["moves"] | ground.complete)], self._time)
+        out, mine = np.zeros(len(ranges), dtype=np.bool_), np.empty(len(points), dtype=np.bool_)
+        kernels.on_movers(points, self._now.positions, self._now.radii, mine)
+        out[hits.beams[mine]] = True
+        return out
+
+    def suspected(self, ground: Ground, pose: Pose, ranges: Floats, time: float) -> npt.NDArray[np.bool_]:
+        """Which beams of a scan that was not read yet may have met something that moves (beams,): no marks to steer by.
+
+        Args:
+            ground: what stands still, as known before this scan; what it explains moves only if it was seen to move
+            pose: the robot's estimated pose
+            ranges: the scan (beams,) [m]
+            time: when it was taken [s]
+        """
+        hits = ground.hits(pose, ranges)
+        points, explained = np.ascontiguousarray(hits.points), np.ascontiguousarray(hits.explained)
+        mine = np.empty(len(points), dtype=np.bool_)
+        dt = time - self._time if self._count else 0.0
+        kernels.suspects(self._tracks, self._count, dt, float(time), self.policy.settle, points, explained, mine)
+        out = np.zeros(len(ranges), dtype=np.bool_)
+        out[hits.beams[mine]] = True
+        return out
+
+    def _make_room(self, points: int) -> None:
+        """Room for the tracks that a scan may begin: each needs some points."""
+        needed = self._count + points // self.policy.least + 1
+        if needed > len(self._tracks):
+            longer = np.zeros(2 * needed, dtype=kernels.TRACK)
+            longer[: self._count] = self._tracks[: self._count]
+            self._tracks = longer
+
+
+def _listed(tracks: npt.NDArray[np.void], time: float) -> TrackedMovers:
+    return TrackedMovers(
+        np.column_stack((tracks["x"], tracks["y"])),
+        np.column_stack((tracks["vx"], tracks["vy"])),
+        tracks["radius"].copy(),
+        tracks["number"].copy(),
+        tracks["last"] == time,
+    )

@@ -1,0 +1,10 @@
+from .cli.testing.checking import CheckResult as CheckResult
+from .cli.testing.checking import check_case as check_case
+from .cli.testing.fixture import DriveFailure as DriveFailure
+from .cli.testing.fixture import DriveFixture as DriveFixture
+from .cli.testing.fixture import assert_collision_free as assert_collision_free
+from .cli.testing.fixture import assert_reached_goal as assert_reached_goal
+from .runs.suites.baseline import Baseline as Baseline
+from .runs.suites.strategies import tasks as tasks
+from .runs.suites.strategies import worlds as worlds
+from .runs.suites.suite import load_suite as load_suite

@@ -1,0 +1,13 @@
+from .campaign.reporting import report_campaign as report_campaign
+from .campaign.reporting import summarise_campaign as summarise_campaign
+from .figures.canvas import panels as panels
+from .figures.canvas import save_figure as save_figure
+from .figures.plan_figures import plan_figure as plan_figure
+from .figures.run_figures import certificate_figure as certificate_figure
+from .figures.run_figures import comparison_figure as comparison_figure
+from .figures.run_figures import overview as overview
+from .figures.sight_figure import sight_figure as sight_figure
+from .film.video import FilmInfo as FilmInfo
+from .film.video import film as film
+from .film.video import still as still
+from .report.report import write_report as write_report

@@ -1,0 +1,247 @@
+"""What is written about a test: the log, pictures, a film of then and now, and the commands that repeat it."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import json
+import math
+import os
+import re
+import tempfile
+import traceback
+import zlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+
+from antdrive.base.atomic import written_whole
+from antdrive.base.types import Floats
+from antdrive.robots.placing import gaps
+from antdrive.runs.suites.baseline import Baseline
+from antdrive.runs.suites.parting import parting
+from antdrive.runs.suites.suite import SUFFIX
+from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.pipeline import Run
+from antdrive.worlds.world import Disc
+
+#: Of which tests a film is made.
+Films: TypeAlias = Literal["never", "failed", "always"]
+
+#: Every file that may be written about a test.
+FILES = (
+    *("result.json", "commands.txt", "rollout.npz", "overview.png"),
+    *("then-and-now.png", "then-and-now.mp4", "film.mp4", "traceback.txt"),
+)
+FILM_SIZE, FILM_FPS = (960, 540), 20.0
+MOST_FILMS = 10  # of failed tests, in one run of many; a film takes longer than most drives
+FILM_LENGTH = 12.0  # where a drive, then or now, is longer, its film is faster than the drive [s]
+
+
+@dataclasses.dataclass(frozen=True)
+class Results:
+    """Where results are written, and how much.
+
+    Attributes:
+        folder: of all results; each test has a folder of its own in it
+        films: of which tests a film is made
+        places: a folder in which all processes of a run count the films of failed tests; None: they are not limited
+        root: the project's folder; what lies in its folders gets results in folders of the same names
+    """
+
+    folder: Path
+    films: Films = "failed"
+    places: Path | None = None
+    root: Path = dataclasses.field(default_factory=Path.cwd)
+
+    def of(self, file: Path, name: str) -> Path:
+        """The folder of one test."""
+        home = file.resolve().parent
+        try:
+            parts = home.relative_to(self.root.resolve()).parts
+        except ValueError:  # outside of the project
+            parts = (f"{file_name(home.name or 'root')}-{zlib.crc32(os.fsencode(home)):08x}",)
+        stem = file.name.removesuffix(SUFFIX) if file.name.endswith(SUFFIX) else file.stem
+        return self.folder.joinpath(*map(file_name, (*parts, stem, name)))
+
+    def takes_film(self, *, failed: bool) -> bool:
+        """Whether a test gets a film. Of failed tests the first `MOST_FILMS` do, and each of them takes a place."""
+        if self.films != "failed":
+            return self.films == "always"
+        return failed and (self.places is None or any(_taken(self.places / str(k)) for k in range(MOST_FILMS)))
+
+
+def _taken(place: Path) -> bool:
+    """Whether this process is the first to take a place."""
+    try:
+        place.touch(exist_ok=False)
+    except OSError:
+        return False
+    return True
+
+
+def file_name(name: str) -> str:
+    """A name that every file system takes, such as aisle-0 for aisle[0].
+
+    Different names stay different, except for aisle[0] and aisle-0; a baseline holds the name of its test, so it is not taken
+    for the other's.
+    """
+    plain = re.sub(r"\[(\d+)\]$", r"-\1", name)
+    if re.fullmatch(r"[\w.-]{1,120}", plain, re.ASCII):
+        return plain
+    short = re.sub(r"[^A-Za-z0-9_.-]+", "-", plain)[:100].strip("-")
+    return f"{short}-{zlib.crc32(name.encode()):08x}"
+
+
+def default_folder(root: Path) -> Path:
+    """The folder of a project's results in the user's cache, or among the temporary files where that cannot be written."""
+    name = f"{file_name(root.name or 'root')}-{zlib.crc32(str(root).encode()):08x}"
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path(os.path.expanduser("~")) / ".cache")
+    for folder in (cache / "antdrive" / "results", Path(tempfile.gettempdir()) / f"antdrive-results-{_user()}"):
+        try:
+            (folder / name).mkdir(parents=True, exist_ok=True)
+            tempfile.TemporaryFile(dir=folder / name).close()
+        except OSError:
+            continue
+        return folder / name
+    return Path(tempfile.mkdtemp(prefix="antdrive-results-"))
+
+
+def _user() -> str:
+    return str(os.getuid()) if hasattr(os, "getuid") else "user"
+
+
+def write_artefacts(
+    run: Run, folder: Path, baseline: Baseline | None, *, film: bool, faults: Sequence[str], commands: Sequence[str]
+) -> dict[str, str]:
+    """Write everything about a test into its folder; the files by what they are. Earlier files are removed first.
+
+    Raises:
+        InputError: the folder cannot be written to.
+    """
+    from antdrive.views.figures.plan_figures import plan_figure
+    from antdrive.views.figures.run_figures import overview
+
+    remove_artefacts(folder)
+    rollout, files = run.rollout, {}
+    if rollout is None:
+        s = run.scenario
+        files["overview"] = str(folder / "overview.png")
+        plan_figure(s.task, run.grid, run.plan, s.robot, files["overview"], mapped=not s.exploring)
+    else:
+        files["rollout"] = str(rollout.save(folder / "rollout.npz"))
+        files["overview"] = str(folder / "overview.png")
+        overview(rollout, files["overview"])
+        files |= _comparison(rollout, baseline, folder, film)
+    _write(folder / "commands.txt", "".join(f"{command}\n" for command in commands))
+    result = {**run.as_dict(), "files": files, "command": commands[0] if commands else "", "faults": list(faults)}
+    _write(folder / "result.json", json.dumps(_finite(result), indent=2, allow_nan=False) + "\n")
+    return files
+
+
+def write_traceback(folder: Path, error: BaseException, commands: Sequence[str]) -> dict[str, str]:
+    """Write where an error arose, in place of what an earlier run wrote about the test; the files by what they are.
+
+    Raises:
+        InputError: the folder cannot be written to.
+    """
+    remove_artefacts(folder)
+    _write(folder / "traceback.txt", "".join(traceback.format_exception(error)))
+    _write(folder / "commands.txt", "".join(f"{command}\n" for command in commands))
+    return {"traceback": str(folder / "traceback.txt")}
+
+
+def remove_artefacts(folder: Path) -> None:
+    """Remove what an earlier run wrote about a test; other files stay."""
+    for name in FILES:
+        with contextlib.suppress(OSError):
+            (folder / name).unlink()
+    with contextlib.suppress(OSError):  # it holds something else, or is not there
+        folder.rmdir()
+
+
+def _comparison(rollout: Rollout, baseline: Baseline | None, folder: Path, film: bool) -> dict[str, str]:
+    """The figure of then and now, and the film; without a baseline the film of now alone."""
+    driven = max(float(rollout.t[-1]), 0.0 if baseline is None else baseline.metric("duration_s"))
+    options: dict[str, Any] = {"size": FILM_SIZE, "fps": FILM_FPS, "speed": max(1.0, driven / FILM_LENGTH)}
+    if baseline is None or len(baseline.line) < 2:
+        if not film:
+            return {}
+        from antdrive.views.film.video import film as make_film
+
+        return {"film": str(make_film(rollout, folder / "film.mp4", **options).path)}
+    from antdrive.views.figures.then_and_now import then_and_now
+
+    then, found = drive_of(baseline, rollout), parting(baseline, rollout)
+    place = None if found is None else (found.t, *found.then)
+    files = {"then and now": str(folder / "then-and-now.png")}
+    then_and_now(then, rollout, files["then and now"], parted=place)
+    if film:
+        from antdrive.views.film.compare import Mark, compare_film
+
+        mark = None if found is None else Mark(found.t, *found.then, f"they part at {found.t:.1f} s")
+        info = compare_film(
+            [then, rollout], folder / "then-and-now.mp4", titles=("baseline", "now"), mark=mark, **options
+        )
+        files["film"] = str(info.path)
+    return files
+
+
+def drive_of(baseline: Baseline, now: Rollout) -> Rollout:
+    """A drive along a baseline's line, in the world of the present drive, for pictures: it has no commands and no contacts."""
+    times = baseline.times
+    samples = np.array(baseline.line, dtype=np.float64)
+    pose = np.column_stack([samples[:, :2], np.unwrap(samples[:, 2])])
+    steps = np.diff(times, prepend=times[0] - 1.0)
+    moved = np.diff(pose, axis=0, prepend=pose[:1])
+    twist = np.column_stack([np.hypot(moved[:, 0], moved[:, 1]), moved[:, 2]]) / np.maximum(steps, 1e-9)[:, None]
+    movers = now.trajectories().positions(times)
+    length = baseline.metric("path_length_m")
+    plan = dataclasses.replace(now.record.plan, length_m=length if math.isfinite(length) else 0.0)
+    record = dataclasses.replace(now.record, outcome=baseline.outcome, reason=baseline.reason, replans=(), plan=plan)
+    return dataclasses.replace(
+        now,
+        t=times,
+        pose=pose,
+        twist=twist,
+        command=twist,
+        clearance=_clearance(now, pose, movers),
+        limiter=np.minimum(samples[:, 3], len(record.limiters) - 1).astype(np.uint8),
+        movers=movers,
+        contacts=np.empty((0, 4)),
+        route=pose[:, :2],
+        estimate=np.empty((0, 3)),
+        actuated=np.empty((0, 2)),
+        record=record,
+    )
+
+
+def _clearance(now: Rollout, pose: Floats, movers: Floats) -> Floats:
+    """The distance from the robot at poses (T, 3) to the nearest obstacle, mover or wall (T,) [m]."""
+    record = now.record
+    still = dataclasses.replace(record.world, movers=())
+    least = gaps(still, record.robot, pose).min(axis=1)
+    for row in range(len(pose)) if movers.shape[1] else ():
+        discs = tuple(
+            Disc(float(x), float(y), mover.radius)
+            for (x, y), mover in zip(movers[row], record.world.movers, strict=True)
+        )
+        around = dataclasses.replace(still, obstacles=discs)
+        least[row] = min(least[row], gaps(around, record.robot, pose[row : row + 1])[0, : len(discs)].min())
+    return np.asarray(least)
+
+
+def _write(path: Path, text: str) -> None:
+    with written_whole(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def _finite(value: Any) -> Any:
+    """Plain values with null for numbers that JSON does not have."""
+    if isinstance(value, dict):
+        return {key: _finite(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(inner) for inner in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

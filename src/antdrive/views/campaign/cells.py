@@ -1,0 +1,135 @@
+"""The tables of a campaign as headings and cells of text, for terminals, Markdown, LaTeX and CSV."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from antdrive.runs.statistics.comparison import SUCCESS, PairedComparison
+from antdrive.runs.statistics.success import PlannerSuccess
+from antdrive.views.campaign.numbers import NONE, percent, percents, probability, short, with_interval
+from antdrive.views.campaign.summary import CampaignSummary, measure_title
+
+#: Headings of columns that hold words.
+WORDS = ("planner", "first", "second", "better", "lower", "against", "measure", "not worse")
+
+
+class TextTable(NamedTuple):
+    """A table of text.
+
+    Attributes:
+        title: what it shows
+        headings: of its columns
+        rows: its cells
+    """
+
+    title: str
+    headings: tuple[str, ...]
+    rows: list[tuple[str, ...]]
+
+
+def success_cells(summary: CampaignSummary) -> TextTable:
+    """How often each planner succeeds, and its medians over the instances in which all do."""
+    names = list(summary.medians)
+    elsewhere = any(row.elsewhere for row in summary.success)
+    over = any(not math.isnan(row.over_worlds.low) for row in summary.success)
+    headings = (
+        *("planner", "share [%]", "95 % interval"),
+        *(["over worlds"] if over else []),
+        *("succeeded", "counted", "runs", *(["elsewhere"] if elsewhere else [])),
+        *(f"median {measure_title(name)}" for name in names),
+    )
+    rows = []
+    for k, row in enumerate(summary.success):
+        rows.append(
+            (
+                row.planner,
+                percent(row.share),
+                percents(row.interval),
+                *([percents(row.across_worlds)] if over else []),
+                *(str(row.successes), str(row.counted), str(row.runs)),
+                *([str(row.elsewhere)] if elsewhere else []),
+                *(with_interval(*summary.medians[name][k]) for name in names),
+            )
+        )
+    return TextTable("Success by planner", headings, rows)
+
+
+def pair_cells(measure: str, comparisons: Sequence[PairedComparison]) -> TextTable:
+    """The comparison of each pair of planners by one measure."""
+    over = any(not math.isnan(row.p_worlds) for row in comparisons)
+    unpaired = any(row.unpaired for row in comparisons)
+    success = measure == SUCCESS
+    directed = not any(row.direction == "neither" for row in comparisons)
+    headings = (
+        *("first", "second", "better" if directed else "lower"),
+        *("difference" + (" [%]" if success else ""), "95 % interval", "p (Holm)"),
+        *(["p worlds (Holm)"] if over else []),
+        *("effect", "pairs", *(("wins", "losses") if directed else ("less", "more")), "ties"),
+        *([] if success else ["dropped"]),
+        *(["unpaired"] if unpaired else []),
+    )
+    title = "Success of pairs" if success else measure_title(measure)
+    return TextTable(title, headings, [_pair_row(row, success, over, unpaired) for row in comparisons])
+
+
+def _pair_row(row: PairedComparison, success: bool, over: bool, unpaired: bool) -> tuple[str, ...]:
+    def shown(value: float) -> str:
+        return percent(value) if success else short(value)
+
+    return (
+        row.first,
+        row.second,
+        row.decided or NONE,
+        shown(row.difference),
+        NONE if math.isnan(row.interval.low) else f"{shown(row.interval.low)} to {shown(row.interval.high)}",
+        probability(row.p_holm),
+        *([probability(row.p_worlds_holm)] if over else []),
+        NONE if not row.pairs else f"{row.effect + 0.0:.2f}",
+        *(str(row.pairs), str(row.first_wins), str(row.second_wins), str(row.ties)),
+        *([] if success else [str(row.dropped)]),
+        *([str(row.unpaired)] if unpaired else []),
+    )
+
+
+def outcome_cells(summary: CampaignSummary) -> TextTable:
+    """How the runs of each planner ended: the most frequent outcome first."""
+    total = Counter[str]()
+    for row in summary.success:
+        total.update(row.outcomes)
+    names = [name for name, _ in sorted(total.items(), key=lambda item: (-item[1], item[0]))]
+    rows = [
+        (row.planner, *(str(row.outcomes.get(name, 0)) for name in names), str(row.runs)) for row in summary.success
+    ]
+    return TextTable("Outcomes", ("planner", *(name.replace("_", " ") for name in names), "runs"), rows)
+
+
+def all_cells(summary: CampaignSummary) -> list[TextTable]:
+    """Every table of a campaign."""
+    pairs = (pair_cells(name, rows) for name, rows in summary.comparisons.items())
+    allowed = [allowance_cells(summary)] if summary.allowances else []
+    return [success_cells(summary), outcome_cells(summary), *pairs, *allowed]
+
+
+def allowance_cells(summary: CampaignSummary) -> TextTable:
+    """Which planners are not worse than another by more than was allowed."""
+    headings = ("planner", "against", "measure", "not worse", "allowed", "advantage", "95 % of all", "worlds", "needed")
+    rows: list[tuple[str, ...]] = []
+    for row in summary.allowances:
+        shown = percent if row.measure == SUCCESS else short
+        title = "success [%]" if row.measure == SUCCESS else measure_title(row.measure)
+        verdict = "yes" if row.not_worse else NONE
+        ends = f"{shown(row.interval.low)} to {shown(row.interval.high)}"
+        counts = (str(row.worlds), str(row.needed))
+        rows.append(
+            (row.planner, row.reference, title, verdict, shown(row.allowed), shown(row.advantage), ends, *counts)
+        )
+    return TextTable("Not worse by more than allowed", headings, rows)
+
+
+def success_note(row: PlannerSuccess) -> str:
+    """The outcomes of a planner's runs, in words, the most frequent first."""
+    found = sorted(row.outcomes.items(), key=lambda item: (-item[1], item[0]))
+    return ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in found)

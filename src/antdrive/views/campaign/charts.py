@@ -1,0 +1,319 @@
+"""The charts of a campaign's page, as SVG whose colours follow the page: profiles, distributions and boxes."""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+from collections.abc import Sequence
+from typing import Any, NamedTuple, TypeAlias
+
+import matplotlib
+import numpy as np
+import numpy.typing as npt
+from matplotlib.cbook import boxplot_stats
+from matplotlib.figure import Figure
+
+from antdrive.runs.statistics.pairing import PairedRuns
+from antdrive.runs.statistics.profiles import StepCurve, distributions, performance_profiles
+from antdrive.views.campaign.colours import LabelStyle
+from antdrive.views.campaign.summary import CampaignSummary, known_metrics, measure_title
+from antdrive.views.figures.canvas import new_figure, styled
+from antdrive.views.style import INK, MUTED, hexed
+
+Floats: TypeAlias = npt.NDArray[np.float64]
+
+WORST = 10_000.0  # times the best value: the right end of a profile
+WIDTH, HEIGHT = 4.7, 3.1  # of a chart [inches]
+FEWEST = 3  # values that a box is drawn for
+MOST_PANELS = 24  # planners that boxes are drawn for
+MOST_DOTS = 60  # beyond the whiskers of a box
+BINS = 4  # groups of world sizes
+CURVE_POINTS = 400  # of a curve, at most
+PROFILED = ("driven_length_m", "plan_s")
+DISTRIBUTED = ("duration_s", "plan_s")
+BOXED = ("plan_s", "gap_to_grid_optimum")
+AREA, OPTIMUM = "area_m2", "grid_optimum_m"  # columns that tell a world's size; the second where areas do not differ
+#: Colours of the canvas's style, and the page's own by which they are replaced.
+PAGE_COLOURS = {hexed(INK): "--ink", hexed(MUTED): "--muted", "#aab2bf": "--axis", "#e6e9ee": "--line"}
+
+
+class Chart(NamedTuple):
+    """A chart of the page.
+
+    Attributes:
+        title: its heading
+        note: what it shows, in a sentence
+        svg: the picture
+    """
+
+    title: str
+    note: str
+    svg: str
+
+
+def campaign_charts(summary: CampaignSummary, styles: Sequence[LabelStyle]) -> list[Chart]:
+    """Every chart that the campaign has data for."""
+    paired = summary.paired
+    whole = paired.counted(*range(len(paired.planners)))
+    charts = []
+    if whole.any() and len(paired.planners) > 1:
+        for name in known_metrics(paired, PROFILED):
+            values = paired.values(name)[whole]
+            if np.nanmin(values, initial=0.0) >= 0:
+                charts.append(_profile(name, performance_profiles(values), int(whole.sum()), styles))
+    if whole.any():
+        for name in known_metrics(paired, DISTRIBUTED):
+            charts.append(_distribution(name, distributions(paired.values(name)[whole]), int(whole.sum()), styles))
+    common = np.asarray(paired.success.all(axis=1)) & whole
+    if common.any():
+        charts += [
+            chart for name in known_metrics(paired, BOXED) for chart in _size_boxes(paired, name, common, styles)
+        ]
+    return charts + _option_boxes(paired, styles)
+
+
+def _profile(name: str, curves: Sequence[StepCurve], count: int, styles: Sequence[LabelStyle]) -> Chart:
+    def draw(axes: Any) -> None:
+        largest = max((float(curve.x[-1]) for curve in curves if len(curve.x)), default=1.0)
+        top = min(max(largest * 1.05, 1.1), WORST)
+        _steps(axes, curves, styles, 1.0, top, log=top > 4)
+        axes.set(xlabel=f"{_plain(name)}: times the best planner's", ylabel="share of instances")
+
+    note = (
+        f"The share of {count} instances (world, task, settings, seed; repetitions once) that a planner solves at no more "
+        "than x times the least value that any planner reached there. Failures stay below. Higher is better."
+    )
+    return Chart(f"Performance profile: {_plain(name)}", note, _drawn(draw, styles))
+
+
+def _distribution(name: str, curves: Sequence[StepCurve], count: int, styles: Sequence[LabelStyle]) -> Chart:
+    def draw(axes: Any) -> None:
+        found = np.concatenate([curve.x for curve in curves])
+        low, high = float(found.min()), float(found.max())
+        log = low > 0 and high > 20 * low
+        _steps(axes, curves, styles, low / 1.1 if log else 0.0, high * 1.05, log=log)
+        axes.set(xlabel=measure_title(name), ylabel="share of instances")
+
+    note = f"The share of {count} instances that a planner solves with at most x. Failures are never solved."
+    return Chart(f"Distribution: {_plain(name)}", note, _drawn(draw, styles))
+
+
+def _steps(
+    axes: Any, curves: Sequence[StepCurve], styles: Sequence[LabelStyle], low: float, high: float, *, log: bool
+) -> None:
+    for k, (curve, style) in enumerate(zip(curves, styles, strict=True)):
+        inside = curve.x <= high
+        x, share = _thinned(curve.x[inside], curve.share[inside], low, high, log)
+        x = np.concatenate([[low], x, [high]])
+        share = np.concatenate([[0.0], share, share[-1:] if len(share) else [0.0]])
+        (line,) = axes.step(x, share, where="post", color=style.light, ls=style.dash, lw=1.6)
+        line.set_gid(f"planner-{k}")
+    if log:
+        axes.set_xscale("log")
+        _plain_ticks(axes.xaxis, low, high)
+    axes.set(xlim=(low, high), ylim=(-0.02, 1.02))
+
+
+def _thinned(x: Floats, share: Floats, low: float, high: float, log: bool) -> tuple[Floats, Floats]:
+    """A curve with at most `CURVE_POINTS` steps: the last of those that would share a pixel."""
+    if len(x) <= CURVE_POINTS:
+        return x, share
+    place = (np.log(x / low) / np.log(high / low)) if log else (x - low) / (high - low)
+    pixel = np.floor(CURVE_POINTS * place)
+    last = np.append(np.diff(pixel) > 0, True)
+    return x[last], share[last]
+
+
+def _size_boxes(
+    paired: PairedRuns, name: str, common: npt.NDArray[np.bool_], styles: Sequence[LabelStyle]
+) -> list[Chart]:
+    """Boxes over groups of worlds of like size, a panel for each planner, on instances that all planners solved."""
+    for column in (AREA, OPTIMUM):
+        known = np.nan_to_num(paired.table.numbers(column), nan=-np.inf)
+        sizes = np.where(paired.row >= 0, known[paired.row], -np.inf).max(axis=1)
+        edges = _edges(sizes[common & np.isfinite(sizes)])
+        if len(edges) > 2:
+            break
+    else:
+        return []
+    common = common & np.isfinite(sizes)
+    group = np.clip(np.searchsorted(edges, sizes, side="right") - 1, 0, len(edges) - 2)
+    values = paired.values(name)
+    groups = [[values[common & (group == g), k] for g in range(len(edges) - 1)] for k in range(len(paired.planners))]
+    exact = edges[-1] == edges[-2]
+    labels = [_round(edge) for edge in edges[:-1]] if exact else [f"≤{_round(edge)}" for edge in edges[1:]]
+    counts = ", ".join(str(int((common & (group == g)).sum())) for g in range(len(labels)))
+    size = "area of the world [m²]" if column == AREA else "shortest path on the grid [m]"
+    note = (
+        f"{measure_title(name)} by {size}, on the {int(common.sum())} instances that every planner solved ({counts} "
+        "from left to right). Box: quartiles and median; whiskers: within 1.5 times the box; dots: beyond."
+    )
+    svg = _panels(groups, labels, list(paired.planners), styles, name, size)
+    return [Chart(f"By size of the world: {_plain(name)}", note, svg)]
+
+
+def _edges(sizes: Floats) -> Floats:
+    """Edges of up to `BINS` groups of like number, the last beyond the largest size."""
+    distinct = np.unique(sizes)
+    if len(distinct) < 2:
+        return distinct
+    if len(distinct) <= BINS:
+        return np.append(distinct, distinct[-1])  # a group for each size
+    inner = np.unique(np.quantile(sizes, np.linspace(0, 1, BINS + 1)))
+    return np.asarray(inner)
+
+
+def _option_boxes(paired: PairedRuns, styles: Sequence[LabelStyle]) -> list[Chart]:
+    """Boxes over the values of each option that a planner has several of, on instances that all of them solved."""
+    table, charts = paired.table, []
+    first = paired.row.max(axis=0)  # some row of each planner
+    names = np.array(table.texts("planner_name"), dtype=object)[first]
+    for column in sorted(name for name in table.columns if name.startswith("option.")):
+        texts = np.array(table.texts(column), dtype=object)[first]
+        for planner in dict.fromkeys(names):
+            mine = [k for k in range(len(names)) if names[k] == planner and texts[k]]
+            others = {_other_options(table, int(first[k]), column) for k in mine}
+            if len({texts[k] for k in mine}) > 1 and len(others) == 1:  # it alone differs
+                mine.sort(key=lambda k: _natural(texts[k]))
+                charts += _boxes_of_option(paired, planner, column, mine, [texts[k] for k in mine], styles)
+    return charts
+
+
+def _boxes_of_option(
+    paired: PairedRuns, planner: str, column: str, mine: list[int], values: list[str], styles: Sequence[LabelStyle]
+) -> list[Chart]:
+    option = column.removeprefix("option.")
+    common = paired.success[:, mine].all(axis=1) & paired.counted(*mine)
+    charts = []
+    for name in known_metrics(paired, BOXED):
+        found = [paired.values(name)[common, k] for k in mine]
+        if common.sum() < FEWEST:
+            continue
+
+        def draw(axes: Any, name: str = name, found: list[Floats] = found) -> None:
+            _draw_boxes(axes, found, [styles[k].light for k in mine])
+            axes.set(xlabel=option, ylabel=measure_title(name))
+            axes.set_xticks(range(1, len(values) + 1), values)
+            _value_scale(axes, np.concatenate(found))
+
+        note = f"{measure_title(name)} of {planner} on the {int(common.sum())} instances solved with every {option}."
+        charts.append(Chart(f"{planner} by {option}: {_plain(name)}", note, _drawn(draw, styles)))
+    return charts
+
+
+def _other_options(table: Any, row: int, column: str) -> tuple[str, ...]:
+    names = sorted(name for name in table.columns if name.startswith("option.") and name != column)
+    return tuple(table.texts(name)[row] for name in names)
+
+
+def _panels(
+    groups: list[list[Floats]],
+    labels: list[str],
+    planners: list[str],
+    styles: Sequence[LabelStyle],
+    name: str,
+    size: str,
+) -> str:
+    """A small chart of boxes for each planner, all with the same axes."""
+    shown = min(len(planners), MOST_PANELS)
+    columns = min(3, shown)
+    rows = math.ceil(shown / columns)
+    with styled(), matplotlib.rc_context({"svg.fonttype": "none", "font.size": 7.5}):
+        figure = new_figure(WIDTH, 0.6 + 1.15 * rows)
+        figure.set_facecolor("none")
+        grid: Any = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+        for k, axes in enumerate(grid.flat):
+            axes.set_facecolor("none")
+            if k >= shown:
+                axes.set_visible(False)
+                continue
+            _draw_boxes(axes, groups[k], [styles[k].light] * len(labels))
+            axes.set_title(planners[k], fontsize=7.5, weight="normal", color=styles[k].light)
+        found = np.concatenate([np.concatenate(group) for group in groups[:shown]])
+        _value_scale(grid.flat[0], found, steps=(1, 3))
+        for k, axes in enumerate(grid.flat[:shown]):
+            axes.set_xticks(range(1, len(labels) + 1), labels)
+            axes.tick_params(axis="x", labelsize=6, labelbottom=k + columns >= shown)
+        figure.supxlabel(size, fontsize=8)
+        figure.supylabel(measure_title(name), fontsize=8)
+        return _svg(figure, styles)
+
+
+def _draw_boxes(axes: Any, groups: Sequence[Floats], colours: Sequence[str]) -> None:
+    for place, (values, colour) in enumerate(zip(groups, colours, strict=True), start=1):
+        if len(values) < FEWEST:
+            axes.plot(np.full(len(values), place), values, "o", ms=3, color=colour)
+            continue
+        facts = boxplot_stats(values)[0]
+        far = np.sort(facts["fliers"])
+        facts["fliers"] = far[np.unique(np.linspace(0, len(far) - 1, MOST_DOTS).astype(int))] if len(far) else far
+        line = {"color": colour, "lw": 1.2}
+        dots = {"marker": "o", "ms": 1.8, "mec": "none", "mfc": colour, "alpha": 0.6}
+        axes.bxp(
+            [facts], positions=[place], widths=0.55, manage_ticks=False, boxprops=line, whiskerprops=line,
+            capprops=line, medianprops={"color": colour, "lw": 2.4}, flierprops=dots,
+        )  # fmt: skip
+    axes.set_xlim(0.4, len(groups) + 0.6)
+
+
+def _value_scale(axes: Any, values: Floats, steps: tuple[float, ...] = ()) -> None:
+    """A logarithmic axis where the values span more than a factor of 20; `steps`: ticks of a decade."""
+    low, high = float(values.min()), float(values.max())
+    if low > 0 and high > 20 * low:
+        axes.set_yscale("log")
+        _plain_ticks(axes.yaxis, low, high, steps)
+
+
+def _plain_ticks(axis: Any, low: float, high: float, steps: tuple[float, ...] = ()) -> None:
+    """Ticks of a logarithmic axis as plain numbers."""
+    from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
+
+    decades = math.log10(high / low)
+    steps = steps or ((1,) if decades > 4 else (1, 3) if decades > 1.5 else (1, 1.5, 2, 3, 5, 7))
+    powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    ticks = [step * 10.0**power for power in powers for step in steps]
+    axis.set_major_locator(FixedLocator([tick for tick in ticks if low * 0.999 <= tick <= high * 1.001]))
+    axis.set_major_formatter(FuncFormatter(lambda tick, _: f"{tick:.6g}"))
+    axis.set_minor_locator(NullLocator())
+    axis.set_minor_formatter(NullFormatter())
+
+
+def _drawn(draw: Any, styles: Sequence[LabelStyle]) -> str:
+    with styled(), matplotlib.rc_context({"svg.fonttype": "none"}):
+        figure = new_figure(WIDTH, HEIGHT)
+        figure.set_facecolor("none")
+        axes: Any = figure.add_subplot()
+        axes.set_facecolor("none")
+        draw(axes)
+        return _svg(figure, styles)
+
+
+def _svg(figure: Figure, styles: Sequence[LabelStyle]) -> str:
+    """A figure as an SVG element without a size of its own; its colours are variables of the page."""
+    content = io.StringIO()
+    figure.savefig(content, format="svg", metadata={"Date": None, "Creator": None}, transparent=True)
+    text = content.getvalue()
+    text = text[text.index("<svg") :]
+    text = re.sub(r' (?:width|height)="[\d.]+pt"', "", text, count=2)
+    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+    text = re.sub(r' id="planner-(\d+)"', r' class="planner-\1"', text)
+    text = re.sub(r' id="\w+_\d+"', "", text)  # would be there once for each chart
+    colours = {style.light: f"--planner-{k}" for k, style in enumerate(styles)} | PAGE_COLOURS
+    return re.sub("#[0-9a-f]{6}", lambda found: f"var({colours[found[0]]})" if found[0] in colours else found[0], text)
+
+
+def _plain(name: str) -> str:
+    return measure_title(name).partition(" [")[0]
+
+
+def _round(value: float) -> str:
+    return f"{value:.3g}"
+
+
+def _natural(text: str) -> tuple[int, float, str]:
+    """A key that sorts numbers by value and before other texts."""
+    try:
+        return 0, float(text), text
+    except ValueError:
+        return 1, 0.0, text

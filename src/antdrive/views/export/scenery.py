@@ -1,0 +1,259 @@
+"""The topics that have few messages: the map, routes, what stands around, the robot's shape, and what happened."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from antdrive.base.plane import in_map
+from antdrive.sim.log.rollout import Rollout
+from antdrive.views.export.description import description, wheel_places
+from antdrive.views.export.frames import BASE, IDENTITY, LIDAR, MAP, ODOM, ROBOT_MAP, mover_frame
+from antdrive.views.export.ground import GroundGrid, known_ground, planned_ground
+from antdrive.views.export.libraries import message_types
+from antdrive.views.export.topics import Floats, Topic, nanoseconds
+from antdrive.views.scene import Scene, contact_point
+
+CUBE, SPHERE, CYLINDER, LINE_STRIP = 1, 2, 3, 4  # kinds of markers
+KNOWN, UNSEEN, MOVING, TOUCHED = (
+    (0.45, 0.47, 0.52, 1.0),
+    (0.85, 0.2, 0.2, 1.0),
+    (0.95, 0.6, 0.1, 1.0),
+    (0.9, 0.0, 0.5, 1.0),
+)
+GOAL, WALL = (0.2, 0.7, 0.3, 0.4), (0.3, 0.32, 0.36, 1.0)
+FLAT, LINE, SPOT = 0.01, 0.05, 0.1  # height of the goal, width of a line, size of a contact [m]
+
+
+def scenery(rollout: Rollout) -> tuple[Topic, list[Topic]]:
+    """The fixed transforms as sent at the first row, for the topic /tf too; and the other topics with few messages."""
+    start = float(rollout.t[0])
+    static = _message("/tf_static", "tf2_msgs/msg/TFMessage", [start], [_static(rollout)], latched=True)
+    latched: dict[str, tuple[str, Any]] = {
+        "/robot_description": ("std_msgs/msg/String", _text(description(rollout.record.robot))),
+        "/obstacles": ("visualization_msgs/msg/MarkerArray", _markers(_standing(rollout))),
+    }
+    if rollout.movers.shape[1]:
+        latched["/movers"] = "visualization_msgs/msg/MarkerArray", _markers(_moving(rollout))
+    topics = [_message(name, kind, [start], [content], latched=True) for name, (kind, content) in latched.items()]
+    once = [*_maps(rollout), *topics, _routes(rollout)]
+    return static, [*once, *_contacts(rollout), _limiters(rollout), _events(rollout)]
+
+
+def _message(name: str, kind: str, times: Sequence[float], contents: Iterable[Any], latched: bool = False) -> Topic:
+    types = message_types()
+    payloads = [types.serialize_cdr(content, kind) for content in contents]
+    return Topic(name, kind, nanoseconds(times), payloads, latched)
+
+
+def _static(rollout: Rollout) -> Any:
+    """The transforms that never change."""
+    robot, start = rollout.record.robot, float(rollout.t[0])
+    x, y, yaw = rollout.record.task.frame
+    placed = [(MAP, ODOM, (x, y, 0.0), yaw)]
+    placed += [(BASE, link, place, 0.0) for link, place in wheel_places(robot).items()]
+    lidar = robot.lidar
+    if lidar is not None:
+        placed.append((BASE, LIDAR, (lidar.x, lidar.y, lidar.height), lidar.yaw))
+    return _of(
+        "tf2_msgs/msg/TFMessage",
+        transforms=[
+            _of(
+                "geometry_msgs/msg/TransformStamped",
+                header=_header(parent, start),
+                child_frame_id=child,
+                transform=_of(
+                    "geometry_msgs/msg/Transform",
+                    translation=_of("geometry_msgs/msg/Vector3", x=at[0], y=at[1], z=at[2]),
+                    rotation=_turn(heading),
+                ),
+            )
+            for parent, child, at, heading in placed
+        ],
+    )
+
+
+def _maps(rollout: Rollout) -> list[Topic]:
+    """The planner's grid, once; of a robot without a map what it had seen, as that grew."""
+    if not rollout.record.exploring:
+        frame, found = MAP, [planned_ground(rollout)]
+    else:
+        frame, found = ROBOT_MAP, list(known_ground(rollout)) if len(rollout.scans) else []
+    kind, times = "nav_msgs/msg/OccupancyGrid", [ground.at for ground in found]
+    return [_message("/map", kind, times, [_grid(ground, frame) for ground in found], latched=True)] if found else []
+
+
+def _grid(ground: GroundGrid, frame: str) -> Any:
+    rows, columns = ground.cells.shape
+    info = _of(
+        "nav_msgs/msg/MapMetaData",
+        map_load_time=_time(ground.at),
+        resolution=ground.cell,
+        width=columns,
+        height=rows,
+        origin=_pose(ground.origin),
+    )
+    return _of("nav_msgs/msg/OccupancyGrid", header=_header(frame, ground.at), info=info, data=ground.cells.reshape(-1))
+
+
+def _routes(rollout: Rollout) -> Topic:
+    """Each route when the robot began to follow it, its points with the heading towards the next one."""
+    record = rollout.record
+    # A robot without a map plans where it believes to be.
+    frame, lies = (ROBOT_MAP, IDENTITY) if record.exploring else (MAP, record.task.frame)
+    times, contents = [], []
+    for rows, route in rollout.legs():
+        at = float(rollout.t[min(rows.start or 0, len(rollout.t) - 1)])
+        points = in_map(lies, route)
+        steps = np.diff(points, axis=0, append=points[-1:])
+        headings = np.arctan2(steps[:, 1], steps[:, 0])
+        headings[-1] = headings[-2] if len(headings) > 1 else 0.0
+        poses = [
+            _of("geometry_msgs/msg/PoseStamped", header=_header(frame, at), pose=_pose(pose))
+            for pose in np.column_stack([points, headings]).tolist()
+        ]
+        times.append(at)
+        contents.append(_of("nav_msgs/msg/Path", header=_header(frame, at), poses=poses))
+    return _message("/plan", "nav_msgs/msg/Path", times, contents, latched=True)
+
+
+def _standing(rollout: Rollout) -> list[Any]:
+    """Markers for the cylinders, the walls and the goal."""
+    scene, frame, at = Scene.of(rollout), rollout.record.task.frame, float(rollout.t[0])
+    centres = in_map(frame, scene.obstacles[:, :2]).tolist()
+    markers = [
+        _marker(at, MAP, "unseen" if unseen else "cylinders", i, CYLINDER, UNSEEN if unseen else KNOWN, (x, y), size)
+        for i, ((x, y), size, unseen) in enumerate(
+            zip(centres, _sizes(scene.obstacles[:, 2:]), scene.unseen.tolist(), strict=True)
+        )
+    ]
+    goal = in_map(frame, [scene.goal])[0].tolist()
+    width = 2 * scene.goal_tolerance
+    markers.append(_marker(at, MAP, "goal", 0, CYLINDER, GOAL, goal, (width, width, FLAT)))
+    x0, y0, x1, y1 = scene.bounds
+    corners = in_map(frame, [(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)]).tolist()
+    walls = _marker(at, MAP, "walls", 0, LINE_STRIP, WALL, (0.0, 0.0), (LINE, 0.0, 0.0))
+    walls.points = [_point(x, y) for x, y in corners]
+    walls.pose.position.z = 0.0
+    return [*markers, walls]
+
+
+def _moving(rollout: Rollout) -> list[Any]:
+    """Markers for the movers, each in its own frame, which moves."""
+    at, markers = float(rollout.t[0]), []
+    for i, mover in enumerate(rollout.record.world.movers):
+        size = (2 * mover.radius, 2 * mover.radius, mover.height)
+        markers.append(_marker(at, mover_frame(i), "movers", i, CYLINDER, MOVING, (0.0, 0.0), size))
+        markers[-1].frame_locked = True
+    return markers
+
+
+def _contacts(rollout: Rollout) -> list[Topic]:
+    """Markers where the robot touched something, with each row's contacts; nothing without a contact."""
+    scene, times, contents = Scene.of(rollout), [], []
+    for row in np.unique(rollout.contacts[:, 0]).astype(int).tolist():
+        things = rollout.contacts[rollout.contacts[:, 0] == row, 1].astype(int)
+        points = [contact_point(scene, rollout.pose[row], thing, rollout.movers[row]) for thing in np.unique(things)]
+        at = float(rollout.t[row])
+        places: Floats = in_map(rollout.record.task.frame, points)
+        markers = [
+            _marker(at, MAP, "contacts", i, SPHERE, TOUCHED, place, (SPOT, SPOT, SPOT))
+            for i, place in enumerate(places.tolist())
+        ]
+        times.append(at)
+        contents.append(_markers(markers))
+    return [_message("/contacts", "visualization_msgs/msg/MarkerArray", times, contents)] if times else []
+
+
+def _limiters(rollout: Rollout) -> Topic:
+    """The name of the rule that limits the speed, whenever it is another one."""
+    rows = np.flatnonzero(np.diff(rollout.limiter, prepend=-1.0)).tolist()
+    names = [_text(rollout.record.limiters[rollout.limiter[row]]) for row in rows]
+    return _message("/limiter_name", "std_msgs/msg/String", [float(rollout.t[row]) for row in rows], names)
+
+
+def _events(rollout: Rollout) -> Topic:
+    """Replans, and at last how the drive ended, in words."""
+    record = rollout.record
+    said = [(r.t, f"replan: {r.trigger}: {'new route' if r.solved else 'no route found'}") for r in record.replans]
+    why = f": {record.reason}" if record.reason else ""
+    said.append((float(rollout.t[-1]), f"{record.outcome.key}: {record.outcome.value}{why}"))
+    return _message("/events", "std_msgs/msg/String", [t for t, _ in said], [_text(text) for _, text in said])
+
+
+def _marker(
+    at: float,
+    frame: str,
+    group: str,
+    number: int,
+    kind: int,
+    colour: tuple[float, float, float, float],
+    place: Sequence[float],
+    size: Sequence[float],
+) -> Any:
+    r, g, b, a = colour
+    pose = _pose((place[0], place[1], 0.0))
+    pose.position.z = size[2] / 2
+    return _of(
+        "visualization_msgs/msg/Marker",
+        header=_header(frame, at),
+        ns=group,
+        id=number,
+        type=kind,
+        action=0,
+        pose=pose,
+        scale=_of("geometry_msgs/msg/Vector3", x=size[0], y=size[1], z=size[2]),
+        color=_of("std_msgs/msg/ColorRGBA", r=r, g=g, b=b, a=a),
+        lifetime=_of("builtin_interfaces/msg/Duration", sec=0, nanosec=0),
+        frame_locked=False,
+        points=[],
+        colors=[],
+        texture_resource="",
+        texture=_of(
+            "sensor_msgs/msg/CompressedImage", header=_header("", 0.0), format="", data=np.empty(0, dtype=np.uint8)
+        ),
+        uv_coordinates=[],
+        text="",
+        mesh_resource="",
+        mesh_file=_of("visualization_msgs/msg/MeshFile", filename="", data=np.empty(0, dtype=np.uint8)),
+        mesh_use_embedded_materials=False,
+    )
+
+
+def _markers(markers: list[Any]) -> Any:
+    return _of("visualization_msgs/msg/MarkerArray", markers=markers)
+
+
+def _sizes(radii_and_heights: Floats) -> list[tuple[float, float, float]]:
+    return [(2 * radius, 2 * radius, height) for radius, height in radii_and_heights.tolist()]
+
+
+def _of(kind: str, **values: Any) -> Any:
+    return message_types().types[kind](**values)
+
+
+def _text(content: str) -> Any:
+    return _of("std_msgs/msg/String", data=content)
+
+
+def _time(at: float) -> Any:
+    seconds, rest = divmod(int(nanoseconds(at)[0]), 10**9)
+    return _of("builtin_interfaces/msg/Time", sec=seconds, nanosec=rest)
+
+
+def _header(frame: str, at: float) -> Any:
+    return _of("std_msgs/msg/Header", stamp=_time(at), frame_id=frame)
+
+
+def _point(x: float, y: float) -> Any:
+    return _of("geometry_msgs/msg/Point", x=x, y=y, z=0.0)
+
+
+def _pose(pose: Sequence[float]) -> Any:
+    return _of("geometry_msgs/msg/Pose", position=_point(pose[0], pose[1]), orientation=_turn(pose[2]))
+
+
+def _turn(yaw: float) -> Any:
+    return _of("geometry_msgs/msg/Quaternion", x=0.0, y=0.0, z=float(np.sin(yaw / 2)), w=float(np.cos(yaw / 2)))

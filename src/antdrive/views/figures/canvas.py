@@ -1,0 +1,145 @@
+"""The canvas of all figures: one look, no screen needed, and the same file, byte for byte, for the same data.
+
+A file's suffix chooses PNG, PDF or SVG. No dates or versions are written into files.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from antdrive.base.atomic import written_whole
+from antdrive.base.errors import InputError
+from antdrive.base.types import Bounds
+from antdrive.views.scene import Scene
+from antdrive.views.style import INK, MUTED, hexed
+
+SUFFIXES = (".png", ".pdf", ".svg")
+
+_STYLE: Any = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9.0,
+    "axes.edgecolor": "#aab2bf",
+    "axes.labelcolor": hexed(INK),
+    "axes.titlesize": 10.0,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#e6e9ee",
+    "grid.linewidth": 0.7,
+    "axes.axisbelow": True,
+    "xtick.color": hexed(MUTED),
+    "ytick.color": hexed(MUTED),
+    "text.color": hexed(INK),
+    "legend.frameon": False,
+    "legend.fontsize": 8.0,
+    "svg.hashsalt": "antdrive",
+    "pdf.compression": 6,
+}
+
+
+def styled() -> Any:
+    """A context in which figures have the common look; matplotlib's settings outside it stay as they are."""
+    return matplotlib.rc_context(_STYLE)
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure of a width and height [inches]; it needs no screen."""
+    figure = Figure(figsize=(width, height), layout="constrained", facecolor="white")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def map_size(scene: Scene, shown: Bounds | None = None) -> tuple[float, float]:
+    """The width and height of a scene's map in a figure [inches]."""
+    x0, y0, x1, y1 = shown or scene.bounds
+    shape = (y1 - y0) / (x1 - x0)
+    high = float(np.clip(5.6 * shape, 3.9, 6.4))
+    return float(np.clip(high / shape, 3.2, 7.0)), high
+
+
+def frame_map(axes: Any, shown: Bounds) -> None:
+    """Show a part of the plane, with some room around it."""
+    x0, y0, x1, y1 = shown
+    room = 0.02 * max(x1 - x0, y1 - y0)
+    axes.set(xlim=(x0 - room, x1 + room), ylim=(y0 - room, y1 + room))
+
+
+def checked(path: str | Path | None) -> Path | None:
+    """The path of a figure, checked before any work; None stays None.
+
+    Raises:
+        InputError: a suffix that is none of .png, .pdf, .svg.
+    """
+    if path is None:
+        return None
+    target = Path(path)
+    if target.suffix.lower() not in SUFFIXES:
+        raise InputError(f"{target}: unknown suffix {target.suffix!r}; choose one of {', '.join(SUFFIXES)}")
+    return target
+
+
+def write_figure(figure: Figure, target: Path, dpi: float) -> Path:
+    """Write a figure in the format of its suffix, whole or not at all; returns its path."""
+    kind = target.suffix.lower()[1:]
+    # Without these entries, matplotlib writes its version or the date.
+    empty: dict[str, Any] = {
+        "png": {"Software": None},
+        "pdf": {"CreationDate": None, "Producer": None, "Creator": None},
+        "svg": {"Date": None, "Creator": None},
+    }[kind]
+    with written_whole(target) as temporary:
+        figure.savefig(temporary, format=kind, dpi=dpi, metadata=empty)
+    return target
+
+
+def finished(figure: Figure, target: Path | None, dpi: float) -> Figure:
+    """A figure as functions return it, written if there is a target."""
+    figure.set_dpi(dpi)
+    if target is not None:
+        write_figure(figure, target, dpi)
+    return figure
+
+
+def save_figure(figure: Figure, path: str | Path, *, dpi: float | None = None) -> Path:
+    """Write a figure after it was labelled or changed: the same file, byte for byte, for the same figure.
+
+    Args:
+        figure: what a figure function returned
+        path: the file to write; its suffix chooses PNG, PDF or SVG
+        dpi: pixels per inch; None: what the figure was drawn for
+
+    Returns:
+        The file's path.
+
+    Raises:
+        InputError: a suffix that is none of .png, .pdf, .svg.
+    """
+    target = checked(path)
+    assert target is not None
+    with styled():
+        return write_figure(figure, target, figure.dpi if dpi is None else dpi)
+
+
+def panels(figure: Figure) -> dict[str, Axes]:
+    """The axes of a figure by name, such as `map` and `clearance`; colour bars have none and are left out.
+
+    Args:
+        figure: what a figure function returned
+    """
+    return {str(axes.get_label()): axes for axes in figure.axes if axes.get_label() in PANELS}
+
+
+#: The names that the axes of figures have.
+PANELS = (
+    *("map", "clearance", "speed", "limiters", "distance", "readings"),
+    *("known ground", "first sights", "history", "field", "lengths", "with elitism", "without elitism"),
+)

@@ -1,0 +1,209 @@
+"""Figures of a plan: its path on the map, the planner's field, and path lengths by iteration."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import textwrap
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.figure import Figure
+
+from antdrive.views.figures.canvas import checked, finished, frame_map, map_size, new_figure, styled
+from antdrive.views.figures.curves import draw_history
+from antdrive.views.figures.map_chart import FIELD, draw_field, draw_legend, draw_map
+from antdrive.views.figures.paper_figures import history_figure
+from antdrive.views.scene import Scene
+from antdrive.views.style import BAD, MUTED, ROUTE, SHELL, hexed
+
+if TYPE_CHECKING:
+    from antdrive.planners.plan import PlanResult
+    from antdrive.robots.spec import RobotSpec
+    from antdrive.worlds.grid import Grid
+    from antdrive.worlds.world import Task
+
+Floats = npt.NDArray[np.float64]
+
+#: The stems of the files that `plan_figures` writes, by the name of the figure.
+FILES = {"plan": "plan", "tour": "tour", "history": "history", "bars": "field-bars", "contours": "field-contours"}
+#: Bars per side. In a larger field each bar stands for several cells and is as high as the highest of them.
+MAX_BARS = 40
+#: Letters of a reason per inch, and the height of its lines [inches].
+LETTERS, LINE = 13.0, 0.165
+#: What is said of a plan that was made without a map.
+FIRST = "First plan of a robot without a map, from its first scan: what it has not seen counts as free."
+
+
+def plan_figure(
+    task: Task,
+    grid: Grid,
+    plan: PlanResult,
+    robot: RobotSpec,
+    path: str | Path | None = None,
+    *,
+    mapped: bool = True,
+    dpi: float = 160,
+) -> Figure:
+    """Draw a plan on the map, over the planner's field; an iterative planner gets path lengths by iteration, too.
+
+    Args:
+        task: the world with start and goal
+        grid: the grid that was planned on
+        plan: the planner's result, with a path or the reason why there is none
+        robot: the robot to draw at the start
+        path: the file to write; its suffix chooses PNG, PDF or SVG; None: no file
+        mapped: whether the robot has a map; the first plan of one without is made before it has seen the world
+        dpi: pixels per inch
+
+    Returns:
+        The figure, which may be labelled and saved; `panels` gives its axes by name.
+
+    Raises:
+        InputError: a suffix that is none of .png, .pdf, .svg.
+    """
+    target = checked(path)
+    scene = Scene.planned(task, robot, grid.inflate, mapped=mapped)
+    cells, line = (grid.xy(plan.cells), grid.xy(plan.line)) if len(plan.cells) else (np.empty((0, 2)),) * 2
+    shown = scene.around(line)
+    iterations = len(plan.history)
+    with styled():
+        wide, high = map_size(scene, shown)
+        wide += 0.9 if plan.field is not None else 0.0
+        wide_all = wide + (4.6 if iterations else 0.6)
+        said = _said_below(plan, mapped=mapped)
+        below = textwrap.wrap(said, round(LETTERS * wide_all)) if said else []
+        figure = new_figure(wide_all, high + 0.9 + (0.4 + LINE * len(below) if below else 0.0))
+        areas = figure.add_gridspec(1, 2 if iterations else 1, width_ratios=[wide, 4.2] if iterations else [1])
+        chart = figure.add_subplot(areas[0, 0], label="map")
+        if plan.field is not None:
+            draw_field(figure, chart, grid, plan.field)
+        draw_map(chart, scene, floor=plan.field is None)
+        handles: list[Any] = []
+        if len(plan.cells):
+            handles += chart.plot(*cells.T, ".", ms=3.4, color=hexed(ROUTE), label="planned cells", zorder=5)
+            handles += chart.plot(*line.T, "-", lw=1.9, color=hexed(SHELL), label="planned path", zorder=6)
+        frame_map(chart, shown)
+        if below:  # the map, where it covers nothing of what it speaks of
+            colour = hexed(MUTED if len(plan.cells) else BAD)
+            figure.supxlabel("\n".join(below), x=0.012, ha="left", fontsize=9, weight="bold", color=colour)
+        draw_legend(chart, handles, scene)
+        if iterations:
+            draw_history(figure.add_subplot(areas[0, 1], label="history"), plan.history)
+        length = f"{plan.cost:.2f} m" if len(plan.cells) else plan.status.value
+        length += ", stopped early" if len(plan.cells) and not plan.solved else ""
+        title = f"{scene.name}   ·   {length}   ·   {plan.work:,} {plan.work_unit}"
+        figure.suptitle(title, x=0.012, ha="left", fontsize=12, weight="bold")
+        return finished(figure, target, dpi)
+
+
+def _said_below(plan: PlanResult, *, mapped: bool) -> str:
+    """What is said below the map: why there is no path, or that the robot had not seen the world when it planned."""
+    if not len(plan.cells):
+        return plan.reason or plan.status.value
+    return "" if mapped else FIRST
+
+
+def plan_figures(
+    task: Task,
+    grid: Grid,
+    plan: PlanResult,
+    robot: RobotSpec,
+    folder: Path,
+    *,
+    name: str,
+    suffixes: Sequence[str],
+    mapped: bool = True,
+) -> dict[str, Path]:
+    """Draw every figure of a plan: with the field, alone, by iteration, and its field as bars and as contours.
+
+    Returns:
+        The files' paths by the name of the figure; formats after the first are named like `plan pdf`.
+    """
+    found: dict[str, Path] = {}
+    bare = dataclasses.replace(plan, field=None, history=type(plan.history)())
+    for suffix in suffixes:
+        end = "" if suffix == suffixes[0] else f" {suffix[1:]}"
+        files = {key: folder / f"{stem}{suffix}" for key, stem in FILES.items()}
+        plan_figure(task, grid, plan, robot, files["plan"], mapped=mapped)
+        drawn = ["plan"]
+        if len(plan.history):
+            plan_figure(task, grid, bare, robot, files["tour"], mapped=mapped)
+            history_figure({name: [plan.history]}, files["history"])
+            drawn += ["tour", "history"]
+        if plan.field is not None:
+            bars_figure(grid, plan.field, files["bars"])
+            contours_figure(task, grid, plan, robot, files["contours"], mapped=mapped)
+            drawn += ["bars", "contours"]
+        found |= {key + end: files[key] for key in drawn}
+    return found
+
+
+def bars_figure(grid: Grid, field: Floats, path: str | Path | None = None, *, dpi: float = 160) -> Figure:
+    """Draw a planner's field (R, C) as three-dimensional bars on the free cells."""
+    target = checked(path)
+    step = max(1, math.ceil(max(grid.shape) / MAX_BARS))
+    values = np.where(grid.free, np.asarray(field, dtype=np.float64), np.nan)
+    rows, cols = (-(-side // step) for side in grid.shape)
+    padded = np.full((rows * step, cols * step), -np.inf)
+    padded[: grid.shape[0], : grid.shape[1]] = np.where(np.isfinite(values), values, -np.inf)
+    high = padded.reshape(rows, step, cols, step).max(axis=(1, 3))
+    r, c = np.nonzero(np.isfinite(high))
+    heights = np.minimum(high[r, c], np.quantile(high[r, c], 0.998)) if len(r) else np.empty(0)
+    base = min(0.0, float(heights.min(initial=0.0)))
+    share = (heights - base) / max(float(heights.max(initial=0.0)) - base, 1e-300)
+    side = step * grid.cell
+    with styled():
+        figure = new_figure(7.2, 5.6)
+        axes: Any = figure.add_subplot(projection="3d", label="field")
+        x, y = grid.origin[0] + c * side - grid.cell / 2, grid.origin[1] + r * side - grid.cell / 2
+        wide, tall = 0.92 * side, np.maximum(heights - base, 1e-12)
+        axes.bar3d(x, y, base, wide, wide, tall, color=FIELD(0.25 + 0.75 * share), shade=True, lw=0)
+        axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="planner's field")
+        axes.view_init(elev=38, azim=-62)
+        axes.set_box_aspect((cols, rows, 0.55 * max(rows, cols)))
+        for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+            axis.set_pane_color((1, 1, 1, 0))
+        return finished(figure, target, dpi)
+
+
+def contours_figure(
+    task: Task,
+    grid: Grid,
+    plan: PlanResult,
+    robot: RobotSpec,
+    path: str | Path | None = None,
+    *,
+    mapped: bool = True,
+    dpi: float = 160,
+) -> Figure:
+    """Draw a planner's field as contours on the map, with the planned path."""
+    target = checked(path)
+    scene = Scene.planned(task, robot, grid.inflate, mapped=mapped)
+    assert plan.field is not None
+    values = np.where(grid.free, np.asarray(plan.field, dtype=np.float64), np.nan)
+    x = grid.origin[0] + grid.cell * np.arange(grid.shape[1])
+    y = grid.origin[1] + grid.cell * np.arange(grid.shape[0])
+    finite = values[np.isfinite(values)]
+    with styled():
+        figure = new_figure(6.6, 5.9)
+        axes: Any = figure.add_subplot(label="map")
+        if len(finite) and finite.max() > finite.min():
+            levels = np.unique(np.quantile(finite, np.linspace(0.6, 0.998, 9)))
+            if len(levels) > 1:
+                drawn = axes.contourf(x, y, values, levels=levels, cmap=FIELD, extend="both", zorder=0.6)
+                axes.contour(x, y, values, levels=levels, colors="#123f7a", linewidths=0.35, alpha=0.6, zorder=0.7)
+                bar = figure.colorbar(drawn, ax=axes, shrink=0.7, aspect=30, pad=0.02, format="%.2g")
+                bar.set_label("planner's field")
+                bar.outline.set_visible(False)
+        draw_map(axes, scene, floor=False)
+        line = grid.xy(plan.line) if plan.solved else np.empty((0, 2))
+        frame_map(axes, scene.around(line))
+        handles: list[Any] = []
+        if len(line):
+            handles = axes.plot(*line.T, "-", lw=1.9, color=hexed(SHELL), label="planned path", zorder=6)
+        draw_legend(axes, handles, scene)
+        return finished(figure, target, dpi)

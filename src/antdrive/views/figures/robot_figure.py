@@ -1,0 +1,73 @@
+"""A robot from above: its footprint, over the collision geometry that it was computed from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Patch, Polygon, Rectangle
+
+from antdrive.base.types import Floats
+from antdrive.robots.drawing import footprint_text, wheel_thickness
+from antdrive.robots.importing.hull import convex_hull
+from antdrive.robots.spec import RobotSpec
+from antdrive.views.figures.canvas import checked, finished, new_figure, styled
+from antdrive.views.style import GOAL, INK, MUTED, ROUTE, hexed
+
+WIDTH = 5.6  # of the figure [inches]
+
+
+def robot_figure(
+    robot: RobotSpec,
+    path: str | Path | None = None,
+    *,
+    pieces: Sequence[Floats] = (),
+    above: Sequence[Floats] = (),
+    dpi: float = 160,
+) -> Figure:
+    """Draw a robot from above, heading right, in metres from the axle's centre."""
+    target = checked(path)
+    with styled():
+        outline = np.array(robot.footprint.outline(48))
+        everything = np.vstack([outline, *pieces, *above])
+        low, high = everything.min(axis=0) - 0.15 * robot.radius, everything.max(axis=0) + 0.15 * robot.radius
+        low, high = np.minimum(low, -1.08 * robot.radius), np.maximum(high, 1.08 * robot.radius)
+        wide, tall = high - low
+        figure = new_figure(WIDTH, float(np.clip(WIDTH * tall / wide, 3.0, 9.0)) + 0.9)
+        axes = figure.add_subplot(label="map")
+        handles = _draw_pieces(axes, pieces, above)
+        handles.append(axes.add_patch(Polygon(outline, fill=False, ec=hexed(ROUTE), lw=2.0, label="footprint")))
+        around = Circle((0, 0), robot.radius, fill=False, ec=hexed(MUTED), lw=1.0, ls="--", label="disc of the plans")
+        handles.append(axes.add_patch(around))
+        thick = wheel_thickness(robot)
+        for side in (1, -1):
+            corner = (-robot.wheel_radius, side * robot.track / 2 - thick / 2)
+            axes.add_patch(Rectangle(corner, 2 * robot.wheel_radius, thick, fc=hexed(INK), ec="none"))
+        axes.plot([0, 0], [-robot.track / 2, robot.track / 2], color=hexed(INK), lw=1.0)
+        tip = robot.footprint.reach(0.0)
+        axes.annotate("", (tip, 0), (0, 0), arrowprops={"arrowstyle": "-|>", "color": hexed(GOAL), "lw": 1.6})
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+        axes.set_xlabel("ahead of the axle [m]")
+        axes.set_ylabel("to the left [m]")
+        title = f"{robot.name}: {footprint_text(robot)}".replace("; ", "\n")
+        axes.set_title(title, fontsize=9, loc="left", wrap=True)
+        figure.legend(handles=handles, loc="outside lower center", ncols=2)
+        return finished(figure, target, dpi)
+
+
+def _draw_pieces(axes: Any, pieces: Sequence[Floats], above: Sequence[Floats]) -> list[Patch]:
+    """Draw the outline of each piece; one patch of each kind for the legend."""
+    handles: list[Patch] = []
+    kinds: tuple[tuple[Sequence[Floats], dict[str, Any], str], ...] = (
+        (above, {"fc": "none", "ec": hexed(MUTED), "ls": ":", "lw": 1.0}, "collision geometry above"),
+        (pieces, {"fc": "#dfe5f2", "ec": "#8a97b3", "lw": 0.8, "alpha": 0.75}, "collision geometry"),
+    )
+    for group, style, label in kinds:
+        for k, points in enumerate(group):
+            hull = convex_hull([(float(x), float(y)) for x, y in points])
+            patch = axes.add_patch(Polygon(hull, **style, label=label))
+            handles += [patch] if k == 0 else []
+    return handles

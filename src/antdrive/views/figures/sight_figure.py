@@ -1,0 +1,158 @@
+"""What a robot without a map knew: the ground it had seen, its hits, and when it first saw what it came near."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.collections import PatchCollection
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Patch
+
+from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.log.sights import Sighting, sightings
+from antdrive.views.figures.canvas import checked, finished, frame_map, map_size, new_figure, styled
+from antdrive.views.figures.map_chart import draw_map
+from antdrive.views.recollection import Recollection, containers
+from antdrive.views.scene import Scene
+from antdrive.views.style import (
+    BAD,
+    BEAM,
+    GOOD,
+    HATCH,
+    HIT,
+    INK,
+    MOVER,
+    MUTED,
+    OBSTACLE,
+    PALE,
+    ROUTE,
+    SHELL,
+    VERDICTS,
+    hexed,
+)
+
+Floats = npt.NDArray[np.float64]
+
+LISTED = 14  # obstacles whose first sight is drawn: those that the robot came nearest to
+CURVE = 160  # points of the curve of explored ground
+
+
+def sight_figure(rollout: Rollout, path: str | Path | None = None, *, dpi: float = 160) -> Figure:
+    """Draw what a robot without a map knew: the ground on its map and hits, route and drive, and its first sights of obstacles.
+
+    The map is the robot's own, in the frame of its estimated poses, over the world as it was: where hits lie beside obstacles,
+    the estimate had drifted.
+
+    Args:
+        rollout: the run's log, with scans
+        path: the file to write; its suffix chooses PNG, PDF or SVG; None: no file
+        dpi: pixels per inch
+
+    Returns:
+        The figure, which may be labelled and saved; `panels` gives its axes by name.
+
+    Raises:
+        InputError: a suffix that is none of .png, .pdf, .svg.
+        ValueError: the log has no scans.
+    """
+    target, scene, seen = checked(path), Scene.of(rollout), Recollection(rollout)
+    moments = np.unique(np.append(np.linspace(0.0, float(rollout.t[-1]), CURVE), rollout.t[-1]))
+    explored = []
+    for at in moments:
+        seen.advance(float(at))
+        explored.append(seen.explored)
+    listed = sorted(sightings(rollout, seen.met)[:LISTED], key=lambda sight: sight.nearest_at)
+    with styled():
+        shown = scene.around(rollout.route)
+        wide, high = map_size(scene, shown)
+        figure = new_figure(wide + 5.4, high + 0.9)
+        areas = figure.add_gridspec(2, 2, width_ratios=[wide, 5.0], height_ratios=[1.0, 1.6])
+        chart: Any = figure.add_subplot(areas[:, 0], label="map")
+        _draw_known(chart, scene, rollout, seen, listed)
+        frame_map(chart, shown)
+        curve: Any = figure.add_subplot(areas[0, 1], label="known ground")
+        curve.plot(moments, explored, color=hexed(BEAM), lw=1.8)
+        curve.set(title="ground on the robot's map [m²]", ylim=(0, None), xlim=(0, max(float(rollout.t[-1]), 1e-3)))
+        curve.set_title(f"{explored[-1]:.1f} m² at the end", loc="right", fontsize=9, weight="normal")
+        _draw_sights(figure.add_subplot(areas[1, 1], sharex=curve, label="first sights"), rollout, listed)
+        name, colour = VERDICTS[rollout.outcome]
+        title = f"{scene.name}   ·   what {scene.robot.name} knew"
+        figure.suptitle(title, x=0.012, ha="left", fontsize=12, weight="bold")
+        figure.text(0.988, 0.993, name, ha="right", va="top", fontsize=11, weight="bold", color=hexed(colour))
+        return finished(figure, target, dpi)
+
+
+def _draw_known(axes: Any, scene: Scene, rollout: Rollout, seen: Recollection, listed: list[Sighting]) -> None:
+    """Draw the robot's map over the world, the route and the drive, and the numbers of the listed obstacles."""
+    draw_map(axes, scene, floor=False)
+    x0, y0, x1, y1 = scene.bounds
+    high, wide = seen.seen.shape
+    left, low = seen.map.origin
+    extent = (left, left + wide * seen.map.cell, low, low + high * seen.map.cell)
+    limits = axes.get_xlim(), axes.get_ylim()
+    axes.fill([x0, x1, x1, x0], [y0, y0, y1, y1], fc=hexed(PALE), ec=hexed(HATCH), hatch="////", lw=0, zorder=0.4)
+    ground = np.where(seen.seen, 1.0, np.nan)
+    white = ListedColormap(["white"])
+    axes.imshow(ground, origin="lower", extent=extent, cmap=white, zorder=0.6, interpolation="nearest", aspect="equal")
+    never = scene.obstacles[np.isinf(seen.met)[containers(scene.obstacles)]]
+    discs = [Circle((x, y), r) for x, y, r, _ in never]
+    axes.add_collection(PatchCollection(discs, facecolor=hexed(PALE), edgecolor=hexed(OBSTACLE), lw=0.6, zorder=3.1))
+    hits = [Circle((x, y), max(r, 0.012)) for x, y, r in seen.map.discs()]
+    axes.add_collection(PatchCollection(hits, facecolor=hexed(HIT), edgecolor="none", zorder=4.6))
+    handles: list[Any] = []
+    for k, (_, line) in enumerate(rollout.legs()):
+        style: dict[str, Any] = {
+            "ls": (0, (4, 2.5)),
+            "lw": 0.9,
+            "color": hexed(ROUTE),
+            "alpha": 0.7 if k == 0 else 0.35,
+        }
+        handles += axes.plot(*line.T, **style, zorder=4.8, label="routes") if k == 0 else []
+        if k:
+            axes.plot(*line.T, **style, zorder=4.7)
+    handles += axes.plot(*rollout.pose[::8, :2].T, color=hexed(SHELL), lw=2.2, label="driven path", zorder=5)
+    for sight in listed:
+        x, y, _, _ = scene.obstacles[sight.obstacle]
+        colour = hexed(BAD) if sight.touched else "white"
+        axes.text(x, y, sight.obstacle, color=colour, ha="center", va="center", fontsize=7, weight="bold", zorder=7)
+    axes.set(xlim=limits[0], ylim=limits[1])
+    known = [
+        Patch(fc=hexed(OBSTACLE), label="obstacle, seen"),
+        Patch(fc=hexed(PALE), ec=hexed(OBSTACLE), label="obstacle, never seen"),
+        Patch(fc=hexed(HIT), label="hits on its map"),
+        Patch(fc=hexed(PALE), ec=hexed(HATCH), hatch="////", lw=0, label="ground not known to be free"),
+    ]
+    if scene.mover_radii:
+        known.append(Patch(fc=hexed(MOVER), label=scene.movers_said))
+    handles += known
+    place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "ncols": 3, "borderaxespad": 0.2}
+    axes.legend(handles=handles, handlelength=1.6, columnspacing=1.2, **place)
+
+
+def _draw_sights(axes: Any, rollout: Rollout, listed: list[Sighting]) -> None:
+    """Draw a bar for each listed obstacle, from its first sight to the moment when the robot was nearest."""
+    axes.set(title="from first sight to nearest, obstacle by obstacle", xlabel="time [s]")
+    for row, sight in enumerate(listed):
+        colour = hexed(BAD if sight.touched else GOOD if np.isfinite(sight.seen_at) else MUTED)
+        start = min(sight.seen_at, sight.nearest_at)
+        axes.plot([start, sight.nearest_at], [row, row], color=hexed(BEAM), lw=3.0, alpha=0.55, solid_capstyle="butt")
+        axes.plot(sight.nearest_at, row, "X" if sight.touched else "o", ms=6 if sight.touched else 4, color=colour)
+        words = "never seen" if np.isinf(sight.seen_at) else f"first seen {sight.seen_from:.1f} m away"
+        words += ", touched" if sight.touched else f", nearest {sight.nearest:.2f} m"
+        axes.text(
+            sight.nearest_at,
+            row,
+            f"  {words}",
+            va="center",
+            fontsize=7,
+            color=hexed(INK),
+        )
+    axes.set_yticks(range(len(listed)), [str(sight.obstacle) for sight in listed], fontsize=7)
+    axes.set_ylim(len(listed) - 0.4, -0.6)
+    end = max(float(rollout.t[-1]), 1e-3)
+    axes.set_xticks([tick for tick in axes.get_xticks() if 0 <= tick <= end])
+    axes.set_xlim(0, 1.6 * end)  # room for the words

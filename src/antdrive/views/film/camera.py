@@ -1,0 +1,169 @@
+"""Cameras: framing a part of the world, projecting points to pixels, and cropping a picture."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+
+CAMERAS: tuple[str, ...] = ("oblique", "top", "follow")
+
+_TILT = {"oblique": 52.0, "top": 90.0, "follow": 46.0}  # above the horizon [degrees]
+_FOV = {
+    "oblique": 30.0,
+    "top": 6.0,
+    "follow": 34.0,
+}  # vertical [degrees]; TinyRenderer has no orthographic view
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A pinhole camera. Pixels count from the upper left corner, x to the right and y down.
+
+    Attributes:
+        view: world to camera (4, 4)
+        projection: camera to clip space (4, 4)
+        size: width and height of the picture [px]
+    """
+
+    view: Floats
+    projection: Floats
+    size: tuple[int, int]
+
+    @classmethod
+    def framing(
+        cls,
+        points: Floats,
+        size: tuple[int, int],
+        *,
+        tilt: float,
+        fov: float,
+        turned: bool = False,
+        pad: tuple[float, float, float, float] = (0.04, 0.04, 0.04, 0.04),
+    ) -> Camera:
+        """The nearest camera that sees all points (N, 3) [m]."""
+        right, up, back = _axes(math.radians(tilt), turned)
+        basis = np.array([right, up, back])
+        seen = points @ basis.T
+        x, y, depth = seen[:, 0], seen[:, 1], -seen[:, 2]
+        tan_y = math.tan(math.radians(fov) / 2)
+        tan_x = tan_y * size[0] / size[1]
+        # A point is right of the left edge if x - cx >= left (depth - cz): linear in the camera's position cx, cz.
+        # The same holds for the other edges, so the nearest position follows from the extreme points alone.
+        left, right_edge = -tan_x * (1 - 2 * pad[0]), tan_x * (1 - 2 * pad[1])
+        top, bottom = tan_y * (1 - 2 * pad[2]), -tan_y * (1 - 2 * pad[3])
+        ax, bx = float((x - left * depth).min()), float((x - right_edge * depth).max())
+        ay, by = float((y - bottom * depth).min()), float((y - top * depth).max())
+        cz = min((ax - bx) / (right_edge - left), (ay - by) / (top - bottom))
+        cx = (ax + left * cz + bx + right_edge * cz) / 2
+        cy = (ay + bottom * cz + by + top * cz) / 2
+        view = np.eye(4)
+        view[:3, :3] = basis
+        view[:3, 3] = -np.array([cx, cy, -cz])
+        near, far = float(depth.min()) - cz, float(depth.max()) - cz
+        return cls(view, _perspective(tan_x, tan_y, max(0.5 * near, 1e-2), 1.5 * far + 1.0), size)
+
+    @property
+    def full(self) -> Floats:
+        """World to clip space (4, 4)."""
+        return self.projection @ self.view
+
+    @property
+    def ground(self) -> Floats:
+        """The homogeneous map (3, 3) from points (x, y, 1) on the ground to pixels."""
+        return self.plane(0.0)
+
+    def plane(self, height: float) -> Floats:
+        """The homogeneous map (3, 3) from points (x, y, 1) at a height [m] above the ground to pixels."""
+        clip = self.full[:, [0, 1, 3]]
+        if height:
+            clip = clip + np.outer(self.full[:, 2], [0.0, 0.0, height])
+        width, height = self.size
+        return np.array(
+            [
+                0.5 * width * (clip[3] + clip[0]),
+                0.5 * height * (clip[3] - clip[1]),
+                clip[3],
+            ]
+        )
+
+    @property
+    def pixel(self) -> float:
+        """The width of a pixel on the ground in the middle of the picture [m]."""
+        width, height = self.size
+        back = np.linalg.inv(self.ground)
+        ends = np.array([(width / 2 + k, height / 2, 1.0) for k in (-0.5, 0.5)]) @ back.T
+        return float(np.hypot(*(ends[1, :2] / ends[1, 2] - ends[0, :2] / ends[0, 2])))
+
+    def pixels(self, points: npt.ArrayLike) -> Floats:
+        """Where points (N, 3) [m] appear, (N, 2) [px]."""
+        xyz = np.asarray(points, dtype=np.float64).reshape(-1, 3)
+        clip = np.column_stack([xyz, np.ones(len(xyz))]) @ self.full.T
+        width, height = self.size
+        ndc = clip[:, :2] / clip[:, 3:]
+        return np.column_stack([(1 + ndc[:, 0]) * width / 2, (1 - ndc[:, 1]) * height / 2])
+
+    def sees(self, centres: Floats, radii: Floats) -> npt.NDArray[np.bool_]:
+        """Which balls at centres (N, 3) with radii (N,) [m] may be in sight; none that reaches behind the camera."""
+        x, y, z = (centres @ self.view[:3, :3].T + self.view[:3, 3]).T
+        depth = -z
+        inside: npt.NDArray[np.bool_] = depth > radii
+        for aside, scale in ((x, self.projection[0, 0]), (y, self.projection[1, 1])):
+            inside &= np.abs(aside) * scale <= depth + radii * math.hypot(1.0, scale)
+        return inside
+
+    def moved(self, x: float, y: float) -> Camera:
+        """The same camera, shifted along the ground [m]."""
+        shift = np.eye(4)
+        shift[:2, 3] = -x, -y
+        return Camera(self.view @ shift, self.projection, self.size)
+
+    def matrices(self, box: tuple[int, int, int, int] | None = None) -> tuple[list[float], list[float]]:
+        """View and projection in OpenGL's column order, of the whole picture or of the pixels in `box`."""
+        projection = self.projection
+        if box is not None:
+            width, height = self.size
+            x0, y0, x1, y1 = box
+            across, down = (x0 + x1) / width - 1, 1 - (y0 + y1) / height
+            projection = projection.copy()
+            projection[0] = width / (x1 - x0) * (self.projection[0] - across * self.projection[3])
+            projection[1] = height / (y1 - y0) * (self.projection[1] - down * self.projection[3])
+        return self.view.T.ravel().tolist(), projection.T.ravel().tolist()
+
+
+def camera_for(name: str, low: npt.ArrayLike, high: npt.ArrayLike, height: float, size: tuple[int, int]) -> Camera:
+    """The camera of a name that sees a rectangle of the ground and the bodies on it."""
+    (x0, y0), (x1, y1) = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
+    corners = np.array([(x, y, z) for x in (x0, x1) for y in (y0, y1) for z in (0.0, height)])
+    tilt, fov = _TILT[name], _FOV[name]
+    shape = (x1 - x0) / ((y1 - y0) * math.sin(math.radians(tilt)))
+    return Camera.framing(corners, size, tilt=tilt, fov=fov, turned=name != "follow" and turns(shape, size))
+
+
+def turns(shape: float, size: tuple[int, int]) -> bool:
+    """Whether cameras of a wide picture look along -x: at ground that is long in y."""
+    return shape < 0.75 and size[0] > size[1]
+
+
+def _axes(tilt: float, turned: bool) -> tuple[Floats, Floats, Floats]:
+    """The camera's right, up and back directions."""
+    ahead = np.array([-1.0, 0.0, 0.0]) if turned else np.array([0.0, 1.0, 0.0])
+    right = np.array([0.0, 1.0, 0.0]) if turned else np.array([1.0, 0.0, 0.0])
+    sky = np.array([0.0, 0.0, 1.0])
+    look = math.cos(tilt) * ahead - math.sin(tilt) * sky
+    return right, np.cross(right, look), -look
+
+
+def _perspective(tan_x: float, tan_y: float, near: float, far: float) -> Floats:
+    return np.array(
+        [
+            [1 / tan_x, 0, 0, 0],
+            [0, 1 / tan_y, 0, 0],
+            [0, 0, -(far + near) / (far - near), -2 * far * near / (far - near)],
+            [0, 0, -1, 0],
+        ]
+    )

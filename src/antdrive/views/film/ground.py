@@ -1,0 +1,148 @@
+"""Paint the ground of a film: floor, grid, inflated zones, soft shadows, planned route, start and goal."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.base.plane import segment_lengths
+from antdrive.views.film import _kernels_paint as kernels
+from antdrive.views.film.camera import Camera
+from antdrive.views.scene import Scene
+from antdrive.views.style import GOAL, GRID, GROUND, PAPER, ROUTE, START, ZONE, Colour
+
+Floats = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+
+SHADOW_DEPTH = 0.30  # how much light the deepest shadow takes away
+
+
+def paint_ground(
+    camera: Camera, scene: Scene, route: Floats, ground: Mask, tall: Floats, sun: tuple[float, float]
+) -> npt.NDArray[np.float32]:
+    """The ground (H, W, 3) as a camera sees it."""
+    width, height = camera.size
+    brush = _Brush(camera, ground)
+    under = kerb_width(scene) / 2  # the floor continues under the kerb, so that its edge is hidden
+    bounds = np.array(scene.bounds) + np.array([-under, -under, under, under])
+    step = grid_step(camera)
+    kernels.lay_floor(
+        brush.rgb,
+        ground,
+        brush.inside,
+        brush.inverse,
+        bounds,
+        step,
+        1.0,
+        np.array([GROUND, PAPER, GRID], dtype=np.float64),
+    )
+    line = 1.5 * camera.pixel
+    if scene.has_zones:
+        brush.zones(scene, line)
+    shade = np.ones((height, width), dtype=np.float32)
+    cylinders = scene.obstacles.copy()
+    cylinders[:, 3] = tall
+    kernels.cast_shadows(shade, brush.forward, brush.inverse, cylinders, *sun, SHADOW_DEPTH)
+    kernels.multiply(brush.rgb, shade)
+    if len(route) > 1:
+        brush.capsules(dashes(route, 7 * line, 5 * line, 0.9 * line), ROUTE, 0.85)
+    brush.start(scene, line)
+    brush.goal(scene, line)
+    return brush.rgb
+
+
+def kerb_width(scene: Scene) -> float:
+    """The width of the kerb around the world [m]."""
+    x0, y0, x1, y1 = scene.bounds
+    return min(0.12, 0.02 * min(x1 - x0, y1 - y0))
+
+
+def grid_step(camera: Camera) -> float:
+    """The distance between grid lines [m]: the smallest of 0.1, 0.25, 0.5, 1, 2, 5, ... that is not too fine."""
+    least = max(34.0, camera.size[0] / 24)  # [px]
+    for step in (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0):
+        if step / camera.pixel >= least:
+            return step
+    return 100.0
+
+
+def dashes(line: Floats, on: float, off: float, half: float) -> Floats:
+    """Capsules (M, 5) that draw a polyline (N, 2) dashed."""
+    steps = segment_lengths(line)
+    arc = np.concatenate([[0.0], np.cumsum(steps)])
+    starts = np.arange(0.0, arc[-1], on + off)
+    at = np.unique(np.concatenate([arc, starts, np.minimum(starts + on, arc[-1])]))
+    points = np.column_stack([np.interp(at, arc, line[:, 0]), np.interp(at, arc, line[:, 1])])
+    rows = np.column_stack([points[:-1], points[1:], np.full(len(at) - 1, half)])
+    return np.ascontiguousarray(rows[(at[:-1] + at[1:]) / 2 % (on + off) < on])
+
+
+class _Brush:
+    """The colours of the ground, and a coverage mask through which shapes are painted."""
+
+    def __init__(self, camera: Camera, ground: Mask) -> None:
+        width, height = camera.size
+        self.forward = camera.ground
+        self.inverse = np.linalg.inv(self.forward)
+        self.inside = np.empty_like(ground)  # the ground within the world's bounds
+        self.rgb = np.empty((height, width, 3), dtype=np.float32)
+        self.cover = np.zeros((height, width), dtype=np.float32)
+
+    def blend(self, colour: Colour, strength: float) -> None:
+        """Blend a colour into the covered pixels and clear the mask."""
+        kernels.blend_cover(self.rgb, self.cover, self.inside, np.array(colour, dtype=np.float64), strength)
+
+    def capsules(self, rows: Floats, colour: Colour, strength: float) -> None:
+        """Paint capsules (N, 5): ax, ay, bx, by, half width [m]."""
+        kernels.cover_capsules(self.cover, self.forward, self.inverse, rows)
+        self.blend(colour, strength)
+
+    def rings(self, rows: list[tuple[float, float, float, float]], colour: Colour, strength: float) -> None:
+        """Paint circles: x, y, radius, half width of the line [m]."""
+        kernels.cover_rings(self.cover, self.forward, self.inverse, np.array(rows, dtype=np.float64))
+        self.blend(colour, strength)
+
+    def zones(self, scene: Scene, line: float) -> None:
+        """Tint the zones that planned paths avoid, and draw one outline around all of them."""
+        kernels.cover_capsules(self.cover, self.forward, self.inverse, _zone_rows(scene, 0.0))
+        outer = self.cover.copy()
+        self.blend(ZONE, 0.20)
+        kernels.cover_capsules(self.cover, self.forward, self.inverse, _zone_rows(scene, line))
+        np.subtract(outer, self.cover, out=self.cover)
+        self.blend(ZONE, 0.38)
+
+    def start(self, scene: Scene, line: float) -> None:
+        """Mark the start by a ring as wide as the robot, with a tick along its heading."""
+        x, y, yaw = scene.start
+        radius = scene.robot.footprint.radius + line
+        self.rings([(x, y, radius, 0.8 * line)], START, 0.9)
+        dx, dy = math.cos(yaw), math.sin(yaw)
+        tick = [(x + radius * dx, y + radius * dy, x + 1.5 * radius * dx, y + 1.5 * radius * dy, 0.8 * line)]
+        self.capsules(np.array(tick), START, 0.9)
+
+    def goal(self, scene: Scene, line: float) -> None:
+        """Mark the disc in which the robot must stop, and its centre."""
+        (x, y), radius = scene.goal, scene.goal_tolerance
+        self.capsules(np.array([(x, y, x, y, radius)]), GOAL, 0.22)
+        self.rings([(x, y, radius, 0.9 * line)], GOAL, 0.95)
+        self.rings([(x, y, 0.5 * radius, 0.5 * line)], GOAL, 0.6)
+        self.capsules(np.array([(x, y, x, y, max(0.10 * radius, 1.4 * line))]), GOAL, 0.95)
+
+
+def _zone_rows(scene: Scene, shrink: float) -> Floats:
+    """The inflated obstacles and walls as capsules (N, 5), `shrink` metres smaller."""
+    x, y, radius, _ = scene.obstacles[~scene.unseen].T
+    reach = scene.inflate - shrink
+    discs = np.column_stack([x, y, x, y, radius + reach])
+    x0, y0, x1, y1 = scene.bounds
+    far = 2 * scene.inflate
+    walls = [
+        (x0, y0 - far, x0, y1 + far, reach),
+        (x1, y0 - far, x1, y1 + far, reach),
+        (x0 - far, y0, x1 + far, y0, reach),
+        (x0 - far, y1, x1 + far, y1, reach),
+    ]
+    rows = np.vstack([discs, walls])
+    return np.ascontiguousarray(rows[rows[:, 4] > 0])

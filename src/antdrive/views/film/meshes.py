@@ -1,0 +1,273 @@
+"""Meshes for films: cylinders, the kerb around the world, and a robot whose wheels visibly turn."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.base.types import Point
+from antdrive.robots.spec import Footprint
+from antdrive.views.scene import Body
+from antdrive.views.style import SHELL, TURRET, WHITE, Colour
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles with a normal per vertex.
+
+    Attributes:
+        vertices: points (V, 3) [m]; those on a sharp edge occur once for each face
+        normals: a unit vector per vertex (V, 3)
+        triangles: vertex numbers (T, 3), counter-clockwise as seen from outside
+    """
+
+    vertices: Floats
+    normals: Floats
+    triangles: npt.NDArray[np.int64]
+
+    @property
+    def ball(self) -> tuple[Floats, float]:
+        """Centre (3,) and radius [m] of a ball that contains the mesh."""
+        centre = (self.vertices.min(axis=0) + self.vertices.max(axis=0)) / 2
+        return centre, float(np.sqrt(((self.vertices - centre) ** 2).sum(axis=1).max()))
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A part of the robot, of one colour, that moves as a whole.
+
+    Attributes:
+        mesh: its shape
+        colour: its colour
+        wheel: 0 if it is fixed to the chassis, 1 if it turns with the left wheel, -1 with the right wheel
+        axle: where its origin is on the chassis [m]
+    """
+
+    mesh: Mesh
+    colour: Colour
+    wheel: int = 0
+    axle: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+def join(*meshes: Mesh) -> Mesh:
+    """Several meshes as one."""
+    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    return Mesh(
+        np.vstack([mesh.vertices for mesh in meshes]),
+        np.vstack([mesh.normals for mesh in meshes]),
+        np.vstack([mesh.triangles + start for mesh, start in zip(meshes, starts, strict=False)]),
+    )
+
+
+def cylinder(radius: float, low: float, high: float, *, sides: int = 48, x: float = 0.0, y: float = 0.0) -> Mesh:
+    """An upright cylinder with a smooth side, a sharp rim and no bottom."""
+    angle = np.arange(sides) * (2 * math.pi / sides)
+    ring = np.column_stack([np.cos(angle), np.sin(angle)])
+    rim = np.column_stack([x + radius * ring[:, 0], y + radius * ring[:, 1]])
+    floor, roof = (np.column_stack([rim, np.full(sides, z)]) for z in (low, high))
+    out = np.column_stack([ring, np.zeros(sides)])
+    here, there = np.arange(sides), (np.arange(sides) + 1) % sides
+    side = np.vstack(
+        [np.column_stack([here, there, there + sides]), np.column_stack([here, there + sides, here + sides])]
+    )
+    lid = np.column_stack([np.full(sides, 3 * sides), here + 2 * sides, there + 2 * sides])
+    up = np.tile([0.0, 0.0, 1.0], (sides + 1, 1))
+    vertices = np.vstack([floor, roof, roof, [[x, y, high]]])
+    return Mesh(vertices, np.vstack([out, out, up]), np.vstack([side, lid]))
+
+
+def prism(outline: Floats, low: float, high: float, *, chamfer: float = 0.0) -> Mesh:
+    """A convex counter-clockwise outline (K, 2) extruded from `low` to `high`, with a chamfered upper edge."""
+    count = len(outline)
+    centre = outline.mean(axis=0)
+    reach = np.hypot(*(outline - centre).T).max()
+    lid = centre + (outline - centre) * (1 - chamfer / reach)
+    levels = [(outline, low), (outline, high - chamfer), (lid, high)]
+    faces = [_band(levels[i], levels[i + 1]) for i in range(2) if levels[i + 1][1] > levels[i][1]]
+    fan = np.column_stack([np.zeros(count - 2), np.arange(1, count - 1), np.arange(2, count)]).astype(np.int64)
+    top = Mesh(np.column_stack([lid, np.full(count, high)]), np.tile([0.0, 0.0, 1.0], (count, 1)), fan)
+    return join(*faces, top)
+
+
+def box(x0: float, y0: float, x1: float, y1: float, low: float, high: float) -> Mesh:
+    """A box along the axes, without a bottom."""
+    return prism(np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)]), low, high)
+
+
+def kerb(bounds: tuple[float, float, float, float], width: float, height: float) -> list[Mesh]:
+    """A low wall around the world, in short pieces; its inner faces stand on the bounds."""
+    x0, y0, x1, y1 = bounds
+    pieces = []
+    for low, high in pairwise(_cuts(x0 - width, x1 + width)):
+        pieces += [box(low, y0 - width, high, y0, 0, height), box(low, y1, high, y1 + width, 0, height)]
+    for low, high in pairwise(_cuts(y0, y1)):
+        pieces += [box(x0 - width, low, x0, high, 0, height), box(x1, low, x1 + width, high, 0, height)]
+    return pieces
+
+
+def _cuts(low: float, high: float) -> list[float]:
+    """Ends of about equal pieces, at most 24."""
+    cuts: list[float] = np.linspace(low, high, min(24, math.ceil(high - low)) + 1).tolist()
+    return cuts
+
+
+def robot_height(body: Body) -> float:
+    """The height that the robot is drawn with [m]; a tall mast is left out, as it would hide the path."""
+    return min(body.height, max(1.1 * body.footprint.radius, 2.4 * body.wheel_radius))
+
+
+def robot_parts(body: Body) -> tuple[Part, ...]:
+    """The robot's parts. The origin is on the ground below the axle's centre, and the robot heads along +x.
+
+    The deck has the footprint's exact outline. On it are a turret, a white arrow and two lamps in front; the wheels
+    turn in wells.
+    """
+    foot, r = body.footprint, body.wheel_radius
+    xmin, ymin, xmax, ymax = foot.bounds
+    length, width, middle_x, middle_y = (xmax - xmin) / 2, (ymax - ymin) / 2, (xmin + xmax) / 2, (ymin + ymax) / 2
+    size = min(length, width)
+    outline = _outline(foot)
+    half_track = body.track / 2
+    edge_y = half_track + foot.depth(0.0, half_track) if foot.corners else width
+    outside = math.sqrt(max(width**2 - r**2, 0.0)) if foot.is_disc else edge_y
+    tread = float(np.clip(2 * (outside - half_track), 0.35 * r, 0.9 * r))
+    well_x, well_y = 1.12 * r, half_track - 0.62 * tread
+    floor = 0.35 * r
+    deck = max(min(1.45 * r, 0.8 * robot_height(body)), floor + 0.3 * r)
+    edge = 0.12 * (deck - floor)
+    roof = max(robot_height(body), deck + 0.2 * r)
+    ahead, behind = min(well_x, 0.98 * xmax), max(-well_x, 0.98 * xmin)
+    front, rear = _cut(outline, 0, ahead), _cut(outline, 0, behind, keep_low=True)
+    middle = np.array([(behind, -well_y), (ahead, -well_y), (ahead, well_y), (behind, well_y)])
+    shell = [prism(front, floor, deck, chamfer=edge), prism(rear, floor, deck, chamfer=edge)]
+    shell.append(prism(middle, floor, deck))
+    back, core = middle_x - 0.08 * length, np.array([middle_x, middle_y])
+    smaller = (outline - core) * (0.60 if foot.is_disc else 0.66) + [back, middle_y]
+    turret = prism(smaller, deck, roof, chamfer=0.05 * size)
+    arrow = [
+        replace(part, vertices=part.vertices + [0, middle_y, 0])
+        for part in _arrow(back, 0.50 * size, roof, 0.012 * size)
+    ]
+    lamps = _lamps(foot, (middle_x, middle_y), (length, width), deck)
+    parts = [Part(join(*shell), SHELL), Part(turret, TURRET), Part(join(*arrow, *lamps), WHITE)]
+    for side in (1, -1):
+        axle = (0.0, side * half_track, r)
+        tyre, marks = _wheel(r, tread, side)
+        parts += [Part(tyre, (30, 34, 42), side, axle), Part(marks, (236, 238, 242), side, axle)]
+    return tuple(parts)
+
+
+def _lamps(foot: Footprint, middle: Point, half: Point, deck: float) -> list[Mesh]:
+    """Two lamps on the deck in front, closer together or farther back where the front is narrow; none where it is pointed."""
+    (x, y), (length, width), size = middle, half, min(half)
+    for ahead, apart in itertools.product((0.90, 0.75, 0.6), (0.26, 0.18, 0.1)):
+        front, aside, wide = ahead * length, apart * width, 0.08 * size
+        if all(foot.depth(x + front, y + side * (aside + wide)) >= 0 for side in (-1, 1)):
+            return [
+                box(x + front - 0.1 * length, y + s - wide, x + front, y + s + wide, deck, deck + 0.05 * size)
+                for s in (-aside, aside)
+            ]
+    return []
+
+
+def _wheel(radius: float, tread: float, side: int) -> tuple[Mesh, Mesh]:
+    """A tyre about the y axis, and the light lugs and spokes that make its rotation visible."""
+    tyre = _about_y(_drum(radius, tread))
+    lugs = []
+    for k in range(5):
+        angle = k * 2 * math.pi / 5
+        half = 0.16 * radius
+        bar = box(-half, -0.46 * tread, half, 0.46 * tread, 0.92 * radius, 1.03 * radius)
+        spoke_y = 0.5 * tread * side
+        thin = 0.06 * tread * side
+        lo, hi = sorted((spoke_y, spoke_y + thin))
+        spoke = box(-0.6 * half, lo, 0.6 * half, hi, 0.15 * radius, 0.86 * radius)
+        lugs += [_turned(bar, angle), _turned(spoke, angle)]
+    return tyre, join(*lugs)
+
+
+def _drum(radius: float, tread: float) -> Mesh:
+    """A closed cylinder about the z axis, centred at the origin."""
+    upper = cylinder(radius, -tread / 2, tread / 2, sides=28)
+    flip = np.array([1.0, -1.0, -1.0])
+    return join(upper, Mesh(upper.vertices * flip, upper.normals * flip, upper.triangles))
+
+
+def _about_y(mesh: Mesh) -> Mesh:
+    """The mesh turned so that its z axis becomes the y axis."""
+    turn = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+    return Mesh(mesh.vertices @ turn, mesh.normals @ turn, mesh.triangles)
+
+
+def _turned(mesh: Mesh, angle: float) -> Mesh:
+    """The mesh turned about the y axis by an angle [rad]."""
+    c, s = math.cos(angle), math.sin(angle)
+    turn = np.array([[c, 0, -s], [0, 1.0, 0], [s, 0, c]])
+    return Mesh(mesh.vertices @ turn, mesh.normals @ turn, mesh.triangles)
+
+
+def _arrow(x: float, reach: float, low: float, thin: float) -> list[Mesh]:
+    """A chevron that points along +x."""
+    tip, tail, wide, notch = x + 0.95 * reach, x - 0.75 * reach, 0.72 * reach, x - 0.30 * reach
+    return [
+        prism(np.array([(tip, 0.0), (tail, wide), (notch, 0.0)]), low, low + thin),
+        prism(np.array([(tip, 0.0), (notch, 0.0), (tail, -wide)]), low, low + thin),
+    ]
+
+
+def _outline(foot: Footprint, *, steps: int = 16) -> Floats:
+    """A footprint's outline (K, 2), counter-clockwise."""
+    if foot.corners:
+        return np.array(foot.outline(steps))
+    corner = max(foot.rounding, 0.0)
+    points = []
+    for k, (sx, sy) in enumerate(((1, 1), (-1, 1), (-1, -1), (1, -1))):
+        x, y = sx * foot.half_length, sy * foot.half_width
+        for angle in np.linspace(k * math.pi / 2, (k + 1) * math.pi / 2, steps if corner > 0 else 1, endpoint=False):
+            points.append((x + corner * math.cos(angle), y + corner * math.sin(angle)))
+    return np.array(points)
+
+
+def _cut(outline: Floats, axis: int, at: float, *, keep_low: bool = False) -> Floats:
+    """The part of a convex outline (K, 2) whose coordinate `axis` is above `at`, or below it with `keep_low`."""
+    sign = -1.0 if keep_low else 1.0
+    inside = sign * (outline[:, axis] - at) >= 0
+    points = []
+    for i, point in enumerate(outline):
+        following = outline[(i + 1) % len(outline)]
+        if inside[i]:
+            points.append(point)
+        if inside[i] != inside[(i + 1) % len(outline)]:
+            share = (at - point[axis]) / (following[axis] - point[axis])
+            points.append(point + share * (following - point))
+    return np.array(points)
+
+
+def _band(low: tuple[Floats, float], high: tuple[Floats, float]) -> Mesh:
+    """The flat faces between two outlines with the same number of points, each at its height."""
+    (a, za), (b, zb) = low, high
+    count = len(a)
+    following = (np.arange(count) + 1) % count
+    quads = np.stack(
+        [
+            np.column_stack([a, np.full(count, za)]),
+            np.column_stack([a[following], np.full(count, za)]),
+            np.column_stack([b[following], np.full(count, zb)]),
+            np.column_stack([b, np.full(count, zb)]),
+        ],
+        axis=1,
+    )
+    normal = np.cross(quads[:, 1] - quads[:, 0], quads[:, 3] - quads[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    first = 4 * np.arange(count)
+    triangles = np.vstack(
+        [np.column_stack([first, first + 1, first + 2]), np.column_stack([first, first + 2, first + 3])]
+    )
+    return Mesh(quads.reshape(-1, 3), np.repeat(normal, 4, axis=0), triangles)

@@ -1,0 +1,385 @@
+"""Text over a film's picture: a band of names and numbers below it, the legend, and the outcome at the end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image, ImageDraw
+
+from antdrive.sim.log.outcome import Outcome
+from antdrive.views.film import _kernels_paint as kernels
+from antdrive.views.film.replay import SLOW_MOTION
+from antdrive.views.film.text import Sprite, fitted, font, pill, plate, text_width, wrapped
+from antdrive.views.scene import Scene
+from antdrive.views.style import (
+    BAD,
+    BAND,
+    BEAM,
+    CALM,
+    FOLLOWED,
+    HATCH,
+    HIT,
+    INK,
+    MOVER,
+    MUTED,
+    PALE,
+    ROUTE,
+    SHELL,
+    UNSEEN,
+    VERDICTS,
+    ZONE,
+    Colour,
+    field_colours,
+    speed_colours,
+)
+
+Picture = npt.NDArray[np.uint8]  # (H, W, 3)
+
+DRIVING = ("DRIVING", CALM)
+PLANNING = ("PLANNING", CALM)
+SLOWED = (f"SLOW ×1/{SLOW_MOTION:g}", BAD)
+
+#: The names of the band's four numbers during the drive and during planning.
+DRIVE_FIELDS = ("TIME", "SPEED", "CLEARANCE", "MINIMUM")
+PLAN_FIELDS = ("ITERATION", "BEST PATH", "MEAN PATH", "ARRIVED")
+
+#: The heights of a row of the legend in the band, and of its edge [units].
+LEGEND_ROW, LEGEND_EDGE = 1.5, 0.4
+
+#: The height of a line of a note that has no room beside the numbers [units], how many it has at most, and its font [units].
+NOTE_LINE, MOST_NOTES, NOTE_FONT = 1.2, 3, 0.86
+#: The most of a picture's height that the band takes, for a legend of several rows or a long note.
+MOST_BAND = 0.34
+#: The same of the lines of a reason below the outcome.
+MOST_REASONS, REASON_FONT = 4, 1.05
+
+Values: TypeAlias = list[tuple[str, bool]]  # each number as text, and whether it is shown in red
+
+
+@dataclass(frozen=True)
+class Reading:
+    """The numbers of one frame of a drive.
+
+    Attributes:
+        time: [s]
+        speed: [m/s]
+        clearance: [m]
+        min_clearance: the smallest clearance so far [m]
+    """
+
+    time: float
+    speed: float
+    clearance: float
+    min_clearance: float
+
+    @property
+    def values(self) -> Values:
+        """The numbers as the band shows them."""
+        return [
+            (f"{self.time:.1f} s", False),
+            (f"{max(self.speed, 0.0):.2f} m/s", False),
+            (_metres(self.clearance), self.clearance <= 0),
+            (_metres(self.min_clearance), self.min_clearance <= 0),
+        ]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The sizes of text and band in a frame.
+
+    Attributes:
+        width: of the frame [px]
+        unit: height of small text [px]
+        wide: names, numbers and outcome stand beside each other in the band
+        rows: how many rows of the band the legend has; 0: it is a card in the picture's corner
+        height: of the band [px]
+        note: the lines of a note that has no room beside the numbers
+    """
+
+    width: int
+    unit: int
+    wide: bool
+    rows: int
+    height: int
+    note: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, size: tuple[int, int], rows: int, note: str = "") -> Layout:
+        """The layout for a frame of a size (width, height) [px] with a legend of so many rows and a note."""
+        width, height = size
+        wide = width >= 1.5 * height and width >= 900
+        unit = max(8, round(min(height / 46, width / (82 if wide else 56))))
+        plain = cls(width, unit, wide, rows, 0)
+        most = min(MOST_NOTES, int((MOST_BAND * height / unit - plain.numbers_units) / NOTE_LINE))
+        lines: list[str] = []
+        if most > 0 and text_width(note, plain.small, True) > plain.note_room:
+            lines = wrapped(note, width - 2 * unit, plain.small, True, most=most)
+        units = plain.numbers_units + NOTE_LINE * len(lines) + (LEGEND_EDGE + LEGEND_ROW * rows if rows else 0.0)
+        return cls(width, unit, wide, rows, 2 * round(units * unit / 2), tuple(lines))
+
+    @property
+    def numbers_units(self) -> float:
+        """The height of names and numbers [units]."""
+        return 4.7 if self.wide else 7.8
+
+    @property
+    def small(self) -> int:
+        """The size of a note's font [px]."""
+        return round(NOTE_FONT * self.unit)
+
+    @property
+    def fields(self) -> tuple[int, int]:
+        """Where the first of the four numbers stands, and how far it is to the next one [px]."""
+        pad = self.unit
+        return (round(0.36 * self.width), 8 * self.unit) if self.wide else (pad, (self.width - pad) // 4)
+
+    @property
+    def note_room(self) -> int:
+        """The room for a note beside the numbers [px]."""
+        first, column = self.fields
+        return self.width - first - 4 * column - self.unit if self.wide else self.width // 2
+
+
+class Band:
+    """The band below the picture. Everything that stays the same is drawn once."""
+
+    def __init__(
+        self,
+        layout: Layout,
+        title: str,
+        subtitle: str,
+        note: str | None,
+        legend: LegendRows,
+        names: tuple[str, ...] = DRIVE_FIELDS,
+    ) -> None:
+        self.layout = layout
+        unit, width, wide = layout.unit, layout.width, layout.wide
+        self._blank = Image.new("RGB", (width, layout.height), BAND)
+        draw = ImageDraw.Draw(self._blank)
+        draw.line([(0, 0), (width, 0)], fill=(210, 216, 225), width=max(1, unit // 8))
+        pad, big, small = unit, round(1.35 * unit), layout.small
+        numbers, column = layout.fields
+        self._fields = [(numbers + k * column, round((0.75 if wide else 4.25) * unit)) for k in range(4)]
+        shown = "" if layout.note else fitted(note or "", layout.note_room, small, True)
+        room = numbers - 2 * pad if wide else width - _widest_verdict(unit) - 3 * pad
+        subroom = room if wide else width - text_width(shown, small, True) - 3 * pad
+        draw.text((pad, 0.6 * unit), fitted(title, room, big, True), font=font(big, True), fill=INK)
+        draw.text((pad, 2.45 * unit), fitted(subtitle, subroom, unit), font=font(unit), fill=MUTED)
+        draw.text(
+            (width - pad, (3.75 if wide else 3.3) * unit),
+            shown,
+            font=font(small, True),
+            fill=CALM,
+            anchor="rm",
+        )
+        for k, line in enumerate(layout.note):
+            middle = (layout.numbers_units - 0.1 + (k + 0.5) * NOTE_LINE) * unit
+            draw.text((pad, middle), line, font=font(small, True), fill=CALM, anchor="lm")
+        for (x, y), name in zip(self._fields, names, strict=True):
+            draw.text((x, y), name, font=font(round(0.82 * unit), True), fill=MUTED)
+        if layout.rows:
+            _draw_rows(draw, legend, layout)
+
+    def draw(self, values: Values, verdict: tuple[str, Colour]) -> Picture:
+        """The band (h, W, 3) of one frame, with its four numbers and a label."""
+        unit = self.layout.unit
+        image = self._blank.copy()
+        draw = ImageDraw.Draw(image)
+        for (x, y), (text, bad) in zip(self._fields, values, strict=True):
+            draw.text((x, y + 1.15 * unit), text, font=font(round(1.4 * unit), True), fill=BAD if bad else INK)
+        band = np.array(image)
+        plate_ = pill(verdict[0], round(1.08 * unit), verdict[1])
+        kernels.put_sprite(band, plate_, self.layout.width - unit - plate_.shape[1], round(0.5 * unit), 1.0)
+        return band
+
+
+def _widest_verdict(unit: int) -> int:
+    size = round(1.08 * unit)
+    widest = max(text_width(text, size, True) for text, _ in (*VERDICTS.values(), DRIVING, PLANNING, SLOWED))
+    return widest + 2 * round(0.75 * size)
+
+
+def _metres(value: float) -> str:
+    if not abs(value) < 99:
+        return "—"
+    return f"{value + 0.0 if abs(value) >= 5e-4 else 0.0:.3f} m"
+
+
+_WIDE_KINDS = ("ramp", "field", "line", "dash", "zone", "hatch")
+
+
+class LegendEntry(NamedTuple):
+    """A line of the legend.
+
+    Attributes:
+        kind: how its sample is drawn: `ramp`, `field`, `line`, `dash`, `zone`, `hatch`, `dot` or `scale`
+        colour: of the sample
+        text: its meaning
+        width: of a scale bar [px]
+    """
+
+    kind: str
+    colour: Colour
+    text: str
+    width: float = 0.0
+
+
+def legend_entries(
+    scene: Scene,
+    step: float,
+    pixel: float,
+    *,
+    planning: bool = False,
+    replans: bool = False,
+    beams: bool = False,
+    sight: bool = False,
+    followed: bool = False,
+) -> list[LegendEntry]:
+    """The legend's lines: one for each kind of thing in the picture."""
+    if planning:
+        found = [LegendEntry("field", INK, "planner's field"), LegendEntry("line", SHELL, "best path so far")]
+    else:
+        speeds = f"speed, 0 to {scene.robot.max_speed:.3g} m/s"
+        found = [LegendEntry("ramp", INK, speeds), LegendEntry("dash", ROUTE, "planned route")]
+    if replans:
+        found.append(LegendEntry("dot", ROUTE, "new route"))
+    if scene.has_zones:
+        found.append(LegendEntry("zone", ZONE, f"inflated by {scene.inflate:.2f} m"))
+    if scene.unseen.any():
+        found.append(LegendEntry("dot", UNSEEN, scene.unseen_said))
+    if beams:
+        found.append(LegendEntry("zone", BEAM, "beams of the lidar"))
+    if sight:
+        found += [
+            LegendEntry("dot", HIT, "hit, on the robot's map"),
+            LegendEntry("hatch", HATCH, "not known to be free"),
+        ]
+    if scene.mover_radii:
+        found.append(LegendEntry("dot", MOVER, "moving obstacle" if followed else "moving obstacle, 1.5 s ahead"))
+    if followed:
+        found.append(LegendEntry("line", FOLLOWED, "mover by lidar, 1.5 s ahead"))
+    return [*found, LegendEntry("scale", INK, f"{step:g} m (grid)", step / pixel)]
+
+
+def legend_card(entries: list[LegendEntry], layout: Layout) -> Sprite:
+    """The legend as a card for the picture's corner."""
+    size = max(8, round(0.9 * layout.unit))
+    line, pad = round(1.55 * size), round(0.8 * size)
+    key = round(max(2.6 * size, *(entry.width for entry in entries)))
+    wide = 2 * pad + key + size // 2 + max(text_width(entry.text, size) for entry in entries)
+    image = plate(wide, 2 * pad + line * len(entries), (255, 255, 255), 222, radius=size // 2)
+    draw = ImageDraw.Draw(image)
+    for k, entry in enumerate(entries):
+        middle = pad + line * k + line / 2
+        _draw_sample(draw, entry, pad, middle, key, size)
+        draw.text((pad + key + size // 2, middle), entry.text, font=font(size), fill=INK, anchor="lm")
+    return np.array(image)
+
+
+class LegendRows(NamedTuple):
+    """The legend's entries in rows of the band.
+
+    Attributes:
+        size: of the text [px]
+        rows: the entries of each row, from the left
+        whole: whether every entry has a place
+    """
+
+    size: int
+    rows: list[list[LegendEntry]]
+    whole: bool
+
+
+def legend_rows(entries: list[LegendEntry], layout: Layout) -> LegendRows:
+    """The entries in the rows that a layout has, in the largest text with which they fit.
+
+    In a picture too small for all of them the last ones are left out.
+    """
+    found = LegendRows(0, [], False)
+    for size in range(max(8, round(0.9 * layout.unit)), max(7, round(0.75 * layout.unit)) - 1, -1):
+        room = float(layout.width - 2 * layout.unit)
+        rows: list[list[LegendEntry]] = [[]] if layout.rows else []
+        left = room
+        for entry in entries:
+            wide = sum(_entry_width(entry, size))
+            if rows and rows[-1] and wide > left:
+                rows.append([])
+                left = room
+            if rows:
+                rows[-1].append(entry)
+            left -= wide + size
+        found = LegendRows(size, rows[: layout.rows], len(rows) <= layout.rows)
+        if found.whole:
+            break
+    return found
+
+
+def _entry_width(entry: LegendEntry, size: int) -> tuple[float, float]:
+    """How wide an entry's sample and its text with the space before it are, for text of a size [px]."""
+    sample = round(entry.width or (2.2 if entry.kind in _WIDE_KINDS else 1.0) * size)
+    return sample, 0.5 * size + text_width(entry.text, size)
+
+
+def _draw_rows(draw: ImageDraw.ImageDraw, legend: LegendRows, layout: Layout) -> None:
+    """Draw the legend as the last rows of a band."""
+    unit, size = layout.unit, legend.size
+    top = layout.height - (LEGEND_EDGE + LEGEND_ROW * layout.rows - 0.05) * unit
+    draw.line([(unit, top - 0.25 * unit), (layout.width - unit, top - 0.25 * unit)], fill=(226, 230, 237))
+    for number, row in enumerate(legend.rows):
+        widths = [_entry_width(entry, size) for entry in row]
+        gap = (layout.width - 2 * unit - sum(map(sum, widths))) / max(1, len(row) - 1)
+        x, middle = float(unit), top + (number + 0.5) * LEGEND_ROW * unit
+        for entry, (sample, text) in zip(row, widths, strict=True):
+            _draw_sample(draw, entry, round(x), middle, round(sample), size)
+            draw.text((x + sample + 0.5 * size, middle), entry.text, font=font(size), fill=INK, anchor="lm")
+            x += sample + text + min(gap, 2.5 * size)
+
+
+def _draw_sample(draw: ImageDraw.ImageDraw, entry: LegendEntry, x: int, y: float, wide: int, size: int) -> None:
+    """Draw the sample of a line of the legend, `wide` pixels wide, beside text of height `size`."""
+    kind, colour = entry.kind, entry.colour
+    r = 0.42 * size
+    if kind in ("ramp", "field"):
+        colours = speed_colours if kind == "ramp" else field_colours
+        for i, tint in enumerate(colours(np.linspace(0, 1, wide))):
+            draw.line([(x + i, y - 0.22 * size), (x + i, y + 0.22 * size)], fill=tuple(int(c) for c in tint))
+    elif kind == "dash":
+        for start in np.arange(x, x + wide - 1, wide / 3):
+            draw.line([(start, y), (start + wide / 5, y)], fill=colour, width=max(2, size // 6))
+    elif kind == "line":
+        draw.line([(x, y), (x + wide, y)], fill=colour, width=max(2, size // 5))
+    elif kind == "zone":
+        pale = tuple(round(238 + (c - 238) * 0.3) for c in colour)
+        draw.rounded_rectangle((x, y - 0.4 * size, x + wide, y + 0.4 * size), size // 4, fill=pale, outline=colour)
+    elif kind == "hatch":
+        high = round(0.4 * size)
+        draw.rectangle((x, y - high, x + wide, y + high), fill=PALE)
+        for at in range(x + high, x + wide - high, max(4, size // 2)):
+            draw.line([(at - high, y + high), (at + high, y - high)], fill=colour, width=max(1, size // 9))
+    elif kind == "dot":
+        draw.ellipse((x + wide / 2 - r, y - r, x + wide / 2 + r, y + r), fill=colour)
+    else:  # a scale bar
+        line = max(1, size // 7)
+        draw.line([(x, y), (x + entry.width, y)], fill=colour, width=line)
+        for end in (x, x + entry.width):
+            draw.line([(end, y - 0.35 * size), (end, y + 0.35 * size)], fill=colour, width=line)
+
+
+def banner(outcome: Outcome, layout: Layout, room: int, reason: str = "") -> Sprite:
+    """The outcome as a sentence and its reason, for the end of a film, at most 0.86 of `room` wide [px].
+
+    A robot is stuck for one of several reasons: where one is given, it stands for the general sentence.
+    """
+    name, colour = VERDICTS[outcome]
+    sentence = "stuck" if reason and outcome is Outcome.STUCK else outcome.value
+    sentence = sentence[0].upper() + sentence[1:]
+    size = round(1.5 * layout.unit)
+    text = f"{name[0]}  {sentence}" if name[0] in "✓✕" else sentence
+    while size > 8 and text_width(text, size, True) > 0.86 * room:
+        size -= 1
+    small = min(size, round(REASON_FONT * layout.unit))
+    lines = wrapped(reason, round(0.86 * room) - 2 * round(0.75 * size), small, most=MOST_REASONS)
+    return pill(text, size, colour, lines, small)

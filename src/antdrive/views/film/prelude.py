@@ -1,0 +1,112 @@
+"""The part of a film before the drive: how the path was planned, with the planner's field and best path so far.
+
+A log holds no field. The path is planned again from the log's seed, which gives the same iterations.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import math
+import zlib
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.base import InputError
+from antdrive.planners import Iteration, Query, as_iterative, load_planner
+from antdrive.sim.log.rollout import Rollout
+from antdrive.views.film.compositor import Compositor
+from antdrive.views.film.overlay import Values
+from antdrive.views.film.shot import Shot
+from antdrive.worlds import Grid, rasterise
+
+Picture = npt.NDArray[np.uint8]  # (H, W, 3)
+Floats = npt.NDArray[np.float64]
+
+
+def plan_again(rollout: Rollout) -> tuple[Grid, int, Iterator[Iteration]]:
+    """Repeat a run's planning: its grid, the number of iterations allowed, and the iterations one at a time.
+
+    Raises:
+        InputError: the planner is unknown, does not plan in iterations, or planned under a time budget.
+    """
+    record = rollout.record
+    name = record.planner.name
+    planner = as_iterative(load_planner(name, **record.planner.settings))
+    if planner is None:
+        raise InputError(f"prelude: {name} does not plan in iterations; there is no field to show")
+    if planner.time_budget is not None:
+        raise InputError("prelude: the plan was made under a time budget and cannot be repeated")
+    grid = rasterise(record.task.world, record.cell, record.inflate)
+    rng = np.random.default_rng([record.seed, zlib.crc32(b"planner")])  # as Scenario.rng
+    states = itertools.islice(planner.iterate(Query.between(grid, record.task), rng), planner.iterations)
+    return grid, planner.iterations, states
+
+
+def check_field(rollout: Rollout) -> None:
+    """Check, before anything is drawn, that a run's planner has a field.
+
+    Raises:
+        InputError: it has none, or its planning cannot be repeated.
+    """
+    if next(plan_again(rollout)[2]).field is None:
+        raise InputError(f"prelude: {rollout.record.planner.name} keeps no field")
+
+
+def planning_frames(rollout: Rollout, setting: dict[str, Any], count: int) -> Iterator[Picture]:
+    """Frames (H, W, 3) of a run's planning, from the first to the last iteration.
+
+    Raises:
+        InputError: planning again led to another path.
+    """
+    grid, total, states = plan_again(rollout)
+    still = {**setting, "camera": "oblique" if setting["camera"] == "follow" else setting["camera"]}
+    with Shot(rollout, **still, planning=True) as shot:
+        number, state = 1, next(states)
+        for k in range(count):
+            due = math.ceil((k + 1) * total / count)
+            for later in itertools.islice(states, due - number):
+                number, state = number + 1, later
+            assert state.field is not None
+            levels = field_levels(grid, state.field)
+            path = grid.xy(state.cells if state.waypoints is None else state.waypoints)
+            yield shot.planning_frame(
+                _values(number, total, state),
+                functools.partial(_draw_field, grid=grid, levels=levels, path=path),
+            )
+    if not np.array_equal(state.cells, rollout.cells):
+        raise InputError("prelude: planning again led to another path; the log is of another version or machine")
+
+
+def _draw_field(compositor: Compositor, grid: Grid, levels: Floats, path: Floats) -> Picture:
+    return compositor.field_frame(grid, levels, path)
+
+
+def field_levels(grid: Grid, field: Floats) -> Floats:
+    """A planner's field (R, C) scaled to 0 to 1 from its low to its high values; NaN where a cell is blocked.
+
+    The scale is a square root, so that weak trails stay visible beside strong ones.
+    """
+    values = np.where(grid.free, np.asarray(field, dtype=np.float64), np.nan)
+    finite = values[np.isfinite(values)]
+    if not len(finite):
+        return values
+    low, high = np.quantile(finite, (0.02, 0.998))
+    return np.asarray(np.sqrt(np.clip((values - low) / max(high - low, 1e-300), 0.0, 1.0)))
+
+
+def _values(number: int, total: int, state: Iteration) -> Values:
+    """The numbers of the band, named `PLAN_FIELDS`."""
+
+    def metres(value: float) -> str:
+        return f"{value:.2f} m" if math.isfinite(value) else "—"
+
+    return [
+        (f"{number} / {total}", False),
+        (metres(state.best), False),
+        (metres(state.iteration_mean), False),
+        (str(state.arrived), False),
+    ]

@@ -1,0 +1,128 @@
+"""Text and other small pictures. The font is the one inside matplotlib, so no system font is needed."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image, ImageDraw, ImageFont
+
+from antdrive.views.style import INK, Colour
+
+Sprite: TypeAlias = npt.NDArray[np.uint8]  # (h, w, 4) RGBA
+
+
+@functools.cache
+def font(size: int, bold: bool = False) -> ImageFont.FreeTypeFont:
+    """DejaVu Sans at a size in pixels."""
+    spec = find_spec("matplotlib")
+    if spec is None or not spec.submodule_search_locations:
+        raise RuntimeError("matplotlib, whose font is used, is not installed")
+    folder = Path(next(iter(spec.submodule_search_locations))) / "mpl-data" / "fonts" / "ttf"
+    return ImageFont.truetype(str(folder / f"DejaVuSans{'-Bold' if bold else ''}.ttf"), size)
+
+
+def text_width(text: str, size: int, bold: bool = False) -> int:
+    """The width of a text [px]."""
+    return int(np.ceil(font(size, bold).getlength(text)))
+
+
+def fitted(text: str, width: int, size: int, bold: bool = False) -> str:
+    """The text, shortened with an ellipsis if it is wider than `width` [px]."""
+    if text_width(text, size, bold) <= width:
+        return text
+    while text and text_width(text + "…", size, bold) > width:
+        text = text[:-1]
+    return text.rstrip() + "…"
+
+
+def wrapped(text: str, width: int, size: int, bold: bool = False, *, most: int) -> list[str]:
+    """The text in lines no wider than `width` [px], broken between words; what is left over is cut off with an ellipsis."""
+    lines: list[str] = []
+    words = text.split()
+    while words and len(lines) < most:
+        count = 1
+        while count < len(words) and text_width(" ".join(words[: count + 1]), size, bold) <= width:
+            count += 1
+        last = len(lines) + 1 == most
+        lines.append(fitted(" ".join(words if last else words[:count]), width, size, bold))
+        words = words[count:]
+    return lines
+
+
+def label(text: str, size: int, colour: Colour = INK, *, bold: bool = True) -> Sprite:
+    """A text with a soft white rim, readable on any background."""
+    rim = max(2, size // 7)
+    wide, high = text_width(text, size, bold) + 2 * rim, round(1.25 * size) + 2 * rim
+    image = Image.new("RGBA", (wide, high), (255, 255, 255, 0))
+    draw = ImageDraw.Draw(image)
+    draw.text(
+        (rim, rim),
+        text,
+        font=font(size, bold),
+        fill=colour,
+        stroke_width=rim - 1,
+        stroke_fill=(255, 255, 255, 215),
+    )
+    draw.text((rim, rim), text, font=font(size, bold), fill=colour)
+    return np.asarray(image)
+
+
+def pill(text: str, size: int, colour: Colour, more: Sequence[str] = (), small: int = 0) -> Sprite:
+    """White text on a coloured plate with round ends."""
+    pad_x, pad_y, line = round(0.75 * size), round(0.36 * size), round(1.35 * small)
+    wide = max(text_width(text, size, True), *(text_width(row, small) for row in more), 0) + 2 * pad_x
+    head = round(1.2 * size) + 2 * pad_y
+    image = plate(wide, head + line * len(more), colour, 255, radius=head // 2)
+    draw = ImageDraw.Draw(image)
+    draw.text((wide / 2, head / 2), text, font=font(size, True), fill=(255, 255, 255, 255), anchor="mm")
+    for k, row in enumerate(more):
+        place = wide / 2, head - pad_y + (k + 0.5) * line
+        draw.text(place, row, font=font(small), fill=(255, 255, 255, 255), anchor="mm")
+    return np.asarray(image)
+
+
+def plate(width: int, height: int, colour: Colour, alpha: int, *, radius: int) -> Image.Image:
+    """A rectangle with smooth round corners on a transparent background."""
+    fine = 4
+    mask = Image.new("L", (width * fine, height * fine), 0)
+    box = (0, 0, width * fine - 1, height * fine - 1)
+    ImageDraw.Draw(mask).rounded_rectangle(box, radius=radius * fine, fill=alpha)
+    image = Image.new("RGBA", (width, height), (*colour, 0))
+    image.putalpha(mask.reduce(fine))
+    return image
+
+
+def burst(size: int, colour: Colour) -> Sprite:
+    """The mark of a contact: a ring with rays."""
+    fine = 4
+    wide = size * fine
+    image = Image.new("RGBA", (wide, wide), (*colour, 0))
+    draw = ImageDraw.Draw(image)
+    middle, reach = wide / 2, wide / 2 - fine
+    for rim, fill in ((0.20, (255, 255, 255, 235)), (0.12, (*colour, 255))):
+        for k in range(8):
+            angle = (k + 0.5) * np.pi / 4
+            way = np.array([np.cos(angle), np.sin(angle)])
+            a, b = middle + 0.66 * reach * way, middle + (0.99 if rim < 0.2 else 1.0) * reach * way
+            draw.line([tuple(a), tuple(b)], fill=fill, width=max(1, round(rim * reach)))
+        r, line = 0.52 * reach + rim * reach / 2, max(1, round(rim * reach))
+        draw.ellipse((middle - r, middle - r, middle + r, middle + r), outline=fill, width=line)
+    return np.asarray(image.resize((size, size), Image.Resampling.LANCZOS))
+
+
+@functools.cache
+def glow(size: int, colour: Colour) -> Sprite:
+    """A soft disc with a thin rim."""
+    along = (np.arange(size) + 0.5) / size * 2 - 1
+    away = np.hypot(along[:, None], along)
+    rim = np.clip(1 - np.abs(away - 0.9) * size / 3, 0, 1)
+    sprite = np.empty((size, size, 4), dtype=np.uint8)
+    sprite[..., :3] = colour
+    sprite[..., 3] = 255 * np.maximum(0.75 * rim, np.where(away < 0.9, 0.16, 0.0))
+    return sprite

@@ -1,0 +1,221 @@
+"""The scene that films and figures draw: world, start, goal and the robot's shape, read from a run's log."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.base.types import Bounds, Point, Pose
+from antdrive.robots.spec import Footprint, RobotSpec
+from antdrive.sim.log.rollout import Rollout
+from antdrive.worlds.movers import Wandering
+from antdrive.worlds.trajectories import Trajectories
+from antdrive.worlds.world import Task
+
+Floats = npt.NDArray[np.float64]
+
+MIN_JUMP = 0.05  # the least distance between two rows that counts as a mover's jump [m]
+PLANNED_TRACK = 30.0  # a plan's figure shows the movers' tracks for this long [s]
+
+
+@dataclass(frozen=True)
+class Body:
+    """The robot's visible shape, and its top speed for the scale of colours.
+
+    Attributes:
+        name: the robot's name
+        footprint: its outline on the ground
+        height: [m]
+        wheel_radius: [m]
+        track: distance between the wheels [m]
+        max_speed: [m/s]
+    """
+
+    name: str
+    footprint: Footprint
+    height: float
+    wheel_radius: float
+    track: float
+    max_speed: float
+
+    @classmethod
+    def of(cls, robot: RobotSpec) -> Body:
+        """The shape of a robot that is not yet in a log."""
+        return cls(robot.name, robot.footprint, robot.height, robot.wheel_radius, robot.track, robot.max_speed)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Scene:
+    """Everything that stands still during a run, the robot's shape, and the movers' tracks.
+
+    Attributes:
+        name: the world's name
+        bounds: xmin, ymin, xmax, ymax [m]
+        obstacles: x, y, radius and height of each cylinder (N, 4) [m]
+        unseen: whether each obstacle was placed after planning (N,)
+        start: x, y [m] and heading [rad]
+        goal: x, y [m]
+        goal_tolerance: how far from the goal the robot may stop [m]
+        inflate: how far the planner kept its path from obstacles: the robot's radius plus the margin [m]
+        margin: the part of `inflate` beyond the robot's radius [m]
+        robot: the robot's shape
+        mapped: whether the robot had a map, and kept a distance from all obstacles from the start
+        mover_radii: one per mover [m]
+        movers: one position per mover [m]: at the run's end, or at t = 0 for a plan that was not driven
+        movers_at: when they are there [s]
+        tracks: polylines (N, 2) that movers follow [m]; a mover that jumps has several
+    """
+
+    name: str
+    bounds: Bounds
+    obstacles: Floats
+    unseen: npt.NDArray[np.bool_]
+    start: Pose
+    goal: Point
+    goal_tolerance: float
+    inflate: float
+    margin: float
+    robot: Body
+    mapped: bool = True
+    mover_radii: tuple[float, ...] = ()
+    movers: tuple[Point, ...] = ()
+    movers_at: float = 0.0
+    tracks: tuple[Floats, ...] = ()
+
+    @classmethod
+    def of(cls, rollout: Rollout) -> Scene:
+        """The scene of a logged run."""
+        record, task, world = rollout.record, rollout.record.task, rollout.record.world
+        discs = [(disc.x, disc.y, disc.radius, disc.height) for disc in world.obstacles]
+        return cls(
+            name=world.name,
+            bounds=world.bounds,
+            obstacles=np.array(discs, dtype=np.float64).reshape(-1, 4),
+            unseen=np.arange(len(discs)) >= len(discs) - len(record.unseen),
+            start=task.start,
+            goal=task.goal,
+            goal_tolerance=task.goal_tolerance,
+            inflate=record.inflate,
+            margin=record.margin,
+            robot=Body.of(record.robot),
+            mapped=not record.exploring,
+            mover_radii=tuple(mover.radius for mover in world.movers),
+            movers=tuple((float(x), float(y)) for x, y in rollout.movers[-1]) if len(rollout.movers) else (),
+            movers_at=float(rollout.t[-1]) if len(rollout.t) else 0.0,
+            tracks=mover_tracks(rollout.movers),
+        )
+
+    @classmethod
+    def planned(cls, task: Task, robot: RobotSpec, inflate: float, *, mapped: bool = True) -> Scene:
+        """The scene of a plan that was not driven."""
+        discs = [(disc.x, disc.y, disc.radius, disc.height) for disc in task.world.obstacles]
+        # The motion of wandering movers depends on a run's seed.
+        shown = [mover for mover in task.world.movers if not isinstance(mover, Wandering)]
+        trajectories = Trajectories.of(dataclasses.replace(task.world, movers=tuple(shown)), task.start[:2])
+        positions = trajectories.positions(np.arange(0.0, PLANNED_TRACK, 0.05))
+        return cls(
+            name=task.world.name,
+            bounds=task.world.bounds,
+            obstacles=np.array(discs, dtype=np.float64).reshape(-1, 4),
+            unseen=np.zeros(len(discs), dtype=np.bool_),
+            start=task.start,
+            goal=task.goal,
+            goal_tolerance=task.goal_tolerance,
+            inflate=inflate,
+            margin=max(0.0, inflate - robot.radius),
+            robot=Body.of(robot),
+            mapped=mapped,
+            mover_radii=tuple(trajectories.radii.tolist()),
+            movers=tuple((x, y) for x, y in positions[0].tolist()),
+            tracks=mover_tracks(positions),
+        )
+
+    @property
+    def unseen_said(self) -> str:
+        """What legends call the obstacles of `--unseen`: without a map the planner knew of no obstacle at first."""
+        return "placed after planning" if self.mapped else "not in the world file"
+
+    @property
+    def route_said(self) -> str:
+        """What legends call the first route."""
+        return "route" if self.mapped else "first route, before the world was seen"
+
+    @property
+    def movers_said(self) -> str:
+        """What a legend says of movers: a picture shows them at one moment."""
+        return f"moving obstacle, at {self.movers_at:.1f} s"
+
+    @property
+    def has_zones(self) -> bool:
+        """Whether there is ground around the obstacles that plans keep off from the start."""
+        return self.mapped and self.inflate > 0
+
+    def around(self, way: Floats) -> Bounds:
+        """The part of the plane that a map shows [m]: the world, and what a robot without a map planned first."""
+        if self.mapped or not len(way):
+            return self.bounds
+        (x0, y0), (x1, y1) = way.min(axis=0).tolist(), way.max(axis=0).tolist()
+        low_x, low_y, high_x, high_y = self.bounds
+        return min(low_x, x0), min(low_y, y0), max(high_x, x1), max(high_y, y1)
+
+    def region(self, points: Floats) -> tuple[Floats, Floats]:
+        """The corners (2,), (2,) [m] of the part of the world to show: around start, goal and points (N, 2).
+
+        If this part is more than half of the world, the whole world is shown.
+        """
+        room = max(0.8, 3 * self.robot.footprint.radius, 1.5 * self.inflate)
+        ends = np.array([self.start[:2], self.goal])
+        points = np.vstack([ends, points.reshape(-1, 2)])
+        world_low, world_high = np.array(self.bounds[:2]), np.array(self.bounds[2:])
+        low = np.maximum(points.min(axis=0) - room, world_low)
+        high = np.minimum(points.max(axis=0) + room, world_high)
+        if np.prod(high - low) > 0.5 * np.prod(world_high - world_low):
+            return world_low, world_high
+        return low, high
+
+
+def contact_point(scene: Scene, pose: npt.ArrayLike, index: int, movers: Floats) -> tuple[float, float]:
+    """The point [m] on the surface of an obstacle, a mover or a wall that is nearest to the robot."""
+    x, y, yaw = (float(value) for value in np.asarray(pose))
+    foot = scene.robot.footprint
+    discs = np.vstack([scene.obstacles[:, :3], np.column_stack([movers, scene.mover_radii])])
+    if index >= len(discs):
+        x0, y0, x1, y1 = scene.bounds
+        return ((x0, y), (x1, y), (x, y0), (x, y1))[(index - len(discs)) % 4]
+    ox, oy, radius = (float(value) for value in discs[index])
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    ahead, aside = foot.nearest((ox - x) * cosine + (oy - y) * sine, (oy - y) * cosine - (ox - x) * sine)
+    nx, ny = x + ahead * cosine - aside * sine, y + ahead * sine + aside * cosine
+    gap = math.hypot(nx - ox, ny - oy)
+    if gap < 1e-9:
+        return ox, oy
+    return ox + radius * (nx - ox) / gap, oy + radius * (ny - oy) / gap
+
+
+def jumps(movers: Floats) -> npt.NDArray[np.bool_]:
+    """Whether movers at positions (T, M, 2) jump between consecutive rows, shape (T - 1, M).
+
+    A jump is a step longer than `MIN_JUMP` that is also more than three times the steps before and after it: a fast
+    mover makes long steps, too, but all alike.
+    """
+    step = np.hypot(*np.moveaxis(np.diff(movers, axis=0), -1, 0))
+    around = np.zeros_like(step)
+    if len(step) > 1:
+        around[1:] = step[:-1]
+        around[:-1] = np.maximum(around[:-1], step[1:])
+    return np.asarray((step > MIN_JUMP) & (step > 3 * around))
+
+
+def mover_tracks(movers: Floats) -> tuple[Floats, ...]:
+    """The polylines (N, 2) of movers at positions (T, M, 2), cut where they jump."""
+    cuts = jumps(movers)
+    return tuple(
+        piece
+        for m in range(movers.shape[1])
+        for piece in np.split(movers[:, m], np.flatnonzero(cuts[:, m]) + 1)
+        if len(piece) > 1
+    )

@@ -1,0 +1,63 @@
+"""Replay a run in real time in PyBullet's own viewer, for machines with a screen."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+
+import numpy as np
+
+from antdrive.base.errors import InputError
+from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.physics.bullet import bullet
+from antdrive.views.film.compositor import drawn_height, merged_by_colour, part_pose, still_meshes
+from antdrive.views.film.meshes import robot_parts
+from antdrive.views.film.replay import Replay
+from antdrive.views.film.tiny_renderer import add_mesh
+from antdrive.views.scene import Scene
+
+
+def check_display() -> None:
+    """Check, before any work, that a window can open.
+
+    Raises:
+        InputError: there is no display.
+    """
+    if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
+        raise InputError("--gui: no display (DISPLAY is not set); --video FILE.mp4 works without one")
+
+
+def show(rollout: Rollout, *, hold: float = 3.0) -> None:
+    """Replay a run in a window until it ends or the window is closed.
+
+    Raises:
+        InputError: there is no display, or the viewer did not open.
+    """
+    check_display()
+    p = bullet()
+    number = p.connect(p.GUI)
+    if number < 0:
+        raise InputError("--gui: PyBullet's viewer did not open")
+    try:
+        p.configureDebugVisualizer(p.COV_ENABLE_GUI, 0, physicsClientId=number)
+        scene, replay = Scene.of(rollout), Replay(rollout)
+        tall = np.minimum(scene.obstacles[:, 3], drawn_height(scene))
+        for mesh, colour in merged_by_colour(still_meshes(scene, tall)):
+            add_mesh(number, mesh, colour)
+        robot = [(part, add_mesh(number, part.mesh, part.colour)) for part in robot_parts(scene.robot)]
+        for a, b in zip(rollout.route[:-1], rollout.route[1:], strict=True):
+            p.addUserDebugLine([*a, 0.01], [*b, 0.01], [0.1, 0.13, 0.26], 2, physicsClientId=number)
+        x0, y0, x1, y1 = scene.bounds
+        middle = [(x0 + x1) / 2, (y0 + y1) / 2, 0.0]
+        p.resetDebugVisualizerCamera(0.9 * max(x1 - x0, y1 - y0), 0, -52, middle, physicsClientId=number)
+        started = time.monotonic()
+        while (at := time.monotonic() - started) < replay.duration + hold and p.isConnected(physicsClientId=number):
+            now = min(at, replay.duration)
+            for part, body in robot:
+                place, turn = part_pose(part, *replay.pose(now), replay.wheels(now))
+                p.resetBasePositionAndOrientation(body, place, turn, physicsClientId=number)
+            time.sleep(1 / 60)
+    finally:
+        if p.isConnected(physicsClientId=number):
+            p.disconnect(number)

@@ -1,0 +1,331 @@
+"""World files: tasks in YAML, read and written, and the catalogue of worlds that comes with the package."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Annotated, Any, Literal
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field
+
+from antdrive.base.atomic import written_whole
+from antdrive.base.checks import OneLine, SchemaVersion, check, suggest, yaml_number
+from antdrive.base.document import MAX_BYTES, MAX_VALUES, Document, count_values, parse_document, read_yaml
+from antdrive.base.errors import FieldError, input_error
+from antdrive.worlds.limits import MAX_CELLS, MAX_COORDINATE, MAX_PHASE, MIN_PERIOD
+from antdrive.worlds.movers import Mover, mover_from_dict, mover_to_dict
+from antdrive.worlds.reuse import reused
+from antdrive.worlds.world import Disc, Task, World
+
+Coordinate = Annotated[float, Field(ge=-MAX_COORDINATE, le=MAX_COORDINATE)]
+Size = Annotated[float, Field(gt=0, le=MAX_COORDINATE)]
+Pair = Annotated[list[Coordinate], Field(min_length=2, max_length=2)]
+Keyframe = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
+
+OF_OTHERS = (".sdf", ".world", ".map")  # the suffixes of other programs' worlds, which are imported
+_CATALOG = Path(__file__).parent.with_name("catalog")
+_RULES = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
+
+
+class DiscEntry(BaseModel):
+    """An upright cylinder. The radius is as built, never inflated."""
+
+    model_config = _RULES
+
+    x: Coordinate = Field(description="the centre's x [m]")
+    y: Coordinate = Field(description="the centre's y [m]")
+    radius: Size = Field(description="the radius as built [m]")
+    height: Size = Field(1.0, description="the height [m]")
+
+
+class WalkEntry(BaseModel):
+    """A random walk: in every period from a cell's centre to that of a random free neighbour."""
+
+    model_config = _RULES
+
+    cell: Size = Field(description="side of a cell [m]")
+    period: float = Field(ge=MIN_PERIOD, le=MAX_COORDINATE, description="time for one step [s]")
+    start: Pair | None = Field(
+        None, description="write [x, y] of a point in the first cell; by default a random free cell"
+    )
+    seed: int | None = Field(None, ge=0, lt=2**63, description="random seed; by default the run's")
+
+
+class MoverEntry(BaseModel):
+    """A moving cylinder; exactly one of keyframes, velocity and walk says how it moves."""
+
+    model_config = _RULES
+
+    radius: Size = Field(description="the radius as built [m]")
+    height: Size = Field(1.0, description="the height [m]")
+    phase: float = Field(
+        0.0, ge=0, le=MAX_PHASE, description="how much of the motion has already passed at the start [s]"
+    )
+    keyframes: list[Keyframe] | None = Field(None, max_length=10_000, description="write [t, x, y] for each")
+    loop: Literal["pingpong", "teleport", "once"] | None = Field(None, description="what follows the last keyframe")
+    interpolation: Literal["linear", "catmull-rom"] | None = Field(None, description="how it moves between keyframes")
+    position: Pair | None = Field(None, description="write [x, y], the centre at first")
+    velocity: Pair | None = Field(None, description="write [vx, vy] in m/s; it bounces off the walls")
+    walk: WalkEntry | None = Field(None, description="write {cell: 0.5, period: 1.0}")
+
+
+class EndsEntry(BaseModel):
+    """Another start and goal in the same world; `--task NAME` chooses it."""
+
+    model_config = _RULES
+
+    name: OneLine = Field(min_length=1, max_length=100, description="what --task calls it")
+    start: list[Coordinate] | None = Field(
+        None,
+        min_length=3,
+        max_length=3,
+        description="write [x, y, yaw] in metres and radians; by default the world's own",
+    )
+    goal: list[Coordinate] = Field(min_length=2, max_length=2, description="write [x, y] in metres")
+    goal_tolerance: Size | None = Field(None, description="how close to the goal the robot must stop [m]")
+
+
+class WorldFile(BaseModel):
+    """A world with a start and a goal, as written in a file."""
+
+    model_config = _RULES
+
+    # "schema" is also a method of BaseModel, hence the alias.
+    schema_: SchemaVersion = Field(alias="schema", description="write schema: 1")
+    name: OneLine = Field(
+        min_length=1, max_length=200, description="what people call the world; by default the file's name"
+    )
+    source: str | None = Field(None, description="where the world comes from, free text")
+    bounds: list[Coordinate] = Field(min_length=4, max_length=4, description="write [xmin, ymin, xmax, ymax] in metres")
+    start: list[Coordinate] = Field(min_length=3, max_length=3, description="write [x, y, yaw] in metres and radians")
+    goal: list[Coordinate] = Field(min_length=2, max_length=2, description="write [x, y] in metres")
+    goal_tolerance: Size = Field(0.25, description="how close to the goal the robot must stop [m]")
+    cell: Size = Field(0.5, description="grid resolution for planners unless another is given [m]")
+    obstacles: list[DiscEntry] = Field([], description="upright cylinders")
+    time_limit: Size | None = Field(None, description="simulated time allowed [s]; by default ample for the route")
+    movers: list[MoverEntry] = Field([], max_length=1000, description="moving cylinders")
+    tasks: list[EndsEntry] = Field([], max_length=10_000, description="other starts and goals, by name")
+    frame: list[Coordinate] | None = Field(
+        None,
+        min_length=3,
+        max_length=3,
+        description="write [x, y, yaw]: where the world's origin lies in the map that it was made from, in metres and radians; "
+        "exports use it",
+    )
+
+
+def list_worlds() -> Mapping[str, Path]:
+    """The worlds that come with the package, by name."""
+    return dict(sorted((path.stem, path) for path in _CATALOG.glob("*.yaml")))
+
+
+def load_task(world: str | os.PathLike[str], name: str | None = None) -> Task:
+    """The task in a world file, or in the catalogue.
+
+    Args:
+        world: a name of the catalogue, or a path; a text that is both means the catalogue
+        name: one of the file's `tasks`; None: the world's own start and goal
+
+    Raises:
+        InputError: there is no such world or task, or something in the file is wrong.
+    """
+    found = _tasks_of(world)
+    if name not in found:
+        known = [known for known in found if known is not None]
+        hint = suggest(name or "", known) if known else "the world has no tasks beside its own start and goal"
+        raise input_error(os.fspath(world), f"no task {name!r:.60}; {hint}")
+    return found[name]
+
+
+def load_tasks(world: str | os.PathLike[str]) -> Mapping[str, Task]:
+    """The tasks under the key `tasks` of a world file or of a world of the catalogue, by name.
+
+    Args:
+        world: as for `load_task`
+
+    Raises:
+        InputError: there is no such world, or something in the file is wrong.
+    """
+    return {name: task for name, task in _tasks_of(world).items() if name is not None}
+
+
+def _tasks_of(world: str | os.PathLike[str]) -> Mapping[str | None, Task]:
+    """The tasks of a world by name; None is its own."""
+    known = list_worlds()
+    path = known[world] if isinstance(world, str) and world in known else Path(world)
+    if not os.path.lexists(path):
+        hint = suggest(path.stem, known)
+        raise input_error(os.fspath(world), f"no such file, nor a world of the catalogue; {hint}")
+    if path.suffix.lower() in OF_OTHERS:
+        raise input_error(str(path), f"is no world file; make one of it with antdrive worlds import {path}")
+    return _tasks_in(read_yaml(path), os.fspath(path), path.stem)
+
+
+@reused(16)
+def _tasks_in(text: str, source: str, stem: str) -> Mapping[str | None, Task]:
+    """The tasks in the text of a world file."""
+    document = parse_document(text, source)
+    if isinstance(document.data, dict):
+        if {"image", "resolution", "origin"} <= document.data.keys():
+            raise document.error((), f"is a map of map_server; make a world of it with antdrive worlds import {source}")
+        document.data.setdefault("name", "".join(filter(str.isprintable, stem))[:200] or "world")
+    return _tasks_in_document(document)
+
+
+def _tasks_in_document(document: Document) -> dict[str | None, Task]:
+    entry = check(WorldFile, document)
+    own = _to_task(document, entry)
+    found: dict[str | None, Task] = {None: own}
+    return found | _named_tasks(document, entry, own)
+
+
+def _named_tasks(document: Document, entry: WorldFile, own: Task) -> dict[str | None, Task]:
+    """The tasks beside a world's own."""
+    found: dict[str | None, Task] = {}
+    for i, ends in enumerate(entry.tasks):
+        if ends.name in found:
+            raise document.error(("tasks", i, "name"), f"{ends.name!r} is the name of two tasks")
+        start = own.start if ends.start is None else (ends.start[0], ends.start[1], ends.start[2])
+        tolerance = ends.goal_tolerance or own.goal_tolerance
+        try:
+            goal = ends.goal[0], ends.goal[1]
+            found[ends.name] = dataclasses.replace(own, start=start, goal=goal, goal_tolerance=tolerance)
+        except FieldError as error:
+            raise document.field_error(error, "tasks", i) from None
+    return found
+
+
+def save_task(task: Task, path: str | Path, tasks: Mapping[str, Task] = MappingProxyType({})) -> None:
+    """Write a task as a world file, whole or not at all.
+
+    Args:
+        task: the world with its own start and goal
+        path: the file
+        tasks: other starts and goals in the same world, by name
+
+    Raises:
+        InputError: the file cannot be written, or a world file cannot hold the task, such as one with an empty name or
+            with too many obstacles.
+    """
+    data = task_to_dict(task)
+    if tasks:
+        data["tasks"] = [{"name": name, **ends_to_dict(other)} for name, other in tasks.items()]
+    _tasks_in_document(Document("task", data))
+    text = _to_yaml(data)
+    size = len(text.encode())
+    values = count_values(data)
+    if size > MAX_BYTES or values > MAX_VALUES:
+        raise input_error(
+            os.fspath(path),
+            f"not written: {len(task.world.obstacles)} obstacles and {len(task.world.movers)} movers make "
+            f"{size / 1e6:.1f} MB and {values} values, and a world file has at most {MAX_BYTES / 1e6:g} MB and "
+            f"{MAX_VALUES} values; use fewer, larger cylinders (for maps, a larger overhang)",
+        )
+    with written_whole(path) as part:
+        part.write_text(text, encoding="utf-8")
+
+
+def ends_to_dict(task: Task) -> dict[str, Any]:
+    """The start and the goal of a task as plain data."""
+    return {
+        "start": [float(v) for v in task.start],
+        "goal": [float(v) for v in task.goal],
+        "goal_tolerance": float(task.goal_tolerance),
+    }
+
+
+def task_to_dict(task: Task) -> dict[str, Any]:
+    """A task as plain data with the keys of a world file, ready for JSON."""
+    world = task.world
+    return {
+        "schema": 1,
+        "name": world.name,
+        **({} if world.source is None else {"source": world.source}),
+        "bounds": [float(v) for v in world.bounds],
+        "start": [float(v) for v in task.start],
+        "goal": [float(v) for v in task.goal],
+        "goal_tolerance": float(task.goal_tolerance),
+        "cell": float(task.cell),
+        **({} if task.time_limit is None else {"time_limit": float(task.time_limit)}),
+        **({"frame": [float(v) for v in task.frame]} if any(task.frame) else {}),
+        "obstacles": [
+            {"x": float(d.x), "y": float(d.y), "radius": float(d.radius), "height": float(d.height)}
+            for d in world.obstacles
+        ],
+        **({"movers": [mover_to_dict(mover) for mover in world.movers]} if world.movers else {}),
+    }
+
+
+def task_from_dict(data: Mapping[str, Any], source: str = "task") -> Task:
+    """The task in plain data, as `task_to_dict` returns it.
+
+    Args:
+        data: mappings, lists, numbers and texts with the keys of a world file
+        source: what error messages call the data
+
+    Raises:
+        InputError: something in the data is wrong.
+    """
+    return _to_task(Document(source, dict(data)))
+
+
+def task_schema() -> dict[str, Any]:
+    """The JSON Schema of a world file, for editors."""
+    schema = WorldFile.model_json_schema(by_alias=True)
+    schema["required"] = [key for key in schema["required"] if key != "name"]
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "antdrive world"}
+
+
+def _to_task(document: Document, entry: WorldFile | None = None) -> Task:
+    entry = entry or check(WorldFile, document)
+    xmin, ymin, xmax, ymax = entry.bounds
+    if (xmax - xmin) / entry.cell * (ymax - ymin) / entry.cell > MAX_CELLS:
+        raise document.error(("cell",), f"{entry.cell:g} m cuts these bounds into more than {MAX_CELLS} cells")
+    x, y, yaw = entry.start
+    discs = tuple(Disc(d.x, d.y, d.radius, d.height) for d in entry.obstacles)
+    movers = tuple(_to_mover(document, i, mover) for i, mover in enumerate(entry.movers))
+    try:
+        world = World(entry.name, (xmin, ymin, xmax, ymax), discs, entry.source, movers)
+        goal = entry.goal[0], entry.goal[1]
+        frame = (0.0, 0.0, 0.0) if entry.frame is None else (entry.frame[0], entry.frame[1], entry.frame[2])
+        return Task(world, (x, y, yaw), goal, entry.goal_tolerance, entry.cell, entry.time_limit, frame)
+    except FieldError as error:
+        raise document.field_error(error) from None
+
+
+def _to_mover(document: Document, index: int, entry: MoverEntry) -> Mover:
+    try:
+        return mover_from_dict(entry.model_dump(exclude_unset=True))
+    except FieldError as error:
+        raise document.field_error(error, "movers", index) from None
+
+
+def _to_yaml(data: dict[str, Any]) -> str:
+    data = dict(data)
+    lists = {key: data.pop(key) for key in ("obstacles", "movers", "tasks") if key in data}
+    lines = []
+    for key, value in data.items():
+        if isinstance(value, list | float):
+            lines.append(f"{key}: {_flow(value)}\n")
+        else:
+            lines.append(yaml.safe_dump({key: value}, allow_unicode=True, width=100))
+    for key, entries in lists.items():
+        lines.append(f"{key}:\n" if entries else f"{key}: []\n")
+        # A string of JSON is one of YAML, whatever is in a name.
+        quoted = [{**entry, "name": json.dumps(entry["name"])} if "name" in entry else entry for entry in entries]
+        lines += [f"  - {_flow(entry)}\n" for entry in quoted]
+    return "".join(lines)
+
+
+def _flow(value: Any) -> str:
+    """Plain data on one line."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key}: {_flow(inner)}" for key, inner in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_flow, value)) + "]"
+    return yaml_number(value) if isinstance(value, float) else str(value)

@@ -1,0 +1,308 @@
+"""Maps of ROS's map_server (wiki.ros.org/map_server, Nav2's nav2_map_server): a YAML file and the image it names.
+
+A pixel of shade s, from 0 (black) to 1 (white), is occupied with probability p = 1 - s, or p = s where `negate` is set.
+Its cell is free when p < free_thresh, occupied when p > occupied_thresh, and unknown in between; the image's last row is
+the lowest. The other modes differ little: in `scale`, pixels that are not opaque are unknown; in `raw`, the shades 0..100
+(of 255) are p in percent, never negated, and higher shades are unknown.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import warnings
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
+
+from antdrive.base.atomic import written_whole
+from antdrive.base.checks import OneLine, check, yaml_number
+from antdrive.base.document import read_document
+from antdrive.base.errors import FieldError, input_error
+from antdrive.base.plane import in_map, out_of_map
+from antdrive.base.types import Floats, Point, Pose
+from antdrive.worlds.files.world_file import Coordinate, Size
+from antdrive.worlds.formats.cellmap import CellMap, Cells, cell_map, file_task
+from antdrive.worlds.formats.checks import require_new, require_no_movers
+from antdrive.worlds.limits import MAX_CELLS
+from antdrive.worlds.world import Task
+
+FORMATS = ("PPM", "PNG", "BMP")  # Pillow's "PPM" includes PBM and PGM
+MODES = {"1": "L", "P": "RGB"}  # black-and-white images become grey, palettes become colours
+FREE, OCCUPIED = 254, 0  # the shades that map_saver writes
+
+Share = Annotated[float, Field(ge=0, le=1)]
+
+
+class KeptTask(BaseModel):
+    """Another start and goal, which `export_map_server` adds to a map."""
+
+    model_config = ConfigDict(strict=True, extra="ignore", allow_inf_nan=False, frozen=True)
+
+    name: OneLine = Field(min_length=1, max_length=100)
+    start: list[Coordinate] = Field(min_length=3, max_length=3, description="write [x, y, yaw] in metres and radians")
+    goal: list[Coordinate] = Field(min_length=2, max_length=2, description="write [x, y] in metres")
+    goal_tolerance: Size = 0.25
+
+
+class KeptEnds(BaseModel):
+    """Start, goal and tolerance, and other tasks, which `export_map_server` adds to a map for `import_map_server`."""
+
+    model_config = ConfigDict(strict=True, extra="ignore", allow_inf_nan=False, frozen=True)
+
+    start: list[Coordinate] = Field(min_length=3, max_length=3, description="write [x, y, yaw] in metres and radians")
+    goal: list[Coordinate] = Field(min_length=2, max_length=2, description="write [x, y] in metres")
+    goal_tolerance: Size = 0.25
+    tasks: list[KeptTask] = Field([], max_length=10_000)
+
+
+class MapFile(BaseModel):
+    """The YAML file of a map. Keys of other tools are ignored, as by map_server."""
+
+    model_config = ConfigDict(strict=True, extra="ignore", allow_inf_nan=False, frozen=True)
+
+    image: str = Field(min_length=1, description="the image's file name, from the YAML file's folder")
+    resolution: Size = Field(description="the side of a cell [m]")
+    origin: list[Coordinate] = Field(
+        min_length=3, max_length=3, description="write [x, y, yaw] of the lower left corner in metres and radians"
+    )
+    negate: bool = Field(description="write 0, or 1 where black is free")
+    occupied_thresh: Share = Field(
+        description="cells that are occupied with a higher probability are occupied; 0.65 is usual"
+    )
+    free_thresh: Share = Field(description="cells that are occupied with a lower probability are free; 0.196 is usual")
+    mode: Literal["trinary", "scale", "raw"] = "trinary"
+    antdrive: KeptEnds | None = None
+
+    @field_validator("negate", mode="before")
+    @classmethod
+    def _zero_or_one(cls, negate: Any) -> Any:
+        return bool(negate) if type(negate) is int and negate in (0, 1) else negate
+
+    @field_validator("free_thresh")
+    @classmethod
+    def _below(cls, free: float, info: ValidationInfo) -> float:
+        occupied = info.data.get("occupied_thresh")
+        if occupied is not None and not free <= occupied:
+            raise ValueError(f"must not be above occupied_thresh, {occupied:g}, got {free:g}")
+        return free
+
+
+@dataclass(frozen=True, eq=False)
+class ServedMap:
+    """A map as map_server would serve it.
+
+    Attributes:
+        cells: the free cells; unknown cells are free only where that was asked for
+        unknown: how many cells are neither free nor occupied
+        ends: start and goal, where antdrive wrote the map
+        frame: where the frame of the cells lies in that of the map; not zero for a turned map, whose cells begin at (0, 0)
+    """
+
+    cells: CellMap
+    unknown: int
+    ends: KeptEnds | None
+    frame: Pose = (0.0, 0.0, 0.0)
+
+
+def import_map_server(
+    path: str | os.PathLike[str],
+    *,
+    start: Pose | None = None,
+    goal: Point | None = None,
+    unknown_is_free: bool = False,
+    overhang: float | None = None,
+    cell: float | None = None,
+    goal_tolerance: float | None = None,
+) -> Task:
+    """A map of map_server as a world of discs; see `map_task`.
+
+    A map that is turned becomes a world that is not; the task's `frame` says how it lies in its map.
+
+    Args:
+        path: the YAML file, which names the image
+        start: the robot's first pose in the map [m, m, rad]; needed unless `export_map_server` wrote the map
+        goal: in the map [m]; needed unless `export_map_server` wrote the map
+        unknown_is_free: whether unknown cells are free instead of blocked
+        overhang: how far discs may reach beyond blocked cells [m]; see `map_task`
+        cell: the task's grid resolution [m]; by default that of the map
+        goal_tolerance: how close to the goal the robot must stop [m]; by default 0.25
+
+    Raises:
+        InputError: a file is wrong, or `map_task` refuses the map.
+    """
+    file = Path(path)
+    served = read_map(file, unknown_is_free=unknown_is_free)
+    ends = served.ends
+    if ends is not None:
+        start = start or (ends.start[0], ends.start[1], ends.start[2])
+        goal = goal or (ends.goal[0], ends.goal[1])
+        goal_tolerance = goal_tolerance or ends.goal_tolerance
+    source = f"the map_server map {file.name}"
+    if served.unknown:
+        source += f" with {served.unknown} unknown cells taken for {'free' if unknown_is_free else 'blocked'}"
+    if any(served.frame):
+        start, goal = _out_of_map(served.frame, start), _out_of_map(served.frame, goal)
+    task = file_task(
+        file, served.cells, start, goal, source=source, overhang=overhang, cell=cell, goal_tolerance=goal_tolerance
+    )
+    return dataclasses.replace(task, frame=served.frame)
+
+
+def kept_tasks(path: str | os.PathLike[str], task: Task) -> dict[str, Task]:
+    """The other tasks that `export_map_server` added to a map, by name; empty for a map that antdrive did not write.
+
+    Raises:
+        InputError: the file is wrong, or a task does not lie in the world.
+    """
+    document = read_document(path)
+    entry = check(MapFile, document)
+    found = {}
+    for i, kept in enumerate(entry.antdrive.tasks if entry.antdrive else ()):
+        start, goal = _out_of_map(task.frame, kept.start), _out_of_map(task.frame, kept.goal)
+        try:
+            found[kept.name] = dataclasses.replace(task, start=start, goal=goal, goal_tolerance=kept.goal_tolerance)
+        except FieldError as error:
+            raise document.field_error(error, "antdrive", "tasks", i) from None
+    return found
+
+
+def _out_of_map(frame: Pose, end: Any) -> Any:
+    return None if end is None else tuple(out_of_map(frame, [end])[0].tolist())
+
+
+def read_map(path: str | os.PathLike[str], *, unknown_is_free: bool = False) -> ServedMap:
+    """The map that a YAML file describes.
+
+    Raises:
+        InputError: a file cannot be read or is wrong.
+    """
+    document = read_document(path)
+    if isinstance(document.data, dict) and "image" not in document.data:
+        raise document.error((), "names no image, so it is not a map of map_server")
+    entry = check(MapFile, document)
+    try:
+        level, opaque = _levels(Path(path).parent / entry.image, average_alpha=entry.mode == "trinary")
+    except ValueError as error:
+        raise document.error(("image",), str(error)) from None
+    p = level / 100 if entry.mode == "raw" else (level if entry.negate else 255 - level) / 255
+    known = p <= 1.0 if entry.mode == "raw" else opaque | (entry.mode == "trinary")
+    free, occupied = known & (p < entry.free_thresh), known & (p > entry.occupied_thresh)
+    cells = np.array((~occupied if unknown_is_free else free)[::-1])
+    cells.setflags(write=False)
+    x, y, yaw = entry.origin
+    frame, corner = ((x, y, yaw), (0.0, 0.0)) if yaw else ((0.0, 0.0, 0.0), (x, y))
+    found = CellMap(cells, entry.resolution, corner, frame)
+    return ServedMap(found, int((~free & ~occupied).sum()), entry.antdrive, frame)
+
+
+def _levels(path: Path, average_alpha: bool) -> tuple[Floats, Cells]:
+    """The brightness of the pixels, 0..255, and which pixels are opaque; both (R, C), the image's top row first.
+
+    Brightness is the mean of the channels; in its trinary mode map_server counts the alpha channel among them.
+
+    Raises:
+        ValueError: the image cannot be read; the message says why.
+    """
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # our own limit is lower
+            with Image.open(path, formats=FORMATS) as stored:
+                width, height = stored.size
+                if width * height > MAX_CELLS:
+                    raise ValueError(f"has {height} x {width} pixels; the limit is {MAX_CELLS}")
+                image = stored.convert("RGBA" if "transparency" in stored.info else MODES.get(stored.mode, stored.mode))
+                if image.mode not in ("L", "LA", "RGB", "RGBA", "I", "I;16", "I;16B"):
+                    raise ValueError(f"Pillow reads it as {image.mode}; save it in grey or in colours")
+                pixels = np.asarray(image, dtype=np.float64) / (257 if image.mode.startswith("I") else 1)
+    except UnidentifiedImageError:
+        raise ValueError(f"{path} is not a PGM, PNG or BMP image") from None
+    except FileNotFoundError:
+        raise ValueError(f"{path}: no such file") from None
+    except (OSError, ValueError, SyntaxError, OverflowError, Image.DecompressionBombError) as error:
+        problem = getattr(error, "strerror", None) or str(error) or type(error).__name__
+        raise ValueError(f"{path} cannot be read: {problem}") from None
+    layers = pixels.reshape(height, width, -1)
+    if image.mode not in ("LA", "RGBA"):
+        return layers.mean(axis=2), np.ones((height, width), dtype=np.bool_)
+    return (layers if average_alpha else layers[..., :-1]).mean(axis=2), layers[..., -1] == 255
+
+
+def export_map_server(
+    task: Task,
+    path: str | Path,
+    *,
+    resolution: float | None = None,
+    tasks: Mapping[str, Task] = MappingProxyType({}),
+    replace: bool = False,
+) -> Path:
+    """Write a world as a map of map_server: a YAML file, and a PGM image of the same name beside it.
+
+    A cell is occupied when a disc or a wall reaches into it by more than a nanometre; no cell is unknown. Heights are
+    lost. Start, goal and tolerance, and other tasks, are kept under the key `antdrive`, which map_server ignores and
+    `import_map_server` reads. The map covers the world's bounds; positions in it are those in the map that the world
+    was made from.
+
+    Args:
+        task: the world to write
+        path: the YAML file
+        resolution: side of a cell [m]; by default the task's own
+        tasks: other starts and goals in the same world, by name
+        replace: whether files that exist may be replaced; the image may be that of another map
+
+    Returns:
+        The image's path.
+
+    Raises:
+        InputError: a file exists or cannot be written, the world has movers, or the resolution is not usable.
+    """
+    require_no_movers(task, path)
+    target = Path(path)
+    require_new((target, target.with_suffix(".pgm")), replace=replace)
+    cells = cell_map(task.world, task.cell if resolution is None else resolution)
+    rows, cols = cells.free.shape
+    picture = np.where(cells.free[::-1], FREE, OCCUPIED).astype(np.uint8)
+    image = target.with_suffix(".pgm")
+    name = image.name.replace("'", "''")
+    if not name.isprintable():
+        raise input_error(str(target), "a map's name must be printable")
+    text = (
+        f"image: '{name}'\n"
+        f"resolution: {yaml_number(cells.resolution)}\n"
+        f"origin: {_yaml_list(in_map(task.frame, [(*cells.origin, 0.0)])[0].tolist())}\n"
+        "negate: 0\n"
+        "occupied_thresh: 0.65\n"
+        "free_thresh: 0.196\n"
+        "antdrive:\n" + "".join(f"  {line}\n" for line in _ends(task))
+    )
+    if tasks:
+        text += "  tasks:\n"
+        text += "".join(
+            f"    - {{name: {json.dumps(name)}, {', '.join(_ends(other))}}}\n" for name, other in tasks.items()
+        )
+    with written_whole(image) as part:
+        part.write_bytes(b"P5\n%d %d\n255\n" % (cols, rows) + picture.tobytes())
+    with written_whole(target) as part:
+        part.write_text(text, encoding="utf-8", newline="\n")
+    return image
+
+
+def _ends(task: Task) -> tuple[str, ...]:
+    """The start, the goal and the tolerance of a task in its map, as keys and values of YAML."""
+    return (
+        f"start: {_yaml_list(in_map(task.frame, [task.start])[0].tolist())}",
+        f"goal: {_yaml_list(in_map(task.frame, [task.goal])[0].tolist())}",
+        f"goal_tolerance: {yaml_number(task.goal_tolerance)}",
+    )
+
+
+def _yaml_list(values: Iterable[float]) -> str:
+    return f"[{', '.join(map(yaml_number, values))}]"

@@ -1,0 +1,260 @@
+"""Grid maps and problems of the MovingAI benchmarks (N. Sturtevant, *Benchmarks for grid-based pathfinding*, 2012).
+
+The first line of cells in a `.map` file is the map's top, so it becomes the last row here: rows grow upwards, as in every
+grid of ours, and the map looks as it does in the benchmark's pictures.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.base.atomic import written_whole
+from antdrive.base.errors import input_error
+from antdrive.base.reading import read_bytes
+from antdrive.base.types import Point, Pose
+from antdrive.worlds.formats.cellmap import CellMap, cell_map, file_task
+from antdrive.worlds.formats.checks import require_no_movers
+from antdrive.worlds.limits import MAX_CELLS
+from antdrive.worlds.world import Task
+
+if TYPE_CHECKING:  # a grid loads the compiler
+    from antdrive.worlds.grid import Grid
+
+MapCell: TypeAlias = tuple[int, int]  # (row, col)
+
+PASSABLE = b".GS"  # ground, the same, swamp that is entered from the ground
+BLOCKED = b"@OTW"  # out of bounds (two letters), trees, water
+
+MAX_BYTES = 100_000_000
+
+
+@dataclass(frozen=True)
+class MapProblem:
+    """A start and a goal on a map, with the length of the shortest path.
+
+    Attributes:
+        start: (row, col) of our grid: row 0 is the map's last line
+        goal: (row, col)
+        optimal: the length of the shortest path with octile moves that cut no corners [cells], as precise as printed
+        printed: the same length as text, as in the file
+        map_name: the map's file name
+        bucket: the length divided by 4, rounded down
+    """
+
+    start: MapCell
+    goal: MapCell
+    optimal: float
+    printed: str
+    map_name: str
+    bucket: int
+
+
+def import_movingai_map(path: str | os.PathLike[str]) -> Grid:
+    """The grid of a `.map` file, with cells of 1 m and diagonals that need both orthogonal neighbours free.
+
+    Raises:
+        InputError: the file cannot be read or is not such a map.
+    """
+    from antdrive.worlds.grid import Grid
+
+    return Grid.from_free(_read_cells(path))
+
+
+def import_movingai_task(
+    path: str | os.PathLike[str],
+    *,
+    start: Pose | None = None,
+    goal: Point | None = None,
+    problem: int | None = None,
+    resolution: float = 1.0,
+    overhang: float | None = None,
+    cell: float | None = None,
+    goal_tolerance: float | None = None,
+) -> Task:
+    """A `.map` file as a world of discs; see `map_task`. To plan on the map's own cells, use `import_movingai_map`.
+
+    Args:
+        path: the `.map` file; its lower left corner becomes (0, 0)
+        start: the robot's first pose [m, m, rad]; needed unless a problem is given
+        goal: [m]; needed unless a problem is given
+        problem: take start and goal from this problem of the `.scen` file beside the map, counted from 0
+        resolution: side of the map's cells [m]
+        overhang: how far discs may reach beyond blocked cells [m]; see `map_task`
+        cell: the task's grid resolution [m]; by default that of the map
+        goal_tolerance: how close to the goal the robot must stop [m]; by default 0.25
+
+    Raises:
+        InputError: a file is wrong, an option is not usable, there is no such problem, or `map_task` refuses the map.
+    """
+    file = Path(path)
+    if not (math.isfinite(resolution) and resolution > 0):
+        raise input_error("resolution", f"must be greater than 0, got {resolution:g}")
+    cells = CellMap(_read_cells(file), resolution)
+    source = f"the MovingAI map {file.name}"
+    if problem is not None:
+        if start is not None or goal is not None:
+            raise input_error("problem", "brings its own start and goal; give either the problem or the two")
+        chosen = _problem_beside(file, problem)
+        (r0, c0), (r1, c1) = chosen.start, chosen.goal
+        start = (c0 + 0.5) * resolution, (r0 + 0.5) * resolution, math.atan2(r1 - r0, c1 - c0)
+        goal = (c1 + 0.5) * resolution, (r1 + 0.5) * resolution
+        source += f", problem {problem} of optimal length {chosen.printed} on its cells"
+    return file_task(
+        file, cells, start, goal, source=source, overhang=overhang, cell=cell, goal_tolerance=goal_tolerance
+    )
+
+
+def _problem_beside(file: Path, number: int) -> MapProblem:
+    """One of the problems in the `.scen` file beside a map."""
+    beside = file.with_name(f"{file.name}.scen")
+    problems = import_movingai_problems(beside)
+    if not 0 <= number < len(problems):
+        raise input_error(str(beside), f"has the problems 0 to {len(problems) - 1}, got {number}")
+    return problems[number]
+
+
+def _read_cells(path: str | os.PathLike[str]) -> npt.NDArray[np.bool_]:
+    """The free cells of a `.map` file, (R, C), the file's last line first."""
+    source, lines = _read_lines(path)
+    numbered = iter(enumerate(lines, 1))
+    rows, cols = _read_header(source, numbered)
+    cells = list(numbered)
+    while cells and not cells[-1][1]:
+        cells.pop()
+    if len(cells) != rows:
+        raise input_error(source, f"must have {rows} lines of cells, as its height says, got {len(cells)}")
+    for number, line in cells:
+        if len(line) != cols:
+            raise input_error(f"{source}:{number}", f"must have {cols} cells, as the width says, got {len(line)}")
+    picture = np.frombuffer(b"".join(line for _, line in cells), dtype=np.uint8).reshape(rows, cols)
+    known = np.isin(picture, np.frombuffer(PASSABLE + BLOCKED, dtype=np.uint8))
+    if not known.all():
+        row, col = np.argwhere(~known)[0]
+        letters = " ".join((PASSABLE + BLOCKED).decode())
+        odd = _quote(bytes(picture[row, col : col + 1]))
+        raise input_error(f"{source}:{cells[row][0]}", f"cell {col + 1} must be one of {letters}, got {odd}")
+    return np.isin(picture, np.frombuffer(PASSABLE, dtype=np.uint8))[::-1]
+
+
+def _read_header(source: str, lines: Iterable[tuple[int, bytes]]) -> tuple[int, int]:
+    """Rows and columns from the numbered lines up to and including the line `map`."""
+    header: dict[str, str] = {}
+    for number, line in lines:
+        words = line.decode("ascii", "replace").split()
+        if words == ["map"]:
+            break
+        if len(words) != 2 or words[0] not in ("type", "height", "width") or words[0] in header:
+            problem = f"the header must be type, height, width and map, got {_quote(line)}"
+            raise input_error(f"{source}:{number}", problem)
+        header[words[0]] = words[1]
+    else:
+        raise input_error(source, "has no line `map` before its cells")
+    if header.get("type") != "octile":
+        raise input_error(source, f"the type must be octile, got {header.get('type', 'none')!r}")
+    rows, cols = (_size(source, key, header.get(key)) for key in ("height", "width"))
+    if rows * cols > MAX_CELLS:
+        raise input_error(source, f"has {rows} x {cols} cells; the limit is {MAX_CELLS}")
+    return rows, cols
+
+
+def _size(source: str, key: str, text: str | None) -> int:
+    if text is None:
+        raise input_error(source, f"has no {key}")
+    if not (text.isascii() and text.isdigit() and len(text) < 10 and int(text) > 0):
+        raise input_error(source, f"the {key} must be a whole number above 0, got {text!r}")
+    return int(text)
+
+
+def import_movingai_problems(path: str | os.PathLike[str]) -> list[MapProblem]:
+    """The problems of a `.scen` file, on the cells of `import_movingai_map`.
+
+    Raises:
+        InputError: the file cannot be read or is not such a list.
+    """
+    source, lines = _read_lines(path)
+    head = lines[0].decode("ascii", "replace").split() if lines else []
+    if len(head) != 2 or head[0] != "version" or head[1] not in ("1", "1.0"):
+        raise input_error(f"{source}:1", f"must be `version 1`, got {_quote(lines[0] if lines else b'')}")
+    return [_problem(f"{source}:{number}", line) for number, line in enumerate(lines[1:], 2) if line.strip()]
+
+
+def _problem(place: str, line: bytes) -> MapProblem:
+    words = line.decode("utf-8", "replace").split("\t" if b"\t" in line else None)
+    if len(words) != 9:
+        raise input_error(
+            place, f"must be bucket, map, width, height, start x, y, goal x, y and length, got {len(words)} values"
+        )
+    try:
+        bucket, width, height, x0, y0, x1, y1 = (int(words[i]) for i in (0, 2, 3, 4, 5, 6, 7))
+        optimal = float(words[8])
+    except ValueError as error:
+        raise input_error(place, f"must hold whole numbers and a length: {error}") from None
+    for key, x, y in (("start", x0, y0), ("goal", x1, y1)):
+        if not (0 <= x < width and 0 <= y < height):
+            raise input_error(place, f"the {key} ({x}, {y}) is outside the map of width {width} and height {height}")
+    if not (math.isfinite(optimal) and optimal >= 0):
+        raise input_error(place, f"the length must be a number that is not negative, got {words[8]}")
+    start, goal = (height - 1 - y0, x0), (height - 1 - y1, x1)
+    return MapProblem(start, goal, optimal, words[8], words[1].replace("\\", "/").rsplit("/", 1)[-1], bucket)
+
+
+def _read_lines(path: str | os.PathLike[str]) -> tuple[str, list[bytes]]:
+    """The file's name and its lines without their ends."""
+    content = read_bytes(path, MAX_BYTES)
+    return os.fspath(path), [line.removesuffix(b"\r") for line in content.removesuffix(b"\n").split(b"\n")]
+
+
+def _quote(line: bytes) -> str:
+    return repr(line[:40].decode("ascii", "backslashreplace"))
+
+
+def export_movingai_map(task: Task, path: str | Path, *, resolution: float | None = None) -> CellMap:
+    """Write a world as a `.map` file and return its cells. The file holds neither the cells' size nor their place.
+
+    A cell is blocked when a disc or a wall reaches into it by more than a nanometre.
+
+    Args:
+        task: the world to write
+        path: the `.map` file
+        resolution: side of a cell [m]; by default the task's own
+
+    Raises:
+        InputError: the file cannot be written, the world has movers, or the resolution is not usable.
+    """
+    require_no_movers(task, path)
+    cells = cell_map(task.world, task.cell if resolution is None else resolution)
+    rows, cols = cells.free.shape
+    lines = [bytes(row).decode("ascii") for row in np.where(cells.free[::-1], ord("."), ord("@")).astype(np.uint8)]
+    text = "\n".join([f"type octile\nheight {rows}\nwidth {cols}\nmap", *lines]) + "\n"
+    with written_whole(path) as part:
+        part.write_text(text, encoding="ascii", newline="\n")
+    return cells
+
+
+def export_movingai_problems(problems: Iterable[MapProblem], shape: tuple[int, int], path: str | Path) -> None:
+    """Write problems as a `.scen` file.
+
+    Args:
+        problems: in the order of the file
+        shape: rows and columns of the map
+        path: the `.scen` file
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    rows, cols = shape
+    lines = ["version 1"]
+    for p in problems:
+        (r0, c0), (r1, c1) = p.start, p.goal
+        values = (p.bucket, p.map_name, cols, rows, c0, rows - 1 - r0, c1, rows - 1 - r1, p.printed)
+        lines.append("\t".join(map(str, values)))
+    with written_whole(path) as part:
+        part.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")

@@ -1,0 +1,276 @@
+"""Random worlds: the same random state gives the same world."""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from antdrive.base.errors import FieldError, input_error, require_positive
+from antdrive.base.types import Point
+from antdrive.worlds.formats.barn import BARN_BOUNDS, BARN_CELL, BARN_GOAL, BARN_START, BARN_TOLERANCE
+from antdrive.worlds.generators.automaton import crossable, cylinders, grow_field
+from antdrive.worlds.geometry import point_clearance
+from antdrive.worlds.grid import DIRECTIONS, Grid, rasterise
+from antdrive.worlds.world import Disc, Task, World
+
+#: The BARN set's fill ratios and smoothing rounds; every pair of them was used for 25 of its 300 worlds.
+BARN_FILLS = (0.15, 0.20, 0.25, 0.30)
+BARN_ROUNDS = (2, 3, 4)
+
+
+def forest(
+    rng: np.random.Generator,
+    *,
+    size: float = 10.0,
+    count: int = 6,
+    radius: tuple[float, float] = (0.5, 2.5),
+    clearance: float = 2.5,
+    spacing: float = 0.5,
+    gap: float | None = None,
+    robot_radius: float = 0.4,
+    cell: float = 0.25,
+    tries: int = 300,
+    name: str = "forest",
+) -> Task:
+    """A square with random cylinders, crossed from corner to corner.
+
+    The rule is that of K. Han, *Collision free path planning algorithms for robot navigation problem*, MSc
+    thesis, Missouri 2007, section 3: cylinders of random size, 1 to 5 grid units, are centred on random grid
+    points, none near the start or the goal. The defaults are his, with 0.5 m to a unit. Here "near" means that
+    a surface lies within `clearance`. A world that the robot cannot cross is thrown away.
+
+    Args:
+        rng: the source of randomness
+        size: side of the square [m]
+        count: how many cylinders
+        radius: smallest and largest radius of a cylinder [m]
+        clearance: least distance from the start and the goal to any surface [m]
+        spacing: distance between the grid points on which cylinders are centred [m]
+        gap: least distance between the surfaces of two cylinders [m]; None: cylinders may overlap
+        robot_radius: the robot that must be able to cross the world [m]
+        cell: the task's grid resolution, on which crossing is tested [m]
+        tries: how many worlds are tried, and how many places for each cylinder
+        name: the world's name
+
+    Raises:
+        FieldError: an argument is out of its range, or no world was found (with the key "forest").
+    """
+    for key, value in (("spacing", spacing), ("robot_radius", robot_radius), ("cell", cell)):
+        require_positive(key, value)
+    inset = robot_radius + cell  # the ends are one cell away from where the walls stop the robot
+    rule = _Rule(size, radius, spacing, clearance, gap, tries, inset)
+    if not 0 <= count <= 10_000:
+        raise FieldError("count", f"must be from 0 to 10000, got {count}")
+    start, goal = rule.ends
+    source = f"the random worlds of han2007, section 3, with {count} cylinders"
+    # Where so many cylinders hardly fit, all the tries would take minutes and find nothing.
+    for _ in range(min(tries, max(20, 60_000 // max(count, 1)))):
+        discs = rule.scatter(rng, count)
+        if discs is None:
+            continue
+        world = World(name, (0.0, 0.0, size, size), discs, source)
+        task = Task(world, (*start, math.pi / 4), goal, cell=cell)
+        if _connected(rasterise(world, cell, robot_radius), task):
+            return task
+    raise FieldError(
+        "forest",
+        f"no world with {count} cylinders of radius {radius[0]:g} to {radius[1]:g} m that a disc of radius "
+        f"{robot_radius:g} m can cross was found in {tries} tries; use fewer or smaller cylinders",
+    )
+
+
+@dataclass(frozen=True)
+class _Rule:
+    """How `forest` places cylinders; see there."""
+
+    size: float
+    radius: tuple[float, float]
+    spacing: float
+    clearance: float
+    gap: float | None
+    tries: int
+    inset: float  # from a corner to the start or the goal, in x and in y [m]
+
+    def __post_init__(self) -> None:
+        low, high = self.radius
+        if not 0.001 <= low <= high:
+            raise FieldError("radius", f"must be (smallest, largest) of at least a millimetre, got {self.radius}")
+        for key, value in (("clearance", self.clearance), ("gap", self.gap or 0.0)):
+            if not (math.isfinite(value) and value >= 0):
+                raise FieldError(key, f"must be at least 0, got {value:g}")
+        _require_tries(self.tries)
+        if not (math.isfinite(self.size) and self.size > 2 * self.inset):
+            raise FieldError("size", f"must be greater than {2 * self.inset:g} m for this robot, got {self.size:g}")
+
+    @property
+    def ends(self) -> tuple[Point, Point]:
+        """The start and the goal [m]."""
+        far = self.size - self.inset
+        return (self.inset, self.inset), (far, far)
+
+    def scatter(self, rng: np.random.Generator, count: int) -> tuple[Disc, ...] | None:
+        """Cylinders placed one after the other; None when one of them found no place in `tries` draws."""
+        discs: list[Disc] = []
+        for _ in range(count):
+            found = next((d for d in (self.draw(rng) for _ in range(self.tries)) if self.fits(d, discs)), None)
+            if found is None:
+                return None
+            discs.append(found)
+        return tuple(discs)
+
+    def draw(self, rng: np.random.Generator) -> Disc:
+        """A random cylinder, with a radius in whole millimetres."""
+        x, y = rng.integers(0, math.floor(self.size / self.spacing) + 1, size=2) * self.spacing
+        return Disc(float(x), float(y), round(float(rng.uniform(*self.radius)), 3))
+
+    def fits(self, disc: Disc, others: list[Disc]) -> bool:
+        """Whether a cylinder keeps the distances from both ends and from the other cylinders."""
+        if min(_distance(disc, end) for end in self.ends) < self.clearance:
+            return False
+        return self.gap is None or all(_distance(disc, (o.x, o.y)) - o.radius >= self.gap for o in others)
+
+
+def _distance(disc: Disc, point: Point) -> float:
+    """The distance from a disc's surface to a point [m]."""
+    return math.dist((disc.x, disc.y), point) - disc.radius
+
+
+def _require_tries(tries: int) -> None:
+    if tries < 1:
+        raise FieldError("tries", f"must be at least 1, got {tries}")
+
+
+def barn(
+    rng: np.random.Generator,
+    fill: float = 0.20,
+    rounds: int = 3,
+    *,
+    robot_radius: float = 0.363,
+    tries: int = 20_000,
+    name: str = "barn",
+) -> Task:
+    """A world like those of the BARN set: a field of cylinders between two walls, grown by a cellular automaton.
+
+    After D. Perille, A. Truong, X. Xiao, P. Stone, *Benchmarking metric ground navigation*, SSRR 2020: 30 x 30 cells
+    of 0.15 m are filled at random and smoothed in rounds. In each round, a cell with five or more filled neighbours of
+    eight is filled and one with one or none is cleared; the walls at the field's sides stay filled, and all cells
+    beyond them count as filled. Every filled cell holds a cylinder of radius 0.075 m. Layout, start and goal are those
+    of the BARN set. A world that the robot cannot cross is thrown away: with a fill of 0.30 a Jackal crosses one of
+    some hundreds, so such worlds take up to some seconds. (BARN cut a way through them instead.)
+
+    Args:
+        rng: the source of randomness
+        fill: the probability that a cell is filled at first; BARN's are `BARN_FILLS`
+        rounds: how many rounds of smoothing follow; BARN's are `BARN_ROUNDS`
+        robot_radius: the robot that must be able to cross the world [m]
+        tries: how many fields are tried
+        name: the world's name
+
+    Raises:
+        FieldError: an argument is out of its range, or no world was found (with the key "barn").
+    """
+    if not 0 <= fill < 1:
+        raise FieldError("fill", f"must be at least 0 and less than 1, got {fill:g}")
+    if rounds < 0:
+        raise FieldError("rounds", f"must be at least 0, got {rounds}")
+    if not 0 < robot_radius <= 2:
+        raise FieldError("robot_radius", f"must be greater than 0 and at most 2, got {robot_radius:g}")
+    _require_tries(tries)
+    source = f"the cellular automaton of BARN (Perille et al. 2020), fill {fill:g}, {rounds} rounds"
+    for _ in range(tries):
+        field = grow_field(rng, fill, rounds)
+        if not crossable(field, robot_radius):
+            continue
+        world = World(name, BARN_BOUNDS, cylinders(field), source)
+        task = Task(world, BARN_START, BARN_GOAL, BARN_TOLERANCE, BARN_CELL)
+        if _connected(rasterise(task.world, BARN_CELL, robot_radius), task):
+            return task
+    raise FieldError(
+        "barn",
+        f"no world of fill {fill:g} that a disc of radius {robot_radius:g} m can cross was found in "
+        f"{tries} tries; use a smaller fill or a smaller robot_radius",
+    )
+
+
+#: The generators by name.
+GENERATORS: Mapping[str, Callable[..., Task]] = MappingProxyType({"forest": forest, "barn": barn})
+
+
+def generate(
+    kind: str,
+    rng: np.random.Generator,
+    options: Mapping[str, str],
+    *,
+    name: str | None = None,
+    note: str = "",
+) -> Task:
+    """A random world, with options as texts.
+
+    Args:
+        kind: a name of `GENERATORS`
+        rng: the source of randomness
+        options: the generator's arguments by name, such as {"count": "20", "radius": "0.2,0.5"}
+        name: the world's name; by default the kind
+        note: a text to add to the world's source
+
+    Raises:
+        InputError: an unknown kind or option, a wrong value, or no such world was found.
+    """
+    if kind not in GENERATORS:
+        raise input_error("generate", f"unknown kind {kind!r}; choose from {', '.join(GENERATORS)}")
+    defaults = {
+        key: parameter.default
+        for key, parameter in inspect.signature(GENERATORS[kind]).parameters.items()
+        if key not in ("rng", "name")
+    }
+    values: dict[str, Any] = {}
+    for key, text in options.items():
+        if key not in defaults:
+            raise input_error(kind, key, f"unknown option; choose from {', '.join(defaults)}")
+        values[key] = _value(kind, key, text, defaults[key])
+    try:
+        task = GENERATORS[kind](rng, **values)
+    except FieldError as error:
+        raise input_error(kind, *([error.key] if error.key != kind else []), error.problem) from None
+    source = "; ".join(part for part in (task.world.source, note) if part)
+    return replace(task, world=replace(task.world, name=name or kind, source=source))
+
+
+def _value(kind: str, key: str, text: str, default: Any) -> Any:
+    """An option's text as a value of the default's type."""
+    words, convert = text.split(","), int if isinstance(default, int) else float
+    count = len(default) if isinstance(default, tuple) else 1
+    one = "a whole number" if convert is int else "a number"
+    wanted = one if count == 1 else f"{count} numbers separated by commas"
+    try:
+        numbers = [convert(word) for word in words]
+    except ValueError:
+        numbers = []
+    if len(numbers) != count or not all(map(math.isfinite, numbers)):
+        raise input_error(kind, key, f"must be {wanted}, got {text}")
+    return tuple(numbers) if count > 1 else numbers[0]
+
+
+def _connected(grid: Grid, task: Task) -> bool:
+    """Whether allowed moves lead from the start's cell to the goal's, and the robot has room at both ends."""
+    ends = [task.start[:2], task.goal]
+    if not (point_clearance(task.world, ends) > grid.inflate).all():
+        return False
+    start, goal = (grid.cell_at(*end) for end in ends)
+    todo, seen = [start], {start}
+    while todo:
+        cell = todo.pop()
+        if cell == goal:
+            return True
+        for bit, (dr, dc) in enumerate(DIRECTIONS):
+            there = cell[0] + dr, cell[1] + dc
+            if grid.moves[cell] >> bit & 1 and there not in seen:
+                seen.add(there)
+                todo.append(there)
+    return False

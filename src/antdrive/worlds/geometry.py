@@ -1,0 +1,68 @@
+"""Exact distances to discs and walls.
+
+Clearance is the distance to the nearest disc surface or wall, in metres, negative inside a disc or beyond a wall.
+A robot of radius R that moves along a segment touches something when the segment's clearance is at most R.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.base.types import Floats
+from antdrive.worlds import _kernels
+from antdrive.worlds.world import World
+
+
+def point_clearance(world: World, points: npt.ArrayLike) -> Floats:
+    """The clearance of each point, shape (N,) [m].
+
+    Args:
+        world: the obstacles and walls; movers do not count
+        points: (N, 2) [m]
+    """
+    xy = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 2)
+    out = np.empty(len(xy))
+    _kernels.point_clearances(xy, world.discs, np.asarray(world.bounds, dtype=np.float64), out)
+    return out
+
+
+def segment_clearance(world: World, starts: npt.ArrayLike, ends: npt.ArrayLike) -> Floats:
+    """The clearance of each straight segment, shape (N,) [m].
+
+    Args:
+        world: the obstacles and walls; movers do not count
+        starts: the segments' first points (N, 2) [m]
+        ends: the segments' last points (N, 2) [m]
+    """
+    a = np.ascontiguousarray(starts, dtype=np.float64).reshape(-1, 2)
+    b = np.ascontiguousarray(ends, dtype=np.float64).reshape(-1, 2)
+    out = np.empty(len(a))
+    _kernels.segment_clearances(a, b, world.discs, np.asarray(world.bounds, dtype=np.float64), out)
+    return out
+
+
+def swept_clearance(world: World, starts: npt.ArrayLike, ends: npt.ArrayLike, radius: float) -> Floats:
+    """The gap left by a disc that is swept along each segment, shape (N,) [m]; the disc touches where it is <= 0.
+
+    Args:
+        world: the obstacles and walls; movers do not count
+        starts: the segments' first points (N, 2) [m]
+        ends: the segments' last points (N, 2) [m]
+        radius: the disc's radius [m]
+    """
+    return segment_clearance(world, starts, ends) - radius
+
+
+def polyline_clearance(world: World, xy: npt.ArrayLike) -> float:
+    """The clearance of a whole polyline [m].
+
+    Args:
+        world: the obstacles and walls; movers do not count
+        xy: the polyline's points (N, 2), N >= 1 [m]
+    """
+    line = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
+    if len(line) == 1:
+        return float(point_clearance(world, line)[0])
+    bounds = np.asarray(world.bounds, dtype=np.float64)
+    return float(_kernels.polyline_clearance(np.ascontiguousarray(line), world.discs, bounds))

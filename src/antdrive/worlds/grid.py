@@ -1,0 +1,144 @@
+"""A world cut into square cells: which are free, and which moves between them are free of collisions.
+
+Cells are (row, col) with the row along +y; cell (0, 0) holds the world's lower-left corner.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.base.errors import FieldError, InputError
+from antdrive.base.types import Floats, Point
+from antdrive.worlds import _kernels
+from antdrive.worlds.limits import MAX_CELLS
+from antdrive.worlds.world import World
+
+#: The eight moves by bit of `Grid.moves`, as (row, column) steps: E, NE, N, NW, W, SW, S, SE.
+DIRECTIONS: tuple[tuple[int, int], ...] = ((0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1))
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Free cells and allowed moves, for a robot of radius `inflate`.
+
+    Attributes:
+        free: which cells are free (R, C): those at whose centre the robot touches nothing; read-only
+        moves: bit k is set where the move `DIRECTIONS[k]` is allowed (R, C), read-only
+        cell: side of a cell [m]
+        origin: centre of cell (0, 0), x and y [m]
+        inflate: the robot's radius plus the margin [m]
+    """
+
+    free: npt.NDArray[np.bool_]
+    moves: npt.NDArray[np.uint8]
+    cell: float = 1.0
+    origin: Point = (0.0, 0.0)
+    inflate: float = 0.0
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        rows, cols = self.free.shape
+        return rows, cols
+
+    def xy(self, cells: npt.ArrayLike) -> Floats:
+        """The centres of cells in world coordinates, shape (N, 2) [m].
+
+        This is the one place where (row, col) becomes (x, y).
+
+        Args:
+            cells: (row, col) of each cell (N, 2); fractional cells are allowed
+        """
+        rc = np.asarray(cells, dtype=np.float64).reshape(-1, 2)
+        return np.asarray(rc[:, ::-1] * self.cell + np.asarray(self.origin))
+
+    def fractional(self, xy: npt.ArrayLike) -> Floats:
+        """The fractional cells (N, 2) of points: the inverse of `Grid.xy`.
+
+        Args:
+            xy: world coordinates (N, 2) [m]
+        """
+        points = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
+        return np.asarray((points - np.asarray(self.origin)) / self.cell)[:, ::-1]
+
+    def cell_at(self, x: float, y: float) -> tuple[int, int]:
+        """The (row, col) of the cell that holds a point; points outside the grid get the nearest cell.
+
+        Args:
+            x: world coordinate [m]
+            y: world coordinate [m]
+        """
+        rows, cols = self.shape
+        row = math.floor((y - self.origin[1]) / self.cell + 0.5)
+        col = math.floor((x - self.origin[0]) / self.cell + 0.5)
+        return min(max(row, 0), rows - 1), min(max(col, 0), cols - 1)
+
+    def _repr_html_(self) -> str:
+        from antdrive.worlds.drawing import card, cells_svg
+
+        rows, cols = self.shape
+        facts = {
+            "cells": f"{rows} × {cols}",
+            "free": f"{100 * self.free.mean():.1f} %",
+            "cell": f"{self.cell:g} m",
+            "inflated by": f"{self.inflate:g} m",
+        }
+        return card(cells_svg(self.free), f"grid of {rows} × {cols} cells", facts)
+
+    @classmethod
+    def from_free(cls, free: npt.ArrayLike, cell: float = 1.0, origin: Point = (0.0, 0.0)) -> Grid:
+        """A grid from its free cells alone; a diagonal move needs both orthogonal neighbours free.
+
+        Args:
+            free: which cells are free (R, C)
+            cell: side of a cell [m]
+            origin: centre of cell (0, 0) [m]
+        """
+        cells = np.array(free, dtype=np.bool_, ndmin=2)
+        return cls._finish(cells, np.zeros(cells.shape, dtype=np.uint8), cell, origin, 0.0)
+
+    @classmethod
+    def _finish(
+        cls, free: npt.NDArray[np.bool_], closed: npt.NDArray[np.uint8], cell: float, origin: Point, inflate: float
+    ) -> Grid:
+        moves = np.zeros(free.shape, dtype=np.uint8)
+        _kernels.allowed_moves(free, closed, moves)
+        free.setflags(write=False)
+        moves.setflags(write=False)
+        return cls(free, moves, cell, origin, inflate)
+
+
+def rasterise(world: World, cell: float, inflate: float = 0.0) -> Grid:
+    """The grid of a world, for a robot of a given size.
+
+    A cell is free when a disc of radius `inflate` at its centre touches nothing. A move is allowed when both cells are
+    free, the disc swept along the move touches nothing (exact segment-disc distance), and, for a diagonal, both
+    orthogonal neighbours are free.
+
+    Args:
+        world: the obstacles and walls; movers do not count
+        cell: side of a cell [m]
+        inflate: the robot's radius plus the margin [m]
+
+    Raises:
+        InputError: the cell size is not positive or cuts the world into too many cells.
+        FieldError: the inflation is negative.
+    """
+    if not cell > 0:
+        raise InputError(f"cell: must be greater than 0, got {cell:g}")
+    if not inflate >= 0:
+        raise FieldError("inflate", f"must be at least 0, got {inflate:g}")
+    width, height = world.size
+    rows, cols = (max(1, math.ceil(side / cell - 1e-9)) for side in (height, width))
+    if rows * cols > MAX_CELLS:
+        raise InputError(f"cell: {cell:g} m cuts this world into {rows} x {cols} cells; the limit is {MAX_CELLS}")
+    free = np.empty((rows, cols), dtype=np.bool_)
+    closed = np.zeros((rows, cols), dtype=np.uint8)
+    x0, y0 = world.bounds[0] + cell / 2, world.bounds[1] + cell / 2
+    bounds = np.asarray(world.bounds, dtype=np.float64)
+    _kernels.rasterise(world.discs, bounds, x0, y0, cell, inflate, free, closed)
+    return Grid._finish(free, closed, cell, (x0, y0), inflate)

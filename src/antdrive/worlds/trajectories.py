@@ -1,0 +1,108 @@
+"""Where all movers of a run are at any time. Needs numpy alone, so that a log is checked without compiler or physics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from antdrive.base.errors import FieldError, InputError
+from antdrive.base.types import Floats, Point
+from antdrive.worlds.motions import Motion, motion_of, require_few_draws
+from antdrive.worlds.world import World
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectories:
+    """All movers of a run as functions of time.
+
+    The same time gives the same bits, whichever other times are asked for.
+
+    Attributes:
+        radii: each mover's radius (M,) [m]
+        heights: each mover's height (M,) [m]
+        motions: each mover's motion, M of them
+    """
+
+    radii: Floats
+    heights: Floats
+    motions: tuple[Motion, ...]
+
+    @classmethod
+    def of(cls, world: World, start: Point, seed: int = 0) -> Trajectories:
+        """The trajectories of a world's movers.
+
+        Args:
+            world: the world
+            start: the robot's start, which a wanderer's random first cell keeps off [m]
+            seed: the run's random seed, for wanderers without a seed of their own
+
+        Raises:
+            InputError: there is no free cell in which a wanderer could begin.
+        """
+        discs, motions = world.discs, []
+        for i, mover in enumerate(world.movers):
+            try:
+                motions.append(motion_of(mover, i, world.bounds, discs, start, seed))
+                require_few_draws(motions)
+            except FieldError as error:
+                raise InputError(str(error.under(f"movers[{i}]"))) from None
+        radii, heights = (np.array([getattr(m, key) for m in world.movers]) for key in ("radius", "height"))
+        return cls(radii, heights, tuple(motions))
+
+    def __len__(self) -> int:
+        return len(self.motions)
+
+    def positions(self, t: npt.ArrayLike) -> Floats:
+        """The movers' centres, shape (T, M, 2) [m].
+
+        Args:
+            t: times (T,), or one time [s]
+        """
+        times = _times(t)
+        return _stacked([motion.at(times) for motion in self.motions], (len(times), 0, 2))
+
+    def velocities(self, t: npt.ArrayLike) -> Floats:
+        """The movers' velocities from each time on, shape (T, M, 2) [m/s].
+
+        Args:
+            t: times (T,), or one time [s]
+        """
+        times = _times(t)
+        return _stacked([motion.velocities(times) for motion in self.motions], (len(times), 0, 2))
+
+    def travel(self, t: npt.ArrayLike) -> Floats:
+        """How far each mover gets at most between one time and the next, shape (T - 1, M) [m]; jumps do not count.
+
+        Args:
+            t: times (T,) [s]
+        """
+        times = _times(t)
+        return _stacked([np.diff(motion.travelled(times)) for motion in self.motions], (max(0, len(times) - 1), 0))
+
+    def jumps(self, t: npt.ArrayLike) -> npt.NDArray[np.bool_]:
+        """Whether each mover jumps after one time and no later than the next, shape (T - 1, M).
+
+        Args:
+            t: times (T,) [s]
+        """
+        times = _times(t)
+        rows = [np.diff(motion.jumped(times)) > 0 for motion in self.motions]
+        return np.stack(rows, axis=1) if rows else np.zeros((max(0, len(times) - 1), 0), dtype=np.bool_)
+
+    def jump_times(self, until: float) -> tuple[Floats, ...]:
+        """The times at which each mover jumps, M arrays of shape (J,) [s].
+
+        Args:
+            until: the last time of interest [s]
+        """
+        return tuple(motion.jump_times(until) for motion in self.motions)
+
+
+def _times(t: npt.ArrayLike) -> Floats:
+    return np.atleast_1d(np.asarray(t, dtype=np.float64))
+
+
+def _stacked(rows: list[Floats], empty: tuple[int, ...]) -> Floats:
+    return np.stack(rows, axis=1) if rows else np.empty(empty)

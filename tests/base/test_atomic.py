@@ -1,0 +1,77 @@
+"""Files that are written whole, what killed processes leave, and folders that one process claims."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from antdrive.base import InputError
+from antdrive.base.atomic import claimed, written_whole
+
+WRITES = """
+import sys, time
+from antdrive.base.atomic import claimed, written_whole
+with claimed(sys.argv[1]), written_whole(sys.argv[1] + "/film.mp4") as part:
+    part.write_text("half")
+    print("there", flush=True)
+    time.sleep(60)
+"""
+
+
+@pytest.fixture
+def writer(tmp_path: Path) -> subprocess.Popen[str]:
+    """A process that has claimed the folder and written half a film."""
+    process = subprocess.Popen([sys.executable, "-c", WRITES, str(tmp_path)], stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    assert process.stdout.readline() == "there\n"
+    return process
+
+
+def kill(process: subprocess.Popen[str]) -> None:
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+
+
+def test_what_a_killed_process_left_is_removed_by_the_next_attempt(
+    writer: subprocess.Popen[str], tmp_path: Path
+) -> None:
+    (tmp_path / ".film-mine.mp4").touch()
+    with written_whole(tmp_path / "film.mp4") as part:
+        part.write_text("whole")
+        assert len(list(tmp_path.glob(".film-*-*-*.mp4"))) == 2, "a living process keeps its file"
+    kill(writer)
+    assert len(list(tmp_path.glob(".film-*-*-*.mp4"))) == 1
+    with written_whole(tmp_path / "plan.mp4") as part:
+        part.touch()
+    assert len(list(tmp_path.glob(".film-*-*-*.mp4"))) == 1, "another file's"
+    with written_whole(tmp_path / "film.mp4") as part:
+        part.write_text("again")
+    assert sorted(path.name for path in tmp_path.glob("*film*")) == [".film-mine.mp4", "film.mp4"]
+    assert (tmp_path / "film.mp4").read_text() == "again"
+
+
+def test_a_folder_is_claimed_once_and_a_claim_dies_with_its_process(
+    writer: subprocess.Popen[str], tmp_path: Path
+) -> None:
+    says = rf"another run \(process {writer.pid}\) is writing into this folder"
+    with pytest.raises(InputError, match=says), claimed(tmp_path):
+        pytest.fail("claimed twice")
+    kill(writer)
+    with claimed(tmp_path):
+        assert (tmp_path / ".antdrive.lock").read_text() == f"{os.getpid()}\n"
+    assert not (tmp_path / ".antdrive.lock").exists()
+    with pytest.raises(KeyError), claimed(tmp_path):
+        raise KeyError
+    with claimed(tmp_path / "new" / "folder"):
+        pass
+
+
+def test_a_long_name_is_written(tmp_path: Path) -> None:
+    with written_whole(tmp_path / f"{'n' * 240}.yaml") as part:
+        part.touch()
+    assert [len(path.stem) for path in tmp_path.iterdir()] == [240]

@@ -1,0 +1,205 @@
+"""Machine code of kernels is kept where it can be, and damaged entries are compiled again."""
+
+import contextlib
+import itertools
+import os
+import shutil
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from antdrive.base import kernel_cache
+from antdrive.base._kernels_compiler import _Entries
+
+MEASURE = (
+    "from antdrive.worlds import Disc, World, point_clearance\n"
+    "print(point_clearance(World('w', (0, 0, 4, 4), (Disc(2, 2, 0.5),)), [[1, 2]]))"
+)
+
+
+def measure(**environment: str) -> subprocess.CompletedProcess[str]:
+    """A process that needs one kernel."""
+    return subprocess.run(
+        [sys.executable, "-c", MEASURE], env={**os.environ, **environment}, capture_output=True, text=True, check=False
+    )
+
+
+@pytest.fixture(scope="module")
+def filled(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """A cache with the kernels that one measurement needs, and what it printed."""
+    folder = tmp_path_factory.mktemp("cache")
+    done = measure(NUMBA_CACHE_DIR=str(folder))
+    assert (done.returncode, done.stderr) == (0, "")
+    return folder, done.stdout
+
+
+@pytest.mark.parametrize(
+    "damage", [b"", b"\x80", b"nonsense", None], ids=["empty", "cut short", "nonsense", "another class"]
+)
+def test_a_damaged_entry_is_compiled_again(filled: tuple[Path, str], tmp_path: Path, damage: bytes | None) -> None:
+    folder, printed = filled
+    shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
+    entries = list(tmp_path.rglob("*.nbc"))
+    assert entries
+    for entry in entries:
+        entry.write_bytes(entry.read_bytes().replace(b"numba", b"nunba") if damage is None else damage)
+    again = measure(NUMBA_CACHE_DIR=str(tmp_path))
+    assert (again.returncode, again.stdout, again.stderr) == (0, printed, "")
+
+
+def test_an_entry_is_used_again(filled: tuple[Path, str], tmp_path: Path) -> None:
+    shutil.copytree(filled[0], tmp_path, dirs_exist_ok=True)
+    before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.nb*")}
+    measure(NUMBA_CACHE_DIR=str(tmp_path))
+    assert before
+    assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.nb*")} == before
+
+
+def entries(folder: Path, stamp: str) -> _Entries:
+    return _Entries(str(folder), "_kernels.f-1.py311", stamp)
+
+
+def test_an_entry_is_that_of_its_types_and_sources_whatever_is_interrupted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two processes write, and each of them is killed before each of its renames in turn: no entry stands for another one."""
+    replace = os.replace
+    written = [("old", "int", 1), ("new", "float", 2), ("new", "int", 3), ("newer", "int", 4)]
+    for killed in range(len(written) + 1):
+        folder = tmp_path / str(killed)
+        folder.mkdir()
+        count = iter(range(100))
+
+        def renamed(source: str, target: str, count: Iterator[int] = count, killed: int = killed) -> None:
+            if next(count) == killed:
+                raise KeyboardInterrupt
+            replace(source, target)
+
+        monkeypatch.setattr(os, "replace", renamed)
+        for stamp, types, code in written:
+            with contextlib.suppress(KeyboardInterrupt):
+                entries(folder, stamp).save(types, code)
+            for other, key, right in written:
+                assert entries(folder, other).load(key) in (None, right)
+        assert entries(folder, "newer").load("int") == (None if killed == 3 else 4)
+        if killed == 4:
+            assert [entries(folder, stamp).load(types) for stamp, types, _ in written[:3]] == [None] * 3, (
+                "older sources"
+            )
+
+
+@pytest.mark.parametrize("order", sorted(set(itertools.permutations(["int", "int", "float", "float"]))))
+def test_two_processes_that_compile_at_once_keep_both_entries(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, order: tuple[str, ...]
+) -> None:
+    """Both have looked into the folder before either writes; then they rename their files in every order.
+
+    Threads stand for the processes.
+    """
+    codes, replace = {"int": 1, "float": 2}, os.replace
+    turns, changed, begun = list(order), threading.Condition(), threading.Barrier(2, timeout=60)
+    begins = threading.local()
+
+    def renamed(source: str, target: str) -> None:
+        name = threading.current_thread().name
+        if not hasattr(begins, "once"):
+            begins.once = begun.wait()
+        with changed:
+            assert changed.wait_for(lambda: turns[0] == name, timeout=60)
+            replace(source, target)
+            turns.pop(0)
+            changed.notify_all()
+
+    def save(types: str) -> None:
+        entries(tmp_path, "s").save(types, codes[types])
+        with changed:
+            turns[:] = [turn for turn in turns if turn != types]
+            changed.notify_all()
+
+    monkeypatch.setattr(os, "replace", renamed)
+    threads = [threading.Thread(target=save, args=(types,), name=types) for types in codes]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert {types: entries(tmp_path, "s").load(types) for types in codes} == codes
+    entries(tmp_path, "s").flush()
+    assert {entries(tmp_path, "s").load(types) for types in codes} == {None}
+
+
+def test_the_first_folder_that_can_be_written_is_chosen(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    closed: set[Path] = set()
+    writable = kernel_cache._writable
+    monkeypatch.setattr(kernel_cache, "_writable", lambda folder: folder not in closed and writable(folder))
+    package, user = kernel_cache.default_folders()
+    assert kernel_cache.cache_folder() == package
+    closed.add(package)
+    assert kernel_cache.cache_folder() == user
+    closed.add(user)
+    private = kernel_cache.cache_folder()
+    assert private is not None
+    assert private.parent == tmp_path
+    assert private.stat().st_mode & 0o077 == 0
+    assert kernel_cache.cache_folder() == private
+    private.chmod(0o777)  # somebody else could have put code there
+    other = kernel_cache.cache_folder()
+    assert other is not None
+    assert other != private
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "nowhere"))
+    assert kernel_cache.cache_folder() is None
+    given = tmp_path / "given"
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(given))
+    assert kernel_cache.cache_folder() == given
+    closed.add(given)
+    assert kernel_cache.cache_folder() is None
+
+
+def test_kernels_work_where_nothing_can_be_written(filled: tuple[Path, str], tmp_path: Path) -> None:
+    """A copy of the package in a folder that is read-only, without a home and without a folder for temporary files."""
+    code = (
+        "import antdrive.base.kernel_cache as k\n"
+        "k._writable = lambda folder: False\n"
+        "import numba.core.caching as c\n"
+        "def refuse(self): raise OSError(30, 'read-only')\n"
+        "c._CacheLocator.ensure_cache_path = refuse\n"
+        "k._private_folder = lambda: None\n" + MEASURE
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert (done.returncode, done.stdout, done.stderr) == (0, filled[1], "")
+
+
+def test_the_stamp_covers_every_kernel_file() -> None:
+    root = Path(kernel_cache.__file__).parent.parent
+    found = sorted(
+        p for package in ("worlds", "planners", "robots", "sim") for p in (root / package).rglob("_kernels*.py")
+    )
+    assert len(found) > 15
+    assert len(kernel_cache.sources_stamp()) == 64
+
+
+def test_code_of_files_that_were_edited_meanwhile_is_of_neither_version(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "worlds" / "_kernels_a.py"
+    file.parent.mkdir()
+    stamps = {}
+    monkeypatch.setattr(kernel_cache, "_ROOT", tmp_path)
+    try:
+        for text in ("one", "three"):  # each as a process of its own
+            file.write_text(text)
+            kernel_cache._first_state.cache_clear()
+            stamps[text] = kernel_cache.sources_stamp()
+        file.write_text("one")
+        mixed = kernel_cache.sources_stamp()
+        assert len({mixed, *stamps.values()}) == 3
+        file.write_text("three")
+        assert kernel_cache.sources_stamp() == stamps["three"]
+    finally:
+        kernel_cache._first_state.cache_clear()

@@ -1,0 +1,223 @@
+"""`antdrive check` and `antdrive accept`: what they print, write and return."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from antdrive import Run, Scenario, run
+from antdrive.cli.testing import checking
+from tests.cli.calling import Call
+
+SUITE = """schema: 1
+defaults: {planner: astar, world: small.yaml}
+scenarios:
+  clear: {seeds: [0, 1]}
+  closed: {margin: 1.2, expect: {outcome: no_path}}
+"""
+HIT = "  hit: {unseen: [{x: 2, y: 1, radius: 0.2}]}\n"
+
+
+@pytest.fixture
+def suite(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    (tmp_path / "small.yaml").write_text(
+        "{schema: 1, bounds: [0, 0, 4, 2], start: [0.6, 1, 0], goal: [3.4, 1], cell: 0.2}\n"
+    )
+    path = tmp_path / "a.drive.yaml"
+    path.write_text(SUITE)
+    return path
+
+
+def test_a_suite_is_accepted_and_then_passes(antdrive: Call, suite: Path) -> None:
+    code, out, _ = antdrive("check", "a.drive.yaml::closed", "--jobs", "1", "--film", "never")
+    assert code == 1
+    assert "is missing; accept this drive with antdrive accept 'a.drive.yaml::closed[0]'" in out
+    code, out, _ = antdrive("accept", "a.drive.yaml", "--jobs", "1")
+    assert (code, out.splitlines()[-2:]) == (0, ["a.drive.yaml::closed[0]: written", "3 of 3 passed"])
+    files = {path: path.read_bytes() for path in (suite.parent / "baselines" / "a").iterdir()}
+    assert sorted(path.name for path in files) == ["clear-0.json", "clear-1.json", "closed-0.json"]
+    assert antdrive("accept", ".", "--jobs", "1")[1].count(": unchanged") == 3
+    code, out, _ = antdrive("check", ".", "--jobs", "1", "--only", "clear")
+    assert (code, out.splitlines()[-1]) == (0, "2 of 2 passed")
+    assert {path: path.read_bytes() for path in files} == files
+
+
+def test_a_collision_fails_is_explained_and_is_not_accepted(antdrive: Call, suite: Path) -> None:
+    suite.write_text(SUITE + HIT)
+    code, out, _ = antdrive("accept", "a.drive.yaml", "--only", "hit", "--film", "never", "--results", "first")
+    assert code == 1
+    assert "not accepted, because the drive is not what the test expects" in out
+    assert not (suite.parent / "baselines").exists()
+    assert Path("first/a/hit-0/overview.png").is_file()
+    code, out, _ = antdrive("check", "a.drive.yaml::hit", "--json", "--film", "never", "--results", "res")
+    found = json.loads(out)
+    (test,) = found["tests"]
+    assert (code, found["passed"], test["outcome"], test["certified"]) == (1, False, "collided", False)
+    assert any(
+        line.startswith("touched unseen[0] at (2, 1) with radius 0.2; the robot was at (") for line in test["details"]
+    )
+    assert Path(test["files"]["overview"]).is_relative_to(Path("res"))
+    code, out, _ = antdrive("report", "res", "-o", "report.md")
+    assert code == 0
+    assert "collided" in Path("report.md").read_text()
+
+
+def test_the_command_in_a_message_repeats_the_drive(antdrive: Call, suite: Path) -> None:
+    import shlex
+
+    suite.write_text(SUITE + HIT)
+    _, out, _ = antdrive("check", "a.drive.yaml::hit", "--json", "--film", "never")
+    (test,) = json.loads(out)["tests"]
+    words = shlex.split(test["commands"][1])
+    code, out, _ = antdrive(*words[1:], "--no-figures", "--json", "--out", "again")
+    again = json.loads(out)
+    assert (code, again["outcome"], again["metrics"]["duration_s"]) == (1, "collided", test["metrics"]["duration_s"])
+
+
+BROKEN = """
+class Raises:
+    def plan(self, query, rng):
+        raise RuntimeError("lost")
+
+
+class Wrong:
+    def __init__(self):
+        self.plan = None
+"""
+
+
+@pytest.mark.parametrize("jobs", ["1", pytest.param("2", marks=pytest.mark.slow)])
+def test_a_broken_test_hides_no_other(antdrive: Call, suite: Path, jobs: str) -> None:
+    """A damaged baseline, a setting that no drive takes, a planner that raises and one that is none, before a good test."""
+    (suite.parent / "mine.py").write_text(BROKEN)
+    suite.write_text(
+        "schema: 1\ndefaults: {planner: astar, world: small.yaml}\nscenarios:\n"
+        "  merged: {}\n"
+        "  fine-cells: {cell: 1.0e-9, baseline: false}\n"
+        "  raises: {planner: {file: mine.py, name: Raises}, baseline: false}\n"
+        "  none: {planner: {file: mine.py, name: Wrong}, baseline: false}\n"
+        "  good: {baseline: false}\n"
+    )
+    damaged = suite.parent / "baselines" / "a" / "merged-0.json"
+    damaged.parent.mkdir(parents=True)
+    damaged.write_text("<<<<<<< HEAD\n{}\n")
+    code, out, _ = antdrive("check", ".", "--jobs", jobs, "--results", "res", "--json")
+    tests = {test["address"].partition("::")[2]: test for test in json.loads(out)["tests"]}
+    assert list(tests) == ["merged[0]", "fine-cells[0]", "raises[0]", "none[0]", "good[0]"]
+    assert [test["passed"] for test in tests.values()] == [False] * 4 + [True]
+    assert "merged-0.json: not a baseline" in tests["merged[0]"]["faults"][0]
+    assert "a.drive.yaml:5: scenarios.fine-cells.cell: " in tests["fine-cells[0]"]["faults"][0]
+    assert tests["raises[0]"]["outcome"] == "planner_error"
+    assert "RuntimeError: lost" in Path(tests["raises[0]"]["files"]["traceback"]).read_text()
+    assert code == 2, "of the worst: input is wrong"
+
+
+def test_a_fault_of_the_program_is_told_with_its_traceback(
+    antdrive: Call, suite: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(scenario: object) -> None:
+        raise IndexError("of another's replanner")
+
+    monkeypatch.setattr(checking, "drive", broken)
+    code, out, _ = antdrive("check", "a.drive.yaml::closed", "--results", "res")
+    assert (code, out.splitlines()[1]) == (3, "  internal error: IndexError: of another's replanner")
+    assert "in broken" in Path("res/a/closed-0/traceback.txt").read_text()
+
+
+def test_results_are_printed_as_they_come(antdrive: Call, suite: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ctrl-C in the second test leaves the first one's result."""
+    made: list[Run] = []
+
+    def interrupted(scenario: Scenario) -> Run:
+        if made:
+            raise KeyboardInterrupt
+        made.append(run(scenario))
+        return made[0]
+
+    monkeypatch.setattr(checking, "drive", interrupted)
+    code, out, _ = antdrive("check", "a.drive.yaml", "--jobs", "1", "--film", "never")
+    assert (code, out.splitlines()[0]) == (130, "a.drive.yaml::clear[0]: FAILED")
+
+
+def test_results_of_suites_of_one_name_are_kept_apart(antdrive: Call, suite: Path) -> None:
+    for name, bound in (("x", "< 1"), ("y", "> 1")):
+        folder = suite.parent / name
+        folder.mkdir()
+        entry = f'{{world: ../small.yaml, planner: astar, baseline: false, expect: {{duration_s: "{bound}"}}}}'
+        (folder / "s.drive.yaml").write_text(f"schema: 1\nscenarios:\n  one: {entry}\n")
+    suite.unlink()
+    code, out, _ = antdrive("check", ".", "--jobs", "1", "--film", "never", "--results", "res")
+    assert (code, "1 of 2 passed" in out) == (1, True)
+    assert (suite.parent / "res" / "x" / "s" / "one-0" / "rollout.npz").exists()
+
+
+def test_results_that_cannot_be_written_do_not_hide_the_fault(antdrive: Call, suite: Path) -> None:
+    (suite.parent / "res").mkdir()
+    (suite.parent / "res" / "a").write_text("a file where a folder is due")
+    suite.write_text(SUITE + HIT)
+    code, out, _ = antdrive("check", "a.drive.yaml::hit", "--film", "never", "--results", "res")
+    assert code == 1
+    assert "  outcome: collided, expected succeeded" in out
+    assert "  results: " in out
+
+
+def test_ci_gets_junit_a_summary_and_unused_baselines(
+    antdrive: Call, suite: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", "page.md")
+    suite.write_text(SUITE + HIT)
+    gone = suite.parent / "baselines" / "a" / "gone-0.json"
+    gone.parent.mkdir(parents=True)
+    gone.write_text("{}")
+    words = ("check", "a.drive.yaml::hit", "--film", "never", "--junit", "out.xml", "--results", "res")
+    code, out, _ = antdrive(*words)
+    assert (code, "unused baseline: baselines/a/gone-0.json; remove it" in out) == (1, True)
+    (case,) = ElementTree.parse("out.xml").iter("testcase")
+    told = {entry.get("name"): entry.get("value") for entry in case.iter("property")}
+    assert (case.get("classname"), case.get("name"), told["drive.outcome"]) == ("a.drive.yaml", "hit[0]", "collided")
+    (failure,) = case.iter("failure")
+    assert "touched unseen[0]" in str(failure.text)
+    assert Path("page.md").read_text().startswith("### Drives: 0 of 1 passed")
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(suite / "page.md"))
+    suite.write_text(SUITE.replace("{margin: 1.2, ", "{margin: 1.2, baseline: false, "))
+    code, _, err = antdrive("check", "a.drive.yaml::closed")
+    assert (code, "GITHUB_STEP_SUMMARY: " in err, err.count("\n")) == (0, True, 1)
+    assert antdrive("check", "a.drive.yaml::closed", "--strict")[0] == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["check", "b.drive.yaml"], "b.drive.yaml: cannot be read (No such file or directory)"),
+        (["check", "a.drive.yaml::x"], "a.drive.yaml: no test 'x'; choose from clear[0], clear[1], closed[0]"),
+        (
+            ["check", "a.drive.yaml::"],
+            "a.drive.yaml::: names no test; write a.drive.yaml for all, or a.drive.yaml::SCENARIO",
+        ),
+        (["check", "a.drive.yaml", "--film", "often"], "--film often: unknown; choose from never, failed, always"),
+        (["accept", "a.drive.yaml", "--film", "no"], "--film no: unknown; choose from never, failed, always"),
+        (["check", "small.yaml"], "small.yaml: is no suite; the name of a suite ends in .drive.yaml"),
+    ],
+)
+def test_wrong_input_is_one_line(antdrive: Call, suite: Path, words: list[str], message: str) -> None:
+    code, _, err = antdrive(*words)
+    assert (code, err) == (2, f"antdrive: {message}\n")
+
+
+@pytest.mark.slow
+def test_processes_change_nothing(antdrive: Call, suite: Path) -> None:
+    antdrive("accept", ".", "--jobs", "1")
+    alone = {path.name: path.read_bytes() for path in (suite.parent / "baselines" / "a").iterdir()}
+    antdrive("accept", ".", "--jobs", "2")
+    assert {path.name: path.read_bytes() for path in (suite.parent / "baselines" / "a").iterdir()} == alone
+
+
+def test_the_schema_of_suites_is_printed(antdrive: Call) -> None:
+    code, out, _ = antdrive("schema", "suite")
+    schema = json.loads(out)
+    assert (code, schema["required"]) == (0, ["schema", "scenarios"])

@@ -1,0 +1,166 @@
+"""`antdrive compare`."""
+
+import json
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from antdrive import robots
+from tests.cli.calling import Call, Refused
+
+CATALOGUE = Path(robots.__path__[0]) / "catalog"
+
+
+def test_planners_are_compared_in_a_table_a_figure_and_a_film(antdrive: Call, small: Path, tmp_path: Path) -> None:
+    words = ("--out", "c", "--video", "c.mp4", "--speed", "20")
+    code, out, err = antdrive("compare", small, "-p", "astar", "-p", "tangent", *words, "--json")
+    facts = json.loads(out)
+    assert (code, err) == (0, "")
+    assert set(facts["runs"]) == {"astar", "tangent"}
+    for name in facts["runs"]:
+        result = json.loads((tmp_path / "c" / name / "result.json").read_text())
+        assert result["command"].startswith("antdrive run ")
+        assert f"--planner {name}" in result["command"]
+    assert Path("c.mp4").stat().st_size > 1000
+    logs = [tmp_path / "c" / name / "rollout.npz" for name in facts["runs"]]
+    assert antdrive("render", *logs, "-o", "again.gif", "--size", "320x240", "--speed", "30")[0] == 0
+    assert Path("again.gif").exists()
+
+
+def test_fewer_than_two_paths_are_nothing_to_compare(antdrive: Call, tmp_path: Path) -> None:
+    words = ["compare", "no-path", "-p", "astar", "-p", "dijkstra", "--out", str(tmp_path / "c"), "--no-figures"]
+    code, _, err = antdrive(*words)
+    assert code == 1
+    assert "nothing to compare" in err
+
+
+def test_the_command_that_repeats_a_run_names_the_robot_as_it_was_given(antdrive: Call, small: Path) -> None:
+    Path("mine.yaml").write_text((CATALOGUE / "turtlebot.yaml").read_text().replace("name: turtlebot", "name: mine"))
+    words = ["-p", "astar", "-p", "dijkstra", "--robot", "mine.yaml", "--no-figures", "--out", "c"]
+    assert antdrive("compare", small, *words)[0] == 0
+    command = shlex.split(json.loads(Path("c/astar/result.json").read_text())["command"])
+    assert command[command.index("--robot") + 1] == "mine.yaml"
+    assert antdrive(*command[1:], "--no-figures", "--out", "again")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["compare", "empty", "-p", "astar"], "two to six different planners"),
+        (["compare", "empty"], "two to six different planners"),
+        (["compare", "empty", "-p", "astar", "-p", "astar"], "gets a label, such as --planner few=aco-han"),
+        (["compare", "empty", "-p", "a/b=astar", "-p", "ants"], "write NAME or LABEL=NAME"),
+        (["compare", "empty", "-p", "planner=astar", "-p", "ants"], "write NAME or LABEL=NAME"),
+        (
+            ["compare", "empty", "-p", "astar", "-p", "ants", "--set", "mmas.ants=3"],
+            "a group of astar, ants, planner, controller",
+        ),
+        (
+            ["compare", "empty", "-p", "astar", "-p", "ants", "--set", "astar.ants=3"],
+            "no option of astar is called 'ants'",
+        ),
+        (["compare", "empty", "empty", "-p", "astar", "-p", "ants"], "name worlds with different names"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_wrong_input_is_one_line_and_exit_code_2(refused: Refused, words: list[str], says: str) -> None:
+    assert says in refused(*words)
+
+
+def test_planners_have_options_of_their_own_and_are_paired_over_worlds_and_seeds(antdrive: Call, small: Path) -> None:
+    Path("other.yaml").write_text(small.read_text().replace("name: small", "name: other"))
+    words = [
+        "-p",
+        "few=aco-han",
+        "-p",
+        "aco-han",
+        "-p",
+        "astar",
+        "--set",
+        "few.ants=3",
+        "--set",
+        "aco-han.iterations=4",
+    ]
+    words += ["--set", "controller.lookahead_time=0.6", "--seeds", "2", "--no-figures"]
+    code, out, err = antdrive("compare", small, "other.yaml", *words, "--json")
+    facts = json.loads(out)
+    assert (code, err) == (0, "")
+    assert set(facts["runs"]) == {"few", "aco-han", "astar"}
+    assert len(facts["drives"]) == 2 * 2 * 3
+    first = facts["runs"]["few"]
+    assert (first["planner"], first["options"]["ants"], first["options"]["iterations"]) == ("aco-han", 3, 50)
+    assert facts["runs"]["aco-han"]["options"]["iterations"] == 4
+    assert first["settings"]["controller"] == {"lookahead_time": 0.6}
+    assert {(d["world"], d["seed"]) for d in facts["drives"]} == {(w, s) for w in ("small", "other") for s in (0, 1)}
+    folders = [Path(d["folder"]) for d in facts["drives"]]
+    assert len({str(folder) for folder in folders}) == 12
+    written = json.loads((folders[-3] / "result.json").read_text())
+    command = shlex.split(written["command"])
+    assert "planner.ants=3" in command
+    assert antdrive(*command[1:], "--no-figures", "--out", "again")[0] == 0
+    assert json.loads(Path("again/result.json").read_text())["digest"] == written["digest"]
+    for entry in facts["differences"]:
+        mine = [d for d in facts["drives"] if d["label"] == entry["planner"]]
+        apart = [d["metrics"]["duration_s"] - f["metrics"]["duration_s"]
+                 for d, f in zip(mine, [d for d in facts["drives"] if d["label"] == "few"], strict=True)]  # fmt: skip
+        assert (entry["succeeded"], entry["pairs"]) == (4, 4)
+        if entry["planner"] != "few":
+            low, high = sorted(apart)[1:3]
+            assert entry["duration_s"] == pytest.approx([(low + high) / 2, min(apart), max(apart)])
+    table = antdrive("compare", small, "other.yaml", *words)[1]
+    assert "few      4/4        4" in table
+
+
+def test_one_route_of_several_plans_is_told_as_the_same_drive(antdrive: Call, small: Path) -> None:
+    words = [
+        "compare",
+        small,
+        "-p",
+        "astar",
+        "-p",
+        "dijkstra",
+        "-p",
+        "few=aco-han",
+        "--set",
+        "few.iterations=1",
+        "--no-figures",
+    ]
+    smooth = antdrive(*words)[1]
+    assert "the same drive" in smooth
+    rough = json.loads(antdrive(*words, "--smoothing", "none", "--json")[1])
+    assert not any("few" in sentence for sentence in rough["same"]), "plans of other cells are other drives"
+
+
+def test_the_default_folder_is_never_that_of_another_comparison(antdrive: Call, small: Path) -> None:
+    words = ["compare", small, "-p", "astar", "-p", "dijkstra", "--no-figures"]
+    assert antdrive(*words)[0] == 0
+    first = Path("out/compare-small/astar/result.json")
+    before = first.read_bytes()
+    assert antdrive(*words, "--noise", "0.5", "--json")[0] in (0, 1)
+    assert first.read_bytes() == before
+    assert len(list(Path("out").iterdir())) == 2
+    assert antdrive(*words)[0] == 0
+    assert len(list(Path("out").iterdir())) == 2, "the same comparison has the same folder"
+
+
+def test_a_second_comparison_in_the_same_folder_is_told(refused: Refused, small: Path) -> None:
+    script = "from antdrive.base.atomic import claimed\nwith claimed('c'):\n print('claimed', flush=True)\n input()"
+    with subprocess.Popen([sys.executable, "-c", script], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
+        assert other.stdout is not None
+        assert other.stdout.readline() == b"claimed\n"
+        says = refused("compare", small, "-p", "astar", "-p", "dijkstra", "--out", "c")
+        planning = refused("plan", small, "-p", "astar", "--out", "c")
+        other.communicate(b"\n")
+    assert "is writing into this folder" in says
+    assert "is writing into this folder" in planning
+
+
+def test_a_mistyped_folder_is_named(refused: Refused, tmp_path: Path) -> None:
+    (tmp_path / "runs").mkdir()
+    assert refused("compare", "slalon") == (
+        "antdrive: slalon: no such file or folder, nor a world of the catalogue; did you mean slalom?\n"
+    )
+    assert "runs: neither a world file nor the folder of a campaign" in refused("compare", "runs")

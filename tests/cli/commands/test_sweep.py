@@ -1,0 +1,175 @@
+"""`antdrive sweep`: from a file, from options, again, interrupted."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from antdrive.base.atomic import claimed
+from antdrive.cli.commands.sweep import _without_again
+from antdrive.cli.console import duration
+from antdrive.runs.campaigns import canonical_bytes, read_results
+from tests.cli.calling import Call, Refused
+
+CAMPAIGN = (
+    "schema: 1\nworlds: [small.yaml]\nplanners:\n  - astar\n  - {name: aco-han, ants: [5, 10]}\nrollouts: failed\n"
+)
+
+
+@pytest.fixture
+def campaign(small: Path) -> Path:
+    path = small.with_name("campaign.yaml")
+    path.write_text(CAMPAIGN)
+    return path
+
+
+def test_a_dry_run_says_how_many_runs_there_are_and_writes_nothing(antdrive: Call, campaign: Path) -> None:
+    code, out, err = antdrive("sweep", campaign, "-o", "out", "--seeds", "0-4", "--dry-run")
+    assert (code, err) == (0, "")
+    assert out.splitlines()[-1] == "15 runs, 15 of them missing"
+    assert not Path("out").exists()
+
+
+def test_a_campaign_is_run_once_and_then_goes_on_with_what_is_new(antdrive: Call, campaign: Path) -> None:
+    code, out, _ = antdrive("sweep", campaign, "-o", "out", "--jobs", "1")
+    assert code == 0
+    lines = out.splitlines()
+    assert lines[0] == "3 runs, 3 of them made now; 3 succeeded, certified"
+    shown = {
+        line.split("  ")[0]: line for line in lines[lines.index("medians of the runs that succeeded (least to most)") :]
+    }
+    rows = read_results("out").table.to_pylist()
+    (astar,) = [row for row in rows if row["planner"] == "astar"]
+    length, duration = (f"{astar[key]:.3g}" for key in ("driven_length_m", "duration_s"))
+    assert f"{length} ({length} to {length})  {duration} ({duration} to {duration})" in " ".join(
+        shown["astar"].split("   ")
+    )
+    assert lines[-1] == "  charts, intervals and all runs: antdrive report out -o out/report.html"
+    made = canonical_bytes("out")
+    code, out, _ = antdrive("sweep", campaign, "-o", "out", "--report", "all.md")
+    assert (code, out.splitlines()[-1]) == (0, "  report   all.md")
+    assert "| astar | 100.0 | 20.7 to 100.0 | 1 | 1 | 1 |" in Path("all.md").read_text()
+    code, out, _ = antdrive("sweep", campaign, "-o", "out", "--seeds", "2", "--dry-run", "--json")
+    assert (json.loads(out)["runs"], json.loads(out)["missing"]) == (6, 3)
+    assert canonical_bytes("out") == made
+    campaign.write_text(CAMPAIGN.replace("[5, 10]", "[5, 6]"))
+    code, out, _ = antdrive("sweep", campaign, "-o", "out", "--jobs", "1", "--json")
+    assert {key: json.loads(out)[key] for key in ("runs", "made", "outcomes")} == {
+        "runs": 3, "made": 1, "outcomes": {"succeeded": 3}
+    }  # fmt: skip
+    campaign.write_text(CAMPAIGN)
+    code, out, _ = antdrive("sweep", campaign, "-o", "out", "--json")
+    assert json.loads(out)["made"] == 0, "what an earlier state of the campaign ran is kept"
+    assert canonical_bytes("out") == made
+
+
+def test_options_mean_what_a_file_means(antdrive: Call, campaign: Path) -> None:
+    words = ["--world", "*.yaml", "-p", "astar", "-p", "aco-han:ants=5,10"]
+    campaign.rename("campaign.txt")
+    _, out, _ = antdrive("sweep", *words, "-o", "flags", "--jobs", "1", "--json")
+    assert json.loads(out)["runs"] == 3
+    _, out, _ = antdrive("sweep", "campaign.txt", "-o", "flags", "--json")
+    assert json.loads(out)["made"] == 0
+
+
+def test_what_robots_know_is_an_option(antdrive: Call, campaign: Path) -> None:
+    words = ["--map", "none", "--localisation", "odometry", "--odometry", "1", "--odometry", "5", "-r", "jackal"]
+    code, out, _ = antdrive("sweep", campaign, *words, "--dry-run", "--json")
+    assert (code, json.loads(out)["runs"], json.loads(out)["counts"]["settings"]) == (0, 6, 2)
+    campaign.write_text(CAMPAIGN + "settings:\n  - {cell: 0.1}\n  - {map: given}\n")
+    _, out, _ = antdrive("sweep", campaign, "--localisation", "true", "--dry-run", "--json")
+    assert json.loads(out)["counts"]["settings"] == 2
+
+
+def test_the_command_in_a_row_repeats_the_run(antdrive: Call, campaign: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    words = ["--tasks", "2", "--noise", "1", "--smoothing", "taut", "--margin", "0.05", "--seeds", "3,7"]
+    antdrive("sweep", campaign, "-o", "out", "--jobs", "1", "-p", "aco-han:ants=5:shortcut=true", *words)
+    row = read_results("out").table.to_pylist()[-1]
+    assert (row["planner"], row["task"], row["seed"]) == ("aco-han ants=5 shortcut=true", "random-0-1", 7)
+    monkeypatch.chdir("out")
+    command = [*shlex.split(row["command"]), "--no-figures", "--out", "again"]
+    subprocess.run([sys.executable, "-m", *command], check=False, capture_output=True)
+    assert json.loads(Path("again/result.json").read_text())["digest"] == row["digest"]
+
+
+def test_a_planner_in_a_file_is_swept_and_its_command_repeats_the_run(
+    antdrive: Call, campaign: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lines = ["from dataclasses import dataclass", "from antdrive.planners import AStar", "@dataclass(frozen=True)"]
+    Path("mine.py").write_text("\n".join([*lines, "class Mine(AStar):", "    width: int = 3", ""]))
+    code, out, _ = antdrive("sweep", campaign, "-o", "out", "--jobs", "1", "-p", "mine.py:Mine:width=4", "--json")
+    assert (code, json.loads(out)["succeeded"]) == (0, 1)
+    (row,) = read_results("out").table.to_pylist()
+    assert row["planner"] == "mine.py:Mine width=4"
+    monkeypatch.chdir("out")
+    antdrive(*shlex.split(row["command"])[1:], "--no-figures", "--out", "again")
+    found = json.loads(Path("again/result.json").read_text())
+    assert (found["digest"], found["planner"]) == (row["digest"], "Mine")
+
+
+def test_runs_that_are_asked_for_again_count_as_missing(antdrive: Call, campaign: Path) -> None:
+    antdrive("sweep", campaign, "-o", "out", "--jobs", "1")
+    _, out, _ = antdrive(
+        "sweep", campaign, "-o", "out", "--dry-run", "--again", "aco-han", "--again", "no_path", "--json"
+    )
+    assert json.loads(out)["missing"] == 2
+
+
+def test_the_command_that_goes_on_does_not_make_runs_a_third_time() -> None:
+    words = ["sweep", "c.yaml", "--again", "astar", "-o", "out", "--again=crashed"]
+    assert list(_without_again(words)) == ["sweep", "c.yaml", "-o", "out"]
+
+
+def test_two_commands_on_one_folder_do_not_mix(refused: Refused, campaign: Path) -> None:
+    with claimed("out"):
+        assert "is writing into this folder; wait for it" in refused("sweep", campaign, "-o", "out", "--jobs", "1")
+
+
+def test_a_folder_with_other_files_is_left_alone(refused: Refused, campaign: Path) -> None:
+    line = refused("sweep", campaign, "-o", ".", "--jobs", "1")
+    assert "holds other files and no manifest.json; name a new folder" in line
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        (["campaign.yaml"], "--out: missing; name the folder"),
+        (["-o", "out", "-p", "astar"], "--world: missing; name a campaign file, or at least one world and one planner"),
+        (["campaign.yaml", "-o", "out", "--keep", "some"], "--keep some: unknown; choose from none, failed, all"),
+        (
+            ["campaign.yaml", "-o", "out", "-p", "as:ants"],
+            "--planner as:ants: write NAME:KEY=VALUE, such as aco-han:ants",
+        ),
+        (["campaign.yaml", "-o", "out", "-p", "as:ants=1..x..2"], "--planner x: must be a number"),
+        (["campaign.yaml", "-o", "out", "--seeds", "1,b"], "--seeds b: must be a whole number"),
+        (["campaign.yaml", "-o", "out", "--dask", "host"], "--dask: host: write local:N with a number of processes"),
+        (["campaign.yaml", "-o", "out", "--dask", "local:0"], "--dask: local:0: write local:N"),
+        (["campaign.yaml", "-o", "out", "--dask", "local:2", "-j", "2"], "--jobs: has no effect with --dask"),
+        (["campaign.yaml", "-o", "out", "--again", "x"], "--again x: no such planner or outcome; choose from astar"),
+        (["campaign.yaml", "-o", "out", "--run-limit", "0"], "run_limit: must be greater than 0, got 0"),
+        (["campaign.yaml", "-o", "out", "--report", "all.doc"], "all.doc"),
+        (["campaign.yaml", "-o", "out", "--report", "a.md", "--dry-run"], "--report: has no effect with --dry-run"),
+        (["nowhere.yaml", "-o", "out"], "nowhere.yaml: no such file"),
+    ],
+)
+def test_wrong_words_are_named(words: list[str], line: str, refused: Refused, campaign: Path) -> None:
+    assert line in refused("sweep", *words)
+
+
+def test_without_parquet_the_extra_is_named(refused: Refused, campaign: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("pyarrow", "pyarrow.parquet"):
+        monkeypatch.setitem(sys.modules, name, None)
+    assert "pip install 'antdrive[campaigns]'" in refused("sweep", campaign, "-o", "out")
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"),
+    [(7, "7 s"), (89, "89 s"), (600, "10 min"), (12000, "3 h 20 min"), (187200, "2 d 4 h")],
+)
+def test_times_are_told_in_fitting_units(seconds: float, words: str) -> None:
+    assert duration(seconds) == words

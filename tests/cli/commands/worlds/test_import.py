@@ -1,0 +1,205 @@
+"""`antdrive worlds import`."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from antdrive.worlds import load_task
+from tests.cli.calling import Call, Refused
+
+
+def test_a_gazebo_world_is_imported_and_driven(antdrive: Call, tmp_path: Path) -> None:
+    (tmp_path / "one.world").write_text(
+        "<sdf version='1.6'><world name='one'><model name='c'><static>1</static><pose>2 1 0 0 0 0</pose><link name='l'>"
+        "<collision name='c'><geometry><cylinder><radius>0.2</radius><length>1</length></cylinder></geometry></collision>"
+        "</link></model></world></sdf>"
+    )
+    code, _, err = antdrive(
+        "worlds",
+        "import",
+        "one.world",
+        "-o",
+        "one.yaml",
+        "--start",
+        "0,0,0",
+        "--goal",
+        "4,2",
+        "--bounds=-1,-1,5,3",
+    )
+    assert code == 0, err
+    task = load_task("one.yaml")
+    assert [(d.x, d.y, d.radius) for d in task.world.obstacles] == [(2, 1, 0.2)]
+    assert antdrive("run", "one.yaml", "--cell", "0.2")[0] == 0
+
+
+#: A building of 8 x 6 m, 0.1 m to a character: four rooms, three doors of 0.9 m, a table, and a corner that nobody has seen.
+def _building() -> list[str]:
+    rows = [["#" if r in (0, 59) or c in (0, 79) else " " for c in range(80)] for r in range(60)]
+    for c in range(80):
+        rows[30][c] = " " if 12 <= c < 21 or 58 <= c < 67 else "#"
+    for r in range(60):
+        rows[r][40] = " " if 8 <= r < 17 else "#"
+    for r in range(44, 48):
+        rows[r][10:22] = "#" * 12
+    for r in range(52, 59):
+        rows[r][70:79] = "?" * 9
+    return ["".join(row) for row in rows]
+
+
+def test_a_map_of_a_building_is_imported_planned_and_driven(antdrive: Call, tmp_path: Path) -> None:
+    levels = [[{"#": 0, " ": 254, "?": 205}[mark] for mark in row] for row in _building()]
+    text = "\n".join(" ".join(map(str, row)) for row in levels)
+    (tmp_path / "office.pgm").write_text(f"P2\n80 60\n255\n{text}\n")
+    (tmp_path / "office.yaml").write_text(
+        "image: office.pgm\nresolution: 0.1\norigin: [-4.0, -3.0, 0.0]\nnegate: 0\n"
+        "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    )
+    # From the lower left room with the table to the lower right room: through the two upper rooms, by three doors.
+    code, out, err = antdrive(
+        "worlds", "import", "office.yaml", "-o", "world.yaml", "--start=-3.0,-2.5,1.57", "--goal", "3.0,-1.5", "--json"
+    )
+    assert (code, err) == (0, "")
+    facts = json.loads(out)
+    assert "with 63 unknown cells taken for blocked" in facts["source"]
+    assert facts["bounds"] == pytest.approx([-3.9, -2.9, 3.9, 2.9])
+    code, out, err = antdrive("run", "world.yaml", "--out", "r", "--json")
+    facts = json.loads(out)
+    assert (code, facts["outcome"], facts["certificate"]["certified"]) == (0, "succeeded", True)
+    assert 10 < facts["metrics"]["route_length_m"] < 18  # there is no door between the two rooms
+    # Sixteen points of the robot's rim stayed over white pixels, which are free.
+    with np.load("r/rollout.npz") as log:
+        x, y = log["pose"][:, 0], log["pose"][:, 1]
+    for angle in np.linspace(0, 2 * np.pi, 16, endpoint=False):
+        col = np.floor((x + 0.18 * np.cos(angle) + 4.0) / 0.1).astype(int)
+        row = np.floor((y + 0.18 * np.sin(angle) + 3.0) / 0.1).astype(int)
+        assert {levels[59 - r][c] for r, c in zip(row, col, strict=True)} == {254}
+    goal_in_unknown_cells = ["--start=-3.0,-2.5,1.57", "--goal", "3.8,-2.8"]
+    assert antdrive("worlds", "import", "office.yaml", *goal_in_unknown_cells, "-o", "w.yaml")[0] == 2
+
+
+@pytest.fixture
+def dynabarn(tmp_path: Path) -> Callable[..., Path]:
+    """Write a DynaBARN file with worlds of these names."""
+    mover = {"radius": 0.5, "loop": "teleport", "keyframes_t_x_y": [[0, 5, 8], [8, 5, 9]]}
+    world = {
+        "bounds": [-12, -12, 12, 12],
+        "start": [11, 0, 3.14],
+        "goal": [9, 0],
+        "goal_tolerance": 1.0,
+        "movers": [mover],
+    }
+
+    def write(*names: str) -> Path:
+        path = tmp_path / "set.json"
+        path.write_text(json.dumps([{"name": name, **world} for name in names]))
+        return path
+
+    return write
+
+
+def test_a_dynabarn_set_becomes_one_file_for_each_world(antdrive: Call, dynabarn: Callable[..., Path]) -> None:
+    code, out, _ = antdrive("worlds", "import", dynabarn("one", "a/b"), "-o", "worlds")
+    assert code == 0
+    assert [line.split()[-1] for line in out.splitlines()] == ["worlds/one.yaml", "worlds/a_b.yaml"]
+    assert len(load_task("worlds/a_b.yaml").world.movers) == 1
+    code, out, _ = antdrive("run", "worlds/one.yaml", "--json")
+    assert (code, json.loads(out)["metrics"]["contacts_driving"]) == (0, 0)
+
+
+def test_a_dynabarn_set_is_listed_as_json(antdrive: Call, dynabarn: Callable[..., Path]) -> None:
+    code, out, _ = antdrive("worlds", "import", dynabarn("one", "a/b"), "-o", "worlds", "--json")
+    listed = json.loads(out)["worlds"]
+    assert code == 0
+    assert [world["files"]["world"] for world in listed] == ["worlds/one.yaml", "worlds/a_b.yaml"]
+
+
+def test_two_worlds_of_one_name_are_refused_before_anything_is_written(
+    refused: Refused, dynabarn: Callable[..., Path]
+) -> None:
+    says = refused("worlds", "import", dynabarn("one", "one"), "-o", "twice")
+    assert "two worlds would be written to twice/one.yaml" in says
+    assert not Path("twice").exists()
+
+
+def test_no_import_overwrites_its_source_or_an_unnamed_file(antdrive: Call, tmp_path: Path) -> None:
+    made = tmp_path / "made.map"
+    made.write_text("type octile\nheight 2\nwidth 3\nmap\n.@.\n...\n")
+    words = ["worlds", "import", "made.map", "--start", "0.5,0.5,0", "--goal", "2.5,0.5"]
+    assert (
+        antdrive(*words, "-o", "made.map")[2] == "antdrive: made.map: is the file to import; give another with --out\n"
+    )
+    assert antdrive(*words)[0] == 0
+    assert load_task("made.yaml").world.name == "made"
+    assert antdrive(*words)[2] == "antdrive: made.yaml: exists; give --out to say where the world goes\n"
+    assert antdrive(*words, "-o", "made.yaml")[0] == 0
+    assert antdrive("worlds", "export", "made.yaml", "-o", "made.yaml")[2].endswith(
+        "is the world itself; choose another name\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["map.pgm"], "map.pgm: is an image; give the map's .yaml file"),
+        (
+            ["map.txt"],
+            "map.txt: cannot be imported; files that can be end in .sdf, .world, .yaml (map_server), .map (MovingAI)",
+        ),
+        (["w.yaml"], "w.yaml: names no image"),
+        (["none.yaml"], "none.yaml: no such file"),
+        (["none.map"], "none.map: no such file"),
+        (["made.map"], "made.map: start and goal: maps have none; give it on free ground, within x 0 to 3"),
+        (["made.map", "--problem", "0"], "made.map.scen: no such file"),
+        (
+            ["made.map", "--start", "0.5,0.5,0", "--goal", "2.5,0.5", "--unknown", "free"],
+            "--unknown: a MovingAI map takes",
+        ),
+        (["made.map", "--bounds", "0,0,1,1"], "--bounds: a MovingAI map brings its own"),
+        (["made.map", "--barn"], "--barn: a MovingAI map takes start, goal, cell, overhang"),
+        (
+            ["made.map", "--start", "0.5,0.5,0", "--goal", "2.5,0.5", "--overhang", "0.1"],
+            "made.map: overhang: must be at",
+        ),
+        (
+            ["made.map", "--start", "0.5,0.5,0", "--goal", "2.5,0.5", "--overhang", "nan"],
+            "Invalid value for '--overhang'",
+        ),
+        (
+            ["made.map", "--start", "0.5,0.5,0", "--goal", "2.5,0.5", "--resolution", "nan"],
+            "Invalid value for '--resolution'",
+        ),
+        (["w.yaml", "--unknown", "perhaps"], "--unknown: must be blocked or free, got 'perhaps'"),
+        (["w.yaml", "--resolution", "1"], "--resolution: a map_server map takes"),
+        (["w.world", "--overhang", "1"], "--overhang: an SDF world takes"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_a_refused_import_is_one_line_and_writes_nothing(
+    antdrive: Call, words: list[str], says: str, tmp_path: Path
+) -> None:
+    (tmp_path / "made.map").write_text("type octile\nheight 2\nwidth 3\nmap\n.@.\n...\n")
+    (tmp_path / "w.yaml").write_text("schema: 1\n")
+    code, out, err = antdrive("worlds", "import", *words, "-o", "out.yaml")
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert says in err
+    assert not Path("out.yaml").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (
+            ["worlds", "import", "x.world", "-o", "w.yaml", "--barn", "--goal", "1,2"],
+            "--goal: a BARN world brings its own",
+        ),
+        (["worlds", "import", "nothing.world", "-o", "w.yaml"], "nothing.world: no such file"),
+        (["worlds", "import", "nothing.json", "-o", "folder"], "nothing.json: no such file"),
+        (["worlds", "import", "x.json", "-o", "folder", "--goal", "1,2"], "--goal: a DynaBARN set brings its own"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_wrong_input_is_one_line_and_exit_code_2(refused: Refused, words: list[str], says: str) -> None:
+    assert says in refused(*words)

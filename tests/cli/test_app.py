@@ -1,0 +1,220 @@
+"""What every command shares: help, exit codes, streams, interruptions."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import typer
+
+from antdrive.cli.app import COMMANDS, WORLDS, application
+from antdrive.cli.exits import BROKEN_PIPE
+from antdrive.planners import PLANNERS, PlanResult, Progress, Query, watch
+from tests.cli.calling import Call, Refused
+
+
+def test_help_lists_every_command_with_a_complete_line(antdrive: Call) -> None:
+    for group, commands in (([], COMMANDS), (["worlds"], WORLDS)):
+        code, out, _ = antdrive(*group, "--help")
+        assert code == 0
+        listed = dict(re.findall(r"^  ([a-z-]+) {2,}(\S.*)$", out.split("Commands:")[1], flags=re.MULTILINE))
+        for name in commands:
+            assert listed[name].endswith("."), listed[name]
+            assert not listed[name].endswith("...")
+
+
+@pytest.mark.parametrize("name", [*COMMANDS, *(f"worlds {name}" for name in WORLDS)])
+def test_every_option_is_explained_with_its_unit(name: str) -> None:
+    command: Any = typer.main.get_command(application())
+    for word in name.split():
+        command = command.commands[word]
+    for param in command.params:
+        unit = {"METRES": "[m]", "SECONDS": "[s]", "SPEED": "[m/s]"}.get(param.metavar or "", "")
+        assert param.help, f"{name} {param.name}"
+        assert unit in param.help, f"{name} {param.name}: {param.help}"
+
+
+def test_the_version_is_shown(antdrive: Call) -> None:
+    code, out, err = antdrive("--version")
+    assert (code, err) == (0, "")
+    assert out.startswith("antdrive 0.")
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["run"], "Missing argument 'WORLD'"),
+        (["rum", "empty"], "Did you mean 'run'"),
+        (["run", "empty", "--bogus"], "(see antdrive run --help)"),
+        (["worlds", "show"], "(see antdrive worlds show --help)"),
+        (["nothing"], "(see antdrive --help)"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_a_wrong_word_is_one_line_that_names_the_help(refused: Refused, words: list[str], says: str) -> None:
+    assert says in refused(*words)
+
+
+def test_python_m_antdrive_is_the_command_and_prints_nothing_else(small: Path, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "antdrive", "run", str(small), "--json", "--out", str(tmp_path / "r")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0
+    assert [line for line in done.stderr.splitlines() if "compiling the planners, once" not in line] == []
+    assert json.loads(done.stdout)["succeeded"]
+
+
+@pytest.mark.parametrize("closed", ["stdout", "stderr"])
+def test_a_closed_pipe_ends_the_program_silently(closed: str) -> None:
+    """As in `antdrive planners | head`, and with an error that nobody reads."""
+    words = ["planners"] if closed == "stdout" else ["planners", "--bogus"]
+    reading, writing = os.pipe()
+    os.close(reading)
+    other = "stderr" if closed == "stdout" else "stdout"
+    command = [sys.executable, "-m", "antdrive", *words]
+    streams: dict[str, int] = {closed: writing, other: subprocess.PIPE}
+    done = subprocess.run(command, check=False, **streams)  # type: ignore[call-overload]
+    os.close(writing)
+    assert (done.returncode, getattr(done, other)) == (BROKEN_PIPE, b"")
+
+
+def test_another_closed_pipe_is_a_fault(antdrive: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    def closed(*_: object, **__: object) -> None:
+        raise BrokenPipeError(32, "Broken pipe")
+
+    monkeypatch.setattr("antdrive.sim.pipeline.run", closed)
+    code, _, err = antdrive("run", "empty")
+    assert (code, err.startswith("antdrive: internal error: BrokenPipeError: ")) == (3, True)
+
+
+def test_ctrl_c_is_one_line(antdrive: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("antdrive.sim.pipeline.run", interrupt)
+    code, _, err = antdrive("run", "empty")
+    assert code == 130
+    assert err == "antdrive: interrupted\n"
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["compare", "WORLD", "-p", "aco-han", "-p", "astar"],
+        ["find-margin", "WORLD", "-p", "aco-han", "--seeds", "1"],
+        ["reproduce", "lee2008", "--seeds", "1"],
+    ],
+    ids=lambda words: words[0],
+)
+def test_ctrl_c_while_planning_ends_a_command_that_plans_many_times(
+    antdrive: Call, small: Path, tmp_path: Path, words: list[str]
+) -> None:
+    def stop(progress: Progress) -> None:
+        raise KeyboardInterrupt
+
+    with watch(stop):
+        code, out, err = antdrive(*(str(small) if word == "WORLD" else word for word in words))
+    *notes, last = err.splitlines()
+    assert (code, out, last) == (130, "", "antdrive: interrupted")
+    assert len(notes) == (words[0] == "reproduce"), "one seed is too few for its claims, it says"
+    assert not list((tmp_path / "out").rglob("*.*"))
+
+
+def test_a_full_disk_is_one_line(refused: Refused, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device", "w.yaml")
+
+    monkeypatch.setattr("antdrive.worlds.save_task", full)
+    assert refused("worlds", "generate", "forest", "-o", "w.yaml") == "antdrive: w.yaml: No space left on device\n"
+
+
+class Faulty:
+    """A planner of somebody else that gets it wrong."""
+
+    def __init__(self, answer: Any) -> None:
+        self.answer = answer
+
+    def plan(self, query: Query, rng: Any) -> PlanResult:
+        if isinstance(self.answer, Exception):
+            raise self.answer
+        right = PLANNERS["astar"].plan(query, rng)
+        return self.answer(right) if callable(self.answer) else self.answer  # type: ignore[no-any-return]
+
+
+@pytest.fixture
+def faulty(monkeypatch: pytest.MonkeyPatch) -> Callable[[Any], None]:
+    """Make a planner `mine` known that answers so, or raises."""
+
+    def install(answer: Any) -> None:
+        monkeypatch.setattr("antdrive.planners.registry.PLANNERS", {**PLANNERS, "mine": Faulty(answer)})
+
+    return install
+
+
+@pytest.mark.parametrize("command", ["run", "plan"])
+@pytest.mark.parametrize(
+    ("answer", "says"),
+    [
+        (ZeroDivisionError("by zero"), r"raised ZeroDivisionError: by zero \(test_app\.py:\d+\)"),
+        (ValueError(), r"raised ValueError \(test_app\.py:\d+\)"),
+        (OSError(2, "No such file", "x"), r"raised FileNotFoundError: .* \(test_app\.py:\d+\)"),
+        (None, r"returned None where a PlanResult is due \(test_app\.py:\d+\)"),
+    ],
+    ids=["ZeroDivisionError", "ValueError", "OSError", "None"],
+)
+def test_a_fault_of_a_planner_is_one_line_with_exit_code_3(
+    antdrive: Call, small: Path, faulty: Callable[[Any], None], command: str, answer: Any, says: str
+) -> None:
+    faulty(answer)
+    code, out, err = antdrive(command, small, "-p", "mine")
+    assert (code, out) == (3, "")
+    assert re.fullmatch(rf"antdrive: planner mine {says} \(run again with --debug for the traceback\)\n", err)
+
+
+@pytest.mark.parametrize("place", [0, 4])
+def test_debug_shows_the_traceback_wherever_it_stands(
+    antdrive: Call, small: Path, faulty: Callable[[Any], None], place: int
+) -> None:
+    faulty(ZeroDivisionError("by zero"))
+    words: list[str | Path] = ["run", small, "-p", "mine"]
+    words.insert(place, "--debug")
+    code, _, err = antdrive(*words)
+    assert code == 3
+    assert err.startswith("Traceback")
+    assert re.fullmatch(r"antdrive: planner mine raised ZeroDivisionError: .*:\d+\)", err.splitlines()[-1])
+
+
+def test_any_other_exception_is_one_line_with_exit_code_3(antdrive: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise ValueError("two\nlines")
+
+    monkeypatch.setattr("antdrive.sim.pipeline.plan", fail)
+    code, out, err = antdrive("run", "empty")
+    assert (code, out) == (3, "")
+    assert err == r"antdrive: internal error: ValueError: two\nlines (run again with --debug for the traceback)" + "\n"
+
+
+def test_a_wrong_plan_is_an_outcome_and_is_not_driven(
+    antdrive: Call, small: Path, faulty: Callable[[Any], None]
+) -> None:
+    faulty(lambda right: replace(right, cells=np.delete(right.cells, 2, axis=0)))
+    code, out, err = antdrive("run", small, "-p", "mine", "--json", "-o", "r")
+    result = json.loads(out)
+    assert (code, err, result["outcome"], result["digest"]) == (1, "", "invalid_plan", None)
+    assert result["reason"].startswith("cells: step 1 from ")
+    assert not Path("r/rollout.npz").exists()
+    code, out, err = antdrive("plan", small, "-p", "mine")
+    assert (code, err) == (1, "")
+    assert "mine gave a wrong plan (cells: step 1 from " in out
+
+
+def test_the_help_explains_the_exit_codes(antdrive: Call) -> None:
+    words = " ".join(antdrive("--help")[1].split())
+    for code in ("0: success", "1: the drive", "2: wrong input", "3: a fault", "--debug"):
+        assert code in words

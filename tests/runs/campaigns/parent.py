@@ -1,0 +1,24 @@
+"""A campaign of runs that take no time to speak of, in a process that tests kill: python -m tests.runs.campaigns.parent DIR."""
+
+from __future__ import annotations
+
+import signal
+import sys
+
+from antdrive.runs.campaigns import expand, make_campaign, store
+from antdrive.runs.campaigns.sweeping import run_expansion
+from tests.runs.campaigns.works import Deadly
+
+CAMPAIGN = {"worlds": ["empty", "gate"], "planners": ["astar"], "seeds": 150}
+
+
+def go(folder: str, seconds: float, jobs: int) -> None:
+    """Run the campaign, or what is left of it."""
+    store.FLUSH_EVERY = 0.05
+    campaign = make_campaign(CAMPAIGN)
+    run_expansion(campaign, expand(campaign), folder, jobs=jobs, work=Deadly(seconds=seconds))
+
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in what a shell starts in the background
+    go(sys.argv[1], 0.2, 2)  # half a minute, so that a test on a busy machine disturbs it in the middle

@@ -1,0 +1,132 @@
+"""Runs on a dask cluster: the same table, a run that kills its workers is recorded, a scheduler that is gone is named."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+pytest.importorskip("distributed")
+
+from antdrive.base.errors import InputError
+from antdrive.runs.campaigns import canonical_bytes, make_campaign, read_results
+from antdrive.runs.campaigns.cluster import _received, run_chunk, run_on_cluster
+from antdrive.runs.campaigns.expanding import expand
+from antdrive.runs.campaigns.running import log_path
+from antdrive.runs.campaigns.sweeping import run_expansion, sweep
+from antdrive.runs.campaigns.waiting import Waiting
+from tests.runs.campaigns.works import Deadly, Endless, Refusing
+
+pytestmark = [
+    pytest.mark.slow,  # starting a cluster takes seconds
+    pytest.mark.timeout(120),
+    pytest.mark.filterwarnings("ignore:unclosed:ResourceWarning"),  # of distributed's own sockets
+]
+CAMPAIGN = {"worlds": ["empty", "gate"], "planners": ["astar"], "seeds": 12, "rollouts": "none"}
+
+
+@pytest.fixture
+def scheduler(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[bytes], str]]:
+    """A scheduler with two workers, in processes of their own: the scheduler's process and its address."""
+    file = tmp_path / "scheduler.json"
+    words = ["--port", "0", "--host", "127.0.0.1", "--no-dashboard", "--no-show", "--scheduler-file", str(file)]
+    process = started("dask_scheduler", *words)
+    for _ in range(600):
+        if file.exists() and file.stat().st_size:
+            break
+        time.sleep(0.1)
+    address = str(json.loads(file.read_text())["address"])
+    workers = started("dask_worker", address, "--nworkers", "2", "--nthreads", "1", "--no-dashboard")
+    yield process, address
+    for one in (workers, process):
+        one.terminate()
+        try:
+            one.wait(10)
+        except subprocess.TimeoutExpired:
+            one.kill()
+            one.wait()
+
+
+def started(module: str, *words: str) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", f"distributed.cli.{module}", *words]
+    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+def test_a_cluster_makes_the_same_table_as_processes_and_hands_logs_back(
+    tmp_path: Path, scheduler: tuple[subprocess.Popen[bytes], str]
+) -> None:
+    _, address = scheduler
+    few = {**CAMPAIGN, "seeds": 2}
+    for name, dask in (("local", None), ("dask", "local:2"), ("tcp", address)):
+        sweep(few, tmp_path / name, jobs=2, dask=dask, keep="all")
+    assert (
+        canonical_bytes(tmp_path / "local") == canonical_bytes(tmp_path / "dask") == canonical_bytes(tmp_path / "tcp")
+    )
+    for name in ("dask", "tcp"):
+        keys = read_results(tmp_path / name).table["key"].to_pylist()
+        assert all((tmp_path / name / log_path(key)).exists() for key in keys)
+
+
+def test_a_run_that_kills_its_workers_is_recorded_and_no_other_is_lost() -> None:
+    jobs = expand(make_campaign(CAMPAIGN)).jobs
+    rows = [finished.row for finished in run_on_cluster(jobs, Deadly((3,)), "local:2")]
+    assert Counter(row["key"] for row in rows) == Counter(job.key for job in jobs)
+    assert {row["key"] for row in rows if row["outcome"] == "crashed"} == {job.key for job in jobs if job.seed == 3}
+
+
+def test_a_run_that_does_not_end_is_ended() -> None:
+    jobs = expand(make_campaign({**CAMPAIGN, "worlds": ["empty"], "seeds": 6})).jobs
+    rows = [finished.row for finished in run_on_cluster(jobs, Endless((3,)), "local:2", limit=1.0)]
+    assert Counter(row["key"] for row in rows) == Counter(job.key for job in jobs)
+    assert {row["outcome"] for row in rows if row["key"] == jobs[3].key} == {"too_slow"}
+    assert sum(row["outcome"] == "succeeded" for row in rows) == 5
+
+
+def test_a_run_that_finds_no_room_ends_the_campaign() -> None:
+    jobs = expand(make_campaign({**CAMPAIGN, "worlds": ["empty"], "seeds": 4})).jobs
+    try:
+        run_chunk(Refusing(), jobs)
+    except InputError as error:
+        raised = error
+    failed = SimpleNamespace(status="error", exception=lambda: raised)
+    with pytest.raises(InputError, match="No space left on device"):
+        list(_received(failed, list(jobs), Waiting(jobs, 1), None))
+
+
+def test_a_scheduler_that_is_gone_ends_the_campaign_which_goes_on_elsewhere(
+    tmp_path: Path, scheduler: tuple[subprocess.Popen[bytes], str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("antdrive.runs.campaigns.cluster.PATIENCE", 1.0)
+    process, address = scheduler
+    campaign = make_campaign(CAMPAIGN)
+    expansion = expand(campaign)
+
+    def kill(done: int, size: int) -> None:
+        if done == 3:
+            process.kill()
+
+    with pytest.raises(InputError, match=r"^--dask: tcp://.*: the scheduler is gone; the same command goes on"):
+        run_expansion(campaign, expansion, tmp_path / "killed", dask=address, work=Deadly(seconds=0.2), progress=kill)
+    assert 3 <= len(read_results(tmp_path / "killed").table) < len(expansion.jobs)
+    run_expansion(campaign, expansion, tmp_path / "killed", jobs=0, work=Deadly())
+    run_expansion(campaign, expansion, tmp_path / "calm", jobs=0, work=Deadly())
+    assert canonical_bytes(tmp_path / "killed") == canonical_bytes(tmp_path / "calm")
+
+
+@pytest.mark.parametrize("address", ["local:", "local:x", "local:0", "localhost:8786", "tcp://"])
+def test_a_wrong_address_is_refused(address: str) -> None:
+    with pytest.raises(InputError, match="write local:N with a number of processes above 0, or tcp://HOST:PORT"):
+        next(run_on_cluster([], Deadly(), address))
+
+
+def test_a_scheduler_that_does_not_answer_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("antdrive.runs.campaigns.cluster.PATIENCE", 0.5)
+    with pytest.raises(InputError, match=r"^--dask: tcp://127\.0\.0\.1:1: no scheduler answers"):
+        next(run_on_cluster([], Deadly(), "tcp://127.0.0.1:1"))

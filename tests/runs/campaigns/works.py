@@ -1,0 +1,77 @@
+"""What workers do in tests instead of driving: nothing, or something terrible."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from antdrive.base.errors import InputError
+from antdrive.runs.campaigns.job import Job
+from antdrive.runs.campaigns.rows import fault_row
+from antdrive.runs.campaigns.running import Finished
+
+
+@dataclass(frozen=True)
+class Deadly:
+    """A run whose seed is among `seeds` kills its process; with `marks`, a folder, only the first time."""
+
+    seeds: tuple[int, ...] = ()
+    marks: str = ""
+    seconds: float = 0.0
+
+    def __call__(self, job: Job) -> Finished:
+        time.sleep(self.seconds)
+        mark = Path(self.marks) / job.key
+        if job.seed in self.seeds and not (self.marks and mark.exists()):
+            if self.marks:
+                mark.touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return Finished(fault_row(job.key, "succeeded", f"seed {job.seed}"))
+
+
+@dataclass(frozen=True)
+class Listing:
+    """Every run adds a line to a file: the world that its process is in."""
+
+    path: str
+
+    def __call__(self, job: Job) -> Finished:
+        time.sleep(0.01)
+        with Path(self.path).open("a") as stream:
+            stream.write(f"{os.getpid()} {job.case.world}\n")
+        return Finished(fault_row(job.key, "succeeded", ""))
+
+
+@dataclass(frozen=True)
+class Endless:
+    """A run whose seed is among `seeds` does not end."""
+
+    seeds: tuple[int, ...]
+
+    def __call__(self, job: Job) -> Finished:
+        while job.seed in self.seeds:
+            time.sleep(0.1)
+        return Finished(fault_row(job.key, "succeeded", f"seed {job.seed}"))
+
+
+@dataclass(frozen=True)
+class Refusing:
+    """A run whose seed is 3 finds that the campaign cannot go on."""
+
+    def __call__(self, job: Job) -> Finished:
+        if job.seed == 3:
+            raise InputError("rollouts/ab.npz: cannot be written (No space left on device)")
+        return Finished(fault_row(job.key, "succeeded", f"seed {job.seed}"))
+
+
+class Unloadable:
+    """Work that ends the process that unpickles it."""
+
+    def __reduce__(self) -> tuple[object, tuple[int, ...]]:
+        return os._exit, (7,)
+
+    def __call__(self, job: Job) -> Finished:
+        raise AssertionError

@@ -1,0 +1,314 @@
+"""The two tables: known differences are found, equal planners are not told apart, nothing unpaired is compared."""
+
+import dataclasses
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from antdrive.base import FieldError
+from antdrive.runs.statistics.columns import SETTINGS
+from antdrive.runs.statistics.comparison import compare_metric, compare_success, pairs_of
+from antdrive.runs.statistics.pairing import PairedRuns
+from antdrive.runs.statistics.runs import RunTable
+from antdrive.runs.statistics.success import common_medians, success_table
+from tests.runs.made_up_campaign import Skill, made_up_columns, made_up_runs
+
+PLANNERS = {"good": Skill(0.95, 1.05), "same": Skill(0.95, 1.05), "poor": Skill(0.6, 1.3)}
+
+
+def rows_of(columns: dict, keep) -> RunTable:
+    places = [k for k in range(len(columns["planner"])) if keep({name: values[k] for name, values in columns.items()})]
+    return RunTable({name: [values[k] for k in places] for name, values in columns.items()})
+
+
+@pytest.fixture(scope="module")
+def paired() -> PairedRuns:
+    return PairedRuns.of(made_up_runs(PLANNERS, worlds=20, seeds=6))
+
+
+def test_shares_are_counted(paired: PairedRuns) -> None:
+    columns = made_up_columns(PLANNERS, worlds=20, seeds=6)
+    for row in success_table(paired):
+        of = [
+            done for label, done in zip(columns["planner"], columns["succeeded"], strict=True) if label == row.planner
+        ]
+        assert (row.runs, row.counted, row.successes) == (120, 120, sum(of))
+        assert row.interval.low < row.share < row.interval.high
+        assert row.over_worlds.low <= row.share <= row.over_worlds.high
+        assert sum(row.outcomes.values()) == 120
+
+
+def test_a_known_difference_is_found_and_none_where_there_is_none(paired: PairedRuns) -> None:
+    found = {(row.first, row.second): row for row in compare_success(paired, pairs_of(paired))}
+    assert {pair: row.better for pair, row in found.items()} == {
+        ("good", "same"): "", ("good", "poor"): "good", ("same", "poor"): "same",
+    }  # fmt: skip
+    row = found["good", "poor"]
+    assert row.pairs == 120
+    assert row.first_wins + row.second_wins + row.ties == 120
+    assert row.interval.low < row.difference < row.interval.high
+    assert row.interval.low <= 0.35 <= row.interval.high
+    assert row.p <= row.p_holm
+    assert row.p_worlds <= row.p_worlds_holm
+
+
+def test_metrics_are_compared_where_both_succeeded(paired: PairedRuns) -> None:
+    rows = compare_metric(paired, pairs_of(paired), "duration_s", "lower")
+    for row in rows:
+        i, j = (paired.planners.index(name) for name in (row.first, row.second))
+        both = paired.success[:, i] & paired.success[:, j]
+        assert (row.pairs, row.dropped) == (both.sum(), (~both).sum())
+        values = paired.values("duration_s")[both]
+        assert row.difference == pytest.approx(np.median(values[:, i] - values[:, j]))
+        assert row.first_wins == (values[:, i] < values[:, j]).sum()
+    assert [row.better for row in rows] == ["", "good", "same"]
+    assert rows[1].effect == 1
+    higher = compare_metric(paired, pairs_of(paired), "duration_s", "higher")
+    assert [row.better for row in higher] == ["", "poor", "poor"]
+
+
+def test_one_planner_is_compared_with_each_other_one(paired: PairedRuns) -> None:
+    rows = compare_success(paired, pairs_of(paired, against="same"))
+    assert [(row.first, row.second) for row in rows] == [("good", "same"), ("same", "poor")]
+    assert rows[1].p_holm == pytest.approx(2 * rows[1].p), "Holm over two comparisons"
+    with pytest.raises(FieldError, match="choose from good, same, poor"):
+        pairs_of(paired, against="nobody")
+
+
+def test_the_order_of_rows_changes_nothing() -> None:
+    columns = made_up_columns(PLANNERS, worlds=6, seeds=3)
+    order = np.random.default_rng(0).permutation(len(columns["seed"]))
+    order = sorted(order, key=lambda k: columns["planner"][k] != "good")  # the planners keep their order
+    order = sorted(order, key=lambda k: columns["planner"][k] == "poor")
+    mixed = PairedRuns.of(RunTable({name: [values[k] for k in order] for name, values in columns.items()}))
+    plain = PairedRuns.of(RunTable(columns))
+    for compare in (compare_success, lambda p, pairs: compare_metric(p, pairs, "plan_s", "lower")):
+        assert repr(compare(mixed, pairs_of(mixed))) == repr(compare(plain, pairs_of(plain)))
+
+
+def test_runs_without_a_partner_are_counted_and_left_out() -> None:
+    columns = made_up_columns(PLANNERS, worlds=6, seeds=3)
+    table = rows_of(columns, lambda row: row["planner"] != "good" or row["seed"] > 0)
+    row = compare_success(PairedRuns.of(table), [(0, 1)])[0]
+    assert (row.pairs, row.unpaired) == (12, 6)
+    metric = compare_metric(PairedRuns.of(table), [(0, 1)], "duration_s", "lower")[0]
+    assert metric.pairs + metric.dropped == 12
+
+
+@pytest.mark.parametrize("key", ["world", "world_hash", "task", "seed", *SETTINGS])
+def test_runs_that_differ_in_anything_are_no_pairs(key: str) -> None:
+    columns = made_up_columns({"a": Skill(), "b": Skill()}, worlds=2, seeds=2)
+    columns[key] = [
+        f"other {value}" if isinstance(value, str) else (value or 0) + 50 if name == "b" else value
+        for name, value in zip(columns["planner"], columns.get(key, [None] * 8), strict=True)
+    ]
+    if isinstance(columns[key][0], str):
+        columns[key] = [f"{value} of {name}" for name, value in zip(columns["planner"], columns[key], strict=True)]
+    with pytest.raises(FieldError, match="only paired runs are compared"):
+        pairs_of(PairedRuns.of(RunTable(columns)))
+
+
+def test_one_planner_alone_and_two_runs_of_one_instance_are_refused() -> None:
+    with pytest.raises(FieldError, match="two are needed"):
+        pairs_of(PairedRuns.of(made_up_runs({"a": Skill()})))
+    columns = made_up_columns({"a": Skill(), "b": Skill()}, worlds=2, seeds=2)
+    columns["seed"] = [0] * 8
+    with pytest.raises(FieldError, match="a has two runs"):
+        PairedRuns.of(RunTable(columns))
+    with pytest.raises(FieldError, match="none"):
+        PairedRuns.of(RunTable(dict.fromkeys(columns, ())))
+    with pytest.raises(FieldError, match="seed: missing"):
+        RunTable({name: values for name, values in columns.items() if name != "seed"})
+
+
+def test_seeds_that_change_no_drive_are_no_evidence() -> None:
+    planners = {"astar": Skill(0.8, seeded=False), "dijkstra": Skill(0.8, seeded=False), "ants": Skill(0.8)}
+    paired = PairedRuns.of(made_up_runs(planners, worlds=30, seeds=10))
+    assert paired.seeded.all(axis=0).tolist() == paired.seeded.any(axis=0).tolist() == [False, False, True]
+    rows = success_table(paired)
+    assert [(row.runs, row.counted) for row in rows] == [(300, 30), (300, 30), (300, 300)]
+    once = success_table(PairedRuns.of(made_up_runs(planners, worlds=30, seeds=1)))[0]
+    assert rows[0].counted == once.counted
+    assert [row.pairs for row in compare_success(paired, pairs_of(paired))] == [30, 300, 300]
+    assert compare_metric(paired, [(0, 1)], "duration_s", "lower")[0].pairs <= 30
+    still = paired.select(["astar", "dijkstra"])
+    assert common_medians(still, ["duration_s"])[0] == still.success.all(axis=1).sum() / 10
+
+
+def repeated(columns: dict, times: int) -> RunTable:
+    """Each run `times` times, with seeds of its own that change no drive."""
+    found = {name: [value for value in values for _ in range(times)] for name, values in columns.items()}
+    found["seed"] = [times * seed + k for seed in columns["seed"] for k in range(times)]
+    return RunTable(found)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1.0], ids=["alone", "with runs of another setting"])
+def test_repetitions_change_no_figure(noise: float) -> None:
+    planners = {"astar": Skill(0.8, 1.0, seeded=False), "dijkstra": Skill(0.7, 1.02, seeded=False)}
+    columns = made_up_columns(planners, worlds=15, seeds=1)
+    other = made_up_columns(planners, worlds=15, seeds=1, rng_seed=2)
+    other["noise"] = [noise] * 30
+    tables = []
+    for times in (1, 2, 7):
+        still = repeated(columns, times).columns
+        both = RunTable({name: [*still[name], *(other[name] if noise else ())] for name in columns})
+        paired = PairedRuns.of(both)
+        rows = [
+            (row.planner, row.counted, row.successes, row.interval, row.over_worlds) for row in success_table(paired)
+        ]
+        pairs = [dataclasses.replace(row, unpaired=0) for row in compare_success(paired, [(0, 1)])]
+        pairs += compare_metric(paired, [(0, 1)], "duration_s", "lower")
+        tables.append(repr((rows, pairs, common_medians(paired, ["duration_s"]))))
+    assert tables[0] == tables[1] == tables[2]
+
+
+def test_a_wall_time_of_repeated_drives_is_their_median() -> None:
+    columns = made_up_columns({"astar": Skill(1.0, seeded=False), "ants": Skill(1.0)}, worlds=2, seeds=3)
+    columns["plan_s"] = [0.3, 0.1, 0.2, 4, 5, 6, 0.9, 0.7, 0.8, 7, 8, 9]
+    paired = PairedRuns.of(RunTable(columns))
+    assert paired.values("plan_s").T.tolist() == [[0.2] * 3 + [0.8] * 3, [4, 5, 6, 7, 8, 9]]
+    assert common_medians(paired.select(["astar"]), ["plan_s"])[1]["plan_s"][0][0] == 0.5
+    first = [paired.table.columns["duration_s"][k] for k in (0, 6)]
+    assert paired.values("duration_s")[[0, 3], 0].tolist() == first
+
+
+def test_seeds_that_change_drives_under_some_settings_count_there() -> None:
+    quiet = made_up_columns({"a": Skill(0.8, seeded=False), "b": Skill(0.9, seeded=False)}, worlds=6, seeds=5)
+    noisy = made_up_columns({"a": Skill(0.8), "b": Skill(0.9)}, worlds=6, seeds=5)
+    noisy["noise"] = [1.0] * 60
+    paired = PairedRuns.of(RunTable({name: [*quiet[name], *noisy[name]] for name in quiet}))
+    assert [row.counted for row in success_table(paired)] == [6 + 30, 6 + 30]
+    assert compare_success(paired, [(0, 1)])[0].pairs == 36
+
+
+def test_shares_are_over_the_instances_that_every_planner_ran() -> None:
+    columns = made_up_columns({"a": Skill(1.0), "b": Skill(1.0)}, worlds=8, seeds=2)
+    hard = [world >= "world-004" for world in columns["world"]]
+    columns["succeeded"] = columns["certified"] = [not one for one in hard]
+    easy_only = rows_of({**columns, "hard": hard}, lambda row: row["planner"] == "a" or not row["hard"])
+    rows = success_table(PairedRuns.of(easy_only))
+    assert [(row.planner, row.share, row.runs, row.elsewhere, row.counted) for row in rows] == [
+        ("a", 1.0, 16, 8, 8), ("b", 1.0, 8, 0, 8),
+    ]  # fmt: skip
+    apart = rows_of({**columns, "hard": hard}, lambda row: (row["planner"] == "a") == row["hard"])
+    assert [(row.share, row.elsewhere, row.counted) for row in success_table(PairedRuns.of(apart))] == [
+        (1.0, 0, 8), (0.0, 0, 8),
+    ]  # fmt: skip
+
+
+def test_where_all_runs_end_alike_whole_worlds_are_counted() -> None:
+    always, never = Skill(1.0), Skill(0.0)
+    rows = success_table(PairedRuns.of(made_up_runs({"a": always, "b": never}, worlds=4, seeds=50)))
+    z2 = 1.959963984540054**2
+    assert rows[0].over_worlds == pytest.approx((4 / (4 + z2), 1.0)), "Wilson's limit for 4 of 4"
+    assert rows[1].over_worlds == pytest.approx((0.0, z2 / (4 + z2)))
+    assert rows[0].interval.low > 0.98, "over single runs"
+    for first, second, low, high in ((always, always, -z2 / (4 + z2), z2 / (4 + z2)), (never, never, -0.49, 0.49)):
+        row = compare_success(PairedRuns.of(made_up_runs({"a": first, "b": second}, worlds=4, seeds=50)), [(0, 1)])[0]
+        assert row.interval == pytest.approx((low, high), abs=0.001)
+    row = compare_success(PairedRuns.of(made_up_runs({"a": always, "b": never}, worlds=4, seeds=50)), [(0, 1)])[0]
+    assert row.interval == pytest.approx((1 - 2**0.5 * z2 / (4 + z2), 1.0)), "Newcombe's for 4 of 4 against 0 of 4"
+
+
+def test_a_metric_without_a_direction_has_no_better_planner() -> None:
+    paired = PairedRuns.of(made_up_runs({"a": Skill(1.0, 1.0), "b": Skill(1.0, 1.3)}, worlds=10, seeds=3))
+    row = compare_metric(paired, [(0, 1)], "duration_s", "neither")[0]
+    assert (row.better, row.lower, row.as_dict()["better"], row.as_dict()["lower"]) == ("", "a", "", "a")
+    row = compare_metric(paired, [(0, 1)], "duration_s", "lower")[0]
+    assert (row.better, row.lower) == ("a", "")
+
+
+def test_runs_are_paired_by_the_margin_that_was_asked_for_and_by_the_robots_content() -> None:
+    columns = made_up_columns({"a": Skill(1.0), "b": Skill(1.0)}, worlds=2, seeds=1)
+    two = {name: [*values, *values] for name, values in columns.items()}
+    with pytest.raises(
+        FieldError, match="lacks robot_hash and margin_asked, which may tell them apart; antdrive sweep"
+    ):
+        PairedRuns.of(RunTable(two))
+    asked = PairedRuns.of(RunTable({**two, "margin_asked": ["0.03"] * 4 + ["auto"] * 4}))
+    assert compare_success(asked, [(0, 1)])[0].pairs == 4, "auto chose the margin that was asked for as well"
+    chosen = {**columns, "margin_asked": ["auto"] * 4, "margin": [0.03, 0.04, 0.03, 0.04]}
+    assert PairedRuns.of(RunTable(chosen)).shared.all(), "both asked for the same"
+    robots = PairedRuns.of(RunTable({**two, "robot_hash": ["1"] * 4 + ["2"] * 4}))
+    assert compare_success(robots, [(0, 1)])[0].pairs == 4
+    with pytest.raises(FieldError, match="one is needed to pair them"):
+        PairedRuns.of(RunTable({**two, "robot_hash": ["1"] * 8, "margin_asked": ["0.03"] * 8}))
+
+
+def test_a_world_that_decides_alone_is_no_evidence_for_other_worlds() -> None:
+    columns = made_up_columns({"a": Skill(1.0), "b": Skill(1.0)}, worlds=8, seeds=40)
+    for k, (world, planner) in enumerate(zip(columns["world"], columns["planner"], strict=True)):
+        if (world, planner) == ("world-003", "b"):
+            columns["succeeded"][k] = columns["certified"][k] = False
+    row = compare_success(PairedRuns.of(RunTable(columns)), [(0, 1)])[0]
+    assert row.p < 1e-9, "over runs the difference is beyond doubt"
+    assert row.p_worlds == 1, "but one world says nothing about others"
+    assert row.better == ""
+    assert row.interval.low <= 0
+
+
+def test_the_test_over_worlds_counts_all_flips_of_whole_worlds() -> None:
+    paired = PairedRuns.of(made_up_runs({"a": Skill(0.9, 1.1), "b": Skill(0.6, 1.105)}, worlds=7, seeds=5))
+    times = paired.values("plan_s")
+    gap = times[:, 0] - times[:, 1]
+    sizes = sorted(np.abs(gap[~np.isnan(gap)]))
+    rank = [0.0 if np.isnan(x) else math.copysign(1 + sizes.index(abs(x)), x) for x in gap]
+    for row, scores in (
+        (compare_success(paired, [(0, 1)])[0], paired.success[:, 0].astype(float) - paired.success[:, 1]),
+        (compare_metric(paired, [(0, 1)], "plan_s", "lower")[0], np.array(rank)),
+    ):
+        sums = [float(scores[paired.world == w].sum()) for w in range(7)]
+        flips = [abs(np.dot(signs, sums)) for signs in itertools.product((1, -1), repeat=7)]
+        assert row.p_worlds == pytest.approx(np.mean(np.array(flips) >= abs(sum(sums)) - 1e-9))
+        assert 0.01 < row.p_worlds < 1
+
+
+def test_where_each_world_has_one_pair_the_test_over_worlds_is_left_out() -> None:
+    row = compare_success(PairedRuns.of(made_up_runs(PLANNERS, worlds=40, seeds=1)), [(0, 2)])[0]
+    assert math.isnan(row.p_worlds)
+    assert row.decisive_p == row.p_holm
+    assert math.isnan(success_table(PairedRuns.of(made_up_runs(PLANNERS, worlds=40, seeds=1)))[0].over_worlds.low)
+
+
+def test_medians_are_taken_where_every_planner_succeeded(paired: PairedRuns) -> None:
+    common = paired.success.all(axis=1)
+    count, found = common_medians(paired, ["duration_s", "no_such_metric"])
+    assert count == common.sum()
+    assert list(found) == ["duration_s"]
+    values = paired.values("duration_s")[common]
+    for k, (median, interval) in enumerate(found["duration_s"]):
+        assert median == pytest.approx(np.median(values[:, k]))
+        assert interval.low <= median <= interval.high
+
+
+def test_an_unknown_metric_is_refused(paired: PairedRuns) -> None:
+    with pytest.raises(FieldError, match="speed: no successful run"):
+        compare_metric(paired, [(0, 1)], "speed", "higher")
+
+
+def test_planners_are_selected(paired: PairedRuns) -> None:
+    few = paired.select(["poor", "good"])
+    assert few.planners == ("poor", "good")
+    whole = compare_success(paired, [(0, 2)])[0]
+    part = compare_success(few, [(1, 0)])[0]
+    assert repr(whole) == repr(part)
+    with pytest.raises(FieldError, match="unknown 'none'"):
+        paired.select(["none"])
+
+
+def test_a_run_that_is_not_certified_is_no_success() -> None:
+    columns = made_up_columns({"a": Skill(1.0)}, worlds=3, seeds=1)
+    columns["certified"] = [True, False, None]
+    assert RunTable(columns).success.tolist() == [True, False, True]
+
+
+@pytest.mark.slow
+def test_equal_planners_are_rarely_called_different() -> None:
+    """Worlds differ much in difficulty; no more than 5 % (and chance) of comparisons of equal planners decide."""
+    called = 0
+    for k in range(60):
+        runs = made_up_runs({"a": Skill(0.6, 1.1), "b": Skill(0.6, 1.1)}, 15, 6, spread=0.4, rng_seed=k)
+        called += bool(compare_success(PairedRuns.of(runs), [(0, 1)])[0].better)
+    assert called <= 0.05 * 60 + 2 * (0.05 * 0.95 * 60) ** 0.5

@@ -1,0 +1,181 @@
+"""The fixture `drive`, the assertions, and the strategies."""
+
+from __future__ import annotations
+
+import pickle
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+import antdrive.testing
+from antdrive import Disc, RobotSpec, Run, Scenario, Task, World, load_robot, rasterise, run
+from antdrive.base.errors import FieldError, InputError
+from antdrive.cli.testing.checking import Update
+from antdrive.cli.testing.fixture import DriveFailure, DriveFixture, assert_collision_free, assert_reached_goal
+from antdrive.planners import load_planner
+from antdrive.runs.suites.strategies import tasks, worlds
+from antdrive.worlds import point_clearance
+from tests.worlds.oracles import passable
+
+
+@pytest.fixture
+def drive(tmp_path: Path) -> DriveFixture:
+    return DriveFixture(file=tmp_path / "test_mine.py", test="test_it[a/b]", address="test_mine.py::test_it[a/b]")
+
+
+def fresh(drive: DriveFixture, update: Update = "") -> DriveFixture:
+    return DriveFixture(file=drive._file, test=drive._test, address=drive._address, update=update)
+
+
+def test_a_drive_is_compared_with_a_baseline_beside_the_tests_file(
+    drive: DriveFixture, small_task: Task, tmp_path: Path
+) -> None:
+    with pytest.raises(DriveFailure, match=r"is missing; accept this drive with pytest .* --drive-update") as caught:
+        drive(small_task, "astar")
+    assert caught.value.result.outcome == "succeeded"
+    fresh(drive, "all")(small_task, "astar")
+    (written,) = (tmp_path / "baselines" / "test_mine").iterdir()
+    assert re.fullmatch(r"test_it-a-b-[0-9a-f]{8}\.json", written.name)
+    assert fresh(drive)(small_task, "astar").succeeded
+    slower = replace(load_robot("turtlebot"), max_speed=0.4)
+    with pytest.raises(DriveFailure, match=r"duration_s: .* longer, tolerance"):
+        fresh(drive)(small_task, "astar", slower)
+
+
+def test_each_drive_of_a_test_has_a_name(drive: DriveFixture, small_task: Task) -> None:
+    drive(small_task, "astar", baseline=False)
+    drive(small_task, "astar", name="second", baseline=False, expect={"duration_s": "< 60"})
+    with pytest.raises(FieldError, match="give each of its drives a name"):
+        drive(small_task, "astar", name="second", baseline=False)
+
+
+@pytest.mark.parametrize("beside", [{"planner": "aco-han"}, {"robot": "jackal"}, {"seed": 1}, {"nonsense": 3}])
+def test_a_scenario_takes_no_settings_beside_it(drive: DriveFixture, small_task: Task, beside: dict[str, Any]) -> None:
+    (key,) = beside
+    with pytest.raises(FieldError, match=f"{key}: a scenario has its own; change it with"):
+        drive(Scenario.of(small_task, "astar"), baseline=False, **beside)
+
+
+@pytest.mark.parametrize("demand", [{"tolerance": {"duration_s": 1}}, {"trajectory": "exact"}])
+def test_what_needs_a_baseline_is_refused_without_one(
+    drive: DriveFixture, small_task: Task, demand: dict[str, Any]
+) -> None:
+    with pytest.raises(FieldError, match=f"{next(iter(demand))}: there is no baseline to compare with"):
+        drive(small_task, "astar", baseline=False, **demand)
+
+
+def test_a_failed_drive_reaches_other_processes(drive: DriveFixture, small_task: Task) -> None:
+    with pytest.raises(DriveFailure) as caught:
+        drive(small_task, "astar", baseline=False, expect={"duration_s": "< 1"})
+    again = pickle.loads(pickle.dumps(caught.value))
+    assert (str(again), again.result) == (str(caught.value), caught.value.result)
+
+
+def test_files_lie_beside_the_tests_file(drive: DriveFixture, tmp_path: Path) -> None:
+    (tmp_path / "w.yaml").write_text(
+        "{schema: 1, bounds: [0, 0, 4, 2], start: [0.6, 1, 0], goal: [3.4, 1], cell: 0.2}\n"
+    )
+    assert drive.run("w.yaml", "astar").succeeded
+    with pytest.raises(InputError, match="no such file"):
+        drive.run("v.yaml", "astar")
+
+
+def test_a_collision_free_drive_is_one_that_is_certified_with_that_clearance(small_run: Run, collided_run: Run) -> None:
+    assert small_run.certificate is not None
+    bound = small_run.certificate.bound
+    assert_collision_free(small_run, clearance=bound)
+    assert_reached_goal(small_run)
+    with pytest.raises(AssertionError, match=r"is proved, expected .* m; nearest to obstacles\[0\] at \(2, 1.5\)"):
+        assert_collision_free(small_run, clearance=bound + 1e-6)
+    with pytest.raises(
+        AssertionError, match=r"collided: touched unseen\[0\] at \(.*\) with radius 0.1; the robot was at"
+    ):
+        assert_collision_free(collided_run)
+    assert collided_run.rollout is not None
+    with pytest.raises(AssertionError, match="collided: touched unseen"):
+        assert_collision_free(collided_run.rollout)
+    assert small_run.rollout is not None
+    forged = replace(small_run.rollout, pose=small_run.rollout.pose + [0.5, 0, 0])
+    with pytest.raises(AssertionError, match="not certified collision-free: "):
+        assert_collision_free(forged)
+
+
+def test_a_robot_that_did_not_drive_proved_nothing(small_task: Task) -> None:
+    nowhere = run(Scenario.of(small_task, "astar", margin=1.2))
+    for assertion in (assert_collision_free, assert_reached_goal):
+        with pytest.raises(AssertionError, match="no_path"):
+            assertion(nowhere)
+
+
+@given(worlds(obstacles=5, size=(2.0, 3.0), radius=(0.1, 0.2)))
+@settings(max_examples=25)
+def test_worlds_keep_to_their_sizes(world: World) -> None:
+    assert all(2 <= side <= 3 for side in world.bounds[2:])
+    assert len(world.obstacles) <= 5
+    assert all(0.1 <= disc.radius <= 0.2 and 0 <= disc.x <= world.bounds[2] for disc in world.obstacles)
+
+
+@given(tasks("jackal", clearance=0.15, obstacles=12))
+@settings(max_examples=25)
+def test_tasks_have_free_ends_and_a_path(task: Task) -> None:
+    reach = load_robot("jackal").radius + 0.15
+    assert (point_clearance(task.world, [task.start[:2], task.goal]) > reach).all()
+    assert passable(task, rasterise(task.world, task.cell, reach))
+
+
+def test_tasks_shrink_to_the_obstacle_that_matters() -> None:
+    import hypothesis
+
+    def blocked(task: Task) -> bool:
+        """Whether a cylinder stands on the straight line between start and goal."""
+        return any(_on_the_way(task, disc) for disc in task.world.obstacles)
+
+    found = hypothesis.find(
+        tasks(obstacles=2, solvable=False), blocked, settings=settings(max_examples=50, database=None)
+    )
+    assert len(found.world.obstacles) == 1
+
+
+def _on_the_way(task: Task, disc: Disc) -> bool:
+    start, goal = np.array(task.start[:2]), np.array(task.goal)
+    along = (goal - start) / np.hypot(*(goal - start))
+    offset = np.array([disc.x, disc.y]) - start
+    aside = abs(float(along[0] * offset[1] - along[1] * offset[0]))
+    return 0 < float(offset @ along) < float(np.hypot(*(goal - start))) and aside < disc.radius
+
+
+def test_without_hypothesis_the_message_names_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    import sys
+
+    monkeypatch.setitem(sys.modules, "hypothesis", None)
+    with pytest.raises(InputError, match="hypothesis is not installed; pip install hypothesis"):
+        worlds()
+
+
+def test_the_door_lists_what_it_offers() -> None:
+    for name in antdrive.testing.__all__:
+        assert getattr(antdrive.testing, name).__doc__
+    assert antdrive.worlds.__name__ == "antdrive.worlds", "the strategy of that name hides no package"
+    stub = (Path(antdrive.testing.__file__ or "").with_suffix(".pyi")).read_text()
+    assert sorted(re.findall(r" as (\w+)$", stub, flags=re.MULTILINE)) == sorted(antdrive.testing.__all__)
+    assert {name for name in dir(antdrive.testing) if not name.startswith("_")} == set(antdrive.testing.__all__)
+
+
+def test_a_robot_may_be_given_as_an_object(turtlebot: RobotSpec, drive: DriveFixture) -> None:
+    assert drive.run("empty", load_planner("astar"), turtlebot).succeeded
+
+
+@given(worlds(obstacles=2, radius=(0.004, 0.1)))
+@settings(max_examples=30)
+def test_radii_keep_to_their_range_in_whole_centimetres(world: World) -> None:
+    assert all(0.01 <= disc.radius <= 0.1 for disc in world.obstacles)
+
+
+def test_a_range_without_a_whole_centimetre_is_refused() -> None:
+    with pytest.raises(InputError, match=r"no whole centimetre lies between 0\.004 m and 0\.006 m"):
+        worlds(radius=(0.004, 0.006))

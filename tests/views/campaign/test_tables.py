@@ -1,0 +1,223 @@
+"""A campaign's tables as Markdown, LaTeX and CSV, and the numbers in their cells."""
+
+import csv
+import json
+import math
+from pathlib import Path
+
+import hypothesis.strategies as st
+import pytest
+from hypothesis import given
+
+from antdrive.base import FieldError, InputError
+from antdrive.runs.statistics.proportions import Interval
+from antdrive.runs.statistics.runs import RunTable
+from antdrive.views.campaign.cells import all_cells, outcome_cells, pair_cells, success_cells
+from antdrive.views.campaign.headline import headline
+from antdrive.views.campaign.numbers import percent, percents, probability, short
+from antdrive.views.campaign.page import latex_text, write_campaign_report
+from antdrive.views.campaign.summary import CampaignSummary, measure_title, summarise
+from tests.runs.made_up_campaign import Skill, made_up_columns, made_up_runs
+
+PLANNERS = {"good": Skill(0.95, 1.05), "poor_one": Skill(0.5, 1.3)}
+
+
+@pytest.fixture(scope="module")
+def summary() -> CampaignSummary:
+    return summarise(made_up_runs(PLANNERS, worlds=12, seeds=4), title="made <up>")
+
+
+def test_csv_holds_the_numbers_as_they_are(summary: CampaignSummary, tmp_path: Path) -> None:
+    files = write_campaign_report(summary, tmp_path, tmp_path / "t.csv")
+    assert [path.name for path in files] == ["t.csv", "t-pairs.csv"]
+    rows, pairs = (list(csv.DictReader(path.read_text().splitlines())) for path in files)
+    assert [row["planner"] for row in rows] == list(PLANNERS)
+    for row, known in zip(rows, summary.success, strict=True):
+        assert (int(row["succeeded"]), float(row["share"])) == (known.successes, known.share)
+        assert (float(row["low"]), float(row["high"])) == known.interval
+        assert float(row["duration_s_low"]) <= float(row["duration_s_median"]) <= float(row["duration_s_high"])
+    assert [pair["measure"] for pair in pairs] == ["success", "driven_length_m", "duration_s", "plan_s"]
+    for pair, known in zip(pairs, [rows[0] for rows in summary.comparisons.values()], strict=True):
+        assert float(pair["p_holm"]) == known.p_holm
+        assert (float(pair["low"]), pair["better"]) == (known.interval.low, known.better)
+
+
+def test_latex_has_as_many_cells_in_each_row_as_columns(summary: CampaignSummary, tmp_path: Path) -> None:
+    text = write_campaign_report(summary, tmp_path, tmp_path / "t.tex")[0].read_text()
+    assert text.count(r"\begin{tabular}") == text.count(r"\end{tabular}") == 6
+    assert text.count(r"\toprule") == text.count(r"\midrule") == text.count(r"\bottomrule") == 6
+    for block in text.split(r"\begin{tabular}{")[1:]:
+        align, rest = block.split("}", 1)
+        rows = [line for line in rest.splitlines() if line.endswith(r"\\")]
+        assert len(rows) >= 2
+        assert {line.count(" & ") + 1 for line in rows} == {len(align)}
+    assert r"poor\_one" in text
+    assert "poor_one" not in text
+
+
+@given(st.text(alphabet=st.characters(codec="ascii", exclude_categories=["Cc"]), max_size=12))
+def test_latex_text_has_no_bare_special_character(text: str) -> None:
+    for piece in (r"\textbackslash{}", r"\textasciitilde{}", r"\textasciicircum{}", "$<$", "$>$", "$-$"):
+        text = text.replace(piece, "")
+    shown = latex_text(text)
+    for piece in (r"\textbackslash{}", r"\textasciitilde{}", r"\textasciicircum{}", "$<$", "$>$", "$-$"):
+        shown = shown.replace(piece, "")
+    for special in "&%$#_{}":
+        shown = shown.replace(f"\\{special}", "")
+    assert not set(shown) & set("&%$#_{}\\~^<>")
+
+
+def test_markdown_lists_failures_with_their_commands_and_stays_short(tmp_path: Path) -> None:
+    columns = made_up_columns({f"planner-{k}": Skill(0.5) for k in range(17)}, worlds=20, seeds=5)
+    columns["command"][next(k for k, done in enumerate(columns["succeeded"]) if not done)] = "antdrive run `odd` | x"
+    summary = summarise(RunTable(columns), title="big", metrics=["duration_s"])
+    text = write_campaign_report(summary, tmp_path, tmp_path / "t.md")[0].read_text()
+    assert len(text.encode()) < 60_000
+    failed = int((~summary.table.success).sum())
+    assert f"## Runs that failed: {failed}" in text
+    assert f"{failed - 25} more are in the page." in text
+    assert "```antdrive run `odd` | x```" in text
+    assert "76 more rows are in the page" in text
+    tables = [line for line in text.splitlines() if line.startswith("|")]
+    assert len(tables) == 4 * 2 + 17 + 17 + 60 + 60
+
+
+def test_what_is_not_known_is_said(tmp_path: Path) -> None:
+    alone = summarise(made_up_runs({"a": Skill()}, worlds=1, seeds=3), title="t", size=10)
+    assert alone.comparisons == {}
+    assert alone.notes[0] == "7 of 10 runs are not done yet."
+    assert any("one world" in note for note in alone.notes)
+    assert any("two are needed" in note for note in alone.notes)
+    for kind in ("md", "tex", "csv", "html"):
+        assert len(write_campaign_report(alone, tmp_path, tmp_path / f"t.{kind}")) == 1
+    few = summarise(made_up_runs({"a": Skill(), "b": Skill(seeded=False)}, worlds=3, seeds=3), title="t")
+    assert any("3 worlds are too few" in note for note in few.notes)
+    assert any("Drives of b repeat with other seeds." in note for note in few.notes)
+
+
+def table_of(planners: str, worlds: int, seeds: int = 4) -> CampaignSummary:
+    """Planners of which in every world each one is faster than the next."""
+    skills = {name: Skill(1.0, 1.0 + 0.3 * k) for k, name in enumerate(planners)}
+    return summarise(made_up_runs(skills, worlds=worlds, seeds=seeds), title="t", metrics=["duration_s"])
+
+
+@pytest.mark.parametrize(
+    ("planners", "too_few", "need", "pairs"),
+    [("AB", 5, 6, "a pair"), ("ABC", 6, 7, "3 pairs"), ("ABCDE", 8, 9, "10 pairs")],
+)
+@pytest.mark.parametrize("seeds", [1, 4])
+def test_too_few_worlds_for_so_many_pairs_are_said(
+    planners: str, too_few: int, need: int, pairs: str, seeds: int
+) -> None:
+    few, enough = table_of(planners, too_few, seeds), table_of(planners, need, seeds)
+    (note,) = few.notes
+    assert note.startswith(f"{too_few} worlds are too few to tell {pairs} of planners apart: ")
+    assert f"It takes {need} worlds" in note
+    assert ("--against" in note) == (len(planners) > 2)
+    assert {row.better for row in few.comparisons["duration_s"]} == {""}
+    assert enough.notes == []
+    assert "" not in {row.better for row in enough.comparisons["duration_s"]}
+
+
+def test_the_least_p_value_is_holms_product() -> None:
+    for planners, worlds in (("ABC", 6), ("ABC", 7)):
+        rows = table_of(planners, worlds).comparisons["duration_s"]
+        assert [row.p_worlds_holm for row in rows] == pytest.approx([3 * 2 ** (1 - worlds)] * 3)
+
+
+def test_outcomes_are_counted_by_planner(summary: CampaignSummary) -> None:
+    table = outcome_cells(summary)
+    assert table.headings == ("planner", "succeeded", "collided", "runs")
+    for cells, row in zip(table.rows, summary.success, strict=True):
+        assert cells[:2] == (row.planner, str(row.outcomes["succeeded"]))
+        assert int(cells[1]) + int(cells[2]) == int(cells[3]) == 48
+    titles = [table.title for table in all_cells(summary)]
+    assert len(set(titles)) == len(titles), "no two tables are called the same"
+
+
+def test_the_headline_favours_no_planner_with_fewer_or_with_more_counted_runs() -> None:
+    columns = made_up_columns({"A": Skill(1.0), "B": Skill(1.0, seeded=False)}, worlds=10, seeds=2)
+    tied = {words: value for value, words in headline(summarise(RunTable(columns), title="t", metrics=[]))}
+    assert tied["runs succeeded, of all planners"] == "40"
+    (best,) = (words for words in tied if words.startswith("succeeded with"))
+    assert best == "succeeded with every planner (95 % over worlds: 72.2 to 100.0)"
+    hard = [world >= "world-005" for world in columns["world"]]
+    columns["succeeded"] = columns["certified"] = [not one for one in hard]
+    columns["outcome"] = ["no_path" if one else "succeeded" for one in hard]
+    kept = [k for k, planner in enumerate(columns["planner"]) if planner == "A" or not hard[k]]
+    some = summarise(RunTable({n: [v[k] for k in kept] for n, v in columns.items()}), title="t", metrics=[], size=40)
+    assert [value for value, words in headline(some) if words.startswith("succeeded with every planner")] == ["100.0 %"]
+    assert (
+        "Shares are over the 10 instances that every planner ran. Runs elsewhere, left out of them: A 10." in some.notes
+    )
+    assert success_cells(some).headings[-2:] == ("runs", "elsewhere")
+    assert [row[-1] for row in success_cells(some).rows] == ["10", "0"]
+    pairs = pair_cells("success", some.comparisons["success"])
+    assert (pairs.headings[-1], pairs.rows[0][-1]) == ("unpaired", "10")
+
+
+def test_a_share_without_exception_is_not_shown_as_certain_over_worlds() -> None:
+    table = success_cells(table_of("AB", 2))
+    assert [row[table.headings.index("over worlds")] for row in table.rows] == ["34.2 to 100.0"] * 2
+
+
+def test_a_metric_without_a_direction_is_lower_or_more(summary: CampaignSummary) -> None:
+    columns = made_up_columns({"A": Skill(1.0, 1.0), "B": Skill(1.0, 1.4)}, worlds=8, seeds=2)
+    columns["replans"] = columns["duration_s"]
+    table = pair_cells("replans", summarise(RunTable(columns), title="t", metrics=["replans"]).comparisons["replans"])
+    found = dict(zip(table.headings, table.rows[0], strict=True))
+    assert (found["lower"], found["less"], found["more"], "better" in found) == ("A", "16", "0", False)
+
+
+def test_settings_that_are_mixed_are_named_and_those_of_worlds_are_not() -> None:
+    columns = made_up_columns(PLANNERS, worlds=6, seeds=4)
+    columns["cell"] = [0.1 if world == "world-000" else 0.2 for world in columns["world"]]
+    assert summarise(RunTable(columns), title="t", metrics=[]).notes == []
+    columns["noise"] = [float(seed % 2) for seed in columns["seed"]]
+    columns["margin_asked"] = ["auto" if seed < 2 else "0.03" for seed in columns["seed"]]
+    columns["margin"] = [0.03 + 0.001 * seed for seed in columns["seed"]]
+    columns["robot_hash"] = [str(seed) for seed in columns["seed"]]
+    assert summarise(RunTable(columns), title="t", metrics=[]).notes == [
+        "Shares and medians are over several values of noise (0, 1); --where noise=0 takes one.",
+        "Shares and medians are over several values of margin_asked (auto, 0.03); --where margin_asked=auto takes one.",
+    ]
+
+
+def test_what_cannot_be_compared_is_refused_if_asked_for() -> None:
+    table = made_up_runs({"a": Skill()}, worlds=2, seeds=2)
+    with pytest.raises(FieldError, match="two are needed"):
+        summarise(table, title="t", strict=True)
+    with pytest.raises(FieldError, match="metric: unknown 'speed'; choose from path_length_m"):
+        summarise(table, title="t", metrics=["speed"])
+
+
+def test_another_suffix_is_refused(summary: CampaignSummary, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"choose one of \.html, \.md, \.tex, \.csv"):
+        write_campaign_report(summary, tmp_path, tmp_path / "t.pdf")
+
+
+def test_no_share_is_shown_without_its_interval(summary: CampaignSummary) -> None:
+    for table in (success_cells(summary), pair_cells("success", summary.comparisons["success"])):
+        for heading, following in zip(table.headings, table.headings[1:], strict=False):
+            assert following == "95 % interval" or heading not in ("share [%]", "difference [%]", "difference")
+        for heading, cells in zip(table.headings, zip(*table.rows, strict=True), strict=True):
+            assert not heading.startswith("median") or all("(" in cell for cell in cells)
+
+
+def test_cells_by_hand() -> None:
+    assert [percent(x) for x in (1.0, 0.99996, 0.9992, 0.0, -0.0001, 0.333, math.nan)] == [
+        "100.0", "99.99", "99.9", "0.0", "0.0", "33.3", "–",
+    ]  # fmt: skip
+    assert percents(Interval(0.5, 1.0)) == "50.0 to 100.0"
+    assert [short(x) for x in (0.0, 12.345, 1234.5, 0.00123456, -0.5, math.nan, math.inf, 1e-9)] == [
+        "0", "12.3", "1234", "0.00123", "-0.500", "–", "∞", "0",
+    ]  # fmt: skip
+    assert [probability(p) for p in (1.0, 0.0123, 0.0009, math.nan)] == ["1.000", "0.012", "< 0.001", "–"]
+    assert [measure_title(name) for name in ("success", "duration_s", "plan_s", "spl", "turning_rad_per_m")] == [
+        "success", "duration [s]", "planning time [s]", "spl", "turning [rad/m]",
+    ]  # fmt: skip
+
+
+def test_json_is_made_of_plain_values(summary: CampaignSummary) -> None:
+    for row in (summary.success[0], summary.comparisons["success"][0]):
+        assert json.loads(json.dumps(row.as_dict()))["interval"] == list(row.interval)

@@ -1,0 +1,336 @@
+"""Exported bags, read back by two programs that share no code with the export or with each other."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import math
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from antdrive.sim.log.record import ReplanRecord
+from antdrive.sim.log.rollout import Rollout
+from antdrive.sim.sensing import Scanner
+from antdrive.views.export.exporting import export
+from antdrive.views.export.ground import free_cells
+from antdrive.views.export.libraries import message_types
+from antdrive.views.export.scans import LEFT_OUT, TAKEN_AGAIN
+from antdrive.worlds.files.world_file import load_task
+from antdrive.worlds.grid import rasterise
+from antdrive.worlds.world import Disc, World
+
+rosbag2 = pytest.importorskip("rosbags.rosbag2", reason="rosbags is not installed")
+mcap_reader = pytest.importorskip("mcap.reader", reason="mcap is not installed")
+mcap_ros2 = pytest.importorskip("mcap_ros2.decoder", reason="mcap-ros2-support is not installed")
+
+FRAME = (10.0, -4.0, 0.3)
+
+
+class Said(NamedTuple):
+    """A message as a reader gave it."""
+
+    topic: str
+    at: int
+    message: Any
+
+
+@pytest.fixture(scope="module")
+def log(made_up_drive: Callable[..., Rollout]) -> Rollout:
+    """A drive of a second with movers, noise, a replan, an unseen cylinder and a contact, in a world turned in its map."""
+    plain = made_up_drive(obstacles=6, collide=True, movers=2)
+    hidden = Disc(3.5, 0.4, 0.1)
+    task = dataclasses.replace(plain.record.task, frame=FRAME)
+    replan = ReplanRecord(
+        t=0.25, trigger="obstructed", solved=True, cost_m=1.0, work=3, route=((1.0, 1.5), (2.0, 1.5), (2.0, 2.0))
+    )
+    record = dataclasses.replace(plain.record, task=task, unseen=(hidden,), replans=(replan,), reason="a cylinder")
+    contacts = plain.contacts + [0, 0, 0, 0]
+    noise = np.random.default_rng(1).normal(scale=0.01, size=plain.pose.shape)
+    return dataclasses.replace(plain, record=record, contacts=contacts, estimate=plain.pose + noise)
+
+
+@pytest.fixture(scope="module")
+def folder(log: Rollout, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("bags")
+    log.save(place / "rollout.npz")
+    export(place / "rollout.npz", "mcap", place / "drive.mcap")
+    export(place / "rollout.npz", "rosbag2", place / "bag")
+    return place
+
+
+def by_rosbags(path: Path) -> Iterator[Said]:
+    with rosbag2.Reader(path) as reader:
+        for connection, at, raw in reader.messages():
+            yield Said(connection.topic, at, message_types().deserialize_cdr(raw, connection.msgtype))
+
+
+def by_mcap(path: Path) -> Iterator[Said]:
+    with path.open("rb") as file:
+        reader = mcap_reader.make_reader(file, decoder_factories=[mcap_ros2.DecoderFactory()])
+        for _, channel, raw, message in reader.iter_decoded_messages():
+            yield Said(channel.topic, raw.log_time, message)
+
+
+@pytest.fixture(scope="module", params=["rosbags of the folder", "rosbags of the file", "mcap"])
+def said(request: pytest.FixtureRequest, folder: Path) -> list[Said]:
+    readers = {
+        "rosbags of the folder": lambda: by_rosbags(folder / "bag"),
+        "rosbags of the file": lambda: by_rosbags(folder / "drive.mcap"),
+        "mcap": lambda: by_mcap(folder / "drive.mcap"),
+    }
+    return list(readers[request.param]())
+
+
+def of(said: list[Said], topic: str) -> list[Said]:
+    return [entry for entry in said if entry.topic == topic]
+
+
+def nanoseconds(stamp: Any) -> int:
+    return int(stamp.sec * 10**9 + stamp.nanosec)
+
+
+def heading(q: Any) -> float:
+    return math.atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y**2 + q.z**2))
+
+
+def to_map(points: Any) -> np.ndarray:
+    """Points of the world in the map, by complex numbers."""
+    z = np.asarray(points, dtype=np.float64)
+    turned = (z[..., 0] + 1j * z[..., 1]) * np.exp(1j * FRAME[2]) + complex(FRAME[0], FRAME[1])
+    return np.stack([turned.real, turned.imag], axis=-1)
+
+
+def test_every_row_is_there_with_its_pose(said: list[Said], log: Rollout) -> None:
+    moving = of(said, "/tf")[1:]
+    assert [entry.at for entry in moving] == [round(t * 1e9) for t in log.t.tolist()]
+    for entry, pose, movers in zip(moving, log.pose.tolist(), log.movers.tolist(), strict=True):
+        base, *others = entry.message.transforms
+        assert nanoseconds(base.header.stamp) == entry.at
+        found = base.transform.translation
+        assert math.hypot(found.x - pose[0], found.y - pose[1]) < 1e-6
+        assert abs(math.remainder(heading(base.transform.rotation) - pose[2], 2 * math.pi)) < 1e-9
+        places = [(t.transform.translation.x, t.transform.translation.y) for t in others]
+        assert np.abs(np.array(places) - movers).max() < 1e-6
+
+
+def test_odometry_commands_and_numbers_are_those_of_the_log(said: list[Said], log: Rollout) -> None:
+    odometry = [entry.message for entry in of(said, "/odom")]
+    assert [(m.header.frame_id, m.child_frame_id) for m in odometry] == [("odom", "base_link")] * len(log.t)
+    poses = [(m.pose.pose.position.x, m.pose.pose.position.y, heading(m.pose.pose.orientation)) for m in odometry]
+    assert np.abs(np.array(poses) - log.pose).max() < 1e-9
+    twists = [(m.twist.twist.linear.x, m.twist.twist.angular.z) for m in odometry]
+    assert np.array_equal(twists, log.twist)
+    commands = [(e.message.linear.x, e.message.angular.z) for e in of(said, "/cmd_vel")]
+    assert np.array_equal(commands, log.command)
+    assert [entry.message.data for entry in of(said, "/clearance")] == log.clearance.tolist()
+    assert [entry.message.data for entry in of(said, "/limiter")] == log.limiter.tolist()
+    estimates = [entry.message.pose.pose.position.x for entry in of(said, "/estimate")]
+    assert np.array_equal(estimates, log.estimate[:, 0])
+
+
+def test_stamps_are_in_order_and_have_a_transform_at_or_before_them(said: list[Said], log: Rollout) -> None:
+    assert [entry.at for entry in said] == sorted(entry.at for entry in said)
+    known: set[str] = set()
+    for entry in said:
+        transforms = getattr(entry.message, "transforms", [])
+        known |= {transform.child_frame_id for transform in transforms}
+        header = getattr(entry.message, "header", None)
+        frames = [header.frame_id] if header else [m.header.frame_id for m in getattr(entry.message, "markers", [])]
+        assert set(frames) <= known | {"map"}
+        for stamp in [header.stamp] if header else [t.header.stamp for t in transforms]:
+            assert nanoseconds(stamp) == entry.at
+    assert known == {"odom", "base_link", "base_scan", "left_wheel", "right_wheel", "mover_0", "mover_1"}
+
+
+def test_fixed_transforms_are_sent_twice_and_the_world_lies_in_its_map(said: list[Said]) -> None:
+    (static,), first = of(said, "/tf_static"), of(said, "/tf")[0]
+    assert static.at == first.at == 0
+    for entry in (static, first):
+        placed = {t.child_frame_id: (t.header.frame_id, t.transform) for t in entry.message.transforms}
+        parent, lies = placed["odom"]
+        assert (parent, lies.translation.x, lies.translation.y) == ("map", FRAME[0], FRAME[1])
+        assert heading(lies.rotation) == pytest.approx(FRAME[2])
+
+
+def test_the_map_is_the_grid_that_was_planned_on(said: list[Said], log: Rollout) -> None:
+    (entry,) = of(said, "/map")
+    info, record = entry.message.info, log.record
+    grid = rasterise(record.task.world, record.cell, record.inflate)
+    assert (info.height, info.width, info.resolution) == (*grid.shape, pytest.approx(grid.cell))
+    assert [info.origin.position.x, info.origin.position.y] == pytest.approx(to_map(record.world.bounds[:2]).tolist())
+    assert heading(info.origin.orientation) == pytest.approx(FRAME[2])
+    assert np.array_equal(np.array(entry.message.data).reshape(grid.shape) == 0, grid.free)
+
+
+@given(data=st.data())
+def test_free_cells_are_those_of_the_planners_grid(data: st.DataObject) -> None:
+    number = st.floats(-1.0, 6.0).map(lambda value: round(value, 2))
+    discs = data.draw(st.lists(st.tuples(number, number, st.floats(0.01, 2.0).map(lambda r: round(r, 2))), max_size=6))
+    width, height = (data.draw(st.sampled_from([0.3, 1.0, 4.95, 5.0])) for _ in range(2))
+    world = World("w", (-0.5, 0.25, width - 0.5, height + 0.25), tuple(Disc(*disc) for disc in discs))
+    cell, inflate = data.draw(st.sampled_from([0.05, 0.1, 0.3])), data.draw(st.sampled_from([0.0, 0.1, 0.25]))
+    assert np.array_equal(free_cells(world, cell, inflate), rasterise(world, cell, inflate).free)
+
+
+def test_each_route_comes_when_it_is_followed(said: list[Said], log: Rollout) -> None:
+    first, second = of(said, "/plan")
+    assert (first.at, second.at) == (0, 250_000_000)
+    for entry, route in ((first, log.route), (second, log.record.replans[0].route)):
+        points = [(p.pose.position.x, p.pose.position.y) for p in entry.message.poses]
+        assert np.abs(np.array(points) - to_map(route)).max() < 1e-9
+    headings = [heading(p.pose.orientation) - FRAME[2] for p in second.message.poses]
+    assert headings == pytest.approx([0.0, math.pi / 2, math.pi / 2])
+
+
+def test_markers_show_cylinders_movers_and_contacts(said: list[Said], log: Rollout) -> None:
+    groups: dict[str, list[Any]] = {}
+    for marker in of(said, "/obstacles")[0].message.markers:
+        groups.setdefault(marker.ns, []).append(marker)
+    standing = groups["cylinders"] + groups["unseen"]
+    discs = log.record.world.obstacles
+    assert len(groups["unseen"]) == 1
+    places = [(m.pose.position.x, m.pose.position.y) for m in standing]
+    assert np.abs(np.array(places) - to_map([(d.x, d.y) for d in discs])).max() < 1e-9
+    assert [(m.scale.x, m.scale.z, m.pose.position.z) for m in standing] == [
+        (2 * d.radius, d.height, d.height / 2) for d in discs
+    ]
+    assert len(groups["walls"][0].points) == 5
+    movers = of(said, "/movers")[0].message.markers
+    assert [(m.header.frame_id, m.frame_locked) for m in movers] == [("mover_0", True), ("mover_1", True)]
+    (touch,) = of(said, "/contacts")
+    row, thing = log.contacts[0, :2].astype(int).tolist()
+    assert touch.at == round(log.t[row] * 1e9)
+    place, disc = touch.message.markers[0].pose.position, discs[thing]
+    (centre,) = to_map([(disc.x, disc.y)])
+    assert math.hypot(place.x - centre[0], place.y - centre[1]) == pytest.approx(disc.radius)
+
+
+def test_words_say_what_limits_the_speed_and_what_happened(said: list[Said], log: Rollout) -> None:
+    names = {entry.at: entry.message.data for entry in of(said, "/limiter_name")}
+    now = ""
+    for t, limiter in zip(log.t.tolist(), log.limiter.tolist(), strict=True):
+        now = names.get(round(t * 1e9), now)
+        assert now == log.record.limiters[limiter]
+    replanned, ended = of(said, "/events")
+    assert (replanned.at, replanned.message.data) == (250_000_000, "replan: obstructed: new route")
+    assert ended.message.data == "collided: touched an obstacle: a cylinder"
+
+
+def test_the_robot_is_described_with_its_footprint(said: list[Said], log: Rollout) -> None:
+    robot = ElementTree.fromstring(of(said, "/robot_description")[0].message.data)
+    body = robot.find("link[@name='base_link']/visual/geometry/cylinder")
+    assert body is not None
+    assert float(body.get("radius", "")) == log.record.robot.footprint.rounding
+    children = {joint.find("child").get("link") for joint in robot.iter("joint")}  # type: ignore[union-attr]
+    assert children == {"left_wheel", "right_wheel"}
+
+
+def test_a_lidar_that_the_drive_did_not_use_measures_at_export(folder: Path, said: list[Said], log: Rollout) -> None:
+    lidar, record = log.record.robot.lidar, log.record
+    assert lidar is not None
+    scans, rows = of(said, "/scan"), range(0, len(log.t), round(record.physics_hz / lidar.rate))
+    assert [entry.at for entry in scans] == [round(log.t[row] * 1e9) for row in rows]
+    scanner, radii = Scanner.of(lidar, record.world), np.array([mover.radius for mover in record.world.movers])
+    for entry, row in zip(scans, rows, strict=True):
+        expected = scanner.scan(tuple(log.pose[row].tolist()), log.movers[row], radii)
+        assert np.allclose(entry.message.ranges, expected, rtol=1e-6)
+    with (folder / "drive.mcap").open("rb") as file:
+        (note,) = mcap_reader.make_reader(file).iter_metadata()
+    assert (note.name, note.metadata) == ("antdrive", {"scans": TAKEN_AGAIN})
+    about = yaml.safe_load((folder / "bag" / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    assert about["custom_data"] == {"antdrive_scans": TAKEN_AGAIN}
+
+
+def test_scans_are_taken_at_export_only_if_asked_for(folder: Path) -> None:
+    export(folder / "rollout.npz", "mcap", folder / "none.mcap", scans=False)
+    assert "/scan" not in {entry.topic for entry in by_mcap(folder / "none.mcap")}
+    with (folder / "none.mcap").open("rb") as file:
+        assert [note.metadata for note in mcap_reader.make_reader(file).iter_metadata()] == [{"scans": LEFT_OUT}]
+
+
+def test_late_subscribers_get_what_is_sent_once(folder: Path) -> None:
+    once = {"/tf_static", "/map", "/robot_description", "/obstacles", "/movers", "/plan"}
+    for path in (folder / "bag", folder / "drive.mcap"):
+        with rosbag2.Reader(path) as reader:
+            offered = {c.topic: c.ext.offered_qos_profiles[0].durability.name for c in reader.connections}
+            assert {topic for topic, durability in offered.items() if durability == "TRANSIENT_LOCAL"} == once
+            assert set(offered.values()) == {"TRANSIENT_LOCAL", "VOLATILE"}
+            assert reader.message_count == sum(c.msgcount for c in reader.connections)
+
+
+def test_the_log_and_all_that_it_proves_are_inside(folder: Path, log: Rollout, tmp_path: Path) -> None:
+    with (folder / "drive.mcap").open("rb") as file:
+        inside = {a.name: a.data for a in mcap_reader.make_reader(file).iter_attachments()}
+    assert (
+        hashlib.sha256(inside["rollout.npz"]).digest() == hashlib.sha256((folder / "rollout.npz").read_bytes()).digest()
+    )
+    assert inside["digest.txt"].decode().strip() == log.digest
+    assert json.loads(inside["certificate.json"])["certified"] is False
+    (tmp_path / "world.yaml").write_bytes(inside["world.yaml"])
+    assert load_task(tmp_path / "world.yaml") == log.record.task
+
+
+def test_the_layout_shows_topics_that_exist(folder: Path, said: list[Said]) -> None:
+    layout = json.loads((folder / "drive.foxglove.json").read_text())
+    assert layout == json.loads((folder / "bag" / "bag.foxglove.json").read_text())
+    panels, topics = layout["configById"], {entry.topic for entry in said}
+
+    def named(node: Any) -> set[str]:
+        return {node} if isinstance(node, str) else named(node["first"]) | named(node["second"])
+
+    assert named(layout["layout"]) == set(panels)
+    paths = [path["value"] for panel in panels.values() for path in panel.get("paths", [])]
+    assert {path.split(".")[0] for path in paths} <= topics
+    for path in paths:
+        value = of(said, path.split(".")[0])[0].message
+        for name in path.split(".")[1:]:
+            value = getattr(value, name)
+    assert set(panels["3D!drive"]["topics"]) <= topics
+
+
+#: The keys of each panel's configuration, after the types in Foxglove's last open release and in Lichtblick.
+TITLES = {"foxglovePanelTitle", "lichtblickPanelTitle"}
+LINE = {"value", "label", "enabled", "timestampMethod", "color"}
+KEYS = {
+    "3D": {
+        "cameraState", "followMode", "followTf", "scene", "transforms", "topics", "layers", "publish", "imageMode",
+    },
+    "Plot": TITLES | {
+        "paths", "showLegend", "legendDisplay", "showPlotValuesInLegend", "showXAxisLabels", "showYAxisLabels", "isSynced",
+        "xAxisVal", "sidebarDimension",
+    },
+    "StateTransitions": TITLES | {"paths", "isSynced", "showPoints"},
+}  # fmt: skip
+
+
+def test_the_layout_has_the_keys_that_the_panels_know(folder: Path) -> None:
+    layout = json.loads((folder / "drive.foxglove.json").read_text())
+    assert set(layout) == {"configById", "globalVariables", "userNodes", "playbackConfig", "layout"}
+    for name, panel in layout["configById"].items():
+        kind = name.split("!")[0]
+        assert set(panel) <= KEYS[kind], name
+        assert all(set(line) <= LINE for line in panel.get("paths", [])), name
+        if kind == "Plot":
+            assert set(panel) == KEYS[kind], "none of them is optional"
+    camera = {
+        "perspective",
+        "distance",
+        "phi",
+        "thetaOffset",
+        "targetOffset",
+        "target",
+        "targetOrientation",
+        "fovy",
+        "near",
+        "far",
+    }
+    assert set(layout["configById"]["3D!drive"]["cameraState"]) == camera

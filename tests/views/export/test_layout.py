@@ -1,0 +1,77 @@
+"""The layout's panels have the keys and values of foxglove-sdk's typed panels."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import re
+from collections.abc import Callable
+from typing import Any
+
+import pydantic
+import pytest
+
+from antdrive.sim.log.rollout import Rollout
+from antdrive.views.export.layout import foxglove_layout
+
+layouts = pytest.importorskip("foxglove.layouts", reason="foxglove-sdk is not installed")
+
+#: Of the program's own files, not of the types: titles, and what axisSize was called before.
+ELSEWHERE = {"foxglovePanelTitle", "lichtblickPanelTitle", "axisScale"}
+CONFIGS = {"3D": "ThreeDeeConfig", "Plot": "PlotConfig", "StateTransitions": "StateTransitionsConfig"}
+TOPICS = {
+    "/map": "BaseRendererRosOccupancyGridTopicSettings",
+    "/plan": "BaseRendererPosesTopicSettings",
+    "/scan": "BaseRendererLaserScanTopicSettings",
+    "/robot_description": "BaseRendererUrdfTopicSettings",
+    "/obstacles": "BaseRendererRosMarkerTopicSettings",
+    "/movers": "BaseRendererRosMarkerTopicSettings",
+    "/contacts": "BaseRendererRosMarkerTopicSettings",
+}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def strict_types() -> None:
+    """Types that refuse keys which they do not know."""
+    for kind in vars(layouts).values():
+        if inspect.isclass(kind) and dataclasses.is_dataclass(kind):
+            kind.__pydantic_config__ = pydantic.ConfigDict(extra="forbid")
+
+
+@pytest.fixture(scope="module")
+def panels(made_up_drive: Callable[..., Rollout]) -> dict[str, Any]:
+    content: dict[str, Any] = foxglove_layout(made_up_drive(movers=1))["configById"]
+    return content
+
+
+def snake(value: Any, named: bool = True) -> Any:
+    """With the types' names of keys; the keys of `topics` and the like are people's own names."""
+    if isinstance(value, list):
+        return [snake(entry) for entry in value]
+    if not isinstance(value, dict):
+        return value
+    known = {key: entry for key, entry in value.items() if key not in ELSEWHERE}
+    return {
+        re.sub("([A-Z])", r"_\1", key).lower() if named else key: snake(entry, key not in ("topics", "layers"))
+        for key, entry in known.items()
+    }
+
+
+def test_panels_are_as_the_types_have_them(panels: dict[str, Any]) -> None:
+    for name, config in panels.items():
+        kind = getattr(layouts, CONFIGS[name.split("!")[0]])
+        given = {key: value for key, value in config.items() if key != "topics"}
+        pydantic.TypeAdapter(kind).validate_python(snake(given))
+
+
+def test_topics_are_as_the_types_have_them(panels: dict[str, Any]) -> None:
+    topics = panels["3D!drive"]["topics"]
+    assert set(topics) == set(TOPICS)
+    for name, settings in topics.items():
+        pydantic.TypeAdapter(getattr(layouts, TOPICS[name])).validate_python(snake(settings))
+
+
+@pytest.mark.parametrize("wrong", [{"showLegends": True}, {"legendDisplay": "floats"}, {"paths": [{"valu": "/a.b"}]}])
+def test_other_keys_and_values_are_refused(panels: dict[str, Any], wrong: dict[str, Any]) -> None:
+    with pytest.raises(pydantic.ValidationError):
+        pydantic.TypeAdapter(layouts.PlotConfig).validate_python(snake({**panels["Plot!speeds"], **wrong}))

@@ -1,0 +1,214 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from antdrive.sim.physics.bullet import client
+from antdrive.views.film import _kernels_paint as kernels
+from antdrive.views.film import compositor as composing
+from antdrive.views.film.camera import Camera, camera_for
+from antdrive.views.film.compositor import Compositor, drawn_height, part_pose, still_meshes
+from antdrive.views.film.ground import paint_ground
+from antdrive.views.film.meshes import cylinder, robot_parts
+from antdrive.views.film.tiny_renderer import add_mesh, merged, render
+from antdrive.views.scene import Scene
+from antdrive.views.style import MOVER
+
+SIZE = (320, 240)
+
+
+@pytest.fixture(scope="module")
+def drive(made_up_drive):
+    return made_up_drive()
+
+
+@pytest.fixture(scope="module")
+def scene(drive):
+    return Scene.of(drive)
+
+
+def camera(scene, name="oblique", size=SIZE) -> Camera:
+    return camera_for(name, scene.bounds[:2], scene.bounds[2:], drawn_height(scene), size)
+
+
+def middle(drive):
+    return drive.pose[len(drive.pose) // 2]
+
+
+def around(compositor, x, y, half=10):
+    px, py = (round(value) for value in compositor.pixel(x, y, 0.05))
+    return np.s_[max(0, py - half) : py + half, max(0, px - half) : px + half]
+
+
+def changed(one, other):
+    return np.abs(one.astype(int) - other.astype(int)).max(axis=-1)
+
+
+def test_a_crop_is_the_same_part_of_the_whole_picture(scene):
+    view = camera(scene)
+    box = (101, 37, 173, 142)
+    with client() as number:
+        for mesh, colour in still_meshes(scene, np.full(len(scene.obstacles), 0.3)):
+            add_mesh(number, mesh, colour)
+        whole, _, _ = render(number, view, None, 2, (0.0, 0.0, 1.0))
+        part, _, _ = render(number, view, box, 2, (0.0, 0.0, 1.0))
+    difference = changed(whole[2 * box[1] : 2 * box[3], 2 * box[0] : 2 * box[2]], part)
+    assert (difference > 2).mean() < 0.01
+
+
+@pytest.mark.parametrize("fine", [1, 2])
+def test_a_frame_equals_a_render_of_everything_at_once(drive, scene, monkeypatch, fine):
+    monkeypatch.setattr(composing, "HIDDEN_OPACITY", 0.0)
+    monkeypatch.setattr(Compositor, "_draw_shadows", lambda *_: None)
+    view = camera(scene)
+    for at in (0.3, 0.5, 0.8):
+        x, y, yaw = drive.pose[int(at * len(drive.pose))]
+        with Compositor(scene, view, route=drive.route, fine=fine) as compositor, client() as number:
+            got = compositor.frame((x, y, yaw), (0.4, 0.7))
+            for mesh, colour in still_meshes(scene, compositor.tall):
+                add_mesh(number, mesh, colour)
+            robot = set()
+            for part in robot_parts(scene.robot):
+                body = add_mesh(number, part.mesh, part.colour)
+                robot.add(body)
+                place, turn = part_pose(part, x, y, yaw, (0.4, 0.7))
+                composing.bullet().resetBasePositionAndOrientation(body, place, turn, physicsClientId=number)
+            image, _, seg = render(number, view, None, fine, compositor._light)
+            visible = np.empty(SIZE[::-1], dtype=np.float32)
+            ground = np.empty(SIZE[::-1], dtype=np.bool_)
+            kernels.count_ground(seg, fine, visible, ground)
+            rgb = paint_ground(view, scene, drive.route, np.ones_like(ground), compositor.tall, compositor._sun)
+            expected = np.empty_like(got)
+            kernels.resolve(rgb, image, seg, fine, visible, expected)
+        assert np.isin(seg, list(robot)).sum() > 100 * fine**2
+        difference = changed(got, expected)
+        # Finer than a pixel, only pixels in which robot, cylinder and ground meet may differ a little.
+        assert (difference > 1).mean() <= (0.0002 if fine == 1 else 0.0015)
+
+
+def test_robot_trail_obstacles_route_goal_and_zones_are_in_the_picture(drive, scene):
+    view = camera(scene)
+    x, y, _ = pose = middle(drive)
+    with Compositor(scene, view, route=drive.route) as compositor:
+        before = compositor.backdrop.pixels.copy()
+        with_robot = compositor.frame(pose)
+        half = len(drive.pose) // 2
+        compositor.extend_trail(drive.pose[: half + 1 : 10, :2], drive.twist[: half + 1 : 10, 0])
+        with_trail = compositor.frame(pose)
+        behind = around(compositor, *drive.pose[half // 2, :2], half=4)
+        there = around(compositor, x, y)
+        goal = around(compositor, *scene.goal, half=6)
+        disc = around(compositor, *scene.obstacles[0, :2], half=4)
+        route = around(compositor, *drive.pose[3 * len(drive.pose) // 4, :2], half=8)
+    assert (changed(with_robot, before)[there] > 40).mean() > 0.3, "robot"
+    assert (changed(with_trail, with_robot)[behind] > 40).mean() > 0.2, "trail"
+    without = replace(scene, obstacles=scene.obstacles[1:], unseen=scene.unseen[1:])
+    with Compositor(without, view, route=drive.route[:1]) as compositor:
+        bare = compositor.backdrop.pixels
+    assert (changed(bare, before)[disc] > 40).mean() > 0.7, "obstacle"
+    assert (changed(bare, before)[route] > 40).any(), "route"
+    elsewhere = replace(scene, goal=(0.5, 0.4), inflate=0.0)
+    with Compositor(elsewhere, view, route=drive.route) as compositor:
+        moved = compositor.backdrop.pixels
+    assert (changed(moved, before)[goal] > 20).mean() > 0.3, "goal"
+    assert (changed(moved, before) > 5).mean() > 0.1, "inflated zones"
+
+
+def test_obstacles_placed_after_planning_have_their_own_colour(drive, scene):
+    marked = replace(scene, unseen=np.arange(len(scene.obstacles)) == 0)
+    with Compositor(marked, camera(scene), route=drive.route) as compositor:
+        at = around(compositor, *scene.obstacles[0, :2], half=3)
+        red, green, blue = compositor.backdrop.pixels[at].reshape(-1, 3).mean(axis=0)
+    assert red > blue > green
+
+
+def test_a_cylinder_hides_the_robot_behind_it(scene):
+    wall = replace(scene, obstacles=np.array([(2.0, 1.0, 0.45, 2.0)]), unseen=np.zeros(1, dtype=bool), inflate=0.0)
+    with Compositor(wall, camera(wall), route=np.empty((0, 2))) as compositor:
+        hidden = changed(compositor.frame((2.0, 1.56, 0.0)), compositor.backdrop.pixels)
+        open_ = changed(compositor.frame((1.0, 1.56, 0.0)), compositor.backdrop.pixels)
+        covered = compositor.backdrop.visible == 0
+    assert (hidden > 60).sum() < 0.75 * (open_ > 60).sum()
+    assert hidden[covered].max() < 60, "what is hidden shines through only faintly"
+
+
+def test_turned_wheels_and_headings_are_visible(drive, scene):
+    x, y, _ = middle(drive)
+    with Compositor(scene, camera(scene), route=drive.route) as compositor:
+        still, turned = compositor.frame((x, y, 0.0)), compositor.frame((x, y, 0.0), (0.6, 0.6))
+        away = compositor.frame((x, y, np.pi))
+        there = around(compositor, x, y)
+    assert (changed(still, turned)[there] > 15).sum() >= 3
+    assert (changed(still, away)[there] > 60).sum() >= 5
+
+
+def test_movers_are_drawn_in_their_colour(drive, scene):
+    moving = replace(scene, mover_radii=(0.15, 0.15))
+    x, y, _ = pose = middle(drive)
+    places = np.array([(x + 0.05, y - 0.4), (3.5, 0.3)])
+    with Compositor(moving, camera(scene), route=drive.route) as compositor:
+        frame = compositor.frame(pose, (0, 0), places)
+        for mx, my in places:
+            px, py = (round(value) for value in compositor.pixel(mx, my, drawn_height(moving)))
+            red, _, blue = (int(channel) for channel in frame[py, px])
+            assert red > blue + 60
+
+
+def test_overlapping_boxes_are_merged():
+    assert merged([(0, 0, 5, 5), (10, 0, 12, 5)]) == [(0, 0, 5, 5), (10, 0, 12, 5)]
+    assert merged([(0, 0, 5, 5), (8, 0, 12, 5), (4, 2, 9, 9)]) == [(0, 0, 12, 9)]
+
+
+def test_a_trail_painted_at_once_equals_one_painted_step_by_step(drive, scene):
+    points, speeds = drive.pose[::10, :2], drive.twist[::10, 0]
+    with Compositor(scene, camera(scene), route=drive.route) as compositor:
+        compositor.extend_trail(points, speeds)
+        at_once = compositor.frame(middle(drive))
+    with Compositor(scene, camera(scene), route=drive.route) as compositor:
+        for k in range(len(points) - 1):
+            compositor.extend_trail(points[k : k + 2], speeds[k : k + 2])
+        assert (compositor.frame(middle(drive)) == at_once).all()
+
+
+def test_a_movers_motion_ahead_is_drawn_on_the_ground(drive, scene):
+    moving = replace(scene, mover_radii=(0.15,), obstacles=np.empty((0, 4)), unseen=np.zeros(0, dtype=bool))
+    places, velocities = np.array([(3.0, 0.6)]), np.array([(-1.0, 0.0)])
+    pose = (0.5, 2.5, 0.0)
+    with Compositor(moving, camera(moving, size=(640, 480)), route=np.empty((0, 2))) as compositor:
+        without = compositor.frame(pose, (0, 0), places)
+        still = compositor.frame(pose, (0, 0), places, 0 * velocities)
+        forecast = compositor.frame(pose, (0, 0), places, velocities)
+        ahead, end = (around(compositor, x, 0.6, half=5) for x in (2.3, 1.5))
+        beyond, behind = (around(compositor, x, 0.6, half=5) for x in (1.2, 3.4))
+    assert (still == without).all()
+    difference = changed(forecast, without)
+    assert difference[ahead].max() > 30
+    assert difference[end].max() > 60
+    assert difference[beyond].max() == difference[behind].max() == 0
+
+
+def test_a_frame_among_movers_equals_a_render_of_everything_at_once(drive, scene, monkeypatch):
+    monkeypatch.setattr(composing, "HIDDEN_OPACITY", 0.0)
+    monkeypatch.setattr(Compositor, "_draw_shadows", lambda *_: None)
+    moving = replace(scene, mover_radii=(0.15, 0.3))
+    view = camera(moving)
+    x, y, yaw = middle(drive)
+    places = np.array([(x + 0.2, y - 0.3), (3.4, 0.4)])
+    with Compositor(moving, view, route=drive.route, fine=1) as compositor, client() as number:
+        got = compositor.frame((x, y, yaw), (0.4, 0.7), places)
+        for mesh, colour in still_meshes(moving, compositor.tall):
+            add_mesh(number, mesh, colour)
+        for part in robot_parts(moving.robot):
+            body = add_mesh(number, part.mesh, part.colour)
+            place, turn = part_pose(part, x, y, yaw, (0.4, 0.7))
+            composing.bullet().resetBasePositionAndOrientation(body, place, turn, physicsClientId=number)
+        for (mx, my), radius in zip(places, moving.mover_radii, strict=True):
+            add_mesh(number, cylinder(radius, 0.0, drawn_height(moving), x=mx, y=my), MOVER)
+        image, _, seg = render(number, view, None, 1, compositor._light)
+        visible = np.empty(SIZE[::-1], dtype=np.float32)
+        ground = np.empty(SIZE[::-1], dtype=np.bool_)
+        kernels.count_ground(seg, 1, visible, ground)
+        rgb = paint_ground(view, moving, drive.route, np.ones_like(ground), compositor.tall, compositor._sun)
+        expected = np.empty_like(got)
+        kernels.resolve(rgb, image, seg, 1, visible, expected)
+    assert (changed(got, expected) > 1).mean() <= 0.0005

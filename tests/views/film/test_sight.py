@@ -1,0 +1,156 @@
+"""Pictures of a robot without a map: what it has not seen looks different until it has."""
+
+import dataclasses
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from antdrive.sim.log.rollout import Rollout
+from antdrive.views.film import sight
+from antdrive.views.film.camera import CAMERAS
+from antdrive.views.film.overlay import legend_entries
+from antdrive.views.film.shot import Shot
+from antdrive.views.recollection import Recollection, containers
+from antdrive.views.scene import Scene
+from tests.views.scanned import scanned
+
+SIZE = (480, 320)
+
+
+@pytest.fixture(scope="module")
+def log(made_up_drive) -> Rollout:
+    return scanned(made_up_drive(size=(6.0, 4.0), obstacles=40), max_range=2.5)
+
+
+def picture(log: Rollout, camera: str, *moments: float) -> np.ndarray:
+    with Shot(log, camera=camera, size=SIZE, bare=True) as shot:
+        return [shot.view(at) for at in moments][-1].astype(int)
+
+
+@pytest.fixture(scope="module")
+def spots(log: Rollout) -> Callable[[Any], tuple[Any, Any]]:
+    """Rows and columns where places (N, 2) on the ground appear to the camera `top`."""
+    with Shot(log, camera="top", size=SIZE, bare=True) as shot:
+        camera = shot._camera
+
+    def project(places: Any) -> tuple[Any, Any]:
+        at = camera.pixels([(x, y, 0.0) for x, y in places])
+        return at[:, 1].astype(int), at[:, 0].astype(int)
+
+    return project
+
+
+def test_obstacles_are_pale_until_a_beam_meets_them(log: Rollout, spots: Any) -> None:
+    seen = Recollection(log)
+    seen.advance(log.t[-1])
+    first, last = (picture(log, "top", at) for at in (0.0, log.t[-1]))
+    later = np.flatnonzero((seen.met > 0) & np.isfinite(seen.met))
+    assert len(later) > 3
+    for j in [*np.flatnonzero(seen.met == 0)[:4], *later[:4], *np.flatnonzero(np.isinf(seen.met))[:2]]:
+        body = log.record.world.obstacles[j]
+        spot = spots([(body.x, body.y)])
+        for shown, at in ((first, 0.0), (last, log.t[-1])):
+            assert (shown[spot].mean() > 180) == (seen.met[j] > at), (j, at)
+
+
+def test_ground_is_hatched_until_it_is_seen(log: Rollout, spots: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    with_fan = picture(log, "top", 0.0)
+    monkeypatch.setattr(sight.SightPainter, "lay_fan", lambda *_: None)
+    first, last = (picture(log, "top", at) for at in (0.0, log.t[-1]))
+    x, y, yaw = log.pose[0].tolist()
+    ahead = spots([(x + 0.45 * math.cos(yaw), y + 0.45 * math.sin(yaw))])
+    red, _, blue = (with_fan - first)[ahead][0]
+    assert red < blue - 12  # the fan
+
+    before, after = Recollection(log), Recollection(log)
+    before.advance(0.0)
+    after.advance(log.t[-1])
+    places = np.random.default_rng(1).uniform((0.3, 0.3), (5.7, 3.7), (4000, 2))
+    away = [log.record.world.discs[:, 2] + 0.5, 0.5]  # from shadows and the driven path
+    clear = (np.hypot(*(places[:, None] - log.record.world.discs[:, :2]).transpose(2, 0, 1)) > away[0]).all(axis=1)
+    clear &= np.hypot(*(places[:, None] - log.pose[::20, :2]).transpose(2, 0, 1)).min(axis=1) > away[1]
+    known = [r.known(places) for r in (before, after)]
+    fresh, old = (spots(places[clear & chosen]) for chosen in (~known[0] & known[1], known[0]))
+    assert min(len(fresh[0]), len(old[0])) > 20
+    assert np.ptp(first[fresh].mean(axis=1)) > 15  # lines
+    assert last[fresh].mean() > first[fresh].mean() + 6
+    assert abs(last[old].mean() - first[old].mean()) < 1
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_a_picture_depends_on_the_moment_alone(log: Rollout, camera: str) -> None:
+    assert np.array_equal(picture(log, camera, 0.0, 0.2, 0.45), picture(log, camera, 0.45))
+
+
+def test_hits_are_where_the_map_has_them(log: Rollout, monkeypatch: pytest.MonkeyPatch) -> None:
+    with_hits = picture(log, "top", 0.3)
+    monkeypatch.setattr(sight.SightPainter, "put_hits", lambda *_: None)
+    changed = np.abs(with_hits - picture(log, "top", 0.3)).max(axis=-1) > 40
+    seen = Recollection(log)
+    seen.advance(0.3)
+    with Shot(log, camera="top", size=SIZE, bare=True) as shot:
+        height = seen.lidar.height
+        spots = np.array([shot._compositor.pixel(x, y, height) for x, y, _ in seen.map.discs()])
+    rows, cols = np.nonzero(changed)
+    apart = np.hypot(cols[:, None] + 0.5 - spots[:, 0], rows[:, None] + 0.5 - spots[:, 1])
+    assert len(rows) > 100
+    assert apart.min(axis=1).max() < 3.5  # painted nowhere else
+    assert (apart.min(axis=0) < 3).mean() > 0.95  # and everywhere there
+
+
+def test_what_stands_inside_a_cylinder_looks_like_it(log: Rollout) -> None:
+    around = containers(np.array([[0, 0, 0.5, 1], [0.1, 0, 0.2, 1], [2, 0, 0.2, 1], [0.6, 0, 0.3, 1.0]]))
+    assert around.tolist() == [0, 0, 2, 3]
+
+
+def test_the_legend_names_what_is_painted(log: Rollout) -> None:
+    scene = Scene.of(log)
+    assert not scene.has_zones
+    plain = {entry.text for entry in legend_entries(scene, 0.5, 0.01)}
+    named = {entry.text for entry in legend_entries(scene, 0.5, 0.01, beams=True, sight=True)}
+    assert named - plain == {"beams of the lidar", "hit, on the robot's map", "not known to be free"}
+    assert not any("inflated" in text for text in named)
+    hidden = [dataclasses.replace(scene, mapped=mapped, unseen=np.ones_like(scene.unseen)) for mapped in (True, False)]
+    given, none = ({entry.text for entry in legend_entries(one, 0.5, 0.01)} for one in hidden)
+    assert "placed after planning" in given - none
+    assert none - plain == {"not in the world file"}
+
+
+def test_movers_that_are_followed_have_rings_and_nothing_else_changes(log: Rollout) -> None:
+    with Shot(log, camera="top", size=SIZE, bare=True) as shot:
+        pose, movers = shot.replay.pose(0.0), np.array([[3.0, 2.0, 0.4, 0.0, 0.5]])
+        plain = shot._compositor.frame(pose).astype(int)
+        ringed = shot._compositor.frame(pose, followed=movers).astype(int)
+        x, y = (np.array(shot._compositor.pixel(*at)) for at in ((3.0, 2.0), (3.55, 2.0)))
+    rows, cols = np.nonzero(np.abs(ringed - plain).max(axis=-1) > 20)
+    away = np.hypot(cols + 0.5 - x[0], rows + 0.5 - x[1])
+    ring = (away > 0.5 * math.dist(x, y)) & (np.abs(rows + 0.5 - x[1]) > 5)  # not the line ahead
+    assert np.count_nonzero(ring) > 60
+    assert np.abs(away[ring] - math.dist(x, y)).max() < 4
+    red, green, blue = ringed[rows, cols].mean(axis=0)
+    assert min(red, blue) > green + 25
+    followed = {entry.text for entry in legend_entries(Scene.of(log), 0.5, 0.01, followed=True)}
+    assert "mover by lidar, 1.5 s ahead" in followed
+
+
+def test_of_a_robot_with_a_map_only_the_beams_are_painted(
+    log: Rollout, spots: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mapped = dataclasses.replace(log, record=dataclasses.replace(log.record, sensing=None))
+    at = float(log.t[-1])
+    fan = picture(mapped, "top", 0.0, at)
+    bare = picture(dataclasses.replace(mapped, scans=log.scans[:0], scan_rows=log.scan_rows[:0]), "top", at)
+    assert np.array_equal(picture(mapped, "top", at), fan)
+    monkeypatch.setattr(sight.FanPainter, "lay_fan", lambda *_: None)
+    changed = np.abs(fan - picture(mapped, "top", at)).max(axis=-1) > 4
+    rows, cols = np.nonzero(changed)
+    assert len(rows) > 1000
+    eye, ahead = (np.array(spots([log.pose[log.scan_rows[-1], :2] + off])).reshape(2) for off in (0.0, [1.0, 0.0]))
+    assert np.hypot(rows - eye[0], cols - eye[1]).max() < 2.6 * math.dist(eye, ahead)  # the lidar's range is 2.5 m
+    red, _, blue = (fan - bare)[changed].mean(axis=0)
+    assert red < blue - 12
+    bodies = spots(log.record.world.discs[:, :2])
+    assert np.array_equal(fan[bodies], bare[bodies])  # none is pale
