@@ -16,8 +16,10 @@ import numpy as np
 
 from antdrive.planners import Planner, Query, load_planner, replanner_for
 from antdrive.worlds import Disc, Grid, World, rasterise
+from benchmarks.tables import command_line
 
-SIDE, CHANGES, WORLDS, ANT_WORLDS = 200, 12, 40, 4
+SIDE, CHANGES = 200, 12
+SMALLEST = ("--worlds 1",)
 
 
 def discs(rng: np.random.Generator) -> Grid:
@@ -86,13 +88,14 @@ def measured(planner: Planner, kind: Callable[[np.random.Generator], Grid], worl
 
 
 def main() -> None:
+    worlds = command_line(__doc__, worlds=(40, "of each kind; a tenth of them for ants")).worlds
     print(
         "| 200×200 | planner | repair, µs: median | 90 % | 99 % | anew, µs | anew / repair | `astar`, µs | `astar` / repair |"
     )
     print("|---|---|---|---|---|---|---|---|---|")
     for kind in (discs, scattered):
         for name in ("dstar-lite", "dstar"):
-            repair, anew, astar, *gaps = measured(load_planner(name), kind, WORLDS)
+            repair, anew, astar, *gaps = measured(load_planner(name), kind, worlds)
             assert np.abs(gaps).max() < 1e-12
             spread = " | ".join(f"{q:.0f}" for q in np.percentile(repair * 1e6, [50, 90, 99]))
             print(
@@ -104,7 +107,7 @@ def main() -> None:
     )
     print("|---|---|---|---|---|---|---|---|---|")
     for kind in (discs, scattered):
-        warm, cold, _, *gaps = measured(load_planner("ants"), kind, ANT_WORLDS)
+        warm, cold, _, *gaps = measured(load_planner("ants"), kind, max(1, worlds // 10))
         spread = " | ".join(f"{q:.0f}" for q in np.percentile(warm * 1e3, [50, 90]))
         lacks = [f"{100 * np.median(gap):.2f} % | {100 * gap.max():.2f} %" for gap in gaps]
         print(

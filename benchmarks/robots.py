@@ -6,24 +6,21 @@ python -m benchmarks.robots --values   # only what was imported
 
 from __future__ import annotations
 
-import argparse
-import tarfile
-import tempfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from antdrive.planners import load_planner
 from antdrive.robots import RobotSpec, list_robots, load_robot
 from antdrive.robots.importing.urdf import import_urdf
 from antdrive.sim import Scenario, run
-from antdrive.worlds import Task, import_barn
-from benchmarks.planners import table
+from antdrive.worlds import Task
+from benchmarks.drives import barn_tasks
+from benchmarks.tables import command_line, print_table
 from tools.shared_data import BARN
 
 URDF = Path(__file__).parent.parent / "tests" / "robots" / "importing" / "urdf"
-WORLD = "world_0.world"
+SMALLEST = ("",)
 #: What public specifications say of the robots that the URDF files are made after [m, kg, m/s, rad/s, m/s2, rad/s2, N m]. A
 #: value that no specification has is left out. The sources are those of the catalogue's robots of the same name.
 SPECIFICATIONS: Mapping[str, Mapping[str, float]] = MappingProxyType(
@@ -93,14 +90,6 @@ def value_rows() -> Iterator[tuple[str, ...]]:
         yield (f"{key} [{unit}]", *cells)
 
 
-def barn_0(archive: Path) -> Task:
-    """The first of BARN's worlds."""
-    with tempfile.TemporaryDirectory() as folder:
-        with tarfile.open(archive) as packed:
-            packed.extract(WORLD, folder, filter="data")
-        return import_barn(Path(folder) / WORLD)
-
-
 def drive_rows(task: Task, reasons: dict[str, list[str]]) -> Iterator[tuple[str, ...]]:
     """How each robot gets through a world, without noise and with that of its file.
 
@@ -113,9 +102,7 @@ def drive_rows(task: Task, reasons: dict[str, list[str]]) -> Iterator[tuple[str,
     for name, robot in robots.items():
         cells = []
         for noise in (0.0, 1.0):
-            done = run(
-                Scenario(task=task, planner=load_planner("astar"), planner_name="astar", robot=robot, noise=noise)
-            )
+            done = run(Scenario.of(task, "astar", robot, noise=noise))
             if done.certificate is not None:
                 m, least = done.metrics, done.certificate.min_clearance
                 cells += ["certified" if done.succeeded else done.outcome.key, f"{m['duration_s']:.1f}", f"{least:.3f}"]
@@ -127,20 +114,13 @@ def drive_rows(task: Task, reasons: dict[str, list[str]]) -> Iterator[tuple[str,
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--values", action="store_true", help="drive nothing")
-    parser.add_argument("--barn", type=Path, default=BARN, metavar="FILE", help="the archive of BARN's worlds")
-    asked = parser.parse_args()
-    if not (asked.values or asked.barn.exists()):
-        parser.error(f"--barn {asked.barn}: no such file; name BARN's archive, or give --values")
-    for line in table(("imported / specified", *SPECIFICATIONS), value_rows()):
-        print(line)
-    if asked.values:
+    given = command_line(__doc__, values=(False, "drive nothing"), barn=(BARN, "the archive of BARN's worlds"))
+    print_table(("imported / specified", *SPECIFICATIONS), value_rows())
+    if given.values:
         return
     reasons: dict[str, list[str]] = {}
-    heads = ("robot", "radius m", "noise 0", "time s", "least clearance m", "noise 1", "time s", "least clearance m")
-    for line in table(heads, drive_rows(barn_0(asked.barn), reasons)):
-        print(line, flush=True)
+    heads = "robot | radius m | noise 0 | time s | least clearance m | noise 1 | time s | least clearance m"
+    print_table(heads, drive_rows(barn_tasks(given.barn)["world_0"], reasons))
     for reason, names in reasons.items():
         print(f"- {' and '.join(names)}: {reason}")
 
