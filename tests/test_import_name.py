@@ -136,5 +136,6 @@ def test_a_package_called_tests_elsewhere_hides_none_of_these(tmp_path: Path) ->
     """Processes that tests start import `tests`, and some distributions install a package by that name."""
     (tmp_path / "tests").mkdir()
     (tmp_path / "tests" / "__init__.py").touch()
-    done = python("-c", "import tests.worlds.malformed as found; print(found.__file__)", cwd=ROOT, path=tmp_path)
-    assert done.stdout.split() == [str(ROOT / "tests" / "worlds" / "malformed.py")], done.stderr
+    code = "import tests.worlds.malformed as found; print(found.__file__)"
+    found = called(sys.executable, "-c", code, cwd=ROOT, PYTHONPATH=str(tmp_path))
+    assert found == f"{ROOT / 'tests' / 'worlds' / 'malformed.py'}\n"
